@@ -1,0 +1,270 @@
+"""The border: array-likes in, checked float64 arrays out, and the one rule for batches.
+
+Leading axes are batch axes and broadcast against each other; the last axes are the core.
+"""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import InvalidValueError, ShapeError
+
+Array = NDArray[np.float64]
+
+
+def as_floats(value: ArrayLike, name: str) -> Array:
+    """Convert to a float64 array and refuse everything that is not a real finite number.
+
+    Parameters
+    ----------
+    value : array_like
+        Numbers of any shape.
+    name : str
+        Used in error messages.
+
+    Returns
+    -------
+    ndarray of float64, same shape
+        A view of the input where that is possible.
+
+    Raises
+    ------
+    InvalidValueError
+        Text, complex numbers, ragged lists, NaN or infinity.
+    """
+    array = _converted(value, name)
+    if not _all_finite(array):
+        bad = np.argwhere(~np.isfinite(array))[0]
+        at = ", ".join(str(int(i)) for i in bad)
+        where = f" at index [{at}]" if array.ndim else ""
+        raise InvalidValueError(
+            f"{name}: expected finite numbers, got {array[tuple(bad)]}{where}; "
+            "remove or repair such values before the call."
+        )
+    return array
+
+
+def as_core(value: ArrayLike, core: tuple[int, ...], name: str) -> Array:
+    """Finite floats of shape ``(..., *core)``.
+
+    Parameters
+    ----------
+    value : array_like, shape (..., *core)
+        Numbers.
+    core : tuple of int
+        Required trailing shape.
+    name : str
+        Used in error messages.
+
+    Returns
+    -------
+    ndarray, shape (..., *core)
+        Checked array.
+
+    Raises
+    ------
+    ShapeError
+        The trailing axes differ from ``core``.
+    InvalidValueError
+        As `as_floats`.
+    """
+    array = _converted(value, name)
+    k = len(core)
+    if array.shape[array.ndim - k :] != core or array.ndim < k:
+        raise ShapeError(_shape_message(name, core, array.shape))
+    return as_floats(array, name)
+
+
+def as_vector(value: ArrayLike, n: int, name: str) -> Array:
+    """Finite floats of shape ``(..., n)``; the quick path of `as_core` for joint vectors.
+
+    Parameters
+    ----------
+    value : array_like, shape (..., n)
+        Numbers.
+    n : int
+        Required length of the last axis.
+    name : str
+        Used in error messages.
+
+    Returns
+    -------
+    ndarray, shape (..., n)
+        Checked array.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        As `as_core`.
+    """
+    if type(value) is np.ndarray and value.dtype == np.float64 and value.shape == (n,):
+        # a sum of squares is finite only if every term is: one call instead of two
+        if isfinite(value.dot(value)):
+            return value
+        return as_floats(value, name)
+    return as_core(value, (n,), name)
+
+
+def as_exact(value: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
+    """Finite floats of exactly this shape: no batch axes.
+
+    Parameters
+    ----------
+    value : array_like
+        Numbers.
+    shape : tuple of int
+        Required shape.
+    name : str
+        Used in error messages.
+
+    Returns
+    -------
+    ndarray
+        Checked array.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        As `as_core`.
+    """
+    array = _converted(value, name)
+    if array.shape != shape:
+        raise ShapeError(f"{name}: expected shape {shape}, got {array.shape}.")
+    return as_floats(array, name)
+
+
+def batch_rows(
+    arrays: tuple[Array, ...], names: tuple[str, ...]
+) -> tuple[tuple[int, ...], list[Array]]:
+    """Broadcast the leading axes of vectors and lay each out as contiguous rows.
+
+    Parameters
+    ----------
+    arrays : tuple of ndarray, shapes (..., n_i)
+        Checked arrays; the last axis of each is its core.
+    names : tuple of str
+        Used in error messages.
+
+    Returns
+    -------
+    batch : tuple of int
+        The common leading shape.
+    rows : list of ndarray, shapes (N, n_i)
+        C-contiguous, N the product of ``batch``.
+
+    Raises
+    ------
+    ShapeError
+        The leading axes do not broadcast.
+    """
+    shapes = [a.shape[:-1] for a in arrays]
+    try:
+        batch = shapes[0] if len(set(shapes)) == 1 else np.broadcast_shapes(*shapes)
+    except ValueError:
+        got = ", ".join(f"{n} {a.shape}" for n, a in zip(names, arrays, strict=True))
+        raise ShapeError(
+            f"The leading (batch) axes do not broadcast against each other: {got}. "
+            "Give each the same number of rows, or a single row."
+        ) from None
+    rows = [
+        np.ascontiguousarray(np.broadcast_to(a, (*batch, a.shape[-1]))).reshape(-1, a.shape[-1])
+        if a.shape[-1]
+        else np.empty((int(np.prod(batch)), 0))
+        for a in arrays
+    ]
+    return batch, rows
+
+
+def read_only(array: ArrayLike, dtype: type = np.float64) -> NDArray[Any]:
+    """A private, C-ordered, read-only copy.
+
+    Parameters
+    ----------
+    array : array_like
+        Values of any shape.
+    dtype : type
+        Of the copy.
+
+    Returns
+    -------
+    ndarray
+        The copy, not writeable.
+    """
+    copy = np.array(array, dtype=dtype, order="C")
+    copy.setflags(write=False)
+    return copy
+
+
+def same_value(a: object, b: object) -> bool:
+    """Equality of fields that may be arrays: same shape and same numbers.
+
+    Parameters
+    ----------
+    a, b : object
+        Two values of a field.
+
+    Returns
+    -------
+    bool
+        Whether they are equal.
+    """
+    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
+        return a.shape == b.shape and bool(np.array_equal(a, b))
+    return bool(a == b)
+
+
+def value_hash(*fields: object) -> int:
+    """Hash of fields that may be arrays, consistent with `same_value`.
+
+    Parameters
+    ----------
+    *fields : object
+        Hashable values or arrays.
+
+    Returns
+    -------
+    int
+        The hash.
+    """
+    # adding 0.0 makes -0.0 and 0.0 hash alike, as they compare alike
+    return hash(
+        tuple((f + 0.0).tobytes() if isinstance(f, np.ndarray) else f for f in fields)
+    )
+
+
+def _converted(value: ArrayLike, name: str) -> Array:
+    try:
+        array = np.asarray(value)
+    except (ValueError, TypeError) as error:
+        raise InvalidValueError(
+            f"{name}: expected numbers in a regular array, got {type(value).__name__} ({error})."
+        ) from None
+    if array.dtype == np.float64:
+        return array
+    if array.dtype.kind not in "iuf":
+        if array.size == 0:
+            return array.astype(np.float64)
+        raise InvalidValueError(
+            f"{name}: expected real numbers, got {array.dtype} values ({value!r:.80})."
+        )
+    return array.astype(np.float64)
+
+
+def _all_finite(array: Array) -> bool:
+    return bool(np.isfinite(array).all())
+
+
+def _shape_message(name: str, core: tuple[int, ...], shape: tuple[int, ...]) -> str:
+    wanted = ", ".join(["...", *map(str, core)])
+    message = f"{name}: expected shape ({wanted}), got {shape}."
+    if len(core) == 1 and shape == (core[0], 1):
+        message += f" This is a column: pass {name}.ravel(), joint vectors are rows."
+    elif len(core) == 1 and len(shape) >= 2 and shape[-2] == core[0]:
+        message += f" The axes look transposed: rows are samples, so pass {name}.T."
+    elif core == (4, 4) and len(shape) == 3 and shape[:2] == (4, 4):
+        message += " This is MATLAB's order (4, 4, N): move the last axis to the front."
+    return message

@@ -1,0 +1,304 @@
+"""Drive chains: rotor inertia, friction and offset of the joints, and the transmission.
+
+Seed book sections 1.2.1 (q = K_c q_c + q_0), 1.5.1.4 (friction), 1.5.1.5 (rotor inertia) and
+1.6.2.5 (joint torques from motor torques).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ._arrays import Array, as_floats, as_vector, read_only, same_value, value_hash
+from .errors import InertiaError, InvalidValueError, ShapeError
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DriveParameters:
+    """Drive terms of each joint, seen from the joint side.
+
+    ``tau_drive = Ia * a + Fv * v + Fc * sign(v) + offset``. Any real values are legal.
+
+    Parameters
+    ----------
+    Ia : array_like, shape (n,), optional
+        Inertia of rotor and gears on the joint side (gear ratio squared times rotor inertia),
+        kg m^2 or kg.
+    Fv : array_like, shape (n,), optional
+        Viscous friction, N m s/rad or N s/m.
+    Fc : array_like, shape (n,), optional
+        Coulomb friction, N m or N.
+    offset : array_like, shape (n,), optional
+        Constant torque or force, N m or N. What is left out is zero; give at least one.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Lengths that differ; NaN or infinity.
+
+    References
+    ----------
+    Seed book sections 1.5.1.4 and 1.5.1.5.
+
+    Examples
+    --------
+    >>> DriveParameters(Fv=[1.0, 2.0]).Ia
+    array([0., 0.])
+    """
+
+    Ia: Array = None  # type: ignore[assignment]
+    Fv: Array = None  # type: ignore[assignment]
+    Fc: Array = None  # type: ignore[assignment]
+    offset: Array = None  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        names = [field.name for field in fields(self)]
+        given = {
+            name: as_floats(getattr(self, name), name)
+            for name in names
+            if getattr(self, name) is not None
+        }
+        if not given:
+            raise InertiaError("Give at least one of Ia, Fv, Fc, offset, each of shape (n,).")
+        shape = next(iter(given.values())).shape
+        if len(shape) != 1 or any(array.shape != shape for array in given.values()):
+            shapes = ", ".join(f"{name} {array.shape}" for name, array in given.items())
+            raise ShapeError(f"Drive parameters are all of shape (n,), got {shapes}.")
+        for name in names:
+            object.__setattr__(self, name, read_only(given.get(name, np.zeros(shape))))
+
+    @classmethod
+    def zeros(cls, n: int) -> Self:
+        """Drives without inertia, friction or offset.
+
+        Parameters
+        ----------
+        n : int
+            Number of joints.
+
+        Returns
+        -------
+        DriveParameters
+            All zero.
+
+        Examples
+        --------
+        >>> DriveParameters.zeros(2).n
+        2
+        """
+        return cls(Ia=np.zeros(n))
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return self.Ia.size
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether every parameter is zero."""
+        return not (self.Ia.any() or self.Fv.any() or self.Fc.any() or self.offset.any())
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, DriveParameters):
+            return NotImplemented
+        return all(same_value(getattr(self, f.name), getattr(other, f.name)) for f in fields(self))
+
+    def __hash__(self) -> int:
+        return value_hash(self.Ia, self.Fv, self.Fc, self.offset)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Transmission:
+    """How encoders (motors) and joints move together: ``q = K q_c + q_0``.
+
+    ``q_c`` are the encoder variables, usually motor angles. Power is conserved, so torques go the
+    other way through the transpose: ``tau_c = K^T tau``. A motor whose shaft is turned by more
+    than one joint (a coupled wrist, such as motor 6 of the Staubli TX40, whose speed is that of
+    joints 5 and 6 together) has drive terms that couple those joints::
+
+        w = row m of K^-1 divided by its diagonal entry        (for the TX40: w_5 = w_6 = 1)
+        tau_j += sum over k != j of w_j w_k (Iam a_k + Fvm v_k)  +  w_j Fcm sign(w . v)
+
+    The diagonal parts (k = j) belong to ``Ia`` and ``Fv`` of `DriveParameters`, as in the
+    published TX40 identifications.
+
+    Parameters
+    ----------
+    matrix : array_like, shape (n, n)
+        ``K``; singular only where joints mimic others.
+    offset : array_like, shape (n,), optional
+        ``q_0``, default zero.
+    Iam, Fvm, Fcm : array_like, shape (n,), optional
+        Coupling inertia, viscous and Coulomb friction of motor m, joint side, default zero.
+        They must be zero for motors that turn one joint only.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Not square, lengths that differ, NaN or infinity.
+    InertiaError
+        A coupling term on a motor that is not coupled.
+
+    References
+    ----------
+    Seed book section 1.2.1 (last note) and 1.6.2.5; A. Janot, P.-O. Vandanjon and M. Gautier,
+    "An instrumental variable approach for rigid industrial robots identification", Control
+    Engineering Practice 25, 2014, section 4 (TX40, Iam6, Fvm6, Fcm6).
+
+    Examples
+    --------
+    >>> wrist = Transmission([[1 / 45, 0], [-1 / 45, 1 / 32]])
+    >>> wrist.coupled_motors
+    (2,)
+    >>> wrist.to_joint([45.0, 0.0])
+    array([ 1., -1.])
+    """
+
+    matrix: Array
+    offset: Array = None  # type: ignore[assignment]
+    Iam: Array = None  # type: ignore[assignment]
+    Fvm: Array = None  # type: ignore[assignment]
+    Fcm: Array = None  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        K = as_floats(self.matrix, "matrix")
+        if K.ndim != 2 or K.shape[0] != K.shape[1]:
+            raise ShapeError(f"matrix: expected a square (n, n) matrix, got {K.shape}.")
+        object.__setattr__(self, "matrix", read_only(K))
+        for name in ("offset", "Iam", "Fvm", "Fcm"):
+            given = getattr(self, name)
+            value = np.zeros(self.n) if given is None else as_vector(given, self.n, name)
+            if value.ndim != 1:
+                raise ShapeError(f"{name}: expected shape ({self.n},), got {value.shape}.")
+            object.__setattr__(self, name, read_only(value))
+        single = sorted(set(range(1, self.n + 1)) - set(self.coupled_motors))
+        for m in single:
+            if self.Iam[m - 1] or self.Fvm[m - 1] or self.Fcm[m - 1]:
+                raise InertiaError(
+                    f"Motor {m} turns one joint only, so its inertia and friction belong to "
+                    "DriveParameters (Ia, Fv, Fc); coupling terms are for the motors "
+                    f"{list(self.coupled_motors)}."
+                )
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return self.matrix.shape[0]
+
+    @property
+    def is_invertible(self) -> bool:
+        """Whether every set of joint variables has encoder variables (no joint mimics others)."""
+        return bool(np.linalg.matrix_rank(self.matrix) == self.n)
+
+    @property
+    def weights(self) -> Array:
+        """Turns of motor m's shaft per turn of joint j, relative to its own joint, shape (n, n).
+
+        Zero for a transmission that cannot be inverted.
+        """
+        if not self.is_invertible:
+            return np.zeros((self.n, self.n))
+        W = np.linalg.inv(self.matrix)
+        W[np.abs(W) < 1e-12 * np.abs(W).max()] = 0.0
+        own = np.diag(W).copy()
+        own[own == 0.0] = 1.0
+        return W / own[:, None]
+
+    @property
+    def coupled_motors(self) -> tuple[int, ...]:
+        """Numbers (from 1) of the motors that more than one joint turns."""
+        return tuple(int(m) + 1 for m in np.flatnonzero((self.weights != 0.0).sum(axis=1) > 1))
+
+    def to_joint(self, q_c: ArrayLike) -> Array:
+        """Joint variables from encoder variables, ``q = K q_c + q_0``.
+
+        Parameters
+        ----------
+        q_c : array_like, shape (..., n)
+            Encoder variables.
+
+        Returns
+        -------
+        ndarray, shape (..., n)
+            Joint variables, radians or metres.
+
+        Raises
+        ------
+        ShapeError, InvalidValueError
+            Wrong length; NaN or infinity.
+
+        Examples
+        --------
+        >>> Transmission([[0.5]], [0.1]).to_joint([2.0])
+        array([1.1])
+        """
+        return as_vector(q_c, self.n, "q_c") @ self.matrix.T + self.offset
+
+    def to_encoder(self, q: ArrayLike) -> Array:
+        """Encoder variables from joint variables, the inverse of `to_joint`.
+
+        Parameters
+        ----------
+        q : array_like, shape (..., n)
+            Joint variables, radians or metres.
+
+        Returns
+        -------
+        ndarray, shape (..., n)
+            Encoder variables.
+
+        Raises
+        ------
+        InvalidValueError
+            K is singular: some joints mimic others, so ``q`` does not fix ``q_c``.
+        ShapeError
+            Wrong length.
+
+        Examples
+        --------
+        >>> Transmission([[0.5]], [0.1]).to_encoder([1.1])
+        array([2.])
+        """
+        q = as_vector(q, self.n, "q")
+        if not self.is_invertible:
+            raise InvalidValueError(
+                "The transmission matrix is singular (a joint mimics another one): not every q "
+                "has encoder variables. Take the master joints' values instead."
+            )
+        return np.linalg.solve(self.matrix, (q - self.offset)[..., None])[..., 0]
+
+    def to_motor_torque(self, tau: ArrayLike) -> Array:
+        """Motor torques that do the work of joint torques, ``tau_c = K^T tau``.
+
+        Parameters
+        ----------
+        tau : array_like, shape (..., n)
+            Joint torques or forces, N m or N.
+
+        Returns
+        -------
+        ndarray, shape (..., n)
+            Torques on the encoder (motor) side.
+
+        Raises
+        ------
+        ShapeError, InvalidValueError
+            Wrong length; NaN or infinity.
+
+        Examples
+        --------
+        >>> Transmission([[0.5]]).to_motor_torque([3.0])
+        array([1.5])
+        """
+        return as_vector(tau, self.n, "tau") @ self.matrix
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Transmission):
+            return NotImplemented
+        return all(same_value(getattr(self, f.name), getattr(other, f.name)) for f in fields(self))
+
+    def __hash__(self) -> int:
+        return value_hash(self.matrix, self.offset, self.Iam, self.Fvm, self.Fcm)

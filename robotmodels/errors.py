@@ -1,0 +1,158 @@
+"""Errors and warnings: each says what was expected, what came, and what to do."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+__all__ = [
+    "FrameNotFoundError",
+    "InertiaError",
+    "InvalidValueError",
+    "MeshNotFoundError",
+    "MissingExtraError",
+    "NotARotationError",
+    "ParFileError",
+    "RobotModelsError",
+    "RobotModelsWarning",
+    "RobotNotFoundError",
+    "ShapeError",
+    "SingularMassMatrixError",
+    "TableError",
+    "UrdfError",
+    "UrdfWarning",
+]
+
+
+class RobotModelsError(Exception):
+    """Base of every error this package raises on purpose."""
+
+
+class ShapeError(RobotModelsError, ValueError):
+    """An array has the wrong shape."""
+
+
+class InvalidValueError(RobotModelsError, ValueError):
+    """A value is not allowed: NaN, infinity, a wrong kind, an unknown option."""
+
+
+class NotARotationError(InvalidValueError):
+    """The upper left 3x3 block of a pose is not a rotation matrix."""
+
+
+class TableError(RobotModelsError, ValueError):
+    """A geometric table contradicts itself: antecedents, joint types, limits or names."""
+
+
+class InertiaError(RobotModelsError, ValueError):
+    """Inertial or drive parameters that cannot be meant."""
+
+
+class SingularMassMatrixError(RobotModelsError, ValueError):
+    """The direct dynamic model has no answer: the mass matrix cannot be inverted."""
+
+
+class UrdfError(RobotModelsError, ValueError):
+    """A URDF cannot be read or written."""
+
+
+class MeshNotFoundError(UrdfError, FileNotFoundError):
+    """A mesh file that a URDF names is not where it was looked for."""
+
+
+class ParFileError(RobotModelsError, ValueError):
+    """A SYMORO ``.par`` file cannot be read."""
+
+
+class MissingExtraError(RobotModelsError, ImportError):
+    """An optional package is not installed."""
+
+
+class _NameNotFoundError(RobotModelsError, KeyError):
+    """A name is unknown; the nearest known ones are in the message and in ``nearest``.
+
+    Parameters
+    ----------
+    kind : str
+        What was looked up, e.g. ``"frame"``.
+    name : object
+        What was asked for.
+    known : iterable of str
+        The names that exist.
+    advice : str, optional
+        What else to do.
+    """
+
+    def __init__(self, kind: str, name: object, known: Iterable[str], advice: str = "") -> None:
+        known = tuple(known)
+        self.name = name
+        self.known = known
+        self.nearest = tuple(nearest_names(str(name), known))
+        hint = f" Did you mean {_listed(self.nearest)}?" if self.nearest else ""
+        shown = _listed(known[:40]) + (f" and {len(known) - 40} more" if len(known) > 40 else "")
+        super().__init__(f"No {kind} {name!r}.{hint} Known: {shown}. {advice}".rstrip())
+
+    def __str__(self) -> str:  # KeyError would show the repr of the sentence
+        return str(self.args[0])
+
+    def __reduce__(self) -> tuple[object, ...]:  # the message is built from other arguments
+        return (_rebuilt, (type(self), self.args[0], self.name, self.known, self.nearest))
+
+
+class FrameNotFoundError(_NameNotFoundError):
+    """The model has no frame of this name or number."""
+
+
+class RobotNotFoundError(_NameNotFoundError):
+    """The catalogue has no robot of this name."""
+
+
+class RobotModelsWarning(UserWarning):
+    """Base of the warnings of this package."""
+
+
+class UrdfWarning(RobotModelsWarning):
+    """Something a model holds has no place in a URDF (or the other way round)."""
+
+
+def nearest_names(name: str, known: Iterable[str], count: int = 3) -> list[str]:
+    """The known names closest to a misspelt one, ignoring case.
+
+    Parameters
+    ----------
+    name : str
+        The name that was not found.
+    known : iterable of str
+        The names that exist.
+    count : int
+        How many to return at most.
+
+    Returns
+    -------
+    list of str
+        Closest first; empty if nothing is near.
+
+    Examples
+    --------
+    >>> nearest_names("RX9O", ["rx90", "tx40", "ur5e"])
+    ['rx90']
+    """
+    by_key = {k.lower(): k for k in known}
+    return [by_key[k] for k in difflib.get_close_matches(name.lower(), by_key, count, 0.5)]
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(repr(n) for n in names) or "none"
+
+
+def _rebuilt(
+    cls: type[_NameNotFoundError],
+    message: str,
+    name: object,
+    known: tuple[str, ...],
+    nearest: tuple[str, ...],
+) -> _NameNotFoundError:
+    error = cls.__new__(cls)
+    KeyError.__init__(error, message)
+    error.name, error.known, error.nearest = name, known, nearest
+    return error

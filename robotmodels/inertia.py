@@ -1,0 +1,393 @@
+"""Inertial parameters of the links, in Khalil's order and frames.
+
+Seed book section 1.5.2.1: the ten standard parameters of link j are the inertia tensor about the
+origin O_j, the first moments and the mass, all in the axes of frame R_j.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import se3
+from ._arrays import Array, as_core, as_floats, read_only, same_value, value_hash
+from .errors import InertiaError, ShapeError
+from .geometry import DHTable
+
+PARAMETERS = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
+"""Names of the ten standard parameters of a link, in order."""
+
+_ROUNDING = 1e-12
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class InertialParameters:
+    """Standard inertial parameters of every frame.
+
+    Any real values are legal: base parameters have first moments with zero mass, identified ones
+    may not be physical. `is_physical` and `consistency` say whether a real body could have them.
+
+    Parameters
+    ----------
+    values : array_like, shape (f, 10)
+        Rows ``XX XY XZ YY YZ ZZ MX MY MZ M``: inertia about the origin O_j in the axes of R_j
+        (kg m^2; products with the sign of the tensor's entries), first moments (kg m), mass (kg).
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Not ``(f, 10)``; NaN or infinity.
+
+    References
+    ----------
+    Seed book section 1.5.2.1.
+
+    Examples
+    --------
+    >>> link = InertialParameters([[0, 0, 0, 0.1, 0, 0.1, 0.5, 0, 0, 2.0]])
+    >>> link.mass, link.first_moments
+    (array([2.]), array([[0.5, 0. , 0. ]]))
+    """
+
+    values: Array
+
+    def __post_init__(self) -> None:
+        values = as_floats(self.values, "values")
+        if values.ndim != 2 or values.shape[1] != 10:
+            raise ShapeError(
+                f"values: expected one row of ten parameters ({' '.join(PARAMETERS)}) for each "
+                f"frame, shape (f, 10), got {values.shape}."
+            )
+        object.__setattr__(self, "values", read_only(values))
+
+    @classmethod
+    def zeros(cls, f: int) -> Self:
+        """Parameters of ``f`` links without any inertia.
+
+        Parameters
+        ----------
+        f : int
+            Number of frames.
+
+        Returns
+        -------
+        InertialParameters
+            All zero.
+
+        Examples
+        --------
+        >>> InertialParameters.zeros(2).f
+        2
+        """
+        return cls(np.zeros((f, 10)))
+
+    @classmethod
+    def from_com(cls, mass: ArrayLike, com: ArrayLike, inertia: ArrayLike) -> Self:
+        """Parameters from masses, centres of mass and inertia about the centres of mass.
+
+        Parameters
+        ----------
+        mass : array_like, shape (f,)
+            Kilograms, not negative.
+        com : array_like, shape (f, 3)
+            Centre of mass in frame R_j, metres.
+        inertia : array_like, shape (f, 3, 3)
+            Symmetric inertia tensor about the centre of mass in the axes of R_j, kg m^2.
+
+        Returns
+        -------
+        InertialParameters
+            The same bodies about the frame origins (Huygens-Steiner).
+
+        Raises
+        ------
+        InertiaError
+            A negative mass, a tensor that is not symmetric, or mass zero with a centre of mass.
+        ShapeError, InvalidValueError
+            Shapes that do not fit each other; NaN or infinity.
+
+        Examples
+        --------
+        >>> InertialParameters.from_com([2.0], [[0.1, 0, 0]], [np.diag([0.1, 0.2, 0.3])]).values
+        array([[0.1 , 0.  , 0.  , 0.22, 0.  , 0.32, 0.2 , 0.  , 0.  , 2.  ]])
+        """
+        mass = as_floats(mass, "mass")
+        if mass.ndim != 1:
+            raise ShapeError(f"mass: expected shape (f,), got {mass.shape}.")
+        com, tensor = as_core(com, (3,), "com"), as_core(inertia, (3, 3), "inertia")
+        f = mass.size
+        if com.shape != (f, 3) or tensor.shape != (f, 3, 3):
+            raise ShapeError(
+                f"expected com of shape ({f}, 3) and inertia of shape ({f}, 3, 3) for {f} masses, "
+                f"got {com.shape} and {tensor.shape}."
+            )
+        if (mass < 0).any():
+            j = int(np.flatnonzero(mass < 0)[0])
+            raise InertiaError(
+                f"Link {j + 1}: a mass cannot be negative, got {mass[j]} kg. Identified sets that "
+                "are not physical are given as InertialParameters(values)."
+            )
+        if (np.abs(tensor - np.swapaxes(tensor, 1, 2)).max(initial=0.0)
+                > 1e-9 * max(1.0, np.abs(tensor).max(initial=0.0))):  # fmt: skip
+            raise InertiaError("inertia: a tensor must be symmetric; check the products of inertia.")
+        S = se3.skew(com)
+        about_origin = tensor - mass[:, None, None] * (S @ S)
+        return cls(_vectors(about_origin, mass[:, None] * com, mass))
+
+    @classmethod
+    def from_standard(
+        cls,
+        rows: Iterable[Mapping[str, Any]],
+        mass: ArrayLike,
+        com: ArrayLike,
+        inertia: ArrayLike,
+        degrees: bool = False,
+    ) -> Self:
+        """Parameters published in classical (distal) link frames, moved to this table's frames.
+
+        The classical frame of link j is ``R_j Trans(x, a_j) Rot(x, alpha_j)``.
+
+        Parameters
+        ----------
+        rows : iterable of mappings
+            The classical table, as for `DHTable.from_standard`.
+        mass : array_like, shape (f,)
+            Kilograms.
+        com : array_like, shape (f, 3)
+            Centres of mass in the classical frames, metres.
+        inertia : array_like, shape (f, 3, 3)
+            About the centres of mass, in the axes of the classical frames, kg m^2.
+        degrees : bool
+            Whether the angles of ``rows`` are in degrees.
+
+        Returns
+        -------
+        InertialParameters
+            About the origins and in the axes of the Khalil-Kleinfinger frames.
+
+        Raises
+        ------
+        InertiaError, ShapeError, InvalidValueError, TableError
+            As `from_com` and `DHTable.from_standard`.
+
+        Examples
+        --------
+        >>> rows = [{"a": 0.4}]
+        >>> tip = InertialParameters.from_standard(rows, [1.0], [[0, 0, 0]], [np.zeros((3, 3))])
+        >>> tip.first_moments
+        array([[0.4, 0. , 0. ]])
+        """
+        rows = list(rows)
+        com, tensor = as_core(com, (3,), "com"), as_core(inertia, (3, 3), "inertia")
+        if com.shape != (len(rows), 3) or tensor.shape != (len(rows), 3, 3):
+            raise ShapeError(
+                f"expected com ({len(rows)}, 3) and inertia ({len(rows)}, 3, 3) for {len(rows)} "
+                f"rows, got {com.shape} and {tensor.shape}."
+            )
+        X = np.array([DHTable.from_standard([row], degrees)[1] for row in rows])
+        X = X.reshape(-1, 4, 4)
+        R = X[:, :3, :3]
+        return cls.from_com(
+            mass, (R @ com[:, :, None])[:, :, 0] + X[:, :3, 3], R @ tensor @ np.swapaxes(R, 1, 2)
+        )
+
+    @property
+    def f(self) -> int:
+        """Number of frames."""
+        return self.values.shape[0]
+
+    @property
+    def mass(self) -> Array:
+        """Masses, shape (f,), kg."""
+        return self.values[:, 9]
+
+    @property
+    def first_moments(self) -> Array:
+        """First moments ``M * com``, shape (f, 3), kg m."""
+        return self.values[:, 6:9]
+
+    @property
+    def tensors(self) -> Array:
+        """Inertia tensors about the origins O_j, shape (f, 3, 3), kg m^2."""
+        return self.values[:, [[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
+
+    @property
+    def is_physical(self) -> NDArray[np.bool_]:
+        """Whether a real body has these parameters, shape (f,): see `consistency`."""
+        return np.array([finding.is_physical for finding in self.consistency().links], dtype=bool)
+
+    def consistency(self) -> ConsistencyReport:
+        """Check each link: mass, moments, triangle inequality, pseudo-inertia.
+
+        Returns
+        -------
+        ConsistencyReport
+            One finding per link; print it.
+
+        References
+        ----------
+        P. M. Wensing, S. Kim and J.-J. E. Slotine, "Linear matrix inequalities for physically
+        consistent inertial parameter identification", IEEE RA-L 3(1), 2018, section III.
+
+        Examples
+        --------
+        >>> print(InertialParameters([[1, 0, 0, 0.1, 0, 0.1, 0, 0, 0, 2.0]]).consistency())
+        link 1: not physical: triangle inequality fails by 0.8 kg m^2
+        """
+        return ConsistencyReport(tuple(_finding(j, row) for j, row in enumerate(self.values)))
+
+    def moved(self, T: ArrayLike) -> Self:
+        """The same bodies described in other frames.
+
+        Parameters
+        ----------
+        T : array_like, shape (f, 4, 4)
+            Pose of the present frame of each body in its new frame.
+
+        Returns
+        -------
+        InertialParameters
+            About the new origins, in the new axes; linear in the values, so M = 0 is allowed.
+
+        Raises
+        ------
+        ShapeError, NotARotationError
+            Not one pose per frame.
+
+        Examples
+        --------
+        >>> InertialParameters([[0] * 9 + [2.0]]).moved([se3.translation(0.1, 0, 0)]).first_moments
+        array([[0.2, 0. , 0. ]])
+        """
+        X = se3.as_pose(T, "T")
+        if X.shape != (self.f, 4, 4):
+            raise ShapeError(f"T: expected one pose per frame ({self.f}, 4, 4), got {X.shape}.")
+        R, p = X[:, :3, :3], X[:, :3, 3]
+        h = (R @ self.first_moments[:, :, None])[:, :, 0]
+        P, H = se3.skew(p), se3.skew(h)
+        m = self.mass[:, None]
+        tensor = (
+            R @ self.tensors @ np.swapaxes(R, 1, 2) - (P @ H + H @ P) - m[:, :, None] * (P @ P)
+        )
+        return type(self)(_vectors(tensor, h + m * p, self.mass))
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, InertialParameters):
+            return NotImplemented
+        return same_value(self.values, other.values)
+
+    def __hash__(self) -> int:
+        return value_hash(self.values)
+
+
+@dataclass(frozen=True, slots=True)
+class LinkFinding:
+    """What the consistency check found for one link.
+
+    Parameters
+    ----------
+    link : int
+        Frame number.
+    mass : float
+        Kilograms.
+    principal_moments : tuple of float
+        About the centre of mass, ascending, kg m^2 (about the origin when the mass is zero).
+    triangle_gap : float
+        Sum of the two smaller principal moments less the largest; negative fails.
+    smallest_eigenvalue : float
+        Of the 4x4 pseudo-inertia matrix, relative to its trace.
+    problems : tuple of str
+        One sentence each; empty if a real body can have these parameters.
+
+    Examples
+    --------
+    >>> LinkFinding(1, 2.0, (0.1, 0.1, 0.1), 0.1, 0.05, ()).is_physical
+    True
+    """
+
+    link: int
+    mass: float
+    principal_moments: tuple[float, float, float]
+    triangle_gap: float
+    smallest_eigenvalue: float
+    problems: tuple[str, ...]
+
+    @property
+    def is_physical(self) -> bool:
+        """Whether nothing was found against the link."""
+        return not self.problems
+
+    def __str__(self) -> str:
+        verdict = f"not physical: {'; '.join(self.problems)}" if self.problems else "physical"
+        return f"link {self.link}: {verdict}"
+
+
+@dataclass(frozen=True, slots=True)
+class ConsistencyReport:
+    """Physical consistency of a set of inertial parameters, link by link.
+
+    Parameters
+    ----------
+    links : tuple of LinkFinding
+        In table order.
+
+    Examples
+    --------
+    >>> InertialParameters.zeros(1).consistency().is_physical
+    False
+    """
+
+    links: tuple[LinkFinding, ...]
+
+    @property
+    def is_physical(self) -> bool:
+        """Whether every link is physical."""
+        return all(link.is_physical for link in self.links)
+
+    def __str__(self) -> str:
+        return "\n".join(map(str, self.links))
+
+
+def _finding(j: int, row: Array) -> LinkFinding:
+    XX, XY, XZ, YY, YZ, ZZ, MX, MY, MZ, M = (float(v) for v in row)
+    tensor = np.array([[XX, XY, XZ], [XY, YY, YZ], [XZ, YZ, ZZ]])
+    h = np.array([MX, MY, MZ])
+    problems = []
+    if M > 0:
+        S = se3.skew(h)
+        tensor_c = tensor + S @ S / M
+    else:
+        tensor_c = tensor
+        problems.append(
+            "no mass" if M == 0 and not h.any() else
+            "first moments without mass" if M == 0 else f"negative mass {M:g} kg"
+        )  # fmt: skip
+    moments = np.linalg.eigvalsh(tensor_c)
+    scale = max(float(np.abs(moments).max()), float(np.abs(tensor).max()))
+    gap = float(moments[0] + moments[1] - moments[2])
+    if moments[0] < -_ROUNDING * scale:
+        problems.append(f"a principal moment is {moments[0]:.3g} kg m^2")
+    if gap < -_ROUNDING * scale:
+        problems.append(f"triangle inequality fails by {-gap:.3g} kg m^2")
+    pseudo = np.empty((4, 4))
+    pseudo[:3, :3] = 0.5 * np.trace(tensor) * np.eye(3) - tensor
+    pseudo[:3, 3] = pseudo[3, :3] = h
+    pseudo[3, 3] = M
+    trace = float(np.abs(np.diag(pseudo)).sum())
+    smallest = float(np.linalg.eigvalsh(pseudo)[0] / trace) if trace else 0.0
+    if smallest < -_ROUNDING and not problems:
+        problems.append(f"the pseudo-inertia has the eigenvalue {smallest:.3g} of its trace")
+    a, b, c = (float(v) for v in moments)
+    return LinkFinding(j + 1, M, (a, b, c), gap, smallest, tuple(problems))
+
+
+def _vectors(tensor: Array, first: Array, mass: Array) -> Array:
+    values = np.empty((mass.size, 10))
+    values[:, :6] = tensor[:, [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]
+    values[:, 6:9] = first
+    values[:, 9] = mass
+    return values
