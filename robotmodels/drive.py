@@ -302,3 +302,97 @@ class Transmission:
 
     def __hash__(self) -> int:
         return value_hash(self.matrix, self.offset, self.Iam, self.Fvm, self.Fcm)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DriveMatrices:
+    """Drive terms of all joints together, coupled motors included.
+
+    ``tau_drive = rotor a + viscous v + Fc sign(v) + W^T (Fcm sign(W v)) + offset``
+
+    Parameters
+    ----------
+    rotor, viscous : ndarray, shape (n, n)
+        Symmetric; diagonal unless motors are coupled.
+    coulomb, offset : ndarray, shape (n,)
+        Of the joints.
+    coupling : ndarray, shape (k, n)
+        ``W``, a row for each coupled motor.
+    coupled_coulomb : ndarray, shape (k,)
+        ``Fcm`` of the coupled motors.
+
+    Examples
+    --------
+    >>> drive_matrices(DriveParameters(Ia=[1.0, 2.0]), None).rotor
+    array([[1., 0.],
+           [0., 2.]])
+    """
+
+    rotor: Array
+    viscous: Array
+    coulomb: Array
+    offset: Array
+    coupling: Array
+    coupled_coulomb: Array
+
+    def torque(self, v: Array, a: Array | None) -> Array:
+        """Torque the drives take up.
+
+        Parameters
+        ----------
+        v : ndarray, shape (..., n)
+            Joint velocities.
+        a : ndarray, shape (..., n), or None
+            Joint accelerations; None leaves the rotor term out.
+
+        Returns
+        -------
+        ndarray, shape (..., n)
+            N m or N.
+
+        Examples
+        --------
+        >>> drive_matrices(DriveParameters(Fc=[2.0]), None).torque(np.array([-1.0]), None)
+        array([-2.])
+        """
+        tau = v @ self.viscous + self.coulomb * np.sign(v) + self.offset
+        if a is not None:
+            tau = tau + a @ self.rotor
+        if self.coupling.size:
+            W = self.coupling
+            tau = tau + (np.sign(v @ W.T) * self.coupled_coulomb) @ W
+        return tau
+
+
+def drive_matrices(drive: DriveParameters, transmission: Transmission | None) -> DriveMatrices:
+    """Gather drive and coupling terms, see `Transmission` for the formula.
+
+    Parameters
+    ----------
+    drive : DriveParameters
+        Of the n joints.
+    transmission : Transmission or None
+        With the terms of coupled motors.
+
+    Returns
+    -------
+    DriveMatrices
+        Ready to be applied to many samples.
+
+    Examples
+    --------
+    >>> wrist = Transmission([[1, 0], [-1, 1]], Iam=[0, 0.1])
+    >>> drive_matrices(DriveParameters.zeros(2), wrist).rotor
+    array([[0. , 0.1],
+           [0.1, 0. ]])
+    """
+    rotor, viscous = np.diag(drive.Ia), np.diag(drive.Fv)
+    coupling, coulomb = np.zeros((0, drive.n)), np.zeros(0)
+    if transmission is not None and transmission.coupled_motors:
+        motors = np.array(transmission.coupled_motors) - 1
+        coupling, coulomb = transmission.weights[motors], transmission.Fcm[motors]
+        cross = np.einsum("mi,mj->mij", coupling, coupling)
+        cross[:, range(drive.n), range(drive.n)] = 0.0
+        rotor = rotor + np.einsum("m,mij->ij", transmission.Iam[motors], cross)
+        viscous = viscous + np.einsum("m,mij->ij", transmission.Fvm[motors], cross)
+    return DriveMatrices(rotor, viscous, drive.Fc, drive.offset, coupling, coulomb)

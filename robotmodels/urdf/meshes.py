@@ -1,0 +1,118 @@
+"""Finding the mesh files that a URDF names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import unquote
+
+from ..errors import MeshNotFoundError
+
+
+@dataclass(frozen=True, slots=True)
+class MeshFinder:
+    """Where to look for meshes.
+
+    ``package://NAME/rest`` is looked for as ``NAME/rest`` in each package folder and, if a package
+    folder is itself called NAME, as ``rest`` in it; then among the folders above the URDF.
+    Relative paths start at the URDF.
+
+    Parameters
+    ----------
+    package_dirs : tuple of Path
+        Folders that hold packages. If any is given, a mesh that is not found is an error;
+        otherwise it stays unresolved until somebody wants to draw it.
+    urdf_dir : Path, optional
+        Folder of the URDF file; None for a text.
+
+    Examples
+    --------
+    >>> MeshFinder().find("package://nowhere/base.stl") is None
+    True
+    """
+
+    package_dirs: tuple[Path, ...] = ()
+    urdf_dir: Path | None = None
+
+    @classmethod
+    def of(cls, package_dirs: Iterable[str | Path] | str | Path, urdf_dir: Path | None) -> MeshFinder:
+        """A finder from what a caller passes: one folder or several.
+
+        Parameters
+        ----------
+        package_dirs : path or iterable of paths
+            Folders that hold packages.
+        urdf_dir : Path or None
+            Folder of the URDF file.
+
+        Returns
+        -------
+        MeshFinder
+            The finder.
+
+        Examples
+        --------
+        >>> MeshFinder.of((), None).package_dirs
+        ()
+        """
+        if isinstance(package_dirs, (str, Path)):
+            package_dirs = (package_dirs,)
+        return cls(tuple(Path(p) for p in package_dirs), urdf_dir)
+
+    def find(self, filename: str) -> Path | None:
+        """Locate one mesh.
+
+        Parameters
+        ----------
+        filename : str
+            As written in the URDF.
+
+        Returns
+        -------
+        Path or None
+            The file; None if it was not found and no package folder was given.
+
+        Raises
+        ------
+        MeshNotFoundError
+            Package folders were given and none holds the file.
+
+        Examples
+        --------
+        >>> MeshFinder().find("missing.stl") is None
+        True
+        """
+        candidates = self._candidates(filename)
+        for path in candidates:
+            if path.is_file():
+                return path
+        if self.package_dirs:
+            tried = "; ".join(str(path) for path in candidates) or "nowhere"
+            raise MeshNotFoundError(
+                f"mesh {filename!r} was not found (looked at {tried}). package_dirs must name the "
+                "folders that contain the package's folder."
+            )
+        return None
+
+    def _candidates(self, filename: str) -> list[Path]:
+        scheme, found, rest = filename.partition("://")
+        if not found:
+            scheme, rest = "", filename
+        if scheme in ("package", "model"):
+            package, _, inside = unquote(rest).partition("/")
+            paths = []
+            for folder in self.package_dirs:
+                paths.append(folder / package / inside)
+                if folder.resolve().name == package:
+                    paths.append(folder / inside)
+            if self.urdf_dir is not None:
+                for folder in (self.urdf_dir, *self.urdf_dir.parents):
+                    if folder.name == package:
+                        paths.append(folder / inside)
+            return paths
+        path = Path(unquote(rest) if scheme == "file" else rest)
+        if path.is_absolute():
+            return [path]
+        start = [self.urdf_dir] if self.urdf_dir is not None else []
+        return [folder / path for folder in (*start, *self.package_dirs)]

@@ -1,0 +1,89 @@
+"""What a robot is made of, on its way into or out of a URDF."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .._arrays import Array
+from ..drive import DriveParameters, Transmission
+from ..geometry import DHTable
+from ..inertia import InertialParameters
+from ..visual import Visual
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NamedFrame:
+    """A frame of interest fixed to a link: a link of a source URDF, a flange, a named tool.
+
+    Parameters
+    ----------
+    name : str
+        Unique among the frames of a robot.
+    parent : int
+        Number of the frame it is fixed to; 0 is R_0.
+    pose : ndarray, shape (4, 4)
+        In that frame.
+    merged : bool
+        Whether it was a link of its own in the source, fixed to (or locked on) another one, so
+        that its inertia is now part of that one's.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> NamedFrame("flange", 6, np.eye(4)).merged
+    False
+    """
+
+    name: str
+    parent: int
+    pose: Array
+    merged: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class RobotParts:
+    """Everything a URDF can say about a robot, and what it cannot.
+
+    Parameters
+    ----------
+    name : str
+        Of the robot.
+    table : DHTable
+        Geometric parameters, f frames and n joints.
+    base, tool : ndarray, shape (4, 4)
+        Pose of R_0 in the world, pose of the tool in the tip frame.
+    tip : int
+        Number of the frame that carries the tool.
+    inertia : InertialParameters
+        Of the f frames.
+    drive : DriveParameters
+        Of the n joints.
+    transmission : Transmission, optional
+        Between encoders and joints.
+    frames : tuple of NamedFrame
+        Frames of interest.
+    visuals : tuple of Visual
+        Shapes; empty if the source has none.
+    notes : tuple of str
+        Sentences about what a reader merged, locked or left out.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> table = DHTable(antecedent=[0], sigma=[0])
+    >>> RobotParts("one", table, np.eye(4), np.eye(4), 1, InertialParameters.zeros(1),
+    ...            DriveParameters.zeros(1)).frames
+    ()
+    """
+
+    name: str
+    table: DHTable
+    base: Array
+    tool: Array
+    tip: int
+    inertia: InertialParameters
+    drive: DriveParameters
+    transmission: Transmission | None = None
+    frames: tuple[NamedFrame, ...] = ()
+    visuals: tuple[Visual, ...] = ()
+    notes: tuple[str, ...] = ()

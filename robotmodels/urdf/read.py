@@ -1,0 +1,287 @@
+"""URDF in: any fixed-base tree of revolute, continuous, prismatic and fixed joints becomes parts.
+
+The frames are placed by `robotmodels.khalil_frames`; everything that was given in link frames
+(inertia, shapes, tools) is moved to them, and the joint variables keep their sign and zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from .. import se3
+from .._arrays import Array
+from ..drive import DriveParameters, Transmission
+from ..errors import FrameNotFoundError, UrdfError
+from ..geometry import DHTable
+from ..inertia import InertialParameters
+from ..khalil_frames import JointAxis, khalil_frames
+from ..visual import Visual
+from .meshes import MeshFinder
+from .parts import NamedFrame, RobotParts
+from .tree import MOVING_TYPES, UrdfJoint, UrdfTree, parse_urdf
+
+
+def read_urdf(
+    path_or_text: str | Path,
+    base_link: str | None = None,
+    tip_link: str | None = None,
+    package_dirs: Iterable[str | Path] | str | Path = (),
+    dynamics: bool = False,
+    mimic: bool = False,
+) -> RobotParts:
+    """Read a URDF and describe it by a Khalil-Kleinfinger table.
+
+    Parameters
+    ----------
+    path_or_text : str or Path
+        A file, or the text itself (recognised by its ``<``).
+    base_link : str, optional
+        Link whose frame is the world; default the root. What is above it is left out.
+    tip_link : str, optional
+        Link whose frame is the tool. The joints between base and tip are kept, others are locked
+        at zero. Default: every joint below the base is kept, and the tool is the link that the
+        last of them carries, or what is fixed to it as long as there is one such link only.
+    package_dirs : path or iterable of paths
+        Folders that hold the packages named in ``package://`` meshes.
+    dynamics : bool
+        Whether ``<dynamics damping friction>`` become Fv and Fc.
+    mimic : bool
+        Whether mimic joints follow their masters (through the transmission) or are independent.
+
+    Returns
+    -------
+    RobotParts
+        Table, base, tool, inertia, limits, named frames, shapes and notes.
+
+    Raises
+    ------
+    UrdfError
+        The text is malformed or describes something a table cannot.
+    FrameNotFoundError
+        ``base_link`` or ``tip_link`` is not a link, or the tip is not below the base.
+    MeshNotFoundError
+        A mesh is not in the given package folders.
+
+    Examples
+    --------
+    >>> text = '''<robot name="one"><link name="base"/><link name="arm"/>
+    ... <joint name="turn" type="continuous"><parent link="base"/><child link="arm"/>
+    ... <origin xyz="0 0 0.4"/><axis xyz="0 0 1"/></joint></robot>'''
+    >>> float(read_urdf(text).base[2, 3])
+    0.4
+    """
+    text, folder = _text_of(path_or_text)
+    tree = parse_urdf(text, MeshFinder.of(package_dirs, folder))
+    for link in (base_link, tip_link):
+        if link is not None and link not in tree.links:
+            raise FrameNotFoundError("link", link, tree.links)
+    return _parts(tree, base_link or tree.root, tip_link, dynamics, mimic)
+
+
+def _text_of(source: str | Path) -> tuple[str, Path | None]:
+    if isinstance(source, str) and "<" in source:
+        return source, None
+    if not isinstance(source, (str, Path)):
+        raise UrdfError(f"expected a path or the text of a URDF, got {type(source).__name__}.")
+    path = Path(source)
+    if path.name.endswith(".xacro"):
+        raise UrdfError(
+            f"{path.name} is a xacro file. Expand it first: `xacro {path.name} > robot.urdf` "
+            "(Python packages xacro or xacrodoc)."
+        )
+    try:
+        return path.read_text(encoding="utf-8-sig"), path.resolve().parent
+    except UnicodeDecodeError as error:
+        raise UrdfError(f"{path}: not UTF-8 text ({error.reason}).") from None
+    except OSError as error:
+        raise UrdfError(
+            f"cannot read {str(source)!r}: {error.strerror}. Give the path of a .urdf file, or the "
+            "text of one."
+        ) from None
+
+
+@dataclass(frozen=True, slots=True)
+class _Placed:
+    """A link of the source, fixed to the link that joint number ``owner`` moves (0: the base)."""
+
+    name: str
+    owner: int
+    pose: Array
+    merged: bool
+
+
+def _parts(
+    tree: UrdfTree, base_link: str, tip_link: str | None, dynamics: bool, mimic: bool
+) -> RobotParts:
+    kept = None if tip_link is None else _chain(tree, base_link, tip_link)
+    joints: list[UrdfJoint] = []
+    axes: list[JointAxis] = []
+    notes: list[str] = []
+    placed = [_Placed(base_link, 0, np.eye(4), False)]
+    _walk(tree, placed[0], kept, joints, axes, placed, notes)
+    if not joints:
+        raise UrdfError(
+            f"no joint moves between {base_link!r} and {tip_link or 'the leaves'!r}: there is "
+            "nothing to model. Choose base_link and tip_link on both sides of a moving joint."
+        )
+    frames = khalil_frames(axes)
+    sigma = [axis.sigma for axis in axes]
+    table = DHTable(
+        antecedent=np.array([axis.antecedent for axis in axes]),
+        sigma=np.array(sigma),
+        mu=np.array([0 if mimic and joint.mimic else 1 for joint in joints]),
+        gamma=frames.gamma, b=frames.b, beta=frames.beta, alpha=frames.alpha, d=frames.d,
+        theta=frames.theta, r=frames.r,
+        names=tuple(joint.name for joint in joints),
+        lower=np.array([joint.lower for joint in joints]),
+        upper=np.array([joint.upper for joint in joints]),
+        velocity=np.array([joint.velocity for joint in joints]),
+        effort=np.array([joint.effort for joint in joints]),
+    )  # fmt: skip
+    # pose of the link moved by joint j (or of the base link) in R_j (or R_0)
+    links = np.concatenate((se3.inverse(frames.base)[None], frames.link_poses))
+    named = tuple(
+        NamedFrame(p.name, p.owner, links[p.owner] @ p.pose, p.merged) for p in placed
+    )
+    visuals = tuple(
+        Visual(frame.parent, frame.pose @ v.pose, v.shape, v.color)
+        for frame in named
+        for v in tree.links[frame.name].visuals
+    )
+    tip_frame = _tip(tree, placed, named, len(joints), tip_link)
+    zeros = np.zeros(len(joints))
+    return RobotParts(
+        name=tree.name,
+        table=table,
+        base=frames.base,
+        tool=tip_frame.pose,
+        tip=tip_frame.parent,
+        inertia=_inertia(tree, named, len(joints)),
+        drive=DriveParameters(
+            Fv=[joint.damping for joint in joints] if dynamics else zeros,
+            Fc=[joint.friction for joint in joints] if dynamics else zeros,
+        ),
+        transmission=_mimicry(joints) if mimic else None,
+        frames=named,
+        visuals=visuals,
+        notes=tuple(notes),
+    )
+
+
+def _chain(tree: UrdfTree, base_link: str, tip_link: str) -> set[str]:
+    """Names of the joints between two links."""
+    chain: set[str] = set()
+    link = tip_link
+    while link != base_link:
+        joint = tree.parent_joint(link)
+        if joint is None:
+            below = [base_link]
+            for name in below:
+                below += [j.child for j in tree.children(name)]
+            raise FrameNotFoundError(
+                f"link below the base link {base_link!r} that is called", tip_link, below[1:]
+            )
+        chain.add(joint.name)
+        link = joint.parent
+    return chain
+
+
+def _walk(
+    tree: UrdfTree,
+    start: _Placed,
+    kept: set[str] | None,
+    joints: list[UrdfJoint],
+    axes: list[JointAxis],
+    placed: list[_Placed],
+    notes: list[str],
+) -> None:
+    """Number the moving joints depth first, in the order of the file, and place every link."""
+    following: dict[str, list[UrdfJoint]] = {}
+    for joint in tree.joints.values():
+        following.setdefault(joint.parent, []).append(joint)
+    stack = [(joint, start) for joint in reversed(following.get(start.name, []))]
+    while stack:
+        joint, parent = stack.pop()
+        if joint.kind not in (*MOVING_TYPES, "fixed"):
+            raise UrdfError(
+                f"joint {joint.name!r} is of type {joint.kind!r}; a table describes revolute, "
+                "continuous, prismatic and fixed joints. If the arm hangs below it, give the link "
+                f"under it ({joint.child!r}) as base_link; choose tip_link to leave out a branch."
+            )
+        pose = parent.pose @ joint.origin
+        moves = joint.kind in MOVING_TYPES and (kept is None or joint.name in kept)
+        if moves:
+            sigma = 1 if joint.kind == "prismatic" else 0
+            axes.append(JointAxis(parent.owner, sigma, pose, joint.axis))
+            joints.append(joint)
+            link = _Placed(joint.child, len(joints), np.eye(4), False)
+        else:
+            link = _Placed(joint.child, parent.owner, pose, True)
+            how = "fixed" if joint.kind == "fixed" else "locked at zero"
+            owner = joints[parent.owner - 1].name if parent.owner else "the base"
+            notes.append(
+                f"link {joint.child!r} ({how} by joint {joint.name!r}) is merged into the link "
+                f"of {owner}."
+            )
+        placed.append(link)
+        stack += [(j, link) for j in reversed(following.get(joint.child, []))]
+
+
+def _tip(
+    tree: UrdfTree,
+    placed: list[_Placed],
+    named: tuple[NamedFrame, ...],
+    last: int,
+    tip_link: str | None,
+) -> NamedFrame:
+    if tip_link is not None:
+        return next(frame for frame in named if frame.name == tip_link)
+    name = next(p.name for p in placed if p.owner == last and not p.merged)
+    following = tree.children(name)
+    while len(following) == 1 and following[0].kind == "fixed":
+        name = following[0].child
+        following = tree.children(name)
+    return next(frame for frame in named if frame.name == name)
+
+
+def _inertia(tree: UrdfTree, named: tuple[NamedFrame, ...], f: int) -> InertialParameters:
+    """Each link's inertia moved to its frame; merged links add to the one that carries them."""
+    total = np.zeros((f, 10))
+    for frame in named:
+        link = tree.links[frame.name]
+        if frame.parent == 0:
+            continue
+        own = InertialParameters.from_com([link.mass], [link.com], [link.inertia])
+        total[frame.parent - 1] += own.moved(frame.pose[None]).values[0]
+    return InertialParameters(total)
+
+
+def _mimicry(joints: list[UrdfJoint]) -> Transmission | None:
+    """q = K q_c + q_0 with the mimicking joints' own columns zero; None if nothing mimics."""
+    numbers = {joint.name: i for i, joint in enumerate(joints)}
+    K, q0 = np.eye(len(joints)), np.zeros(len(joints))
+    followers = [joint for joint in joints if joint.mimic]
+    for joint in followers:
+        master, gain, offset = joint.mimic or ("", 1.0, 0.0)
+        chain = [joint.name]
+        # a master may itself mimic another joint: follow it to one that does not
+        while master in numbers and joints[numbers[master]].mimic:
+            if master in chain:
+                raise UrdfError(f"the joints {', '.join(chain)} mimic each other in a circle.")
+            chain.append(master)
+            above, factor, shift = joints[numbers[master]].mimic or ("", 1.0, 0.0)
+            master, gain, offset = above, gain * factor, offset + gain * shift
+        if master not in numbers:
+            raise UrdfError(
+                f"joint {joint.name!r} mimics {master!r}, which is not a moving joint of this "
+                "part of the robot; read it with mimic=False."
+            )
+        i = numbers[joint.name]
+        K[i] = 0.0
+        K[i, numbers[master]] = gain
+        q0[i] = offset
+    return Transmission(K, q0) if followers else None

@@ -1,0 +1,323 @@
+"""URDF out: full-precision text of a robot's parts, the same for the same robot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from xml.sax.saxutils import escape, quoteattr
+
+import numpy as np
+
+from .. import se3
+from .._arrays import Array
+from ..drive import Transmission
+from ..errors import UrdfError
+from ..geometry import FIXED, PRISMATIC, constant_factors
+from ..visual import Box, Color, Cylinder, Mesh, Sphere, Visual, skeleton
+from .parts import RobotParts
+
+_LARGEST = repr(float(np.finfo(np.float64).max))
+
+
+def urdf_text(parts: RobotParts, visuals: bool = True) -> str:
+    """Write the parts of a robot as URDF.
+
+    The root link is the world; a fixed joint places R_0 in it, each frame of the table is a link
+    whose z axis is the joint's axis, the tool and the named frames are links without mass.
+    Numbers have all their digits, so that reading the text back loses nothing but rounding.
+
+    Parameters
+    ----------
+    parts : RobotParts
+        What to write.
+    visuals : bool
+        Whether shapes are written: those of the source, else a skeleton sized from the table.
+
+    Returns
+    -------
+    str
+        The text.
+
+    Raises
+    ------
+    UrdfError
+        The transmission forces joints together in a way that mimic joints cannot say: the text
+        would describe a robot with other poses.
+
+    References
+    ----------
+    Seed book eq. [1.3]; the URDF specification, wiki.ros.org/urdf/XML.
+
+    Examples
+    --------
+    >>> from robotmodels.inertia import InertialParameters
+    >>> from robotmodels.drive import DriveParameters
+    >>> from robotmodels.geometry import DHTable
+    >>> one = RobotParts("one", DHTable(antecedent=[0], sigma=[0]), np.eye(4), np.eye(4), 1,
+    ...                  InertialParameters.zeros(1), DriveParameters.zeros(1))
+    >>> urdf_text(one).count("<joint ")
+    3
+    """
+    table = parts.table
+    names = link_names(parts)
+    mimics = _mimics(parts.transmission, table.joint_names)
+    shapes: dict[int, list[Visual]] = {}
+    if visuals:
+        for visual in parts.visuals or skeleton(table, parts.tool, parts.tip):
+            shapes.setdefault(visual.frame, []).append(visual)
+    lines = ['<?xml version="1.0" encoding="utf-8"?>', f"<robot name={quoteattr(parts.name)}>"]
+    lines += _link(names.world, parts, -1, [])
+    lines += _link(names.frames[0], parts, -1, shapes.get(0, []))
+    lines += _fixed(names.world, names.frames[0], parts.base, names.fixed[names.frames[0]])
+    C = constant_factors(table)
+    column = 0
+    for k in range(table.f):
+        parent, child = names.frames[int(table.antecedent[k])], names.frames[k + 1]
+        lines += _link(child, parts, k, shapes.get(k + 1, []))
+        if table.sigma[k] == FIXED:
+            lines += _fixed(parent, child, C[k], table.names[k])
+            continue
+        kind = "prismatic" if table.sigma[k] == PRISMATIC else "revolute"
+        lines.append(f"  <joint name={quoteattr(table.names[k])} type={quoteattr(kind)}>")
+        lines += _placement(parent, child, C[k])
+        lines.append('    <axis xyz="0 0 1"/>')
+        lines.append(
+            f'    <limit lower="{_limit(table.lower[column])}" '
+            f'upper="{_limit(table.upper[column])}" effort="{_limit(table.effort[column])}" '
+            f'velocity="{_limit(table.velocity[column])}"/>'
+        )
+        Fv, Fc = float(parts.drive.Fv[column]), float(parts.drive.Fc[column])
+        if Fv or Fc:
+            lines.append(f'    <dynamics damping="{Fv!r}" friction="{Fc!r}"/>')
+        lines += mimics.get(column, [])
+        lines.append("  </joint>")
+        column += 1
+    lines += _link(names.tool, parts, -1, [])
+    lines += _fixed(names.frames[parts.tip], names.tool, parts.tool, names.fixed[names.tool])
+    written = {names.world, *names.frames, names.tool}
+    for frame in parts.frames:
+        if frame.name in written:
+            continue
+        lines += _link(frame.name, parts, -1, [])
+        carrier = names.frames[frame.parent]
+        lines += _fixed(carrier, frame.name, frame.pose, names.fixed[frame.name])
+    return "\n".join([*lines, "</robot>", ""])
+
+
+@dataclass(frozen=True, slots=True)
+class LinkNames:
+    """Names of the links and fixed joints a URDF gets besides the named frames.
+
+    Parameters
+    ----------
+    world : str
+        The root.
+    frames : tuple of str
+        Links of R_0, R_1, ..., R_f.
+    tool : str
+        The tool.
+    fixed : dict of str to str
+        Name of the fixed joint that carries a link, by the link's name.
+
+    Examples
+    --------
+    >>> LinkNames("world", ("base",), "tool", {}).tool
+    'tool'
+    """
+
+    world: str
+    frames: tuple[str, ...]
+    tool: str
+    fixed: dict[str, str]
+
+
+def link_names(parts: RobotParts) -> LinkNames:
+    """Choose link names that collide neither with each other nor with joints or named frames.
+
+    Parameters
+    ----------
+    parts : RobotParts
+        The robot.
+
+    Returns
+    -------
+    LinkNames
+        A named frame that coincides with one of them gives its name; else ``joint_3`` moves
+        ``link_3``, and other joints' names get ``_link`` appended.
+
+    Examples
+    --------
+    >>> from robotmodels.inertia import InertialParameters
+    >>> from robotmodels.drive import DriveParameters
+    >>> from robotmodels.geometry import DHTable
+    >>> link_names(RobotParts("one", DHTable(antecedent=[0], sigma=[0]), np.eye(4), np.eye(4), 1,
+    ...                       InertialParameters.zeros(1), DriveParameters.zeros(1))).frames
+    ('base', 'link_1')
+    """
+    spare = list(parts.frames)
+
+    def own(parent: int, pose: Array) -> str | None:
+        """A named frame that is the very frame to be written gives its name to it."""
+        for frame in spare:
+            if frame.parent == parent and np.array_equal(frame.pose, pose):
+                spare.remove(frame)
+                return frame.name
+        return None
+
+    given = [own(0, se3.inverse(parts.base))]
+    given += [own(k, np.eye(4)) for k in range(parts.table.f + 1)]
+    given.append(own(parts.tip, parts.tool))
+    stems = [name.removeprefix("joint_").removeprefix("frame_") for name in parts.table.names]
+    wanted = [
+        f"link_{stem}" if stem != name else f"{name}_link"
+        for stem, name in zip(stems, parts.table.names, strict=True)
+    ]
+    taken = {*parts.table.names, *(frame.name for frame in parts.frames)}
+
+    def free(name: str) -> str:
+        while name in taken:
+            name += "_kk"
+        taken.add(name)
+        return name
+
+    links = [
+        free(name) if have is None else have
+        for have, name in zip(given, ("world", "base", *wanted, "tool"), strict=True)
+    ]
+    carried = (links[1], links[-1], *(frame.name for frame in spare))
+    return LinkNames(
+        links[0], tuple(links[1:-1]), links[-1], {name: free(f"{name}_fixed") for name in carried}
+    )
+
+
+def holds_inertia(row: Array) -> bool:
+    """Whether a URDF (and Pinocchio) can hold ten parameters: mass positive, or no moments.
+
+    Parameters
+    ----------
+    row : ndarray, shape (10,)
+        ``XX ... M``.
+
+    Returns
+    -------
+    bool
+        False for a negative mass, and for first moments without mass.
+
+    Examples
+    --------
+    >>> holds_inertia(np.array([0, 0, 0, 0, 0, 1.0, 0.1, 0, 0, 0]))
+    False
+    """
+    return bool(row[9] > 0 or (row[9] == 0 and not row[6:9].any()))
+
+
+def _link(name: str, parts: RobotParts, row: int, visuals: list[Visual]) -> list[str]:
+    body: list[str] = []
+    if row >= 0:
+        pi = parts.inertia.values[row]
+        if pi.any() and holds_inertia(pi):
+            body += _inertial(pi)
+    for visual in visuals:
+        body += _visual(visual)
+    if not body:
+        return [f"  <link name={quoteattr(name)}/>"]
+    return [f"  <link name={quoteattr(name)}>", *body, "  </link>"]
+
+
+def _inertial(pi: Array) -> list[str]:
+    M = float(pi[9])
+    com = pi[6:9] / M if M else np.zeros(3)
+    S = se3.skew(com)
+    tensor = np.array([[pi[0], pi[1], pi[2]], [pi[1], pi[3], pi[4]], [pi[2], pi[4], pi[5]]])
+    tensor = tensor + M * (S @ S)
+    keys = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+    values = tensor[[0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]
+    inertia = " ".join(f'{k}="{float(v)!r}"' for k, v in zip(keys, values, strict=True))
+    return [
+        "    <inertial>",
+        f'      <origin xyz="{_words(com)}" rpy="0 0 0"/>',
+        f'      <mass value="{M!r}"/>',
+        f"      <inertia {inertia}/>",
+        "    </inertial>",
+    ]
+
+
+def _visual(visual: Visual) -> list[str]:
+    shape = visual.shape
+    if isinstance(shape, Box):
+        geometry = f'<box size="{_words(shape.size)}"/>'
+    elif isinstance(shape, Cylinder):
+        geometry = f'<cylinder radius="{shape.radius!r}" length="{shape.length!r}"/>'
+    elif isinstance(shape, Sphere):
+        geometry = f'<sphere radius="{shape.radius!r}"/>'
+    else:
+        geometry = _mesh(shape)
+    lines = [
+        "    <visual>",
+        f"      {_origin(visual.pose)}",
+        f"      <geometry>{geometry}</geometry>",
+    ]
+    if visual.color is not None:
+        lines.append(f"      {_material(visual.color)}")
+    return [*lines, "    </visual>"]
+
+
+def _mesh(mesh: Mesh) -> str:
+    return f'<mesh filename={quoteattr(mesh.filename)} scale="{_words(mesh.scale)}"/>'
+
+
+def _material(color: Color) -> str:
+    name = "color_" + "_".join(f"{round(255 * c):02x}" for c in color)
+    return f'<material name="{escape(name)}"><color rgba="{_words(color)}"/></material>'
+
+
+def _fixed(parent: str, child: str, pose: Array, name: str) -> list[str]:
+    head = f'  <joint name={quoteattr(name)} type="fixed">'
+    return [head, *_placement(parent, child, pose), "  </joint>"]
+
+
+def _placement(parent: str, child: str, pose: Array) -> list[str]:
+    return [
+        f"    {_origin(pose)}",
+        f"    <parent link={quoteattr(parent)}/>",
+        f"    <child link={quoteattr(child)}/>",
+    ]
+
+
+def _origin(pose: Array) -> str:
+    return f'<origin xyz="{_words(pose[:3, 3])}" rpy="{_words(se3.to_rpy(pose[:3, :3]))}"/>'
+
+
+def _words(values: Array | tuple[float, ...]) -> str:
+    return " ".join(repr(float(v) + 0.0) for v in values)
+
+
+def _limit(value: float) -> str:
+    """Infinity as the largest float: URDF parsers read no infinity, and take this for one."""
+    if np.isinf(value):
+        return _LARGEST if value > 0 else "-" + _LARGEST
+    return repr(float(value))
+
+
+def _mimics(
+    transmission: Transmission | None, joints: tuple[str, ...]
+) -> dict[int, list[str]]:
+    """<mimic> elements of a singular transmission, by joint column."""
+    if transmission is None or transmission.is_invertible:
+        return {}
+    K, elements = transmission.matrix, {}
+    for i in range(transmission.n):
+        masters = np.flatnonzero(K[i])
+        if K[i, i] == 1.0 and masters.size == 1 and transmission.offset[i] == 0.0:
+            continue
+        master = int(masters[0]) if masters.size else -1
+        if masters.size != 1 or K[:, i].any() or K[master, master] != 1.0:
+            raise UrdfError(
+                f"joint {joints[i]!r} is tied to others by the transmission in a way that a URDF "
+                "cannot say (only q_i = factor * q_k + offset can be): written without it the "
+                "robot would reach other poses. Remove it first: model.with_transmission(None)."
+            )
+        elements[i] = [
+            f"    <mimic joint={quoteattr(joints[master])} multiplier=\"{float(K[i, master])!r}\" "
+            f'offset="{float(transmission.offset[i])!r}"/>'
+        ]
+    return elements

@@ -1,0 +1,272 @@
+"""Shapes that show a robot: what a URDF gives, or a skeleton sized from the table."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from . import se3
+from ._arrays import Array
+from .geometry import FIXED, PRISMATIC, DHTable
+
+Color = tuple[float, float, float, float]
+
+_LINK_COLOR: Color = (0.62, 0.66, 0.72, 1.0)
+_JOINT_COLOR: Color = (0.95, 0.55, 0.15, 1.0)
+_SLIDE_COLOR: Color = (0.25, 0.50, 0.80, 1.0)
+_BASE_COLOR: Color = (0.30, 0.32, 0.36, 1.0)
+_AXIS_COLORS: tuple[Color, Color, Color] = (
+    (0.85, 0.15, 0.15, 1.0),
+    (0.15, 0.65, 0.20, 1.0),
+    (0.15, 0.30, 0.85, 1.0),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """A box centred on its origin.
+
+    Parameters
+    ----------
+    size : tuple of 3 floats
+        Edge lengths along x, y, z in metres.
+
+    Examples
+    --------
+    >>> Box((0.1, 0.1, 0.2)).size[2]
+    0.2
+    """
+
+    size: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Cylinder:
+    """A cylinder along z, centred on its origin.
+
+    Parameters
+    ----------
+    radius, length : float
+        Metres.
+
+    Examples
+    --------
+    >>> Cylinder(0.05, 0.3).length
+    0.3
+    """
+
+    radius: float
+    length: float
+
+
+@dataclass(frozen=True, slots=True)
+class Sphere:
+    """A sphere centred on its origin.
+
+    Parameters
+    ----------
+    radius : float
+        Metres.
+
+    Examples
+    --------
+    >>> Sphere(0.05).radius
+    0.05
+    """
+
+    radius: float
+
+
+@dataclass(frozen=True, slots=True)
+class Mesh:
+    """A mesh file.
+
+    Parameters
+    ----------
+    filename : str
+        As the URDF names it, e.g. ``package://ur_description/meshes/base.stl``.
+    path : Path or None
+        Where it was found; None if it was not.
+    scale : tuple of 3 floats
+        Factors along x, y, z.
+
+    Examples
+    --------
+    >>> Mesh("base.stl", None).scale
+    (1.0, 1.0, 1.0)
+    """
+
+    filename: str
+    path: Path | None
+    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+
+
+Shape = Box | Cylinder | Sphere | Mesh
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Visual:
+    """A shape fixed to a frame.
+
+    Parameters
+    ----------
+    frame : int
+        Number of the frame it moves with; 0 is R_0.
+    pose : ndarray, shape (4, 4)
+        Of the shape in that frame.
+    shape : Box, Cylinder, Sphere or Mesh
+        What to draw.
+    color : tuple of 4 floats, optional
+        Red, green, blue, opacity in [0, 1]; None leaves it to the mesh or the viewer.
+
+    Examples
+    --------
+    >>> Visual(0, np.eye(4), Sphere(0.1)).frame
+    0
+    """
+
+    frame: int
+    pose: Array
+    shape: Shape
+    color: Color | None = None
+
+
+def characteristic_length(table: DHTable, tool: Array) -> float:
+    """A length that says how large a robot is: the sum of its table's lengths and its tool's.
+
+    Parameters
+    ----------
+    table : DHTable
+        The geometric parameters.
+    tool : ndarray, shape (4, 4)
+        Pose of the tool in the last frame.
+
+    Returns
+    -------
+    float
+        Metres; 0.5 for a robot without any length.
+
+    Examples
+    --------
+    >>> characteristic_length(DHTable(antecedent=[0], sigma=[0], d=[0.3]), np.eye(4))
+    0.3
+    """
+    lengths = np.abs(table.d) + np.abs(table.r) + np.abs(table.b)
+    longest = max((float(lengths[np.array(table.path(j)) - 1].sum())
+                   for j in range(1, table.f + 1)), default=0.0)  # fmt: skip
+    strokes = [upper - lower for lower, upper, s in zip(
+        table.lower, table.upper, table.sigma[table.joint_rows], strict=True
+    ) if s == PRISMATIC and np.isfinite(upper - lower)]  # fmt: skip
+    total = longest + float(np.linalg.norm(tool[:3, 3])) + float(sum(strokes))
+    return total if total > 1e-6 else 0.5
+
+
+def skeleton(table: DHTable, tool: Array, tip: int) -> tuple[Visual, ...]:
+    """Simple shapes for a robot that has none: joints, links, a foot and the tool's axes.
+
+    Revolute joints are cylinders along z_j, prismatic ones a slide as long as the stroke, links
+    are rods along b, d and r of the table.
+
+    Parameters
+    ----------
+    table : DHTable
+        The geometric parameters.
+    tool : ndarray, shape (4, 4)
+        Pose of the tool in the tip frame.
+    tip : int
+        Number of the tip frame.
+
+    Returns
+    -------
+    tuple of Visual
+        In table order; the same table gives the same shapes.
+
+    Examples
+    --------
+    >>> len(skeleton(DHTable(antecedent=[0], sigma=[0], d=[0.3]), np.eye(4), 1)) > 3
+    True
+    """
+    size = characteristic_length(table, tool)
+    rod, radius = 0.022 * size, 0.036 * size
+    shapes = [
+        Visual(0, se3.translation(0.0, 0.0, -0.5 * rod), Cylinder(2.2 * radius, rod), _BASE_COLOR)
+    ]
+    motion = dict(zip(table.joint_rows.tolist(), range(table.n), strict=True))
+    for k in range(table.f):
+        frame, antecedent = k + 1, int(table.antecedent[k])
+        b, d, r = float(table.b[k]), float(table.d[k]), float(table.r[k])
+        before = se3.rotation("z", float(table.gamma[k]))
+        shapes += _rod(antecedent, before, b, rod, size)
+        before = before @ se3.translation(0.0, 0.0, b) @ se3.rotation("y", float(table.beta[k]))
+        shapes += _rod(antecedent, before @ se3.rotation("y", np.pi / 2), d, rod, size)
+        if table.sigma[k] == PRISMATIC:
+            i = motion[k]
+            stroke = float(table.upper[i] - table.lower[i])
+            shapes += _slide(frame, stroke if np.isfinite(stroke) else 0.3 * size, radius)
+            continue
+        # the rod along r turns about itself, so it may move with the link it leads to
+        shapes += _rod(frame, se3.translation(0.0, 0.0, -r), r, rod, size)
+        if table.sigma[k] != FIXED:
+            pose = se3.translation(0.0, 0.0, 0.0)
+            shapes.append(Visual(frame, pose, Cylinder(radius, 2.6 * radius), _JOINT_COLOR))
+    reach = float(np.linalg.norm(tool[:3, 3]))
+    if reach > 1e-3 * size:
+        shapes += _rod(tip, _z_along(tool[:3, 3] / reach), reach, 0.7 * rod, size)
+    return (*shapes, *triad(tip, tool, 0.1 * size))
+
+
+def triad(frame: int, pose: Array, length: float) -> tuple[Visual, ...]:
+    """The three axes of a frame as thin cylinders: x red, y green, z blue.
+
+    Parameters
+    ----------
+    frame : int
+        Number of the frame they move with.
+    pose : ndarray, shape (4, 4)
+        Of the axes in that frame.
+    length : float
+        Metres.
+
+    Returns
+    -------
+    tuple of Visual
+        Three cylinders.
+
+    Examples
+    --------
+    >>> [v.color[0] > 0.5 for v in triad(1, np.eye(4), 0.1)]
+    [True, False, False]
+    """
+    turns = (se3.rotation("y", np.pi / 2), se3.rotation("x", -np.pi / 2), np.eye(4))
+    return tuple(
+        Visual(frame, pose @ turn @ se3.translation(0.0, 0.0, 0.5 * length),
+               Cylinder(0.06 * length, length), color)
+        for turn, color in zip(turns, _AXIS_COLORS, strict=True)
+    )  # fmt: skip
+
+
+def _rod(frame: int, start: Array, length: float, radius: float, size: float) -> list[Visual]:
+    """A rod from the origin of ``start`` along its z axis; none if it is too short to see."""
+    if abs(length) < 1e-3 * size:
+        return []
+    pose = start @ se3.translation(0.0, 0.0, 0.5 * length)
+    return [Visual(frame, pose, Cylinder(radius, abs(length)), _LINK_COLOR)]
+
+
+def _slide(frame: int, stroke: float, radius: float) -> list[Visual]:
+    pose = se3.translation(0.0, 0.0, -0.5 * stroke)
+    return [
+        Visual(frame, pose, Box((0.9 * radius, 0.9 * radius, stroke)), _SLIDE_COLOR),
+        Visual(frame, np.eye(4), Box((2 * radius, 2 * radius, 0.8 * radius)), _JOINT_COLOR),
+    ]
+
+
+def _z_along(u: Array) -> Array:
+    """A rotation whose z axis is the unit vector ``u``."""
+    T = np.eye(4)
+    x = np.cross((0.0, 1.0, 0.0) if abs(u[1]) < 0.9 else (1.0, 0.0, 0.0), u)
+    x /= np.linalg.norm(x)
+    T[:3, :3] = np.column_stack((x, np.cross(u, x), u))
+    return T
