@@ -1,0 +1,20 @@
+"""What every test shares: the hypothesis profiles and a seeded generator."""
+
+import os
+
+import numpy as np
+import pytest
+from hypothesis import settings
+
+# Ordinary runs are short and always draw the same examples; HYPOTHESIS_PROFILE=thorough searches
+# further, with new examples each time.
+settings.register_profile(
+    "quick", max_examples=25, deadline=None, derandomize=True, database=None, print_blob=True
+)
+settings.register_profile("thorough", max_examples=1000, deadline=None, print_blob=True)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "quick"))
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(0)
