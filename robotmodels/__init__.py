@@ -1,0 +1,79 @@
+"""robotmodels: kinematics, dynamics, calibration and identification of robot manipulators.
+
+A table of Khalil-Kleinfinger (modified Denavit-Hartenberg) parameters becomes URDF, is loaded into
+Pinocchio, and gives the direct models; everything takes a `RobotModel` first. Only NumPy and
+Pinocchio are imported here, the rest where it is used.
+"""
+
+from __future__ import annotations
+
+import importlib
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+from . import errors
+from .drive import DriveParameters, Transmission
+from .dynamics import (
+    coriolis_matrix,
+    ddm,
+    gravity_torque,
+    idm,
+    kinetic_energy,
+    mass_matrix,
+    potential_energy,
+)
+from .geometry import DHTable, link_transforms
+from .inertia import InertialParameters
+from .kinematics import dgm, dkm, jacobian, jacobian_rate, link_poses
+from .model import RobotModel, to_urdf, write_urdf
+from .regressors import (
+    energy_regressor,
+    parameter_names,
+    parameter_vector,
+    torque_regressor,
+    torque_regressor_chunks,
+)
+from .urdf import NamedFrame
+
+if TYPE_CHECKING:
+    from . import viz
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "DHTable",
+    "DriveParameters",
+    "InertialParameters",
+    "NamedFrame",
+    "RobotModel",
+    "Transmission",
+    "coriolis_matrix",
+    "ddm",
+    "dgm",
+    "dkm",
+    "energy_regressor",
+    "errors",
+    "gravity_torque",
+    "idm",
+    "jacobian",
+    "jacobian_rate",
+    "kinetic_energy",
+    "link_poses",
+    "link_transforms",
+    "mass_matrix",
+    "parameter_names",
+    "parameter_vector",
+    "potential_energy",
+    "to_urdf",
+    "torque_regressor",
+    "torque_regressor_chunks",
+    "viz",
+    "write_urdf",
+]
+
+
+def __getattr__(name: str) -> ModuleType:
+    """Import the pictures when they are first asked for."""
+    if name == "viz":
+        return importlib.import_module(".viz", __name__)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

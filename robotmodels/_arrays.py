@@ -101,12 +101,16 @@ def as_vector(value: ArrayLike, n: int, name: str) -> Array:
     ShapeError, InvalidValueError
         As `as_core`.
     """
-    if type(value) is np.ndarray and value.dtype == np.float64 and value.shape == (n,):
-        # a sum of squares is finite only if every term is: one call instead of two
-        if isfinite(value.dot(value)):
-            return value
-        return as_floats(value, name)
-    return as_core(value, (n,), name)
+    try:
+        array = np.asarray(value)
+    except (ValueError, TypeError):
+        return as_core(value, (n,), name)
+    if array.shape == (n,) and array.dtype.kind in "fiu":
+        array = array.astype(np.float64, copy=False)
+        # a sum of squares is finite only if every term is: one quick call for one configuration
+        if isfinite(array.dot(array)):
+            return array
+    return as_core(array, (n,), name)
 
 
 def as_exact(value: ArrayLike, shape: tuple[int, ...], name: str) -> Array:

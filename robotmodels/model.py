@@ -216,7 +216,7 @@ class RobotModel:
     notes: tuple[str, ...] = ()
     _twin: PinocchioTwin | None = field(default=None, init=False)
     _chain: Chain | None = field(default=None, init=False)
-    _drives: DriveMatrices | None = field(default=None, init=False)
+    _drives: tuple[DriveMatrices | None] | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
         if not isinstance(self.table, DHTable):
@@ -464,9 +464,9 @@ class RobotModel:
         """Drive and coupling terms of all joints; None if every one of them is zero."""
         if self._drives is None:
             drives = drive_matrices(self.drive, self.transmission)
-            object.__setattr__(self, "_drives", drives)
-        drives = self._drives
-        return None if self.drive.is_zero and not drives.coupling.size else drives  # type: ignore[union-attr]
+            idle = self.drive.is_zero and not drives.coupling.size
+            object.__setattr__(self, "_drives", (None if idle else drives,))
+        return self._drives[0]  # type: ignore[index]
 
     @property
     def parts(self) -> RobotParts:

@@ -5,9 +5,13 @@ from __future__ import annotations
 from fractions import Fraction
 from math import pi
 
+import numpy as np
+
+from ._arrays import Array
 from .geometry import FIXED, PRISMATIC, DHTable
 
 _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+_SMALLEST = 1e-9  # a nanometre: what is smaller is rounding of the source, not geometry to read
 
 
 def boxed_table(table: DHTable) -> str:
@@ -43,10 +47,10 @@ def boxed_table(table: DHTable) -> str:
     columns.append(("σj", [str(s) for s in table.sigma]))
     if (table.mu != (table.sigma != FIXED)).any():
         columns.append(("μj", [str(m) for m in table.mu]))
-    if table.gamma.any() or table.b.any():
+    if _shows(table.gamma) or _shows(table.b):
         columns.append(("γj", [angle_text(v) for v in table.gamma]))
         columns.append(("bj", [length_text(v) for v in table.b]))
-    if table.beta.any():
+    if _shows(table.beta):
         columns.append(("βj", [angle_text(v) for v in table.beta]))
     columns.append(("αj", [angle_text(v) for v in table.alpha]))
     columns.append(("dj", [length_text(v) for v in table.d]))
@@ -109,7 +113,7 @@ def angle_text(value: float) -> str:
 
     Examples
     --------
-    >>> angle_text(-pi / 2), angle_text(0.3)
+    >>> angle_text(-np.pi / 2), angle_text(0.3)
     ('-π/2', '0.3')
     """
     ratio = Fraction(value / pi).limit_denominator(12)
@@ -120,7 +124,7 @@ def angle_text(value: float) -> str:
 
 
 def length_text(value: float) -> str:
-    """A number with six significant digits and no needless zeros.
+    """A number with six significant digits and no needless zeros; below 1e-9 it shows as 0.
 
     Parameters
     ----------
@@ -137,7 +141,7 @@ def length_text(value: float) -> str:
     >>> length_text(0.45), length_text(-0.0)
     ('0.45', '0')
     """
-    return f"{value + 0.0:.6g}"
+    return f"{value:.6g}" if abs(value) >= _SMALLEST else "0"
 
 
 def _own(table: DHTable, j: int, symbol: str) -> str:
@@ -148,6 +152,10 @@ def _own(table: DHTable, j: int, symbol: str) -> str:
     if table.sigma[j] == FIXED or symbol != variable:
         return text(offset)
     name = symbol + str(j + 1).translate(_SUBSCRIPTS)
-    if offset == 0:
+    if abs(offset) < _SMALLEST:
         return name
     return f"{name} {'+' if offset > 0 else '-'} {text(abs(offset))}"
+
+
+def _shows(column: Array) -> bool:
+    return bool((np.abs(column) >= _SMALLEST).any())

@@ -179,9 +179,10 @@ def link_names(parts: RobotParts) -> LinkNames:
         taken.add(name)
         return name
 
+    base = "R_0" if "base" in taken else "base"
     links = [
         free(name) if have is None else have
-        for have, name in zip(given, ("world", "base", *wanted, "tool"), strict=True)
+        for have, name in zip(given, ("world", base, *wanted, "tool"), strict=True)
     ]
     carried = (links[1], links[-1], *(frame.name for frame in spare))
     return LinkNames(
