@@ -15,6 +15,9 @@ from .errors import InvalidValueError, ShapeError
 
 Array = NDArray[np.float64]
 
+_FLOAT64 = np.dtype(np.float64)
+_NUMBERS = {float, int}
+
 
 def as_floats(value: ArrayLike, name: str) -> Array:
     """Convert to a float64 array and refuse everything that is not a real finite number.
@@ -101,16 +104,15 @@ def as_vector(value: ArrayLike, n: int, name: str) -> Array:
     ShapeError, InvalidValueError
         As `as_core`.
     """
-    try:
-        array = np.asarray(value)
-    except (ValueError, TypeError):
-        return as_core(value, (n,), name)
-    if array.shape == (n,) and array.dtype.kind in "fiu":
-        array = array.astype(np.float64, copy=False)
-        # a sum of squares is finite only if every term is: one quick call for one configuration
+    # a sum of squares is finite only if every term is: one quick call for one configuration
+    if type(value) is np.ndarray and value.dtype is _FLOAT64 and value.shape == (n,):
+        if isfinite(value.dot(value)):
+            return value
+    elif type(value) is list and len(value) == n and set(map(type, value)) <= _NUMBERS:
+        array = np.array(value, _FLOAT64)
         if isfinite(array.dot(array)):
             return array
-    return as_core(array, (n,), name)
+    return as_core(value, (n,), name)
 
 
 def as_exact(value: ArrayLike, shape: tuple[int, ...], name: str) -> Array:

@@ -113,7 +113,9 @@ class PinocchioTwin:
 
     def from_pin(self, x: Array) -> Array:
         """Reorder the last axis from Pinocchio's order to the table's; always a C-ordered copy."""
-        return np.array(x if self.in_table_order else x[..., self.order], order="C")
+        if self.in_table_order:
+            return x.copy()
+        return np.ascontiguousarray(x[..., self.order])
 
     def frame(self, frame: str | int | None) -> FrameOfInterest:
         """Look a frame up by name, by number, or as None: the tool."""
