@@ -7,16 +7,13 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 import robotmodels as rm
 
 HEAVY = ("numba", "scipy", "sympy", "meshcat", "yourdfpy", "matplotlib", "example_robot_data")
-FUNCTIONS = [name for name in rm.__all__ if inspect.isfunction(getattr(rm, name, None))]
 
 
 def python(code):
-    """What a fresh interpreter, started outside the checkout's warnings filter, prints."""
+    """What a fresh interpreter prints."""
     return subprocess.run(
         [sys.executable, "-c", code], check=True, capture_output=True, text=True, timeout=60
     ).stdout.strip()
@@ -46,27 +43,36 @@ def test_types_are_shipped():
     assert Path(rm.__file__).with_name("py.typed").is_file()
 
 
-@pytest.mark.parametrize("name", FUNCTIONS)
-def test_public_function_is_documented(name):
-    function = getattr(rm, name)
-    text = inspect.getdoc(function) or ""
-    sections = set(re.findall(r"^(\w[\w ]*)\n-{3,}$", text, flags=re.MULTILINE))
-    expected = {"Examples"}
-    if inspect.signature(function).parameters:
-        expected.add("Parameters")
-    if inspect.signature(function).return_annotation not in (None, "None"):
-        expected.add("Returns")
-    assert expected <= sections, f"rm.{name} lacks the sections {sorted(expected - sections)}"
-    assert ">>>" in text.partition("Examples\n")[2], f"the example of rm.{name} does not run"
+def public_functions():
+    """(name, function, its docstring) of every function of the door."""
+    for name in rm.__all__:
+        function = getattr(rm, name)
+        if inspect.isfunction(function):
+            yield name, function, inspect.getdoc(function) or ""
 
 
-@pytest.mark.parametrize("name", FUNCTIONS)
-def test_public_function_states_the_shapes_of_its_arrays(name):
-    """An array's entry gives its shape, ``(..., n)``, or says shape in words."""
-    function = getattr(rm, name)
-    text = inspect.getdoc(function) or ""
-    described = "\n".join(text.split("Examples\n")[0].splitlines()[1:])
-    arrays = [a for a in inspect.get_annotations(function).values() if "Array" in str(a)]
-    assert not arrays or "shape" in described or re.search(r"\([^)]*[,.\d][^)]*\)", described), (
-        f"rm.{name} takes or returns arrays and gives no shape"
-    )
+def test_every_public_function_is_documented():
+    problems = []
+    for name, function, text in public_functions():
+        expected = {"Examples"}
+        if inspect.signature(function).parameters:
+            expected.add("Parameters")
+        if inspect.signature(function).return_annotation not in (None, "None"):
+            expected.add("Returns")
+        missing = expected - set(re.findall(r"^(\w[\w ]*)\n-{3,}$", text, flags=re.MULTILINE))
+        if missing:
+            problems.append(f"{name} lacks {', '.join(sorted(missing))}")
+        if ">>>" not in text.partition("Examples\n")[2]:
+            problems.append(f"{name} has no example that runs")
+    assert problems == []
+
+
+def test_every_public_function_states_the_shapes_of_its_arrays():
+    """Beyond its first line it says shape, or gives one: ``(..., n)``."""
+    problems = []
+    for name, function, text in public_functions():
+        entries = text.partition("Examples\n")[0].partition("\n")[2]
+        has_arrays = any("Array" in str(a) for a in inspect.get_annotations(function).values())
+        if has_arrays and not re.search(r"shape|\([^)]*[,.\d][^)]*\)", entries):
+            problems.append(name)
+    assert problems == []
