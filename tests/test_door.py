@@ -59,7 +59,10 @@ def test_every_public_function_is_documented():
             expected.add("Parameters")
         if inspect.signature(function).return_annotation not in (None, "None"):
             expected.add("Returns")
-        missing = expected - set(re.findall(r"^(\w[\w ]*)\n-{3,}$", text, flags=re.MULTILINE))
+        sections = set(re.findall(r"^(\w[\w ]*)\n-{3,}$", text, flags=re.MULTILINE))
+        if "Yields" in sections:
+            sections.add("Returns")
+        missing = expected - sections
         if missing:
             problems.append(f"{name} lacks {', '.join(sorted(missing))}")
         if ">>>" not in text.partition("Examples\n")[2]:
