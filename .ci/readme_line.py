@@ -19,7 +19,7 @@ def main(readme: str, word: str) -> None:
         elif block is not None:
             block.append(line)
         elif re.match(r"#+ ", line):
-            wanted = re.search(rf"\b{word}s?\b", line, re.IGNORECASE) is not None
+            wanted = re.search(rf"\b{word}", line, re.IGNORECASE) is not None
     if not blocks:
         sys.exit(f"{readme} has no fenced block under a heading that contains '{word}'")
     commands = [line for line in blocks[0] if line.strip()]
