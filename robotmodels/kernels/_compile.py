@@ -40,12 +40,12 @@ def compiled(*signature: Any) -> Any:
     so the compiler need not write the entry from Python, which is half of its work. The result is
     typed as Any because type checkers cannot count the arguments of ``kernel(q, *chain, ...)``.
     """
-    return njit(
-        *signature,
-        cache=True,
-        nogil=True,
-        fastmath=False,
-        error_model="numpy",
-        no_cpython_wrapper=not signature,
-        no_cfunc_wrapper=True,
-    )
+    options: dict[str, Any] = {
+        "cache": True,
+        "nogil": True,
+        "fastmath": False,
+        "error_model": "numpy",
+        "no_cpython_wrapper": not signature,
+        "no_cfunc_wrapper": True,
+    }
+    return njit(*signature, **options)
