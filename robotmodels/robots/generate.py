@@ -1,0 +1,84 @@
+"""Write the catalogue's URDF files: ``python -m robotmodels.robots.generate [folder]``."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..errors import UrdfWarning
+from ..model import write_urdf
+from .catalogue import load, robots
+
+
+def generate(folder: str | Path) -> list[Path]:
+    """Write one URDF file for each robot of the catalogue.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Where to; made if it does not exist. URDF files of robots that are no longer in the
+        catalogue are left alone.
+
+    Returns
+    -------
+    list of Path
+        The files, named ``<robot>.urdf``.
+
+    Raises
+    ------
+    UrdfError
+        A file cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     generate(folder)[0].name
+    'lab_rr.urdf'
+    """
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = []
+    with warnings.catch_warnings():
+        # what a URDF cannot hold (rotor inertia, transmissions) is known here: `load` has it
+        warnings.simplefilter("ignore", UrdfWarning)
+        for name in robots():
+            path = folder / f"{name}.urdf"
+            write_urdf(load(name), path)
+            paths.append(path)
+    return paths
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Default: those of the command line.
+
+    Returns
+    -------
+    int
+        Exit code.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     main([folder])
+    0
+    """
+    parser = argparse.ArgumentParser(
+        prog="python -m robotmodels.robots.generate", description="Write the catalogue as URDF."
+    )
+    parser.add_argument("folder", nargs="?", default="urdf", help="where to (default: urdf)")
+    generate(parser.parse_args(arguments).folder)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
