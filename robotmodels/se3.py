@@ -160,11 +160,13 @@ def as_pose(T: Any, name: str = "T") -> Array:
     R = T[..., :3, :3]
     off = np.abs(R @ np.swapaxes(R, -1, -2) - np.eye(3)).max(axis=(-1, -2))
     worst = float(off.max())
-    if worst > ROTATION_TOLERANCE or (np.linalg.det(R) < 0).any():
-        i = np.unravel_index(int(off.argmax()), off.shape) if off.ndim else ()
+    mirrors = np.linalg.det(R) < 0
+    if worst > ROTATION_TOLERANCE or mirrors.any():
+        fault = off if worst > ROTATION_TOLERANCE else mirrors
+        i = np.unravel_index(int(fault.argmax()), fault.shape) if off.ndim else ()
         row = f" (row {', '.join(map(str, i))})" if i else ""
         raise NotARotationError(
-            f"{name}: the 3x3 block is not a rotation{row}: R R^T differs from 1 by {worst:.2g} "
+            f"{name}: the 3x3 block is not a rotation{row}: R R^T differs from 1 by {float(off[i]):.2g} "
             f"and det R = {float(np.linalg.det(R)[i]):.6g}; at most {ROTATION_TOLERANCE:g} is "
             "accepted and rounded away. Re-orthonormalise it first."
         )

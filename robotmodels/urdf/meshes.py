@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote
 
-from ..errors import MeshNotFoundError
+from ..errors import InvalidValueError, MeshNotFoundError
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +36,9 @@ class MeshFinder:
     urdf_dir: Path | None = None
 
     @classmethod
-    def of(cls, package_dirs: Iterable[str | Path] | str | Path, urdf_dir: Path | None) -> MeshFinder:
+    def of(
+        cls, package_dirs: Iterable[str | Path] | str | Path, urdf_dir: Path | None
+    ) -> MeshFinder:
         """A finder from what a caller passes: one folder or several.
 
         Parameters
@@ -51,6 +53,11 @@ class MeshFinder:
         MeshFinder
             The finder.
 
+        Raises
+        ------
+        InvalidValueError
+            Something that is neither a folder nor a list of folders.
+
         Examples
         --------
         >>> MeshFinder.of((), None).package_dirs
@@ -58,7 +65,12 @@ class MeshFinder:
         """
         if isinstance(package_dirs, (str, Path)):
             package_dirs = (package_dirs,)
-        return cls(tuple(Path(p) for p in package_dirs), urdf_dir)
+        try:
+            return cls(tuple(Path(p) for p in package_dirs), urdf_dir)
+        except TypeError:
+            raise InvalidValueError(
+                f"package_dirs: expected a folder or a list of folders, got {package_dirs!r:.80}."
+            ) from None
 
     def find(self, filename: str) -> Path | None:
         """Locate one mesh.
@@ -107,9 +119,8 @@ class MeshFinder:
                 if folder.resolve().name == package:
                     paths.append(folder / inside)
             if self.urdf_dir is not None:
-                for folder in (self.urdf_dir, *self.urdf_dir.parents):
-                    if folder.name == package:
-                        paths.append(folder / inside)
+                above = (self.urdf_dir, *self.urdf_dir.parents)
+                paths += [folder / inside for folder in above if folder.name == package]
             return paths
         path = Path(unquote(rest) if scheme == "file" else rest)
         if path.is_absolute():

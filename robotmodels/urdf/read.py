@@ -22,7 +22,7 @@ from ..khalil_frames import JointAxis, khalil_frames
 from ..visual import Visual
 from .meshes import MeshFinder
 from .parts import NamedFrame, RobotParts
-from .tree import MOVING_TYPES, UrdfJoint, UrdfTree, parse_urdf
+from .tree import MOVING_TYPES, OTHER_TYPES, UrdfJoint, UrdfTree, parse_urdf
 
 
 def read_urdf(
@@ -102,6 +102,11 @@ def _text_of(source: str | Path) -> tuple[str, Path | None]:
             f"cannot read {str(source)!r}: {error.strerror}. Give the path of a .urdf file, or the "
             "text of one."
         ) from None
+    except ValueError:
+        raise UrdfError(
+            f"{str(source)!r:.80} cannot be a path (it holds a zero character). Give the path of a "
+            ".urdf file, or the text of one."
+        ) from None
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,9 +149,7 @@ def _parts(
     )  # fmt: skip
     # pose of the link moved by joint j (or of the base link) in R_j (or R_0)
     links = np.concatenate((se3.inverse(frames.base)[None], frames.link_poses))
-    named = tuple(
-        NamedFrame(p.name, p.owner, links[p.owner] @ p.pose, p.merged) for p in placed
-    )
+    named = tuple(NamedFrame(p.name, p.owner, links[p.owner] @ p.pose, p.merged) for p in placed)
     visuals = tuple(
         Visual(frame.parent, frame.pose @ v.pose, v.shape, v.color)
         for frame in named
@@ -206,14 +209,15 @@ def _walk(
     stack = [(joint, start) for joint in reversed(following.get(start.name, []))]
     while stack:
         joint, parent = stack.pop()
-        if joint.kind not in (*MOVING_TYPES, "fixed"):
+        left_out = kept is not None and joint.name not in kept
+        if joint.kind not in (*MOVING_TYPES, "fixed", *(OTHER_TYPES if left_out else ())):
             raise UrdfError(
                 f"joint {joint.name!r} is of type {joint.kind!r}; a table describes revolute, "
                 "continuous, prismatic and fixed joints. If the arm hangs below it, give the link "
                 f"under it ({joint.child!r}) as base_link; choose tip_link to leave out a branch."
             )
         pose = parent.pose @ joint.origin
-        moves = joint.kind in MOVING_TYPES and (kept is None or joint.name in kept)
+        moves = joint.kind in MOVING_TYPES and not left_out
         if moves:
             sigma = 1 if joint.kind == "prismatic" else 0
             axes.append(JointAxis(parent.owner, sigma, pose, joint.axis))

@@ -20,6 +20,7 @@ from ..visual import Box, Color, Cylinder, Mesh, Shape, Sphere
 from .meshes import MeshFinder
 
 MOVING_TYPES = ("revolute", "continuous", "prismatic")
+OTHER_TYPES = ("floating", "planar")
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +132,8 @@ def parse_urdf(text: str, meshes: MeshFinder) -> UrdfTree:
 
 
 def _element_tree(text: str) -> ET.Element:
-    parser = expat.ParserCreate()
+    # declared encodings were undone when the file was read as text
+    parser = expat.ParserCreate("utf-8")
     builder = ET.TreeBuilder()
 
     def refuse(*_: object) -> None:
@@ -145,7 +147,6 @@ def _element_tree(text: str) -> ET.Element:
     parser.EndElementHandler = builder.end
     parser.CharacterDataHandler = builder.data
     try:
-        # declared encodings were undone when the file was read as text
         parser.Parse(text.encode("utf-8"), True)
     except expat.ExpatError as error:
         raise UrdfError(f"not well-formed XML: {error}.") from None
