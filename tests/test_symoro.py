@@ -1,0 +1,439 @@
+"""SYMORO's .par files: both spellings, symbols, SYMORO's own numbers, every kind of bad file."""
+
+import json
+import math
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import robotmodels as rm
+from robotmodels.errors import (
+    InvalidValueError,
+    ParFileError,
+    RobotModelsWarning,
+    TableError,
+)
+from robotmodels.symoro import read_par
+
+ORACLES = Path(__file__).parent / "oracles"
+LINK_KEYS = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M", "IA", "FV", "FS")
+WRENCH_KEYS = ("FX", "FY", "FZ", "CX", "CY", "CZ")
+PI = math.pi
+
+RX90 = {
+    "name": "RX90",
+    "ant": [0, 1, 2, 3, 4, 5],
+    "sigma": [0, 0, 0, 0, 0, 0],
+    "mu": [1, 1, 1, 1, 1, 1],
+    "gamma": [0, 0, 0, 0, 0, 0],
+    "b": [0, 0, 0, 0, 0, 0],
+    "alpha": [0, "pi/2", 0, "-pi/2", "pi/2", "-pi/2"],
+    "d": [0, 0, "D3", 0, 0, 0],
+    "theta": ["th1", "th2", "th3", "th4", "th5", "th6"],
+    "r": [0, 0, 0, "RL4", 0, 0],
+}
+RX90_VALUES = {"D3": 0.45, "RL4": 0.45}
+TWO_JOINTS = {
+    "name": "two",
+    "ant": [0, 1],
+    "sigma": [0, 1],
+    "mu": [1, 1],
+    "gamma": [0, 0],
+    "b": [0, 0],
+    "alpha": [0, "pi/2"],
+    "d": [0, 0.2],
+    "theta": ["th1", 0],
+    "r": [0.5, "r2"],
+}
+COLUMNS = ("ant", "sigma", "b", "d", "r", "gamma", "alpha", "mu", "theta")
+
+
+def listed(entries, between=","):
+    return "{" + between.join(map(str, entries)) + "}"
+
+
+def open_symoro(robot, counts=None, kind=0, extra=""):
+    """As OpenSYMORO writes a robot."""
+    n = len(robot["ant"])
+    nl, nj, nf = counts or (n, n, n)
+    lines = [f"(* Robotname = '{robot['name']}' *)", f"NL = {nl}", f"NJ = {nj}", f"NF = {nf}"]
+    lines += [f"Type = {kind}", "is_floating = False", "is_mobile = 0", ""]
+    lines += ["(* Geometric parameters *)"]
+    lines += [f"{key} = {listed(robot[key])}" for key in COLUMNS if key in robot]
+    return "\n".join([*lines, extra, "(* End of definition *)", ""])
+
+
+def symoro_plus(robot, extra=""):
+    """As SYMORO+ writes one: capitals, Pi, lists that begin on the next line, an accent."""
+    n = len(robot["ant"])
+    capitals = {"gamma": "gamma", "d": "d"}
+    lines = ["(*****************)", "(*    SYMORO+    *)", "(* rue de la Noë *)", ""]
+    lines += ["(* General parameters *)", f"(* Robotname = '{robot['name']}' *)"]
+    lines += [f"NF = {n}", f"NL = {n}", f"NJ = {n}", "Type = 0 (* Simple *)", ""]
+    for key in COLUMNS:
+        entries = [str(entry).replace("pi", "Pi") for entry in robot[key]]
+        broken = [",".join(entries[:2]) + ",", ",".join(entries[2:])] if n > 2 else [
+            ",".join(entries)
+        ]  # fmt: skip
+        body = "\n        ".join(broken)
+        lines += [f"{capitals.get(key, key.capitalize())} = {{\n        {body}}}"]
+    return "\n".join([*lines, extra, "(* End of definition *)", ""])
+
+
+def dynamic_lists(links):
+    return "\n".join(f"{key} = {listed([link[key] for link in links])}" for key in LINK_KEYS)
+
+
+def symbolic_lists(n):
+    keys = (*LINK_KEYS, *WRENCH_KEYS)
+    lines = [f"{key} = {listed([f'{key}{j}' for j in range(1, n + 1)])}" for key in keys]
+    lines += [f"{key} = {listed([f'{key}{j}' for j in range(1, n + 1)])}" for key in ("QP", "QDP")]
+    lines += [f"{key} = {{0,0,0}}" for key in ("W0", "WP0", "V0", "VP0")]
+    lines += ["G = {0,0,G3}", "Z = {1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1}"]
+    return "\n".join(lines)
+
+
+@pytest.fixture
+def read(tmp_path):
+    def read_text(text, *args, encoding="utf-8", file="robot.par", **kwargs):
+        path = tmp_path / file
+        path.write_bytes(text if isinstance(text, bytes) else text.encode(encoding))
+        return read_par(path, *args, **kwargs)
+
+    return read_text
+
+
+@pytest.fixture
+def two(read):
+    """Read the two-joint robot with some of its columns changed."""
+
+    def read_changed(values=None, extra="", **columns):
+        return read(open_symoro({**TWO_JOINTS, **columns}, extra=extra), values)
+
+    return read_changed
+
+
+def oracle(name):
+    return json.loads((ORACLES / f"par_{name}.json").read_text())
+
+
+# --- both spellings ------------------------------------------------------------------------------
+
+
+def test_both_spellings_give_equal_models(read):
+    open_ = read(open_symoro(RX90), RX90_VALUES)
+    assert read(symoro_plus(RX90), RX90_VALUES) == open_
+    assert read(symoro_plus(RX90).replace("\n", "\r\n"), RX90_VALUES) == open_
+    assert read(symoro_plus(RX90), RX90_VALUES, encoding="latin-1") == open_
+    assert read(symoro_plus(RX90), RX90_VALUES, encoding="utf-8-sig") == open_
+
+
+def test_rx90_is_the_books_table(read):
+    rx90 = read(open_symoro(RX90), RX90_VALUES)
+    rows = [
+        {"alpha": alpha, "d": d, "r": r}
+        for alpha, d, r in [(0, 0, 0), (90, 0, 0), (0, 0.45, 0), (-90, 0, 0.45), (90, 0, 0),
+                            (-90, 0, 0)]
+    ]  # fmt: skip
+    assert rx90.table == rm.DHTable.from_rows(rows, degrees=True)
+    assert rx90.name == "RX90"
+    np.testing.assert_array_equal(rx90.gravity, [0, 0, -9.81])
+    np.testing.assert_array_equal(rx90.base, np.eye(4))
+    assert not rx90.inertia.values.any()
+
+
+@pytest.mark.parametrize("write", [open_symoro, symoro_plus])
+@pytest.mark.parametrize("name", ["rx90", "scara", "two_arm_tree"])
+def test_poses_and_torques_are_symoros(read, name, write):
+    data = oracle(name)
+    G = f"G = {listed(data['gravity'])}"
+    robot = {**data["table"], "name": data["name"]}
+    model = read(write(robot, extra=f"{dynamic_lists(data['links'])}\n{G}"), data["values"])
+    q, v, a, tau = (np.array([s[k] for s in data["samples"]]) for k in ("q", "qp", "qpp", "tau"))
+    for frame in data["samples"][0]["T"]:
+        expected = np.array([s["T"][frame] for s in data["samples"]])
+        np.testing.assert_allclose(rm.dgm(model, q, int(frame)), expected, atol=1e-11)
+    np.testing.assert_allclose(rm.idm(model, q, v, a), tau, rtol=1e-10, atol=1e-10)
+    assert model.notes == ()
+
+
+# --- symbols, offsets, expressions ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("entry", "offset"),
+    [
+        ("t1", 0.0),
+        ("anything", 0.0),
+        ("th1 + pi/2", PI / 2),
+        ("PI/2+q1", PI / 2),
+        ("theta1 - 2*(0.25 + 1.5e-3)", -0.503),
+        ("D + th1", 0.7),
+        ("2*th1 - th1 + sqrt(D^2)", 0.7),
+        ("q1 + atan2(1, 1)", PI / 4),
+        ("0.3", 0.3),
+        ("-D + .7 + th1 + cos(pi)*sin(pi/2) + 2**0", 0.0),
+    ],
+)
+def test_what_is_added_to_the_variable_is_the_offset(two, entry, offset):
+    values = {"D": 0.7} if "D" in entry else None
+    model = two(values, theta=[entry, 0])
+    assert model.table.theta[0] == pytest.approx(offset, abs=1e-15)
+
+
+def test_prismatic_offset_and_length_with_the_joints_number(two):
+    model = two({"R2": 0.3}, r=[0.5, "r2 + R2 - 0.1"])
+    assert model.table.r.tolist() == pytest.approx([0.5, 0.2])
+    assert model.table.sigma.tolist() == [0, 1]
+
+
+def test_missing_symbols_are_named_all_at_once(read):
+    robot = {**RX90, "d": [0, 0, "D3", "d4", 0, 0], "theta": ["th1 + off1", *RX90["theta"][1:]]}
+    with pytest.raises(ParFileError, match=r"off1, D3, RL4\..*values=\{'off1': \.\.\.") as error:
+        read(open_symoro(robot), {"d4": 0.1})
+    assert "theta, entry 1: no number for th1" not in str(error.value)  # th1 itself is not missing
+    assert "d4" not in str(error.value)
+
+
+def test_values_must_be_symbols_of_the_file(two, read):
+    with pytest.raises(ParFileError, match=r"'d3'.*Did you mean 'D3'"):
+        read(open_symoro(RX90), {"d3": 0.45, "RL4": 0.45})
+    with pytest.raises(InvalidValueError, match=r"values\['D3'\]"):
+        read(open_symoro(RX90), {"D3": np.nan, "RL4": 0.45})
+    with pytest.raises(InvalidValueError, match="one number"):
+        read(open_symoro(RX90), {"D3": [0.45], "RL4": 0.45})
+    with pytest.raises(InvalidValueError, match="expected a mapping"):
+        two([("D3", 0.45)])
+
+
+@pytest.mark.parametrize(
+    ("theta", "values", "message"),
+    [
+        ("pi/2 - th1", None, "sign of its variable turned"),
+        ("-th1", None, "sign of its variable turned"),
+        ("2*th1", None, "not its variable plus a constant"),
+        ("th1**2", None, "not its variable plus a constant"),
+        ("phi + psi", None, "which of phi, psi is the variable of joint 1"),
+        ("th1", {"th1": 0.3}, "take that one"),
+        ("th1 + phi", {"th1": 0.3}, "'th1' is the variable of joint 1; take it out"),
+        ("r2", None, "already the variable of joint 1"),
+    ],
+)
+def test_a_variable_keeps_its_sign_and_is_one(two, theta, values, message):
+    with pytest.raises(ParFileError, match=message):
+        two(values, theta=[theta, 0])
+
+
+def test_a_variable_in_another_column_is_refused(two):
+    with pytest.raises(ParFileError, match=r"d, entry 2.*'th1' is the variable of joint 1"):
+        two(d=[0, "0.1*th1"])
+
+
+@pytest.mark.parametrize(
+    "entry",
+    ["", "1 2", "0,5x", "__import__('os')", "x.y", "[1]", "1 if 1 else 2", "True", "'a'", "1j",
+     "exp(1)", "sqrt(1, 2)", "7 // 2", "lambda", "(1", "(" * 300 + "1", "1+" * 600 + "1",
+     "1/0", "sqrt(-1)", "(-8)**(1/3)", "9.0**9**9**9", "1e999"],
+)  # fmt: skip
+def test_entries_that_are_not_numbers(two, entry):
+    with pytest.raises(ParFileError, match=r"robot\.par, line 1[0-9]: d"):
+        two(d=[0, entry])
+
+
+# --- dynamic parameters, gravity, base -----------------------------------------------------------
+
+
+def test_parameters_that_only_name_themselves_are_zero_with_one_warning(read):
+    text = open_symoro(RX90, extra=symbolic_lists(6))
+    with pytest.warns(RobotModelsWarning, match="XX XY XZ .* FS of all links") as record:
+        model = read(text, RX90_VALUES)
+    assert len(record) == 1
+    assert record[0].filename == __file__  # points at whoever called read_par
+    assert not model.inertia.values.any()
+    assert model.drive.is_zero
+    assert "of all links have no numbers and are 0" in model.notes[0]
+    assert "Gravity is symbolic" in model.notes[1]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RobotModelsWarning)
+        assert read(text, {**RX90_VALUES, "XX1": 0.0}) == model
+
+
+def test_numbers_among_symbols_are_kept(two):
+    extra = "M = {2.5, M2}\nZZ={ZZ1, ZZR2}\nFS = {0.1*k, FS2}\nXX = {0.2 + YY1, 0}"
+    with pytest.warns(RobotModelsWarning, match="YY1, ZZ1, M2, FS2 have no numbers"):
+        model = two({"k": 3.0, "ZZR2": 0.6}, extra=extra)
+    assert model.inertia.mass.tolist() == [2.5, 0.0]
+    assert model.inertia.values[:, 5].tolist() == [0.0, 0.6]
+    assert model.inertia.values[:, 0].tolist() == [0.2, 0.0]
+    assert model.drive.Fc.tolist() == pytest.approx([0.3, 0.0])
+    with pytest.raises(ParFileError, match="no number for rod"):
+        two(extra="M = {rod, 1}")
+
+
+def test_gravity_of_the_file_is_in_frame_0(two):
+    turned = "Z = {0,0,1,0.1, 0,1,0,0.2, -1,0,0,0.3, 0,0,0,1}"
+    model = two({"g": 9.8}, extra=f"G = {{g, 0, 0}}\n{turned}")
+    np.testing.assert_allclose(model.base[:3, 3], [0.1, 0.2, 0.3])
+    np.testing.assert_allclose(model.gravity, [0, 0, -9.8])
+    assert two(extra="G = {0, 0, 0}").gravity.tolist() == [0, 0, 0]
+    assert two({"G3": 9.81}, extra="G = {0, 0, -G3}").gravity.tolist() == [0, 0, -9.81]
+
+
+@pytest.mark.parametrize("G", ["{G1, G2, G3}", "{0, 0, G3}", "{0, 0, -GZ}"])
+def test_symbolic_gravity_is_the_default_and_noted(two, G):
+    model = two(extra=f"G = {G}")
+    assert model.gravity.tolist() == [0, 0, -9.81]
+    assert "Gravity is symbolic" in model.notes[0]
+
+
+def test_symbolic_gravity_elsewhere_needs_a_number(two, read):
+    for extra in ("G = {0, G2, 0}", "G = {1, 0, G2}",
+                  "G = {0,0,G2}\nZ = {1,0,0,0, 0,0,-1,0, 0,1,0,0, 0,0,0,1}"):  # fmt: skip
+        with pytest.raises(ParFileError, match="no number for G2"):
+            two(extra=extra)
+        model = read(open_symoro(TWO_JOINTS, extra=extra), gravity=[0, -1.0, 0])
+        assert model.gravity.tolist() == [0, -1, 0]
+
+
+def test_base_needs_numbers_and_a_pose(two):
+    tilted = "Z = {1,0,0,x0, 0,1,0,0, 0,0,1,0, 0,0,0,1}"
+    with pytest.raises(ParFileError, match="no number for x0"):
+        two(extra=tilted)
+    assert two({"x0": 0.5}, extra=tilted).base[0, 3] == 0.5
+    with pytest.raises(ParFileError, match=r"line 19: Z.*row by row"):
+        two(extra="Z = {1,0,0,0, 0,2,0,0, 0,0,1,0, 0,0,0,1}")
+
+
+def test_loads_and_drives_without_a_place_are_noted(read):
+    robot = {**TWO_JOINTS, "sigma": [0, 2], "mu": [0, 0], "r": [0.5, 0]}
+    model = read(open_symoro(robot, extra="IA = {0.1, 0.2}\nFV={1, FV2}\nFX = {0, 3}\nFY={0, FY2}"))
+    assert model.drive.Ia.tolist() == [0.1]
+    assert model.table.mu.tolist() == [0, 0]
+    assert any("IA2 = 0.2 is left out" in note for note in model.notes)
+    assert any("wrenches FX are left out" in note for note in model.notes)
+
+
+def test_unknown_keywords_are_left_out_with_a_warning(two):
+    with pytest.warns(RobotModelsWarning, match="'Colour' is not a keyword"):
+        two(extra="Colour = {1, 2}")
+
+
+# --- frames, trees, loops ------------------------------------------------------------------------
+
+
+def test_fixed_frames_are_kept_also_after_the_links(read):
+    robot = {**TWO_JOINTS, "sigma": [0, 1, 2], "ant": [0, 1, 2], "d": [0, 0.2, "L3"],
+             "theta": ["q1", 0, 0], "r": [0.5, "q2", 0.1]}  # fmt: skip
+    robot |= {key: [*TWO_JOINTS[key], 0] for key in ("gamma", "b", "alpha", "mu")}
+    three = read(open_symoro(robot, extra="M = {1, 2, 3}"), {"L3": 0.3})
+    # counted as a frame but not as a link: OpenSYMORO's planar2r.par
+    end = read(open_symoro(robot, counts=(2, 2, 3), extra="M = {1, 2}"), {"L3": 0.3})
+    assert (three.f, three.n, three.tip) == (3, 2, 3)
+    assert three.table == end.table
+    assert three.inertia.mass.tolist() == [1, 2, 3]
+    assert end.inertia.mass.tolist() == [1, 2, 0]
+    with pytest.raises(ParFileError, match="only fixed frames"):
+        read(open_symoro({**robot, "sigma": [0, 1, 1]}, counts=(2, 2, 3)), {"L3": 0.3})
+
+
+def test_columns_that_may_be_absent(two, read):
+    short = {k: v for k, v in TWO_JOINTS.items() if k not in ("gamma", "b", "mu")}
+    assert read(open_symoro(short)).table == two().table
+    without_nf = open_symoro(TWO_JOINTS).replace("NF = 2\n", "")
+    assert read(without_nf).table == two().table
+
+
+def test_the_name_falls_back_to_the_files(read):
+    text = open_symoro(TWO_JOINTS).split("\n", 1)[1]
+    assert read(text, file="my-arm.par").name == "my-arm"
+
+
+def test_continued_lines_comments_and_semicolons(two, read):
+    text = open_symoro(TWO_JOINTS)
+    text = text.replace("d = {0,0.2}", "d = {0, (* one *)\\\n 0.2 (* two\nlines *)};")
+    text = text.replace("r = {0.5,r2}", "r\n=\n{0.5,\nr2\n}").replace("r\n=", "r =")
+    assert read(text).table == two().table
+    repeated = open_symoro(TWO_JOINTS, extra="FX = {FX1, FX2}\nFX = {FX1,FX2}")
+    assert read(repeated).table == two().table
+
+
+def test_loops_are_refused_by_name(read):
+    # the SR400's structure: one parallelogram
+    robot = {key: [0] * 10 for key in ("gamma", "b", "alpha", "d", "r", "mu")}
+    robot |= {"name": "SR400", "ant": [0, 1, 2, 3, 4, 5, 1, 7, 8, 3], "sigma": [0] * 9 + [2]}
+    robot |= {"theta": [*(f"th{j}" for j in range(1, 10)), 0]}
+    with pytest.raises(ParFileError, match=r"'SR400' has closed loops.*joint 9 \(second: frame 10"):
+        read(open_symoro(robot, counts=(8, 9, 10), kind=2))
+    with pytest.raises(ParFileError, match=r"first 8 entries of the.*NJ = NF = 8 and Type = 1"):
+        read(open_symoro(robot, counts=(8, 9, 10), kind=2))
+    tree = {k: v[:8] if isinstance(v, list) else v for k, v in robot.items()}
+    assert read(open_symoro(tree, kind=1)).n == 8
+    with pytest.raises(ParFileError, match="Type = 2 says"):
+        read(open_symoro(tree, kind=2))
+
+
+# --- bad files -----------------------------------------------------------------------------------
+
+
+def test_files_that_are_not_there_or_not_par(tmp_path, read):
+    with pytest.raises(ParFileError, match=r"cannot read .*nothing\.par"):
+        read_par(tmp_path / "nothing.par")
+    with pytest.raises(ParFileError, match="cannot read"):
+        read_par(str(tmp_path))
+    with pytest.raises(ParFileError, match="not text"):
+        read(b"NL = 2\0\xff")
+    with pytest.raises(ParFileError, match="expected the keywords NL"):
+        read("")
+    with pytest.raises(ParFileError, match=r"line 1: expected 'keyword = \.\.\.', got '<robot"):
+        read("<robot/>")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("d = {0,0.2}", "d = {0}", "d: expected 2 entries .*NF = 2.*got 1"),
+        ("d = {0,0.2}", "d = {0,0.2,0}", "d: expected 2 entries .*got 3"),
+        ("d = {0,0.2}", "d = {0,0.2,}", "line 13: d, entry 3: '' is empty"),
+        ("d = {0,0.2}", "d = {0,\n\n oops(}", "line 15: d, entry 2"),
+        ("d = {0,0.2}", "d = {0,0.2", "line 13: the list d has no end"),
+        ("d = {0,0.2}", "d = 0.2", "expected a list in braces"),
+        ("d = {0,0.2}", "d = {0,0.2}\nD = {0,0.3}", "d stands here again"),
+        ("d = {0,0.2}", "", "expected the keywords d,"),
+        ("alpha = {", "alhpa = {", "keywords alpha, .*'alhpa' is none"),
+        ("NJ = 2", "", "expected the keywords NJ"),
+        ("NL = 2", "NL = two", "NL: expected a whole number"),
+        ("NL = 2", "NL = {2}", "NL: expected one value"),
+        ("NL = 2", "NL = 3", "do not fit"),
+        ("NL = 2", "NL = 0\nNJ = 0", "NJ stands here again|do not fit"),
+        ("NF = 2", "NF = 1", "do not fit"),
+        ("is_floating = False", "is_floating = True", "floating base is not supported"),
+        ("is_mobile = 0", "is_mobile = 1", "mobile base is not supported"),
+        ("is_mobile = 0", "is_mobile = maybe", "expected True or False"),
+        ("sigma = {0,1}", "sigma = {0,3}", "sigma, entry 2: expected 0"),
+        ("sigma = {0,1}", "sigma = {0,0.5}", "expected a whole number"),
+        ("sigma = {0,1}", "sigma = {0,s2}", "no number for s2"),
+        ("ant = {0,1}", "ant = {0,7}", "ant, entry 2: expected the number of a frame"),
+        ("ant = {0,1}", "ant = {-1,1}", "ant, entry 1: expected the number of a frame"),
+        ("mu = {1,1}", "mu = {1,5}", "mu, entry 2: expected 1"),
+        ("mu = {1,1}", "mu = {1,1e80}", "mu, entry 2: expected 1"),
+        ("(* End", "M = {1}\n(* End", r"M: expected 2 entries \(NL = 2 links\)"),
+        ("(* End", "G = {0, 0}\n(* End", "G: expected 3 entries"),
+        ("(* End", "Z = {1}\n(* End", "Z: expected 16 entries"),
+        ("(* End", "VP0 = {0, 0, 9.81}\n(* End", "the base moves"),
+        ("(* End", "eta = {0, 1}\n(* End", "flexible joints are not supported"),
+        ("(* End of definition *)", "(* End", "line 20: a comment .* has no end"),
+    ],
+)
+def test_bad_files_say_where_and_what(read, old, new, message):
+    text = open_symoro(TWO_JOINTS)
+    assert text.count(old) == 1
+    with pytest.raises(ParFileError, match=message) as error:
+        read(text.replace(old, new))
+    assert str(error.value).startswith("robot.par")
+
+
+def test_antecedents_out_of_order_are_the_tables_error(read):
+    with pytest.raises(TableError):
+        read(open_symoro(TWO_JOINTS).replace("ant = {0,1}", "ant = {2,1}"))
