@@ -147,7 +147,8 @@ def _element_tree(text: str) -> ET.Element:
     parser.EndElementHandler = builder.end
     parser.CharacterDataHandler = builder.data
     try:
-        parser.Parse(text.encode("utf-8"), True)
+        # a text in triple quotes often starts with a line end, which XML forbids
+        parser.Parse(text.lstrip("\ufeff \t\r\n").encode("utf-8"), True)
     except expat.ExpatError as error:
         raise UrdfError(f"not well-formed XML: {error}.") from None
     except (LookupError, ValueError) as error:
