@@ -237,9 +237,7 @@ def value_hash(*fields: object) -> int:
         The hash.
     """
     # adding 0.0 makes -0.0 and 0.0 hash alike, as they compare alike
-    return hash(
-        tuple((f + 0.0).tobytes() if isinstance(f, np.ndarray) else f for f in fields)
-    )
+    return hash(tuple((f + 0.0).tobytes() if isinstance(f, np.ndarray) else f for f in fields))
 
 
 def _converted(value: ArrayLike, name: str) -> Array:

@@ -7,16 +7,16 @@ Seed book sections 1.2.1 (q = K_c q_c + q_0), 1.5.1.4 (friction), 1.5.1.5 (rotor
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._arrays import Array, as_floats, as_vector, read_only, same_value, value_hash
+from ._arrays import Array, as_exact, as_floats, as_vector, read_only, same_value, value_hash
 from .errors import InertiaError, InvalidValueError, ShapeError
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, init=False, eq=False)
 class DriveParameters:
     """Drive terms of each joint, seen from the joint side.
 
@@ -49,26 +49,28 @@ class DriveParameters:
     array([0., 0.])
     """
 
-    Ia: Array = None  # type: ignore[assignment]
-    Fv: Array = None  # type: ignore[assignment]
-    Fc: Array = None  # type: ignore[assignment]
-    offset: Array = None  # type: ignore[assignment]
+    Ia: Array
+    Fv: Array
+    Fc: Array
+    offset: Array
 
-    def __post_init__(self) -> None:
-        names = [field.name for field in fields(self)]
-        given = {
-            name: as_floats(getattr(self, name), name)
-            for name in names
-            if getattr(self, name) is not None
-        }
-        if not given:
+    def __init__(
+        self,
+        Ia: ArrayLike | None = None,
+        Fv: ArrayLike | None = None,
+        Fc: ArrayLike | None = None,
+        offset: ArrayLike | None = None,
+    ) -> None:
+        given = {"Ia": Ia, "Fv": Fv, "Fc": Fc, "offset": offset}
+        values = {name: as_floats(v, name) for name, v in given.items() if v is not None}
+        if not values:
             raise InertiaError("Give at least one of Ia, Fv, Fc, offset, each of shape (n,).")
-        shape = next(iter(given.values())).shape
-        if len(shape) != 1 or any(array.shape != shape for array in given.values()):
-            shapes = ", ".join(f"{name} {array.shape}" for name, array in given.items())
+        shape = next(iter(values.values())).shape
+        if len(shape) != 1 or any(array.shape != shape for array in values.values()):
+            shapes = ", ".join(f"{name} {array.shape}" for name, array in values.items())
             raise ShapeError(f"Drive parameters are all of shape (n,), got {shapes}.")
-        for name in names:
-            object.__setattr__(self, name, read_only(given.get(name, np.zeros(shape))))
+        for name in given:
+            object.__setattr__(self, name, read_only(values.get(name, np.zeros(shape))))
 
     @classmethod
     def zeros(cls, n: int) -> Self:
@@ -101,6 +103,9 @@ class DriveParameters:
         """Whether every parameter is zero."""
         return not (self.Ia.any() or self.Fv.any() or self.Fc.any() or self.offset.any())
 
+    def __reduce__(self) -> tuple[Any, ...]:  # rebuilt, so that a copy is read-only as well
+        return type(self), tuple(getattr(self, f.name) for f in fields(self))
+
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, DriveParameters):
             return NotImplemented
@@ -110,7 +115,7 @@ class DriveParameters:
         return value_hash(self.Ia, self.Fv, self.Fc, self.offset)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, init=False, eq=False)
 class Transmission:
     """How encoders (motors) and joints move together: ``q = K q_c + q_0``.
 
@@ -158,22 +163,28 @@ class Transmission:
     """
 
     matrix: Array
-    offset: Array = None  # type: ignore[assignment]
-    Iam: Array = None  # type: ignore[assignment]
-    Fvm: Array = None  # type: ignore[assignment]
-    Fcm: Array = None  # type: ignore[assignment]
+    offset: Array
+    Iam: Array
+    Fvm: Array
+    Fcm: Array
 
-    def __post_init__(self) -> None:
-        K = as_floats(self.matrix, "matrix")
+    def __init__(
+        self,
+        matrix: ArrayLike,
+        offset: ArrayLike | None = None,
+        Iam: ArrayLike | None = None,
+        Fvm: ArrayLike | None = None,
+        Fcm: ArrayLike | None = None,
+    ) -> None:
+        K = as_floats(matrix, "matrix")
         if K.ndim != 2 or K.shape[0] != K.shape[1]:
             raise ShapeError(f"matrix: expected a square (n, n) matrix, got {K.shape}.")
+        n = K.shape[0]
         object.__setattr__(self, "matrix", read_only(K))
-        for name in ("offset", "Iam", "Fvm", "Fcm"):
-            given = getattr(self, name)
-            value = np.zeros(self.n) if given is None else as_vector(given, self.n, name)
-            if value.ndim != 1:
-                raise ShapeError(f"{name}: expected shape ({self.n},), got {value.shape}.")
-            object.__setattr__(self, name, read_only(value))
+        given = {"offset": offset, "Iam": Iam, "Fvm": Fvm, "Fcm": Fcm}
+        for name, value in given.items():
+            array = np.zeros(n) if value is None else as_exact(value, (n,), name)
+            object.__setattr__(self, name, read_only(array))
         single = sorted(set(range(1, self.n + 1)) - set(self.coupled_motors))
         for m in single:
             if self.Iam[m - 1] or self.Fvm[m - 1] or self.Fcm[m - 1]:
@@ -268,7 +279,8 @@ class Transmission:
                 "The transmission matrix is singular (a joint mimics another one): not every q "
                 "has encoder variables. Take the master joints' values instead."
             )
-        return np.linalg.solve(self.matrix, (q - self.offset)[..., None])[..., 0]
+        columns = (q - self.offset)[..., None]
+        return np.asarray(np.linalg.solve(self.matrix, columns)[..., 0], np.float64)
 
     def to_motor_torque(self, tau: ArrayLike) -> Array:
         """Motor torques that do the work of joint torques, ``tau_c = K^T tau``.
@@ -294,6 +306,9 @@ class Transmission:
         array([1.5])
         """
         return as_vector(tau, self.n, "tau") @ self.matrix
+
+    def __reduce__(self) -> tuple[Any, ...]:  # rebuilt, so that a copy is read-only as well
+        return type(self), tuple(getattr(self, f.name) for f in fields(self))
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Transmission):

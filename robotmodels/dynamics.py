@@ -13,10 +13,11 @@ from numpy.typing import ArrayLike
 
 from ._arrays import Array, as_vector, batch_rows
 from .errors import SingularMassMatrixError
-from .kinematics import jacobian
 from .model import RobotModel
 
 _SINGULAR = 1e-14
+_CHUNK = 1024  # Jacobians held at a time: they stay in the cache
+_WORLD_ALIGNED = 0  # the kernels' number of that reference
 
 
 def idm(
@@ -148,7 +149,7 @@ def ddm(
         scale = np.sqrt(np.abs(np.diag(M)))
         if not scale.all() or np.linalg.cond(M / np.outer(scale, scale)) > 1 / _SINGULAR:
             raise _singular(model, "")
-        return np.linalg.solve(M, tau - h)
+        return np.asarray(np.linalg.solve(M, tau - h), np.float64)
     from .kernels.direct_dynamics import joint_accelerations
 
     batch, rows = batch_rows((q, v, tau), ("q", "v", "tau"))
@@ -390,7 +391,8 @@ def potential_energy(model: RobotModel, q: ArrayLike) -> Array:
     """
     q = as_vector(q, model.n, "q")
     twin = model.twin
-    if q.ndim == 1 and twin.holds_inertia:
+    # Pinocchio leaves out what is fixed to the base
+    if q.ndim == 1 and twin.holds_inertia and twin.base_is_massless:
         return np.asarray(
             pin.computePotentialEnergy(twin.model, twin.data(), twin.to_pin(q)), dtype=np.float64
         )
@@ -415,7 +417,25 @@ def _rigid_torques(model: RobotModel, q: Array, v: Array, a: Array) -> Array:
 def _wrench_torque(model: RobotModel, q: Array, wrench: ArrayLike) -> Array:
     """``J^T wrench``: what the joints add so that the tool exerts a wrench."""
     w = as_vector(wrench, 6, "wrench")
-    return np.einsum("...ij,...i->...j", jacobian(model, q), w)
+    twin = model.twin
+    tool = twin.frame(None)
+    if q.ndim == w.ndim == 1:
+        J = pin.computeFrameJacobian(
+            twin.model, twin.data(), twin.to_pin(q), tool.pin_id, pin.LOCAL_WORLD_ALIGNED
+        )
+        return twin.from_pin(w @ J.reshape(6, model.n))
+    from .kernels.jacobians import jacobians
+
+    batch, rows = batch_rows((q, w), ("q", "wrench"))
+    tau = np.empty(rows[0].shape)
+    J = np.empty((min(_CHUNK, rows[0].shape[0]), 6, model.n))
+    for start in range(0, rows[0].shape[0], _CHUNK):
+        piece = slice(start, start + _CHUNK)
+        configurations = rows[0][piece]
+        k = configurations.shape[0]
+        jacobians(configurations, *model.chain, *tool.kernel_arguments, _WORLD_ALIGNED, J[:k])
+        np.einsum("ki,kij->kj", rows[1][piece], J[:k], out=tau[piece])
+    return tau.reshape(*batch, model.n)
 
 
 def _singular(model: RobotModel, where: str) -> SingularMassMatrixError:

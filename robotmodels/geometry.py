@@ -29,7 +29,7 @@ _ROW_KEYS = ("antecedent", "sigma", "mu", *_ANGLES, *_LENGTHS, *_LIMITS, "name")
 _STANDARD_KEYS = ("theta", "d", "a", "alpha", "sigma", "offset", *_LIMITS, "name")
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@dataclass(frozen=True, slots=True, init=False, eq=False, repr=False)
 class DHTable:
     """Geometric parameters of a serial or tree structure in Khalil-Kleinfinger form.
 
@@ -83,42 +83,63 @@ class DHTable:
 
     antecedent: NDArray[np.int64]
     sigma: NDArray[np.int64]
-    mu: NDArray[np.int64] = None  # type: ignore[assignment]
-    gamma: Array = None  # type: ignore[assignment]
-    b: Array = None  # type: ignore[assignment]
-    beta: Array = None  # type: ignore[assignment]
-    alpha: Array = None  # type: ignore[assignment]
-    d: Array = None  # type: ignore[assignment]
-    theta: Array = None  # type: ignore[assignment]
-    r: Array = None  # type: ignore[assignment]
-    names: tuple[str, ...] = None  # type: ignore[assignment]
-    lower: Array = None  # type: ignore[assignment]
-    upper: Array = None  # type: ignore[assignment]
-    velocity: Array = None  # type: ignore[assignment]
-    effort: Array = None  # type: ignore[assignment]
+    mu: NDArray[np.int64]
+    gamma: Array
+    b: Array
+    beta: Array
+    alpha: Array
+    d: Array
+    theta: Array
+    r: Array
+    names: tuple[str, ...]
+    lower: Array
+    upper: Array
+    velocity: Array
+    effort: Array
 
-    def __post_init__(self) -> None:
-        antecedent = _integers(self.antecedent, "antecedent")
-        f = antecedent.size
-        sigma = _integers(self.sigma, "sigma", f)
-        _check_structure(antecedent, sigma)
-        moving = sigma != FIXED
+    def __init__(
+        self,
+        antecedent: ArrayLike,
+        sigma: ArrayLike,
+        mu: ArrayLike | None = None,
+        gamma: ArrayLike | None = None,
+        b: ArrayLike | None = None,
+        beta: ArrayLike | None = None,
+        alpha: ArrayLike | None = None,
+        d: ArrayLike | None = None,
+        theta: ArrayLike | None = None,
+        r: ArrayLike | None = None,
+        names: Sequence[str] | None = None,
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        effort: ArrayLike | None = None,
+    ) -> None:
+        ancestors = _integers(antecedent, "antecedent")
+        f = ancestors.size
+        kinds = _integers(sigma, "sigma", f)
+        _check_structure(ancestors, kinds)
+        moving = kinds != FIXED
         n = int(moving.sum())
-        mu = moving.astype(np.int64) if self.mu is None else _integers(self.mu, "mu", f)
-        if not np.isin(mu, (0, 1)).all():
-            raise TableError(f"mu: expected 1 (actuated) or 0 (passive), got {mu.tolist()}.")
-        values: dict[str, Any] = {
-            "antecedent": antecedent,
-            "sigma": sigma,
-            "mu": np.where(moving, mu, 0),
+        actuated = moving.astype(np.int64) if mu is None else _integers(mu, "mu", f)
+        if not np.isin(actuated, (0, 1)).all():
+            raise TableError(f"mu: expected 1 (actuated) or 0 (passive), got {actuated.tolist()}.")
+        values: dict[str, NDArray[Any]] = {
+            "antecedent": ancestors,
+            "sigma": kinds,
+            "mu": np.where(moving, actuated, 0),
         }
-        for column in (*_ANGLES, *_LENGTHS):
-            given = getattr(self, column)
+        geometric = {
+            "gamma": gamma, "b": b, "beta": beta, "alpha": alpha, "d": d, "theta": theta, "r": r,
+        }  # fmt: skip
+        for column, given in geometric.items():
             values[column] = np.zeros(f) if given is None else as_exact(given, (f,), column)
-        values |= _checked_limits({k: getattr(self, k) for k in _LIMITS}, n)
-        names = _default_names(sigma) if self.names is None else tuple(map(str, self.names))
-        _check_names(names, f)
-        object.__setattr__(self, "names", names)
+        values |= _checked_limits(
+            {"lower": lower, "upper": upper, "velocity": velocity, "effort": effort}, n
+        )
+        labels = _default_names(kinds) if names is None else tuple(map(str, names))
+        _check_names(labels, f)
+        object.__setattr__(self, "names", labels)
         for key, value in values.items():
             object.__setattr__(self, key, read_only(value, value.dtype.type))
 
@@ -307,6 +328,9 @@ class DHTable:
     def __repr__(self) -> str:
         return f"<DHTable: {self.f} frames, {self.n} joints>\n{self}"
 
+    def __reduce__(self) -> tuple[Any, ...]:  # rebuilt, so that a copy is read-only as well
+        return type(self), tuple(getattr(self, field.name) for field in fields(self))
+
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, DHTable):
             return NotImplemented
@@ -469,7 +493,9 @@ def _check_names(names: tuple[str, ...], f: int) -> None:
     if repeated or not all(names):
         raise TableError(
             f"names: each frame needs a name of its own, got {', '.join(map(repr, repeated))} "
-            "more than once." if repeated else "names: a frame has an empty name."
+            "more than once."
+            if repeated
+            else "names: a frame has an empty name."
         )
 
 

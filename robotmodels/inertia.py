@@ -24,7 +24,7 @@ PARAMETERS = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
 _ROUNDING = 1e-12
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, init=False, eq=False)
 class InertialParameters:
     """Standard inertial parameters of every frame.
 
@@ -55,14 +55,14 @@ class InertialParameters:
 
     values: Array
 
-    def __post_init__(self) -> None:
-        values = as_floats(self.values, "values")
-        if values.ndim != 2 or values.shape[1] != 10:
+    def __init__(self, values: ArrayLike) -> None:
+        rows = as_floats(values, "values")
+        if rows.ndim != 2 or rows.shape[1] != 10:
             raise ShapeError(
                 f"values: expected one row of ten parameters ({' '.join(PARAMETERS)}) for each "
-                f"frame, shape (f, 10), got {values.shape}."
+                f"frame, shape (f, 10), got {rows.shape}."
             )
-        object.__setattr__(self, "values", read_only(values))
+        object.__setattr__(self, "values", read_only(rows))
 
     @classmethod
     def zeros(cls, f: int) -> Self:
@@ -106,7 +106,7 @@ class InertialParameters:
         Raises
         ------
         InertiaError
-            A negative mass, a tensor that is not symmetric, or mass zero with a centre of mass.
+            A negative mass, or a tensor that is not symmetric.
         ShapeError, InvalidValueError
             Shapes that do not fit each other; NaN or infinity.
 
@@ -133,7 +133,9 @@ class InertialParameters:
             )
         if (np.abs(tensor - np.swapaxes(tensor, 1, 2)).max(initial=0.0)
                 > 1e-9 * max(1.0, np.abs(tensor).max(initial=0.0))):  # fmt: skip
-            raise InertiaError("inertia: a tensor must be symmetric; check the products of inertia.")
+            raise InertiaError(
+                "inertia: a tensor must be symmetric; check the products of inertia."
+            )
         S = se3.skew(com)
         about_origin = tensor - mass[:, None, None] * (S @ S)
         return cls(_vectors(about_origin, mass[:, None] * com, mass))
@@ -270,10 +272,11 @@ class InertialParameters:
         h = (R @ self.first_moments[:, :, None])[:, :, 0]
         P, H = se3.skew(p), se3.skew(h)
         m = self.mass[:, None]
-        tensor = (
-            R @ self.tensors @ np.swapaxes(R, 1, 2) - (P @ H + H @ P) - m[:, :, None] * (P @ P)
-        )
+        tensor = R @ self.tensors @ np.swapaxes(R, 1, 2) - (P @ H + H @ P) - m[:, :, None] * (P @ P)
         return type(self)(_vectors(tensor, h + m * p, self.mass))
+
+    def __reduce__(self) -> tuple[Any, ...]:  # rebuilt, so that a copy is read-only as well
+        return type(self), (self.values,)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, InertialParameters):

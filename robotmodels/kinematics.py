@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from ._arrays import Array, as_vector, batch_rows
 from .errors import InvalidValueError
-from .model import FrameOfInterest, RobotModel
+from .model import RobotModel
 
 Reference = Literal["world_aligned", "local", "world"]
 
@@ -77,7 +77,7 @@ def dgm(model: RobotModel, q: ArrayLike, frame: str | int | None = None) -> Arra
 
     batch, (rows,) = batch_rows((q,), ("q",))
     out = np.empty((rows.shape[0], 4, 4))
-    tip_poses(rows, *model.chain, *_point(model, point), out)
+    tip_poses(rows, *model.chain, *point.kernel_arguments, out)
     return out.reshape(*batch, 4, 4)
 
 
@@ -184,12 +184,13 @@ def jacobian(
         J = pin.computeFrameJacobian(
             twin.model, twin.data(), twin.to_pin(q), point.pin_id, pin_reference
         )
-        return twin.from_pin(J)
+        # with one joint Pinocchio returns a flat array
+        return twin.from_pin(J.reshape(6, model.n))
     from .kernels.jacobians import jacobians
 
     batch, (rows,) = batch_rows((q,), ("q",))
     out = np.empty((rows.shape[0], 6, model.n))
-    jacobians(rows, *model.chain, *_point(model, point), number, out)
+    jacobians(rows, *model.chain, *point.kernel_arguments, number, out)
     return out.reshape(*batch, 6, model.n)
 
 
@@ -243,12 +244,12 @@ def jacobian_rate(
         pin.computeJointJacobiansTimeVariation(twin.model, data, twin.to_pin(q), twin.to_pin(v))
         pin.updateFramePlacement(twin.model, data, point.pin_id)
         rate = pin.getFrameJacobianTimeVariation(twin.model, data, point.pin_id, pin_reference)
-        return twin.from_pin(rate)
+        return twin.from_pin(rate.reshape(6, model.n))
     from .kernels.jacobians import jacobian_rates
 
     batch, rows = batch_rows((q, v), ("q", "v"))
     out = np.empty((rows[0].shape[0], 6, model.n))
-    jacobian_rates(*rows, *model.chain, *_point(model, point), number, out)
+    jacobian_rates(*rows, *model.chain, *point.kernel_arguments, number, out)
     return out.reshape(*batch, 6, model.n)
 
 
@@ -311,13 +312,3 @@ def _reference(reference: str) -> tuple[pin.ReferenceFrame, int]:
         raise InvalidValueError(
             f"reference: expected one of {', '.join(map(repr, _REFERENCES))}, got {reference!r}."
         ) from None
-
-
-def _point(model: RobotModel, point: FrameOfInterest) -> tuple[Array, Array, Array]:
-    """Path to a frame's parent, and the frame's rotation and position in it, for the kernels."""
-    path = np.array(model.table.path(point.parent), dtype=np.int64)
-    return (
-        path,
-        np.ascontiguousarray(point.pose[:3, :3]),
-        np.ascontiguousarray(point.pose[:3, 3]),
-    )

@@ -18,7 +18,7 @@ from . import se3
 from ._arrays import Array, as_exact, read_only, same_value, value_hash
 from .drive import DriveMatrices, DriveParameters, Transmission, drive_matrices
 from .errors import FrameNotFoundError, InvalidValueError, ShapeError, UrdfError, UrdfWarning
-from .geometry import DHTable, constant_factors
+from .geometry import FIXED, DHTable, constant_factors
 from .inertia import InertialParameters
 from .kernels import Chain
 from .urdf import NamedFrame, RobotParts, read_urdf, urdf_text
@@ -43,20 +43,31 @@ class FrameOfInterest:
     ----------
     parent : int
         Number of the table's frame it is fixed to; 0 is R_0.
-    pose : ndarray, shape (4, 4)
-        In that frame.
+    path : ndarray of int, shape (k,)
+        Numbers of the table's frames from the base to the parent.
+    rotation : ndarray, shape (3, 3)
+        Axes in the parent frame.
+    position : ndarray, shape (3,)
+        Origin in the parent frame, metres.
     pin_id : int
         Number of the same frame in the Pinocchio model.
 
     Examples
     --------
-    >>> FrameOfInterest(0, np.eye(4), 2).parent
-    0
+    >>> RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 0])).twin.frame(2).path
+    array([1, 2])
     """
 
     parent: int
-    pose: Array
+    path: NDArray[np.int64]
+    rotation: Array
+    position: Array
     pin_id: int
+
+    @property
+    def kernel_arguments(self) -> tuple[NDArray[np.int64], Array, Array]:
+        """What compiled kernels take: path, rotation, position."""
+        return self.path, self.rotation, self.position
 
 
 class PinocchioTwin:
@@ -76,8 +87,10 @@ class PinocchioTwin:
     1
     """
 
-    __slots__ = ("_frames", "_parts", "_scratch", "holds_inertia", "in_table_order", "model",
-                 "names", "order")  # fmt: skip
+    __slots__ = (
+        "_frames", "_parts", "_scratch", "base_is_massless", "holds_inertia", "in_table_order",
+        "model", "names", "order",
+    )  # fmt: skip
 
     def __init__(self, parts: RobotParts, gravity: Array) -> None:
         # mimic joints stay independent here: the coupling is the transmission's
@@ -90,13 +103,16 @@ class PinocchioTwin:
         )
         self.in_table_order = bool((self.order == np.arange(parts.table.n)).all())
         self.holds_inertia = all(holds_inertia(row) for row in parts.inertia.values)
+        table, fixed = parts.table, parts.table.sigma == FIXED
+        on_base = [j for j in range(table.f) if all(fixed[i - 1] for i in table.path(j + 1))]
+        self.base_is_massless = not parts.inertia.values[on_base].any()
         self.names = link_names(parts)
         self._parts = parts
         self._frames: dict[str | int | None, FrameOfInterest] = {}
         self._scratch = threading.local()
 
     def data(self) -> Any:
-        """This thread's ``pin.Data``."""
+        """Scratch data of the calling thread, a ``pin.Data``."""
         try:
             return self._scratch.data
         except AttributeError:
@@ -129,17 +145,17 @@ class PinocchioTwin:
     def _find(self, frame: str | int | None) -> FrameOfInterest:
         parts, names = self._parts, self.names
         if frame is None or frame == names.tool:
-            return FrameOfInterest(parts.tip, parts.tool, self._id(names.tool))
+            return self._point(parts.tip, parts.tool, names.tool)
         if isinstance(frame, (int, np.integer)) and not isinstance(frame, bool):
             if not 0 <= frame <= parts.table.f:
                 raise FrameNotFoundError(
                     "frame number", int(frame), map(str, range(parts.table.f + 1)),
                     "Frames are numbered 1 to f as in the table; 0 is the base.",
                 )  # fmt: skip
-            return FrameOfInterest(int(frame), np.eye(4), self._id(names.frames[int(frame)]))
+            return self._point(int(frame), np.eye(4), names.frames[int(frame)])
         for named in parts.frames:
             if named.name == frame:
-                return FrameOfInterest(named.parent, named.pose, self._id(named.name))
+                return self._point(named.parent, named.pose, named.name)
         if frame == names.frames[0]:
             return self._find(0)
         if frame in parts.table.names:
@@ -152,8 +168,14 @@ class PinocchioTwin:
         names = (self.names.frames[0], *self._parts.table.names, *named, self.names.tool)
         return tuple(dict.fromkeys(names))
 
-    def _id(self, link: str) -> int:
-        return int(self.model.getFrameId(link, pin.FrameType.BODY))
+    def _point(self, parent: int, pose: Array, link: str) -> FrameOfInterest:
+        return FrameOfInterest(
+            parent=parent,
+            path=read_only(self._parts.table.path(parent), np.int64),
+            rotation=read_only(pose[:3, :3]),
+            position=read_only(pose[:3, 3]),
+            pin_id=int(self.model.getFrameId(link, pin.FrameType.BODY)),
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False, weakref_slot=True)
@@ -485,7 +507,9 @@ class RobotModel:
 
     def with_inertia(self, inertia: InertialParameters | None) -> Self:
         """The same robot with other inertial parameters; None makes it massless."""
-        return replace(self, inertia=InertialParameters.zeros(self.f) if inertia is None else inertia)
+        return replace(
+            self, inertia=InertialParameters.zeros(self.f) if inertia is None else inertia
+        )
 
     def with_drive(self, drive: DriveParameters | None) -> Self:
         """The same robot with other drive parameters; None takes them away."""

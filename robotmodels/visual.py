@@ -163,7 +163,7 @@ def characteristic_length(table: DHTable, tool: Array) -> float:
     return total if total > 1e-6 else 0.5
 
 
-def skeleton(table: DHTable, tool: Array, tip: int) -> tuple[Visual, ...]:
+def skeleton(table: DHTable, tool: Array, tip: int, axes: bool = True) -> tuple[Visual, ...]:
     """Simple shapes for a robot that has none: joints, links, a foot and the tool's axes.
 
     Revolute joints are cylinders along z_j, prismatic ones a slide as long as the stroke, links
@@ -177,6 +177,8 @@ def skeleton(table: DHTable, tool: Array, tip: int) -> tuple[Visual, ...]:
         Pose of the tool in the tip frame.
     tip : int
         Number of the tip frame.
+    axes : bool
+        Whether the tool's axes are among them.
 
     Returns
     -------
@@ -214,7 +216,9 @@ def skeleton(table: DHTable, tool: Array, tip: int) -> tuple[Visual, ...]:
     reach = float(np.linalg.norm(tool[:3, 3]))
     if reach > 1e-3 * size:
         shapes += _rod(tip, _z_along(tool[:3, 3] / reach), reach, 0.7 * rod, size)
-    return (*shapes, *triad(tip, tool, 0.1 * size))
+    if axes:
+        shapes += triad(tip, tool, 0.1 * size)
+    return tuple(shapes)
 
 
 def triad(frame: int, pose: Array, length: float) -> tuple[Visual, ...]:

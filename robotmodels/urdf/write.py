@@ -299,9 +299,7 @@ def _limit(value: float) -> str:
     return repr(float(value))
 
 
-def _mimics(
-    transmission: Transmission | None, joints: tuple[str, ...]
-) -> dict[int, list[str]]:
+def _mimics(transmission: Transmission | None, joints: tuple[str, ...]) -> dict[int, list[str]]:
     """<mimic> elements of a singular transmission, by joint column."""
     if transmission is None or transmission.is_invertible:
         return {}
@@ -318,7 +316,7 @@ def _mimics(
                 "robot would reach other poses. Remove it first: model.with_transmission(None)."
             )
         elements[i] = [
-            f"    <mimic joint={quoteattr(joints[master])} multiplier=\"{float(K[i, master])!r}\" "
+            f'    <mimic joint={quoteattr(joints[master])} multiplier="{float(K[i, master])!r}" '
             f'offset="{float(transmission.offset[i])!r}"/>'
         ]
     return elements

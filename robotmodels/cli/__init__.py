@@ -1,0 +1,5 @@
+"""The command line: ``robotmodels demo | robots | info | view``, each with ``--help``."""
+
+from .main import main
+
+__all__ = ["main"]

@@ -1,0 +1,158 @@
+"""``robotmodels demo``: the main job, from a table and from a URDF to every direct model."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .._arrays import Array
+from ..dynamics import ddm, gravity_torque, idm
+from ..geometry import link_transforms
+from ..kinematics import dgm, dkm, jacobian
+from ..model import RobotModel, write_urdf
+from ..robots import load
+from .info import pose_text
+
+_SAMPLES = 1000
+_BATCH = 100_000
+
+
+def add_command(commands: Any) -> None:
+    """Add the command to the parser.
+
+    Parameters
+    ----------
+    commands : argparse subparsers
+        Where to add it.
+
+    Examples
+    --------
+    >>> add_command(argparse.ArgumentParser().add_subparsers())
+    """
+    parser = commands.add_parser(
+        "demo",
+        help="two arms from table and URDF to every direct model",
+        description="Take the Staubli RX-90 from its table to URDF and Pinocchio, and the UR5 "
+        "from its URDF to its table; print every direct model of both and draw them.",
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("robotmodels-demo"), metavar="FOLDER",
+        help="where the URDF and the scene go (default: %(default)s)",
+    )  # fmt: skip
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Run the demonstration.
+
+    Parameters
+    ----------
+    arguments : Namespace
+        With ``out``, the folder for the files.
+
+    Examples
+    --------
+    >>> table_poses(load("rx90"), np.zeros((2, 6))).shape
+    (2, 4, 4)
+    """
+    started = time.perf_counter()
+    folder: Path = arguments.out
+    folder.mkdir(parents=True, exist_ok=True)
+    _say("Staubli RX-90: from the table of the seed book (Table 1.1) to URDF to Pinocchio")
+    rx90 = load("rx90")
+    _show_models(rx90, folder)
+    _say("UR5: from the URDF of example-robot-data to its table")
+    ur5 = load("erd:ur5")
+    _show_models(ur5, folder)
+    _say("Drawing both arms with meshcat")
+    from ..viz import show
+
+    scene = folder / "arms.html"
+    beside = np.eye(4)
+    beside[1, 3] = 1.0
+    show([rx90, ur5.with_base(beside @ ur5.base)], [_posture(rx90), _posture(ur5)]).save(scene)
+    print(f"Offline scene of both arms: {scene.resolve()} (open it in a browser)")
+    print(f"\nDone in {time.perf_counter() - started:.1f} s.")
+
+
+def table_poses(model: RobotModel, q: Array) -> Array:
+    """Tool poses by the plain product of the table's factors, without Pinocchio or kernels.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot.
+    q : ndarray, shape (N, n)
+        Joint variables, rad or m.
+
+    Returns
+    -------
+    ndarray, shape (N, 4, 4)
+        World poses of the tool.
+
+    Examples
+    --------
+    >>> rx90 = load("rx90")
+    >>> bool(np.allclose(table_poses(rx90, np.zeros((1, 6)))[0], dgm(rx90, [0] * 6)))
+    True
+    """
+    T = np.broadcast_to(model.base, (q.shape[0], 4, 4))
+    factors = link_transforms(model.table, q)
+    for j in model.table.path(model.tip):
+        T = T @ factors[:, j - 1]
+    return T @ model.tool
+
+
+def _show_models(model: RobotModel, folder: Path) -> None:
+    print(model)
+    path = folder / f"{model.name}.urdf"
+    write_urdf(model, path)
+    print(f"URDF: {path.resolve()}")
+    for note in model.notes:
+        print(f"Note: {note}")
+    q = _posture(model)
+    v, a = np.full(model.n, 0.5), np.full(model.n, 1.0)
+    print(f"\nAt q = {_row(q)} rad, v = {_row(v)} rad/s, a = {_row(a)} rad/s^2:")
+    print(f"pose of the tool (m):\n{pose_text(dgm(model, q))}")
+    print("Jacobian (rows v, w; world axes):")
+    print("\n".join("  " + _row(row) for row in jacobian(model, q)))
+    print(f"velocity of the tool (m/s, rad/s): {_row(dkm(model, q, v))}")
+    print(f"gravity torque (N m):              {_row(gravity_torque(model, q))}")
+    tau = idm(model, q, v, a)
+    print(f"inverse dynamics, torque (N m):    {_row(tau)}")
+    back = ddm(model, q, v, tau)
+    print(f"direct dynamics of it (rad/s^2):   {_row(back)}")
+    Q = np.random.default_rng(0).uniform(-np.pi, np.pi, (_SAMPLES, model.n))
+    pinocchio = np.array([dgm(model, row) for row in Q])
+    difference = np.abs(pinocchio - table_poses(model, Q)).max()
+    print(f"\nLargest difference between Pinocchio and the plain product of the table's factors\n"
+          f"  over {_SAMPLES} random configurations: {difference:.1e}")  # fmt: skip
+    print("Compiling the batch kernel (the first time on this machine only) ...", flush=True)
+    started = time.perf_counter()
+    dgm(model, Q)
+    print(f"  ready after {time.perf_counter() - started:.1f} s")
+    Q = np.random.default_rng(1).uniform(-np.pi, np.pi, (_BATCH, model.n))
+    times = []
+    for _ in range(5):
+        started = time.perf_counter()
+        dgm(model, Q)
+        times.append(time.perf_counter() - started)
+    print(f"Poses in batch: {np.median(times) / _BATCH * 1e6:.2f} us each ({_BATCH} poses, median "
+          "of 5 runs)")  # fmt: skip
+
+
+def _posture(model: RobotModel) -> Array:
+    """A posture away from singularities, the same for both arms."""
+    return np.array([0.3, -0.9, 1.2, 0.4, 0.8, -0.2])[: model.n]
+
+
+def _row(values: Array) -> str:
+    return "  ".join(f"{v + 0.0:9.4f}" for v in np.asarray(values).round(9))
+
+
+def _say(text: str) -> None:
+    print(f"\n{'=' * 88}\n{text}\n{'=' * 88}", flush=True)

@@ -1,0 +1,46 @@
+"""Arguments of the command line, and what a person reads when something is wrong with them."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+from ..errors import RobotModelsError
+from . import demo, info, listing, view
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a command.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        Arguments; default those of the process.
+
+    Returns
+    -------
+    int
+        0 if it worked, 2 if an argument was wrong.
+
+    Examples
+    --------
+    >>> main(["info", "rx90"])  # doctest: +ELLIPSIS
+    rx90: 6 joints, 6 frames...
+    0
+    """
+    parser = argparse.ArgumentParser(
+        prog="robotmodels",
+        description="Kinematics and dynamics of robot manipulators from their Khalil-Kleinfinger "
+        "table or their URDF.",
+    )
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for module in (demo, listing, info, view):
+        module.add_command(commands)
+    arguments = parser.parse_args(argv)
+    try:
+        arguments.run(arguments)
+    except RobotModelsError as error:
+        print(f"robotmodels: {error}", file=sys.stderr)
+        return 2
+    return 0

@@ -1,0 +1,72 @@
+"""Robots as the command line names them: of the catalogue, or a file."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ..model import RobotModel
+from ..robots import load
+from ..symoro import read_par
+
+
+def add_source(parser: argparse.ArgumentParser) -> None:
+    """Add the argument that names a robot, and the options for URDF files.
+
+    Parameters
+    ----------
+    parser : ArgumentParser
+        Of the command.
+
+    Examples
+    --------
+    >>> parser = argparse.ArgumentParser()
+    >>> add_source(parser)
+    >>> parser.parse_args(["rx90"]).robot
+    'rx90'
+    """
+    parser.add_argument(
+        "robot", help="a name of the catalogue (rx90, erd:ur5), a .urdf or a SYMORO .par file"
+    )
+    parser.add_argument("--base-link", help="URDF only: link whose frame is the world")
+    parser.add_argument("--tip-link", help="URDF only: link whose frame is the tool")
+    parser.add_argument(
+        "--package-dir", action="append", default=[], metavar="FOLDER",
+        help="URDF only: folder that holds packages with meshes; may be repeated",
+    )  # fmt: skip
+
+
+def robot_of(arguments: argparse.Namespace) -> RobotModel:
+    """Load what `add_source` named.
+
+    Parameters
+    ----------
+    arguments : Namespace
+        Parsed arguments.
+
+    Returns
+    -------
+    RobotModel
+        The robot.
+
+    Raises
+    ------
+    RobotModelsError
+        An unknown name, or a file that cannot be read.
+
+    Examples
+    --------
+    >>> parser = argparse.ArgumentParser()
+    >>> add_source(parser)
+    >>> robot_of(parser.parse_args(["rx90"])).n
+    6
+    """
+    name = arguments.robot
+    suffix = Path(name).suffix.lower()
+    if suffix == ".par":
+        return read_par(name)
+    if suffix in (".urdf", ".xml", ".xacro"):
+        return RobotModel.from_urdf(
+            name, arguments.base_link, arguments.tip_link, package_dirs=arguments.package_dir
+        )
+    return load(name)
