@@ -51,6 +51,29 @@ def as_floats(value: ArrayLike, name: str) -> Array:
     return array
 
 
+def as_reals(value: ArrayLike, name: str) -> Array:
+    """Convert to a float64 array of real numbers that may be infinite or NaN, such as limits.
+
+    Parameters
+    ----------
+    value : array_like
+        Numbers of any shape.
+    name : str
+        Used in error messages.
+
+    Returns
+    -------
+    ndarray of float64, same shape
+        A view of the input where that is possible.
+
+    Raises
+    ------
+    InvalidValueError
+        Text, complex numbers, ragged lists.
+    """
+    return _converted(value, name)
+
+
 def as_core(value: ArrayLike, core: tuple[int, ...], name: str) -> Array:
     """Finite floats of shape ``(..., *core)``.
 

@@ -7,6 +7,7 @@ notation for open and closed-loop robots", IEEE ICRA 1986, for trees (gamma, b);
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from math import pi
@@ -16,11 +17,23 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import se3
-from ._arrays import Array, as_exact, as_floats, as_vector, read_only, same_value, value_hash
+from ._arrays import (
+    Array,
+    as_exact,
+    as_floats,
+    as_reals,
+    as_vector,
+    read_only,
+    same_value,
+    value_hash,
+)
 from .errors import InvalidValueError, ShapeError, TableError, nearest_names
 
 REVOLUTE, PRISMATIC, FIXED = 0, 1, 2
 """Values of sigma, seed eq. [1.2]; 2 marks a frame that is fixed to its antecedent."""
+
+NOT_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
+"""Characters that no XML text can hold: names must do without them."""
 
 _ANGLES = ("gamma", "beta", "alpha", "theta")
 _LENGTHS = ("b", "d", "r")
@@ -137,7 +150,7 @@ class DHTable:
         values |= _checked_limits(
             {"lower": lower, "upper": upper, "velocity": velocity, "effort": effort}, n
         )
-        labels = _default_names(kinds) if names is None else tuple(map(str, names))
+        labels = _default_names(kinds) if names is None else _labels(names)
         _check_names(labels, f)
         object.__setattr__(self, "names", labels)
         for key, value in values.items():
@@ -172,7 +185,7 @@ class DHTable:
         >>> round(float(t.alpha[1]), 6)
         1.570796
         """
-        rows = [_checked_row(row, j, _ROW_KEYS) for j, row in enumerate(rows, start=1)]
+        rows = _checked_rows(rows, _ROW_KEYS)
         sigma = [row.get("sigma", 0) for row in rows]
         columns: dict[str, Any] = {
             "antecedent": [row.get("antecedent", j) for j, row in enumerate(rows)],
@@ -225,7 +238,7 @@ class DHTable:
         >>> float(table.d[1]), float(tool[0, 3])
         (0.4, 0.3)
         """
-        rows = [_checked_row(row, j, _STANDARD_KEYS) for j, row in enumerate(rows, start=1)]
+        rows = _checked_rows(rows, _STANDARD_KEYS)
         ours: list[dict[str, Any]] = []
         d, alpha = 0.0, 0.0
         for row in rows:
@@ -457,10 +470,7 @@ def _checked_limits(given: Mapping[str, Any], n: int) -> dict[str, Array]:
     for key, default in (("lower", -np.inf), ("upper", np.inf), ("velocity", np.inf),
                          ("effort", np.inf)):  # fmt: skip
         value = given[key]
-        try:
-            array = np.full(n, default) if value is None else np.asarray(value, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise InvalidValueError(f"{key}: expected {n} numbers, got {value!r:.80}.") from None
+        array = np.full(n, default) if value is None else as_reals(value, key)
         if array.shape != (n,):
             raise ShapeError(
                 f"{key}: expected one value for each of the {n} moving joints, shape ({n},), "
@@ -469,6 +479,10 @@ def _checked_limits(given: Mapping[str, Any], n: int) -> dict[str, Array]:
         if np.isnan(array).any():
             raise InvalidValueError(f"{key}: NaN; leave the limit out or use infinity.")
         limits[key] = array
+    if (limits["lower"] == np.inf).any() or (limits["upper"] == -np.inf).any():
+        raise TableError(
+            "a lower limit of +infinity, or an upper one of -infinity, leaves no room."
+        )
     wrong = np.flatnonzero(~(limits["lower"] <= limits["upper"]))
     if wrong.size:
         i = int(wrong[0])
@@ -486,6 +500,12 @@ def _default_names(sigma: NDArray[np.int64]) -> tuple[str, ...]:
     return tuple(f"{'frame' if s == FIXED else 'joint'}_{j}" for j, s in enumerate(sigma, start=1))
 
 
+def _labels(names: Sequence[str]) -> tuple[str, ...]:
+    if isinstance(names, str) or not isinstance(names, Iterable):
+        raise TableError(f"names: expected a list of names, one for each row, got {names!r:.80}.")
+    return tuple(map(str, names))
+
+
 def _check_names(names: tuple[str, ...], f: int) -> None:
     if len(names) != f:
         raise ShapeError(f"names: expected one name for each of the {f} rows, got {len(names)}.")
@@ -497,16 +517,27 @@ def _check_names(names: tuple[str, ...], f: int) -> None:
             if repeated
             else "names: a frame has an empty name."
         )
+    for name in names:
+        if NOT_XML.search(name):
+            raise TableError(f"names: {name!r} holds a control character; a URDF cannot hold it.")
 
 
-def _checked_row(row: Mapping[str, Any], j: int, known: Sequence[str]) -> Mapping[str, Any]:
-    if not isinstance(row, Mapping):
-        raise TableError(f"Row {j}: expected a mapping such as {{'sigma': 0, 'd': 0.1}}, got "
-                         f"{type(row).__name__}.")  # fmt: skip
-    for key in row:
-        if key not in known:
-            raise TableError(f"Row {j}: " + _unknown("key", str(key), known))
-    return row
+def _checked_rows(
+    rows: Iterable[Mapping[str, Any]], known: Sequence[str]
+) -> list[Mapping[str, Any]]:
+    if not isinstance(rows, Iterable):
+        raise TableError(f"rows: expected a list with a mapping per row, got {rows!r:.80}.")
+    listed = list(rows)
+    for j, row in enumerate(listed, start=1):
+        if not isinstance(row, Mapping):
+            raise TableError(f"Row {j}: expected a mapping such as {{'sigma': 0, 'd': 0.1}}, got "
+                             f"{type(row).__name__}.")  # fmt: skip
+        for key, value in row.items():
+            if key not in known:
+                raise TableError(f"Row {j}: " + _unknown("key", str(key), known))
+            if key != "name" and as_reals(value, f"Row {j}: {key}").ndim:
+                raise InvalidValueError(f"Row {j}: {key} must be one number, got {value!r:.80}.")
+    return listed
 
 
 def _unknown(kind: str, name: str, known: Sequence[str]) -> str:
@@ -534,10 +565,5 @@ def _limits_of_rows(
             default = -np.inf if key == "lower" else np.inf
             value = row.get(key, default)
             scale = pi / 180 if degrees and s == REVOLUTE and key != "effort" else 1.0
-            try:
-                limits[key].append(float(value) * scale)
-            except (TypeError, ValueError):
-                raise InvalidValueError(
-                    f"Row {j}: {key} must be a number, got {value!r}."
-                ) from None
+            limits[key].append(float(value) * scale)
     return limits

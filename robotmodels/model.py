@@ -33,6 +33,7 @@ _PARTS = (
     "configurations", "frames", "visuals", "notes",
 )  # fmt: skip
 _NUMERIC_PARTS = _PARTS[:9]
+_FRAME_KINDS = frozenset((str, int, type(None)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,18 +136,25 @@ class PinocchioTwin:
 
     def frame(self, frame: str | int | None) -> FrameOfInterest:
         """Look a frame up by name, by number, or as None: the tool."""
+        # True and 1.0 are equal to 1 as keys, but they are not frame numbers
+        if frame.__class__ not in _FRAME_KINDS:
+            return self._find(frame)
         try:
             return self._frames[frame]
-        except (KeyError, TypeError):
+        except KeyError:
             found = self._find(frame)
             self._frames[frame] = found
             return found
 
     def _find(self, frame: str | int | None) -> FrameOfInterest:
         parts, names = self._parts, self.names
+        if isinstance(frame, bool) or not isinstance(frame, (str, int, np.integer, type(None))):
+            raise FrameNotFoundError(
+                "frame", frame, self.frame_names(), "Give a name, a number, or None for the tool."
+            )
         if frame is None or frame == names.tool:
             return self._point(parts.tip, parts.tool, names.tool)
-        if isinstance(frame, (int, np.integer)) and not isinstance(frame, bool):
+        if not isinstance(frame, str):
             if not 0 <= frame <= parts.table.f:
                 raise FrameNotFoundError(
                     "frame number", int(frame), map(str, range(parts.table.f + 1)),
@@ -264,7 +272,14 @@ class RobotModel:
         set_(self, "base", read_only(se3.as_single_pose(self.base, "base")))
         set_(self, "tool", read_only(se3.as_single_pose(self.tool, "tool")))
         set_(self, "gravity", read_only(as_exact(self.gravity, (3,), "gravity")))
+        if not isinstance(self.configurations, Mapping):
+            raise InvalidValueError(
+                "configurations: expected a mapping of names to joint vectors, got "
+                f"{type(self.configurations).__name__}."
+            )
         postures = {"zero": np.zeros(n), **self.configurations}
+        if np.any(postures["zero"]):
+            raise InvalidValueError("configuration 'zero' is q = 0; give yours another name.")
         set_(self, "configurations", MappingProxyType({
             key: read_only(as_exact(value, (n,), f"configuration {key!r}"))
             for key, value in postures.items()

@@ -167,8 +167,8 @@ def as_pose(T: Any, name: str = "T") -> Array:
         row = f" (row {', '.join(map(str, i))})" if i else ""
         raise NotARotationError(
             f"{name}: the 3x3 block is not a rotation{row}: R R^T differs from 1 by "
-            f"{float(off[i]):.2g} and det R = {float(np.linalg.det(R)[i]):.6g}; "
-            f"at most {ROTATION_TOLERANCE:g} is accepted and rounded away. Re-orthonormalise it first."
+            f"{float(off[i]):.2g} and det R = {float(np.linalg.det(R)[i]):.6g}; at most "
+            f"{ROTATION_TOLERANCE:g} is accepted and rounded away. Re-orthonormalise it first."
         )
     if worst <= 4e-15:
         return T
