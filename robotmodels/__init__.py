@@ -33,6 +33,8 @@ from .regressors import (
     torque_regressor,
     torque_regressor_chunks,
 )
+from .robots import load, robots
+from .symoro import read_par
 from .urdf import NamedFrame
 
 if TYPE_CHECKING:
@@ -60,10 +62,13 @@ __all__ = [
     "kinetic_energy",
     "link_poses",
     "link_transforms",
+    "load",
     "mass_matrix",
     "parameter_names",
     "parameter_vector",
     "potential_energy",
+    "read_par",
+    "robots",
     "to_urdf",
     "torque_regressor",
     "torque_regressor_chunks",

@@ -116,7 +116,7 @@ def _show_models(model: RobotModel, folder: Path) -> None:
         print(f"Note: {note}")
     q = _posture(model)
     v, a = np.full(model.n, 0.5), np.full(model.n, 1.0)
-    print(f"\nAt q = {_row(q)} rad, v = {_row(v)} rad/s, a = {_row(a)} rad/s^2:")
+    print(f"\nAt q (rad)     {_row(q)}\n   v (rad/s)   {_row(v)}\n   a (rad/s^2) {_row(a)}")
     print(f"pose of the tool (m):\n{pose_text(dgm(model, q))}")
     print("Jacobian (rows v, w; world axes):")
     print("\n".join("  " + _row(row) for row in jacobian(model, q)))

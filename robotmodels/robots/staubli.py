@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import pi
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from .. import se3
 from ..drive import DriveParameters, Transmission
 from ..geometry import DHTable
+from ..inertia import InertialParameters
 from ..model import RobotModel
 from .assembly import PublishedLink, columns, inertia_in_table_frames
 
@@ -18,8 +20,14 @@ def rx90() -> RobotModel:
 
     Khalil-Kleinfinger table, metres and radians. The book gives the symbols ``D3`` and ``RL4``;
     both are 0.45 m (arm and forearm), as in the complete sets of postures this package is tested
-    against. R_0 is at the shoulder and R_6 at the wrist centre, as in the book. No limits and no
-    inertia are given there.
+    against. R_0 is at the shoulder and R_6 at the wrist centre, as in the book. No limits are
+    given there.
+
+    No inertia is published either. So that the dynamic models can be shown on this arm it has an
+    assumed one, said again in `RobotModel.notes`: homogeneous solid cylinders along the links,
+    30, 25, 15, 8, 2 and 0.5 kg (the maker's data sheet gives 111 kg for the whole arm with its
+    foot). It is physical, but no property of the real robot; identify that, or replace it with
+    `RobotModel.with_inertia`.
 
     Returns
     -------
@@ -45,7 +53,35 @@ def rx90() -> RobotModel:
         ),
         degrees=True,
     )
-    return RobotModel.from_table(table, name="rx90")
+    model = RobotModel.from_table(table, _assumed_rx90_inertia(), name="rx90")
+    return replace(model, notes=(_RX90_NOTE,))
+
+
+_RX90_NOTE = (
+    "the inertia of this RX-90 is assumed (solid cylinders along the links), because none is "
+    "published: its torques are examples, not properties of the real robot."
+)
+
+
+def _assumed_rx90_inertia() -> InertialParameters:
+    """Solid cylinders: mass, radius, length, centre in R_j, and the axis of R_j they lie along."""
+    cylinders = (
+        (30.0, 0.12, 0.30, (0.0, 0.0, 0.0), 2),  # shoulder, about the first axis
+        (25.0, 0.08, 0.45, (0.225, 0.0, 0.0), 0),  # arm, from axis 2 to axis 3
+        (15.0, 0.08, 0.30, (0.0, 0.05, 0.0), 1),  # elbow, towards the wrist
+        (8.0, 0.06, 0.25, (0.0, 0.0, -0.125), 2),  # forearm, behind the wrist centre
+        (2.0, 0.05, 0.10, (0.0, 0.0, 0.0), 2),  # wrist
+        (0.5, 0.04, 0.03, (0.0, 0.0, 0.07), 2),  # flange
+    )
+    tensors = []
+    for mass, radius, length, _, axis in cylinders:
+        across = mass * (3 * radius**2 + length**2) / 12
+        moments = [across, across, across]
+        moments[axis] = mass * radius**2 / 2
+        tensors.append(np.diag(moments))
+    return InertialParameters.from_com(
+        [c[0] for c in cylinders], [c[3] for c in cylinders], np.array(tensors)
+    )
 
 
 def tx40() -> RobotModel:
@@ -71,7 +107,7 @@ def tx40() -> RobotModel:
 
     References
     ----------
-    T. D. V. Nguyen et al., figaroh-plus (Apache-2.0), examples/staubli_TX40.
+    T. Nguyen, figaroh-plus (Apache-2.0), examples/staubli_TX40.
 
     Examples
     --------
