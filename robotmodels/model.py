@@ -18,7 +18,7 @@ from . import se3
 from ._arrays import Array, as_exact, read_only, same_value, value_hash
 from .drive import DriveMatrices, DriveParameters, Transmission, drive_matrices
 from .errors import FrameNotFoundError, InvalidValueError, ShapeError, UrdfError, UrdfWarning
-from .geometry import FIXED, DHTable, constant_factors
+from .geometry import FIXED, NOT_XML, DHTable, constant_factors
 from .inertia import InertialParameters
 from .kernels import Chain
 from .urdf import NamedFrame, RobotParts, read_urdf, urdf_text
@@ -103,7 +103,9 @@ class PinocchioTwin:
             np.int64,
         )
         self.in_table_order = bool((self.order == np.arange(parts.table.n)).all())
-        self.holds_inertia = all(holds_inertia(row) for row in parts.inertia.values)
+        self.holds_inertia = all(
+            holds_inertia(row) and _keeps_digits(row) for row in parts.inertia.values
+        )
         table, fixed = parts.table, parts.table.sigma == FIXED
         on_base = [j for j in range(table.f) if all(fixed[i - 1] for i in table.path(j + 1))]
         self.base_is_massless = not parts.inertia.values[on_base].any()
@@ -258,6 +260,10 @@ class RobotModel:
             )
         if not isinstance(self.name, str) or not self.name:
             raise InvalidValueError(f"name: expected a text that is not empty, got {self.name!r}.")
+        if NOT_XML.search(self.name):
+            raise InvalidValueError(
+                f"name: {self.name!r} holds a control character; a URDF cannot hold it."
+            )
         f, n = self.table.f, self.table.n
         _check_count(self.inertia, InertialParameters, "inertia", "f", f)
         _check_count(self.drive, DriveParameters, "drive", "n", n)
@@ -665,6 +671,17 @@ def _lost_in_urdf(model: RobotModel) -> list[str]:
     if K is not None and K.is_invertible:
         lost.append("the transmission (the text's joints are the table's, not the encoders)")
     return lost
+
+
+def _keeps_digits(row: Array) -> bool:
+    """Whether ten parameters survive the way through the centre of mass, where a URDF has them.
+
+    First moments over hardly any mass, as identification may give them, put the centre of mass
+    far away: the tensor about it is so large that the digits of the one about the origin cancel.
+    """
+    M, moments = row[9], row[6:9]
+    # up to two digits, for a robot of about a metre
+    return bool(moments @ moments <= 100.0 * M * (np.abs(row[:6]).sum() + M))
 
 
 def _check_count(part: Any, kind: type, name: str, letter: str, expected: int) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .._arrays import Array
+from .._arrays import Array, read_only
 from ..drive import DriveParameters, Transmission
 from ..geometry import DHTable
 from ..inertia import InertialParameters
@@ -38,6 +38,9 @@ class NamedFrame:
     parent: int
     pose: Array
     merged: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "pose", read_only(self.pose))
 
 
 @dataclass(frozen=True, slots=True)

@@ -77,7 +77,7 @@ def read_urdf(
     text, folder = _text_of(path_or_text)
     tree = parse_urdf(text, MeshFinder.of(package_dirs, folder))
     for link in (base_link, tip_link):
-        if link is not None and link not in tree.links:
+        if link is not None and (not isinstance(link, str) or link not in tree.links):
             raise FrameNotFoundError("link", link, tree.links)
     return _parts(tree, base_link or tree.root, tip_link, dynamics, mimic)
 
