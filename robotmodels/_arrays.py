@@ -166,6 +166,37 @@ def as_exact(value: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
     return as_floats(array, name)
 
 
+def batch_shape(arrays: tuple[Array, ...], names: tuple[str, ...]) -> tuple[int, ...]:
+    """Broadcast the leading axes of vectors.
+
+    Parameters
+    ----------
+    arrays : tuple of ndarray, shapes (..., n_i)
+        Checked arrays; the last axis of each is its core.
+    names : tuple of str
+        Used in error messages.
+
+    Returns
+    -------
+    tuple of int
+        The common leading shape.
+
+    Raises
+    ------
+    ShapeError
+        The leading axes do not broadcast.
+    """
+    shapes = [a.shape[:-1] for a in arrays]
+    try:
+        return shapes[0] if len(set(shapes)) == 1 else np.broadcast_shapes(*shapes)
+    except ValueError:
+        got = ", ".join(f"{n} {a.shape}" for n, a in zip(names, arrays, strict=True))
+        raise ShapeError(
+            f"The leading (batch) axes do not broadcast against each other: {got}. "
+            "Give each the same number of rows, or a single row."
+        ) from None
+
+
 def batch_rows(
     arrays: tuple[Array, ...], names: tuple[str, ...]
 ) -> tuple[tuple[int, ...], list[Array]]:
@@ -190,15 +221,7 @@ def batch_rows(
     ShapeError
         The leading axes do not broadcast.
     """
-    shapes = [a.shape[:-1] for a in arrays]
-    try:
-        batch = shapes[0] if len(set(shapes)) == 1 else np.broadcast_shapes(*shapes)
-    except ValueError:
-        got = ", ".join(f"{n} {a.shape}" for n, a in zip(names, arrays, strict=True))
-        raise ShapeError(
-            f"The leading (batch) axes do not broadcast against each other: {got}. "
-            "Give each the same number of rows, or a single row."
-        ) from None
+    batch = batch_shape(arrays, names)
     rows = [
         np.ascontiguousarray(np.broadcast_to(a, (*batch, a.shape[-1]))).reshape(-1, a.shape[-1])
         if a.shape[-1]

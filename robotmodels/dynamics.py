@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from ._arrays import Array, as_vector, batch_rows
+from ._arrays import Array, as_vector, batch_rows, batch_shape
 from .errors import SingularMassMatrixError
 from .model import RobotModel
 
@@ -72,6 +72,9 @@ def idm(
     """
     n = model.n
     q, v, a = as_vector(q, n, "q"), as_vector(v, n, "v"), as_vector(a, n, "a")
+    if wrench is not None:
+        wrench = as_vector(wrench, 6, "wrench")
+        batch_shape((q, v, a, wrench), ("q", "v", "a", "wrench"))
     twin = model.twin
     if q.ndim == v.ndim == a.ndim == 1 and twin.holds_inertia:
         to_pin = twin.to_pin
@@ -136,13 +139,17 @@ def ddm(
     """
     n = model.n
     q, v, tau = as_vector(q, n, "q"), as_vector(v, n, "v"), as_vector(tau, n, "tau")
+    batch_shape((q, v, tau), ("q", "v", "tau"))
+    if wrench is not None:
+        wrench = as_vector(wrench, 6, "wrench")
+        batch_shape((q, v, tau, wrench), ("q", "v", "tau", "wrench"))
     drives = model.drive_matrices if drive else None
     if drives is not None:
         tau = tau - drives.torque(v, None)
     if wrench is not None:
         tau = tau - _wrench_torque(model, q, wrench)
     twin = model.twin
-    if q.ndim == v.ndim == tau.ndim == 1 and twin.holds_inertia:
+    if n and q.ndim == v.ndim == tau.ndim == 1 and twin.holds_inertia:
         to_pin = twin.to_pin
         h = twin.from_pin(pin.nonLinearEffects(twin.model, twin.data(), to_pin(q), to_pin(v)))
         M = mass_matrix(model, q, drive)
@@ -414,9 +421,8 @@ def _rigid_torques(model: RobotModel, q: Array, v: Array, a: Array) -> Array:
     return out.reshape(*batch, model.n)
 
 
-def _wrench_torque(model: RobotModel, q: Array, wrench: ArrayLike) -> Array:
-    """``J^T wrench``: what the joints add so that the tool exerts a wrench."""
-    w = as_vector(wrench, 6, "wrench")
+def _wrench_torque(model: RobotModel, q: Array, w: Array) -> Array:
+    """``J^T w``: what the joints add so that the tool exerts a wrench."""
     twin = model.twin
     tool = twin.frame(None)
     if q.ndim == w.ndim == 1:

@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from ._arrays import Array, as_vector, batch_rows
+from ._arrays import Array, as_vector, batch_rows, batch_shape
 from .errors import InvalidValueError
 from .model import RobotModel
 
@@ -239,7 +239,7 @@ def jacobian_rate(
     pin_reference, number = _reference(reference)
     twin = model.twin
     point = twin.frame(frame)
-    if q.ndim == v.ndim == 1:
+    if q.ndim == v.ndim == 1 and model.n:  # Pinocchio crashes without joints
         data = twin.data()
         pin.computeJointJacobiansTimeVariation(twin.model, data, twin.to_pin(q), twin.to_pin(v))
         pin.updateFramePlacement(twin.model, data, point.pin_id)
@@ -296,13 +296,12 @@ def dkm(
     >>> dkm(arm, [0.0, 0.0], [2.0, 0.0])
     array([0. , 0.6, 0. , 0. , 0. , 2. ])
     """
-    v = as_vector(v, model.n, "v")
+    q, v = as_vector(q, model.n, "q"), as_vector(v, model.n, "v")
+    batch_shape((q, v), ("q", "v"))
     J = jacobian(model, q, frame, reference)
-    if v.ndim == 1 and J.ndim == 2:
+    if q.ndim == v.ndim == 1:
         return J @ v
-    _, rows = batch_rows((J.reshape(*J.shape[:-2], -1), v), ("q", "v"))
-    batch = np.broadcast_shapes(J.shape[:-2], v.shape[:-1])
-    return np.einsum("kij,kj->ki", rows[0].reshape(-1, 6, model.n), rows[1]).reshape(*batch, 6)
+    return np.einsum("...ij,...j->...i", J, v, order="C")
 
 
 def _reference(reference: str) -> tuple[pin.ReferenceFrame, int]:
