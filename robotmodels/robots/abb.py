@@ -43,9 +43,9 @@ def irb120() -> RobotModel:
     Khalil-Kleinfinger table, metres and radians. Geometry, position and velocity limits, masses,
     centres of mass and inertia: ``irb120_3_58_macro.xacro`` of ros-industrial/abb (commit
     59e17fb). The lengths make the 0.58 m reach of the maker (to the wrist centre, shoulder at
-    the pedestal's axis). ABB publishes no inertia: that of links 1 to 5 was taken from CAD by
-    the authors of that file, that of link 6 (0.001 kg m^2 on the diagonal) is a placeholder of
-    theirs. No torques are published.
+    the pedestal's axis). ABB publishes no inertia: the numbers are those of that file's authors,
+    and that of link 6 (0.001 kg m^2 on the diagonal) can only be a placeholder. No torques are
+    published.
 
     Returns
     -------

@@ -103,8 +103,8 @@ def iiwa14() -> RobotModel:
     lbr-stack/lbr_fri_ros2_stack (commit 122a16a), and 0.42 + 0.40 is the R820 of the name.
     Position and velocity limits: ``joint_limits.yaml`` of the latter (commit 769ae8e); it gives
     the same 200 N m for all joints, which is no maker's number and is left out. Masses, centres
-    of mass and inertia: ``iiwa14_description.xacro`` of the latter, taken by its authors from CAD
-    and scaled so that base and links weigh the 29.9 kg of the data sheet; KUKA publishes none.
+    of mass and inertia: ``iiwa14_description.xacro`` of the latter, which its authors exported
+    from CAD (fusion2urdf; base and links weigh 29.9 kg together). KUKA publishes none.
 
     Returns
     -------

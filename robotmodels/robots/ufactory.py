@@ -5,9 +5,9 @@ flange looks down. R_0 is on the mounting face, the tool is the flange.
 
 Geometry and limits: ``xarm5.urdf.xacro`` and ``xarm6.urdf.xacro`` of the maker's own repository
 xArm-Developer/xarm_ros2 (commit 27be56d). Its axes 2, 3 (and 4) are at joint offsets of
-(53.5, 284.5) and (77.5, 342.5) mm; lengths and angles are computed from these. Masses, centres of mass
-and inertia: ``gen_link_inertial_params.py`` of the same repository (commit b7ebd6d), the data sets
-"HT_BR2", with the signs of the products of inertia as that file writes them into URDF.
+(53.5, 284.5) and (77.5, 342.5) mm; lengths and angles are computed from these. Masses, centres
+of mass and inertia: ``gen_link_inertial_params.py`` of the same repository (commit b7ebd6d), the
+data sets "HT_BR2", with the signs of the products of inertia as that file writes them into URDF.
 """
 
 from __future__ import annotations

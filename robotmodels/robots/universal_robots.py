@@ -68,9 +68,10 @@ def ur5() -> RobotModel:
     """Universal Robots UR5 (CB series), third series of parameters.
 
     Metres, radians. Table: manual of the CB3 controller, appendix "Robot DH parameter", table for
-    the UR5 serie 3; the complete sets of postures this package is tested against use the same.
-    Limits: ``ur5_robot.urdf`` of example-robot-data 5.0.0 (180 degrees/s). No inertia is given by
-    the maker for this arm; for a model with one load ``erd:ur5``.
+    the UR5 serie 3; the complete sets of postures this package is tested against use the same,
+    and ``erd:ur5`` is the same arm turned by 180 degrees about z. Limits: ``ur5_robot.urdf`` of
+    example-robot-data 5.0.0, whose 3.15 and 3.2 rad/s stand for 180 degrees/s. No inertia is given
+    by the maker for this arm; ``erd:ur5`` has one.
 
     Returns
     -------

@@ -1,0 +1,575 @@
+"""The catalogue: its numbers against published ones, its URDF files, and example-robot-data.
+
+The joint placements below are the facts of the makers' and ROS-Industrial's URDF files named in
+each robot's docstring; the poses are a plain product of them, with no code of the package.
+"""
+
+import inspect
+import json
+import pickle
+import re
+import sys
+from importlib import import_module
+from math import pi, sqrt
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import robotmodels as rm
+from robotmodels import errors
+from robotmodels.robots import erd, load, robots
+from robotmodels.robots.catalogue import MODULES
+from robotmodels.robots.generate import generate
+
+ORACLES = Path(__file__).parent / "oracles"
+URDF = Path(__file__).parents[1] / "urdf"
+ASKED_FOR = {
+    "lab_rr", "lab_rrt", "lab_trr", "planar_2r", "planar_3r", "rx90", "tx40", "puma560",
+    "stanford_arm", "cobra_s600", "ur3e", "ur5e", "ur10e", "ur16e", "kr6_r900", "lwr4_plus",
+    "iiwa14", "irb120", "irb140", "irb6640", "panda", "crx10ia", "xarm6", "gantry", "xarm5",
+}  # fmt: skip
+
+h = pi / 2
+X, Y, Z = (1, 0, 0), (0, 1, 0), (0, 0, 1)
+BACK, MY, DOWN = (-1, 0, 0), (0, -1, 0), (0, 0, -1)
+FLAT = (0, 0, 0)
+
+# robot: joints (xyz, rpy, axis), tool (xyz, rpy), joint variables at which the file is at zero
+PLACEMENTS = {
+    "irb120": (
+        [((0, 0, 0), FLAT, Z), ((0, 0, 0.29), FLAT, Y), ((0, 0, 0.27), FLAT, Y),
+         ((0, 0, 0.07), FLAT, X), ((0.302, 0, 0), FLAT, Y), ((0.072, 0, 0), FLAT, X)],
+        ((0, 0, 0), (0, h, 0)),
+    ),
+    "irb140": (
+        [((0, 0, 0.104), FLAT, Z), ((0.07, 0, 0.248), FLAT, Y), ((0, 0, 0.36), FLAT, Y),
+         ((0.38, 0, 0), FLAT, X), ((0, 0, 0), FLAT, Y), ((0.065, 0, 0), FLAT, X)],
+        ((0, 0, 0), (0, h, 0)),
+    ),
+    "irb6640": (
+        [((0, 0, 0.78), FLAT, Z), ((0.32, 0, 0), FLAT, Y), ((0, 0, 1.075), FLAT, Y),
+         ((0, 0, 0.2), FLAT, X), ((1.392, 0, 0), FLAT, Y), ((0.2, 0, 0), FLAT, X)],
+        ((0, 0, 0), (0, h, 0)),
+    ),
+    "kr6_r900": (
+        [((0, 0, 0.4), FLAT, DOWN), ((0.025, 0, 0), FLAT, Y), ((0.455, 0, 0), FLAT, Y),
+         ((0, 0, 0.035), FLAT, BACK), ((0.42, 0, 0), FLAT, Y), ((0.08, 0, 0), FLAT, BACK)],
+        ((0, 0, 0), (0, h, 0)),
+    ),
+    "crx10ia": (
+        [((0, 0, 0), FLAT, Z), ((0, 0, 0), FLAT, Y), ((0, 0, 0.54), FLAT, MY),
+         ((0, 0, 0), FLAT, BACK), ((0.54, 0, 0), FLAT, MY), ((0, -0.15, 0), FLAT, BACK)],
+        ((0.16, 0, 0), (pi, -h, 0)),
+    ),
+    "crx10ia_l": (
+        [((0, 0, 0), FLAT, Z), ((0, 0, 0), FLAT, Y), ((0, 0, 0.71), FLAT, MY),
+         ((0, 0, 0), FLAT, BACK), ((0.54, -0.15, 0), FLAT, MY), ((0.16, 0, 0), FLAT, BACK)],
+        ((0, 0, 0), (pi, -h, 0)),
+    ),
+    "lwr4_plus": (
+        [((0, 0, 0.11), FLAT, Z), ((0, 0, 0.2005), FLAT, MY), ((0, 0, 0.2), FLAT, Z),
+         ((0, 0, 0.2), FLAT, Y), ((0, 0, 0.2), FLAT, Z), ((0, 0, 0.19), FLAT, MY),
+         ((0, 0, 0.078), FLAT, Z)],
+        ((0, 0, 0), FLAT),
+    ),
+    "iiwa14": (  # iiwa_stack, another file than the one the inertia is from
+        [((0, 0, 0.1575), FLAT, Z), ((0, 0, 0.2025), (h, 0, pi), Z),
+         ((0, 0.2045, 0), (h, 0, pi), Z), ((0, 0, 0.2155), (h, 0, 0), Z),
+         ((0, 0.1845, 0), (-h, pi, 0), Z), ((0, 0, 0.2155), (h, 0, 0), Z),
+         ((0, 0.081, 0), (-h, pi, 0), Z)],
+        ((0, 0, 0.045), (pi, pi, pi)),
+    ),
+    "xarm5": (
+        [((0, 0, 0.267), FLAT, Z), ((0, 0, 0), (-h, 0, 0), Z), ((0.0535, -0.2845, 0), FLAT, Z),
+         ((0.0775, 0.3425, 0), FLAT, Z), ((0.076, 0.097, 0), (-h, 0, 0), Z)],
+        ((0, 0, 0), FLAT),
+    ),
+    "xarm6": (
+        [((0, 0, 0.267), FLAT, Z), ((0, 0, 0), (-h, 0, 0), Z), ((0.0535, -0.2845, 0), FLAT, Z),
+         ((0.0775, 0.3425, 0), (-h, 0, 0), Z), ((0, 0, 0), (h, 0, 0), Z),
+         ((0.076, 0.097, 0), (-h, 0, 0), Z)],
+        ((0, 0, 0), FLAT),
+    ),
+    "tx40": (  # the file has no flange; it is at zero where the maker's joints 2, 3 are at 90, -90
+        [((0, 0, 0.32), FLAT, Z), ((0, 0, 0), (-h, 0, 0), Z), ((0.225, 0, 0.035), FLAT, Z),
+         ((0, -0.225, 0), (h, 0, 0), Z), ((0, 0, 0), (-h, 0, 0), Z), ((0, 0, 0), (h, pi, 0), Z)],
+        ((0, 0, 0.065), FLAT),
+    ),
+    "panda": (
+        [((0, 0, 0.333), FLAT, Z), ((0, 0, 0), (-h, 0, 0), Z), ((0, -0.316, 0), (h, 0, 0), Z),
+         ((0.0825, 0, 0), (h, 0, 0), Z), ((-0.0825, 0.384, 0), (-h, 0, 0), Z),
+         ((0, 0, 0), (h, 0, 0), Z), ((0.088, 0, 0), (h, 0, 0), Z)],
+        ((0, 0, 0.107), FLAT),
+    ),
+}  # fmt: skip
+FILE_ZERO = {"tx40": np.array([0, h, -h, 0, 0, 0])}
+
+
+def oracle(name):
+    return json.loads((ORACLES / f"{name}.json").read_text())
+
+
+def placement(xyz, rpy):
+    T = np.eye(4)
+    T[:3, :3] = pin.rpy.rpyToMatrix(*map(float, rpy))
+    T[:3, 3] = xyz
+    return T
+
+
+def turn(axis, angle):
+    T = np.eye(4)
+    T[:3, :3] = pin.exp3(np.array(axis, dtype=float) * angle)
+    return T
+
+
+# --- the list ---------------------------------------------------------------------------------
+
+
+def test_everything_asked_for_is_there():
+    names = robots()
+    assert len(set(names)) == len(names) >= 24
+    assert not ASKED_FOR - set(names)
+    assert rm.load is load
+    assert rm.robots() == names
+
+
+@pytest.mark.parametrize("name", robots())
+def test_a_robot_builds_fast_is_a_value_and_prints(name):
+    load(name)  # its module is imported once
+    start = perf_counter()
+    model = load(name)
+    assert perf_counter() - start < 0.2
+    assert model.name == name
+    assert model == load(name) == pickle.loads(pickle.dumps(model))
+    text = str(model.table)
+    assert len(text.splitlines()) > model.n
+    assert np.isfinite(rm.dgm(model, model.configurations["zero"])).all()
+
+
+@pytest.mark.parametrize("name", robots())
+def test_a_robot_says_where_its_numbers_come_from(name):
+    module = next(m for m, names in MODULES.items() if name in names)
+    text = inspect.getdoc(getattr(import_module(f"robotmodels.robots.{module}"), name))
+    for section in ("Returns", "Examples"):
+        assert re.search(rf"^{section}\n-+$", text, re.M), section
+    assert re.search(r"^References\n-+$", text, re.M) or name == "gantry"
+    assert "etres" in text
+    assert "adians" in text
+
+
+def test_limits_are_ordered_and_postures_are_within_them():
+    for name in robots():
+        model = load(name)
+        assert (model.lower < model.upper).all()
+        assert (model.table.velocity > 0).all()
+        assert (model.table.effort > 0).all()
+        for key, q in model.configurations.items():
+            if key != "zero":
+                assert (q >= model.lower - 1e-12).all(), (name, key)
+                assert (q <= model.upper + 1e-12).all(), (name, key)
+
+
+def test_physical_consistency_is_as_reported_in_the_docstrings():
+    faulty = {}
+    for name in robots():
+        model = load(name)
+        if model.inertia.values.any():
+            bad = [link.link for link in model.inertia.consistency().links if not link.is_physical]
+            faulty |= {name: bad} if bad else {}
+    assert faulty == {"puma560": [1, 3]}
+
+
+# --- geometry against other descriptions --------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", PLACEMENTS)
+def test_poses_are_those_of_the_published_urdf(name, rng):
+    model = load(name)
+    joints, tool = PLACEMENTS[name]
+    for q in rng.uniform(-pi, pi, (5, model.n)):
+        T = np.eye(4)
+        for (xyz, rpy, axis), angle in zip(joints, q - FILE_ZERO.get(name, 0), strict=True):
+            T = T @ placement(xyz, rpy) @ turn(axis, angle)
+        np.testing.assert_allclose(rm.dgm(model, q), T @ placement(*tool), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "frame", "q", "expected", "tolerance"),
+    [
+        # reach of the data sheet: wrist centre (or face plate for the CRX), arm stretched
+        ("irb120", 5, [0, h, -h + np.arctan2(0.07, 0.302), 0, 0, 0], 0.58, 5e-4),
+        ("irb140", 5, [0, h, -h, 0, 0, 0], 0.81, 1e-12),
+        ("irb6640", 5, [0, h, -h + np.arctan2(0.2, 1.392), 0, 0, 0], 2.8, 2e-3),
+        ("kr6_r900", 5, [0, 0, np.arctan2(0.035, 0.42), 0, 0, 0], 0.9015, 1e-4),
+        ("crx10ia", None, [0, h, h, 0, 0, 0], 1.249, 1e-4),
+        ("crx10ia_l", None, [0, h, h, 0, 0, 0], 1.418, 1e-4),
+        ("cobra_s600", None, [0, 0, 0, 0], 0.6, 1e-12),
+        ("tx40", 5, [0, h, 0, 0, 0, 0], sqrt(0.45**2 + 0.035**2), 1e-12),
+    ],
+)
+def test_reach_from_the_first_axis(name, frame, q, expected, tolerance):
+    x, y = rm.dgm(load(name), q, frame)[:2, 3]
+    assert np.hypot(x, y) == pytest.approx(expected, abs=tolerance)
+
+
+@pytest.mark.parametrize(
+    ("name", "shoulder_to_wrist"), [("iiwa14", 0.82), ("lwr4_plus", 0.79), ("panda", 0.7)]
+)
+def test_upright_seven_joint_arms(name, shoulder_to_wrist):
+    model = load(name)
+    p2, p6 = (rm.dgm(model, np.zeros(7), j)[:3, 3] for j in (2, 6))
+    assert p6[2] - p2[2] == pytest.approx(shoulder_to_wrist, abs=1e-12)
+
+
+@pytest.mark.parametrize("name", ["ur5", "ur3e", "ur5e", "ur10e", "ur16e"])
+def test_ur_arm_at_zero_lies_along_minus_x(name):
+    """The maker's zero: stretched out along -x, flange looking along -y (classical table)."""
+    model = load(name)
+    d1, d4, d5, d6 = model.table.r[[0, 3, 4, 5]]
+    a2, a3 = model.table.d[[2, 3]]
+    expected = [[1, 0, 0, a2 + a3], [0, 0, -1, -d4 - d6], [0, 1, 0, d1 - d5], [0, 0, 0, 1]]
+    np.testing.assert_allclose(rm.dgm(model, np.zeros(6)), expected, rtol=0, atol=1e-12)
+    assert rm.dgm(model, model.configurations["up"])[2, 3] > d1 - a2 - a3
+
+
+def test_stanford_arm_slides_along_its_third_axis():
+    model = load("stanford_arm")
+    expected = [[0, 1, 0, 0], [-1, 0, 0, 0.154], [0, 0, 1, 0.412 + 0.263 + 0.7], [0, 0, 0, 1]]
+    T = rm.dgm(model, [0, 0, 0.7, 0, 0, 0])
+    np.testing.assert_allclose(T, expected, rtol=0, atol=1e-12)
+    assert rm.dgm(model, [0, h, 0.7, 0, 0, 0])[0, 3] == pytest.approx(0.263 + 0.7)
+
+
+def test_gantry_wrist_is_where_its_carriages_are():
+    T = rm.dgm(load("gantry"), [0.7, 0.4, 0.2, 0, 0, 0])
+    np.testing.assert_allclose(T[:3, 3], [0.7, 0.4, -0.2], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(T[:3, 2], [0, 0, -1], rtol=0, atol=1e-12)
+
+
+def test_planar_arms():
+    np.testing.assert_allclose(rm.dgm(load("planar_2r"), [h, -h])[:2, 3], [1, 1], atol=1e-12)
+    np.testing.assert_allclose(rm.dgm(load("planar_3r"), [h, -h, -h])[:2, 3], [1, 0], atol=1e-12)
+
+
+# --- the seed documents -------------------------------------------------------------------------
+
+
+def rx90_closed_form(q, D3=0.45, RL4=0.45):
+    """Seed book, example 1.2."""
+    C1, C2, _, C4, C5, C6 = np.cos(q)
+    S1, S2, _, S4, S5, S6 = np.sin(q)
+    C23, S23 = np.cos(q[1] + q[2]), np.sin(q[1] + q[2])
+    s = [
+        C1 * (C23 * (C4 * C5 * C6 - S4 * S6) - S23 * S5 * C6) - S1 * (S4 * C5 * C6 + C4 * S6),
+        S1 * (C23 * (C4 * C5 * C6 - S4 * S6) - S23 * S5 * C6) + C1 * (S4 * C5 * C6 + C4 * S6),
+        S23 * (C4 * C5 * C6 - S4 * S6) + C23 * S5 * C6,
+    ]
+    n = [
+        C1 * (-C23 * (C4 * C5 * S6 + S4 * C6) + S23 * S5 * S6) + S1 * (S4 * C5 * S6 - C4 * C6),
+        S1 * (-C23 * (C4 * C5 * S6 + S4 * C6) + S23 * S5 * S6) - C1 * (S4 * C5 * S6 - C4 * C6),
+        -S23 * (C4 * C5 * S6 + S4 * C6) - C23 * S5 * S6,
+    ]
+    a = [
+        -C1 * (C23 * C4 * S5 + S23 * C5) + S1 * S4 * S5,
+        -S1 * (C23 * C4 * S5 + S23 * C5) - C1 * S4 * S5,
+        -S23 * C4 * S5 + C23 * C5,
+    ]
+    p = [
+        -C1 * (S23 * RL4 - C2 * D3),
+        -S1 * (S23 * RL4 - C2 * D3),
+        C23 * RL4 + S2 * D3,
+    ]
+    return np.vstack([np.column_stack([s, n, a, p]), [0, 0, 0, 1]])
+
+
+def test_rx90_is_the_books(rng):
+    model = load("rx90")
+    for q in rng.uniform(-pi, pi, (20, 6)):
+        np.testing.assert_allclose(rm.dgm(model, q), rx90_closed_form(q), rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("name", ["rx90", "ur5"])
+def test_every_known_posture_reaches_its_pose(name):
+    data = oracle(f"igm_{name}")
+    model = load(name)
+    for column in ("alpha", "d", "theta", "r"):
+        np.testing.assert_array_equal(data["robot"][column], getattr(model.table, column))
+    for case in data["cases"]:
+        solutions = np.array(case["solutions"])
+        assert len(solutions) == case["n_solutions"]
+        T = rm.dgm(model, solutions)
+        np.testing.assert_allclose(T, np.broadcast_to(case["T"], T.shape), rtol=0, atol=1e-9)
+
+
+def test_lab_rr_is_equation_4_5(rng):
+    model = load("lab_rr")
+    for q1, q2 in rng.uniform(-pi, pi, (5, 2)):
+        c1, s1, c2, s2 = np.cos(q1), np.sin(q1), np.cos(q2), np.sin(q2)
+        expected = [
+            [c1 * c2, -s1, c1 * s2, c1 * c2 * 0.2],
+            [s1 * c2, c1, s1 * s2, s1 * c2 * 0.2],
+            [-s2, 0, c2, 0.5 - s2 * 0.2],
+            [0, 0, 0, 1],
+        ]
+        np.testing.assert_allclose(rm.dgm(model, [q1, q2]), expected, rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize(("name", "file"), [("lab_rr", "lab_RR"), ("lab_trr", "lab_TRR")])
+def test_lab_robots_are_those_of_the_toolbox(name, file):
+    model = load(name)
+    for sample in oracle(file)["samples"]:
+        q = np.array(sample["q"])
+        np.testing.assert_allclose(rm.dgm(model, q), sample["fkine"], rtol=0, atol=1e-12)
+        np.testing.assert_allclose(rm.jacobian(model, q), sample["jacob0"], rtol=0, atol=1e-12)
+
+
+def test_lab_rrt_is_its_product(rng):
+    model = load("lab_rrt")
+    for q in rng.uniform(-1, 1, (5, 3)):
+        T = turn(Z, q[0]) @ placement((0, 0, 0.5), FLAT) @ turn(Y, q[1])
+        T = T @ placement((q[2], 0, 0), FLAT)
+        np.testing.assert_allclose(rm.dgm(model, q), T, rtol=0, atol=1e-14)
+
+
+def test_lab_trr_reaches_pose_a_and_the_position_of_b():
+    model = load("lab_trr")
+    A = [[0, 0, -1, 0.1414], [0, 1, 0, -0.3], [1, 0, 0, 0.8414], [0, 0, 0, 1]]
+    np.testing.assert_allclose(rm.dgm(model, model.configurations["pose_a"]), A, rtol=0, atol=5e-5)
+    T = rm.dgm(model, model.configurations["pose_b_position"])
+    np.testing.assert_allclose(T[:3, 3], [0.4, 0.2, 0.5], rtol=0, atol=1e-12)
+
+
+# --- dynamics of the PUMA and drives of the TX40 ------------------------------------------------
+
+
+def test_puma_is_the_toolbox_one():
+    model = load("puma560")
+    for sample in oracle("puma560_dh")["samples"]:
+        q, v, a = (np.array(sample[key]) for key in ("q", "qd", "qdd"))
+        for value, key in (
+            (rm.dgm(model, q), "fkine"),
+            (rm.jacobian(model, q), "jacob0"),
+            (rm.jacobian(model, q, reference="local"), "jacobe"),
+            (rm.jacobian_rate(model, q, v), "jacob0_dot"),
+            (rm.idm(model, q, v, a), "tau"),
+            (rm.idm(model, q, v, a, drive=False), "tau_rigid"),
+            (rm.mass_matrix(model, q), "inertia"),
+            (rm.mass_matrix(model, q, drive=False), "inertia_rigid"),
+            (rm.gravity_torque(model, q), "gravload"),
+            (rm.coriolis_matrix(model, q, v), "coriolis"),
+        ):
+            expected = np.array(sample[key])
+            scale = max(1.0, np.abs(expected).max())
+            np.testing.assert_allclose(value, expected, rtol=0, atol=1e-12 * scale, err_msg=key)
+
+
+def test_tx40_wrist_is_coupled_as_published(rng):
+    transmission = load("tx40").transmission
+    motor = rng.normal(size=6) * 30
+    q = transmission.to_joint(motor)
+    gears = np.array([32, 32, 45, -48, 45, 32])
+    np.testing.assert_allclose(q[:5], motor[:5] / gears[:5])
+    assert q[5] == pytest.approx(motor[5] / 32 - motor[4] / 45)
+    assert transmission.coupled_motors == (6,)
+    # joint torque 5 carries motor 6 as well: T[5, 6] = 32 of the source
+    torque = rng.normal(size=6)
+    tau = np.linalg.solve(transmission.matrix.T, torque)
+    assert tau[4] == pytest.approx(45 * torque[4] + 32 * torque[5])
+
+
+def test_inertia_was_moved_without_loss():
+    """Centres of mass in the world at zero: the published ones plus their joints' positions."""
+    model = load("iiwa14")
+    assert model.inertia.mass.sum() == pytest.approx(22.849622)
+    links = [
+        (5.289529, (0, -0.033795, 0.279904)),
+        (5.688888, (0.000136, 0.037548, 0.436322)),
+        (3.461245, (0, 0.034913, 0.711108)),
+        (4.122995, (0, -0.029293, 0.866944)),
+        (1.563756, (0, -0.029824, 1.063767)),
+        (2.457878, (0, 0.00032, 1.18495)),
+        (0.265331, (3e-06, -2e-06, 1.284782)),
+    ]
+    poses = rm.link_poses(model, np.zeros(7))
+    for j, (mass, com) in enumerate(links):
+        moment = poses[j, :3, :3] @ model.inertia.first_moments[j] + poses[j, :3, 3] * mass
+        np.testing.assert_allclose(moment / mass, com, rtol=0, atol=1e-12)
+
+
+# --- URDF files -----------------------------------------------------------------------------------
+
+
+def tokens(text):
+    return re.split(r"[\s\"<>=/]+", text)
+
+
+def same(a, b):
+    if a == b:
+        return True
+    try:
+        return abs(float(a) - float(b)) <= 1e-12 * max(1.0, abs(float(a)))
+    except ValueError:
+        return False
+
+
+def test_urdf_files_have_not_drifted(tmp_path):
+    fresh = generate(tmp_path)
+    assert {p.name for p in fresh} == {p.name for p in URDF.glob("*.urdf")}, (
+        "run: python -m robotmodels.robots.generate urdf"
+    )
+    for path in fresh:
+        new, kept = (tokens(p.read_text()) for p in (path, URDF / path.name))
+        assert len(new) == len(kept), path.name
+        assert all(map(same, new, kept)), f"{path.name}: run python -m robotmodels.robots.generate"
+
+
+@pytest.mark.parametrize("name", robots())
+def test_urdf_files_load_in_pinocchio(name, rng):
+    model = load(name)
+    twin = pin.buildModelFromUrdf(str(URDF / f"{name}.urdf"))
+    data = twin.createData()
+    assert (twin.nq, twin.nv) == (model.n, model.n)
+    order = [twin.idx_qs[twin.getJointId(joint)] for joint in model.table.joint_names]
+    for q in rng.uniform(-2, 2, (3, model.n)):
+        x = np.empty(model.n)
+        x[order] = q
+        pin.framesForwardKinematics(twin, data, x)
+        T = model.base.copy()
+        for factor, joint in zip(
+            rm.link_transforms(model.table, q), model.table.joint_names, strict=True
+        ):
+            T = T @ factor
+            found = data.oMi[twin.getJointId(joint)].homogeneous
+            np.testing.assert_allclose(found, T, rtol=0, atol=1e-12)
+        tool = data.oMf[twin.getFrameId("tool")].homogeneous
+        np.testing.assert_allclose(tool, T @ model.tool, rtol=0, atol=1e-12)
+
+
+def test_urdf_files_are_valid_for_yourdfpy(rng):
+    import yourdfpy
+
+    for name in robots():
+        model = load(name)
+        urdf = yourdfpy.URDF.load(
+            str(URDF / f"{name}.urdf"), load_meshes=False, load_collision_meshes=False
+        )
+        assert urdf.validate(), (name, urdf.errors)
+        q = rng.uniform(-2, 2, model.n)
+        urdf.update_cfg(dict(zip(model.table.joint_names, q, strict=True)))
+        T = urdf.get_transform("tool", urdf.base_link)
+        np.testing.assert_allclose(T, rm.dgm(model, q), rtol=0, atol=1e-12, err_msg=name)
+
+
+# --- example-robot-data ---------------------------------------------------------------------------
+
+
+def test_fixed_base_robots_are_the_loaders():
+    """Our table of files against what the package's loaders declare."""
+    import example_robot_data
+
+    loaders = example_robot_data.ROBOTS
+    fixed = {name for name, c in loaders.items() if not c.free_flyer and c.urdf_filename}
+    assert not fixed - set(erd.ERD_ARMS)
+    for name in set(loaders) & set(erd.ERD_ARMS):
+        loader = loaders["ur3_gripper" if name == "ur3" else name]
+        declared = f"{loader.path}/{loader.urdf_subpath}/{loader.urdf_filename}"
+        if name == "ur3":  # the package's own table names the UR5 here
+            assert loaders["ur3"].urdf_filename == "ur5_robot.urdf"
+            declared = "ur_description/urdf/ur3_robot.urdf"
+        assert erd.ERD_ARMS[name].urdf == declared
+        assert erd.ERD_ARMS[name].base_link is None
+
+
+@pytest.mark.parametrize("name", erd.ERD_ARMS)
+def test_every_arm_of_example_robot_data_loads(name, rng):
+    model = load(f"erd:{name}")
+    arm = erd.ERD_ARMS[name]
+    q = rng.uniform(-0.5, 0.5, model.n)
+    T = rm.dgm(model, q)
+    assert np.isfinite(T).all()
+    twin = pin.buildModelFromUrdf(str(erd.erd_folder() / arm.urdf))
+    joints = set(model.table.joint_names)
+    assert joints <= set(twin.names)
+    if arm.base_link is None:
+        assert model.n == twin.nv
+    else:
+        assert 2 <= model.n <= 7
+        assert {arm.base_link, arm.tip_link} <= set(model.frame_names)
+
+
+def test_an_arm_cut_out_of_a_mobile_robot_is_where_pinocchio_has_it(rng):
+    model = load("erd:talos_right_arm")
+    arm = erd.ERD_ARMS["talos_right_arm"]
+    twin = pin.buildModelFromUrdf(str(erd.erd_folder() / arm.urdf))
+    data = twin.createData()
+    x, q = pin.neutral(twin), rng.uniform(-1, 1, model.n)
+    for joint, value in zip(model.table.joint_names, q, strict=True):
+        x[twin.idx_qs[twin.getJointId(joint)]] = value
+    pin.framesForwardKinematics(twin, data, x)
+    base, tip = (data.oMf[twin.getFrameId(link)] for link in (arm.base_link, arm.tip_link))
+    expected = base.actInv(tip).homogeneous
+    np.testing.assert_allclose(rm.dgm(model, q), expected, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "other", "frame", "base_turn", "tolerance"),
+    [("ur5", "erd:ur5", "ee_link", pi, 1e-10), ("panda", "erd:panda", "panda_link8", 0, 1e-14)],
+)
+def test_catalogue_and_example_robot_data_agree(name, other, frame, base_turn, tolerance, rng):
+    """The same arm but for a turned base frame and the axes of the flange."""
+    ours, theirs = load(name), load(other)
+
+    def flange_axes(q):
+        other_q = np.r_[q, np.zeros(theirs.n - ours.n)]
+        turned = turn(Z, base_turn) @ rm.dgm(ours, q)
+        return np.linalg.inv(rm.dgm(theirs, other_q, frame)) @ turned
+
+    at_zero = flange_axes(np.zeros(ours.n))
+    np.testing.assert_allclose(at_zero[:3, 3], 0, rtol=0, atol=tolerance)
+    for q in rng.uniform(-2, 2, (5, ours.n)):
+        np.testing.assert_allclose(flange_axes(q), at_zero, rtol=0, atol=tolerance)
+
+
+def test_postures_of_an_srdf_are_configurations():
+    up = load("erd:kinova").configurations["arm_up"]
+    np.testing.assert_allclose(up, [1.5707, 2.618, -1.5707, 3.1415, 2.618, 0])
+
+
+# --- mistakes -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "nearest"),
+    [("RX9O", "rx90"), ("ur5_e", "ur5e"), ("erd:ur55", "ur5"), ("pnda", "panda")],
+)
+def test_a_misspelt_name_is_answered_with_near_ones(name, nearest):
+    with pytest.raises(errors.RobotNotFoundError) as caught:
+        load(name)
+    assert nearest in caught.value.nearest
+    assert isinstance(caught.value, KeyError)
+    assert "from_urdf" in str(caught.value)
+
+
+@pytest.mark.parametrize("name", [None, 3, "", "erd:"])
+def test_what_is_no_name_is_answered_too(name):
+    with pytest.raises(errors.RobotNotFoundError):
+        load(name)
+
+
+def test_without_example_robot_data_the_message_says_what_to_install(monkeypatch, tmp_path):
+    monkeypatch.setattr(sys, "path", [str(tmp_path)])
+    monkeypatch.setattr(sys, "prefix", str(tmp_path))
+    monkeypatch.setattr(sys, "base_prefix", str(tmp_path))
+    with pytest.raises(errors.MissingExtraError, match="pip install example-robot-data"):
+        load("erd:ur5")
+
+
+def test_a_robot_missing_from_the_installed_data_is_named(monkeypatch, tmp_path):
+    folder = tmp_path / "cmeel.prefix" / "share" / "example-robot-data" / "robots"
+    folder.mkdir(parents=True)
+    monkeypatch.setattr(sys, "path", [str(tmp_path)])
+    with pytest.raises(errors.RobotNotFoundError, match=r"ur5_robot\.urdf"):
+        load("erd:ur5")
