@@ -28,6 +28,7 @@ from ._arrays import (
     value_hash,
 )
 from .errors import InvalidValueError, ShapeError, TableError, nearest_names
+from .table_text import SMALLEST, angle_text, boxed, length_text, variable_text
 
 REVOLUTE, PRISMATIC, FIXED = 0, 1, 2
 """Values of sigma, seed eq. [1.2]; 2 marks a frame that is fixed to its antecedent."""
@@ -334,9 +335,33 @@ class DHTable:
         return replace(self, **columns)  # type: ignore[arg-type]
 
     def __str__(self) -> str:
-        from .table_text import boxed_table
+        # columns that say nothing are left out, as in the book's tables of serial robots
+        rows = range(self.f)
+        columns = [("j", [str(j + 1) for j in rows])]
+        if not self.is_serial:
+            columns.append(("a(j)", [str(a) for a in self.antecedent]))
+        columns.append(("σj", [str(s) for s in self.sigma]))
+        if (self.mu != (self.sigma != FIXED)).any():
+            columns.append(("μj", [str(m) for m in self.mu]))
+        if _shows(self.gamma) or _shows(self.b):
+            columns.append(("γj", [angle_text(v) for v in self.gamma]))
+            columns.append(("bj", [length_text(v) for v in self.b]))
+        if _shows(self.beta):
+            columns.append(("βj", [angle_text(v) for v in self.beta]))
+        columns.append(("αj", [angle_text(v) for v in self.alpha]))
+        columns.append(("dj", [length_text(v) for v in self.d]))
+        columns.append(("θj", [self._own_text(j, "θ") for j in rows]))
+        columns.append(("rj", [self._own_text(j, "r") for j in rows]))
+        return boxed(columns)
 
-        return boxed_table(self)
+    def _own_text(self, row: int, symbol: str) -> str:
+        """Cell of the theta or r column: a constant, or the variable with its offset."""
+        offset = float(self.theta[row] if symbol == "θ" else self.r[row])
+        text = angle_text if symbol == "θ" else length_text
+        variable = "r" if self.sigma[row] == PRISMATIC else "θ"
+        if self.sigma[row] == FIXED or symbol != variable:
+            return text(offset)
+        return variable_text(symbol, row + 1, text(abs(offset)), offset < 0)
 
     def __repr__(self) -> str:
         return f"<DHTable: {self.f} frames, {self.n} joints>\n{self}"
@@ -439,6 +464,10 @@ def link_transforms(table: DHTable, q: ArrayLike) -> Array:
     T[..., :3, 3] = left[:, :3, 3] + r[..., None] * left[:, :3, 2]
     T[..., 3, 3] = 1.0
     return T
+
+
+def _shows(column: Array) -> bool:
+    return bool((np.abs(column) >= SMALLEST).any())
 
 
 def _integers(value: ArrayLike, name: str, size: int | None = None) -> NDArray[np.int64]:

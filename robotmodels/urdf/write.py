@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from xml.sax.saxutils import escape, quoteattr
+from html import escape  # xml.sax.saxutils would import urllib and cost 40 ms
 
 import numpy as np
 
@@ -64,7 +64,7 @@ def urdf_text(parts: RobotParts, visuals: bool = True) -> str:
     if visuals:
         for visual in parts.visuals or skeleton(table, parts.tool, parts.tip):
             shapes.setdefault(visual.frame, []).append(visual)
-    lines = ['<?xml version="1.0" encoding="utf-8"?>', f"<robot name={quoteattr(parts.name)}>"]
+    lines = ['<?xml version="1.0" encoding="utf-8"?>', f"<robot name={_quoted(parts.name)}>"]
     lines += _link(names.world, parts, -1, [])
     lines += _link(names.frames[0], parts, -1, shapes.get(0, []))
     lines += _fixed(names.world, names.frames[0], parts.base, names.fixed[names.frames[0]])
@@ -77,7 +77,7 @@ def urdf_text(parts: RobotParts, visuals: bool = True) -> str:
             lines += _fixed(parent, child, C[k], table.names[k])
             continue
         kind = "prismatic" if table.sigma[k] == PRISMATIC else "revolute"
-        lines.append(f"  <joint name={quoteattr(table.names[k])} type={quoteattr(kind)}>")
+        lines.append(f"  <joint name={_quoted(table.names[k])} type={_quoted(kind)}>")
         lines += _placement(parent, child, C[k])
         lines.append('    <axis xyz="0 0 1"/>')
         lines.append(
@@ -220,8 +220,8 @@ def _link(name: str, parts: RobotParts, row: int, visuals: list[Visual]) -> list
     for visual in visuals:
         body += _visual(visual)
     if not body:
-        return [f"  <link name={quoteattr(name)}/>"]
-    return [f"  <link name={quoteattr(name)}>", *body, "  </link>"]
+        return [f"  <link name={_quoted(name)}/>"]
+    return [f"  <link name={_quoted(name)}>", *body, "  </link>"]
 
 
 def _inertial(pi: Array) -> list[str]:
@@ -263,7 +263,7 @@ def _visual(visual: Visual) -> list[str]:
 
 
 def _mesh(mesh: Mesh) -> str:
-    return f'<mesh filename={quoteattr(mesh.filename)} scale="{_words(mesh.scale)}"/>'
+    return f'<mesh filename={_quoted(mesh.filename)} scale="{_words(mesh.scale)}"/>'
 
 
 def _material(color: Color) -> str:
@@ -272,20 +272,24 @@ def _material(color: Color) -> str:
 
 
 def _fixed(parent: str, child: str, pose: Array, name: str) -> list[str]:
-    head = f'  <joint name={quoteattr(name)} type="fixed">'
+    head = f'  <joint name={_quoted(name)} type="fixed">'
     return [head, *_placement(parent, child, pose), "  </joint>"]
 
 
 def _placement(parent: str, child: str, pose: Array) -> list[str]:
     return [
         f"    {_origin(pose)}",
-        f"    <parent link={quoteattr(parent)}/>",
-        f"    <child link={quoteattr(child)}/>",
+        f"    <parent link={_quoted(parent)}/>",
+        f"    <child link={_quoted(child)}/>",
     ]
 
 
 def _origin(pose: Array) -> str:
     return f'<origin xyz="{_words(pose[:3, 3])}" rpy="{_words(se3.to_rpy(pose[:3, :3]))}"/>'
+
+
+def _quoted(text: str) -> str:
+    return f'"{escape(text)}"'
 
 
 def _words(values: Array | tuple[float, ...]) -> str:
@@ -316,7 +320,7 @@ def _mimics(transmission: Transmission | None, joints: tuple[str, ...]) -> dict[
                 "robot would reach other poses. Remove it first: model.with_transmission(None)."
             )
         elements[i] = [
-            f'    <mimic joint={quoteattr(joints[master])} multiplier="{float(K[i, master])!r}" '
+            f'    <mimic joint={_quoted(joints[master])} multiplier="{float(K[i, master])!r}" '
             f'offset="{float(transmission.offset[i])!r}"/>'
         ]
     return elements
