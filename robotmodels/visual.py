@@ -9,7 +9,7 @@ import numpy as np
 
 from . import se3
 from ._arrays import Array
-from .geometry import FIXED, PRISMATIC, DHTable
+from .geometry import FIXED, PRISMATIC, REVOLUTE, DHTable
 
 Color = tuple[float, float, float, float]
 
@@ -134,7 +134,7 @@ class Visual:
 
 
 def characteristic_length(table: DHTable, tool: Array) -> float:
-    """A length that says how large a robot is: the sum of its table's lengths and its tool's.
+    """A length that says how large a robot is: its longest branch, its tool and longest stroke.
 
     Parameters
     ----------
@@ -156,18 +156,22 @@ def characteristic_length(table: DHTable, tool: Array) -> float:
     lengths = np.abs(table.d) + np.abs(table.r) + np.abs(table.b)
     longest = max((float(lengths[np.array(table.path(j)) - 1].sum())
                    for j in range(1, table.f + 1)), default=0.0)  # fmt: skip
-    strokes = [upper - lower for lower, upper, s in zip(
+    # a gantry's strokes point in different directions: together they would make thick beams
+    strokes = [float(upper - lower) for lower, upper, s in zip(
         table.lower, table.upper, table.sigma[table.joint_rows], strict=True
     ) if s == PRISMATIC and np.isfinite(upper - lower)]  # fmt: skip
-    total = longest + float(np.linalg.norm(tool[:3, 3])) + float(sum(strokes))
+    total = longest + float(np.linalg.norm(tool[:3, 3])) + max(strokes, default=0.0)
     return total if total > 1e-6 else 0.5
 
 
 def skeleton(table: DHTable, tool: Array, tip: int, axes: bool = True) -> tuple[Visual, ...]:
     """Simple shapes for a robot that has none: joints, links, a foot and the tool's axes.
 
-    Revolute joints are cylinders along z_j, prismatic ones a slide as long as the stroke, links
-    are rods along b, d and r of the table.
+    Revolute joints are cylinders along z_j and links are rods along b, d and r of the table.
+    Prismatic joints are a bar as long as the stroke and a block at the origin of their frame: a
+    rail on which the block travels if it stands on the base or carries another prismatic joint (a
+    gantry), otherwise a bar that moves with the block (a quill). Where axes intersect, as in a
+    wrist, each next cylinder is thinner and longer, so that all of them can be told apart.
 
     Parameters
     ----------
@@ -196,6 +200,8 @@ def skeleton(table: DHTable, tool: Array, tip: int, axes: bool = True) -> tuple[
         Visual(0, se3.translation(0.0, 0.0, -0.5 * rod), Cylinder(2.2 * radius, rod), _BASE_COLOR)
     ]
     motion = dict(zip(table.joint_rows.tolist(), range(table.n), strict=True))
+    # how many joints before this one have their cylinders at the same point
+    within = [0] * (table.f + 1)
     for k in range(table.f):
         frame, antecedent = k + 1, int(table.antecedent[k])
         b, d, r = float(table.b[k]), float(table.d[k]), float(table.r[k])
@@ -205,14 +211,31 @@ def skeleton(table: DHTable, tool: Array, tip: int, axes: bool = True) -> tuple[
         shapes += _rod(antecedent, before @ se3.rotation("y", np.pi / 2), d, rod, size)
         if table.sigma[k] == PRISMATIC:
             i = motion[k]
-            stroke = float(table.upper[i] - table.lower[i])
-            shapes += _slide(frame, stroke if np.isfinite(stroke) else 0.3 * size, radius)
+            low, high = r + float(table.lower[i]), r + float(table.upper[i])
+            if not np.isfinite(high - low):
+                low, high = r, r + 0.3 * size
+            # the bar also reaches back to the antecedent, however far the stroke is from it
+            low, high = min(low, 0.0), max(high, 0.0)
+            block = Box((2 * radius, 2 * radius, 0.8 * radius))
+            carries_slide = (table.sigma[table.antecedent == frame] == PRISMATIC).any()
+            if antecedent == 0 or carries_slide:
+                start = before @ se3.rotation("x", float(table.alpha[k]))
+                start = start @ se3.translation(d, 0.0, 0.0)
+                start = start @ se3.rotation("z", float(table.theta[k]))
+                shapes.append(_bar(antecedent, start, low, high, radius))
+            else:
+                shapes.append(_bar(frame, np.eye(4), -high, -low, radius))
+            shapes.append(Visual(frame, np.eye(4), block, _JOINT_COLOR))
             continue
         # the rod along r turns about itself, so it may move with the link it leads to
         shapes += _rod(frame, se3.translation(0.0, 0.0, -r), r, rod, size)
         if table.sigma[k] != FIXED:
-            pose = se3.translation(0.0, 0.0, 0.0)
-            shapes.append(Visual(frame, pose, Cylinder(radius, 2.6 * radius), _JOINT_COLOR))
+            same_point = max(abs(b), abs(d), abs(r)) < 1e-3 * size
+            if same_point and antecedent and table.sigma[antecedent - 1] == REVOLUTE:
+                within[frame] = within[antecedent] + 1
+            thin, long = 0.72 ** within[frame], 1.2 ** within[frame]
+            cylinder = Cylinder(thin * radius, 2.6 * long * radius)
+            shapes.append(Visual(frame, np.eye(4), cylinder, _JOINT_COLOR))
     reach = float(np.linalg.norm(tool[:3, 3]))
     if reach > 1e-3 * size:
         shapes += _rod(tip, _z_along(tool[:3, 3] / reach), reach, 0.7 * rod, size)
@@ -246,7 +269,7 @@ def triad(frame: int, pose: Array, length: float) -> tuple[Visual, ...]:
     turns = (se3.rotation("y", np.pi / 2), se3.rotation("x", -np.pi / 2), np.eye(4))
     return tuple(
         Visual(frame, pose @ turn @ se3.translation(0.0, 0.0, 0.5 * length),
-               Cylinder(0.06 * length, length), color)
+               Cylinder(0.05 * length, length), color)
         for turn, color in zip(turns, _AXIS_COLORS, strict=True)
     )  # fmt: skip
 
@@ -259,12 +282,10 @@ def _rod(frame: int, start: Array, length: float, radius: float, size: float) ->
     return [Visual(frame, pose, Cylinder(radius, abs(length)), _LINK_COLOR)]
 
 
-def _slide(frame: int, stroke: float, radius: float) -> list[Visual]:
-    pose = se3.translation(0.0, 0.0, -0.5 * stroke)
-    return [
-        Visual(frame, pose, Box((0.9 * radius, 0.9 * radius, stroke)), _SLIDE_COLOR),
-        Visual(frame, np.eye(4), Box((2 * radius, 2 * radius, 0.8 * radius)), _JOINT_COLOR),
-    ]
+def _bar(frame: int, start: Array, low: float, high: float, radius: float) -> Visual:
+    """A square bar along the z axis of ``start``, between two heights."""
+    pose = start @ se3.translation(0.0, 0.0, 0.5 * (low + high))
+    return Visual(frame, pose, Box((0.9 * radius, 0.9 * radius, high - low)), _SLIDE_COLOR)
 
 
 def _z_along(u: Array) -> Array:
