@@ -199,7 +199,8 @@ def test_poses_are_those_of_the_published_urdf(name, rng):
 @pytest.mark.parametrize(
     ("name", "frame", "q", "expected", "tolerance"),
     [
-        # reach of the data sheet: wrist centre (or face plate for the CRX), arm stretched
+        # the reach in the robot's name (quoted for the CRX, from the lengths for KR 6 and TX40):
+        # wrist centre, for the CRX and the Cobra the flange, arm stretched
         ("irb120", 5, [0, h, -h + np.arctan2(0.07, 0.302), 0, 0, 0], 0.58, 5e-4),
         ("irb140", 5, [0, h, -h, 0, 0, 0], 0.81, 1e-12),
         ("irb6640", 5, [0, h, -h + np.arctan2(0.2, 1.392), 0, 0, 0], 2.8, 2e-3),

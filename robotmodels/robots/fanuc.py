@@ -41,9 +41,9 @@ def crx10ia() -> RobotModel:
 
     Khalil-Kleinfinger table, metres and radians. Geometry, position and velocity limits:
     ``crx10ia.urdf.xacro`` of paolofrance/ros2_fanuc_interface (commit 65fc605). The forearm and
-    wrist (0.540, 0.150, 0.160 m) agree with ROS-Industrial's file for the CRX-10iA/L, and the
-    lengths make FANUC's reach: sqrt((0.54 + 0.54 + 0.16)^2 + 0.15^2) = 1.249 m. No inertia or
-    torques are published.
+    wrist (0.540, 0.150, 0.160 m) agree with ROS-Industrial's file for the CRX-10iA/L. The lengths
+    make a reach of sqrt((0.54 + 0.54 + 0.16)^2 + 0.15^2) = 1.249 m, FANUC's 1249 mm (quoted
+    without the data sheet at hand). Neither file has inertia or torques.
 
     Returns
     -------
@@ -72,8 +72,9 @@ def crx10ia_l() -> RobotModel:
 
     Khalil-Kleinfinger table, metres and radians. Geometry, position and velocity limits:
     ``crx10ial_macro.xacro`` of ros-industrial/fanuc (commit d9e4593), after FANUC's operator's
-    manual B-84194EN/01. The lengths make FANUC's reach:
-    sqrt((0.71 + 0.54 + 0.16)^2 + 0.15^2) = 1.418 m. No inertia or torques are published.
+    manual B-84194EN/01. The lengths make a reach of
+    sqrt((0.71 + 0.54 + 0.16)^2 + 0.15^2) = 1.418 m, FANUC's 1418 mm (quoted without the data sheet
+    at hand). The file has no inertia or torques.
 
     Returns
     -------

@@ -191,9 +191,9 @@ def ur5e() -> RobotModel:
 def ur10e() -> RobotModel:
     """Universal Robots UR10e.
 
-    Metres, radians, kilograms. Table, masses and centres of mass: UR article (its last row,
-    d6 = 0.11655 m, as several public copies of the table have it; older descriptions round it to
-    0.117). Inertia and limits: ROS 2 description (limits at commit 8ef39b3).
+    Metres, radians, kilograms. Table, masses and centres of mass: UR article but for its last
+    row, which was not at hand: d6 = 0.11655 m is that of several public copies of the table (an
+    older description rounds it to 0.117), the last centre of mass that of the ROS 2 description. Inertia and limits: ROS 2 description (limits at commit 8ef39b3).
 
     Returns
     -------
@@ -238,9 +238,10 @@ def ur10e() -> RobotModel:
 def ur16e() -> RobotModel:
     """Universal Robots UR16e.
 
-    Metres, radians, kilograms. Table: UR article, as two independent public copies of it agree
-    (another one with a = -0.505, -0.352 is wrong). Masses, centres of mass, inertia and limits:
-    ROS 2 description (limits at commit 8ecc89e).
+    Metres, radians, kilograms. Table: two independent public copies agree (a third has
+    a = -0.505, -0.352); the article's own rows for this arm were not at hand. Masses, centres of
+    mass, inertia and limits: ROS 2 description (limits at commit 8ecc89e); its centres of mass of
+    the two long links are moved to the classical frames with these lengths.
 
     Returns
     -------
