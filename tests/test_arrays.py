@@ -1,0 +1,144 @@
+"""The border: what comes in as numbers, and what is refused with a sentence."""
+
+import numpy as np
+import pytest
+
+from robotmodels._arrays import (
+    as_core,
+    as_exact,
+    as_floats,
+    as_reals,
+    as_vector,
+    batch_rows,
+    read_only,
+    same_value,
+    value_hash,
+)
+from robotmodels.errors import InvalidValueError, ShapeError
+
+NOT_NUMBERS = {
+    "text": "abc",
+    "texts": ["1", "2"],
+    "complex": [1j, 2.0],
+    "ragged": [[1.0], [1.0, 2.0]],
+    "none": [None, 1.0],
+    "booleans": [True, False],
+    "object": object(),
+}
+
+
+@pytest.mark.parametrize("value", NOT_NUMBERS.values(), ids=NOT_NUMBERS)
+@pytest.mark.parametrize(
+    "check",
+    [
+        as_floats,
+        as_reals,
+        lambda value, name: as_core(value, (2,), name),
+        lambda value, name: as_vector(value, 2, name),
+        lambda value, name: as_exact(value, (2,), name),
+    ],
+    ids=["floats", "reals", "core", "vector", "exact"],
+)
+def test_what_is_not_a_real_number_is_named_in_the_error(check, value):
+    with pytest.raises(InvalidValueError, match=r"^speed: expected (real )?numbers"):
+        check(value, "speed")
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("n", [1, 3])
+def test_the_first_number_that_is_not_finite_is_located(bad, n):
+    value = np.zeros((2, n))
+    value[1, n - 1] = bad
+    with pytest.raises(InvalidValueError, match=rf"^q: .* got {bad} at index \[1, {n - 1}\]"):
+        as_vector(value, n, "q")
+    with pytest.raises(InvalidValueError, match=rf"index \[{n - 1}\]"):
+        as_vector(value[1], n, "q")
+
+
+def test_infinite_limits_are_reals():
+    assert as_reals([np.inf, np.nan], "upper").shape == (2,)
+
+
+@pytest.mark.parametrize("value", [[1, 2], (1, 2), np.array([1, 2], dtype=np.float32), range(1, 3)])
+def test_lists_and_integers_become_float64(value):
+    for array in (as_floats(value, "x"), as_vector(value, 2, "x"), as_exact(value, (2,), "x")):
+        assert array.dtype == np.float64
+        assert array.tolist() == [1.0, 2.0]
+
+
+def test_huge_but_finite_numbers_pass_the_quick_check():
+    """Their sum of squares overflows (NumPy may warn of it), which is no infinite component."""
+    with np.errstate(over="ignore"):
+        assert as_vector([1e200, 1e200], 2, "q").tolist() == [1e200, 1e200]
+
+
+@pytest.mark.parametrize(
+    ("shape", "advice"),
+    [((3,), ""), ((6, 1), "ravel"), ((6, 5), "transposed"), ((), ""), ((5, 7), "")],
+)
+def test_wrong_shapes_say_what_came_and_what_to_do(shape, advice):
+    with pytest.raises(ShapeError, match=r"^q: expected shape \(\.\.\., 6\), got") as caught:
+        as_vector(np.zeros(shape), 6, "q")
+    assert str(shape) in str(caught.value)
+    assert advice in str(caught.value)
+
+
+def test_matlab_order_of_poses_is_recognised():
+    with pytest.raises(ShapeError, match="move the last axis to the front"):
+        as_core(np.zeros((4, 4, 10)), (4, 4), "T")
+
+
+def test_exact_shapes_have_no_batch():
+    with pytest.raises(ShapeError, match=r"expected shape \(3,\), got \(2, 3\)"):
+        as_exact(np.zeros((2, 3)), (3,), "gravity")
+
+
+@pytest.mark.parametrize("shape", [(0, 3), (2, 0, 3)])
+def test_empty_batches_pass(shape):
+    assert as_vector(np.zeros(shape), 3, "q").shape == shape
+
+
+@pytest.mark.parametrize(
+    ("shapes", "batch"),
+    [
+        ([(3,), (3,)], ()),
+        ([(5, 3), (3,)], (5,)),
+        ([(2, 1, 3), (4, 3)], (2, 4)),
+        ([(0, 3), (3,)], (0,)),
+        ([(2, 3), (2, 6)], (2,)),
+        ([(4, 0), (4, 0)], (4,)),
+    ],
+)
+def test_batches_broadcast_and_become_contiguous_rows(shapes, batch):
+    arrays = tuple(np.arange(float(np.prod(s))).reshape(s) for s in shapes)
+    got, rows = batch_rows(arrays, ("q", "v"))
+    assert got == batch
+    for array, row in zip(arrays, rows, strict=True):
+        assert row.flags.c_contiguous
+        wanted = np.broadcast_to(array, (*batch, array.shape[-1]))
+        assert row.shape == (int(np.prod(batch)), array.shape[-1])
+        assert np.array_equal(row.reshape(wanted.shape), wanted)
+
+
+def test_batches_that_do_not_broadcast_are_named():
+    with pytest.raises(ShapeError, match=r"q \(2, 3\), v \(4, 3\)"):
+        batch_rows((np.zeros((2, 3)), np.zeros((4, 3))), ("q", "v"))
+
+
+def test_read_only_is_a_private_copy():
+    source = np.asfortranarray(np.ones((2, 3)))
+    copy = read_only(source)
+    source[0, 0] = 5.0
+    assert copy[0, 0] == 1.0
+    assert copy.flags.c_contiguous
+    with pytest.raises(ValueError, match="read-only"):
+        copy[0, 0] = 2.0
+
+
+def test_equal_values_hash_alike():
+    """-0.0 equals 0.0, so it must hash like it; shapes tell arrays apart."""
+    a, b = np.array([0.0, 1.0]), np.array([-0.0, 1.0])
+    assert same_value(a, b)
+    assert value_hash("x", a) == value_hash("x", b)
+    assert not same_value(a, a[None])
+    assert not same_value(a, np.array([0.0, 2.0]))

@@ -1,0 +1,162 @@
+"""Drives and transmissions: the TX40 wrist, power through the gears, mimics, mistakes."""
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+from hypothesis import given
+from identities.random_robots import random_drive, random_transmission, seeds
+
+import robotmodels as rm
+from robotmodels.drive import drive_matrices
+from robotmodels.errors import InertiaError, InvalidValueError, ShapeError
+
+# joints from motors of the Staubli TX40: q = R^-1 q_motor, R diagonal but for R[6, 5] = 32
+RATIOS = np.diag([32.0, 32.0, 45.0, -48.0, 45.0, 32.0])
+RATIOS[5, 4] = 32.0
+
+
+def tx40(**terms):
+    return rm.Transmission(np.linalg.inv(RATIOS), **terms)
+
+
+def test_tx40_wrist_couples_motor_6_only():
+    wrist = tx40()
+    assert wrist.coupled_motors == (6,)
+    wanted = np.eye(6)
+    wanted[5, 4] = 1.0  # the shaft of motor 6 turns with joints 5 and 6 together
+    assert np.allclose(wrist.weights, wanted, atol=1e-15)
+    assert wrist.to_encoder([0, 0, 0, 0, 1.0, 0]) == pytest.approx([0, 0, 0, 0, 45, 32])
+
+
+def test_tx40_coupled_friction_is_that_of_the_published_identification():
+    """tau_5 += Iam6 a6 + Fvm6 v6 + Fcm6 sign(v5 + v6), and joint 6 likewise with joint 5."""
+    Ia, Fv, Fc = 0.1 * np.arange(1, 7), np.arange(1.0, 7.0), 2.0 * np.arange(1, 7)
+    drive = rm.DriveParameters(Ia=Ia, Fv=Fv, Fc=Fc)
+    last = np.eye(6)[5]
+    Iam, Fvm, Fcm = 0.01, 0.6, 1.8
+    wrist = tx40(Iam=Iam * last, Fvm=Fvm * last, Fcm=Fcm * last)
+    rng = np.random.default_rng(0)
+    v, a = rng.normal(size=(2, 6))
+    wanted = Ia * a + Fv * v + Fc * np.sign(v)
+    both = Fcm * np.sign(v[4] + v[5])
+    wanted[4] += Iam * a[5] + Fvm * v[5] + both
+    wanted[5] += Iam * a[4] + Fvm * v[4] + both
+    assert np.allclose(drive_matrices(drive, wrist).torque(v, a), wanted, atol=1e-14)
+
+
+@given(seeds)
+def test_power_is_the_same_on_both_sides_of_the_gears(seed):
+    """tau . v = tau_c . v_c: torques go through the transpose of what velocities go through."""
+    rng = np.random.default_rng(seed)
+    gears = random_transmission(rng, 6)
+    q_c, v_c, tau = rng.normal(size=(3, 4, 6))
+    v = gears.to_joint(v_c) - gears.offset
+    assert np.allclose(
+        np.sum(tau * v, axis=-1), np.sum(gears.to_motor_torque(tau) * v_c, axis=-1), atol=1e-12
+    )
+    assert np.allclose(gears.to_encoder(gears.to_joint(q_c)), q_c, atol=1e-10)
+    assert np.allclose(gears.to_joint(q_c[0]), gears.matrix @ q_c[0] + gears.offset, atol=1e-14)
+
+
+@given(seeds)
+def test_drive_matrices_state_the_formula_of_the_docstring(seed):
+    rng = np.random.default_rng(seed)
+    n = 5
+    drive, gears = random_drive(rng, n), random_transmission(rng, n)
+    v, a = rng.normal(size=(2, 3, n))
+    wanted = drive.Ia * a + drive.Fv * v + drive.Fc * np.sign(v) + drive.offset
+    W = np.linalg.inv(gears.matrix)
+    for m in range(n):
+        w = np.where(np.abs(W[m]) > 1e-9, W[m], 0.0) / W[m, m]
+        if np.count_nonzero(w) < 2:
+            continue
+        for j in range(n):
+            for k in set(range(n)) - {j}:
+                wanted[:, j] += w[j] * w[k] * (gears.Iam[m] * a[:, k] + gears.Fvm[m] * v[:, k])
+            wanted[:, j] += w[j] * gears.Fcm[m] * np.sign(v @ w)
+    matrices = drive_matrices(drive, gears)
+    assert np.allclose(matrices.torque(v, a), wanted, atol=1e-12)
+    assert np.allclose(matrices.torque(v, None), matrices.torque(v, 0 * a), atol=1e-12)
+    assert np.allclose(matrices.rotor, matrices.rotor.T)
+    assert np.allclose(matrices.viscous, matrices.viscous.T)
+
+
+def test_drives_default_to_nothing():
+    drive = rm.DriveParameters(Fc=[1.0, 2.0])
+    assert drive.n == 2
+    assert not drive.is_zero
+    for zeros in (drive.Ia, drive.Fv, drive.offset):
+        assert zeros.tolist() == [0, 0]
+    assert rm.DriveParameters.zeros(3).is_zero
+    assert drive_matrices(drive, None).coupling.shape == (0, 2)
+
+
+def test_mimic_joints_are_singular_and_say_so():
+    """Joint 2 follows joint 1: q has no unique encoder variables, but torques still go over."""
+    gripper = rm.Transmission([[1, 0], [-1, 0]], offset=[0, 0.1])
+    assert not gripper.is_invertible
+    assert gripper.coupled_motors == ()
+    assert gripper.to_joint([0.3, 7.0]) == pytest.approx([0.3, -0.2])
+    assert gripper.to_motor_torque([2.0, 0.5]) == pytest.approx([1.5, 0.0])
+    with pytest.raises(InvalidValueError, match="a joint mimics another one"):
+        gripper.to_encoder([0.3, -0.2])
+
+
+@pytest.mark.parametrize(
+    "make",
+    [lambda rng: random_drive(rng, 4), lambda rng: random_transmission(rng, 4)],
+    ids=["drive", "transmission"],
+)
+def test_drives_and_transmissions_are_values(make):
+    part, same = make(np.random.default_rng(1)), make(np.random.default_rng(1))
+    assert part == same
+    assert hash(part) == hash(same)
+    assert part != make(np.random.default_rng(2))
+    assert part != "part"
+    for copied in (part, copy.deepcopy(part), pickle.loads(pickle.dumps(part))):
+        assert copied == part
+        assert not copied.offset.flags.writeable
+    with pytest.raises(AttributeError):
+        part.offset = np.zeros(4)
+
+
+@pytest.mark.parametrize(
+    ("fields", "error", "words"),
+    [
+        ({}, InertiaError, "at least one of Ia, Fv, Fc, offset"),
+        ({"Ia": [1.0], "Fv": [1.0, 2.0]}, ShapeError, r"Ia \(1,\), Fv \(2,\)"),
+        ({"Ia": [[1.0]]}, ShapeError, r"Ia \(1, 1\)"),
+        ({"Fc": [np.nan]}, InvalidValueError, "Fc: .* got nan"),
+        ({"offset": "x"}, InvalidValueError, "offset: expected real numbers"),
+    ],
+)
+def test_mistakes_in_drives(fields, error, words):
+    with pytest.raises(error, match=words):
+        rm.DriveParameters(**fields)
+
+
+@pytest.mark.parametrize(
+    ("fields", "error", "words"),
+    [
+        ({"matrix": np.ones((2, 3))}, ShapeError, r"square \(n, n\) matrix, got \(2, 3\)"),
+        ({"matrix": [1.0, 2.0]}, ShapeError, "square"),
+        ({"matrix": [[np.inf]]}, InvalidValueError, "matrix: .* got inf"),
+        ({"matrix": np.eye(2), "offset": [0.0]}, ShapeError, "offset: expected shape"),
+        ({"matrix": np.eye(2), "offset": np.zeros((3, 2))}, ShapeError, "offset: expected shape"),
+        ({"matrix": np.eye(2), "Iam": [0.1, 0]}, InertiaError, "Motor 1 turns one joint only"),
+        ({"matrix": [[1, 0], [-1, 1]], "Fcm": [0.1, 0]}, InertiaError, r"the motors \[2\]"),
+    ],
+)
+def test_mistakes_in_transmissions(fields, error, words):
+    with pytest.raises(error, match=words):
+        rm.Transmission(**fields)
+
+
+@pytest.mark.parametrize("method", ["to_joint", "to_encoder", "to_motor_torque"])
+def test_mistakes_in_vectors_through_the_gears(method):
+    with pytest.raises(ShapeError, match=r"expected shape \(\.\.\., 6\), got \(5,\)"):
+        getattr(tx40(), method)(np.zeros(5))
+    with pytest.raises(InvalidValueError, match="got nan"):
+        getattr(tx40(), method)([0, 0, np.nan, 0, 0, 0])

@@ -1,0 +1,362 @@
+"""The table: fields and defaults, degrees, classical tables, printing, and being a value."""
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+from hypothesis import given
+from identities.random_robots import (
+    any_models,
+    random_angle,
+    random_length,
+    random_model,
+    random_state,
+    random_table,
+    robot_size,
+    seeds,
+    table_poses,
+)
+
+import robotmodels as rm
+from robotmodels import se3
+from robotmodels.errors import InvalidValueError, ShapeError, TableError
+from robotmodels.geometry import constant_factors
+from robotmodels.table_text import angle_text, length_text
+
+ANGLES, LENGTHS = ("gamma", "beta", "alpha", "theta"), ("b", "d", "r")
+RX90_ROWS = [
+    {"sigma": 0, "alpha": 0, "d": 0, "theta": 0, "r": 0},
+    {"sigma": 0, "alpha": 90, "d": 0, "theta": 0, "r": 0},
+    {"sigma": 0, "alpha": 0, "d": 0.45, "theta": 0, "r": 0},
+    {"sigma": 0, "alpha": -90, "d": 0, "theta": 0, "r": 0.45},
+    {"sigma": 0, "alpha": 90, "d": 0, "theta": 0, "r": 0},
+    {"sigma": 0, "alpha": -90, "d": 0, "theta": 0, "r": 0},
+]
+
+
+# --- fields and defaults -----------------------------------------------------------------------
+
+
+def test_defaults():
+    table = rm.DHTable(antecedent=[0, 1, 1], sigma=[0, 2, 1])
+    assert (table.f, table.n) == (3, 2)
+    assert table.mu.tolist() == [1, 0, 1], "a fixed frame is not actuated"
+    for column in (*ANGLES, *LENGTHS):
+        assert getattr(table, column).tolist() == [0, 0, 0]
+    assert table.names == ("joint_1", "frame_2", "joint_3")
+    assert table.joint_names == ("joint_1", "joint_3")
+    assert table.joint_rows.tolist() == [0, 2]
+    assert table.lower.tolist() == [-np.inf] * 2
+    for limit in (table.upper, table.velocity, table.effort):
+        assert limit.tolist() == [np.inf] * 2
+    assert not table.is_serial
+    assert table.path(3) == [1, 3]
+    assert table.path(0) == []
+
+
+def test_rows_carry_every_field():
+    row = {
+        "antecedent": 0, "sigma": 1, "mu": 0, "gamma": 0.1, "b": 0.2, "beta": 0.3, "alpha": 0.4,
+        "d": 0.5, "theta": 0.6, "r": 0.7, "lower": -1, "upper": 2, "velocity": 3, "effort": 4,
+        "name": "slide",
+    }  # fmt: skip
+    table = rm.DHTable.from_rows([row])
+    for key, value in row.items():
+        got = table.names[0] if key == "name" else getattr(table, key)[0]
+        assert got == value, key
+    again = rm.DHTable(**{k: [v] for k, v in row.items() if k != "name"}, names=["slide"])
+    assert again == table
+
+
+def test_rows_default_to_a_chain_of_revolute_joints():
+    table = rm.DHTable.from_rows([{}, {"d": 1}, {"sigma": 2, "name": "flange"}])
+    assert table.antecedent.tolist() == [0, 1, 2]
+    assert table.sigma.tolist() == [0, 0, 2]
+    assert table.names == ("joint_1", "joint_2", "flange")
+    assert table.is_serial
+    assert rm.DHTable.from_rows(iter([{}])).f == 1, "rows may come from a generator"
+
+
+def test_degrees_cover_angles_and_the_limits_of_revolute_joints():
+    rows = [
+        {"gamma": 10, "beta": 20, "alpha": 30, "theta": 40, "r": 50, "b": 60, "d": 70,
+         "lower": -90, "upper": 180, "velocity": 360, "effort": 5},
+        {"sigma": 1, "theta": 45, "r": 0.5, "lower": -0.3, "upper": 0.4, "velocity": 2},
+    ]  # fmt: skip
+    table = rm.DHTable.from_rows(rows, degrees=True)
+    for column, value in zip(ANGLES, (10, 20, 30, 40), strict=True):
+        assert getattr(table, column)[0] == pytest.approx(np.deg2rad(value), rel=1e-15)
+    assert (table.b[0], table.d[0], table.r[0]) == (60, 70, 50), "lengths stay metres"
+    assert table.theta[1] == pytest.approx(np.pi / 4)
+    assert table.lower == pytest.approx([-np.pi / 2, -0.3])
+    assert table.upper == pytest.approx([np.pi, 0.4])
+    assert table.velocity == pytest.approx([2 * np.pi, 2])
+    assert table.effort[0] == 5
+
+
+# --- what the numbers mean -----------------------------------------------------------------------
+
+
+@given(seeds)
+def test_a_factor_is_the_product_of_its_seven_motions(seed):
+    """Rot(z, gamma) Trans(z, b) Rot(y, beta) Rot(x, alpha) Trans(x, d) Rot(z, theta + q) ..."""
+    rng = np.random.default_rng(seed)
+    table = random_table(rng, f=4, tree=True, fixed=True)
+    q = rng.normal(size=table.n)
+    theta, r = table.theta.copy(), table.r.copy()
+    for i, k in enumerate(table.joint_rows):
+        (r if table.sigma[k] == 1 else theta)[k] += q[i]
+    got = rm.link_transforms(table, q)
+    for k in range(table.f):
+        wanted = (
+            se3.rotation("z", table.gamma[k]) @ se3.translation(0, 0, table.b[k])
+            @ se3.rotation("y", table.beta[k]) @ se3.rotation("x", table.alpha[k])
+            @ se3.translation(table.d[k], 0, 0)
+            @ se3.rotation("z", theta[k]) @ se3.translation(0, 0, r[k])
+        )  # fmt: skip
+        assert np.abs(got[k] - wanted).max() < 1e-14
+    assert np.abs(rm.link_transforms(table, np.zeros(table.n)) - constant_factors(table)).max() == (
+        pytest.approx(0, abs=1e-15)
+    )
+
+
+@given(any_models())
+def test_poses_are_the_plain_product_of_the_factors(model):
+    """The oracle here, the compiled kernels and Pinocchio agree on every random robot."""
+    rng = np.random.default_rng(0)
+    q, _, _ = random_state(model, rng)
+    poses, size = table_poses(model, q), robot_size(model, q)
+    assert np.abs(rm.link_poses(model, q) - poses).max() < 1e-12 * size
+    assert np.abs(rm.dgm(model, q) - poses[model.tip - 1] @ model.tool).max() < 1e-12 * size
+
+
+@pytest.mark.parametrize("batch", [(), (1,), (3,), (2, 3), (0,)])
+def test_factors_of_batches(batch, rng):
+    table = random_table(rng, f=5, tree=True, fixed=True)
+    q = rng.normal(size=(*batch, table.n))
+    T = rm.link_transforms(table, q)
+    assert T.shape == (*batch, 5, 4, 4)
+    for i in np.ndindex(*batch):
+        assert np.array_equal(T[i], rm.link_transforms(table, q[i]))
+
+
+@pytest.mark.parametrize("degrees", [False, True])
+@given(seed=seeds)
+def test_classical_tables_become_the_same_robot(seed, degrees):
+    """The product of Rot(z, theta + offset + q) Trans(z, d) Trans(x, a) Rot(x, alpha)."""
+    rng = np.random.default_rng(seed)
+    unit = 180 / np.pi if degrees else 1.0
+    rows, wanted, q = [], np.eye(4), rng.normal(size=6)
+    for i in range(6):
+        sigma = int(rng.integers(2))
+        theta, alpha = random_angle(rng), random_angle(rng)
+        d, a = random_length(rng), random_length(rng)
+        offset = rng.choice([0.0, rng.normal()])
+        rows.append({
+            "sigma": sigma, "theta": theta * unit, "alpha": alpha * unit, "d": d, "a": a,
+            "offset": offset * (1.0 if sigma else unit), "name": f"axis_{i}",
+        })  # fmt: skip
+        turn, shift = (theta, d + offset + q[i]) if sigma else (theta + offset + q[i], d)
+        wanted = (
+            wanted @ se3.rotation("z", turn) @ se3.translation(0, 0, shift)
+            @ se3.translation(a, 0, 0) @ se3.rotation("x", alpha)
+        )  # fmt: skip
+    table, tool = rm.DHTable.from_standard(rows, degrees=degrees)
+    got = np.eye(4)
+    for T in rm.link_transforms(table, q):
+        got = got @ T
+    assert np.abs(got @ tool - wanted).max() < 1e-13
+    assert table.names[0] == "axis_0"
+    assert np.array_equal(tool[:3, 3], [rows[-1]["a"], 0, 0])
+
+
+# --- printing ------------------------------------------------------------------------------------
+
+
+def test_rx90_prints_as_table_1_1_of_the_book():
+    """Same columns in the same order (j, sigma, alpha, d, theta, r), same fractions of pi."""
+    assert (
+        str(rm.DHTable.from_rows(RX90_ROWS, degrees=True))
+        == """\
+┌───┬────┬──────┬──────┬────┬──────┐
+│ j │ σj │   αj │   dj │ θj │   rj │
+├───┼────┼──────┼──────┼────┼──────┤
+│ 1 │  0 │    0 │    0 │ θ₁ │    0 │
+│ 2 │  0 │  π/2 │    0 │ θ₂ │    0 │
+│ 3 │  0 │    0 │ 0.45 │ θ₃ │    0 │
+│ 4 │  0 │ -π/2 │    0 │ θ₄ │ 0.45 │
+│ 5 │  0 │  π/2 │    0 │ θ₅ │    0 │
+│ 6 │  0 │ -π/2 │    0 │ θ₆ │    0 │
+└───┴────┴──────┴──────┴────┴──────┘"""
+    )
+
+
+def test_trees_print_antecedents_branches_offsets_and_beta():
+    table = rm.DHTable.from_rows([
+        {"r": 0.2, "theta": np.pi / 2},
+        {"sigma": 1, "theta": np.pi, "r": -0.1, "alpha": 0.5},
+        {"antecedent": 1, "gamma": -np.pi / 3, "b": 0.25, "beta": 1e-3, "mu": 0},
+        {"sigma": 2, "theta": -np.pi / 2, "r": 1e-12},
+    ])  # fmt: skip
+    assert (
+        str(table)
+        == """\
+┌───┬──────┬────┬────┬──────┬──────┬───────┬─────┬────┬──────────┬──────────┐
+│ j │ a(j) │ σj │ μj │   γj │   bj │    βj │  αj │ dj │       θj │       rj │
+├───┼──────┼────┼────┼──────┼──────┼───────┼─────┼────┼──────────┼──────────┤
+│ 1 │    0 │  0 │  1 │    0 │    0 │     0 │   0 │  0 │ θ₁ + π/2 │      0.2 │
+│ 2 │    1 │  1 │  1 │    0 │    0 │     0 │ 0.5 │  0 │        π │ r₂ - 0.1 │
+│ 3 │    1 │  0 │  0 │ -π/3 │ 0.25 │ 0.001 │   0 │  0 │       θ₃ │        0 │
+│ 4 │    3 │  2 │  0 │    0 │    0 │     0 │   0 │  0 │     -π/2 │        0 │
+└───┴──────┴────┴────┴──────┴──────┴───────┴─────┴────┴──────────┴──────────┘"""
+    )
+    assert str(table) in repr(table)
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0, "0"), (-0.0, "0"), (np.pi, "π"), (-np.pi, "-π"), (2 * np.pi, "2π"), (np.pi / 6, "π/6"),
+     (-3 * np.pi / 4, "-3π/4"), (0.3, "0.3"), (1e-10, "0"), (np.pi / 2 + 1e-6, "1.5708")],
+)  # fmt: skip
+def test_angles_print_as_fractions_of_pi(value, text):
+    assert angle_text(value) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(0.45, "0.45"), (-0.0, "0"), (1 / 3, "0.333333"), (1e-3, "0.001")]
+)
+def test_lengths_print_six_digits(value, text):
+    assert length_text(value) == text
+
+
+# --- being a value -------------------------------------------------------------------------------
+
+
+def test_equality_and_hash_follow_the_numbers(rng):
+    table = random_table(rng, f=5, tree=True, fixed=True)
+    same = table.replace(d=table.d + 0.0)
+    assert same == table
+    assert hash(same) == hash(table)
+    for column in (*ANGLES, *LENGTHS, "lower", "upper", "velocity", "effort"):
+        changed = np.array(getattr(table, column))
+        changed[0] = -9.0 if column == "lower" else 9.0
+        assert table.replace(**{column: changed}) != table, column
+    assert table.replace(names=[f"x{j}" for j in range(5)]) != table
+    assert table != "table"
+    assert len({table, same}) == 1
+
+
+def test_nothing_in_a_table_can_be_written(rng):
+    table = random_table(rng, f=3)
+    source = np.zeros(3)
+    mine = table.replace(d=source)
+    source[0] = 7.0
+    assert mine.d[0] == 0.0, "a table keeps its own copy"
+    with pytest.raises(AttributeError):
+        table.d = source
+    for copied in (table, pickle.loads(pickle.dumps(table)), copy.deepcopy(table)):
+        for column in ("antecedent", "sigma", "mu", *ANGLES, *LENGTHS, "lower", "upper"):
+            assert not getattr(copied, column).flags.writeable, column
+
+
+@pytest.mark.parametrize("protocol", range(2, pickle.HIGHEST_PROTOCOL + 1))
+def test_tables_pickle(protocol, rng):
+    table = random_table(rng, f=6, tree=True, fixed=True, passive=True)
+    assert pickle.loads(pickle.dumps(table, protocol)) == table
+    assert copy.deepcopy(table) == table == copy.copy(table)
+
+
+def test_replace_changes_one_column_and_knows_the_others():
+    table = rm.DHTable(antecedent=[0, 1], sigma=[0, 0])
+    assert table.replace(r=[0.1, 0.2]).r.tolist() == [0.1, 0.2]
+    with pytest.raises(TableError, match=r"unknown column 'thete'\. Did you mean 'theta'\?"):
+        table.replace(thete=[0, 0])
+
+
+def test_zero_rows_make_an_empty_table_but_no_model():
+    table = rm.DHTable.from_rows([])
+    assert (table.f, table.n) == (0, 0)
+    assert rm.link_transforms(table, np.zeros((3, 0))).shape == (3, 0, 4, 4)
+    with pytest.raises(rm.errors.FrameNotFoundError):
+        rm.RobotModel.from_table(table)
+
+
+# --- mistakes ------------------------------------------------------------------------------------
+
+MISTAKES = [
+    ({"antecedent": [1], "sigma": [0]}, TableError, "Row 1 stands on frame 1"),
+    ({"antecedent": [0, 3, 2], "sigma": [0] * 3}, TableError, "Row 2 .* loop"),
+    ({"antecedent": [-1], "sigma": [0]}, TableError, "stands on frame -1"),
+    ({"antecedent": [0.5], "sigma": [0]}, TableError, "antecedent: expected whole numbers"),
+    ({"antecedent": [0], "sigma": [3]}, TableError, "sigma is 0 .revolute."),
+    ({"antecedent": [0], "sigma": [0, 1]}, ShapeError, "sigma: expected 1 numbers"),
+    ({"antecedent": [[0]], "sigma": [0]}, ShapeError, "antecedent: expected one number per row"),
+    ({"antecedent": [0], "sigma": [0], "mu": [2]}, TableError, "mu: expected 1 .actuated."),
+    ({"antecedent": [0], "sigma": [0], "d": [1, 2]}, ShapeError, r"d: expected shape \(1,\)"),
+    ({"antecedent": [0], "sigma": [0], "r": [np.inf]}, InvalidValueError, "r: .* got inf"),
+    ({"antecedent": [0], "sigma": [0], "alpha": [np.nan]}, InvalidValueError, "alpha: .* got nan"),
+    ({"antecedent": [0], "sigma": [0], "theta": ["x"]}, InvalidValueError, "theta: .*real numbers"),
+    ({"antecedent": [0], "sigma": [2], "lower": [0.0]}, ShapeError, "each of the 0 moving joints"),
+    ({"antecedent": [0], "sigma": [0], "upper": [np.nan]}, InvalidValueError, "upper: NaN"),
+    ({"antecedent": [0], "sigma": [0], "upper": ["1"]}, InvalidValueError, "upper: expected real"),
+    ({"antecedent": [0], "sigma": [0], "upper": [1j]}, InvalidValueError, "upper: expected real"),
+    ({"antecedent": [0], "sigma": [0], "lower": [1], "upper": [0]}, TableError, "exchange them"),
+    ({"antecedent": [0], "sigma": [0], "lower": [np.inf]}, TableError, "leaves no room"),
+    ({"antecedent": [0], "sigma": [0], "effort": [-1]}, TableError, "effort: limits are magn"),
+    ({"antecedent": [0, 1], "sigma": [0, 0], "names": ["a", "a"]}, TableError, "'a' more than onc"),
+    ({"antecedent": [0, 1], "sigma": [0, 0], "names": ["a"]}, ShapeError, "2 rows, got 1"),
+    ({"antecedent": [0], "sigma": [0], "names": [""]}, TableError, "empty name"),
+    ({"antecedent": [0, 1], "sigma": [0, 0], "names": "ab"}, TableError, "a list of names"),
+    ({"antecedent": [0], "sigma": [0], "names": 5}, TableError, "a list of names"),
+    ({"antecedent": [0], "sigma": [0], "names": ["a\0b"]}, TableError, "control character"),
+]
+
+
+@pytest.mark.parametrize(("fields", "error", "words"), MISTAKES)
+def test_mistakes_in_a_table(fields, error, words):
+    with pytest.raises(error, match=words):
+        rm.DHTable(**fields)
+
+
+@pytest.mark.parametrize(
+    ("rows", "error", "words"),
+    [
+        (
+            [{"sigma": 0}, {"alhpa": 1}],
+            TableError,
+            r"Row 2: unknown key 'alhpa'\. Did you mean 'al",
+        ),
+        ([{"sigma": 0}, [1, 2]], TableError, "Row 2: expected a mapping .* got list"),
+        ({"sigma": 0}, TableError, "Row 1: expected a mapping .* got str"),
+        (None, TableError, "expected a list with a mapping per row"),
+        ([{"sigma": 2, "lower": 1}], TableError, "a fixed frame has no limits, got lower"),
+        ([{"sigma": "R"}], InvalidValueError, "Row 1: sigma: expected real numbers"),
+        ([{"d": [1, 2]}], InvalidValueError, "Row 1: d must be one number"),
+        ([{"d": None}], InvalidValueError, "Row 1: d: expected real numbers"),
+        ([{"upper": "2"}], InvalidValueError, "Row 1: upper: expected real numbers"),
+        ([{"alpha": np.nan}], InvalidValueError, "alpha: expected finite numbers"),
+    ],
+)
+@pytest.mark.parametrize("degrees", [False, True])
+def test_mistakes_in_rows(rows, error, words, degrees):
+    with pytest.raises(error, match=words):
+        rm.DHTable.from_rows(rows, degrees=degrees)
+    if words.startswith("a fixed"):
+        return
+    with pytest.raises((TableError, InvalidValueError)):
+        rm.DHTable.from_standard(rows, degrees=degrees)
+
+
+def test_classical_rows_have_their_own_keys():
+    with pytest.raises(TableError, match="unknown key 'r'"):
+        rm.DHTable.from_standard([{"r": 0.1}])
+    with pytest.raises(InvalidValueError, match="a and alpha"):
+        rm.DHTable.from_standard([{"a": np.inf}])
+
+
+@pytest.mark.parametrize("q", [[0.0], np.zeros((2, 1)), [[0.0, np.nan]], "ab", [1j, 0]])
+def test_mistakes_in_joint_variables(q, rng):
+    table = random_model(rng, f=2).table
+    with pytest.raises((ShapeError, InvalidValueError), match=r"^q: expected"):
+        rm.link_transforms(table, q)

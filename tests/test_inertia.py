@@ -1,0 +1,251 @@
+"""Inertial parameters: frames they move between, and what a real body can have."""
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+from hypothesis import given
+from identities.random_robots import (
+    random_angle,
+    random_bodies,
+    random_drive,
+    random_length,
+    random_parameters,
+    random_pose,
+    random_rotation,
+    seeds,
+    table_poses,
+)
+
+import robotmodels as rm
+from robotmodels import se3
+from robotmodels.errors import InertiaError, InvalidValueError, NotARotationError, ShapeError
+
+
+def central(rng, f):
+    """Masses, centres of mass and tensors about them of f random solid boxes in random axes."""
+    mass = rng.uniform(0.1, 5.0, size=f)
+    sides = rng.uniform(0.05, 0.5, size=(f, 3)) ** 2
+    R = np.array([random_rotation(rng) for _ in range(f)])
+    moments = mass[:, None] / 12 * (sides.sum(axis=1)[:, None] - sides)
+    tensor = R @ (moments[:, :, None] * np.eye(3)) @ np.swapaxes(R, 1, 2)
+    return mass, rng.normal(size=(f, 3)), 0.5 * (tensor + np.swapaxes(tensor, 1, 2))
+
+
+@given(seeds)
+def test_from_com_is_the_parallel_axis_theorem(seed):
+    """I_O = I_C + m (c.c 1 - c c^T), in Khalil's order; and back to the centre of mass."""
+    mass, com, tensor = central(np.random.default_rng(seed), 4)
+    links = rm.InertialParameters.from_com(mass, com, tensor)
+    for j in range(4):
+        c = com[j]
+        about = tensor[j] + mass[j] * (c @ c * np.eye(3) - np.outer(c, c))
+        XX, XY, XZ, YY, YZ, ZZ, MX, MY, MZ, M = links.values[j]
+        assert np.allclose([[XX, XY, XZ], [XY, YY, YZ], [XZ, YZ, ZZ]], about, atol=1e-14)
+        assert np.allclose([MX, MY, MZ, M], [*(mass[j] * c), mass[j]], atol=1e-15)
+    assert np.allclose(links.tensors[0], links.tensors[0].T)
+    to_com = np.array([se3.translation(*-c) for c in links.first_moments / links.mass[:, None]])
+    back = links.moved(to_com)
+    assert np.allclose(back.tensors, tensor, atol=1e-13)
+    assert np.allclose(back.first_moments, 0, atol=1e-14)
+    assert links.is_physical.all()
+
+
+@given(seeds)
+def test_moving_twice_is_moving_by_the_product(seed):
+    """Also for parameters that no body has: the map is linear in them."""
+    rng = np.random.default_rng(seed)
+    links = random_parameters(rng, 3)
+    A, B = (np.array([random_pose(rng) for _ in range(3)]) for _ in range(2))
+    once = links.moved(B @ A)
+    assert np.allclose(links.moved(A).moved(B).values, once.values, atol=1e-12)
+    assert np.allclose(once.moved(se3.inverse(B @ A)).values, links.values, atol=1e-12)
+    assert np.array_equal(once.mass, links.mass)
+
+
+@given(seeds)
+def test_moving_keeps_kinetic_energy(seed):
+    """The energy of a moving body does not depend on the frame its parameters are given in."""
+    rng = np.random.default_rng(seed)
+    links = random_bodies(rng, 1)
+    T = random_pose(rng)
+    moved = links.moved(T[None])
+    w, v = rng.normal(size=(2, 3))  # in the new frame, at its origin
+    R, p = T[:3, :3], T[:3, 3]
+    v_old, w_old = R.T @ (v + np.cross(w, p)), R.T @ w
+
+    def energy(links, v, w):
+        h, m, tensor = links.first_moments[0], links.mass[0], links.tensors[0]
+        return 0.5 * (m * v @ v + 2 * v @ np.cross(w, h) + w @ tensor @ w)
+
+    assert energy(moved, v, w) == pytest.approx(energy(links, v_old, w_old), rel=1e-12)
+
+
+@given(seeds)
+def test_classical_inertia_keeps_the_bodies_where_they_are(seed):
+    """In the world, each centre of mass and tensor is that of the classical table's frame."""
+    rng = np.random.default_rng(seed)
+    f = 5
+    rows = [
+        {"sigma": int(rng.integers(2)), "theta": random_angle(rng), "alpha": random_angle(rng),
+         "d": random_length(rng), "a": random_length(rng), "offset": rng.normal()}
+        for _ in range(f)
+    ]  # fmt: skip
+    mass, com, tensor = central(rng, f)
+    table, tool = rm.DHTable.from_standard(rows)
+    links = rm.InertialParameters.from_standard(rows, mass, com, tensor)
+    model = rm.RobotModel.from_table(table, inertia=links, tool=tool)
+    q = rng.normal(size=f)
+    ours = links.moved(table_poses(model, q))
+    classical, T = [], np.eye(4)
+    for row, qi in zip(rows, q, strict=True):
+        turn = row["theta"] + (0 if row["sigma"] else row["offset"] + qi)
+        shift = row["d"] + (row["offset"] + qi if row["sigma"] else 0)
+        T = (
+            T @ se3.rotation("z", turn) @ se3.translation(0, 0, shift)
+            @ se3.translation(row["a"], 0, 0) @ se3.rotation("x", row["alpha"])
+        )  # fmt: skip
+        classical.append(T)
+    wanted = rm.InertialParameters.from_com(mass, com, tensor).moved(np.array(classical))
+    assert np.allclose(ours.values, wanted.values, atol=1e-11)
+
+
+def test_classical_inertia_in_degrees():
+    rows = [{"a": 0.3, "alpha": 90.0}, {"a": 0.2, "alpha": -45.0}]
+    radians = [{**row, "alpha": np.deg2rad(row["alpha"])} for row in rows]
+    given = ([1.0, 2.0], [[0, 0, 0.1], [0.1, 0, 0]], [np.eye(3)] * 2)
+    a = rm.InertialParameters.from_standard(rows, *given, degrees=True)
+    b = rm.InertialParameters.from_standard(iter(radians), *given)
+    assert np.allclose(a.values, b.values, atol=1e-15)
+
+
+# --- physical consistency ------------------------------------------------------------------------
+
+
+def body(moments, com=(0.0, 0.0, 0.0), mass=2.0, R=None):
+    R = np.eye(3) if R is None else R
+    return rm.InertialParameters.from_com([mass], [com], [R @ np.diag(moments) @ R.T])
+
+
+@pytest.mark.parametrize(
+    "moments",
+    [(0.1, 0.1, 0.1), (0.1, 0.2, 0.25), (0.0, 0.1, 0.1), (0.1, 0.1, 0.2), (0.0, 0.0, 0.0)],
+    ids=["ball", "box", "rod", "plate", "point"],
+)
+@pytest.mark.parametrize("reach", [0.0, 0.3, 30.0])
+def test_bodies_and_their_limits_are_physical(moments, reach, rng):
+    """Thin rods, plates and points are on the boundary: rounding must not push them over it."""
+    for _ in range(20):
+        R = random_rotation(rng)
+        tensor = R @ np.diag(moments) @ R.T
+        com = reach * rng.normal(size=3)
+        links = rm.InertialParameters.from_com([2.0], [com], [0.5 * (tensor + tensor.T)])
+        assert links.is_physical.tolist() == [True], links.consistency()
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        (body((0.1, 0.1, 0.3)).values, "triangle inequality fails by 0.1 kg m^2"),
+        (body((-0.1, 0.1, 0.1)).values, "a principal moment is -0.1 kg m^2"),
+        ([[0.1, 0, 0, 0.1, 0, 0.1, 1.0, 0, 0, 2.0]], "a principal moment"),
+        ([[1, 0, 0, 1, 0, 1, 0.5, 0, 0, 0]], "first moments without mass"),
+        ([[1, 0, 0, 1, 0, 1, 0, 0, 0, -1.0]], "negative mass -1 kg"),
+        ([[0.0] * 10], "no mass"),
+    ],
+    ids=["triangle", "negative moment", "com too far", "moments", "negative mass", "nothing"],
+)
+def test_what_no_body_has_is_reported(values, words):
+    links = rm.InertialParameters(values)
+    report = links.consistency()
+    assert links.is_physical.tolist() == [False]
+    assert not report.is_physical
+    assert words in str(report)
+    assert str(report).startswith("link 1: not physical: ")
+
+
+def test_the_report_has_a_line_for_each_link():
+    links = rm.InertialParameters(np.vstack([body((0.1, 0.1, 0.1)).values, np.zeros((1, 10))]))
+    assert str(links.consistency()) == "link 1: physical\nlink 2: not physical: no mass"
+    assert links.is_physical.tolist() == [True, False]
+    finding = links.consistency().links[0]
+    assert (finding.link, finding.mass) == (1, 2.0)
+    assert finding.principal_moments == pytest.approx((0.1, 0.1, 0.1))
+    assert finding.triangle_gap == pytest.approx(0.1)
+
+
+# --- being a value, and mistakes -----------------------------------------------------------------
+
+
+def test_parameters_are_values(rng):
+    links = random_parameters(rng, 3)
+    same = rm.InertialParameters(links.values.tolist())
+    assert same == links
+    assert hash(same) == hash(links)
+    assert rm.InertialParameters.zeros(3) != links
+    assert links != "links"
+    for copied in (links, copy.deepcopy(links), pickle.loads(pickle.dumps(links))):
+        assert copied == links
+        assert not copied.values.flags.writeable
+    with pytest.raises(AttributeError):
+        links.values = np.zeros((3, 10))
+
+
+@pytest.mark.parametrize(
+    ("values", "error", "words"),
+    [
+        (np.zeros(10), ShapeError, r"shape \(f, 10\), got \(10,\)"),
+        (np.zeros((2, 9)), ShapeError, "XX XY XZ YY YZ ZZ MX MY MZ M"),
+        ([["a"] * 10], InvalidValueError, "values: expected real numbers"),
+        ([[np.nan] * 10], InvalidValueError, r"values: .* nan at index \[0, 0\]"),
+    ],
+)
+def test_mistakes_in_values(values, error, words):
+    with pytest.raises(error, match=words):
+        rm.InertialParameters(values)
+
+
+GOOD = ([1.0], [[0.1, 0, 0]], [np.eye(3)])
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "error", "words"),
+    [
+        (0, [-1.0], InertiaError, "Link 1: a mass cannot be negative, got -1.0 kg"),
+        (0, 1.0, ShapeError, r"mass: expected shape \(f,\)"),
+        (0, [1.0, 2.0], ShapeError, "for 2 masses"),
+        (1, [0.1, 0, 0], ShapeError, r"com of shape \(1, 3\)"),
+        (1, [[0.1, 0]], ShapeError, "com: expected shape"),
+        (2, [np.eye(2)], ShapeError, "inertia: expected shape"),
+        (2, [np.triu(np.ones((3, 3)))], InertiaError, "must be symmetric"),
+        (2, [np.full((3, 3), np.inf)], InvalidValueError, "inertia: .* got inf"),
+    ],
+)
+def test_mistakes_in_bodies(place, value, error, words):
+    arguments = [*GOOD]
+    arguments[place] = value
+    with pytest.raises(error, match=words):
+        rm.InertialParameters.from_com(*arguments)
+    if words.startswith("mass:"):
+        return
+    with pytest.raises(error):
+        rm.InertialParameters.from_standard([{}], *arguments)
+
+
+def test_mistakes_in_moves():
+    links = rm.InertialParameters.zeros(2)
+    with pytest.raises(ShapeError, match=r"one pose per frame \(2, 4, 4\), got \(1, 4, 4\)"):
+        links.moved([np.eye(4)])
+    with pytest.raises(NotARotationError):
+        links.moved([np.eye(4), 2 * np.eye(4)])
+
+
+def test_a_model_wants_parameters_of_its_own_frames(rng):
+    table = rm.DHTable.from_rows([{}, {}])
+    with pytest.raises(ShapeError, match=r"inertia: expected parameters of the 2 frames .* got 3"):
+        rm.RobotModel.from_table(table, inertia=random_bodies(rng, 3))
+    with pytest.raises(InvalidValueError, match="expected InertialParameters, got ndarray"):
+        rm.RobotModel.from_table(table, inertia=np.zeros((2, 10)))
+    with pytest.raises(ShapeError, match=r"drive: .* 2 moving joints .* got 3"):
+        rm.RobotModel.from_table(table, drive=random_drive(rng, 3))
