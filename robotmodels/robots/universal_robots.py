@@ -193,8 +193,8 @@ def ur10e() -> RobotModel:
 
     Metres, radians, kilograms. Table, masses and centres of mass: UR article but for its last
     row, which was not at hand: d6 = 0.11655 m is that of several public copies of the table (an
-    older description rounds it to 0.117), the last centre of mass that of the ROS 2 description. Inertia
-    and limits: ROS 2 description (limits at commit 8ef39b3).
+    older description rounds it to 0.117), the last centre of mass that of the ROS 2 description.
+    Inertia and limits: ROS 2 description (limits at commit 8ef39b3).
 
     Returns
     -------
