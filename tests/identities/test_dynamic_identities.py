@@ -1,0 +1,493 @@
+"""Physics on random robots: inverse and direct dynamics, energy, power and gravity."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from identities.random_robots import (
+    any_models,
+    models,
+    random_drive,
+    random_parameters,
+    random_pose,
+    random_rotation,
+    random_state,
+    seeds,
+)
+from numpy.polynomial import chebyshev
+
+import robotmodels as rm
+
+
+def close(actual, expected, tolerance=1e-12):
+    """Equal relative to the largest number, at least one."""
+    actual, expected = np.asarray(actual), np.asarray(expected)
+    assert actual.shape == expected.shape
+    scale = max(1.0, np.abs(expected).max(initial=0.0))
+    np.testing.assert_allclose(actual, expected, rtol=0, atol=tolerance * scale)
+
+
+def singles(function, *arrays):
+    """A function called once for each row, the way that goes through Pinocchio."""
+    return np.array([function(*rows) for rows in zip(*arrays, strict=True)])
+
+
+def derivative(function, rate):
+    """Derivative at 0 of smooth ``function(t (k,)) -> (k, ...)``, to about 1e-13 times the rate.
+
+    The Chebyshev series on an interval in which a motion of the given rate turns by less than one
+    radian: sixteen terms leave less than rounding.
+    """
+    half = 0.5 / max(1.0, rate)
+    x = np.cos(np.pi * (np.arange(16) + 0.5) / 16)
+    values = np.asarray(function(half * x))
+    series = chebyshev.chebfit(x, values.reshape(16, -1), 15)
+    slope = chebyshev.chebval(0.0, chebyshev.chebder(series)) / half
+    return slope.reshape(values.shape[1:])
+
+
+def rate_of(v, a=0.0):
+    """How fast the quickest term of an energy turns along a motion."""
+    return 2.0 * np.abs(v).sum() + np.sqrt(np.abs(a).sum())
+
+
+def rotor_matrix(model):
+    """Rotor inertia from its definition in `Transmission`."""
+    rotor = np.diag(model.drive.Ia)
+    if model.transmission is not None:
+        turns = np.linalg.inv(model.transmission.matrix)
+        for m, Iam in enumerate(model.transmission.Iam):
+            w = turns[m] / turns[m, m]
+            rotor = rotor + Iam * (np.outer(w, w) - np.diag(w**2))
+    return rotor
+
+
+# --- Pinocchio and the kernels ---------------------------------------------------------------
+
+
+@given(model=models(max_frames=10), seed=seeds)
+def test_single_calls_equal_batches(model, seed):
+    rng = np.random.default_rng(seed)
+    q, v, a = random_state(model, rng, 3)
+    w = rng.normal(size=(3, 6))
+    for drive in (True, False):
+        tau = rm.idm(model, q, v, a, w, drive=drive)
+        close(singles(lambda *x, d=drive: rm.idm(model, *x, drive=d), q, v, a, w), tau)
+        M = rm.mass_matrix(model, q, drive)
+        close(singles(lambda x, d=drive: rm.mass_matrix(model, x, d), q), M)
+        kinetic = rm.kinetic_energy(model, q, v, drive)
+        close(singles(lambda *x, d=drive: rm.kinetic_energy(model, *x, d), q, v), kinetic)
+        accelerations = rm.ddm(model, q, v, tau, w, drive=drive)
+        tolerance = 1e-13 * np.linalg.cond(M).max()
+        found = singles(lambda *x, d=drive: rm.ddm(model, *x, drive=d), q, v, tau, w)
+        close(found, accelerations, tolerance)
+    C = rm.coriolis_matrix(model, q, v)
+    close(singles(lambda *x: rm.coriolis_matrix(model, *x), q, v), C)
+    close(singles(lambda x: rm.gravity_torque(model, x), q), rm.gravity_torque(model, q))
+    close(singles(lambda x: rm.potential_energy(model, x), q), rm.potential_energy(model, q))
+
+
+@given(model=any_models(), seed=seeds)
+def test_a_sample_does_not_depend_on_its_neighbours(model, seed):
+    rng = np.random.default_rng(seed)
+    q, v, a = random_state(model, rng, 7)
+    order = rng.permutation(7)
+    for function in (
+        lambda q, v, a: rm.idm(model, q, v, a),
+        lambda q, v, a: rm.mass_matrix(model, q),
+        lambda q, v, a: rm.coriolis_matrix(model, q, v),
+        lambda q, v, a: rm.kinetic_energy(model, q, v) + rm.potential_energy(model, q),
+        lambda q, v, a: rm.torque_regressor(model, q, v, a),
+        lambda q, v, a: rm.jacobian_rate(model, q, v),
+    ):
+        shuffled = function(q[order], v[order], a[order])
+        np.testing.assert_array_equal(shuffled, function(q, v, a)[order])
+
+
+# --- inverse and direct ----------------------------------------------------------------------
+
+
+@given(model=models(), seed=seeds, external=st.booleans(), drive=st.booleans())
+def test_direct_dynamics_inverts_inverse_dynamics(model, seed, external, drive):
+    rng = np.random.default_rng(seed)
+    q, v, a = random_state(model, rng, 3)
+    w = rng.normal(size=(3, 6)) if external else np.zeros((3, 6))
+    given_wrench = w if external else None
+    tau = rm.idm(model, q, v, a, given_wrench, drive)
+    M = rm.mass_matrix(model, q, drive)
+    # rounding of the torques, magnified by the solution
+    tolerance = 1e-14 * np.linalg.cond(M).max() * max(1.0, np.abs(tau).max()) + 1e-12
+    close(rm.ddm(model, q, v, tau, given_wrench, drive), a, tolerance)
+    back = singles(lambda *x: rm.ddm(model, *x, drive=drive), q, v, tau, w)
+    close(back, a, tolerance)
+
+
+@given(model=models(), seed=seeds)
+def test_torque_is_mass_coriolis_gravity_drive_and_wrench(model, seed):
+    rng = np.random.default_rng(seed)
+    q, v, a = random_state(model, rng)
+    w = rng.normal(size=6)
+    drive, coupling = model.drive, np.zeros(model.n)
+    if model.transmission is not None:
+        turns = np.linalg.inv(model.transmission.matrix)
+        for m in range(model.n):
+            row = turns[m] / turns[m, m]
+            cross = np.outer(row, row) - np.diag(row**2)
+            coupling += model.transmission.Iam[m] * cross @ a
+            coupling += model.transmission.Fvm[m] * cross @ v
+            coupling += model.transmission.Fcm[m] * row * np.sign(row @ v)
+    expected = (
+        rm.mass_matrix(model, q, drive=False) @ a
+        + rm.coriolis_matrix(model, q, v) @ v
+        + rm.gravity_torque(model, q)
+        + rm.jacobian(model, q).T @ w
+        + drive.Ia * a + drive.Fv * v + drive.Fc * np.sign(v) + drive.offset
+        + coupling
+    )  # fmt: skip
+    close(rm.idm(model, q, v, a, w), expected)
+    close(rm.idm(model, [q], [v], [a], [w])[0], expected)
+
+
+@given(model=any_models(), seed=seeds)
+def test_mass_matrix_is_symmetric_and_holds_the_rotors(model, seed):
+    q, v, _ = random_state(model, np.random.default_rng(seed), 2)
+    rigid, loaded = rm.mass_matrix(model, q, drive=False), rm.mass_matrix(model, q)
+    for M in (rigid, loaded, rm.mass_matrix(model, q[0])):
+        np.testing.assert_array_equal(M, np.swapaxes(M, -1, -2))
+    close(loaded - rigid, np.tile(rotor_matrix(model), (2, 1, 1)), 1e-13 * np.abs(loaded).max())
+    for M, drive in ((rigid, False), (loaded, True)):
+        quadratic = 0.5 * np.einsum("ki,kij,kj->k", v, M, v)
+        close(rm.kinetic_energy(model, q, v, drive), quadratic)
+        columns = [rm.idm(model, q, 0 * v, e, drive=drive) for e in np.eye(model.n)]
+        still = rm.idm(model, q, 0 * v, 0 * v, drive=drive)
+        close(np.moveaxis(np.array(columns) - still, 0, -1), M)
+
+
+@given(model=models(transmission=False), seed=seeds)
+def test_mass_matrix_of_real_bodies_is_positive_definite(model, seed):
+    q, _, _ = random_state(model, np.random.default_rng(seed), 2)
+    for M in (rm.mass_matrix(model, q), rm.mass_matrix(model, q[0], drive=False)):
+        assert np.linalg.eigvalsh(M).min() > 0
+
+
+@given(model=any_models(), seed=seeds)
+def test_torque_is_linear_in_the_inertial_parameters(model, seed):
+    rng = np.random.default_rng(seed)
+    q, v, a = random_state(model, rng)
+    first, second = random_parameters(rng, model.f), random_parameters(rng, model.f)
+    x, y = rng.normal(size=2)
+    mixed = rm.InertialParameters(x * first.values + y * second.values)
+
+    def everything(inertia):
+        robot = model.with_inertia(inertia)
+        return np.concatenate([
+            rm.idm(robot, q, v, a, drive=False),
+            rm.gravity_torque(robot, q),
+            rm.mass_matrix(robot, q, drive=False).ravel(),
+            rm.coriolis_matrix(robot, q, v).ravel(),
+            [rm.kinetic_energy(robot, q, v, drive=False), rm.potential_energy(robot, q)],
+        ])  # fmt: skip
+
+    close(everything(mixed), x * everything(first) + y * everything(second))
+
+
+@given(model=models(fixed=True, drive=False), seed=seeds)
+def test_a_body_may_be_given_on_any_frame_fixed_to_it(model, seed):
+    """Bodies of fixed frames moved to their antecedents: the same robot, the same torques."""
+    q, v, a = random_state(model, np.random.default_rng(seed))
+    factors = rm.link_transforms(model.table, q)
+    values = model.inertia.values.copy()
+    for j in reversed(range(model.f)):
+        antecedent = model.table.antecedent[j] - 1
+        if model.table.sigma[j] == 2 and antecedent >= 0:
+            body = rm.InertialParameters(values[j : j + 1]).moved(factors[j : j + 1])
+            values[antecedent] += body.values[0]
+            values[j] = 0.0
+    merged = model.with_inertia(rm.InertialParameters(values))
+    for robot, q_, v_, a_ in ((merged, q, v, a), (merged, [q], [v], [a])):
+        tau = np.reshape(rm.idm(robot, q_, v_, a_), model.n)
+        close(tau, rm.idm(model, q, v, a))
+        close(np.ravel(rm.potential_energy(robot, q_))[0], rm.potential_energy(model, q))
+
+
+@given(model=models(tree=True, drive=True, tip="any"), seed=seeds)
+def test_the_order_of_the_rows_changes_no_physics(model, seed):
+    """The same tree with its rows numbered in another order that keeps antecedents first."""
+    rng = np.random.default_rng(seed)
+    table, f = model.table, model.f
+    order, waiting = [], list(range(f))
+    while waiting:
+        ready = [j for j in waiting if table.antecedent[j] == 0 or table.antecedent[j] - 1 in order]
+        chosen = ready[rng.integers(len(ready))]
+        order.append(chosen)
+        waiting.remove(chosen)
+    number = np.zeros(f + 1, dtype=int)
+    number[np.array(order) + 1] = np.arange(1, f + 1)
+    joints = [int(np.flatnonzero(table.joint_rows == j)[0]) for j in order if table.sigma[j] != 2]
+    columns = ("sigma", "mu", "gamma", "b", "beta", "alpha", "d", "theta", "r")
+    other = rm.RobotModel.from_table(
+        rm.DHTable(
+            antecedent=number[table.antecedent[order]],
+            names=[table.names[j] for j in order],
+            **{key: getattr(table, key)[order] for key in columns},
+        ),
+        rm.InertialParameters(model.inertia.values[order]),
+        rm.DriveParameters(
+            *(getattr(model.drive, k)[joints] for k in ("Ia", "Fv", "Fc", "offset"))
+        ),
+        model.base,
+        model.tool,
+        int(number[model.tip]),
+        model.gravity,
+    )
+    plain = model.with_transmission(None)
+    q, v, a = random_state(model, rng)
+    w = rng.normal(size=6)
+    close(rm.dgm(other, q[joints]), rm.dgm(plain, q))
+    close(rm.jacobian(other, q[joints]), rm.jacobian(plain, q)[:, joints])
+    tau = rm.idm(plain, q, v, a, w)
+    close(rm.idm(other, q[joints], v[joints], a[joints], w), tau[joints])
+    close(rm.idm(other, [q[joints]], v[joints], a[joints], w)[0], tau[joints])
+
+
+# --- Coriolis --------------------------------------------------------------------------------
+
+
+@given(model=any_models(), seed=seeds)
+def test_coriolis_torque_is_the_bias_without_gravity(model, seed):
+    q, v, _ = random_state(model, np.random.default_rng(seed), 2)
+    weightless = model.with_gravity([0.0, 0.0, 0.0])
+    bias = rm.idm(weightless, q, v, 0 * v, drive=False)
+    C = rm.coriolis_matrix(model, q, v)
+    close(np.einsum("kij,kj->ki", C, v), bias)
+    close(rm.idm(model, q, v, 0 * v, drive=False) - rm.gravity_torque(model, q), bias)
+    close(rm.coriolis_matrix(model, q[0], v[0]) @ v[0], bias[0])
+
+
+@given(model=any_models(), seed=seeds)
+def test_mass_matrix_rate_less_twice_coriolis_is_skew(model, seed):
+    q, v, _ = random_state(model, np.random.default_rng(seed))
+    rate = derivative(lambda t: rm.mass_matrix(model, q + np.outer(t, v)), rate_of(v))
+    for C in (rm.coriolis_matrix(model, q, v), rm.coriolis_matrix(model, [q], [v])[0]):
+        close(C + C.T, rate, 1e-11 * max(1.0, rate_of(v)))
+        skew = rate - 2 * C
+        close(skew, -skew.T, 1e-11 * max(1.0, rate_of(v)))
+
+
+@given(model=any_models(max_frames=5), seed=seeds)
+def test_coriolis_matrix_is_made_of_christoffel_symbols(model, seed):
+    q, v, _ = random_state(model, np.random.default_rng(seed))
+    n = model.n
+    # dM[k] is the derivative of M with respect to q_k
+    dM = np.array([
+        derivative(lambda t, k=k: rm.mass_matrix(model, q + np.outer(t, np.eye(n)[k])), 2.0)
+        for k in range(n)
+    ])  # fmt: skip
+    symbols = 0.5 * (np.einsum("kij->ijk", dM) + np.einsum("jik->ijk", dM) - dM)
+    close(rm.coriolis_matrix(model, q, v), symbols @ v, 1e-11)
+    close(rm.coriolis_matrix(model, [q], v)[0], symbols @ v, 1e-11)
+
+
+# --- energy and power ------------------------------------------------------------------------
+
+
+@given(model=any_models(), seed=seeds)
+def test_power_of_the_torques_is_the_rate_of_energy(model, seed):
+    """tau.v = v.M a + v.dM/dt v / 2 + g.v, and the derivative of the energy along a motion."""
+    q, v, a = random_state(model, np.random.default_rng(seed))
+    power = rm.idm(model, q, v, a, drive=False) @ v
+    C = rm.coriolis_matrix(model, q, v)
+    M = rm.mass_matrix(model, q, drive=False)
+    written_out = v @ M @ a + 0.5 * v @ (C + C.T) @ v + rm.gravity_torque(model, q) @ v
+    close(power, written_out)
+
+    def energy(t):
+        positions = q + np.outer(t, v) + 0.5 * np.outer(t**2, a)
+        velocities = v + np.outer(t, a)
+        kinetic = rm.kinetic_energy(model, positions, velocities, drive=False)
+        return kinetic + rm.potential_energy(model, positions)
+
+    scale = np.abs(energy(np.linspace(-0.1, 0.1, 5))).max()
+    tolerance = 1e-12 * rate_of(v, a) * max(1.0, scale)
+    np.testing.assert_allclose(derivative(energy, rate_of(v, a)), power, rtol=0, atol=tolerance)
+    assert tolerance < 1e-9 * max(1.0, scale)
+
+
+@given(model=models(), seed=seeds)
+def test_drives_store_energy_in_rotors_and_dissipate_the_rest(model, seed):
+    rng = np.random.default_rng(seed)
+    q, v, a = random_state(model, rng)
+    drive = random_drive(rng, model.n)
+    model = model.with_drive(drive).with_transmission(None)
+    power = rm.idm(model, q, v, a) @ v
+
+    def energy(t):
+        positions = q + np.outer(t, v) + 0.5 * np.outer(t**2, a)
+        velocities = v + np.outer(t, a)
+        return rm.kinetic_energy(model, positions, velocities) + rm.potential_energy(
+            model, positions
+        )
+
+    friction = power - derivative(energy, rate_of(v, a)) - drive.offset @ v
+    assert friction > 0
+    expected = drive.Fv @ v**2 + drive.Fc @ np.abs(v)
+    close(friction, expected, 1e-9 * max(1.0, abs(power) / expected))
+
+
+@given(model=models(drive=True, transmission=True), seed=seeds)
+def test_friction_stops_with_the_motion(model, seed):
+    """No Coulomb torque at rest, and friction turns with the velocity."""
+    q, v, _ = random_state(model, np.random.default_rng(seed))
+    rest = rm.idm(model, q, 0 * v, 0 * v)
+    close(rest, rm.gravity_torque(model, q) + model.drive.offset)
+    bias = [rm.idm(model, q, s * v, 0 * v) - rm.idm(model, q, s * v, 0 * v, drive=False)
+            - model.drive.offset for s in (1, -1)]  # fmt: skip
+    close(bias[0], -bias[1])
+
+
+@given(model=any_models(tip="any"), seed=seeds)
+def test_virtual_work_of_the_wrench(model, seed):
+    rng = np.random.default_rng(seed)
+    q, v, a = random_state(model, rng, 2)
+    w = rng.normal(size=(2, 6))
+    free = rm.idm(model, q, v, a)
+    for added in (
+        rm.idm(model, q, v, a, w) - free,
+        singles(lambda *x: rm.idm(model, *x), q, v, a, w) - free,
+    ):
+        scale = max(1.0, np.abs(free).max())
+        J = rm.jacobian(model, q)
+        close(added, np.einsum("kij,ki->kj", J, w), 1e-12 * scale)
+        power = np.einsum("ki,ki->k", w, rm.dkm(model, q, v))
+        close(np.einsum("ki,ki->k", added, v), power, 1e-12 * scale)
+
+
+# --- gravity ---------------------------------------------------------------------------------
+
+
+@given(model=any_models(), seed=seeds)
+def test_gravity_torque_is_the_slope_of_the_potential(model, seed):
+    q, v, _ = random_state(model, np.random.default_rng(seed))
+    g = rm.gravity_torque(model, q)
+    n = model.n
+    slope = [
+        derivative(lambda t, k=k: rm.potential_energy(model, q + np.outer(t, np.eye(n)[k])), 1.0)
+        for k in range(n)
+    ]
+    scale = max(1.0, abs(rm.potential_energy(model, q)))
+    close(g, slope, 1e-12 * scale)
+    close(rm.gravity_torque(model, [q])[0], g)
+    close(rm.idm(model, q, 0 * v, 0 * v, drive=False), g)
+
+
+@given(model=any_models(), seed=seeds)
+def test_gravity_of_any_direction_adds_up(model, seed):
+    rng = np.random.default_rng(seed)
+    q, _, _ = random_state(model, rng)
+    first, second = rng.normal(size=(2, 3))
+    parts = [rm.gravity_torque(model.with_gravity(g), q) for g in (first, second)]
+    close(rm.gravity_torque(model.with_gravity(first + second), q), sum(parts))
+    assert not rm.gravity_torque(model.with_gravity([0, 0, 0]), q).any()
+
+
+@given(model=any_models(), seed=seeds)
+def test_turning_the_whole_world_changes_no_torque(model, seed):
+    """Base, gravity and wrench turned together; where the base stands never matters."""
+    rng = np.random.default_rng(seed)
+    q, v, a = random_state(model, rng)
+    w = rng.normal(size=6)
+    Z = random_pose(rng)
+    R = Z[:3, :3]
+    turned = model.with_base(Z @ model.base).with_gravity(R @ model.gravity)
+    w_turned = (w.reshape(2, 3) @ R.T).ravel()
+    for one in (lambda x: x, lambda x: [x]):
+        tau = rm.idm(model, one(q), one(v), one(a), one(w))
+        close(rm.idm(turned, one(q), one(v), one(a), one(w_turned)), tau)
+    close(rm.coriolis_matrix(turned, q, v), rm.coriolis_matrix(model, q, v))
+    close(rm.mass_matrix(turned, q), rm.mass_matrix(model, q))
+    close(rm.kinetic_energy(turned, q, v), rm.kinetic_energy(model, q, v))
+    shifted = model.with_base(model.base + np.pad(rng.normal(size=(3, 1)), ((0, 1), (3, 0))))
+    close(rm.idm(shifted, q, v, a, w), rm.idm(model, q, v, a, w))
+
+
+@given(model=models(), seed=seeds)
+def test_a_falling_base_feels_no_weight(model, seed):
+    """A robot on a vertical slide that falls freely: Newton's and Einstein's elevator."""
+    rng = np.random.default_rng(seed)
+    q, v, a = random_state(model, rng)
+    table, Z = model.table, random_rotation(rng)
+    # row 1 slides along z of the base, along which gravity is turned
+    lift = rm.DHTable(
+        antecedent=np.r_[0, table.antecedent + 1],
+        sigma=np.r_[1, table.sigma],
+        **{
+            key: np.r_[0.0, getattr(table, key)]
+            for key in ("gamma", "b", "beta", "alpha", "d", "theta", "r")
+        },
+    )
+    base = np.eye(4)
+    base[:3, :3] = Z
+    falling = rm.RobotModel.from_table(
+        lift,
+        rm.InertialParameters(np.vstack([np.zeros(10), model.inertia.values])),
+        base=base,
+        gravity=-9.81 * Z[:, 2],
+    )
+    tau = rm.idm(falling, np.r_[0.3, q], np.r_[2.0, v], np.r_[-9.81, a])
+    floating = model.with_base(base).with_gravity([0, 0, 0]).with_drive(None)
+    floating = floating.with_transmission(None)
+    close(tau[1:], rm.idm(floating, q, v, a))
+
+
+# --- units -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("size", [1e-4, 1e4])
+@given(model=models(transmission=False, tip="any"), seed=seeds)
+def test_numbers_keep_their_digits_at_any_size(size, model, seed):
+    """A robot a size larger, in a gravity larger by as much: torques grow by its square."""
+    rng = np.random.default_rng(seed)
+    q, v, a = random_state(model, rng, 2)
+    table, drive = model.table, model.drive
+    prismatic = table.sigma[table.joint_rows] == 1
+    stroke = np.where(prismatic, size, 1.0)
+    power = np.array([2] * 6 + [1] * 3 + [0])
+    other = rm.RobotModel.from_table(
+        table.replace(**{key: size * getattr(table, key) for key in ("b", "d", "r")}),
+        rm.InertialParameters(model.inertia.values * size**power),
+        rm.DriveParameters(
+            Ia=drive.Ia * (size / stroke) ** 2,
+            Fv=drive.Fv * (size / stroke) ** 2,
+            Fc=drive.Fc * size**2 / stroke,
+            offset=drive.offset * size**2 / stroke,
+        ),
+        base=enlarged(model.base, size),
+        tool=enlarged(model.tool, size),
+        tip=model.tip,
+        gravity=size * model.gravity,
+    )
+    x, dx, ddx = (stroke * y for y in (q, v, a))
+    torque = size**2 / stroke
+    rows = np.repeat([size, 1.0], 3)[:, None]
+    for one in (slice(None), 0):
+        close(rm.dgm(other, x[one]) / enlarged(np.ones((4, 4)), size), rm.dgm(model, q[one]))
+        J = rm.jacobian(model, q[one])
+        close(rm.jacobian(other, x[one]) / rows * stroke, J)
+        dJ = rm.jacobian_rate(model, q[one], v[one])
+        close(rm.jacobian_rate(other, x[one], dx[one]) / rows * stroke, dJ)
+        tau = rm.idm(model, q[one], v[one], a[one])
+        grown = rm.idm(other, x[one], dx[one], ddx[one])
+        close(grown / torque, tau)
+        M = rm.mass_matrix(model, q[one])
+        close(rm.mass_matrix(other, x[one]) / np.outer(torque, 1 / stroke), M)
+        C = rm.coriolis_matrix(model, q[one], v[one])
+        close(rm.coriolis_matrix(other, x[one], dx[one]) / np.outer(torque, 1 / stroke), C)
+        tolerance = 1e-14 * np.linalg.cond(M).max() * max(1.0, np.abs(tau).max()) + 1e-12
+        close(rm.ddm(other, x[one], dx[one], grown) / stroke, a[one], tolerance)
+
+
+def enlarged(T, size):
+    """A pose with its position multiplied."""
+    T = T.copy()
+    T[:3, 3] *= size
+    return T

@@ -1,0 +1,226 @@
+"""Poses and Jacobians of random robots: three ways to the same numbers, and differences.
+
+Everything is held for the tool, for frames by number and by name, for one configuration
+(Pinocchio) and for batches (compiled kernels).
+"""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from identities.random_robots import (
+    any_models,
+    models,
+    random_pose,
+    random_state,
+    robot_size,
+    seeds,
+    table_poses,
+)
+
+import robotmodels as rm
+
+EPS = np.finfo(float).eps
+# The step that balances a central difference: its truncation is h^2 / 6 times the third
+# derivative, its rounding eps / h times the value. Both are near 1e-11 here.
+STEP = EPS ** (1 / 3)
+REFERENCES = ("world_aligned", "local", "world")
+
+
+def difference_error(size, rate=1.0):
+    """Bound on a central difference of numbers of this size that vary with sines of rate t."""
+    return size * (STEP**2 * rate**3 / 6 + 20 * EPS / STEP)
+
+
+def close(actual, expected, tolerance):
+    assert np.shape(actual) == np.shape(expected)
+    np.testing.assert_allclose(actual, expected, rtol=0, atol=tolerance)
+
+
+def vee(W):
+    """Vector of the skew-symmetric part of matrices (..., 3, 3)."""
+    A = (W - np.swapaxes(W, -1, -2)) / 2
+    return np.stack([A[..., 2, 1], A[..., 0, 2], A[..., 1, 0]], axis=-1)
+
+
+def frames_of(model):
+    """Every way to name a frame, with the frame that carries it and its pose there."""
+    table = model.table
+    yield None, model.tip, model.tool
+    yield 0, 0, np.eye(4)
+    for j in range(1, model.f + 1):
+        yield j, j, np.eye(4)
+        yield table.names[j - 1], j, np.eye(4)
+
+
+@given(model=any_models(), seed=seeds)
+def test_pinocchio_is_the_kernels_is_the_plain_product(model, seed):
+    q, _, _ = random_state(model, np.random.default_rng(seed), 3)
+    product = np.array([table_poses(model, row) for row in q])
+    tolerance = 1e-12 * max(robot_size(model, row) for row in q)
+    close(rm.link_poses(model, q), product, tolerance)
+    close([rm.link_poses(model, row) for row in q], product, tolerance)
+    world = np.concatenate([np.tile(model.base, (3, 1, 1, 1)), product], axis=1)
+    for frame, parent, pose in frames_of(model):
+        expected = world[:, parent] @ pose
+        close(rm.dgm(model, q, frame), expected, tolerance)
+        close([rm.dgm(model, row, frame) for row in q], expected, tolerance)
+
+
+@given(model=models(), seed=seeds)
+def test_poses_are_rigid(model, seed):
+    q, _, _ = random_state(model, np.random.default_rng(seed), 3)
+    for poses in (rm.link_poses(model, q), rm.link_poses(model, q[0])):
+        R = poses[..., :3, :3]
+        close(R @ np.swapaxes(R, -1, -2), np.broadcast_to(np.eye(3), R.shape), 1e-14 * model.f)
+        np.testing.assert_array_equal(
+            poses[..., 3, :], np.broadcast_to([0.0, 0.0, 0.0, 1.0], (*poses.shape[:-2], 4))
+        )
+
+
+def twist_of_poses(before, now, after, reference):
+    """Twists (..., 6) of the motion from one pose to another, by central differences."""
+    rate = (after - before) / (2 * STEP)
+    R, p = now[..., :3, :3], now[..., :3, 3]
+    w = vee(rate[..., :3, :3] @ np.swapaxes(R, -1, -2))
+    v = rate[..., :3, 3]
+    if reference == "world":
+        v = v - np.cross(w, p)
+    if reference == "local":
+        v, w = (np.einsum("...ji,...j->...i", R, x) for x in (v, w))
+    return np.concatenate([v, w], axis=-1)
+
+
+@pytest.mark.parametrize("reference", REFERENCES)
+@given(model=any_models(), seed=seeds)
+def test_jacobian_is_the_difference_of_poses(reference, model, seed):
+    q, _, _ = random_state(model, np.random.default_rng(seed))
+    steps = STEP * np.eye(model.n)
+    tolerance = difference_error(robot_size(model, q))
+    for frame, *_ in frames_of(model):
+        twists = twist_of_poses(
+            rm.dgm(model, q - steps, frame),
+            rm.dgm(model, q, frame),
+            rm.dgm(model, q + steps, frame),
+            reference,
+        )
+        close(rm.jacobian(model, q, frame, reference), twists.T, tolerance)
+        close(rm.jacobian(model, [q], frame, reference)[0], twists.T, tolerance)
+
+
+@given(model=any_models(), seed=seeds)
+def test_single_and_batch_jacobians_agree(model, seed):
+    q, v, _ = random_state(model, np.random.default_rng(seed), 3)
+    size = max(robot_size(model, row) for row in q)
+    speed = max(1.0, np.abs(v).sum(axis=-1).max())
+    for frame, *_ in frames_of(model):
+        for reference in REFERENCES:
+            J = rm.jacobian(model, q, frame, reference)
+            close([rm.jacobian(model, x, frame, reference) for x in q], J, 1e-12 * size)
+            dJ = rm.jacobian_rate(model, q, v, frame, reference)
+            singles = [
+                rm.jacobian_rate(model, x, dx, frame, reference) for x, dx in zip(q, v, strict=True)
+            ]
+            close(singles, dJ, 1e-12 * size * speed)
+
+
+@given(model=any_models(), seed=seeds)
+def test_the_three_references_are_the_same_twist(model, seed):
+    q, _, _ = random_state(model, np.random.default_rng(seed))
+    tolerance = 1e-12 * robot_size(model, q)
+    for frame, *_ in frames_of(model):
+        T = rm.dgm(model, q, frame)
+        aligned, local, world = (rm.jacobian(model, q, frame, r) for r in REFERENCES)
+        close(local[:3], T[:3, :3].T @ aligned[:3], tolerance)
+        close(local[3:], T[:3, :3].T @ aligned[3:], tolerance)
+        close(world[:3], aligned[:3] + np.cross(T[:3, 3], aligned[3:], axisb=0).T, tolerance)
+        close(world[3:], aligned[3:], tolerance)
+
+
+@given(model=any_models(), seed=seeds)
+def test_only_joints_below_a_frame_move_it(model, seed):
+    q, v, _ = random_state(model, np.random.default_rng(seed))
+    joints = model.table.joint_rows + 1
+    for frame, parent, _ in frames_of(model):
+        still = ~np.isin(joints, model.table.path(parent))
+        for reference in REFERENCES:
+            for J in (
+                rm.jacobian(model, q, frame, reference),
+                rm.jacobian(model, [q], frame, reference)[0],
+                rm.jacobian_rate(model, q, v, frame, reference),
+                rm.jacobian_rate(model, [q], v, frame, reference)[0],
+            ):
+                assert not J[:, still].any()
+
+
+@pytest.mark.parametrize("reference", REFERENCES)
+@given(model=any_models(), seed=seeds)
+def test_jacobian_rate_is_the_difference_of_jacobians(reference, model, seed):
+    q, v, _ = random_state(model, np.random.default_rng(seed))
+    # along the motion every entry is a sum of sines of at most this rate
+    rate = np.abs(v).sum()
+    tolerance = difference_error(robot_size(model, q), max(1.0, rate))
+    for frame, *_ in frames_of(model):
+        before, after = rm.jacobian(model, q + STEP * np.outer([-1, 1], v), frame, reference)
+        expected = (after - before) / (2 * STEP)
+        close(rm.jacobian_rate(model, q, v, frame, reference), expected, tolerance)
+
+
+@given(model=any_models(), seed=seeds)
+def test_velocity_is_the_jacobian_times_joint_velocities(model, seed):
+    q, v, _ = random_state(model, np.random.default_rng(seed), 2)
+    tolerance = 1e-13 * max(robot_size(model, row) for row in q) * max(1.0, np.abs(v).sum())
+    for frame, *_ in frames_of(model):
+        for reference in REFERENCES:
+            J = rm.jacobian(model, q, frame, reference)
+            expected = (J @ v[..., None])[..., 0]
+            close(rm.dkm(model, q, v, frame, reference), expected, tolerance)
+            singles = [rm.dkm(model, x, dx, frame, reference) for x, dx in zip(q, v, strict=True)]
+            close(singles, expected, 10 * tolerance)
+
+
+@given(model=any_models(base=False), seed=seeds)
+def test_the_base_moves_everything_along(model, seed):
+    rng = np.random.default_rng(seed)
+    q, v, _ = random_state(model, rng)
+    Z = random_pose(rng)
+    moved = model.with_base(Z)
+    tolerance = 1e-12 * robot_size(moved, q)
+    close(rm.dgm(moved, q), Z @ rm.dgm(model, q), tolerance)
+    turned = (Z[:3, :3] @ rm.jacobian(model, q).reshape(2, 3, -1)).reshape(6, -1)
+    close(rm.jacobian(moved, q), turned, tolerance)
+    speed = max(1.0, np.abs(v).sum())
+    for function in (rm.jacobian, lambda m, x, *k: rm.jacobian_rate(m, x, v, *k)):
+        close(function(moved, q, None, "local"), function(model, q, None, "local"),
+              tolerance * speed)  # fmt: skip
+
+
+@given(model=models(tool=False), seed=seeds)
+def test_the_tool_is_carried_by_its_frame(model, seed):
+    rng = np.random.default_rng(seed)
+    q, _, _ = random_state(model, rng, 2)
+    E, tip = random_pose(rng), int(rng.integers(1, model.f + 1))
+    equipped = model.with_tool(E, tip)
+    size = max(robot_size(equipped, row) for row in q)
+    for x in (q, q[0]):
+        close(rm.dgm(equipped, x), rm.dgm(model, x, tip) @ E, 1e-12 * size)
+
+
+@given(model=models(tree=True, max_frames=10), seed=seeds)
+def test_names_of_siblings_change_no_number(model, seed):
+    """Pinocchio orders siblings by name; nothing of that is seen outside."""
+    rng = np.random.default_rng(seed)
+    q, v, a = random_state(model, rng)
+    names = [model.table.names[i] for i in rng.permutation(model.f)]
+    renamed = model.with_table(model.table.replace(names=names))
+    size = robot_size(model, q)
+    speed = max(1.0, np.abs(v).sum())
+    close(rm.link_poses(renamed, q), rm.link_poses(model, q), 1e-12 * size)
+    close(rm.jacobian(renamed, q), rm.jacobian(model, q), 1e-12 * size)
+    close(rm.jacobian_rate(renamed, q, v), rm.jacobian_rate(model, q, v), 1e-12 * size * speed)
+    tau = rm.idm(model, q, v, a)
+    scale = max(1.0, np.abs(tau).max())
+    close(rm.idm(renamed, q, v, a), tau, 1e-12 * scale)
+    M = rm.mass_matrix(model, q)
+    close(rm.mass_matrix(renamed, q), M, 1e-12 * max(1.0, np.abs(M).max()))
+    C = rm.coriolis_matrix(model, q, v)
+    close(rm.coriolis_matrix(renamed, q, v), C, 1e-12 * max(1.0, np.abs(C).max()))
