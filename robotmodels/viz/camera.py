@@ -1,0 +1,112 @@
+"""Where to look from, so that what is drawn fills the picture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import cos, radians, sin, tan
+
+import numpy as np
+
+from .._arrays import Array
+
+FIELD_OF_VIEW = 30.0
+"""Vertical angle of the picture in degrees: narrow, so that an arm looks undistorted."""
+
+# Narrower than most windows, so that nothing is cut off at the sides.
+_ASPECT = 1.15
+_MARGIN = 0.88
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Camera:
+    """A camera that looks at a point.
+
+    Parameters
+    ----------
+    target : ndarray, shape (3,)
+        What it looks at and turns about, world axes, metres.
+    position : ndarray, shape (3,)
+        Where it is, world axes, metres.
+
+    Examples
+    --------
+    >>> Camera(np.zeros(3), np.array([2.0, 0.0, 0.0])).distance
+    2.0
+    """
+
+    target: Array
+    position: Array
+
+    @property
+    def distance(self) -> float:
+        """From the camera to its target, metres."""
+        return float(np.linalg.norm(self.position - self.target))
+
+
+def default_view(points: Array) -> tuple[float, float]:
+    """Azimuth and elevation that show a robot well.
+
+    Parameters
+    ----------
+    points : ndarray, shape (k, 3)
+        That enclose it, world axes.
+
+    Returns
+    -------
+    azimuth, elevation : float
+        Of the camera seen from the robot, radians.
+
+    Examples
+    --------
+    >>> flat = np.array([[-1.0, -1.0, 0.0], [1.0, 1.0, 0.01]])
+    >>> azimuth, elevation = default_view(flat)
+    >>> elevation > 0.8
+    True
+    """
+    x, y, z = np.ptp(points, axis=0)
+    # a planar arm lies on the floor: look down on it
+    elevation = radians(55.0 if z < 0.2 * max(x, y) else 18.0)
+    # face the wider side, yet obliquely
+    azimuth = radians(-60.0 if x >= y else -30.0)
+    return azimuth, elevation
+
+
+def framed(points: Array, view: tuple[float, float] | None = None) -> Camera:
+    """The camera from which points fill the picture.
+
+    Parameters
+    ----------
+    points : ndarray, shape (k, 3)
+        To be seen, world axes, metres.
+    view : (azimuth, elevation), optional
+        Direction to look from, radians; default `default_view`.
+
+    Returns
+    -------
+    Camera
+        Its distance is the least from which all points are in the picture.
+
+    Examples
+    --------
+    >>> framed(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]])).distance > 1.0
+    True
+    """
+    azimuth, elevation = default_view(points) if view is None else view
+    back = np.array((cos(elevation) * cos(azimuth), cos(elevation) * sin(azimuth), sin(elevation)))
+    right = np.array((-sin(azimuth), cos(azimuth), 0.0))
+    up = np.cross(back, right)
+    x, y, z = points @ right, points @ up, points @ back
+    # |x - x0| <= (distance - z) slope for every point, likewise y: the tightest ones decide
+    slope = tan(radians(0.5 * FIELD_OF_VIEW)) * _MARGIN
+    x0, across = _tightest(x, z, slope * _ASPECT)
+    y0, high = _tightest(y, z, slope)
+    middle = 0.5 * (z.min() + z.max())
+    target = x0 * right + y0 * up + middle * back
+    distance = max(across - middle, high - middle, 0.05)
+    return Camera(target, target + distance * back)
+
+
+def _tightest(x: Array, z: Array, slope: float) -> tuple[float, float]:
+    """Centre and distance of the narrowest wedge that holds all points."""
+    right, left = (x + z * slope).max(), (z * slope - x).max()
+    return float(0.5 * (right - left)), float(0.5 * (right + left) / slope)

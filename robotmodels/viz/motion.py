@@ -1,0 +1,221 @@
+"""A joint motion as few keyframes, and what an animation plays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import Array, as_vector
+from ..errors import InvalidValueError, ShapeError
+from ..geometry import PRISMATIC
+from ..model import RobotModel
+
+# A joint may be off by this much between keyframes, in radians and in parts of the robot's size:
+# less than a pixel.
+_TOLERANCE = 5e-4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Track:
+    """The motion of one joint; between keyframes it moves in proportion to time.
+
+    Parameters
+    ----------
+    path : str
+        The node that moves.
+    prismatic : bool
+        Whether it slides along its z axis; otherwise it turns about it.
+    times : ndarray, shape (k,)
+        Seconds.
+    values : ndarray, shape (k,)
+        Metres or radians.
+
+    Examples
+    --------
+    >>> Track("robots/arm/joint_1/q", False, np.array([0.0, 1.0]), np.zeros(2)).times[-1]
+    np.float64(1.0)
+    """
+
+    path: str
+    prismatic: bool
+    times: Array
+    values: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """What an animation plays.
+
+    Parameters
+    ----------
+    tracks : tuple of Track
+        One for each joint.
+    samples : int
+        How many postures were given.
+    duration : float
+        Seconds.
+    loop : bool
+        Whether it starts again at its end.
+
+    Examples
+    --------
+    >>> Motion((), 0, 0.0, True).keyframes
+    0
+    """
+
+    tracks: tuple[Track, ...]
+    samples: int
+    duration: float
+    loop: bool
+
+    @property
+    def keyframes(self) -> int:
+        """Keyframes kept, of all joints together."""
+        return sum(len(track.times) for track in self.tracks)
+
+
+def sample_times(count: int, dt: float | None, fps: float | None) -> Array:
+    """Times of the samples of a motion.
+
+    Parameters
+    ----------
+    count : int
+        Number of samples.
+    dt : float, optional
+        Seconds from one sample to the next.
+    fps : float, optional
+        Samples a second, instead of ``dt``; default 30.
+
+    Returns
+    -------
+    ndarray, shape (count,)
+        Seconds, from 0.
+
+    Raises
+    ------
+    InvalidValueError
+        Both are given, or the one given is not positive.
+
+    Examples
+    --------
+    >>> sample_times(3, 0.1, None)
+    array([0. , 0.1, 0.2])
+    """
+    if dt is not None and fps is not None:
+        raise InvalidValueError(f"dt and fps say the same: give one of them, got {dt} and {fps}.")
+    name, value = ("dt", dt) if dt is not None else ("fps", 30.0 if fps is None else fps)
+    value = float(as_vector([value], 1, name)[0])  # type: ignore[list-item]
+    if value <= 0:
+        raise InvalidValueError(f"{name}: expected a positive number, got {value}.")
+    step = value if name == "dt" else 1.0 / value
+    return step * np.arange(count, dtype=np.float64)
+
+
+def as_motion_samples(value: object, n: int, name: str) -> Array:
+    """Check the postures of an animation.
+
+    Parameters
+    ----------
+    value : array_like, shape (N, n)
+        Joint variables.
+    n : int
+        Number of joints.
+    name : str
+        Used in error messages.
+
+    Returns
+    -------
+    ndarray, shape (N, n)
+        Checked.
+
+    Raises
+    ------
+    ShapeError
+        Another shape, or fewer than two samples.
+    InvalidValueError
+        NaN or infinity.
+
+    Examples
+    --------
+    >>> as_motion_samples([[0.0], [1.0]], 1, "q").shape
+    (2, 1)
+    """
+    q = as_vector(value, n, name)  # type: ignore[arg-type]
+    if q.ndim != 2 or len(q) < 2:
+        raise ShapeError(
+            f"{name}: an animation needs at least two samples, shape (N, {n}), got {q.shape}; "
+            "draw a single posture with show."
+        )
+    return q
+
+
+def joint_tracks(
+    model: RobotModel, q: Array, times: Array, paths: Sequence[str], size: float
+) -> tuple[Track, ...]:
+    """Reduce a motion to keyframes, joint by joint.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot.
+    q : ndarray, shape (N, n)
+        Joint variables.
+    times : ndarray, shape (N,)
+        Seconds.
+    paths : sequence of str
+        The moving node of each joint.
+    size : float
+        Of the robot, metres: what counts as small.
+
+    Returns
+    -------
+    tuple of Track
+        One a joint.
+    """
+    tracks = []
+    for i, row in enumerate(model.table.joint_rows):
+        prismatic = bool(model.table.sigma[row] == PRISMATIC)
+        keep = keyframes(times, q[:, i : i + 1], _TOLERANCE * (size if prismatic else 1.0))
+        tracks.append(Track(paths[i], prismatic, times[keep], q[keep, i]))
+    return tuple(tracks)
+
+
+def keyframes(times: Array, values: Array, tolerance: float) -> NDArray[np.int64]:
+    """Samples from which straight lines give back all others (Ramer, Douglas and Peucker).
+
+    Parameters
+    ----------
+    times : ndarray, shape (N,)
+        Increasing.
+    values : ndarray, shape (N, k)
+        What moves.
+    tolerance : float
+        Largest distance from the line, in the unit of the values.
+
+    Returns
+    -------
+    ndarray of int
+        Sorted sample numbers; the first and the last are among them.
+
+    Examples
+    --------
+    >>> keyframes(np.arange(5.0), np.array([[0.0], [1.0], [2.0], [1.0], [0.0]]), 1e-6)
+    array([0, 2, 4])
+    """
+    last = len(times) - 1
+    kept, waiting = {0, last}, [(0, last)]
+    while waiting:
+        a, b = waiting.pop()
+        if b - a < 2:
+            continue
+        s = ((times[a + 1 : b] - times[a]) / (times[b] - times[a]))[:, None]
+        off = np.linalg.norm(values[a + 1 : b] - (1 - s) * values[a] - s * values[b], axis=1)
+        k = int(off.argmax())
+        if off[k] > tolerance:
+            k += a + 1
+            kept.add(k)
+            waiting += [(a, k), (k, b)]
+    return np.array(sorted(kept), dtype=np.int64)

@@ -1,0 +1,132 @@
+"""A finished picture: it shows itself in a notebook and saves itself as one offline page."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from .._arrays import Array
+from ..errors import FrameNotFoundError
+from .camera import Camera
+from .motion import Motion
+from .nodes import Node
+from .page import page
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """A picture of robots, made by `show` or `animate`. It holds no process, port or file.
+
+    Parameters
+    ----------
+    title : str
+        Of the page.
+    nodes : tuple of Node
+        What is drawn; upper nodes first.
+    camera : Camera
+        Where it is seen from at first; the mouse turns, shifts and zooms.
+    motion : Motion or None
+        What is played.
+    height : int
+        Pixels in a notebook.
+
+    Examples
+    --------
+    >>> from robotmodels.geometry import DHTable
+    >>> from robotmodels.model import RobotModel
+    >>> from robotmodels.viz import show
+    >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.3]))
+    >>> show(arm, [0.0, 0.5]).paths[0]
+    'robots/robot'
+    """
+
+    title: str
+    nodes: tuple[Node, ...]
+    camera: Camera
+    motion: Motion | None = None
+    height: int = 480
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Paths of all nodes."""
+        return tuple(node.path for node in self.nodes)
+
+    def pose(self, path: str) -> Array:
+        """World pose of a node, of the first sample if the scene moves.
+
+        Parameters
+        ----------
+        path : str
+            One of `paths`.
+
+        Returns
+        -------
+        ndarray, shape (4, 4)
+            Its pose.
+
+        Raises
+        ------
+        FrameNotFoundError
+            No node has this path.
+        """
+        poses = {node.path: node.pose for node in self.nodes}
+        if path not in poses:
+            raise FrameNotFoundError("node", path, poses)
+        T, names = np.eye(4), path.split("/")
+        for k in range(len(names)):
+            T = T @ poses.get("/".join(names[: k + 1]), np.eye(4))
+        return T
+
+    def html(self) -> str:
+        """The picture as one HTML page that loads nothing from anywhere.
+
+        Returns
+        -------
+        str
+            About 0.9 MB without meshes.
+
+        Raises
+        ------
+        MissingExtraError
+            meshcat is not installed.
+        """
+        return page(self.title, self.nodes, self.camera, self.motion)
+
+    def save(self, path: str | Path) -> Path:
+        """Write the picture as one offline page, with its animation.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file, by custom ``.html``; its folder must exist.
+
+        Returns
+        -------
+        Path
+            The file written.
+
+        Raises
+        ------
+        OSError
+            It cannot be written.
+        """
+        path = Path(path)
+        path.write_text(self.html(), encoding="utf-8")
+        return path
+
+    def _repr_html_(self) -> str:
+        text = self.html().replace("&", "&amp;").replace('"', "&quot;")
+        return (
+            f'<iframe srcdoc="{text}" style="width: 100%; height: {self.height}px; '
+            'border: 1px solid #ddd;"></iframe>'
+        )
+
+    def __repr__(self) -> str:
+        shapes = sum(node.shape is not None for node in self.nodes)
+        played = ""
+        if self.motion is not None:
+            m = self.motion
+            played = f", {m.duration:g} s from {m.samples} samples in {m.keyframes} keyframes"
+        return f"<Scene {self.title!r}: {shapes} shapes{played}>"
