@@ -1,0 +1,283 @@
+"""Frames of any joint tree: same poses, no huge lengths, and the zeros the book's rules allow."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from identities.random_robots import random_pose, seeds
+
+import robotmodels as rm
+from robotmodels import se3
+from robotmodels.khalil_frames import JointAxis, khalil_frames
+
+Z = np.array([0.0, 0.0, 1.0])
+
+
+def table_of(joints, frames):
+    return rm.DHTable(
+        antecedent=[j.antecedent for j in joints],
+        sigma=[j.sigma for j in joints],
+        **{c: getattr(frames, c) for c in ("gamma", "b", "beta", "alpha", "d", "theta", "r")},
+    )
+
+
+def source_poses(joints, q):
+    """Link poses straight from origins and axes (Rodrigues), no table involved."""
+    poses = [np.eye(4)]
+    for joint, x in zip(joints, q, strict=True):
+        motion, K = np.eye(4), se3.skew(joint.axis)
+        if joint.sigma:
+            motion[:3, 3] = x * joint.axis
+        else:
+            motion[:3, :3] += np.sin(x) * K + (1 - np.cos(x)) * K @ K
+        poses.append(poses[joint.antecedent] @ joint.origin @ motion)
+    return np.array(poses[1:])
+
+
+def table_link_poses(joints, frames, q):
+    poses = [frames.base]
+    for j, T in enumerate(rm.link_transforms(table_of(joints, frames), q)):
+        poses.append(poses[joints[j].antecedent] @ T)
+    return np.array(poses[1:]) @ frames.link_poses
+
+
+def assert_same_robot(joints, tolerance=1e-12):
+    """The table moves every link as the source does; returns the frames."""
+    frames = khalil_frames(joints)
+    rng = np.random.default_rng(0)
+    for q in (np.zeros(len(joints)), *rng.uniform(-3, 3, size=(3, len(joints)))):
+        wanted = source_poses(joints, q)
+        size = max(1.0, np.abs(wanted[:, :3, 3]).max())
+        assert np.abs(table_link_poses(joints, frames, q) - wanted).max() < tolerance * size
+    return frames
+
+
+def random_axis(rng):
+    if rng.random() < 0.6:
+        return np.eye(3)[rng.integers(3)] * rng.choice([-1.0, 1.0])
+    u = rng.normal(size=3)
+    return u / np.linalg.norm(u)
+
+
+def random_origin(rng):
+    """Aligned, turned by right angles, turned by almost nothing, or anything; often no shift."""
+    kind = rng.integers(4)
+    T = np.eye(4)
+    if kind == 1:
+        T = se3.rotation("xyz"[rng.integers(3)], rng.integers(-2, 3) * np.pi / 2)
+    elif kind == 2:
+        small = rng.normal(size=2) * 10.0 ** rng.integers(-16, -1, size=2)
+        T = se3.rotation("x", small[0]) @ se3.rotation("y", small[1])
+        T = T @ se3.rotation("z", rng.normal())
+    elif kind == 3:
+        T = random_pose(rng, 0.0)
+    T[:3, 3] = rng.normal(size=3) * (rng.random(3) < 0.5)
+    return T
+
+
+def random_tree(rng, f, branching=0.3):
+    return [
+        JointAxis(
+            int(rng.integers(0, j + 1)) if rng.random() < branching else j,
+            int(rng.random() < 0.3),
+            random_origin(rng),
+            random_axis(rng),
+        )
+        for j in range(f)
+    ]
+
+
+@given(seeds, st.integers(1, 9), st.sampled_from([0.0, 0.3, 0.9]))
+def test_random_trees_keep_their_poses_and_their_size(seed, f, branching):
+    """q keeps its sign and zero; no parameter is longer than the robot times 1 / 0.02."""
+    rng = np.random.default_rng(seed)
+    joints = random_tree(rng, f, branching)
+    frames = assert_same_robot(joints)
+    size = 1.0 + sum(np.linalg.norm(j.origin[:3, 3]) for j in joints)
+    for lengths in (frames.b, frames.d, frames.r, frames.base[:3, 3]):
+        assert np.abs(lengths).max() < 60 * size
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_many_random_trees(seed):
+    """The same as above on more robots than hypothesis draws in an ordinary run."""
+    rng = np.random.default_rng(seed)
+    for _ in range(50):
+        assert_same_robot(random_tree(rng, int(rng.integers(1, 9))))
+
+
+@pytest.mark.parametrize("tilt", [0.0, *(10.0**k for k in range(-16, -1)), 0.019, 0.021, 0.1])
+@pytest.mark.parametrize("flip", [False, True], ids=["parallel", "antiparallel"])
+@pytest.mark.parametrize("about", ["x", "y", "xy"])
+@pytest.mark.parametrize("sigma", [0, 1])
+def test_nearly_parallel_axes_never_run_away(tilt, flip, about, sigma):
+    """Without beta the common perpendicular of axes 1e-8 rad apart is thousands of km away."""
+    turn = np.eye(4)
+    for axis in about:
+        turn = turn @ se3.rotation(axis, tilt)
+    if flip:
+        turn = turn @ se3.rotation("x", np.pi)
+    joints = [
+        JointAxis(0, 0, np.eye(4), Z),
+        JointAxis(1, sigma, se3.translation(0.3, 0.4, 0.2) @ turn, Z),
+        JointAxis(2, 0, se3.translation(0.1, -0.2, 0.3), np.array([1.0, 0.0, 0.0])),
+        JointAxis(1, sigma, se3.translation(-0.3, 0.1, 0.0) @ turn, Z),
+    ]
+    frames = assert_same_robot(joints)
+    for lengths in (frames.b, frames.d, frames.r):
+        assert np.abs(lengths).max() < 60
+    if tilt < 1e-13 / 2:
+        assert np.array_equal(frames.beta, np.zeros(4)), "rounding of the input is not geometry"
+        # a flip, and the plane x z of the foot, leave alpha = 0 or pi
+        assert np.abs(frames.alpha[1]) in (0.0, np.pi)
+    elif tilt > 0.02:
+        assert np.array_equal(frames.beta, np.zeros(4)), "the common perpendicular is at hand"
+
+
+def parallel_offset(sigma=0):
+    return [
+        JointAxis(0, 0, se3.translation(0, 0, 0.5), Z),
+        JointAxis(1, sigma, se3.translation(0.3, 0.4, 0.2), Z),
+        JointAxis(2, 0, se3.translation(0.2, 0.0, 0.1), Z),
+    ]
+
+
+def test_parallel_revolute_axes_share_a_plane_of_origins():
+    """x goes through the foot of the perpendicular, so r is zero between parallel axes."""
+    frames = assert_same_robot(parallel_offset())
+    assert np.allclose(frames.d, [0, 0.5, 0.2])
+    assert np.array_equal(frames.r, np.zeros(3))
+    assert np.array_equal(frames.alpha, np.zeros(3))
+    assert np.array_equal(frames.beta, np.zeros(3))
+    assert np.allclose(frames.base[:3, 3], [0, 0, 0.5]), "R_0 is R_1 at q = 0"
+
+
+def test_position_of_a_prismatic_axis_is_free_so_it_passes_through_the_origin():
+    frames = assert_same_robot(parallel_offset(sigma=1))
+    assert frames.d[1] == 0
+    assert frames.r[1] == 0
+
+
+def test_coincident_axes_have_no_parameters_at_all():
+    joints = [JointAxis(j, j % 2, se3.translation(0, 0, 0.3 * j), Z) for j in range(4)]
+    frames = assert_same_robot(joints)
+    for column in ("gamma", "b", "beta", "alpha", "d", "theta", "r"):
+        assert np.array_equal(getattr(frames, column), np.zeros(4)), column
+
+
+def test_intersecting_axes_meet_in_their_origin():
+    """A spherical wrist: d and r vanish, alpha are right angles."""
+    axes = [Z, np.array([0.0, 1.0, 0.0]), Z]
+    joints = [JointAxis(j, 0, np.eye(4), axes[j]) for j in range(3)]
+    frames = assert_same_robot(joints)
+    assert np.array_equal(frames.d, np.zeros(3))
+    assert np.array_equal(frames.r, np.zeros(3))
+    assert np.abs(frames.alpha).tolist() == [0, np.pi / 2, np.pi / 2]
+
+
+def test_free_signs_are_chosen_with_theta_near_zero():
+    """x may point either way along the perpendicular: theta stays in (-pi/2, pi/2]."""
+    rng = np.random.default_rng(3)
+    for _ in range(30):
+        frames = khalil_frames(random_tree(rng, 6, branching=0.0))
+        assert (np.abs(frames.theta) <= np.pi / 2 + 1e-8).all()
+        assert frames.theta[-1] == 0
+        assert frames.r[-1] == 0, "a last frame has nothing to choose: theta = r = 0"
+
+
+def test_a_main_branch_needs_no_gamma_and_b():
+    """Only the second and later children of a link take gamma and b."""
+    rng = np.random.default_rng(4)
+    for _ in range(30):
+        joints = random_tree(rng, 7, branching=0.6)
+        frames = khalil_frames(joints)
+        seen = set()
+        for k, joint in enumerate(joints):
+            if joint.antecedent not in seen:
+                assert frames.gamma[k] == 0
+                assert frames.b[k] == 0
+            seen.add(joint.antecedent)
+
+
+def test_a_long_chain_does_not_recurse():
+    joints = [JointAxis(j, 0, se3.translation(0.01, 0, 0), Z) for j in range(1500)]
+    frames = khalil_frames(joints)
+    assert np.abs(frames.d[1:] - 0.01).max() < 1e-12
+
+
+def test_no_joints():
+    assert khalil_frames([]).link_poses.shape == (0, 4, 4)
+
+
+# --- tables that already follow the rules come back -----------------------------------------------
+
+# alpha (degrees), d, r, theta (degrees), index of a prismatic joint
+STANDARD = {
+    "rx90": ([0, 90, 0, -90, 90, -90], [0, 0, 0.45, 0, 0, 0], [0, 0, 0, 0.45, 0, 0], [0] * 6, None),
+    "puma": ([0, -90, 0, -90, 90, -90], [0, 0, 0.4318, 0.0203, 0, 0],
+             [0, 0, 0.15005, 0.4318, 0, 0], [0] * 6, None),
+    "ur5": ([0, 90, 0, 0, 90, -90], [0, 0, -0.425, -0.39225, 0, 0],
+            [0, 0, 0, 0.10915, 0.09465, 0], [0] * 6, None),
+    "scara": ([0, 0, 0, 0], [0, 0.4, 0.3, 0], [0, 0, 0, 0], [0] * 4, 3),
+    "stanford": ([0, -90, 90, 0, 90, -90], [0, 0, 0, 0.15, 0, 0], [0] * 6,
+                 [0, 0, 90, 90, 0, 0], 2),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", STANDARD)
+@pytest.mark.parametrize("offset", [0.0, -0.2])
+def test_tables_that_follow_the_rules_come_back(name, offset):
+    """Table -> URDF -> table: every column, with the zeros where the book has them."""
+    alpha, d, r, theta, prismatic = STANDARD[name]
+    f = len(alpha)
+    # x_j is fixed by the next axis unless that one coincides with z_j; x_1 is, by R_0 = R_1
+    fixed = [j > 0 and j + 1 < f and bool(alpha[j + 1] or d[j + 1]) for j in range(f)]
+    sigma = np.array([int(j == prismatic) for j in range(f)])
+    table = rm.DHTable(
+        antecedent=range(f),
+        sigma=sigma,
+        alpha=np.deg2rad(alpha),
+        d=d,
+        r=r,
+        theta=np.deg2rad(theta) + offset * np.array(fixed),
+        lower=[-3.0] * f,
+        upper=[3.0] * f,
+    )
+    again = rm.RobotModel.from_urdf(rm.to_urdf(rm.RobotModel.from_table(table))).table
+    assert again.names == table.names
+    assert again.lower.tolist() == table.lower.tolist()
+    for column in ("antecedent", "sigma", "mu", "gamma", "b", "beta"):
+        assert np.array_equal(getattr(again, column), getattr(table, column)), column
+    for column in ("alpha", "d", "theta", "r"):
+        got, wanted = getattr(again, column), getattr(table, column)
+        assert np.abs(got - wanted).max() < 1e-14, column
+        assert (got[wanted == 0] == 0).all(), f"{column} has a zero that is only nearly one"
+
+
+@given(seeds, st.booleans())
+def test_extracting_twice_changes_nothing(seed, tree):
+    """The rules leave no choice to chance: their own result is where they lead again."""
+    rng = np.random.default_rng(seed)
+    joints = random_tree(rng, 6, branching=0.4 * tree)
+    once = khalil_frames(joints)
+    factors = rm.link_transforms(table_of(joints, once), np.zeros(6))
+    own = [JointAxis(j.antecedent, j.sigma, T, Z) for j, T in zip(joints, factors, strict=True)]
+    assert_same_robot(own)
+    twice = khalil_frames(own)
+    size = 1.0 + np.abs([once.b, once.d, once.r]).max()
+    assert np.abs(twice.base[:3, 3]).max() < 1e-10 * size
+    for column in ("b", "d", "r"):
+        assert np.abs(getattr(twice, column) - getattr(once, column)).max() < 1e-9 * size, column
+
+
+def test_prismatic_axis_of_the_stanford_arm_goes_through_the_shoulder():
+    """Its place is free: r_2 of the textbook becomes d_4, as many parameters are zero."""
+    table = rm.DHTable.from_rows([
+        {}, {"alpha": -90, "r": 0.15}, {"sigma": 1, "alpha": 90}, {}, {"alpha": -90}, {"alpha": 90},
+    ], degrees=True)  # fmt: skip
+    model = rm.RobotModel.from_table(table)
+    again = rm.RobotModel.from_urdf(rm.to_urdf(model))
+    assert np.allclose(again.table.d, [0, 0, 0, 0.15, 0, 0])
+    assert np.array_equal(again.table.r, np.zeros(6))
+    q = np.arange(6) / 7
+    assert np.allclose(rm.dgm(again, q), rm.dgm(model, q), atol=1e-15)
