@@ -20,7 +20,8 @@ import pytest
 
 import robotmodels as rm
 from robotmodels import errors
-from robotmodels.robots import erd, load, robots
+from robotmodels.errors import RobotNotFoundError
+from robotmodels.robots import CATALOGUE, erd, load, title
 from robotmodels.robots.catalogue import MODULES
 from robotmodels.robots.generate import generate
 
@@ -129,14 +130,19 @@ def turn(axis, angle):
 
 
 def test_everything_asked_for_is_there():
-    names = robots()
-    assert len(set(names)) == len(names) >= 24
-    assert not ASKED_FOR - set(names)
+    assert len(CATALOGUE) >= 24
+    assert not ASKED_FOR - set(CATALOGUE)
     assert rm.load is load
-    assert rm.robots() == names
+    names = rm.robots()
+    assert len(set(names)) == len(names)
+    assert names == (*CATALOGUE, *(f"erd:{arm}" for arm in erd.ERD_ARMS))
+    for name in names:
+        assert title(name).endswith(".")
+    with pytest.raises(RobotNotFoundError, match="rx90"):
+        title("rx9")
 
 
-@pytest.mark.parametrize("name", robots())
+@pytest.mark.parametrize("name", CATALOGUE)
 def test_a_robot_builds_fast_is_a_value_and_prints(name):
     load(name)  # its module is imported once
     start = perf_counter()
@@ -149,7 +155,7 @@ def test_a_robot_builds_fast_is_a_value_and_prints(name):
     assert np.isfinite(rm.dgm(model, model.configurations["zero"])).all()
 
 
-@pytest.mark.parametrize("name", robots())
+@pytest.mark.parametrize("name", CATALOGUE)
 def test_a_robot_says_where_its_numbers_come_from(name):
     module = next(m for m, names in MODULES.items() if name in names)
     text = inspect.getdoc(getattr(import_module(f"robotmodels.robots.{module}"), name))
@@ -161,7 +167,7 @@ def test_a_robot_says_where_its_numbers_come_from(name):
 
 
 def test_limits_are_ordered_and_postures_are_within_them():
-    for name in robots():
+    for name in CATALOGUE:
         model = load(name)
         assert (model.lower < model.upper).all()
         assert (model.table.velocity > 0).all()
@@ -174,7 +180,7 @@ def test_limits_are_ordered_and_postures_are_within_them():
 
 def test_physical_consistency_is_as_reported_in_the_docstrings():
     faulty = {}
-    for name in robots():
+    for name in CATALOGUE:
         model = load(name)
         if model.inertia.values.any():
             bad = [link.link for link in model.inertia.consistency().links if not link.is_physical]
@@ -427,7 +433,7 @@ def test_urdf_files_have_not_drifted(tmp_path):
         assert all(map(same, new, kept)), f"{path.name}: run python -m robotmodels.robots.generate"
 
 
-@pytest.mark.parametrize("name", robots())
+@pytest.mark.parametrize("name", CATALOGUE)
 def test_urdf_files_load_in_pinocchio(name, rng):
     model = load(name)
     twin = pin.buildModelFromUrdf(str(URDF / f"{name}.urdf"))
@@ -452,7 +458,7 @@ def test_urdf_files_load_in_pinocchio(name, rng):
 def test_urdf_files_are_valid_for_yourdfpy(rng):
     import yourdfpy
 
-    for name in robots():
+    for name in CATALOGUE:
         model = load(name)
         urdf = yourdfpy.URDF.load(
             str(URDF / f"{name}.urdf"), load_meshes=False, load_collision_meshes=False

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from ..robots import robots
+from ..robots import robots, title
 
 
 def add_command(commands: Any) -> None:
@@ -29,7 +29,7 @@ def add_command(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Print one name a line.
+    """Print each name with what it stands for.
 
     Parameters
     ----------
@@ -39,6 +39,9 @@ def run(arguments: argparse.Namespace) -> None:
     Examples
     --------
     >>> run(argparse.Namespace())  # doctest: +ELLIPSIS
-    ...rx90...
+    lab_rr ...
     """
-    print("\n".join(robots()))
+    names = robots()
+    width = max(map(len, names))
+    for name in names:
+        print(f"{name:<{width}}  {title(name)}")

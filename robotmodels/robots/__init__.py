@@ -3,6 +3,6 @@
 One file per maker (or group). `robotmodels.load` and `robotmodels.robots` are its door.
 """
 
-from .catalogue import load, robots
+from .catalogue import CATALOGUE, load, robots, title
 
-__all__ = ["load", "robots"]
+__all__ = ["CATALOGUE", "load", "robots", "title"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib import import_module
 
 from ..errors import RobotNotFoundError
@@ -29,21 +30,54 @@ MODULES: dict[str, tuple[str, ...]] = {
 
 _MODULE_OF = {name: module for module, names in MODULES.items() for name in names}
 
+CATALOGUE: tuple[str, ...] = tuple(_MODULE_OF)
+"""The robots that this package builds itself: simple ones first, then by maker."""
+
 
 def robots() -> tuple[str, ...]:
-    """Names that `load` knows, without those of example-robot-data.
+    """Names that `load` knows.
 
     Returns
     -------
     tuple of str
-        Simple ones first, then by maker.
+        The catalogue's own, then ``erd:<name>`` for the arms of example-robot-data.
 
     Examples
     --------
-    >>> "rx90" in robots(), len(robots()) >= 24
+    >>> "rx90" in robots(), "erd:ur5" in robots()
     (True, True)
     """
-    return tuple(_MODULE_OF)
+    return (*CATALOGUE, *(ERD_PREFIX + arm for arm in ERD_ARMS))
+
+
+def title(name: str) -> str:
+    """What a name stands for: the first line of what builds it.
+
+    Parameters
+    ----------
+    name : str
+        One of `robots`.
+
+    Returns
+    -------
+    str
+        A sentence.
+
+    Raises
+    ------
+    RobotNotFoundError
+        The name is unknown.
+
+    Examples
+    --------
+    >>> title("rx90")
+    'Staubli RX-90, the running example of the seed book.'
+    """
+    if isinstance(name, str) and name.removeprefix(ERD_PREFIX) in ERD_ARMS and ":" in name:
+        arm = ERD_ARMS[name.removeprefix(ERD_PREFIX)]
+        part = f", from {arm.base_link} to {arm.tip_link}" if arm.base_link else ""
+        return f"example-robot-data: {arm.urdf}{part}."
+    return str(_builder(name).__doc__).splitlines()[0].replace("`", "")
 
 
 def load(name: str) -> RobotModel:
@@ -76,10 +110,13 @@ def load(name: str) -> RobotModel:
     """
     if isinstance(name, str) and name.startswith(ERD_PREFIX):
         return load_erd(name.removeprefix(ERD_PREFIX))
+    return _builder(name)()
+
+
+def _builder(name: str) -> Callable[[], RobotModel]:
     module = _MODULE_OF.get(name) if isinstance(name, str) else None
     if module is None:
-        known = (*robots(), *(ERD_PREFIX + arm for arm in ERD_ARMS))
         raise RobotNotFoundError(
-            "robot", name, known, "A URDF file is read with RobotModel.from_urdf(path)."
+            "robot", name, robots(), "A URDF file is read with RobotModel.from_urdf(path)."
         )
-    return getattr(import_module(f".{module}", __package__), name)()
+    return getattr(import_module(f".{module}", __package__), name)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ..errors import UrdfWarning
 from ..model import write_urdf
-from .catalogue import load, robots
+from .catalogue import CATALOGUE, load
 
 
 def generate(folder: str | Path) -> list[Path]:
@@ -45,7 +45,7 @@ def generate(folder: str | Path) -> list[Path]:
     with warnings.catch_warnings():
         # what a URDF cannot hold (rotor inertia, transmissions) is known here: `load` has it
         warnings.simplefilter("ignore", UrdfWarning)
-        for name in robots():
+        for name in CATALOGUE:
             path = folder / f"{name}.urdf"
             write_urdf(load(name), path)
             paths.append(path)
