@@ -208,13 +208,14 @@ def energy_regressor(model: RobotModel, q: ArrayLike, v: ArrayLike, drive: bool 
     q, v : array_like, shape (..., n)
         Joint variables (rad or m) and velocities; the leading axes broadcast.
     drive : bool
-        Whether the columns of the rotor inertias, ``v^2 / 2``, are included. Friction is no
-        energy.
+        Whether the columns of the rotor inertias, ``v^2 / 2`` (and those of coupled motors), are
+        included. Friction is no energy.
 
     Returns
     -------
     ndarray, shape (..., 10 f + n)
-        Columns as `parameter_names` up to ``Ia`` (10 f without drives).
+        Columns as `parameter_names` up to ``Ia`` (10 f without drives), then one more for the
+        ``Iam`` of each coupled motor.
 
     Raises
     ------
@@ -240,7 +241,9 @@ def energy_regressor(model: RobotModel, q: ArrayLike, v: ArrayLike, drive: bool 
     out = np.empty((rows[0].shape[0], 10 * model.f))
     energy_regressors(*rows, *model.chain, model.gravity, out)
     if drive:
-        out = np.concatenate((out, 0.5 * rows[1] ** 2), axis=1)
+        v = rows[1]
+        coupled = [0.5 * np.einsum("ki,ij,kj->k", v, c, v)[:, None] for _, c in _couplings(model)]
+        out = np.concatenate((out, 0.5 * v**2, *coupled), axis=1)
     return out.reshape(*batch, out.shape[-1])
 
 
@@ -280,15 +283,19 @@ def _fill(model: RobotModel, rows: list[Array], rigid: Array, W: Array | None) -
     joints = np.arange(n)
     for kind, values in enumerate((a, v, np.sign(v), np.ones_like(v))):
         W[:, joints, p + kind * n + joints] = values
-    if not _coupled(model):
-        return
-    w = model.transmission.weights  # type: ignore[union-attr]
-    for i, motor in enumerate(_coupled(model)):
-        row = w[motor - 1]
-        cross = np.outer(row, row)
-        np.fill_diagonal(cross, 0.0)
+    couplings = _couplings(model)
+    step = len(couplings)
+    for i, (row, cross) in enumerate(couplings):
         first = p + 4 * n + i
-        step = len(_coupled(model))
         W[:, :, first] = a @ cross
         W[:, :, first + step] = v @ cross
         W[:, :, first + 2 * step] = np.sign(v @ row)[:, None] * row
+
+
+def _couplings(model: RobotModel) -> list[tuple[Array, Array]]:
+    """Of each coupled motor, its turns ``w`` per joint (n,) and ``w w^T`` without diagonal."""
+    if model.transmission is None:
+        return []
+    weights = model.transmission.weights
+    rows = [weights[m - 1] for m in model.transmission.coupled_motors]
+    return [(w, np.outer(w, w) - np.diag(w**2)) for w in rows]
