@@ -1,0 +1,316 @@
+"""The border of the dynamic models: shapes, batches, wrenches, singular matrices, errors."""
+
+import numpy as np
+import pytest
+from identities.random_robots import random_model, random_state
+
+import robotmodels as rm
+from robotmodels.errors import InvalidValueError, ShapeError, SingularMassMatrixError
+
+# name: function of the model and its vectors, lengths of these, shape of the result
+FUNCTIONS = {
+    "idm": (rm.idm, "nnn", ("n",)),
+    "idm with a wrench": (rm.idm, "nnn6", ("n",)),
+    "idm without drives": (lambda m, *x: rm.idm(m, *x, drive=False), "nnn", ("n",)),
+    "ddm": (rm.ddm, "nnn", ("n",)),
+    "ddm with a wrench": (rm.ddm, "nnn6", ("n",)),
+    "mass_matrix": (rm.mass_matrix, "n", ("n", "n")),
+    "rigid mass_matrix": (lambda m, q: rm.mass_matrix(m, q, drive=False), "n", ("n", "n")),
+    "coriolis_matrix": (rm.coriolis_matrix, "nn", ("n", "n")),
+    "gravity_torque": (rm.gravity_torque, "n", ("n",)),
+    "kinetic_energy": (rm.kinetic_energy, "nn", ()),
+    "rigid kinetic_energy": (lambda m, *x: rm.kinetic_energy(m, *x, drive=False), "nn", ()),
+    "potential_energy": (rm.potential_energy, "n", ()),
+}
+
+
+@pytest.fixture(params=FUNCTIONS)
+def case(request):
+    return FUNCTIONS[request.param]
+
+
+@pytest.fixture(scope="module", params=["physical", "any"])
+def model(request):
+    """A tree that Pinocchio orders otherwise; with "any" inertia it cannot hold it at all."""
+    model = random_model(
+        np.random.default_rng(3), f=7, tree=True, fixed=True, inertia=request.param, drive=True,
+        transmission=True,
+    )  # fmt: skip
+    assert model.n >= 3
+    assert not model.twin.in_table_order
+    assert model.twin.holds_inertia == (request.param == "physical")
+    return model
+
+
+def shape_of(core, model):
+    return tuple(model.n if k == "n" else k for k in core)
+
+
+def vectors_of(lengths, model, *batch):
+    rng = np.random.default_rng(5)
+    q, v, a = random_state(model, rng, *batch)
+    return [q, v, a, rng.normal(size=(*batch, 6))][: len(lengths)]
+
+
+def close(actual, expected, tolerance=1e-12):
+    expected = np.asarray(expected)
+    assert np.shape(actual) == expected.shape
+    scale = max(1.0, np.abs(expected).max(initial=0.0))
+    np.testing.assert_allclose(actual, expected, rtol=0, atol=tolerance * scale)
+
+
+@pytest.mark.parametrize("batch", [(), (1,), (3,), (2, 3), (0,), (2, 0, 3)], ids=str)
+def test_leading_axes_are_the_batch(case, model, batch):
+    function, lengths, core = case
+    vectors = vectors_of(lengths, model, *batch)
+    result = function(model, *vectors)
+    assert isinstance(result, np.ndarray)
+    assert result.shape == (*batch, *shape_of(core, model))
+    assert result.dtype == np.float64
+    assert result.flags.c_contiguous
+    for index in np.ndindex(*batch):
+        close(result[index], function(model, *(x[index] for x in vectors)), 1e-11)
+
+
+def test_batches_broadcast(case, model):
+    """One argument of three rows among single ones, each in turn; and an outer product."""
+    function, lengths, core = case
+    vectors = vectors_of(lengths, model, 3)
+    for k in range(len(lengths)):
+        mixed = [x if i == k else x[0] for i, x in enumerate(vectors)]
+        full = [x if i == k else np.tile(x[0], (3, 1)) for i, x in enumerate(vectors)]
+        result = function(model, *mixed)
+        assert result.flags.c_contiguous
+        close(result, function(model, *full))
+        close(function(model, *(x[:0] if i == k else x for i, x in enumerate(mixed))),
+              np.empty((0, *shape_of(core, model))))  # fmt: skip
+    outer = [x[:, None] if i == 0 else x[:2] for i, x in enumerate(vectors)]
+    if len(outer) > 1:
+        result = function(model, *outer)
+        assert result.shape == (3, 2, *shape_of(core, model))
+        for i, j in np.ndindex(3, 2):
+            one = [x[i] if k == 0 else x[j] for k, x in enumerate(vectors)]
+            close(result[i, j], function(model, *one), 1e-11)
+
+
+@pytest.mark.parametrize("batch", [(), (2,)], ids=str)
+def test_results_are_fresh_and_inputs_stay(case, model, batch):
+    function, lengths, _ = case
+    vectors = vectors_of(lengths, model, *batch)
+    copies = [x.copy() for x in vectors]
+    first = function(model, *vectors)
+    kept = first.copy()
+    second = function(model, *vectors)
+    assert first.flags.writeable
+    assert not np.shares_memory(first, second)
+    assert not any(np.shares_memory(first, x) for x in vectors)
+    first[...] = np.nan
+    np.testing.assert_array_equal(function(model, *vectors), kept)
+    np.testing.assert_array_equal(second, kept)
+    for x, copy in zip(vectors, copies, strict=True):
+        np.testing.assert_array_equal(x, copy)
+
+
+@pytest.mark.parametrize("batch", [(), (2,)], ids=str)
+def test_anything_like_an_array_is_taken(case, model, batch):
+    function, lengths, _ = case
+    whole = [
+        np.arange(np.prod(batch, dtype=int) * k).reshape(*batch, k) % 3 - 1
+        for k in (6 if length == "6" else model.n for length in lengths)
+    ]
+    expected = function(model, *(x.astype(float) for x in whole))
+    frozen = [x.astype(float) for x in whole]
+    for x in frozen:
+        x.flags.writeable = False
+    np.testing.assert_array_equal(function(model, *frozen), expected)
+    for kind in (
+        lambda x: x,
+        lambda x: x.tolist(),
+        lambda x: tuple(x.tolist()),
+        lambda x: x.astype(np.float32),
+        lambda x: np.asfortranarray(x.astype(float)),
+        lambda x: np.repeat(x.astype(float), 2, axis=-1)[..., ::2],
+    ):
+        np.testing.assert_array_equal(function(model, *map(kind, whole)), expected)
+
+
+FAULTS = {
+    "too long": (lambda k: np.zeros(k + 1), ShapeError, "expected shape"),
+    "too short": (lambda k: np.zeros((4, k - 1)), ShapeError, "expected shape"),
+    "column": (lambda k: np.zeros((k, 1)), ShapeError, "ravel"),
+    "number": (lambda k: 0.0, ShapeError, "got ()"),
+    "NaN": (lambda k: np.r_[np.zeros(k - 1), np.nan], InvalidValueError, "nan"),
+    "NaN in a list": (lambda k: [np.nan] + [0] * (k - 1), InvalidValueError, "nan"),
+    "infinity": (lambda k: np.full((3, k), np.inf), InvalidValueError, "inf"),
+    "text": (lambda k: ["0"] * k, InvalidValueError, "real numbers"),
+    "complex": (lambda k: np.zeros(k) * 1j, InvalidValueError, "complex"),
+    "truth": (lambda k: [True] * k, InvalidValueError, "bool"),
+    "ragged": (lambda k: [[0.0] * k, [0.0]], InvalidValueError, "regular"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_bad_vector_is_named(case, model, fault):
+    function, lengths, _ = case
+    build, error, words = FAULTS[fault]
+    names = (*("q", "v", "tau" if function is rm.ddm else "a"), "wrench")
+    for position, length in enumerate(lengths):
+        vectors = vectors_of(lengths, model)
+        vectors[position] = build(6 if length == "6" else model.n)
+        with pytest.raises(error) as caught:
+            function(model, *vectors)
+        assert words in str(caught.value)
+        assert str(caught.value).startswith(f"{names[position]}:")
+
+
+@pytest.mark.parametrize("function", [rm.idm, rm.ddm])
+@pytest.mark.parametrize("drive", [True, False])
+def test_batches_that_do_not_fit_are_named(function, drive, model):
+    vectors = vectors_of("nnn6", model, 3)
+    for k in range(4):
+        for others in (3, None):
+            if others is None and k == 3:
+                continue
+            mixed = [x[:2] if i == k else x for i, x in enumerate(vectors)]
+            if others is None:  # everything else single, but for the wrench
+                mixed = [x if i in (k, 3) else x[0] for i, x in enumerate(mixed)]
+            with pytest.raises(ShapeError, match="do not broadcast"):
+                function(model, *mixed, drive=drive)
+    with pytest.raises(ShapeError, match="do not broadcast"):
+        rm.coriolis_matrix(model, vectors[0], vectors[1][:2])
+    with pytest.raises(ShapeError, match="do not broadcast"):
+        rm.kinetic_energy(model, vectors[0], vectors[1][:2])
+
+
+# --- singular mass matrices ------------------------------------------------------------------
+
+
+def test_a_massless_arm_has_no_direct_model(model):
+    massless = model.with_inertia(None).with_drive(None).with_transmission(None)
+    vectors = vectors_of("nnn", model, 4)
+    with pytest.raises(SingularMassMatrixError, match=f"'{model.name}'.*with_inertia"):
+        rm.ddm(massless, *(x[0] for x in vectors))
+    with pytest.raises(SingularMassMatrixError, match="sample 0 of 4"):
+        rm.ddm(massless, *vectors)
+    assert rm.ddm(massless, *(x[:0] for x in vectors)).shape == (0, model.n)
+    rotors = massless.with_drive(rm.DriveParameters(Ia=np.full(model.n, 0.5)))
+    close(rm.ddm(rotors, *(x[0] for x in vectors)), 2 * vectors[2][0])
+    close(rm.ddm(rotors, *vectors), 2 * vectors[2])
+    with pytest.raises(SingularMassMatrixError):
+        rm.ddm(rotors, *(x[0] for x in vectors), drive=False)
+
+
+def test_one_joint_without_inertia_is_enough():
+    """The last axis of a wrist that carries a point mass on itself."""
+    table = rm.DHTable.from_rows([{"sigma": 0}, {"sigma": 0, "d": 0.3}])
+    bodies = rm.InertialParameters.from_com([1, 2], [[0.1, 0, 0], [0, 0, 0.2]], np.zeros((2, 3, 3)))
+    arm = rm.RobotModel.from_table(table, bodies)
+    for q in ([0.1, 0.2], [[0.1, 0.2]]):
+        with pytest.raises(SingularMassMatrixError):
+            rm.ddm(arm, q, [0.0, 0.0], [1.0, 1.0])
+
+
+def test_a_configuration_alone_may_be_singular():
+    """Two slides that the hinge between them turns parallel; the last one carries all mass."""
+    rows = [
+        {"sigma": 1},
+        {"sigma": 0, "alpha": np.pi / 2},
+        {"sigma": 1, "alpha": -np.pi / 2},
+    ]
+    bodies = np.zeros((3, 10))
+    bodies[2] = rm.InertialParameters.from_com([2.0], [[0.1, 0, 0]], [0.1 * np.eye(3)]).values
+    arm = rm.RobotModel.from_table(rm.DHTable.from_rows(rows), rm.InertialParameters(bodies))
+    q = np.tile([0.1, 0.7, 0.2], (200, 1))
+    q[[130, 150], 1] = 0.0
+    with pytest.raises(SingularMassMatrixError, match="sample 130 of 200"):
+        rm.ddm(arm, q, np.zeros(3), np.ones(3))
+    with pytest.raises(SingularMassMatrixError):
+        rm.ddm(arm, q[130], np.zeros(3), np.ones(3))
+    a = rm.ddm(arm, q[0], np.zeros(3), np.ones(3))
+    close(rm.idm(arm, q[0], np.zeros(3), a), np.ones(3), 1e-11)
+
+
+@pytest.mark.parametrize("mass", [1e-12, 1e12])
+def test_light_and_heavy_arms_are_not_singular(mass):
+    model = random_model(np.random.default_rng(1), f=5, gravity=False)
+    scaled = model.with_inertia(rm.InertialParameters(mass * model.inertia.values))
+    q, v, a = vectors_of("nnn", model, 2)
+    tau = rm.idm(scaled, q, v, a)
+    tolerance = 1e-13 * np.linalg.cond(rm.mass_matrix(model, q)).max()
+    close(rm.ddm(scaled, q, v, tau), a, tolerance)
+    close(rm.ddm(scaled, q[0], v[0], tau[0]), a[0], tolerance)
+
+
+# --- bodies that no body is ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("mass", [0.0, 1e-15, 1e-9, 1e-3, -1.0])
+def test_first_moments_over_hardly_any_mass_lose_no_digits(mass):
+    """One call and a batch agree though the centre of mass may be anywhere."""
+    table = rm.DHTable.from_rows([{"sigma": 0}, {"sigma": 0, "d": 0.3, "alpha": 1.0}])
+    values = [[1, 0, 0, 1, 0, 1, 0.5, 0, 0, mass], [1, 0.1, 0, 1, 0, 2, 0.1, 0.2, 0.3, mass]]
+    arm = rm.RobotModel.from_table(table, rm.InertialParameters(values), gravity=(1, 2, 3))
+    q, v, a = [0.3, 0.4], [0.5, 0.6], [0.7, 0.8]
+    close(rm.idm(arm, q, v, a), rm.idm(arm, [q], v, a)[0], 1e-13)
+    close(rm.mass_matrix(arm, q), rm.mass_matrix(arm, [q])[0], 1e-13)
+    close(rm.coriolis_matrix(arm, q, v), rm.coriolis_matrix(arm, [q], v)[0], 1e-13)
+    parameters = rm.parameter_vector(arm)
+    close(rm.idm(arm, q, v, a), rm.torque_regressor(arm, q, v, a) @ parameters, 1e-13)
+
+
+def test_what_stands_on_the_base_has_potential_energy():
+    rows = [{"sigma": 2, "r": 0.5}, {"sigma": 0, "d": 0.3}]
+    bodies = rm.InertialParameters.from_com([2, 1], np.zeros((2, 3)), np.zeros((2, 3, 3)))
+    arm = rm.RobotModel.from_table(rm.DHTable.from_rows(rows), bodies)
+    for q in ([0.0], [[0.0]]):
+        close(np.squeeze(rm.potential_energy(arm, q)), 9.81 * (2 * 0.5 + 1 * 0.5))
+        close(np.squeeze(rm.gravity_torque(arm, q)), 0.0)
+
+
+# --- few joints ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("sigma", [0, 1])
+def test_one_joint_by_hand(sigma):
+    """A pendulum and a lift, with every drive term and a wrench."""
+    body = rm.InertialParameters.from_com([2.0], [[0.1, 0, 0]], [np.diag([0.3, 0.2, 0.1])])
+    drive = rm.DriveParameters([0.5], [0.6], [0.7], [0.8])
+    tool = np.eye(4)
+    tool[0, 3] = 0.4
+    arm = rm.RobotModel.from_table(
+        rm.DHTable(antecedent=[0], sigma=[sigma]), body, drive, tool=tool, gravity=(0, -3.0, -9.81)
+    )
+    q, v, a = np.array([0.3]), np.array([-1.5]), np.array([2.0])
+    w = [1.0, 10.0, 100.0, 4.0, 5.0, 6.0]
+    if sigma == 0:
+        mass, gravity = 0.1 + 2 * 0.01, 2 * 3.0 * 0.1 * np.cos(0.3)
+        pull = 6.0 + 0.4 * (np.cos(0.3) * 10.0 - np.sin(0.3) * 1.0)
+        potential = 2 * 3.0 * 0.1 * np.sin(0.3)
+    else:
+        mass, gravity, pull, potential = 2.0, 2 * 9.81, 100.0, 2 * 9.81 * 0.3
+    tau = (mass + 0.5) * 2.0 - 0.6 * 1.5 - 0.7 + 0.8 + gravity + pull
+    for one in (lambda x: x, lambda x: [x]):
+        x, dx, ddx, wrench = map(one, (q, v, a, w))
+        close(np.ravel(rm.idm(arm, x, dx, ddx, wrench)), [tau])
+        close(np.ravel(rm.idm(arm, x, dx, ddx, drive=False)), [mass * 2.0 + gravity])
+        close(np.ravel(rm.ddm(arm, x, dx, one([tau]), wrench)), [2.0])
+        close(np.ravel(rm.mass_matrix(arm, x)), [mass + 0.5])
+        close(np.ravel(rm.mass_matrix(arm, x, drive=False)), [mass])
+        close(np.ravel(rm.coriolis_matrix(arm, x, dx)), [0.0])
+        close(np.ravel(rm.gravity_torque(arm, x)), [gravity])
+        close(np.ravel(rm.kinetic_energy(arm, x, dx)), [(mass + 0.5) * 1.5**2 / 2])
+        close(np.ravel(rm.kinetic_energy(arm, x, dx, drive=False)), [mass * 1.5**2 / 2])
+        close(np.ravel(rm.potential_energy(arm, x)), [potential])
+
+
+def test_no_joint_at_all(case):
+    function, lengths, core = case
+    rows = [{"sigma": 2, "d": 0.2}, {"sigma": 2, "r": 0.5}]
+    bodies = rm.InertialParameters.from_com([2, 1], np.zeros((2, 3)), np.zeros((2, 3, 3)))
+    model = rm.RobotModel.from_table(rm.DHTable.from_rows(rows), bodies)
+    vectors = [np.zeros(6 if length == "6" else 0) for length in lengths]
+    single = function(model, *vectors)
+    assert single.shape == shape_of(core, model)
+    batch = function(model, *(np.tile(x, (3, 1)) for x in vectors))
+    assert batch.shape == (3, *single.shape)
+    close(batch, np.broadcast_to(single, batch.shape))
