@@ -33,8 +33,8 @@ from .table_text import SMALLEST, angle_text, boxed, length_text, variable_text
 REVOLUTE, PRISMATIC, FIXED = 0, 1, 2
 """Values of sigma, seed eq. [1.2]; 2 marks a frame that is fixed to its antecedent."""
 
-NOT_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
-"""Characters that no XML text can hold: names must do without them."""
+NOT_XML = re.compile("[\x00-\x1f\ud800-\udfff\ufffe\uffff]")
+"""Characters that an XML attribute cannot hold or does not keep: names must do without them."""
 
 _ANGLES = ("gamma", "beta", "alpha", "theta")
 _LENGTHS = ("b", "d", "r")

@@ -1,0 +1,292 @@
+"""URDF out: the same text for the same robot, nothing lost but what the warning lists."""
+
+import re
+import warnings
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given
+from identities.random_robots import (
+    any_models,
+    models,
+    random_drive,
+    random_model,
+    random_state,
+    random_transmission,
+    robot_size,
+    table_poses,
+)
+
+import robotmodels as rm
+from robotmodels import se3
+from robotmodels.errors import InvalidValueError, TableError, UrdfError, UrdfWarning
+from robotmodels.urdf.write import link_names
+
+ONE = rm.DHTable(antecedent=[0], sigma=[0])
+
+
+def quiet_urdf(model):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UrdfWarning)
+        return rm.to_urdf(model)
+
+
+def pin_poses(text, links, joint_names, q):
+    """World poses of links by Pinocchio's own reading of the text."""
+    model = pin.buildModelFromXML(text)
+    data = model.createData()
+    x = np.zeros(model.nq)
+    for name, value in zip(joint_names, q, strict=True):
+        x[model.joints[model.getJointId(name)].idx_q] = value
+    pin.framesForwardKinematics(model, data, x)
+    ids = [model.getFrameId(link, pin.FrameType.BODY) for link in links]
+    assert max(ids) < model.nframes
+    return np.array([data.oMf[i].homogeneous for i in ids])
+
+
+@given(any_models())
+def test_pinocchio_reads_the_table_from_the_text(model):
+    """Links R_1..R_f and the tool stand where the plain product of the table puts them."""
+    q, _, _ = random_state(model, np.random.default_rng(1))
+    names = link_names(model.parts)
+    got = pin_poses(quiet_urdf(model), (*names.frames[1:], names.tool), model.table.joint_names, q)
+    poses = table_poses(model, q)
+    wanted = np.concatenate((poses, (poses[model.tip - 1] @ model.tool)[None]))
+    assert np.abs(got - wanted).max() < 1e-12 * robot_size(model, q)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("gap", [0.0, 1e-16, 1e-9])
+def test_gimbal_lock_loses_nothing(sign, gap):
+    """alpha = theta = 90 degrees on a prismatic joint: pitch is 90 degrees in the URDF."""
+    half = sign * (np.pi / 2 - gap)
+    table = rm.DHTable(
+        antecedent=[0, 1, 2], sigma=[0, 1, 0], alpha=[0.3, half, half], theta=[0.1, half, half],
+        d=[0.1, 0.2, 0.3], r=[0.3, 0.2, 0.1],
+    )  # fmt: skip
+    model = rm.RobotModel.from_table(
+        table, base=se3.rotation("y", half), tool=se3.rotation("y", half)
+    )
+    q = [0.3, 0.2, -0.5]
+    got = pin_poses(rm.to_urdf(model), ["link_3", "tool"], table.names, q)
+    poses = table_poses(model, q)
+    assert np.abs(got - np.array([poses[2], poses[2] @ model.tool])).max() < 2e-15
+
+
+@given(any_models())
+def test_the_text_is_deterministic(model):
+    text = quiet_urdf(model)
+    twin = rm.RobotModel.from_table(
+        model.table.replace(), model.inertia, model.drive, model.base, model.tool, model.tip,
+        model.gravity, model.transmission, model.name,
+    )  # fmt: skip
+    assert quiet_urdf(twin) == text
+
+
+@pytest.mark.parametrize("name", ["rx90", "scara"])
+def test_a_table_that_follows_the_rules_is_read_back_to_the_identical_text(name):
+    rows = {
+        "rx90": [{}, {"alpha": 90}, {"d": 0.5}, {"alpha": -90, "r": 0.4}, {"alpha": 90}],
+        "scara": [{}, {"d": 0.4}, {"d": 0.3}, {"sigma": 1, "lower": -0.2, "upper": 0.1}],
+    }[name]
+    model = rm.RobotModel.from_table(
+        rm.DHTable.from_rows(rows, degrees=True), tool=se3.translation(0, 0, 0.1), name=name
+    )
+    text = rm.to_urdf(model)
+    back = rm.RobotModel.from_urdf(text)
+    assert back == model
+
+    def kinematic(urdf):
+        """Shapes have no place in a model made from a table; compare all the rest."""
+        return re.sub(r" *<visual>.*?</visual>\n", "", urdf, flags=re.DOTALL).replace(
+            ">\n  </link>", "/>"
+        )
+
+    assert kinematic(rm.to_urdf(back)) == kinematic(text)
+
+
+@given(models(inertia="physical", drive=False, transmission=False, gravity=False))
+def test_reading_back_gives_the_same_robot(model):
+    """Poses, Jacobians and torques, with other frames: R_j are placed anew by the rules."""
+    back = rm.RobotModel.from_urdf(rm.to_urdf(model), tip_link=None)
+    rng = np.random.default_rng(2)
+    tool = link_names(model.parts).tool
+    q, v, a = random_state(model, rng)
+    # depth first in the order of the text may number branches otherwise
+    order = [model.table.joint_names.index(name) for name in back.table.joint_names]
+    size = robot_size(model, q)
+    assert np.abs(rm.dgm(back, q[order], tool) - rm.dgm(model, q)).max() < 1e-12 * size
+    J = rm.jacobian(model, q)[:, order]
+    assert np.abs(rm.jacobian(back, q[order], tool) - J).max() < 1e-12 * size
+    tau = rm.idm(model, q, v, a)
+    error = np.abs(rm.idm(back, q[order], v[order], a[order]) - tau[order]).max()
+    assert error < 1e-12 * max(1.0, np.abs(tau).max()) * size
+    for limit in ("lower", "upper", "velocity", "effort"):
+        got, wanted = getattr(back.table, limit), getattr(model.table, limit)[order]
+        assert np.array_equal(got, wanted), limit
+
+
+def test_limits_are_kept_and_infinity_is_a_number_parsers_read():
+    table = ONE.replace(lower=[-np.inf], upper=[0.1], velocity=[np.inf], effort=[1 / 3])
+    text = rm.to_urdf(rm.RobotModel.from_table(table))
+    limit = ET.fromstring(text).find("joint/limit")
+    assert float(limit.get("lower")) == -np.finfo(float).max
+    assert limit.get("upper") == "0.1"
+    assert limit.get("effort") == repr(1 / 3)
+    back = rm.RobotModel.from_urdf(text).table
+    for key in ("lower", "upper", "velocity", "effort"):
+        assert np.array_equal(getattr(back, key), getattr(table, key)), key
+    assert pin.buildModelFromXML(text).nq == 1, "continuous would have nq = 2"
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("base", "world", "tool"),
+        ("link_1", "link_2", "link_3"),
+        ("joint_1", "1", "link_1"),
+        ("R_0", "base", "base_fixed"),
+        ("tool_fixed", "tool", "tool_kk"),
+        ("a<&>\"'", "b c", "θ_1"),
+        ("link", "link_link", "frame_1"),
+        (" ", "  ", "\u00a0"),
+    ],
+    ids=lambda names: "-".join(names).encode("unicode_escape").decode(),
+)
+def test_names_that_collide_or_need_escaping(names):
+    """Any names: all links and joints differ, each joint keeps its name, poses are right."""
+    table = rm.DHTable(antecedent=[0, 1, 2], sigma=[0, 1, 0], d=[0.1, 0.2, 0.3], names=names)
+    model = rm.RobotModel.from_table(table, tool=se3.translation(0.1, 0, 0), name=f"<{names[0]}>")
+    text = rm.to_urdf(model)
+    robot = ET.fromstring(text)
+    for kind in ("link", "joint"):
+        found = [element.get("name") for element in robot.findall(kind)]
+        assert len(set(found)) == len(found)
+    q = [0.1, 0.2, 0.3]
+    back = rm.RobotModel.from_urdf(text)
+    assert back.table.names == names
+    assert back.name == model.name
+    assert np.abs(rm.dgm(back, q) - rm.dgm(model, q)).max() < 1e-15
+    for j, name in enumerate(names, start=1):
+        # a name of the table is its frame, whatever else the text is made of
+        assert np.array_equal(rm.dgm(model, q, name), rm.dgm(model, q, j))
+
+
+@given(any_models(limits=False))
+def test_every_name_of_the_model_is_a_frame(model):
+    q = np.zeros(model.n)
+    for name in model.frame_names:
+        assert rm.dgm(model, q, name).shape == (4, 4)
+    assert len(set(model.frame_names)) == len(model.frame_names)
+
+
+@pytest.mark.parametrize("character", ["\0", "\x01", "\t", "\n", "\ud800", "\uffff"])
+def test_control_characters_are_refused(character):
+    """XML cannot hold them, or turns them into spaces, so that names would collide."""
+    with pytest.raises(TableError, match="control character"):
+        ONE.replace(names=[f"a{character}b"])
+    with pytest.raises(InvalidValueError, match="control character"):
+        rm.RobotModel.from_table(ONE, name=f"a{character}b")
+
+
+def test_mimics_are_written_and_read_back():
+    table = rm.DHTable(antecedent=[0, 1, 1], sigma=[0, 1, 1], names=["arm", "left", "right"])
+    K = rm.Transmission([[1, 0, 0], [0, 1, 0], [0, -0.5, 0]], [0, 0, 0.25])
+    model = rm.RobotModel.from_table(table, transmission=K)
+    text = rm.to_urdf(model)
+    element = ET.fromstring(text).find("joint[@name='right']/mimic")
+    assert element.attrib == {"joint": "left", "multiplier": "-0.5", "offset": "0.25"}
+    assert rm.RobotModel.from_urdf(text, mimic=True).transmission == K
+    assert rm.RobotModel.from_urdf(text).transmission is None
+    assert model.pin_model.nq == 3, "the twin keeps all joints independent"
+
+
+@pytest.mark.parametrize(
+    "matrix",
+    [[[1, 0], [1, 0]], [[0, 0], [0, 1]], [[1, 1], [1, 1]], [[0.5, 0], [1, 0]], [[0, 1], [0, 0]]],
+    ids=["follows", "still", "sums", "geared master", "chain to a still one"],
+)
+def test_transmissions_that_a_urdf_cannot_say_are_refused(matrix):
+    table = rm.DHTable(antecedent=[0, 1], sigma=[0, 0])
+    model = rm.RobotModel.from_table(table, transmission=rm.Transmission(matrix))
+    if matrix == [[1, 0], [1, 0]]:
+        assert "<mimic" in rm.to_urdf(model)
+        return
+    with pytest.raises(UrdfError, match=r"other poses\. .*with_transmission\(None\)"):
+        rm.to_urdf(model)
+    assert rm.to_urdf(model.with_transmission(None)).count("<mimic") == 0
+
+
+LOST = {
+    "rotor": ({"drive": rm.DriveParameters(Ia=[0.1])}, "the rotor inertias Ia"),
+    "offset": ({"drive": rm.DriveParameters(offset=[0.1])}, "the torque offsets"),
+    "gravity": ({"gravity": (0, 9.81, 0)}, "gravity [0.0, 9.81, 0.0]"),
+    "moments": (
+        {"inertia": rm.InertialParameters([[0] * 6 + [1, 0, 0, 0]])}, "the inertia of joint_1",
+    ),
+    "negative": ({"inertia": rm.InertialParameters([[0] * 9 + [-1.0]])}, "the inertia of joint_1"),
+    "gears": ({"transmission": rm.Transmission([[0.01]])}, "the transmission"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("parts", "words"), LOST.values(), ids=LOST)
+def test_each_loss_is_listed(parts, words):
+    with pytest.warns(UrdfWarning) as caught:
+        rm.to_urdf(rm.RobotModel.from_table(ONE, **parts))
+    assert len(caught) == 1
+    assert words in str(caught[0].message)
+    assert caught[0].filename == __file__, "the warning points at the caller"
+
+
+def test_passive_joints_are_listed():
+    with pytest.warns(UrdfWarning, match="passive joints"):
+        rm.to_urdf(rm.RobotModel.from_table(ONE.replace(mu=[0])))
+
+
+def test_all_losses_come_in_one_warning(rng):
+    model = random_model(rng, f=4, inertia="any", passive=True).with_gravity([0, 0, 1])
+    model = model.with_drive(random_drive(rng, model.n))
+    model = model.with_transmission(random_transmission(rng, model.n))
+    with pytest.warns(UrdfWarning) as caught:
+        rm.to_urdf(model)
+    message = str(caught.pop().message)
+    for words in ("Ia", "offsets", "gravity", "the inertia of", "transmission"):
+        assert words in message
+    assert not caught.list
+
+
+def test_what_a_urdf_holds_raises_no_warning():
+    """Massless links, frictions, limits and mimics are all written: warnings are errors here."""
+    drive = rm.DriveParameters(Fv=[0.5], Fc=[0.25])
+    text = rm.to_urdf(rm.RobotModel.from_table(ONE, drive=drive))
+    assert '<dynamics damping="0.5" friction="0.25"/>' in text
+    assert rm.RobotModel.from_urdf(text, dynamics=True).drive == drive
+    assert rm.RobotModel.from_urdf(text).drive.is_zero
+
+
+@given(models(max_frames=6))
+def test_yourdfpy_loads_and_validates(model):
+    yourdfpy = pytest.importorskip("yourdfpy")
+    import io
+
+    robot = yourdfpy.URDF.load(
+        io.BytesIO(quiet_urdf(model).encode()), load_meshes=False, build_scene_graph=True
+    )
+    assert robot.validate(), robot.errors
+    q, _, _ = random_state(model, np.random.default_rng(0))
+    robot.update_cfg(dict(zip(model.table.joint_names, q, strict=True)))
+    names = link_names(model.parts)
+    got = robot.get_transform(names.tool, names.world)
+    assert np.abs(got - rm.dgm(model, q)).max() < 1e-9 * robot_size(model, q)
+
+
+def test_writing_a_file(tmp_path):
+    model = rm.RobotModel.from_table(ONE.replace(names=["θ"]), name="é")
+    path = tmp_path / "arm.urdf"
+    rm.write_urdf(model, path)
+    assert path.read_text(encoding="utf-8") == rm.to_urdf(model)
+    assert rm.RobotModel.from_urdf(path) == model == rm.RobotModel.from_urdf(str(path))
+    with pytest.raises(UrdfError, match=r"cannot write .*missing.*No such file"):
+        rm.write_urdf(model, tmp_path / "missing" / "arm.urdf")
