@@ -120,7 +120,7 @@ class Scene:
         text = self.html().replace("&", "&amp;").replace('"', "&quot;")
         return (
             f'<iframe srcdoc="{text}" style="width: 100%; height: {self.height}px; '
-            'border: 1px solid #ddd;"></iframe>'
+            'border: 1px solid #ddd; box-sizing: border-box; display: block;"></iframe>'
         )
 
     def __repr__(self) -> str:
