@@ -107,6 +107,27 @@ def test_jacobian_is_the_difference_of_poses(reference, model, seed):
         close(rm.jacobian(model, [q], frame, reference)[0], twists.T, tolerance)
 
 
+@given(model=models(tree=True, gravity=False, drive=False, transmission=False), seed=seeds)
+def test_named_frames_of_a_urdf(model, seed):
+    """Every link of a URDF is a frame, where the robot it was written from has it."""
+    q, _, _ = random_state(model, np.random.default_rng(seed))
+    read = rm.RobotModel.from_urdf(rm.to_urdf(model))
+    order = [model.table.joint_names.index(name) for name in read.table.joint_names]
+    x, size = q[order], robot_size(model, q)
+    world = np.concatenate([[model.base], table_poses(model, q)])
+    for name, pose in zip(model.twin.names.frames, world, strict=True):
+        close(rm.dgm(read, x, name), pose, 1e-12 * size)
+    close(rm.dgm(read, x, model.twin.names.tool), rm.dgm(model, q), 1e-12 * size)
+    steps = STEP * np.eye(read.n)
+    for name in read.frame_names:
+        pose = rm.dgm(read, x, name)
+        close(rm.dgm(read, [x], name)[0], pose, 1e-12 * size)
+        before, after = rm.dgm(read, x - steps, name), rm.dgm(read, x + steps, name)
+        twists = twist_of_poses(before, pose, after, "world_aligned")
+        close(rm.jacobian(read, x, name), twists.T, difference_error(size))
+        close(rm.jacobian(read, [x], name)[0], twists.T, difference_error(size))
+
+
 @given(model=any_models(), seed=seeds)
 def test_single_and_batch_jacobians_agree(model, seed):
     q, v, _ = random_state(model, np.random.default_rng(seed), 3)
