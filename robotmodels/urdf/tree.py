@@ -367,4 +367,6 @@ def _limit(element: ET.Element | None, key: str, default: float, where: str) -> 
         raise UrdfError(f"{where}: limit {key} must be a number, got {text!r}.") from None
     if np.isnan(value):
         raise UrdfError(f"{where}: limit {key} is NaN; leave it out or give a number.")
+    if value < 0 and key in ("velocity", "effort"):
+        raise UrdfError(f"{where}: limit {key} is a magnitude, got {value}.")
     return float(np.copysign(np.inf, value)) if abs(value) >= 1e300 else value

@@ -1,0 +1,711 @@
+"""URDF in: every joint type, any axis, what is refused and how, and real robots there and back."""
+
+import os
+import re
+import time
+import warnings
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given
+from identities.random_robots import random_bodies, random_pose, seeds
+
+import robotmodels as rm
+from robotmodels import se3
+from robotmodels.errors import (
+    FrameNotFoundError,
+    InvalidValueError,
+    MeshNotFoundError,
+    UrdfError,
+    UrdfWarning,
+)
+from robotmodels.robots.erd import ERD_ARMS, erd_folder
+
+read = rm.RobotModel.from_urdf
+LIMIT = '<limit lower="-1" upper="2" velocity="3" effort="4"/>'
+
+
+def link(name, inside=""):
+    return f'<link name="{name}">{inside}</link>'
+
+
+def joint(name, parent, child, kind="revolute", axis="0 0 1", origin="", inside=None):
+    inside = (LIMIT if kind in ("revolute", "prismatic") else "") if inside is None else inside
+    axis = "" if axis is None else f'<axis xyz="{axis}"/>'
+    return (
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+        f"{origin}{axis}{inside}</joint>"
+    )
+
+
+def robot(*elements, name="r"):
+    return f'<robot name="{name}">{"".join(elements)}</robot>'
+
+
+def chain(*joints, **options):
+    """Links a, b, c, ... joined by the given joints, each a dict of `joint` options."""
+    letters = "abcdefghij"[: len(joints) + 1]
+    return robot(
+        *map(link, letters),
+        *(
+            joint(f"j{i}", letters[i - 1], letters[i], **options)
+            for i, options in enumerate(joints, start=1)
+        ),
+        **options,
+    )
+
+
+ORIGIN = '<origin xyz="0.1 -0.2 0.3" rpy="0.4 0.5 -0.6"/>'
+
+
+def assert_like_pinocchio(text, model, frames=None, dynamics=True, tolerance=1e-12):
+    """Poses of links, Jacobians and torques are those of Pinocchio's own reading of the URDF.
+
+    Joints that Pinocchio has and the model has not are held at zero; continuous ones are a
+    cosine and a sine there.
+    """
+    theirs = text if isinstance(text, pin.Model) else pin.buildModelFromXML(text)
+    data = theirs.createData()
+    rng = np.random.default_rng(0)
+    joints = [theirs.joints[theirs.getJointId(name)] for name in model.table.joint_names]
+    columns = [j.idx_v for j in joints]
+    frames = model.frames if frames is None else frames
+    ids = [theirs.getFrameId(frame.name, pin.FrameType.BODY) for frame in frames]
+    assert max(ids) < theirs.nframes
+    for _ in range(2):
+        lower, upper = np.maximum(model.lower, -3), np.minimum(model.upper, 3)
+        q = lower + (upper - lower) * rng.random(model.n)
+        v, a = rng.normal(size=(2, model.n))
+        full_q, full_v, full_a = pin.neutral(theirs), np.zeros(theirs.nv), np.zeros(theirs.nv)
+        full_v[columns], full_a[columns] = v, a
+        for j, x in zip(joints, q, strict=True):
+            full_q[j.idx_q : j.idx_q + j.nq] = (np.cos(x), np.sin(x)) if j.nq == 2 else x
+        pin.computeJointJacobians(theirs, data, full_q)
+        pin.updateFramePlacements(theirs, data)
+        # the world of the model is its base link, wherever that is in the file
+        base = next(frame.name for frame in model.frames if frame.parent == 0)
+        world = data.oMf[theirs.getFrameId(base, pin.FrameType.BODY)].copy()
+        size = max(1.0, *(np.abs(data.oMf[i].translation).max() for i in ids))
+        for frame, i in zip(frames, ids, strict=True):
+            wanted = world.actInv(data.oMf[i]).homogeneous
+            error = np.abs(rm.dgm(model, q, frame.name) - wanted).max()
+            assert error < tolerance * size, frame.name
+            J = pin.getFrameJacobian(theirs, data, i, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+            wanted = np.vstack(
+                [world.rotation.T @ J[:3, columns], world.rotation.T @ J[3:, columns]]
+            )
+            error = np.abs(rm.jacobian(model, q, frame.name) - wanted).max()
+            assert error < tolerance * size, frame.name
+        if dynamics:
+            theirs.gravity.linear = world.rotation @ model.gravity
+            wanted = pin.rnea(theirs, data, full_q, full_v, full_a)[columns]
+            error = np.abs(rm.idm(model, q, v, a, drive=False) - wanted).max()
+            assert error < tolerance * size * max(1.0, np.abs(wanted).max())
+
+
+# --- joints, axes, inertia ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["revolute", "continuous", "prismatic"])
+@pytest.mark.parametrize(
+    "axis",
+    ["0 0 1", "0 0 2", "0 0 -1", "1 0 0", "0 -3 0", "1 2 -3", "1e-3 0 0", "-1 1e-9 0", None],
+)
+def test_every_type_about_any_axis(kind, axis):
+    """Axes need not be unit and may be negative: q keeps its sign and zero; default is x."""
+    text = chain(
+        {"origin": ORIGIN, "kind": kind, "axis": axis},
+        {"origin": ORIGIN, "kind": "fixed", "axis": None},
+        {"origin": ORIGIN, "kind": kind, "axis": axis},
+        {"origin": ORIGIN, "axis": "0 1 0"},
+    )
+    model = read(text)
+    assert model.table.sigma.tolist() == [int(kind == "prismatic")] * 2 + [0]
+    assert_like_pinocchio(text, model, dynamics=False)
+
+
+def random_urdf(rng, f=6):
+    """A random tree of links with inertia, some of them fixed, as text."""
+    kinds = ["revolute", "continuous", "prismatic", "fixed"]
+    bodies = random_bodies(rng, f + 1)
+    elements = []
+    for j in range(f + 1):
+        M = bodies.mass[j]
+        com = bodies.first_moments[j] / M
+        tensor = bodies.tensors[j] + M * se3.skew(com) @ se3.skew(com)
+        rpy = rng.normal(size=3)
+        R = se3.from_rpy(rpy)[:3, :3]
+        tensor = R.T @ tensor @ R
+        keys = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+        numbers = zip(keys, tensor[np.triu_indices(3)], strict=True)
+        elements.append(link(f"L{j}", (
+            f'<inertial><origin xyz="{com[0]} {com[1]} {com[2]}" rpy="{rpy[0]} {rpy[1]} {rpy[2]}"/>'
+            f'<mass value="{M}"/><inertia {" ".join(f"{k}={str(v)!r}" for k, v in numbers)}/>'
+            "</inertial>"
+        )))  # fmt: skip
+    for j in range(1, f + 1):
+        T = random_pose(rng, 0.3)
+        xyz, rpy = T[:3, 3], se3.to_rpy(T[:3, :3])
+        axis = rng.normal(size=3)
+        elements.append(joint(
+            f"J{f + 5 - j}", f"L{rng.integers(j)}", f"L{j}", kinds[rng.integers(4) if j > 1 else 0],
+            f"{axis[0]} {axis[1]} {axis[2]}",
+            f'<origin xyz="{xyz[0]} {xyz[1]} {xyz[2]}" rpy="{rpy[0]} {rpy[1]} {rpy[2]}"/>',
+        ))  # fmt: skip
+    return robot(*elements)
+
+
+@given(seeds)
+def test_random_trees_are_what_pinocchio_reads(seed):
+    """Poses, Jacobians and torques, merged links and reordered siblings included."""
+    text = random_urdf(np.random.default_rng(seed))
+    model = read(text)
+    assert_like_pinocchio(text, model)
+    back = read(quiet_urdf(model))
+    assert_like_pinocchio(text, back, frames=model.frames)
+
+
+def quiet_urdf(model):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UrdfWarning)
+        return rm.to_urdf(model)
+
+
+def test_continuous_joints_have_no_position_limits_but_keep_the_others():
+    table = read(chain({"kind": "continuous", "inside": '<limit velocity="3" effort="4"/>'})).table
+    assert (table.lower[0], table.upper[0]) == (-np.inf, np.inf)
+    assert (table.velocity[0], table.effort[0]) == (3, 4)
+    table = read(chain({"kind": "continuous"})).table
+    assert (table.velocity[0], table.effort[0]) == (np.inf, np.inf)
+
+
+def test_limits():
+    table = read(chain({}, {"inside": '<limit effort="1" velocity="2"/>'})).table
+    assert table.lower.tolist() == [-1, 0], "a missing lower limit is 0 in URDF"
+    assert table.upper.tolist() == [2, 0]
+    huge = '<limit lower="-1.7976931348623157e+308" upper="inf" effort="1e301" velocity="1e10"/>'
+    table = read(chain({"inside": huge})).table
+    assert (table.lower[0], table.upper[0], table.effort[0]) == (-np.inf, np.inf, np.inf)
+    assert table.velocity[0] == 1e10
+
+
+def test_merged_links_are_listed_and_stay_frames():
+    text = chain({}, {"kind": "fixed", "axis": None, "origin": ORIGIN}, {}, {"kind": "fixed"})
+    model = read(text)
+    assert model.table.names == ("j1", "j3")
+    assert model.merged_links == ("c", "e")
+    assert model.notes == (
+        "link 'c' (fixed by joint 'j2') is merged into the link of j1.",
+        "link 'e' (fixed by joint 'j4') is merged into the link of j3.",
+    )
+    assert set("abcde") <= set(model.frame_names)
+    assert model.pin_model.existFrame("c")
+    assert_like_pinocchio(text, model, dynamics=False)
+
+
+@pytest.mark.parametrize("dynamics", [False, True])
+def test_dynamics_flag(dynamics):
+    text = chain({"inside": LIMIT + '<dynamics damping="0.5" friction="0.25"/>'}, {})
+    drive = read(text, dynamics=dynamics).drive
+    assert drive.Fv.tolist() == [0.5 * dynamics, 0]
+    assert drive.Fc.tolist() == [0.25 * dynamics, 0]
+    assert not drive.Ia.any()
+
+
+# --- base and tip -------------------------------------------------------------------------------
+
+BRANCHED = robot(
+    *map(link, ("world", "base", "arm", "hand", "tcp", "camera", "finger", "head")),
+    joint("lift", "world", "base", "prismatic", origin='<origin xyz="0 0 1"/>'),
+    joint("shoulder", "base", "arm", origin=ORIGIN),
+    joint("wrist", "arm", "hand", axis="1 0 0", origin=ORIGIN),
+    joint("mount", "hand", "tcp", "fixed", origin='<origin xyz="0 0 0.1"/>'),
+    joint("grip", "hand", "finger", "prismatic", axis="0 1 0"),
+    joint("neck", "base", "head", axis="0 1 0"),
+    joint("eye", "head", "camera", "fixed", origin=ORIGIN),
+)
+
+
+def test_base_and_tip_choose_a_chain_and_lock_the_rest():
+    model = read(BRANCHED, base_link="base", tip_link="tcp")
+    assert model.table.names == ("shoulder", "wrist")
+    assert model.tip == 2
+    assert any("'finger' (locked at zero by joint 'grip')" in note for note in model.notes)
+    assert any("'head' (locked at zero by joint 'neck')" in n and "the base" in n
+               for n in model.notes)  # fmt: skip
+    assert "world" not in model.frame_names, "what is above the base is left out"
+    assert_like_pinocchio(BRANCHED, model, dynamics=False)
+    q = [0.3, -0.4]
+    assert np.array_equal(rm.dgm(model, q), rm.dgm(model, q, "tcp"))
+    assert np.allclose(rm.dgm(model, q, "base"), np.eye(4), atol=1e-15)
+
+
+def test_everything_below_the_base_is_kept_by_default():
+    model = read(BRANCHED)
+    assert model.table.names == ("lift", "shoulder", "wrist", "grip", "neck"), "depth first"
+    assert model.table.antecedent.tolist() == [0, 1, 2, 3, 1]
+    assert_like_pinocchio(BRANCHED, model, dynamics=False)
+
+
+@pytest.mark.parametrize(
+    ("text", "tool"),
+    [
+        (chain({}, {}), "c"),
+        (chain({}, {"kind": "fixed"}), "c"),
+        (chain({}, {"kind": "fixed"}, {"kind": "fixed"}), "d"),
+        (BRANCHED, "camera"),
+        (robot(*map(link, "abcd"), joint("j", "a", "b"), joint("f", "b", "c", "fixed"),
+               joint("g", "b", "d", "fixed")), "b"),
+        (robot(*map(link, "abcd"), joint("j", "a", "b"), joint("f", "b", "c", "fixed"),
+               joint("k", "a", "d")), "d"),
+    ],
+    ids=["last link", "fixed to it", "chain of fixed", "last in the file", "two tools", "branch"],
+)  # fmt: skip
+def test_default_tool(text, tool):
+    """The link of the last joint, or what is fixed to it as long as there is one such link."""
+    model = read(text)
+    q = 0.1 * np.arange(1, model.n + 1)
+    assert np.allclose(rm.dgm(model, q), rm.dgm(model, q, tool), atol=1e-15)
+
+
+@pytest.mark.parametrize("which", ["base_link", "tip_link"])
+def test_unknown_links_are_answered_with_the_nearest(which):
+    with pytest.raises(
+        FrameNotFoundError, match=r"No link 'fingr'\. Did you mean 'finger'"
+    ) as caught:
+        read(BRANCHED, **{which: "fingr"})
+    assert caught.value.nearest[0] == "finger"
+    with pytest.raises(FrameNotFoundError, match="No link"):
+        read(BRANCHED, **{which: ["hand"]})
+
+
+@pytest.mark.parametrize(("base", "tip"), [("arm", "base"), ("head", "tcp"), ("tcp", "world")])
+def test_a_tip_that_is_not_below_the_base(base, tip):
+    with pytest.raises(FrameNotFoundError, match=f"below the base link '{base}'"):
+        read(BRANCHED, base_link=base, tip_link=tip)
+
+
+@pytest.mark.parametrize(
+    "options", [{"base_link": "tcp"}, {"base_link": "hand", "tip_link": "tcp"}]
+)
+def test_nothing_moves_between_base_and_tip(options):
+    with pytest.raises(UrdfError, match="no joint moves between"):
+        read(BRANCHED, **options)
+
+
+@pytest.mark.parametrize("kind", ["floating", "planar"])
+def test_floating_joints_are_refused_unless_left_out(kind):
+    text = robot(
+        *map(link, "abcd"), joint("free", "a", "b", kind), joint("turn", "b", "c"),
+        joint("side", "a", "d"),
+    )  # fmt: skip
+    with pytest.raises(UrdfError, match=rf"'free' is of type '{kind}'.*\('b'\) as base_link"):
+        read(text)
+    assert read(text, base_link="b").table.names == ("turn",)
+    assert read(text, tip_link="d").table.names == ("side",)
+    with pytest.raises(UrdfError, match="'free' is of type"):
+        read(text, tip_link="c")
+
+
+# --- mimics -------------------------------------------------------------------------------------
+
+
+def mimic(master, multiplier=None, offset=None):
+    factor = "" if multiplier is None else f' multiplier="{multiplier}"'
+    shift = "" if offset is None else f' offset="{offset}"'
+    return {"inside": f'{LIMIT}<mimic joint="{master}"{factor}{shift}/>'}
+
+
+def test_mimics_are_independent_unless_asked_for():
+    model = read(chain({}, mimic("j1")))
+    assert model.transmission is None
+    assert model.table.mu.tolist() == [1, 1]
+
+
+def test_mimics_follow_through_chains():
+    """j3 = 2 j2 + 0.1 and j2 = -3 j1 + 0.2, so j3 = -6 j1 + 0.5; the order does not matter."""
+    text = chain({}, mimic("j1", -3, 0.2), mimic("j2", 2, 0.1), mimic("j1"))
+    model = read(text, mimic=True)
+    q = model.transmission.to_joint([0.3, 9, 9, 9])
+    assert q == pytest.approx([0.3, -0.7, -1.3, 0.3])
+    assert model.table.mu.tolist() == [1, 0, 0, 0]
+    assert not model.transmission.is_invertible
+    early = read(chain(mimic("j2", 2, 0.1), mimic("j3"), {}), mimic=True)
+    assert early.transmission.to_joint([9, 9, 0.3]) == pytest.approx([0.7, 0.3, 0.3])
+    assert read(chain({}, {}), mimic=True).transmission is None
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (chain(mimic("j1")), "'?j1'? mimic each other in a circle"),
+        (chain(mimic("j2"), mimic("j1")), "j1, j2 mimic each other in a circle"),
+        (chain({}, mimic("j1"), mimic("j4"), mimic("j3")), "in a circle"),
+        (chain({}, mimic("nobody")), "mimics 'nobody', which is not a moving joint"),
+        (chain({}, {"kind": "fixed"}, mimic("j2")), "mimics 'j2', which is not a moving joint"),
+    ],
+)
+def test_mimics_that_make_no_sense(text, words):
+    with pytest.raises(UrdfError, match=words):
+        read(text, mimic=True)
+    assert read(text).transmission is None, "they do not matter when joints are independent"
+
+
+# --- meshes -------------------------------------------------------------------------------------
+
+
+def meshed(filename):
+    visual = f'<visual><geometry><mesh filename="{filename}"/></geometry></visual>'
+    return robot(link("a", visual), link("b"), joint("j", "a", "b"))
+
+
+@pytest.fixture
+def package(tmp_path):
+    """A package ``arm_description`` with one mesh and a URDF that names it in three ways."""
+    folder = tmp_path / "share" / "arm_description"
+    (folder / "meshes").mkdir(parents=True)
+    (folder / "meshes" / "base link.stl").write_text("solid\n")
+    (folder / "urdf").mkdir()
+    return folder
+
+
+@pytest.mark.parametrize(
+    "filename",
+    ["package://arm_description/meshes/base link.stl",
+     "package://arm_description/meshes/base%20link.stl",
+     "model://arm_description/meshes/base link.stl"],
+)  # fmt: skip
+@pytest.mark.parametrize("dirs", ["share", "[share]", "(other, share)", "path", "itself"])
+def test_packages_are_found_in_their_folders(package, filename, dirs):
+    share = package.parent
+    package_dirs = {
+        "share": str(share), "[share]": [str(share)], "(other, share)": (share / "other", share),
+        "path": share, "itself": package,
+    }[dirs]  # fmt: skip
+    model = read(meshed(filename), package_dirs=package_dirs)
+    assert model.visuals[0].shape.path == package / "meshes" / "base link.stl"
+    assert model.visuals[0].shape.filename == filename
+
+
+@pytest.mark.parametrize(
+    "filename", ["package://arm_description/meshes/base link.stl", "../meshes/base link.stl"]
+)
+def test_meshes_are_found_from_the_file(package, filename):
+    path = package / "urdf" / "arm.urdf"
+    path.write_text(meshed(filename))
+    found = read(path).visuals[0].shape.path
+    assert found.samefile(package / "meshes" / "base link.stl")
+    absolute = "file://" + str(found.resolve()).replace(" ", "%20")
+    assert read(meshed(absolute)).visuals[0].shape.path.samefile(found)
+
+
+def test_missing_meshes(package):
+    """An error if folders were given, unresolved until somebody draws it otherwise."""
+    text = meshed("package://arm_description/meshes/nope.stl")
+    assert read(text).visuals[0].shape.path is None
+    with pytest.raises(MeshNotFoundError, match=r"nope\.stl' was not found \(looked at .*share"):
+        read(text, package_dirs=package.parent)
+    with pytest.raises(FileNotFoundError):
+        read(text, package_dirs=[package.parent])
+
+
+@pytest.mark.parametrize("package_dirs", [5, None, [None]])
+def test_package_dirs_that_are_no_folders(package_dirs):
+    with pytest.raises(InvalidValueError, match="package_dirs: expected a folder or a list"):
+        read(meshed("a.stl"), package_dirs=package_dirs)
+
+
+# --- text and files -------------------------------------------------------------------------------
+
+GOOD = chain({}, name="good")
+OTHERS = "<gazebo><x/></gazebo><transmission><joint name='j1'/></transmission></robot>"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "\ufeff" + GOOD,
+        '<?xml version="1.0"?>\n' + GOOD,
+        '\n  <?xml version="1.0"?>' + GOOD,
+        '<?xml version="1.0" encoding="ISO-8859-1"?>' + GOOD,
+        '<?xml version="1.0" encoding="utf-16"?>' + GOOD,
+        GOOD.replace("><", ">\r\n<"),
+        GOOD.replace("<link", "<!-- a <comment> & more --><link").replace(
+            "</robot>",
+            "<gazebo><x/></gazebo><transmission><joint name='j1'/></transmission></robot>",
+        ),
+        GOOD.replace("<robot", '<robot xmlns:xacro="http://ros.org/wiki/xacro"'),
+        GOOD.replace('name="good"', "name='good' version='1.0' extra='x'"),
+    ],
+    ids=["bom", "declaration", "blank", "latin", "utf-16", "crlf", "others", "namespace", "attr"],
+)
+def test_texts_that_mean_the_same(text, tmp_path):
+    assert read(text) == read(GOOD)
+    path = tmp_path / "robot.urdf"
+    path.write_bytes(text.encode("utf-8"))
+    assert read(path) == read(GOOD)
+    assert read(str(path)) == read(GOOD)
+
+
+def test_a_declared_encoding_does_not_spoil_names():
+    text = '<?xml version="1.0" encoding="ISO-8859-1"?>' + GOOD.replace("j1", "drehé")
+    assert read(text).table.names == ("drehé",)
+
+
+BOMB = "".join(f'<!ENTITY e{i} "{f"&e{i - 1};" * 10}">' for i in range(1, 30))
+
+
+@pytest.mark.parametrize(
+    "doctype",
+    [
+        "<!DOCTYPE robot>",
+        f'<!DOCTYPE robot [<!ENTITY e0 "ha">{BOMB}]>',
+        '<!DOCTYPE robot [<!ENTITY x SYSTEM "file:///etc/passwd">]>',
+        '<!DOCTYPE robot SYSTEM "http://127.0.0.1:9/robot.dtd">',
+        '<!DOCTYPE robot [<!ENTITY % p SYSTEM "http://127.0.0.1:9/p"> %p;]>',
+    ],
+    ids=["plain", "bomb", "file", "network", "parameter"],
+)
+def test_doctypes_are_refused_at_once(doctype):
+    text = doctype + GOOD.replace("good", "&e29;" if "e29" in doctype else "&x;")
+    start = time.perf_counter()
+    with pytest.raises(UrdfError, match=r"has a DOCTYPE: .* Remove the"):
+        read(text)
+    assert time.perf_counter() - start < 0.1
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        (GOOD.replace("<link", '<xacro:property name="x" value="1"/><link', 1), "xacro:property"),
+        (GOOD.replace('name="j1"', 'name="${prefix}j1"'), "${prefix}j1"),
+        (meshed("$(find arm_description)/meshes/a.stl"), "$(find arm_description)"),
+    ],
+)
+def test_xacro_is_refused_with_what_to_run(text, found):
+    with pytest.raises(UrdfError, match=r"xacro .* > robot\.urdf") as caught:
+        read(text)
+    assert found in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["arm.xacro", "arm.urdf.xacro"])
+def test_xacro_files_are_refused_by_name(name, tmp_path):
+    (tmp_path / name).write_text(GOOD)
+    with pytest.raises(UrdfError, match=f"`xacro {re.escape(name)} > robot.urdf`"):
+        read(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("source", "words"),
+    [
+        (b"<robot/>", "expected a path or the text of a URDF, got bytes"),
+        (None, "got NoneType"),
+        (5, "got int"),
+        (["a.urdf"], "got list"),
+        ("", "cannot read"),
+        ("nowhere/arm.urdf", "cannot read 'nowhere/arm.urdf': No such file"),
+        ("a\0b", "zero character"),
+        (Path("/"), "cannot read '/'"),
+        ("x" * 5000, "cannot read 'xxx"),
+    ],
+)
+def test_sources_that_are_neither_file_nor_text(source, words):
+    with pytest.raises(UrdfError, match=words):
+        read(source)
+
+
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="root may read every file")
+def test_files_without_permission(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(GOOD)
+    path.chmod(0)
+    with pytest.raises(UrdfError, match="Permission denied"):
+        read(path)
+
+
+def test_files_that_are_not_text(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_bytes(b"<robot name='\xff\xfe'/>")
+    with pytest.raises(UrdfError, match="not UTF-8 text"):
+        read(path)
+
+
+# --- content that makes no sense ------------------------------------------------------------------
+
+
+def inertial(mass="1", inertia='ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"', origin=""):
+    block = f'<inertial>{origin}<mass value="{mass}"/><inertia {inertia}/></inertial>'
+    return robot(link("a"), link("b", block), joint("j", "a", "b"))
+
+
+def visual(inside):
+    return robot(link("a", f"<visual>{inside}</visual>"), link("b"), joint("j", "a", "b"))
+
+
+MISTAKES = {
+    "open tag": ("<robot name='r'><link name='a'>", "not well-formed XML.*no element found"),
+    "bad entity": (GOOD.replace("good", "&nope;"), "not well-formed XML: undefined entity"),
+    "rubbish after": (GOOD + "<robot/>", "not well-formed XML: junk after document"),
+    "surrogate": (GOOD.replace("good", "\ud800"), "cannot be decoded"),
+    "other root": ("<sdf version='1.6'/>", "expected the root element <robot>, got <sdf>"),
+    "no links": ("<robot name='r'/>", "has no <link>"),
+    "nothing moves": (robot(link("a")), "no joint moves"),
+    "nameless link": (robot("<link/>"), "a <link> has no name"),
+    "nameless joint": (GOOD.replace('name="j1" ', ""), "a <joint> has no name"),
+    "two links alike": (robot(link("a"), link("a")), "two links are called 'a'"),
+    "two joints alike": (
+        robot(*map(link, "abc"), joint("j", "a", "b"), joint("j", "b", "c")),
+        "two joints are called 'j'",
+    ),
+    "unknown parent": (
+        robot(link("base_link"), link("b"), joint("j", "base_lnk", "b")),
+        "'j': its parent link 'base_lnk' is not defined. Did you mean 'base_link'?",
+    ),
+    "unknown child": (robot(link("a"), joint("j", "a", "zz")), "its child link 'zz' is not def"),
+    "no child": (GOOD.replace('<child link="b"/>', ""), "needs a <parent link=...> and a <child"),
+    "two parents": (
+        robot(*map(link, "abc"), joint("j", "a", "c"), joint("k", "b", "c")),
+        "link 'c' hangs from two joints, 'j' and 'k'.*tree",
+    ),
+    "loop": (robot(*map(link, "ab"), joint("j", "a", "b"), joint("k", "b", "a")), "form a loop"),
+    "loop aside": (
+        robot(*map(link, "abc"), joint("j", "a", "b"), joint("k", "b", "a")),
+        "a, b form a loop apart from the root",
+    ),
+    "own child": (robot(*map(link, "ab"), joint("j", "b", "b")), "form a loop"),
+    "two roots": (robot(*map(link, "abc"), joint("j", "a", "b")), r"2 root links \(a, c\)"),
+    "zero axis": (chain({"axis": "0 0 0"}), "joint 'j1': its axis is '0 0 0'"),
+    "no direction": (chain({"axis": "1e-9 0 0"}), "an axis needs a direction"),
+    "two numbers": (chain({"axis": "0 1"}), "'j1': axis: expected 3 finite numbers, got '0 1'"),
+    "words": (chain({"axis": "a b c"}), "axis: expected 3 numbers, got 'a b c'"),
+    "NaN axis": (chain({"axis": "nan 0 1"}), "expected 3 finite numbers, got 'nan 0 1'"),
+    "NaN origin": (chain({"origin": '<origin xyz="0 nan 0"/>'}), "origin xyz: expected 3 finite"),
+    "inf rpy": (chain({"origin": '<origin rpy="0 0 inf"/>'}), "origin rpy: expected 3 finite"),
+    "empty xyz": (chain({"origin": '<origin xyz=""/>'}), "origin xyz: expected 3 finite numbers"),
+    "no limits": (chain({"inside": ""}), "a revolute joint without limits is of type continuous"),
+    "no stroke": (chain({"kind": "prismatic", "inside": ""}), "a prismatic joint needs <limit"),
+    "NaN limit": (chain({"inside": '<limit lower="nan"/>'}), "limit lower is NaN"),
+    "word limit": (chain({"inside": '<limit upper="far"/>'}), "upper must be a number, got 'far'"),
+    "limits crossed": (
+        chain({"inside": '<limit lower="1" upper="-1"/>'}), "lower limit 1.0 is above the upper",
+    ),
+    "negative speed": (chain({"inside": '<limit velocity="-1"/>'}), "'j1': limit velocity is a magnitude, got -1.0"),
+    "unknown type": (chain({"kind": "helical"}), "'j1' is of type 'helical'"),
+    "no type": (GOOD.replace('type="revolute"', ""), "is of type ''"),
+    "NaN damping": (
+        chain({"inside": LIMIT + '<dynamics damping="nan"/>'}), "dynamics damping: expected 1 fin",
+    ),
+    "NaN mimic": (
+        chain({"inside": LIMIT + '<mimic joint="j1" multiplier="nan"/>'}), "mimic multiplier",
+    ),
+    "negative mass": (inertial("-1"), "link 'b': a mass cannot be negative, got -1.0 kg"),
+    "NaN mass": (inertial("nan"), "link 'b': mass value: expected 1 finite numbers"),
+    "word inertia": (inertial(inertia='ixx="big"'), "inertia ixx: expected 1 numbers, got 'big'"),
+    "inf inertia": (inertial(inertia='izz="inf"'), "inertia izz"),
+    "com": (inertial(origin='<origin xyz="0 0"/>'), "'b': inertial: origin xyz: expected 3"),
+    "no shape": (visual("<geometry/>"), "link 'a': visual: there is no shape"),
+    "no geometry": (visual(""), "there is no shape"),
+    "odd shape": (visual("<geometry><torus/></geometry>"), "unknown shape <torus>"),
+    "box": (visual('<geometry><box size="1 2"/></geometry>'), "box size: expected 3"),
+    "mesh": (visual("<geometry><mesh/></geometry>"), "a mesh has no filename"),
+    "color": (
+        visual('<geometry><sphere radius="1"/></geometry><material name=""><color rgba="1"/>'
+               "</material>"), "material color: expected 4",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "words"), MISTAKES.values(), ids=MISTAKES)
+def test_mistakes_are_refused_with_the_element_at_fault(text, words):
+    with pytest.raises(UrdfError, match=words):
+        read(text)
+
+
+def test_not_physical_but_finite_inertia_is_read_and_reported():
+    model = read(inertial(inertia='ixx="1" iyy="1" izz="9"'))
+    assert not model.inertia.is_physical.any()
+    assert "triangle inequality" in str(model.inertia.consistency())
+
+
+def test_a_mass_without_inertia_and_an_inertia_without_mass_are_read():
+    assert read(inertial(inertia="")).inertia.mass.tolist() == [1.0]
+    weightless = read(inertial("0", origin='<origin xyz="1 0 0"/>')).inertia
+    assert weightless.values[0].tolist() == [1, 0, 0, 1, 0, 1, 0, 0, 0, 0]
+
+
+def test_shapes_and_colours_are_kept():
+    shapes = (
+        '<visual><origin xyz="0 0 1"/><geometry><box size="1 2 3"/></geometry>'
+        '<material name="blue"/></visual>'
+        '<visual><geometry><!-- c --><cylinder radius="0.1" length="0.2"/></geometry>'
+        '<material name="own"><color rgba="1 0 0 0.5"/></material></visual>'
+        '<visual><geometry><sphere radius="0.3"/></geometry></visual>'
+    )
+    text = robot(
+        '<material name="blue"><color rgba="0 0 1 1"/></material>',
+        link("a", shapes), link("b"), joint("j", "a", "b"),
+    )  # fmt: skip
+    box, cylinder, ball = read(text).visuals
+    assert box.shape.size == (1, 2, 3)
+    assert box.color == (0, 0, 1, 1)
+    assert (cylinder.shape.radius, cylinder.shape.length) == (0.1, 0.2)
+    assert cylinder.color == (1, 0, 0, 0.5)
+    assert (ball.shape.radius, ball.color) == (0.3, None)
+    back = read(rm.to_urdf(read(text))).visuals
+    assert [v.shape for v in back] == [box.shape, cylinder.shape, ball.shape]
+    assert [v.color for v in back] == [box.color, cylinder.color, ball.color]
+
+
+# --- size ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["revolute", "fixed"])
+def test_a_chain_of_a_thousand_links_is_read_without_recursion(kind):
+    f = 1000
+    origin = '<origin xyz="0.001 0 0"/>'
+    text = robot(
+        *(link(f"L{j}") for j in range(f + 1)),
+        *(joint(f"J{j}", f"L{j}", f"L{j + 1}", kind if j else "revolute", origin=origin)
+          for j in range(f)),
+    )  # fmt: skip
+    start = time.perf_counter()
+    model = read(text)
+    assert time.perf_counter() - start < 3.0
+    assert model.n == (f if kind == "revolute" else 1)
+    # in a batch: the scratch data of Pinocchio's single calls grow with the cube of n
+    T = rm.dgm(model, np.zeros((1, model.n)))
+    assert T[0, 0, 3] == pytest.approx(0.001 * f, abs=1e-12)
+
+
+def test_deeply_nested_elements_are_no_danger():
+    text = GOOD.replace("</robot>", "<x>" * 20000 + "</x>" * 20000 + "</robot>")
+    assert read(text).n == 1
+
+
+# --- real robots, there and back ------------------------------------------------------------------
+
+
+@cache
+def original(urdf):
+    return pin.buildModelFromUrdf(str(erd_folder() / urdf))
+
+
+@pytest.mark.parametrize("name", ERD_ARMS)
+def test_real_arms_there_and_back(name):
+    """URDF -> table -> URDF: poses of every link, Jacobians and torques as in the original.
+
+    The original is the whole robot as Pinocchio reads it; where an arm is cut out of it by base
+    and tip, its other joints rest at zero and its base link is the arm's world.
+    """
+    arm = ERD_ARMS[name]
+    model = rm.load(f"erd:{name}").with_gravity([1.0, -2.0, -9.0])
+    assert_like_pinocchio(original(arm.urdf), model)
+    back = read(quiet_urdf(model)).with_gravity(model.gravity)
+    assert_like_pinocchio(original(arm.urdf), back, frames=model.frames)
+    for limit in ("lower", "upper", "velocity", "effort"):
+        assert np.array_equal(getattr(back.table, limit), getattr(model.table, limit)), limit
+    lengths = np.abs([model.table.b, model.table.d, model.table.r])
+    assert lengths.max() < 3.0, "no length beyond the robot's size, let alone kilometres"
