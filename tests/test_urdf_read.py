@@ -592,7 +592,9 @@ MISTAKES = {
     "limits crossed": (
         chain({"inside": '<limit lower="1" upper="-1"/>'}), "lower limit 1.0 is above the upper",
     ),
-    "negative speed": (chain({"inside": '<limit velocity="-1"/>'}), "'j1': limit velocity is a magnitude, got -1.0"),
+    "negative speed": (
+        chain({"inside": '<limit velocity="-1"/>'}), "'j1': limit velocity is a magnitude, got -1",
+    ),
     "unknown type": (chain({"kind": "helical"}), "'j1' is of type 'helical'"),
     "no type": (GOOD.replace('type="revolute"', ""), "is of type ''"),
     "NaN damping": (

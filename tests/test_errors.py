@@ -1,0 +1,93 @@
+"""Errors: one family, each a standard kind too, that carry facts and travel between processes."""
+
+import inspect
+import pickle
+
+import pytest
+
+import robotmodels as rm
+from robotmodels import errors
+from robotmodels.errors import (
+    FrameNotFoundError,
+    MeshNotFoundError,
+    RobotModelsError,
+    RobotNotFoundError,
+    UrdfError,
+    nearest_names,
+)
+
+ERRORS = [
+    value
+    for _, value in inspect.getmembers(errors, inspect.isclass)
+    if issubclass(value, RobotModelsError) and not value.__name__.startswith("_")
+]
+NAMED = [FrameNotFoundError, RobotNotFoundError]
+
+
+@pytest.mark.parametrize("error", ERRORS, ids=lambda e: e.__name__)
+def test_every_error_is_of_the_family_and_of_a_standard_kind(error):
+    """``except ValueError`` works as with NumPy, ``except RobotModelsError`` catches all."""
+    assert issubclass(error, RobotModelsError)
+    standard = (ValueError, KeyError, ImportError, FileNotFoundError)
+    assert error is RobotModelsError or issubclass(error, standard)
+    assert error.__doc__
+    assert error.__name__ in errors.__all__
+
+
+def test_the_list_of_names_is_complete():
+    assert all(hasattr(errors, name) for name in errors.__all__)
+    assert issubclass(errors.UrdfWarning, errors.RobotModelsWarning)
+    assert issubclass(MeshNotFoundError, UrdfError)
+
+
+@pytest.mark.parametrize("error", [e for e in ERRORS if e not in NAMED], ids=lambda e: e.__name__)
+def test_plain_errors_pickle(error):
+    again = pickle.loads(pickle.dumps(error("what came; what to do")))
+    assert type(again) is error
+    assert str(again) == "what came; what to do"
+
+
+@pytest.mark.parametrize("error", NAMED, ids=lambda e: e.__name__)
+def test_errors_about_names_carry_facts_and_pickle(error):
+    raised = error("frame", "wrist_3", ["wrist_1_link", "wrist_3_link", "base"], "Look again.")
+    assert raised.name == "wrist_3"
+    assert raised.known == ("wrist_1_link", "wrist_3_link", "base")
+    assert raised.nearest[0] == "wrist_3_link"
+    assert str(raised) == (
+        "No frame 'wrist_3'. Did you mean 'wrist_3_link', 'wrist_1_link'? "
+        "Known: 'wrist_1_link', 'wrist_3_link', 'base'. Look again."
+    )
+    again = pickle.loads(pickle.dumps(raised))
+    assert type(again) is error
+    assert str(again) == str(raised)
+    assert (again.name, again.known, again.nearest) == (raised.name, raised.known, raised.nearest)
+
+
+def test_errors_about_names_without_anything_near():
+    assert str(FrameNotFoundError("frame", "x", ["base"])) == "No frame 'x'. Known: 'base'."
+    assert str(FrameNotFoundError("frame", "x", [])) == "No frame 'x'. Known: none."
+    many = FrameNotFoundError("frame", 99, [f"link_{i}" for i in range(60)])
+    assert "'link_39' and 20 more" in str(many)
+
+
+@pytest.mark.parametrize(
+    ("name", "known", "nearest"),
+    [
+        ("RX9O", ["rx90", "tx40", "ur5e"], ["rx90"]),
+        ("ur5", ["ur5e", "ur10e", "puma560"], ["ur5e"]),
+        ("Base", ["base", "tool"], ["base"]),
+        ("zzz", ["base", "tool"], []),
+        ("", ["base"], []),
+    ],
+)
+def test_nearest_names_ignore_case(name, known, nearest):
+    assert nearest_names(name, known)[: max(1, len(nearest))] == nearest
+
+
+def test_unknown_robots_are_answered_with_the_nearest():
+    with pytest.raises(RobotNotFoundError, match=r"No robot 'rx9O'\. Did you mean 'rx90'"):
+        rm.load("rx9O")
+    with pytest.raises(KeyError):
+        rm.load("erd:ur55")
+    with pytest.raises(RobotNotFoundError):
+        rm.load(None)

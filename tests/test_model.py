@@ -1,0 +1,382 @@
+"""The model: parts that fit, a value that copies, pickles and computes the same anywhere."""
+
+import copy
+import multiprocessing
+import pickle
+import sys
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given
+from identities.random_robots import (
+    any_models,
+    models,
+    random_bodies,
+    random_drive,
+    random_model,
+    random_pose,
+    random_rotation,
+    random_state,
+    random_table,
+    random_transmission,
+)
+
+import robotmodels as rm
+from robotmodels import se3
+from robotmodels.errors import (
+    FrameNotFoundError,
+    InvalidValueError,
+    NotARotationError,
+    ShapeError,
+)
+
+TWO = rm.DHTable.from_rows([{}, {"d": 0.3}])
+
+
+def tree_model(seed=0, **options):
+    options = {"f": 7, "tree": True, "fixed": True, "drive": True, "transmission": True, **options}
+    return random_model(np.random.default_rng(seed), **options)
+
+
+def numbers(model, q, v, a):
+    """One vector of everything that threads and processes must agree on."""
+    parts = (
+        rm.dgm(model, q), rm.jacobian(model, q), rm.idm(model, q, v, a), rm.mass_matrix(model, q),
+        rm.link_poses(model, q), rm.ddm(model, q, v, a),
+    )  # fmt: skip
+    return np.concatenate([np.ravel(part) for part in parts])
+
+
+# --- making one ----------------------------------------------------------------------------------
+
+
+def test_defaults():
+    model = rm.RobotModel.from_table(TWO)
+    assert (model.n, model.f, model.name, model.tip) == (2, 2, "robot", 2)
+    assert np.array_equal(model.base, np.eye(4))
+    assert np.array_equal(model.tool, np.eye(4))
+    assert model.gravity.tolist() == [0, 0, -9.81]
+    assert model.transmission is None
+    assert model.inertia == rm.InertialParameters.zeros(2)
+    assert model.drive.is_zero
+    assert model.lower is model.table.lower
+    assert model.upper is model.table.upper
+    assert model.frame_names == ("base", "joint_1", "joint_2", "tool")
+    assert repr(model) == "<RobotModel 'robot': 2 joints, 2 frames>"
+    assert str(TWO) in str(model)
+
+
+def test_named_postures():
+    model = rm.RobotModel.from_table(TWO, configurations={"up": [0.1, 0.2]})
+    assert {k: v.tolist() for k, v in model.configurations.items()} == {
+        "zero": [0, 0],
+        "up": [0.1, 0.2],
+    }
+    assert not model.configurations["up"].flags.writeable
+    with pytest.raises(TypeError):
+        model.configurations["down"] = np.zeros(2)
+    assert list(model.with_configurations({}).configurations) == ["zero"]
+    assert dict(pickle.loads(pickle.dumps(model)).configurations).keys() == {"zero", "up"}
+
+
+def test_pinocchio_poses_are_accepted_as_base_and_tool(rng):
+    Z, E = (pin.SE3(random_rotation(rng), rng.normal(size=3)) for _ in range(2))
+    model = rm.RobotModel.from_table(TWO, base=Z, tool=E)
+    assert np.array_equal(model.base, Z.homogeneous)
+    assert np.array_equal(model.with_tool(None).with_tool(E).tool, E.homogeneous)
+
+
+def test_a_slightly_off_base_is_projected(rng):
+    T = random_pose(rng)
+    T[:3, :3] += 1e-8 * rng.normal(size=(3, 3))
+    R = rm.RobotModel.from_table(TWO, base=T).base[:3, :3]
+    assert np.abs(R @ R.T - np.eye(3)).max() < 4e-15
+    with pytest.raises(NotARotationError, match="base: "):
+        rm.RobotModel.from_table(TWO, base=T + 1e-4 * np.eye(4, k=1))
+
+
+MISTAKES = {
+    "table": ({"table": "rx90"}, InvalidValueError, "expected a DHTable, got str"),
+    "name": ({"name": ""}, InvalidValueError, "name: expected a text"),
+    "base shape": ({"base": np.eye(3)}, ShapeError, r"base: expected shape \(\.\.\., 4, 4\)"),
+    "bases": ({"base": [np.eye(4)] * 2}, ShapeError, "base: expected one pose"),
+    "base text": ({"base": "here"}, InvalidValueError, "base: expected real numbers"),
+    "tool scale": ({"tool": np.diag([2, 2, 2, 1])}, NotARotationError, "tool: .* not a rotation"),
+    "tool mirror": ({"tool": np.diag([1, 1, -1, 1])}, NotARotationError, "det R = -1"),
+    "tip 0": ({"tip": 0}, FrameNotFoundError, r"No frame number 0\..* 1 to f"),
+    "tip 3": ({"tip": 3}, FrameNotFoundError, "No frame number 3"),
+    "tip name": ({"tip": "joint_1"}, FrameNotFoundError, "tip is a number"),
+    "gravity 2": ({"gravity": [0, 1]}, ShapeError, r"gravity: expected shape \(3,\)"),
+    "gravity column": ({"gravity": [[0], [0], [1]]}, ShapeError, r"got \(3, 1\)"),
+    "gravity nan": ({"gravity": [0, 0, np.nan]}, InvalidValueError, "gravity: .* got nan"),
+    "gravity None": ({"gravity": None}, InvalidValueError, "gravity"),
+    "drive": ({"drive": [0, 0]}, InvalidValueError, "expected DriveParameters, got list"),
+    "gears": ({"transmission": np.eye(2)}, InvalidValueError, "expected Transmission, got ndarr"),
+    "gears of 3": ({"transmission": rm.Transmission(np.eye(3))}, ShapeError, "2 moving joints"),
+    "posture": ({"configurations": {"up": [1]}}, ShapeError, "configuration 'up': expected shape"),
+    "postures": ({"configurations": [1]}, InvalidValueError, "configurations: expected a mapping"),
+    "zero": ({"configurations": {"zero": [1, 0]}}, InvalidValueError, "'zero' is q = 0"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("parts", "error", "words"), MISTAKES.values(), ids=MISTAKES)
+def test_parts_that_do_not_fit(parts, error, words):
+    with pytest.raises(error, match=words):
+        rm.RobotModel.from_table(**{"table": TWO, **parts})
+
+
+# --- a value -------------------------------------------------------------------------------------
+
+
+@given(any_models())
+def test_models_pickle_copy_and_compare(model):
+    q, _, _ = random_state(model, np.random.default_rng(0))
+    rm.jacobian(model, q)  # what was computed and cached must not go along
+    for other in (
+        pickle.loads(pickle.dumps(model)), copy.deepcopy(model), copy.copy(model),
+        pickle.loads(pickle.dumps(model, 2)),
+    ):  # fmt: skip
+        assert other == model
+        assert hash(other) == hash(model)
+        assert np.array_equal(rm.dgm(other, q), rm.dgm(model, q))
+        assert np.array_equal(rm.gravity_torque(other, q), rm.gravity_torque(model, q))
+        for array in (other.base, other.tool, other.gravity, other.table.d, other.inertia.values):
+            assert not array.flags.writeable
+
+
+def test_a_model_from_a_urdf_keeps_its_frames_through_pickle():
+    model = rm.load("erd:ur5")
+    other = pickle.loads(pickle.dumps(model))
+    assert other == model
+    assert other.frame_names == model.frame_names
+    assert other.notes == model.notes
+    assert rm.to_urdf(other) == rm.to_urdf(model)
+    with pytest.raises(ValueError, match="read-only"):
+        model.frames[0].pose[0, 3] = 1.0
+
+
+CHANGES = {
+    "table": lambda m, rng: m.with_table(m.table.replace(d=m.table.d + 0.1)),
+    "inertia": lambda m, rng: m.with_inertia(random_bodies(rng, m.f)),
+    "no inertia": lambda m, rng: m.with_inertia(None),
+    "drive": lambda m, rng: m.with_drive(random_drive(rng, m.n)),
+    "no drive": lambda m, rng: m.with_drive(None),
+    "base": lambda m, rng: m.with_base(random_pose(rng)),
+    "no base": lambda m, rng: m.with_base(None),
+    "tool": lambda m, rng: m.with_tool(random_pose(rng)),
+    "tip": lambda m, rng: m.with_tool(m.tool, tip=1),
+    "no tool": lambda m, rng: m.with_tool(None),
+    "gravity": lambda m, rng: m.with_gravity([1, 2, 3]),
+    "gears": lambda m, rng: m.with_transmission(random_transmission(rng, m.n)),
+    "no gears": lambda m, rng: m.with_transmission(None),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_with_methods_change_one_thing_in_a_new_model(change, rng):
+    model = tree_model()
+    q, v, a = random_state(model, rng)
+    before = numbers(model, q, v, a)
+    changed = CHANGES[change](model, np.random.default_rng(5))
+    assert changed != model
+    assert np.array_equal(numbers(model, q, v, a), before), "the old one must not change"
+    differing = [
+        part
+        for part in ("table", "inertia", "drive", "base", "tool", "tip", "gravity", "transmission")
+        if not np.array_equal(getattr(changed, part), getattr(model, part))
+    ]
+    expected = {"gears": "transmission"}.get(change.split()[-1], change.split()[-1])
+    assert differing == [expected]
+    fresh = pickle.loads(pickle.dumps(changed))
+    assert np.array_equal(numbers(changed, q, v, a), numbers(fresh, q, v, a)), "no stale cache"
+
+
+def test_with_methods_check_as_the_constructor(rng):
+    model = rm.RobotModel.from_table(TWO)
+    with pytest.raises(ShapeError, match="2 frames"):
+        model.with_inertia(random_bodies(rng, 3))
+    with pytest.raises(ShapeError):
+        model.with_table(random_table(rng, f=3, prismatic=False))
+    with pytest.raises(NotARotationError):
+        model.with_base(np.zeros((4, 4)))
+    with pytest.raises(FrameNotFoundError):
+        model.with_tool(None, tip=7)
+
+
+def test_models_are_immutable():
+    model = rm.RobotModel.from_table(TWO)
+    with pytest.raises(AttributeError):
+        model.gravity = [0, 0, 0]
+    with pytest.raises(ValueError, match="read-only"):
+        model.base[0, 3] = 1.0
+
+
+# --- the same numbers in threads and processes ---------------------------------------------------
+
+
+@pytest.mark.parametrize("inertia", ["physical", "any"])
+def test_threads_compute_the_same_numbers(inertia):
+    """Scratch data are each thread's own: eight threads, one model, many calls."""
+    model = tree_model(inertia="physical", drive=True).with_transmission(None)
+    if inertia == "any":
+        model = model.with_inertia(rm.InertialParameters(
+            np.where(np.arange(10) == 9, 0.0, 1.0) * model.inertia.values
+        ))  # fmt: skip
+    states = np.swapaxes(random_state(model, np.random.default_rng(0), 40), 0, 1)
+
+    def work(state):
+        q, v, a = state
+        return np.concatenate(
+            [np.ravel(x) for x in (rm.dgm(model, q), rm.jacobian(model, q), rm.idm(model, q, v, a))]
+        )
+
+    wanted = [work(s) for s in states]
+    with ThreadPoolExecutor(8) as pool:
+        for _ in range(10):
+            for got, want in zip(pool.map(work, states), wanted, strict=True):
+                assert np.array_equal(got, want)
+
+
+def test_a_fresh_model_may_be_used_first_by_many_threads():
+    """The twin is built at the first use, which may come from several threads at once."""
+    model = tree_model(3)
+    q, v, a = random_state(model, np.random.default_rng(0))
+    wanted = numbers(pickle.loads(pickle.dumps(model)), q, v, a)
+    with ThreadPoolExecutor(8) as pool:
+        for got in pool.map(lambda _: numbers(model, q, v, a), range(16)):
+            assert np.array_equal(got, wanted)
+
+
+def test_processes_compute_the_same_numbers():
+    """Models travel to freshly started interpreters (spawn) and compute the same there."""
+    model = tree_model(1)
+    q, v, a = random_state(model, np.random.default_rng(0), 4)
+    # functions of the package itself: the workers need not import this file
+    jobs = [
+        (rm.dgm, (model, q[0])), (rm.idm, (model, q[1], v[1], a[1])), (rm.jacobian, (model, q)),
+        (rm.mass_matrix, (model, q[2])), (rm.ddm, (model, q[3], v[3], a[3])),
+    ]  # fmt: skip
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(2, mp_context=context, initializer=sys.path.extend,
+                             initargs=(sys.path,)) as pool:  # fmt: skip
+        results = [pool.submit(function, *arguments) for function, arguments in jobs]
+        for result, (function, arguments) in zip(results, jobs, strict=True):
+            assert np.array_equal(result.result(timeout=60), function(*arguments))
+
+
+# --- Pinocchio's side ----------------------------------------------------------------------------
+
+
+def test_pinocchio_sorts_siblings_and_the_order_says_how():
+    """J10 comes before J2 there; ours is the order of the table."""
+    table = rm.DHTable(
+        antecedent=[0, 1, 1, 3], sigma=[0, 0, 1, 0], names=["J1", "J2", "J10", "J3"],
+        d=[0, 0.1, 0.2, 0.3],
+    )  # fmt: skip
+    model = rm.RobotModel.from_table(table)
+    assert list(model.pin_model.names)[1:] == ["J1", "J10", "J3", "J2"]
+    assert model.pin_order.tolist() == [0, 3, 1, 2]
+    assert not model.pin_order.flags.writeable
+
+
+@given(models(tree=True))
+def test_pin_order_leads_to_each_joint_in_the_twin(model):
+    twin = model.pin_model
+    assert (twin.nq, twin.nv) == (model.n, model.n)
+    assert sorted(model.pin_order) == list(range(model.n))
+    for name, column in zip(model.table.joint_names, model.pin_order, strict=True):
+        assert twin.joints[twin.getJointId(name)].idx_q == column
+    lower = twin.lowerPositionLimit[model.pin_order]
+    assert np.array_equal(np.where(lower < -1e300, -np.inf, lower), model.lower)
+    x = np.arange(float(model.n))
+    assert np.array_equal(model.twin.from_pin(model.twin.to_pin(x)), x)
+    assert np.array_equal(twin.gravity.linear, model.gravity)
+
+
+# --- frames --------------------------------------------------------------------------------------
+
+
+def test_frames_by_name_by_number_and_none():
+    model = rm.load("erd:ur5")
+    q = np.arange(6) / 3
+    poses = rm.link_poses(model, q)
+    for j, name in enumerate(model.table.names, start=1):
+        assert np.allclose(rm.dgm(model, q, j), poses[j - 1], atol=1e-15)
+        assert np.array_equal(rm.dgm(model, q, name), rm.dgm(model, q, np.int64(j)))
+    assert np.allclose(rm.dgm(model, q, 0), model.base, atol=1e-15)
+    assert np.allclose(rm.dgm(model, q), poses[model.tip - 1] @ model.tool, atol=1e-15)
+    assert "wrist_3_link" in model.frame_names
+    assert "ee_link" in model.merged_links
+
+
+@pytest.mark.parametrize("frame", ["wrist_3_lnk", 7, -1, True, 1.0, b"base", [1], np.zeros(2), ""])
+@pytest.mark.parametrize("function", [rm.dgm, rm.jacobian])
+def test_unknown_frames(frame, function):
+    model = rm.load("erd:ur5")
+    function(model, np.zeros(6), frame=1)  # True and 1.0 must not find what 1 has left behind
+    with pytest.raises(FrameNotFoundError, match=r"^No frame") as caught:
+        function(model, np.zeros(6), frame=frame)
+    if isinstance(frame, str) and frame:
+        assert "Did you mean 'wrist_3_link'" in str(caught.value)
+        assert caught.value.nearest[0] == "wrist_3_link"
+
+
+# --- joint vectors -------------------------------------------------------------------------------
+
+WRONG = {
+    "short": (np.zeros(5), ShapeError, r"expected shape \(\.\.\., 6\), got \(5,\)"),
+    "column": (np.zeros((6, 1)), ShapeError, r"got \(6, 1\)\. This is a column: pass"),
+    "transposed": (np.zeros((6, 4)), ShapeError, r"rows are samples, so pass .*\.T"),
+    "scalar": (0.0, ShapeError, r"got \(\)"),
+    "nan": ([0, 0, np.nan, 0, 0, 0], InvalidValueError, r"got nan at index \[2\]"),
+    "inf": (np.full((2, 6), np.inf), InvalidValueError, r"got inf at index \[0, 0\]"),
+    "text": ("123456", InvalidValueError, "expected real numbers"),
+    "texts": (["1"] * 6, InvalidValueError, "expected real numbers"),
+    "complex": (np.zeros(6, complex), InvalidValueError, "expected real numbers"),
+    "ragged": ([[0], [0, 1]], InvalidValueError, "in a regular array"),
+    "None": (None, InvalidValueError, "expected real numbers"),
+}
+
+CALLS = {
+    "dgm": lambda m, x: rm.dgm(m, x),
+    "link_poses": lambda m, x: rm.link_poses(m, x),
+    "jacobian": lambda m, x: rm.jacobian(m, x),
+    "jacobian_rate": lambda m, x: rm.jacobian_rate(m, np.zeros(6), x),
+    "dkm": lambda m, x: rm.dkm(m, np.zeros(6), x),
+    "idm q": lambda m, x: rm.idm(m, x, np.zeros(6), np.zeros(6)),
+    "idm v": lambda m, x: rm.idm(m, np.zeros(6), x, np.zeros(6)),
+    "idm a": lambda m, x: rm.idm(m, np.zeros(6), np.zeros(6), x),
+    "wrench": lambda m, x: rm.idm(m, np.zeros(6), np.zeros(6), np.zeros(6), wrench=x)
+    if x is not None else rm.dgm(m, x),
+    "ddm tau": lambda m, x: rm.ddm(m, np.zeros(6), np.zeros(6), x),
+    "mass_matrix": lambda m, x: rm.mass_matrix(m, x),
+    "coriolis": lambda m, x: rm.coriolis_matrix(m, np.zeros(6), x),
+    "gravity": lambda m, x: rm.gravity_torque(m, x),
+    "kinetic": lambda m, x: rm.kinetic_energy(m, np.zeros(6), x),
+    "potential": lambda m, x: rm.potential_energy(m, x),
+    "regressor": lambda m, x: rm.torque_regressor(m, np.zeros(6), x, np.zeros(6)),
+    "energy_regressor": lambda m, x: rm.energy_regressor(m, x, np.zeros(6)),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def ur5():
+    return rm.load("erd:ur5")
+
+
+@pytest.mark.parametrize(("value", "error", "words"), WRONG.values(), ids=WRONG)
+@pytest.mark.parametrize("call", CALLS)
+def test_wrong_joint_vectors_are_refused_everywhere(ur5, call, value, error, words):
+    with pytest.raises(error, match=words):
+        CALLS[call](ur5, value)
+
+
+def test_a_tool_may_sit_on_any_frame(rng):
+    model = tree_model(2, tip=2)
+    E = se3.translation(0.1, 0.2, 0.3)
+    q, _, _ = random_state(model, rng)
+    poses = rm.link_poses(model, q)
+    for j in range(1, model.f + 1):
+        assert np.allclose(rm.dgm(model.with_tool(E, tip=j), q), poses[j - 1] @ E, atol=1e-13)
