@@ -1,0 +1,309 @@
+"""The numeric inverse geometric model: any robot, any mask, one posture a pose."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from math import inf
+from numbers import Real
+from operator import index
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .. import se3
+from .._arrays import Array, as_floats, as_vector, batch_rows, read_only
+from ..errors import InvalidValueError, ShapeError
+from ..geometry import PRISMATIC, REVOLUTE
+from ..model import RobotModel
+from .solutions import IGMSolutions
+from .status import IGMStatus
+
+METHOD = "numeric (Levenberg-Marquardt)"
+"""What `igm_numeric` calls itself in its results."""
+
+_SEED = 20
+# the first few starts also tell how many components of the task the arm can govern
+_FEWEST_STARTS = 8
+# in the order of the outcomes that the kernel writes
+_STATUS = np.array(
+    [
+        IGMStatus.REACHED,
+        IGMStatus.OUTSIDE_LIMITS,
+        IGMStatus.ORIENTATION_NOT_AVAILABLE,
+        IGMStatus.TOO_FAR,
+        IGMStatus.TOO_NEAR,
+        IGMStatus.NOT_CONVERGED,
+    ],
+    dtype=np.int8,
+)
+
+
+def igm_numeric(
+    model: RobotModel,
+    T: ArrayLike,
+    q0: ArrayLike | None = None,
+    mask: ArrayLike | None = None,
+    mask_axes: Literal["world", "tool"] = "world",
+    position_tolerance: float = 1e-6,
+    orientation_tolerance: float = 1e-6,
+    rng: np.random.Generator | int | None = None,
+    limits: bool = False,
+    restarts: int = 100,
+    iterations: int = 40,
+) -> IGMSolutions:
+    """Numeric inverse geometric model: one posture that brings the tool to each pose.
+
+    Also called inverse kinematics, ``ikine``, ``ik_LM``, CLIK. For any robot: any number of
+    joints, any tree, redundant or with fewer joints than the task has components. It
+    starts from ``q0`` if given, then from postures spread over the joint ranges, those whose pose
+    is nearest first. A solution is a posture whose pose was computed again and is met within both
+    tolerances.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, n joints.
+    T : array_like, shape (..., 4, 4)
+        World poses of the tool, metres. A rotation that is off by less than 1e-6 is rounded to
+        the nearest one.
+    q0 : array_like, shape (..., n), optional
+        Where to start, rad or m; broadcasts with the poses. The solution found from it is usually
+        near it. Joints that do not move the tool keep its value. Without it nothing is
+        preferred, and such joints stay at 0 (with ``limits`` at mid-range).
+    mask : array_like, shape (6,), optional
+        Ones for the components ``x y z rx ry rz`` that are asked for, zeros for the others;
+        default all. Rotations are the components of ``log(R_desired R^T)``.
+    mask_axes : {"world", "tool"}
+        Axes of the components: the world's, or those of the tool at the desired pose. Pointing
+        the tool's z axis is ``[1, 1, 1, 1, 1, 0]`` in tool axes.
+    position_tolerance : float
+        Metres, on the length of the asked-for translation that is missing.
+    orientation_tolerance : float
+        Radians, on the asked-for rotation that is missing. For poses given with few digits take
+        wider tolerances.
+    rng : numpy.random.Generator or int, optional
+        Generator or seed of the spread starts; default a fixed seed. The starts are the same for
+        all poses of a call, so that a batch gives what its poses give one by one.
+    limits : bool
+        Whether solutions must lie within the joint limits. Angles are then shifted by whole turns
+        to be nearest to ``q0`` (else to mid-range) inside the limits; otherwise they are in
+        (-pi, pi].
+    restarts : int
+        How many starts to try beside ``q0``; 0 needs a ``q0``.
+    iterations : int
+        Most steps from one start.
+
+    Returns
+    -------
+    IGMSolutions
+        With one row (S = 1) for every pose, its ``error`` per component, and ``closest``: the
+        posture the search ended with, also where it is no solution. Then ``status`` tells whether
+        limits are the reason; whether the position is met but the orientation is not (``closest``
+        is where the remaining angle is least); or whether the position is too far or too near.
+        These are findings of the search, not proofs.
+        Postures of redundant arms are marked as members of an infinite family, with
+        the joints that move along it; double roots and families at singular postures are not
+        looked for.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError, NotARotationError
+        ``T`` that are not poses, ``q0`` or ``mask`` of the wrong length, NaN or infinity; a mask
+        that is not of zeros and ones or that leaves nothing; an unknown option.
+
+    References
+    ----------
+    The exercise, section 4.3 (``ikine`` and its mask). T. Sugihara, Solvability-unconcerned
+    inverse kinematics by the Levenberg-Marquardt method, IEEE T-RO 27(5), 2011.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> from robotmodels.kinematics import dgm
+    >>> arm = load("panda")
+    >>> T = dgm(arm, [0.1, 0.2, 0.3, -1.4, 0.5, 1.6, 0.7])
+    >>> found = igm_numeric(arm, T, limits=True)
+    >>> bool(found.within_limits[0]), bool(np.allclose(dgm(arm, found.q[0]), T, atol=1e-6))
+    (True, True)
+
+    The exercise's pose B: its position is reached, its orientation cannot be.
+
+    >>> trr = load("lab_trr")
+    >>> B = [[-1, 0, 0, 0.4], [0, 1, 0, 0.2], [0, 0, -1, 0.5], [0, 0, 0, 1]]
+    >>> igm_numeric(trr, B, mask=[1, 1, 1, 0, 0, 0]).reason()
+    'The pose is reached.'
+    >>> igm_numeric(trr, B).reason()
+    'The position is reached, but the orientation is not available there. It is off by 180 deg.'
+    """
+    T = se3.as_pose(T)
+    asked = _mask(mask)
+    if mask_axes not in ("world", "tool"):
+        raise InvalidValueError(f"mask_axes: expected 'world' or 'tool', got {mask_axes!r}.")
+    tolerance = np.array(
+        [
+            _positive(position_tolerance, "position_tolerance"),
+            _positive(orientation_tolerance, "orientation_tolerance"),
+        ]
+    )
+    restarts = _whole(restarts, "restarts", 0)
+    iterations = _whole(iterations, "iterations", 1)
+    if not isinstance(limits, (bool, np.bool_)):
+        raise InvalidValueError(f"limits: expected True or False, got {limits!r}.")
+    if restarts == 0 and q0 is None:
+        raise InvalidValueError("restarts: 0 leaves no start without q0; give q0 or restarts.")
+    length, reach = _lengths(model, limits)
+    low, high = _ranges(model, limits, length)
+    middle = 0.5 * (low + high) if limits else np.zeros(model.n)
+    first = middle if q0 is None else as_vector(q0, model.n, "q0")
+    flat = T.reshape(*T.shape[:-2], 16)
+    batch, (targets, first) = batch_rows((flat, first), ("T", "q0"))
+    if limits:
+        first = np.clip(first, model.lower, model.upper)
+    unit = _unit_starts(restarts, model.n, rng)
+    N, n = first.shape
+    q, error = np.empty((N, n)), np.empty((N, 6))
+    family, outcome = np.empty((N, n), dtype=np.bool_), np.empty(N, dtype=np.int64)
+    from ._descent import solve_poses
+
+    solve_poses(
+        targets.reshape(N, 4, 4), first, int(q0 is not None), low + unit * (high - low),
+        *model.chain, *_tool(model), model.lower, model.upper, int(limits),
+        asked.astype(np.int64), int(mask_axes == "tool"), length, reach, tolerance, restarts,
+        iterations, q, error, family, outcome,
+    )  # fmt: skip
+    return _solutions(model, batch, q, error, family, outcome, asked, bool(limits))
+
+
+def _solutions(
+    model: RobotModel,
+    batch: tuple[int, ...],
+    q: Array,
+    error: Array,
+    family: NDArray[np.bool_],
+    outcome: NDArray[np.int64],
+    asked: NDArray[np.bool_],
+    limits: bool,
+) -> IGMSolutions:
+    """Lay the kernel's rows out as the common result."""
+    n = model.n
+    revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
+    status = _STATUS[outcome]
+    valid = status == IGMStatus.REACHED
+    on_path = np.zeros(n, dtype=np.bool_)
+    joints = model.chain.joint[_tool(model)[0] - 1]
+    on_path[joints[joints >= 0]] = True
+    free = valid[:, None] & ~on_path
+    status[valid & (free | family).any(axis=-1)] = IGMStatus.REACHED_FAMILY
+    missing = error * asked
+    residual = np.maximum(
+        np.linalg.norm(missing[:, :3], axis=-1), np.linalg.norm(missing[:, 3:], axis=-1)
+    )
+    inside = valid & ((q >= model.lower) & (q <= model.upper)).all(axis=-1)
+    rows = (*batch, 1)
+    return IGMSolutions(
+        q=np.where(valid[:, None], q, np.nan).reshape(*rows, n),
+        valid=valid.reshape(rows),
+        residual=residual.reshape(rows),
+        within_limits=inside.reshape(rows),
+        branch=np.zeros(rows, dtype=np.str_),
+        status=status.reshape(batch),
+        double=np.zeros(rows, dtype=np.bool_),
+        free_joints=free.reshape(*rows, n),
+        family_joints=(family & valid[:, None]).reshape(*rows, n),
+        method=METHOD,
+        periodic=np.zeros(n, dtype=np.bool_) if limits else revolute,
+        mask=asked,
+        error=error.reshape(*rows, 6),
+        closest=q.reshape(*batch, n),
+    )
+
+
+def _tool(model: RobotModel) -> tuple[NDArray[np.int64], Array, Array]:
+    """Path, rotation and position of the tool as kernels take them, without Pinocchio."""
+    path = np.array(model.table.path(model.tip), dtype=np.int64)
+    E = model.tool
+    return path, np.ascontiguousarray(E[:3, :3]), np.ascontiguousarray(E[:3, 3])
+
+
+def _lengths(model: RobotModel, limits: bool) -> tuple[float, float]:
+    """Length of the path's constant links, and how far the tool gets from its first frame."""
+    path, _, e = _tool(model)
+    links = np.linalg.norm(model.chain.position[path[1:] - 1], axis=-1).sum()
+    length = float(links + np.linalg.norm(e))
+    reach = length
+    for j in path:
+        if model.table.sigma[j - 1] == PRISMATIC:
+            i = model.chain.joint[j - 1]
+            reach += max(abs(model.lower[i]), abs(model.upper[i])) if limits else inf
+    return length or 1.0, float(reach) * (1.0 + 1e-12)
+
+
+def _ranges(model: RobotModel, limits: bool, length: float) -> tuple[Array, Array]:
+    """Where spread starts lie: the limits, or a whole turn, or the length of the arm."""
+    revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
+    span = np.where(revolute, 2.0 * np.pi, 2.0 * length)
+    lower, upper = model.lower, model.upper
+    if not limits:
+        lower = np.where(revolute, -inf, lower)
+        upper = np.where(revolute, inf, upper)
+    low = np.where(np.isfinite(lower), lower, np.where(np.isfinite(upper), upper - span, -span / 2))
+    high = np.where(np.isfinite(upper), upper, low + span)
+    # more than a turn says nothing new; the one around mid-range is taken
+    wide = revolute & (high - low > span)
+    middle = 0.5 * (low + high)
+    return np.where(wide, middle - span / 2, low), np.where(wide, middle + span / 2, high)
+
+
+def _unit_starts(restarts: int, n: int, rng: Any) -> Array:
+    """Points of the unit cube, shape (max(restarts, 8), n)."""
+    count = max(restarts, _FEWEST_STARTS)
+    if rng is None:
+        return _fixed_starts(count, n)
+    if not isinstance(rng, np.random.Generator):
+        rng = np.random.default_rng(_whole(rng, "rng", 0))
+    return rng.random((count, n))
+
+
+@lru_cache(maxsize=32)
+def _fixed_starts(count: int, n: int) -> Array:
+    return read_only(np.random.default_rng(_SEED).random((count, n)))
+
+
+def _mask(mask: ArrayLike | None) -> NDArray[np.bool_]:
+    """The components asked for, shape (6,)."""
+    if mask is None:
+        return np.ones(6, dtype=np.bool_)
+    numbers = np.asarray(mask)
+    if numbers.dtype == np.bool_:
+        numbers = numbers.astype(np.float64)
+    numbers = as_floats(numbers, "mask")
+    if numbers.shape != (6,):
+        raise ShapeError(f"mask: expected six numbers x y z rx ry rz, got shape {numbers.shape}.")
+    if not np.isin(numbers, (0.0, 1.0)).all():
+        raise InvalidValueError(
+            f"mask: expected zeros and ones, got {numbers.tolist()}; a component is either asked "
+            "for or not, it has no weight."
+        )
+    if not numbers.any():
+        raise InvalidValueError("mask: all six are 0, so nothing is asked for.")
+    return numbers == 1.0
+
+
+def _positive(value: Any, name: str) -> float:
+    if not isinstance(value, (Real, np.number)) or isinstance(value, bool):
+        raise InvalidValueError(f"{name}: expected a number, got {value!r}.")
+    number = float(value)
+    if not 0.0 < number < inf:
+        raise InvalidValueError(f"{name}: expected a finite number above 0, got {number}.")
+    return number
+
+
+def _whole(value: Any, name: str, least: int) -> int:
+    try:
+        number = index(value)
+    except TypeError:
+        raise InvalidValueError(f"{name}: expected a whole number, got {value!r}.") from None
+    if isinstance(value, (bool, np.bool_)) or number < least:
+        raise InvalidValueError(f"{name}: expected a whole number >= {least}, got {value!r}.")
+    return number

@@ -1,0 +1,266 @@
+"""The result of every inverse geometric model: all postures found, and why there are no more."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .._arrays import Array, as_vector, batch_shape, read_only
+from ..errors import InvalidValueError, ShapeError
+from .status import IGMStatus
+
+_WHOLE_POSE = (True,) * 6
+_SHOWN = 8
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class IGMSolutions:
+    """Postures that reach the poses of one call. Read-only, picklable.
+
+    The leading axes are those of the poses. S is the number of rows kept for each pose: the most
+    solutions found for any of them (always 1 for `igm_numeric`). Rows are packed: what is missing
+    stands last, is NaN in ``q`` and False in ``valid``.
+
+    Parameters
+    ----------
+    q : ndarray, shape (..., S, n)
+        Joint variables, rad or m.
+    valid : ndarray of bool, shape (..., S)
+        Whether the row is a solution.
+    residual : ndarray, shape (..., S)
+        The larger of the position error in metres and the rotation angle in radians, over what
+        was asked, from a forward pass.
+    within_limits : ndarray of bool, shape (..., S)
+        Whether the row is a solution inside the joint limits.
+    branch : ndarray of str, shape (..., S)
+        Labels of the branches; empty where a method has none.
+    status : ndarray of int8, shape (...)
+        Codes of `IGMStatus`.
+    double : ndarray of bool, shape (..., S)
+        Double roots, which are given once.
+    free_joints : ndarray of bool, shape (..., S, n)
+        Joints whose value was taken from the reference posture, because it does not matter.
+    family_joints : ndarray of bool, shape (..., S, n)
+        Other joints that move along the infinite family the row belongs to.
+    method : str
+        What solved it.
+    periodic : ndarray of bool, shape (n,)
+        Joints whose values count modulo a whole turn in `nearest`: the revolute ones, unless
+        limits were asked for.
+    mask : array_like of bool, shape (6,)
+        Which components x y z rx ry rz were asked for.
+    error : ndarray, shape (..., S, 6), optional
+        Translation (m) and rotation (rad) that are missing, ``x y z rx ry rz`` in the axes of the
+        mask. From a numeric method also where there is no solution: then of ``closest``.
+    closest : ndarray, shape (..., n), optional
+        From a numeric method: the posture it ended with, also where it is no solution, rad or m.
+
+    Raises
+    ------
+    ShapeError
+        Fields that do not fit each other.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> from robotmodels.kinematics import dgm
+    >>> from robotmodels.igm import igm_numeric
+    >>> arm = load("rx90")
+    >>> found = igm_numeric(arm, dgm(arm, [0.1, 0.2, 1.3, 0.4, 0.5, 0.6]))
+    >>> found.q.shape, found.count, found.reason()
+    ((1, 6), np.int64(1), 'The pose is reached.')
+    """
+
+    q: Array
+    valid: NDArray[np.bool_]
+    residual: Array
+    within_limits: NDArray[np.bool_]
+    branch: NDArray[np.str_]
+    status: NDArray[np.int8]
+    double: NDArray[np.bool_]
+    free_joints: NDArray[np.bool_]
+    family_joints: NDArray[np.bool_]
+    method: str
+    periodic: NDArray[np.bool_]
+    mask: NDArray[np.bool_] = _WHOLE_POSE  # type: ignore[assignment]
+    error: Array | None = None
+    closest: Array | None = None
+
+    def __post_init__(self) -> None:
+        *batch, S, n = np.shape(self.q)
+        shapes = {
+            "q": (float, (*batch, S, n)),
+            "valid": (bool, (*batch, S)),
+            "residual": (float, (*batch, S)),
+            "within_limits": (bool, (*batch, S)),
+            "branch": (str, (*batch, S)),
+            "status": (np.int8, tuple(batch)),
+            "double": (bool, (*batch, S)),
+            "free_joints": (bool, (*batch, S, n)),
+            "family_joints": (bool, (*batch, S, n)),
+            "periodic": (bool, (n,)),
+            "mask": (bool, (6,)),
+            "error": (float, (*batch, S, 6)),
+            "closest": (float, (*batch, n)),
+        }
+        for name, (dtype, shape) in shapes.items():
+            value = getattr(self, name)
+            if value is None:
+                continue
+            array = read_only(value, dtype)
+            if array.shape != shape:
+                raise ShapeError(f"{name}: expected shape {shape}, got {array.shape}.")
+            object.__setattr__(self, name, array)
+
+    @property
+    def count(self) -> NDArray[np.int64]:
+        """Number of solutions of each pose, shape (...)."""
+        return self.valid.sum(axis=-1)
+
+    def reason(self, i: int | tuple[int, ...] = ()) -> str:
+        """What became of one pose, in a sentence.
+
+        Parameters
+        ----------
+        i : int or tuple of int
+            Which pose; left out for a call with a single pose.
+
+        Returns
+        -------
+        str
+            The sentence of its status, with what is missing where the method knows it.
+
+        Raises
+        ------
+        InvalidValueError
+            ``i`` does not name one pose.
+
+        Examples
+        --------
+        >>> from robotmodels.robots import load
+        >>> from robotmodels.igm import igm_numeric
+        >>> from robotmodels.se3 import translation
+        >>> igm_numeric(load("lab_rr"), translation(0.5, 0, 0.5)).reason()
+        'The position is out of reach: too far. The closest posture misses it by 0.3 m.'
+        """
+        status, at = self._status(i)
+        if self.error is None or status in (IGMStatus.REACHED, IGMStatus.REACHED_FAMILY):
+            return status.sentence
+        missing = np.where(self.mask, self.error[at][0], 0.0)
+        metres = float(np.linalg.norm(missing[:3]))
+        angle = f"{np.rad2deg(np.linalg.norm(missing[3:])):.4g} deg"
+        if status in (IGMStatus.TOO_FAR, IGMStatus.TOO_NEAR):
+            return f"{status.sentence} The closest posture misses it by {metres:.4g} m."
+        if status is IGMStatus.ORIENTATION_NOT_AVAILABLE:
+            return f"{status.sentence} It is off by {angle}."
+        if status is IGMStatus.NOT_CONVERGED:
+            return f"{status.sentence} The closest one misses it by {metres:.4g} m and {angle}."
+        return status.sentence
+
+    def nearest(self, q: ArrayLike) -> Array:
+        """The solution of each pose that is nearest to a posture.
+
+        Parameters
+        ----------
+        q : array_like, shape (..., n)
+            Postures, rad or m; the leading axes broadcast with the poses.
+
+        Returns
+        -------
+        ndarray, shape (..., n)
+            Solutions as they are in ``q``, NaN for poses without any. The distance is the square
+            root of the summed squares; a revolute joint counts by its shorter way round unless
+            limits were asked for.
+
+        Raises
+        ------
+        ShapeError, InvalidValueError
+            ``q`` of the wrong length, or with NaN or infinity.
+
+        Examples
+        --------
+        >>> from robotmodels.robots import load
+        >>> from robotmodels.igm import igm_numeric
+        >>> arm = load("lab_trr")
+        >>> igm_numeric(arm, [[0, 0, -1, 0.2], [0, 1, 0, -0.3], [1, 0, 0, 0.7], [0, 0, 0, 1]],
+        ...             mask=[1, 1, 1, 0, 0, 0], q0=[0, -1, 0.5]).nearest([0, 0, 0]).round(4)
+        array([-0.3   , -1.5708,  1.5708])
+        """
+        S, n = self.q.shape[-2:]
+        q = as_vector(q, n, "q")
+        batch = batch_shape((q, np.empty((*self.status.shape, n))), ("q", "solutions"))
+        rows = np.broadcast_to(self.q, (*batch, S, n))
+        if S == 0:
+            return np.full((*batch, n), np.nan)
+        distance = posture_distance(rows, q[..., None, :], self.periodic)
+        best = np.where(self.valid, distance, np.inf).argmin(axis=-1)
+        return np.take_along_axis(rows, best[..., None, None], axis=-2)[..., 0, :]
+
+    def __repr__(self) -> str:
+        poses = int(self.status.size)
+        total = int(self.valid.sum())
+        head = (
+            f"<IGMSolutions: {total} posture{'s' * (total != 1)} for {poses} "
+            f"pose{'s' * (poses != 1)}, method {self.method!r}>"
+        )
+        lines = [head]
+        for i in list(np.ndindex(self.status.shape))[:_SHOWN] if poses <= _SHOWN else ():
+            label = f"pose {', '.join(map(str, i))}: " if i else ""
+            lines.append(f"  {label}{self.reason(i)}")
+            for s in np.flatnonzero(self.valid[i]):
+                numbers = " ".join(f"{v:9.5f}" for v in self.q[i][s])
+                where = "" if self.within_limits[i][s] else ", outside the limits"
+                branch = f"  {self.branch[i][s]}" if self.branch[i][s] else ""
+                lines.append(
+                    f"    q = [{numbers}]{branch}  residual {self.residual[i][s]:.1e}{where}"
+                )
+        if poses > _SHOWN:
+            codes, numbers = np.unique(self.status, return_counts=True)
+            for code, number in zip(codes, numbers, strict=True):
+                lines.append(f"  {number} x {IGMStatus(code).sentence}")
+        return "\n".join(lines)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # rebuilt, so that its arrays are read-only again
+        return type(self), tuple(getattr(self, field.name) for field in fields(self))
+
+    def _status(self, i: int | tuple[int, ...]) -> tuple[IGMStatus, tuple[int, ...]]:
+        at = tuple(i) if isinstance(i, tuple) else (i,)
+        try:
+            codes = np.asarray(self.status[at])
+        except (IndexError, TypeError):
+            codes = self.status[None]
+        if codes.ndim:
+            raise InvalidValueError(
+                f"i: expected the index of one pose among {self.status.shape}, got {i!r}."
+            )
+        return IGMStatus(int(codes)), at
+
+
+def posture_distance(a: Array, b: Array, periodic: NDArray[np.bool_]) -> Array:
+    """Distance between postures; periodic joints by the shorter way round.
+
+    Parameters
+    ----------
+    a, b : ndarray, shape (..., n)
+        Postures, rad or m; they broadcast.
+    periodic : ndarray of bool, shape (n,)
+        Joints whose values count modulo a whole turn.
+
+    Returns
+    -------
+    ndarray, shape (...)
+        Square root of the summed squares (metres and radians alike).
+
+    Examples
+    --------
+    >>> float(posture_distance(np.array([3.0]), np.array([-3.0]), np.array([True])).round(4))
+    0.2832
+    """
+    way = a - b
+    turn = 2.0 * np.pi
+    way = np.where(periodic, way - turn * np.round(way / turn), way)
+    return np.sqrt((way * way).sum(axis=-1))

@@ -1,0 +1,44 @@
+"""What became of a pose: a small number per pose whose value is a sentence."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import Self
+
+
+class IGMStatus(IntEnum):
+    """Outcome of an inverse geometric model for one pose; fits int8.
+
+    ``REACHED`` and ``REACHED_FAMILY`` come with solutions, the others say why there is none.
+
+    Attributes
+    ----------
+    sentence : str
+        What a person reads.
+
+    Examples
+    --------
+    >>> IGMStatus.TOO_FAR.sentence
+    'The position is out of reach: too far.'
+    >>> IGMStatus(0)
+    <IGMStatus.REACHED: 0>
+    """
+
+    sentence: str
+
+    REACHED = 0, "The pose is reached."
+    REACHED_FAMILY = 1, "The pose is reached by an infinite family of postures."
+    OUTSIDE_LIMITS = 2, "The pose is reached only outside the joint limits."
+    TOO_FAR = 3, "The position is out of reach: too far."
+    TOO_NEAR = 4, "The position is out of reach: too near."
+    ORIENTATION_NOT_AVAILABLE = (
+        5, "The position is reached, but the orientation is not available there.",
+    )  # fmt: skip
+    NOT_CONVERGED = 6, "No posture was found that meets the pose, and no reason why."
+
+    def __new__(cls, value: int, sentence: str = "") -> Self:
+        """Attach the sentence to the number."""
+        status = int.__new__(cls, value)
+        status._value_ = value
+        status.sentence = sentence
+        return status
