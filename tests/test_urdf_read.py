@@ -94,9 +94,9 @@ def assert_like_pinocchio(text, model, frames=None, dynamics=True, tolerance=1e-
             error = np.abs(rm.dgm(model, q, frame.name) - wanted).max()
             assert error < tolerance * size, frame.name
             J = pin.getFrameJacobian(theirs, data, i, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
-            wanted = np.vstack(
-                [world.rotation.T @ J[:3, columns], world.rotation.T @ J[3:, columns]]
-            )
+            # Pinocchio gives a vector for a robot of one joint
+            J = np.reshape(J, (2, 3, -1))[:, :, columns]
+            wanted = (world.rotation.T @ J).reshape(6, -1)
             error = np.abs(rm.jacobian(model, q, frame.name) - wanted).max()
             assert error < tolerance * size, frame.name
         if dynamics:
