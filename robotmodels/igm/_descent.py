@@ -29,7 +29,7 @@ from ..kernels._compile import (
     Ints,
     compiled,
 )
-from ..kernels._motion import coordinate, link_transform
+from ..kernels._motion import link_transform
 from ..kernels._vectors import (
     Matrix,
     Vector,
@@ -39,7 +39,6 @@ from ..kernels._vectors import (
     matrix,
     product,
     product_transpose,
-    put_matrix,
     put_vector,
     scale,
     subtract,
@@ -57,11 +56,14 @@ FLAGS = types.Array(types.boolean, 2, "C")
 CODES = types.Array(types.int64, 1, "C")
 
 # outcomes of `solve_poses`, translated to statuses by its caller
-FOUND, BEYOND_LIMITS, NO_ORIENTATION, TOO_FAR, TOO_NEAR, NOTHING_FOUND = range(6)
+FOUND, BEYOND_LIMITS, NO_ORIENTATION, TOO_FAR, TOO_NEAR, NOTHING_FOUND = 0, 1, 2, 3, 4, 5
 
-STIFF = 1e3  # weight of the position while the least orientation error is looked for
+STIFF = 1e3  # weights of the position while the least orientation error is looked for
+STIFFER = 1e5
+GIVE_UP = 0.7  # of the cost that is left after five steps; more, and another start is better
 SIDE_STARTS = 16  # starts for the questions asked when a pose could not be met
 START_DAMPING = 0.1  # of the first step, in units of the cost
+FAR = 1.0  # cost beyond which the damping does not grow
 EXACT = 1e-28  # cost below which only rounding is left
 SPREAD = 0.5  # weight of the orientation in the choice of the next start
 IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
@@ -108,12 +110,12 @@ def turned(phi: Vector, w: Vector) -> Vector:
 
 
 @compiled()
-def forward(q, row, arm, z, o):
-    """Pose (R, p) of the tool at posture ``q[row]``; axes and origins of the path into z and o."""
+def forward(q, arm, z, o):
+    """Pose (R, p) of the tool at posture q; axes and origins of the path into z and o."""
     sigma, joint, rotation, position, R, p, path, E, e = arm
     for s in range(path.shape[0]):
         k = path[s] - 1
-        qj = coordinate(q, row, joint[k])
+        qj = q[joint[k]] if joint[k] >= 0 else 0.0
         Rj, Pj = link_transform(sigma[k], qj, matrix(rotation, k), vector(position, k))
         p = add(p, times(R, Pj))
         R = product(R, Rj)
@@ -166,13 +168,25 @@ def cost_of(e, weight):
 
 
 @compiled()
-def part_of(e, mask, first):
-    """Size of the asked-for components of the translation (first = 0) or rotation (first = 3)."""
-    total = 0.0
-    for c in range(first, first + 3):
-        if mask[c]:
-            total += e[c] * e[c]
-    return sqrt(total)
+def sizes(e, mask):
+    """Size of the asked-for translation and of the asked-for rotation of an error."""
+    return (
+        sqrt((mask[0] * e[0]) ** 2 + (mask[1] * e[1]) ** 2 + (mask[2] * e[2]) ** 2),
+        sqrt((mask[3] * e[3]) ** 2 + (mask[4] * e[4]) ** 2 + (mask[5] * e[5]) ** 2),
+    )
+
+
+@compiled()
+def is_met(size, tolerance):
+    """Whether both sizes are within their tolerances."""
+    return size[0] <= tolerance[0] and size[1] <= tolerance[1]
+
+
+@compiled()
+def copy(a, b):
+    """Copy vector a into b."""
+    for i in range(a.shape[0]):
+        b[i] = a[i]
 
 
 @compiled()
@@ -224,18 +238,18 @@ def gradient(weight, bounds, unit, work):
 
     A joint at a limit that would leave it is held there; a joint off the path always is.
     """
-    q, e, J, _, g, _, held, _, _ = work
+    q, _, e, J, _, g, _, held, _, _ = work
     lower, upper = bounds
     size = 0.0
-    for i in range(q.shape[1]):
+    for i in range(q.shape[0]):
         total = 0.0
         for c in range(6):
             total += weight[c] * weight[c] * J[c, i] * e[c]
         g[i] = total
         held[i] = (
             unit[i] == 0.0
-            or (q[0, i] <= lower[i] and total <= 0.0)
-            or (q[0, i] >= upper[i] and total >= 0.0)
+            or (q[i] <= lower[i] and total <= 0.0)
+            or (q[i] >= upper[i] and total >= 0.0)
         )
         if not held[i]:
             size += (total / unit[i]) ** 2
@@ -243,18 +257,28 @@ def gradient(weight, bounds, unit, work):
 
 
 @compiled()
-def descend(goal, arm, weight, mask, tolerance, bounds, unit, iterations, work):
-    """Levenberg-Marquardt from the posture in row 0 of ``work.q``, which it improves.
+def look(goal, arm, work):
+    """Error and Jacobian of the posture in ``work``; returns the tool's position."""
+    q, _, e, J, _, _, _, _, z, o = work
+    R, p = forward(q, arm, z, o)
+    phi = missing(R, p, goal, e)
+    error_jacobian(p, phi, goal, arm, z, o, J)
+    return p
+
+
+@compiled()
+def descend(goal, arm, weight, mask, tolerance, bounds, unit, iterations, patience, work):
+    """Levenberg-Marquardt from the posture q in ``work``, which it improves.
 
     Within the tolerances it goes on while a step takes away most of the error, so that what is
     returned is as good as rounding allows where the pose can be met exactly. It gives up where
-    steps stop paying. Returns the sizes of the asked-for errors in metres and radians.
+    steps stop paying: where after five of them more than ``patience`` of the cost is left. The
+    error e in ``work`` is that of the posture it ends with; its sizes are returned.
     """
-    q, e, J, H, g, step, held, z, o = work
+    q, trial, e, J, H, g, step, held, z, o = work
     lower, upper = bounds
-    n = q.shape[1]
-    R, p = forward(q, 0, arm, z, o)
-    phi = missing(R, p, goal, e)
+    n = q.shape[0]
+    look(goal, arm, work)
     cost = cost_of(e, weight)
     damping = START_DAMPING
     due, before = 0, inf
@@ -262,11 +286,9 @@ def descend(goal, arm, weight, mask, tolerance, bounds, unit, iterations, work):
         if cost < EXACT:
             break
         if count == due:
-            # a valley that takes this long is left for another start
-            if cost > 0.7 * before:
+            if cost > patience * before:
                 break
             due, before = count + 5, cost
-        error_jacobian(p, phi, goal, arm, z, o, J)
         gradient(weight, bounds, unit, work)
         better = False
         new = cost
@@ -277,103 +299,86 @@ def descend(goal, arm, weight, mask, tolerance, bounds, unit, iterations, work):
                     for c in range(6):
                         total += weight[c] * weight[c] * J[c, i] * J[c, j]
                     H[i, j] = total
-                H[i, i] += (damping * cost + 1e-14) * unit[i] * unit[i]
+                H[i, i] += (damping * min(cost, FAR) + 1e-14) * unit[i] * unit[i]
                 step[i] = g[i]
             if factored(H, held):
                 substitute(H, held, step)
                 for i in range(n):
-                    q[1, i] = min(max(q[0, i] + step[i], lower[i]), upper[i])
-                R, p = forward(q, 1, arm, z, o)
+                    trial[i] = min(max(q[i] + step[i], lower[i]), upper[i])
+                R, p = forward(trial, arm, z, o)
                 phi = missing(R, p, goal, e)
                 new = cost_of(e, weight)
                 if new < cost:
+                    copy(trial, q)
+                    error_jacobian(p, phi, goal, arm, z, o, J)
                     better = True
                     break
             damping = 8.0 * damping
         if not better:
-            R, p = forward(q, 0, arm, z, o)
-            missing(R, p, goal, e)
+            look(goal, arm, work)
             break
-        for i in range(n):
-            q[0, i] = q[1, i]
         damping = max(damping / 3.0, 1e-3)
         pays = new < 0.1 * cost
         cost = new
-        met = part_of(e, mask, 0) <= tolerance[0] and part_of(e, mask, 3) <= tolerance[1]
-        if met and not pays:
+        if not pays and is_met(sizes(e, mask), tolerance):
             break
-    return part_of(e, mask, 0), part_of(e, mask, 3)
+    return sizes(e, mask)
 
 
 @compiled()
-def settle(q, turns, box, boxed, reference):
-    """Shift the angles in row 0 of q by whole turns.
-
-    Without limits into (-pi, pi]; with limits inside them, nearest to the reference.
-    """
+def settle(q, turns, box, reference):
+    """Shift the angles of q by whole turns: into (-pi, pi], or inside limits near the reference."""
     lower, upper = box
-    for i in range(q.shape[1]):
+    for i in range(q.shape[0]):
         if not turns[i]:
             continue
-        if boxed:
-            angle = q[0, i] + 2.0 * pi * round((reference[i] - q[0, i]) / (2.0 * pi))
-            while angle > upper[i]:
-                angle -= 2.0 * pi
-            while angle < lower[i]:
-                angle += 2.0 * pi
-            # at the ends of the range only rounding is clipped
-            q[0, i] = min(max(angle, lower[i]), upper[i])
+        if lower[i] == -inf and upper[i] == inf:
+            angle = q[i] - 2.0 * pi * np.rint(q[i] / (2.0 * pi))
+            q[i] = pi if angle <= -pi else angle
         else:
-            angle = q[0, i] - 2.0 * pi * round(q[0, i] / (2.0 * pi))
-            q[0, i] = pi if angle <= -pi else angle
+            turn = np.rint((reference[i] - q[i]) / (2.0 * pi))
+            turn = max(turn, np.ceil((lower[i] - q[i]) / (2.0 * pi)))
+            turn = min(turn, np.floor((upper[i] - q[i]) / (2.0 * pi)))
+            # at the ends of the range only rounding is clipped
+            q[i] = min(max(q[i] + 2.0 * pi * turn, lower[i]), upper[i])
 
 
 @compiled()
-def rate_starts(Rs, ps, goal, weight, spread, score):
+def rate_starts(poses, goal, weight, score):
     """How far the pose of each start is from the goal, smallest first to be tried."""
     Rd, pd, axes = goal
-    angular = 0.0
-    for c in range(3, 6):
-        angular = max(angular, weight[c])
+    angular = max(weight[3], weight[4], weight[5])
     for s in range(score.shape[0]):
-        away = transpose_times(axes, subtract(pd, vector(ps, s)))
+        p = (poses[s, 0, 3], poses[s, 1, 3], poses[s, 2, 3])
+        away = transpose_times(axes, subtract(pd, p))
         total = 0.0
         for c in range(3):
             total += (weight[c] * away[c]) ** 2
         if angular > 0.0:
-            R = matrix(Rs, s)
             trace = 0.0
-            for c in range(9):
-                trace += R[c] * Rd[c]
-            total += spread * angular * angular * (3.0 - trace)
+            for row in range(3):
+                for c in range(3):
+                    trace += poses[s, row, c] * Rd[3 * row + c]
+            total += SPREAD * angular * angular * (3.0 - trace)
         score[s] = total
 
 
 @compiled()
-def take_start(starts, score, q):
-    """Copy the best start that is left into row 0 of q."""
-    best = 0
-    for s in range(score.shape[0]):
-        if score[s] < score[best]:
-            best = s
-    score[best] = inf
-    for i in range(q.shape[1]):
-        q[0, i] = starts[best, i]
+def take_start(s, first, starts, score, unit, bounds, q):
+    """Start number s into q: the given one for s = 0, else the best that is left.
 
-
-@compiled()
-def copy_row(a, i, b, j):
-    """Copy row i of a into row j of b."""
-    for c in range(a.shape[1]):
-        b[j, c] = a[i, c]
-
-
-@compiled()
-def clip_row(q, bounds):
-    """Bring the posture in row 0 of q inside the bounds."""
+    Joints off the path stay where the given start has them.
+    """
     lower, upper = bounds
-    for i in range(q.shape[1]):
-        q[0, i] = min(max(q[0, i], lower[i]), upper[i])
+    best = 0
+    if s > 0:
+        for k in range(score.shape[0]):
+            if score[k] < score[best]:
+                best = k
+        score[best] = inf
+    for i in range(q.shape[0]):
+        value = starts[best, i] if s > 0 and unit[i] > 0.0 else first[i]
+        q[i] = min(max(value, lower[i]), upper[i])
 
 
 @compiled()
@@ -421,37 +426,118 @@ def row_space(J, weight, unit, rows, moves):
 def which_side(p, arm, goal, mask, work):
     """Whether the target is too far or too near for the posture that comes closest.
 
-    There the line from the tool to the target meets every axis that could turn the tool towards
-    it: TOO_NEAR if one of them lies beyond the target, else TOO_FAR.
+    There the line from the tool to the target meets every axis that turns the tool. TOO_NEAR if
+    one of them lies at the target or beyond: the tool does not come closer to it. Else TOO_FAR.
     """
     sigma, joint, _, _, _, _, path, _, _ = arm
     _, _, axes = goal
-    _, e, _, _, _, _, held, z, o = work
-    missed = (
-        e[0] if mask[0] else 0.0,
-        e[1] if mask[1] else 0.0,
-        e[2] if mask[2] else 0.0,
-    )
-    missed = times(axes, missed)
+    _, _, e, _, _, _, _, held, z, o = work
+    missed = times(axes, (mask[0] * e[0], mask[1] * e[1], mask[2] * e[2]))
     distance = sqrt(dot(missed, missed))
     ahead = scale(1.0 / distance, missed)
     for s in range(path.shape[0]):
         k = path[s] - 1
         if sigma[k] != 0 or held[joint[k]]:
             continue
-        # where the line passes the axis
+        # where the line passes the axis; along the line it says nothing
         axis = vector(z, s)
-        normal = cross(axis, cross(ahead, axis))
-        slope = dot(normal, ahead)
-        if slope > 1e-6 and dot(normal, subtract(vector(o, s), p)) > slope * distance:
+        across = cross(axis, cross(ahead, axis))
+        slope = dot(across, ahead)
+        if slope > 0.01 and dot(across, subtract(vector(o, s), p)) > 0.5 * slope * distance:
             return TOO_NEAR
     return TOO_FAR
 
 
+@compiled()
+def reach_pose(goal, arm, task, bounds, box, first, given, starts, score, kept, work):
+    """The whole task from one start after the other; the posture that comes closest into kept."""
+    asked, mask, tolerance, unit, turns, restarts, iterations = task
+    q, _, e, _, _, _, _, _, _, _ = work
+    least = inf
+    for s in range(1 - given, restarts + 1):
+        take_start(s, first, starts, score, unit, bounds, q)
+        descend(goal, arm, asked, mask, tolerance, bounds, unit, iterations, GIVE_UP, work)
+        settle(q, turns, box, first)
+        look(goal, arm, work)
+        cost = cost_of(e, asked)
+        if cost < least:
+            least = cost
+            copy(q, kept)
+        if is_met(sizes(e, mask), tolerance):
+            copy(q, kept)
+            return True
+    return False
+
+
+@compiled()
+def reach_position(
+    goal, arm, task, place, place_mask, stiff, bounds, box, first, starts, score, kept, work
+):
+    """The position alone, and there the least orientation error; the best posture into kept.
+
+    Returns FOUND if the pose is met after all, NO_ORIENTATION if its position is, else on which
+    side the target lies.
+    """
+    asked, mask, tolerance, unit, turns, restarts, iterations = task
+    q, _, e, _, _, _, _, _, _, _ = work
+    placed = False
+    closest, angle = inf, inf
+    for s in range(min(SIDE_STARTS, restarts) + 2):
+        if s == 0:
+            copy(kept, q)
+        else:
+            take_start(s - 1, first, starts, score, unit, bounds, q)
+        weight, part, patience = place, place_mask, GIVE_UP
+        for stage in range(4):
+            # the position; the orientation with it, twice; again the position
+            if stage == 1:
+                weight, part, patience = stiff, mask, 0.999
+                for c in range(3):
+                    stiff[c] = STIFF * asked[c]
+            elif stage == 2:
+                for c in range(3):
+                    stiff[c] = STIFFER * asked[c]
+            elif stage == 3:
+                weight, part, patience = place, place_mask, GIVE_UP
+            size = descend(
+                goal, arm, weight, part, tolerance, bounds, unit, iterations, patience, work
+            )
+            if (stage == 0 and not is_met(size, tolerance)) or is_met(sizes(e, mask), tolerance):
+                break
+        settle(q, turns, box, first)
+        look(goal, arm, work)
+        away, off = sizes(e, mask)
+        if away <= tolerance[0]:
+            if off <= tolerance[1]:
+                copy(q, kept)
+                return FOUND
+            if off < angle:
+                angle = off
+                copy(q, kept)
+            placed = True
+        elif not placed and away < closest:
+            closest = away
+            copy(q, kept)
+    if placed:
+        return NO_ORIENTATION
+    copy(kept, q)
+    side = NOTHING_FOUND
+    for _ in range(20):
+        descend(goal, arm, place, place_mask, tolerance, bounds, unit, iterations, GIVE_UP, work)
+        p = look(goal, arm, work)
+        slope = gradient(place, bounds, unit, work)
+        if slope <= 1e-3 * sqrt(cost_of(e, place)):
+            side = which_side(p, arm, goal, mask, work)
+            break
+    settle(q, turns, box, first)
+    copy(q, kept)
+    return side
+
+
 @compiled(
     NOTHING(
-        STACK, MATRIX, INT, MATRIX, *CHAIN, INTS, MATRIX, VECTOR, VECTOR, VECTOR, INT, INTS, INT,
-        FLOAT, FLOAT, VECTOR, INT, INT, OUT2, OUT2, FLAGS, CODES,
+        STACK, MATRIX, INT, MATRIX, STACK, *CHAIN, INTS, MATRIX, VECTOR, VECTOR, VECTOR, INT,
+        INTS, INT, FLOAT, FLOAT, VECTOR, INT, INT, OUT2, OUT2, FLAGS, CODES,
     )
 )  # fmt: skip
 def solve_poses(
@@ -459,6 +545,7 @@ def solve_poses(
     first: Floats,
     given: int,
     starts: Floats,
+    poses: Floats,
     antecedent: Ints,
     sigma: Ints,
     joint: Ints,
@@ -495,7 +582,9 @@ def solve_poses(
     given : int
         1 if ``first`` is a start, 0 if it only holds joints without effect and mid-ranges.
     starts : (K, n)
-        Further starts, K >= 1, the same for all poses [rad or m].
+        Further starts, K >= 1, the same for all targets [rad or m].
+    poses : (K, 4, 4)
+        World poses of the tool at these starts [m].
     antecedent, ..., base_position
         The `Chain`.
     path, tool_rotation, tool_position
@@ -529,34 +618,30 @@ def solve_poses(
         whole_vector(base_position), path, whole_matrix(tool_rotation),
         whole_vector(tool_position),
     )  # fmt: skip
-    e = np.zeros(6)
-    z, o = np.empty((k, 3)), np.empty((k, 3))
-    q = np.empty((2, n))
-    J = np.zeros((6, n))
-    held = np.empty(n, np.bool_)
-    work = (q, e, J, np.empty((n, n)), np.empty(n), np.empty(n), held, z, o)
-    kept = np.empty((1, n))
+    q, e, J = np.empty(n), np.zeros(6), np.zeros((6, n))
+    work = (
+        q, np.empty(n), e, J, np.empty((n, n)), np.empty(n), np.empty(n), np.empty(n, np.bool_),
+        np.empty((k, 3)), np.empty((k, 3)),
+    )  # fmt: skip
+    kept, score = np.empty(n), np.empty(starts.shape[0])
     rows, moves = np.empty((6, n)), np.empty(n)
 
     # weights of the whole task, of its position alone, and of a position that must not be lost
-    asked, place, stiff, place_mask = np.empty(6), np.empty(6), np.empty(6), np.zeros(6, np.int64)
+    asked, place, stiff = np.empty(6), np.zeros(6), np.empty(6)
+    whole_mask, place_mask = mask.copy(), np.zeros(6, np.int64)
     for c in range(6):
         asked[c] = mask[c] / length if c < 3 else mask[c]
-        place[c] = asked[c] if c < 3 else 0.0
-        stiff[c] = STIFF * asked[c] if c < 3 else asked[c]
-        place_mask[c] = mask[c] if c < 3 else 0
-    has_place = mask[0] + mask[1] + mask[2] > 0
-    has_turn = mask[3] + mask[4] + mask[5] > 0
+        stiff[c] = asked[c]
+        if c < 3:
+            place[c], place_mask[c] = asked[c], mask[c]
     unit, turns = np.zeros(n), np.zeros(n, np.bool_)
     for j in range(sigma.shape[0]):
         if sigma[j] == 0:
             turns[joint[j]] = True
+    free = 0
     for j in path:
         if sigma[j - 1] != 2:
             unit[joint[j - 1]] = 1.0 if sigma[j - 1] == 0 else 1.0 / length
-    free = 0
-    for i in range(n):
-        if unit[i] > 0.0:
             free += 1
     # an angle that has a whole turn is not limited: it is shifted inside afterwards
     nowhere = (np.full(n, -inf), np.full(n, inf))
@@ -567,16 +652,12 @@ def solve_poses(
         for i in range(n):
             if turns[i] and upper[i] - lower[i] >= 2.0 * pi:
                 bounds[0][i], bounds[1][i] = -inf, inf
-
-    Rs, ps = np.empty((starts.shape[0], 3, 3)), np.empty((starts.shape[0], 3))
-    for s in range(starts.shape[0]):
-        copy_row(starts, s, q, 0)
-        R, p = forward(q, 0, arm, z, o)
-        put_matrix(Rs, s, R)
-        put_vector(ps, s, p)
-    score = np.empty(starts.shape[0])
+    task = (asked, whole_mask, tolerance, unit, turns, restarts, iterations)
+    j = path[0] - 1
+    centre = add(arm[5], times(arm[4], vector(position, j)))
 
     generic = -1
+    reference = np.empty(n)
     for i in range(targets.shape[0]):
         T = targets[i]
         Rd = (T[0, 0], T[0, 1], T[0, 2], T[1, 0], T[1, 1], T[1, 2], T[2, 0], T[2, 1], T[2, 2])
@@ -585,127 +666,45 @@ def solve_poses(
         if generic < 0:
             # the rank of the task away from singular postures
             for s in range(min(8, starts.shape[0])):
-                copy_row(starts, s, q, 0)
-                R, p = forward(q, 0, arm, z, o)
-                phi = missing(R, p, goal, e)
-                error_jacobian(p, phi, goal, arm, z, o, J)
+                copy(starts[s], q)
+                look(goal, arm, work)
                 generic = max(generic, row_space(J, asked, unit, rows, moves))
 
-        # 1. the whole task from every start; 2. without limits, to say that they are the reason
-        found, beyond = False, False
-        copy_row(first, i, kept, 0)
-        least = inf
-        out_of_reach = False
-        if mask[0] and mask[1] and mask[2]:
-            copy_row(first, i, q, 0)
-            forward(q, 0, arm, z, o)
-            if k == 0:
-                centre = add(arm[5], times(arm[4], arm[8]))
-            else:
-                j = path[0] - 1
-                centre = add(arm[5], times(arm[4], vector(position, j)))
-            away = subtract(pd, centre)
-            out_of_reach = sqrt(dot(away, away)) > reach + tolerance[0]
-        for attempt in range(2):
-            if out_of_reach or (attempt == 1 and not boxed):
-                break
-            limits = bounds if attempt == 0 else nowhere
-            rate_starts(Rs, ps, goal, asked, SPREAD, score)
-            for s in range(1 - given, restarts + 1):
-                if s == 0:
-                    copy_row(first, i, q, 0)
+        copy(first[i], reference)
+        copy(reference, kept)
+        outcome = NOTHING_FOUND
+        away = subtract(pd, centre)
+        beyond = sqrt(dot(away, away)) > reach + tolerance[0] and place_mask.sum() == 3
+        if not beyond:
+            rate_starts(poses, goal, asked, score)
+            if reach_pose(
+                goal, arm, task, bounds, box, reference, given, starts, score, kept, work
+            ):
+                outcome = FOUND
+            elif boxed:
+                # without limits, to say that they are the reason
+                rate_starts(poses, goal, asked, score)
+                copy(kept, moves)
+                if reach_pose(
+                    goal, arm, task, nowhere, nowhere, reference, given, starts, score, kept,
+                    work,
+                ):  # fmt: skip
+                    outcome = BEYOND_LIMITS
                 else:
-                    take_start(starts, score, q)
-                    for c in range(n):
-                        if unit[c] == 0.0:
-                            q[0, c] = first[i, c]
-                clip_row(q, limits)
-                descend(goal, arm, asked, mask, tolerance, limits, unit, iterations, work)
-                settle(q, turns, box, attempt == 0 and boxed == 1, first[i])
-                R, p = forward(q, 0, arm, z, o)
-                phi = missing(R, p, goal, e)
-                cost = cost_of(e, asked)
-                if attempt == 0 and cost < least:
-                    least = cost
-                    copy_row(q, 0, kept, 0)
-                if part_of(e, mask, 0) <= tolerance[0] and part_of(e, mask, 3) <= tolerance[1]:
-                    found = True
-                    break
-            if found:
-                beyond = attempt == 1
-                break
-        code[i] = NOTHING_FOUND
-        if found:
-            code[i] = BEYOND_LIMITS if beyond else FOUND
-            copy_row(q, 0, kept, 0)
+                    copy(moves, kept)
+        if outcome == NOTHING_FOUND and place_mask.any():
+            rate_starts(poses, goal, place, score)
+            outcome = reach_position(
+                goal, arm, task, place, place_mask, stiff, bounds, box, reference, starts,
+                score, kept, work,
+            )  # fmt: skip
 
-        # 3. the position alone, and the least orientation error there
-        placed = False
-        if not found and has_place:
-            closest, angle = inf, inf
-            rate_starts(Rs, ps, goal, place, SPREAD, score)
-            for s in range(min(SIDE_STARTS, restarts) + 2):
-                if s == 0:
-                    copy_row(kept, 0, q, 0)
-                elif s == 1:
-                    copy_row(first, i, q, 0)
-                else:
-                    take_start(starts, score, q)
-                    for c in range(n):
-                        if unit[c] == 0.0:
-                            q[0, c] = first[i, c]
-                clip_row(q, bounds)
-                away_, _ = descend(
-                    goal, arm, place, place_mask, tolerance, bounds, unit, iterations, work
-                )
-                if away_ <= tolerance[0] and has_turn:
-                    descend(goal, arm, stiff, mask, tolerance, bounds, unit, iterations, work)
-                    if part_of(e, mask, 0) > tolerance[0] or part_of(e, mask, 3) > tolerance[1]:
-                        descend(
-                            goal, arm, place, place_mask, tolerance, bounds, unit, iterations, work
-                        )
-                settle(q, turns, box, boxed == 1, first[i])
-                R, p = forward(q, 0, arm, z, o)
-                missing(R, p, goal, e)
-                away_, off = part_of(e, mask, 0), part_of(e, mask, 3)
-                if away_ <= tolerance[0] and off <= tolerance[1]:
-                    found = True
-                    code[i] = FOUND
-                    copy_row(q, 0, kept, 0)
-                    break
-                if away_ <= tolerance[0]:
-                    if off < angle:
-                        angle = off
-                        copy_row(q, 0, kept, 0)
-                    placed = True
-                elif not placed and away_ < closest:
-                    closest = away_
-                    copy_row(q, 0, kept, 0)
-            if placed and not found:
-                code[i] = NO_ORIENTATION
-
-        # 4. the posture that is kept, what it misses, and on which side the target lies
-        copy_row(kept, 0, q, 0)
-        if not found and has_place and not placed:
-            for _ in range(20):
-                descend(goal, arm, place, place_mask, tolerance, bounds, unit, iterations, work)
-                R, p = forward(q, 0, arm, z, o)
-                phi = missing(R, p, goal, e)
-                error_jacobian(p, phi, goal, arm, z, o, J)
-                slope = gradient(place, bounds, unit, work)
-                if slope <= 1e-3 * sqrt(cost_of(e, place)):
-                    code[i] = which_side(p, arm, goal, mask, work)
-                    break
-            settle(q, turns, box, boxed == 1, first[i])
-        R, p = forward(q, 0, arm, z, o)
-        phi = missing(R, p, goal, e)
+        copy(kept, q)
+        look(goal, arm, work)
+        code[i] = outcome
+        copy(kept, out[i])
+        copy(e, error[i])
+        known = outcome == FOUND and generic < free
+        known = known and row_space(J, asked, unit, rows, moves) == generic
         for c in range(n):
-            out[i, c] = q[0, c]
-            family[i, c] = False
-        for c in range(6):
-            error[i, c] = e[c]
-        if found and generic < free:
-            error_jacobian(p, phi, goal, arm, z, o, J)
-            if row_space(J, asked, unit, rows, moves) == generic:
-                for c in range(n):
-                    family[i, c] = moves[c] > 1e-10
+            family[i, c] = known and moves[c] > 1e-10

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+import weakref
+from dataclasses import dataclass
 from math import inf
 from numbers import Real
 from operator import index
@@ -14,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from .. import se3
 from .._arrays import Array, as_floats, as_vector, batch_rows, read_only
 from ..errors import InvalidValueError, ShapeError
-from ..geometry import PRISMATIC, REVOLUTE
+from ..geometry import REVOLUTE
 from ..model import RobotModel
 from .solutions import IGMSolutions
 from .status import IGMStatus
@@ -25,7 +26,9 @@ METHOD = "numeric (Levenberg-Marquardt)"
 _SEED = 20
 # the first few starts also tell how many components of the task the arm can govern
 _FEWEST_STARTS = 8
+_FAMILY = int(IGMStatus.REACHED_FAMILY)
 # in the order of the outcomes that the kernel writes
+_FOUND = 0
 _STATUS = np.array(
     [
         IGMStatus.REACHED,
@@ -136,6 +139,8 @@ def igm_numeric(
     >>> igm_numeric(trr, B).reason()
     'The position is reached, but the orientation is not available there. It is off by 180 deg.'
     """
+    if not isinstance(model, RobotModel):
+        raise InvalidValueError(f"model: expected a RobotModel, got {type(model).__name__}.")
     T = se3.as_pose(T)
     asked = _mask(mask)
     if mask_axes not in ("world", "tool"):
@@ -150,33 +155,31 @@ def igm_numeric(
     iterations = _whole(iterations, "iterations", 1)
     if not isinstance(limits, (bool, np.bool_)):
         raise InvalidValueError(f"limits: expected True or False, got {limits!r}.")
-    if restarts == 0 and q0 is None:
+    if restarts == 0 and q0 is None:  # nowhere to start from
         raise InvalidValueError("restarts: 0 leaves no start without q0; give q0 or restarts.")
-    length, reach = _lengths(model, limits)
-    low, high = _ranges(model, limits, length)
-    middle = 0.5 * (low + high) if limits else np.zeros(model.n)
-    first = middle if q0 is None else as_vector(q0, model.n, "q0")
+    search = _search(model, bool(limits), restarts, rng)
+    first = search.middle if q0 is None else as_vector(q0, model.n, "q0")
     flat = T.reshape(*T.shape[:-2], 16)
     batch, (targets, first) = batch_rows((flat, first), ("T", "q0"))
     if limits:
         first = np.clip(first, model.lower, model.upper)
-    unit = _unit_starts(restarts, model.n, rng)
     N, n = first.shape
     q, error = np.empty((N, n)), np.empty((N, 6))
     family, outcome = np.empty((N, n), dtype=np.bool_), np.empty(N, dtype=np.int64)
     from ._descent import solve_poses
 
     solve_poses(
-        targets.reshape(N, 4, 4), first, int(q0 is not None), low + unit * (high - low),
-        *model.chain, *_tool(model), model.lower, model.upper, int(limits),
-        asked.astype(np.int64), int(mask_axes == "tool"), length, reach, tolerance, restarts,
-        iterations, q, error, family, outcome,
+        targets.reshape(N, 4, 4), first, int(q0 is not None), search.starts, search.poses,
+        *model.chain, *search.tool, model.lower, model.upper, int(limits),
+        asked.astype(np.int64), int(mask_axes == "tool"), search.length, search.reach, tolerance,
+        restarts, iterations, q, error, family, outcome,
     )  # fmt: skip
-    return _solutions(model, batch, q, error, family, outcome, asked, bool(limits))
+    return _solutions(model, search, batch, q, error, family, outcome, asked, bool(limits))
 
 
 def _solutions(
     model: RobotModel,
+    search: _Search,
     batch: tuple[int, ...],
     q: Array,
     error: Array,
@@ -187,61 +190,98 @@ def _solutions(
 ) -> IGMSolutions:
     """Lay the kernel's rows out as the common result."""
     n = model.n
-    revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
     status = _STATUS[outcome]
-    valid = status == IGMStatus.REACHED
-    on_path = np.zeros(n, dtype=np.bool_)
-    joints = model.chain.joint[_tool(model)[0] - 1]
-    on_path[joints[joints >= 0]] = True
-    free = valid[:, None] & ~on_path
-    status[valid & (free | family).any(axis=-1)] = IGMStatus.REACHED_FAMILY
-    missing = error * asked
-    residual = np.maximum(
-        np.linalg.norm(missing[:, :3], axis=-1), np.linalg.norm(missing[:, 3:], axis=-1)
-    )
-    inside = valid & ((q >= model.lower) & (q <= model.upper)).all(axis=-1)
+    valid = outcome == _FOUND
+    each = valid[:, None]
+    free = each & ~search.on_path
+    status[valid & (free | family).any(axis=-1)] = _FAMILY
+    squares = (error * error * asked).reshape(-1, 2, 3).sum(axis=-1)
+    inside = (each & (q >= model.lower) & (q <= model.upper)).all(axis=-1)
     rows = (*batch, 1)
     return IGMSolutions(
-        q=np.where(valid[:, None], q, np.nan).reshape(*rows, n),
+        q=np.where(each, q, np.nan).reshape(*rows, n),
         valid=valid.reshape(rows),
-        residual=residual.reshape(rows),
+        residual=np.sqrt(squares.max(axis=-1)).reshape(rows),
         within_limits=inside.reshape(rows),
         branch=np.zeros(rows, dtype=np.str_),
         status=status.reshape(batch),
         double=np.zeros(rows, dtype=np.bool_),
         free_joints=free.reshape(*rows, n),
-        family_joints=(family & valid[:, None]).reshape(*rows, n),
+        family_joints=(each & family).reshape(*rows, n),
         method=METHOD,
-        periodic=np.zeros(n, dtype=np.bool_) if limits else revolute,
+        periodic=np.zeros(n, dtype=np.bool_) if limits else search.revolute,
         mask=asked,
         error=error.reshape(*rows, 6),
         closest=q.reshape(*batch, n),
     )
 
 
-def _tool(model: RobotModel) -> tuple[NDArray[np.int64], Array, Array]:
-    """Path, rotation and position of the tool as kernels take them, without Pinocchio."""
-    path = np.array(model.table.path(model.tip), dtype=np.int64)
-    E = model.tool
-    return path, np.ascontiguousarray(E[:3, :3]), np.ascontiguousarray(E[:3, 3])
+@dataclass(frozen=True, slots=True, eq=False)
+class _Search:
+    """What every call with a model and its limits needs: starts, their poses, lengths."""
+
+    tool: tuple[NDArray[np.int64], Array, Array]
+    """Path, rotation and position of the tool as kernels take them."""
+    revolute: NDArray[np.bool_]
+    on_path: NDArray[np.bool_]
+    length: float
+    """Of the path's constant links, metres."""
+    reach: float
+    """What the tool's distance from its path's first frame never exceeds, metres."""
+    middle: Array
+    """Where joints without effect stay, and mid-range."""
+    starts: Array
+    poses: Array
 
 
-def _lengths(model: RobotModel, limits: bool) -> tuple[float, float]:
-    """Length of the path's constant links, and how far the tool gets from its first frame."""
-    path, _, e = _tool(model)
-    links = np.linalg.norm(model.chain.position[path[1:] - 1], axis=-1).sum()
-    length = float(links + np.linalg.norm(e))
-    reach = length
-    for j in path:
-        if model.table.sigma[j - 1] == PRISMATIC:
-            i = model.chain.joint[j - 1]
-            reach += max(abs(model.lower[i]), abs(model.upper[i])) if limits else inf
-    return length or 1.0, float(reach) * (1.0 + 1e-12)
+# by identity: a model's hash reads all of its numbers
+_SEARCHES: dict[tuple[int, bool, int], tuple[weakref.ref[RobotModel], _Search]] = {}
 
 
-def _ranges(model: RobotModel, limits: bool, length: float) -> tuple[Array, Array]:
+def _search(model: RobotModel, limits: bool, restarts: int, rng: Any) -> _Search:
+    """What `_new_search` builds, kept with the model when the starts are the fixed ones."""
+    if rng is not None:
+        return _new_search(model, limits, restarts, rng)
+    key = (id(model), limits, restarts)
+    entry = _SEARCHES.get(key)
+    if entry is None or entry[0]() is not model:
+        search = _new_search(model, limits, restarts, _SEED)
+        entry = (weakref.ref(model, lambda _: _SEARCHES.pop(key, None)), search)
+        _SEARCHES[key] = entry
+    return entry[1]
+
+
+def _new_search(model: RobotModel, limits: bool, restarts: int, rng: Any) -> _Search:
+    """Draw the starts and multiply out what they and the lengths need."""
+    if not isinstance(rng, np.random.Generator):
+        rng = np.random.default_rng(_whole(rng, "rng", 0))
+    table, chain, n = model.table, model.chain, model.n
+    path, E = read_only(table.path(model.tip), np.int64), model.tool
+    tool = path, read_only(E[:3, :3]), read_only(E[:3, 3])
+    revolute = read_only(table.sigma[table.joint_rows] == REVOLUTE, np.bool_)
+    joints = chain.joint[path - 1]
+    on_path = np.zeros(n, dtype=np.bool_)
+    on_path[joints[joints >= 0]] = True
+    links = np.linalg.norm(chain.position[path[1:] - 1], axis=-1).sum()
+    length = float(links + np.linalg.norm(tool[2])) or 1.0
+    strokes = np.maximum(np.abs(model.lower), np.abs(model.upper)) if limits else np.full(n, inf)
+    reach = (length + strokes[on_path & ~revolute].sum()) * (1.0 + 1e-12)
+    low, high = _ranges(model, revolute, limits, length)
+    starts = low + rng.random((max(restarts, _FEWEST_STARTS), n)) * (high - low)
+    poses = np.empty((len(starts), 4, 4))
+    from ..kernels.poses import tip_poses
+
+    tip_poses(starts, *chain, *tool, poses)
+    middle = read_only(0.5 * (low + high) if limits else np.zeros(n))
+    return _Search(
+        tool, revolute, on_path, length, float(reach), middle, read_only(starts), read_only(poses)
+    )
+
+
+def _ranges(
+    model: RobotModel, revolute: NDArray[np.bool_], limits: bool, length: float
+) -> tuple[Array, Array]:
     """Where spread starts lie: the limits, or a whole turn, or the length of the arm."""
-    revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
     span = np.where(revolute, 2.0 * np.pi, 2.0 * length)
     lower, upper = model.lower, model.upper
     if not limits:
@@ -253,21 +293,6 @@ def _ranges(model: RobotModel, limits: bool, length: float) -> tuple[Array, Arra
     wide = revolute & (high - low > span)
     middle = 0.5 * (low + high)
     return np.where(wide, middle - span / 2, low), np.where(wide, middle + span / 2, high)
-
-
-def _unit_starts(restarts: int, n: int, rng: Any) -> Array:
-    """Points of the unit cube, shape (max(restarts, 8), n)."""
-    count = max(restarts, _FEWEST_STARTS)
-    if rng is None:
-        return _fixed_starts(count, n)
-    if not isinstance(rng, np.random.Generator):
-        rng = np.random.default_rng(_whole(rng, "rng", 0))
-    return rng.random((count, n))
-
-
-@lru_cache(maxsize=32)
-def _fixed_starts(count: int, n: int) -> Array:
-    return read_only(np.random.default_rng(_SEED).random((count, n)))
 
 
 def _mask(mask: ArrayLike | None) -> NDArray[np.bool_]:

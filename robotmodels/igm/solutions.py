@@ -150,14 +150,15 @@ class IGMSolutions:
         if self.error is None or status in (IGMStatus.REACHED, IGMStatus.REACHED_FAMILY):
             return status.sentence
         missing = np.where(self.mask, self.error[at][0], 0.0)
-        metres = float(np.linalg.norm(missing[:3]))
+        metres = f"{np.linalg.norm(missing[:3]):.4g} m"
         angle = f"{np.rad2deg(np.linalg.norm(missing[3:])):.4g} deg"
         if status in (IGMStatus.TOO_FAR, IGMStatus.TOO_NEAR):
-            return f"{status.sentence} The closest posture misses it by {metres:.4g} m."
+            return f"{status.sentence} The closest posture misses it by {metres}."
         if status is IGMStatus.ORIENTATION_NOT_AVAILABLE:
             return f"{status.sentence} It is off by {angle}."
         if status is IGMStatus.NOT_CONVERGED:
-            return f"{status.sentence} The closest one misses it by {metres:.4g} m and {angle}."
+            asked = [metres] * bool(self.mask[:3].any()) + [angle] * bool(self.mask[3:].any())
+            return f"{status.sentence} The closest one misses it by {' and '.join(asked)}."
         return status.sentence
 
     def nearest(self, q: ArrayLike) -> Array:

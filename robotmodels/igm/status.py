@@ -34,7 +34,7 @@ class IGMStatus(IntEnum):
     ORIENTATION_NOT_AVAILABLE = (
         5, "The position is reached, but the orientation is not available there.",
     )  # fmt: skip
-    NOT_CONVERGED = 6, "No posture was found that meets the pose, and no reason why."
+    NOT_CONVERGED = 6, "No posture was found that meets the pose."
 
     def __new__(cls, value: int, sentence: str = "") -> Self:
         """Attach the sentence to the number."""

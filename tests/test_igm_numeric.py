@@ -1,0 +1,595 @@
+"""The numeric inverse geometric model: poses met, limits, masks, and what is said when not."""
+
+import json
+import pickle
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+from identities.random_robots import random_model, random_pose, random_rotation, random_state
+from numba import njit
+
+import robotmodels as rm
+from robotmodels import se3
+from robotmodels.errors import InvalidValueError, NotARotationError, RobotModelsError, ShapeError
+from robotmodels.igm import IGMStatus, igm_numeric
+from robotmodels.igm import _descent as descent
+
+ORACLES = Path(__file__).parent / "oracles"
+POSITION = [1, 1, 1, 0, 0, 0]
+POINTING = [1, 1, 1, 1, 1, 0]
+A = np.array([[0, 0, -1, 0.1414], [0, 1, 0, -0.3], [1, 0, 0, 0.8414], [0, 0, 0, 1]])
+B = np.array([[-1, 0, 0, 0.4], [0, 1, 0, 0.2], [0, 0, -1, 0.5], [0, 0, 0, 1]])
+
+
+def at(x, y, z):
+    return se3.translation(x, y, z)
+
+
+def postures(model, rng, count):
+    """Postures inside the limits; angles without limits anywhere, strokes within a metre."""
+    revolute = model.table.sigma[model.table.joint_rows] == 0
+    reach = np.where(revolute, np.pi, 1.0)
+    lower = np.where(np.isfinite(model.lower), model.lower, -reach)
+    upper = np.where(np.isfinite(model.upper), model.upper, reach)
+    return rng.uniform(lower, upper, (count, model.n))
+
+
+def log_rotation(R):
+    """Rotation vectors by the plain formula, away from pi."""
+    angle = np.arccos(np.clip((np.trace(R, axis1=-2, axis2=-1) - 1) / 2, -1, 1))
+    axis = np.stack(
+        [R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], -1
+    )
+    return axis / (2 * np.sinc(angle / np.pi))[..., None]
+
+
+def pose_error(model, q, T, axes):
+    """What is missing at q, by the definition in the docstring."""
+    P = rm.dgm(model, q)
+    R = T[..., :3, :3]
+    turn = R if axes == "tool" else np.broadcast_to(np.eye(3), R.shape)
+    away = np.einsum("...ji,...j->...i", turn, T[..., :3, 3] - P[..., :3, 3])
+    phi = log_rotation(R @ np.swapaxes(P[..., :3, :3], -1, -2))
+    return np.concatenate([away, np.einsum("...ji,...j->...i", turn, phi)], axis=-1)
+
+
+def check_met(model, T, found, mask=None, tolerance=1e-6):
+    """Everything marked valid meets its pose, by an independent forward pass."""
+    mask = np.ones(6) if mask is None else np.array(mask)
+    valid = found.valid[..., 0]
+    P = rm.dgm(model, found.q[..., 0, :][valid])
+    T = np.broadcast_to(T, (*valid.shape, 4, 4))[valid]
+    R = T[..., :3, :3] @ np.swapaxes(P[..., :3, :3], -1, -2)
+    # near zero the vector part is the angle; half a turn would show in the trace
+    phi = np.stack([R[..., 2, 1], R[..., 0, 2], R[..., 1, 0]], -1)
+    away = (T[..., :3, 3] - P[..., :3, 3]) * mask[:3]
+    assert np.linalg.norm(away, axis=-1).max(initial=0) <= 1.001 * tolerance + 1e-13
+    if mask[3:].all():
+        assert np.linalg.norm(phi, axis=-1).max(initial=0) <= 1.001 * tolerance + 1e-13
+        assert np.trace(R, axis1=-2, axis2=-1).min(initial=3) > 2.9
+
+
+# --- the derivative ------------------------------------------------------------------------------
+
+
+@njit
+def probe(q, arm, goal, z, o, e, J):
+    R, p = descent.forward(q, arm, z, o)
+    phi = descent.missing(R, p, goal, e)
+    descent.error_jacobian(p, phi, goal, arm, z, o, J)
+
+
+def plain(array):
+    return tuple(float(v) for v in np.ravel(array))
+
+
+@pytest.mark.parametrize("axes", ["world", "tool"])
+@pytest.mark.parametrize("turn", [0.0, 1e-6, 0.01, 2.0, np.pi - 1e-4])
+def test_error_and_its_derivative(axes, turn, rng):
+    """The analytic derivative of all six components is that of finite differences."""
+    for seed in range(3):
+        model = random_model(np.random.default_rng(seed), f=7, tree=True, fixed=True, tip=7)
+        chain, path = model.chain, np.array(model.table.path(model.tip))
+        arm = (
+            chain.sigma, chain.joint, chain.rotation, chain.position, plain(chain.base_rotation),
+            plain(chain.base_position), path, plain(model.tool[:3, :3]), plain(model.tool[:3, 3]),
+        )  # fmt: skip
+        q = random_state(model, rng)[0]
+        axis = random_rotation(rng)[0]
+        R = se3.rotation("z", turn)[:3, :3]
+        turned = np.linalg.qr(np.c_[axis, rng.normal(size=(3, 2))])[0]
+        turned = np.roll(turned * np.sign(np.linalg.det(turned)), -1, axis=1)
+        T = rm.dgm(model, q)
+        T[:3, :3] = turned @ R @ turned.T @ T[:3, :3]
+        T[:3, 3] += rng.normal(size=3)
+        goal = (plain(T[:3, :3]), plain(T[:3, 3]),
+                plain(T[:3, :3]) if axes == "tool" else plain(np.eye(3)))  # fmt: skip
+        z, o = np.empty((len(path), 3)), np.empty((len(path), 3))
+
+        def error(x, arm=arm, goal=goal, z=z, o=o, n=model.n):
+            e, J = np.zeros(6), np.zeros((6, n))
+            probe(x, arm, goal, z, o, e, J)
+            return e, J
+
+        e, J = error(q)
+        assert np.linalg.norm(e[3:]) == pytest.approx(turn, abs=1e-9)
+        if 1e-3 < turn < 3:
+            np.testing.assert_allclose(e, pose_error(model, q, T, axes), atol=1e-9)
+        h = 1e-6
+        for i, step in enumerate(h * np.eye(model.n)):
+            numeric = -(error(q + step)[0] - error(q - step)[0]) / (2 * h)
+            np.testing.assert_allclose(J[:, i], numeric, atol=2e-8 * (1 + np.abs(J[:, i]).max()))
+
+
+# --- reachable poses ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("limits", [False, True])
+@pytest.mark.parametrize("name", [n for n in rm.robots() if not n.startswith("erd:")])
+def test_catalogue_reaches_its_poses(name, limits, rng):
+    """Poses of postures inside the limits are reached, in full, by every robot."""
+    model = rm.load(name)
+    T = rm.dgm(model, postures(model, rng, 60))
+    found = igm_numeric(model, T, limits=limits)
+    check_met(model, T, found)
+    assert found.valid.mean() >= 0.98
+    if limits:
+        q = found.q[found.valid]
+        assert ((q >= model.lower) & (q <= model.upper)).all()
+        assert (found.within_limits == found.valid).all()
+
+
+@pytest.mark.parametrize("f", [1, 2, 4, 6, 7, 9])
+@pytest.mark.parametrize("tree", [False, True])
+def test_random_structures_reach_their_poses(f, tree):
+    """Any structure: prismatic joints, fixed frames, branches, any tip, base and tool."""
+    total = reached = 0
+    for seed in range(8):
+        rng = np.random.default_rng([f, tree, seed])
+        model = random_model(rng, f=f, tree=tree, fixed=True, tip="any")
+        T = rm.dgm(model, random_state(model, rng, 5)[0])
+        found = igm_numeric(model, T)
+        check_met(model, T, found)
+        total, reached = total + 5, reached + int(found.count.sum())
+    assert reached >= 0.97 * total
+
+
+def test_success_rate_of_six_and_seven_joints(rng):
+    """At least 99.5 % of reachable poses inside the limits."""
+    for name in ("puma560", "panda"):
+        model = rm.load(name)
+        T = rm.dgm(model, postures(model, rng, 1000))
+        found = igm_numeric(model, T, limits=True)
+        check_met(model, T, found)
+        assert found.valid.mean() >= 0.995
+
+
+@pytest.mark.parametrize("robot", ["rx90", "ur5"])
+def test_oracle_postures_are_found_from_near(robot):
+    """From near a regular posture of the oracle the solver ends there."""
+    oracle = json.loads((ORACLES / f"igm_{robot}.json").read_text(encoding="utf-8"))
+    rows = [
+        {"sigma": 0, "alpha": a, "d": d, "theta": t, "r": r}
+        for a, d, t, r in zip(
+            *(oracle["robot"][k] for k in ("alpha", "d", "theta", "r")), strict=True
+        )
+    ]
+    model = rm.RobotModel.from_table(rm.DHTable.from_rows(rows), tool=oracle["robot"]["tool"])
+    rng = np.random.default_rng(0)
+    checked = 0
+    for case in oracle["cases"]:
+        solutions = np.array(case["solutions"]).reshape(-1, 6)
+        if not len(solutions):
+            continue
+        near = solutions + 1e-3 * rng.normal(size=solutions.shape)
+        found = igm_numeric(model, case["T"], q0=near)
+        assert found.valid.all(), case["kind"]
+        if case["kind"] != "generic":
+            continue
+        way = found.q[:, 0] - solutions
+        assert np.abs(way - 2 * np.pi * np.round(way / (2 * np.pi))).max() < 1e-8
+        checked += len(solutions)
+    assert checked >= 40
+
+
+def test_singular_poses_are_reached():
+    """Wrist aligned, elbow stretched, shoulder over the wrist: reached like any pose."""
+    model = rm.load("rx90")
+    for q in ([0.3, 0.5, 1.2, 0.4, 0.0, 0.7], [0.3, 0.5, np.pi / 2, 0.4, 0.6, 0.7],
+              [0.3, np.pi / 2, 0.0, 0.4, 0.6, 0.7], np.zeros(6)):  # fmt: skip
+        T = rm.dgm(model, q)
+        found = igm_numeric(model, T)
+        assert found.valid.all()
+        check_met(model, T, found)
+
+
+def test_half_a_turn_away():
+    """A start whose tool looks exactly the other way is left all the same."""
+    model = rm.load("rx90")
+    q = np.array([0.1, 0.4, 1.1, 0.3, 0.8, 0.2])
+    T = rm.dgm(model, q)
+    found = igm_numeric(model, T, q0=q + np.pi * np.eye(6)[5], restarts=0)
+    assert found.valid.all()
+    check_met(model, T, found)
+
+
+def test_long_strokes():
+    """A prismatic joint without limits goes as far as it must."""
+    found = igm_numeric(rm.load("lab_trr"), at(0.3, 500.0, 0.6), mask=POSITION)
+    assert found.valid.all()
+    assert found.q[0, 0] == pytest.approx(500.0, abs=1e-6)
+
+
+# --- the exercise ---------------------------------------------------------------------------------
+
+
+def test_exercise_pose_a_in_full():
+    """Pose A is printed with four digits: reached in full within 1e-4, not within 1e-6."""
+    model = rm.load("lab_trr")
+    found = igm_numeric(model, A, position_tolerance=1e-4, orientation_tolerance=1e-4)
+    np.testing.assert_allclose(found.q[0], [-0.3, -np.pi / 4, -np.pi / 4], atol=1e-4)
+    assert found.residual[0] < 3e-5
+    assert not igm_numeric(model, A).valid.any()
+
+
+def test_exercise_pose_b_in_position_only():
+    """Pose B: the position, stretched out; the orientation is half a turn off, and that is said."""
+    model = rm.load("lab_trr")
+    position = igm_numeric(model, B, mask=POSITION)
+    np.testing.assert_allclose(position.q[0], [0.2, 0, 0], atol=1e-4)
+    full = igm_numeric(model, B)
+    assert full.count == 0
+    assert np.isnan(full.q).all()
+    assert full.status == IGMStatus.ORIENTATION_NOT_AVAILABLE
+    np.testing.assert_allclose(full.closest, [0.2, 0, 0], atol=1e-4)
+    np.testing.assert_allclose(full.error[0, :3], 0, atol=1e-6)
+    assert np.linalg.norm(full.error[0, 3:]) == pytest.approx(np.pi, abs=1e-4)
+    assert full.residual[0] == pytest.approx(np.pi, abs=1e-4)
+    assert full.reason().endswith("It is off by 180 deg.")
+
+
+def test_exercise_path_with_the_position_mask():
+    """The straight path from A to B is reachable in position at all 50 points."""
+    model = rm.load("lab_trr")
+    T = np.repeat(A[None], 50, axis=0)
+    T[:, :3, 3] = np.linspace(A[:3, 3], B[:3, 3], 50)
+    found = igm_numeric(model, T, mask=POSITION)
+    assert found.valid.all()
+    assert found.q.shape == (50, 1, 3)
+    check_met(model, T, found, POSITION)
+
+
+# --- poses that cannot be met ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("robot", "position", "status", "gap"),
+    [
+        ("lab_rr", (0.5, 0, 0.5), IGMStatus.TOO_FAR, 0.3),
+        ("lab_rr", (0.0, 0, 0.71), IGMStatus.TOO_FAR, 0.01),
+        ("lab_rr", (0.1, 0, 0.5), IGMStatus.TOO_NEAR, 0.1),
+        ("rx90", (0.0, 0, 2.5), IGMStatus.TOO_FAR, 1.6),
+        ("rx90", (0.0, 3.0, 0), IGMStatus.TOO_FAR, 2.1),
+        ("kr6_r900", (0.0, 0, 2.5), IGMStatus.TOO_FAR, None),
+        ("ur5", (0.0, 0, 0.35), IGMStatus.TOO_NEAR, None),
+    ],
+)
+@pytest.mark.parametrize("mask", [None, POSITION])
+def test_out_of_reach(robot, position, status, gap, mask):
+    """Never valid; which side, and by how much, is said."""
+    found = igm_numeric(rm.load(robot), at(*position), mask=mask)
+    assert found.count == 0
+    assert found.status == status
+    if gap:
+        assert np.linalg.norm(found.error[0, :3]) == pytest.approx(gap, abs=1e-4)
+        assert f"misses it by {gap:g} m" in found.reason()
+
+
+def test_hole_in_the_middle_of_a_planar_arm():
+    """Links of 0.5 and 0.3: nearer than 0.2 is too near, farther than 0.8 too far."""
+    table = rm.DHTable.from_rows([{"sigma": 0}, {"sigma": 0, "d": 0.5}])
+    model = rm.RobotModel.from_table(table, tool=at(0.3, 0, 0))
+    found = igm_numeric(model, [at(0.05, 0.1, 0), at(0.3, 0.3, 0), at(0.8, 0.1, 0)], mask=POSITION)
+    assert found.status.tolist() == [IGMStatus.TOO_NEAR, IGMStatus.REACHED, IGMStatus.TOO_FAR]
+
+
+def test_orientation_that_a_small_arm_does_not_have():
+    """With the position held, the remaining angle is the least one: checked against a scan."""
+    model = rm.load("lab_rrt")
+    T = at(0.4, 0.1, 0.6)
+    T[:3, :3] = random_rotation(np.random.default_rng(3))
+    found = igm_numeric(model, T)
+    assert found.status == IGMStatus.ORIENTATION_NOT_AVAILABLE
+    # its postures at that position: two, with the stroke to either side, and their mirror images
+    P = rm.dgm(model, igm_numeric(model, np.array([T] * 40), mask=POSITION, rng=1,
+               q0=np.random.default_rng(0).uniform(-3, 3, (40, 3))).q[:, 0])  # fmt: skip
+    angles = np.arccos(
+        (np.trace(T[:3, :3] @ np.swapaxes(P[:, :3, :3], 1, 2), axis1=1, axis2=2) - 1) / 2
+    )
+    assert np.linalg.norm(found.error[0, 3:]) == pytest.approx(angles.min(), abs=1e-5)
+    assert np.linalg.norm(found.error[0, :3]) <= 1e-6
+
+
+def test_orientation_least_along_a_self_motion():
+    """A planar 3R arm holds its point along a self-motion: the best orientation of it is kept."""
+    model = rm.load("planar_3r").with_tool(at(1.0, 0, 0))
+    T = at(2.9, 0, 0) @ se3.rotation("z", np.pi / 2)
+    found = igm_numeric(model, T)
+    assert found.status == IGMStatus.ORIENTATION_NOT_AVAILABLE
+    a = np.linspace(-np.pi, np.pi, 200_001)  # direction of the last link: the others must reach
+    ends = np.hypot(2.9 - np.cos(a), np.sin(a)) <= 2.0
+    assert abs(found.error[0, 5]) == pytest.approx(np.abs(np.pi / 2 - a[ends]).min(), abs=1e-4)
+
+
+def test_no_false_success_on_wild_poses(rng):
+    """Poses drawn at random are either met or refused; refused ones carry a true error."""
+    for name in ("rx90", "lab_trr", "xarm5", "panda"):
+        model = rm.load(name)
+        T = np.array([random_pose(rng, 0.5) for _ in range(40)])
+        found = igm_numeric(model, T, limits=True)
+        check_met(model, T, found)
+        assert np.isnan(found.q[~found.valid]).all()
+        assert not found.within_limits[~found.valid].any()
+        P = rm.dgm(model, found.closest)
+        np.testing.assert_allclose(found.error[:, 0, :3], T[:, :3, 3] - P[:, :3, 3], atol=1e-12)
+
+
+def test_unreachable_orientation_alone():
+    """Without a position there is no far or near: not converged, with the angle that is left."""
+    found = igm_numeric(rm.load("lab_rr"), at(0, 0, 0) @ se3.rotation("x", 1.0),
+                        mask=[0, 0, 0, 1, 1, 1])  # fmt: skip
+    assert found.status == IGMStatus.NOT_CONVERGED
+    assert found.reason().startswith("No posture was found")
+    assert " m " not in found.reason()
+
+
+# --- limits ---------------------------------------------------------------------------------------
+
+
+def test_limits_are_said_to_be_the_reason():
+    """A pose that only a posture outside the limits reaches."""
+    table = rm.DHTable.from_rows(
+        [{"sigma": 0, "lower": -0.5, "upper": 0.5}, {"sigma": 0, "d": 0.5}]
+    )
+    model = rm.RobotModel.from_table(table, tool=at(0.5, 0, 0))
+    T = rm.dgm(model, [2.0, 0.3])
+    inside = igm_numeric(model, T, limits=True)
+    assert inside.status == IGMStatus.OUTSIDE_LIMITS
+    assert inside.count == 0
+    np.testing.assert_allclose(rm.dgm(model, inside.closest), T, atol=1e-6)
+    outside = igm_numeric(model, T)
+    assert outside.valid.all()
+    assert not outside.within_limits.any()
+
+
+def test_a_solution_at_a_limit():
+    """Poses of postures on the corner of the limits are met on it, not beyond."""
+    model = rm.load("puma560")
+    for q in (model.lower, model.upper):
+        T = rm.dgm(model, q)
+        found = igm_numeric(model, T, limits=True)
+        assert found.valid.all()
+        assert found.within_limits.all()
+
+
+def test_whole_turns():
+    """Angles in (-pi, pi], or with limits nearest to q0 inside them, or to mid-range."""
+    model = rm.load("ur5")
+    q = np.array([1.0, -1.2, 1.4, 0.3, 1.0, 0.5])
+    T = rm.dgm(model, q)
+    far = q + 2 * np.pi * np.array([-1, 0, 0, 0, -1, 1])
+    near = igm_numeric(model, T, q0=far + 0.01)
+    assert (np.abs(near.q) <= np.pi).all()
+    np.testing.assert_allclose(near.q[0], q, atol=1e-6)
+    far[3] += 0.2  # near enough for the same whole turns
+    shifted = igm_numeric(model, T, q0=far, limits=True)
+    inside = q + 2 * np.pi * np.array([-1, 0, 0, 0, -1, 0])
+    np.testing.assert_allclose(shifted.q[0], inside, atol=1e-6)
+    assert shifted.within_limits.all()
+
+
+# --- masks ----------------------------------------------------------------------------------------
+
+
+def test_position_of_a_robot_of_six_joints(rng):
+    model = rm.load("rx90")
+    T = rm.dgm(model, postures(model, rng, 20))
+    T[:, :3, :3] = [random_rotation(rng) for _ in T]
+    found = igm_numeric(model, T, mask=POSITION)
+    assert found.valid.all()
+    assert (found.status == IGMStatus.REACHED_FAMILY).all()
+    check_met(model, T, found, POSITION)
+
+
+def test_pointing_with_five_joints(rng):
+    """Five-axis pointing: position and the direction of the tool's z axis, nothing about it."""
+    tool = at(0.05, 0, 0.1) @ se3.rotation("x", 1.0)
+    model = rm.load("xarm5").with_tool(tool)
+    T = rm.dgm(model, postures(model, rng, 40))
+    spun = T @ se3.rotation("z", 2.5)
+    found = igm_numeric(model, spun, mask=POINTING, mask_axes="tool")
+    assert found.valid.all()
+    P = rm.dgm(model, found.q[:, 0])
+    np.testing.assert_allclose(P[:, :3, 2:], spun[:, :3, 2:], atol=1e-5)
+    assert igm_numeric(model, spun).valid.mean() < 0.5
+
+
+@pytest.mark.parametrize("axes", ["world", "tool"])
+@pytest.mark.parametrize(
+    "mask", [[1, 0, 0, 0, 0, 0], [0, 1, 1, 0, 0, 0], [0, 0, 0, 1, 0, 1], [1, 1, 0, 0, 0, 1],
+             [1, 0, 1, 1, 1, 1], POINTING],
+)  # fmt: skip
+def test_components_are_those_of_the_axes(axes, mask, rng):
+    """The asked-for components of the independently computed error vanish, the others are told."""
+    model = rm.load("puma560")
+    T = rm.dgm(model, postures(model, rng, 10))
+    T[:, :3, :3] = T[:, :3, :3] @ [random_rotation(rng) for _ in T]
+    found = igm_numeric(model, T, mask=mask, mask_axes=axes, restarts=100)
+    valid = found.valid[:, 0]
+    assert valid.mean() > 0.7
+    error = pose_error(model, found.q[valid, 0], T[valid], axes)
+    assert np.abs(error * mask).max() < 2e-6
+    np.testing.assert_allclose(found.error[valid, 0], error, atol=1e-6)
+    parts = np.linalg.norm((error * mask).reshape(-1, 2, 3), axis=-1).max(axis=-1)
+    np.testing.assert_allclose(found.residual[valid, 0], parts, atol=1e-8)
+
+
+def test_planar_task():
+    model = rm.load("planar_3r")
+    T = rm.dgm(model, [0.3, 0.9, -0.4])
+    T[2, 3] = 5.0
+    assert not igm_numeric(model, T).valid.any()
+    found = igm_numeric(model, T, mask=[1, 1, 0, 0, 0, 1])
+    assert found.valid.all()
+    assert found.status == IGMStatus.REACHED
+
+
+# --- infinite families ----------------------------------------------------------------------------
+
+
+def test_redundant_arms_are_members_of_a_family(rng):
+    """Seven joints: all move along the self-motion, unless the arm is built otherwise."""
+    model = rm.load("panda")
+    found = igm_numeric(model, rm.dgm(model, postures(model, rng, 5)))
+    assert (found.status == IGMStatus.REACHED_FAMILY).all()
+    assert found.family_joints.any(axis=-1).all()
+    assert not found.free_joints.any()
+    J = rm.jacobian(model, found.q[:, 0])
+    null = np.linalg.svd(J)[2][:, -1]
+    assert (found.family_joints[:, 0] == (np.abs(null) > 1e-5)).all()
+
+
+def test_family_of_a_planar_arm():
+    """Three parallel axes and two asked-for coordinates, though three were written in the mask."""
+    model = rm.load("planar_3r").with_tool(at(0.5, 0, 0))
+    found = igm_numeric(model, rm.dgm(model, [0.3, 0.9, -0.4]), mask=POSITION)
+    assert found.status == IGMStatus.REACHED_FAMILY
+    assert found.family_joints.all()
+    assert igm_numeric(model, rm.dgm(model, [0.3, 0.9, -0.4])).status == IGMStatus.REACHED
+
+
+def test_joints_off_the_path_keep_the_start():
+    """The other arm of a tree does not matter: it stays where it is and is marked free."""
+    table = rm.DHTable(antecedent=[0, 1, 0, 3], sigma=[0, 0, 0, 1], d=[0, 0.5, 0, 0.2])
+    model = rm.RobotModel.from_table(table, tool=at(0.5, 0, 0), tip=2)
+    T = rm.dgm(model, [0.4, 0.8, 0, 0])
+    found = igm_numeric(model, T, q0=[2.0, -1.0, 0.7, 0.1])
+    assert found.valid.all()
+    assert found.q[0, 2:].tolist() == [0.7, 0.1]
+    assert found.free_joints[0].tolist() == [False, False, True, True]
+    assert igm_numeric(model, T).q[0, 2:].tolist() == [0, 0]
+
+
+# --- batches, determinism, threads ----------------------------------------------------------------
+
+
+def test_batch_is_single_row_by_row(rng):
+    model = rm.load("tx40")
+    T = np.array([*rm.dgm(model, postures(model, rng, 5)), at(9, 0, 0)]).reshape(2, 3, 4, 4)
+    batch = igm_numeric(model, T, limits=True)
+    assert batch.q.shape == (2, 3, 1, 6)
+    assert batch.status.shape == (2, 3)
+    for i in np.ndindex(2, 3):
+        one = igm_numeric(model, T[i], limits=True)
+        assert one.q.shape == (1, 6)
+        assert np.array_equal(one.q, batch.q[i], equal_nan=True)
+        assert np.array_equal(one.error, batch.error[i])
+        assert one.status == batch.status[i]
+
+
+def test_batches_broadcast(rng):
+    model = rm.load("rx90")
+    q = postures(model, rng, 4)
+    T = rm.dgm(model, q)
+    assert igm_numeric(model, T[0], q0=q).q.shape == (4, 1, 6)
+    assert igm_numeric(model, T, q0=q[0]).q.shape == (4, 1, 6)
+    assert igm_numeric(model, T[:, None], q0=q).q.shape == (4, 4, 1, 6)
+    empty = igm_numeric(model, np.empty((0, 4, 4)))
+    assert empty.q.shape == (0, 1, 6)
+    assert empty.count.shape == (0,)
+    with pytest.raises(ShapeError, match="broadcast"):
+        igm_numeric(model, T, q0=q[:3])
+
+
+def test_same_call_same_answer(rng):
+    model = rm.load("puma560")
+    T = rm.dgm(model, postures(model, rng, 20))
+    first, again = igm_numeric(model, T), igm_numeric(model, T)
+    assert np.array_equal(first.q, again.q)
+    seeded = igm_numeric(model, T, rng=5), igm_numeric(model, T, rng=np.random.default_rng(5))
+    assert np.array_equal(seeded[0].q, seeded[1].q)
+    assert not np.array_equal(seeded[0].q, first.q)
+
+
+def test_threads_and_pickles(rng):
+    model = rm.load("ur5")
+    T = rm.dgm(model, postures(model, rng, 40)).reshape(8, 5, 4, 4)
+    expected = [igm_numeric(model, rows).q for rows in T]
+    with ThreadPoolExecutor(4) as pool:
+        results = list(pool.map(lambda rows: igm_numeric(model, rows), T))
+    for result, q in zip(results, expected, strict=True):
+        assert np.array_equal(result.q, q)
+        assert np.array_equal(pickle.loads(pickle.dumps(result)).q, q)
+
+
+def test_inputs_are_left_alone(rng):
+    model = rm.load("rx90")
+    T, q0 = rm.dgm(model, postures(model, rng, 3)), np.zeros((3, 6))
+    before = T.copy()
+    igm_numeric(model, T, q0=q0)
+    assert np.array_equal(T, before)
+    assert not q0.any()
+    assert igm_numeric(model, T[0].tolist(), q0=[0] * 6, mask=(True,) * 6).valid.all()
+
+
+# --- mistakes in the input ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "words"),
+    [
+        ({"T": np.eye(3)}, ShapeError, r"\(\.\.\., 4, 4\)"),
+        ({"T": np.zeros((4, 4, 5))}, ShapeError, "MATLAB"),
+        ({"T": 2 * np.eye(4)}, NotARotationError, "last row"),
+        ({"T": np.diag([1.0, 1, -1, 1])}, NotARotationError, "not a rotation"),
+        ({"T": np.full((4, 4), np.nan)}, InvalidValueError, "finite"),
+        ({"q0": [0, 0]}, ShapeError, "q0"),
+        ({"q0": [np.inf] * 6}, InvalidValueError, "q0"),
+        ({"mask": [0] * 6}, InvalidValueError, "nothing"),
+        ({"mask": [1, 1, 1]}, ShapeError, "six"),
+        ({"mask": [1, 1, 1, 0.5, 0, 0]}, InvalidValueError, "zeros and ones"),
+        ({"mask": [1, 1, 1, -1, 0, 0]}, InvalidValueError, "zeros and ones"),
+        ({"mask": "111000"}, InvalidValueError, "mask"),
+        ({"mask_axes": "local"}, InvalidValueError, "'world' or 'tool'"),
+        ({"mask_axes": ["tool"]}, InvalidValueError, "'world' or 'tool'"),
+        ({"position_tolerance": 0}, InvalidValueError, "position_tolerance"),
+        ({"position_tolerance": "fine"}, InvalidValueError, "position_tolerance"),
+        ({"orientation_tolerance": np.nan}, InvalidValueError, "orientation_tolerance"),
+        ({"restarts": -1}, InvalidValueError, "restarts"),
+        ({"restarts": 2.5}, InvalidValueError, "restarts"),
+        ({"restarts": 0}, InvalidValueError, "q0"),
+        ({"iterations": 0}, InvalidValueError, "iterations"),
+        ({"limits": "yes"}, InvalidValueError, "limits"),
+        ({"rng": "seed"}, InvalidValueError, "rng"),
+    ],
+)
+def test_mistakes_raise(options, error, words):
+    model = rm.load("rx90")
+    with pytest.raises(error, match=words) as caught:
+        igm_numeric(model, **{"T": np.eye(4), **options})
+    assert isinstance(caught.value, RobotModelsError)
+
+
+def test_model_comes_first():
+    with pytest.raises(InvalidValueError, match="RobotModel"):
+        igm_numeric(np.eye(4), rm.load("rx90"))
+
+
+def test_numba_waits_for_the_first_call():
+    """Importing the solver does not import the compiler."""
+    code = "import sys, robotmodels.igm; sys.exit('numba' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
