@@ -289,6 +289,35 @@ def test_out_of_reach(robot, position, status, gap, mask):
         assert f"misses it by {gap:g} m" in found.reason()
 
 
+@pytest.mark.parametrize("distance", [1e3, 1e6, 1e300])
+def test_far_beyond(distance):
+    """However far, a target is too far, also in two of its coordinates only."""
+    model = rm.load("puma560")
+    for mask in (None, POSITION, [1, 1, 0, 0, 0, 0]):
+        found = igm_numeric(model, at(distance, 0, 0), mask=mask, restarts=10)
+        assert found.count == 0
+        if distance < 1e100 or mask != [1, 1, 0, 0, 0, 0]:
+            assert found.status == IGMStatus.TOO_FAR
+        assert "misses it by" in found.reason()
+
+
+def test_structures_of_few_joints():
+    """No joint at all, one slide, a joint that its limits hold."""
+    fixed = rm.RobotModel.from_table(rm.DHTable(antecedent=[0], sigma=[2], d=[0.3]))
+    found = igm_numeric(fixed, [at(0.3, 0, 0), at(0.5, 0, 0)])
+    assert found.status.tolist() == [IGMStatus.REACHED, IGMStatus.TOO_FAR]
+    assert found.q.shape == (2, 1, 0)
+    slide = rm.RobotModel.from_table(rm.DHTable(antecedent=[0], sigma=[1]))
+    assert igm_numeric(slide, at(0, 0, 0.5)).q[0] == pytest.approx(0.5)
+    assert igm_numeric(slide, at(0.5, 0, 1e4)).status == IGMStatus.TOO_FAR
+    held = rm.RobotModel.from_table(rm.DHTable(
+        antecedent=[0, 1], sigma=[0, 0], d=[0, 0.5], lower=[0.3, -np.inf], upper=[0.3, np.inf]
+    ))  # fmt: skip
+    T = rm.dgm(held, [[0.3, 1.0], [0.4, 1.0]])
+    found = igm_numeric(held, T, limits=True)
+    assert found.status.tolist() == [IGMStatus.REACHED, IGMStatus.OUTSIDE_LIMITS]
+
+
 def test_hole_in_the_middle_of_a_planar_arm():
     """Links of 0.5 and 0.3: nearer than 0.2 is too near, farther than 0.8 too far."""
     table = rm.DHTable.from_rows([{"sigma": 0}, {"sigma": 0, "d": 0.5}])

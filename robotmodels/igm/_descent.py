@@ -7,14 +7,16 @@ Jacobian of the rotation group (below). It is regular up to whole turns, so that
 exact for every mask, also half a turn away, where the sign of phi jumps but its size does not.
 
 Steps are ``(J^T W^2 J + lambda D) dq = J^T W^2 e`` with lambda in proportion to the squared error
-(T. Sugihara, IEEE T-RO 27(5), 2011), raised where a step does not pay. Metres are divided by the
+(T. Sugihara, IEEE T-RO 27(5), 2011; to the error itself where that is large, as it bends the cost
+by its size), raised where a step does not pay. Metres are divided by the
 length of the arm inside the iteration only; whether a pose is met is asked in metres and radians.
 """
 
-from math import atan2, inf, pi, sqrt, tan
+from math import atan2, inf, nan, pi, sqrt, tan
 
 import numpy as np
 from numba import types
+from numpy.typing import NDArray
 
 from ..kernels._compile import (
     CHAIN,
@@ -22,6 +24,7 @@ from ..kernels._compile import (
     INTS,
     MATRIX,
     NOTHING,
+    OUT1,
     OUT2,
     STACK,
     VECTOR,
@@ -48,22 +51,30 @@ from ..kernels._vectors import (
     whole_matrix,
     whole_vector,
 )
+from .status import IGMStatus
 
 __all__ = ["solve_poses"]
 
-FLOAT = types.float64
-FLAGS = types.Array(types.boolean, 2, "C")
-CODES = types.Array(types.int64, 1, "C")
+Flags = NDArray[np.bool_]
+Codes = NDArray[np.int8]
 
-# outcomes of `solve_poses`, translated to statuses by its caller
-FOUND, BEYOND_LIMITS, NO_ORIENTATION, TOO_FAR, TOO_NEAR, NOTHING_FOUND = 0, 1, 2, 3, 4, 5
+FLOAT = types.float64
+ROW_FLAGS, JOINT_FLAGS = (types.Array(types.boolean, ndim, "C") for ndim in (1, 2))
+CODES = types.Array(types.int8, 1, "C")
+
+FOUND = int(IGMStatus.REACHED)
+FAMILY = int(IGMStatus.REACHED_FAMILY)
+BEYOND_LIMITS = int(IGMStatus.OUTSIDE_LIMITS)
+NO_ORIENTATION = int(IGMStatus.ORIENTATION_NOT_AVAILABLE)
+TOO_FAR = int(IGMStatus.TOO_FAR)
+TOO_NEAR = int(IGMStatus.TOO_NEAR)
+NOTHING_FOUND = int(IGMStatus.NOT_CONVERGED)
 
 STIFF = 1e3  # weights of the position while the least orientation error is looked for
 STIFFER = 1e5
 GIVE_UP = 0.7  # of the cost that is left after five steps; more, and another start is better
 SIDE_STARTS = 16  # starts for the questions asked when a pose could not be met
 START_DAMPING = 0.1  # of the first step, in units of the cost
-FAR = 1.0  # cost beyond which the damping does not grow
 EXACT = 1e-28  # cost below which only rounding is left
 SPREAD = 0.5  # weight of the orientation in the choice of the next start
 IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
@@ -299,7 +310,7 @@ def descend(goal, arm, weight, mask, tolerance, bounds, unit, iterations, patien
                     for c in range(6):
                         total += weight[c] * weight[c] * J[c, i] * J[c, j]
                     H[i, j] = total
-                H[i, i] += (damping * min(cost, FAR) + 1e-14) * unit[i] * unit[i]
+                H[i, i] += (damping * min(cost, sqrt(cost)) + 1e-14) * unit[i] * unit[i]
                 step[i] = g[i]
             if factored(H, held):
                 substitute(H, held, step)
@@ -537,7 +548,8 @@ def reach_position(
 @compiled(
     NOTHING(
         STACK, MATRIX, INT, MATRIX, STACK, *CHAIN, INTS, MATRIX, VECTOR, VECTOR, VECTOR, INT,
-        INTS, INT, FLOAT, FLOAT, VECTOR, INT, INT, OUT2, OUT2, FLAGS, CODES,
+        INTS, INT, FLOAT, FLOAT, VECTOR, INT, INT, OUT2, OUT2, OUT2, OUT1, ROW_FLAGS,
+        ROW_FLAGS, JOINT_FLAGS, JOINT_FLAGS, CODES,
     )
 )  # fmt: skip
 def solve_poses(
@@ -566,10 +578,15 @@ def solve_poses(
     tolerance: Floats,
     restarts: int,
     iterations: int,
-    out: Floats,
+    closest: Floats,
+    postures: Floats,
     error: Floats,
-    family: Ints,
-    code: Ints,
+    residual: Floats,
+    valid: Flags,
+    inside: Flags,
+    unmoved: Flags,
+    family: Flags,
+    status: Codes,
 ) -> None:
     """One posture a pose, or the closest one and why there is none.
 
@@ -590,7 +607,7 @@ def solve_poses(
     path, tool_rotation, tool_position
         As for `tip_poses`.
     lower, upper : (n,)
-        Joint limits [rad or m]; not looked at unless ``boxed`` is 1.
+        Joint limits [rad or m].
     boxed : int
         1: inside the limits only.
     mask : (6,) int64
@@ -604,12 +621,16 @@ def solve_poses(
         Position [m] and orientation [rad].
     restarts, iterations : int
         Starts beside the given one, at most K; steps from each start.
-    out, error : (N, n), (N, 6)
-        Written: the posture and what it misses.
-    family : (N, n) bool
-        Written: joints on the path that move in the infinite family the posture belongs to.
-    code : (N,) int64
-        Written: the outcome.
+    closest, postures : (N, n)
+        Written: the posture the search ended with; the same where it is a solution, else NaN.
+    error, residual : (N, 6), (N,)
+        Written: what that posture misses, and the larger of the sizes that were asked for.
+    valid, inside : (N,) bool
+        Written: whether it is a solution, and one inside the limits.
+    unmoved, family : (N, n) bool
+        Written: joints off the path; joints that move in the infinite family it belongs to.
+    status : (N,) int8
+        Written: codes of `IGMStatus`.
     """
     n = starts.shape[1]
     k = path.shape[0]
@@ -653,6 +674,8 @@ def solve_poses(
             if turns[i] and upper[i] - lower[i] >= 2.0 * pi:
                 bounds[0][i], bounds[1][i] = -inf, inf
     task = (asked, whole_mask, tolerance, unit, turns, restarts, iterations)
+    has_place = place_mask[0] + place_mask[1] + place_mask[2] > 0
+    all_place = place_mask[0] + place_mask[1] + place_mask[2] == 3
     j = path[0] - 1
     centre = add(arm[5], times(arm[4], vector(position, j)))
 
@@ -674,7 +697,7 @@ def solve_poses(
         copy(reference, kept)
         outcome = NOTHING_FOUND
         away = subtract(pd, centre)
-        beyond = sqrt(dot(away, away)) > reach + tolerance[0] and place_mask.sum() == 3
+        beyond = sqrt(dot(away, away)) > reach + tolerance[0] and all_place
         if not beyond:
             rate_starts(poses, goal, asked, score)
             if reach_pose(
@@ -692,19 +715,32 @@ def solve_poses(
                     outcome = BEYOND_LIMITS
                 else:
                     copy(moves, kept)
-        if outcome == NOTHING_FOUND and place_mask.any():
+        if outcome == NOTHING_FOUND and has_place:
             rate_starts(poses, goal, place, score)
             outcome = reach_position(
                 goal, arm, task, place, place_mask, stiff, bounds, box, reference, starts,
                 score, kept, work,
             )  # fmt: skip
+            if beyond:
+                outcome = TOO_FAR
 
         copy(kept, q)
         look(goal, arm, work)
-        code[i] = outcome
-        copy(kept, out[i])
-        copy(e, error[i])
-        known = outcome == FOUND and generic < free
+        solved = outcome == FOUND
+        known = solved and generic < free
         known = known and row_space(J, asked, unit, rows, moves) == generic
+        within = solved
         for c in range(n):
+            unmoved[i, c] = solved and unit[c] == 0.0
             family[i, c] = known and moves[c] > 1e-10
+            if unmoved[i, c] or family[i, c]:
+                outcome = FAMILY
+            within = within and q[c] >= lower[c] and q[c] <= upper[c]
+            closest[i, c] = q[c]
+            postures[i, c] = q[c] if solved else nan
+        for c in range(6):
+            error[i, c] = e[c]
+        size = sizes(e, whole_mask)
+        residual[i] = max(size[0], size[1])
+        valid[i], inside[i] = solved, within
+        status[i] = outcome

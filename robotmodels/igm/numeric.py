@@ -18,7 +18,6 @@ from ..errors import InvalidValueError, ShapeError
 from ..geometry import REVOLUTE
 from ..model import RobotModel
 from .solutions import IGMSolutions
-from .status import IGMStatus
 
 METHOD = "numeric (Levenberg-Marquardt)"
 """What `igm_numeric` calls itself in its results."""
@@ -26,20 +25,6 @@ METHOD = "numeric (Levenberg-Marquardt)"
 _SEED = 20
 # the first few starts also tell how many components of the task the arm can govern
 _FEWEST_STARTS = 8
-_FAMILY = int(IGMStatus.REACHED_FAMILY)
-# in the order of the outcomes that the kernel writes
-_FOUND = 0
-_STATUS = np.array(
-    [
-        IGMStatus.REACHED,
-        IGMStatus.OUTSIDE_LIMITS,
-        IGMStatus.ORIENTATION_NOT_AVAILABLE,
-        IGMStatus.TOO_FAR,
-        IGMStatus.TOO_NEAR,
-        IGMStatus.NOT_CONVERGED,
-    ],
-    dtype=np.int8,
-)
 
 
 def igm_numeric(
@@ -164,55 +149,35 @@ def igm_numeric(
     if limits:
         first = np.clip(first, model.lower, model.upper)
     N, n = first.shape
-    q, error = np.empty((N, n)), np.empty((N, 6))
-    family, outcome = np.empty((N, n), dtype=np.bool_), np.empty(N, dtype=np.int64)
+    closest, q, error, residual = (np.empty((N, n)), np.empty((N, n)), np.empty((N, 6)),
+                                   np.empty(N))  # fmt: skip
+    valid, inside = np.empty((2, N), dtype=np.bool_)
+    unmoved, family = np.empty((2, N, n), dtype=np.bool_)
+    status = np.empty(N, dtype=np.int8)
     from ._descent import solve_poses
 
     solve_poses(
         targets.reshape(N, 4, 4), first, int(q0 is not None), search.starts, search.poses,
         *model.chain, *search.tool, model.lower, model.upper, int(limits),
         asked.astype(np.int64), int(mask_axes == "tool"), search.length, search.reach, tolerance,
-        restarts, iterations, q, error, family, outcome,
+        restarts, iterations, closest, q, error, residual, valid, inside, unmoved, family, status,
     )  # fmt: skip
-    return _solutions(model, search, batch, q, error, family, outcome, asked, bool(limits))
-
-
-def _solutions(
-    model: RobotModel,
-    search: _Search,
-    batch: tuple[int, ...],
-    q: Array,
-    error: Array,
-    family: NDArray[np.bool_],
-    outcome: NDArray[np.int64],
-    asked: NDArray[np.bool_],
-    limits: bool,
-) -> IGMSolutions:
-    """Lay the kernel's rows out as the common result."""
-    n = model.n
-    status = _STATUS[outcome]
-    valid = outcome == _FOUND
-    each = valid[:, None]
-    free = each & ~search.on_path
-    status[valid & (free | family).any(axis=-1)] = _FAMILY
-    squares = (error * error * asked).reshape(-1, 2, 3).sum(axis=-1)
-    inside = (each & (q >= model.lower) & (q <= model.upper)).all(axis=-1)
     rows = (*batch, 1)
     return IGMSolutions(
-        q=np.where(each, q, np.nan).reshape(*rows, n),
+        q=q.reshape(*rows, n),
         valid=valid.reshape(rows),
-        residual=np.sqrt(squares.max(axis=-1)).reshape(rows),
+        residual=residual.reshape(rows),
         within_limits=inside.reshape(rows),
         branch=np.zeros(rows, dtype=np.str_),
         status=status.reshape(batch),
         double=np.zeros(rows, dtype=np.bool_),
-        free_joints=free.reshape(*rows, n),
-        family_joints=(each & family).reshape(*rows, n),
+        free_joints=unmoved.reshape(*rows, n),
+        family_joints=family.reshape(*rows, n),
         method=METHOD,
-        periodic=np.zeros(n, dtype=np.bool_) if limits else search.revolute,
+        periodic=search.revolute & (not limits),
         mask=asked,
         error=error.reshape(*rows, 6),
-        closest=q.reshape(*batch, n),
+        closest=closest.reshape(*batch, n),
     )
 
 
@@ -223,7 +188,6 @@ class _Search:
     tool: tuple[NDArray[np.int64], Array, Array]
     """Path, rotation and position of the tool as kernels take them."""
     revolute: NDArray[np.bool_]
-    on_path: NDArray[np.bool_]
     length: float
     """Of the path's constant links, metres."""
     reach: float
@@ -274,7 +238,7 @@ def _new_search(model: RobotModel, limits: bool, restarts: int, rng: Any) -> _Se
     tip_poses(starts, *chain, *tool, poses)
     middle = read_only(0.5 * (low + high) if limits else np.zeros(n))
     return _Search(
-        tool, revolute, on_path, length, float(reach), middle, read_only(starts), read_only(poses)
+        tool, revolute, length, float(reach), middle, read_only(starts), read_only(poses)
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from math import degrees, hypot
 from typing import Any
 
 import numpy as np
@@ -150,8 +151,8 @@ class IGMSolutions:
         if self.error is None or status in (IGMStatus.REACHED, IGMStatus.REACHED_FAMILY):
             return status.sentence
         missing = np.where(self.mask, self.error[at][0], 0.0)
-        metres = f"{np.linalg.norm(missing[:3]):.4g} m"
-        angle = f"{np.rad2deg(np.linalg.norm(missing[3:])):.4g} deg"
+        metres = f"{hypot(*missing[:3]):.4g} m"
+        angle = f"{degrees(hypot(*missing[3:])):.4g} deg"
         if status in (IGMStatus.TOO_FAR, IGMStatus.TOO_NEAR):
             return f"{status.sentence} The closest posture misses it by {metres}."
         if status is IGMStatus.ORIENTATION_NOT_AVAILABLE:
