@@ -8,8 +8,8 @@ exact for every mask, also half a turn away, where the sign of phi jumps but its
 
 Steps are ``(J^T W^2 J + lambda D) dq = J^T W^2 e`` with lambda in proportion to the squared error
 (T. Sugihara, IEEE T-RO 27(5), 2011; to the error itself where that is large, as it bends the cost
-by its size), raised where a step does not pay. Metres are divided by the
-length of the arm inside the iteration only; whether a pose is met is asked in metres and radians.
+by its size), raised where a step does not pay. Metres are divided by the length of the arm inside
+the iteration only; whether a pose is met is asked in metres and radians.
 """
 
 from math import atan2, inf, nan, pi, sqrt, tan
@@ -57,6 +57,13 @@ __all__ = ["solve_poses"]
 
 Flags = NDArray[np.bool_]
 Codes = NDArray[np.int8]
+Goal = tuple[Matrix, Vector, Matrix]  # R_d, P_d, the axes of the mask
+Arm = tuple[Ints, Ints, Floats, Floats, Matrix, Vector, Ints, Matrix, Vector]  # chain, path, tool
+Bounds = tuple[Floats, Floats]
+# posture, trial, error, Jacobian, J^T W^2 J, gradient, step, held joints, axes, origins
+Work = tuple[Floats, Floats, Floats, Floats, Floats, Floats, Floats, Flags, Floats, Floats]
+# weights, mask, tolerances, units and turning joints; restarts and iterations
+Task = tuple[Floats, Ints, Floats, Floats, Flags, int, int]
 
 FLOAT = types.float64
 ROW_FLAGS, JOINT_FLAGS = (types.Array(types.boolean, ndim, "C") for ndim in (1, 2))
@@ -121,7 +128,7 @@ def turned(phi: Vector, w: Vector) -> Vector:
 
 
 @compiled()
-def forward(q, arm, z, o):
+def forward(q: Floats, arm: Arm, z: Floats, o: Floats) -> tuple[Matrix, Vector]:
     """Pose (R, p) of the tool at posture q; axes and origins of the path into z and o."""
     sigma, joint, rotation, position, R, p, path, E, e = arm
     for s in range(path.shape[0]):
@@ -136,7 +143,7 @@ def forward(q, arm, z, o):
 
 
 @compiled()
-def missing(R, p, goal, e):
+def missing(R: Matrix, p: Vector, goal: Goal, e: Floats) -> Vector:
     """Six components of what is missing at the pose (R, p) into e; phi in world axes."""
     Rd, pd, axes = goal
     phi = rotation_vector(product_transpose(Rd, R))
@@ -149,7 +156,9 @@ def missing(R, p, goal, e):
 
 
 @compiled()
-def error_jacobian(p, phi, goal, arm, z, o, J):
+def error_jacobian(
+    p: Vector, phi: Vector, goal: Goal, arm: Arm, z: Floats, o: Floats, J: Floats
+) -> None:
     """Minus the derivative of the error, J (6, n), zero in the columns off the path."""
     sigma, joint, _, _, _, _, path, _, _ = arm
     _, _, axes = goal
@@ -170,7 +179,7 @@ def error_jacobian(p, phi, goal, arm, z, o, J):
 
 
 @compiled()
-def cost_of(e, weight):
+def cost_of(e: Floats, weight: Floats) -> float:
     """Squared weighted error."""
     total = 0.0
     for c in range(6):
@@ -179,7 +188,7 @@ def cost_of(e, weight):
 
 
 @compiled()
-def sizes(e, mask):
+def sizes(e: Floats, mask: Ints) -> tuple[float, float]:
     """Size of the asked-for translation and of the asked-for rotation of an error."""
     return (
         sqrt((mask[0] * e[0]) ** 2 + (mask[1] * e[1]) ** 2 + (mask[2] * e[2]) ** 2),
@@ -188,20 +197,20 @@ def sizes(e, mask):
 
 
 @compiled()
-def is_met(size, tolerance):
+def is_met(size: tuple[float, float], tolerance: Floats) -> bool:
     """Whether both sizes are within their tolerances."""
     return size[0] <= tolerance[0] and size[1] <= tolerance[1]
 
 
 @compiled()
-def copy(a, b):
+def copy(a: Floats, b: Floats) -> None:
     """Copy vector a into b."""
     for i in range(a.shape[0]):
         b[i] = a[i]
 
 
 @compiled()
-def factored(H, held):
+def factored(H: Floats, held: Flags) -> bool:
     """Cholesky's factor in the lower half of H, in place, without held rows; False if singular."""
     for i in range(H.shape[0]):
         if held[i]:
@@ -223,7 +232,7 @@ def factored(H, held):
 
 
 @compiled()
-def substitute(H, held, x):
+def substitute(H: Floats, held: Flags, x: Floats) -> None:
     """Solve with the factor of `factored`, in place; held entries of x become 0."""
     n = x.shape[0]
     for i in range(n):
@@ -244,7 +253,7 @@ def substitute(H, held, x):
 
 
 @compiled()
-def gradient(weight, bounds, unit, work):
+def gradient(weight: Floats, bounds: Bounds, unit: Floats, work: Work) -> float:
     """Minus half the gradient of the cost into g, and which joints are held; returns its size.
 
     A joint at a limit that would leave it is held there; a joint off the path always is.
@@ -268,7 +277,7 @@ def gradient(weight, bounds, unit, work):
 
 
 @compiled()
-def look(goal, arm, work):
+def look(goal: Goal, arm: Arm, work: Work) -> Vector:
     """Error and Jacobian of the posture in ``work``; returns the tool's position."""
     q, _, e, J, _, _, _, _, z, o = work
     R, p = forward(q, arm, z, o)
@@ -278,7 +287,18 @@ def look(goal, arm, work):
 
 
 @compiled()
-def descend(goal, arm, weight, mask, tolerance, bounds, unit, iterations, patience, work):
+def descend(
+    goal: Goal,
+    arm: Arm,
+    weight: Floats,
+    mask: Ints,
+    tolerance: Floats,
+    bounds: Bounds,
+    unit: Floats,
+    iterations: int,
+    patience: float,
+    work: Work,
+) -> tuple[float, float]:
     """Levenberg-Marquardt from the posture q in ``work``, which it improves.
 
     Within the tolerances it goes on while a step takes away most of the error, so that what is
@@ -337,7 +357,7 @@ def descend(goal, arm, weight, mask, tolerance, bounds, unit, iterations, patien
 
 
 @compiled()
-def settle(q, turns, box, reference):
+def settle(q: Floats, turns: Flags, box: Bounds, reference: Floats) -> None:
     """Shift the angles of q by whole turns: into (-pi, pi], or inside limits near the reference."""
     lower, upper = box
     for i in range(q.shape[0]):
@@ -355,7 +375,7 @@ def settle(q, turns, box, reference):
 
 
 @compiled()
-def rate_starts(poses, goal, weight, score):
+def rate_starts(poses: Floats, goal: Goal, weight: Floats, score: Floats) -> None:
     """How far the pose of each start is from the goal, smallest first to be tried."""
     Rd, pd, axes = goal
     angular = max(weight[3], weight[4], weight[5])
@@ -375,7 +395,9 @@ def rate_starts(poses, goal, weight, score):
 
 
 @compiled()
-def take_start(s, first, starts, score, unit, bounds, q):
+def take_start(
+    s: int, first: Floats, starts: Floats, score: Floats, unit: Floats, bounds: Bounds, q: Floats
+) -> None:
     """Start number s into q: the given one for s = 0, else the best that is left.
 
     Joints off the path stay where the given start has them.
@@ -393,7 +415,7 @@ def take_start(s, first, starts, score, unit, bounds, q):
 
 
 @compiled()
-def row_space(J, weight, unit, rows, moves):
+def row_space(J: Floats, weight: Floats, unit: Floats, rows: Floats, moves: Floats) -> int:
     """Rank of the asked-for rows of J; ``moves[i]``: motion without effect goes through joint i.
 
     Gram and Schmidt's method with pivoting gives an orthonormal basis of the rows; what it
@@ -434,7 +456,7 @@ def row_space(J, weight, unit, rows, moves):
 
 
 @compiled()
-def which_side(p, arm, goal, mask, work):
+def which_side(p: Vector, arm: Arm, goal: Goal, mask: Ints, work: Work) -> int:
     """Whether the target is too far or too near for the posture that comes closest.
 
     There the line from the tool to the target meets every axis that turns the tool. TOO_NEAR if
@@ -460,7 +482,19 @@ def which_side(p, arm, goal, mask, work):
 
 
 @compiled()
-def reach_pose(goal, arm, task, bounds, box, first, given, starts, score, kept, work):
+def reach_pose(
+    goal: Goal,
+    arm: Arm,
+    task: Task,
+    bounds: Bounds,
+    box: Bounds,
+    first: Floats,
+    given: int,
+    starts: Floats,
+    score: Floats,
+    kept: Floats,
+    work: Work,
+) -> bool:
     """The whole task from one start after the other; the posture that comes closest into kept."""
     asked, mask, tolerance, unit, turns, restarts, iterations = task
     q, _, e, _, _, _, _, _, _, _ = work
@@ -482,8 +516,20 @@ def reach_pose(goal, arm, task, bounds, box, first, given, starts, score, kept, 
 
 @compiled()
 def reach_position(
-    goal, arm, task, place, place_mask, stiff, bounds, box, first, starts, score, kept, work
-):
+    goal: Goal,
+    arm: Arm,
+    task: Task,
+    place: Floats,
+    place_mask: Ints,
+    stiff: Floats,
+    bounds: Bounds,
+    box: Bounds,
+    first: Floats,
+    starts: Floats,
+    score: Floats,
+    kept: Floats,
+    work: Work,
+) -> int:
     """The position alone, and there the least orientation error; the best posture into kept.
 
     Returns FOUND if the pose is met after all, NO_ORIENTATION if its position is, else on which
@@ -707,7 +753,7 @@ def solve_poses(
             elif boxed:
                 # without limits, to say that they are the reason
                 rate_starts(poses, goal, asked, score)
-                copy(kept, moves)
+                copy(kept, moves)  # which has no other use here
                 if reach_pose(
                     goal, arm, task, nowhere, nowhere, reference, given, starts, score, kept,
                     work,
