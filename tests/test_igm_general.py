@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import brentq
 
 import robotmodels as rm
-from robotmodels.igm.general import general_postures, prepare_general
+from robotmodels.igm.general import general_postures, on_infinite_family, prepare_general
 from robotmodels.igm.loop import JointChain, joint_chain
 from robotmodels.robots import load
 
@@ -353,6 +353,26 @@ def test_near_singular_poses(chain, eps):
     if eps >= 1e-4:
         assert not double.any()
         assert np.all(valid.sum(axis=1) % 2 == 0)
+
+
+@pytest.mark.parametrize("eps", [0.0, 1e-8, 1e-5, 1e-4, 1e-3])
+def test_beside_an_infinite_family(eps):
+    # Axis 3 of the CRX at -90 deg brings four axes together, which then turn with the tool at rest.
+    # The arm is stretched there, so that the pose changes with the square of eps: at 1e-8 all
+    # members of the family still meet it.
+    chain = arm("crx10ia")
+    q0 = draw(chain, 100, np.random.default_rng(12))
+    q0[:, 2] = -np.pi / 2 + eps
+    U = poses(chain, q0)
+    q, valid, _ = general_postures(solver_of(chain), U)
+    check(chain, U, q, valid)
+    family = on_infinite_family(solver_of(chain), q, valid)
+    if eps < 1e-7:
+        assert np.mean(family.any(axis=1)) > 0.9
+    else:
+        assert not family.any()
+        # the pose fixes these postures to 1e-16 / eps^2 only
+        assert lost(chain, q0, q, valid, within=1e-5) <= (0 if eps == 1e-3 else 3)
 
 
 # --- symmetry, borders ---------------------------------------------------------------------------

@@ -41,7 +41,7 @@ from ..kernels._compile import (
     compiled,
 )
 
-__all__ = ["assemble", "bring_home", "partners", "postures"]
+__all__ = ["assemble", "bring_home", "flat_singularities", "follow_valleys", "partners", "postures"]
 
 FLOAT = types.float64
 COUNTS = types.Array(types.int64, 1, "C")
@@ -53,7 +53,13 @@ MERGE = 1e-6  # postures closer than this in every joint are one [rad, or length
 NEARLY_REAL = 2e-2  # imaginary part of an angle up to which its real part is tried [rad]
 MERGED = 1e-3  # imaginary part up to which a pair counts as a double root that rounding split [rad]
 TURNS = 12  # candidates for the angle at which the leading matrix is inverted
+SMALL = 0.1  # smallest singular value of the Jacobian above which a posture is at no fold
+SINGULAR = 1e-7  # and below which it is singular but for rounding
 FLAT = 1e-6  # curvature along the null direction below which a posture is not at a fold
+VALLEY = 1e-2  # smallest singular value of the Jacobian in a valley: nearly an infinite family
+STRIDE = 0.02  # step along a valley [rad]
+STRIDES = 1200  # steps one way
+POINTS = 6000  # points of valleys remembered per pose
 CLOSE = 0.3  # partners predicted farther away than this are left to the eigenvalues [rad]
 
 
@@ -686,10 +692,20 @@ def distance(sigma, a, b):
 
 
 @compiled()
+def is_near(sigma, a, b, radius):
+    """Whether two postures differ by at most the radius in every joint."""
+    for k in range(6):
+        d = a[k] - b[k]
+        if abs(d) > radius and (sigma[k] == 1 or abs(wrapped(d)) > radius):
+            return False
+    return True
+
+
+@compiled()
 def keep(sigma, q, found, count):
     """Add q (6,) to ``found (16, 6)`` unless it is there; the new number."""
     for k in range(count):
-        if distance(sigma, q, found[k]) <= MERGE:
+        if is_near(sigma, q, found[k], MERGE):
             return count
     if count < found.shape[0]:
         for k in range(6):
@@ -894,6 +910,32 @@ def bring_home(sigma, D, goals, tolerance, starts, starting, found, count):
                 count[n] = keep(sigma, q, found[n], count[n])
 
 
+@compiled()
+def fold_at(sigma, D, root, q, u, v, work):
+    """Smallest singular value of the Jacobian at a posture, and the curvature along its v.
+
+    The curvature is ``h = u . d(J v) / ds`` on the line root + s v; ``u, v`` receive the vectors.
+    """
+    T, z, o, J, pivots, _, _ = work
+    pose_of(sigma, D, root, T, z, o)
+    jacobian_of(sigma, T, z, o, J)
+    factor(J, pivots)
+    small = smallest_vectors(J, pivots, u, v)
+    h = 0.0
+    if small > SMALL:
+        return small, h
+    for side in range(2):
+        step = 1e-4 if side == 0 else -1e-4
+        for i in range(6):
+            q[i] = root[i] + step * v[i]
+        pose_of(sigma, D, q, T, z, o)
+        jacobian_of(sigma, T, z, o, J)
+        for i in range(6):
+            for j in range(6):
+                h += u[i] * J[i, j] * v[j] / (2.0 * step)
+    return small, h
+
+
 @compiled(NOTHING(INTS, STACK, STACK, VECTOR, OUT3, COUNTS, FLAGS))
 def partners(sigma, D, goals, tolerance, found, count, double):
     """Find the other root of pairs that nearly merged, and flag those that did.
@@ -902,34 +944,25 @@ def partners(sigma, D, goals, tolerance, found, count, double):
     with sigma the smallest singular value (left vector u) and h = u . d(J v)/ds. The partner of a
     posture is at ``s = -2 sigma / h``.
     """
-    T, z, o = np.empty((3, 4)), np.empty((6, 3)), np.empty((6, 3))
-    J, pivots, e, best = np.empty((6, 6)), np.empty(6, np.int64), np.empty(6), np.empty(6)
     u, v, q, start = np.empty(6), np.empty(6), np.empty(6), np.empty(6)
-    work = (T, z, o, J, pivots, e, best)
+    work = (
+        np.empty((3, 4)),
+        np.empty((6, 3)),
+        np.empty((6, 3)),
+        np.empty((6, 6)),
+        np.empty(6, np.int64),
+        np.empty(6),
+        np.empty(6),
+    )
     for n in range(goals.shape[0]):
         k = 0
         while k < count[n]:
             root = found[n, k]
-            pose_of(sigma, D, root, T, z, o)
-            jacobian_of(sigma, T, z, o, J)
-            factor(J, pivots)
-            small = smallest_vectors(J, pivots, u, v)
+            small, h = fold_at(sigma, D, root, q, u, v, work)
             double[n, k] = False
             k += 1
-            if small > 0.1:
-                continue
-            h = 0.0
-            for side in range(2):
-                step = 1e-4 if side == 0 else -1e-4
-                for i in range(6):
-                    q[i] = root[i] + step * v[i]
-                pose_of(sigma, D, q, T, z, o)
-                jacobian_of(sigma, T, z, o, J)
-                for i in range(6):
-                    for j in range(6):
-                        h += u[i] * J[i, j] * v[j] / (2.0 * step)
             # without curvature there is no fold: an infinite family, or a root of higher order
-            if abs(h) < FLAT or abs(h) * CLOSE < 2.0 * small:
+            if small > SMALL or abs(h) < FLAT or abs(h) * CLOSE < 2.0 * small:
                 continue
             s = -2.0 * small / h
             for i in range(6):
@@ -952,3 +985,136 @@ def partners(sigma, D, goals, tolerance, found, count, double):
                     count[n] = keep(sigma, q, found[n], count[n])
                 if count[n] > before:
                     break
+
+
+@compiled(NOTHING(INTS, STACK, STACK, INTS, FLAGS))
+def flat_singularities(sigma, D, found, count, flat):
+    """Flag postures at which the Jacobian is singular and stays so along its null direction."""
+    u, v, q, root = np.empty(6), np.empty(6), np.empty(6), np.empty(6)
+    work = (
+        np.empty((3, 4)),
+        np.empty((6, 3)),
+        np.empty((6, 3)),
+        np.empty((6, 6)),
+        np.empty(6, np.int64),
+        np.empty(6),
+        np.empty(6),
+    )
+    for n in range(found.shape[0]):
+        for k in range(count[n]):
+            for i in range(6):
+                root[i] = found[n, k, i]
+            small, h = fold_at(sigma, D, root, q, u, v, work)
+            flat[n, k] = small < SINGULAR and abs(h) < FLAT
+
+
+@compiled()
+def slide_down(sigma, D, U, q, u, v, work):
+    """Correct q (6,) in all but the null direction; what is missing along it, and the rest.
+
+    ``u, v`` receive the singular vectors of the smallest singular value. The third result is that
+    value.
+    """
+    T, z, o, J, pivots, e, _ = work
+    along, rest, small = 0.0, np.inf, np.inf
+    for step in range(3):
+        pose_of(sigma, D, q, T, z, o)
+        missing(U, T, e)
+        jacobian_of(sigma, T, z, o, J)
+        factor(J, pivots)
+        small = smallest_vectors(J, pivots, u, v)
+        along, size = 0.0, 0.0
+        for i in range(6):
+            along += u[i] * e[i]
+            size += e[i] * e[i]
+        rest = sqrt(max(size - along * along, 0.0))
+        if step == 2 or rest > 0.3:
+            break
+        for i in range(6):
+            e[i] -= along * u[i]
+        solve_one(J, pivots, e)
+        onto = 0.0
+        for i in range(6):
+            onto += e[i] * v[i]
+        for i in range(6):
+            q[i] += e[i] - onto * v[i]
+    return along, rest, small
+
+
+@compiled(NOTHING(INTS, STACK, STACK, VECTOR, STACK, INTS, OUT3, COUNTS))
+def follow_valleys(sigma, D, goals, tolerance, starts, starting, found, count):
+    """Search along valleys for postures that Newton's method does not tell apart.
+
+    Beside a pose with an infinite family of postures the Jacobian is nearly singular all along the
+    former family, and the few postures that are left lie on it. From ``starts (N, S, 6)`` the
+    valley is followed along the null direction; a posture is where what is missing along the
+    left null vector changes sign.
+    """
+    T, z, o = np.empty((3, 4)), np.empty((6, 3)), np.empty((6, 3))
+    J, pivots, e, best = np.empty((6, 6)), np.empty(6, np.int64), np.empty(6), np.empty(6)
+    u, v, before, behind = np.empty(6), np.empty(6), np.empty(6), np.empty(6)
+    q, origin, trial = np.empty(6), np.empty(6), np.empty(6)
+    path = np.empty((POINTS, 6))
+    work = (T, z, o, J, pivots, e, best)
+    for n in range(goals.shape[0]):
+        points = 0
+        for k in range(starting[n]):
+            # beside or on a family more is found than there is room for
+            if count[n] == found.shape[1]:
+                break
+            for i in range(6):
+                origin[i] = starts[n, k, i]
+            rest, small = np.inf, np.inf
+            for _ in range(4):
+                _, rest, small = slide_down(sigma, D, goals[n], origin, u, v, work)
+            if rest > 1e-6 or small > VALLEY:
+                continue
+            known = False
+            for j in range(points):
+                if is_near(sigma, path[j], origin, 2.0 * STRIDE):
+                    known = True
+                    break
+            if known:
+                continue
+            closed = False
+            for side in range(2):
+                if closed:
+                    break
+                for i in range(6):
+                    q[i] = origin[i]
+                last, _, _ = slide_down(sigma, D, goals[n], q, u, v, work)
+                for i in range(6):
+                    before[i] = v[i] if side == 0 else -v[i]
+                    behind[i] = u[i]
+                for step in range(STRIDES):
+                    for i in range(6):
+                        trial[i] = q[i]
+                        q[i] += STRIDE * before[i]
+                    now, rest, small = slide_down(sigma, D, goals[n], q, u, v, work)
+                    if rest > 1e-3 or small > VALLEY:
+                        break
+                    # singular vectors have no sign of their own: keep going, keep the side
+                    ahead, same = 0.0, 0.0
+                    for i in range(6):
+                        ahead += v[i] * before[i]
+                        same += u[i] * behind[i]
+                    if same < 0.0:
+                        now = -now
+                    for i in range(6):
+                        before[i] = v[i] if ahead > 0.0 else -v[i]
+                        behind[i] = u[i] if same > 0.0 else -u[i]
+                    # on the family itself nothing is missing anywhere, and rounding changes signs
+                    if now * last < 0.0 and max(abs(now), abs(last)) > 1e-12:
+                        share = last / (last - now)
+                        for i in range(6):
+                            trial[i] += share * (q[i] - trial[i])
+                        if newton(sigma, D, goals[n], tolerance, trial, work):
+                            count[n] = keep(sigma, trial, found[n], count[n])
+                    last = now
+                    if points < POINTS:
+                        for i in range(6):
+                            path[points, i] = q[i]
+                        points += 1
+                    if step > 10 and distance(sigma, q, origin) < STRIDE:
+                        closed = True
+                        break

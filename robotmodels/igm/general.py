@@ -28,14 +28,20 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import Array, read_only
 from .loop import JointChain
 
-__all__ = ["GeneralSolver", "Representation", "general_postures", "prepare_general"]
+__all__ = [
+    "GeneralSolver",
+    "Representation",
+    "general_postures",
+    "on_infinite_family",
+    "prepare_general",
+]
 
 MOST = 16  # postures a six-joint arm can have at one pose
 CHUNK = 256  # poses worked on at a time: 2 MB of equations
 TOLERANCE = 1e-13  # residual of a posture [m, or the arm's length if that is more; rad]
 POOR = 1e-9  # quality of the elimination below which another representation is asked as well
 WAYS = 12  # representations kept
-ASIDE = 6  # poses nearby that are solved where doubts are left
+ASIDE = 16  # poses nearby that are solved where doubts are left
 ROUGH = 1e-4  # way that polishing moved a posture above which it is asked as well [rad]
 
 
@@ -219,6 +225,51 @@ def general_postures(
     return q, valid, double
 
 
+def on_infinite_family(
+    solver: GeneralSolver, q: Array, valid: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Whether postures belong to an infinite family: the arm moves and the tool does not.
+
+    There `general_postures` returns some members of the family, as many as it came upon.
+
+    Parameters
+    ----------
+    solver : GeneralSolver
+        From `prepare_general`.
+    q : ndarray, shape (N, 16, 6)
+        Postures from `general_postures` [rad or m].
+    valid : ndarray of bool, shape (N, 16)
+        Rows that hold one.
+
+    Returns
+    -------
+    ndarray of bool, shape (N, 16)
+        Rows at which the Jacobian is singular and, to first order, stays so along its null
+        direction.
+
+    Examples
+    --------
+    Joint 3 of the CRX at -90 degrees brings four of its axes together.
+
+    >>> from robotmodels.igm.loop import joint_chain
+    >>> from robotmodels.kinematics import dgm
+    >>> from robotmodels.robots import load
+    >>> model = load("crx10ia")
+    >>> solver = prepare_general(joint_chain(model))
+    >>> T = dgm(model, [[0.3, -0.2, -np.pi / 2, 1.0, -0.7, 0.4]])
+    >>> q, valid, _ = general_postures(solver, T)
+    >>> bool(on_infinite_family(solver, q, valid).any())
+    True
+    """
+    from . import _general_kernels as kernels
+
+    found = np.where(valid[..., None], q, 0.0)
+    found[:, :, solver.sigma == 1] /= solver.unit
+    flat = np.zeros(valid.shape, np.bool_)
+    kernels.flat_singularities(solver.sigma, solver.D, found, np.sum(valid, axis=1), flat)
+    return flat
+
+
 # --- the loop and its 24 representations ---------------------------------------------------------
 
 
@@ -397,16 +448,19 @@ def _solve(solver: GeneralSolver, goals: Array) -> _Found:
         part = found.rows(chosen)
         doubt[chosen] = _one_way(solver, way, goals[chosen], part)[0]
         found.put(chosen, part)
-    chosen = np.flatnonzero(doubt)
+    chosen = np.flatnonzero(doubt & (found.count < MOST))
     if chosen.size:
         # Where roots merge the equations lose digits, or all meaning; a little aside they do not.
         # A pair that is complex on one side of a fold is real on the other, so both are tried.
+        # Beside an infinite family what is found aside leads into a valley to be searched.
         part, goals = found.rows(chosen), goals[chosen]
         arm = (solver.sigma, solver.D, goals, _tolerance(solver.unit))
         for k in range(ASIDE):
             aside = _Found(chosen.size)
             _one_way(solver, solver.representations[0], _nearby(goals, k), aside)
             kernels.bring_home(*arm, aside.q, aside.count, part.q, part.count)
+            kernels.follow_valleys(*arm, aside.q, aside.count, part.q, part.count)
+        kernels.follow_valleys(*arm, part.q.copy(), part.count.copy(), part.q, part.count)
         kernels.partners(*arm, part.q, part.count, part.double)
         found.put(chosen, part)
     found.double &= found.there
