@@ -23,6 +23,7 @@ from .dynamics import (
     potential_energy,
 )
 from .geometry import DHTable, link_transforms
+from .igm import IGMSolutions, IGMStatus, igm_numeric
 from .inertia import InertialParameters
 from .kinematics import dgm, dkm, jacobian, jacobian_rate, link_poses
 from .model import RobotModel, to_urdf, write_urdf
@@ -34,6 +35,7 @@ from .regressors import (
     torque_regressor_chunks,
 )
 from .robots import load, robots
+from .symbolic_dgm import DirectModelExplanation, explain_dgm
 from .symoro import read_par
 from .urdf import NamedFrame
 
@@ -44,7 +46,10 @@ __version__ = "0.1.0"
 
 __all__ = [
     "DHTable",
+    "DirectModelExplanation",
     "DriveParameters",
+    "IGMSolutions",
+    "IGMStatus",
     "InertialParameters",
     "NamedFrame",
     "RobotModel",
@@ -55,8 +60,10 @@ __all__ = [
     "dkm",
     "energy_regressor",
     "errors",
+    "explain_dgm",
     "gravity_torque",
     "idm",
+    "igm_numeric",
     "jacobian",
     "jacobian_rate",
     "kinetic_energy",

@@ -127,13 +127,13 @@ def as_vector(value: ArrayLike, n: int, name: str) -> Array:
     ShapeError, InvalidValueError
         As `as_core`.
     """
-    # a sum of squares is finite only if every term is: one quick call for one configuration
-    if type(value) is np.ndarray and value.dtype is _FLOAT64 and value.shape == (n,):
-        if isfinite(value.dot(value)):
-            return value
-    elif type(value) is list and len(value) == n and set(map(type, value)) <= _NUMBERS:
+    # the usual case quickly: one configuration, as an array or a list of numbers. A sum is finite
+    # only if every term is (one that overflows takes the slow check)
+    array = value
+    if type(value) is list and len(value) == n and set(map(type, value)) <= _NUMBERS:
         array = np.array(value, _FLOAT64)
-        if isfinite(array.dot(array)):
+    if type(array) is np.ndarray and array.dtype is _FLOAT64 and array.shape == (n,):  # noqa: SIM102
+        if isfinite(sum(array.tolist())):
             return array
     return as_core(value, (n,), name)
 

@@ -76,7 +76,7 @@ def idm(
         wrench = as_vector(wrench, 6, "wrench")
         batch_shape((q, v, a, wrench), ("q", "v", "a", "wrench"))
     twin = model.twin
-    if q.ndim == v.ndim == a.ndim == 1 and twin.holds_inertia:
+    if q.ndim == v.ndim == a.ndim == 1 and twin.serves_dynamics:
         to_pin = twin.to_pin
         rigid = pin.rnea(twin.model, twin.data(), to_pin(q), to_pin(v), to_pin(a))
         tau = twin.from_pin(rigid)
@@ -149,7 +149,7 @@ def ddm(
     if wrench is not None:
         tau = tau - _wrench_torque(model, q, wrench)
     twin = model.twin
-    if n and q.ndim == v.ndim == tau.ndim == 1 and twin.holds_inertia:
+    if n and q.ndim == v.ndim == tau.ndim == 1 and twin.serves_dynamics:
         to_pin = twin.to_pin
         h = twin.from_pin(pin.nonLinearEffects(twin.model, twin.data(), to_pin(q), to_pin(v)))
         M = mass_matrix(model, q, drive)
@@ -205,7 +205,7 @@ def mass_matrix(model: RobotModel, q: ArrayLike, drive: bool = True) -> Array:
     """
     q = as_vector(q, model.n, "q")
     twin = model.twin
-    if q.ndim == 1 and twin.holds_inertia:
+    if q.ndim == 1 and twin.serves_dynamics:
         upper = np.triu(pin.crba(twin.model, twin.data(), twin.to_pin(q)))
         M = upper + np.triu(upper, 1).T
         if not twin.in_table_order:
@@ -259,7 +259,7 @@ def coriolis_matrix(model: RobotModel, q: ArrayLike, v: ArrayLike) -> Array:
     """
     q, v = as_vector(q, model.n, "q"), as_vector(v, model.n, "v")
     twin = model.twin
-    if q.ndim == v.ndim == 1 and twin.holds_inertia:
+    if q.ndim == v.ndim == 1 and twin.serves_dynamics:
         C = pin.computeCoriolisMatrix(twin.model, twin.data(), twin.to_pin(q), twin.to_pin(v))
         return np.array(C if twin.in_table_order else C[np.ix_(twin.order, twin.order)], order="C")
     from .kernels.coriolis import coriolis_matrices
@@ -303,7 +303,7 @@ def gravity_torque(model: RobotModel, q: ArrayLike) -> Array:
     """
     q = as_vector(q, model.n, "q")
     twin = model.twin
-    if q.ndim == 1 and twin.holds_inertia:
+    if q.ndim == 1 and twin.serves_dynamics:
         g = pin.computeGeneralizedGravity(twin.model, twin.data(), twin.to_pin(q))
         return twin.from_pin(g)
     zero = np.zeros(model.n)
@@ -347,7 +347,7 @@ def kinetic_energy(model: RobotModel, q: ArrayLike, v: ArrayLike, drive: bool = 
     """
     q, v = as_vector(q, model.n, "q"), as_vector(v, model.n, "v")
     twin = model.twin
-    if q.ndim == v.ndim == 1 and twin.holds_inertia:
+    if q.ndim == v.ndim == 1 and twin.serves_dynamics:
         energy = np.float64(
             pin.computeKineticEnergy(twin.model, twin.data(), twin.to_pin(q), twin.to_pin(v))
         )
@@ -399,7 +399,7 @@ def potential_energy(model: RobotModel, q: ArrayLike) -> Array:
     q = as_vector(q, model.n, "q")
     twin = model.twin
     # Pinocchio leaves out what is fixed to the base
-    if q.ndim == 1 and twin.holds_inertia and twin.base_is_massless:
+    if q.ndim == 1 and twin.serves_dynamics and twin.base_is_massless:
         return np.asarray(
             pin.computePotentialEnergy(twin.model, twin.data(), twin.to_pin(q)), dtype=np.float64
         )
@@ -425,7 +425,7 @@ def _wrench_torque(model: RobotModel, q: Array, w: Array) -> Array:
     """``J^T w``: what the joints add so that the tool exerts a wrench."""
     twin = model.twin
     tool = twin.frame(None)
-    if q.ndim == w.ndim == 1:
+    if q.ndim == w.ndim == 1 and twin.serves_poses:
         J = pin.computeFrameJacobian(
             twin.model, twin.data(), twin.to_pin(q), tool.pin_id, pin.LOCAL_WORLD_ALIGNED
         )

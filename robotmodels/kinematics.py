@@ -68,7 +68,7 @@ def dgm(model: RobotModel, q: ArrayLike, frame: str | int | None = None) -> Arra
     q = as_vector(q, model.n, "q")
     twin = model.twin
     point = twin.frame(frame)
-    if q.ndim == 1:
+    if q.ndim == 1 and twin.serves_poses:
         data = twin.data()
         pin.forwardKinematics(twin.model, data, twin.to_pin(q))
         placement = pin.updateFramePlacement(twin.model, data, point.pin_id)
@@ -116,7 +116,7 @@ def link_poses(model: RobotModel, q: ArrayLike) -> Array:
     """
     q = as_vector(q, model.n, "q")
     twin = model.twin
-    if q.ndim == 1:
+    if q.ndim == 1 and twin.serves_poses:
         data = twin.data()
         pin.forwardKinematics(twin.model, data, twin.to_pin(q))
         poses = np.empty((model.f, 4, 4))
@@ -180,7 +180,7 @@ def jacobian(
     pin_reference, number = _reference(reference)
     twin = model.twin
     point = twin.frame(frame)
-    if q.ndim == 1:
+    if q.ndim == 1 and twin.serves_poses:
         J = pin.computeFrameJacobian(
             twin.model, twin.data(), twin.to_pin(q), point.pin_id, pin_reference
         )
@@ -239,7 +239,7 @@ def jacobian_rate(
     pin_reference, number = _reference(reference)
     twin = model.twin
     point = twin.frame(frame)
-    if q.ndim == v.ndim == 1 and model.n:  # Pinocchio crashes without joints
+    if q.ndim == v.ndim == 1 and twin.serves_poses and model.n:  # Pinocchio crashes without joints
         data = twin.data()
         pin.computeJointJacobiansTimeVariation(twin.model, data, twin.to_pin(q), twin.to_pin(v))
         pin.updateFramePlacement(twin.model, data, point.pin_id)

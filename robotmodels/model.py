@@ -28,6 +28,9 @@ from .visual import Visual
 GRAVITY = (0.0, 0.0, -9.81)
 """Default gravity: the acceleration vector in the world frame, m/s^2."""
 
+_LONGEST_CHAIN = 100
+"""Joints up to which single calls go through Pinocchio, whose scratch data grow with n cubed."""
+
 _PARTS = (
     "name", "table", "inertia", "drive", "base", "tool", "tip", "gravity", "transmission",
     "configurations", "frames", "visuals", "notes",
@@ -89,8 +92,8 @@ class PinocchioTwin:
     """
 
     __slots__ = (
-        "_frames", "_parts", "_scratch", "base_is_massless", "holds_inertia", "in_table_order",
-        "model", "names", "order",
+        "_frames", "_parts", "_scratch", "base_is_massless", "in_table_order",
+        "model", "names", "order", "serves_dynamics", "serves_poses",
     )  # fmt: skip
 
     def __init__(self, parts: RobotParts, gravity: Array) -> None:
@@ -103,7 +106,8 @@ class PinocchioTwin:
             np.int64,
         )
         self.in_table_order = bool((self.order == np.arange(parts.table.n)).all())
-        self.holds_inertia = all(
+        self.serves_poses = parts.table.n <= _LONGEST_CHAIN
+        self.serves_dynamics = self.serves_poses and all(
             holds_inertia(row) and _keeps_digits(row) for row in parts.inertia.values
         )
         table, fixed = parts.table, parts.table.sigma == FIXED
@@ -581,6 +585,9 @@ def to_urdf(model: RobotModel) -> str:
     """URDF text of a model; also called export.
 
     Full-precision numbers, so that reading it back gives the same poses, Jacobians and torques.
+    The tool is the link called ``tool`` (or the source's own link there): read a branched robot
+    back with ``tip_link``, because a URDF does not say which of its links is the tool. Named
+    configurations are no part of a URDF.
 
     Parameters
     ----------

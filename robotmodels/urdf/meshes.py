@@ -120,7 +120,8 @@ class MeshFinder:
                     paths.append(folder / inside)
             if self.urdf_dir is not None:
                 above = (self.urdf_dir, *self.urdf_dir.parents)
-                paths += [folder / inside for folder in above if folder.name == package]
+                # some files leave the package's name empty: package:///folder/mesh.stl
+                paths += [folder / inside for folder in above if package in (folder.name, "")]
             return paths
         path = Path(unquote(rest) if scheme == "file" else rest)
         if path.is_absolute():
