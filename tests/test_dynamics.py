@@ -38,7 +38,7 @@ def model(request):
     )  # fmt: skip
     assert model.n >= 3
     assert not model.twin.in_table_order
-    assert model.twin.holds_inertia == (request.param == "physical")
+    assert model.twin.serves_dynamics == (request.param == "physical")
     return model
 
 

@@ -19,6 +19,9 @@ from .info import pose_text
 
 _SAMPLES = 1000
 _BATCH = 100_000
+# stated configurations, away from singular positions
+_RX90_POSTURE = np.array([0.3, 1.0, -1.8, 0.4, 0.8, -0.2])
+_UR5_POSTURE = np.array([0.3, -0.9, 1.2, 0.4, 0.8, -0.2])
 
 
 def add_command(commands: Any) -> None:
@@ -64,17 +67,17 @@ def run(arguments: argparse.Namespace) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     _say("Staubli RX-90: from the table of the seed book (Table 1.1) to URDF to Pinocchio")
     rx90 = load("rx90")
-    _show_models(rx90, folder)
+    _show_models(rx90, _RX90_POSTURE, folder)
     _say("UR5: from the URDF of example-robot-data to its table")
     ur5 = load("erd:ur5")
-    _show_models(ur5, folder)
+    _show_models(ur5, _UR5_POSTURE, folder)
     _say("Drawing both arms with meshcat")
     from ..viz import show
 
     scene = folder / "arms.html"
     beside = np.eye(4)
     beside[1, 3] = 1.0
-    show([rx90, ur5.with_base(beside @ ur5.base)], [_posture(rx90), _posture(ur5)]).save(scene)
+    show([rx90, ur5.with_base(beside @ ur5.base)], [_RX90_POSTURE, _UR5_POSTURE]).save(scene)
     print(f"Offline scene of both arms: {scene.resolve()} (open it in a browser)")
     print(f"\nDone in {time.perf_counter() - started:.1f} s.")
 
@@ -107,14 +110,13 @@ def table_poses(model: RobotModel, q: Array) -> Array:
     return T @ model.tool
 
 
-def _show_models(model: RobotModel, folder: Path) -> None:
+def _show_models(model: RobotModel, q: Array, folder: Path) -> None:
     print(model)
     path = folder / f"{model.name}.urdf"
     write_urdf(model, path)
     print(f"URDF: {path.resolve()}")
     for note in model.notes:
         print(f"Note: {note}")
-    q = _posture(model)
     v, a = np.full(model.n, 0.5), np.full(model.n, 1.0)
     print(f"\nAt q (rad)     {_row(q)}\n   v (rad/s)   {_row(v)}\n   a (rad/s^2) {_row(a)}")
     print(f"pose of the tool (m):\n{pose_text(dgm(model, q))}")
@@ -143,11 +145,6 @@ def _show_models(model: RobotModel, folder: Path) -> None:
         times.append(time.perf_counter() - started)
     print(f"Poses in batch: {np.median(times) / _BATCH * 1e6:.2f} us each ({_BATCH} poses, median "
           "of 5 runs)")  # fmt: skip
-
-
-def _posture(model: RobotModel) -> Array:
-    """A posture away from singularities, the same for both arms."""
-    return np.array([0.3, -0.9, 1.2, 0.4, 0.8, -0.2])[: model.n]
 
 
 def _row(values: Array) -> str:
