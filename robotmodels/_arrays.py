@@ -16,7 +16,6 @@ from .errors import InvalidValueError, ShapeError
 Array = NDArray[np.float64]
 
 _FLOAT64 = np.dtype(np.float64)
-_NUMBERS = {float, int}
 
 
 def as_floats(value: ArrayLike, name: str) -> Array:
@@ -130,12 +129,14 @@ def as_vector(value: ArrayLike, n: int, name: str) -> Array:
     # the usual case quickly: one configuration, as an array or a list of numbers. A sum is finite
     # only if every term is (one that overflows takes the slow check)
     array = value
-    if type(value) is list and len(value) == n and set(map(type, value)) <= _NUMBERS:
+    if type(value) is list and len(value) == n and set(map(type, value)) == {float}:
         array = np.array(value, _FLOAT64)
-    if type(array) is np.ndarray and array.dtype is _FLOAT64 and array.shape == (n,):  # noqa: SIM102
-        if isfinite(sum(array.tolist())):
-            return array
-    return as_core(value, (n,), name)
+    plain = type(array) is np.ndarray and array.dtype is _FLOAT64 and array.shape == (n,)
+    if plain and array.flags.c_contiguous and isfinite(sum(array.tolist())):
+        return array
+    array = as_core(value, (n,), name)
+    # Pinocchio misreads strides that are no multiple of eight bytes (columns of packed records)
+    return np.ascontiguousarray(array) if array.ndim == 1 else array
 
 
 def as_exact(value: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
@@ -293,6 +294,8 @@ def _converted(value: ArrayLike, name: str) -> Array:
         raise InvalidValueError(
             f"{name}: expected numbers in a regular array, got {type(value).__name__} ({error})."
         ) from None
+    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+        raise InvalidValueError(f"{name}: some entries are masked; fill or remove them first.")
     if array.dtype == np.float64:
         return array
     if array.dtype.kind not in "iuf":

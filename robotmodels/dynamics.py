@@ -7,9 +7,11 @@ negative mass, as in sets of base parameters).
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ._arrays import Array, as_vector, batch_rows, batch_shape
 from .errors import SingularMassMatrixError
@@ -153,10 +155,13 @@ def ddm(
         to_pin = twin.to_pin
         h = twin.from_pin(pin.nonLinearEffects(twin.model, twin.data(), to_pin(q), to_pin(v)))
         M = mass_matrix(model, q, drive)
-        scale = np.sqrt(np.abs(np.diag(M)))
-        if not scale.all() or np.linalg.cond(M / np.outer(scale, scale)) > 1 / _SINGULAR:
+        # as the kernel does: coordinates of unit diagonal, so that units and sizes do not matter
+        size = np.abs(np.diag(M))
+        size = np.sqrt(np.where(size > 0.0, size, np.abs(M).max(axis=1)))
+        scaled = M / (size[:, None] * size) if size.all() else np.zeros_like(M)
+        if _is_singular(scaled):
             raise _singular(model, "")
-        return np.asarray(np.linalg.solve(M, tau - h), np.float64)
+        return np.asarray(np.linalg.solve(scaled, (tau - h) / size) / size, np.float64)
     from .kernels.direct_dynamics import joint_accelerations
 
     batch, rows = batch_rows((q, v, tau), ("q", "v", "tau"))
@@ -206,8 +211,8 @@ def mass_matrix(model: RobotModel, q: ArrayLike, drive: bool = True) -> Array:
     q = as_vector(q, model.n, "q")
     twin = model.twin
     if q.ndim == 1 and twin.serves_dynamics:
-        upper = np.triu(pin.crba(twin.model, twin.data(), twin.to_pin(q)))
-        M = upper + np.triu(upper, 1).T
+        upper = pin.crba(twin.model, twin.data(), twin.to_pin(q))
+        M = np.where(_upper_triangle(model.n), upper, upper.T)
         if not twin.in_table_order:
             M = M[np.ix_(twin.order, twin.order)]
     else:
@@ -442,6 +447,23 @@ def _wrench_torque(model: RobotModel, q: Array, w: Array) -> Array:
         jacobians(configurations, *model.chain, *tool.kernel_arguments, _WORLD_ALIGNED, J[:k])
         np.einsum("ki,kij->kj", rows[1][piece], J[:k], out=tau[piece])
     return tau.reshape(*batch, model.n)
+
+
+def _is_singular(M: Array) -> bool:
+    """Whether a symmetric matrix of unit diagonal is singular to rounding."""
+    try:
+        pivots = np.linalg.cholesky(M).diagonal()
+        return bool((pivots * pivots).min() <= 4 * len(M) * np.finfo(np.float64).eps)
+    except np.linalg.LinAlgError:
+        # not positive definite: parameters that are not physical, or values out of range
+        if not np.isfinite(M).all():
+            return True
+        return bool(np.linalg.cond(M) > 1 / _SINGULAR)
+
+
+@lru_cache
+def _upper_triangle(n: int) -> NDArray[np.bool_]:
+    return np.triu(np.ones((n, n), dtype=bool))
 
 
 def _singular(model: RobotModel, where: str) -> SingularMassMatrixError:

@@ -132,7 +132,7 @@ class InertialParameters:
                 "are not physical are given as InertialParameters(values)."
             )
         if (np.abs(tensor - np.swapaxes(tensor, 1, 2)).max(initial=0.0)
-                > 1e-9 * max(1.0, np.abs(tensor).max(initial=0.0))):  # fmt: skip
+                > 1e-9 * np.abs(tensor).max(initial=0.0)):  # fmt: skip
             raise InertiaError(
                 "inertia: a tensor must be symmetric; check the products of inertia."
             )
@@ -356,26 +356,31 @@ class ConsistencyReport:
 
 
 def _finding(j: int, row: Array) -> LinkFinding:
-    XX, XY, XZ, YY, YZ, ZZ, MX, MY, MZ, M = (float(v) for v in row)
+    # the findings are those of the row divided by its largest entry: nothing overflows
+    largest = float(np.abs(row).max()) or 1.0
+    XX, XY, XZ, YY, YZ, ZZ, MX, MY, MZ, M = (float(v) for v in row / largest)
     tensor = np.array([[XX, XY, XZ], [XY, YY, YZ], [XZ, YZ, ZZ]])
     h = np.array([MX, MY, MZ])
     problems = []
+    tensor_c = tensor
     if M > 0:
-        S = se3.skew(h)
-        tensor_c = tensor + S @ S / M
+        with np.errstate(over="ignore", invalid="ignore"):
+            S = se3.skew(h / np.sqrt(M))
+            tensor_c = tensor + S @ S
+        if not np.isfinite(tensor_c).all():
+            tensor_c = tensor
+            problems.append("hardly any mass for its first moments")
+    elif M < 0:
+        problems.append(f"negative mass {row[9]:g} kg")
     else:
-        tensor_c = tensor
-        problems.append(
-            "no mass" if M == 0 and not h.any() else
-            "first moments without mass" if M == 0 else f"negative mass {M:g} kg"
-        )  # fmt: skip
+        problems.append("first moments without mass" if h.any() else "no mass")
     moments = np.linalg.eigvalsh(tensor_c)
     scale = max(float(np.abs(moments).max()), float(np.abs(tensor).max()))
     gap = float(moments[0] + moments[1] - moments[2])
     if moments[0] < -_ROUNDING * scale:
-        problems.append(f"a principal moment is {moments[0]:.3g} kg m^2")
+        problems.append(f"a principal moment is {moments[0] * largest:.3g} kg m^2")
     if gap < -_ROUNDING * scale:
-        problems.append(f"triangle inequality fails by {-gap:.3g} kg m^2")
+        problems.append(f"triangle inequality fails by {-gap * largest:.3g} kg m^2")
     pseudo = np.empty((4, 4))
     pseudo[:3, :3] = 0.5 * np.trace(tensor) * np.eye(3) - tensor
     pseudo[:3, 3] = pseudo[3, :3] = h
@@ -384,8 +389,8 @@ def _finding(j: int, row: Array) -> LinkFinding:
     smallest = float(np.linalg.eigvalsh(pseudo)[0] / trace) if trace else 0.0
     if smallest < -_ROUNDING and not problems:
         problems.append(f"the pseudo-inertia has the eigenvalue {smallest:.3g} of its trace")
-    a, b, c = (float(v) for v in moments)
-    return LinkFinding(j + 1, M, (a, b, c), gap, smallest, tuple(problems))
+    a, b, c = (float(v) * largest for v in moments)
+    return LinkFinding(j + 1, float(row[9]), (a, b, c), gap * largest, smallest, tuple(problems))
 
 
 def _vectors(tensor: Array, first: Array, mass: Array) -> Array:

@@ -20,7 +20,7 @@ PARALLEL = 1e-13
 """Axes whose directions differ by less than this (rad) are parallel: rounding of the input."""
 NEARLY_PARALLEL = 0.02
 """Below this angle (rad) a row takes beta: the common perpendicular would run far away."""
-_LENGTH_ZERO = 1e-13
+_LENGTH_ZERO = 1e-13  # for a robot of a metre or more
 _ANGLE_ZERO = 1e-13
 _TIE = 1e-9
 
@@ -120,8 +120,10 @@ def khalil_frames(joints: Sequence[JointAxis]) -> KhalilFrames:
     for j, joint in enumerate(joints, start=1):
         children[joint.antecedent].append(j)
     frames = np.empty((f + 1, 4, 4))  # pose of R_i in the frame of link i, at q = 0
+    longest = max((float(np.abs(joint.origin[:3, 3]).max()) for joint in joints), default=1.0)
+    tiny = _LENGTH_ZERO * min(1.0, longest)
     if f:
-        frames[0] = _base_frame(joints, children)
+        frames[0] = _base_frame(joints, children, tiny)
     for j, joint in enumerate(joints, start=1):
         i, k = joint.antecedent, j - 1
         point, direction = _axis_in(frames[i], joint)
@@ -129,7 +131,7 @@ def khalil_frames(joints: Sequence[JointAxis]) -> KhalilFrames:
         if i == 0 and is_main:
             row = (0.0, 0.0, 0.0, 0.0, 0.0)
         else:
-            row = _place(point, direction, joint.sigma)
+            row = _place(point, direction, joint.sigma, tiny)
         # for the main child theta_i and r_i have already been chosen so that these two vanish
         gamma[k], b[k] = (0.0, 0.0) if is_main and i else row[:2]
         beta[k], alpha[k], d[k] = row[2:]
@@ -137,12 +139,12 @@ def khalil_frames(joints: Sequence[JointAxis]) -> KhalilFrames:
         anchor = se3.inverse(joint.origin) @ anchor
         if children[j] and not (i == 0 and is_main):
             main = joints[children[j][0] - 1]
-            theta[k], r[k] = _place(*_axis_in(anchor, main), main.sigma)[:2]
+            theta[k], r[k] = _place(*_axis_in(anchor, main), main.sigma, tiny)[:2]
         frames[j] = anchor @ se3.rotation("z", theta[k]) @ se3.translation(0.0, 0.0, r[k])
     return KhalilFrames(*columns.copy(), base=frames[0], link_poses=se3.inverse(frames[1:]))
 
 
-def _base_frame(joints: Sequence[JointAxis], children: list[list[int]]) -> Array:
+def _base_frame(joints: Sequence[JointAxis], children: list[list[int]], tiny: float) -> Array:
     """R_0 = R_1 at q_1 = 0: on the first axis, x along the perpendicular to the second."""
     first = joints[children[0][0] - 1]
     frame = np.eye(4)
@@ -157,7 +159,7 @@ def _base_frame(joints: Sequence[JointAxis], children: list[list[int]]) -> Array
     if following:
         second = joints[following[0] - 1]
         in_first = se3.inverse(first.origin) @ frame
-        angle, shift = _place(*_axis_in(in_first, second), second.sigma)[:2]
+        angle, shift = _place(*_axis_in(in_first, second), second.sigma, tiny)[:2]
         frame = frame @ se3.rotation("z", angle) @ se3.translation(0.0, 0.0, shift)
     return frame
 
@@ -178,14 +180,17 @@ def _factor(gamma: float, b: float, beta: float, alpha: float, d: float) -> Arra
     )
 
 
-def _place(point: Array, u: Array, sigma: int) -> tuple[float, float, float, float, float]:
+def _place(
+    point: Array, u: Array, sigma: int, tiny: float
+) -> tuple[float, float, float, float, float]:
     """Angle and shift along z, then beta, alpha and d that lead from a frame to an axis.
 
-    The first two become theta and r of the frame's own row (or gamma and b of a side branch).
+    Lengths below ``tiny`` are zero. The first two become theta and r of the frame's own row (or
+    gamma and b of a side branch).
     """
     s = hypot(u[0], u[1])
     if s >= NEARLY_PARALLEL:
-        return _place_skew(point, u, s, sigma)
+        return _place_skew(point, u, s, sigma, tiny)
     if s < PARALLEL:
         u = np.array([0.0, 0.0, 1.0 if u[2] > 0 else -1.0])
     # x through the foot of the perpendicular from the origin onto the axis (Hayati's choice);
@@ -193,7 +198,7 @@ def _place(point: Array, u: Array, sigma: int) -> tuple[float, float, float, flo
     foot = np.zeros(3) if sigma == PRISMATIC else point - (point @ u) * u
     d = float(np.linalg.norm(foot))
     angle = 0.0
-    if d < _LENGTH_ZERO:
+    if d < tiny:
         d = 0.0
     else:
         angle = atan2(foot[1], foot[0])
@@ -211,7 +216,7 @@ def _place(point: Array, u: Array, sigma: int) -> tuple[float, float, float, flo
 
 
 def _place_skew(
-    point: Array, u: Array, s: float, sigma: int
+    point: Array, u: Array, s: float, sigma: int, tiny: float
 ) -> tuple[float, float, float, float, float]:
     """The regular case: x along the common perpendicular of z and the axis."""
     angle, alpha = atan2(u[0], -u[1]), atan2(s, u[2])  # x = z x u / |z x u|
@@ -224,7 +229,7 @@ def _place_skew(
     d = c * point[0] + sn * point[1]
     across = c * point[1] - sn * point[0]
     shift = point[2] + across * u[2] / (sin(alpha) or s)
-    return angle, _tidy_length(shift), 0.0, alpha, _tidy_length(d)
+    return angle, _tidy_length(shift, tiny), 0.0, alpha, _tidy_length(d, tiny)
 
 
 def _tidy_angle(angle: float) -> float:
@@ -233,5 +238,5 @@ def _tidy_angle(angle: float) -> float:
     return nearest + 0.0 if abs(angle - nearest) < _ANGLE_ZERO else angle
 
 
-def _tidy_length(length: float) -> float:
-    return 0.0 if abs(length) < _LENGTH_ZERO else float(length)
+def _tidy_length(length: float, tiny: float) -> float:
+    return 0.0 if abs(length) < tiny else float(length)

@@ -21,7 +21,7 @@ from .errors import FrameNotFoundError, InvalidValueError, ShapeError, UrdfError
 from .geometry import FIXED, NOT_XML, DHTable, constant_factors
 from .inertia import InertialParameters
 from .kernels import Chain
-from .urdf import NamedFrame, RobotParts, read_urdf, urdf_text
+from .urdf import TOOL, NamedFrame, RobotParts, read_urdf, urdf_text
 from .urdf.write import holds_inertia, link_names
 from .visual import Visual
 
@@ -30,6 +30,8 @@ GRAVITY = (0.0, 0.0, -9.81)
 
 _LONGEST_CHAIN = 100
 """Joints up to which single calls go through Pinocchio, whose scratch data grow with n cubed."""
+
+_SMALLEST_MASS = 1e-12
 
 _PARTS = (
     "name", "table", "inertia", "drive", "base", "tool", "tip", "gravity", "transmission",
@@ -97,8 +99,16 @@ class PinocchioTwin:
     )  # fmt: skip
 
     def __init__(self, parts: RobotParts, gravity: Array) -> None:
-        # mimic joints stay independent here: the coupling is the transmission's
-        text = urdf_text(replace(parts, transmission=None), visuals=False)
+        # mimic joints stay independent here: the coupling is the transmission's. Drives are ours,
+        # and bodies whose digits a URDF would lose are the kernels'
+        kept = [holds_inertia(row) and _keeps_digits(row) for row in parts.inertia.values]
+        bodies = replace(
+            parts,
+            transmission=None,
+            drive=DriveParameters.zeros(parts.table.n),
+            inertia=InertialParameters(parts.inertia.values * np.reshape(kept, (-1, 1))),
+        )
+        text = urdf_text(bodies, visuals=False)
         self.model: Any = pin.buildModelFromXML(text)
         self.model.gravity.linear = np.array(gravity)
         self.order: NDArray[np.int64] = read_only(
@@ -107,9 +117,7 @@ class PinocchioTwin:
         )
         self.in_table_order = bool((self.order == np.arange(parts.table.n)).all())
         self.serves_poses = parts.table.n <= _LONGEST_CHAIN
-        self.serves_dynamics = self.serves_poses and all(
-            holds_inertia(row) and _keeps_digits(row) for row in parts.inertia.values
-        )
+        self.serves_dynamics = self.serves_poses and all(kept)
         table, fixed = parts.table, parts.table.sigma == FIXED
         on_base = [j for j in range(table.f) if all(fixed[i - 1] for i in table.path(j + 1))]
         self.base_is_massless = not parts.inertia.values[on_base].any()
@@ -394,8 +402,8 @@ class RobotModel:
             Link whose frame is the world; default the root. What is above it is left out.
         tip_link : str, optional
             Link whose frame is the tool. Only the joints between base and tip are kept, others
-            are locked at zero. Default: all joints below the base; the tool is the link carried
-            by the last joint, or what alone is fixed to it.
+            are locked at zero. Default: all joints below the base; the tool is the link called
+            ``tool``, else the link carried by the last joint, or what alone is fixed to it.
         gravity : array_like, shape (3,)
             Acceleration in the world frame (the axes of the base link), m/s^2.
         package_dirs : path or iterable of paths
@@ -585,8 +593,7 @@ def to_urdf(model: RobotModel) -> str:
     """URDF text of a model; also called export.
 
     Full-precision numbers, so that reading it back gives the same poses, Jacobians and torques.
-    The tool is the link called ``tool`` (or the source's own link there): read a branched robot
-    back with ``tip_link``, because a URDF does not say which of its links is the tool. Named
+    The tool is the link called ``tool``, which `RobotModel.from_urdf` takes for it again. Named
     configurations are no part of a URDF.
 
     Parameters
@@ -661,6 +668,8 @@ def _lost_in_urdf(model: RobotModel) -> list[str]:
     lost = []
     if model.drive.Ia.any():
         lost.append("the rotor inertias Ia")
+    if (model.drive.Fv < 0).any() or (model.drive.Fc < 0).any():
+        lost.append("negative friction")
     if model.drive.offset.any():
         lost.append("the torque offsets")
     if not np.array_equal(model.gravity, GRAVITY):
@@ -668,12 +677,17 @@ def _lost_in_urdf(model: RobotModel) -> list[str]:
     names = [
         name
         for name, row in zip(model.table.names, model.inertia.values, strict=True)
-        if not holds_inertia(row)
+        if not (holds_inertia(row) and _keeps_digits(row))
     ]
     if names:
-        lost.append(f"the inertia of {', '.join(names)} (mass negative, or zero with moments)")
+        lost.append(
+            f"the inertia of {', '.join(names)} (mass negative, or too small for its moments)"
+        )
     if (model.table.mu[model.table.joint_rows] == 0).any():
         lost.append("passive joints (mu = 0)")
+    tool = model.twin.names.tool
+    if tool != TOOL:
+        lost.append(f"the tool's name, taken by a link: read it back with tip_link={tool!r}")
     K = model.transmission
     if K is not None and K.is_invertible:
         lost.append("the transmission (the text's joints are the table's, not the encoders)")
@@ -687,6 +701,8 @@ def _keeps_digits(row: Array) -> bool:
     far away: the tensor about it is so large that the digits of the one about the origin cancel.
     """
     M, moments = row[9], row[6:9]
+    if 0.0 < M < _SMALLEST_MASS:
+        return False  # Pinocchio takes masses below its epsilon for zero in sums
     # up to two digits, for a robot of about a metre
     return bool(moments @ moments <= 100.0 * M * (np.abs(row[:6]).sum() + M))
 

@@ -170,12 +170,11 @@ def as_pose(T: Any, name: str = "T") -> Array:
             f"{float(off[i]):.2g} and det R = {float(np.linalg.det(R)[i]):.6g}; at most "
             f"{ROTATION_TOLERANCE:g} is accepted and rounded away. Re-orthonormalise it first."
         )
-    if worst <= 4e-15:
-        return T
-    U, _, Vt = np.linalg.svd(R)
     T = T.copy()
-    T[..., :3, :3] = U @ Vt
     T[..., 3, :] = 0.0, 0.0, 0.0, 1.0
+    if worst > 4e-15:
+        U, _, Vt = np.linalg.svd(R)
+        T[..., :3, :3] = np.where((off > 4e-15)[..., None, None], U @ Vt, R)
     return T
 
 
@@ -269,7 +268,7 @@ def to_rpy(R: Array) -> tuple[float, float, float]:
 def _cos_sin(angle: float) -> tuple[float, float]:
     """Cosine and sine, exact at the multiples of a right angle that tables are full of."""
     quarter = angle / (pi / 2)
-    if quarter == round(quarter) and abs(quarter) < 1e6:
+    if quarter == round(quarter) and abs(quarter) <= 8:
         k = int(quarter) % 4
         return (1.0, 0.0, -1.0, 0.0)[k], (0.0, 1.0, 0.0, -1.0)[k]
     return cos(angle), sin(angle)

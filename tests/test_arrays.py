@@ -142,3 +142,20 @@ def test_equal_values_hash_alike():
     assert value_hash("x", a) == value_hash("x", b)
     assert not same_value(a, a[None])
     assert not same_value(a, np.array([0.0, 2.0]))
+
+
+def test_columns_of_packed_records_are_laid_out_anew():
+    """Strides that are no multiple of eight bytes would be misread by Pinocchio."""
+    records = np.zeros(6, dtype=[("c", "f4"), ("x", "f8")])
+    records["x"] = q = np.linspace(0.1, 0.6, 6)
+    found = as_vector(records["x"], 6, "q")
+    assert found.flags.c_contiguous
+    assert found.flags.aligned
+    np.testing.assert_array_equal(found, q)
+
+
+def test_masked_and_huge_numbers_are_refused():
+    with pytest.raises(InvalidValueError, match="masked"):
+        as_vector(np.ma.array([0.5], mask=[True]), 1, "q")
+    with pytest.raises(InvalidValueError):
+        as_vector([10**400], 1, "q")

@@ -3,6 +3,7 @@
 import re
 import warnings
 import xml.etree.ElementTree as ET
+from contextlib import nullcontext
 
 import numpy as np
 import pinocchio as pin
@@ -159,7 +160,10 @@ def test_names_that_collide_or_need_escaping(names):
     """Any names: all links and joints differ, each joint keeps its name, poses are right."""
     table = rm.DHTable(antecedent=[0, 1, 2], sigma=[0, 1, 0], d=[0.1, 0.2, 0.3], names=names)
     model = rm.RobotModel.from_table(table, tool=se3.translation(0.1, 0, 0), name=f"<{names[0]}>")
-    text = rm.to_urdf(model)
+    # a joint called so takes the name by which the tool is found again: that is said
+    taken = pytest.warns(UrdfWarning, match="tip_link=") if "tool" in names else nullcontext()
+    with taken:
+        text = rm.to_urdf(model)
     robot = ET.fromstring(text)
     for kind in ("link", "joint"):
         found = [element.get("name") for element in robot.findall(kind)]
@@ -211,7 +215,8 @@ def test_mimics_are_written_and_read_back():
 def test_transmissions_that_a_urdf_cannot_say_are_refused(matrix):
     table = rm.DHTable(antecedent=[0, 1], sigma=[0, 0])
     model = rm.RobotModel.from_table(table, transmission=rm.Transmission(matrix))
-    if matrix == [[1, 0], [1, 0]]:
+    if matrix in ([[1, 0], [1, 0]], [[0, 0], [0, 1]]):
+        # the second is a joint that stands still: it follows with a factor of zero
         assert "<mimic" in rm.to_urdf(model)
         return
     with pytest.raises(UrdfError, match=r"other poses\. .*with_transmission\(None\)"):
@@ -290,3 +295,25 @@ def test_writing_a_file(tmp_path):
     assert rm.RobotModel.from_urdf(path) == model == rm.RobotModel.from_urdf(str(path))
     with pytest.raises(UrdfError, match=r"cannot write .*missing.*No such file"):
         rm.write_urdf(model, tmp_path / "missing" / "arm.urdf")
+
+
+def test_the_tool_survives_a_round_trip():
+    """Also where it is neither on the last frame nor a link of the source."""
+    for name in ("erd:panda", "erd:ur5", "erd:tiago_dual"):
+        model = rm.load(name).with_tool(se3.translation(0.1, 0.2, 0.3), tip=3)
+        back = rm.RobotModel.from_urdf(rm.to_urdf(model))
+        q = np.linspace(-0.5, 0.5, model.n)
+        assert np.abs(rm.dgm(back, q) - rm.dgm(model, q)).max() < 1e-14
+
+
+def test_negative_friction_and_hardly_any_mass():
+    """Both are legal to compute with; a URDF takes neither, and that is said."""
+    model = rm.RobotModel.from_table(
+        ONE,
+        rm.InertialParameters([[0, 0, 0, 0, 0, 0.1, 1.0, 0, 0, 1e-12]]),
+        rm.DriveParameters(Fc=[-1e-3]),
+    )
+    assert rm.idm(model, [0.2], [1.0], [2.0]) == pytest.approx(0.2 - 1e-3)
+    with pytest.warns(UrdfWarning, match=r"negative friction.*the inertia of joint_1"):
+        text = rm.to_urdf(model)
+    assert "friction" not in text

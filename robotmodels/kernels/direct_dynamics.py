@@ -5,6 +5,8 @@ system is solved by elimination with row pivoting, because M need not be positiv
 parameters that are not physical.
 """
 
+from math import sqrt
+
 import numpy as np
 
 from ._compile import CHAIN, INT, MATRIX, OUT2, VECTOR, Floats, Ints, compiled
@@ -18,9 +20,26 @@ EPSILON = float(np.finfo(np.float64).eps)
 
 
 @compiled()
-def solve_in_place(A: Floats, b: Floats, i: int) -> bool:
-    """Solve ``A[i] x = b[i]`` into b[i], spoiling A[i]; False if A[i] is singular to rounding."""
+def solve_in_place(A: Floats, b: Floats, i: int, sizes: Floats) -> bool:
+    """Solve ``A[i] x = b[i]`` into b[i], spoiling A[i]; False if A[i] is singular to rounding.
+
+    ``sizes`` (n,) is scratch.
+    """
     n = A.shape[1]
+    # Coordinates of unit diagonal (of the row's size where that is zero), so that the units and
+    # sizes of the bodies do not decide what is singular
+    for row in range(n):
+        sizes[row] = abs(A[i, row, row])
+        if not sizes[row] > 0.0:
+            for column in range(n):
+                sizes[row] = max(sizes[row], abs(A[i, row, column]))
+        if not sizes[row] > 0.0:
+            return False
+        sizes[row] = sqrt(sizes[row])
+    for row in range(n):
+        for column in range(n):
+            A[i, row, column] /= sizes[row] * sizes[column]
+        b[i, row] /= sizes[row]
     for row in range(n):
         scale = 0.0
         for column in range(n):
@@ -53,6 +72,8 @@ def solve_in_place(A: Floats, b: Floats, i: int) -> bool:
         for column in range(row + 1, n):
             rest -= A[i, row, column] * b[i, column]
         b[i, row] = rest / A[i, row, row]
+    for row in range(n):
+        b[i, row] /= sizes[row]
     return True
 
 
@@ -100,6 +121,7 @@ def joint_accelerations(
     h = np.empty((block, n))
     M = np.empty((block, n, n))
     still = np.zeros((block, n))
+    sizes = np.empty(n)
     singular = -1
     for start in range(0, samples, BLOCK):
         stop = min(start + BLOCK, samples)
@@ -136,7 +158,7 @@ def joint_accelerations(
                 h[i, row] = tau[start + i, row] - h[i, row]
                 for column in range(n):
                     M[i, row, column] += rotor[row, column]
-            solved = solve_in_place(M, h, i)
+            solved = solve_in_place(M, h, i, sizes)
             if not solved and singular < 0:
                 singular = start + i
             for row in range(n):

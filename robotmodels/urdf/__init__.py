@@ -1,7 +1,7 @@
 """URDF: parts of a robot to text, and text to parts. It knows no model and no Pinocchio."""
 
-from .parts import NamedFrame, RobotParts
+from .parts import TOOL, NamedFrame, RobotParts
 from .read import read_urdf
 from .write import urdf_text
 
-__all__ = ["NamedFrame", "RobotParts", "read_urdf", "urdf_text"]
+__all__ = ["TOOL", "NamedFrame", "RobotParts", "read_urdf", "urdf_text"]

@@ -10,6 +10,9 @@ from ..geometry import DHTable
 from ..inertia import InertialParameters
 from ..visual import Visual
 
+TOOL = "tool"
+"""Name of the link that is the tool of a robot in the URDF files of this package."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NamedFrame:

@@ -21,7 +21,7 @@ from ..inertia import InertialParameters
 from ..khalil_frames import JointAxis, khalil_frames
 from ..visual import Visual
 from .meshes import MeshFinder
-from .parts import NamedFrame, RobotParts
+from .parts import TOOL, NamedFrame, RobotParts
 from .tree import MOVING_TYPES, OTHER_TYPES, UrdfJoint, UrdfTree, parse_urdf
 
 
@@ -43,8 +43,9 @@ def read_urdf(
         Link whose frame is the world; default the root. What is above it is left out.
     tip_link : str, optional
         Link whose frame is the tool. The joints between base and tip are kept, others are locked
-        at zero. Default: every joint below the base is kept, and the tool is the link that the
-        last of them carries, or what is fixed to it as long as there is one such link only.
+        at zero. Default: every joint below the base is kept, and the tool is the link called
+        ``tool`` (as `urdf_text` writes it), else the link that the last joint carries, or what is
+        fixed to it as long as there is one such link only.
     package_dirs : path or iterable of paths
         Folders that hold the packages named in ``package://`` meshes.
     dynamics : bool
@@ -155,7 +156,17 @@ def _parts(
         for frame in named
         for v in tree.links[frame.name].visuals
     )
+    notes += [
+        f"joint {joint.name!r} mimics {joint.mimic[0]!r}, which the text does not define."
+        for joint in joints
+        if joint.mimic and joint.mimic[0] not in tree.joints
+    ]
     tip_frame = _tip(tree, placed, named, len(joints), tip_link)
+    if tip_link is None and tip_frame.name != TOOL and len(_leaves(table)) > 1:
+        notes.append(
+            f"the robot has {len(_leaves(table))} branches; the tool is link {tip_frame.name!r} at "
+            "the end of the last one. Choose another with tip_link or with_tool."
+        )
     zeros = np.zeros(len(joints))
     return RobotParts(
         name=tree.name,
@@ -244,12 +255,20 @@ def _tip(
 ) -> NamedFrame:
     if tip_link is not None:
         return next(frame for frame in named if frame.name == tip_link)
+    own = next((frame for frame in named if frame.name == TOOL and frame.parent > 0), None)
+    if own is not None:
+        return own
     name = next(p.name for p in placed if p.owner == last and not p.merged)
     following = tree.children(name)
     while len(following) == 1 and following[0].kind == "fixed":
         name = following[0].child
         following = tree.children(name)
     return next(frame for frame in named if frame.name == name)
+
+
+def _leaves(table: DHTable) -> list[int]:
+    """Numbers of the frames that nothing stands on."""
+    return [j for j in range(1, table.f + 1) if j not in table.antecedent]
 
 
 def _inertia(tree: UrdfTree, named: tuple[NamedFrame, ...], f: int) -> InertialParameters:

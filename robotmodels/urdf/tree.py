@@ -151,6 +151,8 @@ def _element_tree(text: str) -> ET.Element:
         parser.Parse(text.lstrip("\ufeff \t\r\n").encode("utf-8"), True)
     except expat.ExpatError as error:
         raise UrdfError(f"not well-formed XML: {error}.") from None
+    except UrdfError:
+        raise
     except (LookupError, ValueError) as error:
         raise UrdfError(f"the text cannot be decoded: {error}.") from None
     return builder.close()
@@ -215,6 +217,8 @@ def _numbers(text: str | None, count: int, default: tuple[float, ...], where: st
         return np.array(default)
     try:
         values = np.array([float(word) for word in text.split()])
+        if "_" in text:  # Python's float takes 1_0 for 10
+            raise ValueError
     except ValueError:
         raise UrdfError(f"{where}: expected {count} numbers, got {text!r}.") from None
     if values.size != count or not np.isfinite(values).all():
@@ -251,7 +255,10 @@ def _link(element: ET.Element, materials: dict[str, Color], meshes: MeshFinder) 
     mass, com, tensor = 0.0, np.zeros(3), np.zeros((3, 3))
     inertial = element.find("inertial")
     if inertial is not None:
-        mass = _number(inertial.find("mass"), "value", 0.0, f"{where}: mass")
+        given = inertial.find("mass")
+        if given is None or given.get("value") is None:
+            raise UrdfError(f"{where}: <inertial> needs <mass value=...>; remove it if unknown.")
+        mass = _number(given, "value", 0.0, f"{where}: mass")
         if mass < 0:
             raise UrdfError(f"{where}: a mass cannot be negative, got {mass} kg.")
         pose = _origin(inertial, f"{where}: inertial")
@@ -318,7 +325,8 @@ def _joint(element: ET.Element) -> UrdfJoint:
     axis_element = element.find("axis")
     text = None if axis_element is None else axis_element.get("xyz")
     axis = _numbers(text, 3, (1.0, 0.0, 0.0), f"{where}: axis")
-    length = float(np.linalg.norm(axis))
+    largest = float(np.abs(axis).max())
+    length = float(np.linalg.norm(axis / largest)) * largest if largest else 0.0
     if kind in MOVING_TYPES and length < 1e-6:
         raise UrdfError(f"{where}: its axis is {text!r}; an axis needs a direction.")
     limit = element.find("limit")
@@ -341,7 +349,7 @@ def _joint(element: ET.Element) -> UrdfJoint:
         parent=parent.get("link", ""),
         child=child.get("link", ""),
         origin=_origin(element, where),
-        axis=axis / length if length else axis,
+        axis=axis / largest / (length / largest) if length else axis,
         lower=lower,
         upper=upper,
         velocity=_limit(limit, "velocity", np.inf, where),

@@ -13,7 +13,7 @@ from ..drive import Transmission
 from ..errors import UrdfError
 from ..geometry import FIXED, PRISMATIC, constant_factors
 from ..visual import Box, Color, Cylinder, Mesh, Sphere, Visual, skeleton
-from .parts import RobotParts
+from .parts import TOOL, RobotParts
 
 _LARGEST = repr(float(np.finfo(np.float64).max))
 
@@ -85,7 +85,9 @@ def urdf_text(parts: RobotParts, visuals: bool = True) -> str:
             f'upper="{_limit(table.upper[column])}" effort="{_limit(table.effort[column])}" '
             f'velocity="{_limit(table.velocity[column])}"/>'
         )
-        Fv, Fc = float(parts.drive.Fv[column]), float(parts.drive.Fc[column])
+        # readers refuse negative friction
+        Fv = max(float(parts.drive.Fv[column]), 0.0)
+        Fc = max(float(parts.drive.Fc[column]), 0.0)
         if Fv or Fc:
             lines.append(f'    <dynamics damping="{Fv!r}" friction="{Fc!r}"/>')
         lines += mimics.get(column, [])
@@ -165,7 +167,12 @@ def link_names(parts: RobotParts) -> LinkNames:
 
     given = [own(0, se3.inverse(parts.base))]
     given += [own(k, np.eye(4)) for k in range(parts.table.f + 1)]
-    given.append(own(parts.tip, parts.tool))
+    # the tool is called so, whatever the source called it: that is how it is found again
+    given.append(TOOL if any(
+        frame.name == TOOL and frame.parent == parts.tip and np.array_equal(frame.pose, parts.tool)
+        for frame in spare
+    ) else None)  # fmt: skip
+    spare = [frame for frame in spare if frame.name != given[-1]]
     stems = [name.removeprefix("joint_").removeprefix("frame_") for name in parts.table.names]
     wanted = [
         f"link_{stem}" if stem != name else f"{name}_link"
@@ -182,7 +189,7 @@ def link_names(parts: RobotParts) -> LinkNames:
     base = "R_0" if "base" in taken else "base"
     links = [
         free(name) if have is None else have
-        for have, name in zip(given, ("world", base, *wanted, "tool"), strict=True)
+        for have, name in zip(given, ("world", base, *wanted, TOOL), strict=True)
     ]
     carried = (links[1], links[-1], *(frame.name for frame in spare))
     return LinkNames(
@@ -312,8 +319,10 @@ def _mimics(transmission: Transmission | None, joints: tuple[str, ...]) -> dict[
         masters = np.flatnonzero(K[i])
         if K[i, i] == 1.0 and masters.size == 1 and transmission.offset[i] == 0.0:
             continue
-        master = int(masters[0]) if masters.size else -1
-        if masters.size != 1 or K[:, i].any() or K[master, master] != 1.0:
+        # a factor of zero is a joint that stands still: any joint that moves can be its master
+        free = [k for k in range(transmission.n) if K[k, k] == 1.0 and k != i]
+        master = int(masters[0]) if masters.size else (free[0] if free else -1)
+        if masters.size > 1 or master < 0 or K[:, i].any() or K[master, master] != 1.0:
             raise UrdfError(
                 f"joint {joints[i]!r} is tied to others by the transmission in a way that a URDF "
                 "cannot say (only q_i = factor * q_k + offset can be): written without it the "
