@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ._arrays import Array, as_vector, batch_rows, batch_shape
 from .errors import SingularMassMatrixError
-from .model import RobotModel
+from .model import RobotModel, check_model
 
 _SINGULAR = 1e-14
 _CHUNK = 1024  # Jacobians held at a time: they stay in the cache
@@ -72,6 +72,7 @@ def idm(
     >>> idm(pendulum, [0.0], [0.0], [0.0])
     array([1.962])
     """
+    check_model(model)
     n = model.n
     q, v, a = as_vector(q, n, "q"), as_vector(v, n, "v"), as_vector(a, n, "a")
     if wrench is not None:
@@ -139,6 +140,7 @@ def ddm(
     >>> ddm(pendulum, [0.0], [0.0], [0.04]).round(12)
     array([2.])
     """
+    check_model(model)
     n = model.n
     q, v, tau = as_vector(q, n, "q"), as_vector(v, n, "v"), as_vector(tau, n, "tau")
     batch_shape((q, v, tau), ("q", "v", "tau"))
@@ -208,6 +210,7 @@ def mass_matrix(model: RobotModel, q: ArrayLike, drive: bool = True) -> Array:
     >>> mass_matrix(RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]), link), [0.0])
     array([[0.02]])
     """
+    check_model(model)
     q = as_vector(q, model.n, "q")
     twin = model.twin
     if q.ndim == 1 and twin.serves_dynamics:
@@ -262,6 +265,7 @@ def coriolis_matrix(model: RobotModel, q: ArrayLike, v: ArrayLike) -> Array:
     >>> coriolis_matrix(arm, [0.0, 0.0], [1.0, 1.0]).shape
     (2, 2)
     """
+    check_model(model)
     q, v = as_vector(q, model.n, "q"), as_vector(v, model.n, "v")
     twin = model.twin
     if q.ndim == v.ndim == 1 and twin.serves_dynamics:
@@ -306,6 +310,7 @@ def gravity_torque(model: RobotModel, q: ArrayLike) -> Array:
     >>> gravity_torque(arm, [0.0, 0.0])
     array([0., 0.])
     """
+    check_model(model)
     q = as_vector(q, model.n, "q")
     twin = model.twin
     if q.ndim == 1 and twin.serves_dynamics:
@@ -350,6 +355,7 @@ def kinetic_energy(model: RobotModel, q: ArrayLike, v: ArrayLike, drive: bool = 
     >>> float(kinetic_energy(one, [0.0], [2.0]))
     1.0
     """
+    check_model(model)
     q, v = as_vector(q, model.n, "q"), as_vector(v, model.n, "v")
     twin = model.twin
     if q.ndim == v.ndim == 1 and twin.serves_dynamics:
@@ -401,6 +407,7 @@ def potential_energy(model: RobotModel, q: ArrayLike) -> Array:
     >>> round(float(potential_energy(lift, [0.5])), 12)
     9.81
     """
+    check_model(model)
     q = as_vector(q, model.n, "q")
     twin = model.twin
     # Pinocchio leaves out what is fixed to the base

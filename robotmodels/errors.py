@@ -89,8 +89,10 @@ class _NameNotFoundError(RobotModelsError, KeyError):
         self.known = known
         self.nearest = tuple(nearest_names(str(name), known))
         hint = f" Did you mean {_listed(self.nearest)}?" if self.nearest else ""
-        shown = _listed(known[:40]) + (f" and {len(known) - 40} more" if len(known) > 40 else "")
-        super().__init__(f"No {kind} {name!r}.{hint} Known: {shown}. {advice}".rstrip())
+        few = known if len(known) <= 12 or not self.nearest else ()
+        shown = _listed(few[:40]) + (f" and {len(few) - 40} more" if len(few) > 40 else "")
+        listing = f" Known: {shown}." if few or not known else ""
+        super().__init__(f"No {kind} {name!r}.{hint}{listing} {advice}".rstrip())
 
     def __str__(self) -> str:  # KeyError would show the repr of the sentence
         return str(self.args[0])

@@ -8,6 +8,7 @@ notation for open and closed-loop robots", IEEE ICRA 1986, for trees (gamma, b);
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from math import pi
@@ -27,7 +28,7 @@ from ._arrays import (
     same_value,
     value_hash,
 )
-from .errors import InvalidValueError, ShapeError, TableError, nearest_names
+from .errors import InvalidValueError, RobotModelsWarning, ShapeError, TableError, nearest_names
 from .table_text import SMALLEST, angle_text, boxed, length_text, variable_text
 
 REVOLUTE, PRISMATIC, FIXED = 0, 1, 2
@@ -131,6 +132,8 @@ class DHTable:
     ) -> None:
         ancestors = _integers(antecedent, "antecedent")
         f = ancestors.size
+        if not f:
+            raise TableError("a table needs at least one row, got none.")
         kinds = _integers(sigma, "sigma", f)
         _check_structure(ancestors, kinds)
         moving = kinds != FIXED
@@ -196,6 +199,17 @@ class DHTable:
         for key in (*_ANGLES, *_LENGTHS):
             column = as_floats([row.get(key, 0.0) for row in rows], key)
             columns[key] = np.deg2rad(column) if degrees and key in _ANGLES else column
+            if (
+                key in ("gamma", "beta", "alpha")
+                and not degrees
+                and (np.abs(column) > 2 * pi).any()
+            ):
+                warnings.warn(
+                    f"{key} holds {column.tolist()}, more than a turn in radians: if these are "
+                    "degrees, pass degrees=True.",
+                    RobotModelsWarning,
+                    stacklevel=2,
+                )
         columns |= _limits_of_rows(rows, sigma, degrees)
         columns["names"] = _names_of_rows(rows, sigma)
         return cls(**columns)
@@ -448,6 +462,9 @@ def link_transforms(table: DHTable, q: ArrayLike) -> Array:
     >>> link_transforms(table, [0.0, 0.2])[1, 2, 3].round(12)
     np.float64(0.3)
     """
+    if not isinstance(table, DHTable):
+        hint = "; pass model.table" if hasattr(table, "table") else ""
+        raise InvalidValueError(f"table: expected a DHTable, got {type(table).__name__}{hint}.")
     q = as_vector(q, table.n, "q")
     theta = np.broadcast_to(table.theta, (*q.shape[:-1], table.f)).copy()
     r = np.broadcast_to(table.r, theta.shape).copy()

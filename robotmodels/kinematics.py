@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from ._arrays import Array, as_vector, batch_rows, batch_shape
 from .errors import InvalidValueError
-from .model import RobotModel
+from .model import RobotModel, check_model
 
 Reference = Literal["world_aligned", "local", "world"]
 
@@ -65,6 +65,7 @@ def dgm(model: RobotModel, q: ArrayLike, frame: str | int | None = None) -> Arra
     >>> dgm(arm, np.zeros((1000, 2))).shape
     (1000, 4, 4)
     """
+    check_model(model)
     q = as_vector(q, model.n, "q")
     twin = model.twin
     point = twin.frame(frame)
@@ -114,6 +115,7 @@ def link_poses(model: RobotModel, q: ArrayLike) -> Array:
     >>> link_poses(arm, [0.0, 0.0])[:, 0, 3]
     array([0. , 0.3])
     """
+    check_model(model)
     q = as_vector(q, model.n, "q")
     twin = model.twin
     if q.ndim == 1 and twin.serves_poses:
@@ -176,6 +178,7 @@ def jacobian(
     >>> jacobian(arm, [0.0, 0.0])[1]
     array([0.3, 0. ])
     """
+    check_model(model)
     q = as_vector(q, model.n, "q")
     pin_reference, number = _reference(reference)
     twin = model.twin
@@ -235,6 +238,7 @@ def jacobian_rate(
     >>> jacobian_rate(arm, [0.0, 0.0], [1.0, 0.0])[0]
     array([-0.3,  0. ])
     """
+    check_model(model)
     q, v = as_vector(q, model.n, "q"), as_vector(v, model.n, "v")
     pin_reference, number = _reference(reference)
     twin = model.twin
@@ -296,6 +300,7 @@ def dkm(
     >>> dkm(arm, [0.0, 0.0], [2.0, 0.0])
     array([0. , 0.6, 0. , 0. , 0. , 2. ])
     """
+    check_model(model)
     q, v = as_vector(q, model.n, "q"), as_vector(v, model.n, "v")
     batch_shape((q, v), ("q", "v"))
     J = jacobian(model, q, frame, reference)

@@ -573,7 +573,12 @@ class RobotModel:
         return f"<RobotModel {self.name!r}: {self.n} joints, {self.f} frames>"
 
     def __str__(self) -> str:
-        return f"{self.name}: {self.n} joints, {self.f} frames\n{self.table}"
+        text = f"{self.name}: {self.n} joints, {self.f} frames\n{self.table}"
+        if not self.inertia.values.any():
+            text += (
+                "\nNo inertial parameters are known: links without mass, torques of drives only."
+            )
+        return text
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, RobotModel):
@@ -587,6 +592,35 @@ class RobotModel:
         parts = [getattr(self, p) for p in _PARTS]
         parts[_PARTS.index("configurations")] = dict(self.configurations)
         return type(self), tuple(parts)
+
+
+def check_model(model: object) -> None:
+    """Refuse what is not a model, with a hint for what it is.
+
+    Parameters
+    ----------
+    model : object
+        First argument of a public function.
+
+    Raises
+    ------
+    InvalidValueError
+        It is a name, a table, a Pinocchio model or something else.
+
+    Examples
+    --------
+    >>> check_model(RobotModel.from_table(DHTable(antecedent=[0], sigma=[0])))
+    """
+    if isinstance(model, RobotModel):
+        return
+    hint = "build one with RobotModel.from_table(...), RobotModel.from_urdf(...) or load(...)"
+    if isinstance(model, (str, Path)):
+        hint = f"load it first: load({str(model)!r}), or RobotModel.from_urdf(path) for a file"
+    elif isinstance(model, DHTable):
+        hint = "make one of the table: RobotModel.from_table(table)"
+    elif isinstance(model, pin.Model):
+        hint = "Pinocchio's models are no input; RobotModel.from_urdf(...) reads their URDF"
+    raise InvalidValueError(f"model: expected a RobotModel, got {type(model).__name__}; {hint}.")
 
 
 def to_urdf(model: RobotModel) -> str:
@@ -624,6 +658,7 @@ def to_urdf(model: RobotModel) -> str:
     >>> to_urdf(arm).splitlines()[1]
     '<robot name="robot">'
     """
+    check_model(model)
     text = urdf_text(model.parts)
     lost = _lost_in_urdf(model)
     if lost:

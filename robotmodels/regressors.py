@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from ._arrays import Array, as_vector, batch_rows
 from .errors import InvalidValueError
 from .inertia import PARAMETERS
-from .model import RobotModel
+from .model import RobotModel, check_model
 
 _DRIVE_PARAMETERS = ("Ia", "Fv", "Fc", "offset")
 _COUPLED_PARAMETERS = ("Iam", "Fvm", "Fcm")
@@ -47,6 +47,7 @@ def parameter_names(model: RobotModel, drive: bool = True) -> tuple[str, ...]:
     >>> names[5], names[-1], len(names)
     ('ZZ1', 'offset1', 14)
     """
+    check_model(model)
     names = [f"{p}{j}" for j in range(1, model.f + 1) for p in PARAMETERS]
     if drive:
         frames = [int(row) + 1 for row in model.table.joint_rows]
@@ -80,6 +81,7 @@ def parameter_vector(model: RobotModel, drive: bool = True) -> Array:
     >>> parameter_vector(RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))).shape
     (14,)
     """
+    check_model(model)
     values = [model.inertia.values.ravel()]
     if drive:
         values += [getattr(model.drive, p) for p in _DRIVE_PARAMETERS]
@@ -131,6 +133,7 @@ def torque_regressor(
     >>> float(torque_regressor(one, [0.0], [0.0], [2.0])[0, 5])
     2.0
     """
+    check_model(model)
     n = model.n
     arrays = as_vector(q, n, "q"), as_vector(v, n, "v"), as_vector(a, n, "a")
     batch, rows = batch_rows(arrays, ("q", "v", "a"))
@@ -190,6 +193,7 @@ def torque_regressor_chunks(
     >>> [W.shape[0] for _, W in torque_regressor_chunks(one, samples, samples, samples, size=400)]
     [400, 400, 200]
     """
+    check_model(model)
     if size < 1:
         raise InvalidValueError(f"size: expected at least one sample in a piece, got {size}.")
     n = model.n
@@ -234,6 +238,7 @@ def energy_regressor(model: RobotModel, q: ArrayLike, v: ArrayLike, drive: bool 
     >>> float(energy_regressor(one, [0.0], [2.0])[5])
     2.0
     """
+    check_model(model)
     from .kernels.energy_regressor import energy_regressors
 
     arrays = as_vector(q, model.n, "q"), as_vector(v, model.n, "v")

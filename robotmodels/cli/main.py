@@ -6,6 +6,7 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
+from importlib.metadata import version
 
 from ..errors import RobotModelsError
 from . import demo, info, listing, view
@@ -38,14 +39,28 @@ def main(argv: Sequence[str] | None = None) -> int:
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for module in (demo, listing, info, view):
         module.add_command(commands)
-    arguments = parser.parse_args(argv)
+    parser.add_argument("--version", action="version", version=version("robotmodels"))
+    arguments = parser.parse_args(_joined(sys.argv[1:] if argv is None else argv))
     try:
         arguments.run(arguments)
         sys.stdout.flush()
     except RobotModelsError as error:
         print(f"robotmodels: {error}", file=sys.stderr)
         return 2
-    except BrokenPipeError:
+    except OSError as error:
+        if not isinstance(error, BrokenPipeError):
+            print(f"robotmodels: {error.strerror}: {error.filename}", file=sys.stderr)
+            return 2
         # the reader (head, a pager) has seen enough; keep Python from complaining at exit
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return 0
+
+
+def _joined(argv: Sequence[str]) -> list[str]:
+    """``--q -1,0`` as ``--q=-1,0``: argparse would take the numbers for an option."""
+    words = list(argv)
+    for i, word in enumerate(words[:-1]):
+        if word == "--q":
+            words[i : i + 2] = [f"--q={words[i + 1]}"]
+            break
+    return words

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from ..errors import InvalidValueError
 from ..model import RobotModel
 from ..robots import load
 from ..symoro import read_par
@@ -63,10 +64,17 @@ def robot_of(arguments: argparse.Namespace) -> RobotModel:
     """
     name = arguments.robot
     suffix = Path(name).suffix.lower()
+    if suffix != ".par" and Path(name).is_dir():
+        raise InvalidValueError(f"{name!r} is a folder; give a robot's name or file.")
     if suffix == ".par":
         return read_par(name)
     if suffix in (".urdf", ".xml", ".xacro"):
         return RobotModel.from_urdf(
             name, arguments.base_link, arguments.tip_link, package_dirs=arguments.package_dir
+        )
+    if arguments.base_link or arguments.tip_link or arguments.package_dir:
+        raise InvalidValueError(
+            f"--base-link, --tip-link and --package-dir are for URDF files; {name!r} is a name of "
+            "the catalogue."
         )
     return load(name)

@@ -117,6 +117,9 @@ def _builder(name: str) -> Callable[[], RobotModel]:
     module = _MODULE_OF.get(name) if isinstance(name, str) else None
     if module is None:
         raise RobotNotFoundError(
-            "robot", name, robots(), "A URDF file is read with RobotModel.from_urdf(path)."
+            "robot",
+            name,
+            robots(),
+            "All names: robots(). A URDF file is read with RobotModel.from_urdf(path).",
         )
     return getattr(import_module(f".{module}", __package__), name)

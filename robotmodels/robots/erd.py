@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +33,8 @@ class ErdArm:
         Links between which the arm lies; default the whole tree.
     srdf : str, optional
         File with named postures, relative to the folder of robots.
+    tool : str, optional
+        Link that is the tool, where that is not the end of the last branch.
 
     Examples
     --------
@@ -44,6 +46,7 @@ class ErdArm:
     base_link: str | None = None
     tip_link: str | None = None
     srdf: str | None = None
+    tool: str | None = None
 
 
 _UR = "ur_description/urdf/"
@@ -74,8 +77,12 @@ ERD_ARMS: dict[str, ErdArm] = {
     "ur5_limited": ErdArm(_UR + "ur5_joint_limited_robot.urdf", srdf=_UR_SRDF + "ur5.srdf"),
     "ur10": ErdArm(_UR + "ur10_robot.urdf"),
     "ur10_limited": ErdArm(_UR + "ur10_joint_limited_robot.urdf"),
-    "panda": ErdArm("panda_description/urdf/panda.urdf", srdf="panda_description/srdf/panda.srdf"),
-    "panda_collision": ErdArm("panda_description/urdf/panda_collision.urdf"),
+    "panda": ErdArm(
+        "panda_description/urdf/panda.urdf",
+        srdf="panda_description/srdf/panda.srdf",
+        tool="panda_hand_tcp",
+    ),
+    "panda_collision": ErdArm("panda_description/urdf/panda_collision.urdf", tool="panda_hand_tcp"),
     "kinova": ErdArm(
         "kinova_description/robots/kinova.urdf", srdf="kinova_description/srdf/kinova.srdf"
     ),
@@ -205,8 +212,18 @@ def load_erd(name: str) -> RobotModel:
             f"Its file would be {arm.urdf}; update with: pip install -U example-robot-data",
         )  # fmt: skip
     model = RobotModel.from_urdf(path, base_link=arm.base_link, tip_link=arm.tip_link)
+    if arm.tool is not None:
+        point = model.twin.frame(arm.tool)
+        tool = np.eye(4)
+        tool[:3, :3], tool[:3, 3] = point.rotation, point.position
+        model = replace(model.with_tool(tool, tip=point.parent), notes=_without_branches(model))
     postures = _postures(folder / arm.srdf, model) if arm.srdf else {}
     return model.with_configurations(postures) if postures else model
+
+
+def _without_branches(model: RobotModel) -> tuple[str, ...]:
+    """Notes of a model whose tool has been chosen: the one about the choice is void."""
+    return tuple(note for note in model.notes if "branches; the tool is" not in note)
 
 
 def erd_folder() -> Path:

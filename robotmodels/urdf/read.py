@@ -84,6 +84,8 @@ def read_urdf(
 
 
 def _text_of(source: str | Path) -> tuple[str, Path | None]:
+    if isinstance(source, str) and not source.strip():
+        raise UrdfError("expected a path or the text of a URDF, got an empty text.")
     if isinstance(source, str) and "<" in source:
         return source, None
     if not isinstance(source, (str, Path)):
@@ -131,8 +133,9 @@ def _parts(
     _walk(tree, placed[0], kept, joints, axes, placed, notes)
     if not joints:
         raise UrdfError(
-            f"no joint moves between {base_link!r} and {tip_link or 'the leaves'!r}: there is "
-            "nothing to model. Choose base_link and tip_link on both sides of a moving joint."
+            f"no joint moves between {base_link!r} and "
+            f"{repr(tip_link) if tip_link else 'the leaves'}: there is nothing to model. Choose "
+            "base_link and tip_link on both sides of a moving joint."
         )
     frames = khalil_frames(axes)
     sigma = [axis.sigma for axis in axes]
