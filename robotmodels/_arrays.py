@@ -131,12 +131,17 @@ def as_vector(value: ArrayLike, n: int, name: str) -> Array:
     array = value
     if type(value) is list and len(value) == n and set(map(type, value)) == {float}:
         array = np.array(value, _FLOAT64)
-    plain = type(array) is np.ndarray and array.dtype is _FLOAT64 and array.shape == (n,)
-    if plain and array.flags.c_contiguous and isfinite(sum(array.tolist())):
+    if (
+        type(array) is np.ndarray
+        and array.dtype is _FLOAT64
+        and array.shape == (n,)
+        and array.flags.c_contiguous
+        and isfinite(sum(array.tolist()))
+    ):
         return array
-    array = as_core(value, (n,), name)
+    checked = as_core(value, (n,), name)
     # Pinocchio misreads strides that are no multiple of eight bytes (columns of packed records)
-    return np.ascontiguousarray(array) if array.ndim == 1 else array
+    return np.ascontiguousarray(checked) if checked.ndim == 1 else checked
 
 
 def as_exact(value: ArrayLike, shape: tuple[int, ...], name: str) -> Array:

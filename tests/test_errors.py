@@ -3,6 +3,7 @@
 import inspect
 import pickle
 
+import numpy as np
 import pytest
 
 import robotmodels as rm
@@ -91,3 +92,18 @@ def test_unknown_robots_are_answered_with_the_nearest():
         rm.load("erd:ur55")
     with pytest.raises(RobotNotFoundError):
         rm.load(None)
+
+
+def test_a_first_argument_that_is_no_model_is_named():
+    rx90 = rm.load("rx90")
+    q = np.zeros(6)
+    mistakes = [
+        (lambda: rm.dgm("rx90", q), "load\\('rx90'\\)"),
+        (lambda: rm.idm(rx90.table, q, q, q), "from_table"),
+        (lambda: rm.torque_regressor(rx90.pin_model, q, q, q), "Pinocchio"),
+        (lambda: rm.to_urdf(5), "got int"),
+        (lambda: rm.link_transforms(rx90, q), "pass model.table"),
+    ]
+    for call, words in mistakes:
+        with pytest.raises(rm.errors.InvalidValueError, match=words):
+            call()

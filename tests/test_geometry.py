@@ -274,12 +274,15 @@ def test_replace_changes_one_column_and_knows_the_others():
         table.replace(thete=[0, 0])
 
 
-def test_zero_rows_make_an_empty_table_but_no_model():
-    table = rm.DHTable.from_rows([])
-    assert (table.f, table.n) == (0, 0)
-    assert rm.link_transforms(table, np.zeros((3, 0))).shape == (3, 0, 4, 4)
-    with pytest.raises(rm.errors.FrameNotFoundError):
-        rm.RobotModel.from_table(table)
+def test_a_table_needs_a_row():
+    for make in (rm.DHTable.from_rows, rm.DHTable.from_standard):
+        with pytest.raises(TableError, match="at least one row"):
+            make([])
+
+
+def test_angles_that_look_like_degrees_are_pointed_out():
+    with pytest.warns(rm.errors.RobotModelsWarning, match="degrees=True"):
+        rm.DHTable.from_rows([{"alpha": 90}])
 
 
 # --- mistakes ------------------------------------------------------------------------------------

@@ -505,7 +505,7 @@ def test_xacro_files_are_refused_by_name(name, tmp_path):
         (None, "got NoneType"),
         (5, "got int"),
         (["a.urdf"], "got list"),
-        ("", "cannot read"),
+        ("", "got an empty text"),
         ("nowhere/arm.urdf", "cannot read 'nowhere/arm.urdf': No such file"),
         ("a\0b", "zero character"),
         (Path("/"), "cannot read '/'"),
@@ -711,3 +711,22 @@ def test_real_arms_there_and_back(name):
         assert np.array_equal(getattr(back.table, limit), getattr(model.table, limit)), limit
     lengths = np.abs([model.table.b, model.table.d, model.table.r])
     assert lengths.max() < 3.0, "no length beyond the robot's size, let alone kilometres"
+
+
+def test_a_tool_by_name_and_the_note_on_branches():
+    """A link called tool is the tool; without one, a choice among branches is said."""
+    hand = rm.load("erd:allegro_right_hand")
+    assert any("4 branches" in note for note in hand.notes)
+    panda = rm.load("erd:panda")
+    assert panda.tip == 7
+    assert not any("branches" in note for note in panda.notes)
+    q = np.linspace(-0.2, 0.4, panda.n)
+    assert np.abs(rm.dgm(panda, q) - rm.dgm(panda, q, "panda_hand_tcp")).max() < 1e-15
+
+
+def test_an_inertial_without_mass_is_refused():
+    text = """<robot name="r"><link name="a"/><link name="b"><inertial>
+    <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
+    <joint name="j" type="continuous"><parent link="a"/><child link="b"/></joint></robot>"""
+    with pytest.raises(UrdfError, match="needs <mass"):
+        read(text)

@@ -6,8 +6,8 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
-from importlib.metadata import version
 
+from .. import __version__
 from ..errors import RobotModelsError
 from . import demo, info, listing, view
 
@@ -39,7 +39,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for module in (demo, listing, info, view):
         module.add_command(commands)
-    parser.add_argument("--version", action="version", version=version("robotmodels"))
+    parser.add_argument("--version", action="version", version=__version__)
     arguments = parser.parse_args(_joined(sys.argv[1:] if argv is None else argv))
     try:
         arguments.run(arguments)
