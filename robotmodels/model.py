@@ -143,10 +143,8 @@ class PinocchioTwin:
         return y
 
     def from_pin(self, x: Array) -> Array:
-        """Reorder the last axis from Pinocchio's order to the table's; always a C-ordered copy."""
-        if self.in_table_order:
-            return x.copy()
-        return np.ascontiguousarray(x[..., self.order])
+        """Reorder the last axis of what Pinocchio returned (a copy of its own) to the table's."""
+        return np.ascontiguousarray(x if self.in_table_order else x[..., self.order])
 
     def frame(self, frame: str | int | None) -> FrameOfInterest:
         """Look a frame up by name, by number, or as None: the tool."""
