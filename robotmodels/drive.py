@@ -335,6 +335,8 @@ class DriveMatrices:
         ``W``, a row for each coupled motor.
     coupled_coulomb : ndarray, shape (k,)
         ``Fcm`` of the coupled motors.
+    rows : tuple of (Ia, Fv, Fc, offset)
+        The same numbers joint by joint; empty if motors are coupled.
 
     Examples
     --------
@@ -349,6 +351,7 @@ class DriveMatrices:
     offset: Array
     coupling: Array
     coupled_coulomb: Array
+    rows: tuple[tuple[float, float, float, float], ...]
 
     def torque(self, v: Array, a: Array | None) -> Array:
         """Torque the drives take up.
@@ -370,7 +373,14 @@ class DriveMatrices:
         >>> drive_matrices(DriveParameters(Fc=[2.0]), None).torque(np.array([-1.0]), None)
         array([-2.])
         """
-        # in place on a fresh array: a single call should cost microseconds
+        if self.rows and a is not None and v.ndim == a.ndim == 1:
+            # one sample of uncoupled drives: plain floats take a third of small arrays' time
+            return np.array([
+                Ia * acc + Fv * vel + offset + (Fc if vel > 0.0 else -Fc if vel < 0.0 else 0.0)
+                for (Ia, Fv, Fc, offset), vel, acc in zip(
+                    self.rows, v.tolist(), a.tolist(), strict=True
+                )
+            ])  # fmt: skip
         tau = np.sign(v)
         tau *= self.coulomb
         tau += v.dot(self.viscous)
@@ -414,4 +424,6 @@ def drive_matrices(drive: DriveParameters, transmission: Transmission | None) ->
         cross[:, range(drive.n), range(drive.n)] = 0.0
         rotor = rotor + np.einsum("m,mij->ij", transmission.Iam[motors], cross)
         viscous = viscous + np.einsum("m,mij->ij", transmission.Fvm[motors], cross)
-    return DriveMatrices(rotor, viscous, drive.Fc, drive.offset, coupling, coulomb)
+    columns = (drive.Ia, drive.Fv, drive.Fc, drive.offset)
+    rows = () if len(coupling) else tuple(zip(*(c.tolist() for c in columns), strict=True))
+    return DriveMatrices(rotor, viscous, drive.Fc, drive.offset, coupling, coulomb, rows)

@@ -155,7 +155,12 @@ def link_names(parts: RobotParts) -> LinkNames:
     ...                       InertialParameters.zeros(1), DriveParameters.zeros(1))).frames
     ('base', 'link_1')
     """
-    spare = list(parts.frames)
+    # the tool is called so, whatever the source called it: that is how it is found again
+    has_tool = any(
+        frame.name == TOOL and frame.parent == parts.tip and np.array_equal(frame.pose, parts.tool)
+        for frame in parts.frames
+    )
+    spare = [frame for frame in parts.frames if not (has_tool and frame.name == TOOL)]
 
     def own(parent: int, pose: Array) -> str | None:
         """A named frame that is the very frame to be written gives its name to it."""
@@ -167,12 +172,7 @@ def link_names(parts: RobotParts) -> LinkNames:
 
     given = [own(0, se3.inverse(parts.base))]
     given += [own(k, np.eye(4)) for k in range(parts.table.f + 1)]
-    # the tool is called so, whatever the source called it: that is how it is found again
-    given.append(TOOL if any(
-        frame.name == TOOL and frame.parent == parts.tip and np.array_equal(frame.pose, parts.tool)
-        for frame in spare
-    ) else None)  # fmt: skip
-    spare = [frame for frame in spare if frame.name != given[-1]]
+    given.append(TOOL if has_tool else None)
     stems = [name.removeprefix("joint_").removeprefix("frame_") for name in parts.table.names]
     wanted = [
         f"link_{stem}" if stem != name else f"{name}_link"
