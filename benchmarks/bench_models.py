@@ -23,7 +23,7 @@ import pinocchio as pin
 
 import robotmodels as rm
 
-ROUNDS = 7
+ROUNDS = 15
 BATCH = 100_000
 FEW = 2_000
 

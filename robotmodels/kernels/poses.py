@@ -71,14 +71,22 @@ def tip_poses(
     origin = whole_vector(base_position)
     E = whole_matrix(tool_rotation)
     e = whole_vector(tool_position)
+    if path.shape[0] == 0:
+        for i in range(q.shape[0]):
+            put_pose(out[i], product(base, E), add(origin, times(base, e)))
+        return
+    # what comes before the first motion is the same for every sample; after that each frame is
+    # the constant of its row, then the motion of its joint
+    first = path[0] - 1
+    origin = add(origin, times(base, vector(position, first)))
+    base = product(base, matrix(rotation, first))
     for i in range(q.shape[0]):
-        R, p = base, origin
-        for j in path:
+        R, p = link_transform(sigma[first], coordinate(q, i, joint[first]), base, origin)
+        for j in path[1:]:
             k = j - 1
-            qj = coordinate(q, i, joint[k])
-            Rj, Pj = link_transform(sigma[k], qj, matrix(rotation, k), vector(position, k))
-            p = add(p, times(R, Pj))
-            R = product(R, Rj)
+            p = add(p, times(R, vector(position, k)))
+            R = product(R, matrix(rotation, k))
+            R, p = link_transform(sigma[k], coordinate(q, i, joint[k]), R, p)
         put_pose(out[i], product(R, E), add(p, times(R, e)))
 
 
