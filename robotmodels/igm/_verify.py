@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from ..kernels._compile import INTS, OUT3, STACK, Floats, Ints, compiled
 from ._parallel import wrapped
 
-ACCEPTED = 1e-9  # largest error of a posture [m, rad]
 EXACT = 5e-13  # error above which a candidate is improved [m, rad]
 STEPS = 3
 MERGE = 1e-6  # postures closer than this in every joint are one [rad, m]
@@ -80,6 +79,7 @@ def newton_step(U: Floats, sigma: Ints, P: Floats, axes: Floats) -> Floats:
         STACK,
         INTS,
         types.float64,
+        types.float64,
         STACK,
         _MARKS,
         _COUNTS,
@@ -94,6 +94,7 @@ def verified_postures(
     D: Floats,
     order: Ints,
     sense: float,
+    accepted: float,
     found: Floats,
     marks: Ints,
     counts: Ints,
@@ -119,7 +120,7 @@ def verified_postures(
                 if not improved < error:
                     break
                 x[:], error = trial, improved
-            if not error <= ACCEPTED:
+            if not error <= accepted:
                 continue
             for m in range(6):
                 if sigma[m] == 0:

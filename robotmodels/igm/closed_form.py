@@ -1,28 +1,82 @@
 """All postures of six-joint arms with a closed form: three axes that meet, or three parallel.
 
 `plan_loop` finds the family; `closed_form_postures` solves poses, checks every candidate on the
-chain itself and takes out duplicates. No public function calls this module yet: it is the room on
-which the general inverse model, one function for every robot, is to be built.
+chain itself and takes out duplicates.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array
+from .check import checked
 from .loop import JointChain
+from .solver import Found, Tolerances, postures
 from .structure import Family, LoopPlan, plan_loop
 
-__all__ = ["MOST", "closed_form_postures", "plan_loop"]
+__all__ = ["MOST", "ClosedForm", "closed_form_postures", "plan_loop"]
 
 MOST = 8  # postures of one pose
 CHUNK = 2048  # poses worked on at a time: 1 MB of candidates
+ACCEPTED = 1e-9  # largest error of a posture [m, rad]
 SLACK = 1e-9  # overshoot beside the length of the arm that is tried as a double root
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class ClosedForm:
+    """A six-joint arm with three axes that meet, or three that are parallel.
+
+    Parameters
+    ----------
+    chain : JointChain
+        The arm.
+    plan : LoopPlan
+        Its loop in normal form.
+    """
+
+    chain: JointChain
+    plan: LoopPlan
+
+    @property
+    def method(self) -> str:
+        """The family in words."""
+        return self.plan.family.value
+
+
+def prepare_closed_form(chain: JointChain) -> ClosedForm | None:
+    """The closed form of a six-joint arm, None if it has none.
+
+    Examples
+    --------
+    >>> from robotmodels.igm.loop import joint_chain
+    >>> from robotmodels.robots import load
+    >>> prepare_closed_form(joint_chain(load("irb140"))).method
+    'three revolute axes that meet in a point (Pieper)'
+    """
+    plan = plan_loop(chain)
+    return None if plan is None else ClosedForm(chain, plan)
+
+
+@postures.register
+def _(solver: ClosedForm, U: Array, references: Array, tolerances: Tolerances) -> Found:
+    slack = max(SLACK, tolerances.position / solver.plan.size, tolerances.orientation)
+    accepted = max(ACCEPTED, *tolerances)
+    q, valid, free = closed_form_postures(
+        solver.plan, solver.chain, U, references, slack=slack, accepted=accepted
+    )
+    return checked(solver.chain, U, q, valid, tolerances, free=free)
+
+
 def closed_form_postures(
-    plan: LoopPlan, chain: JointChain, U: ArrayLike, references: ArrayLike | None = None
+    plan: LoopPlan,
+    chain: JointChain,
+    U: ArrayLike,
+    references: ArrayLike | None = None,
+    slack: float = SLACK,
+    accepted: float = ACCEPTED,
 ) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
     """All real postures of a six-joint arm that has a closed form.
 
@@ -37,6 +91,10 @@ def closed_form_postures(
     references : array_like, shape (N, 6) or (6,), optional
         Values, in the order of the chain, for joints that a singular pose leaves free [rad or m].
         Zero where they are left out.
+    slack : float
+        Overshoot beside the length of the arm that is tried as a double root.
+    accepted : float
+        Largest error of a posture [m, rad].
 
     Returns
     -------
@@ -44,7 +102,7 @@ def closed_form_postures(
         Postures in the order of the chain, packed, angles in (-pi, pi] [rad or m]; NaN in the rows
         without one.
     valid : ndarray of bool, shape (N, 8)
-        Rows that hold a posture. Each meets its pose to 1e-9 m and rad, and to 1e-12 or so away
+        Rows that hold a posture. Each meets its pose to ``accepted`` m and rad, and to 1e-12 or so away
         from folds, where two postures fall together.
     free : ndarray of bool, shape (N, 8, 6)
         Joints that the pose left free, so that the posture has infinitely many neighbours. They
@@ -91,14 +149,15 @@ def closed_form_postures(
         loop = (poses[rows], plan.constants, plan.slot, plan.left, plan.right, int(plan.inverted))
         if plan.family is Family.CONCURRENT:
             concurrent_postures(
-                *loop, first_three, int(plan.backwards), plan.meeting, plan.size, SLACK,
+                *loop, first_three, int(plan.backwards), plan.meeting, plan.size, slack,
                 loop_references[rows], found, marks, counts,
             )  # fmt: skip
         else:
-            parallel_postures(*loop, plan.size, SLACK, loop_references[rows], found, marks, counts)
+            parallel_postures(*loop, plan.size, slack, loop_references[rows], found, marks, counts)
         counts[~finite[rows]] = 0
         verified_postures(
-            poses[rows], chain.sigma, chain.D, plan.order, plan.sense, found, marks, counts,
+            poses[rows], chain.sigma, chain.D, plan.order, plan.sense, accepted,
+            found, marks, counts,
             q[rows], valid[rows], free[rows],
         )  # fmt: skip
     return q, valid, free

@@ -26,9 +26,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, read_only
+from .check import checked
 from .loop import JointChain
+from .solver import Found, Tolerances, postures
 
 __all__ = [
+    "GeneralArm",
     "GeneralSolver",
     "Representation",
     "general_postures",
@@ -116,6 +119,35 @@ class GeneralSolver:
     def reliable(self) -> bool:
         """Whether the self-test found every posture, and most at the first attempt."""
         return self.misses == 0 and 4 * self.doubts <= self.tested and self.conditioning < 1e-6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GeneralArm:
+    """A six-joint arm that the elimination serves well.
+
+    Parameters
+    ----------
+    chain : JointChain
+        The arm.
+    solver : GeneralSolver
+        The representations that were chosen for it.
+    """
+
+    chain: JointChain
+    solver: GeneralSolver
+
+    @property
+    def method(self) -> str:
+        """The family in words."""
+        return "any six joints: elimination to 16 postures (Raghavan and Roth)"
+
+
+@postures.register
+def _(solver: GeneralArm, U: Array, references: Array, tolerances: Tolerances) -> Found:
+    q, valid, double = general_postures(solver.solver, U)
+    found = checked(solver.chain, U, q, valid, tolerances, double=double)
+    found.family[...] = on_infinite_family(solver.solver, found.q, found.valid) & found.valid
+    return found
 
 
 def prepare_general(
