@@ -23,7 +23,7 @@ from .dynamics import (
     potential_energy,
 )
 from .geometry import DHTable, link_transforms
-from .igm import IGMSolutions, IGMStatus, igm_numeric
+from .igm import IGMSolutions, IGMStatus, igm, igm_numeric
 from .inertia import InertialParameters
 from .kinematics import dgm, dkm, jacobian, jacobian_rate, link_poses
 from .model import RobotModel, to_urdf, write_urdf
@@ -63,6 +63,7 @@ __all__ = [
     "explain_dgm",
     "gravity_torque",
     "idm",
+    "igm",
     "igm_numeric",
     "jacobian",
     "jacobian_rate",

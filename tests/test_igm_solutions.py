@@ -21,7 +21,8 @@ def solutions(**changes):
         "valid": valid,
         "residual": np.where(valid, 1e-14, NAN),
         "within_limits": valid & (q[..., 0] < 2),
-        "branch": np.where(valid, [["front", "back"]] * 3, ""),
+        "code": np.where(valid, [[0, 1]] * 3, -1),
+        "labels": ("front", "back"),
         "status": [IGMStatus.REACHED, IGMStatus.REACHED_FAMILY, IGMStatus.TOO_FAR],
         "double": np.zeros((3, 2), bool),
         "free_joints": np.zeros((3, 2, 2), bool),
@@ -35,7 +36,7 @@ def solutions(**changes):
 def empty_batch(S):
     return IGMSolutions(
         q=np.empty((0, S, 2)), valid=np.empty((0, S)), residual=np.empty((0, S)),
-        within_limits=np.empty((0, S)), branch=np.empty((0, S), str), status=np.empty(0),
+        within_limits=np.empty((0, S)), code=np.empty((0, S)), labels=("front",), status=np.empty(0),
         double=np.empty((0, S)), free_joints=np.empty((0, S, 2)),
         family_joints=np.empty((0, S, 2)), method="by hand", periodic=[True, True],
     )  # fmt: skip
@@ -54,6 +55,7 @@ def test_fields_are_typed_and_frozen():
     found = solutions()
     assert found.status.dtype == np.int8
     assert found.count.tolist() == [2, 1, 0]
+    assert found.branch.tolist() == [["front", "back"], ["front", ""], ["", ""]]
     for name in ("q", "valid", "residual", "status", "branch", "free_joints", "mask"):
         with pytest.raises(ValueError, match="read-only"):
             getattr(found, name)[...] = 0
@@ -126,7 +128,7 @@ def test_no_solution_at_all():
     """S may be 0: then nearest is NaN."""
     found = IGMSolutions(
         q=np.empty((0, 2)), valid=np.empty(0), residual=np.empty(0), within_limits=np.empty(0),
-        branch=np.empty(0, str), status=IGMStatus.TOO_NEAR, double=np.empty(0),
+        code=np.empty(0), labels=("front",), status=IGMStatus.TOO_NEAR, double=np.empty(0),
         free_joints=np.empty((0, 2)), family_joints=np.empty((0, 2)), method="by hand",
         periodic=[True, True],
     )  # fmt: skip
@@ -143,7 +145,7 @@ def test_repr_is_for_people():
     assert "back  residual 1.0e-14, outside the limits" in text
     many = solutions(
         **{name: np.concatenate([getattr(solutions(), name)] * 4) for name in (
-            "q", "valid", "residual", "within_limits", "branch", "status", "double", "free_joints",
+            "q", "valid", "residual", "within_limits", "code", "status", "double", "free_joints",
             "family_joints")}
     )  # fmt: skip
     assert len(repr(many).splitlines()) == 4

@@ -102,8 +102,8 @@ def closed_form_postures(
         Postures in the order of the chain, packed, angles in (-pi, pi] [rad or m]; NaN in the rows
         without one.
     valid : ndarray of bool, shape (N, 8)
-        Rows that hold a posture. Each meets its pose to ``accepted`` m and rad, and to 1e-12 or so away
-        from folds, where two postures fall together.
+        Rows that hold a posture. Each meets its pose to ``accepted`` m and rad, and to 1e-12 or so
+        away from folds, where two postures fall together.
     free : ndarray of bool, shape (N, 8, 6)
         Joints that the pose left free, so that the posture has infinitely many neighbours. They
         took their reference, or the value nearest to it at which the others can follow.

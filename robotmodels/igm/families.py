@@ -2,10 +2,29 @@
 
 from __future__ import annotations
 
+from .asked import Task
 from .closed_form import prepare_closed_form
 from .general import GeneralArm, prepare_general
 from .loop import JointChain
 from .solver import Solver
+
+
+def prepare_task(chain: JointChain, task: Task) -> Solver | None:
+    """Choose and prepare what solves a task: locked joints, then the mask, then the arm.
+
+    Parameters
+    ----------
+    chain : JointChain
+        The arm.
+    task : Task
+        What is asked of it.
+
+    Returns
+    -------
+    Solver or None
+        None if no family serves the arm for this task.
+    """
+    return prepare(chain)
 
 
 def prepare(chain: JointChain) -> Solver | None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import weakref
 from dataclasses import dataclass
 from math import inf
-from numbers import Real
 from operator import index
 from typing import Any, Literal
 
@@ -13,10 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import se3
-from .._arrays import Array, as_floats, as_vector, batch_rows, read_only
-from ..errors import InvalidValueError, ShapeError
+from .._arrays import Array, as_vector, batch_rows, read_only
+from ..errors import InvalidValueError
 from ..geometry import REVOLUTE
 from ..model import RobotModel
+from .asked import above_zero, mask_of
 from .solutions import IGMSolutions
 
 METHOD = "numeric (Levenberg-Marquardt)"
@@ -127,13 +127,13 @@ def igm_numeric(
     if not isinstance(model, RobotModel):
         raise InvalidValueError(f"model: expected a RobotModel, got {type(model).__name__}.")
     T = se3.as_pose(T)
-    asked = _mask(mask)
+    asked = mask_of(mask)
     if mask_axes not in ("world", "tool"):
         raise InvalidValueError(f"mask_axes: expected 'world' or 'tool', got {mask_axes!r}.")
     tolerance = np.array(
         [
-            _positive(position_tolerance, "position_tolerance"),
-            _positive(orientation_tolerance, "orientation_tolerance"),
+            above_zero(position_tolerance, "position_tolerance"),
+            above_zero(orientation_tolerance, "orientation_tolerance"),
         ]
     )
     restarts = _whole(restarts, "restarts", 0)
@@ -168,7 +168,8 @@ def igm_numeric(
         valid=valid.reshape(rows),
         residual=residual.reshape(rows),
         within_limits=inside.reshape(rows),
-        branch=np.zeros(rows, dtype=np.str_),
+        code=np.where(valid, 0, -1).reshape(rows),
+        labels=("",),
         status=status.reshape(batch),
         double=np.zeros(rows, dtype=np.bool_),
         free_joints=unmoved.reshape(*rows, n),
@@ -257,35 +258,6 @@ def _ranges(
     wide = revolute & (high - low > span)
     middle = 0.5 * (low + high)
     return np.where(wide, middle - span / 2, low), np.where(wide, middle + span / 2, high)
-
-
-def _mask(mask: ArrayLike | None) -> NDArray[np.bool_]:
-    """The components asked for, shape (6,)."""
-    if mask is None:
-        return np.ones(6, dtype=np.bool_)
-    numbers = np.asarray(mask)
-    if numbers.dtype == np.bool_:
-        numbers = numbers.astype(np.float64)
-    numbers = as_floats(numbers, "mask")
-    if numbers.shape != (6,):
-        raise ShapeError(f"mask: expected six numbers x y z rx ry rz, got shape {numbers.shape}.")
-    if not np.isin(numbers, (0.0, 1.0)).all():
-        raise InvalidValueError(
-            f"mask: expected zeros and ones, got {numbers.tolist()}; a component is either asked "
-            "for or not, it has no weight."
-        )
-    if not numbers.any():
-        raise InvalidValueError("mask: all six are 0, so nothing is asked for.")
-    return numbers == 1.0
-
-
-def _positive(value: Any, name: str) -> float:
-    if not isinstance(value, (Real, np.number)) or isinstance(value, bool):
-        raise InvalidValueError(f"{name}: expected a number, got {value!r}.")
-    number = float(value)
-    if not 0.0 < number < inf:
-        raise InvalidValueError(f"{name}: expected a finite number above 0, got {number}.")
-    return number
 
 
 def _whole(value: Any, name: str, least: int) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from math import degrees, hypot
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -36,8 +36,10 @@ class IGMSolutions:
         was asked, from a forward pass.
     within_limits : ndarray of bool, shape (..., S)
         Whether the row is a solution inside the joint limits.
-    branch : ndarray of str, shape (..., S)
-        Labels of the branches; empty where a method has none.
+    code : ndarray of int16, shape (..., S)
+        Number of the branch, which of ``labels`` it has; -1 in rows without a solution.
+    labels : tuple of str
+        Words for the branches.
     status : ndarray of int8, shape (...)
         Codes of `IGMStatus`.
     double : ndarray of bool, shape (..., S)
@@ -55,9 +57,12 @@ class IGMSolutions:
         Which components x y z rx ry rz were asked for.
     error : ndarray, shape (..., S, 6), optional
         Translation (m) and rotation (rad) that are missing, ``x y z rx ry rz`` in the axes of the
-        mask. From a numeric method also where there is no solution: then of ``closest``.
+        mask. From `igm_numeric` also where there is no solution: then of ``closest``.
     closest : ndarray, shape (..., n), optional
-        From a numeric method: the posture it ended with, also where it is no solution, rad or m.
+        The posture a search ended with, also where it is no solution, rad or m. From a closed form
+        only for poses without a solution, NaN for the others.
+    missing : ndarray, shape (..., 6), optional
+        What ``closest`` misses, as in ``error``.
 
     Raises
     ------
@@ -79,7 +84,8 @@ class IGMSolutions:
     valid: NDArray[np.bool_]
     residual: Array
     within_limits: NDArray[np.bool_]
-    branch: NDArray[np.str_]
+    code: NDArray[np.int16]
+    labels: tuple[str, ...]
     status: NDArray[np.int8]
     double: NDArray[np.bool_]
     free_joints: NDArray[np.bool_]
@@ -89,6 +95,7 @@ class IGMSolutions:
     mask: NDArray[np.bool_] = _WHOLE_POSE  # type: ignore[assignment]
     error: Array | None = None
     closest: Array | None = None
+    missing: Array | None = None
 
     def __post_init__(self) -> None:
         *batch, S, n = np.shape(self.q)
@@ -97,7 +104,7 @@ class IGMSolutions:
             "valid": (bool, (*batch, S)),
             "residual": (float, (*batch, S)),
             "within_limits": (bool, (*batch, S)),
-            "branch": (str, (*batch, S)),
+            "code": (np.int16, (*batch, S)),
             "status": (np.int8, tuple(batch)),
             "double": (bool, (*batch, S)),
             "free_joints": (bool, (*batch, S, n)),
@@ -106,6 +113,7 @@ class IGMSolutions:
             "mask": (bool, (6,)),
             "error": (float, (*batch, S, 6)),
             "closest": (float, (*batch, n)),
+            "missing": (float, (*batch, 6)),
         }
         for name, (dtype, shape) in shapes.items():
             value = getattr(self, name)
@@ -115,6 +123,25 @@ class IGMSolutions:
             if array.shape != shape:
                 raise ShapeError(f"{name}: expected shape {shape}, got {array.shape}.")
             object.__setattr__(self, name, array)
+
+    @classmethod
+    def checked_before(cls, *values: Any) -> Self:
+        """Build from fields, in their order, that are read-only and fit each other already.
+
+        A single pose is solved in a few microseconds; looking at every field again would cost
+        more than that.
+        """
+        result = object.__new__(cls)
+        for name, value in zip(_NAMES, values, strict=True):
+            _put(result, name, value)
+        return result
+
+    @property
+    def branch(self) -> NDArray[np.str_]:
+        """Labels of the branches, shape (..., S); empty in rows without a solution."""
+        labels = np.array((*self.labels, ""))[self.code]
+        labels.flags.writeable = False
+        return labels
 
     @property
     def count(self) -> NDArray[np.int64]:
@@ -148,9 +175,10 @@ class IGMSolutions:
         'The position is out of reach: too far. The closest posture misses it by 0.3 m.'
         """
         status, at = self._status(i)
-        if self.error is None or status in (IGMStatus.REACHED, IGMStatus.REACHED_FAMILY):
+        lacking = self.missing if self.error is None else self.error[..., 0, :]
+        if lacking is None or status in (IGMStatus.REACHED, IGMStatus.REACHED_FAMILY):
             return status.sentence
-        missing = np.where(self.mask, self.error[at][0], 0.0)
+        missing = np.where(self.mask, lacking[at], 0.0)
         metres = f"{hypot(*missing[:3]):.4g} m"
         angle = f"{degrees(hypot(*missing[3:])):.4g} deg"
         if status in (IGMStatus.TOO_FAR, IGMStatus.TOO_NEAR):
@@ -210,12 +238,13 @@ class IGMSolutions:
         )
         lines = [head]
         for i in list(np.ndindex(self.status.shape))[:_SHOWN] if poses <= _SHOWN else ():
-            label = f"pose {', '.join(map(str, i))}: " if i else ""
-            lines.append(f"  {label}{self.reason(i)}")
+            head = f"pose {', '.join(map(str, i))}: " if i else ""
+            lines.append(f"  {head}{self.reason(i)}")
             for s in np.flatnonzero(self.valid[i]):
                 numbers = " ".join(f"{v:9.5f}" for v in self.q[i][s])
                 where = "" if self.within_limits[i][s] else ", outside the limits"
-                branch = f"  {self.branch[i][s]}" if self.branch[i][s] else ""
+                label = self.labels[self.code[i][s]]
+                branch = f"  {label}" if label else ""
                 lines.append(
                     f"    q = [{numbers}]{branch}  residual {self.residual[i][s]:.1e}{where}"
                 )
@@ -240,6 +269,10 @@ class IGMSolutions:
                 f"i: expected the index of one pose among {self.status.shape}, got {i!r}."
             )
         return IGMStatus(int(codes)), at
+
+
+_NAMES = tuple(field.name for field in fields(IGMSolutions))
+_put = object.__setattr__
 
 
 def posture_distance(a: Array, b: Array, periodic: NDArray[np.bool_]) -> Array:

@@ -1,0 +1,165 @@
+"""What a call asks of an inverse model, checked at the border: mask, tolerances, locked joints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import inf, isfinite
+from numbers import Real
+from operator import index
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .._arrays import as_floats
+from ..errors import InvalidValueError, ShapeError, nearest_names
+from ..model import RobotModel
+
+WHOLE_POSE = (True,) * 6
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """What decides, beside the arm, which family solves a call.
+
+    Parameters
+    ----------
+    mask : tuple of bool
+        Components ``x y z rx ry rz`` asked for.
+    in_tool_axes : bool
+        Whether they are those of the tool at the desired pose, or the world's.
+    locks : tuple of (int, float)
+        Columns of q that keep a value [rad or m], ascending.
+    by_arm_angle : bool
+        Whether arm angles are given.
+    """
+
+    mask: tuple[bool, ...] = WHOLE_POSE
+    in_tool_axes: bool = False
+    locks: tuple[tuple[int, float], ...] = ()
+    by_arm_angle: bool = False
+
+
+def mask_of(mask: ArrayLike | None) -> NDArray[np.bool_]:
+    """The components asked for.
+
+    Parameters
+    ----------
+    mask : array_like, shape (6,), optional
+        Zeros and ones; None asks for all.
+
+    Returns
+    -------
+    ndarray of bool, shape (6,)
+        The components.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Not six zeros and ones, or nothing asked for.
+    """
+    if mask is None:
+        return np.ones(6, dtype=np.bool_)
+    numbers = np.asarray(mask)
+    if numbers.dtype == np.bool_:
+        numbers = numbers.astype(np.float64)
+    numbers = as_floats(numbers, "mask")
+    if numbers.shape != (6,):
+        raise ShapeError(f"mask: expected six numbers x y z rx ry rz, got shape {numbers.shape}.")
+    if not np.isin(numbers, (0.0, 1.0)).all():
+        raise InvalidValueError(
+            f"mask: expected zeros and ones, got {numbers.tolist()}; a component is either asked "
+            "for or not, it has no weight."
+        )
+    if not numbers.any():
+        raise InvalidValueError("mask: all six are 0, so nothing is asked for.")
+    return numbers == 1.0
+
+
+def above_zero(value: Any, name: str) -> float:
+    """A finite number above 0, or an error that names the argument.
+
+    Parameters
+    ----------
+    value : float
+        What was given.
+    name : str
+        Of the argument.
+
+    Returns
+    -------
+    float
+        The number.
+
+    Raises
+    ------
+    InvalidValueError
+        Not a finite number above 0.
+    """
+    if not isinstance(value, (Real, np.number)) or isinstance(value, bool):
+        raise InvalidValueError(f"{name}: expected a number, got {value!r}.")
+    number = float(value)
+    if not 0.0 < number < inf:
+        raise InvalidValueError(f"{name}: expected a finite number above 0, got {number}.")
+    return number
+
+
+def locks_of(
+    model: RobotModel, lock: Mapping[int | str, float] | None
+) -> tuple[tuple[int, float], ...]:
+    """Columns and values of locked joints.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot.
+    lock : mapping, optional
+        Column of q, from 0, or name of a joint, to its value [rad or m].
+
+    Returns
+    -------
+    tuple of (int, float)
+        Ascending.
+
+    Raises
+    ------
+    InvalidValueError
+        A joint that does not exist or is named twice, or a value that is no finite number.
+    """
+    if lock is None:
+        return ()
+    if not isinstance(lock, Mapping):
+        raise InvalidValueError(
+            f"lock: expected a mapping from joints to values, such as {{2: 0.5}}, got {lock!r}."
+        )
+    rows = model.table.joint_rows
+    names = [str(model.table.names[row]) for row in rows]
+    columns: dict[int, float] = {}
+    for joint, value in lock.items():
+        if isinstance(joint, str):
+            if joint not in names:
+                near = nearest_names(joint, names) or names
+                raise InvalidValueError(
+                    f"lock: no joint is called {joint!r}; there is {', '.join(near)}."
+                )
+            column = names.index(joint)
+        else:
+            try:
+                column = index(joint)
+            except TypeError:
+                raise InvalidValueError(
+                    f"lock: expected columns of q or names of joints, got {joint!r}."
+                ) from None
+            if isinstance(joint, (bool, np.bool_)) or not 0 <= column < model.n:
+                raise InvalidValueError(
+                    f"lock: columns of q run from 0 to {model.n - 1}, got {joint!r}."
+                )
+        if column in columns:
+            raise InvalidValueError(f"lock: joint {joint!r} is given twice.")
+        if not isinstance(value, (Real, np.number)) or not isfinite(value):
+            raise InvalidValueError(
+                f"lock: expected one finite number for joint {joint!r}, got {value!r}."
+            )
+        columns[column] = float(value)
+    return tuple(sorted(columns.items()))

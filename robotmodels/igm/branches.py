@@ -1,0 +1,100 @@
+"""Labels of postures: on which side of its shoulder, elbow and wrist singularity an arm stands."""
+
+from __future__ import annotations
+
+from functools import singledispatch
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .closed_form import ClosedForm
+from .solver import Found, Solver
+from .structure import Family
+
+SIDES = tuple(
+    f"shoulder{shoulder} elbow{elbow} wrist{wrist}"
+    for shoulder in "+-"
+    for elbow in "+-"
+    for wrist in "+-"
+)
+"""Labels of six-joint arms with a closed form; the signs are those of three geometric products."""
+
+
+@singledispatch
+def branches(solver: Solver, found: Found) -> tuple[NDArray[np.int16], tuple[str, ...]]:
+    """Number the postures of each pose and name the numbers.
+
+    Parameters
+    ----------
+    solver : Solver
+        What found them.
+    found : Found
+        The postures.
+
+    Returns
+    -------
+    code : ndarray of int16, shape (N, S)
+        Number of the branch; -1 in rows without a posture.
+    labels : tuple of str
+        Its label. Families whose branches have no names get their rank in ascending order of the
+        joint values, "1", "2", ...
+
+    Notes
+    -----
+    Of three axes that meet: ``wrist`` is the sign of ``z_d . (z_e x z_f)``, ``shoulder`` that of
+    ``(z_a x O_aW) . z_b`` with W the meeting point, and ``shoulder * elbow`` that of the
+    determinant of the velocities of W. Of three parallel axes: ``shoulder`` and ``wrist`` are the
+    signs of the same product taken from either end, ``elbow`` says to which side the middle axis
+    stands. A sign changes only at the singular position of that name. Several postures of one pose
+    with the same signs (arms with a quartic) get a number behind.
+    """
+    return ranked(np.zeros(found.valid.shape, np.int16), ("",), found)
+
+
+@branches.register
+def _(solver: ClosedForm, found: Found) -> tuple[NDArray[np.int16], tuple[str, ...]]:
+    from ._sides import sides
+
+    plan = solver.plan
+    code = np.empty(found.valid.shape, np.int16)
+    sides(
+        solver.chain.sigma, solver.chain.D, plan.order, int(plan.family is Family.PARALLEL),
+        found.q, found.valid, code,
+    )  # fmt: skip
+    return ranked(code, SIDES, found)
+
+
+def ranked(
+    code: NDArray[np.int16], labels: tuple[str, ...], found: Found
+) -> tuple[NDArray[np.int16], tuple[str, ...]]:
+    """Codes made unique within each pose by the rank of the postures that share one.
+
+    Parameters
+    ----------
+    code : ndarray of int16, shape (N, S)
+        Numbers of labels.
+    labels : tuple of str
+        The labels.
+    found : Found
+        The postures.
+
+    Returns
+    -------
+    code, labels
+        As `branches` gives them.
+    """
+    from ._sides import ranks
+
+    if found.valid.shape[1] == 0:
+        return code, labels
+    rank = np.zeros(code.shape, np.int16)
+    ranks(found.q, found.valid, code, rank)
+    most = int(rank.max(initial=0))
+    bare = labels == ("",)
+    if bare:
+        named = tuple(str(r + 1) for r in range(most + 1))
+    else:
+        named = (*labels, *(f"{s} ({r + 1})" for r in range(1, most + 1) for s in labels))
+    unique = (code + len(labels) * rank).astype(np.int16)
+    unique[~found.valid] = -1
+    return unique, named
