@@ -1,0 +1,37 @@
+"""Trajectories: motion from poses and postures, by laws of time that keep limits.
+
+Seed book sections 4.2 and 4.3. Every generator of joint motion returns a `Trajectory`; the plain
+arrays of ``ctraj`` and ``jtraj`` come from `cartesian_trajectory` and `joint_trajectory`.
+"""
+
+from .laws import TimeLaw
+from .limits import LimitsReport, MotionLimits
+from .point_to_point import (
+    Synchronisation,
+    along_line,
+    bang_bang,
+    linear,
+    smoothed_trapezoidal,
+    trapezoidal,
+)
+from .polynomials import cubic, quintic
+from .sampled import cartesian_trajectory, joint_trajectory
+from .trajectory import Samples, Trajectory
+
+__all__ = [
+    "LimitsReport",
+    "MotionLimits",
+    "Samples",
+    "Synchronisation",
+    "TimeLaw",
+    "Trajectory",
+    "along_line",
+    "bang_bang",
+    "cartesian_trajectory",
+    "cubic",
+    "joint_trajectory",
+    "linear",
+    "quintic",
+    "smoothed_trapezoidal",
+    "trapezoidal",
+]

@@ -1,0 +1,230 @@
+"""Limits of a motion: of velocity, acceleration, jerk and position."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import Array, as_reals, read_only
+from ..errors import InvalidValueError, ShapeError
+from ..model import RobotModel
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MotionLimits:
+    """Limits that a motion keeps; a number stands for all joints.
+
+    Parameters
+    ----------
+    velocity : array_like, shape () or (n,)
+        Greatest velocity, rad/s or m/s. Infinity is no limit, as everywhere here.
+    acceleration : array_like, shape () or (n,)
+        Greatest acceleration, rad/s^2 or m/s^2.
+    jerk : array_like, shape () or (n,)
+        Greatest absolute jerk, rad/s^3 or m/s^3.
+    velocity_lower, acceleration_lower : array_like, shape () or (n,), optional
+        Least velocity and acceleration, not above zero; default the greatest with the sign changed.
+    lower, upper : array_like, shape () or (n,)
+        Limits of position, rad or m.
+
+    Raises
+    ------
+    InvalidValueError
+        NaN, a limit on the wrong side of zero, ``lower`` above ``upper``.
+    ShapeError
+        Limits for different numbers of joints.
+
+    Examples
+    --------
+    >>> limits = MotionLimits(velocity=[1.0, 2.0], acceleration=4.0)
+    >>> limits.velocity_lower
+    array([-1., -2.])
+    """
+
+    velocity: Array = np.inf  # type: ignore[assignment]
+    acceleration: Array = np.inf  # type: ignore[assignment]
+    jerk: Array = np.inf  # type: ignore[assignment]
+    velocity_lower: Array = None  # type: ignore[assignment]
+    acceleration_lower: Array = None  # type: ignore[assignment]
+    lower: Array = -np.inf  # type: ignore[assignment]
+    upper: Array = np.inf  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        given = {field.name: getattr(self, field.name) for field in fields(self)}
+        for side in ("velocity", "acceleration"):
+            if given[f"{side}_lower"] is None:
+                given[f"{side}_lower"] = -as_reals(given[side], side)
+        arrays = {name: as_reals(value, name) for name, value in given.items()}
+        for name, array in arrays.items():
+            if array.ndim > 1:
+                raise ShapeError(
+                    f"{name}: expected one number or one per joint, got {array.shape}."
+                )
+            if np.isnan(array).any():
+                raise InvalidValueError(f"{name}: a limit is NaN; infinity means no limit.")
+            if name in ("velocity", "acceleration", "jerk") and (array < 0.0).any():
+                raise InvalidValueError(f"{name}: expected limits of at least 0, got {array}.")
+            if name in ("velocity_lower", "acceleration_lower") and (array > 0.0).any():
+                raise InvalidValueError(f"{name}: expected limits of at most 0, got {array}.")
+        try:
+            shape = np.broadcast_shapes(*(array.shape for array in arrays.values()))
+        except ValueError:
+            got = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
+            raise ShapeError(f"The limits are for different numbers of joints: {got}.") from None
+        if (arrays["lower"] > arrays["upper"]).any():
+            raise InvalidValueError(
+                f"lower: expected at most upper, got {arrays['lower']} above {arrays['upper']}."
+            )
+        for name, array in arrays.items():
+            object.__setattr__(self, name, read_only(np.broadcast_to(array, shape)))
+
+    @classmethod
+    def of_model(
+        cls, model: RobotModel, acceleration: ArrayLike = np.inf, jerk: ArrayLike = np.inf
+    ) -> Self:
+        """Limits of a robot: positions and velocities from its table, the others as given.
+
+        Parameters
+        ----------
+        model : RobotModel
+            The robot, n joints.
+        acceleration, jerk : array_like, shape () or (n,)
+            Which a table does not hold, rad/s^2 and rad/s^3, or m.
+
+        Returns
+        -------
+        MotionLimits
+            Of n joints.
+
+        Examples
+        --------
+        >>> from robotmodels.robots import load
+        >>> MotionLimits.of_model(load("rx90"), acceleration=10.0).jerk.shape
+        (6,)
+        """
+        return cls(
+            velocity=model.table.velocity,
+            acceleration=as_reals(acceleration, "acceleration"),
+            jerk=as_reals(jerk, "jerk"),
+            lower=model.lower,
+            upper=model.upper,
+        )
+
+    def for_joints(self, n: int) -> Self:
+        """The same limits, one for each of n joints.
+
+        Parameters
+        ----------
+        n : int
+            Number of joints.
+
+        Returns
+        -------
+        MotionLimits
+            Its arrays have shape (n,).
+
+        Raises
+        ------
+        ShapeError
+            They are limits of another number of joints.
+
+        Examples
+        --------
+        >>> MotionLimits(2.0).for_joints(3).velocity
+        array([2., 2., 2.])
+        """
+        if self.velocity.shape not in ((), (1,), (n,)):
+            raise ShapeError(
+                f"limits: expected limits of {n} joints, got limits of {self.velocity.size}."
+            )
+        return type(self)(
+            **{f.name: np.broadcast_to(getattr(self, f.name), n) for f in fields(self)}
+        )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), tuple(getattr(self, field.name) for field in fields(self))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LimitsReport:
+    """What a motion asks of each joint, beside what is allowed.
+
+    Parameters
+    ----------
+    limits : MotionLimits
+        Of n joints.
+    position, velocity, acceleration, jerk : ndarray, shape (2, ..., n)
+        Least and greatest values of the motion, ends included. Infinite where the quantity below
+        jumps inside the motion.
+    tolerance : float
+        Relative overshoot that is put down to rounding.
+    """
+
+    limits: MotionLimits
+    position: Array
+    velocity: Array
+    acceleration: Array
+    jerk: Array
+    tolerance: float = 1e-9
+
+    @property
+    def kept(self) -> bool:
+        """Whether every joint keeps every limit."""
+        return not self.violations()
+
+    @property
+    def stretch(self) -> float:
+        """By how much the motion must be slowed down to keep its limits; at most 1 if it does.
+
+        Duration times this keeps velocity, acceleration and jerk. Positions are not touched.
+        """
+        need = 0.0
+        for order, (_, low, high, least, most) in enumerate(self._rows()):
+            if order:
+                worst = max(_ratio(high, most), _ratio(-low, -least))
+                need = max(need, worst ** (1.0 / order))
+        return need
+
+    def violations(self) -> tuple[str, ...]:
+        """The limits that are not kept, one sentence each.
+
+        Returns
+        -------
+        tuple of str
+            Empty if all are kept.
+        """
+        found = []
+        for name, low, high, least, most in self._rows():
+            n = low.shape[-1]
+            below = low.reshape(-1, n).min(axis=0)
+            above = high.reshape(-1, n).max(axis=0)
+            for j in range(n):
+                for value, bound, side in ((above[j], most[j], 1.0), (below[j], least[j], -1.0)):
+                    slack = self.tolerance * max(abs(bound), float(name == "position"))
+                    if np.isfinite(bound) and side * (value - bound) > slack:
+                        found.append(f"joint {j + 1}: {name} {value:.6g}, allowed {bound:.6g}")
+        return tuple(found)
+
+    def __repr__(self) -> str:
+        if self.kept:
+            return "<LimitsReport: every limit is kept>"
+        return "\n  ".join(["<LimitsReport: limits are exceeded", *self.violations()]) + ">"
+
+    def _rows(self) -> list[tuple[str, Array, Array, Array, Array]]:
+        of = self.limits
+        return [
+            ("position", *self.position, of.lower, of.upper),  # type: ignore[list-item]
+            ("velocity", *self.velocity, of.velocity_lower, of.velocity),
+            ("acceleration", *self.acceleration, of.acceleration_lower, of.acceleration),
+            ("jerk", *self.jerk, -of.jerk, of.jerk),
+        ]
+
+
+def _ratio(value: Array, bound: Array) -> float:
+    """Greatest value / bound where the value counts."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.where((value > 0.0) & np.isfinite(bound), value / bound, 0.0)
+    return float(ratio.max(initial=0.0))

@@ -1,0 +1,243 @@
+"""Motions whose pieces are polynomials of time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from .._arrays import Array, read_only
+from ..errors import ShapeError
+
+_ROUNDING = 1e-9  # jumps smaller than this beside the largest value are put down to rounding
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PiecewisePolynomial:
+    """Polynomials of the normalised time of each piece.
+
+    On the piece from ``breaks[k]`` to ``breaks[k + 1]``, with ``x`` from 0 to 1 over the piece,
+    ``q = sum_i coefficients[k, i] x^i``. Normalised time keeps the ends as exact as the middle.
+    Pieces may have no length.
+
+    Parameters
+    ----------
+    breaks : array_like, shape (..., c, K + 1)
+        Times, s, ascending from 0; c is 1 (all joints change pieces together) or n.
+    coefficients : array_like, shape (..., K, d + 1, n)
+        rad or m, lowest power first.
+
+    Raises
+    ------
+    ShapeError
+        Fields that do not fit each other.
+
+    Examples
+    --------
+    >>> ramp = PiecewisePolynomial([[0.0, 2.0]], [[[1.0], [4.0]]])
+    >>> ramp.derivatives(np.array([0.0, 1.0]), (0, 1))[1].ravel()
+    array([2., 2.])
+    """
+
+    breaks: Array
+    coefficients: Array
+
+    def __post_init__(self) -> None:
+        breaks, coefficients = read_only(self.breaks), read_only(self.coefficients)
+        *batch, K, _, n = coefficients.shape
+        c = breaks.shape[-2] if breaks.ndim > 1 else 0
+        if c not in (1, n) or breaks.shape != (*batch, c, K + 1) or K == 0:
+            raise ShapeError(
+                f"breaks: expected shape {(*batch, 1, K + 1)} for coefficients of shape "
+                f"{coefficients.shape}, got {breaks.shape}."
+            )
+        object.__setattr__(self, "breaks", breaks)
+        object.__setattr__(self, "coefficients", coefficients)
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return self.coefficients.shape[-1]
+
+    @property
+    def batch(self) -> tuple[int, ...]:
+        """Leading axes: one motion each."""
+        return self.coefficients.shape[:-3]
+
+    @property
+    def duration(self) -> Array:
+        """Durations of the motions, s, shape (...)."""
+        return self.breaks[..., -1].max(axis=-1)
+
+    def derivatives(self, t: Array, orders: tuple[int, ...]) -> list[Array]:
+        """Derivatives at times inside the motion.
+
+        Parameters
+        ----------
+        t : ndarray, shape (..., N)
+            Times of each motion, s; the leading axes are those of the motion.
+        orders : tuple of int
+            0 position, 1 velocity, and so on.
+
+        Returns
+        -------
+        list of ndarray, shapes (..., N, n)
+            One for each order. At a break the value of the piece that begins there.
+        """
+        out = [np.empty((*t.shape, self.n)) for _ in orders]
+        if self.batch:
+            self._by_gathering(t, orders, out)
+        else:
+            self._by_slices(t, orders, out)
+        return out
+
+    def extremes(self, order: int) -> tuple[Array, Array]:
+        """Least and greatest value of a derivative over the motion, exact on every piece.
+
+        Parameters
+        ----------
+        order : int
+            0 position, 1 velocity, and so on.
+
+        Returns
+        -------
+        lower, upper : ndarray, shapes (..., n)
+            Infinite where the derivative below jumps between two pieces.
+        """
+        h = np.diff(self.breaks)  # (..., c, K)
+        live = np.swapaxes(h, -1, -2) > 0.0  # (..., K, c)
+        step = np.where(live, np.swapaxes(h, -1, -2), 1.0)
+        c = _derived(self.coefficients, order) / step[..., None, :] ** order
+        low, high = _range_on_unit_interval(c)
+        none = ~live.any(axis=-2)
+        low = np.where(live, low, np.inf).min(axis=-2)
+        high = np.where(live, high, -np.inf).max(axis=-2)
+        if none.any():  # a motion without duration stays at its start
+            still = self.coefficients[..., 0, 0, :] if order == 0 else 0.0
+            low, high = np.where(none, still, low), np.where(none, still, high)
+        if order > 0:
+            down, up = self._jumps(order - 1, live, step)
+            low, high = np.where(down, -np.inf, low), np.where(up, np.inf, high)
+        return low, high
+
+    def _jumps(self, order: int, live: Any, step: Array) -> tuple[Any, Any]:
+        """Whether a derivative jumps down, and up, between pieces beyond rounding, (..., n)."""
+        c = _derived(self.coefficients, order) / step[..., None, :] ** order
+        first, last = c[..., 0, :], c.sum(axis=-2)
+        live = np.broadcast_to(live, first.shape)
+        scale = np.abs(np.where(live[..., None, :], c, 0.0)).sum(axis=-2).max(axis=-2)
+        before, started = last[..., 0, :], live[..., 0, :]
+        down, up = np.zeros(before.shape), np.zeros(before.shape)
+        for k in range(1, c.shape[-3]):
+            jump = np.where(live[..., k, :] & started, first[..., k, :] - before, 0.0)
+            down, up = np.minimum(down, jump), np.maximum(up, jump)
+            before = np.where(live[..., k, :], last[..., k, :], before)
+            started = started | live[..., k, :]
+        return down < -_ROUNDING * scale, up > _ROUNDING * scale
+
+    def _by_slices(self, t: Array, orders: tuple[int, ...], out: list[Array]) -> None:
+        """One motion: each piece takes its run of the sorted times at once."""
+        order = None if t.size < 2 or bool((t[1:] >= t[:-1]).all()) else np.argsort(t)
+        times = t if order is None else t[order]
+        together = self.breaks.shape[0] == 1
+        powers = np.ones((self.coefficients.shape[-2], t.size))
+        for j, breaks in enumerate(self.breaks):
+            column = slice(None) if together else j
+            edges = [0, *np.searchsorted(times, breaks[1:-1]).tolist(), len(times)]
+            for k, (first, last) in enumerate(pairwise(edges)):
+                if first == last:
+                    continue
+                h = float(breaks[k + 1] - breaks[k]) or 1.0
+                X = powers[:, : last - first]
+                x = (times[first:last] - breaks[k]) / h
+                for i in range(1, len(X)):
+                    np.multiply(X[i - 1], x, out=X[i])
+                rows = slice(first, last) if order is None else order[first:last]
+                for result, m in zip(out, orders, strict=True):
+                    c = _derived(self.coefficients[k], m)[:, column] / h**m
+                    result[rows, column] = X[: len(c)].T @ c
+
+    def _by_gathering(self, t: Array, orders: tuple[int, ...], out: list[Array]) -> None:
+        """Several motions: the coefficients of every time's piece are brought together."""
+        for j in range(self.n):
+            breaks = self.breaks[..., min(j, self.breaks.shape[-2] - 1), :]
+            piece = (t[..., None] >= breaks[..., None, 1:-1]).sum(axis=-1)
+            start = np.take_along_axis(breaks, piece, axis=-1)
+            h = np.take_along_axis(breaks, piece + 1, axis=-1) - start
+            h = np.where(h > 0.0, h, 1.0)
+            x = (t - start) / h
+            c = np.take_along_axis(self.coefficients[..., j], piece[..., None], axis=-2)
+            for result, m in zip(out, orders, strict=True):
+                d = np.moveaxis(_derived(c[..., None], m)[..., 0], -1, 0)
+                result[..., j] = _horner(d, x) / h**m
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), tuple(getattr(self, field.name) for field in fields(self))
+
+
+def _derived(c: Array, order: int) -> Array:
+    """Coefficients of a derivative with respect to x; the powers are the last axis but one."""
+    for _ in range(order):
+        if c.shape[-2] == 1:
+            return np.zeros_like(c)
+        c = c[..., 1:, :] * np.arange(1.0, c.shape[-2])[:, None]
+    return c
+
+
+def _horner(c: Array, x: Array) -> Any:
+    """Value of a polynomial whose powers are the first axis of ``c``."""
+    y = c[-1] + 0.0 * x if len(c) == 1 else c[-1] * x
+    for i in range(len(c) - 2, -1, -1):
+        y += c[i]
+        if i:
+            y *= x
+    return y
+
+
+def _range_on_unit_interval(c: Array) -> tuple[Array, Array]:
+    """Least and greatest value on [0, 1] of polynomials (..., d + 1, n), shapes (..., n)."""
+    ends = np.stack((c[..., 0, :], c.sum(axis=-2)))
+    low, high = ends.min(axis=0), ends.max(axis=0)
+    if c.shape[-2] < 3:
+        return low, high
+    x = _real_roots(np.moveaxis(_derived(c, 1), -2, -1))  # (..., n, d - 1)
+    y = _horner(np.moveaxis(c, -2, 0)[..., None], x)
+    return np.minimum(low, y.min(axis=-1)), np.maximum(high, y.max(axis=-1))
+
+
+def _real_roots(c: Array) -> Array:
+    """Real parts of all roots (..., d) of polynomials (..., d + 1), clipped to [0, 1].
+
+    Points that are no roots do no harm where the caller takes an extreme over them.
+    """
+    d = c.shape[-1] - 1
+    size = np.abs(c).max(axis=-1, keepdims=True)
+    c = c / np.where(size > 0.0, size, 1.0)
+    if d == 1:
+        slope = np.where(c[..., 1:] == 0.0, 1.0, c[..., 1:])
+        return np.clip(-c[..., :1] / slope, 0.0, 1.0)
+    if d == 2:
+        half = -0.5 * c[..., 1]
+        root = np.sqrt(np.maximum(half * half - c[..., 2] * c[..., 0], 0.0))
+        far = half + np.copysign(root, half)
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            x = np.stack((far / c[..., 2], c[..., 0] / far), axis=-1)
+        return np.clip(np.nan_to_num(x, nan=0.0, posinf=1.0, neginf=0.0), 0.0, 1.0)
+    # a leading coefficient that is nothing beside the others moves only roots far outside
+    lead = np.where(np.abs(c[..., -1]) < 1e-14, 1e-14, c[..., -1])
+    companion = np.zeros((*c.shape[:-1], d, d))
+    companion[..., range(1, d), range(d - 1)] = 1.0
+    companion[..., -1] = -c[..., :-1] / lead[..., None]
+    x = np.linalg.eigvals(companion).real
+    for _ in range(2):  # a companion matrix with a small lead loses digits
+        p = c[..., -1, None] * x + c[..., -2, None]
+        dp = np.broadcast_to(c[..., -1, None], x.shape)
+        for i in range(d - 2, -1, -1):
+            dp = dp * x + p
+            p = p * x + c[..., i, None]
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            step = p / dp
+        x = np.where(np.abs(step) < 1e-3, x - step, x)
+    return np.clip(x, 0.0, 1.0)

@@ -1,0 +1,490 @@
+"""Joint motions from rest to rest on the straight line between two postures."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import Array, as_floats
+from ..errors import InvalidValueError, ShapeError
+from .laws import LineLimits, Pieces, TimeLaw, law_of_duration, law_of_limits
+from .limits import MotionLimits
+from .piecewise import PiecewisePolynomial
+from .trajectory import Trajectory, joint_vectors
+
+ROUNDING = 1e-12
+"""Relative shortfall of a given duration that is put down to rounding."""
+
+
+class Synchronisation(Enum):
+    """How joints that move together are kept in step; the value says what is common to them.
+
+    Examples
+    --------
+    >>> Synchronisation.SAME_TIME.value
+    'start and end: each joint has its own quickest law, slowed down to the slowest joint'
+    """
+
+    COORDINATED = "one law: the ratio of the joints' motions is kept along the whole path"
+    SAME_TIME = (
+        "start and end: each joint has its own quickest law, slowed down to the slowest joint"
+    )
+    INDEPENDENT = "the start only: each joint arrives as soon as it can and waits"
+
+
+def linear(
+    q0: ArrayLike,
+    q1: ArrayLike,
+    duration: ArrayLike | None = None,
+    limits: MotionLimits | None = None,
+    synchronisation: Synchronisation = Synchronisation.COORDINATED,
+) -> Trajectory:
+    """Constant velocity. It jumps at both ends: no acceleration limit holds there.
+
+    Parameters
+    ----------
+    q0, q1 : array_like, shape () or (..., n)
+        Postures, rad or m; leading axes are motions of their own.
+    duration : array_like, shape () or (...), optional
+        Seconds; default the least that the limits allow.
+    limits : MotionLimits, optional
+        Kept inside the motion, so that of velocity alone tells here.
+    synchronisation : Synchronisation
+        How the joints are kept in step.
+
+    Returns
+    -------
+    Trajectory
+        Of n joints, or scalar.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Vectors that do not fit, NaN; neither duration nor limits; a duration below the least,
+        which the message tells; a limit of zero for a joint that has to move.
+
+    References
+    ----------
+    Khalil and Dombre, Modeling, identification and control of robots, section 13.3.1.
+
+    Examples
+    --------
+    >>> linear([0.0, 0.0], [1.0, 4.0], limits=MotionLimits(velocity=2.0)).duration
+    2.00...
+    """
+    return along_line(TimeLaw.LINEAR, q0, q1, duration, limits, synchronisation)
+
+
+def bang_bang(
+    q0: ArrayLike,
+    q1: ArrayLike,
+    duration: ArrayLike | None = None,
+    limits: MotionLimits | None = None,
+    synchronisation: Synchronisation = Synchronisation.COORDINATED,
+) -> Trajectory:
+    """Constant acceleration, then constant deceleration, with no cruise between them.
+
+    Parameters, errors and result as `linear`. With asymmetric limits the two parts share the
+    time so that both accelerations are used in full; without limits they are equal. A limit of
+    velocity slows the whole motion down; one of jerk is refused.
+
+    Parameters
+    ----------
+    q0, q1 : array_like, shape () or (..., n)
+        Postures, rad or m.
+    duration : array_like, shape () or (...), optional
+        Seconds; default the least that the limits allow.
+    limits : MotionLimits, optional
+        Of velocity and acceleration.
+    synchronisation : Synchronisation
+        How the joints are kept in step.
+
+    Returns
+    -------
+    Trajectory
+        Of n joints, or scalar.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        As `linear`; a limit of jerk.
+
+    References
+    ----------
+    Khalil and Dombre, section 13.3.3.
+
+    Examples
+    --------
+    >>> bang_bang(0.0, 1.0, limits=MotionLimits(acceleration=4.0)).duration
+    1.00...
+    """
+    return along_line(TimeLaw.BANG_BANG, q0, q1, duration, limits, synchronisation)
+
+
+def trapezoidal(
+    q0: ArrayLike,
+    q1: ArrayLike,
+    duration: ArrayLike | None = None,
+    limits: MotionLimits | None = None,
+    synchronisation: Synchronisation = Synchronisation.COORDINATED,
+) -> Trajectory:
+    """Trapezoidal velocity: the quickest motion under limits of velocity and acceleration.
+
+    Also called linear segment with parabolic blends, ``lspb``, ``trapezoidal``. A duration
+    longer than the least slows the quickest motion down evenly. Without limits the ramps take a
+    third of the duration each.
+
+    Parameters
+    ----------
+    q0, q1 : array_like, shape () or (..., n)
+        Postures, rad or m; leading axes are motions of their own.
+    duration : array_like, shape () or (...), optional
+        Seconds; default the least that the limits allow.
+    limits : MotionLimits, optional
+        Of velocity and acceleration, which may be asymmetric. Coordinated joints share the law
+        that none of them exceeds.
+    synchronisation : Synchronisation
+        How the joints are kept in step.
+
+    Returns
+    -------
+    Trajectory
+        Of n joints, or scalar.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Vectors that do not fit, NaN; neither duration nor limits; a duration below the least,
+        which the message tells; a limit of zero for a joint that has to move; a limit of jerk,
+        which no jump of acceleration keeps.
+
+    References
+    ----------
+    Seed book section 4.2.2. Khalil and Dombre, section 13.3.4.
+
+    Examples
+    --------
+    >>> limits = MotionLimits(velocity=[1.0, 2.0], acceleration=2.0)
+    >>> move = trapezoidal([0.0, 0.0], [1.0, -1.0], limits=limits)
+    >>> move.duration, move.v(0.75)
+    (1.50..., array([ 1., -1.]))
+    """
+    return along_line(TimeLaw.TRAPEZOIDAL, q0, q1, duration, limits, synchronisation)
+
+
+def smoothed_trapezoidal(
+    q0: ArrayLike,
+    q1: ArrayLike,
+    duration: ArrayLike | None = None,
+    limits: MotionLimits | None = None,
+    synchronisation: Synchronisation = Synchronisation.COORDINATED,
+) -> Trajectory:
+    """Smoothed trapezoidal velocity: ramps whose acceleration is a parabola of time.
+
+    The acceleration is continuous, also at the ends. A ramp to the velocity V takes
+    ``1.5 V / acceleration``, or longer where a limit of jerk asks for it.
+
+    Parameters
+    ----------
+    q0, q1 : array_like, shape () or (..., n)
+        Postures, rad or m; leading axes are motions of their own.
+    duration : array_like, shape () or (...), optional
+        Seconds; default the least that the limits allow with this law.
+    limits : MotionLimits, optional
+        Of velocity, acceleration and jerk.
+    synchronisation : Synchronisation
+        How the joints are kept in step.
+
+    Returns
+    -------
+    Trajectory
+        Of n joints, or scalar.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        As `trapezoidal`, but limits of jerk are kept.
+
+    References
+    ----------
+    Seed book section 4.2.3. Khalil and Dombre, section 13.3.5.
+
+    Examples
+    --------
+    >>> limits = MotionLimits(velocity=1.0, acceleration=1.5)
+    >>> smoothed_trapezoidal(0.0, 3.0, limits=limits).duration
+    4.00...
+    """
+    return along_line(TimeLaw.SMOOTHED_TRAPEZOIDAL, q0, q1, duration, limits, synchronisation)
+
+
+def along_line(
+    law: TimeLaw,
+    q0: ArrayLike,
+    q1: ArrayLike,
+    duration: ArrayLike | None,
+    limits: MotionLimits | None,
+    synchronisation: Synchronisation = Synchronisation.COORDINATED,
+) -> Trajectory:
+    """Motion from rest to rest by any law, for programs that choose it.
+
+    Parameters
+    ----------
+    law : TimeLaw
+        How the motion is distributed over the time.
+    q0, q1 : array_like, shape () or (..., n)
+        Postures, rad or m.
+    duration : array_like, shape () or (...), or None
+        Seconds.
+    limits : MotionLimits or None
+        Kept inside the motion.
+    synchronisation : Synchronisation
+        How the joints are kept in step.
+
+    Returns
+    -------
+    Trajectory
+        Of n joints, or scalar.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        As `trapezoidal`.
+
+    Examples
+    --------
+    >>> along_line(TimeLaw.CUBIC, 0.0, 1.0, None, MotionLimits(velocity=1.5)).duration
+    1.00...
+    """
+    if not isinstance(law, TimeLaw):
+        raise InvalidValueError(f"law: expected a TimeLaw, got {law!r}.")
+    if not isinstance(synchronisation, Synchronisation):
+        raise InvalidValueError(
+            f"synchronisation: expected a Synchronisation, got {synchronisation!r}."
+        )
+    given, batch, scalar = joint_vectors(q0=q0, q1=q1)
+    start, end = given["q0"], given["q1"]
+    R, n = start.shape
+    T = given_durations(duration, batch)
+    if T is None and limits is None:
+        raise InvalidValueError("Give duration, limits or both.")
+    bounds = checked_limits(limits, n, start, end)
+    together = bounds is None or synchronisation is Synchronisation.COORDINATED
+    # one law for all joints of a motion, or one law each
+    way = (end - start)[:, None, :] if together else (end - start)[:, :, None]
+    length = np.abs(way).max(axis=-1, initial=0.0).reshape(-1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        direction = np.where(way != 0.0, way / length.reshape(*way.shape[:2], 1), 0.0)
+    if bounds is None:
+        assert T is not None
+        pieces = law_of_duration(law, length, np.repeat(T, length.size // max(R, 1)))
+        least = np.zeros(R)
+    else:
+        pieces = law_of_limits(law, length, limits_along(bounds, direction))
+        totals = pieces.durations.sum(axis=-1).reshape(R, -1)
+        least = totals.max(axis=-1, initial=0.0)
+    refuse_short(T, least, length.reshape(R, -1))
+    pieces = _timed(pieces, T, least, synchronisation, length.size // max(R, 1))
+    return _assembled(pieces, start, direction, batch, scalar, T)
+
+
+def limits_along(limits: MotionLimits, direction: Array) -> LineLimits:
+    """Limits of the coordinate that several joints share.
+
+    Parameters
+    ----------
+    limits : MotionLimits
+        Of n joints, arrays of shape (n,).
+    direction : ndarray, shape (R, 1, n) or (R, n, 1)
+        Motion of the joints per unit of the coordinate: all joints in one row, or one each.
+
+    Returns
+    -------
+    LineLimits
+        Shape (R,) or (R n,). No joint that stays limits anything.
+
+    Raises
+    ------
+    InvalidValueError
+        A limit of zero for a joint that has to move.
+    """
+    own = direction.shape[-1] == 1 and direction.shape[-2] == limits.velocity.size
+    u = direction[..., 0] if own else direction[..., 0, :]
+    forward, moves = u > 0.0, u != 0.0
+    size = np.where(moves, np.abs(u), 1.0)
+
+    def along(name: str, least: Array, most: Array) -> tuple[Array, Array]:
+        zero = moves & (np.where(forward, most, -least) == 0.0)
+        if zero.any():
+            j = int(np.argwhere(zero)[0][-1])
+            raise InvalidValueError(
+                f"limits: the limit of {name} of joint {j + 1} is 0, but it has to move; any "
+                "positive limit will do, or leave the joint where it is."
+            )
+        with np.errstate(over="ignore"):
+            with_it = np.where(moves, np.where(forward, most, -least) / size, np.inf)
+            against = np.where(moves, np.where(forward, -least, most) / size, np.inf)
+        if own:
+            return with_it.reshape(-1), against.reshape(-1)
+        return with_it.min(axis=-1), against.min(axis=-1)
+
+    velocity, _ = along("velocity", limits.velocity_lower, limits.velocity)
+    faster, slower = along("acceleration", limits.acceleration_lower, limits.acceleration)
+    if (slower == 0.0).any():
+        raise InvalidValueError(
+            "limits: an acceleration limit against the motion is 0: it could never stop; any "
+            "limit other than 0 will do."
+        )
+    jerk, _ = along("jerk", -limits.jerk, limits.jerk)
+    return LineLimits(velocity, faster, slower, jerk)
+
+
+def given_durations(duration: ArrayLike | None, batch: tuple[int, ...]) -> Array | None:
+    """Checked durations, shape (R,), one per motion.
+
+    Parameters
+    ----------
+    duration : array_like, shape () or (...), or None
+        Seconds.
+    batch : tuple of int
+        Leading axes of the motions.
+
+    Returns
+    -------
+    ndarray or None
+        As given.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Another shape, NaN, a negative time.
+    """
+    if duration is None:
+        return None
+    T = as_floats(duration, "duration")
+    if (T < 0.0).any():
+        raise InvalidValueError(f"duration: expected seconds of at least 0, got {T.min():g}.")
+    try:
+        return np.broadcast_to(T, batch).reshape(-1)
+    except ValueError:
+        raise ShapeError(
+            f"duration: expected one number or one per motion {batch}, got shape {T.shape}."
+        ) from None
+
+
+def checked_limits(limits: MotionLimits | None, n: int, *postures: Array) -> MotionLimits | None:
+    """Limits of n joints, within which the postures are.
+
+    Parameters
+    ----------
+    limits : MotionLimits or None
+        As given.
+    n : int
+        Number of joints.
+    *postures : ndarray, shapes (R, n)
+        Positions that the motion takes, rad or m.
+
+    Returns
+    -------
+    MotionLimits or None
+        With arrays of shape (n,).
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Limits of other joints, no limits, a posture outside.
+    """
+    if limits is None:
+        return None
+    if not isinstance(limits, MotionLimits):
+        raise InvalidValueError(
+            f"limits: expected MotionLimits, got {type(limits).__name__}; write for instance "
+            "MotionLimits(velocity=2.0, acceleration=10.0)."
+        )
+    limits = limits.for_joints(n)
+    slack = 1e-9
+    for q in postures:
+        outside = (q < limits.lower - slack) | (q > limits.upper + slack)
+        if outside.any():
+            j = int(np.argwhere(outside)[0][-1])
+            raise InvalidValueError(
+                f"Joint {j + 1} is asked to be at {q[outside].ravel()[0]:.6g}, outside its limits "
+                f"{limits.lower[j]:.6g} to {limits.upper[j]:.6g}."
+            )
+    return limits
+
+
+def refuse_short(T: Array | None, least: Array, length: Array) -> None:
+    """Refuse durations below the least feasible ones.
+
+    Parameters
+    ----------
+    T : ndarray, shape (R,), or None
+        Durations asked for, s.
+    least : ndarray, shape (R,)
+        Least durations, s.
+    length : ndarray, shape (R, ...)
+        Lengths of the motions: none may take no time.
+
+    Raises
+    ------
+    InvalidValueError
+        With the least feasible duration.
+    """
+    if T is None:
+        return
+    short = least * (1.0 - ROUNDING) > T
+    if short.any():
+        i = int(short.argmax())
+        raise InvalidValueError(
+            f"duration: {T[i]:.9g} s is too short for the limits; the least is {least[i]:.12g} s."
+        )
+    if ((T == 0.0) & (length > 0.0).any(axis=-1)).any():
+        raise InvalidValueError("duration: expected a positive time for a motion, got 0 s.")
+
+
+def _timed(
+    pieces: Pieces, T: Array | None, least: Array, how: Synchronisation, laws: int
+) -> Pieces:
+    """Stretch the laws of each motion to its duration, and let those that arrive early wait."""
+    total = pieces.durations.sum(axis=-1)
+    goal = np.repeat(least if T is None else T, laws)
+    if T is None and how is Synchronisation.INDEPENDENT:
+        wait = goal - total
+    else:
+        wait = np.where(total > 0.0, 0.0, goal)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            factor = np.where(total > 0.0, goal / total, 1.0)
+        pieces = Pieces(pieces.durations * factor[:, None], pieces.coefficients)
+    if not (wait > 0.0).any():
+        return pieces
+    rest = np.zeros_like(pieces.coefficients[:, :1])
+    rest[:, 0, 0] = pieces.coefficients[:, -1].sum(axis=-1)
+    return Pieces(
+        np.concatenate((pieces.durations, wait[:, None]), axis=1),
+        np.concatenate((pieces.coefficients, rest), axis=1),
+    )
+
+
+def _assembled(
+    pieces: Pieces, start: Array, direction: Array, batch: tuple[int, ...], scalar: bool,
+    T: Array | None,
+) -> Trajectory:  # fmt: skip
+    R, n = start.shape
+    K, powers = pieces.coefficients.shape[1:]
+    columns = pieces.durations.shape[0] // R if R else 1
+    breaks = np.zeros((R, columns, K + 1))
+    breaks[..., 1:] = np.cumsum(pieces.durations, axis=-1).reshape(R, columns, K)
+    if T is not None:
+        # times of all laws end together to the last digit
+        breaks = np.minimum(breaks, T[:, None, None])
+        breaks[..., -1] = T[:, None]
+    c = pieces.coefficients.reshape(R, columns, K, powers)
+    c = np.moveaxis(c, 1, -1) * direction.reshape(R, 1, 1, n)
+    c[:, :, 0] += start[:, None, :]
+    motion = PiecewisePolynomial(
+        breaks.reshape(*batch, columns, K + 1), c.reshape(*batch, K, powers, n)
+    )
+    return Trajectory(motion, scalar)

@@ -1,0 +1,371 @@
+"""The type that every generator returns: positions and their derivatives at any time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import Array, as_floats, read_only
+from ..errors import InvalidValueError
+from .limits import LimitsReport, MotionLimits
+
+
+class Motion(Protocol):
+    """What a `Trajectory` is made of: functions of time for n joints."""
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        ...
+
+    @property
+    def batch(self) -> tuple[int, ...]:
+        """Leading axes: one motion each."""
+        ...
+
+    @property
+    def duration(self) -> Array:
+        """Durations, s, shape (...)."""
+        ...
+
+    def derivatives(self, t: Array, orders: tuple[int, ...]) -> list[Array]:
+        """Derivatives (..., N, n) of the orders at times (..., N) within the duration."""
+        ...
+
+    def extremes(self, order: int) -> tuple[Array, Array]:
+        """Least and greatest value (..., n) of a derivative over the motion."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Samples:
+    """A trajectory at given times. As an array (``np.asarray``) it is its positions.
+
+    Parameters
+    ----------
+    t : ndarray, shape (N,)
+        Times, s.
+    q, v, a, jerk : ndarray, shape (..., N, n)
+        Positions and their first three derivatives, rad or m, and per s.
+
+    Examples
+    --------
+    >>> joint_samples = Samples([0.0, 1.0], [[0.0], [1.0]], *np.zeros((3, 2, 1)))
+    >>> np.asarray(joint_samples).shape
+    (2, 1)
+    """
+
+    t: Array
+    q: Array
+    v: Array
+    a: Array
+    jerk: Array
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not isinstance(value, np.ndarray) or value.flags.writeable:
+                value = read_only(value)
+            object.__setattr__(self, field.name, value)
+
+    def __len__(self) -> int:
+        return self.t.size
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        return np.array(self.q, dtype=dtype, copy=copy)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), tuple(getattr(self, field.name) for field in fields(self))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trajectory:
+    """Motion of joints over a time from 0 to ``duration``.
+
+    Before and after it the joints stay where they are, if the motion begins and ends at rest;
+    a time outside of one that does not is an error. Pictures are drawn by `robotmodels.viz`.
+
+    Parameters
+    ----------
+    motion : Motion
+        Functions of time.
+    scalar : bool
+        Whether positions are numbers instead of vectors of joints.
+    repeats : bool
+        Whether the motion is periodic, so that every time is inside it.
+    """
+
+    motion: Motion
+    scalar: bool = False
+    repeats: bool = False
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return self.motion.n
+
+    @property
+    def duration(self) -> Any:
+        """Seconds: a float, or an array (...) for a batch of motions."""
+        duration = self.motion.duration
+        return duration.copy() if self.motion.batch else float(duration)
+
+    def q(self, t: ArrayLike) -> Array:
+        """Positions.
+
+        Parameters
+        ----------
+        t : array_like, any shape
+            Times, s.
+
+        Returns
+        -------
+        ndarray, shape (..., *t.shape, n)
+            rad or m; without the last axis for a scalar trajectory. Leading axes are those of a
+            batch of motions.
+
+        Raises
+        ------
+        InvalidValueError
+            NaN, or a time outside of a motion that does not rest there.
+
+        Examples
+        --------
+        >>> from robotmodels.trajectories import quintic
+        >>> quintic([0.0, 0.0], [1.0, 2.0], duration=2.0).q([0.0, 1.0, 2.0])
+        array([[0. , 0. ],
+               [0.5, 1. ],
+               [1. , 2. ]])
+        """
+        return self._at(t, (0,))[0]
+
+    def v(self, t: ArrayLike) -> Array:
+        """Velocities; arguments, shape and errors as `q`.
+
+        Parameters
+        ----------
+        t : array_like, any shape
+            Times, s.
+
+        Returns
+        -------
+        ndarray, shape (..., *t.shape, n)
+            rad/s or m/s.
+        """
+        return self._at(t, (1,))[0]
+
+    def a(self, t: ArrayLike) -> Array:
+        """Accelerations; arguments, shape and errors as `q`.
+
+        Parameters
+        ----------
+        t : array_like, any shape
+            Times, s.
+
+        Returns
+        -------
+        ndarray, shape (..., *t.shape, n)
+            rad/s^2 or m/s^2. Where it jumps, the value after the jump.
+        """
+        return self._at(t, (2,))[0]
+
+    def jerk(self, t: ArrayLike) -> Array:
+        """Derivatives of the accelerations; arguments, shape and errors as `q`.
+
+        Parameters
+        ----------
+        t : array_like, any shape
+            Times, s.
+
+        Returns
+        -------
+        ndarray, shape (..., *t.shape, n)
+            rad/s^3 or m/s^3, without the pulses where the acceleration jumps.
+        """
+        return self._at(t, (3,))[0]
+
+    def at(self, t: ArrayLike) -> Samples:
+        """Positions and derivatives together.
+
+        Parameters
+        ----------
+        t : array_like, any shape
+            Times, s.
+
+        Returns
+        -------
+        Samples
+            The times with q, v, a and jerk.
+
+        Raises
+        ------
+        InvalidValueError
+            As `q`.
+
+        Examples
+        --------
+        >>> from robotmodels.trajectories import quintic
+        >>> quintic(0.0, 1.0, duration=1.0).at([0.0, 0.5]).v
+        array([0.   , 1.875])
+        """
+        t = read_only(as_floats(t, "t"))
+        values = self._at(t, (0, 1, 2, 3))
+        for value in values:
+            value.setflags(write=False)  # nobody else has them: they need no copy
+        return Samples(t, *values)
+
+    def resample(self, samples: int | None = None, period: float | None = None) -> Samples:
+        """The motion on a regular grid of time.
+
+        Parameters
+        ----------
+        samples : int, optional
+            How many, from 0 to the duration.
+        period : float, optional
+            Seconds between them instead: from 0 to the first multiple at or after the duration,
+            or to the last one before it where the motion does not end at rest.
+
+        Returns
+        -------
+        Samples
+            Times and q, v, a, jerk.
+
+        Raises
+        ------
+        InvalidValueError
+            Not exactly one of the two; less than one sample; a period that is not positive; a
+            batch of motions, which has no common grid.
+
+        Examples
+        --------
+        >>> from robotmodels.trajectories import quintic
+        >>> quintic(0.0, 1.0, duration=1.0).resample(period=0.3).t
+        array([0. , 0.3, 0.6, 0.9, 1.2])
+        """
+        if (samples is None) == (period is None):
+            raise InvalidValueError("resample: give either samples or period.")
+        if self.motion.batch:
+            raise InvalidValueError("resample: a batch of motions has no common grid; use at(t).")
+        T = self.duration
+        if samples is not None:
+            if int(samples) != samples or samples < 1:
+                raise InvalidValueError(
+                    f"samples: expected a whole number from 1, got {samples!r}."
+                )
+            return self.at(np.linspace(0.0, T, int(samples)))
+        step = float(as_floats(period, "period"))  # type: ignore[arg-type]
+        if step <= 0.0:
+            raise InvalidValueError(f"period: expected a positive time, got {step:g} s.")
+        count = T / step
+        near = round(count)
+        if abs(count - near) <= 1e-9 * max(1.0, count):  # a multiple up to rounding
+            t = step * np.arange(near + 1.0)
+            t[-1] = min(t[-1], T) if near else 0.0
+            return self.at(t)
+        at_rest = self.repeats or not self._moving(np.array([T]))
+        return self.at(step * np.arange(int(count) + 1.0 + at_rest))
+
+    def check(self, limits: MotionLimits, tolerance: float = 1e-9) -> LimitsReport:
+        """Compare the motion with limits, everywhere on it and not at samples only.
+
+        Parameters
+        ----------
+        limits : MotionLimits
+            Of the same joints.
+        tolerance : float
+            Relative overshoot that is put down to rounding.
+
+        Returns
+        -------
+        LimitsReport
+            Extreme values, `kept`, and what is exceeded by which joint.
+
+        Raises
+        ------
+        ShapeError
+            Limits of another number of joints.
+
+        Examples
+        --------
+        >>> from robotmodels.trajectories import MotionLimits, quintic
+        >>> quintic(0.0, 1.0, duration=1.0).check(MotionLimits(velocity=1.5))
+        <LimitsReport: limits are exceeded
+          joint 1: velocity 1.875, allowed 1.5>
+        """
+        peaks = [np.stack(self.motion.extremes(order)) for order in range(4)]
+        return LimitsReport(limits.for_joints(self.n), *peaks, tolerance)
+
+    def _moving(self, ends: Array) -> bool:
+        """Whether any joint has a velocity at one of the times."""
+        (v,) = self.motion.derivatives(ends, (1,))
+        scale = max(np.abs(peak).max(initial=0.0) for peak in self.motion.extremes(1))
+        return bool(np.abs(v).max(initial=0.0) > 1e-9 * scale) if scale > 0.0 else False
+
+    def _at(self, t: ArrayLike, orders: tuple[int, ...]) -> list[Array]:
+        t = as_floats(t, "t")
+        batch, duration = self.motion.batch, self.motion.duration
+        flat = np.broadcast_to(t.reshape(-1), (*batch, t.size))
+        before = after = None
+        if not self.repeats and t.size:
+            end = np.asarray(duration)[..., None]
+            before, after = flat < 0.0, flat > end
+            if not (before.any() or after.any()):
+                before = after = None
+            else:
+                self._refuse_outside(flat, before, after, duration)
+                flat = np.clip(flat, 0.0, end)
+        values = self.motion.derivatives(np.ascontiguousarray(flat), orders)
+        if before is not None and after is not None:
+            for value, order in zip(values, orders, strict=True):
+                if order:
+                    value[before | after] = 0.0
+        shape = (*batch, *t.shape) if self.scalar else (*batch, *t.shape, self.n)
+        return [value.reshape(shape) for value in values]
+
+    def _refuse_outside(self, t: Array, before: Any, after: Any, duration: Array) -> None:
+        end = np.broadcast_to(np.asarray(duration)[..., None], (*self.motion.batch, 1))
+        for outside, edge, side in ((before, np.zeros_like(end), "before the start"),
+                                    (after, end, "after the end")):  # fmt: skip
+            if outside.any() and self._moving(edge):
+                raise InvalidValueError(
+                    f"t: {float(t[outside].ravel()[0]):g} s is {side} of a motion of "
+                    f"{float(np.max(end)):g} s that does not rest there; ask for times inside it."
+                )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.motion, self.scalar, self.repeats)
+
+
+def joint_vectors(**given: Any) -> tuple[dict[str, Array], tuple[int, ...], bool]:
+    """Check positions and rates given for the same joints and give them one shape.
+
+    Parameters
+    ----------
+    **given : array_like, shapes () or (..., n)
+        Named as in error messages. Numbers stand for all joints; if all are numbers, there is one
+        joint and the trajectory is scalar.
+
+    Returns
+    -------
+    arrays : dict of ndarray, shapes (R, n)
+        Broadcast, one row per motion.
+    batch : tuple of int
+        The leading axes.
+    scalar : bool
+        Whether all were numbers.
+    """
+    from ..errors import ShapeError
+
+    arrays = {name: as_floats(value, name) for name, value in given.items()}
+    scalar = all(array.ndim == 0 for array in arrays.values())
+    try:
+        shape = np.broadcast_shapes((1,), *(array.shape for array in arrays.values()))
+    except ValueError:
+        got = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
+        raise ShapeError(f"Expected vectors of the same joints, got {got}.") from None
+    n = shape[-1]
+    rows = {k: np.broadcast_to(v, shape).reshape(-1, n) for k, v in arrays.items()}
+    return rows, shape[:-1], scalar
