@@ -1,0 +1,314 @@
+"""Spherical shoulder, revolute elbow, spherical wrist: eight postures for every arm angle.
+
+``D_0 M_1 D_1 ... M_7 D_7 = U`` with the axes of joints 1, 2, 3 meeting in S and those of 5, 6, 7
+in W. The distance from S to W gives joint 4, the arm angle the orientation of the upper arm; its
+frame is that of joint 4 before the joint turns. Shoulder and wrist are then three turning joints
+each that reach an orientation.
+"""
+
+from __future__ import annotations
+
+from math import atan2, cos, hypot, sin, sqrt
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from ..kernels._compile import INTS, MATRIX, OUT1, STACK, VECTOR, Floats, Ints, compiled
+from ._check import EXACT, MERGE, improved, missing, wrapped
+from ._concurrent import advance
+from ._equations import DOUBLE, NONE, type_2
+from ._wrist import wrist_postures
+
+STEPS = 12  # Gauss-Newton steps for a posture that rounding or a rounded table left beside its pose
+ROUGH = 1e-2  # candidates that miss by more are none [m, rad]
+ALONG = 1e-6  # sine between the line and base z below which base x takes its place
+STRAIGHT = 1e-7  # sine of the bend of the elbow below which it counts as stretched or folded
+NO_LINE = 1e-9  # distance from shoulder to wrist below which there is no line [m]
+
+_OUT4 = types.Array(types.float64, 4, "C")
+_OUT3 = types.Array(types.float64, 3, "C")
+_ROWS = types.Array(types.boolean, 3, "C")
+_JOINTS = types.Array(types.boolean, 4, "C")
+
+
+@compiled()
+def cross_into(a: Floats, b: Floats, out: Floats) -> None:
+    """``out = a x b``."""
+    out[0] = a[1] * b[2] - a[2] * b[1]
+    out[1] = a[2] * b[0] - a[0] * b[2]
+    out[2] = a[0] * b[1] - a[1] * b[0]
+
+
+@compiled()
+def copy(A: Floats, B: Floats) -> None:
+    """Copy the first three rows of a pose."""
+    for i in range(3):
+        for j in range(4):
+            B[i, j] = A[i, j]
+
+
+@compiled()
+def upper_arm(points: Floats, flat: bool, angle: float, F: Floats) -> float:
+    """Line, elbow and their normal as columns of ``F (3, 3)``, in the frame of joint 4.
+
+    ``points`` are S before joint 4 and W behind it. The elbow is the foot of S on axis 4; where
+    it lies on the line (an arm in one plane, stretched or folded) the side is that of an elbow
+    bent towards ``axis 4 x line``. Returns the distance from S to W.
+    """
+    s, w = points[0], points[1]
+    c, n = cos(angle), sin(angle)
+    x = c * w[0] - n * w[1] - s[0]
+    y = n * w[0] + c * w[1] - s[1]
+    z = 0.0 if flat else w[2] - s[2]
+    distance = sqrt(x * x + y * y + z * z)
+    if distance < NO_LINE:
+        F[:, :] = np.eye(3)
+        return distance
+    F[0, 0], F[1, 0], F[2, 0] = x / distance, y / distance, z / distance
+    if flat:
+        # the elbow seen from S is (-s_x, -s_y, 0)
+        side = s[0] * F[1, 0] - s[1] * F[0, 0]
+        sign = -1.0 if side < -STRAIGHT * hypot(s[0], s[1]) else 1.0
+        F[0, 1], F[1, 1], F[2, 1] = -sign * F[1, 0], sign * F[0, 0], 0.0
+    else:
+        along = -s[0] * F[0, 0] - s[1] * F[1, 0]
+        ex, ey, ez = -s[0] - along * F[0, 0], -s[1] - along * F[1, 0], -along * F[2, 0]
+        length = sqrt(ex * ex + ey * ey + ez * ez)
+        F[0, 1], F[1, 1], F[2, 1] = ex / length, ey / length, ez / length
+    cross_into(F[:, 0], F[:, 1], F[:, 2])
+    return distance
+
+
+@compiled()
+def reference_axes(x: float, y: float, z: float, B: Floats) -> None:
+    """The line (a unit vector), the direction of arm angle 0 and their normal as columns of B."""
+    B[0, 0], B[1, 0], B[2, 0] = x, y, z
+    if hypot(x, y) > ALONG:
+        a, b, c = -z * x, -z * y, x * x + y * y
+    else:
+        a, b, c = y * y + z * z, -x * y, -x * z
+    length = sqrt(a * a + b * b + c * c)
+    B[0, 1], B[1, 1], B[2, 1] = a / length, b / length, c / length
+    cross_into(B[:, 0], B[:, 1], B[:, 2])
+
+
+@compiled()
+def times_transposed(A: Floats, B: Floats, out: Floats) -> None:
+    """``out = A B^T`` of rotations."""
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = A[i, 0] * B[j, 0] + A[i, 1] * B[j, 1] + A[i, 2] * B[j, 2]
+
+
+@compiled()
+def transposed_times(A: Floats, B: Floats, out: Floats) -> None:
+    """``out = A^T B`` of rotations."""
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = A[0, i] * B[0, j] + A[1, i] * B[1, j] + A[2, i] * B[2, j]
+
+
+@compiled()
+def three_motions(D: Floats, first: int, x: Floats, P: Floats, Q: Floats) -> None:
+    """``P <- P M_j D_j`` for three turning joints in a row, the first before ``D[first]``."""
+    advance(P, True, x[0], D[first], Q)
+    advance(Q, True, x[1], D[first + 1], P)
+    advance(P, True, x[2], D[first + 2], Q)
+    copy(Q, P)
+
+
+@compiled(types.void(MATRIX, STACK, VECTOR, MATRIX, types.boolean, OUT1))
+def arm_angles(
+    q: Floats, D: Floats, shoulder: Floats, points: Floats, flat: bool, psi: Floats
+) -> None:
+    """Arm angles ``psi (N,)`` of postures ``q (N, 7)``."""
+    F, B = np.zeros((3, 3)), np.zeros((3, 3))
+    P, Q = np.zeros((3, 4)), np.zeros((3, 4))
+    for n in range(q.shape[0]):
+        psi[n] = 0.0
+        if upper_arm(points, flat, q[n, 3], F) < NO_LINE:
+            continue
+        copy(D[0], P)
+        three_motions(D, 1, q[n, :3], P, Q)
+        line, elbow = np.zeros(3), np.zeros(3)
+        for i in range(3):
+            for j in range(3):
+                line[i] += P[i, j] * F[j, 0]
+                elbow[i] += P[i, j] * F[j, 1]
+        reference_axes(line[0], line[1], line[2], B)
+        c = elbow[0] * B[0, 1] + elbow[1] * B[1, 1] + elbow[2] * B[2, 1]
+        s = elbow[0] * B[0, 2] + elbow[1] * B[1, 2] + elbow[2] * B[2, 2]
+        psi[n] = wrapped(atan2(s, c))
+
+
+@compiled()
+def turned_arm(B: Floats, F: Floats, psi: float, G: Floats, R: Floats) -> None:
+    """Rotation R of the frame of joint 4, before it turns, with the elbow at the arm angle."""
+    c, s = cos(psi), sin(psi)
+    for i in range(3):
+        G[i, 0] = B[i, 0]
+        G[i, 1] = c * B[i, 1] + s * B[i, 2]
+        G[i, 2] = c * B[i, 2] - s * B[i, 1]
+    times_transposed(G, F, R)
+
+
+@compiled()
+def wrist_target(R: Floats, q4: float, D: Floats, U: Floats, G: Floats, M: Floats) -> None:
+    """``M = (R Rz(q_4) D_4)^T U D_7^T``: what joints 5 to 7 must do, ``M_5 D_5 M_6 D_6 M_7``."""
+    c, s = cos(q4), sin(q4)
+    for i in range(3):
+        x, y = c * R[i, 0] + s * R[i, 1], c * R[i, 1] - s * R[i, 0]
+        for j in range(3):
+            M[i, j] = x * D[4, 0, j] + y * D[4, 1, j] + R[i, 2] * D[4, 2, j]
+    transposed_times(M, U, G)
+    times_transposed(G, D[7], M)
+
+
+@compiled()
+def joined(L: Floats, T: Floats, P: Floats) -> None:
+    """``P = L T`` of poses as 3x4 arrays."""
+    for i in range(3):
+        for j in range(4):
+            P[i, j] = L[i, 0] * T[0, j] + L[i, 1] * T[1, j] + L[i, 2] * T[2, j]
+        P[i, 3] += L[i, 3]
+
+
+@compiled()
+def twin(q: Floats, count: int, x: Floats) -> int:
+    """Row of ``q (8, 7)`` that is the posture x, -1 if it is new."""
+    for k in range(count):
+        same = True
+        for m in range(7):
+            if abs(wrapped(x[m] - q[k, m])) >= MERGE:
+                same = False
+                break
+        if same:
+            return k
+    return -1
+
+
+@compiled(
+    types.void(
+        STACK, MATRIX, MATRIX, INTS, STACK, VECTOR, VECTOR, MATRIX, types.boolean, VECTOR,
+        _OUT4, _ROWS, _OUT3, _ROWS, _JOINTS,
+    )
+)  # fmt: skip
+def arm_angle_rows(
+    poses: Floats,
+    psi: Floats,
+    references: Floats,
+    sigma: Ints,
+    D: Floats,
+    shoulder: Floats,
+    wrist: Floats,
+    points: Floats,
+    flat: bool,
+    tolerances: Floats,
+    q: Floats,
+    valid: NDArray[np.bool_],
+    residual: Floats,
+    double: NDArray[np.bool_],
+    free: NDArray[np.bool_],
+) -> None:
+    """Postures ``q (N, A, 8, 7)`` of poses ``(N, 4, 4)`` at arm angles ``psi (N, A)``, checked.
+
+    ``shoulder`` is S in R_0, ``wrist`` is W in the frame of the tool.
+    """
+    s, w = points[0], points[1]
+    X, Y = s[1] * w[0] - s[0] * w[1], s[0] * w[0] + s[1] * w[1]
+    offset = 0.0 if flat else w[2] - s[2]
+    known = s[0] * s[0] + s[1] * s[1] + w[0] * w[0] + w[1] * w[1] + offset * offset
+    F, B, M = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
+    R, G = np.zeros((3, 3)), np.zeros((3, 3))
+    P, Q = np.zeros((3, 4)), np.zeros((3, 4))
+    left, right = np.zeros((2, 3, 4)), np.zeros((2, 3, 4))
+    x_shoulder, x_wrist = np.zeros((2, 3)), np.zeros((2, 3))
+    free_shoulder, free_wrist = np.zeros(2, dtype=np.int64), np.zeros(2, dtype=np.int64)
+    held = np.zeros(7, dtype=np.int64)
+    x, e, line = np.zeros(7), np.zeros(6), np.zeros(3)
+    unit = np.eye(4)
+    slack_angle = max(1e-9, tolerances[1])
+    for n in range(poses.shape[0]):
+        U, reference = poses[n], references[n]
+        for i in range(3):
+            line[i] = U[i, 3] - shoulder[i]
+            for j in range(3):
+                line[i] += U[i, j] * wrist[j]
+        length = sqrt(line[0] * line[0] + line[1] * line[1] + line[2] * line[2])
+        # an overshoot by a length moves Z by that times the distance
+        slack = (length + 1e-9) * max(tolerances[0], 1e-9)
+        kind, first, second = type_2(X, Y, 0.5 * (known - length * length), slack, 0.0)
+        if kind == NONE or not length >= 0.0:
+            continue
+        no_line = length < NO_LINE
+        if not no_line:
+            reference_axes(line[0] / length, line[1] / length, line[2] / length, B)
+        for a in range(1 if no_line else psi.shape[1]):
+            count = 0
+            for root in range(1 if kind == DOUBLE else 2):
+                q4 = first if root == 0 else second
+                if no_line:
+                    # the upper arm may point anywhere: the shoulder stays at its reference
+                    for i in range(3):
+                        x_shoulder[0, i] = reference[i]
+                    shoulders, free_shoulder[0] = 1, 1
+                    copy(D[0], P)
+                    three_motions(D, 1, x_shoulder[0], P, Q)
+                    for i in range(3):
+                        for j in range(3):
+                            R[i, j] = P[i, j]
+                else:
+                    upper_arm(points, flat, q4, F)
+                    turned_arm(B, F, psi[n, a], G, R)
+                    # R = D_0 M_1 D_1 M_2 D_2 M_3 D_3
+                    times_transposed(R, D[3], G)
+                    transposed_times(D[0], G, M)
+                    shoulders = wrist_postures(
+                        D[1], D[2], M, slack_angle, reference[:3], x_shoulder, free_shoulder
+                    )
+                wrist_target(R, q4, D, U, G, M)
+                wrists = wrist_postures(
+                    D[5], D[6], M, slack_angle, reference[4:], x_wrist, free_wrist
+                )
+                # the forward pass in two halves: each serves two postures
+                for i in range(shoulders):
+                    copy(D[0], P)
+                    three_motions(D, 1, x_shoulder[i], P, Q)
+                    advance(P, True, q4, D[4], left[i])
+                for j in range(wrists):
+                    copy(unit, P)
+                    three_motions(D, 5, x_wrist[j], P, Q)
+                    copy(P, right[j])
+                for i in range(shoulders):
+                    for j in range(wrists):
+                        joined(left[i], right[j], Q)
+                        way, angle = missing(U, Q, e)
+                        for m in range(3):
+                            x[m], x[4 + m] = x_shoulder[i, m], x_wrist[j, m]
+                            held[m] = 1 if no_line else 0
+                        x[3] = q4
+                        held[0] = free_shoulder[i]
+                        held[4] = free_wrist[j]
+                        if max(way, angle) > EXACT:
+                            way, angle = improved(U, sigma, D, held, tolerances, STEPS, ROUGH, x)
+                        if not (way <= tolerances[0] and angle <= tolerances[1]):
+                            continue
+                        for m in range(7):
+                            x[m] = wrapped(x[m])
+                        same = twin(q[n, a], count, x)
+                        if same >= 0:
+                            double[n, a, same] = True
+                            continue
+                        for m in range(7):
+                            q[n, a, count, m] = x[m]
+                            free[n, a, count, m] = held[m] == 1
+                        residual[n, a, count] = max(way, angle)
+                        double[n, a, count] = kind == DOUBLE
+                        valid[n, a, count] = True
+                        count += 1
+        if no_line:
+            # the arm angle has no meaning: each gives the same
+            for a in range(1, psi.shape[1]):
+                q[n, a], valid[n, a], residual[n, a] = q[n, 0], valid[n, 0], residual[n, 0]
+                double[n, a], free[n, a] = double[n, 0], free[n, 0]

@@ -1,0 +1,259 @@
+"""Seven joints with a spherical shoulder, a revolute elbow and a spherical wrist, by arm angle.
+
+The elbow of such an arm swings about the line from shoulder to wrist while the tool stands still.
+The arm angle says where it is: it is the angle, about the line (positive by the right hand from
+shoulder to wrist), from the reference plane to the elbow. The reference plane holds the line
+and the z axis of R_0; at 0 the elbow is on the side to which z points. Where the line is parallel
+to z (sine below 1e-6) the x axis takes its place. The elbow is the foot of the shoulder on axis 4.
+An arm whose shoulder, elbow and wrist lie in a plane across axis 4 has its elbow on the line when
+it is stretched or folded; the angle is then that of an elbow which would bend towards
+``axis 4 x line``, so that the swing keeps its measure there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import se3
+from .._arrays import Array, read_only
+from .loop import JointChain
+from .solver import Found, Tolerances, nothing_found, postures
+
+__all__ = ["MOST", "ArmAngle", "arm_angle_of", "arm_angle_postures", "prepare_arm_angle"]
+
+MOST = 8
+"""Postures at one arm angle."""
+MEETING = 1e-6
+"""Axes that miss each other by less (m) meet: a URDF's rounded numbers. Postures are then brought
+home on the chain itself."""
+_APART = 1e-6  # sine between axes below which they are no spherical joint
+_FLAT = 1e-9  # difference in height along axis 4 below which shoulder and wrist are level [m]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ArmAngle:
+    """A seven-joint arm with spherical shoulder and wrist.
+
+    Parameters
+    ----------
+    chain : JointChain
+        The arm.
+    shoulder : ndarray, shape (3,)
+        Where axes 1, 2, 3 meet, in R_0 [m].
+    wrist : ndarray, shape (3,)
+        Where axes 5, 6, 7 meet, in the frame of the tool [m].
+    points : ndarray, shape (2, 3)
+        The shoulder in the frame of joint 4 before the joint turns, the wrist in that frame
+        behind the joint [m].
+    flat : bool
+        Whether shoulder and wrist are level on axis 4.
+    """
+
+    chain: JointChain
+    shoulder: Array
+    wrist: Array
+    points: Array
+    flat: bool
+
+    @property
+    def method(self) -> str:
+        """The family in words."""
+        return "spherical shoulder, elbow, spherical wrist: arm angle"
+
+
+def prepare_arm_angle(chain: JointChain) -> ArmAngle | None:
+    """Find shoulder, elbow and wrist of a seven-joint arm.
+
+    Parameters
+    ----------
+    chain : JointChain
+        The arm.
+
+    Returns
+    -------
+    ArmAngle or None
+        None unless the arm has seven revolute joints, the first three of whose axes meet in a
+        point off axis 4, as do the last three.
+
+    References
+    ----------
+    M. Shimizu et al., "Analytical inverse kinematic computation for 7-DOF redundant manipulators
+    with joint limits and its application to redundancy resolution", IEEE T-RO 24(5), 2008.
+
+    Examples
+    --------
+    >>> from robotmodels.igm.loop import joint_chain
+    >>> from robotmodels.robots import load
+    >>> prepare_arm_angle(joint_chain(load("iiwa14"))).shoulder
+    array([0.  , 0.  , 0.36])
+    >>> prepare_arm_angle(joint_chain(load("panda"))) is None
+    True
+    """
+    if chain.k != 7 or chain.sigma.any():
+        return None
+    D = chain.D
+    shoulder_height, wrist_height = _centre(D[1], D[2]), _centre(D[5], D[6])
+    if shoulder_height is None or wrist_height is None:
+        return None
+    # a centre seen from its outer joints lies on their axes, whatever their angles
+    S = np.array([0.0, 0.0, shoulder_height, 1.0])
+    W = np.array([0.0, 0.0, wrist_height, 1.0])
+    shoulder = D[0] @ _on_axis(D[1] @ S)
+    wrist = se3.inverse(D[7]) @ _on_axis(se3.inverse(D[6]) @ W)
+    before = se3.inverse(D[3]) @ _on_axis(se3.inverse(D[2]) @ S)
+    behind = D[4] @ _on_axis(D[5] @ W)
+    points = np.array([before[:3], behind[:3]])
+    if min(np.hypot(points[:, 0], points[:, 1])) < MEETING:
+        return None  # the elbow does not change the distance
+    return ArmAngle(
+        chain=chain,
+        shoulder=read_only(shoulder[:3]),
+        wrist=read_only(wrist[:3]),
+        points=read_only(points),
+        flat=bool(abs(points[1, 2] - points[0, 2]) < _FLAT),
+    )
+
+
+def arm_angle_of(solver: ArmAngle, q: ArrayLike) -> Array:
+    """Arm angle of postures.
+
+    Parameters
+    ----------
+    solver : ArmAngle
+        From `prepare_arm_angle`.
+    q : array_like, shape (..., 7)
+        Postures, rad.
+
+    Returns
+    -------
+    ndarray, shape (...)
+        Arm angles in (-pi, pi], rad; 0 for an arm folded so that its wrist is in its shoulder.
+
+    Examples
+    --------
+    An elbow that points up.
+
+    >>> from robotmodels.igm.loop import joint_chain
+    >>> from robotmodels.robots import load
+    >>> solver = prepare_arm_angle(joint_chain(load("iiwa14")))
+    >>> float(arm_angle_of(solver, [0, 0.5, 0, -1.5, 0, 0, 0]).round(12))
+    0.0
+    """
+    from ._arm_angle import arm_angles
+
+    q = np.asarray(q, dtype=np.float64)
+    psi = np.zeros(q.shape[:-1])
+    flat = np.ascontiguousarray(q.reshape(-1, 7))
+    out = np.zeros(flat.shape[0])
+    arm_angles(flat, solver.chain.D, solver.shoulder, solver.points, solver.flat, out)
+    psi[...] = out.reshape(psi.shape)
+    return psi
+
+
+def arm_angle_postures(
+    solver: ArmAngle,
+    U: ArrayLike,
+    psi: ArrayLike,
+    references: ArrayLike | None = None,
+    tolerances: Tolerances | None = None,
+) -> Found:
+    """All postures of poses at given arm angles.
+
+    Parameters
+    ----------
+    solver : ArmAngle
+        From `prepare_arm_angle`.
+    U : array_like, shape (N, 4, 4)
+        Poses of the tool in R_0, ``U = D_0 M_1 D_1 ... M_7 D_7`` [m].
+    psi : array_like, shape (N, A) or (A,)
+        Arm angles, rad.
+    references : array_like, shape (N, 7) or (7,), optional
+        Values for joints that a singular pose leaves free at a given arm angle; zero without it.
+    tolerances : Tolerances
+        When a pose counts as met; default 1e-9 m and 1e-9 rad.
+
+    Returns
+    -------
+    Found
+        With arrays ``q (N, A, 8, 7)``, ``valid``, ``residual``, ``double``, ``family (N, A, 8)``
+        and ``free (N, A, 8, 7)``. Every row is a member of an infinite family; ``free`` names
+        joints that took a reference: joint 1 where axes 1 and 3 are aligned, joint 5 where
+        axes 5 and 7 are, joints 1 to 3 where the wrist is in the shoulder (the arm angle has no
+        meaning then). A pose that is not finite, or out of reach, has no row; an arm stretched to
+        within the position tolerance (at least 1e-9 m) is a double root.
+
+    Examples
+    --------
+    >>> from robotmodels.igm.loop import joint_chain
+    >>> from robotmodels.kinematics import dgm
+    >>> from robotmodels.robots import load
+    >>> solver = prepare_arm_angle(joint_chain(load("iiwa14")))
+    >>> T = dgm(load("iiwa14"), [[0.3, 0.5, 0.2, -1.4, 0.5, 0.9, 0.7]])
+    >>> found = arm_angle_postures(solver, T, [0.0, 0.5, 1.0])
+    >>> found.valid.sum(axis=-1)
+    array([[8, 8, 8]])
+    """
+    from ._arm_angle import arm_angle_rows
+
+    poses = np.array(U, dtype=np.float64, order="C")
+    N = poses.shape[0]
+    angles = np.asarray(psi, dtype=np.float64)
+    angles = np.ascontiguousarray(np.broadcast_to(angles, (N, angles.shape[-1])))
+    A = angles.shape[1]
+    wanted = np.zeros((N, 7))
+    if references is not None:
+        wanted[:] = references
+    finite = np.isfinite(poses).all(axis=(1, 2)) & np.isfinite(wanted).all(axis=1)
+    finite &= np.isfinite(angles).all(axis=1)
+    poses[~finite] = np.nan
+    limits = np.array(tolerances or Tolerances())
+    flat = nothing_found(N * A, MOST, 7)
+    q, free = flat.q.reshape(N, A, MOST, 7), flat.free.reshape(N, A, MOST, 7)
+    rows = (N, A, MOST)
+    valid, residual = flat.valid.reshape(rows), flat.residual.reshape(rows)
+    double = flat.double.reshape(rows)
+    if N * A:
+        arm_angle_rows(
+            poses, angles, wanted, np.ascontiguousarray(solver.chain.sigma), solver.chain.D,
+            solver.shoulder, solver.wrist, solver.points, solver.flat, limits,
+            q, valid, residual, double, free,
+        )  # fmt: skip
+    return Found(q, valid, residual, double, free, valid.copy())
+
+
+@postures.register
+def _(solver: ArmAngle, U: Array, references: Array, tolerances: Tolerances) -> Found:
+    psi = arm_angle_of(solver, references)
+    found = arm_angle_postures(solver, U, psi[:, None], references, tolerances)
+    return Found(
+        found.q[:, 0], found.valid[:, 0], found.residual[:, 0], found.double[:, 0],
+        found.free[:, 0], found.family[:, 0],
+    )  # fmt: skip
+
+
+def _centre(E: Array, G: Array) -> float | None:
+    """Height on the middle axis of the point where three axes meet, None if they do not.
+
+    ``E`` and ``G`` are the constants before and behind the middle joint.
+    """
+    into = se3.inverse(E)
+    heights = []
+    for line in (into, G):
+        point, direction = line[:3, 3], line[:3, 2]
+        across = np.hypot(direction[0], direction[1])
+        if across < _APART:
+            return None
+        way = -(point[0] * direction[0] + point[1] * direction[1]) / across**2
+        nearest = point + way * direction
+        if np.hypot(nearest[0], nearest[1]) > MEETING:
+            return None
+        heights.append(float(nearest[2]))
+    return None if abs(heights[0] - heights[1]) > MEETING else 0.5 * sum(heights)
+
+
+def _on_axis(point: Array) -> Array:
+    """The point with its rounding across the z axis taken off."""
+    return np.array([0.0, 0.0, point[2], 1.0])
