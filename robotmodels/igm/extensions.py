@@ -1,0 +1,254 @@
+"""Where virtual joints may stand so that an arm of fewer than six joints has a closed form.
+
+Six joints have one if three consecutive revolute axes meet in a point or are parallel. The three
+may be virtual (a wrist at a point of any link), or one or two of them real: two virtual axes
+through a point of a real one, one through the crossing of two real ones or parallel to them. What
+is then still short of six stands anywhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from enum import Enum, auto
+from typing import NamedTuple
+
+import numpy as np
+
+from .. import se3
+from .._arrays import Array
+from .loop import JointChain
+from .structure import ANGLE_TOLERANCE, LENGTH_TOLERANCE
+from .virtual import VirtualJoint
+
+TRIES = 3
+"""Random placings of each layout."""
+
+_ONTO_X, _ONTO_Y = se3.rotation("y", np.pi / 2), se3.rotation("x", -np.pi / 2)
+
+
+class Triple(Enum):
+    """What the family of the extended arm is built on."""
+
+    MEETING = auto()
+    PARALLEL = auto()
+    ANY = auto()
+
+
+class Layout(NamedTuple):
+    """One way to place the virtual joints.
+
+    Parameters
+    ----------
+    triple : Triple
+        Which family it aims at.
+    first, real : int
+        The run of real joints that belong to the triple: where it starts (for none: the gap) and
+        how many they are.
+    behind : int
+        How many joints of the run stand before the triple's virtual ones.
+    joints : tuple of VirtualJoint
+        The virtual joints.
+    """
+
+    triple: Triple
+    first: int
+    real: int
+    behind: int
+    joints: tuple[VirtualJoint, ...]
+
+
+def layouts(chain: JointChain, length: float, rng: np.random.Generator) -> Iterator[Layout]:
+    """Placings that give a chain of one to five joints a closed form, in random directions.
+
+    Parameters
+    ----------
+    chain : JointChain
+        The arm.
+    length : float
+        A length of it [m].
+    rng : Generator
+        Directions and places that are not dictated.
+
+    Yields
+    ------
+    Layout
+        Any number, none if no closed form can be had.
+    """
+    k, missing = chain.k, 6 - chain.k
+    for real in range(4):
+        for first in range(k + 1 if real == 0 else k - real + 1):
+            run = chain.sigma[first : first + real]
+            if 3 - real > missing or run.any():
+                continue
+            point = _meeting_point(chain, first, real)
+            parallel = real >= 2 and _are_parallel(chain, first, real) and not chain.sigma.any()
+            # with its virtual joints before, amid or behind the run
+            places = range(real + 1) if real == 2 else (0, real) if real == 1 else (0,)
+            for behind in places:
+                for _ in range(TRIES):
+                    if real < 2 or point is not None:
+                        block = _meeting_block(chain, first, real, behind, point, length, rng)
+                        joints = _filled(chain, first, real, behind, block, True, length, rng)
+                        yield Layout(Triple.MEETING, first, real, behind, joints)
+                    if parallel:
+                        block = _parallel_block(chain, first, real, behind, length, rng)
+                        joints = _filled(chain, first, real, behind, block, False, length, rng)
+                        yield Layout(Triple.PARALLEL, first, real, behind, joints)
+
+
+def loose_layouts(chain: JointChain, length: float, rng: np.random.Generator) -> Iterator[Layout]:
+    """Placings in random places and directions: no closed form is aimed at.
+
+    Parameters
+    ----------
+    chain : JointChain
+        The arm.
+    length : float
+        A length of it [m].
+    rng : Generator
+        Places and directions.
+
+    Yields
+    ------
+    Layout
+        A virtual revolute joint in each gap, for each of a few directions; prismatic ones after.
+    """
+    for sigma in (0, 1):
+        for gap in range(chain.k + 1):
+            for _ in range(TRIES):
+                joints = tuple(
+                    VirtualJoint(gap, _anywhere(length, rng), sigma) for _ in range(6 - chain.k)
+                )
+                yield Layout(Triple.ANY, gap, 0, sigma, joints)
+
+
+# --- the triple -----------------------------------------------------------------------------------
+
+
+def _meeting_point(chain: JointChain, first: int, real: int) -> Array | None:
+    """Where the axes of a run meet, in the frame of its first joint; None if they do not."""
+    if real < 2:
+        return None
+    crossing = _crossing(chain.D[first + 1])
+    if crossing is None or real == 2:
+        return crossing
+    into = se3.inverse(chain.D[first + 1])
+    second = _crossing(chain.D[first + 2])
+    if second is None:
+        return None
+    onwards = into[:3, :3] @ crossing + into[:3, 3]
+    return crossing if np.linalg.norm(onwards - second) <= LENGTH_TOLERANCE else None
+
+
+def _crossing(D: Array) -> Array | None:
+    """Point in which the z axis and that of the frame D meet, shape (3,)."""
+    direction, origin = D[:3, 2], D[:3, 3]
+    across = float(np.hypot(direction[0], direction[1]))
+    if across < 1e-6:
+        return None
+    point = origin - (origin[:2] @ direction[:2]) / across**2 * direction
+    return None if np.hypot(point[0], point[1]) > LENGTH_TOLERANCE else np.array([0, 0, point[2]])
+
+
+def _are_parallel(chain: JointChain, first: int, real: int) -> bool:
+    """Whether the axes of a run are parallel and neighbours are apart."""
+    for D in chain.D[first + 1 : first + real]:
+        if np.hypot(D[0, 2], D[1, 2]) > ANGLE_TOLERANCE:
+            return False
+        if np.hypot(D[0, 3], D[1, 3]) < LENGTH_TOLERANCE:
+            return False
+    return True
+
+
+def _gap(first: int, real: int, behind: int) -> int:
+    """Gap in which a triple's virtual joints stand."""
+    return first if real == 0 else first + behind
+
+
+def _seen_from_before(chain: JointChain, first: int, real: int, behind: int) -> Array:
+    """Frame of the real joint that the block leans on, in the frame its gap is measured in."""
+    if real == 0 or behind > 0:
+        return np.eye(4)
+    return np.asarray(chain.D[first])
+
+
+def _meeting_block(
+    chain: JointChain,
+    first: int,
+    real: int,
+    behind: int,
+    point: Array | None,
+    length: float,
+    rng: np.random.Generator,
+) -> list[VirtualJoint]:
+    """Virtual axes through the meeting point, square to their neighbours where they can be."""
+    gap = _gap(first, real, behind)
+    if real == 3:
+        return []
+    lean = _seen_from_before(chain, first, real, behind).copy()
+    if real == 0:
+        lean = _anywhere(length, rng)
+        turns = (_ONTO_X, np.eye(4), _ONTO_Y)
+    else:
+        if point is None:
+            centre = np.array([0.0, 0.0, length * rng.uniform(-1.0, 1.0)])
+        elif behind == 2:
+            into = se3.inverse(chain.D[first + 1])
+            centre = into[:3, :3] @ point + into[:3, 3]
+        else:
+            centre = point
+        lean = lean @ se3.translation(*centre) @ se3.rotation("z", rng.uniform(-np.pi, np.pi))
+        turns = (_ONTO_X,) if real == 2 else (_ONTO_X, _ONTO_Y)
+    return [VirtualJoint(gap, lean @ turn, 0) for turn in turns]
+
+
+def _parallel_block(
+    chain: JointChain,
+    first: int,
+    real: int,
+    behind: int,
+    length: float,
+    rng: np.random.Generator,
+) -> list[VirtualJoint]:
+    """A third axis parallel to two, at a distance."""
+    if real == 3:
+        return []
+    lean = _seen_from_before(chain, first, real, behind)
+    away = se3.rotation("z", rng.uniform(-np.pi, np.pi)) @ se3.translation(length, 0.0, 0.0)
+    return [VirtualJoint(_gap(first, real, behind), lean @ away, 0)]
+
+
+# --- the rest -------------------------------------------------------------------------------------
+
+
+def _filled(
+    chain: JointChain,
+    first: int,
+    real: int,
+    behind: int,
+    block: list[VirtualJoint],
+    slides: bool,
+    length: float,
+    rng: np.random.Generator,
+) -> tuple[VirtualJoint, ...]:
+    """The block and as many loose joints as are missing, none of them within the triple."""
+    gap = _gap(first, real, behind)
+    inner = range(first + 1, first + max(real, 1)) if real > 1 else range(0)
+    free = [g for g in range(chain.k + 1) if g not in inner]
+    before, after = [], []
+    for _ in range(6 - chain.k - len(block)):
+        sigma = int(slides and rng.random() < 0.3)
+        joint = VirtualJoint(int(rng.choice(free)), _anywhere(length, rng), sigma)
+        # next to a real joint of the triple the block must stay
+        (before if joint.gap < gap or (joint.gap == gap and behind == 0) else after).append(joint)
+    return (*before, *block, *after)
+
+
+def _anywhere(length: float, rng: np.random.Generator) -> Array:
+    """A random frame, about a length away."""
+    # the columns of a random orthogonal matrix, the last turned so that it is a rotation
+    R = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    frame = np.eye(4)
+    frame[:3, :3] = R * np.array([1.0, 1.0, np.linalg.det(R)])
+    frame[:3, 3] = length * rng.uniform(-1.0, 1.0, 3)
+    return frame

@@ -1,0 +1,365 @@
+"""Arms of one to five joints: virtual joints make six of them, and stay at zero.
+
+A pose asks for six components, so that an arm of fewer joints meets only some poses, and those
+with few postures. The extended arm meets all of them; its postures whose virtual joints are at
+zero are the arm's. Where the extended arm is singular and the arm is not, another extension is
+asked, whose singular postures are different ones.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import Array
+from .check import checked
+from .extensions import Layout, Triple, layouts, loose_layouts
+from .loop import JointChain
+from .motion import jacobians, lever, random_postures, tool_poses
+from .solver import Found, Prepare, Solver, Tolerances, nothing_found, postures
+from .structure import plan_loop
+from .virtual import with_virtual_joints
+
+WAYS = 3  # extensions kept
+TESTS = 32  # random postures of the self-test
+TRIED = 12  # extensions with a closed form that are tested, best conditioned first
+TRIED_LOOSE = 4  # the same of those without, which take a second each to prepare
+SINGULAR = 1e-6  # singular values of the Jacobian beside the largest that count as zero
+DEPENDENT = 1e-9  # the same where no posture is better: the joints do the same thing
+LOOSER = 30.0  # tolerances of the extended arm beside those of the call
+ROUGH = 1e-2  # how far virtual joints may be from zero before the posture is improved
+MEMORY = 8  # chains with a held joint that are kept
+
+
+class Extension(NamedTuple):
+    """Six joints, some of them virtual.
+
+    Parameters
+    ----------
+    solver : Solver
+        Of the extended arm.
+    places : ndarray of int, shape (k,)
+        Where the joints of the arm stand in it.
+    """
+
+    solver: Solver
+    places: NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FewerJoints:
+    """An arm of one to five joints whose postures have no free joint in general.
+
+    Parameters
+    ----------
+    chain : JointChain
+        The arm.
+    ways : tuple of Extension
+        The first is used for every pose, the others in turn where doubts are left.
+    length : float
+        A length of the arm [m].
+    """
+
+    chain: JointChain
+    ways: tuple[Extension, ...]
+    length: float
+
+    @property
+    def method(self) -> str:
+        """The family in words."""
+        count = 6 - self.chain.k
+        return f"{_joints(self.chain.k)} and {count} virtual at zero: {self.ways[0].solver.method}"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DependentJoints:
+    """An arm of which a joint only does what others can do: it takes its reference.
+
+    Parameters
+    ----------
+    chain : JointChain
+        The arm.
+    held : int
+        The joint that takes the reference.
+    inner : str
+        Method by which the others are solved.
+    prepare : callable
+        Chooses the family of extended arms.
+    """
+
+    chain: JointChain
+    held: int
+    inner: str
+    prepare: Prepare
+    _known: dict[float, Solver | None] = field(default_factory=dict)
+
+    @property
+    def method(self) -> str:
+        """The family in words."""
+        return f"joint {self.held + 1} of {self.chain.k} at its reference; {self.inner}"
+
+
+def prepare_fewer(chain: JointChain, prepare: Prepare) -> FewerJoints | DependentJoints | None:
+    """Find extensions of an arm of one to five joints that serve it, and test them.
+
+    Parameters
+    ----------
+    chain : JointChain
+        The arm.
+    prepare : callable
+        Chooses and prepares the family of an arm of six joints.
+
+    Returns
+    -------
+    FewerJoints, DependentJoints or None
+        None if the arm has no joint or more than five, or if no extension passed its test.
+
+    Notes
+    -----
+    The virtual axes go through points of real ones, so that three axes meet or are parallel; see
+    `layouts`. The extensions are ranked by their smallest singular value at random postures, and
+    have to give back the random postures of a self-test.
+
+    References
+    ----------
+    Section 1.2.3 of the book: fewer than six degrees of freedom.
+
+    Examples
+    --------
+    >>> from robotmodels.igm.families import prepare
+    >>> from robotmodels.igm.loop import joint_chain
+    >>> from robotmodels.robots import load
+    >>> prepare_fewer(joint_chain(load("lab_rrt")), prepare).method
+    '3 joints and 3 virtual at zero: three revolute axes that meet in a point (Pieper)'
+    """
+    if not 1 <= chain.k <= 5:
+        return None
+    length = lever(chain)
+    rng = np.random.default_rng(0)
+    q = random_postures(chain, TESTS, rng)
+    held = _dependent_joint(_scaled(jacobians(chain, q), length))
+    if held is not None:
+        return _prepare_dependent(chain, held, prepare)
+    closed, loose = list(layouts(chain, length, rng)), list(loose_layouts(chain, length, rng))
+    ways = _chosen(chain, length, q, closed, TRIED, prepare)
+    if not ways:
+        ways = _chosen(chain, length, q, loose, TRIED_LOOSE, prepare)
+    return FewerJoints(chain, tuple(ways), length) if ways else None
+
+
+@postures.register
+def _(solver: FewerJoints, U: Array, references: Array, tolerances: Tolerances) -> Found:
+    chain, N = solver.chain, len(U)
+    gathered = nothing_found(N, 0, chain.k)
+    doubt = np.ones(N, np.bool_)
+    for way in solver.ways:
+        asked = np.flatnonzero(doubt)
+        if asked.size == 0:
+            break
+        part, unsure = _one_way(solver, way, U[asked], references[asked], tolerances)
+        gathered = _joined(gathered, asked, part)
+        doubt[asked] = unsure
+    found = checked(
+        chain, U, gathered.q, gathered.valid, tolerances, double=np.zeros_like(gathered.valid),
+        rough=_rough(tolerances),
+    )  # fmt: skip
+    return _judged(solver, U, references, tolerances, found, gathered)
+
+
+@postures.register
+def _(solver: DependentJoints, U: Array, references: Array, tolerances: Tolerances) -> Found:
+    chain, held = solver.chain, solver.held
+    others = np.delete(np.arange(chain.k), held)
+    values, group = np.unique(references[:, held], return_inverse=True)
+    parts = []
+    for value in values:
+        if value not in solver._known:
+            if len(solver._known) >= MEMORY:
+                solver._known.pop(next(iter(solver._known)))
+            solver._known[value] = _solver_of_rest(_held(chain, held, value), solver.prepare)
+    for i, value in enumerate(values):
+        rows = np.flatnonzero(group == i)
+        rest = solver._known.get(value) or _solver_of_rest(
+            _held(chain, held, value), solver.prepare
+        )
+        if rest is not None:
+            part = postures(rest, U[rows], references[np.ix_(rows, others)], tolerances)
+            parts.append((rows, value, part))
+    most = max((part.q.shape[1] for _, _, part in parts), default=0)
+    out = nothing_found(len(U), most, chain.k)
+    for rows, value, part in parts:
+        S = part.q.shape[1]
+        q = np.insert(part.q, held, value, axis=2)
+        q[~part.valid] = np.nan
+        out.q[rows, :S], out.valid[rows, :S] = q, part.valid
+        out.residual[rows, :S], out.double[rows, :S] = part.residual, part.double
+        out.free[rows, :S] = np.insert(part.free, held, True, axis=2) & part.valid[..., None]
+        out.family[rows, :S] = part.valid
+    return out
+
+
+# --- solving --------------------------------------------------------------------------------------
+
+
+def _rough(tolerances: Tolerances) -> float:
+    """How far candidates may be off: near a fold the square root of what a pose is off by."""
+    return max(ROUGH, 10.0 * float(np.sqrt(max(tolerances))))
+
+
+def _one_way(
+    solver: FewerJoints, way: Extension, U: Array, references: Array, tolerances: Tolerances
+) -> tuple[Found, NDArray[np.bool_]]:
+    """Postures of one extension with the virtual joints near zero; where doubts remain."""
+    six = np.zeros((len(U), 6))
+    six[:, way.places] = references
+    wide = Tolerances(LOOSER * tolerances.position, LOOSER * tolerances.orientation)
+    found = postures(way.solver, U, six, wide)
+    virtual = np.setdiff1d(np.arange(6), way.places)
+    near = np.abs(np.where(found.valid[..., None], found.q[..., virtual], 0.0)).max(axis=-1)
+    # a length of the arm is one, a turn is another
+    limit = _rough(tolerances) * max(1.0, solver.length)
+    kept = found.valid & (near <= limit)
+    part = Found(
+        found.q[..., way.places], kept, found.residual, found.double,
+        found.free[..., way.places] & kept[..., None], found.family,
+    )  # fmt: skip
+    singular = found.valid & (found.family | found.double | found.free.any(axis=-1))
+    return part, ~kept.any(axis=1) | singular.any(axis=1)
+
+
+def _joined(gathered: Found, rows: NDArray[np.int64], part: Found) -> Found:
+    """Rows of some poses added behind those there are."""
+    S = gathered.q.shape[1]
+    out = nothing_found(len(gathered.q), S + part.q.shape[1], gathered.q.shape[2])
+    out.q[:, :S], out.valid[:, :S], out.free[:, :S] = gathered.q, gathered.valid, gathered.free
+    out.q[rows, S:], out.valid[rows, S:], out.free[rows, S:] = part.q, part.valid, part.free
+    return out
+
+
+def _judged(
+    solver: FewerJoints,
+    U: Array,
+    references: Array,
+    tolerances: Tolerances,
+    found: Found,
+    gathered: Found,
+) -> Found:
+    """Mark double roots and infinite families; joints of a family at their references."""
+    n, s = np.nonzero(found.valid)
+    J = _scaled(jacobians(solver.chain, found.q[n, s]), solver.length)
+    _, values, rows = np.linalg.svd(J, full_matrices=False)
+    singular = np.flatnonzero(values[:, -1] <= SINGULAR * values[:, 0])
+    if singular.size == 0:
+        return found
+    n, s, null = n[singular], s[singular], rows[singular, -1]
+    moves = _moves(solver.chain, U[n], found.q[n, s], null)
+    found.family[n, s], found.double[n, s] = moves, ~moves
+    return found
+
+
+def _moves(chain: JointChain, U: Array, q: Array, direction: Array) -> NDArray[np.bool_]:
+    """Whether the arm can go on along a null direction without the tool moving."""
+    step = 1e-3
+    away = (q + step * direction)[:, None]
+    there = np.ones((len(q), 1), np.bool_)
+    # a fold leaves the second-order part of the step, 1e-6 of the arm's length, a family nothing
+    reached = checked(chain, U, away, there, Tolerances(1e-10, 1e-10))
+    gone = np.abs(reached.q[:, 0] - q).max(axis=1)
+    return reached.valid[:, 0] & (gone > 0.1 * step)
+
+
+# --- preparing ------------------------------------------------------------------------------------
+
+
+def _joints(k: int) -> str:
+    return "1 joint" if k == 1 else f"{k} joints"
+
+
+def _scaled(J: Array, length: float) -> Array:
+    """Jacobians with lengths in units of the arm."""
+    J = J.copy()
+    J[:, :3] /= length
+    return J
+
+
+def _dependent_joint(J: Array) -> int | None:
+    """The first joint that moves where the tool does not, at all postures; None if none does."""
+    _, values, rows = np.linalg.svd(J, full_matrices=False)
+    if not np.all(values[:, -1] <= DEPENDENT * values[:, 0]):
+        return None
+    null = values <= DEPENDENT * values[:, :1]
+    share = np.sqrt(np.sum(np.where(null[..., None], rows, 0.0) ** 2, axis=1))
+    return int(np.argmax(share.max(axis=0) > 1e-6))
+
+
+def _held(chain: JointChain, held: int, value: float) -> JointChain:
+    """The chain with a joint that has become a constant."""
+    M = np.eye(4)
+    if chain.sigma[held] == 0:
+        M[:2, :2] = [[np.cos(value), -np.sin(value)], [np.sin(value), np.cos(value)]]
+    else:
+        M[2, 3] = value
+    joined = chain.D[held] @ M @ chain.D[held + 1]
+    D = np.concatenate([chain.D[:held], joined[None], chain.D[held + 2 :]])
+    others = np.delete(np.arange(chain.k), held)
+    return JointChain(chain.columns[others], chain.sigma[others], D, chain.base)
+
+
+def _solver_of_rest(chain: JointChain, prepare: Prepare) -> Solver | None:
+    """What serves the joints that are left, which may be none."""
+    return prepare_fewer(chain, prepare)
+
+
+def _prepare_dependent(chain: JointChain, held: int, prepare: Prepare) -> DependentJoints | None:
+    rest = _solver_of_rest(_held(chain, held, 0.0), prepare)
+    if rest is None:
+        return None
+    return DependentJoints(chain, held, rest.method, prepare, {0.0: rest})
+
+
+def _chosen(
+    chain: JointChain, length: float, q: Array, candidates: list[Layout], tried: int,
+    prepare: Prepare,
+) -> list[Extension]:  # fmt: skip
+    """The best conditioned extensions that give back the postures of a self-test."""
+    ranked = []
+    for layout in candidates:
+        longer, places = with_virtual_joints(chain, layout.joints)
+        six = np.zeros((len(q), 6))
+        six[:, places] = q
+        values = np.linalg.svd(_scaled(jacobians(longer, six), length), compute_uv=False)
+        worth = float(np.mean(np.log10(values[:, -1] / values[:, 0] + 1e-16)))
+        if worth > -6.0:
+            ranked.append((worth, layout, longer, places))
+    ranked.sort(key=lambda row: -row[0])
+    U = tool_poses(chain, q)
+    ways: list[Extension] = []
+    taken: list[tuple[Triple, int, int, int]] = []
+    for _, layout, longer, places in ranked:
+        kind = layout[:4]
+        if kind in taken or tried == 0 or len(ways) == WAYS:
+            continue
+        if layout.triple is not Triple.ANY and plan_loop(longer) is None:
+            continue
+        tried -= 1
+        solver = prepare(longer)
+        if solver is None:
+            continue
+        way = Extension(solver, places)
+        if _gives_back(FewerJoints(chain, (way,), length), U, q):
+            taken.append(kind)
+            ways.append(way)
+    return ways
+
+
+def _gives_back(solver: FewerJoints, U: Array, q: Array) -> bool:
+    """Whether the postures are among those found for their poses."""
+    found = postures(solver, U, np.zeros_like(q), Tolerances())
+    gap = found.q - q[:, None]
+    turning = solver.chain.sigma == 0
+    gap = np.where(turning, gap - 2 * np.pi * np.round(gap / (2 * np.pi)), gap)
+    nearest = np.where(found.valid, np.abs(gap).max(axis=-1), np.inf).min(axis=1, initial=np.inf)
+    return bool(np.all(nearest < 1e-6))

@@ -1,0 +1,109 @@
+"""Where a chain stands and how it moves at many postures at once, for the choices of families.
+
+Plain array code: it runs when an arm is prepared and on the few postures that are singular.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._arrays import Array
+from .loop import JointChain
+
+
+def tool_poses(chain: JointChain, q: Array) -> Array:
+    """Poses of the tool in R_0.
+
+    Parameters
+    ----------
+    chain : JointChain
+        The arm.
+    q : ndarray, shape (N, k)
+        Postures, rad or m.
+
+    Returns
+    -------
+    ndarray, shape (N, 4, 4)
+        ``D_0 M_1 D_1 ... M_k D_k`` [m].
+
+    Examples
+    --------
+    >>> from robotmodels.igm.loop import joint_chain
+    >>> from robotmodels.robots import load
+    >>> tool_poses(joint_chain(load("lab_trr")), np.array([[0.2, 0.0, 0.0]]))[0, :3, 3].round(9)
+    array([0.4, 0.2, 0.5])
+    """
+    return _walk(chain, q)[0]
+
+
+def jacobians(chain: JointChain, q: Array) -> Array:
+    """Jacobians at the tool in the axes of R_0, rows ``[v; w]``.
+
+    Parameters
+    ----------
+    chain : JointChain
+        The arm.
+    q : ndarray, shape (N, k)
+        Postures, rad or m.
+
+    Returns
+    -------
+    ndarray, shape (N, 6, k)
+        m/rad and 1 for revolute joints, 1 and 0 for prismatic ones.
+
+    Examples
+    --------
+    >>> from robotmodels.igm.loop import joint_chain
+    >>> from robotmodels.robots import load
+    >>> jacobians(joint_chain(load("lab_trr")), np.zeros((1, 3)))[0, :3].round(9) + 0.0
+    array([[ 0. ,  0. ,  0. ],
+           [ 1. ,  0. ,  0. ],
+           [ 0. , -0.4, -0.2]])
+    """
+    U, axes, origins = _walk(chain, q)
+    J = np.zeros((len(q), 6, chain.k))
+    for m in range(chain.k):
+        if chain.sigma[m] == 0:
+            J[:, :3, m] = np.cross(axes[m], U[:, :3, 3] - origins[m])
+            J[:, 3:, m] = axes[m]
+        else:
+            J[:, :3, m] = axes[m]
+    return J
+
+
+def random_postures(chain: JointChain, count: int, rng: np.random.Generator) -> Array:
+    """Postures for trying an arm out, shape (count, k): any angle, lengths like the arm's own."""
+    length = lever(chain)
+    return np.where(
+        chain.sigma == 0,
+        rng.uniform(-np.pi, np.pi, (count, chain.k)),
+        length * rng.uniform(-1.0, 1.0, (count, chain.k)),
+    )
+
+
+def lever(chain: JointChain) -> float:
+    """A length of the arm [m]: the lever of its revolute joints about the tool, 1 without any."""
+    turning = chain.sigma == 0
+    rng = np.random.default_rng(0)
+    q = np.where(turning, rng.uniform(-np.pi, np.pi, (32, chain.k)), 0.0)
+    squares = np.sum(jacobians(chain, q)[:, :3, turning] ** 2, axis=1)
+    length = float(np.sqrt(squares.mean())) if squares.size else 0.0
+    return length if length > 1e-9 else 1.0
+
+
+def _walk(chain: JointChain, q: Array) -> tuple[Array, list[Array], list[Array]]:
+    """Poses of the tool, and directions and origins of the axes, each (N, 3)."""
+    T = np.broadcast_to(chain.D[0], (len(q), 4, 4))
+    axes, origins = [], []
+    for m in range(chain.k):
+        axes.append(T[:, :3, 2])
+        origins.append(T[:, :3, 3])
+        M = np.zeros((len(q), 4, 4))
+        M[:] = np.eye(4)
+        if chain.sigma[m] == 0:
+            c, s = np.cos(q[:, m]), np.sin(q[:, m])
+            M[:, 0, 0], M[:, 0, 1], M[:, 1, 0], M[:, 1, 1] = c, -s, s, c
+        else:
+            M[:, 2, 3] = q[:, m]
+        T = T @ M @ chain.D[m + 1]
+    return np.ascontiguousarray(T), axes, origins
