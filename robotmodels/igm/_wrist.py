@@ -10,6 +10,10 @@ from ..kernels._compile import Floats, Ints, compiled
 from ._equations import ANY, DOUBLE, NONE, type_2
 
 
+# sine between axes below which they count as aligned: any first angle is then good to 1e-12
+ALIGNED = 4e-13
+
+
 @compiled()
 def wrist_postures(
     A: Floats,
@@ -30,7 +34,7 @@ def wrist_postures(
     n0, n1, n2 = B[0, 2], B[1, 2], B[2, 2]
     X = A[0, 2] * m1 - A[1, 2] * m0
     Y = A[0, 2] * m0 + A[1, 2] * m1
-    kind, first, second = type_2(X, Y, n2 - A[2, 2] * m2, max(slack, 1e-9), 1e-13)
+    kind, first, second = type_2(X, Y, n2 - A[2, 2] * m2, max(slack, 1e-9), ALIGNED)
     if kind == NONE:
         return 0
     count = 1 if kind in (ANY, DOUBLE) else 2

@@ -1,0 +1,332 @@
+"""The inverse geometric model through its one call: results, order, limits, statuses, mistakes."""
+
+import json
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import robotmodels as rm
+from robotmodels.errors import InvalidValueError, NotARotationError, ShapeError
+from robotmodels.igm.solutions import posture_distance
+
+ORACLES = Path(__file__).parent / "oracles"
+PERIODIC = np.ones(6, bool)
+TINY = (0.0, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)
+
+
+def random_q(model, count, seed=0):
+    q = np.random.default_rng(seed).uniform(-np.pi, np.pi, (count, model.n))
+    sigma = model.table.sigma[model.table.joint_rows]
+    q[:, sigma == 1] *= 0.2
+    return q
+
+
+def checked(model, T, found, residual=1e-12):
+    """What holds of every result."""
+    T = np.asarray(T)
+    q, valid = found.q, found.valid
+    assert q.shape == (*T.shape[:-2], valid.shape[-1], model.n)
+    assert np.all(np.isnan(q) == ~valid[..., None])
+    assert not np.any(np.diff(valid.astype(int), axis=-1) > 0)
+    assert np.all((found.branch != "") == valid)
+    assert np.all(np.isin(found.status, (0, 1)) == valid.any(axis=-1))
+    assert found.valid.shape[-1] == (found.count.max() if found.count.size else 0)
+    again = rm.dgm(model, np.where(valid[..., None], q, 0.0))
+    error = np.where(valid[..., None, None], again - T[..., None, :, :], 0.0)
+    assert np.abs(error).max(initial=0.0) <= residual
+    assert np.nanmax(found.residual, initial=0.0) <= residual
+    turning = model.table.sigma[model.table.joint_rows] == 0
+    angles = q[..., turning][valid]
+    assert not np.any((angles > np.pi) | (angles <= -np.pi))
+    return found
+
+
+def distance(model, q, goal):
+    turning = model.table.sigma[model.table.joint_rows] == 0
+    return posture_distance(q, goal, turning)
+
+
+@pytest.mark.parametrize("name", ["rx90", "ur5"])
+def test_the_oracles_complete_sets(name):
+    oracle = json.loads((ORACLES / f"igm_{name}.json").read_text())
+    rows = oracle["robot"]
+    table = rm.DHTable.from_rows(
+        [
+            {key: rows[key][j] for key in ("sigma", "alpha", "d", "theta", "r")}
+            for j in range(rows["n"])
+        ]
+    )
+    model = rm.RobotModel.from_table(table, tool=np.array(rows["tool"]))
+    T = np.array([case["T"] for case in oracle["cases"]])
+    found = checked(model, T, rm.igm(model, T))
+    assert found.count.tolist() == [case["n_solutions"] for case in oracle["cases"]]
+    for i, case in enumerate(oracle["cases"]):
+        for q in case["solutions"]:
+            assert np.nanmin(distance(model, found.q[i], np.array(q))) < 1e-6
+
+
+@pytest.mark.parametrize("name", ["rx90", "tx40", "puma560", "stanford_arm", "ur5e", "kr6_r900"])
+def test_every_posture_and_the_one_it_came_from(name):
+    model = rm.load(name)
+    q = random_q(model, 200)
+    T = rm.dgm(model, q)
+    found = checked(model, T, rm.igm(model, T, q))
+    assert np.all(found.count % 2 == 0)
+    # ordered by distance to the reference: the posture itself comes first
+    away = distance(model, found.q, q[:, None])
+    assert away[:, 0].max() < 1e-8
+    assert np.all(np.diff(away, axis=1)[found.valid[:, 1:]] >= 0)
+    for i in range(0, 200, 40):
+        single = rm.igm(model, T[i], q[i])
+        np.testing.assert_array_equal(single.q, found.q[i][found.valid[i]])
+        assert single.branch.tolist() == found.branch[i][found.valid[i]].tolist()
+
+
+@pytest.mark.parametrize("name", ["rx90", "puma560", "ur5", "kr6_r900"])
+def test_branches_keep_their_label_along_a_path(name):
+    """Postures move continuously where no singularity is crossed, and so do their labels."""
+    model = rm.load(name)
+    for seed in range(40):
+        start = random_q(model, 1, seed)[0]
+        q = start + np.linspace(0, 0.1, 60)[:, None] * np.cos(np.arange(model.n) + seed)
+        found = rm.igm(model, rm.dgm(model, q))
+        conditions = np.linalg.svd(rm.jacobian(model, q), compute_uv=False)[:, -1]
+        if conditions.min() < 0.02 or len(set(found.count.tolist())) > 1:
+            continue
+        at = np.nanargmin(distance(model, found.q, q[:, None]), axis=1)
+        labels = {found.branch[i][s] for i, s in enumerate(at)}
+        assert len(labels) == 1
+        # without a reference the rows are in the order of their labels
+        assert all(list(row) == sorted(row) for row in found.code[:, : found.count[0]])
+        assert all(len(set(row)) == len(row) for row in found.code[:, : found.count[0]])
+
+
+@pytest.mark.parametrize("eps", TINY)
+@pytest.mark.parametrize("name", ["rx90", "puma560", "ur5e"])
+def test_no_branch_is_lost_at_a_singular_wrist(name, eps):
+    model = rm.load(name)
+    q = random_q(model, 400, 5)
+    q[:, 4] = 1.0
+    # singular at the wrist only
+    q = q[np.linalg.svd(rm.jacobian(model, q), compute_uv=False)[:, -1] > 0.05][:60]
+    q[:, 4] = eps * np.where(np.arange(60) % 2, 1, -1) + np.pi * (np.arange(60) % 3 == 0)
+    T = rm.dgm(model, q)
+    found = checked(model, T, rm.igm(model, T, q))
+    # a pose with its sixteen digits says no more about the joints than this
+    assert distance(model, found.q[:, 0], q).max() < (1e-9 if eps == 0 else 1e-8 + 3e-14 / eps)
+    if eps == 0.0:
+        free = 3 if name != "ur5e" else 1
+        moving = [3, 5] if name != "ur5e" else [1, 2, 3, 5]
+        assert np.all(found.status == rm.IGMStatus.REACHED_FAMILY)
+        assert np.all(found.free_joints[:, 0, free])
+        assert np.all(found.free_joints[:, 0].sum(axis=-1) == 1)
+        moves = found.free_joints[:, 0] | found.family_joints[:, 0]
+        assert np.all(moves == np.isin(np.arange(6), moving))
+        # without a reference the free joint is zero
+        zero = rm.igm(model, T[0])
+        rows = zero.free_joints.any(axis=-1)
+        assert rows.any()
+        if name != "ur5e":
+            np.testing.assert_allclose(zero.q[zero.free_joints], 0.0, atol=1e-12)
+        assert "infinite family" in zero.reason()
+
+
+def test_the_three_singular_positions_of_the_rx90():
+    """Section 1.2.3, notes on singular positions: shoulder, wrist, elbow, and combinations."""
+    model = rm.load("rx90")
+    q = random_q(model, 40, 9)
+    shoulder = q.copy()
+    shoulder[:, 1] = 0.5 * (0.5 * np.pi - q[:, 2])  # S23 RL4 = C2 D3 with D3 = RL4
+    found = rm.igm(model, rm.dgm(model, shoulder), shoulder)
+    assert np.all(found.free_joints[:, 0, 0])
+    assert distance(model, found.q[:, 0], shoulder).max() < 1e-6
+    both = shoulder.copy()
+    both[:, 4] = 0.0
+    found = rm.igm(model, rm.dgm(model, both), both)
+    assert distance(model, found.q[:, 0], both).max() < 1e-6
+    assert np.all(found.free_joints[:, 0] == np.isin(np.arange(6), [0, 3]))
+    elbow = q.copy()
+    elbow[:, 2] = 0.5 * np.pi  # C3 = 0
+    found = rm.igm(model, rm.dgm(model, elbow), elbow)
+    assert distance(model, found.q[:, 0], elbow).max() < 1e-6
+    assert np.all(found.double[:, 0])
+    assert np.all(found.status == rm.IGMStatus.REACHED)
+    assert np.nanmax(found.residual) <= 1e-12
+
+
+def test_batches_single_poses_and_nothing():
+    model = rm.load("irb140")
+    q = random_q(model, 6).reshape(2, 3, 6)
+    T = rm.dgm(model, q)
+    found = checked(model, T, rm.igm(model, T))
+    assert found.status.shape == (2, 3)
+    assert found.count.dtype.kind == "i"
+    one = rm.igm(model, T[1, 2].tolist())
+    np.testing.assert_array_equal(one.q, found.q[1, 2][found.valid[1, 2]])
+    pinned = rm.igm(model, pin.SE3(T[1, 2]))
+    np.testing.assert_allclose(pinned.q, one.q, atol=1e-12)
+    none = rm.igm(model, np.empty((0, 4, 4)))
+    assert none.q.shape[0] == 0
+    assert none.count.shape == (0,)
+    # references broadcast with poses
+    many = rm.igm(model, T[0, 0], q.reshape(6, 6))
+    assert many.q.shape[0] == 6
+    assert distance(model, many.q[0, 0], q[0, 0]) < 1e-9
+    assert pickle.loads(pickle.dumps(found)).branch.tolist() == found.branch.tolist()
+    with pytest.raises(ValueError, match="read-only"):
+        found.q[...] = 0
+
+
+def test_limits_shift_by_whole_turns_and_drop():
+    rows = rm.load("puma560").table
+    lower, upper = np.array([-3.0, -7, -7, 0.5, -1.5, 7.0]), np.array([3.0, 7, 7, 7.5, 1.5, 13.0])
+    model = rm.RobotModel.from_table(
+        rm.DHTable(
+            antecedent=rows.antecedent, sigma=rows.sigma, alpha=rows.alpha, d=rows.d,
+            theta=rows.theta, r=rows.r, lower=lower, upper=upper,
+        )
+    )  # fmt: skip
+    q = np.random.default_rng(3).uniform(lower, upper, (200, 6))
+    T = rm.dgm(model, q)
+    inside = rm.igm(model, T, q, limits=True)
+    assert np.abs(inside.q[:, 0] - q).max() < 1e-9
+    assert np.all(inside.within_limits == inside.valid)
+    kept = inside.q[inside.valid]
+    assert np.all((kept >= lower - 1e-9) & (kept <= upper + 1e-9))
+    free = rm.igm(model, T)
+    assert np.all(inside.count <= free.count)
+    assert not inside.periodic.any()
+    # nearest to mid-range without a reference
+    middle = rm.igm(model, T, limits=True)
+    way = np.abs(middle.q - 0.5 * (lower + upper))[middle.valid]
+    assert np.all(way[:, 1:3] <= np.pi + 1e-9)
+    # what is within the limits as it stands
+    stands = (free.q >= lower - 1e-9) & (free.q <= upper + 1e-9)
+    np.testing.assert_array_equal(free.within_limits, stands.all(axis=-1) & free.valid)
+    # every posture outside
+    narrow = model.with_table(
+        rm.DHTable(
+            antecedent=rows.antecedent, sigma=rows.sigma, alpha=rows.alpha, d=rows.d,
+            theta=rows.theta, r=rows.r, lower=np.full(6, 0.1), upper=np.full(6, 0.2),
+        )
+    )  # fmt: skip
+    away = rm.igm(narrow, T[:3], limits=True)
+    assert np.all(away.status == rm.IGMStatus.OUTSIDE_LIMITS)
+    assert "limits" in away.reason(1)
+
+
+def test_why_a_pose_has_no_posture():
+    model = rm.load("rx90")
+    T = rm.dgm(model, [0.3, 0.4, 0.5, 0.6, 0.7, 0.8])
+    far = T.copy()
+    far[:3, 3] = 4.0, 0, 0
+    found = rm.igm(model, np.array([T, far]))
+    assert found.count.tolist() == [8, 0]
+    assert found.status.tolist() == [rm.IGMStatus.REACHED, rm.IGMStatus.TOO_FAR]
+    assert "too far" in found.reason(1)
+    assert "m." in found.reason(1)
+    assert np.isnan(found.closest[0]).all()
+    assert np.isfinite(found.closest[1]).all()
+    # a five-fold longer forearm leaves a hole around the shoulder
+    t = model.table
+    long = rm.RobotModel.from_table(
+        rm.DHTable(antecedent=t.antecedent, sigma=t.sigma, alpha=t.alpha, d=t.d, theta=t.theta,
+                   r=np.array(t.r) * 5)
+    )  # fmt: skip
+    near = np.eye(4)
+    near[:3, 3] = 0.2, 0.1, 0.1
+    assert rm.igm(long, near).status == rm.IGMStatus.TOO_NEAR
+    assert rm.igm(model, far).q.shape == (0, 6)
+    # the tool point is in reach, but not with this orientation: half a tool's length inside
+    tool = np.eye(4)
+    tool[2, 3] = 0.6
+    handed = model.with_tool(tool)
+    out = rm.dgm(handed, [0.3, 0.0, 0.5 * np.pi, 0.0, 0.0, 0.0])
+    turned = out.copy()
+    turned[:3, :3] = out[:3, :3] @ np.diag([1.0, -1.0, -1.0])
+    assert rm.igm(handed, turned).status == rm.IGMStatus.ORIENTATION_NOT_AVAILABLE
+
+
+def test_other_bases_tools_and_signs():
+    rng = np.random.default_rng(11)
+    for name in ("erd:ur10", "erd:kinova", "erd:centauro_left_arm"):
+        model = rm.load(name)
+        Z, E = (rm.dgm(rm.load("rx90"), rng.uniform(-3, 3, 6)) for _ in range(2))
+        model = model.with_base(Z).with_tool(E)
+        q = random_q(model, 50)
+        T = rm.dgm(model, q)
+        found = checked(model, T, rm.igm(model, T, q), residual=2e-12)
+        assert distance(model, found.q[:, 0], q).max() < 1e-6
+
+
+def test_reversed_arms_agree():
+    """The chain walked from the tool to the base: the same postures, signs and order reversed."""
+    for name in ("rx90", "stanford_arm", "ur5", "crx10ia"):
+        model = rm.load(name)
+        urdf = reversed_arm(model)
+        q = random_q(model, 30, 2)
+        T = rm.dgm(model, q)
+        back = rm.se3.inverse(T)
+        np.testing.assert_allclose(rm.dgm(urdf, -q[:, ::-1]), back, atol=1e-12)
+        a, b = rm.igm(model, T), checked(urdf, back, rm.igm(urdf, back))
+        np.testing.assert_array_equal(a.count, b.count)
+        for i in range(30):
+            for row in a.q[i][a.valid[i]]:
+                assert np.nanmin(distance(urdf, b.q[i], -row[::-1])) < 1e-7
+
+
+def reversed_arm(model):
+    """The arm that leads from the tool to the base, through URDF text."""
+    T = np.array(rm.link_transforms(model.table, np.zeros(model.n)))
+    # from joint frame j + 1 back to joint frame j
+    steps = [rm.se3.inverse(model.tool), *(rm.se3.inverse(t) for t in T[::-1])]
+    sigma = model.table.sigma
+    links = ["<link name='l0'/>"]
+    for j in range(model.n):
+        xyz = steps[j][:3, 3]
+        roll, pitch, yaw = pin.rpy.matrixToRpy(steps[j][:3, :3])
+        kind = "prismatic" if sigma[model.n - 1 - j] else "revolute"
+        numbers = " ".join(f"{v:.17g}" for v in xyz)
+        links.append(
+            f"<link name='l{j + 1}'/><joint name='j{j}' type='{kind}'>"
+            f"<origin xyz='{numbers}' rpy='{roll:.17g} {pitch:.17g} {yaw:.17g}'/>"
+            f"<parent link='l{j}'/><child link='l{j + 1}'/><axis xyz='0 0 1'/>"
+            "<limit lower='-9' upper='9' effort='1' velocity='1'/></joint>"
+        )
+    end = steps[-1] @ rm.se3.inverse(model.base)
+    text = f"<robot name='back'>{''.join(links)}</robot>"
+    urdf = rm.RobotModel.from_urdf(text)
+    return urdf.with_tool(urdf.tool @ end)
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "words"),
+    [
+        ({"T": np.eye(3)}, ShapeError, "4, 4"),
+        ({"T": np.full((4, 4), np.nan)}, InvalidValueError, "finite"),
+        ({"T": np.diag([2.0, 1, 1, 1])}, NotARotationError, "rotation"),
+        ({"T": np.diag([-1.0, 1, 1, 1])}, NotARotationError, "rotation"),
+        ({"q_ref": [0.0] * 5}, ShapeError, "q_ref"),
+        ({"q_ref": [np.nan] * 6}, InvalidValueError, "q_ref"),
+        ({"mask": [0] * 6}, InvalidValueError, "nothing"),
+        ({"mask": [1, 1, 1]}, ShapeError, "mask"),
+        ({"mask": [2, 1, 1, 1, 1, 1]}, InvalidValueError, "zeros and ones"),
+        ({"mask_axes": "base"}, InvalidValueError, "mask_axes"),
+        ({"limits": 1}, InvalidValueError, "limits"),
+        ({"position_tolerance": 0}, InvalidValueError, "position_tolerance"),
+        ({"orientation_tolerance": "1e-3"}, InvalidValueError, "orientation_tolerance"),
+        ({"lock": {7: 0.1}}, InvalidValueError, "columns of q"),
+        ({"lock": {"joint": 0.1}}, InvalidValueError, "no joint is called"),
+        ({"lock": {0: np.nan}}, InvalidValueError, "finite"),
+        ({"lock": [1]}, InvalidValueError, "mapping"),
+        ({"arm_angle": 0.3}, InvalidValueError, "arm angle"),
+        ({"model": "rx90"}, InvalidValueError, "RobotModel"),
+    ],
+)
+def test_mistakes_are_named(change, error, words):
+    given = {"model": rm.load("rx90"), "T": np.eye(4), **change}
+    with pytest.raises(error, match=words):
+        rm.igm(**given)
