@@ -96,7 +96,9 @@ def layouts(chain: JointChain, length: float, rng: np.random.Generator) -> Itera
                         yield Layout(Triple.PARALLEL, first, real, behind, joints)
 
 
-def loose_layouts(chain: JointChain, length: float, rng: np.random.Generator) -> Iterator[Layout]:
+def loose_layouts(
+    chain: JointChain, length: float, sigma: int, rng: np.random.Generator
+) -> Iterator[Layout]:
     """Placings in random places and directions: no closed form is aimed at.
 
     Parameters
@@ -105,21 +107,22 @@ def loose_layouts(chain: JointChain, length: float, rng: np.random.Generator) ->
         The arm.
     length : float
         A length of it [m].
+    sigma : int
+        Kind of the virtual joints, 0 revolute, 1 prismatic.
     rng : Generator
         Places and directions.
 
     Yields
     ------
     Layout
-        A virtual revolute joint in each gap, for each of a few directions; prismatic ones after.
+        With the virtual joints in each gap, in a few directions.
     """
-    for sigma in (0, 1):
-        for gap in range(chain.k + 1):
-            for _ in range(TRIES):
-                joints = tuple(
-                    VirtualJoint(gap, _anywhere(length, rng), sigma) for _ in range(6 - chain.k)
-                )
-                yield Layout(Triple.ANY, gap, 0, sigma, joints)
+    for gap in range(chain.k + 1):
+        for _ in range(TRIES):
+            joints = tuple(
+                VirtualJoint(gap, _anywhere(length, rng), sigma) for _ in range(6 - chain.k)
+            )
+            yield Layout(Triple.ANY, gap, 0, sigma, joints)
 
 
 # --- the triple -----------------------------------------------------------------------------------

@@ -143,10 +143,13 @@ def prepare_fewer(chain: JointChain, prepare: Prepare) -> FewerJoints | Dependen
     held = _dependent_joint(_scaled(jacobians(chain, q), length))
     if held is not None:
         return _prepare_dependent(chain, held, prepare)
-    closed, loose = list(layouts(chain, length, rng)), list(loose_layouts(chain, length, rng))
-    ways = _chosen(chain, length, q, closed, TRIED, prepare)
-    if not ways:
-        ways = _chosen(chain, length, q, loose, TRIED_LOOSE, prepare)
+    ways = _chosen(chain, length, q, list(layouts(chain, length, rng)), TRIED, prepare)
+    # three prismatic joints leave the orientation to the others, which is simpler than two do
+    slides = int(chain.sigma.sum())
+    for sigma in (1, 0) if slides == 2 else (0, 1):
+        if not ways:
+            loose = list(loose_layouts(chain, length, sigma, rng))
+            ways = _chosen(chain, length, q, loose, TRIED_LOOSE, prepare)
     return FewerJoints(chain, tuple(ways), length) if ways else None
 
 
