@@ -1,0 +1,251 @@
+"""From the postures of a structured neighbour to those of the arm itself, branch by branch.
+
+Lengths are in units of the arm. A regular branch arrives by Newton's method in three or four
+steps; one that does not is followed while the neighbour is changed into the arm (homotopy), and
+what the pose has beside near singular postures is searched along valleys (`_neighbour_valley`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from ..kernels._compile import INTS, NOTHING, OUT3, STACK, Floats, Ints, compiled
+from ._check import forward, jacobian, missing, wrapped
+from ._neighbour_linear import factor, smallest_singular, solve
+
+Work = tuple[Floats, Floats, Floats, Ints, Floats, Floats, Floats]
+
+MERGE = 1e-6  # postures closer than this in every joint are one [rad, or lengths of the arm]
+MET = 1e-11  # error of a posture that has arrived
+FLOOR = 2e-14  # error below which a step gains nothing
+LONGEST = 0.5  # longest step of a joint
+JUMP = 0.2  # way to the neighbour's posture above which a branch is looked at again [rad]
+
+PATH = types.Array(types.float64, 4, "C", readonly=True)
+FLAGS_IN = types.Array(types.boolean, 2, "C", readonly=True)
+FLAGS = types.Array(types.boolean, 2, "C")
+COUNTS = types.Array(types.int64, 1, "C")
+MARKS = types.Array(types.int64, 2, "C")
+DOUBTS = types.Array(types.boolean, 1, "C")
+
+
+@compiled()
+def workspace() -> Work:
+    """Arrays that `newton` and the functions built on it write to."""
+    return (
+        np.zeros((3, 4)), np.zeros((6, 6)), np.zeros((6, 6)), np.zeros(6, np.int64),
+        np.zeros(6), np.zeros(6), np.zeros(6),
+    )  # fmt: skip
+
+
+@compiled()
+def error_at(sigma: Ints, D: Floats, U: Floats, q: Floats, work: Work) -> float:
+    """The larger of the position and the angle missing; their vector stays in ``work``."""
+    forward(sigma, D, q, work[0], work[1])
+    way, angle = missing(U, work[0], work[4])
+    return max(way, angle)
+
+
+@compiled()
+def factored_jacobian(sigma: Ints, work: Work) -> None:
+    """LU factors of the Jacobian where the arm was last put."""
+    P, axes, J, pivots, _, _, _ = work
+    jacobian(sigma, P, axes, J)
+    factor(J, pivots)
+
+
+@compiled()
+def newton(sigma: Ints, D: Floats, U: Floats, q: Floats, steps: int, work: Work) -> float:
+    """Newton's method from ``q (6,)``, in place; the error left. A step that does not help is halved."""
+    e, trial, way = work[4], work[5], work[6]
+    error = error_at(sigma, D, U, q, work)
+    for _ in range(steps):
+        if not FLOOR < error < np.inf:
+            break
+        factored_jacobian(sigma, work)
+        solve(work[2], work[3], e)
+        largest = 0.0
+        for k in range(6):
+            largest = max(largest, abs(e[k]))
+        if not largest < 1e100:
+            break
+        scale = min(1.0, LONGEST / largest)
+        for k in range(6):
+            way[k] = e[k]
+        then = np.inf
+        for _ in range(4):
+            for k in range(6):
+                trial[k] = q[k] + scale * way[k]
+            then = error_at(sigma, D, U, trial, work)
+            if then < error or error < 1e-9:
+                break
+            scale *= 0.5
+        if not then < error:
+            break
+        error = then
+        for k in range(6):
+            q[k] = trial[k]
+    return error
+
+
+@compiled()
+def distance(sigma: Ints, a: Floats, b: Floats) -> float:
+    """Largest difference of two postures over the joints."""
+    largest = 0.0
+    for k in range(6):
+        d = a[k] - b[k]
+        largest = max(largest, abs(wrapped(d)) if sigma[k] == 0 else abs(d))
+    return largest
+
+
+@compiled()
+def keep(sigma: Ints, q: Floats, found: Floats, count: int) -> int:
+    """Add ``q (6,)`` to ``found (16, 6)`` unless it is there; the new number."""
+    for k in range(count):
+        if distance(sigma, q, found[k]) < MERGE:
+            return count
+    if count < found.shape[0]:
+        for k in range(6):
+            found[count, k] = wrapped(q[k]) if sigma[k] == 0 else q[k]
+        count += 1
+    return count
+
+
+@compiled(
+    NOTHING(
+        INTS, STACK, STACK, STACK, STACK, FLAGS_IN, types.float64,
+        OUT3, COUNTS, FLAGS, COUNTS, DOUBTS,
+    )
+)  # fmt: skip
+def arrivals(
+    sigma: Ints,
+    near: Floats,
+    D: Floats,
+    goals: Floats,
+    candidates: Floats,
+    there: NDArray[np.bool_],
+    small: float,
+    found: Floats,
+    count: Ints,
+    arrived: NDArray[np.bool_],
+    exact: Ints,
+    doubt: NDArray[np.bool_],
+) -> None:
+    """Newton's method from every candidate ``(N, C, 6)`` of the neighbour ``near`` to the arm ``D``.
+
+    ``exact (N,)`` counts the candidates that are postures of the neighbour and not only its best
+    approach. A pose is left in ``doubt`` where a branch did not arrive, moved far, met another
+    branch, or ended where the smallest singular value of the Jacobian is below ``small``.
+    """
+    work = workspace()
+    q, u, v = np.zeros(6), np.zeros(6), np.zeros(6)
+    for n in range(goals.shape[0]):
+        for c in range(candidates.shape[1]):
+            if not there[n, c]:
+                continue
+            for k in range(6):
+                q[k] = candidates[n, c, k]
+            if error_at(sigma, near, goals[n], q, work) < 1e-8:
+                exact[n] += 1
+            else:
+                doubt[n] = True
+            if not newton(sigma, D, goals[n], q, 10, work) <= MET:
+                doubt[n] = True
+                continue
+            arrived[n, c] = True
+            before = count[n]
+            count[n] = keep(sigma, q, found[n], count[n])
+            if count[n] == before or distance(sigma, q, candidates[n, c]) > JUMP:
+                doubt[n] = True
+                continue
+            factored_jacobian(sigma, work)
+            if smallest_singular(work[2], work[3], u, v, 2) < small:
+                doubt[n] = True
+
+
+@compiled()
+def follow(sigma: Ints, path: Floats, U: Floats, q: Floats, last: Floats, work: Work) -> int:
+    """Follow a posture of ``path[0]`` to the last arm of ``path (m, 7, 4, 4)``, in place.
+
+    Returns the place on the path that was reached; ``last`` is overwritten.
+    """
+    end = path.shape[0] - 1
+    if not error_at(sigma, path[0], U, q, work) < 1e-8:
+        return 0
+    at, step = 0, 4
+    trial, slope = np.zeros(6), np.zeros(6)
+    for k in range(6):
+        last[k] = q[k]
+    while at < end:
+        onto = min(at + step, end)
+        for k in range(6):
+            trial[k] = q[k] + (onto - at) * slope[k]
+        met = newton(sigma, path[onto], U, trial, 8, work) <= 1e-9
+        if met and distance(sigma, trial, q) < 0.15 * (1.0 + 0.5 * step):
+            for k in range(6):
+                slope[k] = (trial[k] - q[k]) / (onto - at)
+                q[k] = trial[k]
+            at = onto
+            step = min(2 * step, 8)
+        elif step == 1:
+            break
+        else:
+            step //= 2
+    return at
+
+
+@compiled(NOTHING(INTS, PATH, STACK, STACK, FLAGS_IN, FLAGS, OUT3, OUT3, COUNTS))
+def followed(
+    sigma: Ints,
+    path: Floats,
+    goals: Floats,
+    candidates: Floats,
+    there: NDArray[np.bool_],
+    arrived: NDArray[np.bool_],
+    ends: Floats,
+    found: Floats,
+    count: Ints,
+) -> None:
+    """Follow the candidates that have not arrived; ``ends (N, C, 6)`` is how far each came."""
+    work = workspace()
+    q, last = np.zeros(6), np.zeros(6)
+    D = path[path.shape[0] - 1]
+    for n in range(goals.shape[0]):
+        for c in range(candidates.shape[1]):
+            for k in range(6):
+                ends[n, c, k] = candidates[n, c, k]
+            if not there[n, c] or arrived[n, c]:
+                continue
+            for k in range(6):
+                q[k] = candidates[n, c, k]
+            at = follow(sigma, path, goals[n], q, last, work)
+            for k in range(6):
+                ends[n, c, k] = q[k]
+            if at == path.shape[0] - 1 and newton(sigma, D, goals[n], q, 10, work) <= MET:
+                arrived[n, c] = True
+                count[n] = keep(sigma, q, found[n], count[n])
+
+
+@compiled(NOTHING(INTS, STACK, STACK, STACK, FLAGS_IN, OUT3, COUNTS))
+def tried(
+    sigma: Ints,
+    D: Floats,
+    goals: Floats,
+    starts: Floats,
+    there: NDArray[np.bool_],
+    found: Floats,
+    count: Ints,
+) -> None:
+    """Newton's method from starts ``(N, C, 6)``; what meets the pose is kept."""
+    work = workspace()
+    q = np.zeros(6)
+    for n in range(goals.shape[0]):
+        for c in range(starts.shape[1]):
+            if not there[n, c]:
+                continue
+            for k in range(6):
+                q[k] = starts[n, c, k]
+            if newton(sigma, D, goals[n], q, 15, work) <= MET:
+                count[n] = keep(sigma, q, found[n], count[n])

@@ -1,0 +1,465 @@
+"""Postures along valleys, where the Jacobian of the arm is nearly singular.
+
+Where a structured arm has an infinite family of postures (an aligned wrist, a wrist centre on
+the shoulder's axis), its neighbour has a few isolated ones along what is left of the family, far
+from each other; where it has a fold (a stretched elbow), two that are close. Both lie on the curve
+of postures that miss the pose only along the left null vector u of the Jacobian: a valley of the
+error. The curve is walked along the right null vector v, and a posture is where what is missing
+changes sign.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+from numba import types
+from numpy.typing import NDArray
+
+from ..kernels._compile import INTS, MATRIX, NOTHING, OUT3, STACK, VECTOR, Floats, Ints, compiled
+from ._check import wrapped
+from ._neighbour import (
+    COUNTS,
+    DOUBTS,
+    FLAGS,
+    FLAGS_IN,
+    MARKS,
+    MERGE,
+    MET,
+    Work,
+    distance,
+    error_at,
+    factored_jacobian,
+    keep,
+    newton,
+    workspace,
+)
+from ._neighbour_linear import smallest_singular, solve
+
+STRIDE = 0.1  # step along a valley [rad]
+STRIDES = 160  # steps one way
+POINTS = 4000  # points of valleys remembered for a pose
+LOST = 1e-3  # error beside the valley above which the curve was lost
+NARROW = 10  # points that the infinite family of a tolerance has at least
+
+Curve = tuple[Floats, Floats, Floats]
+
+
+@compiled()
+def slide(
+    sigma: Ints, D: Floats, U: Floats, q: Floats, u: Floats, v: Floats, rounds: int, work: Work
+) -> tuple[float, float, float]:
+    """Bring ``q`` to the curve, in place; what is missing along u, beside it, and the value of u, v."""
+    e = work[4]
+    along, beside, small = 0.0, np.inf, np.inf
+    for turn in range(rounds + 1):
+        error_at(sigma, D, U, q, work)
+        factored_jacobian(sigma, work)
+        small = smallest_singular(work[2], work[3], u, v, 3)
+        along, size = 0.0, 0.0
+        for i in range(6):
+            along += u[i] * e[i]
+        for i in range(6):
+            e[i] -= along * u[i]
+            size += e[i] * e[i]
+        beside = sqrt(size)
+        if turn == rounds or beside < 1e-14 or not beside < 0.5:
+            break
+        solve(work[2], work[3], e)
+        onto, largest = 0.0, 0.0
+        for i in range(6):
+            onto += e[i] * v[i]
+        for i in range(6):
+            e[i] -= onto * v[i]
+            largest = max(largest, abs(e[i]))
+        scale = min(1.0, 0.5 / largest) if largest > 0.0 else 1.0
+        for i in range(6):
+            q[i] += scale * e[i]
+    return along, beside, small
+
+
+@compiled()
+def walk(
+    sigma: Ints, D: Floats, U: Floats, origin: Floats, valley: float, curve: Curve, work: Work
+) -> tuple[int, int]:
+    """Walk the curve through ``origin`` both ways while the Jacobian stays nearly singular.
+
+    The points, what is missing along u at each and the u are written to ``curve``, in order, one
+    sense of u throughout. Returns the first and one past the last row in use.
+    """
+    points, missing, us = curve
+    middle = STRIDES + 2
+    first, last = middle, middle + 1
+    q, u, v = np.zeros(6), np.zeros(6), np.zeros(6)
+    ahead = np.zeros(6)
+    closed = False
+    for side in range(2):
+        if closed:
+            break
+        for i in range(6):
+            q[i] = origin[i]
+        along, beside, small = slide(sigma, D, U, q, u, v, 4, work)
+        if side == 0:
+            if not (beside < LOST and small < valley):
+                return middle, middle
+            for i in range(6):
+                points[middle, i], us[middle, i] = q[i], u[i]
+            missing[middle] = along
+        at = middle
+        for i in range(6):
+            u[i] = us[middle, i]
+            ahead[i] = v[i] if side == 0 else -v[i]
+        left = STRIDES
+        while left > 0:
+            left -= 1
+            for i in range(6):
+                q[i] = points[at, i] + STRIDE * ahead[i]
+            along, beside, small = slide(sigma, D, U, q, u, v, 3, work)
+            if not (beside < LOST and small < valley):
+                break
+            # singular vectors have no sign of their own: keep going, keep the side
+            same, forth = 0.0, 0.0
+            for i in range(6):
+                same += u[i] * us[at, i]
+                forth += v[i] * ahead[i]
+            if abs(forth) < 0.3:
+                break
+            at += 1 if side == 0 else -1
+            for i in range(6):
+                points[at, i] = q[i]
+                us[at, i] = u[i] if same >= 0.0 else -u[i]
+                ahead[i] = v[i] if forth >= 0.0 else -v[i]
+            missing[at] = along if same >= 0.0 else -along
+            first, last = min(first, at), max(last, at + 1)
+            if side == 0 and not closed and at - middle > 10:
+                if distance(sigma, q, points[middle]) < STRIDE:
+                    # two steps more, so that the ends overlap
+                    closed = True
+                    left = 2
+    return first, last
+
+
+@compiled()
+def _at(
+    sigma: Ints, D: Floats, U: Floats, side: Floats, q: Floats, work: Work
+) -> float:  # fmt: skip
+    """What is missing along u at the point of the curve next to q, u on the side of ``side``."""
+    u, v = np.zeros(6), np.zeros(6)
+    along, _, _ = slide(sigma, D, U, q, u, v, 3, work)
+    same = 0.0
+    for i in range(6):
+        same += u[i] * side[i]
+    return along if same >= 0.0 else -along
+
+
+@compiled()
+def _between(
+    sigma: Ints,
+    D: Floats,
+    U: Floats,
+    a: Floats,
+    at_a: float,
+    b: Floats,
+    at_b: float,
+    side: Floats,
+    found: Floats,
+    count: int,
+    work: Work,
+) -> int:
+    """The posture between two points of the curve where what is missing changes sign."""
+    low, high, q = a.copy(), b.copy(), np.zeros(6)
+    f_low, f_high = at_a, at_b
+    for _ in range(30):
+        share = f_low / (f_low - f_high)
+        for i in range(6):
+            q[i] = low[i] + share * (high[i] - low[i])
+        f = _at(sigma, D, U, side, q, work)
+        if abs(f) < 1e-12:
+            break
+        # the false position that does not stick at one end (Illinois)
+        if (f > 0.0) == (f_low > 0.0):
+            low[:], f_low = q, f
+            f_high *= 0.5
+        else:
+            high[:], f_high = q, f
+            f_low *= 0.5
+    newton(sigma, D, U, q, 10, work)
+    if error_at(sigma, D, U, q, work) <= MET:
+        count = keep(sigma, q, found, count)
+    return count
+
+
+@compiled()
+def _near_zero(
+    sigma: Ints,
+    D: Floats,
+    U: Floats,
+    curve: Curve,
+    at: int,
+    touch: float,
+    found: Floats,
+    count: int,
+    work: Work,
+) -> int:
+    """Two postures, or a double one, between rows at - 1 and at + 1 without a change of sign."""
+    points, missing, us = curve
+    f0, f1, f2 = missing[at - 1], missing[at], missing[at + 1]
+    bend = f0 - 2.0 * f1 + f2
+    a, b, c, q = points[at - 1].copy(), points[at].copy(), points[at + 1].copy(), np.zeros(6)
+    x0, x1, x2 = -1.0, 0.0, 1.0
+    sign = 1.0 if f1 > 0.0 else -1.0
+    if bend * sign <= 0.0 or f1 * sign - (f2 - f0) ** 2 / (8.0 * abs(bend)) > 0.5 * abs(bend):
+        return count
+    for _ in range(8):
+        # vertex of the parabola through the three
+        d1, d2 = (f1 - f0) / (x1 - x0), (f2 - f1) / (x2 - x1)
+        second = (d2 - d1) / (x2 - x0)
+        if second * sign <= 0.0:
+            break
+        x = 0.5 * (x0 + x1) - 0.5 * d1 / second
+        if not x0 < x < x2:
+            break
+        # near a point that is known a little aside says more
+        if abs(x - x1) < 1e-3 * (x2 - x0):
+            x = x1 + 2e-3 * (x2 - x1 if x2 - x1 > x1 - x0 else x0 - x1)
+        low, high, xl, xh = (a, b, x0, x1) if x < x1 else (b, c, x1, x2)
+        for i in range(6):
+            q[i] = low[i] + (x - xl) / (xh - xl) * (high[i] - low[i])
+        f = _at(sigma, D, U, us[at], q, work)
+        if f * sign <= 0.0:
+            count = _between(sigma, D, U, a, f0, q, f, us[at], found, count, work)
+            return _between(sigma, D, U, q, f, c, f2, us[at], found, count, work)
+        if f * sign < f1 * sign:
+            if x < x1:
+                c[:], x2, f2 = b, x1, f1
+            else:
+                a[:], x0, f0 = b, x1, f1
+            b[:], x1, f1 = q, x, f
+        elif x < x1:
+            a[:], x0, f0 = q, x, f
+        else:
+            c[:], x2, f2 = q, x, f
+        if x2 - x0 < 1e-7:
+            break
+    # the curve turns back at zero: a double posture, within rounding or the tolerance
+    if abs(f1) <= touch:
+        count = keep(sigma, b, found, count)
+    return count
+
+
+@compiled()
+def _driven(
+    sigma: Ints, D: Floats, U: Floats, joint: int, value: float, q: Floats, work: Work
+) -> bool:
+    """Move along the curve until a joint has a value; whether it got there."""
+    u, v = np.zeros(6), np.zeros(6)
+    for _ in range(12):
+        slide(sigma, D, U, q, u, v, 2, work)
+        gap = value - q[joint]
+        if sigma[joint] == 0:
+            gap = wrapped(gap)
+        if abs(gap) < 1e-13:
+            break
+        if abs(v[joint]) < 1e-6:
+            return False
+        for i in range(6):
+            step = v[i] * gap / v[joint]
+            q[i] += max(-STRIDE, min(STRIDE, step))
+    gap = value - q[joint]
+    if sigma[joint] == 0:
+        gap = wrapped(gap)
+    q[joint] += gap
+    return abs(gap) < 1e-9
+
+
+@compiled()
+def _family(
+    sigma: Ints,
+    D: Floats,
+    U: Floats,
+    curve: Curve,
+    first: int,
+    last: int,
+    reference: Floats,
+    found: Floats,
+    free: Ints,
+    count: int,
+    work: Work,
+) -> int:
+    """A curve that meets the pose within the tolerance all along: its members at the reference.
+
+    Postures on it that were found before make room for them.
+    """
+    points = curve[0]
+    kept = 0
+    for j in range(count):
+        on = False
+        for m in range(first, last):
+            on = on or distance(sigma, found[j], points[m]) < STRIDE
+        if not on:
+            found[kept], free[kept] = found[j], free[j]
+            kept += 1
+    count = kept
+    # the first joint that moves
+    joint = 5
+    for k in range(5, -1, -1):
+        low, high = np.inf, -np.inf
+        for m in range(first, last):
+            low, high = min(low, points[m, k]), max(high, points[m, k])
+        if high - low > STRIDE:
+            joint = k
+    nearest, best, q = first, np.inf, np.zeros(6)
+    for m in range(first, last):
+        gap = reference[joint] - points[m, joint]
+        gap = wrapped(gap) if sigma[joint] == 0 else gap
+        if abs(gap) < best:
+            nearest, best = m, abs(gap)
+        if m + 1 == last:
+            break
+        after = reference[joint] - points[m + 1, joint]
+        after = wrapped(after) if sigma[joint] == 0 else after
+        if gap * after <= 0.0 and abs(gap - after) < 1.0:
+            share = gap / (gap - after) if gap != after else 0.0
+            for i in range(6):
+                q[i] = points[m, i] + share * (points[m + 1, i] - points[m, i])
+            if _driven(sigma, D, U, joint, reference[joint], q, work):
+                before = count
+                count = keep(sigma, q, found, count)
+                if count > before:
+                    free[before] = joint + 1
+    if count == kept:
+        # out of the reference's reach: the nearest value
+        before = count
+        count = keep(sigma, points[nearest], found, count)
+        if count > before:
+            free[before] = joint + 1
+    return count
+
+
+@compiled()
+def _is_double(sigma: Ints, D: Floats, root: Floats, work: Work) -> bool:
+    """Whether the partner of a posture at a fold is nearer than 1e-6.
+
+    Along the null direction v the error is ``s sigma + s^2 h / 2`` with sigma the smallest
+    singular value (left vector u) and ``h = u . d(J v)/ds``: the partner is at ``-2 sigma / h``.
+    """
+    u, v, w, t = np.zeros(6), np.zeros(6), np.zeros(6), np.zeros(6)
+    U = np.zeros((4, 4))
+    U[0, 0] = U[1, 1] = U[2, 2] = U[3, 3] = 1.0
+    error_at(sigma, D, U, root, work)
+    factored_jacobian(sigma, work)
+    small = smallest_singular(work[2], work[3], u, v, 3)
+    if small > 1e-5:
+        return False
+    # sigma on either side along v, with the sign of u kept
+    step, q = 1e-4, np.zeros(6)
+    bend = 0.0
+    for side in (-1.0, 1.0):
+        for i in range(6):
+            q[i] = root[i] + side * step * v[i]
+        error_at(sigma, D, U, q, work)
+        factored_jacobian(sigma, work)
+        value = smallest_singular(work[2], work[3], w, t, 4)
+        same = 0.0
+        forth = 0.0
+        for i in range(6):
+            same += w[i] * u[i]
+            forth += t[i] * v[i]
+        bend += side * (value if same * forth >= 0.0 else -value) / (2.0 * step)
+    return abs(bend) > 1e-6 and 2.0 * small <= MERGE * abs(bend)
+
+
+@compiled(
+    NOTHING(
+        INTS, STACK, STACK, STACK, FLAGS_IN, MATRIX, VECTOR, types.float64, types.float64,
+        OUT3, COUNTS, FLAGS, MARKS, DOUBTS,
+    )
+)  # fmt: skip
+def valleys(
+    sigma: Ints,
+    D: Floats,
+    goals: Floats,
+    starts: Floats,
+    there: NDArray[np.bool_],
+    references: Floats,
+    tolerances: Floats,
+    small: float,
+    valley: float,
+    found: Floats,
+    count: Ints,
+    double: NDArray[np.bool_],
+    free: Ints,
+    walked: NDArray[np.bool_],
+) -> None:
+    """Search the valleys that run through ``starts (N, C, 6)`` and through nearly singular postures.
+
+    ``tolerances`` are of the position in lengths of the arm and of the angle. A curve along which
+    every point is within them is an infinite family: of it the members at the reference are kept,
+    with the number of the freed joint (from 1) in ``free (N, 16)``.
+    """
+    work = workspace()
+    rows = 2 * STRIDES + 8
+    curve = (np.zeros((rows, 6)), np.zeros(rows), np.zeros((rows, 6)))
+    points, missing, us = curve
+    known = np.zeros((POINTS, 6))
+    u, v, q = np.zeros(6), np.zeros(6), np.zeros(6)
+    # an error of this length is within both tolerances
+    touch = 0.5 * min(tolerances[0], tolerances[1])
+    for n in range(goals.shape[0]):
+        remembered = 0
+        C = starts.shape[1]
+        k = 0
+        while k < C + count[n]:
+            if k < C:
+                at = k
+                k += 1
+                if not there[n, at]:
+                    continue
+                for i in range(6):
+                    q[i] = starts[n, at, i]
+                slide(sigma, D, goals[n], q, u, v, 8, work)
+            else:
+                for i in range(6):
+                    q[i] = found[n, k - C, i]
+                k += 1
+                error_at(sigma, D, goals[n], q, work)
+                factored_jacobian(sigma, work)
+                if smallest_singular(work[2], work[3], u, v, 3) > small:
+                    continue
+            passed = False
+            for m in range(remembered):
+                if distance(sigma, q, known[m]) < 0.7 * STRIDE:
+                    passed = True
+                    break
+            if passed:
+                continue
+            first, last = walk(sigma, D, goals[n], q, valley, curve, work)
+            if last == first:
+                continue
+            walked[n] = True
+            for m in range(first, last):
+                if remembered < POINTS:
+                    known[remembered] = points[m]
+                    remembered += 1
+            most = 0.0
+            for m in range(first, last):
+                most = max(most, abs(missing[m]))
+            if last - first >= NARROW and most <= touch:
+                count[n] = _family(
+                    sigma, D, goals[n], curve, first, last, references[n],
+                    found[n], free[n], count[n], work,
+                )  # fmt: skip
+                continue
+            for m in range(first, last - 1):
+                if missing[m] * missing[m + 1] <= 0.0:
+                    count[n] = _between(
+                        sigma, D, goals[n], points[m], missing[m], points[m + 1], missing[m + 1],
+                        us[m], found[n], count[n], work,
+                    )  # fmt: skip
+                elif m > first and missing[m] * missing[m - 1] > 0.0:
+                    if abs(missing[m]) <= min(abs(missing[m - 1]), abs(missing[m + 1])):
+                        count[n] = _near_zero(
+                            sigma, D, goals[n], curve, m, touch, found[n], count[n], work
+                        )
+        for k in range(count[n]):
+            double[n, k] = free[n, k] == 0 and _is_double(sigma, D, found[n, k], work)
