@@ -1,0 +1,316 @@
+"""Solutions of the equations of Paul's catalogue.
+
+Every function writes up to four solutions to the rows of ``found``: value, cosine and sine of the
+first unknown (a length has its value and 1, 0), then of the second, and returns how many and a bit
+field: 1 double root or overshoot, 2 first unknown free, 4 second unknown free, 8 small amplitude.
+What is free takes its reference. ``slack`` is the overshoot beside the amplitude that still counts
+as a double root; ``small`` the amplitude beside which rounding of the coefficients shows.
+"""
+
+from __future__ import annotations
+
+from math import atan2, cos, pi, sin, sqrt
+
+import numpy as np
+
+from ...kernels._compile import Floats, compiled
+from .._equations import polynomial_roots, trigonometric_roots
+
+DOUBLE, FREE_1, FREE_2, SMALL = 1, 2, 4, 8
+
+
+@compiled()
+def put_angle(found: Floats, i: int, at: int, value: float, C: float, S: float) -> None:
+    """One solution of an angle."""
+    found[i, at], found[i, at + 1], found[i, at + 2] = value, C, S
+
+
+@compiled()
+def put_free(found: Floats, i: int, at: int, value: float) -> None:
+    """An angle that takes its reference."""
+    found[i, at], found[i, at + 1], found[i, at + 2] = value, cos(value), sin(value)
+
+
+@compiled()
+def put_length(found: Floats, i: int, at: int, value: float) -> None:
+    """One solution of a length."""
+    found[i, at], found[i, at + 1], found[i, at + 2] = value, 1.0, 0.0
+
+
+@compiled()
+def type_1(X: float, Y: float, zero: float, small: float, reference: float, found: Floats
+           ) -> tuple[int, int]:  # fmt: skip
+    """``X r = Y``."""
+    if abs(X) <= zero:
+        put_length(found, 0, 0, reference)
+        return 1, FREE_1
+    put_length(found, 0, 0, Y / X)
+    return 1, SMALL if abs(X) <= small else 0
+
+
+@compiled()
+def type_2_zero(X: float, Y: float, zero: float, small: float, reference: float, found: Floats
+                ) -> tuple[int, int]:  # fmt: skip
+    """``X S + Y C = 0``: ``theta = atan2(-Y, X)`` and ``theta + pi``."""
+    rho = sqrt(X * X + Y * Y)
+    if rho <= zero:
+        put_free(found, 0, 0, reference)
+        return 1, FREE_1
+    value, C, S = atan2(-Y, X), X / rho, -Y / rho
+    put_angle(found, 0, 0, value, C, S)
+    put_angle(found, 1, 0, value - pi if value > 0.0 else value + pi, -C, -S)
+    return 2, SMALL if rho <= small else 0
+
+
+@compiled()
+def type_2(X: float, Y: float, Z: float, slack: float, zero: float, small: float,
+           reference: float, found: Floats) -> tuple[int, int]:  # fmt: skip
+    """``X S + Y C = Z``.
+
+    ``S = (X Z + e Y sqrt(X^2 + Y^2 - Z^2)) / (X^2 + Y^2)`` and
+    ``C = (Y Z - e X sqrt(X^2 + Y^2 - Z^2)) / (X^2 + Y^2)`` with e = +-1, the book's example 1.3
+    with its misprint put right.
+    """
+    square = X * X + Y * Y
+    rho = sqrt(square)
+    if rho <= zero:
+        if abs(Z) > max(zero, slack):
+            return 0, SMALL
+        put_free(found, 0, 0, reference)
+        return 1, FREE_1
+    flags = SMALL if rho <= small else 0
+    room = (rho - Z) * (rho + Z)
+    if room <= 1e-12 * square:
+        # the two solutions fall together, or miss each other by rounding
+        if abs(Z) - rho > slack * rho:
+            return 0, flags | (SMALL if abs(Z) - rho < 1e-6 * rho else 0)
+        if room <= 0.0:
+            sign = 1.0 if Z >= 0.0 else -1.0
+            C, S = sign * Y / rho, sign * X / rho
+            put_angle(found, 0, 0, atan2(S, C), C, S)
+            return 1, flags | DOUBLE
+        flags |= DOUBLE
+    root = sqrt(room)
+    scale = 1.0 / square
+    S, C = (X * Z + Y * root) * scale, (Y * Z - X * root) * scale
+    put_angle(found, 0, 0, atan2(S, C), C, S)
+    S, C = (X * Z - Y * root) * scale, (Y * Z + X * root) * scale
+    put_angle(found, 1, 0, atan2(S, C), C, S)
+    return 2, flags
+
+
+@compiled()
+def type_3_direct(A: float, B: float, zero: float, small: float, reference: float, found: Floats
+                  ) -> tuple[int, int]:  # fmt: skip
+    """``X1 S = A, X1 C = B`` with ``X1 > 0``."""
+    rho = sqrt(A * A + B * B)
+    if rho <= zero:
+        put_free(found, 0, 0, reference)
+        return 1, FREE_1
+    scale = 1.0 / rho
+    put_angle(found, 0, 0, atan2(A, B), B * scale, A * scale)
+    return 1, SMALL if rho <= small else 0
+
+
+@compiled()
+def type_3(X1: float, Y1: float, Z1: float, X2: float, Y2: float, Z2: float, zero: float,
+           small: float, reference: float, found: Floats) -> tuple[int, int]:  # fmt: skip
+    """``X1 S + Y1 C = Z1, X2 S + Y2 C = Z2``."""
+    det = X1 * Y2 - X2 * Y1
+    size = sqrt((X1 * X1 + Y1 * Y1) * (X2 * X2 + Y2 * Y2))
+    if size <= zero * zero:
+        put_free(found, 0, 0, reference)
+        return 1, FREE_1
+    if abs(det) <= 1e-12 * size:
+        # they say the same twice: the stronger one alone
+        if X1 * X1 + Y1 * Y1 >= X2 * X2 + Y2 * Y2:
+            count, flags = type_2(X1, Y1, Z1, 1e-9, zero, small, reference, found)
+        else:
+            count, flags = type_2(X2, Y2, Z2, 1e-9, zero, small, reference, found)
+        return min(count, 1), flags | SMALL
+    sign = 1.0 if det > 0.0 else -1.0
+    S, C = sign * (Z1 * Y2 - Z2 * Y1), sign * (X1 * Z2 - X2 * Z1)
+    rho = sqrt(S * S + C * C)
+    if rho <= zero * zero:
+        put_free(found, 0, 0, reference)
+        return 1, FREE_1
+    put_angle(found, 0, 0, atan2(S, C), C / rho, S / rho)
+    return 1, SMALL if abs(det) <= 1e-6 * size or rho <= small * small else 0
+
+
+@compiled()
+def type_4(X1: float, Y1: float, X2: float, Y2: float, zero: float, small: float,
+           reference: float, found: Floats) -> tuple[int, int]:  # fmt: skip
+    """``X1 r S = Y1, X2 r C = Y2``: a length ``r = +-sqrt((Y1 / X1)^2 + (Y2 / X2)^2)``, an angle."""
+    if min(abs(X1), abs(X2)) <= zero:
+        return 0, SMALL
+    A, B = Y1 / X1, Y2 / X2
+    r = sqrt(A * A + B * B)
+    if r <= zero:
+        put_length(found, 0, 0, 0.0)
+        put_free(found, 0, 3, reference)
+        return 1, FREE_2
+    value, C, S = atan2(A, B), B / r, A / r
+    put_length(found, 0, 0, r)
+    put_angle(found, 0, 3, value, C, S)
+    put_length(found, 1, 0, -r)
+    put_angle(found, 1, 3, value - pi if value > 0.0 else value + pi, -C, -S)
+    return 2, SMALL if r <= small or min(abs(X1), abs(X2)) <= small else 0
+
+
+@compiled()
+def quadratic(a: float, h: float, c: float, slack: float, roots: Floats) -> tuple[int, int]:
+    """``a r^2 + 2 h r + c = 0``: solutions and flags."""
+    room, size = h * h - a * c, h * h + abs(a * c)
+    if room < -slack * size:
+        return 0, SMALL if room > -1e-6 * size else 0
+    if room <= 1e-12 * size:
+        if room <= 0.0:
+            roots[0] = -h / a
+            return 1, DOUBLE
+    whole = -(h + (sqrt(room) if h >= 0.0 else -sqrt(room)))
+    roots[0], roots[1] = whole / a, c / whole if whole != 0.0 else 0.0
+    return 2, DOUBLE if room <= 1e-12 * size else 0
+
+
+@compiled()
+def type_5(X1: float, Y1: float, Z1: float, X2: float, Y2: float, Z2: float, slack: float,
+           zero: float, small: float, found: Floats) -> tuple[int, int]:  # fmt: skip
+    """``X1 S = Y1 + Z1 r, X2 C = Y2 + Z2 r``: a length, then an angle."""
+    if min(abs(X1), abs(X2)) <= zero:
+        return 0, SMALL
+    u0, u1, v0, v1 = Y1 / X1, Z1 / X1, Y2 / X2, Z2 / X2
+    a = u1 * u1 + v1 * v1
+    if a <= zero:
+        return 0, SMALL
+    roots = np.empty(2)
+    count, flags = quadratic(a, u0 * u1 + v0 * v1, u0 * u0 + v0 * v0 - 1.0, slack, roots)
+    for i in range(count):
+        S, C = u0 + u1 * roots[i], v0 + v1 * roots[i]
+        rho = sqrt(S * S + C * C)
+        put_length(found, i, 0, roots[i])
+        put_angle(found, i, 3, atan2(S, C), C / rho, S / rho)
+    return count, flags | (SMALL if min(abs(X1), abs(X2)) <= small else 0)
+
+
+@compiled()
+def two_angles(W1: float, W2: float, X: float, Y: float, Z1: float, Z2: float, sense: float,
+               slack: float, zero: float, small: float, reference_i: float, reference_j: float,
+               found: Floats) -> tuple[int, int]:  # fmt: skip
+    """``W1 Cj + W2 Sj = X Ci + Y Si + Z1, sense (W1 Sj - W2 Cj) = X Si - Y Ci + Z2``.
+
+    Squared and added they are of type 2 in i: ``B1 Si + B2 Ci = B3`` with
+    ``B1 = 2 (Z1 Y + Z2 X)``, ``B2 = 2 (Z1 X - Z2 Y)`` and
+    ``B3 = W1^2 + W2^2 - X^2 - Y^2 - Z1^2 - Z2^2``; then j is of type 3.
+    """
+    W = W1 * W1 + W2 * W2
+    # half of B1, B2, B3
+    B1, B2 = Z1 * Y + Z2 * X, Z1 * X - Z2 * Y
+    B3 = 0.5 * (W - X * X - Y * Y - Z1 * Z1 - Z2 * Z2)
+    limit = max(zero * sqrt(W), zero * zero)
+    count, flags = type_2(B1, B2, B3, slack, limit, small * sqrt(W), reference_i, found)
+    for n in range(count):
+        C, S = found[n, 1], found[n, 2]
+        one = X * C + Y * S + Z1
+        two = sense * (X * S - Y * C + Z2)
+        Sj, Cj = W2 * one + W1 * two, W1 * one - W2 * two
+        rho = sqrt(Sj * Sj + Cj * Cj)
+        if rho <= zero * zero:
+            put_free(found, n, 3, reference_j)
+            flags |= FREE_2
+        else:
+            put_angle(found, n, 3, atan2(Sj, Cj), Cj / rho, Sj / rho)
+    return count, flags
+
+
+@compiled()
+def type_8(X: float, Y: float, Z1: float, Z2: float, slack: float, zero: float, small: float,
+           reference_i: float, reference_j: float, found: Floats) -> tuple[int, int]:  # fmt: skip
+    """``X Ci + Y C(i+j) = Z1, X Si + Y S(i+j) = Z2``: the angle i, then the sum.
+
+    ``Cj = (Z1^2 + Z2^2 - X^2 - Y^2) / (2 X Y)``, ``Sj = +-sqrt(1 - Cj^2)``, and i is of type 3:
+    ``(X + Y Cj) Ci - Y Sj Si = Z1``, ``Y Sj Ci + (X + Y Cj) Si = Z2``.
+    """
+    reach = Z1 * Z1 + Z2 * Z2
+    product = 2.0 * X * Y
+    top = reach - X * X - Y * Y
+    # (X + Y)^2 - reach and reach - (X - Y)^2, times each other: (2 X Y Sj)^2
+    size = abs(product)
+    if size <= zero * zero:
+        return 0, SMALL
+    room = (size - top) * (size + top)
+    flags = 0
+    if room <= 1e-12 * size * size:
+        if abs(top) - size > slack * size:
+            return 0, SMALL if abs(top) - size < 1e-6 * size else 0
+        flags = DOUBLE
+    root = sqrt(room) if room > 0.0 else 0.0
+    Cj = top / product if room > 0.0 else (1.0 if top * product > 0.0 else -1.0)
+    Sj = root / size
+    A = X + Y * Cj
+    if sqrt(reach) <= zero:
+        # the second end lies on the first axis: i is free
+        put_free(found, 0, 0, reference_i)
+        C, S = found[0, 1], found[0, 2]
+        put_angle(found, 0, 3, atan2(S * Cj + C * Sj, C * Cj - S * Sj), C * Cj - S * Sj,
+                  S * Cj + C * Sj)  # fmt: skip
+        return 1, flags | FREE_1
+    if sqrt(reach) <= small:
+        flags |= SMALL
+    count = 2 if root > 0.0 else 1
+    for n in range(count):
+        B = Y * Sj if n == 0 else -Y * Sj
+        C, S = A * Z1 + B * Z2, A * Z2 - B * Z1
+        rho = sqrt(C * C + S * S)
+        C, S = C / rho, S / rho
+        put_angle(found, n, 0, atan2(S, C), C, S)
+        sine = Sj if n == 0 else -Sj
+        c, s = C * Cj - S * sine, S * Cj + C * sine
+        put_angle(found, n, 3, atan2(s, c), c, s)
+    return count, flags
+
+
+@compiled()
+def quartic(a0: float, a1: float, a2: float, a3: float, a4: float, slack: float, reference: float,
+            found: Floats) -> tuple[int, int]:  # fmt: skip
+    """``a0 + a1 C + a2 S + a3 cos(2 theta) + a4 sin(2 theta) = 0``."""
+    g, roots = np.empty(5), np.empty(4)
+    g[0], g[1], g[2], g[3], g[4] = a0, a1, a2, a3, a4
+    size = np.abs(g).max()
+    if size == 0.0:
+        put_free(found, 0, 0, reference)
+        return 1, FREE_1
+    count, flags = trigonometric_roots(g, roots, slack * size), 0
+    for i in range(count):
+        put_free(found, i, 0, roots[i])
+        for m in range(i):
+            gap = abs(roots[i] - roots[m])
+            if min(gap, abs(gap - 2.0 * pi)) < 1e-3:
+                flags |= DOUBLE
+    if count % 2 == 1:
+        flags |= DOUBLE
+    return count, flags
+
+
+@compiled()
+def polynomial(a0: float, a1: float, a2: float, a3: float, a4: float, slack: float,
+               reference: float, found: Floats) -> tuple[int, int]:  # fmt: skip
+    """``a0 + a1 r + a2 r^2 + a3 r^3 + a4 r^4 = 0``."""
+    roots = np.empty(4)
+    if a3 == 0.0 and a4 == 0.0 and a2 != 0.0:
+        count, flags = quadratic(a2, 0.5 * a1, a0, slack, roots)
+        for i in range(count):
+            put_length(found, i, 0, roots[i])
+        return count, flags
+    g = np.empty(5)
+    g[0], g[1], g[2], g[3], g[4] = a0, a1, a2, a3, a4
+    if np.abs(g).max() == 0.0:
+        put_length(found, 0, 0, reference)
+        return 1, FREE_1
+    count, flags = polynomial_roots(g, roots), 0
+    for i in range(count):
+        put_length(found, i, 0, roots[i])
+        for m in range(i):
+            if abs(roots[i] - roots[m]) < 1e-3 * (1.0 + abs(roots[i])):
+                flags |= DOUBLE
+    return count, flags

@@ -1,0 +1,233 @@
+"""The matrix equations of an arm, element by element: pre- and post-multiplication."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import cos, pi, sin
+
+import numpy as np
+
+from ..._arrays import Array
+from .expressions import UNIT, ZERO, Expression, Graph, Kind, negative
+from .normal_form import NormalForm
+from .polynomials import Monomial, minus, plus, unknowns
+from .products import Fixed, Item, Motion, Rotation, product
+from .unknowns import Joints
+
+SAMPLES = 7
+POSE_NAMES = (("s", "n", "a", "P"), ("x", "y", "z"))
+
+
+@dataclass(frozen=True, slots=True)
+class Split:
+    """A way to write the matrix equation of the arm.
+
+    ``(0Ts)^-1 U0 (pTk)^-1 = sTp``: the first s joints and those after p stand with the pose.
+    ``tool`` says whether a tool that belongs to the chain stays with the joints; ``twist`` that the
+    constant before joint s + 1 stands with the pose as well; ``inverse`` that both sides are
+    inverted.
+    """
+
+    s: int
+    p: int
+    tool: bool = False
+    twist: bool = False
+    inverse: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Equation:
+    """One element of a matrix equation, ``polynomial = 0``, with at most two unknowns."""
+
+    polynomial: dict[Monomial, Expression]
+    unknowns: frozenset[int]
+    split: Split
+    row: int
+    column: int
+    length: int
+
+    @property
+    def of_position(self) -> bool:
+        """Whether it compares positions."""
+        return self.column == 3
+
+
+class Arm:
+    """The matrices of one arm, with the symbols of its pose and table."""
+
+    def __init__(self, form: NormalForm) -> None:
+        self.form = form
+        graph = self.graph = Graph(SAMPLES)
+        rng = np.random.default_rng(3)
+        postures = rng.uniform(-2.5, 2.5, (SAMPLES, form.k))
+        slides = form.sigma == 1
+        postures[:, slides] *= 0.3 * _reach(form)
+        self.constants: list[tuple[str, str, float, str]] = []
+        self.K = [self._row_matrix(j) for j in range(form.k)]
+        self.E = self._tool_matrix()
+        self.joints = Joints(form, graph, [K.R for K in self.K], postures)
+        U = np.array([self._pose(q) for q in postures])
+        R = [[self._element(i, j, U) for j in range(3)] for i in range(3)]
+        self.U0 = Fixed(R, [self._element(i, 3, U) for i in range(3)], False)
+        self.U0_inverse = self.U0.inverse(graph)
+
+    def _element(self, i: int, j: int, U: Array) -> Expression:
+        column, axis = POSE_NAMES[0][j], POSE_NAMES[1][i]
+        latex = f"{column}_{{{axis}}}"
+        return self.graph.symbol(Kind.POSE, column + axis, latex, U[:, i, j])
+
+    def _constant(self, name: str, latex: str, value: float, meaning: str) -> Expression:
+        if value == 0.0:
+            return ZERO
+        if all(name != c[0] for c in self.constants):
+            self.constants.append((name, latex, value, meaning))
+        return self.graph.symbol(Kind.CONSTANT, name, latex, np.full(SAMPLES, value))
+
+    def _angle(self, name: str, latex: str, value: float, meaning: str):  # noqa: ANN202
+        """Cosine and sine of a constant angle."""
+        quarters = round(value / (pi / 2))
+        if abs(value - quarters * pi / 2) < 1e-15:
+            turn = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[quarters % 4]
+            return (turn[0], 0), (turn[1], 0)
+        return (
+            self._constant(f"C{name}", rf"C{latex}", cos(value), f"cosine of {meaning}"),
+            self._constant(f"S{name}", rf"S{latex}", sin(value), f"sine of {meaning}"),
+        )
+
+    def _row_matrix(self, j: int) -> Fixed:
+        row, graph = self.form.rows[j], self.graph
+        name = str(row.frame)
+        ca, sa = self._angle(f"A{name}", rf"\alpha_{{{name}}}", row.alpha, f"alpha{name}")
+        ct, st = self._angle(f"TH{name}", rf"\theta_{{{name}}}", row.theta, f"theta{name}")
+        d = self._constant(f"D{name}", f"D_{{{name}}}", row.d, f"d{name}")
+        r = self._constant(f"RL{name}", f"RL_{{{name}}}", row.r, f"r{name}")
+        X = [[UNIT, ZERO, ZERO], [ZERO, ca, negative(sa)], [ZERO, sa, ca]]
+        turn = [[ct, negative(st), ZERO], [st, ct, ZERO], [ZERO, ZERO, UNIT]]
+        R = [[graph.sum(graph.product(X[i][m], turn[m][c]) for m in range(3)) for c in range(3)]
+             for i in range(3)]  # fmt: skip
+        return Fixed(R, [d, graph.product(negative(sa), r), graph.product(ca, r)])
+
+    def _tool_matrix(self) -> Fixed | None:
+        tool = self.form.tool
+        if np.abs(tool - np.eye(4)).max() < 1e-13:
+            return None
+        R = [[self._turn_element(i, j, float(tool[i, j])) for j in range(3)] for i in range(3)]
+        p = [
+            self._constant(f"{a.upper()}E", f"{a.upper()}_{{E}}", float(tool[i, 3]),
+                           f"{a} of the tool")
+            if abs(tool[i, 3]) > 1e-12 else ZERO
+            for i, a in enumerate("xyz")
+        ]  # fmt: skip
+        return Fixed(R, p)
+
+    def _turn_element(self, i: int, j: int, value: float) -> Expression:
+        if abs(value - round(value)) < 1e-12:
+            return float(round(value)), 0
+        column, axis = POSE_NAMES[0][j], POSE_NAMES[1][i]
+        meaning = f"{column}{axis} of the tool"
+        return self._constant(f"{column}{axis}E", f"{column}_{{{axis}E}}", value, meaning)
+
+    def _pose(self, q: Array) -> Array:
+        T = np.eye(4)
+        for j, row in enumerate(self.form.rows):
+            T = T @ _number(self.K[j], self.graph) @ _motion(q[j], row.sigma)
+        return T if self.E is None else T @ _number(self.E, self.graph)
+
+    def chain(self, start: int, stop: int) -> list[Item]:
+        """``K_j M_j`` of the joints after start up to stop."""
+        return [item for j in range(start, stop) for item in (self.K[j], Motion(j, 1))]
+
+    def inverse_chain(self, start: int, stop: int) -> list[Item]:
+        """The inverse of the same."""
+        return [item for j in reversed(range(start, stop))
+                for item in (Motion(j, -1), self.K[j].inverse(self.graph))]  # fmt: skip
+
+    def sides(self, split: Split) -> tuple[list[Item], list[Item]]:
+        """Matrices on the side of the pose and on the other."""
+        k, tool = self.form.k, [] if self.E is None else [self.E]
+        untool = [E.inverse(self.graph) for E in tool]
+        middle, unmiddle = self.chain(split.s, split.p), self.inverse_chain(split.s, split.p)
+        before, after = self.chain(0, split.s), self.chain(split.p, k)
+        unbefore = self.inverse_chain(0, split.s)
+        unafter = self.inverse_chain(split.p, k)
+        if split.tool:
+            middle, unmiddle = [*middle, *tool], [*untool, *unmiddle]
+        else:
+            after, unafter = [*after, *tool], [*untool, *unafter]
+        if split.twist:
+            K = middle.pop(0)
+            assert isinstance(K, Fixed)
+            unmiddle.pop()
+            before, unbefore = [*before, K], [K.inverse(self.graph), *unbefore]
+        if split.inverse:
+            return [*after, self.U0_inverse, *before], unmiddle
+        return [*unbefore, self.U0, *unafter], middle
+
+    def splits(self, inverse: bool) -> Iterator[Split]:
+        """Ways to write the equation while some joints are known; simplest first."""
+        k, joints = self.form.k, self.joints
+        m = 0
+        while m < k and joints.knows(m):
+            m += 1
+        last = k
+        while last > m and joints.knows(last - 1):
+            last -= 1
+        for s in range(m, last):
+            oblique = not _is_right(self.K[s].R)
+            for p in (*((k,) if last < k else ()), *range(last, s, -1)):
+                for twist in (False, True) if oblique else (False,):
+                    if p == k and self.E is not None:
+                        yield Split(s, p, True, twist, inverse)
+                    yield Split(s, p, False, twist, inverse)
+
+    def equations(self, inverse: bool = False) -> list[Equation]:
+        """Elements of all matrix equations that have one or two unknowns."""
+        found: list[Equation] = []
+        for near in (True, False) if self.joints.tied else (False,):
+            self.joints.near = near
+            found += self._written(inverse)
+        return found
+
+    def _written(self, inverse: bool) -> list[Equation]:
+        found: list[Equation] = []
+        graph, seen = self.graph, set()
+        for split in self.splits(inverse):
+            left, right = (product(side, self.joints) for side in self.sides(split))
+            for column in (3,) if inverse else (3, 0, 1, 2):
+                for row in range(3):
+                    p = plus(graph, left[column][row], minus(right[column][row]))
+                    if not p or not (of := unknowns(p)) or len(of) > 2:
+                        continue
+                    key = frozenset(p.items())
+                    if key in seen or frozenset((m, negative(e)) for m, e in p.items()) in seen:
+                        continue
+                    seen.add(key)
+                    length = sum(graph.leaves(e) for e in p.values())
+                    found.append(Equation(p, of, split, row, column, length))
+        return found
+
+
+def _is_right(R: Rotation) -> bool:
+    return all(e[1] == 0 for row in R for e in row)
+
+
+def _reach(form: NormalForm) -> float:
+    lengths = sum(abs(row.d) + abs(row.r) for row in form.rows)
+    return lengths + float(np.abs(form.tool[:3, 3]).sum()) or 1.0
+
+
+def _number(item: Fixed, graph: Graph) -> Array:
+    T = np.eye(4)
+    T[:3, :3] = [[graph.values(e)[0] for e in row] for row in item.R]
+    T[:3, 3] = [graph.values(e)[0] for e in item.p]
+    return T
+
+
+def _motion(x: float, slides: int) -> Array:
+    T = np.eye(4)
+    if slides:
+        T[2, 3] = x
+    else:
+        T[:2, :2] = [[cos(x), -sin(x)], [sin(x), cos(x)]]
+    return T

@@ -1,0 +1,256 @@
+"""Which angles and lengths are known, and the sines and cosines of sums about parallel axes.
+
+Revolute joints whose axes are parallel, whatever slides between them, form a group. Its running
+sums of angles are points on a line: ``Phi_0 = 0, Phi_1, ...``; a joint's angle, or the sum of
+several, is the difference of two of them. Solving an angle ties two points together, so that a sum
+that is known (theta_234 of a UR arm) is used as readily as a joint that is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ..._arrays import Array
+from .expressions import UNIT, ZERO, Expression, Graph, Kind, negative
+from .normal_form import NormalForm, Row
+from .polynomials import Polynomial, constant, plus, scaled
+
+CosSin = tuple[Expression, Expression]
+
+
+class Span(NamedTuple):
+    """A sum of angles: the difference of two running sums of a group."""
+
+    group: int
+    a: int
+    b: int
+
+
+@dataclass(frozen=True, slots=True)
+class Unknown:
+    """A variable of the equations: an angle (a joint's or a sum), or the length of a joint.
+
+    ``terms`` are the joints whose variables add up to it, with their signs.
+    """
+
+    span: Span | None
+    terms: tuple[tuple[int, float], ...]
+    slides: bool
+    name: str
+    latex: str
+
+
+@dataclass(slots=True)
+class Solved:
+    """A span whose angle a step gave: the symbols of its cosine and sine."""
+
+    span: Span
+    unknown: int
+    cos: Expression
+    sin: Expression
+
+
+class Joints:
+    """The joints of an arm, the groups of parallel ones, and what is known of them so far."""
+
+    def __init__(self, form: NormalForm, graph: Graph, rotations: list[list[list[Expression]]],
+                 postures: Array) -> None:  # fmt: skip
+        self.form, self.graph, self.postures = form, graph, postures
+        self.unknowns: list[Unknown] = []
+        self._numbers: dict[object, int] = {}
+        self.lengths: dict[int, Expression] = {}  # of solved sliding joints
+        self.solved: list[Solved] = []
+        self.group: dict[int, tuple[int, int, float]] = {}  # joint: group, place, sense
+        self.members: list[list[int]] = []
+        self._grouped(rotations)
+        self._rep = [list(range(len(m) + 1)) for m in self.members]
+        self.near = False  # write an unknown angle by the shortest sum, or from the first joint
+
+    def _grouped(self, rotations: list[list[list[Expression]]]) -> None:
+        sense = 1.0
+        between: Array = np.eye(3)
+        for j, row in enumerate(self.form.rows):
+            between = between @ np.array([[self.graph.values(e)[0] for e in r]
+                                          for r in rotations[j]])  # fmt: skip
+            if row.sigma:
+                continue
+            parallel = abs(abs(between[2, 2]) - 1.0) < 1e-15
+            if self.members and parallel:
+                sense *= float(np.sign(between[2, 2]))
+                self.members[-1].append(j)
+            else:
+                sense = 1.0
+                self.members.append([j])
+            self.group[j] = len(self.members) - 1, len(self.members[-1]) - 1, sense
+            between = np.eye(3)
+
+    def sense(self, span: Span) -> float:
+        """Sense of the first joint of a span within its group."""
+        return self.group[self.members[span.group][min(span.a, span.b)]][2]
+
+    def terms(self, span: Span) -> tuple[tuple[int, float], ...]:
+        """Joints of a span a < b with their signs, the first one positive."""
+        joints = self.members[span.group][span.a : span.b]
+        first = self.sense(span)
+        return tuple((j, first * self.group[j][2]) for j in joints)
+
+    def span_of(self, j: int) -> Span:
+        """Span of one revolute joint."""
+        group, place, _ = self.group[j]
+        return Span(group, place, place + 1)
+
+    def frame(self, j: int) -> int:
+        """Number of a joint's frame in the table."""
+        return self.form.rows[j].frame
+
+    def row(self, j: int) -> Row:
+        """Constants of a joint."""
+        return self.form.rows[j]
+
+    def _letters(self, terms: tuple[tuple[int, float], ...], latex: bool = False) -> str:
+        wide = max(row.frame for row in self.form.rows) > 9
+        out = ""
+        for j, sign in terms:
+            minus = ("-" if latex else "m") if sign < 0 else ""
+            comma = ("," if latex else "_") if wide and out and not minus else ""
+            out += comma + minus + str(self.frame(j))
+        return out
+
+    def unknown(self, key: Span | int) -> int:
+        """Number of the unknown of a span (a < b) or of a sliding joint."""
+        if key not in self._numbers:
+            if isinstance(key, Span):
+                terms = self.terms(key)
+                letters = self._letters(terms)
+                item = Unknown(key, terms, False, letters, self._letters(terms, latex=True))
+            else:
+                name = str(self.frame(key))
+                item = Unknown(None, ((key, 1.0),), True, name, name)
+            self._numbers[key] = len(self.unknowns)
+            self.unknowns.append(item)
+        return self._numbers[key]
+
+    def samples(self, number: int) -> Array:
+        """Values of an unknown at the sample postures."""
+        values = np.zeros(self.graph.samples)
+        for j, sign in self.unknowns[number].terms:
+            values += sign * self.postures[:, j]
+        return values
+
+    def symbols(self, number: int) -> CosSin:
+        """Symbols of the cosine and sine of an angle, or of a length (with 0)."""
+        item, values = self.unknowns[number], self.samples(number)
+        if item.slides:
+            name, latex = f"r{item.name}", f"r_{{{item.latex}}}"
+            return self.graph.symbol(Kind.JOINT, name, latex, values), ZERO
+        C = self.graph.symbol(Kind.JOINT, f"C{item.name}", f"C_{{{item.latex}}}", np.cos(values))
+        S = self.graph.symbol(Kind.JOINT, f"S{item.name}", f"S_{{{item.latex}}}", np.sin(values))
+        return C, S
+
+    def settle(self, number: int) -> None:
+        """Count an unknown as known from now on."""
+        item = self.unknowns[number]
+        C, S = self.symbols(number)
+        if item.span is None:
+            self.lengths[item.terms[0][0]] = C
+            return
+        self.solved.append(Solved(item.span, number, C, S))
+        rep = self._rep[item.span.group]
+        low, high = sorted((rep[item.span.a], rep[item.span.b]))
+        self._rep[item.span.group] = [low if r == high else r for r in rep]
+
+    def knows(self, j: int) -> bool:
+        """Whether a joint is known by itself."""
+        if self.row(j).sigma:
+            return j in self.lengths
+        group, place, _ = self.group[j]
+        return self._rep[group][place] == self._rep[group][place + 1]
+
+    def path(self, span: Span) -> list[tuple[Solved, float]]:
+        """Solved spans that add up to a known one, with their signs in the sense of the group."""
+        seen: dict[int, list[tuple[Solved, float]]] = {span.a: []}
+        waiting = [span.a]
+        while waiting:
+            at = waiting.pop(0)
+            for solved in self.solved:
+                if solved.span.group != span.group:
+                    continue
+                for start, end, way in ((solved.span.a, solved.span.b, 1.0),
+                                        (solved.span.b, solved.span.a, -1.0)):  # fmt: skip
+                    if start == at and end not in seen:
+                        seen[end] = [*seen[at], (solved, way)]
+                        waiting.append(end)
+        return seen[span.b]
+
+    def _known(self, span: Span) -> CosSin:
+        """Cosine and sine of ``Phi_b - Phi_a``, which is known, in the sense of the group."""
+        if span.a == span.b:
+            return UNIT, ZERO
+        if span.a > span.b:
+            C, S = self._known(Span(span.group, span.b, span.a))
+            return C, negative(S)
+        sense, sums, products = self.sense(span), self.graph.sum, self.graph.product
+        C, S = UNIT, ZERO
+        path = self.path(span)
+        for solved, way in path:
+            way *= self.sense(solved.span)
+            c, s = solved.cos, (way * solved.sin[0], solved.sin[1])
+            C, S = (
+                sums((products(C, c), negative(products(S, s)))),
+                sums((products(S, c), products(C, s))),
+            )
+        if len(path) > 1:
+            terms = self.terms(span)
+            letters, latex = self._letters(terms), self._letters(terms, latex=True)
+            C = self.graph.named(f"C{letters}", f"C_{{{latex}}}", C)
+            S = self.graph.named(f"S{letters}", f"S_{{{latex}}}", (sense * S[0], S[1]))
+            S = (sense * S[0], S[1])
+        return C, S
+
+    def cos_sin(self, span: Span, way: float) -> tuple[Polynomial, Polynomial]:
+        """Cosine and sine of ``way (Phi_b - Phi_a)`` as polynomials."""
+        rep = self._rep[span.group]
+        ra, rb = rep[span.a], rep[span.b]
+        if ra == rb:
+            C, S = self._known(span)
+            return constant(C), constant((way * S[0], S[1]))
+        if self.near:
+            ends = ((abs(a - b), a, b) for a in range(len(rep)) for b in range(len(rep))
+                    if rep[a] == ra and rep[b] == rb)  # fmt: skip
+            _, ra, rb = min(ends)
+        key = Span(span.group, min(ra, rb), max(ra, rb))
+        number = self.unknown(key)
+        turn = self.sense(key) * (1.0 if ra < rb else -1.0)
+        c: Polynomial = {(2 * number,): UNIT}
+        s: Polynomial = {(2 * number + 1,): (turn, 0)}
+        # the rest, Phi_b - Phi_rb + Phi_ra - Phi_a, is known
+        g, products = self.graph, self.graph.product
+        C1, S1 = self._known(Span(span.group, rb, span.b))
+        C2, S2 = self._known(Span(span.group, span.a, ra))
+        C = g.sum((products(C1, C2), negative(products(S1, S2))))
+        S = g.sum((products(S1, C2), products(C1, S2)))
+        cosine = plus(g, scaled(g, C, c), scaled(g, negative(S), s))
+        sine = plus(g, scaled(g, C, s), scaled(g, S, c))
+        return cosine, scaled(g, (way, 0), sine)
+
+    def length(self, j: int) -> Polynomial:
+        """Length of a sliding joint."""
+        if j in self.lengths:
+            return constant(self.lengths[j])
+        return {(2 * self.unknown(j),): UNIT}
+
+    @property
+    def tied(self) -> bool:
+        """Whether unknown angles can be written in more than one way."""
+        return any(1 < len(set(rep)) < len(rep) for rep in self._rep)
+
+    def is_free_of(self, number: int) -> bool:
+        """Whether an unknown is still one: neither solved nor tied by what has been."""
+        item = self.unknowns[number]
+        if item.span is None:
+            return item.terms[0][0] not in self.lengths
+        rep = self._rep[item.span.group]
+        return rep[item.span.a] != rep[item.span.b]
