@@ -228,6 +228,58 @@ def test_two_robots_side_by_side_have_nodes_of_their_own():
     assert len(set(scene.paths)) == len(scene.paths)
 
 
+def test_postures_beside_each_other():
+    """Each where it would stand alone, moved along x and against y, and none touches another."""
+    arm = SCARA
+    q = np.array([[0.1, 0.5, 0.1], [0.9, -0.7, 0.0], [-1.0, 0.2, 0.2], [2.0, 1.0, 0.1], [0, 0, 0]])
+    scene = rm.viz.show(arm, q, columns=2)
+    assert len(set(scene.paths)) == len(scene.paths)
+    assert scene.title == "scara"
+    spans, shifts = [], []
+    for k, posture in enumerate(q):
+        root = "robots/scara" + (f"_{k + 1}" if k else "")
+        shift = scene.pose(root)[:3, 3] - arm.base[:3, 3]
+        path = next(p for p in scene.paths if p.startswith(root + "/") and p.endswith("joint_3/q"))
+        T = rm.link_poses(arm, posture)
+        np.testing.assert_allclose(scene.pose(path)[:3, 3], T[2, :3, 3] + shift, atol=1e-14)
+        points = np.vstack((T[:, :3, 3], arm.base[:3, 3])) + shift
+        spans.append((points.min(axis=0), points.max(axis=0)))
+        shifts.append(shift)
+    assert shifts[0].tolist() == [0, 0, 0]
+    np.testing.assert_allclose(shifts[3], shifts[1] + shifts[2], atol=1e-14)
+    assert shifts[1][0] > 0 > shifts[2][1]
+    assert np.abs([shifts[1][1:], shifts[2][::2]]).max() == 0
+    for k, (low, high) in enumerate(spans):
+        for other_low, other_high in spans[:k]:
+            assert ((low > other_high) | (high < other_low))[:2].any()
+    texts = [n.shape.text for n in scene.nodes if n.path.startswith("numbers/")]
+    assert texts == ["1", "2", "3", "4", "5"]
+    colors = {n.color for n in scene.nodes if "/shape:" in n.path}
+    assert len(colors) == 5  # the feet too
+
+
+def test_sixteen_postures_have_sixteen_colors():
+    scene = rm.viz.show(
+        RX90, np.linspace(np.zeros(6), np.ones(6), 16), legend=[str(k) for k in range(16)]
+    )
+    assert len({n.color for n in scene.nodes if "/shape:" in n.path and "posture" in n.path}) == 16
+    assert len({color for _, color in scene.legend}) == 16
+
+
+def test_legend_names_the_colors_of_the_links():
+    q = np.zeros((2, 6))
+    scene = rm.viz.show(RX90, q, color=[(1, 0, 0), (0, 0, 1)], legend=["<up> & away", "down"])
+    assert scene.legend == (("<up> & away", (1.0, 0.0, 0.0, 1.0)), ("down", (0.0, 0.0, 1.0, 1.0)))
+    text = scene.html()
+    assert "background: #ff0000" in text
+    assert "&lt;up&gt; &amp; away</li>" in text
+    assert "<up>" not in text
+    assert scene._repr_html_().count('"') == 4
+    assert '<ul id="legend">' not in rm.viz.show(RX90, q).html()
+    two = rm.viz.show([RX90, SCARA], color=[(1, 0, 0), (0, 1, 0)], legend=["one", "two"])
+    assert [color[1] for _, color in two.legend] == [0.0, 1.0]
+
+
 def test_workspace_box():
     scene = rm.viz.show(SCARA, box=(0.0, 0.5, -0.2, 0.2, 0.1, 0.4))
     faces = next(n for n in scene.nodes if n.path == "box/faces")
@@ -612,6 +664,15 @@ def test_wrong_options():
         rm.viz.show(RX90, np.zeros((2, 6)), color=[(1, 0, 0)] * 3)
     with pytest.raises(ShapeError, match="view"):
         rm.viz.show(RX90, view=(1,))
+    for bad in (0, -1, 1.5, True, "two"):
+        with pytest.raises(InvalidValueError, match="columns: expected how many"):
+            rm.viz.show(RX90, np.zeros((2, 6)), columns=bad)
+    with pytest.raises(InvalidValueError, match="several robots stand"):
+        rm.viz.show([RX90, SCARA], columns=2)
+    with pytest.raises(InvalidValueError, match="legend: expected a list of texts, got str"):
+        rm.viz.show(RX90, np.zeros((2, 6)), legend="ab")
+    with pytest.raises(ShapeError, match="each of the 2 postures drawn, got 3"):
+        rm.viz.show(RX90, np.zeros((2, 6)), legend=["a", "b", "c"])
     with pytest.raises(FrameNotFoundError, match="node"):
         rm.viz.show(RX90).pose("robots/rx91")
 

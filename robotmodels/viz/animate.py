@@ -106,4 +106,4 @@ def animate(
         robots.append(robot)
     count = max(len(motion) for motion in samples)
     played = Motion(tuple(tracks), count, float(sample_times(count, dt, fps)[-1]), bool(loop))
-    return compose(labels, robots, paths, box, grid, view, height, played)
+    return compose(", ".join(labels), robots, paths, box, grid, view, height, played)

@@ -15,6 +15,7 @@ from ..visual import Color
 from .camera import framed
 from .motion import Motion
 from .nodes import Node
+from .palette import Legend
 from .robot import DrawnRobot
 from .scene import Scene
 from .surroundings import floor_grid, workspace_box
@@ -172,7 +173,7 @@ def unique_names(models: Sequence[RobotModel]) -> tuple[str, ...]:
 
 
 def compose(
-    names: Sequence[str],
+    title: str,
     robots: Sequence[DrawnRobot],
     extra: Sequence[Node],
     box: ArrayLike | None,
@@ -180,13 +181,14 @@ def compose(
     view: ArrayLike | None,
     height: int,
     motion: Motion | None = None,
+    legend: Legend = (),
 ) -> Scene:
     """Put robots and what stands around them into a scene that they fill.
 
     Parameters
     ----------
-    names : sequence of str
-        Of the robots.
+    title : str
+        Of the picture.
     robots : sequence of DrawnRobot
         The robots.
     extra : sequence of Node
@@ -201,6 +203,8 @@ def compose(
         Pixels in a notebook.
     motion : Motion, optional
         What is played.
+    legend : tuple of (str, Color)
+        What the colours stand for.
 
     Returns
     -------
@@ -220,4 +224,4 @@ def compose(
     if view is not None:
         azimuth, elevation = as_exact(view, (2,), "view").tolist()
         angles = (azimuth, elevation)
-    return Scene(", ".join(names), tuple(nodes), framed(points, angles), motion, height)
+    return Scene(title, tuple(nodes), framed(points, angles), motion, height, legend)

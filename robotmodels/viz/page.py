@@ -24,6 +24,7 @@ from ..visual import Box, Color, Cylinder, Sphere
 from .camera import FIELD_OF_VIEW, Camera
 from .motion import Motion
 from .nodes import Drawable, Label, Node, Segments, Triangles
+from .palette import Legend
 
 _SKY = ([0.86, 0.91, 0.97], [1.0, 1.0, 1.0])
 # Lights far away (directional), so that a gantry of ten metres is as bright as a finger.
@@ -48,13 +49,18 @@ _TEMPLATE = """<!DOCTYPE html>
 <style>
 body {{ margin: 0; }}
 #meshcat-pane {{ width: 100vw; height: 100vh; overflow: hidden; }}
+#legend {{ position: absolute; left: 10px; top: 10px; margin: 0; padding: 6px 10px;
+ list-style: none; font: 13px/1.5 sans-serif; color: #222; background: rgba(255, 255, 255, 0.8);
+ border-radius: 4px; }}
+#legend span {{ display: inline-block; width: 0.9em; height: 0.9em; margin-right: 0.5em;
+ vertical-align: -0.1em; border-radius: 2px; }}
 #message {{ display: none; margin: 2em; font-family: sans-serif; }}
 </style>
 </head>
 <body>
 <p id="message">This picture needs WebGL, which this browser or its settings do not offer.</p>
 <div id="meshcat-pane"></div>
-<script>
+{legend}<script>
 {viewer}
 </script>
 <script type="application/json" id="scene">
@@ -93,7 +99,13 @@ body {{ margin: 0; }}
 """
 
 
-def page(title: str, nodes: Iterable[Node], camera: Camera, motion: Motion | None) -> str:
+def page(
+    title: str,
+    nodes: Iterable[Node],
+    camera: Camera,
+    motion: Motion | None,
+    legend: Legend = (),
+) -> str:
     """Write a scene as one HTML page.
 
     Parameters
@@ -106,6 +118,8 @@ def page(title: str, nodes: Iterable[Node], camera: Camera, motion: Motion | Non
         Where to look from.
     motion : Motion or None
         What is played.
+    legend : tuple of (str, Color)
+        What the colours stand for.
 
     Returns
     -------
@@ -130,8 +144,26 @@ def page(title: str, nodes: Iterable[Node], camera: Camera, motion: Motion | Non
     scene = json.dumps(content, separators=(",", ":"))
     # a "<" could end the script element or open a comment in it
     return _TEMPLATE.format(
-        title=escape(title), viewer=_viewer_script(), scene=scene.replace("<", "\\u003c")
-    )
+        title=escape(title), viewer=_viewer_script(), scene=scene.replace("<", "\\u003c"),
+        legend=_legend_list(legend),
+    )  # fmt: skip
+
+
+def _legend_list(legend: Legend) -> str:
+    """A list of coloured squares with their texts, or nothing."""
+    if not legend:
+        return ""
+    items = [
+        f'<li><span style="background: #{_rgb(color):06x}"></span>{escape(text)}</li>'
+        for text, color in legend
+    ]
+    return "\n".join(('<ul id="legend">', *items, "</ul>\n"))
+
+
+def _rgb(color: Color) -> int:
+    """Red, green and blue as the number that a browser writes in six hexadecimal digits."""
+    r, g, b = (round(255 * min(max(c, 0.0), 1.0)) for c in color[:3])
+    return (r << 16) + (g << 8) + b
 
 
 class _ArrayStore:
@@ -244,11 +276,12 @@ def _position(points: np.ndarray, store: _ArrayStore) -> dict[str, Any]:
 
 
 def _material(shape: Drawable, color: Color) -> dict[str, Any]:
-    r, g, b = (round(255 * min(max(c, 0.0), 1.0)) for c in color[:3])
     material: dict[str, Any] = {
-        "uuid": "material", "color": (r << 16) + (g << 8) + b,
-        "transparent": color[3] < 1.0, "opacity": float(color[3]),
-    }  # fmt: skip
+        "uuid": "material",
+        "color": _rgb(color),
+        "transparent": color[3] < 1.0,
+        "opacity": float(color[3]),
+    }
     match shape:
         case Label():
             # drawn over everything, as large as its distance makes it

@@ -13,6 +13,7 @@ from .camera import Camera
 from .motion import Motion
 from .nodes import Node
 from .page import page
+from .palette import Legend
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,6 +32,8 @@ class Scene:
         What is played.
     height : int
         Pixels in a notebook.
+    legend : tuple of (str, Color)
+        What the colours stand for, listed in a corner.
 
     Examples
     --------
@@ -47,6 +50,7 @@ class Scene:
     camera: Camera
     motion: Motion | None = None
     height: int = 480
+    legend: Legend = ()
 
     @property
     def paths(self) -> tuple[str, ...]:
@@ -92,7 +96,7 @@ class Scene:
         MissingExtraError
             meshcat is not installed.
         """
-        return page(self.title, self.nodes, self.camera, self.motion)
+        return page(self.title, self.nodes, self.camera, self.motion, self.legend)
 
     def save(self, path: str | Path) -> Path:
         """Write the picture as one offline page, with its animation.

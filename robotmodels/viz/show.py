@@ -7,19 +7,15 @@ from collections.abc import Sequence
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_vector
-from ..errors import ShapeError
+from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel
 from ..visual import Color
+from .beside import FROM_THE_FRONT, beside
 from .compose import as_color, as_many, as_models, as_opacity, compose, unique_names
+from .nodes import Node
+from .palette import PALETTE, as_legend
 from .robot import Look, draw_robot
 from .scene import Scene
-
-# Distinct also for colour-blind readers (Okabe and Ito), for postures drawn over each other.
-_PALETTE: tuple[Color, ...] = (
-    (0.00, 0.45, 0.70, 1.0), (0.90, 0.60, 0.00, 1.0), (0.00, 0.62, 0.45, 1.0),
-    (0.80, 0.40, 0.00, 1.0), (0.80, 0.47, 0.65, 1.0), (0.34, 0.71, 0.91, 1.0),
-    (0.85, 0.78, 0.15, 1.0), (0.35, 0.35, 0.35, 1.0),
-)  # fmt: skip
 
 
 def show(
@@ -36,6 +32,8 @@ def show(
     grid: bool = True,
     view: ArrayLike | None = None,
     height: int = 480,
+    columns: int | None = None,
+    legend: Sequence[str] | None = None,
 ) -> Scene:
     """Draw a robot, several postures of it over each other, or several robots; also called plot.
 
@@ -68,6 +66,13 @@ def show(
         Azimuth and elevation of the camera seen from the robot, radians; default obliquely.
     height : int
         Of the picture in a notebook, pixels.
+    columns : int, optional
+        Postures of one robot beside each other, so many in a row, numbered from 1; without it
+        they stand over each other, where those that differ only by the turn of a link hide one
+        another.
+    legend : sequence of str, optional
+        A text for each posture drawn (those of the first robot first), listed in a corner of the
+        picture with its colour.
 
     Returns
     -------
@@ -97,12 +102,23 @@ def show(
     ]
     colors = _colors(color, [len(p) for p in postures])
     look = Look(bool(frames), bool(names), bool(tool), bool(meshes), as_opacity(opacity))
-    labels = unique_names(models)
+    title = ", ".join(unique_names(models))
+    key = as_legend(legend, [c for each in colors for c in each])
+    drawn, numbers = list(models), list[Node]()
+    if columns is not None:
+        if len(drawn) > 1:
+            raise InvalidValueError(
+                "columns: the postures of one robot stand beside each other; several robots stand "
+                "where their bases are, see RobotModel.with_base."
+            )
+        drawn, numbers = beside(drawn[0], postures[0], columns)
+        view = FROM_THE_FRONT if view is None else view
+        postures, colors = [p[None] for p in postures[0]], [[c] for c in colors[0]]
     robots = [
         draw_robot(item, p, f"robots/{label}", look, c)
-        for item, p, label, c in zip(models, postures, labels, colors, strict=True)
+        for item, p, label, c in zip(drawn, postures, unique_names(drawn), colors, strict=True)
     ]
-    return compose(labels, robots, (), box, grid, view, height)
+    return compose(title, robots, numbers, box, grid, view, height, legend=key)
 
 
 def _as_postures(value: ArrayLike | None, model: RobotModel) -> Array:
@@ -123,7 +139,7 @@ def _colors(
     """A colour, or None for the links' own, for each posture of each robot."""
     if color is None:
         return [
-            [None] if count == 1 else [_PALETTE[k % len(_PALETTE)] for k in range(count)]
+            [None] if count == 1 else [PALETTE[k % len(PALETTE)] for k in range(count)]
             for count in counts
         ]
     if hasattr(color, "__len__") and len(color) and hasattr(color[0], "__len__"):  # type: ignore[arg-type,index]
