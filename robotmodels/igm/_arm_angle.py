@@ -8,7 +8,7 @@ each that reach an orientation.
 
 from __future__ import annotations
 
-from math import atan2, cos, hypot, sin, sqrt
+from math import atan2, cos, hypot, pi, sin, sqrt
 
 import numpy as np
 from numba import types
@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 from ..kernels._compile import INTS, MATRIX, OUT1, STACK, VECTOR, Floats, Ints, compiled
 from ._check import EXACT, MERGE, improved, missing, wrapped
 from ._concurrent import advance
-from ._equations import DOUBLE, NONE, type_2
+from ._equations import DOUBLE, NONE, TWO, type_2
 from ._wrist import wrist_postures
 
 STEPS = 12  # Gauss-Newton steps for a posture that rounding or a rounded table left beside its pose
 ROUGH = 1e-2  # candidates that miss by more are none [m, rad]
 ALONG = 1e-6  # sine between the line and base z below which base x takes its place
-STRAIGHT = 1e-7  # sine of the bend of the elbow below which it counts as stretched or folded
+STRAIGHT = 4e-7  # bend below which the elbow counts as stretched or folded: 1e-14 m or so
 NO_LINE = 1e-9  # distance from shoulder to wrist below which there is no line [m]
 
 _OUT4 = types.Array(types.float64, 4, "C")
@@ -238,9 +238,14 @@ def arm_angle_rows(
         length = sqrt(line[0] * line[0] + line[1] * line[1] + line[2] * line[2])
         # an overshoot by a length moves Z by that times the distance
         slack = (length + 1e-9) * max(tolerances[0], 1e-9)
-        kind, first, second = type_2(X, Y, 0.5 * (known - length * length), slack, 0.0)
+        Z = 0.5 * (known - length * length)
+        kind, first, second = type_2(X, Y, Z, slack, 0.0)
         if kind == NONE or not length >= 0.0:
             continue
+        if kind == TWO and abs(sin(first - second)) < 2.0 * STRAIGHT:
+            # rounding splits the double root of a stretched or folded arm, and would take it out
+            # of line with an aligned shoulder or wrist
+            kind, first = DOUBLE, atan2(X, Y) + (0.0 if Z > 0.0 else pi)
         no_line = length < NO_LINE
         if not no_line:
             reference_axes(line[0] / length, line[1] / length, line[2] / length, B)
