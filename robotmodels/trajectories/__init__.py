@@ -4,6 +4,7 @@ Seed book sections 4.2 and 4.3. Every generator of joint motion returns a `Traje
 arrays of ``ctraj`` and ``jtraj`` come from `cartesian_trajectory` and `joint_trajectory`.
 """
 
+from .jerk import jerk_limited
 from .laws import TimeLaw
 from .limits import LimitsReport, MotionLimits
 from .point_to_point import (
@@ -29,6 +30,7 @@ __all__ = [
     "bang_bang",
     "cartesian_trajectory",
     "cubic",
+    "jerk_limited",
     "joint_trajectory",
     "linear",
     "quintic",

@@ -51,12 +51,15 @@ class LineLimits(NamedTuple):
         Greatest ``s''`` and ``-s''``.
     jerk : ndarray
         Greatest absolute ``s'''``.
+    back : ndarray
+        Greatest ``-s'``, which motions from rest to rest never need.
     """
 
     velocity: Array
     acceleration: Array
     deceleration: Array
     jerk: Array
+    back: Array
 
 
 class Pieces(NamedTuple):
@@ -103,11 +106,11 @@ def law_of_limits(law: TimeLaw, distance: Array, limits: LineLimits) -> Pieces:
     Examples
     --------
     >>> one, none = np.ones(1), np.full(1, np.inf)
-    >>> law_of_limits(TimeLaw.TRAPEZOIDAL, 2 * one, LineLimits(one, one, one, none)).durations
+    >>> law_of_limits(TimeLaw.TRAPEZOIDAL, 2 * one, LineLimits(one, one, one, none, one)).durations
     array([[1., 1., 1.]])
     """
     moves = distance > 0.0
-    V, A, B, J = (np.where(moves, limit, np.inf) for limit in limits)
+    V, A, B, J, _ = (np.where(moves, limit, np.inf) for limit in limits)
     L = np.where(moves, distance, 0.0)
     if law in (TimeLaw.BANG_BANG, TimeLaw.TRAPEZOIDAL) and np.isfinite(J).any():
         raise InvalidValueError(

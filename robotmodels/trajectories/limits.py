@@ -203,8 +203,10 @@ class LimitsReport:
             above = high.reshape(-1, n).max(axis=0)
             for j in range(n):
                 for value, bound, side in ((above[j], most[j], 1.0), (below[j], least[j], -1.0)):
+                    if np.isinf(bound):
+                        continue
                     slack = self.tolerance * max(abs(bound), float(name == "position"))
-                    if np.isfinite(bound) and side * (value - bound) > slack:
+                    if side * (value - bound) > slack:
                         found.append(f"joint {j + 1}: {name} {value:.6g}, allowed {bound:.6g}")
         return tuple(found)
 

@@ -28,6 +28,9 @@ class PiecewisePolynomial:
         Times, s, ascending from 0; c is 1 (all joints change pieces together) or n.
     coefficients : array_like, shape (..., K, d + 1, n)
         rad or m, lowest power first.
+    lengths : array_like, shape (..., c, K), optional
+        Durations of the pieces, s, where they are known to more digits than the difference of
+        their breaks has.
 
     Raises
     ------
@@ -43,6 +46,7 @@ class PiecewisePolynomial:
 
     breaks: Array
     coefficients: Array
+    lengths: Array = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         breaks, coefficients = read_only(self.breaks), read_only(self.coefficients)
@@ -55,6 +59,10 @@ class PiecewisePolynomial:
             )
         object.__setattr__(self, "breaks", breaks)
         object.__setattr__(self, "coefficients", coefficients)
+        lengths = read_only(np.diff(breaks) if self.lengths is None else self.lengths)
+        if lengths.shape != (*batch, c, K):
+            raise ShapeError(f"lengths: expected shape {(*batch, c, K)}, got {lengths.shape}.")
+        object.__setattr__(self, "lengths", lengths)
 
     @property
     def n(self) -> int:
@@ -106,9 +114,9 @@ class PiecewisePolynomial:
         lower, upper : ndarray, shapes (..., n)
             Infinite where the derivative below jumps between two pieces.
         """
-        h = np.diff(self.breaks)  # (..., c, K)
-        live = np.swapaxes(h, -1, -2) > 0.0  # (..., K, c)
-        step = np.where(live, np.swapaxes(h, -1, -2), 1.0)
+        h = np.swapaxes(self.lengths, -1, -2)  # (..., K, c)
+        live = h > 0.0
+        step = np.where(live, h, 1.0)
         c = _derived(self.coefficients, order) / step[..., None, :] ** order
         low, high = _range_on_unit_interval(c)
         none = ~live.any(axis=-2)
@@ -143,29 +151,37 @@ class PiecewisePolynomial:
         times = t if order is None else t[order]
         together = self.breaks.shape[0] == 1
         powers = np.ones((self.coefficients.shape[-2], t.size))
+        derived = [_derived(self.coefficients, m) for m in orders]
         for j, breaks in enumerate(self.breaks):
             column = slice(None) if together else j
+            lengths = self.lengths[j]
             edges = [0, *np.searchsorted(times, breaks[1:-1]).tolist(), len(times)]
+            live = np.flatnonzero(lengths > 0.0)
+            if live.size:  # the end belongs to the last piece that has a length
+                edges[live[-1] + 1 :] = [len(times)] * (len(lengths) - live[-1])
             for k, (first, last) in enumerate(pairwise(edges)):
                 if first == last:
                     continue
-                h = float(breaks[k + 1] - breaks[k]) or 1.0
+                h = float(lengths[k]) or 1.0
                 X = powers[:, : last - first]
                 x = (times[first:last] - breaks[k]) / h
                 for i in range(1, len(X)):
                     np.multiply(X[i - 1], x, out=X[i])
                 rows = slice(first, last) if order is None else order[first:last]
-                for result, m in zip(out, orders, strict=True):
-                    c = _derived(self.coefficients[k], m)[:, column] / h**m
-                    result[rows, column] = X[: len(c)].T @ c
+                for result, m, d in zip(out, orders, derived, strict=True):
+                    result[rows, column] = X[: d.shape[-2]].T @ (d[k][:, column] / h**m)
 
     def _by_gathering(self, t: Array, orders: tuple[int, ...], out: list[Array]) -> None:
         """Several motions: the coefficients of every time's piece are brought together."""
         for j in range(self.n):
             breaks = self.breaks[..., min(j, self.breaks.shape[-2] - 1), :]
+            lengths = self.lengths[..., min(j, self.lengths.shape[-2] - 1), :]
             piece = (t[..., None] >= breaks[..., None, 1:-1]).sum(axis=-1)
+            # the end belongs to the last piece that has a length
+            last = np.where(lengths > 0.0, np.arange(lengths.shape[-1]), 0).max(axis=-1)
+            piece = np.minimum(piece, last[..., None])
             start = np.take_along_axis(breaks, piece, axis=-1)
-            h = np.take_along_axis(breaks, piece + 1, axis=-1) - start
+            h = np.take_along_axis(lengths, piece, axis=-1)
             h = np.where(h > 0.0, h, 1.0)
             x = (t - start) / h
             c = np.take_along_axis(self.coefficients[..., j], piece[..., None], axis=-2)
@@ -223,7 +239,7 @@ def _real_roots(c: Array) -> Array:
         root = np.sqrt(np.maximum(half * half - c[..., 2] * c[..., 0], 0.0))
         far = half + np.copysign(root, half)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            x = np.stack((far / c[..., 2], c[..., 0] / far), axis=-1)
+            x: Any = np.stack((far / c[..., 2], c[..., 0] / far), axis=-1)
         return np.clip(np.nan_to_num(x, nan=0.0, posinf=1.0, neginf=0.0), 0.0, 1.0)
     # a leading coefficient that is nothing beside the others moves only roots far outside
     lead = np.where(np.abs(c[..., -1]) < 1e-14, 1e-14, c[..., -1])

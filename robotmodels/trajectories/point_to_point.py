@@ -312,33 +312,30 @@ def limits_along(limits: MotionLimits, direction: Array) -> LineLimits:
     """
     own = direction.shape[-1] == 1 and direction.shape[-2] == limits.velocity.size
     u = direction[..., 0] if own else direction[..., 0, :]
-    forward, moves = u > 0.0, u != 0.0
-    size = np.where(moves, np.abs(u), 1.0)
+    size = np.where(u != 0.0, np.abs(u), 1.0)
 
-    def along(name: str, least: Array, most: Array) -> tuple[Array, Array]:
-        zero = moves & (np.where(forward, most, -least) == 0.0)
-        if zero.any():
+    def along(name: str, least: Array, most: Array, needed: bool = True) -> Array:
+        """The bound that stops the coordinate from growing."""
+        bound = np.where(u > 0.0, most, -least)
+        zero = (u != 0.0) & (bound == 0.0)
+        if needed and zero.any():
             j = int(np.argwhere(zero)[0][-1])
             raise InvalidValueError(
-                f"limits: the limit of {name} of joint {j + 1} is 0, but it has to move; any "
-                "positive limit will do, or leave the joint where it is."
+                f"limits: a limit of {name} of joint {j + 1} is 0, but it has to move; any "
+                "other limit will do, or leave the joint where it is."
             )
         with np.errstate(over="ignore"):
-            with_it = np.where(moves, np.where(forward, most, -least) / size, np.inf)
-            against = np.where(moves, np.where(forward, -least, most) / size, np.inf)
-        if own:
-            return with_it.reshape(-1), against.reshape(-1)
-        return with_it.min(axis=-1), against.min(axis=-1)
+            bound = np.where(u != 0.0, bound / size, np.inf)
+        return bound.reshape(-1) if own else bound.min(axis=-1)
 
-    velocity, _ = along("velocity", limits.velocity_lower, limits.velocity)
-    faster, slower = along("acceleration", limits.acceleration_lower, limits.acceleration)
-    if (slower == 0.0).any():
-        raise InvalidValueError(
-            "limits: an acceleration limit against the motion is 0: it could never stop; any "
-            "limit other than 0 will do."
-        )
-    jerk, _ = along("jerk", -limits.jerk, limits.jerk)
-    return LineLimits(velocity, faster, slower, jerk)
+    least_v, least_a = limits.velocity_lower, limits.acceleration_lower
+    return LineLimits(
+        along("velocity", least_v, limits.velocity),
+        along("acceleration", least_a, limits.acceleration),
+        along("acceleration", -limits.acceleration, -least_a),
+        along("jerk", -limits.jerk, limits.jerk),
+        along("velocity", -limits.velocity, -least_v, needed=False),
+    )
 
 
 def given_durations(duration: ArrayLike | None, batch: tuple[int, ...]) -> Array | None:
@@ -485,6 +482,8 @@ def _assembled(
     c = np.moveaxis(c, 1, -1) * direction.reshape(R, 1, 1, n)
     c[:, :, 0] += start[:, None, :]
     motion = PiecewisePolynomial(
-        breaks.reshape(*batch, columns, K + 1), c.reshape(*batch, K, powers, n)
+        breaks.reshape(*batch, columns, K + 1),
+        c.reshape(*batch, K, powers, n),
+        pieces.durations.reshape(*batch, columns, K),
     )
     return Trajectory(motion, scalar)

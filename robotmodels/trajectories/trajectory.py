@@ -295,8 +295,8 @@ class Trajectory:
         <LimitsReport: limits are exceeded
           joint 1: velocity 1.875, allowed 1.5>
         """
-        peaks = [np.stack(self.motion.extremes(order)) for order in range(4)]
-        return LimitsReport(limits.for_joints(self.n), *peaks, tolerance)
+        q, v, a, jerk = (np.stack(self.motion.extremes(order)) for order in range(4))
+        return LimitsReport(limits.for_joints(self.n), q, v, a, jerk, tolerance)
 
     def _moving(self, ends: Array) -> bool:
         """Whether any joint has a velocity at one of the times."""

@@ -1,0 +1,325 @@
+"""Motions of constant jerk by phases, the quickest under limits of jerk, between any two states.
+
+From rest to rest, and on the straight line of coordinated joints, the closed form of `laws` or a
+single joint's solution serves. Other states go through ruckig (Berscheid and Kroeger, 2021), of
+which only the phases of its profiles are taken.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import Array
+from ..errors import InvalidValueError
+from .laws import TimeLaw
+from .limits import MotionLimits
+from .piecewise import PiecewisePolynomial
+from .point_to_point import (
+    ROUNDING,
+    Synchronisation,
+    along_line,
+    checked_limits,
+    given_durations,
+    limits_along,
+)
+from .trajectory import Trajectory, joint_vectors
+
+_PHASES = 9  # two that bring a start back inside the limits, and seven
+_STATES = ("q0", "q1", "v0", "v1", "a0", "a1")
+
+
+def jerk_limited(
+    q0: ArrayLike,
+    q1: ArrayLike,
+    duration: ArrayLike | None = None,
+    limits: MotionLimits | None = None,
+    v0: ArrayLike = 0.0,
+    v1: ArrayLike = 0.0,
+    a0: ArrayLike = 0.0,
+    a1: ArrayLike = 0.0,
+    synchronisation: Synchronisation = Synchronisation.COORDINATED,
+) -> Trajectory:
+    """The quickest motion under limits of velocity, acceleration and jerk, between any states.
+
+    Also called double S, seven-phase profile, online trajectory generation. Coordinated joints
+    stay on the straight line between the postures, which states at the ends must lie along;
+    joints that share the time only may start and end in any state.
+
+    Parameters
+    ----------
+    q0, q1 : array_like, shape () or (..., n)
+        Positions at the ends, rad or m; leading axes are motions of their own.
+    duration : array_like, shape () or (...), optional
+        Seconds; default the least.
+    limits : MotionLimits
+        Of velocity, acceleration and jerk; velocity and acceleration may be asymmetric or, apart
+        from jerk, infinite.
+    v0, v1, a0, a1 : array_like, shape () or (..., n)
+        Velocities and accelerations at the ends, rad or m, per s and s^2.
+    synchronisation : Synchronisation
+        How the joints are kept in step.
+
+    Returns
+    -------
+    Trajectory
+        Of n joints, or scalar.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Vectors that do not fit, NaN; no limit of jerk; states that the limits do not allow, or
+        not along the line of coordinated joints; a duration that cannot be had, with the least
+        that can; a limit of zero for a joint that has to move.
+
+    References
+    ----------
+    L. Berscheid, T. Kroeger, Jerk-limited real-time trajectory generation with arbitrary target
+    states, Robotics: Science and Systems, 2021.
+
+    Examples
+    --------
+    >>> limits = MotionLimits(velocity=1.0, acceleration=1.0, jerk=2.0)
+    >>> jerk_limited([0.0, 0.0], [2.0, 1.0], limits=limits).duration
+    3.50...
+    >>> move = jerk_limited([0.0, 0.0], [2.0, 1.0], limits=limits, v0=[0.0, 0.5],
+    ...                     synchronisation=Synchronisation.SAME_TIME)
+    >>> move.duration, move.v(0.0)
+    (3.50..., array([0. , 0.5]))
+    """
+    if limits is None:
+        raise InvalidValueError("limits: JERK_LIMITED has no shape without limits; give limits.")
+    if not isinstance(synchronisation, Synchronisation):
+        raise InvalidValueError(
+            f"synchronisation: expected a Synchronisation, got {synchronisation!r}."
+        )
+    states, batch, scalar = joint_vectors(q0=q0, q1=q1, v0=v0, v1=v1, a0=a0, a1=a1)
+    R, n = states["q0"].shape
+    if not any(states[name].any() for name in _STATES[2:]):
+        start, end = (states[name].reshape(*batch, n) for name in ("q0", "q1"))
+        rest = along_line(TimeLaw.JERK_LIMITED, start, end, duration, limits, synchronisation)
+        return Trajectory(rest.motion, scalar)
+    T = given_durations(duration, batch)
+    bounds = checked_limits(limits, n, states["q0"], states["q1"])
+    assert bounds is not None
+    breaks, c = np.zeros((R, n, _PHASES + 2)), np.zeros((R, _PHASES + 1, 4, n))
+    lengths = np.zeros((R, n, _PHASES + 1))
+    for i in range(R):
+        state = {name: value[i] for name, value in states.items()}
+        asked = None if T is None else float(T[i])
+        if synchronisation is Synchronisation.COORDINATED:
+            breaks[i], c[i], lengths[i] = _on_line(state, bounds, asked)
+        else:
+            breaks[i], c[i], lengths[i] = _of_joints(state, bounds, asked, synchronisation)
+    motion = PiecewisePolynomial(
+        breaks.reshape(*batch, n, _PHASES + 2),
+        c.reshape(*batch, _PHASES + 1, 4, n),
+        lengths.reshape(*batch, n, _PHASES + 1),
+    )
+    moves = Trajectory(motion, scalar)
+    low, high = motion.extremes(0)
+    outside = (low < bounds.lower - 1e-9) | (high > bounds.upper + 1e-9)
+    if outside.any():
+        j = int(np.argwhere(outside)[0][-1])
+        raise InvalidValueError(
+            f"limits: between these states joint {j + 1} swings from {low[..., j].min():.6g} to "
+            f"{high[..., j].max():.6g}, outside its limits {bounds.lower[j]:.6g} to "
+            f"{bounds.upper[j]:.6g}; give states at the ends that are slower."
+        )
+    return moves
+
+
+class _Box(NamedTuple):
+    """Limits of the joints that move, each shape (k,)."""
+
+    velocity: Array
+    velocity_lower: Array
+    acceleration: Array
+    acceleration_lower: Array
+    jerk: Array
+
+
+def _on_line(state: dict[str, Array], limits: MotionLimits, T: float | None) -> Any:
+    """Coordinated joints: one coordinate along their common direction."""
+    D = state["q1"] - state["q0"]
+    rows = np.stack((D, *(state[name] for name in _STATES[2:])))
+    size = np.abs(rows).max(axis=-1)
+    u = rows[int((size > 0.0).argmax())]
+    u = u / np.abs(u).max()
+    along = rows @ u / (u @ u)
+    off = np.abs(rows - along[:, None] * u).max(axis=-1)
+    if (off > 1e-9 * size).any():
+        raise InvalidValueError(
+            "The velocities and accelerations at the ends are not along the line from q0 to q1, "
+            "so the joints cannot stay on it; pass synchronisation=Synchronisation.SAME_TIME."
+        )
+    V, A, B, J, back = (float(v[0]) for v in limits_along(limits, u[None, None, :]))
+    one = {name: along[k : k + 1] for k, name in enumerate(("q1", *_STATES[2:]))}
+    one["q0"] = np.zeros(1)
+    box = _Box(*(np.array([v]) for v in (V, -back, A, -B, J)))
+    breaks, c, lengths = _ruckig(one, box, T, Synchronisation.SAME_TIME)
+    c = c * u
+    c[:, 0] += state["q0"]
+    return breaks, c, lengths
+
+
+def _of_joints(
+    state: dict[str, Array], limits: MotionLimits, T: float | None, how: Synchronisation
+) -> Any:
+    """Joints that have only their time in common."""
+    n = state["q0"].size
+    if how is Synchronisation.INDEPENDENT and (state["v1"].any() or state["a1"].any()):
+        raise InvalidValueError(
+            "Independent joints wait where they arrive, so v1 and a1 must be 0; pass "
+            "synchronisation=Synchronisation.SAME_TIME."
+        )
+    D = state["q1"] - state["q0"]
+    moves = (D != 0.0) | np.any([state[name] != 0.0 for name in _STATES[2:]], axis=0)
+    rows = [
+        getattr(limits, name)[moves]
+        for name in ("velocity", "velocity_lower", "acceleration", "acceleration_lower", "jerk")
+    ]
+    breaks, c = np.zeros((n, _PHASES + 2)), np.zeros((_PHASES + 1, 4, n))
+    lengths = np.zeros((n, _PHASES + 1))
+    active = {name: value[moves] for name, value in state.items()}
+    breaks[moves], c[..., moves], lengths[moves] = _ruckig(active, _Box(*rows), T, how)
+    breaks[~moves, 1:] = lengths[~moves, 0] = breaks.max()
+    c[:, 0, ~moves] = state["q0"][~moves]
+    return breaks, c, lengths
+
+
+def _ruckig(state: dict[str, Array], box: _Box, T: float | None, how: Synchronisation) -> Any:
+    """Breaks (k, K + 1), coefficients (K, 4, k) and lengths (k, K) of k joints."""
+    import ruckig
+
+    k = state["q0"].size
+    _refuse_states(state, box)
+    given = ruckig.InputParameter(k)
+    given.current_position, given.target_position = state["q0"].tolist(), state["q1"].tolist()
+    given.current_velocity, given.target_velocity = state["v0"].tolist(), state["v1"].tolist()
+    given.current_acceleration = state["a0"].tolist()
+    given.target_acceleration = state["a1"].tolist()
+    given.max_velocity, given.min_velocity = box.velocity.tolist(), box.velocity_lower.tolist()
+    given.max_acceleration = box.acceleration.tolist()
+    given.min_acceleration = box.acceleration_lower.tolist()
+    given.max_jerk = box.jerk.tolist()
+    independent = how is Synchronisation.INDEPENDENT and T is None
+    modes = ruckig.Synchronization
+    given.synchronization = modes.No if independent else modes.Time
+    if T is not None:
+        given.minimum_duration = T
+    found = ruckig.Trajectory(k)
+    try:
+        code = ruckig.Ruckig(k).calculate(given, found)
+    except ruckig.RuckigError as error:
+        raise InvalidValueError(f"No motion between these states: {error}.") from None
+    if code not in (ruckig.Result.Working, ruckig.Result.Finished):
+        raise InvalidValueError(f"No motion between these states was found: {code.name}.")
+    if T is not None and abs(found.duration - T) > ROUNDING * max(T, found.duration):
+        raise InvalidValueError(
+            f"duration: with {T:.9g} s the limits are not kept; the least duration from there on "
+            f"with which they are is {found.duration:.12g} s."
+        )
+    breaks, c = np.zeros((k, _PHASES + 2)), np.zeros((_PHASES + 1, 4, k))
+    lengths = np.zeros((k, _PHASES + 1))
+    for i, profile in enumerate(found.profiles[0]):
+        h = np.array([*profile.brake.t, *profile.t])
+        jerk = np.array([*profile.brake.j, *profile.j])
+        h[:2] = np.where(np.cumsum(h[:2]) <= profile.brake.duration * (1 + 1e-12), h[:2], 0.0)
+        start = np.array([state[name][i] for name in ("q0", "v0", "a0")])
+        goal = np.array([state[name][i] for name in ("q1", "v1", "a1")])
+        h = _polished(h, jerk, start, goal)
+        x = _states(h, jerk, start)[:-1]
+        lengths[i, :-1], breaks[i, 1:-1] = h, np.cumsum(h)
+        c[:-1, :, i] = np.stack(
+            (x[:, 0], x[:, 1] * h, 0.5 * x[:, 2] * h**2, jerk * h**3 / 6.0), axis=-1
+        )
+        c[-1, 0, i] = goal[0]
+    breaks[:, -1] = breaks.max() if T is None else T
+    if independent:
+        lengths[:, -1] = breaks[:, -1] - breaks[:, -2]
+    else:  # all joints end together, to the last digit
+        late = breaks[:, :-1] >= breaks[:, -2:-1]
+        breaks[:, :-1] = np.where(late, breaks[:, -1:], breaks[:, :-1])
+    return breaks, c, lengths
+
+
+def _states(h: Array, jerk: Array, start: Array) -> Array:
+    """Position, velocity and acceleration at the ends of the phases, shape (K + 1, 3)."""
+    x = np.empty((h.size + 1, 3))
+    x[0] = p, v, a = start
+    for k, (t, j) in enumerate(zip(h.tolist(), jerk.tolist(), strict=True)):
+        p += t * (v + t * (0.5 * a + t * j / 6.0))
+        v += t * (a + 0.5 * t * j)
+        a += t * j
+        x[k + 1] = p, v, a
+    return x
+
+
+def _polished(h: Array, jerk: Array, start: Array, goal: Array) -> Array:
+    """Durations of the phases that meet the goal to rounding.
+
+    Where ruckig is asked for a time it meets positions to 1e-8. Newton steps of least length bring
+    that to rounding; they keep the whole time, and the acceleration of every phase without jerk.
+    """
+    free = h > 1e-9
+    scale = np.array([1.0 + abs(goal[0]), 1.0, 1.0])
+    level = [k for k in range(h.size) if free[k] and jerk[k] == 0.0]
+    x = _states(h, jerk, start)
+    error = (goal - x[-1]) / scale
+    if np.abs(error).max() <= 1e-14 or not free.any():
+        return h
+    held, better = x[level, 2], h
+    for _ in range(4):
+        left = better.sum() - np.cumsum(better)
+        v, a = x[1:, 1], x[1:, 2]
+        rows = [
+            (v + left * (a + 0.5 * left * jerk)) / scale[0],
+            a + left * jerk,
+            jerk,
+            np.ones(h.size),
+            *(np.where(np.arange(h.size) < k, jerk, 0.0) for k in level),
+        ]
+        wanted = np.concatenate((error, [h.sum() - better.sum()], held - x[level, 2]))
+        step = np.zeros(h.size)
+        step[free] = np.linalg.lstsq(np.stack(rows)[:, free], wanted, rcond=1e-12)[0]
+        trial = np.maximum(better + step, 0.0)
+        x_trial = _states(trial, jerk, start)
+        new = (goal - x_trial[-1]) / scale
+        if np.abs(new).max() >= np.abs(error).max():
+            break
+        better, x, error = trial, x_trial, new
+    return better
+
+
+def _refuse_states(state: dict[str, Array], box: _Box) -> None:
+    """States at the ends that no motion within the limits has."""
+    if np.isinf(box.jerk).any():
+        raise InvalidValueError("limits: JERK_LIMITED needs a limit of jerk.")
+    for name, bound in (("velocity", box.velocity), ("acceleration", box.acceleration),
+                        ("jerk", box.jerk)):  # fmt: skip
+        if (bound == 0.0).any():
+            raise InvalidValueError(
+                f"limits: a limit of {name} of a joint that has to move is 0; any other will do."
+            )
+    slack = 1.0 + 1e-12
+    for end, sense in (("0", 1.0), ("1", -1.0)):
+        v, a = state["v" + end], state["a" + end]
+        # the velocity after the acceleration is taken away as fast as may be, forth or back
+        swing = v + sense * a * np.abs(a) / (2.0 * box.jerk)
+        high, low = np.maximum(v, swing), np.minimum(v, swing)
+        for what, most, least, upper, lower in (
+            ("velocity", high, low, box.velocity, box.velocity_lower),
+            ("acceleration", a, a, box.acceleration, box.acceleration_lower),
+        ):
+            bad = (most > upper * slack + 1e-15) | (least < lower * slack - 1e-15)
+            if bad.any():
+                j = int(bad.argmax())
+                need = most[j] if most[j] > upper[j] * slack else least[j]
+                raise InvalidValueError(
+                    f"limits: v{end} and a{end} need a {what} of {need:.9g}, outside "
+                    f"{lower[j]:.9g} to {upper[j]:.9g}; the least limit that will do is "
+                    f"{abs(need):.9g}."
+                )
