@@ -182,7 +182,7 @@ def prepare_general(
     if chain.k != 6 or int(np.sum(chain.sigma == 1)) > 1:
         return None
     rng = np.random.default_rng(rng)
-    D, unit = _shortened(chain)
+    D, unit = shortened(chain)
     sigma = read_only(chain.sigma, np.int64)
     candidates = _representations(sigma, D)
     few, many = _random_goals(sigma, D, 8, rng), _random_goals(sigma, D, tests, rng)
@@ -315,15 +315,34 @@ def _inverse(T: Array) -> Array:
     return out
 
 
-def _shortened(chain: JointChain) -> tuple[Array, float]:
+def shortened(chain: JointChain) -> tuple[Array, float]:
     """Constants with each frame slid along its axis towards its neighbours, in units of the arm.
 
     Sliding changes nothing (motions commute with it for revolute joints; for prismatic ones too)
     but keeps the numbers small where a table put frames far out, at nearly parallel axes.
+
+    Parameters
+    ----------
+    chain : JointChain
+        Any number of joints.
+
+    Returns
+    -------
+    D : ndarray, shape (k + 1, 4, 4)
+        Constants of a chain with the same poses at the same joint values, lengths in ``unit``.
+    unit : float
+        About the length of the arm [m].
+
+    Examples
+    --------
+    >>> from robotmodels.igm.loop import joint_chain
+    >>> from robotmodels.robots import load
+    >>> round(shortened(joint_chain(load("rx90")))[1], 3)
+    0.45
     """
-    D = np.array(chain.D)
+    D, k = np.array(chain.D), chain.k
     for forward in (True, False):
-        for i in range(1, 6) if forward else range(5, 0, -1):
+        for i in range(1, k) if forward else range(k - 1, 0, -1):
             # joint frame i + 1 slides when going out, joint frame i when coming back
             near, far = (i, i + 1) if forward else (i, i - 1)
             z = D[near][:3, 2] if forward else np.array([0.0, 0.0, 1.0])
@@ -334,7 +353,7 @@ def _shortened(chain: JointChain) -> tuple[Array, float]:
             else:
                 D[near][2, 3] -= slide
                 D[far][:3, 3] += slide * D[far][:3, 2]
-    unit = float(np.sum(np.linalg.norm(D[1:6, :3, 3], axis=1))) / 2.0
+    unit = float(np.sum(np.linalg.norm(D[1:k, :3, 3], axis=1))) / 2.0
     if unit < 1e-9:
         unit = 1.0
     D[:, :3, 3] /= unit

@@ -1,0 +1,230 @@
+"""Infinite families of postures, one posture taken from each; and double roots.
+
+Where a pose lets the arm move while the tool stands still, a posture is one of a family. The first
+joint, from the base, that moves along the family takes its reference value, or the nearest value
+that it reaches; in families of more dimensions then the next joint, given the ones before. Every
+posture of the family at that value is returned: a closed curve passes a value more than once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import Array
+from .check import checked
+from .general import shortened
+from .loop import JointChain
+from .solver import Found, Tolerances
+
+__all__ = ["Settled", "double_roots", "settle_families"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Settled(Found):
+    """Postures with the families settled.
+
+    Parameters
+    ----------
+    moving : ndarray of bool, shape (N, S, k)
+        Joints that move along the family, the free ones among them.
+    """
+
+    moving: NDArray[np.bool_]
+
+
+def settle_families(
+    chain: JointChain,
+    U: Array,
+    found: Found,
+    references: Array,
+    tolerances: Tolerances,
+) -> Settled:
+    """Take from every infinite family the postures at the reference values of its first joints.
+
+    Parameters
+    ----------
+    chain : JointChain
+        The arm.
+    U : ndarray, shape (N, 4, 4)
+        Poses of the tool in R_0 [m].
+    found : Found
+        Postures; work is done where ``found.family`` is True. Families whose free joints are the
+        first that move are left as they are.
+    references : ndarray, shape (N, k)
+        Values for joints that a pose leaves free [rad or m].
+    tolerances : Tolerances
+        When a pose counts as met.
+
+    Returns
+    -------
+    Settled
+        Postures packed, ``family`` False where the arm cannot move after all. Rows that came from
+        the same family are one. S grows where a family has more postures than it had rows.
+
+    Notes
+    -----
+    Families are walked all round on the chain itself. They are found where the Jacobian is singular
+    to 1e-6 (lengths in units of the arm) and a step of 0.02 along its null space leads to postures
+    that meet the pose to 1e-11.
+
+    Examples
+    --------
+    The wrist of an RX-90 is aligned: joints 4 and 6 turn against each other, joint 4 takes 0.3.
+
+    >>> from robotmodels.igm.families import prepare
+    >>> from robotmodels.igm.loop import joint_chain
+    >>> from robotmodels.igm.solver import postures
+    >>> from robotmodels.kinematics import dgm
+    >>> from robotmodels.robots import load
+    >>> arm = load("rx90")
+    >>> chain, U = joint_chain(arm), dgm(arm, [[0.3, 1.0, 0.5, 0.0, 0.0, 0.8]])
+    >>> references, tolerances = np.full((1, 6), 0.3), Tolerances()
+    >>> found = postures(prepare(chain), U, references, tolerances)
+    >>> settled = settle_families(chain, U, found, references, tolerances)
+    >>> row = int(np.flatnonzero(settled.family[0])[0])
+    >>> settled.moving[0, row].astype(int), settled.free[0, row].astype(int)
+    (array([0, 0, 0, 1, 0, 1]), array([0, 0, 0, 1, 0, 0]))
+    """
+    N, S, k = found.q.shape
+    chosen = np.flatnonzero(np.any(found.family & found.valid, axis=1))
+    if chosen.size == 0:
+        still = np.broadcast_to(np.False_, (N, S, k))
+        return Settled(*_fields(found), moving=still)
+    part, moving = _settled(
+        chain, np.ascontiguousarray(U[chosen]), _rows(found, chosen), references[chosen], tolerances
+    )
+    most = max(S, int(np.max(np.sum(part.valid, axis=1), initial=0)))
+    out = [_widened(field, most) for field in _fields(found)]
+    all_moving = np.zeros((N, most, k), np.bool_)
+    for whole, piece in zip((*out, all_moving), (*_fields(part), moving), strict=True):
+        whole[chosen] = _widened(piece, most)[:, :most]
+    return Settled(*out, moving=all_moving)
+
+
+def double_roots(chain: JointChain, found: Found) -> NDArray[np.bool_]:
+    """Postures at which two or more fell together: the Jacobian is singular, the arm cannot move.
+
+    Parameters
+    ----------
+    chain : JointChain
+        The arm.
+    found : Found
+        Its postures.
+
+    Returns
+    -------
+    ndarray of bool, shape (N, S)
+        Rows whose Jacobian has a singular value below 1e-6 (lengths in units of the arm) and that
+        are no members of an infinite family.
+
+    Examples
+    --------
+    >>> from robotmodels.igm.families import prepare
+    >>> from robotmodels.igm.loop import joint_chain
+    >>> from robotmodels.igm.solver import postures
+    >>> from robotmodels.kinematics import dgm
+    >>> from robotmodels.robots import load
+    >>> arm = load("rx90")
+    >>> chain, U = joint_chain(arm), dgm(arm, [[0.3, 0.4, np.pi / 2, 0.1, 0.2, 0.8]])
+    >>> found = postures(prepare(chain), U, np.zeros((1, 6)), Tolerances())
+    >>> int(double_roots(chain, found).sum())  # the elbow is stretched
+    4
+    """
+    from ._self_motion import singular_postures
+
+    D, unit = shortened(chain)
+    double = np.zeros(found.valid.shape, np.bool_)
+    q = np.ascontiguousarray(found.q)
+    if unit != 1.0 and np.any(chain.sigma == 1):
+        q = np.where(chain.sigma == 1, q / unit, q)
+    singular_postures(
+        np.ascontiguousarray(chain.sigma), D, q, np.ascontiguousarray(found.valid), double
+    )
+    return double
+
+
+def _fields(found: Found) -> tuple[Array, ...]:
+    """The arrays of Found, in its order."""
+    return found.q, found.valid, found.residual, found.double, found.free, found.family
+
+
+def _rows(found: Found, chosen: NDArray[np.int64]) -> Found:
+    """Some poses."""
+    return Found(*(field[chosen] for field in _fields(found)))
+
+
+def _widened(field: Array, most: int) -> Array:
+    """A copy with room for ``most`` rows a pose; NaN or False in the new ones."""
+    if field.shape[1] >= most:
+        return field.copy()
+    fill = np.nan if field.dtype == np.float64 else False
+    out = np.full((field.shape[0], most, *field.shape[2:]), fill, field.dtype)
+    out[:, : field.shape[1]] = field
+    return out
+
+
+def _bits(packed: NDArray[np.int64], k: int) -> NDArray[np.bool_]:
+    """The lowest k bits of each number, one joint each, shape (..., k)."""
+    return (packed[..., None] >> np.arange(k)) & 1 == 1
+
+
+def _settled(
+    chain: JointChain, U: Array, found: Found, references: Array, tolerances: Tolerances
+) -> tuple[Found, NDArray[np.bool_]]:
+    """Poses with families: their postures, and the joints that move."""
+    from ._self_motion import settled_already
+    from .family_curves import Family, settled_members
+
+    D, unit = shortened(chain)
+    N, S, k = found.q.shape
+    sigma = np.ascontiguousarray(chain.sigma)
+    lengths = np.where(sigma == 1, unit, 1.0)
+    goals = U.copy()
+    goals[:, :3, 3] /= unit
+    q = np.where(found.valid[..., None], found.q, 0.0) / lengths
+    member = found.family & found.valid
+    free = np.sum(found.free.astype(np.int64) << np.arange(k), axis=-1)
+    moving = np.zeros((N, S), np.int64)
+    settled_already(goals, sigma, D, q, free, member, moving)
+    unsettled = np.flatnonzero(np.any(member & (moving == 0), axis=1))
+    if unsettled.size == 0:
+        return found, _bits(moving, k)
+    # rows of a pose: posture, free and moving joints, double root
+    rows: list[list[tuple[Array, int, int, bool]]] = []
+    for n in unsettled:
+        family, kept = Family(sigma, D, goals[n], references[n] / lengths), []
+        for r in np.flatnonzero(found.valid[n]):
+            if member[n, r] and moving[n, r] == 0:
+                kept += [
+                    (item.q, item.held, item.moving, double)
+                    for item, double in settled_members(family, q[n, r])
+                ]
+            else:
+                row = int(free[n, r]), int(moving[n, r]), bool(found.double[n, r])
+                kept.append((q[n, r], *row))
+        rows.append(kept)
+    most = max(len(kept) for kept in rows)
+    there = np.arange(most) < np.array([len(kept) for kept in rows])[:, None]
+    candidates = np.full((unsettled.size, most, k), np.nan)
+    marks = np.zeros((3, unsettled.size, most), np.int64)
+    for i, kept in enumerate(rows):
+        candidates[i, : len(kept)] = [row[0] for row in kept]
+        marks[:, i, : len(kept)] = np.transpose([row[1:] for row in kept])
+    candidates *= lengths
+    part = checked(
+        chain, U[unsettled], candidates, there, tolerances,
+        free=_bits(marks[0], k), double=marks[2] == 1,
+    )  # fmt: skip
+    # which candidate a posture was: the nearest one
+    d = np.abs(part.q[:, :, None] - candidates[:, None])
+    d = np.where(sigma == 0, np.minimum(d, np.abs(d - 2.0 * np.pi)), d).max(axis=-1)
+    source = np.argmin(np.where(np.isnan(d), np.inf, d), axis=-1)
+    moves = _bits(np.take_along_axis(marks[1], source, axis=1), k) & part.valid[..., None]
+    whole = [_widened(field, most) for field in _fields(found)]
+    all_moving = _widened(_bits(moving, k), most)
+    for field, piece in zip((*whole, all_moving), (*_fields(part), moves), strict=True):
+        field[unsettled] = _widened(piece, field.shape[1])
+    return Found(*whole), all_moving
