@@ -4,6 +4,8 @@ Seed book sections 4.2 and 4.3. Every generator of joint motion returns a `Traje
 arrays of ``ctraj`` and ``jtraj`` come from `cartesian_trajectory` and `joint_trajectory`.
 """
 
+from .blends import blended_lines
+from .harmonics import FourierSeries, fourier, fourier_basis
 from .jerk import jerk_limited
 from .laws import TimeLaw
 from .limits import LimitsReport, MotionLimits
@@ -17,23 +19,31 @@ from .point_to_point import (
 )
 from .polynomials import cubic, quintic
 from .sampled import cartesian_trajectory, joint_trajectory
+from .splines import SplineEnds, cubic_spline, quintic_spline
 from .trajectory import Samples, Trajectory
 
 __all__ = [
+    "FourierSeries",
     "LimitsReport",
     "MotionLimits",
     "Samples",
+    "SplineEnds",
     "Synchronisation",
     "TimeLaw",
     "Trajectory",
     "along_line",
     "bang_bang",
+    "blended_lines",
     "cartesian_trajectory",
     "cubic",
+    "cubic_spline",
+    "fourier",
+    "fourier_basis",
     "jerk_limited",
     "joint_trajectory",
     "linear",
     "quintic",
+    "quintic_spline",
     "smoothed_trapezoidal",
     "trapezoidal",
 ]

@@ -1,0 +1,225 @@
+"""Straight lines between points at constant velocity, joined by blends near the points.
+
+The motion would turn a corner at each inner point; a blend of a chosen time around it changes the
+velocity evenly (parabola) or smoothly (quartic), and leaves the corner aside. The first and the
+last point are met at rest: there a line of no velocity precedes or follows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import Array, as_floats
+from ..errors import InvalidValueError, ShapeError
+from .limits import MotionLimits
+from .piecewise import PiecewisePolynomial
+from .point_to_point import ROUNDING, checked_limits, given_durations
+from .trajectory import Trajectory
+
+PARABOLA, QUARTIC = 1.0, 1.5
+"""Greatest acceleration of a blend, beside its mean."""
+
+
+def blended_lines(
+    points: ArrayLike,
+    duration: float | None = None,
+    limits: MotionLimits | None = None,
+    segment_times: ArrayLike | None = None,
+    blend_times: ArrayLike | None = None,
+    smooth: bool = False,
+) -> Trajectory:
+    """Lines through points with blends: trapezoids of velocity that do not stop at the points.
+
+    Also called linear segments with parabolic blends, ``mstraj``. All joints change velocity
+    together, so that the motion is straight between blends. It passes an inner point at a
+    distance of ``blend time * change of velocity / 8`` (3/32 of it with smooth blends).
+
+    Parameters
+    ----------
+    points : array_like, shape (m,) or (m, n)
+        Positions, rad or m, at least two.
+    duration : float, optional
+        Seconds; default what the limits or the times make it. Longer than the least, it slows the
+        whole motion down evenly.
+    limits : MotionLimits, optional
+        Velocity and acceleration, with smooth blends also jerk. Each line is as quick as it may
+        be; where the blends of a line would overlap, it is slowed down.
+    segment_times : array_like, shape () or (m - 1,), optional
+        Seconds from corner to corner instead.
+    blend_times : array_like, shape () or (m,), optional
+        Seconds of each blend, with ``segment_times``; default the least that the limits allow.
+        The motion starts and ends half a blend before and after the time of its end points.
+    smooth : bool
+        Whether the blends keep the acceleration continuous.
+
+    Returns
+    -------
+    Trajectory
+        Of n joints, or scalar.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Fewer than two points; neither limits nor times; blends that overlap; a duration that is
+        too short, with the least one; limits that are missing, zero, or not kept.
+
+    References
+    ----------
+    Khalil and Dombre, Modeling, identification and control of robots, section 13.5. J. Craig,
+    Introduction to robotics, section 7.3.
+
+    Examples
+    --------
+    >>> limits = MotionLimits(velocity=1.0, acceleration=2.0)
+    >>> path = blended_lines([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0]], limits=limits)
+    >>> path.duration, path.q(2.25)
+    (3.5..., array([1.9375, 0.0625]))
+    """
+    q = as_floats(points, "points")
+    if q.ndim not in (1, 2) or len(q) < 2:
+        raise ShapeError(f"points: expected at least two, shape (m, n), got shape {q.shape}.")
+    scalar = q.ndim == 1
+    q = q[:, None] if scalar else q
+    m, n = q.shape
+    bounds = checked_limits(limits, n, q)
+    step = np.diff(q, axis=0)
+    if segment_times is None:
+        if bounds is None or blend_times is not None:
+            raise InvalidValueError("Give limits, or segment_times (and then blend_times).")
+        T = _full_speed(step, bounds)
+        T, tb = schedule(T, lambda T: _least_blends(step, T, bounds, smooth))
+    else:
+        T = _spread(segment_times, m - 1, "segment_times")
+        if blend_times is not None:
+            tb = _spread(blend_times, m, "blend_times")
+        elif bounds is not None:
+            tb = _least_blends(step, T, bounds, smooth)
+        else:
+            raise InvalidValueError("blend_times: give them, or limits of acceleration.")
+        if ((T == 0.0) & step.any(axis=-1)).any():
+            raise InvalidValueError("segment_times: expected a positive time for every line.")
+        room = T - 0.5 * (tb[:-1] + tb[1:])
+        if (room < -ROUNDING * T).any():
+            k = int(room.argmin())
+            raise InvalidValueError(
+                f"The blends at the ends of line {k + 1} overlap: it needs at least "
+                f"{0.5 * (tb[k] + tb[k + 1]):.9g} s, and has {T[k]:.9g} s."
+            )
+    least = float(T.sum() + 0.5 * (tb[0] + tb[-1]))
+    wanted = given_durations(duration, ())
+    if wanted is not None and least > 0.0:
+        if bounds is not None and wanted[0] < least * (1.0 - ROUNDING):
+            raise InvalidValueError(
+                f"duration: {wanted[0]:.9g} s is too short for the limits; the least is "
+                f"{least:.12g} s."
+            )
+        if wanted[0] == 0.0:
+            raise InvalidValueError("duration: expected a positive time for a motion, got 0 s.")
+        T, tb = T * (wanted[0] / least), tb * (wanted[0] / least)
+    trajectory = Trajectory(_joined(q, step, T, tb, smooth), scalar)
+    if bounds is not None and not (report := trajectory.check(bounds, 1e-9)).kept:
+        raise InvalidValueError(
+            f"The limits are not kept: {'; '.join(report.violations())}. The least factor on the "
+            f"times is {report.stretch:.12g}."
+        )
+    return trajectory
+
+
+def schedule(T: Array, blends: Callable[[Array], Array]) -> tuple[Array, Array]:
+    """Times of lines that leave room for their blends.
+
+    Parameters
+    ----------
+    T : ndarray, shape (m - 1,)
+        Least times of the lines, s.
+    blends : callable
+        Least times (m,) of the blends for given times of the lines; infinite where the lines are
+        too fast for any blend.
+
+    Returns
+    -------
+    T : ndarray, shape (m - 1,)
+        Times of the lines, increased where their halves of two blends did not fit.
+    tb : ndarray, shape (m,)
+        Times of the blends.
+    """
+    for _ in range(500):
+        tb = blends(T)
+        need = np.minimum(0.5 * (tb[:-1] + tb[1:]), 4.0 * T)
+        if (need <= T * (1.0 + 1e-13)).all():
+            break
+        # slower lines need shorter blends: the geometric mean is the answer for a line alone
+        T = np.where(need > T, np.sqrt(T * need), T)
+    else:
+        need = 0.5 * (tb[:-1] + tb[1:])
+        T = T * float(np.sqrt(max(1.0, (need / np.where(T > 0.0, T, 1.0)).max())))
+    return T * (1.0 + 1e-13), blends(T)
+
+
+def _full_speed(step: Array, limits: MotionLimits) -> Array:
+    """Times of lines at the greatest velocity, shape (m - 1,)."""
+    V = np.where(step > 0.0, limits.velocity, -limits.velocity_lower)
+    moves = step != 0.0
+    for bound, name in ((V, "velocity"), (np.minimum(limits.acceleration,
+                        -limits.acceleration_lower) + 0.0 * V, "acceleration")):  # fmt: skip
+        if (moves & (bound == 0.0)).any():
+            j = int(np.argwhere(moves & (bound == 0.0))[0][-1])
+            raise InvalidValueError(
+                f"limits: the limit of {name} of joint {j + 1} is 0, but it has to move; any "
+                "other will do."
+            )
+    with np.errstate(divide="ignore", invalid="ignore"):
+        T = np.where(moves, np.abs(step) / V, 0.0).max(axis=-1, initial=0.0)
+    if ((T == 0.0) & moves.any(axis=-1)).any():
+        raise InvalidValueError("limits: lines with blends need a limit of velocity.")
+    return T
+
+
+def _least_blends(step: Array, T: Array, limits: MotionLimits, smooth: bool) -> Array:
+    """Least times of blends, shape (m,)."""
+    if not smooth and np.isfinite(limits.jerk).any():
+        raise InvalidValueError(
+            "limits: the acceleration of a parabolic blend jumps, which keeps no limit of jerk; "
+            "leave jerk out, or pass smooth=True."
+        )
+    v = np.where(T[:, None] > 0.0, step / np.where(T > 0.0, T, 1.0)[:, None], 0.0)
+    change = np.diff(v, axis=0, prepend=0.0, append=0.0)
+    A = np.where(change > 0.0, limits.acceleration, -limits.acceleration_lower)
+    by_j = np.sqrt(6.0 * np.abs(change) / limits.jerk) if smooth else np.zeros_like(change)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        by_a = (QUARTIC if smooth else PARABOLA) * np.abs(change) / A
+    tb = np.where(change != 0.0, np.maximum(by_a, by_j), 0.0)
+    if ((change != 0.0).any(axis=-1) & (tb.max(axis=-1) == 0.0)).any():
+        raise InvalidValueError("limits: blends need a limit of acceleration.")
+    return tb.max(axis=-1)
+
+
+def _joined(q: Array, step: Array, T: Array, tb: Array, smooth: bool) -> PiecewisePolynomial:
+    """Blend, line, blend, and so on to the last blend."""
+    m, n = q.shape
+    v = np.where(T[:, None] > 0.0, step / np.where(T > 0.0, T, 1.0)[:, None], 0.0)
+    before, after = np.vstack((np.zeros(n), v)), np.vstack((v, np.zeros(n)))
+    c = np.zeros((2 * m - 1, 5 if smooth else 3, n))
+    h = np.zeros(2 * m - 1)
+    h[::2], h[1::2] = tb, np.maximum(T - 0.5 * (tb[:-1] + tb[1:]), 0.0)
+    blend = tb[:, None]
+    c[::2, 0], c[::2, 1] = q - 0.5 * before * blend, before * blend
+    if smooth:
+        c[::2, 3], c[::2, 4] = (after - before) * blend, -0.5 * (after - before) * blend
+    else:
+        c[::2, 2] = 0.5 * (after - before) * blend
+    c[1::2, 0], c[1::2, 1] = q[:-1] + 0.5 * v * blend[:-1], v * h[1::2, None]
+    breaks = np.concatenate(((0.0,), np.cumsum(h)))
+    return PiecewisePolynomial(breaks[None], c, h[None])
+
+
+def _spread(value: ArrayLike, count: int, name: str) -> Array:
+    times = as_floats(value, name)
+    if times.shape not in ((), (count,)):
+        raise ShapeError(f"{name}: expected one number or shape ({count},), got {times.shape}.")
+    if (times < 0.0).any():
+        raise InvalidValueError(f"{name}: expected times of at least 0, got {times.min():g}.")
+    return np.broadcast_to(times, count)

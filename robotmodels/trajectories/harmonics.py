@@ -1,0 +1,247 @@
+"""Periodic motions as finite Fourier series, which excite robots for identification."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import Array, as_floats, read_only
+from ..errors import InvalidValueError, ShapeError
+from .trajectory import Trajectory
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FourierSeries:
+    """Finite Fourier series of n joints.
+
+    ``q = mean + sum_k (a_k sin(k w t) - b_k cos(k w t)) / (k w)``, so that ``a`` and ``b`` are the
+    amplitudes of the velocity.
+
+    Parameters
+    ----------
+    period : float
+        Seconds, ``w = 2 pi / period``.
+    a, b : array_like, shape (H, n)
+        Amplitudes of the velocity, rad/s or m/s.
+    mean : array_like, shape (n,)
+        Middle of the motion, rad or m.
+    periods : float
+        How many the motion lasts.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Amplitudes that do not fit each other, a period that is not positive.
+
+    Examples
+    --------
+    >>> FourierSeries(2.0, [[1.0]], [[0.0]], [0.0]).duration
+    array(2.)
+    """
+
+    period: float
+    a: Array
+    b: Array
+    mean: Array
+    periods: float = 1.0
+
+    def __post_init__(self) -> None:
+        a, b, mean = (as_floats(v, k) for v, k in ((self.a, "a"), (self.b, "b"),
+                                                   (self.mean, "mean")))  # fmt: skip
+        if a.ndim != 2 or a.shape != b.shape or mean.shape != a.shape[1:]:
+            raise ShapeError(
+                "a, b, mean: expected shapes (H, n), (H, n) and (n,), got "
+                f"{a.shape}, {b.shape} and {mean.shape}."
+            )
+        for name in ("period", "periods"):
+            value = float(as_floats(getattr(self, name), name))
+            if value <= 0.0:
+                raise InvalidValueError(f"{name}: expected a positive number, got {value:g}.")
+            object.__setattr__(self, name, value)
+        for name, value in (("a", a), ("b", b), ("mean", mean)):
+            object.__setattr__(self, name, read_only(value))
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return self.mean.size
+
+    @property
+    def batch(self) -> tuple[int, ...]:
+        """No leading axes: one motion."""
+        return ()
+
+    @property
+    def duration(self) -> Array:
+        """Seconds."""
+        return np.asarray(self.period * self.periods)
+
+    def derivatives(self, t: Array, orders: tuple[int, ...]) -> list[Array]:
+        """Derivatives at any times.
+
+        Parameters
+        ----------
+        t : ndarray, shape (N,)
+            Times, s.
+        orders : tuple of int
+            0 position, 1 velocity, and so on.
+
+        Returns
+        -------
+        list of ndarray, shapes (N, n)
+            One for each order.
+        """
+        coefficients = np.vstack((self.mean, self.a, self.b))
+        waves = _waves(t, self.period, len(self.a))
+        return [_basis(*waves, self.period, order) @ coefficients for order in orders]
+
+    def extremes(self, order: int) -> tuple[Array, Array]:
+        """Least and greatest value of a derivative over a period, shapes (n,).
+
+        Parameters
+        ----------
+        order : int
+            0 position, 1 velocity, and so on.
+
+        Returns
+        -------
+        lower, upper : ndarray, shapes (n,)
+            At the zeros of the next derivative, which are the roots of a polynomial in
+            ``exp(i w t)``.
+        """
+        H, w = len(self.a), 2.0 * np.pi / self.period
+        k = np.arange(1, H + 1)
+        # the next derivative in harmonics: sum_k c_k cos(k w t) + s_k sin(k w t)
+        power = (k * w)[:, None] ** order
+        turned = [(self.a, self.b), (self.b, -self.a), (-self.a, -self.b), (-self.b, self.a)]
+        c, s = (power * part for part in turned[order % 4])
+        low, high = np.empty(self.n), np.empty(self.n)
+        for j in range(self.n):
+            half = 0.5 * (c[:, j] - 1j * s[:, j])
+            roots = np.roots(np.concatenate((half[::-1], (0.0,), half.conj())))
+            angles = np.concatenate(((0.0,), np.angle(roots[roots != 0.0])))
+            (value,) = self.derivatives(angles / w, (order,))
+            low[j], high[j] = value[:, j].min(), value[:, j].max()
+        return low, high
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), tuple(getattr(self, field.name) for field in fields(self))
+
+
+def fourier(
+    a: ArrayLike,
+    b: ArrayLike,
+    mean: ArrayLike = 0.0,
+    period: float = 10.0,
+    periods: float = 1.0,
+) -> Trajectory:
+    """Periodic motion, a finite Fourier series with analytic derivatives.
+
+    Parameters
+    ----------
+    a, b : array_like, shape (H,) or (H, n)
+        Amplitudes of the sine and cosine terms, such that the velocity is
+        ``sum_k a_k cos(k w t) + b_k sin(k w t)``, rad/s or m/s.
+    mean : array_like, shape () or (n,)
+        Middle of the motion, rad or m.
+    period : float
+        Seconds; ``w = 2 pi / period``.
+    periods : float
+        How many the motion lasts. It is defined at every time.
+
+    Returns
+    -------
+    Trajectory
+        Of n joints, or scalar.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Amplitudes that do not fit each other, a period that is not positive.
+
+    References
+    ----------
+    Seed book section 1.6.2.3. J. Swevers, C. Ganseman, D. Tukel, J. De Schutter, H. Van Brussel,
+    Optimal robot excitation and identification, IEEE T-RA 13(5), 1997.
+
+    Examples
+    --------
+    >>> swing = fourier(a=[[1.0, 0.0]], b=[[0.0, 2.0]], mean=[0.0, 0.5], period=2 * np.pi)
+    >>> swing.v(0.0), swing.q(np.pi / 2).round(12)
+    (array([1., 0.]), array([1. , 0.5]))
+    """
+    a, b = as_floats(a, "a"), as_floats(b, "b")
+    scalar = a.ndim == 1
+    if scalar:
+        a, b = a[:, None], b[:, None] if b.ndim == 1 else b
+    mean = as_floats(mean, "mean")
+    if mean.ndim == 0:
+        mean = np.full(a.shape[-1:], float(mean))
+    return Trajectory(FourierSeries(period, a, b, mean, periods), scalar, repeats=True)
+
+
+def fourier_basis(t: ArrayLike, harmonics: int, period: float, order: int = 0) -> Array:
+    """The functions of which a Fourier motion is a sum: its gradient by its own parameters.
+
+    Parameters
+    ----------
+    t : array_like, shape (N,)
+        Times, s.
+    harmonics : int
+        Their number H.
+    period : float
+        Seconds.
+    order : int
+        Derivative: 0 position, 1 velocity, and so on.
+
+    Returns
+    -------
+    ndarray, shape (N, 2 H + 1)
+        ``basis @ [mean, a_1 .. a_H, b_1 .. b_H]`` is the derivative of that order of the motion.
+
+    Raises
+    ------
+    InvalidValueError
+        NaN, numbers that are not positive.
+
+    Examples
+    --------
+    >>> fourier_basis([0.0], harmonics=2, period=1.0, order=1)
+    array([[0., 1., 1., 0., 0.]])
+    """
+    t = as_floats(t, "t")
+    if t.ndim != 1:
+        raise ShapeError(f"t: expected shape (N,), got {t.shape}.")
+    if int(harmonics) != harmonics or harmonics < 1 or not 0.0 < period < np.inf:
+        raise InvalidValueError(
+            f"Expected at least one harmonic and a positive period, got {harmonics}, {period}."
+        )
+    if int(order) != order or order < 0:
+        raise InvalidValueError(f"order: expected a whole number from 0, got {order!r}.")
+    return _basis(*_waves(t, period, int(harmonics)), period, int(order))
+
+
+def _waves(t: Array, period: float, H: int) -> tuple[Array, Array]:
+    """Cosines and sines (N, H) of the harmonics; the time is brought into one period first."""
+    angle = 2.0 * np.pi * np.remainder(t / period, 1.0)
+    c1, s1 = np.cos(angle), np.sin(angle)
+    c, s = np.empty((H, t.size)), np.empty((H, t.size))
+    for k in range(H):
+        if k == 0:
+            c[0], s[0] = c1, s1
+        else:
+            c[k] = c[k - 1] * c1 - s[k - 1] * s1
+            s[k] = s[k - 1] * c1 + c[k - 1] * s1
+    return c.T, s.T
+
+
+def _basis(c: Array, s: Array, period: float, order: int) -> Array:
+    H = c.shape[-1]
+    scale = (2.0 * np.pi / period * np.arange(1, H + 1)) ** (order - 1)
+    # velocity: a cos + b sin; each derivative turns cos into -sin and sin into cos
+    of_a, of_b = ((s, -c), (c, s), (-s, c), (-c, -s))[order % 4]
+    first = np.ones((len(c), 1)) if order == 0 else np.zeros((len(c), 1))
+    return np.hstack((first, of_a * scale, of_b * scale))

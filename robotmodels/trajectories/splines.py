@@ -1,0 +1,242 @@
+"""Splines through points: every point is met, at its time."""
+
+from __future__ import annotations
+
+from enum import Enum
+from math import factorial
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import Array, as_floats
+from ..errors import InvalidValueError, ShapeError
+from .limits import MotionLimits
+from .piecewise import PiecewisePolynomial
+from .point_to_point import ROUNDING, checked_limits
+from .trajectory import Trajectory
+
+
+class SplineEnds(Enum):
+    """What is asked of a cubic spline at its ends.
+
+    Examples
+    --------
+    >>> SplineEnds.NATURAL.value
+    'no acceleration at the ends'
+    """
+
+    CLAMPED = "given velocities at the ends"
+    NATURAL = "no acceleration at the ends"
+    PERIODIC = "velocity and acceleration go on from the last point at the first"
+
+
+def cubic_spline(
+    points: ArrayLike,
+    times: ArrayLike | None = None,
+    limits: MotionLimits | None = None,
+    v0: ArrayLike = 0.0,
+    v1: ArrayLike = 0.0,
+    ends: SplineEnds = SplineEnds.CLAMPED,
+) -> Trajectory:
+    """Third-order spline through points, with continuous acceleration.
+
+    Parameters
+    ----------
+    points : array_like, shape (m,) or (m, n)
+        Positions, rad or m, at least two.
+    times : array_like, shape (m,), optional
+        When, s, ascending from 0. Without them each interval is in proportion to the time that its
+        slowest joint needs at full velocity, and the whole is as quick as the limits allow.
+    limits : MotionLimits, optional
+        Kept everywhere on the motion.
+    v0, v1 : array_like, shape () or (n,)
+        Velocities at the ends of a clamped spline, rad/s or m/s. Other than zero, they need times.
+    ends : SplineEnds
+        What is asked at the ends.
+
+    Returns
+    -------
+    Trajectory
+        Of n joints, or scalar.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Fewer than two points, times that do not ascend from 0, limits that the times do not keep
+        (the message tells by how much to slow down) or that no times keep.
+
+    References
+    ----------
+    Khalil and Dombre, Modeling, identification and control of robots, section 13.5.
+
+    Examples
+    --------
+    >>> path = cubic_spline([[0.0, 0.0], [1.0, 0.5], [0.0, 1.0]], times=[0.0, 1.0, 2.0])
+    >>> path.q(1.0), path.v([0.0, 2.0]).round(12)
+    (array([1. , 0.5]), array([[0., 0.],
+           [0., 0.]]))
+    """
+    from scipy.interpolate import CubicSpline
+
+    if not isinstance(ends, SplineEnds):
+        raise InvalidValueError(f"ends: expected SplineEnds, got {ends!r}.")
+    knots = _Knots(points, times, limits, {"v0": v0, "v1": v1})
+    if ends is not SplineEnds.CLAMPED and knots.moving:
+        raise InvalidValueError("v0, v1: only a clamped spline takes velocities at its ends.")
+    q = knots.points
+    if ends is SplineEnds.PERIODIC:
+        if np.abs(q[0] - q[-1]).max(initial=0.0) > 1e-9:
+            raise InvalidValueError("points: a periodic spline ends where it began.")
+        q = q.copy()
+        q[-1] = q[0]
+    condition: Any = {
+        SplineEnds.CLAMPED: ((1, knots.rates["v0"]), (1, knots.rates["v1"])),
+        SplineEnds.NATURAL: "natural",
+        SplineEnds.PERIODIC: "periodic",
+    }[ends]
+    spline = CubicSpline(knots.times, q, bc_type=condition)
+    trajectory = knots.finished(np.asarray(spline.c), np.asarray(spline.x))
+    if ends is SplineEnds.PERIODIC:
+        return Trajectory(trajectory.motion, trajectory.scalar)
+    return trajectory
+
+
+def quintic_spline(
+    points: ArrayLike,
+    times: ArrayLike | None = None,
+    limits: MotionLimits | None = None,
+    v0: ArrayLike = 0.0,
+    v1: ArrayLike = 0.0,
+    a0: ArrayLike = 0.0,
+    a1: ArrayLike = 0.0,
+) -> Trajectory:
+    """Fifth-order spline through points, with continuous jerk and its derivative.
+
+    Parameters
+    ----------
+    points : array_like, shape (m,) or (m, n)
+        Positions, rad or m, at least two.
+    times : array_like, shape (m,), optional
+        When, s, ascending from 0; without them as in `cubic_spline`.
+    limits : MotionLimits, optional
+        Kept everywhere on the motion.
+    v0, v1, a0, a1 : array_like, shape () or (n,)
+        Velocities and accelerations at the ends. Other than zero, they need times.
+
+    Returns
+    -------
+    Trajectory
+        Of n joints, or scalar.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        As `cubic_spline`.
+
+    Examples
+    --------
+    >>> path = quintic_spline([0.0, 1.0, 0.5], times=[0.0, 1.0, 2.0])
+    >>> path.q([0.0, 1.0, 2.0]).round(12), path.a([0.0, 2.0]).round(9) + 0.0
+    (array([0. , 1. , 0.5]), array([0., 0.]))
+    """
+    from scipy.interpolate import make_interp_spline
+
+    knots = _Knots(points, times, limits, {"v0": v0, "v1": v1, "a0": a0, "a1": a1})
+    rates = knots.rates
+    # in units of the mean interval the equations are well scaled
+    unit = knots.times[-1] / (len(knots.times) - 1)
+    condition: Any = (
+        [(1, rates["v0"] * unit), (2, rates["a0"] * unit**2)],
+        [(1, rates["v1"] * unit), (2, rates["a1"] * unit**2)],
+    )
+    spline = make_interp_spline(knots.times / unit, knots.points, k=5, bc_type=condition)
+    left = knots.times[:-1] / unit
+    # Taylor's coefficients at the start of every interval, highest power first
+    c = np.stack([spline(left, nu=k) / (factorial(k) * unit**k) for k in range(5, -1, -1)])
+    return knots.finished(c, knots.times)
+
+
+class _Knots:
+    """Points, times and rates as given, checked; and the end of the work, common to all splines."""
+
+    __slots__ = ("chosen", "limits", "moving", "points", "rates", "scalar", "times")
+
+    def __init__(
+        self,
+        points: ArrayLike,
+        times: ArrayLike | None,
+        limits: MotionLimits | None,
+        rates: dict[str, ArrayLike],
+    ) -> None:
+        q = as_floats(points, "points")
+        if q.ndim not in (1, 2) or len(q) < 2:
+            raise ShapeError(f"points: expected at least two, shape (m, n), got shape {q.shape}.")
+        self.scalar = q.ndim == 1
+        self.points = q[:, None] if self.scalar else q
+        n = self.points.shape[1]
+        try:
+            self.rates = {k: np.broadcast_to(as_floats(v, k), n) for k, v in rates.items()}
+        except ValueError as error:
+            raise ShapeError(f"Expected rates of {n} joints at the ends: {error}.") from None
+        self.moving = any(rate.any() for rate in self.rates.values())
+        self.limits = checked_limits(limits, n, self.points)
+        self.chosen = times is None
+        self.times = _chosen_times(self) if times is None else _given_times(times, len(q))
+
+    def finished(self, c: Array, x: Array) -> Trajectory:
+        """The trajectory of coefficients (d + 1, K, n), highest power first, and its limits."""
+        h = np.diff(x)
+        c = np.moveaxis(c[::-1], 0, 1) * h[:, None, None] ** np.arange(float(len(c)))[:, None]
+        motion = PiecewisePolynomial(x[None], c)
+        trajectory = Trajectory(motion, self.scalar)
+        if self.limits is None:
+            return trajectory
+        report = trajectory.check(self.limits, ROUNDING)
+        if self.chosen:
+            factor = report.stretch * (1.0 + 1e-14)
+            motion = PiecewisePolynomial(x[None] * factor, c, h[None] * factor)
+            trajectory = Trajectory(motion, self.scalar)
+            report = trajectory.check(self.limits, ROUNDING)
+        if not report.kept:
+            sentences = "; ".join(report.violations())
+            advice = (
+                f"The least factor on the times is {report.stretch:.12g}."
+                if report.stretch > 1.0 and not self.moving
+                else "Choose other points or times."
+            )
+            raise InvalidValueError(f"The limits are not kept: {sentences}. {advice}")
+        return trajectory
+
+
+def _given_times(times: ArrayLike, m: int) -> Array:
+    t = as_floats(times, "times")
+    if t.shape != (m,):
+        raise ShapeError(f"times: expected one per point, shape ({m},), got {t.shape}.")
+    if t[0] != 0.0 or (np.diff(t) <= 0.0).any():
+        raise InvalidValueError(
+            "times: expected times that ascend from 0, each later than the last."
+        )
+    return t
+
+
+def _chosen_times(knots: _Knots) -> Array:
+    if knots.limits is None:
+        raise InvalidValueError("Give times, limits or both.")
+    if knots.moving:
+        raise InvalidValueError("times: velocities or accelerations at the ends need given times.")
+    step = np.diff(knots.points, axis=0)
+    forward = np.where(step > 0.0, knots.limits.velocity, -knots.limits.velocity_lower)
+    if ((step != 0.0) & (forward == 0.0)).any():
+        raise InvalidValueError("limits: a limit of velocity of a joint that has to move is 0.")
+    with np.errstate(divide="ignore", invalid="ignore"):
+        needs = np.where(step != 0.0, np.abs(step) / forward, 0.0).max(axis=-1)
+    if not needs.any():  # no limit of velocity
+        needs = np.linalg.norm(step, axis=-1)
+    if (needs == 0.0).any():
+        k = int((needs == 0.0).argmax())
+        raise InvalidValueError(
+            f"points: {k} and {k + 1} are the same, which leaves no time between them; drop one or "
+            "give times."
+        )
+    return np.concatenate(((0.0,), np.cumsum(needs)))
