@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 
 from ..kernels._compile import INTS, NOTHING, OUT3, STACK, Floats, Ints, compiled
 from ._check import forward, jacobian, missing, wrapped
-from ._neighbour_linear import factor, smallest_singular, solve
+from ._neighbour_linear import anywhere, factor, smallest_singular, solve
 
 Work = tuple[Floats, Floats, Floats, Ints, Floats, Floats, Floats]
 
 MERGE = 1e-6  # postures closer than this in every joint are one [rad, or lengths of the arm]
 MET = 1e-11  # error of a posture that has arrived
+EXACT = 1e-8  # error of a posture of the neighbour, and not only its best approach
 FLOOR = 2e-14  # error below which a step gains nothing
 LONGEST = 0.5  # longest step of a joint
-JUMP = 0.2  # way to the neighbour's posture above which a branch is looked at again [rad]
 
 PATH = types.Array(types.float64, 4, "C", readonly=True)
 FLAGS_IN = types.Array(types.boolean, 2, "C", readonly=True)
@@ -115,8 +115,8 @@ def keep(sigma: Ints, q: Floats, found: Floats, count: int) -> int:
 
 @compiled(
     NOTHING(
-        INTS, STACK, STACK, STACK, STACK, FLAGS_IN, types.float64,
-        OUT3, COUNTS, FLAGS, COUNTS, DOUBTS,
+        INTS, STACK, STACK, STACK, OUT3, FLAGS, types.float64, types.float64,
+        types.float64, OUT3, COUNTS, FLAGS, COUNTS, FLAGS, DOUBTS,
     )
 )  # fmt: skip
 def arrivals(
@@ -126,18 +126,23 @@ def arrivals(
     goals: Floats,
     candidates: Floats,
     there: NDArray[np.bool_],
+    reach: float,
     small: float,
+    jump: float,
     found: Floats,
     count: Ints,
     arrived: NDArray[np.bool_],
     exact: Ints,
+    doubtful: NDArray[np.bool_],
     doubt: NDArray[np.bool_],
 ) -> None:
     """Newton's method from every candidate ``(N, C, 6)`` of the neighbour ``near`` to the arm ``D``.
 
     ``exact (N,)`` counts the candidates that are postures of the neighbour and not only its best
-    approach. A pose is left in ``doubt`` where a branch did not arrive, moved far, met another
-    branch, or ended where the smallest singular value of the Jacobian is below ``small``.
+    approach; those that miss by more than ``reach`` are taken out of ``there``. Candidates are
+    overwritten by where they arrived. A branch is ``doubtful (N, C)``, and its pose in ``doubt``,
+    where it did not arrive, moved by more than ``jump``, met another branch, or ended where the
+    smallest singular value of the Jacobian is below ``small``.
     """
     work = workspace()
     q, u, v = np.zeros(6), np.zeros(6), np.zeros(6)
@@ -147,22 +152,29 @@ def arrivals(
                 continue
             for k in range(6):
                 q[k] = candidates[n, c, k]
-            if error_at(sigma, near, goals[n], q, work) < 1e-8:
+            error = error_at(sigma, near, goals[n], q, work)
+            if not error <= reach:
+                there[n, c] = False
+                continue
+            start_is_exact = error < EXACT
+            if start_is_exact:
                 exact[n] += 1
-            else:
-                doubt[n] = True
             if not newton(sigma, D, goals[n], q, 10, work) <= MET:
-                doubt[n] = True
+                doubtful[n, c] = doubt[n] = True
                 continue
             arrived[n, c] = True
             before = count[n]
             count[n] = keep(sigma, q, found[n], count[n])
-            if count[n] == before or distance(sigma, q, candidates[n, c]) > JUMP:
-                doubt[n] = True
+            moved = distance(sigma, q, candidates[n, c])
+            for k in range(6):
+                candidates[n, c, k] = q[k]
+            if count[n] == before or moved > jump or not start_is_exact:
+                doubtful[n, c] = doubt[n] = True
                 continue
             factored_jacobian(sigma, work)
+            anywhere(u)
             if smallest_singular(work[2], work[3], u, v, 2) < small:
-                doubt[n] = True
+                doubtful[n, c] = doubt[n] = True
 
 
 @compiled()
@@ -172,7 +184,7 @@ def follow(sigma: Ints, path: Floats, U: Floats, q: Floats, last: Floats, work: 
     Returns the place on the path that was reached; ``last`` is overwritten.
     """
     end = path.shape[0] - 1
-    if not error_at(sigma, path[0], U, q, work) < 1e-8:
+    if not error_at(sigma, path[0], U, q, work) < EXACT:
         return 0
     at, step = 0, 4
     trial, slope = np.zeros(6), np.zeros(6)
@@ -196,7 +208,7 @@ def follow(sigma: Ints, path: Floats, U: Floats, q: Floats, last: Floats, work: 
     return at
 
 
-@compiled(NOTHING(INTS, PATH, STACK, STACK, FLAGS_IN, FLAGS, OUT3, OUT3, COUNTS))
+@compiled(NOTHING(INTS, PATH, STACK, OUT3, FLAGS_IN, FLAGS, OUT3, COUNTS))
 def followed(
     sigma: Ints,
     path: Floats,
@@ -204,37 +216,32 @@ def followed(
     candidates: Floats,
     there: NDArray[np.bool_],
     arrived: NDArray[np.bool_],
-    ends: Floats,
     found: Floats,
     count: Ints,
 ) -> None:
-    """Follow the candidates that have not arrived; ``ends (N, C, 6)`` is how far each came."""
+    """Follow the candidates that have not arrived; they are overwritten by how far each came."""
     work = workspace()
-    q, last = np.zeros(6), np.zeros(6)
+    last = np.zeros(6)
     D = path[path.shape[0] - 1]
     for n in range(goals.shape[0]):
         for c in range(candidates.shape[1]):
-            for k in range(6):
-                ends[n, c, k] = candidates[n, c, k]
             if not there[n, c] or arrived[n, c]:
                 continue
-            for k in range(6):
-                q[k] = candidates[n, c, k]
+            q = candidates[n, c]
             at = follow(sigma, path, goals[n], q, last, work)
-            for k in range(6):
-                ends[n, c, k] = q[k]
             if at == path.shape[0] - 1 and newton(sigma, D, goals[n], q, 10, work) <= MET:
                 arrived[n, c] = True
                 count[n] = keep(sigma, q, found[n], count[n])
 
 
-@compiled(NOTHING(INTS, STACK, STACK, STACK, FLAGS_IN, OUT3, COUNTS))
+@compiled(NOTHING(INTS, STACK, STACK, STACK, FLAGS, FLAGS, OUT3, COUNTS))
 def tried(
     sigma: Ints,
     D: Floats,
     goals: Floats,
     starts: Floats,
     there: NDArray[np.bool_],
+    arrived: NDArray[np.bool_],
     found: Floats,
     count: Ints,
 ) -> None:
@@ -248,4 +255,5 @@ def tried(
             for k in range(6):
                 q[k] = starts[n, c, k]
             if newton(sigma, D, goals[n], q, 15, work) <= MET:
+                arrived[n, c] = True
                 count[n] = keep(sigma, q, found[n], count[n])

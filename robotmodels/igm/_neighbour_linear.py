@@ -83,12 +83,16 @@ def unit(x: Floats) -> float:
 
 
 @compiled()
-def smallest_singular(A: Floats, pivots: Ints, u: Floats, v: Floats, rounds: int) -> float:
-    """Smallest singular value from the factors by inverse iteration, its vectors in ``u, v``."""
-    # no direction of the joints is special: an unsymmetric start is orthogonal to none of them
+def anywhere(u: Floats) -> None:
+    """A direction to start inverse iteration from: unsymmetric, so orthogonal to no axis."""
     for i in range(6):
-        u[i] = 1.0 + 0.3 * i * (-1.0) ** i
+        u[i] = 1.0 + (0.3 * i if i % 2 == 0 else -0.3 * i)
     unit(u)
+
+
+@compiled()
+def smallest_singular(A: Floats, pivots: Ints, u: Floats, v: Floats, rounds: int) -> float:
+    """Smallest singular value from the factors by inverse iteration from u; its vectors ``u, v``."""
     grown = 1.0
     for _ in range(rounds):
         for i in range(6):

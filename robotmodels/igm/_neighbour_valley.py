@@ -34,7 +34,7 @@ from ._neighbour import (
     newton,
     workspace,
 )
-from ._neighbour_linear import smallest_singular, solve
+from ._neighbour_linear import anywhere, smallest_singular, solve
 
 STRIDE = 0.1  # step along a valley [rad]
 STRIDES = 160  # steps one way
@@ -49,13 +49,18 @@ Curve = tuple[Floats, Floats, Floats]
 def slide(
     sigma: Ints, D: Floats, U: Floats, q: Floats, u: Floats, v: Floats, rounds: int, work: Work
 ) -> tuple[float, float, float]:
-    """Bring ``q`` to the curve, in place; what is missing along u, beside it, and the value of u, v."""
+    """Bring ``q`` to the curve, in place; what is missing along u, beside it, and the value of u, v.
+
+    ``u`` is where the search for the singular vectors starts.
+    """
     e = work[4]
     along, beside, small = 0.0, np.inf, np.inf
+    iterations = 3
     for turn in range(rounds + 1):
         error_at(sigma, D, U, q, work)
         factored_jacobian(sigma, work)
-        small = smallest_singular(work[2], work[3], u, v, 3)
+        small = smallest_singular(work[2], work[3], u, v, iterations)
+        iterations = 2
         along, size = 0.0, 0.0
         for i in range(6):
             along += u[i] * e[i]
@@ -63,7 +68,7 @@ def slide(
             e[i] -= along * u[i]
             size += e[i] * e[i]
         beside = sqrt(size)
-        if turn == rounds or beside < 1e-14 or not beside < 0.5:
+        if turn == rounds or beside < 1e-3 * abs(along) or beside < 1e-14 or not beside < 0.5:
             break
         solve(work[2], work[3], e)
         onto, largest = 0.0, 0.0
@@ -80,10 +85,18 @@ def slide(
 
 @compiled()
 def walk(
-    sigma: Ints, D: Floats, U: Floats, origin: Floats, valley: float, curve: Curve, work: Work
+    sigma: Ints,
+    D: Floats,
+    U: Floats,
+    origin: Floats,
+    valley: float,
+    far: float,
+    curve: Curve,
+    work: Work,
 ) -> tuple[int, int]:
     """Walk the curve through ``origin`` both ways while the Jacobian stays nearly singular.
 
+    No further than to where more than ``far`` is missing.
     The points, what is missing along u at each and the u are written to ``curve``, in order, one
     sense of u throughout. Returns the first and one past the last row in use.
     """
@@ -98,9 +111,10 @@ def walk(
             break
         for i in range(6):
             q[i] = origin[i]
+        anywhere(u)
         along, beside, small = slide(sigma, D, U, q, u, v, 4, work)
         if side == 0:
-            if not (beside < LOST and small < valley):
+            if not (beside < LOST and small < valley and abs(along) < far):
                 return middle, middle
             for i in range(6):
                 points[middle, i], us[middle, i] = q[i], u[i]
@@ -131,6 +145,8 @@ def walk(
                 ahead[i] = v[i] if forth >= 0.0 else -v[i]
             missing[at] = along if same >= 0.0 else -along
             first, last = min(first, at), max(last, at + 1)
+            if abs(along) > far:
+                break
             if side == 0 and not closed and at - middle > 10:
                 if distance(sigma, q, points[middle]) < STRIDE:
                     # two steps more, so that the ends overlap
@@ -144,8 +160,8 @@ def _at(
     sigma: Ints, D: Floats, U: Floats, side: Floats, q: Floats, work: Work
 ) -> float:  # fmt: skip
     """What is missing along u at the point of the curve next to q, u on the side of ``side``."""
-    u, v = np.zeros(6), np.zeros(6)
-    along, _, _ = slide(sigma, D, U, q, u, v, 3, work)
+    u, v = side.copy(), np.zeros(6)
+    along, _, _ = slide(sigma, D, U, q, u, v, 4, work)
     same = 0.0
     for i in range(6):
         same += u[i] * side[i]
@@ -253,6 +269,7 @@ def _driven(
 ) -> bool:
     """Move along the curve until a joint has a value; whether it got there."""
     u, v = np.zeros(6), np.zeros(6)
+    anywhere(u)
     for _ in range(12):
         slide(sigma, D, U, q, u, v, 2, work)
         gap = value - q[joint]
@@ -348,6 +365,7 @@ def _is_double(sigma: Ints, D: Floats, root: Floats, work: Work) -> bool:
     U[0, 0] = U[1, 1] = U[2, 2] = U[3, 3] = 1.0
     error_at(sigma, D, U, root, work)
     factored_jacobian(sigma, work)
+    anywhere(u)
     small = smallest_singular(work[2], work[3], u, v, 3)
     if small > 1e-5:
         return False
@@ -359,6 +377,8 @@ def _is_double(sigma: Ints, D: Floats, root: Floats, work: Work) -> bool:
             q[i] = root[i] + side * step * v[i]
         error_at(sigma, D, U, q, work)
         factored_jacobian(sigma, work)
+        for i in range(6):
+            w[i] = u[i]
         value = smallest_singular(work[2], work[3], w, t, 4)
         same = 0.0
         forth = 0.0
@@ -372,6 +392,7 @@ def _is_double(sigma: Ints, D: Floats, root: Floats, work: Work) -> bool:
 @compiled(
     NOTHING(
         INTS, STACK, STACK, STACK, FLAGS_IN, MATRIX, VECTOR, types.float64, types.float64,
+        types.float64,
         OUT3, COUNTS, FLAGS, MARKS, DOUBTS,
     )
 )  # fmt: skip
@@ -385,6 +406,7 @@ def valleys(
     tolerances: Floats,
     small: float,
     valley: float,
+    far: float,
     found: Floats,
     count: Ints,
     double: NDArray[np.bool_],
@@ -417,6 +439,7 @@ def valleys(
                     continue
                 for i in range(6):
                     q[i] = starts[n, at, i]
+                anywhere(u)
                 slide(sigma, D, goals[n], q, u, v, 8, work)
             else:
                 for i in range(6):
@@ -424,6 +447,7 @@ def valleys(
                 k += 1
                 error_at(sigma, D, goals[n], q, work)
                 factored_jacobian(sigma, work)
+                anywhere(u)
                 if smallest_singular(work[2], work[3], u, v, 3) > small:
                     continue
             passed = False
@@ -433,7 +457,7 @@ def valleys(
                     break
             if passed:
                 continue
-            first, last = walk(sigma, D, goals[n], q, valley, curve, work)
+            first, last = walk(sigma, D, goals[n], q, valley, far, curve, work)
             if last == first:
                 continue
             walked[n] = True

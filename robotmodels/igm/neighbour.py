@@ -34,6 +34,10 @@ TILT_TOLERANCE = 0.014
 off by 0.5 deg make 0.0124."""
 SLANTED = 0.05  # sine between axes that meet, at least
 STAGES = 16  # arms between the neighbour and the arm, for branches that have to be followed
+REACH = 6.0  # deviations by which a best approach of the neighbour may miss
+NEARLY_SINGULAR = 3.0  # deviations up to which a singular value may hide more postures
+JUMP = 6.0  # deviations by which a joint of a regular branch may move
+FAR = 6.0  # deviations missing in a valley beyond which it is left
 ASIDE = 24  # poses nearby that are asked where doubts are left
 MOST = 16  # postures of one pose
 CHUNK = 1024
@@ -129,7 +133,7 @@ arm and brought home by Newton steps
     if best is None:
         return None
     _, change, plan = best
-    unit = max(0.5 * plan.size, 1e-3)
+    unit = max(0.5 * float(np.linalg.norm(slid[1:, :3, 3], axis=1).sum()), 1e-3)
     deviation = _deviation(chain.sigma, change.D, slid, unit)
     return Neighbour(
         chain=chain,
@@ -376,22 +380,20 @@ def _solve(
     finite = np.isfinite(goals).all(axis=(1, 2))
     there &= finite[:, None]
     found, count = np.zeros((N, MOST, 6)), np.zeros(N, np.int64)
-    arrived, exact, doubt = (
-        np.zeros(there.shape, np.bool_),
-        np.zeros(N, np.int64),
-        np.zeros(N, np.bool_),
-    )
+    arrived, doubtful = np.zeros((2, *there.shape), np.bool_)
+    exact, doubt = np.zeros(N, np.int64), np.zeros(N, np.bool_)
     double, free = np.zeros((N, MOST), np.bool_), np.zeros((N, MOST), np.int64)
     sigma = np.ascontiguousarray(solver.chain.sigma)
     kernels.arrivals(
-        sigma, solver.path[0], solver.path[-1], goals, candidates, there, _small(solver),
-        found, count, arrived, exact, doubt,
+        sigma, solver.path[0], solver.path[-1], goals, candidates, there,
+        max(REACH * solver.deviation, 1e-7), _small(solver), min(JUMP * solver.deviation, 0.2),
+        found, count, arrived, exact, doubtful, doubt,
     )  # fmt: skip
     chosen = np.flatnonzero(doubt)
     if chosen.size:
         part = _Search(
             *(np.ascontiguousarray(array[chosen]) for array in
-              (goals, scaled, candidates, there, arrived, exact, found, count, double, free))
+              (goals, scaled, candidates, there, arrived, doubtful, exact, found, count, double, free))
         )  # fmt: skip
         _search(solver, U[chosen], part, tolerances)
         found[chosen], count[chosen] = part.found, part.count
@@ -417,6 +419,7 @@ class _Search(NamedTuple):
     candidates: Array
     there: NDArray[np.bool_]
     arrived: NDArray[np.bool_]
+    doubtful: NDArray[np.bool_]
     exact: NDArray[np.int64]
     found: Array
     count: NDArray[np.int64]
@@ -426,7 +429,7 @@ class _Search(NamedTuple):
 
 def _small(solver: Neighbour) -> float:
     """Singular value below which the arm may have postures that its neighbour has not."""
-    return min(max(8.0 * solver.deviation, 1e-6), 0.3)
+    return min(max(NEARLY_SINGULAR * solver.deviation, 1e-6), 0.3)
 
 
 def _valley(solver: Neighbour) -> float:
@@ -443,7 +446,7 @@ def _scaled(solver: Neighbour, U: Array, references: Array) -> tuple[Array, Arra
 
 def _candidates(solver: Neighbour, U: Array, references: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Postures of the neighbour, or its best approach; lengths in units of the arm."""
-    slack = max(5.0 * solver.deviation, 1e-9)
+    slack = max(3.0 * solver.deviation * max(1.0, solver.unit / solver.plan.size), 1e-9)
     q, there, _ = closed_form_postures(
         solver.plan, solver.near, U, references, slack=slack, accepted=np.inf
     )
@@ -454,22 +457,62 @@ def _candidates(solver: Neighbour, U: Array, references: Array) -> tuple[Array, 
 def _search(solver: Neighbour, U: Array, part: _Search, tolerances: Tolerances) -> None:
     """Find the postures of poses in doubt, in place."""
     from . import _neighbour as kernels
-    from . import _neighbour_valley as more
 
     sigma = np.ascontiguousarray(solver.chain.sigma)
-    goals, there, arrived = part.goals, part.there, part.arrived
-    limits = np.array([tolerances.position / solver.unit, tolerances.orientation])
-    ends = np.empty_like(part.candidates)
     kernels.followed(
-        sigma, solver.path, goals, part.candidates, there, arrived, ends, part.found, part.count
-    )
-    walked = np.zeros(len(goals), np.bool_)
-    valley = (_small(solver), _valley(solver))
-    results = (part.found, part.count, part.double, part.free, walked)
-    more.valleys(
-        sigma, solver.path[-1], goals, ends, there & ~arrived, part.references, limits, *valley,
-        *results,
+        sigma, solver.path, part.goals, part.candidates, part.there, part.arrived,
+        part.found, part.count,
     )  # fmt: skip
+    _walk(solver, part, part.candidates, part.doubtful, tolerances)
+    uneven = (part.count + part.double.sum(axis=1)) % 2 == 1
+    fewer = np.minimum(part.count, part.exact) < part.there.sum(axis=1)
+    chosen = np.flatnonzero(uneven | fewer)
+    if chosen.size == 0:
+        return
+    rest = _Search(*(np.ascontiguousarray(array[chosen]) for array in part))
+    shifts = _shifts(solver)
+    aside = (shifts[:, None] @ U[chosen]).reshape(-1, 4, 4)
+    q, there = _candidates(solver, aside, np.tile(part.references[chosen], (len(shifts), 1)))
+    q = q.reshape(len(shifts), chosen.size, 8, 6).transpose(1, 0, 2, 3)
+    there = there.reshape(len(shifts), chosen.size, 8).transpose(1, 0, 2)
+    starts = np.ascontiguousarray(q.reshape(chosen.size, -1, 6))
+    open_ = np.ascontiguousarray(there.reshape(chosen.size, -1))
+    arrived = np.zeros_like(open_)
+    kernels.tried(
+        sigma, solver.path[-1], rest.goals, starts, open_, arrived, rest.found, rest.count
+    )
+    _walk(solver, rest, starts, open_ & ~arrived, tolerances)
+    part.found[chosen], part.count[chosen] = rest.found, rest.count
+    part.double[chosen], part.free[chosen] = rest.double, rest.free
+
+
+def _walk(
+    solver: Neighbour,
+    part: _Search,
+    starts: Array,
+    there: NDArray[np.bool_],
+    tolerances: Tolerances,
+) -> None:
+    """Search the valleys through starts and nearly singular postures, in place."""
+    from . import _neighbour_valley as kernels
+
+    kernels.valleys(
+        np.ascontiguousarray(solver.chain.sigma), solver.path[-1], part.goals, starts, there,
+        part.references, np.array([tolerances.position / solver.unit, tolerances.orientation]),
+        _small(solver), _valley(solver), FAR * solver.deviation,
+        part.found, part.count, part.double, part.free, np.zeros(len(part.goals), np.bool_),
+    )  # fmt: skip
+
+
+def _shifts(solver: Neighbour) -> Array:
+    """Small motions of the pose in R_0, some of which bring it into the neighbour's reach."""
+    rng = np.random.default_rng(0)
+    shifts = np.tile(np.eye(4), (ASIDE, 1, 1))
+    for k in range(ASIDE):
+        K = se3.skew(solver.deviation * rng.normal(size=3))
+        shifts[k, :3, :3] = np.linalg.solve(np.eye(3) - 0.5 * K, np.eye(3) + 0.5 * K)
+        shifts[k, :3, 3] = solver.deviation * solver.unit * rng.normal(size=3)
+    return shifts
 
 
 @lru_cache(maxsize=16)
