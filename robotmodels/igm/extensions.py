@@ -46,6 +46,8 @@ class Layout(NamedTuple):
         how many they are.
     behind : int
         How many joints of the run stand before the triple's virtual ones.
+    seed : int
+        Of the directions and places that are not dictated.
     joints : tuple of VirtualJoint
         The virtual joints.
     """
@@ -54,10 +56,11 @@ class Layout(NamedTuple):
     first: int
     real: int
     behind: int
+    seed: int
     joints: tuple[VirtualJoint, ...]
 
 
-def layouts(chain: JointChain, length: float, rng: np.random.Generator) -> Iterator[Layout]:
+def layouts(chain: JointChain, length: float) -> Iterator[Layout]:
     """Placings that give a chain of one to five joints a closed form, in random directions.
 
     Parameters
@@ -66,39 +69,25 @@ def layouts(chain: JointChain, length: float, rng: np.random.Generator) -> Itera
         The arm.
     length : float
         A length of it [m].
-    rng : Generator
-        Directions and places that are not dictated.
 
     Yields
     ------
     Layout
         Any number, none if no closed form can be had.
     """
-    k, missing = chain.k, 6 - chain.k
     for real in range(4):
-        for first in range(k + 1 if real == 0 else k - real + 1):
-            run = chain.sigma[first : first + real]
-            if 3 - real > missing or run.any():
-                continue
-            point = _meeting_point(chain, first, real)
-            parallel = real >= 2 and _are_parallel(chain, first, real) and not chain.sigma.any()
+        for first in range(chain.k + 1 if real == 0 else chain.k - real + 1):
             # with its virtual joints before, amid or behind the run
             places = range(real + 1) if real == 2 else (0, real) if real == 1 else (0,)
-            for behind in places:
-                for _ in range(TRIES):
-                    if real < 2 or point is not None:
-                        block = _meeting_block(chain, first, real, behind, point, length, rng)
-                        joints = _filled(chain, first, real, behind, block, True, length, rng)
-                        yield Layout(Triple.MEETING, first, real, behind, joints)
-                    if parallel:
-                        block = _parallel_block(chain, first, real, behind, length, rng)
-                        joints = _filled(chain, first, real, behind, block, False, length, rng)
-                        yield Layout(Triple.PARALLEL, first, real, behind, joints)
+            for triple in (Triple.MEETING, Triple.PARALLEL):
+                for behind in places:
+                    for seed in range(TRIES):
+                        layout = _placed(chain, length, triple, first, real, behind, seed)
+                        if layout is not None:
+                            yield layout
 
 
-def loose_layouts(
-    chain: JointChain, length: float, sigma: int, rng: np.random.Generator
-) -> Iterator[Layout]:
+def loose_layouts(chain: JointChain, length: float, sigma: int) -> Iterator[Layout]:
     """Placings in random places and directions: no closed form is aimed at.
 
     Parameters
@@ -109,8 +98,6 @@ def loose_layouts(
         A length of it [m].
     sigma : int
         Kind of the virtual joints, 0 revolute, 1 prismatic.
-    rng : Generator
-        Places and directions.
 
     Yields
     ------
@@ -118,11 +105,46 @@ def loose_layouts(
         With the virtual joints in each gap, in a few directions.
     """
     for gap in range(chain.k + 1):
-        for _ in range(TRIES):
-            joints = tuple(
-                VirtualJoint(gap, _anywhere(length, rng), sigma) for _ in range(6 - chain.k)
-            )
-            yield Layout(Triple.ANY, gap, 0, sigma, joints)
+        for seed in range(TRIES):
+            layout = _placed(chain, length, Triple.ANY, gap, 0, sigma, seed)
+            if layout is not None:
+                yield layout
+
+
+def layout_like(chain: JointChain, length: float, layout: Layout) -> Layout | None:
+    """The same placing for a chain with other constants; None if it has not the same structure."""
+    return _placed(chain, length, *layout[:5])
+
+
+def _placed(
+    chain: JointChain,
+    length: float,
+    triple: Triple,
+    first: int,
+    real: int,
+    behind: int,
+    seed: int,
+) -> Layout | None:
+    """The virtual joints of a layout, None if the real joints do not suit it."""
+    rng = np.random.default_rng((seed, first, real, behind))
+    missing = 6 - chain.k
+    if triple is Triple.ANY:
+        loose = tuple(VirtualJoint(first, _anywhere(length, rng), behind) for _ in range(missing))
+        return Layout(triple, first, real, behind, seed, loose)
+    if 3 - real > missing or chain.sigma[first : first + real].any():
+        return None
+    if triple is Triple.MEETING:
+        point = _meeting_point(chain, first, real)
+        if real >= 2 and point is None:
+            return None
+        block = _meeting_block(chain, first, real, behind, point, length, rng)
+    else:
+        if real < 2 or chain.sigma.any() or not _are_parallel(chain, first, real):
+            return None
+        block = _parallel_block(chain, first, real, behind, length, rng)
+    slides = triple is Triple.MEETING
+    joints = _filled(chain, first, real, behind, block, slides, length, rng)
+    return Layout(triple, first, real, behind, seed, joints)
 
 
 # --- the triple -----------------------------------------------------------------------------------

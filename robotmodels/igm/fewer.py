@@ -8,17 +8,19 @@ asked, whose singular postures are different ones.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
+from .alike import prepare_alike
 from .check import checked
-from .extensions import Layout, Triple, layouts, loose_layouts
+from .dependent import DependentJoints, prepare_dependent
+from .extensions import Layout, Triple, layout_like, layouts, loose_layouts
 from .loop import JointChain
-from .motion import jacobians, lever, random_postures, tool_poses
+from .motion import jacobians, lever, random_postures, scaled, tool_poses
 from .solver import Found, Prepare, Solver, Tolerances, nothing_found, postures
 from .structure import plan_loop
 from .virtual import with_virtual_joints
@@ -28,10 +30,8 @@ TESTS = 32  # random postures of the self-test
 TRIED = 12  # extensions with a closed form that are tested, best conditioned first
 TRIED_LOOSE = 4  # the same of those without, which take a second each to prepare
 SINGULAR = 1e-6  # singular values of the Jacobian beside the largest that count as zero
-DEPENDENT = 1e-9  # the same where no posture is better: the joints do the same thing
 LOOSER = 30.0  # tolerances of the extended arm beside those of the call
 ROUGH = 1e-2  # how far virtual joints may be from zero before the posture is improved
-MEMORY = 8  # chains with a held joint that are kept
 
 
 class Extension(NamedTuple):
@@ -43,10 +43,13 @@ class Extension(NamedTuple):
         Of the extended arm.
     places : ndarray of int, shape (k,)
         Where the joints of the arm stand in it.
+    layout : Layout
+        How the virtual ones were placed.
     """
 
     solver: Solver
     places: NDArray[np.int64]
+    layout: Layout
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,34 +75,6 @@ class FewerJoints:
         """The family in words."""
         count = 6 - self.chain.k
         return f"{_joints(self.chain.k)} and {count} virtual at zero: {self.ways[0].solver.method}"
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class DependentJoints:
-    """An arm of which a joint only does what others can do: it takes its reference.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    held : int
-        The joint that takes the reference.
-    inner : str
-        Method by which the others are solved.
-    prepare : callable
-        Chooses the family of extended arms.
-    """
-
-    chain: JointChain
-    held: int
-    inner: str
-    prepare: Prepare
-    _known: dict[float, Solver | None] = field(default_factory=dict)
-
-    @property
-    def method(self) -> str:
-        """The family in words."""
-        return f"joint {self.held + 1} of {self.chain.k} at its reference; {self.inner}"
 
 
 def prepare_fewer(chain: JointChain, prepare: Prepare) -> FewerJoints | DependentJoints | None:
@@ -138,17 +113,16 @@ def prepare_fewer(chain: JointChain, prepare: Prepare) -> FewerJoints | Dependen
     if not 1 <= chain.k <= 5:
         return None
     length = lever(chain)
-    rng = np.random.default_rng(0)
-    q = random_postures(chain, TESTS, rng)
-    held = _dependent_joint(_scaled(jacobians(chain, q), length))
-    if held is not None:
-        return _prepare_dependent(chain, held, prepare)
-    ways = _chosen(chain, length, q, list(layouts(chain, length, rng)), TRIED, prepare)
+    dependent = prepare_dependent(chain, lambda rest: prepare_fewer(rest, prepare))
+    if dependent is not None:
+        return dependent
+    q = random_postures(chain, TESTS, np.random.default_rng(0))
+    ways = _chosen(chain, length, q, list(layouts(chain, length)), TRIED, prepare)
     # three prismatic joints leave the orientation to the others, which is simpler than two do
     slides = int(chain.sigma.sum())
     for sigma in (1, 0) if slides == 2 else (0, 1):
         if not ways:
-            loose = list(loose_layouts(chain, length, sigma, rng))
+            loose = list(loose_layouts(chain, length, sigma))
             ways = _chosen(chain, length, q, loose, TRIED_LOOSE, prepare)
     return FewerJoints(chain, tuple(ways), length) if ways else None
 
@@ -172,36 +146,19 @@ def _(solver: FewerJoints, U: Array, references: Array, tolerances: Tolerances) 
     return _judged(solver, U, references, tolerances, found, gathered)
 
 
-@postures.register
-def _(solver: DependentJoints, U: Array, references: Array, tolerances: Tolerances) -> Found:
-    chain, held = solver.chain, solver.held
-    others = np.delete(np.arange(chain.k), held)
-    values, group = np.unique(references[:, held], return_inverse=True)
-    parts = []
-    for value in values:
-        if value not in solver._known:
-            if len(solver._known) >= MEMORY:
-                solver._known.pop(next(iter(solver._known)))
-            solver._known[value] = _solver_of_rest(_held(chain, held, value), solver.prepare)
-    for i, value in enumerate(values):
-        rows = np.flatnonzero(group == i)
-        rest = solver._known.get(value) or _solver_of_rest(
-            _held(chain, held, value), solver.prepare
-        )
-        if rest is not None:
-            part = postures(rest, U[rows], references[np.ix_(rows, others)], tolerances)
-            parts.append((rows, value, part))
-    most = max((part.q.shape[1] for _, _, part in parts), default=0)
-    out = nothing_found(len(U), most, chain.k)
-    for rows, value, part in parts:
-        S = part.q.shape[1]
-        q = np.insert(part.q, held, value, axis=2)
-        q[~part.valid] = np.nan
-        out.q[rows, :S], out.valid[rows, :S] = q, part.valid
-        out.residual[rows, :S], out.double[rows, :S] = part.residual, part.double
-        out.free[rows, :S] = np.insert(part.free, held, True, axis=2) & part.valid[..., None]
-        out.family[rows, :S] = part.valid
-    return out
+@prepare_alike.register
+def _(known: FewerJoints, chain: JointChain, prepare: Prepare) -> Solver | None:
+    ways = []
+    for way in known.ways:
+        layout = layout_like(chain, known.length, way.layout)
+        if layout is not None:
+            longer, places = with_virtual_joints(chain, layout.joints)
+            solver = prepare_alike(way.solver, longer, prepare)
+            if solver is not None:
+                ways.append(Extension(solver, places, layout))
+    if ways:
+        return FewerJoints(chain, tuple(ways), known.length)
+    return prepare_fewer(chain, prepare)
 
 
 # --- solving --------------------------------------------------------------------------------------
@@ -252,7 +209,7 @@ def _judged(
 ) -> Found:
     """Mark double roots and infinite families; joints of a family at their references."""
     n, s = np.nonzero(found.valid)
-    J = _scaled(jacobians(solver.chain, found.q[n, s]), solver.length)
+    J = scaled(jacobians(solver.chain, found.q[n, s]), solver.length)
     _, values, rows = np.linalg.svd(J, full_matrices=False)
     singular = np.flatnonzero(values[:, -1] <= SINGULAR * values[:, 0])
     if singular.size == 0:
@@ -281,48 +238,6 @@ def _joints(k: int) -> str:
     return "1 joint" if k == 1 else f"{k} joints"
 
 
-def _scaled(J: Array, length: float) -> Array:
-    """Jacobians with lengths in units of the arm."""
-    J = J.copy()
-    J[:, :3] /= length
-    return J
-
-
-def _dependent_joint(J: Array) -> int | None:
-    """The first joint that moves where the tool does not, at all postures; None if none does."""
-    _, values, rows = np.linalg.svd(J, full_matrices=False)
-    if not np.all(values[:, -1] <= DEPENDENT * values[:, 0]):
-        return None
-    null = values <= DEPENDENT * values[:, :1]
-    share = np.sqrt(np.sum(np.where(null[..., None], rows, 0.0) ** 2, axis=1))
-    return int(np.argmax(share.max(axis=0) > 1e-6))
-
-
-def _held(chain: JointChain, held: int, value: float) -> JointChain:
-    """The chain with a joint that has become a constant."""
-    M = np.eye(4)
-    if chain.sigma[held] == 0:
-        M[:2, :2] = [[np.cos(value), -np.sin(value)], [np.sin(value), np.cos(value)]]
-    else:
-        M[2, 3] = value
-    joined = chain.D[held] @ M @ chain.D[held + 1]
-    D = np.concatenate([chain.D[:held], joined[None], chain.D[held + 2 :]])
-    others = np.delete(np.arange(chain.k), held)
-    return JointChain(chain.columns[others], chain.sigma[others], D, chain.base)
-
-
-def _solver_of_rest(chain: JointChain, prepare: Prepare) -> Solver | None:
-    """What serves the joints that are left, which may be none."""
-    return prepare_fewer(chain, prepare)
-
-
-def _prepare_dependent(chain: JointChain, held: int, prepare: Prepare) -> DependentJoints | None:
-    rest = _solver_of_rest(_held(chain, held, 0.0), prepare)
-    if rest is None:
-        return None
-    return DependentJoints(chain, held, rest.method, prepare, {0.0: rest})
-
-
 def _chosen(
     chain: JointChain, length: float, q: Array, candidates: list[Layout], tried: int,
     prepare: Prepare,
@@ -333,7 +248,7 @@ def _chosen(
         longer, places = with_virtual_joints(chain, layout.joints)
         six = np.zeros((len(q), 6))
         six[:, places] = q
-        values = np.linalg.svd(_scaled(jacobians(longer, six), length), compute_uv=False)
+        values = np.linalg.svd(scaled(jacobians(longer, six), length), compute_uv=False)
         worth = float(np.mean(np.log10(values[:, -1] / values[:, 0] + 1e-16)))
         if worth > -6.0:
             ranked.append((worth, layout, longer, places))
@@ -351,7 +266,7 @@ def _chosen(
         solver = prepare(longer)
         if solver is None:
             continue
-        way = Extension(solver, places)
+        way = Extension(solver, places, layout)
         if _gives_back(FewerJoints(chain, (way,), length), U, q):
             taken.append(kind)
             ways.append(way)

@@ -91,6 +91,13 @@ def lever(chain: JointChain) -> float:
     return length if length > 1e-9 else 1.0
 
 
+def scaled(J: Array, length: float) -> Array:
+    """Jacobians with lengths in units of the arm."""
+    J = J.copy()
+    J[:, :3] /= length
+    return J
+
+
 def _walk(chain: JointChain, q: Array) -> tuple[Array, list[Array], list[Array]]:
     """Poses of the tool, and directions and origins of the axes, each (N, 3)."""
     T = np.broadcast_to(chain.D[0], (len(q), 4, 4))

@@ -1,0 +1,89 @@
+"""Postures found in parts put together: rows padded, equal ones merged, packed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .solver import Found, nothing_found
+
+MERGE = 1e-6
+"""Postures closer than this in every joint are one [rad, m]."""
+
+
+def assembled(N: int, k: int, parts: Iterable[tuple[NDArray[np.int64], Found]]) -> Found:
+    """What was found for some of N poses at a time, each pose in one part.
+
+    Parameters
+    ----------
+    N, k : int
+        Poses, joints.
+    parts : iterable of (ndarray of int, Found)
+        Which poses, and their postures.
+
+    Returns
+    -------
+    Found
+        As many rows a pose as the widest part has.
+
+    Examples
+    --------
+    >>> assembled(3, 2, [(np.array([1]), nothing_found(1, 4, 2))]).q.shape
+    (3, 4, 2)
+    """
+    parts = list(parts)
+    out = nothing_found(N, max((part.q.shape[1] for _, part in parts), default=0), k)
+    for rows, part in parts:
+        S = part.q.shape[1]
+        out.q[rows, :S], out.valid[rows, :S] = part.q, part.valid
+        out.residual[rows, :S], out.double[rows, :S] = part.residual, part.double
+        out.free[rows, :S], out.family[rows, :S] = part.free, part.family
+    return out
+
+
+def merged(sigma: NDArray[np.int64], found: Found) -> Found:
+    """Equal postures of a pose made one, the first of them; rows packed, the others emptied.
+
+    Parameters
+    ----------
+    sigma : ndarray of int, shape (k,)
+        0 revolute, 1 prismatic.
+    found : Found
+        Rows in any order.
+
+    Returns
+    -------
+    Found
+        No wider than it must be.
+
+    Examples
+    --------
+    >>> found = nothing_found(1, 3, 1)
+    >>> found.q[0, :, 0], found.valid[0] = [3.1415926, 1.0, -3.1415926], True
+    >>> merged(np.array([0]), found).q[0, :, 0].round(3)
+    array([3.142, 1.   ])
+    """
+    q = np.where(found.valid[..., None], found.q, 0.0)
+    gap = q[:, :, None] - q[:, None]
+    turns = np.where(sigma == 0, np.round(gap / (2.0 * np.pi)), 0.0)
+    same = np.all(np.abs(gap - 2.0 * np.pi * turns) < MERGE, axis=-1)
+    # a row equal to an earlier one goes
+    S = q.shape[1]
+    earlier = np.tril(np.ones((S, S), np.bool_), -1)
+    valid = found.valid & ~np.any(same & earlier & found.valid[:, None], axis=-1)
+    order = np.argsort(~valid, axis=1, kind="stable")
+    order = order[:, : int(valid.sum(axis=1).max(initial=0))]
+    pick = np.arange(len(q))[:, None], order
+    there = valid[pick]
+    return replace(
+        found,
+        q=np.where(there[..., None], found.q[pick], np.nan),
+        valid=there,
+        residual=np.where(there, found.residual[pick], np.nan),
+        double=found.double[pick] & there,
+        free=found.free[pick] & there[..., None],
+        family=found.family[pick] & there,
+    )
