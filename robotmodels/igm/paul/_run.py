@@ -1,7 +1,8 @@
 """The kernel that runs plans: one compiled program for every arm.
 
-It walks the tree of solutions depth first. Registers hold what the branch so far has computed;
-going to the next branch of a step overwrites what belongs to the levels below it.
+It walks the tree of solutions depth first, for a block of poses (lanes) at a time. Registers hold
+what the branch so far has computed; going to the next branch of a step overwrites what belongs to
+the levels below it.
 """
 
 from __future__ import annotations
@@ -11,196 +12,283 @@ from math import pi, sqrt
 import numpy as np
 from numba import types
 
-from ...kernels._compile import INTS, MATRIX, OUT2, OUT3, STACK, VECTOR, Floats, Ints, compiled
+from ...kernels._compile import MATRIX, OUT2, OUT3, STACK, VECTOR, Floats, Ints, compiled
 from ._types import (
-    DOUBLE, FREE_1, FREE_2, SMALL, polynomial, quartic, two_angles, type_1, type_2, type_2_zero,
+    FREE_1, FREE_2, atan2, polynomial, quartic, two_angles, type_1, type_2, type_2_zero,
     type_3, type_3_direct, type_4, type_5, type_8,
 )  # fmt: skip
 
 STEP = 24
 MOST_STEPS = 8
+LANES = 16
 FALSE = 1e-2  # errors above this are of false candidates, not of rough ones
 EXACT = 5e-13  # errors above this are polished
+ROUGH = 16
 
-_COUNTS = types.Array(types.int64, 1, "C")
+_PLAN = types.Array(types.uint32, 1, "C", readonly=True)
 _MARKS = types.Array(types.int64, 2, "C")
-_TABLE = types.Array(types.int64, 2, "C", readonly=True)
 
 
 @compiled()
-def operate(operations: Ints, factors: Floats, start: int, stop: int, x: Floats) -> None:
-    """``x_d = f x_a x_b + g x_c x_e`` for a range of operations."""
+def operate(plan: Ints, numbers: Floats, at: int, of: int, start: int, stop: int, x: Floats) -> None:
+    """``x_d = f x_a x_b + g x_c x_e`` for a range of operations and every lane."""
+    lanes = x.shape[1]
     for i in range(start, stop):
-        x[operations[i, 0]] = (
-            factors[i, 0] * x[operations[i, 1]] * x[operations[i, 2]]
-            + factors[i, 1] * x[operations[i, 3]] * x[operations[i, 4]]
-        )
+        row = at + 5 * i
+        d, a, b, c, e = plan[row], plan[row + 1], plan[row + 2], plan[row + 3], plan[row + 4]
+        f, g = numbers[of + 2 * i], numbers[of + 2 * i + 1]
+        if lanes == 1:
+            x[d, 0] = f * x[a, 0] * x[b, 0] + g * x[c, 0] * x[e, 0]
+        else:
+            for lane in range(LANES):
+                x[d, lane] = f * x[a, lane] * x[b, lane] + g * x[c, lane] * x[e, lane]
 
 
 @compiled()
-def solve(step: Ints, x: Floats, tolerances: Floats, wanted: Floats, found: Floats
-          ) -> tuple[int, int]:  # fmt: skip
+def solve(plan: Ints, at: int, x: Floats, lane: int, tolerances: Floats, wanted: Floats,
+          found: Floats, o: int) -> tuple[int, int]:  # fmt: skip
     """Solutions of one step from the coefficients in the registers."""
-    code = step[0]
+    code = plan[at]
     slack, zero, small = tolerances[0], tolerances[1], tolerances[2]
-    a, b = x[step[9]], x[step[10]]
+    first, second = wanted[plan[at + 7], lane], wanted[plan[at + 8], lane]
+    a, b = x[plan[at + 9], lane], x[plan[at + 10], lane]
     if code == 10:
-        return type_3_direct(a, b, zero, small, wanted[step[7]], found)
+        return type_3_direct(a, b, zero, small, first, found, o, lane)
     if code == 9:
-        return type_2_zero(a, b, zero, small, wanted[step[7]], found)
+        return type_2_zero(a, b, zero, small, first, found, o, lane)
     if code == 1:
-        return type_1(a, b, zero, small, wanted[step[7]], found)
-    c = x[step[11]]
+        return type_1(a, b, zero, small, first, found, o, lane)
+    c = x[plan[at + 11], lane]
     if code == 2:
-        return type_2(a, b, c, slack, zero, small, wanted[step[7]], found)
-    d = x[step[12]]
+        return type_2(a, b, c, slack, zero, small, first, found, o, lane)
+    d = x[plan[at + 12], lane]
     if code == 4:
-        return type_4(a, b, c, d, zero, small, wanted[step[8]], found)
+        return type_4(a, b, c, d, zero, small, second, found, o, lane)
     if code == 8:
-        return type_8(a, b, c, d, slack, zero, small, wanted[step[7]], wanted[step[8]], found)
-    e = x[step[13]]
+        return type_8(a, b, c, d, slack, zero, small, first, second, found, o, lane)
+    e = x[plan[at + 13], lane]
     if code == 11:
-        return quartic(a, b, c, d, e, slack, wanted[step[7]], found)
+        return quartic(a, b, c, d, e, slack, first, found, o, lane)
     if code == 12:
-        return polynomial(a, b, c, d, e, slack, wanted[step[7]], found)
-    f = x[step[14]]
+        return polynomial(a, b, c, d, e, slack, first, found, o, lane)
+    f = x[plan[at + 14], lane]
     if code == 3:
-        return type_3(a, b, c, d, e, f, zero, small, wanted[step[7]], found)
+        return type_3(a, b, c, d, e, f, zero, small, first, found, o, lane)
     if code == 5:
-        return type_5(a, b, c, d, e, f, slack, zero, small, found)
+        return type_5(a, b, c, d, e, f, slack, zero, small, found, o, lane)
     return two_angles(
-        a, b, c, d, e, f, x[step[15]], slack, zero, small, wanted[step[7]], wanted[step[8]], found
+        a, b, c, d, e, f, x[plan[at + 15], lane], slack, zero, small, first, second, found, o, lane
     )
 
 
 @compiled()
-def residual(results: Ints, k: int, x: Floats, lever: Floats) -> float:
-    """The larger of the tool's position error [m] and the rotation angle [rad]."""
-    turn = 0.0
-    p0 = x[results[k + 9]] - x[results[k + 21]]
-    p1 = x[results[k + 10]] - x[results[k + 22]]
-    p2 = x[results[k + 11]] - x[results[k + 23]]
-    for j in range(3):
-        d0 = x[results[k + 3 * j]] - x[results[k + 12 + 3 * j]]
-        d1 = x[results[k + 3 * j + 1]] - x[results[k + 13 + 3 * j]]
-        d2 = x[results[k + 3 * j + 2]] - x[results[k + 14 + 3 * j]]
-        turn += d0 * d0 + d1 * d1 + d2 * d2
-        h = lever[j]
-        p0 += h * d0
-        p1 += h * d1
-        p2 += h * d2
-    # the chord of a rotation by phi: the squares of its nine elements sum to 8 sin^2(phi / 2)
-    return sqrt(max(p0 * p0 + p1 * p1 + p2 * p2, 0.5 * turn))
+def solve_lanes(plan: Ints, at: int, x: Floats, tolerances: Floats, found: Floats, o: int,
+                weak: Ints) -> int:  # fmt: skip
+    """The two commonest types in vector code, for lanes whose amplitude is not small.
+
+    Returns the number of solutions, 0 for other types; ``weak`` marks lanes that `solve` must do.
+    """
+    code, small = plan[at], tolerances[2]
+    a, b = plan[at + 9], plan[at + 10]
+    if code == 10:
+        for lane in range(LANES):
+            S, C = x[a, lane], x[b, lane]
+            rho = sqrt(S * S + C * C)
+            weak[lane] = 0 if rho > small else 1
+            scale = 1.0 / rho
+            found[o, lane], found[o + 1, lane], found[o + 2, lane] = (
+                atan2(S, C), C * scale, S * scale
+            )  # fmt: skip
+        return 1
+    if code == 9:
+        for lane in range(LANES):
+            C, S = x[a, lane], -x[b, lane]
+            rho = sqrt(S * S + C * C)
+            weak[lane] = 0 if rho > small else 1
+            scale = 1.0 / rho
+            angle = atan2(S, C)
+            C, S = C * scale, S * scale
+            found[o, lane], found[o + 1, lane], found[o + 2, lane] = angle, C, S
+            found[o + 6, lane] = angle - pi if angle > 0.0 else angle + pi
+            found[o + 7, lane], found[o + 8, lane] = -C, -S
+        return 2
+    return 0
 
 
 @compiled()
-def take_branch(step: Ints, found: Floats, branch: int, x: Floats) -> None:
-    """Put the solution of a branch into the registers of its step."""
-    at = step[1]
-    x[at], x[at + 1], x[at + 2] = found[branch, 0], found[branch, 1], found[branch, 2]
-    at = step[4]
-    if at != 0:
-        x[at], x[at + 1], x[at + 2] = found[branch, 3], found[branch, 4], found[branch, 5]
+def errors_of(plan: Ints, results: int, x: Floats, numbers: Floats, lever: int, errors: Floats
+              ) -> None:  # fmt: skip
+    """The larger of the tool's position error [m] and the rotation angle [rad], of every lane.
+
+    ``results`` is where the registers of the twelve elements of both sides stand.
+    """
+    e0, e1, e2 = numbers[lever], numbers[lever + 1], numbers[lever + 2]
+    for lane in range(x.shape[1]):
+        turn, far = 0.0, 0.0
+        for i in range(3):
+            at = results + i
+            d0 = x[plan[at], lane] - x[plan[at + 12], lane]
+            d1 = x[plan[at + 3], lane] - x[plan[at + 15], lane]
+            d2 = x[plan[at + 6], lane] - x[plan[at + 18], lane]
+            d3 = x[plan[at + 9], lane] - x[plan[at + 21], lane]
+            d3 += e0 * d0 + e1 * d1 + e2 * d2
+            turn += d0 * d0 + d1 * d1 + d2 * d2
+            far += d3 * d3
+        # the chord of a rotation by phi: the squares of its nine elements sum to 8 sin^2(phi / 2)
+        turn *= 0.5
+        errors[lane] = sqrt(far if far > turn else turn)
 
 
-@compiled(
-    types.void(
-        _TABLE, INTS, _TABLE, MATRIX, VECTOR, INTS, MATRIX, INTS, STACK, VECTOR, VECTOR,
-        STACK, MATRIX, OUT3, OUT2, _COUNTS, _MARKS, _MARKS, _COUNTS,
-    )
-)  # fmt: skip
+@compiled()
+def joints_of(plan: Ints, results: int, sigma: int, k: int, x: Floats, values: Floats) -> None:
+    """Joint variables of every lane, angles in (-pi, pi]."""
+    for j in range(k):
+        row = plan[results + j]
+        if plan[sigma + j] == 0:
+            for lane in range(x.shape[1]):
+                value = x[row, lane]
+                values[j, lane] = value - 2.0 * pi * np.ceil((value - pi) * (0.5 / pi))
+        else:
+            for lane in range(x.shape[1]):
+                values[j, lane] = x[row, lane]
+
+
+@compiled()
+def load(numbers: Floats, sides: int, poses: Floats, n: int, x: Floats, lane: int) -> None:
+    """``U0 = before pose after`` into registers 1 to 12, column by column."""
+    before, after = sides, sides + 12
+    for i in range(3):
+        at = before + 4 * i
+        a, b, c = numbers[at], numbers[at + 1], numbers[at + 2]
+        m0 = a * poses[n, 0, 0] + b * poses[n, 1, 0] + c * poses[n, 2, 0]
+        m1 = a * poses[n, 0, 1] + b * poses[n, 1, 1] + c * poses[n, 2, 1]
+        m2 = a * poses[n, 0, 2] + b * poses[n, 1, 2] + c * poses[n, 2, 2]
+        m3 = a * poses[n, 0, 3] + b * poses[n, 1, 3] + c * poses[n, 2, 3] + numbers[at + 3]
+        for j in range(4):
+            e = after + j
+            value = m0 * numbers[e] + m1 * numbers[e + 4] + m2 * numbers[e + 8]
+            x[1 + 3 * j + i, lane] = value + m3 if j == 3 else value
+
+
+@compiled(types.void(_PLAN, VECTOR, VECTOR, STACK, MATRIX, OUT3, OUT2, _MARKS))
 def run_plan(
-    steps: Ints,
-    starts: Ints,
-    operations: Ints,
-    factors: Floats,
-    registers: Floats,
-    results: Ints,
-    reference_rows: Floats,
-    sigma: Ints,
-    sides: Floats,
-    lever: Floats,
+    plan: Ints,
+    numbers: Floats,
     tolerances: Floats,
     poses: Floats,
     references: Floats,
     q: Floats,
     residuals: Floats,
-    counts: Ints,
-    free: Ints,
-    path: Ints,
-    flags: Ints,
+    marks: Ints,
 ) -> None:
-    """Postures of every pose; see `paul_postures` for what is returned.
+    """Postures of every pose; `paul_postures` says what is returned.
 
-    ``tolerances``: slack, zero, small, largest accepted error in m and rad.
+    ``plan`` and ``numbers`` are a `Program` in two arrays. ``tolerances``: overshoot beside the
+    amplitude that counts as a double root, amplitudes that are zero and that are small, largest
+    error accepted [m, rad]. Row n of ``marks (N, 2 + 2 S)``: number of postures, flags of the
+    pose, and of each posture the bits of free unknowns and of the branches taken.
     """
-    k, m = sigma.shape[0], steps.shape[0]
-    x = registers.copy()
-    wanted = np.zeros(reference_rows.shape[0])
-    found = np.zeros((MOST_STEPS, 4, 6))
-    number, branch = np.zeros(MOST_STEPS, np.int64), np.zeros(MOST_STEPS, np.int64)
-    marks = np.zeros(MOST_STEPS, np.int64)
-    before, after = sides[0], sides[1]
-    moved = np.zeros((3, 4))
-    accepted = tolerances[3]
-    most = q.shape[1]
-    for n in range(poses.shape[0]):
-        U = poses[n]
-        for i in range(3):
-            for j in range(4):
-                moved[i, j] = before[i, 0] * U[0, j] + before[i, 1] * U[1, j] + before[i, 2] * U[2, j]
-            moved[i, 3] += before[i, 3]
-        for j in range(4):
-            for i in range(3):
-                value = (moved[i, 0] * after[0, j] + moved[i, 1] * after[1, j]
-                         + moved[i, 2] * after[2, j])  # fmt: skip
-                x[1 + 3 * j + i] = value + moved[i, 3] if j == 3 else value
-        for i in range(wanted.shape[0]):
-            wanted[i] = reference_rows[i, k]
-            for j in range(k):
-                wanted[i] += reference_rows[i, j] * references[n, j]
-        count, delicate = 0, 0
+    k, m, at_steps, at_starts = int(plan[0]), int(plan[1]), int(plan[2]), int(plan[3])
+    at_operations, at_results, at_sigma = int(plan[4]), int(plan[5]), int(plan[6])
+    size, unknowns, most = int(plan[7]), int(plan[8]), int(plan[9])
+    of_registers, of_references, of_sides = int(plan[10]), int(plan[11]), int(plan[12])
+    of_lever = of_sides + 24
+    N = poses.shape[0]
+    lanes = 1 if N == 1 else LANES
+    x, wanted = np.empty((size, lanes)), np.empty((unknowns, lanes))
+    found = np.empty((24 * m, lanes))
+    errors, values = np.empty(lanes), np.empty((k, lanes))
+    weak = np.ones(lanes, np.int64)
+    number, flags = np.zeros((m, lanes), np.int64), np.zeros((m, lanes), np.int64)
+    alive = np.zeros((m + 1, lanes), np.int64)
+    branch, widest = np.zeros(m + 1, np.int64), np.zeros(m + 1, np.int64)
+    for i in range(size):
+        for lane in range(lanes):
+            x[i, lane] = numbers[of_registers + i]
+    for start in range(0, N, lanes):
+        filled = min(lanes, N - start)
+        for lane in range(lanes):
+            n = start + min(lane, filled - 1)
+            load(numbers, of_sides, poses, n, x, lane)
+            for i in range(unknowns):
+                row = of_references + i * (k + 1)
+                value = numbers[row + k]
+                for j in range(k):
+                    value += numbers[row + j] * references[n, j]
+                wanted[i, lane] = value
+            alive[0, lane] = 1 if lane < filled else 0
+        for lane in range(filled):
+            marks[start + lane, 0] = marks[start + lane, 1] = 0
         level = 0
-        operate(operations, factors, starts[0], starts[1], x)
-        number[0], marks[0] = solve(steps[0], x, tolerances, wanted, found[0])
-        delicate |= marks[0]
-        branch[0] = -1
+        branch[0] = -2
         while level >= 0:
+            if branch[level] == -2:
+                # arrived at this level: what its registers need, then its equation or the check
+                first, last = int(plan[at_starts + level]), int(plan[at_starts + level + 1])
+                operate(plan, numbers, at_operations, 0, first, last, x)
+                if level == m:
+                    errors_of(plan, at_results + k, x, numbers, of_lever, errors)
+                    joints_of(plan, at_results, at_sigma, k, x, values)
+                    way = 0
+                    for i in range(m):
+                        way |= branch[i] << (2 * i)
+                    for lane in range(filled):
+                        error = errors[lane]
+                        if alive[m, lane] == 0 or not error <= FALSE:
+                            continue
+                        n = start + lane
+                        count = marks[n, 0]
+                        if error > EXACT:
+                            marks[n, 1] |= ROUGH
+                            if error > tolerances[3]:
+                                continue
+                        for j in range(k):
+                            q[n, count, j] = values[j, lane]
+                        residuals[n, count] = error
+                        bits = 0
+                        if marks[n, 1] & (FREE_1 | FREE_2):
+                            for i in range(m):
+                                bits |= ((flags[i, lane] & (FREE_1 | FREE_2)) >> 1) << (2 * i)
+                        marks[n, 2 + count] = bits
+                        marks[n, 2 + most + count] = way
+                        marks[n, 0] = count + 1
+                    level -= 1
+                    continue
+                widest[level], step = 0, at_steps + STEP * level
+                common = 0
+                if lanes > 1:
+                    common = solve_lanes(plan, step, x, tolerances, found, 24 * level, weak)
+                for lane in range(lanes):
+                    if alive[level, lane] == 0:
+                        number[level, lane] = 0
+                        continue
+                    if common > 0 and weak[lane] == 0:
+                        number[level, lane], flags[level, lane] = common, 0
+                        widest[level] = max(widest[level], common)
+                        continue
+                    solutions, flag = solve(
+                        plan, step, x, lane, tolerances, wanted, found, 24 * level
+                    )
+                    number[level, lane], flags[level, lane] = solutions, flag
+                    marks[start + lane, 1] |= flag
+                    widest[level] = max(widest[level], solutions)
+                branch[level] = -1
             branch[level] += 1
-            if branch[level] >= number[level]:
+            now = branch[level]
+            if now >= widest[level]:
                 level -= 1
                 continue
-            take_branch(steps[level], found[level], branch[level], x)
+            step = at_steps + STEP * level
+            one, two = int(plan[step + 1]), int(plan[step + 4])
+            row = 24 * level + 6 * now
+            for lane in range(lanes):
+                alive[level + 1, lane] = 1 if now < number[level, lane] else 0
+            for i in range(3):
+                for lane in range(lanes):
+                    x[one + i, lane] = found[row + i, lane]
+            if two:
+                for i in range(3, 6):
+                    for lane in range(lanes):
+                        x[two - 3 + i, lane] = found[row + i, lane]
             level += 1
-            operate(operations, factors, starts[level], starts[level + 1], x)
-            if level < m:
-                number[level], marks[level] = solve(
-                    steps[level], x, tolerances, wanted, found[level]
-                )
-                delicate |= marks[level]
-                branch[level] = -1
-                continue
-            level -= 1
-            error = residual(results, k, x, lever)
-            if not error <= FALSE or count == most:
-                continue
-            if error > EXACT:
-                delicate |= 16
-                if error > accepted:
-                    continue
-            for j in range(k):
-                value = x[results[j]]
-                if sigma[j] == 0:
-                    if value > pi or value <= -pi:
-                        value -= 2.0 * pi * np.floor((value + pi) / (2.0 * pi))
-                        if value <= -pi:
-                            value = pi
-                q[n, count, j] = value
-            residuals[n, count] = error
-            bits, way = 0, 0
-            for i in range(m):
-                way |= branch[i] << (2 * i)
-                bits |= ((marks[i] & FREE_1) >> 1) << (2 * i) | ((marks[i] & FREE_2) >> 2) << (2 * i + 1)
-            free[n, count], path[n, count] = bits, way
-            count += 1
-        counts[n], flags[n] = count, delicate
+            branch[level] = -2

@@ -1,15 +1,15 @@
 """Solutions of the equations of Paul's catalogue.
 
-Every function writes up to four solutions to the rows of ``found``: value, cosine and sine of the
-first unknown (a length has its value and 1, 0), then of the second, and returns how many and a bit
-field: 1 double root or overshoot, 2 first unknown free, 4 second unknown free, 8 small amplitude.
+Every function writes up to four solutions to a column of ``found``, six rows for each: value, cosine
+and sine of the first unknown (a length has its value and 1, 0), then of the second. It returns how
+many and a bit field: 1 double root or overshoot, 2 first unknown free, 4 second unknown free, 8 small amplitude.
 What is free takes its reference. ``slack`` is the overshoot beside the amplitude that still counts
 as a double root; ``small`` the amplitude beside which rounding of the coefficients shows.
 """
 
 from __future__ import annotations
 
-from math import atan2, cos, pi, sin, sqrt
+from math import cos, pi, sin, sqrt
 
 import numpy as np
 
@@ -18,53 +18,88 @@ from .._equations import polynomial_roots, trigonometric_roots
 
 DOUBLE, FREE_1, FREE_2, SMALL = 1, 2, 4, 8
 
-
-@compiled()
-def put_angle(found: Floats, i: int, at: int, value: float, C: float, S: float) -> None:
-    """One solution of an angle."""
-    found[i, at], found[i, at + 1], found[i, at + 2] = value, C, S
+_TAN_EIGHTH = 0.41421356237309503  # tan(pi / 8)
 
 
 @compiled()
-def put_free(found: Floats, i: int, at: int, value: float) -> None:
+def atan2(y: float, x: float) -> float:
+    """The angle of (x, y), to two units in the last place.
+
+    Without branches, so that a loop over lanes becomes vector code: some five times quicker than
+    the library's. The tangent below 22.5 degrees is left of three foldings; of that the arc is an
+    odd polynomial whose coefficients are a Chebyshev fit of ``(atan(u) / u - 1) / u^2``.
+    """
+    a, b = abs(x), abs(y)
+    low = b if b < a else a
+    high = a if b < a else b
+    fold = low > _TAN_EIGHTH * high
+    top = low - high if fold else low
+    bottom = low + high if fold else high
+    u = top / (bottom if bottom > 0.0 else 1.0)
+    w = u * u
+    w2 = w * w
+    w4 = w2 * w2
+    p0 = -0.3333333333333333 + w * 0.1999999999999552
+    p1 = -0.14285714284666542 + w * 0.11111111015256292
+    p2 = -0.09090904578121085 + w * 0.07692183190760651
+    p3 = -0.0666451144646022 + w * 0.05858148904795124
+    p4 = -0.050854496960392584 + w * 0.039231657085083686
+    p = (p0 + w2 * p1) + w4 * ((p2 + w2 * p3) + w4 * (p4 - w2 * 0.019176885636589053))
+    angle = u + u * w * p
+    angle = angle + 0.25 * pi if fold else angle
+    angle = 0.5 * pi - angle if b > a else angle
+    angle = pi - angle if x < 0.0 else angle
+    return -angle if y < 0.0 else angle
+
+
+@compiled()
+def put_angle(found: Floats, o: int, i: int, at: int, lane: int, value: float, C: float, S: float
+              ) -> None:  # fmt: skip
+    """Solution i of an angle."""
+    row = o + 6 * i + at
+    found[row, lane], found[row + 1, lane], found[row + 2, lane] = value, C, S
+
+
+@compiled()
+def put_free(found: Floats, o: int, i: int, at: int, lane: int, value: float) -> None:
     """An angle that takes its reference."""
-    found[i, at], found[i, at + 1], found[i, at + 2] = value, cos(value), sin(value)
+    put_angle(found, o, i, at, lane, value, cos(value), sin(value))
 
 
 @compiled()
-def put_length(found: Floats, i: int, at: int, value: float) -> None:
-    """One solution of a length."""
-    found[i, at], found[i, at + 1], found[i, at + 2] = value, 1.0, 0.0
+def put_length(found: Floats, o: int, i: int, at: int, lane: int, value: float) -> None:
+    """Solution i of a length."""
+    put_angle(found, o, i, at, lane, value, 1.0, 0.0)
 
 
 @compiled()
-def type_1(X: float, Y: float, zero: float, small: float, reference: float, found: Floats
+def type_1(X: float, Y: float, zero: float, small: float, reference: float, found: Floats, o: int, lane: int
            ) -> tuple[int, int]:  # fmt: skip
     """``X r = Y``."""
     if abs(X) <= zero:
-        put_length(found, 0, 0, reference)
+        put_length(found, o, 0, 0, lane, reference)
         return 1, FREE_1
-    put_length(found, 0, 0, Y / X)
+    put_length(found, o, 0, 0, lane, Y / X)
     return 1, SMALL if abs(X) <= small else 0
 
 
 @compiled()
-def type_2_zero(X: float, Y: float, zero: float, small: float, reference: float, found: Floats
+def type_2_zero(X: float, Y: float, zero: float, small: float, reference: float, found: Floats, o: int, lane: int
                 ) -> tuple[int, int]:  # fmt: skip
     """``X S + Y C = 0``: ``theta = atan2(-Y, X)`` and ``theta + pi``."""
     rho = sqrt(X * X + Y * Y)
     if rho <= zero:
-        put_free(found, 0, 0, reference)
+        put_free(found, o, 0, 0, lane, reference)
         return 1, FREE_1
     value, C, S = atan2(-Y, X), X / rho, -Y / rho
-    put_angle(found, 0, 0, value, C, S)
-    put_angle(found, 1, 0, value - pi if value > 0.0 else value + pi, -C, -S)
+    put_angle(found, o, 0, 0, lane, value, C, S)
+    put_angle(found, o, 1, 0, lane, value - pi if value > 0.0 else value + pi, -C, -S)
     return 2, SMALL if rho <= small else 0
 
 
 @compiled()
 def type_2(X: float, Y: float, Z: float, slack: float, zero: float, small: float,
-           reference: float, found: Floats) -> tuple[int, int]:  # fmt: skip
+           reference: float, found: Floats, o: int, lane: int) -> tuple[int, int]:  # fmt: skip
     """``X S + Y C = Z``.
 
     ``S = (X Z + e Y sqrt(X^2 + Y^2 - Z^2)) / (X^2 + Y^2)`` and
@@ -76,7 +111,7 @@ def type_2(X: float, Y: float, Z: float, slack: float, zero: float, small: float
     if rho <= zero:
         if abs(Z) > max(zero, slack):
             return 0, SMALL
-        put_free(found, 0, 0, reference)
+        put_free(found, o, 0, 0, lane, reference)
         return 1, FREE_1
     flags = SMALL if rho <= small else 0
     room = (rho - Z) * (rho + Z)
@@ -87,74 +122,74 @@ def type_2(X: float, Y: float, Z: float, slack: float, zero: float, small: float
         if room <= 0.0:
             sign = 1.0 if Z >= 0.0 else -1.0
             C, S = sign * Y / rho, sign * X / rho
-            put_angle(found, 0, 0, atan2(S, C), C, S)
+            put_angle(found, o, 0, 0, lane, atan2(S, C), C, S)
             return 1, flags | DOUBLE
         flags |= DOUBLE
     root = sqrt(room)
     scale = 1.0 / square
     S, C = (X * Z + Y * root) * scale, (Y * Z - X * root) * scale
-    put_angle(found, 0, 0, atan2(S, C), C, S)
+    put_angle(found, o, 0, 0, lane, atan2(S, C), C, S)
     S, C = (X * Z - Y * root) * scale, (Y * Z + X * root) * scale
-    put_angle(found, 1, 0, atan2(S, C), C, S)
+    put_angle(found, o, 1, 0, lane, atan2(S, C), C, S)
     return 2, flags
 
 
 @compiled()
-def type_3_direct(A: float, B: float, zero: float, small: float, reference: float, found: Floats
+def type_3_direct(A: float, B: float, zero: float, small: float, reference: float, found: Floats, o: int, lane: int
                   ) -> tuple[int, int]:  # fmt: skip
     """``X1 S = A, X1 C = B`` with ``X1 > 0``."""
     rho = sqrt(A * A + B * B)
     if rho <= zero:
-        put_free(found, 0, 0, reference)
+        put_free(found, o, 0, 0, lane, reference)
         return 1, FREE_1
     scale = 1.0 / rho
-    put_angle(found, 0, 0, atan2(A, B), B * scale, A * scale)
+    put_angle(found, o, 0, 0, lane, atan2(A, B), B * scale, A * scale)
     return 1, SMALL if rho <= small else 0
 
 
 @compiled()
 def type_3(X1: float, Y1: float, Z1: float, X2: float, Y2: float, Z2: float, zero: float,
-           small: float, reference: float, found: Floats) -> tuple[int, int]:  # fmt: skip
+           small: float, reference: float, found: Floats, o: int, lane: int) -> tuple[int, int]:  # fmt: skip
     """``X1 S + Y1 C = Z1, X2 S + Y2 C = Z2``."""
     det = X1 * Y2 - X2 * Y1
     size = sqrt((X1 * X1 + Y1 * Y1) * (X2 * X2 + Y2 * Y2))
     if size <= zero * zero:
-        put_free(found, 0, 0, reference)
+        put_free(found, o, 0, 0, lane, reference)
         return 1, FREE_1
     if abs(det) <= 1e-12 * size:
         # they say the same twice: the stronger one alone
         if X1 * X1 + Y1 * Y1 >= X2 * X2 + Y2 * Y2:
-            count, flags = type_2(X1, Y1, Z1, 1e-9, zero, small, reference, found)
+            count, flags = type_2(X1, Y1, Z1, 1e-9, zero, small, reference, found, o, lane)
         else:
-            count, flags = type_2(X2, Y2, Z2, 1e-9, zero, small, reference, found)
+            count, flags = type_2(X2, Y2, Z2, 1e-9, zero, small, reference, found, o, lane)
         return min(count, 1), flags | SMALL
     sign = 1.0 if det > 0.0 else -1.0
     S, C = sign * (Z1 * Y2 - Z2 * Y1), sign * (X1 * Z2 - X2 * Z1)
     rho = sqrt(S * S + C * C)
     if rho <= zero * zero:
-        put_free(found, 0, 0, reference)
+        put_free(found, o, 0, 0, lane, reference)
         return 1, FREE_1
-    put_angle(found, 0, 0, atan2(S, C), C / rho, S / rho)
+    put_angle(found, o, 0, 0, lane, atan2(S, C), C / rho, S / rho)
     return 1, SMALL if abs(det) <= 1e-6 * size or rho <= small * small else 0
 
 
 @compiled()
 def type_4(X1: float, Y1: float, X2: float, Y2: float, zero: float, small: float,
-           reference: float, found: Floats) -> tuple[int, int]:  # fmt: skip
+           reference: float, found: Floats, o: int, lane: int) -> tuple[int, int]:  # fmt: skip
     """``X1 r S = Y1, X2 r C = Y2``: a length ``r = +-sqrt((Y1 / X1)^2 + (Y2 / X2)^2)``, an angle."""
     if min(abs(X1), abs(X2)) <= zero:
         return 0, SMALL
     A, B = Y1 / X1, Y2 / X2
     r = sqrt(A * A + B * B)
     if r <= zero:
-        put_length(found, 0, 0, 0.0)
-        put_free(found, 0, 3, reference)
+        put_length(found, o, 0, 0, lane, 0.0)
+        put_free(found, o, 0, 3, lane, reference)
         return 1, FREE_2
     value, C, S = atan2(A, B), B / r, A / r
-    put_length(found, 0, 0, r)
-    put_angle(found, 0, 3, value, C, S)
-    put_length(found, 1, 0, -r)
-    put_angle(found, 1, 3, value - pi if value > 0.0 else value + pi, -C, -S)
+    put_length(found, o, 0, 0, lane, r)
+    put_angle(found, o, 0, 3, lane, value, C, S)
+    put_length(found, o, 1, 0, lane, -r)
+    put_angle(found, o, 1, 3, lane, value - pi if value > 0.0 else value + pi, -C, -S)
     return 2, SMALL if r <= small or min(abs(X1), abs(X2)) <= small else 0
 
 
@@ -175,7 +210,7 @@ def quadratic(a: float, h: float, c: float, slack: float, roots: Floats) -> tupl
 
 @compiled()
 def type_5(X1: float, Y1: float, Z1: float, X2: float, Y2: float, Z2: float, slack: float,
-           zero: float, small: float, found: Floats) -> tuple[int, int]:  # fmt: skip
+           zero: float, small: float, found: Floats, o: int, lane: int) -> tuple[int, int]:  # fmt: skip
     """``X1 S = Y1 + Z1 r, X2 C = Y2 + Z2 r``: a length, then an angle."""
     if min(abs(X1), abs(X2)) <= zero:
         return 0, SMALL
@@ -188,15 +223,15 @@ def type_5(X1: float, Y1: float, Z1: float, X2: float, Y2: float, Z2: float, sla
     for i in range(count):
         S, C = u0 + u1 * roots[i], v0 + v1 * roots[i]
         rho = sqrt(S * S + C * C)
-        put_length(found, i, 0, roots[i])
-        put_angle(found, i, 3, atan2(S, C), C / rho, S / rho)
+        put_length(found, o, i, 0, lane, roots[i])
+        put_angle(found, o, i, 3, lane, atan2(S, C), C / rho, S / rho)
     return count, flags | (SMALL if min(abs(X1), abs(X2)) <= small else 0)
 
 
 @compiled()
 def two_angles(W1: float, W2: float, X: float, Y: float, Z1: float, Z2: float, sense: float,
                slack: float, zero: float, small: float, reference_i: float, reference_j: float,
-               found: Floats) -> tuple[int, int]:  # fmt: skip
+               found: Floats, o: int, lane: int) -> tuple[int, int]:  # fmt: skip
     """``W1 Cj + W2 Sj = X Ci + Y Si + Z1, sense (W1 Sj - W2 Cj) = X Si - Y Ci + Z2``.
 
     Squared and added they are of type 2 in i: ``B1 Si + B2 Ci = B3`` with
@@ -208,24 +243,24 @@ def two_angles(W1: float, W2: float, X: float, Y: float, Z1: float, Z2: float, s
     B1, B2 = Z1 * Y + Z2 * X, Z1 * X - Z2 * Y
     B3 = 0.5 * (W - X * X - Y * Y - Z1 * Z1 - Z2 * Z2)
     limit = max(zero * sqrt(W), zero * zero)
-    count, flags = type_2(B1, B2, B3, slack, limit, small * sqrt(W), reference_i, found)
+    count, flags = type_2(B1, B2, B3, slack, limit, small * sqrt(W), reference_i, found, o, lane)
     for n in range(count):
-        C, S = found[n, 1], found[n, 2]
+        C, S = found[o + 6 * n + 1, lane], found[o + 6 * n + 2, lane]
         one = X * C + Y * S + Z1
         two = sense * (X * S - Y * C + Z2)
         Sj, Cj = W2 * one + W1 * two, W1 * one - W2 * two
         rho = sqrt(Sj * Sj + Cj * Cj)
         if rho <= zero * zero:
-            put_free(found, n, 3, reference_j)
+            put_free(found, o, n, 3, lane, reference_j)
             flags |= FREE_2
         else:
-            put_angle(found, n, 3, atan2(Sj, Cj), Cj / rho, Sj / rho)
+            put_angle(found, o, n, 3, lane, atan2(Sj, Cj), Cj / rho, Sj / rho)
     return count, flags
 
 
 @compiled()
 def type_8(X: float, Y: float, Z1: float, Z2: float, slack: float, zero: float, small: float,
-           reference_i: float, reference_j: float, found: Floats) -> tuple[int, int]:  # fmt: skip
+           reference_i: float, reference_j: float, found: Floats, o: int, lane: int) -> tuple[int, int]:  # fmt: skip
     """``X Ci + Y C(i+j) = Z1, X Si + Y S(i+j) = Z2``: the angle i, then the sum.
 
     ``Cj = (Z1^2 + Z2^2 - X^2 - Y^2) / (2 X Y)``, ``Sj = +-sqrt(1 - Cj^2)``, and i is of type 3:
@@ -250,9 +285,9 @@ def type_8(X: float, Y: float, Z1: float, Z2: float, slack: float, zero: float, 
     A = X + Y * Cj
     if sqrt(reach) <= zero:
         # the second end lies on the first axis: i is free
-        put_free(found, 0, 0, reference_i)
-        C, S = found[0, 1], found[0, 2]
-        put_angle(found, 0, 3, atan2(S * Cj + C * Sj, C * Cj - S * Sj), C * Cj - S * Sj,
+        put_free(found, o, 0, 0, lane, reference_i)
+        C, S = found[o + 1, lane], found[o + 2, lane]
+        put_angle(found, o, 0, 3, lane, atan2(S * Cj + C * Sj, C * Cj - S * Sj), C * Cj - S * Sj,
                   S * Cj + C * Sj)  # fmt: skip
         return 1, flags | FREE_1
     if sqrt(reach) <= small:
@@ -263,26 +298,26 @@ def type_8(X: float, Y: float, Z1: float, Z2: float, slack: float, zero: float, 
         C, S = A * Z1 + B * Z2, A * Z2 - B * Z1
         rho = sqrt(C * C + S * S)
         C, S = C / rho, S / rho
-        put_angle(found, n, 0, atan2(S, C), C, S)
+        put_angle(found, o, n, 0, lane, atan2(S, C), C, S)
         sine = Sj if n == 0 else -Sj
         c, s = C * Cj - S * sine, S * Cj + C * sine
-        put_angle(found, n, 3, atan2(s, c), c, s)
+        put_angle(found, o, n, 3, lane, atan2(s, c), c, s)
     return count, flags
 
 
 @compiled()
 def quartic(a0: float, a1: float, a2: float, a3: float, a4: float, slack: float, reference: float,
-            found: Floats) -> tuple[int, int]:  # fmt: skip
+            found: Floats, o: int, lane: int) -> tuple[int, int]:  # fmt: skip
     """``a0 + a1 C + a2 S + a3 cos(2 theta) + a4 sin(2 theta) = 0``."""
     g, roots = np.empty(5), np.empty(4)
     g[0], g[1], g[2], g[3], g[4] = a0, a1, a2, a3, a4
     size = np.abs(g).max()
     if size == 0.0:
-        put_free(found, 0, 0, reference)
+        put_free(found, o, 0, 0, lane, reference)
         return 1, FREE_1
     count, flags = trigonometric_roots(g, roots, slack * size), 0
     for i in range(count):
-        put_free(found, i, 0, roots[i])
+        put_free(found, o, i, 0, lane, roots[i])
         for m in range(i):
             gap = abs(roots[i] - roots[m])
             if min(gap, abs(gap - 2.0 * pi)) < 1e-3:
@@ -294,22 +329,22 @@ def quartic(a0: float, a1: float, a2: float, a3: float, a4: float, slack: float,
 
 @compiled()
 def polynomial(a0: float, a1: float, a2: float, a3: float, a4: float, slack: float,
-               reference: float, found: Floats) -> tuple[int, int]:  # fmt: skip
+               reference: float, found: Floats, o: int, lane: int) -> tuple[int, int]:  # fmt: skip
     """``a0 + a1 r + a2 r^2 + a3 r^3 + a4 r^4 = 0``."""
     roots = np.empty(4)
     if a3 == 0.0 and a4 == 0.0 and a2 != 0.0:
         count, flags = quadratic(a2, 0.5 * a1, a0, slack, roots)
         for i in range(count):
-            put_length(found, i, 0, roots[i])
+            put_length(found, o, i, 0, lane, roots[i])
         return count, flags
     g = np.empty(5)
     g[0], g[1], g[2], g[3], g[4] = a0, a1, a2, a3, a4
     if np.abs(g).max() == 0.0:
-        put_length(found, 0, 0, reference)
+        put_length(found, o, 0, 0, lane, reference)
         return 1, FREE_1
     count, flags = polynomial_roots(g, roots), 0
     for i in range(count):
-        put_length(found, i, 0, roots[i])
+        put_length(found, o, i, 0, lane, roots[i])
         for m in range(i):
             if abs(roots[i] - roots[m]) < 1e-3 * (1.0 + abs(roots[i])):
                 flags |= DOUBLE

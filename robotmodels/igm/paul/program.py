@@ -23,42 +23,31 @@ from .products import product
 if TYPE_CHECKING:
     from .plan import Step
 
+_HEAD = 13
 STEP = 24
 """Numbers per step: type, registers of the results (2 x 3), references (2), coefficients (15)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Program:
-    """A plan for the kernel.
+    """A plan for the kernel, in two arrays because every array costs time at a call.
 
     Parameters
     ----------
-    steps : ndarray of int, shape (m, 24)
-        The steps.
-    starts : ndarray of int, shape (m + 2,)
-        First operation of each level; level m ends with the check.
-    operations : ndarray of int, shape (p, 5)
-        Registers d, a, b, c, e.
-    factors : ndarray, shape (p, 2)
-        Numbers f, g.
-    registers : ndarray, shape (size,)
-        Initial values: the constants.
-    results : ndarray of int, shape (k + 24,)
-        Registers of the joint variables, then of the twelve elements, by columns, that one side
-        of the matrix equation has, and of the twelve of the other.
-    references : ndarray, shape (u, k + 1)
-        Reference of an unknown from those of the joints: a row of signs and an offset.
+    plan : ndarray of uint32
+        Thirteen numbers of the head (joints, steps, where the parts stand), then the steps (24
+        numbers each), the first operation of each level, the operations (registers d, a, b, c, e),
+        the registers of the results (joint variables; the twelve elements by columns of one side
+        of the matrix equation; of the other), and the joint types.
+    numbers : ndarray
+        The factors f, g of the operations, the initial registers (the constants), a row of signs
+        and an offset for the reference of each unknown, ``before`` and ``after`` (3x4), the lever.
     branches : int
         Most postures.
     """
 
-    steps: NDArray[np.int64]
-    starts: NDArray[np.int64]
-    operations: NDArray[np.int64]
-    factors: Array
-    registers: Array
-    results: NDArray[np.int64]
-    references: Array
+    plan: NDArray[np.uint32]
+    numbers: Array
     branches: int
 
 
@@ -217,15 +206,19 @@ def lowered(arm: Arm, steps: Sequence[Step]) -> Program:
     operations = [table.operations[i] for i in order]
     levels = np.array([max(level, 0) for level, _, _ in operations], dtype=np.int64)
     starts = np.searchsorted(levels, np.arange(len(steps) + 2))
+    branches = int(reached[-1])
+    parts = [rows, starts, np.array([w for _, w, _ in operations]), results, form.sigma]
+    places = np.cumsum([_HEAD, *(np.size(p) for p in parts)])
+    factors = np.array([f for _, _, f in operations])
+    sides = np.concatenate([form.before[:3].ravel(), form.after[:3].ravel(), form.lever])
+    spans = np.cumsum([factors.size, len(table.initial), np.size(references)])
+    head = [form.k, len(steps), *places[:5], len(table.initial), len(references), branches, *spans]
+    whole = np.concatenate([np.ravel(p) for p in (head, *parts)])
+    numbers = [np.ravel(p) for p in (factors, table.initial, references, sides)]
     return Program(
-        steps=read_only(rows, np.int64),
-        starts=read_only(starts, np.int64),
-        operations=read_only(np.array([w for _, w, _ in operations]).reshape(-1, 5), np.int64),
-        factors=read_only(np.array([f for _, _, f in operations]).reshape(-1, 2)),
-        registers=read_only(np.array(table.initial)),
-        results=read_only(results, np.int64),
-        references=read_only(np.array(references)),
-        branches=int(np.prod([step.type.branches for step in steps])),
+        plan=read_only(whole, np.uint32),
+        numbers=read_only(np.concatenate(numbers)),
+        branches=branches,
     )
 
 
