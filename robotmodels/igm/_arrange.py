@@ -53,8 +53,8 @@ def before(a: Floats, code_a: int, key_a: float, b: Floats, code_b: int, key_b: 
 
 @compiled(
     types.int64(
-        STACK, _IN2, MATRIX, _IN2, _IN3, _IN3, _CODES2_IN, INTS, MATRIX, INT, VECTOR, VECTOR, INT,
-        INTS, _FLOATS3, _FLAGS, _FLOATS2, _FLAGS, _CODES2, _FLAGS, _FLAGS3, _FLAGS3, _CODES1,
+        STACK, _IN2, MATRIX, _IN2, _IN3, _IN3, _CODES2_IN, INTS, INTS, MATRIX, INT, VECTOR, VECTOR,
+        INT, INTS, _FLOATS3, _FLAGS, _FLOATS2, _FLAGS, _CODES2, _FLAGS, _FLAGS3, _FLAGS3, _CODES1,
     )
 )  # fmt: skip
 def arranged(
@@ -66,6 +66,7 @@ def arranged(
     moving: Flags,
     branch: NDArray[np.int16],
     columns: Ints,
+    off_path: Ints,
     references: Floats,
     given: int,
     lower: Floats,
@@ -85,9 +86,6 @@ def arranged(
     """Fill the rows of a result; returns the most postures of any pose."""
     N, S, k = found.shape
     n = references.shape[1]
-    on_path = np.zeros(n, dtype=np.bool_)
-    for m in range(k):
-        on_path[columns[m]] = True
     rows, keys = np.zeros((S, n)), np.zeros(S)
     order = np.zeros(S, dtype=np.int64)
     most = 0
@@ -138,7 +136,7 @@ def arranged(
                 q[p, at, m] = rows[i, m]
                 fits = fits and lower[m] - AT_LIMIT <= rows[i, m] <= upper[m] + AT_LIMIT
                 # a joint that does not move the tool keeps its reference
-                free[p, at, m] = not on_path[m]
+                free[p, at, m] = off_path[m] == 1
             inside[p, at] = fits
             for m in range(k):
                 free[p, at, columns[m]] = took[p, i, m]

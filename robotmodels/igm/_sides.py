@@ -93,6 +93,26 @@ def sides(
             )  # fmt: skip
 
 
+@compiled(types.void(STACK, STACK, _FLAGS, _CODES))
+def arm_sides(D: Floats, q: Floats, valid: NDArray[np.bool_], code: NDArray[np.int16]) -> None:
+    """The same for seven joints with a spherical shoulder (1 to 3) and wrist (5 to 7)."""
+    sigma = np.zeros(7, np.int64)
+    P, axes = np.zeros((3, 4)), np.zeros((7, 6))
+    S, W = np.zeros(3), np.zeros(3)
+    for p in range(q.shape[0]):
+        for i in range(q.shape[1]):
+            code[p, i] = -1
+            if not valid[p, i]:
+                continue
+            forward(sigma, D, q[p, i], P, axes)
+            nearest_on(axes[1], axes[2], S)
+            nearest_on(axes[5], axes[4], W)
+            shoulder = triple(axes[0, :3], axes[1, :3], axes[2, :3])
+            elbow = triple(axes[3, :3], axes[3, 3:] - S, W - axes[3, 3:])
+            wrist = triple(axes[4, :3], axes[5, :3], axes[6, :3])
+            code[p, i] = 4 * int(shoulder < 0.0) + 2 * int(elbow < 0.0) + int(wrist < 0.0)
+
+
 @compiled(types.void(STACK, _FLAGS, _CODES_IN, _CODES))
 def ranks(
     q: Floats, valid: NDArray[np.bool_], code: NDArray[np.int16], rank: NDArray[np.int16]

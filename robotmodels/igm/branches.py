@@ -7,6 +7,7 @@ from functools import singledispatch
 import numpy as np
 from numpy.typing import NDArray
 
+from .arm_angle import ArmAngle
 from .closed_form import ClosedForm
 from .solver import Found, Solver
 from .structure import Family
@@ -45,7 +46,8 @@ def branches(solver: Solver, found: Found) -> tuple[NDArray[np.int16], tuple[str
     ``(z_a x O_aW) . z_b`` with W the meeting point, and ``shoulder * elbow`` that of the
     determinant of the velocities of W. Of three parallel axes: ``shoulder`` and ``wrist`` are the
     signs of the same product taken from either end, ``elbow`` says to which side the middle axis
-    stands. A sign changes only at the singular position of that name. Several postures of one pose
+    stands. Seven joints with an arm angle: the triple products of the axes of shoulder and wrist,
+    and the side to which the elbow bends. A sign changes only at the singular position of that name. Several postures of one pose
     with the same signs (arms with a quartic) get a number behind.
     """
     return ranked(np.zeros(found.valid.shape, np.int16), ("",), found)
@@ -61,6 +63,15 @@ def _(solver: ClosedForm, found: Found) -> tuple[NDArray[np.int16], tuple[str, .
         solver.chain.sigma, solver.chain.D, plan.order, int(plan.family is Family.PARALLEL),
         found.q, found.valid, code,
     )  # fmt: skip
+    return ranked(code, SIDES, found)
+
+
+@branches.register
+def _(solver: ArmAngle, found: Found) -> tuple[NDArray[np.int16], tuple[str, ...]]:
+    from ._sides import arm_sides
+
+    code = np.empty(found.valid.shape, np.int16)
+    arm_sides(solver.chain.D, found.q, found.valid, code)
     return ranked(code, SIDES, found)
 
 

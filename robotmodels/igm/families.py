@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from .arm_angle import prepare_arm_angle
 from .asked import Task
 from .closed_form import prepare_closed_form
+from .fewer import prepare_fewer
 from .general import GeneralArm, prepare_general
+from .lock import locked_chain
 from .loop import JointChain
+from .neighbour import prepare_neighbour
 from .solver import Solver
 
 
@@ -15,7 +19,7 @@ def prepare_task(chain: JointChain, task: Task) -> Solver | None:
     Parameters
     ----------
     chain : JointChain
-        The arm.
+        The arm, locked joints among its joints.
     task : Task
         What is asked of it.
 
@@ -24,6 +28,10 @@ def prepare_task(chain: JointChain, task: Task) -> Solver | None:
     Solver or None
         None if no family serves the arm for this task.
     """
+    places = {int(column): place for place, column in enumerate(chain.columns)}
+    locks = {places[column]: value for column, value in task.locks if column in places}
+    if locks:
+        chain = locked_chain(chain, locks)
     return prepare(chain)
 
 
@@ -47,10 +55,19 @@ def prepare(chain: JointChain) -> Solver | None:
     >>> prepare(joint_chain(load("ur5e"))).method
     'three consecutive revolute axes that are parallel'
     """
+    if chain.k < 6:
+        return prepare_fewer(chain, prepare)
+    if chain.k == 7:
+        angle = prepare_arm_angle(chain)
+        if angle is not None:
+            return angle
     if chain.k == 6:
         closed = prepare_closed_form(chain)
         if closed is not None:
             return closed
+        neighbour = prepare_neighbour(chain)
+        if neighbour is not None:
+            return neighbour
         general = prepare_general(chain)
         if general is not None and general.reliable:
             return GeneralArm(chain, general)

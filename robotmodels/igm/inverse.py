@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import se3
-from .._arrays import Array, as_vector, batch_rows, read_only
+from .._arrays import Array, as_core, as_vector, batch_rows, read_only
 from ..errors import InvalidValueError
 from ..geometry import FIXED, PRISMATIC, REVOLUTE
 from ..model import RobotModel
-from .asked import Task, above_zero, locks_of, mask_of
+from .arm_angle import ArmAngle, arm_angle_postures
+from .asked import WHOLE_POSE, Task, above_zero, locks_of, mask_of
 from .branches import branches
 from .families import prepare_task
 from .loop import joint_chain
 from .numeric import igm_numeric
+from .self_motion import Settled, double_roots, settle_families
 from .solutions import IGMSolutions
 from .solver import Found, Solver, Tolerances, nothing_found, postures
 from .status import IGMStatus
@@ -144,15 +146,25 @@ def igm(
     poses = rows.reshape(-1, 4, 4)
     if limits:
         references = np.clip(references, model.lower, model.upper)
+    psi = None
+    if arm_angle is not None:
+        # every pose once for every angle, the angles behind
+        angles = as_core(arm_angle, (), "arm_angle")
+        poses, references = (np.repeat(a, angles.size, axis=0) for a in (poses, references))
+        psi = np.tile(angles.ravel(), rows.shape[0])
+        batch = (*batch, *angles.shape)
     U = np.ascontiguousarray(arm.to_base @ poses)
-    if solver is None:
-        found, method = nothing_found(len(U), 1, arm.columns.size), NO_FAMILY
-    else:
-        wanted = np.ascontiguousarray(references[:, arm.columns])
-        found, method = postures(solver, U, wanted, tolerances), solver.method
+    # locked joints are not solved for: like joints off the path they keep their reference
+    if task.locks:
+        references = references.copy()
+    for column, value in task.locks:
+        references[:, column] = value
+    columns = np.setdiff1d(arm.columns, [column for column, _ in task.locks], assume_unique=True)
+    wanted = np.ascontiguousarray(references[:, columns])
+    found = _found(solver, task, U, psi, wanted, tolerances)
     return _result(
-        model, arm, task, solver, poses, U, references, q_ref is not None, bool(limits), tolerances,
-        found, batch, method,
+        model, arm, task, solver, columns, poses, references, q_ref is not None, bool(limits),
+        tolerances, found, batch,
     )  # fmt: skip
 
 
@@ -201,25 +213,65 @@ def _known(model: RobotModel) -> _Arm:
     return entry[1]
 
 
+def _found(
+    solver: Solver | None,
+    task: Task,
+    U: Array,
+    psi: Array | None,
+    references: Array,
+    tolerances: Tolerances,
+) -> Settled:
+    """Postures of a chain, infinite families settled and double roots marked."""
+    if solver is None:
+        found = nothing_found(len(U), 1, references.shape[1])
+    elif psi is not None:
+        if not isinstance(solver, ArmAngle):
+            raise InvalidValueError(
+                "arm_angle: this arm has none, which takes seven revolute joints with three axes "
+                "that meet in a shoulder and three in a wrist; lock a joint instead, if there are "
+                f"seven. It is solved by: {solver.method}."
+            )
+        every = arm_angle_postures(solver, U, psi[:, None], references, tolerances)
+        rows = (getattr(every, field.name)[:, 0] for field in fields(every))
+        found = Found(*rows)
+        # the angle is given, so that only joints that took a reference are free
+        found.family[...] = found.free.any(axis=-1)
+    else:
+        found = postures(solver, U, references, tolerances)
+    whole = task.mask == WHOLE_POSE
+    if solver is not None and whole and solver.chain.k <= 6:
+        if solver.chain.k == 6:
+            found.double[...] |= double_roots(solver.chain, found)
+        return settle_families(solver.chain, U, found, references, tolerances)
+    moving = np.zeros(found.q.shape, np.bool_)
+    if solver is not None and psi is None and whole:
+        from ._moving import moving_joints
+
+        chain = solver.chain
+        length = float(np.linalg.norm(chain.D[:, :3, 3], axis=-1).sum()) or 1.0
+        sigma, rows = np.ascontiguousarray(chain.sigma), found.family & found.valid
+        moving_joints(sigma, chain.D, length, found.q, rows, moving)
+    moving |= found.free
+    return Settled(*(getattr(found, field.name) for field in fields(Found)), moving=moving)
+
+
 def _result(
     model: RobotModel,
     arm: _Arm,
     task: Task,
     solver: Solver | None,
+    columns: NDArray[np.int64],
     poses: Array,
-    U: Array,
     references: Array,
     given: bool,
     limits: bool,
     tolerances: Tolerances,
-    found: Found,
+    found: Settled,
     batch: tuple[int, ...],
-    method: str,
 ) -> IGMSolutions:
     """Families settled, rows labelled, ordered and put into the model's columns."""
     from ._arrange import arranged
 
-    moving = found.free
     code, labels = branches(solver, found)
     N, S, _ = found.q.shape
     S, n = max(S, 1), model.n
@@ -227,9 +279,11 @@ def _result(
     valid, inside, double = np.zeros((3, N, S), np.bool_)
     codes, status = np.full((N, S), -1, np.int16), np.empty(N, np.int8)
     free, family = np.zeros((2, N, S, n), np.bool_)
+    off_path = np.ones(n, np.int64)
+    off_path[arm.columns] = 0
     most = arranged(
-        found.q, found.valid, found.residual, found.double, found.free, moving, code,
-        arm.columns, references, int(given), model.lower, model.upper, int(limits), arm.turns,
+        found.q, found.valid, found.residual, found.double, found.free, np.ascontiguousarray(found.moving), code,
+        columns, off_path, references, int(given), model.lower, model.upper, int(limits), arm.turns,
         q, valid, residual, inside, codes, double, free, family, status,
     )  # fmt: skip
     search = _search(model, task, solver, poses, references, limits, tolerances, status)
@@ -260,7 +314,7 @@ def _result(
         double=rows(double),
         free_joints=rows(free, n),
         family_joints=rows(family, n),
-        method=method,
+        method=NO_FAMILY if solver is None else solver.method,
         periodic=(arm.turns == 1) & (not limits),
         mask=np.array(task.mask),
         closest=None if closest is None else closest.reshape(*batch, n),
