@@ -1,0 +1,159 @@
+"""Checks of inverse models that know nothing of how they work: residuals, paths, other searches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from igm_postures import sigma_of, uniform
+from numpy.typing import NDArray
+
+import robotmodels as rm
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+CLOSE = 1e-6  # postures as near as this in every joint are the same [rad, m]
+ON_PATH = 1e-12  # what may be missing of the pose on the way between two that are the same [m, rad]
+ON_FAMILY = 1e-9  # the same on the way along an infinite family
+DAMPING = (1e-5, 1e-5, 1e-7, 1e-7, 1e-9, 1e-9, 1e-11, 1e-11)
+"""Of the steps that keep a pose: singular directions are used where the others do not suffice."""
+
+
+def missing(model: rm.RobotModel, T: Array, q: Array) -> Array:
+    """Translation and rotation from the pose of ``q (N, n)`` to ``T (N, 4, 4)``, shape (N, 6)."""
+    P = rm.dgm(model, q)
+    R = T[:, :3, :3] @ np.swapaxes(P[:, :3, :3], 1, 2)
+    twice = np.stack(
+        [R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1
+    )
+    length = np.linalg.norm(twice, axis=1)
+    angle = np.arctan2(length, np.trace(R, axis1=1, axis2=2) - 1.0)
+    grow = np.where(length > 1e-12, angle / np.maximum(length, 1e-300), 0.5)
+    return np.hstack([T[:, :3, 3] - P[:, :3, 3], grow[:, None] * twice])
+
+
+def residual(model: rm.RobotModel, T: Array, q: Array) -> Array:
+    """The larger of the position error [m] and the rotation angle [rad], shape (N,)."""
+    e = missing(model, T, q)
+    return np.maximum(np.linalg.norm(e[:, :3], axis=1), np.linalg.norm(e[:, 3:], axis=1))
+
+
+def difference(model: rm.RobotModel, a: Array, b: Array) -> Array:
+    """``a - b``, angles by the shorter way round."""
+    d = a - b
+    return np.where(sigma_of(model) == 0, d - 2 * np.pi * np.round(d / (2 * np.pi)), d)
+
+
+def gaps(model: rm.RobotModel, rows: Array, valid: Flags, q: Array) -> Array:
+    """Largest difference in a joint between ``rows (N, S, n)`` and ``q (N, n)``; inf if invalid."""
+    d = np.abs(difference(model, np.where(valid[..., None], rows, 0.0), q[:, None])).max(axis=-1)
+    return np.where(valid, d, np.inf)
+
+
+def joined(model: rm.RobotModel, T: Array, a: Array, b: Array, most: float, steps: int) -> Flags:
+    """Whether postures ``a`` and ``b (N, n)`` of one pose are joined by a path that keeps it.
+
+    The straight way from one to the other is walked in steps, each brought home by damped Newton
+    steps. Isolated postures hold the walker back, who then has to jump; ``most`` is what may be
+    missing of the pose on the way.
+    """
+    length = np.linalg.norm(difference(model, b, a), axis=1)
+    alive = np.ones(len(a), np.bool_)
+    at = a.copy()
+    for k in range(steps):
+        rows = np.flatnonzero(alive)
+        if rows.size == 0:
+            break
+        trial = at[rows] + difference(model, b[rows], at[rows]) / (steps - k)
+        for damping in DAMPING:
+            step, e = newton_step(model, T[rows], trial, damping)
+            # what meets the pose stays: a step out of rounding errors would go far
+            off = np.linalg.norm(e, axis=1) > 0.5 * most
+            if not off.any():
+                break
+            trial[off] += step[off]
+        step = np.linalg.norm(difference(model, trial, at[rows]), axis=1)
+        at[rows] = trial
+        alive[rows] = residual(model, T[rows], trial) <= most
+        # from one isolated posture to another is one whole jump
+        alive[rows] &= step <= length[rows] / 3.0
+    return alive & (np.abs(difference(model, at, b)).max(axis=1, initial=0.0) < 1e-5)
+
+
+def newton_step(model: rm.RobotModel, T: Array, q: Array, damping: float) -> tuple[Array, Array]:
+    """Damped least-squares step towards the poses, and what was missing before it."""
+    e = missing(model, T, q)
+    left, scale, right = np.linalg.svd(rm.jacobian(model, q), full_matrices=False)
+    along = (np.swapaxes(left, 1, 2) @ e[..., None])[..., 0]
+    along *= scale / (scale**2 + damping**2)
+    return (np.swapaxes(right, 1, 2) @ along[..., None])[..., 0], e
+
+
+def given_back(model: rm.RobotModel, T: Array, q: Array, rows: Array, valid: Flags) -> Flags:
+    """Whether ``q`` is among the rows, or a posture that its pose to 1e-12 cannot tell from it."""
+    there = gaps(model, rows, valid, q).min(axis=1, initial=np.inf) < CLOSE
+    return _or_joined(model, T, q, rows, valid, there, ON_PATH, 24)
+
+
+def branch_given_back(model: rm.RobotModel, T: Array, q: Array, rows: Array, valid: Flags) -> Flags:
+    """Whether ``q``, or another member of its infinite family, is among the rows."""
+    there = given_back(model, T, q, rows, valid)
+    return _or_joined(model, T, q, rows, valid, there, ON_FAMILY, 120)
+
+
+def _or_joined(
+    model: rm.RobotModel,
+    T: Array,
+    q: Array,
+    rows: Array,
+    valid: Flags,
+    there: Flags,
+    most: float,
+    steps: int,
+) -> Flags:
+    there = there.copy()
+    pose, row = np.nonzero(valid & ~there[:, None])
+    if pose.size:
+        ends = q[pose], rows[pose, row]
+        found = joined(model, T[pose], *ends, most, steps)
+        found |= joined(model, T[pose], *ends[::-1], most, steps)
+        there[pose[found]] = True
+    return there
+
+
+@dataclass(frozen=True)
+class Search:
+    """What a search from many starts found: ``postures[i] (k, n)`` for pose i."""
+
+    postures: list[Array]
+
+
+def newton_search(
+    model: rm.RobotModel, T: Array, starts: int, rng: np.random.Generator, steps: int = 30
+) -> Search:
+    """Every posture that damped Newton steps reach from random starts, independent of families."""
+    N = len(T)
+    pose = np.repeat(np.arange(N), starts)
+    q = uniform(model, N * starts, rng)
+    done: list[tuple[NDArray[np.int64], Array]] = []
+    for _ in range(steps):
+        step, e = newton_step(model, T[pose], q, 1e-6)
+        met = np.abs(e).max(axis=1) < 1e-11
+        done.append((pose[met], q[met]))
+        pose, q, step = pose[~met], q[~met], step[~met]
+        if pose.size == 0:
+            break
+        q = q + step * np.minimum(1.0, 0.6 / np.maximum(np.abs(step).max(axis=1), 1e-12))[:, None]
+    where = np.concatenate([p for p, _ in done])
+    found = np.concatenate([x for _, x in done])
+    return Search([_distinct(model, found[where == i]) for i in range(N)])
+
+
+def _distinct(model: rm.RobotModel, q: Array) -> Array:
+    kept = np.empty((0, model.n))
+    while len(q):
+        one = q[:1]
+        kept = np.vstack([kept, one])
+        q = q[np.abs(difference(model, q, one)).max(axis=1) > 1e-5]
+    return kept
