@@ -1,4 +1,4 @@
-"""``robotmodels demo``: the main job, from a table and from a URDF to every direct model."""
+"""``robotmodels demo``: from a table and from a URDF to every direct model and every posture."""
 
 from __future__ import annotations
 
@@ -13,13 +13,16 @@ import numpy as np
 from .._arrays import Array
 from ..dynamics import ddm, gravity_torque, idm
 from ..geometry import link_transforms
+from ..igm import igm
 from ..kinematics import dgm, dkm, jacobian
 from ..model import RobotModel, write_urdf
 from ..robots import load
+from .igm import as_text
 from .info import pose_text
 
 _SAMPLES = 1000
 _BATCH = 100_000
+_INVERSE_BATCH = 10_000
 # stated configurations, away from singular positions
 _RX90_POSTURE = np.array([0.3, 1.0, -1.8, 0.4, 0.8, -0.2])
 _UR5_POSTURE = np.array([0.3, -0.9, 1.2, 0.4, 0.8, -0.2])
@@ -39,13 +42,14 @@ def add_command(commands: Any) -> None:
     """
     parser = commands.add_parser(
         "demo",
-        help="two arms from table and URDF to every direct model",
+        help="two arms from table and URDF to every direct model and every posture",
         description="Take the Staubli RX-90 from its table to URDF and Pinocchio, and the UR5 "
-        "from its URDF to its table; print every direct model of both and draw them.",
+        "from its URDF to its table; print every direct model of both and every posture that "
+        "reaches a pose, and draw them.",
     )
     parser.add_argument(
         "--out", type=Path, default=Path("robotmodels-demo"), metavar="FOLDER",
-        help="where the URDF and the scene go (default: %(default)s)",
+        help="where the URDF and the scenes go (default: %(default)s)",
     )  # fmt: skip
     parser.set_defaults(run=run)
 
@@ -72,6 +76,11 @@ def run(arguments: argparse.Namespace) -> None:
     _say("UR5: from the URDF of example-robot-data to its table")
     ur5 = load("erd:ur5")
     _show_models(ur5, _UR5_POSTURE, folder)
+    _say("Inverse geometric model: every posture of both arms that reaches the pose of q")
+    # the postures of the RX-90 differ by turns of links about their own length, so that they
+    # would hide one another if they stood in one place
+    _show_inverse(rx90, _RX90_POSTURE, folder, columns=4)
+    _show_inverse(ur5, _UR5_POSTURE, folder, columns=None)
     _say("Drawing both arms with meshcat")
     from ..viz import show
 
@@ -147,6 +156,33 @@ def _show_models(model: RobotModel, q: Array, folder: Path) -> None:
         times.append(time.perf_counter() - started)
     print(f"Poses in batch: {np.median(times) / _BATCH * 1e6:.2f} us each ({_BATCH} poses, median "
           "of 5 runs)")  # fmt: skip
+
+
+def _show_inverse(model: RobotModel, q: Array, folder: Path, columns: int | None) -> None:
+    from ..viz import show
+
+    T = dgm(model, q)
+    print("Preparing (compiles the first time on this machine only) ...", flush=True)
+    started = time.perf_counter()
+    found = igm(model, T)
+    print(f"  ready after {time.perf_counter() - started:.1f} s")
+    print(as_text(model, T, found, "world", degrees=True))
+    path = folder / f"{model.name}-postures.html"
+    words = [f"{k + 1}: {branch}" for k, branch in enumerate(found.branch)]
+    show(model, found.q, columns=columns, frames=columns is not None, legend=words).save(path)
+    print(f"Offline scene of the {found.count} postures: {path.resolve()}")
+    Q = np.random.default_rng(2).uniform(-np.pi, np.pi, (_INVERSE_BATCH, model.n))
+    T = dgm(model, Q)
+    times = []
+    for _ in range(3):
+        started = time.perf_counter()
+        found = igm(model, T)
+        times.append(time.perf_counter() - started)
+    off = np.abs(np.angle(np.exp(1j * (found.nearest(Q) - Q)))).max()
+    print(f"{_INVERSE_BATCH} random poses: {found.valid.sum()} postures, "
+          f"{np.median(times) / _INVERSE_BATCH * 1e6:.1f} us a pose (median of 3 runs),\n  largest "
+          f"residual {np.nanmax(found.residual):.1e}; the joint variables that made each pose are\n"
+          f"  among its postures to {off:.1e} rad")  # fmt: skip
 
 
 def _row(values: Array) -> str:

@@ -9,7 +9,8 @@ from collections.abc import Sequence
 
 from .. import __version__
 from ..errors import RobotModelsError
-from . import demo, info, listing, view
+from . import demo, igm, info, listing, view
+from .numbers import joined
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -23,7 +24,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 if it worked, 2 if an argument was wrong.
+        0 if it worked, 1 if a pose is not reached, 2 if an argument was wrong.
 
     Examples
     --------
@@ -37,12 +38,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         "table or their URDF.",
     )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for module in (demo, listing, info, view):
+    for module in (demo, listing, info, igm, view):
         module.add_command(commands)
     parser.add_argument("--version", action="version", version=__version__)
-    arguments = parser.parse_args(_joined(sys.argv[1:] if argv is None else argv))
+    arguments = parser.parse_args(joined(sys.argv[1:] if argv is None else argv))
+    code: int | None = 0
     try:
-        arguments.run(arguments)
+        code = arguments.run(arguments)
         sys.stdout.flush()
     except RobotModelsError as error:
         print(f"robotmodels: {error}", file=sys.stderr)
@@ -53,14 +55,4 @@ def main(argv: Sequence[str] | None = None) -> int:
             return 2
         # the reader (head, a pager) has seen enough; keep Python from complaining at exit
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    return 0
-
-
-def _joined(argv: Sequence[str]) -> list[str]:
-    """``--q -1,0`` as ``--q=-1,0``: argparse would take the numbers for an option."""
-    words = list(argv)
-    for i, word in enumerate(words[:-1]):
-        if word == "--q":
-            words[i : i + 2] = [f"--q={words[i + 1]}"]
-            break
-    return words
+    return code or 0

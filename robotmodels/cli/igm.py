@@ -1,0 +1,344 @@
+"""``robotmodels igm``: every posture that brings a robot's tool to a pose, or why there is none."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from typing import Any
+
+import numpy as np
+
+from .. import se3
+from .._arrays import Array
+from ..errors import InvalidValueError
+from ..igm import IGMSolutions, IGMStatus
+from ..igm import igm as inverse_model
+from ..kinematics import dgm
+from ..model import RobotModel
+from ..table_text import boxed
+from .info import pose_text
+from .numbers import numbers, posture, revolute
+from .source import add_source, robot_of
+
+_COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
+_EXAMPLES = """\
+examples:
+  robotmodels igm rx90 --xyz 0.3 0.2 0.5 --rpy 0 90 45 --degrees
+  robotmodels igm lab_trr --xyz 0.4 0.2 0.5 --mask 1 1 1 0 0 0
+  robotmodels igm arm.urdf --matrix 0 0 -1 0.4  0 1 0 0.1  1 0 0 0.6  0 0 0 1
+  robotmodels igm erd:ur5 --q 0.3 -0.9 1.2 0.4 0.8 -0.2 --limits
+
+exit status: 0 the pose is reached, 1 it is not, 2 an argument is wrong"""
+
+
+def add_command(commands: Any) -> None:
+    """Add the command to the parser.
+
+    Parameters
+    ----------
+    commands : argparse subparsers
+        Where to add it.
+
+    Examples
+    --------
+    >>> add_command(argparse.ArgumentParser().add_subparsers())
+    """
+    parser = commands.add_parser(
+        "igm",
+        help="all postures that bring the tool to a pose",
+        description="Inverse geometric model: print every posture that brings the robot's tool to "
+        "a pose,\nwith its branch, what it misses and whether it is inside the joint limits; or "
+        "why there is\nnone. Lengths are in m, angles in rad unless --degrees is given.",
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add_source(parser)
+    pose = parser.add_argument_group("the pose of the tool, in one of three ways")
+    pose.add_argument("--xyz", metavar="X Y Z", help="position in world axes")
+    pose.add_argument(
+        "--rpy", metavar="R P Y",
+        help="with --xyz: roll, pitch and yaw of the orientation, Rot(z,Y) Rot(y,P) Rot(x,R); may "
+        "be left out if --mask asks for no rotation",
+    )  # fmt: skip
+    pose.add_argument("--matrix", metavar="NUMBERS", help="16 numbers of the 4x4 pose, row by row")
+    pose.add_argument(
+        "--q", metavar="NUMBERS",
+        help="the pose that these joint variables (or a named configuration) lead to",
+    )  # fmt: skip
+    asked = parser.add_argument_group("what is asked for")
+    asked.add_argument("--degrees", action="store_true",
+                       help="angles in degrees, those given and those printed")  # fmt: skip
+    asked.add_argument("--limits", action="store_true",
+                       help="only postures inside the joint limits")  # fmt: skip
+    asked.add_argument(
+        "--q-ref", metavar="NUMBERS",
+        help="order by the distance to this posture; joints that the pose leaves free take its "
+        "values (default 0)",
+    )  # fmt: skip
+    asked.add_argument("--mask", metavar="NUMBERS",
+                       help="1 or 0 for each of x y z rx ry rz: what has to be met")  # fmt: skip
+    asked.add_argument("--mask-axes", choices=("world", "tool"), default="world",
+                       help="axes of the mask (default: %(default)s)")  # fmt: skip
+    asked.add_argument(
+        "--tolerance", metavar="NUMBERS",
+        help="how much may be missing: metres and radians, or one number for both (default 1e-9); "
+        "poses given with few digits need more",
+    )  # fmt: skip
+    parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Solve and print.
+
+    Parameters
+    ----------
+    arguments : Namespace
+        Parsed arguments.
+
+    Returns
+    -------
+    int
+        0 if the pose is reached, else 1.
+
+    Raises
+    ------
+    RobotModelsError
+        A robot or numbers that make no sense.
+
+    Examples
+    --------
+    >>> parser = argparse.ArgumentParser()
+    >>> add_command(parser.add_subparsers())
+    >>> run(parser.parse_args(["igm", "lab_rr", "--q=0.1,0.2"]))  # doctest: +ELLIPSIS
+    lab_rr: 1 posture...
+    0
+    """
+    model = robot_of(arguments)
+    mask = None if arguments.mask is None else numbers(arguments.mask, 6, "--mask")
+    T = pose_of(arguments, model, mask)
+    tolerance = (1e-9,) if arguments.tolerance is None else numbers(
+        arguments.tolerance, (1, 2), "--tolerance"
+    )  # fmt: skip
+    degrees = bool(arguments.degrees)
+    q_ref = arguments.q_ref
+    found = inverse_model(
+        model, T,
+        q_ref=None if q_ref is None else posture(q_ref, model, "--q-ref", degrees),
+        mask=mask, mask_axes=arguments.mask_axes, limits=arguments.limits,
+        position_tolerance=float(tolerance[0]), orientation_tolerance=float(tolerance[-1]),
+    )  # fmt: skip
+    if arguments.json:
+        print(json.dumps(as_json(model, T, found, degrees), indent=2, ensure_ascii=False))
+    else:
+        print(as_text(model, T, found, arguments.mask_axes, degrees))
+    return 0 if found.count else 1
+
+
+def pose_of(arguments: argparse.Namespace, model: RobotModel, mask: Array | None) -> Array:
+    """The pose asked for.
+
+    Parameters
+    ----------
+    arguments : Namespace
+        With ``xyz``, ``rpy``, ``matrix``, ``q``, ``degrees``.
+    model : RobotModel
+        The robot.
+    mask : ndarray, shape (6,), or None
+        What has to be met.
+
+    Returns
+    -------
+    ndarray, shape (4, 4)
+        World pose of the tool [m].
+
+    Raises
+    ------
+    InvalidValueError
+        No pose, several, or an incomplete one.
+
+    Examples
+    --------
+    >>> from ..robots import load
+    >>> given = argparse.Namespace(xyz="1 2 3", rpy="0 0 90", matrix=None, q=None, degrees=True)
+    >>> pose_of(given, load("rx90"), None)[:3, 0]
+    array([0., 1., 0.])
+    """
+    ways = ("--xyz", "--matrix", "--q")
+    given = [w for w in ways if getattr(arguments, w.removeprefix("--")) is not None]
+    if len(given) != 1:
+        raise InvalidValueError(
+            f"pose: expected one of {', '.join(ways)}, got {' and '.join(given) or 'none'}."
+        )
+    if arguments.rpy is not None and given != ["--xyz"]:
+        raise InvalidValueError(f"--rpy belongs to --xyz; {given[0]} holds the orientation.")
+    if given == ["--q"]:
+        return dgm(model, posture(arguments.q, model, "--q", arguments.degrees))
+    if given == ["--matrix"]:
+        return se3.as_pose(numbers(arguments.matrix, 16, "--matrix").reshape(4, 4), "--matrix")
+    xyz = numbers(arguments.xyz, 3, "--xyz")
+    if arguments.rpy is None:
+        if mask is None or mask[3:].any():
+            raise InvalidValueError(
+                "--xyz: the orientation is missing; add --rpy, or ask for the position alone with "
+                "--mask 1 1 1 0 0 0."
+            )
+        return se3.translation(*xyz)
+    rpy = numbers(arguments.rpy, 3, "--rpy")
+    return se3.from_rpy(np.deg2rad(rpy) if arguments.degrees else rpy, xyz)
+
+
+def as_text(model: RobotModel, T: Array, found: IGMSolutions, mask_axes: str, degrees: bool) -> str:
+    """The solutions of one pose as text.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot.
+    T : ndarray, shape (4, 4)
+        The pose asked for [m].
+    found : IGMSolutions
+        For this pose.
+    mask_axes : str
+        Axes of its mask.
+    degrees : bool
+        Whether angles are printed in degrees.
+
+    Returns
+    -------
+    str
+        Lines.
+
+    Examples
+    --------
+    >>> from ..robots import load
+    >>> T = se3.translation(1, 0, 0)
+    >>> found = inverse_model(load("lab_trr"), T, mask=[1, 1, 1, 0, 0, 0])
+    >>> print(as_text(load("lab_trr"), T, found, "world", False).splitlines()[0])
+    lab_trr: 0 postures. The position is out of reach: too far. The closest posture misses it by ...
+    """
+    names = model.table.joint_names
+    count = int(found.count)
+    lines = [
+        f"{model.name}: {count} posture{'s' * (count != 1)}. {found.reason()}",
+        f"method: {found.method}",
+        f"pose of the tool (m):\n{pose_text(T)}",
+    ]
+    if not found.mask.all():
+        asked = " ".join(c for c, m in zip(_COMPONENTS, found.mask, strict=True) if m)
+        lines.append(f"asked for: {asked} in {mask_axes} axes")
+    units = _units(model, degrees)
+    if count:
+        q = _shown(model, found.q[:count], degrees)
+        columns = [("", [str(k + 1) for k in range(count)]), ("branch", list(found.branch[:count]))]
+        columns += [
+            (f"q{j + 1} [{unit}]", [_number(v, unit) for v in q[:, j]])
+            for j, unit in enumerate(units)
+        ]
+        columns.append(("residual", [f"{r:.1e}" for r in found.residual[:count]]))
+        inside = ["inside" if w else "outside" for w in found.within_limits[:count]]
+        columns.append(("limits", inside))
+        if found.double.any():
+            columns.append(("root", ["double" if d else "" for d in found.double[:count]]))
+        lines += [f"q: {', '.join(names)}", boxed(columns)]
+    lines += _family_lines(names, found)
+    if not count and found.closest is not None and np.isfinite(found.closest).all():
+        q = _shown(model, found.closest, degrees)
+        each = zip(names, q, units, strict=True)
+        lines.append(
+            "closest posture: " + ", ".join(f"{n} {_number(v, u)} {u}" for n, v, u in each)
+        )
+    return "\n".join(lines)
+
+
+def as_json(model: RobotModel, T: Array, found: IGMSolutions, degrees: bool) -> dict[str, Any]:
+    """The solutions of one pose as what `json` writes.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot.
+    T : ndarray, shape (4, 4)
+        The pose asked for [m].
+    found : IGMSolutions
+        For this pose.
+    degrees : bool
+        Whether angles are in degrees.
+
+    Returns
+    -------
+    dict
+        ``robot, joints, units, pose, reached, status, reason, method, mask, postures``, each
+        posture with ``q, branch, residual, within_limits, double, free_joints, family_joints``,
+        and ``closest`` (null where the pose is reached). Residuals are in m and rad.
+
+    Examples
+    --------
+    >>> from ..robots import load
+    >>> arm = load("lab_rr")
+    >>> T = dgm(arm, [0.1, 0.2])
+    >>> as_json(arm, T, inverse_model(arm, T), False)["reached"]
+    True
+    """
+    names = np.array(model.table.joint_names)
+    q = _shown(model, found.q, degrees)
+    postures = [
+        {
+            "q": q[s].tolist(),
+            "branch": str(found.branch[s]),
+            "residual": float(found.residual[s]),
+            "within_limits": bool(found.within_limits[s]),
+            "double": bool(found.double[s]),
+            "free_joints": names[found.free_joints[s]].tolist(),
+            "family_joints": names[found.family_joints[s]].tolist(),
+        }
+        for s in np.flatnonzero(found.valid)
+    ]
+    closest = None
+    if not postures and found.closest is not None and np.isfinite(found.closest).all():
+        closest = _shown(model, found.closest, degrees).tolist()
+    return {
+        "robot": model.name,
+        "joints": names.tolist(),
+        "units": _units(model, degrees),
+        "pose": T.tolist(),
+        "reached": bool(postures),
+        "status": IGMStatus(int(found.status)).name,
+        "reason": found.reason(),
+        "method": found.method,
+        "mask": found.mask.astype(int).tolist(),
+        "postures": postures,
+        "closest": closest,
+    }
+
+
+def _family_lines(names: tuple[str, ...], found: IGMSolutions) -> list[str]:
+    """Which joints took the reference, each set once with the postures it holds for."""
+    groups: dict[tuple[bytes, bytes], list[int]] = {}
+    for s in np.flatnonzero(found.valid):
+        free, family = found.free_joints[s], found.family_joints[s]
+        if free.any() or family.any():
+            groups.setdefault((free.tobytes(), family.tobytes()), []).append(int(s))
+    lines = []
+    for rows in groups.values():
+        free, family = found.free_joints[rows[0]], found.family_joints[rows[0]]
+        which = ", ".join(str(s + 1) for s in rows)
+        taken = ", ".join(n for n, f in zip(names, free, strict=True) if f)
+        others = ", ".join(n for n, f in zip(names, family, strict=True) if f)
+        text = f"infinite family through posture {which}:"
+        text += f" {taken} took the reference;" if taken else ""
+        lines.append(f"{text} {others or 'no other joint'} moves with it.")
+    return lines
+
+
+def _units(model: RobotModel, degrees: bool) -> list[str]:
+    return [("deg" if degrees else "rad") if turns else "m" for turns in revolute(model)]
+
+
+def _shown(model: RobotModel, q: Array, degrees: bool) -> Array:
+    return np.where(revolute(model), np.rad2deg(q), q) if degrees else q
+
+
+def _number(value: float, unit: str) -> str:
+    text = f"{value:.4f}" if unit == "deg" else f"{value:.6f}"
+    return text.removeprefix("-") if float(text) == 0 else text

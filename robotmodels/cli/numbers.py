@@ -1,0 +1,165 @@
+"""Lists of numbers on the command line: ``--q 0.1 -0.5``, ``--q 0.1,-0.5`` and ``--q=-0.5,0.1``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .._arrays import Array
+from ..errors import InvalidValueError
+from ..geometry import REVOLUTE
+from ..model import RobotModel
+
+NUMBER_OPTIONS = ("--q", "--q-ref", "--xyz", "--rpy", "--matrix", "--mask", "--tolerance")
+"""Options that take lists of numbers."""
+
+
+def joined(argv: Sequence[str]) -> list[str]:
+    """Put the numbers behind an option into one word, ``--q -1 1e-3`` into ``--q=-1,1e-3``.
+
+    argparse would take -1e-3 for the name of an option.
+
+    Parameters
+    ----------
+    argv : sequence of str
+        Arguments.
+
+    Returns
+    -------
+    list of str
+        Arguments.
+
+    Examples
+    --------
+    >>> joined(["igm", "rx90", "--xyz", "-1e-3", "0", "1", "--limits", "--q-ref", "home"])
+    ['igm', 'rx90', '--xyz=-1e-3,0,1', '--limits', '--q-ref', 'home']
+    """
+    words: list[str] = []
+    rest = list(argv)
+    while rest:
+        word = rest.pop(0)
+        taken: list[str] = []
+        if word in NUMBER_OPTIONS:
+            while rest and _is_list(rest[0]):
+                taken.append(rest.pop(0))
+        words.append(f"{word}={','.join(taken)}" if taken else word)
+    return words
+
+
+def numbers(text: str, count: int | Sequence[int], option: str) -> Array:
+    """Numbers of an option.
+
+    Parameters
+    ----------
+    text : str
+        Separated by commas, blanks or both; brackets, as arrays are printed, do no harm.
+    count : int or sequence of int
+        How many there may be.
+    option : str
+        Its name, for the error message.
+
+    Returns
+    -------
+    ndarray, shape (count,)
+        The numbers.
+
+    Raises
+    ------
+    InvalidValueError
+        Another count, or something that is no finite number.
+
+    Examples
+    --------
+    >>> numbers("1, 2 3", 3, "--xyz")
+    array([1., 2., 3.])
+    """
+    counts = (count,) if isinstance(count, int) else tuple(count)
+    try:
+        values = np.array([float(word) for word in _words(text)])
+    except ValueError:
+        values = np.empty(0)
+    if values.size not in counts or not np.isfinite(values).all():
+        wanted = " or ".join(map(str, counts))
+        raise InvalidValueError(f"{option}: expected {wanted} finite numbers, got {text!r}.")
+    return values
+
+
+def posture(text: str, model: RobotModel, option: str, degrees: bool) -> Array:
+    """Joint variables from numbers, or from the name of a configuration of the robot.
+
+    Parameters
+    ----------
+    text : str
+        What was given.
+    model : RobotModel
+        The robot.
+    option : str
+        Its name, for the error message.
+    degrees : bool
+        Whether the numbers of revolute joints are degrees.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Radians and metres.
+
+    Raises
+    ------
+    InvalidValueError
+        Neither n numbers nor a name.
+
+    Examples
+    --------
+    >>> from ..robots import load
+    >>> posture("180 0.5", load("planar_2r"), "--q", degrees=True).round(4)
+    array([3.1416, 0.0087])
+    """
+    named = model.configurations.get(text)
+    if named is not None:
+        return named
+    try:
+        q = numbers(text, model.n, option)
+    except InvalidValueError:
+        names = ", ".join(model.configurations)
+        raise InvalidValueError(
+            f"{option}: expected {model.n} numbers, or the name of a configuration ({names}), "
+            f"got {text!r}."
+        ) from None
+    return np.deg2rad(q, out=q, where=revolute(model)) if degrees else q
+
+
+def revolute(model: RobotModel) -> np.ndarray:
+    """Which joints are revolute, whose variables may be in degrees.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot.
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
+        One for each joint.
+
+    Examples
+    --------
+    >>> from ..robots import load
+    >>> revolute(load("lab_trr"))
+    array([False,  True,  True])
+    """
+    return model.table.sigma[model.table.joint_rows] == REVOLUTE
+
+
+def _words(text: str) -> list[str]:
+    for mark in "[],":
+        text = text.replace(mark, " ")
+    return text.split()
+
+
+def _is_list(word: str) -> bool:
+    """Whether a word of the command line holds nothing but numbers."""
+    try:
+        return bool([float(number) for number in _words(word)])
+    except ValueError:
+        return False

@@ -1,0 +1,282 @@
+"""The command line: what it prints, what it returns, and how it says that an argument is wrong."""
+
+import json
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import robotmodels as rm
+from robotmodels import se3
+from robotmodels.cli import main
+from robotmodels.cli.numbers import joined, numbers
+
+POINT = ["--mask", "1", "1", "1", "0", "0", "0"]
+
+
+@pytest.fixture
+def run(capsys):
+    """Exit status, standard output and standard error of a command."""
+
+    def run(*words):
+        try:
+            code = main([str(word) for word in words])
+        except SystemExit as stop:
+            code = stop.code
+        out, err = capsys.readouterr()
+        return code, out, err
+
+    return run
+
+
+def solved(run, *words):
+    """The JSON of a pose that is reached."""
+    code, out, _ = run("igm", *words, "--json")
+    assert code == 0
+    return json.loads(out)
+
+
+# --- lists of numbers -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--q", "-1", "1e-3", "-2.5E+1"],
+        ["--q", "-1,1e-3,-2.5E+1"],
+        ["--q=-1,1e-3,-2.5E+1"],
+        ["--q", "-1, 1e-3", "-2.5E+1"],
+        ["--q", "[-1,", "1e-3,", "-2.5E+1]"],
+    ],
+)
+def test_numbers_may_be_negative_and_written_in_any_way(words):
+    (word,) = joined(words)
+    option, _, text = word.partition("=")
+    assert option == "--q"
+    assert numbers(text, 3, "--q").tolist() == [-1.0, 1e-3, -25.0]
+
+
+def test_only_numbers_are_joined():
+    words = ["igm", "--xyz", "1", "2", "rx90", "--q-ref", "home", "--limits", "--out", "1"]
+    assert joined(words) == ["igm", "--xyz=1,2", "rx90", *words[5:]]
+    assert joined(["--q"]) == ["--q"]
+
+
+# --- igm ------------------------------------------------------------------------------------------
+
+
+def test_igm_prints_every_posture(run):
+    q = np.array([0.3, 1.0, -1.8, 0.4, 0.8, -0.2])
+    code, out, err = run("igm", "rx90", "--q", *q)
+    assert (code, err) == (0, "")
+    assert out.startswith("rx90: 8 postures. The pose is reached.\nmethod: ")
+    rx90 = rm.load("rx90")
+    found = rm.igm(rx90, rm.dgm(rx90, q))
+    rows = [line.split("│")[1:-1] for line in out.splitlines() if re.match(r"│ \d", line)]
+    assert [row[1].strip() for row in rows] == found.branch.tolist()
+    printed = np.array([[float(cell) for cell in row[2:8]] for row in rows])
+    np.testing.assert_allclose(printed, found.q, atol=5.1e-7)
+    assert all(float(row[8]) < 1e-9 for row in rows)
+
+
+def test_the_three_ways_to_give_a_pose_agree(run):
+    model = rm.load("rx90")
+    q = np.radians([20.0, 60.0, -110.0, 30.0, 50.0, -20.0])
+    T = rm.dgm(model, q)
+    rpy = np.degrees(se3.to_rpy(T[:3, :3]))
+    ways = (
+        ["--q", *np.degrees(q), "--degrees"],
+        ["--xyz", *T[:3, 3], "--rpy", *rpy, "--degrees"],
+        ["--matrix", *T.ravel(), "--degrees"],
+    )
+    results = [solved(run, "rx90", *way) for way in ways]
+    for result in results:
+        assert result["units"] == ["deg"] * 6
+        np.testing.assert_allclose(result["pose"], T, atol=1e-15)
+        postures = np.radians([posture["q"] for posture in result["postures"]])
+        assert len(postures) == 8
+        np.testing.assert_allclose(rm.dgm(model, postures), np.tile(T, (8, 1, 1)), atol=1e-12)
+
+
+def test_json_holds_what_the_call_returns(run):
+    model = rm.load("lab_trr")
+    q = [-0.3, -0.7, 1.1]
+    result = solved(run, "lab_trr", "--q", *q, *POINT, "--q-ref", *q)
+    found = rm.igm(model, rm.dgm(model, q), q_ref=q, mask=[1, 1, 1, 0, 0, 0])
+    assert result["robot"] == "lab_trr"
+    assert result["units"] == ["m", "rad", "rad"]
+    assert result["mask"] == [1, 1, 1, 0, 0, 0]
+    assert result["status"] == "REACHED"
+    assert result["reason"] == found.reason()
+    assert result["method"] == found.method
+    assert result["closest"] is None
+    rows = result["postures"]
+    np.testing.assert_allclose([row["q"] for row in rows], found.q, atol=0)
+    assert [row["branch"] for row in rows] == found.branch.tolist()
+    assert [row["within_limits"] for row in rows] == found.within_limits.tolist()
+    np.testing.assert_allclose(rows[0]["q"], q, atol=1e-6)
+
+
+def test_degrees_leave_slides_in_metres(run):
+    q = [0.2, 30.0, -45.0]
+    result = solved(run, "lab_trr", "--q", *q, *POINT, "--degrees", "--q-ref", *q)
+    assert result["units"] == ["m", "deg", "deg"]
+    np.testing.assert_allclose(result["postures"][0]["q"], q, atol=1e-4)
+
+
+def test_tolerance_for_a_pose_of_four_digits(run):
+    """Pose A of the exercise: reached to its digits, not to 1e-9."""
+    pose = [0, 0, -1, 0.1414, 0, 1, 0, -0.3, 1, 0, 0, 0.8414, 0, 0, 0, 1]
+    code, out, _ = run("igm", "lab_trr", "--matrix", *pose)
+    assert code == 1
+    assert "closest posture: joint_1 -0.3" in out
+    result = solved(run, "lab_trr", "--matrix", *pose, "--tolerance", "1e-4", "--degrees")
+    np.testing.assert_allclose(result["postures"][0]["q"], [-0.3, -45, -45], atol=0.02)
+    # metres, then radians: the position is what has four digits
+    assert run("igm", "lab_trr", "--matrix", *pose, "--tolerance", "1e-4", "1e-6")[0] == 0
+    assert run("igm", "lab_trr", "--matrix", *pose, "--tolerance", "1e-6", "1e-6")[0] == 1
+
+
+def test_a_pose_that_is_not_reached_says_why(run):
+    code, out, err = run("igm", "rx90", "--xyz", 2, 0, 0, "--rpy", 0, 0, 0)
+    assert (code, err) == (1, "")
+    assert out.startswith("rx90: 0 postures. The position is out of reach: too far.")
+    assert "closest posture: joint_1 " in out
+    code, out, _ = run("igm", "rx90", "--xyz", 2, 0, 0, "--rpy", 0, 0, 0, "--json")
+    result = json.loads(out)
+    assert code == 1
+    assert (result["reached"], result["status"], result["postures"]) == (False, "TOO_FAR", [])
+    T = rm.dgm(rm.load("rx90"), result["closest"])
+    np.testing.assert_allclose(T[:3, 3], [0.9, 0, 0], atol=1e-3)
+
+
+def test_a_singular_pose_names_the_joint_that_took_the_reference(run):
+    q = [0.3, 1.0, -1.8, 0.4, 0.0, -0.2]
+    code, out, _ = run("igm", "rx90", "--q", *q, "--q-ref", *q)
+    assert code == 0
+    assert re.search(r"infinite family through posture 1\b.*: joint_4 took the reference;", out)
+    rows = solved(run, "rx90", "--q", *q, "--q-ref", *q)["postures"]
+    assert rows[0]["free_joints"] == ["joint_4"]
+    np.testing.assert_allclose(rows[0]["q"], q, atol=1e-9)
+
+
+def test_limits_drop_postures(run, tmp_path):
+    urdf = tmp_path / "arm.urdf"
+    q = [0.3, 1.0, -1.8, 0.4, 0.8, -0.2]
+    table = rm.load("rx90").table.replace(lower=[-1.0] + [-4.0] * 5, upper=[1.0] + [4.0] * 5)
+    rm.write_urdf(rm.RobotModel.from_table(table, name="arm"), urdf)
+    words = [urdf, "--q", *q]
+    every = solved(run, *words)["postures"]
+    assert sorted(row["within_limits"] for row in every) == [False] * 4 + [True] * 4
+    inside = solved(run, *words, "--limits", "--q-ref", *q)["postures"]
+    assert [row["within_limits"] for row in inside] == [True] * 4
+    np.testing.assert_allclose(inside[0]["q"], q, atol=1e-9)
+    assert run("igm", *words)[1].count("outside") == 4
+
+
+def test_mask_axes_of_the_tool(run):
+    """Pointing: the turn about the tool's z axis is free."""
+    q = [0.3, 1.0, -1.8, 0.4, 0.8, -0.2]
+    words = ["rx90", "--q", *q, "--mask", 1, 1, 1, 1, 1, 0, "--mask-axes", "tool"]
+    result = solved(run, *words)
+    T = np.array(result["pose"])
+    for row in result["postures"]:
+        reached = rm.dgm(rm.load("rx90"), row["q"])
+        np.testing.assert_allclose(reached[:3, 2:], T[:3, 2:], atol=1e-7)
+    assert "asked for: x y z rx ry in tool axes" in run("igm", *words)[1]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["rx90"], "expected one of --xyz, --matrix, --q, got none"),
+        (["rx90", "--q", "zero", "--xyz", 1, 2, 3], "got --xyz and --q"),
+        (["rx90", "--q", "zero", "--rpy", 1, 2, 3], "--rpy belongs to --xyz"),
+        (["rx90", "--xyz", 1, 2], "--xyz: expected 3 finite numbers, got '1,2'"),
+        (["rx90", "--xyz", 1, 2, "nan", "--rpy", 0, 0, 0], "--xyz: expected 3 finite numbers"),
+        (["rx90", "--xyz", 1, 2, 3], "the orientation is missing"),
+        (["rx90", "--xyz", 1, 2, 3, "--mask", 1, 1, 1, 1, 0, 0], "the orientation is missing"),
+        (["rx90", "--matrix", *range(16)], "last row"),
+        (["rx90", "--matrix", *(np.eye(4) * [1, 1, -1, 1]).ravel()], "det R = -1"),
+        (["rx90", "--q", 1, 2], "expected 6 numbers, or the name of a configuration"),
+        (["rx90", "--q", "zero", "--q-ref", "nowhere"], "--q-ref: expected 6 numbers"),
+        (["rx90", "--q", "zero", "--mask", 1, 1], "--mask: expected 6"),
+        (["rx90", "--q", "zero", "--mask", 0, 0, 0, 0, 0, 0], "nothing is asked for"),
+        (["rx90", "--q", "zero", "--tolerance", 0], "above 0"),
+        (["rx90", "--q", "zero", "--tolerance", 1, 2, 3], "--tolerance: expected 1 or 2"),
+        (["rx91", "--q", "zero"], "rx90"),
+        (["missing.urdf", "--q", "zero"], "missing.urdf"),
+    ],
+)
+def test_wrong_arguments_of_igm(run, words, message):
+    code, out, err = run("igm", *words)
+    assert (code, out) == (2, "")
+    assert err.startswith("robotmodels: ")
+    assert message in err
+
+
+def test_what_argparse_refuses_has_the_same_status(run):
+    for words in (["igm"], ["igm", "rx90", "--mask-axes", "joint"], ["igm", "rx90", "--xyz"]):
+        code, _, err = run(*words)
+        assert code == 2
+        assert "usage: robotmodels igm" in err
+
+
+def test_help_shows_an_example_that_works(run):
+    code, out, _ = run("igm", "--help")
+    assert code == 0
+    examples = re.findall(r"^  robotmodels (igm .*)$", out, re.MULTILINE)
+    assert len(examples) >= 3
+    for example in examples:
+        words = example.split()
+        if not words[1].endswith(".urdf"):
+            assert run(*words)[0] == 0, example
+
+
+def test_a_closed_pipe_keeps_the_status():
+    """``robotmodels igm ... | head -1``: no traceback."""
+    code = "import sys; from robotmodels.cli import main; sys.exit(main())"
+    words = [sys.executable, "-c", code, "igm", "lab_rr", "--q", "0.1", "0.2"]
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process.stdout.close()
+    err = process.stderr.read()
+    process.stderr.close()
+    assert process.wait(timeout=60) == 0
+    assert err == ""
+
+
+# --- the other commands ---------------------------------------------------------------------------
+
+
+def test_view_takes_numbers_names_and_degrees(run, tmp_path):
+    page = tmp_path / "arm.html"
+    for words in (["--q", "-0.5", "1e-1"], ["--q", "-0.5,1e-1"], ["--q=-0.5,0.1"]):
+        code, out, _ = run("view", "planar_2r", *words, "--out", page)
+        assert (code, page.stat().st_size > 500_000) == (0, True)
+        assert "q = [-0.5  0.1]" in out
+    assert "q = [1.5708 0.    ]" in run(
+        "view", "planar_2r", "--q", 90, 0, "--degrees", "--out", page
+    )[1]  # fmt: skip
+    assert "q = [-0.3    -0.7854 -0.7854]" in run(
+        "view", "lab_trr", "--q", "pose_a", "--out", page
+    )[1]  # fmt: skip
+    code, _, err = run("view", "planar_2r", "--q", 1, 2, 3, "--out", page)
+    assert code == 2
+    assert "--q: expected 2 numbers" in err
+
+
+def test_demo_draws_the_eight_postures(run, tmp_path):
+    code, out, _ = run("demo", "--out", tmp_path)
+    assert code == 0
+    pages = {path.name for path in tmp_path.glob("*.html")}
+    assert pages == {"arms.html", "rx90-postures.html", "ur5-postures.html"}
+    assert {path.name for path in tmp_path.glob("*.urdf")} == {"rx90.urdf", "ur5.urdf"}
+    for name in ("rx90", "ur5"):
+        text = (tmp_path / f"{name}-postures.html").read_text(encoding="utf-8")
+        assert re.findall(r"</span>(\d): shoulder", text) == list("12345678")
+        assert f"{name}: 8 postures. The pose is reached." in out
+    lost = [float(number) for number in re.findall(r"its postures to (\S+) rad", out)]
+    assert len(lost) == 2
+    assert max(lost) < 1e-6
