@@ -13,7 +13,7 @@ import numpy as np
 
 from .._arrays import Array
 from .alike import prepare_alike
-from .gather import assembled
+from .gather import assembled, rows_of
 from .loop import JointChain
 from .motion import jacobians, lever, random_postures, scaled
 from .solver import Found, Prepare, Solver, Tolerances, nothing_found, postures
@@ -163,15 +163,10 @@ def _(solver: DependentJoints, U: Array, references: Array, tolerances: Toleranc
         part = _at(solver, wanted[empty] + step, U[empty], references[empty], tolerances)
         there = part.valid.any(axis=1)
         rest = np.setdiff1d(np.arange(N), empty[there])
-        kept = Found(*(field[rest] for field in _fields(out)))
-        new = Found(*(field[there] for field in _fields(part)))
-        out = assembled(N, solver.chain.k, [(rest, kept), (empty[there], new)])
+        new = empty[there], rows_of(part, there)
+        out = assembled(N, solver.chain.k, [(rest, rows_of(out, rest)), new])
         empty = empty[~there]
     return out
-
-
-def _fields(found: Found) -> tuple[Array, ...]:
-    return found.q, found.valid, found.residual, found.double, found.free, found.family
 
 
 def _steps(solver: DependentJoints) -> Array:

@@ -87,3 +87,11 @@ def merged(sigma: NDArray[np.int64], found: Found) -> Found:
         free=found.free[pick] & there[..., None],
         family=found.family[pick] & there,
     )
+
+
+def rows_of(found: Found, poses: NDArray[np.int64] | NDArray[np.bool_]) -> Found:
+    """What was found for some of the poses, shape (len(poses), S)."""
+    return Found(
+        found.q[poses], found.valid[poses], found.residual[poses], found.double[poses],
+        found.free[poses], found.family[poses],
+    )  # fmt: skip

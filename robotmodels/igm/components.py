@@ -1,0 +1,143 @@
+"""The components of a pose that a mask asks for: what is missing of them, and how they move."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .._arrays import Array
+from .loop import JointChain
+from .motion import jacobians, tool_poses
+
+
+@dataclass(frozen=True, slots=True)
+class Components:
+    """Components ``x y z rx ry rz`` of the way from a pose to the desired one.
+
+    Parameters
+    ----------
+    asked : tuple of bool
+        Six.
+    in_tool_axes : bool
+        Along the axes of the tool at the desired pose, or the world's.
+    """
+
+    asked: tuple[bool, ...]
+    in_tool_axes: bool
+
+    @property
+    def freed_translations(self) -> tuple[int, ...]:
+        """Axes along which the position is not asked for."""
+        return tuple(i for i in range(3) if not self.asked[i])
+
+    @property
+    def freed_rotations(self) -> tuple[int, ...]:
+        """Axes about which the rotation is not asked for."""
+        return tuple(i for i in range(3) if not self.asked[3 + i])
+
+
+def mask_axes(chain: JointChain, U: Array, components: Components) -> Array:
+    """The axes of the mask in R_0, columns of a rotation, shape (N, 3, 3)."""
+    if components.in_tool_axes:
+        return U[:, :3, :3]
+    return np.broadcast_to(chain.base[:3, :3].T, (len(U), 3, 3))
+
+
+def missing_components(
+    chain: JointChain, U: Array, q: Array, components: Components
+) -> tuple[Array, Array]:
+    """What is missing of each component, in the mask's axes.
+
+    Parameters
+    ----------
+    chain : JointChain
+        The arm.
+    U : ndarray, shape (N, 4, 4)
+        Desired poses of the tool in R_0 [m].
+    q : ndarray, shape (N, k)
+        Postures, rad or m.
+    components : Components
+        What is asked.
+
+    Returns
+    -------
+    translation : ndarray, shape (N, 3)
+        Position that is missing [m].
+    rotation : ndarray, shape (N, 3)
+        ``log(R_desired R^T)`` [rad].
+
+    Examples
+    --------
+    The exercise's pose B: stretched out the position is met, the orientation is half a turn off.
+
+    >>> from robotmodels.igm.loop import joint_chain
+    >>> from robotmodels.robots import load
+    >>> B = np.array([[[-1, 0, 0, 0.4], [0, 1, 0, 0.2], [0, 0, -1, 0.5], [0, 0, 0, 1.0]]])
+    >>> away, turn = missing_components(
+    ...     joint_chain(load("lab_trr")), B, np.array([[0.2, 0.0, 0.0]]),
+    ...     Components((True,) * 3 + (False,) * 3, in_tool_axes=False))
+    >>> bool(np.abs(away).max() < 1e-15), (np.abs(turn) / np.pi).round(9)
+    (True, array([[0., 1., 0.]]))
+    """
+    P = tool_poses(chain, q)
+    axes = mask_axes(chain, U, components)
+    translation = U[:, :3, 3] - P[:, :3, 3]
+    rotation = rotation_vectors(U[:, :3, :3] @ np.swapaxes(P[:, :3, :3], 1, 2))
+    return _along(axes, translation), _along(axes, rotation)
+
+
+def asked_errors(
+    chain: JointChain, U: Array, q: Array, components: Components
+) -> tuple[Array, Array]:
+    """Lengths of what is missing of the asked translations [m] and rotations [rad], each (N,)."""
+    asked = np.array(components.asked)
+    translation, rotation = missing_components(chain, U, q, components)
+    return (
+        np.linalg.norm(translation[:, asked[:3]], axis=1),
+        np.linalg.norm(rotation[:, asked[3:]], axis=1),
+    )
+
+
+def asked_jacobians(chain: JointChain, U: Array, q: Array, components: Components) -> Array:
+    """How the asked components of the tool's motion depend on the joints, shape (N, a, k).
+
+    The rows of rotations hold where all asked ones are met and the freed ones are none or all, or
+    nothing is missing of them; elsewhere they are those of the angular velocity.
+    """
+    J = jacobians(chain, q)
+    axes = np.swapaxes(mask_axes(chain, U, components), 1, 2)
+    return np.concatenate([axes @ J[:, :3], axes @ J[:, 3:]], axis=1)[:, np.array(components.asked)]
+
+
+def quaternions(R: Array) -> Array:
+    """Unit quaternions ``(c, x, y, z)`` of rotations (N, 3, 3), exact at any angle, c >= 0."""
+    xx, yy, zz = R[:, 0, 0], R[:, 1, 1], R[:, 2, 2]
+    # 4 times the products of each component with all: the largest row loses no digits
+    K = np.empty((len(R), 4, 4))
+    K[:, 0, 0], K[:, 1, 1] = 1 + xx + yy + zz, 1 + xx - yy - zz
+    K[:, 2, 2], K[:, 3, 3] = 1 - xx + yy - zz, 1 - xx - yy + zz
+    K[:, 0, 1] = K[:, 1, 0] = R[:, 2, 1] - R[:, 1, 2]
+    K[:, 0, 2] = K[:, 2, 0] = R[:, 0, 2] - R[:, 2, 0]
+    K[:, 0, 3] = K[:, 3, 0] = R[:, 1, 0] - R[:, 0, 1]
+    K[:, 1, 2] = K[:, 2, 1] = R[:, 1, 0] + R[:, 0, 1]
+    K[:, 1, 3] = K[:, 3, 1] = R[:, 0, 2] + R[:, 2, 0]
+    K[:, 2, 3] = K[:, 3, 2] = R[:, 2, 1] + R[:, 1, 2]
+    best = np.argmax(np.diagonal(K, axis1=1, axis2=2), axis=1)
+    Q = K[np.arange(len(R)), best]
+    Q /= np.linalg.norm(Q, axis=1)[:, None]
+    return np.where(Q[:, :1] < 0.0, -Q, Q)
+
+
+def rotation_vectors(R: Array) -> Array:
+    """``log`` of rotations (N, 3, 3), shape (N, 3) [rad]."""
+    Q = quaternions(R)
+    half_sine = np.linalg.norm(Q[:, 1:], axis=1)
+    angle = 2.0 * np.arctan2(half_sine, Q[:, 0])
+    scale = np.where(half_sine > 1e-150, angle / np.maximum(half_sine, 1e-150), 2.0)
+    return Q[:, 1:] * scale[:, None]
+
+
+def _along(axes: Array, vectors: Array) -> Array:
+    """Components of vectors (N, 3) along axes (N, 3, 3)."""
+    return np.einsum("nij,ni->nj", axes, vectors)
