@@ -45,11 +45,10 @@ def operate(plan: Ints, numbers: Floats, at: int, of: int, start: int, stop: int
 
 
 @compiled()
-def solve(plan: Ints, at: int, x: Floats, lane: int, tolerances: Floats, wanted: Floats,
-          found: Floats, o: int) -> tuple[int, int]:  # fmt: skip
+def solve(plan: Ints, at: int, x: Floats, lane: int, slack: float, zero: float, small: float,
+          wanted: Floats, found: Floats, o: int) -> tuple[int, int]:  # fmt: skip
     """Solutions of one step from the coefficients in the registers."""
     code = plan[at]
-    slack, zero, small = tolerances[0], tolerances[1], tolerances[2]
     first, second = wanted[plan[at + 7], lane], wanted[plan[at + 8], lane]
     a, b = x[plan[at + 9], lane], x[plan[at + 10], lane]
     if code == 10:
@@ -82,13 +81,13 @@ def solve(plan: Ints, at: int, x: Floats, lane: int, tolerances: Floats, wanted:
 
 
 @compiled()
-def solve_lanes(plan: Ints, at: int, x: Floats, tolerances: Floats, found: Floats, o: int,
-                weak: Ints) -> int:  # fmt: skip
+def solve_lanes(plan: Ints, at: int, x: Floats, small: float, found: Floats, o: int, weak: Ints
+                ) -> int:  # fmt: skip
     """The two commonest types in vector code, for lanes whose amplitude is not small.
 
     Returns the number of solutions, 0 for other types; ``weak`` marks lanes that `solve` must do.
     """
-    code, small = plan[at], tolerances[2]
+    code = plan[at]
     a, b = plan[at + 9], plan[at + 10]
     if code == 10:
         for lane in range(LANES):
@@ -184,8 +183,8 @@ def run_plan(
     """Postures of every pose; `paul_postures` says what is returned.
 
     ``plan`` and ``numbers`` are a `Program` in two arrays. ``tolerances``: overshoot beside the
-    amplitude that counts as a double root, amplitudes that are zero and that are small, largest
-    error accepted [m, rad]. Row n of ``marks (N, 2 + 2 S)``: number of postures, flags of the
+    amplitude that counts as a double root, amplitudes that are zero and that are small beside
+    their usual size, largest error accepted [m, rad]. Row n of ``marks (N, 2 + 2 S)``: number of postures, flags of the
     pose, and of each posture the bits of free unknowns and of the branches taken.
     """
     k, m, at_steps, at_starts = int(plan[0]), int(plan[1]), int(plan[2]), int(plan[3])
@@ -193,15 +192,18 @@ def run_plan(
     size, unknowns, most = int(plan[7]), int(plan[8]), int(plan[9])
     of_registers, of_references, of_sides = int(plan[10]), int(plan[11]), int(plan[12])
     of_lever = of_sides + 24
+    rough = max(FALSE, tolerances[3])
     N = poses.shape[0]
     lanes = 1 if N == 1 else LANES
-    x, wanted = np.empty((size, lanes)), np.empty((unknowns, lanes))
-    found = np.empty((24 * m, lanes))
-    errors, values = np.empty(lanes), np.empty((k, lanes))
-    weak = np.ones(lanes, np.int64)
-    number, flags = np.zeros((m, lanes), np.int64), np.zeros((m, lanes), np.int64)
-    alive = np.zeros((m + 1, lanes), np.int64)
-    branch, widest = np.zeros(m + 1, np.int64), np.zeros(m + 1, np.int64)
+    # two pieces of memory for everything: allocating costs time where a single pose is asked for
+    room = np.empty((size + unknowns + 24 * m + k + 1, lanes))
+    x, room = room[:size], room[size:]
+    wanted, room = room[:unknowns], room[unknowns:]
+    found, room = room[: 24 * m], room[24 * m :]
+    values, errors = room[:k], room[k]
+    whole = np.zeros((3 * m + 4, lanes if lanes > m else m + 1), np.int64)
+    number, flags, alive = whole[:m], whole[m : 2 * m], whole[2 * m : 3 * m + 1]
+    weak, branch, widest = whole[3 * m + 1], whole[3 * m + 2], whole[3 * m + 3]
     for i in range(size):
         for lane in range(lanes):
             x[i, lane] = numbers[of_registers + i]
@@ -234,7 +236,7 @@ def run_plan(
                         way |= branch[i] << (2 * i)
                     for lane in range(filled):
                         error = errors[lane]
-                        if alive[m, lane] == 0 or not error <= FALSE:
+                        if alive[m, lane] == 0 or not error <= rough:
                             continue
                         n = start + lane
                         count = marks[n, 0]
@@ -255,9 +257,12 @@ def run_plan(
                     level -= 1
                     continue
                 widest[level], step = 0, at_steps + STEP * level
+                # amplitudes are measured beside what they usually are
+                scale = numbers[of_lever + 3 + level]
+                zero, small = tolerances[1] * scale, tolerances[2] * scale
                 common = 0
                 if lanes > 1:
-                    common = solve_lanes(plan, step, x, tolerances, found, 24 * level, weak)
+                    common = solve_lanes(plan, step, x, small, found, 24 * level, weak)
                 for lane in range(lanes):
                     if alive[level, lane] == 0:
                         number[level, lane] = 0
@@ -267,7 +272,7 @@ def run_plan(
                         widest[level] = max(widest[level], common)
                         continue
                     solutions, flag = solve(
-                        plan, step, x, lane, tolerances, wanted, found, 24 * level
+                        plan, step, x, lane, tolerances[0], zero, small, wanted, found, 24 * level
                     )
                     number[level, lane], flags[level, lane] = solutions, flag
                     marks[start + lane, 1] |= flag

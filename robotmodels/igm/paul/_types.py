@@ -311,7 +311,7 @@ def quartic(a0: float, a1: float, a2: float, a3: float, a4: float, slack: float,
     """``a0 + a1 C + a2 S + a3 cos(2 theta) + a4 sin(2 theta) = 0``."""
     g, roots = np.empty(5), np.empty(4)
     g[0], g[1], g[2], g[3], g[4] = a0, a1, a2, a3, a4
-    size = np.abs(g).max()
+    size = max(max(abs(a0), abs(a1)), max(abs(a2), max(abs(a3), abs(a4))))
     if size == 0.0:
         put_free(found, o, 0, 0, lane, reference)
         return 1, FREE_1
@@ -339,7 +339,7 @@ def polynomial(a0: float, a1: float, a2: float, a3: float, a4: float, slack: flo
         return count, flags
     g = np.empty(5)
     g[0], g[1], g[2], g[3], g[4] = a0, a1, a2, a3, a4
-    if np.abs(g).max() == 0.0:
+    if a0 == a1 == a2 == a3 == a4 == 0.0:
         put_length(found, o, 0, 0, lane, reference)
         return 1, FREE_1
     count, flags = polynomial_roots(g, roots), 0

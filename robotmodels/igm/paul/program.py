@@ -41,7 +41,8 @@ class Program:
         of the matrix equation; of the other), and the joint types.
     numbers : ndarray
         The factors f, g of the operations, the initial registers (the constants), a row of signs
-        and an offset for the reference of each unknown, ``before`` and ``after`` (3x4), the lever.
+        and an offset for the reference of each unknown, ``before`` and ``after`` (3x4), the lever,
+        and the usual size of the amplitude of each step.
     branches : int
         Most postures.
     """
@@ -210,11 +211,11 @@ def lowered(arm: Arm, steps: Sequence[Step]) -> Program:
     parts = [rows, starts, np.array([w for _, w, _ in operations]), results, form.sigma]
     places = np.cumsum([_HEAD, *(np.size(p) for p in parts)])
     factors = np.array([f for _, _, f in operations])
-    sides = np.concatenate([form.before[:3].ravel(), form.after[:3].ravel(), form.lever])
+    sides = [form.before[:3], form.after[:3], form.lever, [_scale(step, graph) for step in steps]]
     spans = np.cumsum([factors.size, len(table.initial), np.size(references)])
     head = [form.k, len(steps), *places[:5], len(table.initial), len(references), branches, *spans]
     whole = np.concatenate([np.ravel(p) for p in (head, *parts)])
-    numbers = [np.ravel(p) for p in (factors, table.initial, references, sides)]
+    numbers = [np.ravel(p) for p in (factors, table.initial, references, *sides)]
     return Program(
         plan=read_only(whole, np.uint32),
         numbers=read_only(np.concatenate(numbers)),
@@ -230,6 +231,17 @@ def _for_kernel(step: Step) -> tuple[Expression, ...]:
     if step.type is EquationType.TYPE_3_DIRECT:
         return step.coefficients[1:]
     return step.coefficients
+
+
+def _scale(step: Step, graph: Graph) -> float:
+    """Usual size of what must not be zero for the step to have an answer."""
+    of = {
+        EquationType.TYPE_1: (0,), EquationType.TYPE_2: (0, 1), EquationType.TYPE_2_ZERO: (0, 1),
+        EquationType.TYPE_3: (0, 1, 3, 4), EquationType.TYPE_3_DIRECT: (0,),
+        EquationType.TYPE_4: (0, 2), EquationType.TYPE_5: (0, 3), EquationType.TYPE_6: (0,),
+        EquationType.TYPE_7: (0, 1), EquationType.TYPE_8: (0, 1),
+    }.get(step.type, ())  # fmt: skip
+    return max((graph.size(step.coefficients[i]) for i in of), default=1.0)
 
 
 def _reference(arm: Arm, number: int) -> Array:
