@@ -18,7 +18,7 @@ from .catalogue import EquationType
 from .equations import Arm, Split
 from .expressions import ONE, ZERO, Expression, Graph, Kind
 from .polynomials import part
-from .products import product
+from .products import Fixed, product
 
 if TYPE_CHECKING:
     from .plan import Step
@@ -200,7 +200,10 @@ def lowered(arm: Arm, steps: Sequence[Step]) -> Program:
             rows[n, 9 + m] = table.expression(e)[0]
     results = [table.expression(_joint_value(arm, j, values))[0] for j in range(form.k)]
     reached = np.cumprod([1, *(step.type.branches for step in steps)])
+    nominal = arm.K
+    arm.K = [_as_is(arm, j) for j in range(form.k)]
     sides = min((_check(arm, s, table, reached) for s in range(form.k + 1)), key=lambda c: c[0])[1]
+    arm.K = nominal
     for e in sides:
         results.append(table.expression(e)[0])
     order = sorted(range(len(table.operations)), key=lambda i: max(table.operations[i][0], 0))
@@ -265,6 +268,17 @@ def _joint_value(arm: Arm, j: int, values: dict[int, Expression]) -> Expression:
         factor, node = values[solved.unknown]
         terms.append((sense * way * joints.sense(solved.span) * factor, node))
     return arm.graph.sum((*terms, offset))
+
+
+def _as_is(arm: Arm, j: int) -> Fixed:
+    """The constant before a joint without rounding to structure: the check is of the true arm."""
+    nominal, exact = arm.K[j], arm.form.exact[j]
+
+    def element(e: Expression, value: float) -> Expression:
+        return e if abs(arm.graph.values(e)[0] - value) <= 1e-15 else (float(value), ONE)
+
+    R = [[element(nominal.R[i][c], exact[i, c]) for c in range(3)] for i in range(3)]
+    return Fixed(R, [element(nominal.p[i], exact[i, 3]) for i in range(3)])
 
 
 def _check(
