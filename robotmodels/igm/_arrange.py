@@ -8,7 +8,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from ..kernels._compile import INT, INTS, MATRIX, STACK, VECTOR, Floats, Ints, compiled
+from ..kernels._compile import INT, INTS, MATRIX, STACK, Floats, Ints, compiled
 from .status import IGMStatus
 
 Flags = NDArray[np.bool_]
@@ -53,8 +53,8 @@ def before(a: Floats, code_a: int, key_a: float, b: Floats, code_b: int, key_b: 
 
 @compiled(
     types.int64(
-        STACK, _IN2, MATRIX, _IN2, _IN3, _IN3, _CODES2_IN, INTS, INTS, MATRIX, INT, VECTOR, VECTOR,
-        INT, INTS, _FLOATS3, _FLAGS, _FLOATS2, _FLAGS, _CODES2, _FLAGS, _FLAGS3, _FLAGS3, _CODES1,
+        STACK, _IN2, MATRIX, _IN2, _IN3, _IN3, _CODES2_IN, INTS, INTS, MATRIX, INT, MATRIX,
+        INT, _FLOATS3, _FLAGS, _FLOATS2, _FLAGS, _CODES2, _FLAGS, _FLAGS3, _FLAGS3, _CODES1,
     )
 )  # fmt: skip
 def arranged(
@@ -69,10 +69,8 @@ def arranged(
     off_path: Ints,
     references: Floats,
     given: int,
-    lower: Floats,
-    upper: Floats,
+    joints: Floats,
     boxed: int,
-    turns: Ints,
     q: Floats,
     valid: Flags,
     residual: Floats,
@@ -83,8 +81,12 @@ def arranged(
     family: Flags,
     status: NDArray[np.int8],
 ) -> int:
-    """Fill the rows of a result; returns the most postures of any pose."""
+    """Fill the rows of a result; returns the most postures of any pose.
+
+    ``joints (3, n)`` holds lower and upper limits and 1 for joints that turn.
+    """
     N, S, k = found.shape
+    lower, upper, turns = joints[0], joints[1], joints[2]
     n = references.shape[1]
     rows, keys = np.zeros((S, n)), np.zeros(S)
     order = np.zeros(S, dtype=np.int64)
@@ -103,7 +105,7 @@ def arranged(
                 for m in range(n):
                     middle = 0.5 * (lower[m] + upper[m])
                     goal = references[p, m] if given else (middle if abs(middle) < 1e9 else 0.0)
-                    if turns[m]:
+                    if turns[m] != 0.0:
                         rows[i, m] = turned_inside(rows[i, m], lower[m], upper[m], goal)
                     if not lower[m] - AT_LIMIT <= rows[i, m] <= upper[m] + AT_LIMIT:
                         reachable = False
@@ -114,7 +116,7 @@ def arranged(
             if given:
                 for m in range(n):
                     way = rows[i, m] - references[p, m]
-                    if turns[m] and not boxed:
+                    if turns[m] != 0.0 and not boxed:
                         way -= 2.0 * pi * np.round(way / (2.0 * pi))
                     keys[i] += way * way
                 keys[i] = sqrt(keys[i])

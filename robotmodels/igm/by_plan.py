@@ -1,0 +1,188 @@
+"""Arms that Paul's method solves: its plan for the poses it is sure of, a family for the others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import Array, read_only
+from ..model import RobotModel
+from .branches import SIDES, branches
+from .loop import JointChain
+from .motion import random_postures, tool_poses
+from .paul.plan import PaulPlan, derive_plan
+from .solver import Found, Solver, Tolerances, postures
+
+TESTS = 128
+"""Random poses at which a plan has to find what the family finds before it is used."""
+SLACK, ZERO, SMALL, ACCEPTED = 1e-9, 1e-13, 1e-5, 1e-9
+"""Of `run_plan`: overshoot tried as a double root, amplitudes that are zero and that are doubtful
+beside what they are made of, largest error of a posture [m, rad]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ByPlan:
+    """An arm whose regular poses Paul's plan solves.
+
+    Parameters
+    ----------
+    plan : PaulPlan
+        Equations and their types, and the program of them.
+    family : Solver
+        What solves poses at which a step of the plan is singular or nearly so, or that the plan
+        does not reach.
+    labels : tuple of str
+        Labels of the branches.
+    branch_of_way : ndarray of int16
+        Number of the label of each way through the plan; empty if a way is not always the same
+        branch.
+    """
+
+    plan: PaulPlan
+    family: Solver
+    labels: tuple[str, ...]
+    branch_of_way: NDArray[np.int16]
+
+    @property
+    def chain(self) -> JointChain:
+        """The arm that is solved."""
+        return self.family.chain
+
+    @property
+    def method(self) -> str:
+        """The family, in words."""
+        return f"Paul's equations; {self.family.method}"
+
+
+def prepare_by_plan(model: RobotModel, family: Solver) -> ByPlan | None:
+    """Derive the plan of an arm and compare it with the arm's family.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot.
+    family : Solver
+        What solves its whole poses.
+
+    Returns
+    -------
+    ByPlan or None
+        None if Paul's method does not give every joint, or if at one of `TESTS` random poses that
+        the plan is sure of it does not find what the family finds.
+
+    Examples
+    --------
+    >>> from robotmodels.igm.families import prepare
+    >>> from robotmodels.igm.loop import joint_chain
+    >>> from robotmodels.robots import load
+    >>> arm = load("rx90")
+    >>> prepare_by_plan(arm, prepare(joint_chain(arm))).branch_of_way.size > 0
+    True
+    """
+    plan = derive_plan(model)
+    if plan.program is None or plan.program.branches > 16:
+        return None
+    chain = family.chain
+    q = random_postures(chain, TESTS, np.random.default_rng(0))
+    U = tool_poses(chain, q)
+    by_family = postures(family, U, np.zeros_like(q), Tolerances())
+    rows, _, marks = run(plan, plan.program.numbers, U, np.zeros_like(q))
+    S = rows.shape[1]
+    sure = marks[:, 1] == 0
+    there = (np.arange(S) < marks[:, :1]) & sure[:, None]
+    away = np.abs(_short(chain, rows[:, :, None] - by_family.q[:, None])).max(axis=-1)
+    away = np.where(there[:, :, None] & by_family.valid[:, None], away, np.inf)
+    same = away.min(axis=2, initial=np.inf) < 1e-6
+    counts = np.sum(by_family.valid, axis=1)
+    if np.sum(sure) < TESTS // 2 or not np.array_equal(same, there):
+        return None
+    if not np.array_equal(np.sum(there, axis=1)[sure], counts[sure]):
+        return None
+    code, labels = branches(family, by_family)
+    ways, at = marks[:, 2 + S :][there], away.argmin(axis=2)[there]
+    codes = code[np.nonzero(there)[0], at]
+    table = np.full(int(ways.max(initial=0)) + 1, -1, np.int16)
+    table[ways] = codes
+    if not np.array_equal(table[ways], codes) or len(labels) > len(SIDES):
+        table, labels = np.empty(0, np.int16), tuple(str(i + 1) for i in range(S))
+    return ByPlan(plan, family, labels, read_only(table, np.int16))
+
+
+def run(
+    plan: PaulPlan, numbers: Array, poses: Array, references: Array
+) -> tuple[Array, Array, NDArray[np.int64]]:
+    """Let the kernel run a plan.
+
+    Parameters
+    ----------
+    plan : PaulPlan
+        A complete plan.
+    numbers : ndarray
+        The numbers of its program.
+    poses : ndarray, shape (N, 4, 4)
+        Poses [m].
+    references : ndarray, shape (N, k)
+        Reference postures [rad or m].
+
+    Returns
+    -------
+    q : ndarray, shape (N, S, k)
+        Postures [rad or m]; what stands in rows that are not in use has no meaning.
+    residual : ndarray, shape (N, S)
+        Their errors [m, rad].
+    marks : ndarray of int, shape (N, 2 + 2 S)
+        How many there are, whether there are doubts, and the ways through the plan: see `run_plan`.
+    """
+    from .paul._run import run_plan
+
+    assert plan.program is not None
+    N, k, S = poses.shape[0], references.shape[1], plan.program.branches
+    q, residual = np.empty((N, S, k)), np.empty((N, S))
+    marks = np.empty((N, 2 + 2 * S), np.int64)
+    run_plan(plan.program.plan, numbers, _TOLERANCES, poses, references, q, residual, marks)
+    return q, residual, marks
+
+
+_TOLERANCES = read_only([SLACK, ZERO, SMALL, ACCEPTED])
+
+
+def numbers_for_world(plan: PaulPlan, to_base: Array) -> Array:
+    """The numbers of a plan's program for poses in the world.
+
+    Parameters
+    ----------
+    plan : PaulPlan
+        A complete plan.
+    to_base : ndarray, shape (4, 4)
+        ``Z^-1``.
+
+    Returns
+    -------
+    ndarray
+        The same numbers, the constant before the pose multiplied by ``Z^-1``.
+    """
+    assert plan.program is not None
+    numbers = np.array(plan.program.numbers)
+    at = int(plan.program.plan[12])
+    before = numbers[at : at + 12].reshape(3, 4)
+    before[...] = before @ to_base
+    return read_only(numbers)
+
+
+@postures.register
+def _(solver: ByPlan, U: Array, references: Array, tolerances: Tolerances) -> Found:
+    # the plan's tolerances are the exact ones, and so is its knowledge of what is free
+    return postures(solver.family, U, references, tolerances)
+
+
+@branches.register
+def _(solver: ByPlan, found: Found) -> tuple[NDArray[np.int16], tuple[str, ...]]:
+    return branches(solver.family, found)
+
+
+def _short(chain: JointChain, way: Array) -> Array:
+    """Differences of postures, angles by the shorter way round."""
+    turn = 2.0 * np.pi
+    return np.where(chain.sigma == 0, way - turn * np.round(way / turn), way)

@@ -1,0 +1,132 @@
+"""What the inverse model keeps of a robot between calls: its joints, and prepared families."""
+
+from __future__ import annotations
+
+import weakref
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import se3
+from .._arrays import Array, read_only
+from ..geometry import REVOLUTE
+from ..model import RobotModel
+from .asked import Task
+from .by_plan import ByPlan, numbers_for_world, prepare_by_plan
+from .families import prepare_task
+from .loop import joint_chain
+from .solver import Solver
+
+KEPT_TASKS = 32
+"""Tasks (masks, locked values) prepared for one model that are remembered."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class KnownArm:
+    """A robot as the inverse model sees it.
+
+    Parameters
+    ----------
+    columns : ndarray of int, shape (k,)
+        Columns of q of the joints between base and tool, in their order.
+    to_base : ndarray, shape (4, 4)
+        ``Z^-1``.
+    turns : ndarray of bool, shape (n,)
+        Revolute joints.
+    never : ndarray of bool, shape (n,)
+        False: no joint counts modulo a turn within limits.
+    joints : ndarray, shape (3, n)
+        Lower and upper limits, and 1 for joints that turn.
+    plan : ByPlan or None
+        Paul's equations, where they solve the arm and every joint moves the tool.
+    numbers : ndarray or None
+        Of the plan's program, for poses in the world.
+    solvers : dict
+        What was prepared for tasks.
+    """
+
+    columns: NDArray[np.int64]
+    to_base: Array
+    turns: NDArray[np.bool_]
+    never: NDArray[np.bool_]
+    joints: Array
+    plan: ByPlan | None
+    numbers: Array | None
+    solvers: dict[Task, Solver | None] = field(default_factory=dict)
+
+
+# by identity: a model's hash reads all of its numbers
+_ARMS: dict[int, tuple[weakref.ref[RobotModel], KnownArm]] = {}
+
+
+def known_arm(model: RobotModel) -> KnownArm:
+    """What earlier calls prepared for a model; prepared now if there was none.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot.
+
+    Returns
+    -------
+    KnownArm
+        Kept for as long as the model lives.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> known_arm(load("ur5")).plan.plan.complete
+    True
+    """
+    key = id(model)
+    entry = _ARMS.get(key)
+    if entry is None or entry[0]() is not model:
+        entry = (weakref.ref(model, lambda _: _ARMS.pop(key, None)), _prepared(model))
+        _ARMS[key] = entry
+    return entry[1]
+
+
+def solver_for(model: RobotModel, arm: KnownArm, task: Task) -> Solver | None:
+    """The family prepared for a task, from the last call that asked for it if any.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot.
+    arm : KnownArm
+        What is known of it.
+    task : Task
+        What is asked.
+
+    Returns
+    -------
+    Solver or None
+        None if no family serves the task.
+    """
+    if task not in arm.solvers:
+        if len(arm.solvers) >= KEPT_TASKS:
+            arm.solvers.pop(next(iter(arm.solvers)))
+        arm.solvers[task] = prepare_task(joint_chain(model), task)
+    return arm.solvers[task]
+
+
+def _prepared(model: RobotModel) -> KnownArm:
+    chain = joint_chain(model)
+    turns = model.table.sigma[model.table.joint_rows] == REVOLUTE
+    to_base = read_only(se3.inverse(model.base))
+    whole = Task()
+    family = prepare_task(chain, whole)
+    plan = None
+    if family is not None and np.array_equal(chain.columns, np.arange(model.n)):
+        plan = prepare_by_plan(model, family)
+    return KnownArm(
+        columns=chain.columns,
+        to_base=to_base,
+        turns=read_only(turns, np.bool_),
+        never=read_only(np.zeros(model.n), np.bool_),
+        joints=read_only(np.array([model.lower, model.upper, turns])),
+        plan=plan,
+        numbers=None if plan is None else numbers_for_world(plan.plan, to_base),
+        solvers={whole: family if plan is None else plan},
+    )

@@ -1,0 +1,251 @@
+"""Postures of a chain as rows of a result: ordered, labelled, in the model's columns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import Array
+from ..errors import InvalidValueError
+from ..model import RobotModel
+from .arm_angle import ArmAngle, arm_angle_postures
+from .asked import WHOLE_POSE, Task
+from .branches import branches
+from .known import KnownArm
+from .self_motion import Settled, double_roots, settle_families
+from .solver import Found, Solver, Tolerances, nothing_found, postures
+from .status import IGMStatus
+from .why import search
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Call:
+    """What one call asks, checked.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot.
+    arm : KnownArm
+        What is known of it.
+    task : Task
+        Mask, locked joints, whether arm angles are given.
+    solver : Solver or None
+        The family prepared for the task.
+    given : bool
+        Whether references were given.
+    limits : bool
+        Whether postures must lie within the joint limits.
+    tolerances : Tolerances
+        When a pose counts as met.
+    """
+
+    model: RobotModel
+    arm: KnownArm
+    task: Task
+    solver: Solver | None
+    given: bool
+    limits: bool
+    tolerances: Tolerances
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rows:
+    """Fields of an `IGMSolutions` for N poses, S rows a pose of which ``most`` are in use."""
+
+    q: Array
+    valid: NDArray[np.bool_]
+    residual: Array
+    inside: NDArray[np.bool_]
+    code: NDArray[np.int16]
+    double: NDArray[np.bool_]
+    free: NDArray[np.bool_]
+    family: NDArray[np.bool_]
+    status: NDArray[np.int8]
+    labels: tuple[str, ...]
+    most: int
+    closest: Array | None
+    missing: Array | None
+
+
+def rows_by_family(call: Call, poses: Array, references: Array, psi: Array | None = None) -> Rows:
+    """Postures by the family of the arm; poses without one searched for the reason.
+
+    Parameters
+    ----------
+    call : Call
+        What is asked.
+    poses : ndarray, shape (N, 4, 4)
+        World poses [m].
+    references : ndarray, shape (N, n)
+        Reference postures [rad or m].
+    psi : ndarray, shape (N,), optional
+        Arm angles, rad.
+
+    Returns
+    -------
+    Rows
+        What was found.
+    """
+    from ._arrange import arranged
+
+    model, arm, task = call.model, call.arm, call.task
+    U = np.ascontiguousarray(arm.to_base @ poses)
+    # locked joints are not solved for: like joints off the path they keep their reference
+    locked = [column for column, _ in task.locks]
+    if locked:
+        references = references.copy()
+        references[:, locked] = [value for _, value in task.locks]
+    columns = arm.columns[~np.isin(arm.columns, locked)]
+    found = _settled(call, U, psi, np.ascontiguousarray(references[:, columns]))
+    code, labels = branches(call.solver, found)
+    N, S, _ = found.q.shape
+    S, n = max(S, 1), model.n
+    q, residual = np.full((N, S, n), np.nan), np.full((N, S), np.nan)
+    valid, inside, double = np.zeros((3, N, S), np.bool_)
+    codes, status = np.full((N, S), -1, np.int16), np.empty(N, np.int8)
+    free, family = np.zeros((2, N, S, n), np.bool_)
+    off_path = np.ones(n, np.int64)
+    off_path[arm.columns] = 0
+    most = arranged(
+        found.q, found.valid, found.residual, found.double, found.free,
+        np.ascontiguousarray(found.moving), code, columns, off_path, references, int(call.given),
+        arm.joints, int(call.limits), q, valid, residual, inside, codes, double, free, family,
+        status,
+    )  # fmt: skip
+    reasons = search(
+        model, task, call.solver is None, poses, references, call.limits, call.tolerances, status
+    )
+    closest = missing = None
+    if reasons is not None:
+        closest, missing = reasons.closest, reasons.missing
+        status[reasons.rows] = reasons.status
+        met = reasons.rows[reasons.met]
+        # a posture that the search came upon all the same
+        q[met, 0], residual[met, 0] = closest[met], reasons.residual[reasons.met]
+        valid[met, 0], codes[met, 0] = True, 0
+        low, high = model.lower <= closest[met], closest[met] <= model.upper
+        inside[met, 0] = np.all(low & high, axis=-1)
+        most = max(most, int(met.size > 0))
+    return Rows(
+        q, valid, residual, inside, codes, double, free, family, status, labels, most, closest,
+        missing,
+    )  # fmt: skip
+
+
+def rows_by_plan(call: Call, poses: Array, references: Array) -> Rows:
+    """Postures by Paul's plan, where it is in doubt by the family of the arm.
+
+    Parameters
+    ----------
+    call : Call
+        What is asked; its solver is a `ByPlan`, its task the whole pose.
+    poses : ndarray, shape (N, 4, 4)
+        World poses [m].
+    references : ndarray, shape (N, n)
+        Reference postures [rad or m].
+
+    Returns
+    -------
+    Rows
+        What was found.
+    """
+    from ._regular import regular_rows
+    from .by_plan import run
+
+    plan, numbers = call.arm.plan, call.arm.numbers
+    assert plan is not None
+    assert numbers is not None
+    q, residual, marks = run(plan.plan, numbers, poses, references)
+    N, S, n = q.shape
+    flags, code = np.empty((2, N, S), np.bool_), np.empty((N, S), np.int16)
+    status = np.empty(N, np.int8)
+    most = regular_rows(
+        marks, plan.branch_of_way, references, call.given, call.arm.joints, call.limits,
+        q, residual, flags, code, status,
+    )  # fmt: skip
+    # zeros that nobody touches take no time
+    rows = Rows(
+        q, flags[0], residual, flags[1], code, np.zeros((N, S), np.bool_),
+        np.zeros((N, S, n), np.bool_), np.zeros((N, S, n), np.bool_), status, plan.labels,
+        abs(most) - (most < 0), None, None,
+    )  # fmt: skip
+    if most >= 0:
+        return rows
+    doubtful = np.flatnonzero(status == _DOUBTFUL)
+    return _joined(rows, doubtful, rows_by_family(call, poses[doubtful], references[doubtful]))
+
+
+def _joined(rows: Rows, chosen: NDArray[np.int64], part: Rows) -> Rows:
+    """Rows of some poses put among those of all."""
+    N, S, n = rows.q.shape
+    most = max(rows.most, part.most)
+    out = rows if most <= S else _widened(rows, most)
+    for field in _PER_ROW:
+        whole, piece = getattr(out, field), getattr(part, field)
+        keep = min(whole.shape[1], piece.shape[1])
+        whole[chosen, :keep] = piece[:, :keep]
+    out.status[chosen] = part.status
+    closest = missing = None
+    if part.closest is not None and part.missing is not None:
+        closest, missing = np.full((N, n), np.nan), np.full((N, 6), np.nan)
+        closest[chosen], missing[chosen] = part.closest, part.missing
+    labels = max(rows.labels, part.labels, key=len)
+    return replace(out, most=most, labels=labels, closest=closest, missing=missing)
+
+
+def _widened(rows: Rows, S: int) -> Rows:
+    """The same with S rows a pose."""
+    wide = {}
+    for field in _PER_ROW:
+        old = getattr(rows, field)
+        new = np.zeros((old.shape[0], S, *old.shape[2:]), old.dtype)
+        if old.dtype == np.float64:
+            new[...] = np.nan
+        elif old.dtype == np.int16:
+            new[...] = -1
+        new[:, : old.shape[1]] = old
+        wide[field] = new
+    return replace(rows, **wide)
+
+
+_PER_ROW = ("q", "valid", "residual", "inside", "code", "double", "free", "family")
+_DOUBTFUL = int(IGMStatus.NOT_CONVERGED)
+
+
+def _settled(call: Call, U: Array, psi: Array | None, references: Array) -> Settled:
+    """Postures of a chain, infinite families settled and double roots marked."""
+    solver, tolerances = call.solver, call.tolerances
+    if solver is None:
+        found = nothing_found(len(U), 1, references.shape[1])
+    elif psi is not None:
+        if not isinstance(solver, ArmAngle):
+            raise InvalidValueError(
+                "arm_angle: this arm has none, which takes seven revolute joints with three axes "
+                "that meet in a shoulder and three in a wrist; lock a joint instead, if there are "
+                f"seven. It is solved by: {solver.method}."
+            )
+        every = arm_angle_postures(solver, U, psi[:, None], references, tolerances)
+        rows = (getattr(every, field.name)[:, 0] for field in fields(every))
+        found = Found(*rows)
+        # the angle is given, so that only joints that took a reference are free
+        found.family[...] = found.free.any(axis=-1)
+    else:
+        found = postures(solver, U, references, tolerances)
+    whole = call.task.mask == WHOLE_POSE
+    if solver is not None and whole and solver.chain.k <= 6:
+        if solver.chain.k == 6:
+            found.double[...] |= double_roots(solver.chain, found)
+        return settle_families(solver.chain, U, found, references, tolerances)
+    moving = np.zeros(found.q.shape, np.bool_)
+    if solver is not None and psi is None and whole:
+        from ._moving import moving_joints
+
+        chain = solver.chain
+        length = float(np.linalg.norm(chain.D[:, :3, 3], axis=-1).sum()) or 1.0
+        sigma, rows = np.ascontiguousarray(chain.sigma), found.family & found.valid
+        moving_joints(sigma, chain.D, length, found.q, rows, moving)
+    moving |= found.free
+    return Settled(*(getattr(found, field.name) for field in fields(Found)), moving=moving)
