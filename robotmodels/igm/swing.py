@@ -19,7 +19,7 @@ from .._arrays import Array
 from .alike import prepare_alike
 from .components import Components, asked_errors, mask_axes, quaternions
 from .dependent import DEPENDENT, held_chain, prepare_held
-from .gather import assembled, merged
+from .gather import assembled, merged, rows_of
 from .loop import JointChain
 from .motion import jacobians, lever, random_postures, tool_poses
 from .solver import Found, Prepare, Solver, Tolerances, nothing_found, postures
@@ -28,6 +28,8 @@ GRID = 72  # values of the searched joint
 CHUNK = 64  # poses worked on at a time
 STEPS = 40  # of a root search
 SINGULAR = 1e-6  # singular values of the Jacobian beside the largest that count as zero
+CLOSE = 0.05  # the same below which a second root may be close
+PARTNERS = (0.01, 0.03, 0.1, 0.3)  # ways along the null direction at which it is looked for
 NEAR = 1e-3  # singular postures closer than this came from one root, to half the digits
 
 
@@ -73,6 +75,9 @@ class SwingSearch:
         Of the others for the asked translations, at each value; empty where none is left to solve.
     length : float
         A length of the arm [m].
+    second : SwingSearch, optional
+        The same along another joint, for poses of which nothing is found: their curves may lie
+        between the points of the grid.
     """
 
     chain: JointChain
@@ -81,6 +86,7 @@ class SwingSearch:
     values: Array
     inner: tuple[Solver | None, ...]
     length: float
+    second: SwingSearch | None = None
 
     @property
     def method(self) -> str:
@@ -138,13 +144,16 @@ def prepare_swing(chain: JointChain, components: Components, position: Prepare) 
     worth = [_worth(J[:, :-1][:, :, others[joint]], place) for joint in range(k)]
     # an angle has an end, a length has none
     worth = np.array(worth) - 0.5 * chain.sigma
+    searches: list[SwingSearch] = []
     for joint in np.argsort(-worth, kind="stable"):
-        if worth[joint] < -6.0:
+        if worth[joint] < -6.0 or len(searches) == 2:
             break
         search = _search(chain, components, int(joint), position, length)
         if search is not None:
-            return search
-    return None
+            searches.append(search)
+    if not searches:
+        return None
+    return replace(searches[0], second=searches[1] if len(searches) == 2 else None)
 
 
 @postures.register
@@ -159,7 +168,13 @@ def _(solver: SwingSearch, U: Array, references: Array, tolerances: Tolerances) 
     for start in range(0, len(U), CHUNK):
         rows = np.arange(start, min(start + CHUNK, len(U)))
         parts.append((rows, _searched(solver, U[rows], references[rows], tolerances)))
-    return assembled(len(U), solver.chain.k, parts)
+    found = assembled(len(U), solver.chain.k, parts)
+    empty = np.flatnonzero(~found.valid.any(axis=1))
+    if solver.second is None or empty.size == 0:
+        return found
+    others = np.setdiff1d(np.arange(len(U)), empty)
+    again = postures(solver.second, U[empty], references[empty], tolerances)
+    return assembled(len(U), solver.chain.k, [(others, rows_of(found, others)), (empty, again)])
 
 
 @prepare_alike.register
@@ -170,7 +185,9 @@ def _(known: SwingSearch, chain: JointChain, prepare: Prepare) -> Solver | None:
         else prepare_alike(old, held_chain(chain, known.searched, value), prepare)
         for old, value in zip(known.inner, known.values.tolist(), strict=True)
     )
-    return replace(known, chain=chain, inner=inner)
+    second = None if known.second is None else prepare_alike(known.second, chain, prepare)
+    assert second is None or isinstance(second, SwingSearch)
+    return replace(known, chain=chain, inner=inner, second=second)
 
 
 def judged(
@@ -261,19 +278,41 @@ def _search(
 
 def _searched(solver: SwingSearch, U: Array, references: Array, tolerances: Tolerances) -> Found:
     """Postures of a chunk of poses."""
-    chain, N = solver.chain, len(U)
+    chain = solver.chain
     curve, there = _curves(solver, U, references, tolerances)
     start = _starts(solver, U, curve, there)
     n, g, s = np.nonzero(start)
-    q = _root(solver, U[n], curve[n, g, s], tolerances)
-    counts = np.bincount(n, minlength=N)
+    q = _root(solver, U[n], curve[n, g, s])
+    found = _collected(solver, U, n, q, tolerances)
+    n, s = np.nonzero(found.valid)
+    q = found.q[n, s]
+    _, values, rows = np.linalg.svd(_equations(chain, U[n], q, solver.components, solver.length)[1])
+    if values.shape[1] == chain.k:
+        close = np.flatnonzero(values[:, -1] < CLOSE * values[:, 0])
+        ways = np.array(PARTNERS + tuple(-way for way in PARTNERS))
+        trial = q[close, None] + ways[:, None] * rows[close, None, -1]
+        pose = np.repeat(n[close], len(ways))
+        partners = _root(solver, U[pose], trial.reshape(-1, chain.k))
+        found = _collected(
+            solver, U, np.concatenate([n, pose]), np.concatenate([q, partners]), tolerances
+        )
+    return _singular(solver, U, found, tolerances)
+
+
+def _collected(
+    solver: SwingSearch, U: Array, pose: NDArray[np.int64], q: Array, tolerances: Tolerances
+) -> Found:
+    """Roots (n, k), each of a pose, as packed postures of the poses U; false ones left out."""
+    chain, N = solver.chain, len(U)
+    order = np.argsort(pose, kind="stable")
+    pose, q = pose[order], q[order]
+    counts = np.bincount(pose, minlength=N)
     out = nothing_found(N, int(counts.max(initial=0)), chain.k)
-    place = np.arange(len(n)) - np.repeat(np.cumsum(counts) - counts, counts)
-    out.q[n, place], out.valid[n, place] = q, True
+    place = np.arange(len(pose)) - np.repeat(np.cumsum(counts) - counts, counts)
+    out.q[pose, place], out.valid[pose, place] = q, True
     turning = chain.sigma == 0
     out.q[..., turning] = np.pi - (np.pi - out.q[..., turning]) % (2.0 * np.pi)
-    found = merged(chain.sigma, judged(out, chain, U, solver.components, tolerances))
-    return _singular(solver, U, found, tolerances)
+    return merged(chain.sigma, judged(out, chain, U, solver.components, tolerances))
 
 
 def _curves(
@@ -333,7 +372,7 @@ def _starts(
     return (start | least) & there
 
 
-def _root(solver: SwingSearch, U: Array, q: Array, tolerances: Tolerances) -> Array:
+def _root(solver: SwingSearch, U: Array, q: Array) -> Array:
     """Levenberg and Marquardt's steps on all equations, (n, k)."""
     chain, asked, length = solver.chain, solver.components, solver.length
     damping = np.full(len(q), 1e-4)
@@ -389,7 +428,7 @@ def _singular(solver: SwingSearch, U: Array, found: Found, tolerances: Tolerance
                     found.double[pose, i] = True
     exact = smallest <= SINGULAR * np.maximum(values[:, 0], 1e-300)
     away = found.q[n[exact], s[exact]] + 1e-2 * rows[exact, k - 1]
-    back = _root(solver, U[n[exact]], away, tolerances)
+    back = _root(solver, U[n[exact]], away)
     met, turned = asked_errors(chain, U[n[exact]], back, asked)
     gone = np.abs(back - found.q[n[exact], s[exact]]).max(axis=1, initial=0.0)
     moves = (met <= 1e-10) & (turned <= 1e-10) & (gone > 1e-3)
