@@ -5,10 +5,20 @@ arrays of ``ctraj`` and ``jtraj`` come from `cartesian_trajectory` and `joint_tr
 """
 
 from .blends import blended_lines
+from .cartesian import (
+    PoseSamples,
+    PoseTrajectory,
+    blended_poses,
+    circle,
+    circular_arc,
+    straight_line,
+)
 from .harmonics import FourierSeries, fourier, fourier_basis
 from .jerk import jerk_limited
+from .joint_path import JointPath, joint_path
 from .laws import TimeLaw
 from .limits import LimitsReport, MotionLimits
+from .path_events import PathEvent, PathEventKind
 from .point_to_point import (
     Synchronisation,
     along_line,
@@ -24,8 +34,13 @@ from .trajectory import Samples, Trajectory
 
 __all__ = [
     "FourierSeries",
+    "JointPath",
     "LimitsReport",
     "MotionLimits",
+    "PathEvent",
+    "PathEventKind",
+    "PoseSamples",
+    "PoseTrajectory",
     "Samples",
     "SplineEnds",
     "Synchronisation",
@@ -34,16 +49,21 @@ __all__ = [
     "along_line",
     "bang_bang",
     "blended_lines",
+    "blended_poses",
     "cartesian_trajectory",
+    "circle",
+    "circular_arc",
     "cubic",
     "cubic_spline",
     "fourier",
     "fourier_basis",
     "jerk_limited",
+    "joint_path",
     "joint_trajectory",
     "linear",
     "quintic",
     "quintic_spline",
     "smoothed_trapezoidal",
+    "straight_line",
     "trapezoidal",
 ]

@@ -96,11 +96,14 @@ class Trajectory:
         Whether positions are numbers instead of vectors of joints.
     repeats : bool
         Whether the motion is periodic, so that every time is inside it.
+    holds : bool
+        Whether it stops at its ends whatever its velocity there, as the parameter of a path may.
     """
 
     motion: Motion
     scalar: bool = False
     repeats: bool = False
+    holds: bool = False
 
     @property
     def n(self) -> int:
@@ -265,7 +268,7 @@ class Trajectory:
             t = step * np.arange(near + 1.0)
             t[-1] = min(t[-1], T) if near else 0.0
             return self.at(t)
-        at_rest = self.repeats or not self._moving(np.array([T]))
+        at_rest = self.repeats or self.holds or not self._moving(np.array([T]))
         return self.at(step * np.arange(int(count) + 1.0 + at_rest))
 
     def check(self, limits: MotionLimits, tolerance: float = 1e-9) -> LimitsReport:
@@ -315,7 +318,8 @@ class Trajectory:
             if not (before.any() or after.any()):
                 before = after = None
             else:
-                self._refuse_outside(flat, before, after, duration)
+                if not self.holds:
+                    self._refuse_outside(flat, before, after, duration)
                 flat = np.clip(flat, 0.0, end)
         values = self.motion.derivatives(np.ascontiguousarray(flat), orders)
         if before is not None and after is not None:
@@ -336,7 +340,7 @@ class Trajectory:
                 )
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.motion, self.scalar, self.repeats)
+        return type(self), (self.motion, self.scalar, self.repeats, self.holds)
 
 
 def joint_vectors(**given: Any) -> tuple[dict[str, Array], tuple[int, ...], bool]:

@@ -1,0 +1,523 @@
+"""Motions of the tool in space: lines, circles and blended lines through poses, under limits.
+
+Seed book section 4.3. Limits are those of two quantities: translation in m, then rotation in rad,
+for instance ``MotionLimits(velocity=[0.5, 1.0], acceleration=[2.0, 4.0])``; they bound the lengths
+of the vectors of velocity and acceleration.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import se3
+from .._arrays import Array, as_exact, as_floats, read_only
+from ..errors import InvalidValueError, ShapeError
+from .blends import PARABOLA, QUARTIC, schedule
+from .laws import TimeLaw
+from .limits import MotionLimits
+from .paths import BlendedPoses, FixedAxisPath, PosePath, arc, line
+from .piecewise import PiecewisePolynomial
+from .point_to_point import ROUNDING, along_line, given_durations, limits_along
+from .rotations import rotation_about, rotation_vector
+from .trajectory import Trajectory
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoseSamples:
+    """A motion of the tool at given times. As an array (``np.asarray``) it is its poses.
+
+    Parameters
+    ----------
+    t : ndarray, shape (N,)
+        Times, s.
+    T : ndarray, shape (N, 4, 4)
+        World poses, m.
+    twist, acceleration : ndarray, shape (N, 6)
+        Velocity and acceleration ``[v; w]`` of the tool's origin, world axes, m and rad per s and
+        s^2.
+    """
+
+    t: Array
+    T: Array
+    twist: Array
+    acceleration: Array
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            object.__setattr__(self, field.name, read_only(getattr(self, field.name)))
+
+    def __len__(self) -> int:
+        return self.t.size
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        return np.array(self.T, dtype=dtype, copy=copy)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), tuple(getattr(self, field.name) for field in fields(self))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoseTrajectory:
+    """Motion of the tool: a path in space and a law of time on it.
+
+    Parameters
+    ----------
+    path : PosePath
+        Pose for every value of its parameter.
+    law : Trajectory
+        The parameter at every time, scalar.
+    """
+
+    path: PosePath
+    law: Trajectory
+
+    @property
+    def duration(self) -> float:
+        """Seconds."""
+        return float(self.law.duration)
+
+    def pose(self, t: ArrayLike) -> Array:
+        """World poses.
+
+        Parameters
+        ----------
+        t : array_like, any shape
+            Times, s; the tool rests before and after the motion.
+
+        Returns
+        -------
+        ndarray, shape (*t.shape, 4, 4)
+            Poses, m.
+
+        Raises
+        ------
+        InvalidValueError
+            NaN, or a time outside of a motion that does not rest there.
+
+        Examples
+        --------
+        >>> from robotmodels.se3 import translation
+        >>> move = straight_line(np.eye(4), translation(0.2, 0, 0), duration=1.0)
+        >>> move.pose(0.5)[:3, 3]
+        array([0.1, 0. , 0. ])
+        """
+        s = self.law.q(t)
+        return self.path.poses(s.reshape(-1)).reshape(*s.shape, 4, 4)
+
+    def twist(self, t: ArrayLike) -> Array:
+        """Velocities; arguments and errors as `pose`.
+
+        Parameters
+        ----------
+        t : array_like, any shape
+            Times, s.
+
+        Returns
+        -------
+        ndarray, shape (*t.shape, 6)
+            ``[v; w]`` of the tool's origin, world axes, m/s and rad/s.
+        """
+        s, v = self.law.q(t), self.law.v(t)
+        return self.path.rates(s.reshape(-1))[0].reshape(*s.shape, 6) * v[..., None]
+
+    def acceleration(self, t: ArrayLike) -> Array:
+        """Accelerations; arguments and errors as `pose`.
+
+        Parameters
+        ----------
+        t : array_like, any shape
+            Times, s.
+
+        Returns
+        -------
+        ndarray, shape (*t.shape, 6)
+            Derivative of the twist, m/s^2 and rad/s^2.
+        """
+        s, v, a = self.law.q(t), self.law.v(t), self.law.a(t)
+        rate, change = (x.reshape(*s.shape, 6) for x in self.path.rates(s.reshape(-1)))
+        return rate * a[..., None] + change * (v * v)[..., None]
+
+    def at(self, t: ArrayLike) -> PoseSamples:
+        """Poses, twists and accelerations together.
+
+        Parameters
+        ----------
+        t : array_like, shape (N,)
+            Times, s.
+
+        Returns
+        -------
+        PoseSamples
+            With the times.
+
+        Raises
+        ------
+        ShapeError, InvalidValueError
+            Times of another shape; as `pose`.
+        """
+        times = as_floats(t, "t")
+        if times.ndim != 1:
+            raise ShapeError(f"t: expected shape (N,), got {times.shape}.")
+        return PoseSamples(times, self.pose(times), self.twist(times), self.acceleration(times))
+
+    def resample(self, samples: int | None = None, period: float | None = None) -> PoseSamples:
+        """The motion on a regular grid of time.
+
+        Parameters
+        ----------
+        samples : int, optional
+            How many, from 0 to the duration.
+        period : float, optional
+            Seconds between them instead, as in `Trajectory.resample`.
+
+        Returns
+        -------
+        PoseSamples
+            With the times.
+
+        Raises
+        ------
+        InvalidValueError
+            As `Trajectory.resample`.
+        """
+        return self.at(self.law.resample(samples, period).t)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.path, self.law)
+
+
+def straight_line(
+    T0: Any,
+    T1: Any,
+    duration: float | None = None,
+    limits: MotionLimits | None = None,
+    law: TimeLaw = TimeLaw.TRAPEZOIDAL,
+) -> PoseTrajectory:
+    """Straight line from rest to rest, with the shorter rotation about a fixed axis.
+
+    Also called ``ctraj``, linear interpolation with slerp, MOVEL. One law of time moves the
+    position and the orientation.
+
+    Parameters
+    ----------
+    T0, T1 : array_like, shape (4, 4)
+        First and last pose, m.
+    duration : float, optional
+        Seconds; default the least that the limits allow.
+    limits : MotionLimits, optional
+        Of translation and rotation.
+    law : TimeLaw
+        How the motion is distributed over the time.
+
+    Returns
+    -------
+    PoseTrajectory
+        From ``T0`` to ``T1``.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError, NotARotationError
+        What are no poses; neither duration nor limits; a duration below the least, which the
+        message tells; limits that the law cannot keep.
+
+    References
+    ----------
+    Seed book section 4.3.
+
+    Examples
+    --------
+    >>> from robotmodels.se3 import rotation, translation
+    >>> T1 = translation(1.0, 0, 0) @ rotation("z", 0.5)
+    >>> move = straight_line(np.eye(4), T1, limits=MotionLimits([0.5, 1.0], [1.0, 2.0]))
+    >>> move.duration, move.twist(1.0).round(9) + 0.0
+    (2.50..., array([0.5 , 0.  , 0.  , 0.  , 0.  , 0.25]))
+    """
+    path = line(se3.as_single_pose(T0, "T0"), se3.as_single_pose(T1, "T1"))
+    return _timed(path, duration, limits, law)
+
+
+def circular_arc(
+    T0: Any,
+    through: ArrayLike,
+    T1: Any,
+    duration: float | None = None,
+    limits: MotionLimits | None = None,
+    law: TimeLaw = TimeLaw.TRAPEZOIDAL,
+) -> PoseTrajectory:
+    """Arc of the circle through three points, with a rotation about a fixed axis.
+
+    Also called MOVEC. The orientation goes from the first to the last by the shorter way,
+    whatever the arc.
+
+    Parameters
+    ----------
+    T0, T1 : array_like, shape (4, 4)
+        First and last pose, m.
+    through : array_like, shape (3,)
+        Position on the arc between them, m.
+    duration : float, optional
+        Seconds; default the least that the limits allow.
+    limits : MotionLimits, optional
+        Of translation and rotation, as in `circle`.
+    law : TimeLaw
+        How the motion is distributed over the time.
+
+    Returns
+    -------
+    PoseTrajectory
+        From ``T0`` to ``T1``.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError, NotARotationError
+        As `straight_line`; three points on one line, or two that are the same.
+
+    Examples
+    --------
+    >>> from robotmodels.se3 import translation
+    >>> half = circular_arc(translation(1, 0, 0), [0, 1, 0], translation(-1, 0, 0), duration=2.0)
+    >>> half.pose(1.0)[:3, 3].round(12)
+    array([0., 1., 0.])
+    """
+    first, last = se3.as_single_pose(T0, "T0"), se3.as_single_pose(T1, "T1")
+    p, m, e = first[:3, 3], as_exact(through, (3,), "through"), last[:3, 3]
+    a, b = m - p, e - p
+    cross = np.cross(a, b)
+    size = float(np.linalg.norm(cross))
+    if size <= 1e-9 * max(float(a @ a), float(b @ b), float((e - m) @ (e - m))):
+        raise InvalidValueError(
+            "through: the three points lie on one line, which is no circle; take straight_line, "
+            "or circle for a whole turn."
+        )
+    normal = cross / size
+    centre = p + (np.cross((a @ a) * b - (b @ b) * a, cross)) / (2.0 * size * size)
+    u = p - centre
+    w = np.cross(normal, u)
+    # with this normal the points come in their order, so the angle is between 0 and 2 pi
+    sweep = float(np.arctan2((e - centre) @ w, (e - centre) @ u) % (2.0 * np.pi))
+    return _timed(arc(first, last, centre, normal, sweep), duration, limits, law)
+
+
+def circle(
+    T0: Any,
+    centre: ArrayLike,
+    axis: ArrayLike,
+    angle: float = 2.0 * np.pi,
+    duration: float | None = None,
+    limits: MotionLimits | None = None,
+    law: TimeLaw = TimeLaw.TRAPEZOIDAL,
+    turning: bool = False,
+) -> PoseTrajectory:
+    """Circle about an axis, any angle.
+
+    Parameters
+    ----------
+    T0 : array_like, shape (4, 4)
+        First pose, m.
+    centre : array_like, shape (3,)
+        A point of the axis, m.
+    axis : array_like, shape (3,)
+        Direction of the axis, about which the tool goes round to the right.
+    angle : float
+        How far, rad.
+    duration : float, optional
+        Seconds; default the least that the limits allow.
+    limits : MotionLimits, optional
+        Of translation and rotation. The acceleration is that along the circle and that towards
+        its centre together: the velocity is held down where the latter would take more than half
+        of its square.
+    law : TimeLaw
+        How the motion is distributed over the time.
+    turning : bool
+        Whether the tool turns with the circle, instead of keeping its orientation.
+
+    Returns
+    -------
+    PoseTrajectory
+        From ``T0`` round the axis.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError, NotARotationError
+        As `straight_line`; an axis of no length, a pose on the axis.
+
+    Examples
+    --------
+    >>> from robotmodels.se3 import translation
+    >>> round_trip = circle(translation(1, 0, 0), [0, 0, 0], [0, 0, 1], duration=4.0)
+    >>> round_trip.pose(2.0)[:3, 3].round(12)
+    array([-1.,  0.,  0.])
+    """
+    first = se3.as_single_pose(T0, "T0")
+    point, direction = as_exact(centre, (3,), "centre"), as_exact(axis, (3,), "axis")
+    size = float(np.linalg.norm(direction))
+    if size == 0.0:
+        raise InvalidValueError("axis: expected a direction, got a vector of no length.")
+    n = direction / size
+    foot = point + n * (n @ (first[:3, 3] - point))
+    if np.linalg.norm(first[:3, 3] - foot) <= 1e-12 * max(1.0, float(np.abs(first[:3, 3]).max())):
+        raise InvalidValueError("T0: the pose stands on the axis, so its circle has no radius.")
+    sweep = float(as_floats(angle, "angle"))
+    last = first.copy()
+    R = rotation_about(n, np.array(sweep))
+    last[:3, 3] = foot + R @ (first[:3, 3] - foot)
+    if sweep == 0.0:
+        return _timed(line(first, first), duration, limits, law)
+    if not turning:
+        return _timed(arc(first, last, foot, n, sweep), duration, limits, law)
+    last[:3, :3] = R @ first[:3, :3]
+    # the turn goes all the way round with the position, where the shorter way would not
+    path = FixedAxisPath(first, last, np.zeros(3), foot, n, sweep, n, sweep)
+    return _timed(path, duration, limits, law)
+
+
+def blended_poses(
+    poses: Any,
+    limits: MotionLimits,
+    duration: float | None = None,
+    smooth: bool = False,
+) -> PoseTrajectory:
+    """Straight lines through poses, joined by blends that leave the inner poses aside.
+
+    Position and orientation follow the same lines and the same blends. The motion passes an inner
+    position at a distance of ``blend time * change of velocity / 8`` (3/32 of it when smooth).
+
+    Parameters
+    ----------
+    poses : array_like, shape (m, 4, 4)
+        Corners, at least two, m.
+    limits : MotionLimits
+        Of the velocity and acceleration of translation and rotation.
+    duration : float, optional
+        Seconds; longer than the least, it slows the whole motion down evenly.
+    smooth : bool
+        Whether the acceleration is continuous.
+
+    Returns
+    -------
+    PoseTrajectory
+        From the first pose to the last.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError, NotARotationError
+        Fewer than two poses, or what are none; limits of velocity or acceleration that are
+        missing or zero; a limit of jerk; a duration below the least, which the message tells.
+
+    Examples
+    --------
+    >>> from robotmodels.se3 import translation
+    >>> corners = [translation(0, 0, 0), translation(1, 0, 0), translation(1, 1, 0)]
+    >>> path = blended_poses(corners, MotionLimits(velocity=1.0, acceleration=4.0))
+    >>> path.duration, path.pose(path.duration)[:3, 3]
+    (2.25..., array([1., 1., 0.]))
+    """
+    T = se3.as_pose(poses, "poses")
+    if T.ndim != 3 or len(T) < 2:
+        raise ShapeError(f"poses: expected at least two, shape (m, 4, 4), got {T.shape}.")
+    bounds = _of_space(limits)
+    if bounds is None or np.isfinite(bounds.jerk).any():
+        raise InvalidValueError(
+            "limits: give limits of velocity and acceleration, and none of jerk; blends of poses "
+            "keep no limit of jerk."
+        )
+    step = np.empty((len(T) - 1, 6))
+    step[:, :3] = np.diff(T[:, :3, 3], axis=0)
+    step[:, 3:] = rotation_vector(T[1:, :3, :3] @ np.swapaxes(T[:-1, :3, :3], -1, -2))
+    size = np.stack((np.linalg.norm(step[:, :3], axis=-1), np.linalg.norm(step[:, 3:], axis=-1)))
+    for name, bound in (("velocity", bounds.velocity), ("acceleration", bounds.acceleration)):
+        wrong = size.any(axis=-1) & ((bound == 0.0) | np.isinf(bound))
+        if wrong.any():
+            what = ("translation", "rotation")[int(wrong.argmax())]
+            raise InvalidValueError(f"limits: expected a positive {name} of {what}.")
+    with np.errstate(divide="ignore", invalid="ignore"):
+        least_T = np.where(size > 0.0, size / bounds.velocity[:, None], 0.0).max(axis=0)
+    times, tb = schedule(least_T, lambda t: _pose_blends(step, t, bounds, smooth))
+    total = float(times.sum() + 0.5 * (tb[0] + tb[-1]))
+    wanted = given_durations(duration, ())
+    if wanted is not None and total > 0.0:
+        if wanted[0] < total * (1.0 - ROUNDING):
+            raise InvalidValueError(
+                f"duration: {wanted[0]:.9g} s is too short for the limits; the least is "
+                f"{total:.12g} s."
+            )
+        times, tb = times * (wanted[0] / total), tb * (wanted[0] / total)
+    twists = np.where(times[:, None] > 0.0, step / np.where(times > 0.0, times, 1.0)[:, None], 0.0)
+    corners = 0.5 * tb[0] + np.concatenate(((0.0,), np.cumsum(times)))
+    path = BlendedPoses(T, twists, corners, tb, smooth)
+    end = path.end
+    clock = PiecewisePolynomial(np.array([[0.0, end]]), np.array([[[0.0], [end]]]))
+    # the path's parameter is the time itself, and the tool rests outside of it
+    return PoseTrajectory(path, Trajectory(clock, scalar=True, holds=True))
+
+
+def _timed(
+    path: FixedAxisPath, duration: float | None, limits: MotionLimits | None, law: TimeLaw
+) -> PoseTrajectory:
+    bounds = _of_space(limits)
+    size = np.array([path.length, abs(path.turn)])
+    of_s = None
+    if bounds is not None:
+        V, A, B, J, _ = limits_along(bounds, size[None, None, :])
+        if path.radius > 0.0 and np.isfinite(bounds.acceleration[0]):
+            V, A, B = _held_down(path, float(bounds.acceleration[0]), float(V[0]), A[0], B[0])
+        of_s = MotionLimits(
+            velocity=V, acceleration=A, jerk=J, velocity_lower=-V, acceleration_lower=-B
+        )
+    goal = 1.0 if size.any() else 0.0
+    moves = along_line(law, np.zeros(1), np.array([goal]), duration, of_s)
+    return PoseTrajectory(path, Trajectory(moves.motion, scalar=True))
+
+
+def _held_down(path: FixedAxisPath, most: float, V: float, A: float, B: float) -> Any:
+    """Limits of s on a circle: the acceleration towards the centre takes its part."""
+    length, r = path.length, path.radius
+    V = min(V, float(np.sqrt(most * r * np.sqrt(0.5))) / length)
+    inwards = (V * length) ** 2 / r
+    along = float(np.sqrt(most * most - inwards * inwards)) / length
+    return np.array([V]), np.array([min(A, along)]), np.array([min(B, along)])
+
+
+def _of_space(limits: MotionLimits | None) -> MotionLimits | None:
+    """Limits of translation and rotation, the same forth and back."""
+    if limits is None:
+        return None
+    if not isinstance(limits, MotionLimits):
+        raise InvalidValueError(
+            f"limits: expected MotionLimits, got {type(limits).__name__}; write for instance "
+            "MotionLimits(velocity=[0.5, 1.0], acceleration=[2.0, 4.0])."
+        )
+    bounds = limits.for_joints(2)
+    if (bounds.velocity_lower != -bounds.velocity).any() or (
+        bounds.acceleration_lower != -bounds.acceleration
+    ).any():
+        raise InvalidValueError("limits: those of a path in space are lengths, alike both ways.")
+    if np.isfinite(bounds.lower).any() or np.isfinite(bounds.upper).any():
+        raise InvalidValueError("limits: a path in space has no limits of position.")
+    return bounds
+
+
+def _pose_blends(step: Array, T: Array, limits: MotionLimits, smooth: bool) -> Array:
+    """Least times of the blends of poses, shape (m,)."""
+    v = np.where(T[:, None] > 0.0, step / np.where(T > 0.0, T, 1.0)[:, None], 0.0)
+    before = np.vstack((np.zeros(6), v))
+    after = np.vstack((v, np.zeros(6)))
+    peak = QUARTIC if smooth else PARABOLA
+    change = after - before
+    # the two rotations do not commute: what is left of the product of their rates is not faded.
+    # f2 f2'' + f1' f2' is at most 1/2 for the parabola, and 0.456 for the smooth step
+    crossed = np.linalg.norm(np.cross(before[:, 3:], after[:, 3:]), axis=-1) * (
+        0.46 if smooth else 0.5
+    )
+    A, alpha = limits.acceleration
+    left = alpha - crossed
+    turn = np.linalg.norm(change[:, 3:], axis=-1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        by_turn = np.where(turn > 0.0, np.where(left > 0.0, peak * turn / left, np.inf), 0.0)
+        move = np.linalg.norm(change[:, :3], axis=-1)
+        by_move = np.where(move > 0.0, peak * move / A, 0.0)
+    return np.maximum(by_turn, by_move)

@@ -1,0 +1,251 @@
+"""From poses of the tool to joints: one posture after the other, without leaving its branch.
+
+The seed book's section 4.3 ends with this step. A straight line in space may leave the reach of the
+robot, meet a singular position or ask for joint velocities that no motor has; where it does, the
+`JointPath` tells.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from functools import partial
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .. import se3
+from .._arrays import Array, as_exact, as_floats, read_only
+from ..errors import InvalidValueError, ShapeError
+from ..igm import IGMSolutions, igm
+from ..model import RobotModel
+from .cartesian import PoseTrajectory
+from .follow import Task, continuous, follow
+from .path_events import PathEvent, PathEventKind, path_events
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointPath:
+    """Postures that follow poses, and what happens on the way.
+
+    Parameters
+    ----------
+    t : ndarray, shape (N,)
+        Times, s; NaN where the poses have none.
+    q : ndarray, shape (N, n)
+        Postures, rad or m, continuous (angles may leave (-pi, pi]); NaN where there is none.
+    v : ndarray, shape (N, n)
+        Velocities, rad/s or m/s; NaN where there is none, or no time.
+    status : ndarray of int8, shape (N,)
+        Codes of `IGMStatus`.
+    conditioning : ndarray, shape (N,)
+        Of the Jacobian, from 1 where it is best to 0 where it is singular (the inverse of its
+        condition number in the Frobenius norm, positions taken in units of the arm's lever).
+    branch : ndarray of str, shape (N,)
+        Labels of the branches.
+    events : tuple of PathEvent
+        What happens, in the order of the path.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> from robotmodels.kinematics import dgm
+    >>> from robotmodels.trajectories import cartesian_trajectory
+    >>> arm, q = load("rx90"), np.array([0.1, 0.2, 1.3, 0.4, 0.5, 0.6])
+    >>> path = joint_path(arm, cartesian_trajectory(dgm(arm, q), dgm(arm, q + 0.1), 50), q)
+    >>> path.complete, path.q[-1].round(6)
+    (True, array([0.2, 0.3, 1.4, 0.5, 0.6, 0.7]))
+    """
+
+    t: Array
+    q: Array
+    v: Array
+    status: NDArray[np.int8]
+    conditioning: Array
+    branch: NDArray[np.str_]
+    events: tuple[PathEvent, ...]
+
+    def __post_init__(self) -> None:
+        kinds = {"status": np.int8, "branch": str}
+        for field in fields(self):
+            if field.name != "events":
+                value = read_only(getattr(self, field.name), kinds.get(field.name, float))
+                object.__setattr__(self, field.name, value)
+
+    @property
+    def complete(self) -> bool:
+        """Whether every pose is reached, inside the joint limits and without a jump."""
+        stops = (PathEventKind.OUT_OF_REACH, PathEventKind.OUTSIDE_LIMITS, PathEventKind.JUMP)
+        return not any(event.kind in stops for event in self.events)
+
+    def of_kind(self, kind: PathEventKind) -> tuple[PathEvent, ...]:
+        """The events of one kind.
+
+        Parameters
+        ----------
+        kind : PathEventKind
+            Which.
+
+        Returns
+        -------
+        tuple of PathEvent
+            In the order of the path.
+        """
+        return tuple(event for event in self.events if event.kind is kind)
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        return np.array(self.q, dtype=dtype, copy=copy)
+
+    def __repr__(self) -> str:
+        state = "complete" if self.complete else "not complete"
+        lines = [f"<JointPath: {len(self.q)} poses, {state}>", *(str(e) for e in self.events)]
+        return "\n  ".join(lines)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), tuple(getattr(self, field.name) for field in fields(self))
+
+
+def joint_path(
+    model: RobotModel,
+    poses: Any,
+    q_start: ArrayLike | None = None,
+    t: ArrayLike | None = None,
+    samples: int = 1000,
+    mask: ArrayLike | None = None,
+    mask_axes: Literal["world", "tool"] = "world",
+    position_tolerance: float = 1e-9,
+    orientation_tolerance: float = 1e-9,
+    singular_below: float = 0.01,
+) -> JointPath:
+    """Joint positions along poses, branch kept, with a report of what happens on the way.
+
+    Also called ``ikine`` of a ``ctraj``. Each pose is solved for all postures, and the posture
+    nearest to the last one is taken. Without ``q_start`` the branch is chosen that goes through
+    with the fewest jumps, the fewest poses outside the limits, and then the shortest way. Whole
+    turns are chosen so that the joints move continuously.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, n joints.
+    poses : PoseTrajectory or array_like, shape (N, 4, 4)
+        World poses of the tool, m.
+    q_start : array_like, shape (n,), optional
+        Posture from which the robot comes, rad or m. Joints that do not matter keep its value.
+    t : array_like, shape (N,), optional
+        Times of an array of poses, s, ascending; without them there are no velocities.
+    samples : int
+        Into how many poses a `PoseTrajectory` is divided.
+    mask : array_like, shape (6,), optional
+        Ones for the components ``x y z rx ry rz`` that are asked for, as in `igm`.
+    mask_axes : {"world", "tool"}
+        Axes of the components.
+    position_tolerance, orientation_tolerance : float
+        When a pose counts as met, m and rad.
+    singular_below : float
+        Conditioning below which a position is reported as singular.
+
+    Returns
+    -------
+    JointPath
+        Postures, velocities and events.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError, NotARotationError
+        What are no poses, times or postures; as `igm`.
+
+    References
+    ----------
+    Seed book section 4.3; the exercise, problem 2.
+
+    Examples
+    --------
+    The exercise's path from A to B: positions are reached all the way.
+
+    >>> from robotmodels.robots import load
+    >>> from robotmodels.trajectories import cartesian_trajectory
+    >>> A = [[0, 0, -1, 0.1414], [0, 1, 0, -0.3], [1, 0, 0, 0.8414], [0, 0, 0, 1]]
+    >>> B = [[-1, 0, 0, 0.4], [0, 1, 0, 0.2], [0, 0, -1, 0.5], [0, 0, 0, 1]]
+    >>> path = joint_path(load("lab_trr"), cartesian_trajectory(A, B, 50), [-0.3, -0.8, -0.8],
+    ...                   mask=[1, 1, 1, 0, 0, 0], position_tolerance=1e-6)
+    >>> path.complete, path.q[0].round(2)
+    (True, array([-0.3 , -0.79, -0.79]))
+    """
+    if not isinstance(model, RobotModel):
+        raise InvalidValueError(f"model: expected a RobotModel, got {type(model).__name__}.")
+    start = None if q_start is None else as_exact(q_start, (model.n,), "q_start")
+    motion = poses if isinstance(poses, PoseTrajectory) else None
+    twists = None
+    if motion is not None:
+        if t is not None:
+            raise InvalidValueError("t: a PoseTrajectory has its own times; pass samples.")
+        grid = motion.resample(samples)
+        times, T, twists = grid.t, np.asarray(grid.T), np.asarray(grid.twist)
+    else:
+        T = se3.as_pose(poses, "poses")
+        if T.ndim != 3:
+            raise ShapeError(f"poses: expected shape (N, 4, 4), got {T.shape}.")
+        times = np.full(len(T), np.nan) if t is None else as_exact(t, (len(T),), "t")
+        if (np.diff(times) <= 0.0).any():
+            raise InvalidValueError("t: expected times that ascend.")
+    singular_below = float(as_floats(singular_below, "singular_below"))
+    tolerances = {
+        "position_tolerance": position_tolerance,
+        "orientation_tolerance": orientation_tolerance,
+    }
+
+    def solve(targets: Array, near: Array | None) -> IGMSolutions:
+        return igm(model, targets, near, mask, mask_axes, **tolerances)  # type: ignore[arg-type]
+
+    # without a reference postures come in the order of their branches
+    found = solve(T, None)
+    rows = follow(model, T, found, start, lambda i, near: solve(T[i], near))
+    q = continuous(model, rows.q, rows.reached, start)
+    task = Task(model, T, q, rows.reached, mask, mask_axes)
+    if twists is not None and task.square:
+        v = task.rates(twists)
+    else:
+        v = _differences(times, q, rows.reached)
+    events = list(path_events(model, times, q, v, rows, found, task, singular_below))
+    if motion is not None:
+        known = partial(_reached, motion, lambda pose: solve(pose, start))
+        events = [_located(event, times, known) for event in events]
+    return JointPath(times, q, v, rows.status, task.conditioning, rows.branch, tuple(events))
+
+
+def _differences(times: Array, q: Array, reached: NDArray[np.bool_]) -> Array:
+    """Velocities from the neighbours of each pose on either side that are reached."""
+    v = np.full(q.shape, np.nan)
+    if np.isnan(times).any() or len(q) < 2:
+        return v
+    with np.errstate(invalid="ignore"):
+        slope = np.diff(q, axis=0) / np.diff(times)[:, None]
+    left = np.vstack((np.full((1, q.shape[1]), np.nan), slope))
+    right = np.vstack((slope, np.full((1, q.shape[1]), np.nan)))
+    both = np.where(np.isnan(left), right, np.where(np.isnan(right), left, 0.5 * (left + right)))
+    return np.where(reached[:, None], both, np.nan)
+
+
+def _reached(motion: PoseTrajectory, solve: Callable[[Array], IGMSolutions], time: float) -> bool:
+    return bool(solve(motion.pose(time)).count > 0)
+
+
+def _located(event: PathEvent, times: Array, reached: Callable[[float], bool]) -> PathEvent:
+    """The edges of a run out of reach, found between the samples by bisection."""
+    if event.kind is not PathEventKind.OUT_OF_REACH:
+        return event
+
+    def edge(inside: float, outside: float) -> float:
+        for _ in range(30):
+            middle = 0.5 * (inside + outside)
+            if reached(middle):
+                inside = middle
+            else:
+                outside = middle
+        return outside
+
+    start = edge(times[event.first - 1], event.start) if event.first > 0 else event.start
+    stop = edge(times[event.last + 1], event.stop) if event.last + 1 < len(times) else event.stop
+    return replace(event, start=start, stop=stop)

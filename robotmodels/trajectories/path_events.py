@@ -1,0 +1,191 @@
+"""What happens to a robot on the way along poses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from enum import Enum
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import Array
+from ..igm import IGMSolutions
+from ..model import RobotModel
+from .follow import Followed, Task
+
+_JUMP = 0.1
+"""A step that differs from what the Jacobian foresees by this much, and by half of itself, is no
+continuation: rad or m."""
+
+
+class PathEventKind(Enum):
+    """What may happen on the way; the value is the sentence a person reads.
+
+    Examples
+    --------
+    >>> PathEventKind.SINGULAR.value
+    'The path meets a singular position.'
+    """
+
+    OUT_OF_REACH = "The path leaves the reach of the robot."
+    OUTSIDE_LIMITS = "The posture is outside the joint limits."
+    SINGULAR = "The path meets a singular position."
+    CHANGES_POSTURE = "The posture changes its branch."
+    JUMP = "The posture does not go on: the joints would have to jump."
+    TOO_FAST = "The joints would have to be faster than they can."
+
+
+@dataclass(frozen=True, slots=True)
+class PathEvent:
+    """Something that happens on a run of poses.
+
+    Parameters
+    ----------
+    kind : PathEventKind
+        What.
+    first, last : int
+        Numbers of the first and the last pose of the run.
+    start, stop : float
+        Their times, s, where the path has times; NaN otherwise. The edges of the reach on a
+        `PoseTrajectory` are found between the samples.
+    detail : str
+        Which joint, by how much.
+    """
+
+    kind: PathEventKind
+    first: int
+    last: int
+    start: float
+    stop: float
+    detail: str = ""
+
+    def __str__(self) -> str:
+        where = f"pose {self.first}" + (f" to {self.last}" if self.last > self.first else "")
+        when = "" if np.isnan(self.start) else f" ({self.start:.4g} s to {self.stop:.4g} s)"
+        return f"{where}{when}: {self.kind.value}" + (f" {self.detail}" if self.detail else "")
+
+
+def path_events(
+    model: RobotModel,
+    times: Array,
+    q: Array,
+    v: Array,
+    rows: Followed,
+    found: IGMSolutions,
+    task: Task,
+    singular_below: float,
+) -> Iterator[PathEvent]:
+    """Everything that happens on the way, in the order of the path.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, n joints.
+    times : ndarray, shape (N,)
+        Times, s, or NaN.
+    q, v : ndarray, shape (N, n)
+        Postures and velocities, rad or m, and per s; NaN where there is none.
+    rows : Followed
+        Which postures were taken.
+    found : IGMSolutions
+        All postures.
+    task : Task
+        The Jacobians on the way.
+    singular_below : float
+        Conditioning that counts as singular.
+
+    Yields
+    ------
+    PathEvent
+        Sorted by their first pose.
+    """
+    reached = rows.reached
+    events: list[PathEvent] = []
+
+    def report(kind: PathEventKind, where: Any, detail: Callable[[int, int], str]) -> None:
+        for first, last in _runs(where):
+            text = detail(first, last)
+            events.append(PathEvent(kind, first, last, times[first], times[last], text))
+
+    report(PathEventKind.OUT_OF_REACH, ~reached, lambda i, _: found.reason(i))
+    with np.errstate(invalid="ignore"):
+        slack = 1e-9
+        over = np.maximum(q - model.upper, model.lower - q)
+        outside = over > slack
+    report(
+        PathEventKind.OUTSIDE_LIMITS,
+        outside.any(axis=-1),
+        lambda i, j: _worst(over[i : j + 1], "is outside by {:.4g}."),
+    )
+    step, jump = _jumps(q, reached, task)
+    flips = reached[1:] & reached[:-1] & ~jump & (task.sign[1:] * task.sign[:-1] < 0.0)
+    low = reached & (task.conditioning < singular_below)
+    # a determinant that changes its sign between two samples passed a singular position
+    passed = np.zeros_like(low)
+    passed[:-1] |= flips
+    passed[1:] |= flips
+    report(
+        PathEventKind.SINGULAR,
+        low | passed,
+        lambda i, j: (
+            f"The least conditioning of the samples is "
+            f"{np.nanmin(task.conditioning[i : j + 1]):.2g}."
+        ),
+    )
+    for k in np.flatnonzero(jump):
+        i, j = int(k), int(k) + 1
+        text = _worst(np.abs(step[i : i + 1]), "steps by {:.4g}.")
+        events.append(PathEvent(PathEventKind.JUMP, i, j, times[i], times[j], text))
+    changed = reached[1:] & reached[:-1] & ((rows.branch[1:] != rows.branch[:-1]) | flips)
+    for k in np.flatnonzero(changed):
+        i, j = int(k), int(k) + 1
+        before, after = str(rows.branch[i]), str(rows.branch[j])
+        # numbers are ranks among the postures of a pose, not names
+        named = before != after and before[:1].isalpha() and after[:1].isalpha()
+        if named or flips[i]:
+            text = f"From {before} to {after}." if named else ""
+            kind = PathEventKind.CHANGES_POSTURE
+            events.append(PathEvent(kind, i, j, times[i], times[j], text))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        share = np.abs(v) / model.table.velocity
+        fast = share > 1.0 + 1e-9
+    report(
+        PathEventKind.TOO_FAST,
+        fast.any(axis=-1),
+        lambda i, j: _worst(share[i : j + 1], "needs {:.4g} times its greatest velocity."),
+    )
+    events.sort(key=lambda event: (event.first, event.last))
+    yield from events
+
+
+def _jumps(q: Array, reached: NDArray[np.bool_], task: Task) -> tuple[Array, NDArray[np.bool_]]:
+    """Steps (N - 1, n), and which of them are no continuation."""
+    step = np.diff(q, axis=0)
+    adjacent = reached[1:] & reached[:-1]
+    with np.errstate(invalid="ignore"):
+        off = np.abs(step - task.foreseen()).max(axis=-1, initial=0.0)
+        size = np.abs(step).max(axis=-1, initial=0.0)
+        jump = adjacent & (size > _JUMP) & ~(off <= np.maximum(_JUMP, 0.5 * size))
+    # after a gap the posture goes on where it can; any other one is a jump
+    ends = np.flatnonzero(reached)
+    for i, j in pairwise(ends.tolist()):
+        if j > i + 1 and np.abs(q[j] - q[i]).max(initial=0.0) > 0.5 * np.pi:
+            step[j - 1], jump[j - 1] = q[j] - q[i], True
+    return step, jump
+
+
+def _runs(where: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and last number of every run of true values."""
+    edges = np.diff(np.concatenate(((False,), where, (False,))).astype(np.int8))
+    first, last = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
+    return [(int(i), int(j)) for i, j in zip(first, last, strict=True)]
+
+
+def _worst(values: Array, sentence: str) -> str:
+    """The joint with the greatest value of a run, in a sentence."""
+    peak = np.nanmax(values, axis=0)
+    j = int(peak.argmax())
+    return f"Joint {j + 1} {sentence.format(peak[j])}"

@@ -1,0 +1,287 @@
+"""Paths of the tool: a pose for every value of one parameter, and how it changes with it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import Array
+from .rotations import axis_and_angle, rotation_about, rotation_vector
+
+
+class PosePath(Protocol):
+    """What a `PoseTrajectory` follows."""
+
+    @property
+    def end(self) -> float:
+        """The parameter runs from 0 to this."""
+        ...
+
+    def poses(self, s: Array) -> Array:
+        """World poses (N, 4, 4) at parameters (N,)."""
+        ...
+
+    def rates(self, s: Array) -> tuple[Array, Array]:
+        """Twist and its derivative with respect to s, each (N, 6), rows ``[v; w]`` in the world."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FixedAxisPath:
+    """Line or circle, with a rotation about a fixed axis, both in proportion to s from 0 to 1.
+
+    Parameters
+    ----------
+    start : ndarray, shape (4, 4)
+        First pose, m.
+    last : ndarray, shape (4, 4)
+        Last pose, which is given back as it is.
+    shift : ndarray, shape (3,)
+        Along a line from the first position to the last, m; zero on a circle.
+    centre : ndarray, shape (3,)
+        Of the circle, m.
+    normal : ndarray, shape (3,)
+        Unit axis of the circle, about which the position turns.
+    sweep : float
+        Angle of the arc, rad; 0 on a line.
+    axis : ndarray, shape (3,)
+        Unit axis of the rotation of the tool, in the world.
+    turn : float
+        Angle of that rotation, rad.
+    """
+
+    start: Array
+    last: Array
+    shift: Array
+    centre: Array
+    normal: Array
+    sweep: float
+    axis: Array
+    turn: float
+
+    @property
+    def end(self) -> float:
+        """The parameter runs from 0 to 1."""
+        return 1.0
+
+    @property
+    def length(self) -> float:
+        """Of the way of the position, m."""
+        return float(np.linalg.norm(self.shift)) + self.radius * abs(self.sweep)
+
+    @property
+    def radius(self) -> float:
+        """Of the circle, m; 0 on a line."""
+        if self.sweep == 0.0:
+            return 0.0
+        arm = self.start[:3, 3] - self.centre
+        return float(np.linalg.norm(arm - self.normal * (self.normal @ arm)))
+
+    def poses(self, s: Array) -> Array:
+        """World poses.
+
+        Parameters
+        ----------
+        s : ndarray, shape (N,)
+            Parameters.
+
+        Returns
+        -------
+        ndarray, shape (N, 4, 4)
+            The first and the last are those given.
+        """
+        T = np.zeros((s.size, 4, 4))
+        T[:, :3, :3] = rotation_about(self.axis, self.turn * s) @ self.start[:3, :3]
+        T[:, :3, 3] = self.start[:3, 3] + s[:, None] * self.shift
+        if self.sweep:
+            arm = self.start[:3, 3] - self.centre
+            T[:, :3, 3] = self.centre + rotation_about(self.normal, self.sweep * s) @ arm
+        T[:, 3, 3] = 1.0
+        T[s == 0.0], T[s == 1.0] = self.start, self.last
+        return T
+
+    def rates(self, s: Array) -> tuple[Array, Array]:
+        """Twist and its derivative with respect to s.
+
+        Parameters
+        ----------
+        s : ndarray, shape (N,)
+            Parameters.
+
+        Returns
+        -------
+        twist, change : ndarray, shapes (N, 6)
+            Rows ``[v; w]``, world axes, at the tool's origin.
+        """
+        twist, change = np.zeros((s.size, 6)), np.zeros((s.size, 6))
+        twist[:, :3], twist[:, 3:] = self.shift, self.turn * self.axis
+        if self.sweep:
+            arm = rotation_about(self.normal, self.sweep * s) @ (self.start[:3, 3] - self.centre)
+            twist[:, :3] = self.sweep * np.cross(self.normal, arm)
+            change[:, :3] = self.sweep * np.cross(self.normal, twist[:, :3])
+        return twist, change
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BlendedPoses:
+    """Lines between poses, each with a rotation about a fixed axis, and blends at the poses.
+
+    In a blend the motions of the two lines overlap: the one before fades out while the one after
+    fades in, in position and orientation alike, ``R = exp(w2 f2) exp(w1 f1) R_k``. The parameter
+    is time.
+
+    Parameters
+    ----------
+    poses_at : ndarray, shape (m, 4, 4)
+        Corners, m.
+    twists : ndarray, shape (m - 1, 6)
+        Of the lines, world axes, at the tool's origin, m/s and rad/s.
+    times : ndarray, shape (m,)
+        Of the corners, s; the motion starts half a blend before the first.
+    blends : ndarray, shape (m,)
+        Durations of the blends, s.
+    smooth : bool
+        Whether the velocity fades by the smooth step instead of evenly.
+    """
+
+    poses_at: Array
+    twists: Array
+    times: Array
+    blends: Array
+    smooth: bool
+
+    @property
+    def end(self) -> float:
+        """Seconds from the start of the first blend to the end of the last."""
+        return float(self.times[-1] + 0.5 * self.blends[-1])
+
+    def poses(self, s: Array) -> Array:
+        """World poses.
+
+        Parameters
+        ----------
+        s : ndarray, shape (N,)
+            Times, s.
+
+        Returns
+        -------
+        ndarray, shape (N, 4, 4)
+            The first and the last corner are met, those between are left aside by the blends.
+        """
+        corner, before, after, f1, f2 = self._fades(s)
+        w1, a1 = axis_and_angle(before[:, 3:])
+        w2, a2 = axis_and_angle(after[:, 3:])
+        T = np.zeros((s.size, 4, 4))
+        R = rotation_about(w2, a2 * f2[0]) @ rotation_about(w1, a1 * f1[0])
+        T[:, :3, :3] = R @ self.poses_at[corner, :3, :3]
+        T[:, :3, 3] = self.poses_at[corner, :3, 3]
+        T[:, :3, 3] += before[:, :3] * f1[0][:, None] + after[:, :3] * f2[0][:, None]
+        T[:, 3, 3] = 1.0
+        T[s <= 0.0], T[s >= self.end] = self.poses_at[0], self.poses_at[-1]
+        return T
+
+    def rates(self, s: Array) -> tuple[Array, Array]:
+        """Twist and its derivative with respect to s.
+
+        Parameters
+        ----------
+        s : ndarray, shape (N,)
+            Times, s.
+
+        Returns
+        -------
+        twist, change : ndarray, shapes (N, 6)
+            Rows ``[v; w]``, world axes, at the tool's origin.
+        """
+        _, before, after, f1, f2 = self._fades(s)
+        w2, a2 = axis_and_angle(after[:, 3:])
+        carried = before.copy()
+        turned = rotation_about(w2, a2 * f2[0]) @ before[:, 3:, None]
+        carried[:, 3:] = turned[..., 0]
+        twist = carried * f1[1][:, None] + after * f2[1][:, None]
+        change = carried * f1[2][:, None] + after * f2[2][:, None]
+        change[:, 3:] += np.cross(after[:, 3:], carried[:, 3:]) * (f1[1] * f2[1])[:, None]
+        return twist, change
+
+    def _fades(self, s: Array) -> tuple[NDArray[np.intp], Array, Array, Array, Array]:
+        """Nearest corner, the twists of its lines, and how far they have gone from it.
+
+        The last two are arrays (3, N): times along the line before and the line after, and their
+        first two derivatives.
+        """
+        t = s - 0.5 * self.blends[0]
+        times = self.times - 0.5 * self.blends[0]
+        corner = np.searchsorted(0.5 * (times[1:] + times[:-1]), t, side="right")
+        none = np.zeros((1, 6))
+        before = np.concatenate((none, self.twists))[corner]
+        after = np.concatenate((self.twists, none))[corner]
+        t, b = t - times[corner], self.blends[corner]
+        width = np.where(b > 0.0, b, 1.0)
+        x = np.clip(np.where(b > 0.0, t / width + 0.5, t >= 0.0), 0.0, 1.0)
+        if self.smooth:
+            gone = x**3 * (1.0 - 0.5 * x) * b
+            rate, rise = x * x * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x) / width
+        else:
+            gone, rate, rise = 0.5 * x * x * b, x, 1.0 / width
+        inside = (x > 0.0) & (x < 1.0)
+        rise = np.where(inside, rise, 0.0)
+        # outside the blend one of the two runs at its full rate
+        beyond = np.maximum(t - 0.5 * b, 0.0)
+        f2 = np.stack((gone + beyond, rate, rise))
+        # together the two go as the time does
+        f1 = np.stack((t - f2[0], 1.0 - rate, -rise))
+        return corner, before, after, f1, f2
+
+
+def line(T0: Array, T1: Array) -> FixedAxisPath:
+    """Straight line between two checked poses, with the shorter rotation about a fixed axis.
+
+    Parameters
+    ----------
+    T0, T1 : ndarray, shape (4, 4)
+        First and last pose, m.
+
+    Returns
+    -------
+    FixedAxisPath
+        Its parameter runs from 0 to 1.
+
+    Examples
+    --------
+    >>> line(np.eye(4), np.diag([1.0, -1.0, -1.0, 1.0])).turn
+    3.14159...
+    """
+    axis, angle = _turn(T0, T1)
+    zero, z = np.zeros(3), np.array([0.0, 0.0, 1.0])
+    return FixedAxisPath(T0, T1, T1[:3, 3] - T0[:3, 3], zero, z, 0.0, axis, angle)
+
+
+def arc(T0: Array, T1: Array, centre: Array, normal: Array, sweep: float) -> FixedAxisPath:
+    """Circular arc between two checked poses, with the shorter rotation about a fixed axis.
+
+    Parameters
+    ----------
+    T0, T1 : ndarray, shape (4, 4)
+        First and last pose, m; their positions are those of the arc's ends.
+    centre : ndarray, shape (3,)
+        Of the circle, m.
+    normal : ndarray, shape (3,)
+        Its unit axis.
+    sweep : float
+        Angle about it, rad.
+
+    Returns
+    -------
+    FixedAxisPath
+        Its parameter runs from 0 to 1.
+    """
+    axis, angle = _turn(T0, T1)
+    return FixedAxisPath(T0, T1, np.zeros(3), centre, normal, sweep, axis, angle)
+
+
+def _turn(T0: Array, T1: Array) -> tuple[Array, float]:
+    axis, angle = axis_and_angle(rotation_vector(T1[:3, :3] @ T0[:3, :3].T))
+    return axis, float(angle)
