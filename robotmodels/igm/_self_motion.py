@@ -162,6 +162,35 @@ def corrected(sigma, D, U, q, held, spare):
     return error
 
 
+@compiled(FLOAT(INTS, STACK, MATRIX, OUT1, INT))
+def sought(sigma, D, U, q, held):
+    """Gauss-Newton steps of at most half a radian from anywhere, in place. Returns the error."""
+    k = sigma.size
+    e, W, s, V = np.empty(6), np.empty((6, k)), np.empty(k), np.empty((k, k))
+    step = np.empty(k)
+    for _ in range(25):
+        if error_at(sigma, D, U, q, e) < 1e-3:
+            return corrected(sigma, D, U, q, held, 0)
+        f = decomposed(sigma, D, q, held, W, s, V)
+        largest = 0.0
+        for m in range(k):
+            step[m] = 0.0
+        for i in range(min(f, 6)):
+            if s[i] < 1e-6:
+                break
+            part = 0.0
+            for r in range(6):
+                part += W[r, i] * e[r]
+            for m in range(k):
+                step[m] += part / (s[i] * s[i]) * V[m, i]
+        for m in range(k):
+            largest = max(largest, abs(step[m]))
+        scale = min(1.0, 0.5 / largest) if largest > 0.0 else 1.0
+        for m in range(k):
+            q[m] += scale * step[m]
+    return error_at(sigma, D, U, q, e)
+
+
 @compiled(types.void(INTS, STACK, MATRIX, OUT1, INT, INT))
 def on_fold(sigma, D, U, q, held, spare):
     """Move a posture beside a fold onto it, in place: there two postures of every pose are one.
@@ -424,11 +453,19 @@ def is_settled(sigma, D, U, q, free, W, s, V):
     for m in range(k):
         ahead[m] = q[m]
         for c in range(null):
-            B[m, c] = V[m, first + c]
-            ahead[m] += PROBE * cos(1.0 + 2.3 * c) * B[m, c]
-            if abs(B[m, c]) > 1e-6:
+            ahead[m] += PROBE * cos(1.0 + 2.3 * c) * V[m, first + c]
+            if abs(V[m, first + c]) > 1e-6:
                 moving |= 1 << m
         y[m] = ahead[m]
+    # where a joint turns round it seems to be at rest: a member aside is asked which is the first
+    if corrected(sigma, D, U, y, 0, null) > MET or way_between(y, ahead) > 0.2 * PROBE:
+        return 0
+    decomposed(sigma, D, y, 0, W, s, V)
+    for m in range(k):
+        for c in range(null):
+            B[m, c] = V[m, first + c]
+            if abs(B[m, c]) > 1e-6:
+                moving |= 1 << m
     for m in range(k):
         pivot = done
         for c in range(done, null):
@@ -444,17 +481,7 @@ def is_settled(sigma, D, U, q, free, W, s, V):
             for r in range(k):
                 B[r, c] -= share * B[r, done]
         done += 1
-    if chosen != free:
-        return 0
-    # where a joint turns round it seems to be at rest: a member aside is asked as well
-    if corrected(sigma, D, U, y, 0, null) > MET or way_between(y, ahead) > 0.2 * PROBE:
-        return 0
-    decomposed(sigma, D, y, 0, W, s, V)
-    for m in range(k):
-        for c in range(first, f):
-            if abs(V[m, c]) > 1e-6:
-                moving |= 1 << m
-    return moving
+    return moving if chosen == free and s[first] < SINGULAR else 0
 
 
 @compiled(types.void(STACK, INTS, STACK, STACK, _NUMBERS, _FLAGS, _NUMBERS_OUT))
@@ -489,15 +516,15 @@ def well_placed(J):
     return True
 
 
-@compiled(types.void(INTS, STACK, STACK, _FLAGS, _FLAGS_OUT))
-def singular_postures(sigma, D, q, there, double):
-    """Which postures ``q (N, S, k)`` have a singular Jacobian and are the only ones nearby."""
+@compiled(types.void(INTS, STACK, STACK, _FLAGS, _FLAGS_OUT, _FLAGS_OUT))
+def singular_postures(sigma, D, q, there, double, member):
+    """Postures ``q (N, S, k)`` whose Jacobian is singular: alone there, or one of a family."""
     k = sigma.size
     P, axes, J = np.empty((3, 4)), np.empty((k, 6)), np.empty((6, k))
     rows = np.empty((24, k))
     for n in range(q.shape[0]):
         for r in range(q.shape[1]):
-            double[n, r] = False
+            double[n, r] = member[n, r] = False
             if not there[n, r]:
                 continue
             forward(sigma, D, q[n, r], P, axes)
@@ -505,4 +532,4 @@ def singular_postures(sigma, D, q, there, double):
             if k == 6 and well_placed(J):
                 continue
             count, null = directions(sigma, D, P, q[n, r], 0, rows)
-            double[n, r] = null > 0 and count == 0
+            double[n, r], member[n, r] = null > 0 and count == 0, count > 0

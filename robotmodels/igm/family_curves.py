@@ -16,6 +16,7 @@ from .._arrays import Array
 
 SAME = 1e-6  # postures closer than this in every joint are one
 STILL = 1e-6  # range, or part of a direction, below which a joint does not move
+STARTS = 16  # starts of the search for other curves
 POINTS = 4000  # points of a curve, doubled until it fits
 
 
@@ -136,7 +137,15 @@ def settled_members(family: Family, q: Array) -> list[tuple[Waiting, bool]]:
                 aside, error = family.corrected(item.q - PROBE * row, item.held, 1)
             basis = _independent(family.directions(aside, item.held)[0])
             if len(basis) > 1:
+                # where joints happen to be at rest others seem to be the first that move
+                mixed = np.cos(1.0 + 2.3 * np.arange(len(basis))) @ basis
+                y, error = family.corrected(aside + PROBE * mixed, item.held, len(basis))
+                further = _independent(family.directions(y, item.held)[0])
+                if error <= MET and len(further) == len(basis):
+                    aside, basis = y, further
                 _drive(family, item, aside, basis)
+                if len(basis) == null:
+                    break  # no fold and no crossing: one surface through this posture
             else:
                 _follow(family, item, row)
     return settled
@@ -179,10 +188,36 @@ def _follow(family: Family, item: Waiting, along: Array) -> None:
             family.add(
                 q, item.held | 1 << joint, item.moving | _bits(moves), item.turned or least > 0.0
             )
+    for q in _elsewhere(family, item, points, moves, joint):
+        family.add(q, item.held | 1 << joint, item.moving | _bits(moves), item.turned)
     # where the Jacobian loses one more dimension another curve may cross this one
     for curve in curves:
         for q in _branchings(family, curve):
             family.add(q, item.held, item.moving, item.turned)
+
+
+def _elsewhere(
+    family: Family, item: Waiting, points: Array, moves: NDArray[np.bool_], joint: int
+) -> list[Array]:
+    """Postures at the reference on other curves that the same joints make, from many starts.
+
+    A linkage of four bars may be put together in two ways that no motion joins.
+    """
+    from ._self_motion import MET, sought
+
+    rng = np.random.default_rng(0)
+    centre, spread = np.mean(points, axis=0), np.ptp(points, axis=0)
+    turns = family.sigma == 0
+    held = item.held | 1 << joint | _bits(~moves)
+    found = []
+    for _ in range(STARTS):
+        spin = rng.uniform(-1.0, 1.0, moves.size)
+        q = np.where(turns, np.pi * spin, centre + np.minimum(spread, 4.0) * spin)
+        q = np.where(moves, q, item.q)
+        q[joint] = family.references[joint]
+        if sought(family.sigma, family.D, family.U, q, held) <= MET:
+            found.append(q)
+    return found
 
 
 def _walk(family: Family, start: Array, along: Array, held: int) -> tuple[Curve, bool]:

@@ -9,6 +9,7 @@ posture of the family at that value is returned: a closed curve passes a value m
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,9 @@ from .general import shortened
 from .loop import JointChain
 from .solver import Found, Tolerances
 
-__all__ = ["Settled", "double_roots", "settle_families"]
+__all__ = ["Settled", "double_roots", "settle_families", "singular_postures"]
+
+_Kind = TypeVar("_Kind", bound=np.generic)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,21 +94,16 @@ def settle_families(
     N, S, k = found.q.shape
     chosen = np.flatnonzero(np.any(found.family & found.valid, axis=1))
     if chosen.size == 0:
-        still = np.broadcast_to(np.False_, (N, S, k))
-        return Settled(*_fields(found), moving=still)
-    part, moving = _settled(
-        chain, np.ascontiguousarray(U[chosen]), _rows(found, chosen), references[chosen], tolerances
-    )
-    most = max(S, int(np.max(np.sum(part.valid, axis=1), initial=0)))
-    out = [_widened(field, most) for field in _fields(found)]
-    all_moving = np.zeros((N, most, k), np.bool_)
-    for whole, piece in zip((*out, all_moving), (*_fields(part), moving), strict=True):
-        whole[chosen] = _widened(piece, most)[:, :most]
-    return Settled(*out, moving=all_moving)
+        return _with_moving(found, np.broadcast_to(np.False_, (N, S, k)))
+    goals = np.ascontiguousarray(U[chosen])
+    part = _settled(chain, goals, _rows(found, chosen), references[chosen], tolerances)
+    return _replaced(found, np.zeros((N, S, k), np.bool_), chosen, part)
 
 
-def double_roots(chain: JointChain, found: Found) -> NDArray[np.bool_]:
-    """Postures at which two or more fell together: the Jacobian is singular, the arm cannot move.
+def singular_postures(
+    chain: JointChain, found: Found
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Double roots, and members of infinite families, by the Jacobian of each posture.
 
     Parameters
     ----------
@@ -116,9 +114,12 @@ def double_roots(chain: JointChain, found: Found) -> NDArray[np.bool_]:
 
     Returns
     -------
-    ndarray of bool, shape (N, S)
-        Rows whose Jacobian has a singular value below 1e-6 (lengths in units of the arm) and that
-        are no members of an infinite family.
+    double : ndarray of bool, shape (N, S)
+        Rows whose Jacobian has a singular value below 1e-6 (lengths in units of the arm) though the
+        arm cannot move: two postures or more fell together.
+    member : ndarray of bool, shape (N, S)
+        Rows of infinite families, whether the solver knew it or not. A stretched elbow, which
+        rounding bends by 1e-8, can hide that the wrist behind it is aligned.
 
     Examples
     --------
@@ -128,42 +129,85 @@ def double_roots(chain: JointChain, found: Found) -> NDArray[np.bool_]:
     >>> from robotmodels.kinematics import dgm
     >>> from robotmodels.robots import load
     >>> arm = load("rx90")
-    >>> chain, U = joint_chain(arm), dgm(arm, [[0.3, 0.4, np.pi / 2, 0.1, 0.2, 0.8]])
+    >>> chain, U = joint_chain(arm), dgm(arm, [[0.3, 0.4, -np.pi / 2, 0.1, 0.2, 0.8]])
     >>> found = postures(prepare(chain), U, np.zeros((1, 6)), Tolerances())
-    >>> int(double_roots(chain, found).sum())  # the elbow is stretched
-    4
+    >>> double, member = singular_postures(chain, found)
+    >>> bool(np.all(double == found.valid)), bool(member.any())  # stretched elbow
+    (True, False)
     """
-    from ._self_motion import singular_postures
+    from ._self_motion import singular_postures as singular
 
     D, unit = shortened(chain)
-    double = np.zeros(found.valid.shape, np.bool_)
+    double, member = np.zeros((2, *found.valid.shape), np.bool_)
     q = np.ascontiguousarray(found.q)
     if unit != 1.0 and np.any(chain.sigma == 1):
         q = np.where(chain.sigma == 1, q / unit, q)
-    singular_postures(
-        np.ascontiguousarray(chain.sigma), D, q, np.ascontiguousarray(found.valid), double
-    )
-    return double
+    valid = np.ascontiguousarray(found.valid)
+    singular(np.ascontiguousarray(chain.sigma), D, q, valid, double, member)
+    return double, member
 
 
-def _fields(found: Found) -> tuple[Array, ...]:
-    """The arrays of Found, in its order."""
-    return found.q, found.valid, found.residual, found.double, found.free, found.family
+def double_roots(chain: JointChain, found: Found) -> NDArray[np.bool_]:
+    """Postures at which two or more fell together, shape (N, S): see `singular_postures`.
+
+    Examples
+    --------
+    >>> from robotmodels.igm.loop import joint_chain
+    >>> from robotmodels.igm.solver import nothing_found
+    >>> from robotmodels.robots import load
+    >>> bool(double_roots(joint_chain(load("rx90")), nothing_found(1, 8, 6)).any())
+    False
+    """
+    return singular_postures(chain, found)[0]
 
 
 def _rows(found: Found, chosen: NDArray[np.int64]) -> Found:
     """Some poses."""
-    return Found(*(field[chosen] for field in _fields(found)))
+    return Found(
+        q=found.q[chosen],
+        valid=found.valid[chosen],
+        residual=found.residual[chosen],
+        double=found.double[chosen],
+        free=found.free[chosen],
+        family=found.family[chosen],
+    )
 
 
-def _widened(field: Array, most: int) -> Array:
-    """A copy with room for ``most`` rows a pose; NaN or False in the new ones."""
-    if field.shape[1] >= most:
-        return field.copy()
-    fill = np.nan if field.dtype == np.float64 else False
-    out = np.full((field.shape[0], most, *field.shape[2:]), fill, field.dtype)
-    out[:, : field.shape[1]] = field
-    return out
+def _replaced(
+    whole: Found, moving: NDArray[np.bool_], chosen: NDArray[np.int64], part: Settled
+) -> Settled:
+    """The postures with those of some poses replaced; more rows where they need more."""
+    most = max(whole.q.shape[1], part.q.shape[1])
+
+    def merged(field: NDArray[_Kind], piece: NDArray[_Kind], fill: float) -> NDArray[_Kind]:
+        out = np.full((field.shape[0], most, *field.shape[2:]), fill, field.dtype)
+        out[:, : field.shape[1]] = field
+        out[chosen] = fill
+        out[chosen, : piece.shape[1]] = piece
+        return out
+
+    return Settled(
+        q=merged(whole.q, part.q, np.nan),
+        valid=merged(whole.valid, part.valid, False),
+        residual=merged(whole.residual, part.residual, np.nan),
+        double=merged(whole.double, part.double, False),
+        free=merged(whole.free, part.free, False),
+        family=merged(whole.family, part.family, False),
+        moving=merged(moving, part.moving, False),
+    )
+
+
+def _with_moving(found: Found, moving: NDArray[np.bool_]) -> Settled:
+    """The same postures, and the joints that move."""
+    return Settled(
+        q=found.q,
+        valid=found.valid,
+        residual=found.residual,
+        double=found.double,
+        free=found.free,
+        family=found.family,
+        moving=moving,
+    )
 
 
 def _bits(packed: NDArray[np.int64], k: int) -> NDArray[np.bool_]:
@@ -173,7 +217,7 @@ def _bits(packed: NDArray[np.int64], k: int) -> NDArray[np.bool_]:
 
 def _settled(
     chain: JointChain, U: Array, found: Found, references: Array, tolerances: Tolerances
-) -> tuple[Found, NDArray[np.bool_]]:
+) -> Settled:
     """Poses with families: their postures, and the joints that move."""
     from ._self_motion import settled_already
     from .family_curves import Family, settled_members
@@ -191,7 +235,7 @@ def _settled(
     settled_already(goals, sigma, D, q, free, member, moving)
     unsettled = np.flatnonzero(np.any(member & (moving == 0), axis=1))
     if unsettled.size == 0:
-        return found, _bits(moving, k)
+        return _with_moving(found, _bits(moving, k))
     # rows of a pose: posture, free and moving joints, double root
     rows: list[list[tuple[Array, int, int, bool]]] = []
     for n in unsettled:
@@ -223,8 +267,4 @@ def _settled(
     d = np.where(sigma == 0, np.minimum(d, np.abs(d - 2.0 * np.pi)), d).max(axis=-1)
     source = np.argmin(np.where(np.isnan(d), np.inf, d), axis=-1)
     moves = _bits(np.take_along_axis(marks[1], source, axis=1), k) & part.valid[..., None]
-    whole = [_widened(field, most) for field in _fields(found)]
-    all_moving = _widened(_bits(moving, k), most)
-    for field, piece in zip((*whole, all_moving), (*_fields(part), moves), strict=True):
-        field[unsettled] = _widened(piece, field.shape[1])
-    return Found(*whole), all_moving
+    return _replaced(found, _bits(moving, k), unsettled, _with_moving(part, moves))

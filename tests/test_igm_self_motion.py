@@ -1,0 +1,330 @@
+"""Infinite families settled at the reference values, against independent searches."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from robotmodels.igm.families import prepare
+from robotmodels.igm.loop import JointChain, joint_chain
+from robotmodels.igm.self_motion import Settled, double_roots, settle_families, singular_postures
+from robotmodels.igm.solver import Found, Tolerances, nothing_found, postures
+from robotmodels.robots import load
+from robotmodels.se3 import inverse
+
+TOLERANCES = Tolerances()
+
+
+@cache
+def arm(name, backwards=False):
+    chain = joint_chain(load(name))
+    if backwards:
+        chain = JointChain(
+            chain.columns,
+            np.ascontiguousarray(chain.sigma[::-1]),
+            np.ascontiguousarray(inverse(chain.D)[::-1]),
+            chain.base,
+        )
+    return chain, prepare(chain)
+
+
+def poses_and_jacobians(chain, q):
+    M = np.zeros((*q.shape, 4, 4))
+    turning = chain.sigma == 0
+    c, s = np.where(turning, np.cos(q), 1.0), np.where(turning, np.sin(q), 0.0)
+    M[..., 0, 0], M[..., 0, 1], M[..., 1, 0], M[..., 1, 1] = c, -s, s, c
+    M[..., 2, 2] = M[..., 3, 3] = 1.0
+    M[..., 2, 3] = np.where(turning, 0.0, q)
+    T = np.broadcast_to(chain.D[0], (*q.shape[:-1], 4, 4))
+    axes, origins = [], []
+    for j in range(chain.k):
+        axes.append(T[..., :3, 2])
+        origins.append(T[..., :3, 3])
+        T = T @ M[..., j, :, :] @ chain.D[j + 1]
+    J = np.zeros((*q.shape[:-1], 6, chain.k))
+    for j in range(chain.k):
+        J[..., :3, j] = axes[j]
+        if turning[j]:
+            J[..., :3, j] = np.cross(axes[j], T[..., :3, 3] - origins[j])
+            J[..., 3:, j] = axes[j]
+    return T, J
+
+
+def poses(chain, q):
+    return poses_and_jacobians(chain, q)[0]
+
+
+def missing(U, T):
+    """Position [m] and the sine of the angle missing, (..., 6)."""
+    E = U[..., :3, :3] @ np.swapaxes(T[..., :3, :3], -1, -2)
+    turn = [
+        E[..., 2, 1] - E[..., 1, 2],
+        E[..., 0, 2] - E[..., 2, 0],
+        E[..., 1, 0] - E[..., 0, 1],
+    ]
+    return np.concatenate([U[..., :3, 3] - T[..., :3, 3], 0.5 * np.stack(turn, -1)], axis=-1)
+
+
+def apart(chain, a, b):
+    d = np.abs(a - b)
+    return np.where(chain.sigma == 0, np.minimum(d, 2 * np.pi - d), d).max(axis=-1)
+
+
+def draw(chain, N, rng):
+    q = rng.uniform(-np.pi, np.pi, (N, chain.k))
+    return np.where(chain.sigma == 0, q, 0.2 * q)
+
+
+def searched(chain, U, free, values, rng, starts=400):
+    """Postures with some joints at given values, by Gauss-Newton from many random starts."""
+    q, rest = draw(chain, starts, rng), ~free
+    q[:, free] = values
+    for _ in range(50):
+        T, J = poses_and_jacobians(chain, q)
+        step = (np.linalg.pinv(J[:, :, rest], rcond=1e-9) @ missing(U, T)[..., None])[..., 0]
+        largest = np.abs(step).max(axis=1)[:, None]
+        q[:, rest] += step * np.minimum(1.0, 0.5 / np.maximum(largest, 1e-9))
+    T = poses(chain, q)
+    met = (np.abs(missing(U, T)).max(axis=1) < 1e-9) & (np.einsum("ij,nij->n", U, T) > 3.0)
+    q = np.where(chain.sigma == 0, np.remainder(q + np.pi, 2 * np.pi) - np.pi, q)
+    found = []
+    for one in q[met]:
+        if all(apart(chain, one, other) > 1e-4 for other in found):
+            found.append(one)
+    return found
+
+
+def settled(chain, solver, q, reference):
+    """Postures of the poses of q; each meets its pose and is there once, packed."""
+    U = poses(chain, q)
+    references = np.full(q.shape, reference)
+    found = postures(solver, U, references, TOLERANCES)
+    found.family[...] |= singular_postures(chain, found)[1]
+    out = settle_families(chain, U, found, references, TOLERANCES)
+    assert np.all(np.diff(out.valid.astype(int), axis=1) <= 0)
+    n, r = np.nonzero(out.valid)
+    assert np.abs(missing(U[n], poses(chain, out.q[n, r]))).max() < 1e-12
+    assert np.nanmax(out.residual) < 1e-12
+    for i in range(len(q)):
+        rows = out.q[i][out.valid[i]]
+        gaps = apart(chain, rows[:, None], rows[None]) + np.eye(len(rows))
+        assert gaps.min() > 1e-6
+    assert not out.free[~out.family].any()
+    assert np.all(out.moving >= out.free)
+    assert np.all(out.moving.any(axis=-1) == out.family)
+    return U, found, out
+
+
+def agrees_with_search(chain, U, out, reference, rng):
+    """Every posture a search finds at the values of the free joints is there."""
+    count = 0
+    for n in range(len(U)):
+        members = out.q[n][out.family[n]]
+        for free in np.unique(out.free[n][out.family[n]], axis=0):
+            others = searched(chain, U[n], free, reference, rng)
+            for one in others:
+                assert apart(chain, one, out.q[n][out.valid[n]]).min() < 1e-5
+            rows = members[(out.free[n][out.family[n]] == free).all(axis=1)]
+            at_reference = np.abs(rows[:, free] - reference).max(axis=1) < 1e-9
+            assert at_reference.sum() <= len(others)
+            assert at_reference.any() == bool(others)
+            count += len(others)
+    return count
+
+
+# --- which joint is free -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("reference", [0.0, 0.3, -2.0])
+def test_what_the_closed_forms_settled_is_left_alone(reference, rng):
+    chain, solver = arm("rx90")
+    q = draw(chain, 5, rng)
+    q[:, 4] = 0.0
+    _, found, out = settled(chain, solver, q, reference)
+    np.testing.assert_array_equal(found.q, out.q)
+    assert out.family.sum() == 10
+    np.testing.assert_array_equal(np.unique(out.free[out.family], axis=0), [[0, 0, 0, 1, 0, 0]])
+    np.testing.assert_array_equal(np.unique(out.moving[out.family], axis=0), [[0, 0, 0, 1, 0, 1]])
+    assert np.abs(out.q[out.family][:, 3] - reference).max() < 1e-15
+
+
+def test_the_wrist_of_a_ur_frees_joint_two(rng):
+    chain, solver = arm("ur5e")
+    q = draw(chain, 6, rng)
+    q[:, 4] = 0.0
+    U, found, out = settled(chain, solver, q, 0.3)
+    np.testing.assert_array_equal(found.q, out.q)
+    np.testing.assert_array_equal(np.unique(out.free[out.family], axis=0), [[0, 1, 0, 0, 0, 0]])
+    np.testing.assert_array_equal(np.unique(out.moving[out.family], axis=0), [[0, 1, 1, 1, 0, 1]])
+    # walking the curves from members elsewhere comes to the same postures
+    moved = Found(
+        q=found.q,
+        valid=found.valid,
+        residual=found.residual,
+        double=found.double,
+        free=np.zeros_like(found.free),
+        family=found.family,
+    )
+    again = settle_families(chain, U, moved, np.full((6, 6), 0.3), TOLERANCES)
+    at = np.abs(out.q[..., 1] - 0.3) < 1e-9
+    assert at[out.family].any()
+    for n in range(6):
+        for row in out.q[n][out.family[n] & at[n]]:
+            assert apart(chain, row, again.q[n][again.valid[n]]).min() < 1e-7
+
+
+@pytest.mark.parametrize("name", ["rx90", "irb140", "ur5e"])
+def test_a_wrist_at_the_base_frees_the_first_joint(name, rng):
+    chain, solver = arm(name, backwards=True)
+    q = draw(chain, 4, rng)
+    q[:, 1] = 0.0
+    U, _, out = settled(chain, solver, q, 0.3)
+    assert out.family.any(axis=1).all()
+    assert np.all(out.free[out.family] == [1, 0, 0, 0, 0, 0])
+    assert agrees_with_search(chain, U, out, 0.3, rng) >= 4
+
+
+def shoulder_singular(chain, N, rng):
+    """Postures of the RX-90 with the centre of the wrist on axis 1."""
+    q = draw(chain, N, rng)
+    bend = rng.uniform(-1.0, 1.0, N)
+    # C2 D3 = S23 RL4 with D3 = RL4
+    q[:, 1], q[:, 2] = (np.pi / 2 - bend) / 2, bend
+    return q
+
+
+def test_joint_one_is_free_on_a_singular_shoulder(rng):
+    chain, solver = arm("rx90")
+    q = shoulder_singular(chain, 4, rng)
+    _, found, out = settled(chain, solver, q, 0.3)
+    np.testing.assert_array_equal(found.q, out.q)
+    assert np.all(out.free[out.family] == [1, 0, 0, 0, 0, 0])
+    assert np.all(out.moving[out.family] == [1, 0, 0, 1, 1, 1])
+
+
+@pytest.mark.parametrize("wrist", [0.0, 0.7])
+def test_a_singular_shoulder_from_the_other_end(wrist, rng):
+    chain, solver = arm("rx90", backwards=True)
+    q = -shoulder_singular(arm("rx90")[0], 3, rng)[:, ::-1]
+    q[:, 1] = wrist
+    U, _, out = settled(chain, solver, q, 0.3)
+    assert np.all(out.free[out.family][:, 0])
+    agrees_with_search(chain, U, out, 0.3, rng)
+
+
+@pytest.mark.parametrize("wrist", [0.0, 0.7])
+def test_two_dimensions(wrist, rng):
+    # the forearm of the RX-90 folded onto the upper arm: five axes meet in the shoulder
+    chain, solver = arm("rx90", backwards=True)
+    q = draw(chain, 2, rng)
+    q[:, 3], q[:, 1] = -np.pi / 2, wrist
+    U, _, out = settled(chain, solver, q, 0.3)
+    assert np.all(out.free[out.family] == [1, 1, 0, 0, 0, 0])
+    assert np.all(out.moving[out.family] == [1, 1, 1, 0, 1, 1])
+    assert agrees_with_search(chain, U, out, 0.3, rng) >= 2
+
+
+def test_a_stretched_elbow_adds_no_dimension(rng):
+    chain, solver = arm("rx90", backwards=True)
+    q = draw(chain, 3, rng)
+    q[:, 3], q[:, 1] = np.pi / 2, 0.0
+    _, _, out = settled(chain, solver, q, 0.3)
+    assert np.all(out.free[out.family] == [1, 0, 0, 0, 0, 0])
+    assert np.all(out.moving[out.family] == [1, 0, 1, 0, 0, 0])
+    # facing the wrist and turned away from it, each once, though an elbow alone has two in one
+    stretched = np.abs(out.q[..., 3] - np.pi / 2) < 1e-6
+    np.testing.assert_array_equal(np.sum(out.family & stretched, axis=1), [2, 2, 2])
+    assert np.all(out.family == out.valid)
+
+
+def test_beside_the_elbow_of_the_crx(rng):
+    chain, solver = arm("crx10ia")
+    q = draw(chain, 4, rng)
+    q[:, 2] = -np.pi / 2
+    U, _, out = settled(chain, solver, q, 0.3)
+    assert np.all(out.moving[out.family] == [1, 1, 0, 1, 1, 0])
+    assert np.all(out.free[out.family] == [1, 0, 0, 0, 0, 0])
+    assert agrees_with_search(chain, U, out, 0.3, rng) == 8
+
+
+# --- values that no posture has ------------------------------------------------------------------
+
+
+def test_the_nearest_value_where_the_reference_is_out_of_reach(rng):
+    chain, solver = arm("ur5e", backwards=True)
+    q = draw(chain, 8, rng)
+    q[:, 1], q[:, 2:5] = 0.0, 0.3 * q[:, 2:5]
+    U, _, out = settled(chain, solver, q, 2.5)
+    nearest = np.abs(np.remainder(out.q[..., 0] - 2.5 + np.pi, 2 * np.pi) - np.pi)
+    short = np.argwhere(out.family & (nearest > 1e-6))
+    assert len(short) > 1
+    for n, r in short:
+        # at a turning point the Jacobian of the other joints is singular
+        J = poses_and_jacobians(chain, out.q[n, r])[1]
+        assert np.linalg.svd(J[:, 1:])[1][-1] < 1e-6
+        closer = out.q[n, r, 0] + 1e-3 * np.sign(
+            np.remainder(2.5 - out.q[n, r, 0] + np.pi, 2 * np.pi) - np.pi
+        )
+        free = np.arange(6) == 0
+        for one in searched(chain, U[n], free, closer, rng, 200):
+            assert apart(chain, one, out.q[n, r]) > 0.05
+
+
+def test_prismatic_joints_that_make_up_for_each_other(rng):
+    D = np.tile(np.eye(4), (4, 1, 1))
+    D[2, 0, 3] = 0.4
+    D[1, :3, 3] = 0.1, 0.2, 0.3
+    chain = JointChain(np.arange(3), np.array([1, 1, 0]), D, np.eye(4))
+    q = np.array([[0.4, -0.3, 0.5]])
+    found = nothing_found(1, 2, 3)
+    found.q[0, 0], found.valid[0, 0], found.family[0, 0], found.residual[0, 0] = q, True, True, 0.0
+    out = settle_families(chain, poses(chain, q), found, np.full((1, 3), 7.5), TOLERANCES)
+    np.testing.assert_allclose(out.q[0, 0], [7.5, -7.4, 0.5], atol=1e-12)
+    assert out.valid.sum() == 1
+    np.testing.assert_array_equal(out.free[0, 0], [1, 0, 0])
+    np.testing.assert_array_equal(out.moving[0, 0], [1, 1, 0])
+
+
+# --- double roots and borders --------------------------------------------------------------------
+
+
+def test_double_roots(rng):
+    chain, solver = arm("rx90")
+    q = draw(chain, 3, rng)
+    q[1, 2] = -np.pi / 2  # stretched
+    q[2, 2], q[2, 4] = -np.pi / 2, 0.0  # and a wrist aligned: half of them are a family
+    U = poses(chain, q)
+    found = postures(solver, U, np.zeros((3, 6)), TOLERANCES)
+    double = double_roots(chain, found)
+    assert not double[~found.valid].any()
+    assert not double[0].any()
+    np.testing.assert_array_equal(double[1], found.valid[1])
+    np.testing.assert_array_equal(double[2], found.valid[2] & ~found.family[2])
+    # a singular shoulder is a family, no double root
+    q = shoulder_singular(chain, 2, rng)
+    found = postures(solver, poses(chain, q), np.zeros((2, 6)), TOLERANCES)
+    assert not double_roots(chain, found).any()
+
+
+def test_no_family_costs_nothing(rng):
+    chain, solver = arm("rx90")
+    q = draw(chain, 4, rng)
+    U = poses(chain, q)
+    found = postures(solver, U, np.zeros((4, 6)), TOLERANCES)
+    out = settle_families(chain, U, found, np.zeros((4, 6)), TOLERANCES)
+    assert isinstance(out, Settled)
+    assert out.q is found.q
+    assert not out.moving.any()
+    empty = settle_families(chain, U[:0], nothing_found(0, 8, 6), np.zeros((0, 6)), TOLERANCES)
+    assert empty.moving.shape == (0, 8, 6)
+
+
+def test_a_wrong_mark_is_taken_back(rng):
+    chain, solver = arm("rx90")
+    q = draw(chain, 1, rng)
+    U = poses(chain, q)
+    found = postures(solver, U, np.zeros((1, 6)), TOLERANCES)
+    found.family[...] = found.valid
+    out = settle_families(chain, U, found, np.zeros((1, 6)), TOLERANCES)
+    assert not out.family.any()
+    np.testing.assert_allclose(np.sort(out.q[0], axis=0), np.sort(found.q[0], axis=0), atol=1e-12)
