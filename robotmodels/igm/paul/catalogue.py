@@ -78,6 +78,8 @@ class Candidate:
 
 
 _WEAK = 1e-6
+_MOST_ROWS = 8
+"""Equations in the same unknowns that are combined in pairs: the shortest."""
 
 
 def candidates(equations: Sequence[Equation], joints: Joints) -> list[Candidate]:
@@ -96,13 +98,17 @@ def candidates(equations: Sequence[Equation], joints: Joints) -> list[Candidate]
         out += of(number, group, joints)
     if out:
         return out
-    for group in double.values():
-        for first, second in permutations(group, 2):
-            a, b = sorted(first.unknowns)
-            for i, j in ((a, b), (b, a)):
-                found = _pair(i, j, first, second, joints)
-                if found is not None:
-                    out.append(_costed(found, graph, joints))
+    for find in (_pair, _polynomial):
+        for group in double.values():
+            short = sorted(group, key=lambda e: (not e.of_position, e.length))[:_MOST_ROWS]
+            a, b = sorted(short[0].unknowns)
+            for first, second in permutations(short, 2):
+                for i, j in ((a, b), (b, a)):
+                    found = find(i, j, first, second, joints)
+                    if found is not None:
+                        out.append(_costed(found, graph, joints))
+        if out:
+            return out
     return out
 
 
@@ -192,7 +198,8 @@ def _angles(number: int, group: list[Equation], joints: Joints) -> Iterable[Cand
         else:
             one = Candidate(EquationType.TYPE_2_ZERO, (number,), _signed(graph, X, Y), (e,), ())
         yield _costed(one, graph, joints)
-    for a, b in combinations(rows, 2):
+    rows.sort(key=lambda row: (not _is_position(row[0], joints), row[0].length))
+    for a, b in combinations(rows[:_MOST_ROWS], 2):
         (_, X1, Y1, Z1), (_, X2, Y2, Z2) = a, b
         det = graph.values(X1) * graph.values(Y2) - graph.values(X2) * graph.values(Y1)
         size = np.hypot(graph.values(X1), graph.values(Y1))
@@ -277,18 +284,7 @@ def _length_and_angle(
     if not c1[0] and not s2[0] and _strong(graph, s1) and _strong(graph, c2):
         values = (s1, negative(k1), negative(r1), c2, negative(k2), negative(r2))
         return Candidate(EquationType.TYPE_5, (i, j), values, (first, second), ())
-    product, add = graph.product, graph.sum
-    det = add((product(s1, c2), negative(product(s2, c1))))
-    if not _strong(graph, det):
-        return None
-    # det (S, C) = -(adjugate) (k + r_i), squares added
-    u = [add((product(c2, x), negative(product(c1, y)))) for x, y in ((k1, k2), (r1, r2))]
-    v = [add((product(s1, y), negative(product(s2, x)))) for x, y in ((k1, k2), (r1, r2))]
-    a0 = add((product(u[0], u[0]), product(v[0], v[0]), negative(product(det, det))))
-    a1 = add(((2.0, 0) and product((2.0, 0), u[0], u[1]), product((2.0, 0), v[0], v[1])))
-    a2 = add((product(u[1], u[1]), product(v[1], v[1])))
-    powers = (a0, a1, a2, ZERO, ZERO)
-    return Candidate(EquationType.POLYNOMIAL, (i,), powers, (first, second), ())
+    return None
 
 
 def _two_angles(
@@ -301,7 +297,6 @@ def _two_angles(
         return None
     ((sj1, cj1, si1, ci1), k1), ((sj2, cj2, si2, ci2), k2) = one, two
     pair = (first, second)
-    product, add = graph.product, graph.sum
     for sign in (1.0, -1.0):
         # an equation and its negative are the same
         s2, c2, k = ((sign * f, n) for f, n in (si2, ci2, k2))
@@ -322,21 +317,7 @@ def _two_angles(
             if sj == (sense * cj1[0], cj1[1]) and cj == (-sense * sj1[0], sj1[1]):
                 values = (cj1, sj1, *right, (sense, 0))
                 return Candidate(EquationType.TYPE_7, (i, j), values, pair, ())
-    det = add((product(sj1, cj2), negative(product(sj2, cj1))))
-    if not graph.is_constant(det) or not _strong(graph, det):
-        return None
-    # det (Sj, Cj) = minus the adjugate times (k + c Ci + s Si): squares added
-    u, v = [], []
-    for x, y in ((k1, k2), (ci1, ci2), (si1, si2)):
-        u.append(add((product(cj2, x), negative(product(cj1, y)))))
-        v.append(add((product(sj1, y), negative(product(sj2, x)))))
-    dot = lambda m, n: (product(u[m], u[n]), product(v[m], v[n]))  # noqa: E731
-    half = lambda m, n: [product((0.5, 0), e) for e in dot(m, n)]  # noqa: E731
-    twice = lambda m, n: [product((2.0, 0), e) for e in dot(m, n)]  # noqa: E731
-    a0 = add((*dot(0, 0), *half(1, 1), *half(2, 2), negative(product(det, det))))
-    a3 = add((*half(1, 1), *map(negative, half(2, 2))))
-    quartic = (a0, add(twice(0, 1)), add(twice(0, 2)), a3, add(dot(1, 2)))
-    return Candidate(EquationType.QUARTIC, (i,), quartic, pair, ())
+    return None
 
 
 def _type_8(
@@ -363,3 +344,65 @@ def _type_8(
         return None
     values = (first[2], first[0], negative(first[4]), negative(second[4]))
     return Candidate(EquationType.TYPE_8, (i, j), values, pair, ())
+
+
+def _polynomial(
+    i: int, j: int, first: Equation, second: Equation, joints: Joints
+) -> Candidate | None:
+    """The angle j eliminated from two equations: a polynomial in i."""
+    if joints.unknowns[j].slides or first.row > second.row:
+        return None
+    if joints.unknowns[i].slides:
+        return _in_a_length(i, j, first, second, joints)
+    return _in_an_angle(i, j, first, second, joints)
+
+
+def _in_a_length(
+    i: int, j: int, first: Equation, second: Equation, joints: Joints
+) -> Candidate | None:
+    """Degree two in the length i."""
+    graph = joints.graph
+    one, two = (_rows(e, 2 * j + 1, 2 * j, 2 * i) for e in (first, second))
+    if one is None or two is None:
+        return None
+    ((s1, c1, r1), k1), ((s2, c2, r2), k2) = one, two
+    product, add = graph.product, graph.sum
+    det = add((product(s1, c2), negative(product(s2, c1))))
+    if not _strong(graph, det):
+        return None
+    # det (S, C) = -(adjugate) (k + r_i), squares added
+    u = [add((product(c2, x), negative(product(c1, y)))) for x, y in ((k1, k2), (r1, r2))]
+    v = [add((product(s1, y), negative(product(s2, x)))) for x, y in ((k1, k2), (r1, r2))]
+    a0 = add((product(u[0], u[0]), product(v[0], v[0]), negative(product(det, det))))
+    a1 = add((product((2.0, 0), u[0], u[1]), product((2.0, 0), v[0], v[1])))
+    a2 = add((product(u[1], u[1]), product(v[1], v[1])))
+    powers = (a0, a1, a2, ZERO, ZERO)
+    return Candidate(EquationType.POLYNOMIAL, (i,), powers, (first, second), ())
+
+
+def _in_an_angle(
+    i: int, j: int, first: Equation, second: Equation, joints: Joints
+) -> Candidate | None:
+    """A quartic in the angle i."""
+    graph = joints.graph
+    one, two = (_rows(e, 2 * j + 1, 2 * j, 2 * i + 1, 2 * i) for e in (first, second))
+    if one is None or two is None:
+        return None
+    ((sj1, cj1, si1, ci1), k1), ((sj2, cj2, si2, ci2), k2) = one, two
+    pair = (first, second)
+    product, add = graph.product, graph.sum
+    det = add((product(sj1, cj2), negative(product(sj2, cj1))))
+    if not graph.is_constant(det) or not _strong(graph, det):
+        return None
+    # det (Sj, Cj) = minus the adjugate times (k + c Ci + s Si): squares added
+    u, v = [], []
+    for x, y in ((k1, k2), (ci1, ci2), (si1, si2)):
+        u.append(add((product(cj2, x), negative(product(cj1, y)))))
+        v.append(add((product(sj1, y), negative(product(sj2, x)))))
+    dot = lambda m, n: (product(u[m], u[n]), product(v[m], v[n]))  # noqa: E731
+    half = lambda m, n: [product((0.5, 0), e) for e in dot(m, n)]  # noqa: E731
+    twice = lambda m, n: [product((2.0, 0), e) for e in dot(m, n)]  # noqa: E731
+    a0 = add((*dot(0, 0), *half(1, 1), *half(2, 2), negative(product(det, det))))
+    a3 = add((*half(1, 1), *map(negative, half(2, 2))))
+    quartic = (a0, add(twice(0, 1)), add(twice(0, 2)), a3, add(dot(1, 2)))
+    return Candidate(EquationType.QUARTIC, (i,), quartic, pair, ())
