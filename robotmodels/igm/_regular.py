@@ -1,4 +1,4 @@
-"""Rows of a result for poses that Paul's plan solved alone: order, limits, status, in place."""
+"""Poses that Paul's plan solves alone: postures, order, limits and status in one call."""
 
 from __future__ import annotations
 
@@ -8,26 +8,26 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from ..kernels._compile import INT, MATRIX, Floats, Ints, compiled
+from ..kernels._compile import INT, MATRIX, STACK, VECTOR, Floats, Ints, compiled
+from ..kernels.rotations import improper_pose
 from ._arrange import AT_LIMIT, before, turned_inside
+from .paul._run import run_plan
 from .status import IGMStatus
 
 _TABLE = types.Array(types.int16, 1, "C", readonly=True)
-_MARKS = types.Array(types.int64, 2, "C", readonly=True)
+_PLAN = types.Array(types.uint32, 1, "C", readonly=True)
 _FLOATS3, _FLOATS2 = types.Array(types.float64, 3, "C"), types.Array(types.float64, 2, "C")
 _FLAGS3 = types.Array(types.boolean, 3, "C")
 _CODES2, _CODES1 = types.Array(types.int16, 2, "C"), types.Array(types.int8, 1, "C")
+
+IMPROPER = -1000
 
 _REACHED, _OUTSIDE = int(IGMStatus.REACHED), int(IGMStatus.OUTSIDE_LIMITS)
 _NOTHING = int(IGMStatus.NOT_CONVERGED)
 
 
-@compiled(
-    types.int64(
-        _MARKS, _TABLE, MATRIX, INT, MATRIX, INT, _FLOATS3, _FLOATS2, _FLAGS3, _CODES2, _CODES1,
-    )
-)  # fmt: skip
-def regular_rows(
+@compiled()
+def ordered_rows(
     marks: Ints,
     labels: NDArray[np.int16],
     references: Floats,
@@ -42,10 +42,8 @@ def regular_rows(
 ) -> int:
     """Order the postures of each pose; returns the most of any, or -1 - most.
 
-    ``marks`` is what `run_plan` left, ``labels`` gives the branch of the ways through the plan,
-    ``joints (3, n)`` holds lower and upper limits and 1 for joints that turn. ``flags (2, N, S)``
-    become valid and within the limits. Status NOT_CONVERGED is left to poses that have no posture
-    or that the plan was not sure of: if there are any, the result is negative.
+    ``marks`` is what `run_plan` left. Poses that have no posture or that the plan was not sure of
+    are left to others, with status NOT_CONVERGED: if there are any, the result is negative.
     """
     N, S, n = q.shape
     row, keys, order = np.empty((S, n)), np.empty(S), np.empty(S, np.int64)
@@ -118,3 +116,45 @@ def regular_rows(
         status[p] = _REACHED if count > 0 else _OUTSIDE
         most = max(most, count)
     return most if doubtful == 0 else -1 - most
+
+
+@compiled(
+    types.int64(
+        _PLAN, VECTOR, VECTOR, STACK, MATRIX, INT, _TABLE, MATRIX, INT, _FLOATS3, _FLOATS2,
+        _FLAGS3, _CODES2, _CODES1,
+    )
+)  # fmt: skip
+def regular_postures(
+    plan: Ints,
+    numbers: Floats,
+    tolerances: Floats,
+    poses: Floats,
+    references: Floats,
+    given: int,
+    labels: NDArray[np.int16],
+    joints: Floats,
+    boxed: int,
+    q: Floats,
+    residual: Floats,
+    flags: NDArray[np.bool_],
+    code: NDArray[np.int16],
+    status: NDArray[np.int8],
+) -> int:
+    """Rows of a result by a plan: a border check, the plan, the order.
+
+    ``labels`` gives the branch of the ways through the plan, ``joints (3, n)`` holds lower and
+    upper limits and 1 for joints that turn. ``flags (2, N, S)`` become valid and within the limits.
+    Returns the most postures of any pose, -1 - most if some poses are left to others, or IMPROPER
+    if a pose is none or a reference is not finite, before anything is solved.
+    """
+    if improper_pose(poses) >= 0:
+        return IMPROPER
+    for p in range(references.shape[0]):
+        for m in range(references.shape[1]):
+            if not np.isfinite(references[p, m]):
+                return IMPROPER
+    marks = np.empty((poses.shape[0], 2 + 2 * q.shape[1]), np.int64)
+    run_plan(plan, numbers, tolerances, poses, references, q, residual, marks)
+    return ordered_rows(
+        marks, labels, references, given, joints, boxed, q, residual, flags, code, status
+    )

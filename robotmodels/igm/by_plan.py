@@ -20,6 +20,7 @@ TESTS = 128
 SLACK, ZERO, SMALL, ACCEPTED = 1e-9, 1e-13, 1e-5, 1e-9
 """Of `run_plan`: overshoot tried as a double root, amplitudes that are zero and that are doubtful
 beside what they are made of, largest error of a posture [m, rad]."""
+TOLERANCES = read_only([SLACK, ZERO, SMALL, ACCEPTED])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,6 +45,18 @@ class ByPlan:
     family: Solver
     labels: tuple[str, ...]
     branch_of_way: NDArray[np.int16]
+
+    @property
+    def instructions(self) -> NDArray[np.uint32]:
+        """The plan as the kernel reads it."""
+        assert self.plan.program is not None
+        return self.plan.program.plan
+
+    @property
+    def most(self) -> int:
+        """Most postures of a pose."""
+        assert self.plan.program is not None
+        return self.plan.program.branches
 
     @property
     def chain(self) -> JointChain:
@@ -141,11 +154,8 @@ def run(
     N, k, S = poses.shape[0], references.shape[1], plan.program.branches
     q, residual = np.empty((N, S, k)), np.empty((N, S))
     marks = np.empty((N, 2 + 2 * S), np.int64)
-    run_plan(plan.program.plan, numbers, _TOLERANCES, poses, references, q, residual, marks)
+    run_plan(plan.program.plan, numbers, TOLERANCES, poses, references, q, residual, marks)
     return q, residual, marks
-
-
-_TOLERANCES = read_only([SLACK, ZERO, SMALL, ACCEPTED])
 
 
 def numbers_for_world(plan: PaulPlan, to_base: Array) -> Array:

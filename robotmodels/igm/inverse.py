@@ -15,7 +15,7 @@ from ..errors import InvalidValueError
 from ..model import RobotModel
 from .asked import Task, above_zero, locks_of, mask_of
 from .known import known_arm, solver_for
-from .rows import Call, Rows, rows_by_family, rows_by_plan
+from .rows import Call, Rows, rows_by_family, rows_by_plan, rows_of_doubtful
 from .solutions import IGMSolutions
 from .solver import Tolerances
 
@@ -118,82 +118,102 @@ def igm(
     """
     if not isinstance(model, RobotModel):
         raise InvalidValueError(f"model: expected a RobotModel, got {type(model).__name__}.")
-    if not isinstance(limits, (bool, np.bool_)):
-        raise InvalidValueError(f"limits: expected True or False, got {limits!r}.")
     if mask_axes not in ("world", "tool"):
         raise InvalidValueError(f"mask_axes: expected 'world' or 'tool', got {mask_axes!r}.")
+    if not isinstance(limits, (bool, np.bool_)):
+        raise InvalidValueError(f"limits: expected True or False, got {limits!r}.")
     arm = known_arm(model)
-    tolerances = Tolerances(
-        above_zero(position_tolerance, "position_tolerance"),
-        above_zero(orientation_tolerance, "orientation_tolerance"),
-    )
-    task = _WHOLE
-    if mask is not None or lock is not None or arm_angle is not None:
+    ordinary = mask is None and lock is None and arm_angle is None
+    if ordinary and position_tolerance == 1e-9 == orientation_tolerance:
+        task, tolerances = _WHOLE, _EXACT
+    else:
+        tolerances = Tolerances(
+            above_zero(position_tolerance, "position_tolerance"),
+            above_zero(orientation_tolerance, "orientation_tolerance"),
+        )
         task = Task(
             mask=tuple(mask_of(mask).tolist()),
             in_tool_axes=mask_axes == "tool",
             locks=locks_of(model, lock),
             by_arm_angle=arm_angle is not None,
         )
-    batch, poses, references = _rows_of_call(model, T, q_ref)
+    given, limits = q_ref is not None, bool(limits)
+    solver = arm.plan if task is _WHOLE else None
+    rows = None
+    if solver is not None:
+        # proper arrays, which are nearly all, pass a quick look; others are told or mended
+        batch, poses, references = _as_they_are(model, T, q_ref, limits)
+        rows = rows_by_plan(arm, poses, references, given, limits)
+    if rows is None:
+        batch, poses, references = _checked(model, T, q_ref, limits)
+        solver = solver_for(model, arm, task)
+        if task is _WHOLE and solver is arm.plan is not None:
+            rows = rows_by_plan(arm, poses, references, given, limits)
+    if rows is None or rows.most < 0:
+        call = Call(model, arm, task, solver, given, limits, tolerances)
+        if rows is not None:
+            rows = rows_of_doubtful(call, poses, references, rows)
+        elif arm_angle is None:
+            rows = rows_by_family(call, poses, references)
+        else:
+            # every pose once for every angle, the angles behind
+            angles = as_core(arm_angle, (), "arm_angle")
+            psi = np.tile(angles.ravel(), poses.shape[0])
+            poses, references = (np.repeat(a, angles.size, axis=0) for a in (poses, references))
+            batch = (*batch, *angles.shape)
+            rows = rows_by_family(call, poses, references, psi)
+    method = NO_FAMILY if solver is None else solver.method
+    return _solutions(batch, rows, method, arm.never if limits else arm.turns, task)
+
+
+def _as_they_are(
+    model: RobotModel, T: ArrayLike, q_ref: ArrayLike | None, limits: bool
+) -> tuple[tuple[int, ...], Array, Array]:
+    """Batch shape, poses (N, 4, 4), references (N, n); unchecked where that costs nothing."""
+    plain = type(T) is np.ndarray and T.dtype == np.float64 and T.flags.c_contiguous
+    if not plain or T.shape[-2:] != (4, 4) or not (q_ref is None or T.ndim == 2):
+        return _checked(model, T, q_ref, limits)
+    poses = T.reshape(-1, 4, 4)
+    if q_ref is None:
+        return T.shape[:-2], poses, np.zeros((poses.shape[0], model.n))
+    q = np.asarray(q_ref)
+    if limits or q.dtype != np.float64 or q.shape != (model.n,) or not q.flags.c_contiguous:
+        return _checked(model, T, q_ref, limits)
+    return (), poses, q.reshape(1, -1)
+
+
+def _checked(
+    model: RobotModel, T: ArrayLike, q_ref: ArrayLike | None, limits: bool
+) -> tuple[tuple[int, ...], Array, Array]:
+    """The same, checked, or an error."""
+    poses = se3.as_pose(T)
+    flat = poses.reshape(*poses.shape[:-2], 16)
+    reference = np.zeros(model.n) if q_ref is None else as_vector(q_ref, model.n, "q_ref")
+    batch, (rows, references) = batch_rows((flat, reference), ("T", "q_ref"))
     if limits:
         references = np.clip(references, model.lower, model.upper)
-    solver = solver_for(model, arm, task)
-    call = Call(model, arm, task, solver, q_ref is not None, bool(limits), tolerances)
-    if arm.plan is not None and solver is arm.plan and tolerances == _EXACT:
-        return _solutions(call, batch, rows_by_plan(call, poses, references))
-    psi = None
-    if arm_angle is not None:
-        # every pose once for every angle, the angles behind
-        angles = as_core(arm_angle, (), "arm_angle")
-        psi = np.tile(angles.ravel(), poses.shape[0])
-        poses, references = (np.repeat(a, angles.size, axis=0) for a in (poses, references))
-        batch = (*batch, *angles.shape)
-    return _solutions(call, batch, rows_by_family(call, poses, references, psi))
-
-
-def _rows_of_call(
-    model: RobotModel, T: ArrayLike, q_ref: ArrayLike | None
-) -> tuple[tuple[int, ...], Array, Array]:
-    """Batch shape, poses (N, 4, 4) and references (N, n), checked."""
-    from ..kernels.rotations import improper_pose
-
-    # proper poses, which are nearly all, pass a quick look; what does not is told or mended
-    if not (
-        isinstance(T, np.ndarray)
-        and T.dtype == np.float64
-        and T.flags.c_contiguous
-        and T.shape[-2:] == (4, 4)
-        and improper_pose(T.reshape(-1, 4, 4)) < 0
-    ):
-        T = se3.as_pose(T)
-    if q_ref is None:
-        poses = T.reshape(-1, 4, 4)
-        return T.shape[:-2], poses, np.zeros((poses.shape[0], model.n))
-    reference = as_vector(q_ref, model.n, "q_ref")
-    batch, (rows, references) = batch_rows(
-        (T.reshape(*T.shape[:-2], 16), reference), ("T", "q_ref")
-    )
     return batch, rows.reshape(-1, 4, 4), references
 
 
-def _solutions(call: Call, batch: tuple[int, ...], rows: Rows) -> IGMSolutions:
+def _solutions(
+    batch: tuple[int, ...], rows: Rows, method: str, periodic: NDArray[np.bool_], task: Task
+) -> IGMSolutions:
     """The result of a call."""
-    n, most = call.model.n, rows.most
+    most, n = rows.most, periodic.size
 
-    def cut(array: NDArray[Any], *core: int) -> NDArray[Any]:
+    def cut(array: NDArray[Any] | None, *core: int) -> NDArray[Any]:
+        shape = (*batch, most, *core)
+        if array is None:
+            return _still(shape)
         if most < array.shape[1]:
             array = np.ascontiguousarray(array[:, :most])
-        array = array.reshape(*batch, most, *core)
-        array.flags.writeable = False
+        return frozen(array, shape)
+
+    def frozen(array: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
+        array = array.reshape(shape)
+        array.setflags(write=False)
         return array
 
-    status = rows.status.reshape(batch)
-    status.flags.writeable = False
-    closest = missing = None
-    if rows.closest is not None and rows.missing is not None:
-        closest, missing = rows.closest.reshape(*batch, n), rows.missing.reshape(*batch, 6)
-        closest.flags.writeable = missing.flags.writeable = False
     return IGMSolutions.checked_before(
         cut(rows.q, n),
         cut(rows.valid),
@@ -201,17 +221,34 @@ def _solutions(call: Call, batch: tuple[int, ...], rows: Rows) -> IGMSolutions:
         cut(rows.inside),
         cut(rows.code),
         rows.labels,
-        status,
+        frozen(rows.status, batch),
         cut(rows.double),
         cut(rows.free, n),
         cut(rows.family, n),
-        NO_FAMILY if call.solver is None else call.solver.method,
-        call.arm.never if call.limits else call.arm.turns,
-        _mask_array(call.task.mask),
+        method,
+        periodic,
+        _mask_array(task.mask),
         None,
-        closest,
-        missing,
+        None if rows.closest is None else frozen(rows.closest, (*batch, n)),
+        None if rows.missing is None else frozen(rows.missing, (*batch, 6)),
     )
+
+
+def _still(shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Flags none of which is set; those of a single pose are kept."""
+    return _small_still(shape) if len(shape) < 3 else _new_still(shape)
+
+
+def _new_still(shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    # zeros that nobody touches take no time
+    flags = np.zeros(shape, np.bool_)
+    flags.setflags(write=False)
+    return flags
+
+
+@lru_cache(maxsize=256)
+def _small_still(shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    return _new_still(shape)
 
 
 @lru_cache(maxsize=64)

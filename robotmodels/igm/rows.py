@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +16,14 @@ from ..model import RobotModel
 from .arm_angle import ArmAngle, arm_angle_postures
 from .asked import WHOLE_POSE, Task
 from .branches import branches
+from .by_plan import TOLERANCES
 from .known import KnownArm
 from .self_motion import Settled, double_roots, settle_families
 from .solver import Found, Solver, Tolerances, nothing_found, postures
 from .status import IGMStatus
 from .why import search
+
+_IMPROPER = -1000  # what the kernel of plans says before it has done anything
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,23 +57,25 @@ class Call:
     tolerances: Tolerances
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Rows:
-    """Fields of an `IGMSolutions` for N poses, S rows a pose of which ``most`` are in use."""
+class Rows(NamedTuple):
+    """Fields of an `IGMSolutions` for N poses, S rows a pose of which ``most`` are in use.
+
+    ``double``, ``free`` and ``family`` are None where no row has any.
+    """
 
     q: Array
     valid: NDArray[np.bool_]
     residual: Array
     inside: NDArray[np.bool_]
     code: NDArray[np.int16]
-    double: NDArray[np.bool_]
-    free: NDArray[np.bool_]
-    family: NDArray[np.bool_]
     status: NDArray[np.int8]
     labels: tuple[str, ...]
     most: int
-    closest: Array | None
-    missing: Array | None
+    double: NDArray[np.bool_] | None = None
+    free: NDArray[np.bool_] | None = None
+    family: NDArray[np.bool_] | None = None
+    closest: Array | None = None
+    missing: Array | None = None
 
 
 def rows_by_family(call: Call, poses: Array, references: Array, psi: Array | None = None) -> Rows:
@@ -130,89 +138,114 @@ def rows_by_family(call: Call, poses: Array, references: Array, psi: Array | Non
         inside[met, 0] = np.all(low & high, axis=-1)
         most = max(most, int(met.size > 0))
     return Rows(
-        q, valid, residual, inside, codes, double, free, family, status, labels, most, closest,
+        q, valid, residual, inside, codes, status, labels, most, double, free, family, closest,
         missing,
     )  # fmt: skip
 
 
-def rows_by_plan(call: Call, poses: Array, references: Array) -> Rows:
-    """Postures by Paul's plan, where it is in doubt by the family of the arm.
+def rows_by_plan(
+    arm: KnownArm, poses: Array, references: Array, given: bool, limits: bool
+) -> Rows | None:
+    """Postures by Paul's plan.
+
+    Parameters
+    ----------
+    arm : KnownArm
+        An arm with a plan.
+    poses : ndarray, shape (N, 4, 4)
+        World poses [m], not checked yet.
+    references : ndarray, shape (N, n)
+        Reference postures [rad or m], not checked yet.
+    given : bool
+        Whether the caller gave them.
+    limits : bool
+        Whether postures must lie within the joint limits.
+
+    Returns
+    -------
+    Rows or None
+        Postures; status NOT_CONVERGED where the family of the arm has to be asked. None, and
+        nothing done, if a pose is not a proper one to rounding or a reference not finite.
+    """
+    plan, numbers = arm.plan, arm.numbers
+    assert plan is not None
+    S = plan.most
+    N, n = references.shape
+    q, residual = np.empty((N, S, n)), np.empty((N, S))
+    flags, code = np.empty((2, N, S), np.bool_), np.empty((N, S), np.int16)
+    status = np.empty(N, np.int8)
+    most = _kernel()(
+        plan.instructions, numbers, TOLERANCES, poses, references, given, plan.branch_of_way,
+        arm.joints, limits, q, residual, flags, code, status,
+    )  # fmt: skip
+    if most == _IMPROPER:
+        return None
+    return Rows(q, flags[0], residual, flags[1], code, status, plan.labels, most)
+
+
+@cache
+def _kernel() -> Callable[..., int]:
+    """The kernel of plans, imported when the first pose is solved."""
+    from ._regular import regular_postures
+
+    return regular_postures
+
+
+def rows_of_doubtful(call: Call, poses: Array, references: Array, rows: Rows) -> Rows:
+    """Ask the family of the arm where its plan was in doubt.
 
     Parameters
     ----------
     call : Call
-        What is asked; its solver is a `ByPlan`, its task the whole pose.
+        What is asked.
     poses : ndarray, shape (N, 4, 4)
         World poses [m].
     references : ndarray, shape (N, n)
         Reference postures [rad or m].
+    rows : Rows
+        From `rows_by_plan`.
 
     Returns
     -------
     Rows
-        What was found.
+        Of all poses.
     """
-    from ._regular import regular_rows
-    from .by_plan import run
-
-    plan, numbers = call.arm.plan, call.arm.numbers
-    assert plan is not None
-    assert numbers is not None
-    q, residual, marks = run(plan.plan, numbers, poses, references)
-    N, S, n = q.shape
-    flags, code = np.empty((2, N, S), np.bool_), np.empty((N, S), np.int16)
-    status = np.empty(N, np.int8)
-    most = regular_rows(
-        marks, plan.branch_of_way, references, call.given, call.arm.joints, call.limits,
-        q, residual, flags, code, status,
-    )  # fmt: skip
-    # zeros that nobody touches take no time
-    rows = Rows(
-        q, flags[0], residual, flags[1], code, np.zeros((N, S), np.bool_),
-        np.zeros((N, S, n), np.bool_), np.zeros((N, S, n), np.bool_), status, plan.labels,
-        abs(most) - (most < 0), None, None,
-    )  # fmt: skip
-    if most >= 0:
-        return rows
-    doubtful = np.flatnonzero(status == _DOUBTFUL)
-    return _joined(rows, doubtful, rows_by_family(call, poses[doubtful], references[doubtful]))
-
-
-def _joined(rows: Rows, chosen: NDArray[np.int64], part: Rows) -> Rows:
-    """Rows of some poses put among those of all."""
+    doubtful = np.flatnonzero(rows.status == IGMStatus.NOT_CONVERGED)
+    part = rows_by_family(call, poses[doubtful], references[doubtful])
     N, S, n = rows.q.shape
-    most = max(rows.most, part.most)
-    out = rows if most <= S else _widened(rows, most)
-    for field in _PER_ROW:
-        whole, piece = getattr(out, field), getattr(part, field)
-        keep = min(whole.shape[1], piece.shape[1])
-        whole[chosen, :keep] = piece[:, :keep]
-    out.status[chosen] = part.status
+    most, wide = max(-1 - rows.most, part.most), max(S, part.most)
+
+    def joined(name: str, nothing: float) -> NDArray[Any]:
+        whole, piece = getattr(rows, name), getattr(part, name)
+        if whole is None or whole.shape[1] < wide:
+            old = whole
+            whole = np.full((N, wide, *piece.shape[2:]), nothing, piece.dtype)
+            if old is not None:
+                whole[:, :S] = old
+        keep = min(wide, piece.shape[1])
+        whole[doubtful, :keep] = piece[:, :keep]
+        return whole
+
+    rows.status[doubtful] = part.status
     closest = missing = None
     if part.closest is not None and part.missing is not None:
         closest, missing = np.full((N, n), np.nan), np.full((N, 6), np.nan)
-        closest[chosen], missing[chosen] = part.closest, part.missing
-    labels = max(rows.labels, part.labels, key=len)
-    return replace(out, most=most, labels=labels, closest=closest, missing=missing)
-
-
-def _widened(rows: Rows, S: int) -> Rows:
-    """The same with S rows a pose."""
-    wide = {}
-    for field in _PER_ROW:
-        old = getattr(rows, field)
-        new = np.zeros((old.shape[0], S, *old.shape[2:]), old.dtype)
-        if old.dtype == np.float64:
-            new[...] = np.nan
-        elif old.dtype == np.int16:
-            new[...] = -1
-        new[:, : old.shape[1]] = old
-        wide[field] = new
-    return replace(rows, **wide)
-
-
-_PER_ROW = ("q", "valid", "residual", "inside", "code", "double", "free", "family")
-_DOUBTFUL = int(IGMStatus.NOT_CONVERGED)
+        closest[doubtful], missing[doubtful] = part.closest, part.missing
+    return Rows(
+        q=joined("q", np.nan),
+        valid=joined("valid", False),
+        residual=joined("residual", np.nan),
+        inside=joined("inside", False),
+        code=joined("code", -1),
+        status=rows.status,
+        labels=max(rows.labels, part.labels, key=len),
+        most=most,
+        double=joined("double", False),
+        free=joined("free", False),
+        family=joined("family", False),
+        closest=closest,
+        missing=missing,
+    )
 
 
 def _settled(call: Call, U: Array, psi: Array | None, references: Array) -> Settled:
