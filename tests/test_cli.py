@@ -188,6 +188,24 @@ def test_mask_axes_of_the_tool(run):
     assert "asked for: x y z rx ry in tool axes" in run("igm", *words)[1]
 
 
+def test_seven_joints_by_arm_angle_or_a_locked_joint(run):
+    iiwa = rm.load("iiwa14")
+    q = np.radians([10.0, 30.0, -15.0, -80.0, 20.0, 40.0, 5.0])
+    words = ["iiwa14", "--q", *np.degrees(q), "--degrees"]
+    T = rm.dgm(iiwa, q)
+    swung = solved(run, *words, "--arm-angle", -20)
+    wanted = rm.igm(iiwa, T, arm_angle=np.radians(-20.0))
+    assert len(swung["postures"]) == wanted.count
+    np.testing.assert_allclose(
+        np.radians([row["q"] for row in swung["postures"]]), wanted.q, atol=1e-9
+    )
+    for name in ("3", iiwa.table.joint_names[2]):
+        locked = solved(run, *words, "--lock", f"{name}=-15", "--q-ref", *np.degrees(q))
+        rows = np.array([row["q"] for row in locked["postures"]])
+        np.testing.assert_allclose(rows[:, 2], -15.0, atol=1e-12)
+        np.testing.assert_allclose(rows[0], np.degrees(q), atol=1e-6)
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -206,6 +224,12 @@ def test_mask_axes_of_the_tool(run):
         (["rx90", "--q", "zero", "--mask", 0, 0, 0, 0, 0, 0], "nothing is asked for"),
         (["rx90", "--q", "zero", "--tolerance", 0], "above 0"),
         (["rx90", "--q", "zero", "--tolerance", 1, 2, 3], "--tolerance: expected 1 or 2"),
+        (["rx90", "--q", "zero", "--lock", "7=1"], "number from 1 to 6"),
+        (["rx90", "--q", "zero", "--lock", "0=1"], "number from 1 to 6"),
+        (["rx90", "--q", "zero", "--lock", "joint_1"], "expected JOINT=VALUE"),
+        (["rx90", "--q", "zero", "--lock", "1=two"], "--lock 1: expected 1 finite number, got"),
+        (["rx90", "--q", "zero", "--lock", "1=0", "--lock", "joint_1=0"], "given twice"),
+        (["rx90", "--q", "zero", "--arm-angle", "1", "2"], "--arm-angle: expected 1"),
         (["rx91", "--q", "zero"], "rx90"),
         (["missing.urdf", "--q", "zero"], "missing.urdf"),
     ],

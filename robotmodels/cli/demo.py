@@ -17,8 +17,8 @@ from ..igm import igm
 from ..kinematics import dgm, dkm, jacobian
 from ..model import RobotModel, write_urdf
 from ..robots import load
-from .igm import as_text
 from .info import pose_text
+from .postures import as_text
 
 _SAMPLES = 1000
 _BATCH = 100_000

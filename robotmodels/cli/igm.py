@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,22 +12,20 @@ import numpy as np
 from .. import se3
 from .._arrays import Array
 from ..errors import InvalidValueError
-from ..igm import IGMSolutions, IGMStatus
 from ..igm import igm as inverse_model
 from ..kinematics import dgm
 from ..model import RobotModel
-from ..table_text import boxed
-from .info import pose_text
 from .numbers import numbers, posture, revolute
+from .postures import as_json, as_text
 from .source import add_source, robot_of
 
-_COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
 _EXAMPLES = """\
 examples:
   robotmodels igm rx90 --xyz 0.3 0.2 0.5 --rpy 0 90 45 --degrees
   robotmodels igm lab_trr --xyz 0.4 0.2 0.5 --mask 1 1 1 0 0 0
   robotmodels igm arm.urdf --matrix 0 0 -1 0.4  0 1 0 0.1  1 0 0 0.6  0 0 0 1
   robotmodels igm erd:ur5 --q 0.3 -0.9 1.2 0.4 0.8 -0.2 --limits
+  robotmodels igm iiwa14 --q 10 30 0 -80 0 40 0 --degrees --arm-angle 20
 
 exit status: 0 the pose is reached, 1 it is not, 2 an argument is wrong"""
 
@@ -80,6 +79,12 @@ def add_command(commands: Any) -> None:
     asked.add_argument("--mask-axes", choices=("world", "tool"), default="world",
                        help="axes of the mask (default: %(default)s)")  # fmt: skip
     asked.add_argument(
+        "--lock", action="append", default=[], metavar="JOINT=VALUE",
+        help="a joint, by name or number from 1, that keeps a value; may be repeated",
+    )  # fmt: skip
+    asked.add_argument("--arm-angle", metavar="ANGLE",
+                       help="of seven-joint arms with an elbow that swings")  # fmt: skip
+    asked.add_argument(
         "--tolerance", metavar="NUMBERS",
         help="how much may be missing: metres and radians, or one number for both (default 1e-9); "
         "poses given with few digits need more",
@@ -126,6 +131,8 @@ def run(arguments: argparse.Namespace) -> int:
         model, T,
         q_ref=None if q_ref is None else posture(q_ref, model, "--q-ref", degrees),
         mask=mask, mask_axes=arguments.mask_axes, limits=arguments.limits,
+        lock=locks_of(arguments.lock, model, degrees),
+        arm_angle=angle_of(arguments.arm_angle, degrees),
         position_tolerance=float(tolerance[0]), orientation_tolerance=float(tolerance[-1]),
     )  # fmt: skip
     if arguments.json:
@@ -188,157 +195,80 @@ def pose_of(arguments: argparse.Namespace, model: RobotModel, mask: Array | None
     return se3.from_rpy(np.deg2rad(rpy) if arguments.degrees else rpy, xyz)
 
 
-def as_text(model: RobotModel, T: Array, found: IGMSolutions, mask_axes: str, degrees: bool) -> str:
-    """The solutions of one pose as text.
+def locks_of(
+    words: Sequence[str], model: RobotModel, degrees: bool
+) -> dict[int | str, float] | None:
+    """Joints that keep a value.
 
     Parameters
     ----------
+    words : sequence of str
+        ``JOINT=VALUE``; the joint by its name or by its number, from 1 as in the printed table.
     model : RobotModel
         The robot.
-    T : ndarray, shape (4, 4)
-        The pose asked for [m].
-    found : IGMSolutions
-        For this pose.
-    mask_axes : str
-        Axes of its mask.
     degrees : bool
-        Whether angles are printed in degrees.
+        Whether the values of revolute joints are degrees.
 
     Returns
     -------
-    str
-        Lines.
+    dict, or None
+        Columns of q, from 0, and values [rad or m].
+
+    Raises
+    ------
+    InvalidValueError
+        Another form, a joint that does not exist, or one that is given twice.
 
     Examples
     --------
     >>> from ..robots import load
-    >>> T = se3.translation(1, 0, 0)
-    >>> found = inverse_model(load("lab_trr"), T, mask=[1, 1, 1, 0, 0, 0])
-    >>> print(as_text(load("lab_trr"), T, found, "world", False).splitlines()[0])
-    lab_trr: 0 postures. The position is out of reach: too far. The closest posture misses it by ...
+    >>> locks_of(["3=0.5", "joint_5=0"], load("iiwa14"), degrees=False)
+    {2: 0.5, 4: 0.0}
     """
-    names = model.table.joint_names
-    count = int(found.count)
-    lines = [
-        f"{model.name}: {count} posture{'s' * (count != 1)}. {found.reason()}",
-        f"method: {found.method}",
-        f"pose of the tool (m):\n{pose_text(T)}",
-    ]
-    if not found.mask.all():
-        asked = " ".join(c for c, m in zip(_COMPONENTS, found.mask, strict=True) if m)
-        lines.append(f"asked for: {asked} in {mask_axes} axes")
-    units = _units(model, degrees)
-    if count:
-        q = _shown(model, found.q[:count], degrees)
-        columns = [("", [str(k + 1) for k in range(count)]), ("branch", list(found.branch[:count]))]
-        columns += [
-            (f"q{j + 1} [{unit}]", [_number(v, unit) for v in q[:, j]])
-            for j, unit in enumerate(units)
-        ]
-        columns.append(("residual", [f"{r:.1e}" for r in found.residual[:count]]))
-        inside = ["inside" if w else "outside" for w in found.within_limits[:count]]
-        columns.append(("limits", inside))
-        if found.double.any():
-            columns.append(("root", ["double" if d else "" for d in found.double[:count]]))
-        lines += [f"q: {', '.join(names)}", boxed(columns)]
-    lines += _family_lines(names, found)
-    if not count and found.closest is not None and np.isfinite(found.closest).all():
-        q = _shown(model, found.closest, degrees)
-        each = zip(names, q, units, strict=True)
-        lines.append(
-            "closest posture: " + ", ".join(f"{n} {_number(v, u)} {u}" for n, v, u in each)
-        )
-    return "\n".join(lines)
+    names = list(model.table.joint_names)
+    locks: dict[int | str, float] = {}
+    for word in words:
+        joint, equals, text = word.partition("=")
+        known = joint in names or (joint.isdecimal() and 1 <= int(joint) <= model.n)
+        if not equals or not known:
+            raise InvalidValueError(
+                f"--lock: expected JOINT=VALUE with a joint by its number from 1 to {model.n} or "
+                f"by its name ({', '.join(names)}), got {word!r}."
+            )
+        column = names.index(joint) if joint in names else int(joint) - 1
+        if column in locks:
+            raise InvalidValueError(f"--lock: joint {joint} is given twice.")
+        value = float(numbers(text, 1, f"--lock {joint}")[0])
+        locks[column] = np.deg2rad(value).item() if degrees and revolute(model)[column] else value
+    return locks or None
 
 
-def as_json(model: RobotModel, T: Array, found: IGMSolutions, degrees: bool) -> dict[str, Any]:
-    """The solutions of one pose as what `json` writes.
+def angle_of(text: str | None, degrees: bool) -> float | None:
+    """The arm angle in radians.
 
     Parameters
     ----------
-    model : RobotModel
-        The robot.
-    T : ndarray, shape (4, 4)
-        The pose asked for [m].
-    found : IGMSolutions
-        For this pose.
+    text : str or None
+        What was given.
     degrees : bool
-        Whether angles are in degrees.
+        Whether it is in degrees.
 
     Returns
     -------
-    dict
-        ``robot, joints, units, pose, reached, status, reason, method, mask, postures``, each
-        posture with ``q, branch, residual, within_limits, double, free_joints, family_joints``,
-        and ``closest`` (null where the pose is reached). Residuals are in m and rad.
+    float or None
+        Radians.
+
+    Raises
+    ------
+    InvalidValueError
+        No number.
 
     Examples
     --------
-    >>> from ..robots import load
-    >>> arm = load("lab_rr")
-    >>> T = dgm(arm, [0.1, 0.2])
-    >>> as_json(arm, T, inverse_model(arm, T), False)["reached"]
-    True
+    >>> angle_of("180", degrees=True)
+    3.141592653589793
     """
-    names = np.array(model.table.joint_names)
-    q = _shown(model, found.q, degrees)
-    postures = [
-        {
-            "q": q[s].tolist(),
-            "branch": str(found.branch[s]),
-            "residual": float(found.residual[s]),
-            "within_limits": bool(found.within_limits[s]),
-            "double": bool(found.double[s]),
-            "free_joints": names[found.free_joints[s]].tolist(),
-            "family_joints": names[found.family_joints[s]].tolist(),
-        }
-        for s in np.flatnonzero(found.valid)
-    ]
-    closest = None
-    if not postures and found.closest is not None and np.isfinite(found.closest).all():
-        closest = _shown(model, found.closest, degrees).tolist()
-    return {
-        "robot": model.name,
-        "joints": names.tolist(),
-        "units": _units(model, degrees),
-        "pose": T.tolist(),
-        "reached": bool(postures),
-        "status": IGMStatus(int(found.status)).name,
-        "reason": found.reason(),
-        "method": found.method,
-        "mask": found.mask.astype(int).tolist(),
-        "postures": postures,
-        "closest": closest,
-    }
-
-
-def _family_lines(names: tuple[str, ...], found: IGMSolutions) -> list[str]:
-    """Which joints took the reference, each set once with the postures it holds for."""
-    groups: dict[tuple[bytes, bytes], list[int]] = {}
-    for s in np.flatnonzero(found.valid):
-        free, family = found.free_joints[s], found.family_joints[s]
-        if free.any() or family.any():
-            groups.setdefault((free.tobytes(), family.tobytes()), []).append(int(s))
-    lines = []
-    for rows in groups.values():
-        free, family = found.free_joints[rows[0]], found.family_joints[rows[0]]
-        which = ", ".join(str(s + 1) for s in rows)
-        taken = ", ".join(n for n, f in zip(names, free, strict=True) if f)
-        others = ", ".join(n for n, f in zip(names, family, strict=True) if f)
-        text = f"infinite family through posture {which}:"
-        text += f" {taken} took the reference;" if taken else ""
-        lines.append(f"{text} {others or 'no other joint'} moves with it.")
-    return lines
-
-
-def _units(model: RobotModel, degrees: bool) -> list[str]:
-    return [("deg" if degrees else "rad") if turns else "m" for turns in revolute(model)]
-
-
-def _shown(model: RobotModel, q: Array, degrees: bool) -> Array:
-    return np.where(revolute(model), np.rad2deg(q), q) if degrees else q
-
-
-def _number(value: float, unit: str) -> str:
-    text = f"{value:.4f}" if unit == "deg" else f"{value:.6f}"
-    return text.removeprefix("-") if float(text) == 0 else text
+    if text is None:
+        return None
+    angle = float(numbers(text, 1, "--arm-angle")[0])
+    return float(np.deg2rad(angle)) if degrees else angle

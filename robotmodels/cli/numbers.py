@@ -11,7 +11,9 @@ from ..errors import InvalidValueError
 from ..geometry import REVOLUTE
 from ..model import RobotModel
 
-NUMBER_OPTIONS = ("--q", "--q-ref", "--xyz", "--rpy", "--matrix", "--mask", "--tolerance")
+NUMBER_OPTIONS = (
+    "--q", "--q-ref", "--xyz", "--rpy", "--matrix", "--mask", "--tolerance", "--arm-angle",
+)  # fmt: skip
 """Options that take lists of numbers."""
 
 
@@ -81,7 +83,8 @@ def numbers(text: str, count: int | Sequence[int], option: str) -> Array:
         values = np.empty(0)
     if values.size not in counts or not np.isfinite(values).all():
         wanted = " or ".join(map(str, counts))
-        raise InvalidValueError(f"{option}: expected {wanted} finite numbers, got {text!r}.")
+        what = "finite number" + "s" * (counts != (1,))
+        raise InvalidValueError(f"{option}: expected {wanted} {what}, got {text!r}.")
     return values
 
 
