@@ -13,13 +13,13 @@ from .branches import SIDES, branches
 from .loop import JointChain
 from .motion import random_postures, tool_poses
 from .paul.plan import PaulPlan, derive_plan
+from .paul.postures import SLACK, SMALL, ZERO
 from .solver import Found, Solver, Tolerances, postures
 
 TESTS = 128
 """Random poses at which a plan has to find what the family finds before it is used."""
-SLACK, ZERO, SMALL, ACCEPTED = 1e-9, 1e-13, 1e-5, 1e-9
-"""Of `run_plan`: overshoot tried as a double root, amplitudes that are zero and that are doubtful
-beside what they are made of, largest error of a posture [m, rad]."""
+ACCEPTED = 1e-9
+"""Largest error of a posture of the plan [m, rad]."""
 TOLERANCES = read_only([SLACK, ZERO, SMALL, ACCEPTED])
 
 
@@ -66,7 +66,7 @@ class ByPlan:
     @property
     def method(self) -> str:
         """The family, in words."""
-        return f"Paul's equations; {self.family.method}"
+        return f"Paul's equations; singular poses by: {self.family.method}"
 
 
 def prepare_by_plan(model: RobotModel, family: Solver) -> ByPlan | None:

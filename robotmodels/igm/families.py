@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from .arm_angle import prepare_arm_angle
-from .asked import Task
+from .asked import WHOLE_POSE, Task
 from .closed_form import prepare_closed_form
 from .fewer import prepare_fewer
 from .general import GeneralArm, prepare_general
 from .lock import locked_chain
 from .loop import JointChain
+from .mask import prepare_masked
 from .neighbour import prepare_neighbour
+from .redundant import prepare_redundant
 from .solver import Solver
 
 
@@ -32,6 +33,8 @@ def prepare_task(chain: JointChain, task: Task) -> Solver | None:
     locks = {places[column]: value for column, value in task.locks if column in places}
     if locks:
         chain = locked_chain(chain, locks)
+    if task.mask != WHOLE_POSE:
+        return prepare_masked(chain, task.mask, task.in_tool_axes, prepare)
     return prepare(chain)
 
 
@@ -57,10 +60,8 @@ def prepare(chain: JointChain) -> Solver | None:
     """
     if chain.k < 6:
         return prepare_fewer(chain, prepare)
-    if chain.k == 7:
-        angle = prepare_arm_angle(chain)
-        if angle is not None:
-            return angle
+    if chain.k > 6:
+        return prepare_redundant(chain, prepare)
     if chain.k == 6:
         closed = prepare_closed_form(chain)
         if closed is not None:

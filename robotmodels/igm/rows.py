@@ -17,7 +17,10 @@ from .arm_angle import ArmAngle, arm_angle_postures
 from .asked import WHOLE_POSE, Task
 from .branches import branches
 from .by_plan import TOLERANCES
+from .components import Components, asked_jacobians
 from .known import KnownArm
+from .loop import JointChain
+from .motion import lever
 from .self_motion import Settled, double_roots, settle_families
 from .solver import Found, Solver, Tolerances, nothing_found, postures
 from .status import IGMStatus
@@ -280,5 +283,23 @@ def _settled(call: Call, U: Array, psi: Array | None, references: Array) -> Sett
         length = float(np.linalg.norm(chain.D[:, :3, 3], axis=-1).sum()) or 1.0
         sigma, rows = np.ascontiguousarray(chain.sigma), found.family & found.valid
         moving_joints(sigma, chain.D, length, found.q, rows, moving)
+    if solver is not None and not whole:
+        moving |= moving_for_mask(solver.chain, call.task, U, found)
     moving |= found.free
     return Settled(*(getattr(found, field.name) for field in fields(Found)), moving=moving)
+
+
+def moving_for_mask(chain: JointChain, task: Task, U: Array, found: Found) -> NDArray[np.bool_]:
+    """Joints that move along the families of a masked task, shape (N, S, k)."""
+    moving = np.zeros(found.q.shape, np.bool_)
+    n, s = np.nonzero(found.family & found.valid)
+    if n.size == 0:
+        return moving
+    components = Components(task.mask, task.in_tool_axes)
+    J = asked_jacobians(chain, U[n], found.q[n, s], components)
+    J[:, : sum(task.mask[:3])] /= lever(chain)
+    _, sizes, rows = np.linalg.svd(J)
+    rank = np.sum(sizes > 1e-6 * sizes[:, :1], axis=1)
+    null = np.where((np.arange(chain.k) >= rank[:, None])[..., None], rows, 0.0)
+    moving[n, s] = np.abs(null).max(axis=1) > 1e-6
+    return moving
