@@ -52,7 +52,8 @@ class DependentJoints:
     @property
     def method(self) -> str:
         """The family in words."""
-        return f"joint {self.held + 1} of {self.chain.k} at its reference; {self.first.method}"
+        number = self.chain.columns[self.held] + 1
+        return f"joint {number} at its reference; {self.first.method}"
 
 
 def dependent_joint(J: Array, choose: Array) -> int | None:

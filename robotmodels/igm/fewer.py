@@ -19,6 +19,7 @@ from .alike import prepare_alike
 from .check import checked
 from .dependent import DependentJoints, prepare_dependent
 from .extensions import Layout, Triple, layout_like, layouts, loose_layouts
+from .gather import MERGE, merged, rows_of
 from .loop import JointChain
 from .motion import jacobians, lever, random_postures, scaled, tool_poses
 from .solver import Found, Prepare, Solver, Tolerances, nothing_found, postures
@@ -30,6 +31,7 @@ TESTS = 32  # random postures of the self-test
 TRIED = 12  # extensions with a closed form that are tested, best conditioned first
 TRIED_LOOSE = 4  # the same of those without, which take a second each to prepare
 SINGULAR = 1e-6  # singular values of the Jacobian beside the largest that count as zero
+SAME = 30.0  # postures that differ by so many tolerances are one
 LOOSER = 30.0  # tolerances of the extended arm beside those of the call
 ROUGH = 1e-2  # how far virtual joints may be from zero before the posture is improved
 
@@ -143,7 +145,7 @@ def _(solver: FewerJoints, U: Array, references: Array, tolerances: Tolerances) 
         chain, U, gathered.q, gathered.valid, tolerances, double=np.zeros_like(gathered.valid),
         rough=_rough(tolerances),
     )  # fmt: skip
-    return _judged(solver, U, references, tolerances, found, gathered)
+    return _judged(solver, U, _apart(chain, found, tolerances))
 
 
 @prepare_alike.register
@@ -199,15 +201,21 @@ def _joined(gathered: Found, rows: NDArray[np.int64], part: Found) -> Found:
     return out
 
 
-def _judged(
-    solver: FewerJoints,
-    U: Array,
-    references: Array,
-    tolerances: Tolerances,
-    found: Found,
-    gathered: Found,
-) -> Found:
-    """Mark double roots and infinite families; joints of a family at their references."""
+def _apart(chain: JointChain, found: Found, tolerances: Tolerances) -> Found:
+    """The best of postures that are one as far as the tolerances can tell.
+
+    A pose that is met only nearly is met nearly as well a little aside.
+    """
+    within = SAME * max(tolerances)
+    if within <= MERGE:
+        return found
+    order = np.argsort(found.residual, axis=1)
+    best = rows_of(found, (np.arange(len(found.q))[:, None], order))
+    return merged(chain.sigma, best, within)
+
+
+def _judged(solver: FewerJoints, U: Array, found: Found) -> Found:
+    """Mark double roots and infinite families."""
     n, s = np.nonzero(found.valid)
     J = scaled(jacobians(solver.chain, found.q[n, s]), solver.length)
     _, values, rows = np.linalg.svd(J, full_matrices=False)

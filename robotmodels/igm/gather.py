@@ -44,7 +44,7 @@ def assembled(N: int, k: int, parts: Iterable[tuple[NDArray[np.int64], Found]]) 
     return out
 
 
-def merged(sigma: NDArray[np.int64], found: Found) -> Found:
+def merged(sigma: NDArray[np.int64], found: Found, within: float = MERGE) -> Found:
     """Equal postures of a pose made one, the first of them; rows packed, the others emptied.
 
     Parameters
@@ -53,6 +53,8 @@ def merged(sigma: NDArray[np.int64], found: Found) -> Found:
         0 revolute, 1 prismatic.
     found : Found
         Rows in any order.
+    within : float
+        Largest difference in a joint of postures that are one [rad, m].
 
     Returns
     -------
@@ -69,7 +71,7 @@ def merged(sigma: NDArray[np.int64], found: Found) -> Found:
     q = np.where(found.valid[..., None], found.q, 0.0)
     gap = q[:, :, None] - q[:, None]
     turns = np.where(sigma == 0, np.round(gap / (2.0 * np.pi)), 0.0)
-    same = np.all(np.abs(gap - 2.0 * np.pi * turns) < MERGE, axis=-1)
+    same = np.all(np.abs(gap - 2.0 * np.pi * turns) < within, axis=-1)
     # a row equal to an earlier one goes
     S = q.shape[1]
     earlier = np.tril(np.ones((S, S), np.bool_), -1)
@@ -89,8 +91,10 @@ def merged(sigma: NDArray[np.int64], found: Found) -> Found:
     )
 
 
-def rows_of(found: Found, poses: NDArray[np.int64] | NDArray[np.bool_]) -> Found:
-    """What was found for some of the poses, shape (len(poses), S)."""
+def rows_of(
+    found: Found, poses: NDArray[np.int64] | NDArray[np.bool_] | tuple[NDArray[np.int64], ...]
+) -> Found:
+    """What was found for some of the poses."""
     return Found(
         found.q[poses], found.valid[poses], found.residual[poses], found.double[poses],
         found.free[poses], found.family[poses],

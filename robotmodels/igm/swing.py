@@ -92,7 +92,8 @@ class SwingSearch:
     def method(self) -> str:
         """The family in words."""
         others = next((solver.method for solver in self.inner if solver is not None), "no other")
-        return f"roots of the twist along joint {self.searched + 1}; {others}"
+        number = self.chain.columns[self.searched] + 1
+        return f"roots of the twist along joint {number}; {others}"
 
 
 def prepare_swing(chain: JointChain, components: Components, position: Prepare) -> Solver | None:
