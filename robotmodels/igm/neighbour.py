@@ -65,6 +65,9 @@ class Neighbour:
     deviation : float
         Largest distance of the two arms' poses at the same joint values, in units of the arm and
         radians: the scale of what can happen near singular postures.
+    abrupt : bool
+        Whether the neighbour's closed form ends without a best approach where its reach does: it
+        solves quadratics or quartics there.
     path : ndarray, shape (17, 7, 4, 4)
         Constants from the neighbour's to the arm's, lengths in ``unit``.
     """
@@ -76,6 +79,7 @@ class Neighbour:
     tilt: float
     unit: float
     deviation: float
+    abrupt: bool
     path: Array
 
     @property
@@ -143,6 +147,7 @@ arm and brought home by Newton steps
         tilt=change.tilt,
         unit=unit,
         deviation=deviation,
+        abrupt=_abrupt(plan),
         path=read_only(_path(change.D, slid, unit)),
     )
 
@@ -314,6 +319,24 @@ def _square(change: _Change, plan: LoopPlan) -> _Change | None:
     return simpler if simpler.small else None
 
 
+def _abrupt(plan: LoopPlan) -> bool:
+    """Whether the closed form solves more than equations of type 2."""
+    if plan.family is Family.PARALLEL:
+        square = (0.0, 0.0, 0.0)
+        if plan.slot not in (3, 4):
+            E, F = plan.constants[3], plan.constants[4]
+            square = (E[2, 2], F[2, 2], np.hypot(F[0, 3], F[1, 3]))
+        return plan.slot in (3, 4) or max(np.abs(square)) > 1e-9
+    if plan.sigma[:3].any():
+        return True
+    for place in (0, 1):
+        E = plan.constants[place]
+        beside = abs(E[0, 2] * E[1, 3] - E[1, 2] * E[0, 3])
+        if plan.slot != place and min(np.hypot(E[0, 2], E[1, 2]), beside) < 1e-9:
+            return False
+    return True
+
+
 def _poses(sigma: NDArray[np.int64], D: Array, q: Array) -> Array:
     """Tool in R_0, ``q (N, 6)``."""
     T = np.broadcast_to(D[0], (len(q), 4, 4))
@@ -389,6 +412,8 @@ def _solve(
         max(REACH * solver.deviation, 1e-7), _small(solver), min(JUMP * solver.deviation, 0.2),
         found, count, arrived, exact, doubtful, doubt,
     )  # fmt: skip
+    if solver.abrupt:
+        doubt |= finite & (there.sum(axis=1) < 8)
     chosen = np.flatnonzero(doubt)
     if chosen.size:
         part = _Search(
@@ -465,25 +490,31 @@ def _search(solver: Neighbour, U: Array, part: _Search, tolerances: Tolerances) 
     )  # fmt: skip
     _walk(solver, part, part.candidates, part.doubtful, tolerances)
     uneven = (part.count + part.double.sum(axis=1)) % 2 == 1
-    fewer = np.minimum(part.count, part.exact) < part.there.sum(axis=1)
-    chosen = np.flatnonzero(uneven | fewer)
+    own = part.there.sum(axis=1)
+    unsure = uneven | (np.minimum(part.count, part.exact) < own)
+    chosen = np.flatnonzero(unsure | (own < 8) if solver.abrupt else unsure)
     if chosen.size == 0:
         return
     rest = _Search(*(np.ascontiguousarray(array[chosen]) for array in part))
-    shifts = _shifts(solver)
-    aside = (shifts[:, None] @ U[chosen]).reshape(-1, 4, 4)
-    q, there = _candidates(solver, aside, np.tile(part.references[chosen], (len(shifts), 1)))
-    q = q.reshape(len(shifts), chosen.size, 8, 6).transpose(1, 0, 2, 3)
-    there = there.reshape(len(shifts), chosen.size, 8).transpose(1, 0, 2)
-    starts = np.ascontiguousarray(q.reshape(chosen.size, -1, 6))
-    open_ = np.ascontiguousarray(there.reshape(chosen.size, -1))
-    arrived = np.zeros_like(open_)
-    kernels.tried(
-        sigma, solver.path[-1], rest.goals, starts, open_, arrived, rest.found, rest.count
-    )
-    _walk(solver, rest, starts, open_ & ~arrived, tolerances)
+    starts, there = _aside(solver, U[chosen], rest.references)
+    # where the poses nearby have no more postures than the pose, there is no edge between
+    same = there.sum(axis=2) == own[chosen, None]
+    there[same & ~unsure[chosen, None]] = False
+    starts, there = starts.reshape(chosen.size, -1, 6), there.reshape(chosen.size, -1)
+    arrived = np.zeros_like(there)
+    kernels.tried(sigma, solver.path[-1], rest.goals, starts, there, arrived, rest.found, rest.count)
+    _walk(solver, rest, starts, there & ~arrived, tolerances)
     part.found[chosen], part.count[chosen] = rest.found, rest.count
     part.double[chosen], part.free[chosen] = rest.double, rest.free
+
+
+def _aside(solver: Neighbour, U: Array, references: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Postures of the neighbour at poses nearby, ``(N, 24, 8, 6)``, lengths in units of the arm."""
+    shifts = _shifts(solver)
+    aside = (U[:, None] @ shifts).reshape(-1, 4, 4)
+    scale = np.where(solver.chain.sigma == 1, solver.unit, 1.0)
+    q, there = _candidates(solver, aside, np.repeat(scale * references, len(shifts), axis=0))
+    return q.reshape(len(U), -1, 8, 6), there.reshape(len(U), -1, 8)
 
 
 def _walk(
@@ -505,7 +536,7 @@ def _walk(
 
 
 def _shifts(solver: Neighbour) -> Array:
-    """Small motions of the pose in R_0, some of which bring it into the neighbour's reach."""
+    """Small motions of the tool, some of which bring it into the neighbour's reach."""
     rng = np.random.default_rng(0)
     shifts = np.tile(np.eye(4), (ASIDE, 1, 1))
     for k in range(ASIDE):
