@@ -342,7 +342,9 @@ def _type_8(
         return None
     if not graph.is_constant(first[0]) or not graph.is_constant(first[2]):
         return None
-    values = (first[2], first[0], negative(first[4]), negative(second[4]))
+    sign = 1.0 if graph.values(first[2])[0] > 0 else -1.0
+    terms = (first[2], first[0], negative(first[4]), negative(second[4]))
+    values = tuple((sign * f, n) for f, n in terms)
     return Candidate(EquationType.TYPE_8, (i, j), values, pair, ())
 
 

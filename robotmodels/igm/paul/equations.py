@@ -128,10 +128,16 @@ class Arm:
         meaning = f"{column}{axis} of the tool"
         return self._constant(f"{column}{axis}E", f"{column}_{{{axis}E}}", value, meaning)
 
-    def _pose(self, q: Array) -> Array:
-        T = np.eye(4)
+    def frames(self, q: Array) -> list[Array]:
+        """Poses of the frames of the rows at a posture."""
+        T, out = np.eye(4), []
         for j, row in enumerate(self.form.rows):
             T = T @ _number(self.K[j], self.graph) @ _motion(q[j], row.sigma)
+            out.append(T)
+        return out
+
+    def _pose(self, q: Array) -> Array:
+        T = self.frames(q)[-1]
         return T if self.E is None else T @ _number(self.E, self.graph)
 
     def chain(self, start: int, stop: int) -> list[Item]:

@@ -1,0 +1,174 @@
+"""The inverse geometric model explained: the plan of Paul's method in words and formulas."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ...model import RobotModel
+from ..loop import JointChain
+from ..structure import Family, plan_loop
+from .catalogue import EquationType
+from .plan import PaulPlan, derive_plan
+from .wording import Wording
+
+
+@dataclass(frozen=True, slots=True)
+class ExplainedStep:
+    """One step of the derivation.
+
+    Parameters
+    ----------
+    joints : tuple of str
+        What it gives: ``("θ2", "θ3")``; a sum of angles as ``"θ2 + θ3 + θ4"``.
+    type : EquationType
+        Its type.
+    matrix_equation : str
+        The multiplication, such as ``"1T0 U0 = 1T6"``.
+    equations : tuple of str
+        Its elements that are used, each an equation.
+    formulas : tuple of str
+        The solution.
+    undetermined : str
+        Where the step has no single answer and what is done there; may be empty.
+    branches : int
+        Most solutions.
+    text, latex : str
+        All of it for people.
+
+    Examples
+    --------
+    >>> from robotmodels.igm.paul import explain_igm
+    >>> from robotmodels.robots import load
+    >>> explain_igm(load("lab_rr")).steps[1].formulas
+    ('θ2 = atan2(RL1 - Pz, C1*Px + S1*Py)',)
+    """
+
+    joints: tuple[str, ...]
+    type: EquationType
+    matrix_equation: str
+    equations: tuple[str, ...]
+    formulas: tuple[str, ...]
+    undetermined: str
+    branches: int
+    text: str
+    latex: str
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class InverseModelExplanation:
+    """How the inverse geometric model of a robot is derived, made by `explain_igm`.
+
+    Parameters
+    ----------
+    robot : str
+        Its name.
+    steps : tuple of ExplainedStep
+        In the order in which the joints are found.
+    complete : bool
+        Whether Paul's method gives all joints.
+    remaining : tuple of str
+        Variables that it does not give.
+    takes_over : str
+        The method that solves the arm where Paul's stops; empty if it does not stop.
+    plan : PaulPlan
+        The plan that is printed, the same that the kernel runs.
+    text, latex : str
+        The derivation; the LaTeX is a series of amsmath environments.
+
+    Examples
+    --------
+    >>> from robotmodels.igm.paul import explain_igm
+    >>> from robotmodels.robots import load
+    >>> explain_igm(load("crx10ia")).complete
+    False
+    """
+
+    robot: str
+    steps: tuple[ExplainedStep, ...]
+    complete: bool
+    remaining: tuple[str, ...]
+    takes_over: str
+    plan: PaulPlan
+    text: str
+    latex: str
+
+    def __str__(self) -> str:
+        return self.text
+
+    def __repr__(self) -> str:
+        found = "all joints" if self.complete else f"all but {', '.join(self.remaining)}"
+        return f"<InverseModelExplanation of {self.robot}: {found} by Paul's method>"
+
+    def _repr_latex_(self) -> str:
+        """What a notebook shows."""
+        return self.latex
+
+
+def explain_igm(model: RobotModel) -> InverseModelExplanation:
+    """Derive the inverse geometric model by Paul's method and explain it step by step.
+
+    Notation: ``U0`` is the desired pose, its elements ``sx nx ax Px`` and so on as in eq. [1.13];
+    ``sTp`` the pose of R_p in R_s. ``C1``, ``S1`` are cosine and sine of ``θ1``, ``C23`` of
+    ``θ2 + θ3`` (an ``m`` before a number subtracts). ``Dj`` and ``RLj`` are d and r of row j.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, any number of joints.
+
+    Returns
+    -------
+    InverseModelExplanation
+        Prints as the derivation; has the steps and ``.latex``.
+
+    Raises
+    ------
+    InvalidValueError
+        No joint moves the tool.
+
+    References
+    ----------
+    Seed book section 1.2.3.2, example 1.3 (its formula for S2 has a misprint that is put right
+    here); the exercise, eq. (4.9) and (4.13), whose ``arctan(y/x)`` loses the quadrant: atan2 is
+    used, and both solutions are kept.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> rx90 = explain_igm(load("rx90"))
+    >>> print("; ".join(rx90.steps[2].formulas))
+    θ4 = atan2(S1*ax - C1*ay, -C23*(C1*ax + S1*ay) - S23*az); θ4' = θ4 + π
+    """
+    plan = derive_plan(model)
+    words = Wording(plan)
+    steps = []
+    for number, step in enumerate(plan.steps):
+        told = words.step(number, step)
+        steps.append(
+            ExplainedStep(
+                told.names, step.type, told.matrix_equation, told.equations, told.formulas,
+                told.undetermined, step.type.branches, told.text, told.latex,
+            )
+        )  # fmt: skip
+    remaining = tuple(words.variable(j) for j in plan.remaining)
+    takes_over = "" if plan.complete else _successor(plan.chain)
+    text, latex = words.whole(model, [(s.text, s.latex) for s in steps], takes_over)
+    return InverseModelExplanation(
+        model.name, tuple(steps), plan.complete, remaining, takes_over, plan, text, latex
+    )
+
+
+def _successor(chain: JointChain) -> str:
+    """What solves an arm where Paul's method stops."""
+    if chain.k > 7:
+        return "locked joints (`lock` of `igm`), or the numeric solver `igm_numeric`"
+    if chain.k == 7:
+        return "the arm angle where shoulder and wrist are spherical, else a locked joint"
+    if chain.k < 6:
+        return "`igm`, which adds virtual joints to make six, or the numeric solver `igm_numeric`"
+    loop = plan_loop(chain)
+    if loop is None:
+        return "Raghavan and Roth's elimination, up to 16 postures"
+    if loop.family is Family.CONCURRENT:
+        return "Pieper's method: three axes meet, and a quartic gives one of the other joints"
+    return "the closed form of three parallel axes"
