@@ -6,8 +6,6 @@ arrays of ``ctraj`` and ``jtraj`` come from `cartesian_trajectory` and `joint_tr
 
 from .blends import blended_lines
 from .cartesian import (
-    PoseSamples,
-    PoseTrajectory,
     blended_poses,
     circle,
     circular_arc,
@@ -28,6 +26,7 @@ from .point_to_point import (
     trapezoidal,
 )
 from .polynomials import cubic, quintic
+from .pose_trajectory import PoseSamples, PoseTrajectory
 from .sampled import cartesian_trajectory, joint_trajectory
 from .splines import SplineEnds, cubic_spline, quintic_spline
 from .trajectory import Samples, Trajectory

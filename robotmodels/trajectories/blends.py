@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_floats
 from ..errors import InvalidValueError, ShapeError
+from .asked import ROUNDING, checked_limits, given_durations
 from .limits import MotionLimits
 from .piecewise import PiecewisePolynomial
-from .point_to_point import ROUNDING, checked_limits, given_durations
 from .trajectory import Trajectory
 
 PARABOLA, QUARTIC = 1.0, 1.5

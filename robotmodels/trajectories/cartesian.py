@@ -7,187 +7,24 @@ of the vectors of velocity and acceleration.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import se3
-from .._arrays import Array, as_exact, as_floats, read_only
+from .._arrays import Array, as_exact, as_floats
 from ..errors import InvalidValueError, ShapeError
+from .asked import ROUNDING, given_durations, limits_along
 from .blends import PARABOLA, QUARTIC, schedule
 from .laws import TimeLaw
 from .limits import MotionLimits
-from .paths import BlendedPoses, FixedAxisPath, PosePath, arc, line
+from .paths import BlendedPoses, FixedAxisPath, arc, line
 from .piecewise import PiecewisePolynomial
-from .point_to_point import ROUNDING, along_line, given_durations, limits_along
+from .point_to_point import along_line
+from .pose_trajectory import PoseTrajectory
 from .rotations import rotation_about, rotation_vector
 from .trajectory import Trajectory
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PoseSamples:
-    """A motion of the tool at given times. As an array (``np.asarray``) it is its poses.
-
-    Parameters
-    ----------
-    t : ndarray, shape (N,)
-        Times, s.
-    T : ndarray, shape (N, 4, 4)
-        World poses, m.
-    twist, acceleration : ndarray, shape (N, 6)
-        Velocity and acceleration ``[v; w]`` of the tool's origin, world axes, m and rad per s and
-        s^2.
-    """
-
-    t: Array
-    T: Array
-    twist: Array
-    acceleration: Array
-
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            object.__setattr__(self, field.name, read_only(getattr(self, field.name)))
-
-    def __len__(self) -> int:
-        return self.t.size
-
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
-        return np.array(self.T, dtype=dtype, copy=copy)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), tuple(getattr(self, field.name) for field in fields(self))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PoseTrajectory:
-    """Motion of the tool: a path in space and a law of time on it.
-
-    Parameters
-    ----------
-    path : PosePath
-        Pose for every value of its parameter.
-    law : Trajectory
-        The parameter at every time, scalar.
-    """
-
-    path: PosePath
-    law: Trajectory
-
-    @property
-    def duration(self) -> float:
-        """Seconds."""
-        return float(self.law.duration)
-
-    def pose(self, t: ArrayLike) -> Array:
-        """World poses.
-
-        Parameters
-        ----------
-        t : array_like, any shape
-            Times, s; the tool rests before and after the motion.
-
-        Returns
-        -------
-        ndarray, shape (*t.shape, 4, 4)
-            Poses, m.
-
-        Raises
-        ------
-        InvalidValueError
-            NaN, or a time outside of a motion that does not rest there.
-
-        Examples
-        --------
-        >>> from robotmodels.se3 import translation
-        >>> move = straight_line(np.eye(4), translation(0.2, 0, 0), duration=1.0)
-        >>> move.pose(0.5)[:3, 3]
-        array([0.1, 0. , 0. ])
-        """
-        s = self.law.q(t)
-        return self.path.poses(s.reshape(-1)).reshape(*s.shape, 4, 4)
-
-    def twist(self, t: ArrayLike) -> Array:
-        """Velocities; arguments and errors as `pose`.
-
-        Parameters
-        ----------
-        t : array_like, any shape
-            Times, s.
-
-        Returns
-        -------
-        ndarray, shape (*t.shape, 6)
-            ``[v; w]`` of the tool's origin, world axes, m/s and rad/s.
-        """
-        s, v = self.law.q(t), self.law.v(t)
-        return self.path.rates(s.reshape(-1))[0].reshape(*s.shape, 6) * v[..., None]
-
-    def acceleration(self, t: ArrayLike) -> Array:
-        """Accelerations; arguments and errors as `pose`.
-
-        Parameters
-        ----------
-        t : array_like, any shape
-            Times, s.
-
-        Returns
-        -------
-        ndarray, shape (*t.shape, 6)
-            Derivative of the twist, m/s^2 and rad/s^2.
-        """
-        s, v, a = self.law.q(t), self.law.v(t), self.law.a(t)
-        rate, change = (x.reshape(*s.shape, 6) for x in self.path.rates(s.reshape(-1)))
-        return rate * a[..., None] + change * (v * v)[..., None]
-
-    def at(self, t: ArrayLike) -> PoseSamples:
-        """Poses, twists and accelerations together.
-
-        Parameters
-        ----------
-        t : array_like, shape (N,)
-            Times, s.
-
-        Returns
-        -------
-        PoseSamples
-            With the times.
-
-        Raises
-        ------
-        ShapeError, InvalidValueError
-            Times of another shape; as `pose`.
-        """
-        times = as_floats(t, "t")
-        if times.ndim != 1:
-            raise ShapeError(f"t: expected shape (N,), got {times.shape}.")
-        return PoseSamples(times, self.pose(times), self.twist(times), self.acceleration(times))
-
-    def resample(self, samples: int | None = None, period: float | None = None) -> PoseSamples:
-        """The motion on a regular grid of time.
-
-        Parameters
-        ----------
-        samples : int, optional
-            How many, from 0 to the duration.
-        period : float, optional
-            Seconds between them instead, as in `Trajectory.resample`.
-
-        Returns
-        -------
-        PoseSamples
-            With the times.
-
-        Raises
-        ------
-        InvalidValueError
-            As `Trajectory.resample`.
-        """
-        return self.at(self.law.resample(samples, period).t)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.path, self.law)
 
 
 def straight_line(

@@ -33,12 +33,15 @@ class Followed(NamedTuple):
         Codes of `IGMStatus`.
     branch : ndarray of str, shape (N,)
         Labels.
+    reason : callable
+        What became of a pose, by its number, in a sentence.
     """
 
     q: Array
     reached: NDArray[np.bool_]
     status: NDArray[np.int8]
     branch: NDArray[np.str_]
+    reason: Callable[[int], str]
 
 
 def follow(
@@ -76,7 +79,7 @@ def follow(
     reached = np.zeros(N, np.bool_)
     reached[index] = True
     if index.size == 0:
-        return Followed(q, reached, status, branch)
+        return Followed(q, reached, status, branch, found.reason)
     revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
     postures, valid = found.q[index], found.valid[index]
     following = _following(postures, valid, revolute)
@@ -86,7 +89,7 @@ def follow(
     else:
         s = _best_start(postures, valid, found.within_limits[index], following, revolute)
     # postures with free joints depend on the reference: they are solved again from the one before
-    loose = found.free_joints[index].any(axis=-1)
+    loose: NDArray[np.bool_] = np.any(found.free_joints[index], axis=-1)
     after, again = following.tolist(), False
     picks = [s] * len(index)
     settled: dict[int, tuple[Array, str]] = {}
@@ -112,7 +115,49 @@ def follow(
     branch[index] = found.branch[index, picks]
     for k, (posture, label) in settled.items():
         q[index[k]], branch[index[k]] = posture, label
-    return Followed(q, reached, status, branch)
+    return Followed(q, reached, status, branch, found.reason)
+
+
+def follow_singly(
+    model: RobotModel,
+    N: int,
+    start: Array | None,
+    solve: Callable[[int, Array | None], IGMSolutions],
+) -> Followed:
+    """Solve pose by pose, each from the posture before: for arms with a choice of postures.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, n joints.
+    N : int
+        Number of poses.
+    start : ndarray, shape (n,), or None
+        Where the robot comes from.
+    solve : callable
+        Postures of one pose, by its number, with a reference or None.
+
+    Returns
+    -------
+    Followed
+        One posture of each pose that has any.
+    """
+    q, reached = np.full((N, model.n), np.nan), np.zeros(N, np.bool_)
+    status, labels, reasons = np.zeros(N, np.int8), [""] * N, [""] * N
+    before = start
+    for k in range(N):
+        one = solve(k, before)
+        status[k], reasons[k] = one.status, one.reason()
+        if not one.valid.any():
+            continue
+        s = 0
+        if before is not None:
+            revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
+            distance = posture_distance(one.q, before, revolute)
+            s = int(np.where(one.valid, distance, np.inf).argmin())
+        before = q[k] = one.q[s]
+        reached[k], labels[k] = True, str(one.branch[s])
+    return Followed(q, reached, status, np.array(labels, dtype=np.str_), reasons.__getitem__)
 
 
 def continuous(

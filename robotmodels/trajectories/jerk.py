@@ -14,18 +14,12 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array
 from ..errors import InvalidValueError
+from .asked import ROUNDING, checked_limits, given_durations, joint_vectors, limits_along
 from .laws import TimeLaw
 from .limits import MotionLimits
 from .piecewise import PiecewisePolynomial
-from .point_to_point import (
-    ROUNDING,
-    Synchronisation,
-    along_line,
-    checked_limits,
-    given_durations,
-    limits_along,
-)
-from .trajectory import Trajectory, joint_vectors
+from .point_to_point import Synchronisation, along_line
+from .trajectory import Trajectory
 
 _PHASES = 9  # two that bring a start back inside the limits, and seven
 _STATES = ("q0", "q1", "v0", "v1", "a0", "a1")

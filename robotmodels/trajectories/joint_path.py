@@ -18,11 +18,12 @@ from numpy.typing import ArrayLike, NDArray
 from .. import se3
 from .._arrays import Array, as_exact, as_floats, read_only
 from ..errors import InvalidValueError, ShapeError
+from ..geometry import FIXED
 from ..igm import IGMSolutions, igm
 from ..model import RobotModel
-from .cartesian import PoseTrajectory
-from .follow import Task, continuous, follow
+from .follow import Task, continuous, follow, follow_singly
 from .path_events import PathEvent, PathEventKind, path_events
+from .pose_trajectory import PoseTrajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,7 +117,7 @@ def joint_path(
     mask_axes: Literal["world", "tool"] = "world",
     position_tolerance: float = 1e-9,
     orientation_tolerance: float = 1e-9,
-    singular_below: float = 0.01,
+    singular_below: float = 0.002,
 ) -> JointPath:
     """Joint positions along poses, branch kept, with a report of what happens on the way.
 
@@ -199,16 +200,23 @@ def joint_path(
     def solve(targets: Array, near: Array | None) -> IGMSolutions:
         return igm(model, targets, near, mask, mask_axes, **tolerances)  # type: ignore[arg-type]
 
-    # without a reference postures come in the order of their branches
-    found = solve(T, None)
-    rows = follow(model, T, found, start, lambda i, near: solve(T[i], near))
+    asked = 6 if mask is None else int(np.count_nonzero(mask))
+    joints = model.table.sigma[np.asarray(model.table.path(model.tip)) - 1] != FIXED
+    found = None
+    if np.count_nonzero(joints) <= asked:
+        # without a reference postures come in the order of their branches
+        found = solve(T, None)
+    if found is not None and (found.q.shape[-2] > 1 or not found.method.startswith("numeric")):
+        rows = follow(model, T, found, start, lambda i, near: solve(T[i], near))
+    else:
+        rows = follow_singly(model, len(T), start, lambda i, near: solve(T[i], near))
     q = continuous(model, rows.q, rows.reached, start)
     task = Task(model, T, q, rows.reached, mask, mask_axes)
     if twists is not None and task.square:
         v = task.rates(twists)
     else:
         v = _differences(times, q, rows.reached)
-    events = list(path_events(model, times, q, v, rows, found, task, singular_below))
+    events = list(path_events(model, times, q, v, rows, task, singular_below))
     if motion is not None:
         known = partial(_reached, motion, lambda pose: solve(pose, start))
         events = [_located(event, times, known) for event in events]

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
-from ..igm import IGMSolutions
 from ..model import RobotModel
 from .follow import Followed, Task
 
@@ -74,7 +73,6 @@ def path_events(
     q: Array,
     v: Array,
     rows: Followed,
-    found: IGMSolutions,
     task: Task,
     singular_below: float,
 ) -> Iterator[PathEvent]:
@@ -90,8 +88,6 @@ def path_events(
         Postures and velocities, rad or m, and per s; NaN where there is none.
     rows : Followed
         Which postures were taken.
-    found : IGMSolutions
-        All postures.
     task : Task
         The Jacobians on the way.
     singular_below : float
@@ -110,7 +106,7 @@ def path_events(
             text = detail(first, last)
             events.append(PathEvent(kind, first, last, times[first], times[last], text))
 
-    report(PathEventKind.OUT_OF_REACH, ~reached, lambda i, _: found.reason(i))
+    report(PathEventKind.OUT_OF_REACH, ~reached, lambda i, _: rows.reason(i))
     with np.errstate(invalid="ignore"):
         slack = 1e-9
         over = np.maximum(q - model.upper, model.lower - q)

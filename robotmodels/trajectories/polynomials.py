@@ -7,11 +7,12 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array
 from ..errors import InvalidValueError
+from .asked import ROUNDING, checked_limits, given_durations, joint_vectors, refuse_short
 from .laws import TimeLaw
 from .limits import MotionLimits
 from .piecewise import PiecewisePolynomial
-from .point_to_point import ROUNDING, along_line, checked_limits, given_durations, refuse_short
-from .trajectory import Trajectory, joint_vectors
+from .point_to_point import along_line
+from .trajectory import Trajectory
 
 
 def cubic(

@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_floats
 from ..errors import InvalidValueError, ShapeError
+from .asked import ROUNDING, checked_limits
 from .limits import MotionLimits
 from .piecewise import PiecewisePolynomial
-from .point_to_point import ROUNDING, checked_limits
 from .trajectory import Trajectory
 
 

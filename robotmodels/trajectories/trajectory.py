@@ -341,35 +341,3 @@ class Trajectory:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.motion, self.scalar, self.repeats, self.holds)
-
-
-def joint_vectors(**given: Any) -> tuple[dict[str, Array], tuple[int, ...], bool]:
-    """Check positions and rates given for the same joints and give them one shape.
-
-    Parameters
-    ----------
-    **given : array_like, shapes () or (..., n)
-        Named as in error messages. Numbers stand for all joints; if all are numbers, there is one
-        joint and the trajectory is scalar.
-
-    Returns
-    -------
-    arrays : dict of ndarray, shapes (R, n)
-        Broadcast, one row per motion.
-    batch : tuple of int
-        The leading axes.
-    scalar : bool
-        Whether all were numbers.
-    """
-    from ..errors import ShapeError
-
-    arrays = {name: as_floats(value, name) for name, value in given.items()}
-    scalar = all(array.ndim == 0 for array in arrays.values())
-    try:
-        shape = np.broadcast_shapes((1,), *(array.shape for array in arrays.values()))
-    except ValueError:
-        got = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
-        raise ShapeError(f"Expected vectors of the same joints, got {got}.") from None
-    n = shape[-1]
-    rows = {k: np.broadcast_to(v, shape).reshape(-1, n) for k, v in arrays.items()}
-    return rows, shape[:-1], scalar
