@@ -15,6 +15,7 @@ Flags = NDArray[np.bool_]
 
 CLOSE = 1e-6  # postures as near as this in every joint are the same [rad, m]
 ON_PATH = 1e-12  # what may be missing of the pose on the way between two that are the same [m, rad]
+FLAT = 1e-7  # smallest singular value of the Jacobian on an infinite family
 ON_FAMILY = 1e-9  # the same on the way along an infinite family
 DAMPING = (1e-5, 1e-5, 1e-7, 1e-7, 1e-9, 1e-9, 1e-11, 1e-11)
 """Of the steps that keep a pose: singular directions are used where the others do not suffice."""
@@ -78,6 +79,10 @@ def joined(model: rm.RobotModel, T: Array, a: Array, b: Array, most: float, step
         alive[rows] = residual(model, T[rows], trial) <= most
         # from one isolated posture to another is one whole jump
         alive[rows] &= step <= length[rows] / 3.0
+        if k == steps // 4:
+            # held back
+            left = np.linalg.norm(difference(model, b[rows], trial), axis=1)
+            alive[rows] &= left < 0.97 * length[rows]
     return alive & (np.abs(difference(model, at, b)).max(axis=1, initial=0.0) < 1e-5)
 
 
@@ -99,7 +104,9 @@ def given_back(model: rm.RobotModel, T: Array, q: Array, rows: Array, valid: Fla
 def branch_given_back(model: rm.RobotModel, T: Array, q: Array, rows: Array, valid: Flags) -> Flags:
     """Whether ``q``, or another member of its infinite family, is among the rows."""
     there = given_back(model, T, q, rows, valid)
-    return _or_joined(model, T, q, rows, valid, there, ON_FAMILY, 120)
+    # families have a direction in which the tool stays at rest
+    flat = np.linalg.svd(rm.jacobian(model, q), compute_uv=False)[:, -1] < FLAT
+    return _or_joined(model, T, q, rows, valid & flat[:, None], there, ON_FAMILY, 80)
 
 
 def _or_joined(

@@ -8,10 +8,12 @@ robot's own direct model, or it does not enter.
 from __future__ import annotations
 
 import importlib
+import platform
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -83,6 +85,17 @@ def versions() -> dict[str, str]:
         except PackageNotFoundError:
             found[package] = "not installed"
     return found
+
+
+def machine() -> dict[str, str]:
+    """What the figures were measured on, and with which versions."""
+    cpu = platform.processor() or platform.machine()
+    info = Path("/proc/cpuinfo")
+    if info.exists():
+        names = [line for line in info.read_text().splitlines() if line.startswith("model name")]
+        cpu = names[0].partition(":")[2].strip() if names else cpu
+    system, python = platform.system(), platform.python_version()
+    return {"cpu": cpu, "system": system, "python": python, **versions()}
 
 
 def frames_at_zero(model: rm.RobotModel) -> Array:

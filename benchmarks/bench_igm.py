@@ -1,0 +1,384 @@
+"""Speed of the closed-form inverse models beside their peers, in one run.
+
+    python benchmarks/bench_igm.py [--out benchmarks/results] [--rounds 15] [--slow]
+
+Contestants of a row take turns, round after round, so that a drifting machine is fair to all of
+them; the figures are medians in microseconds a pose. Every peer is told the same arm (those with
+arms of their own solve poses of these) and has to give back random postures before it enters.
+Peers that are not installed are named and left out (`pip install eaik ssik ik-geo
+ur-analytic-ik roboticstoolbox-python`). `--slow` adds ssik's preparation of a general arm of one's
+own, which takes minutes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import igm_arms
+import igm_peers
+import numpy as np
+from igm_peers import Peer, machine, peers_of
+from numpy.typing import NDArray
+
+import robotmodels as rm
+from robotmodels.igm.closed_form import MOST, SLACK, ClosedForm
+from robotmodels.igm.families import prepare
+from robotmodels.igm.loop import joint_chain
+from robotmodels.igm.solver import Tolerances, postures
+from robotmodels.igm.structure import Family
+
+Array = NDArray[np.float64]
+
+FEW, BATCH = 200, 100_000
+THOUSAND = 1000
+STRUCTURED = ("puma560", "rx90", "irb6640", "kr6_r900", "ur5", "ur5e")
+OURS = "robotmodels"
+BENEATH = "robotmodels, family beneath rm.igm"
+KERNEL = "robotmodels, kernels alone"
+
+
+@dataclass(frozen=True)
+class Contestant:
+    """One way to do the work of a row; ``weight`` times slower, ``rounds`` are so many fewer."""
+
+    name: str
+    run: Callable[[], object]
+    poses: int
+    once: bool = False
+
+
+@dataclass(frozen=True)
+class Row:
+    """A line of the table: medians in microseconds a pose, and the goals that were set."""
+
+    work: str
+    microseconds: dict[str, float]
+    goal: str
+    met: bool | None
+
+
+def measure(contestants: list[Contestant], rounds: int) -> dict[str, float]:
+    """Median time of each contestant, taking turns."""
+    times: dict[str, list[float]] = {c.name: [] for c in contestants}
+    for c in contestants:
+        if not c.once:
+            c.run()  # compile, page in
+    for r in range(rounds):
+        for c in contestants:
+            if c.once and r:
+                continue
+            start = time.perf_counter()
+            c.run()
+            times[c.name].append((time.perf_counter() - start) / c.poses * 1e6)
+    return {name: float(np.median(values)) for name, values in times.items()}
+
+
+def row(work: str, us: dict[str, float], goals: dict[str, float]) -> Row:
+    """A line with its goals, each for one contestant."""
+    print(f"{work}: " + "; ".join(f"{name} {value:.2f}" for name, value in us.items()), flush=True)
+    text = ", ".join(
+        f"<= {goal:g} us" + (" in the kernels" if name == KERNEL else "")
+        for name, goal in goals.items()
+    )
+    met = all(us[name] <= goal for name, goal in goals.items()) if goals else None
+    return Row(work, us, text, met)
+
+
+def loop(call: Callable[[Array], object], poses: Array) -> Callable[[], None]:
+    """One call a pose."""
+
+    def run() -> None:
+        for T in poses:
+            call(T)
+
+    return run
+
+
+def reachable(model: rm.RobotModel, count: int, seed: int = 0) -> Array:
+    """Poses of random postures over whole turns."""
+    rng = np.random.default_rng(seed)
+    low, high = -np.pi * np.ones(model.n), np.pi * np.ones(model.n)
+    slides = model.table.sigma[model.table.joint_rows] == 1
+    low[slides], high[slides] = -0.5, 0.5
+    return rm.dgm(model, rng.uniform(low, high, (count, model.n)))
+
+
+def single_peer(peer: Peer, n: int) -> Contestant:
+    """A peer on poses of its own direct model."""
+    q = np.random.default_rng(0).uniform(-np.pi, np.pi, (FEW, n))
+    return Contestant(peer.name, loop(peer.solve, np.array([peer.direct(x) for x in q])), FEW)
+
+
+# --- what stands beneath rm.igm -------------------------------------------------------------------
+
+
+def beneath(model: rm.RobotModel, T: Array) -> Callable[[], object]:
+    """The prepared family on the poses of one call."""
+    chain = joint_chain(model)
+    solver = prepare(chain)
+    assert solver is not None
+    U = np.ascontiguousarray(np.linalg.inv(chain.base) @ T)
+    references = np.zeros((len(T), chain.k))
+    return lambda: postures(solver, U, references, Tolerances())
+
+
+def kernels(model: rm.RobotModel, T: Array) -> Callable[[], object] | None:
+    """The compiled closed form and its check on buffers that are kept, without any Python between.
+
+    None for arms of other families.
+    """
+    from robotmodels.igm._concurrent import concurrent_postures
+    from robotmodels.igm._parallel import parallel_postures
+    from robotmodels.igm._verify import verified_postures
+
+    chain = joint_chain(model)
+    solver = prepare(chain)
+    if not isinstance(solver, ClosedForm):
+        return None
+    plan = solver.plan
+    U = np.ascontiguousarray(np.linalg.inv(chain.base) @ T)
+    N = len(T)
+    found, marks, counts = np.zeros((N, MOST, 6)), np.zeros((N, MOST), np.int64), np.zeros(N, int)
+    q, valid = np.full((N, MOST, 6), np.nan), np.zeros((N, MOST), np.bool_)
+    free, references = np.zeros((N, MOST, 6), np.bool_), np.zeros((N, 6))
+    first = np.ascontiguousarray(plan.sigma[:3])
+    pose = (U, plan.constants, plan.slot, plan.left, plan.right, int(plan.inverted))
+
+    def run() -> None:
+        if plan.family is Family.CONCURRENT:
+            concurrent_postures(
+                *pose, first, int(plan.backwards), plan.meeting, plan.size, SLACK, references,
+                found, marks, counts,
+            )  # fmt: skip
+        else:
+            parallel_postures(*pose, plan.size, SLACK, references, found, marks, counts)
+        verified_postures(
+            U, chain.sigma, chain.D, plan.order, plan.sense, 1e-9, found, marks, counts, q, valid,
+            free,
+        )  # fmt: skip
+
+    return run
+
+
+# --- rows ----------------------------------------------------------------------------------------
+
+
+def structured_rows(rounds: int) -> list[Row]:
+    """All eight postures of arms with a spherical wrist, and of UR arms."""
+    rows = []
+    for name in STRUCTURED:
+        model = rm.load(name)
+        T = reachable(model, BATCH)
+        few, thousand = T[:FEW], np.ascontiguousarray(T[:THOUSAND])
+        peers = peers_of(model, name)
+        contestants = [Contestant(OURS, loop(lambda x, m=model: rm.igm(m, x), few), FEW)]
+        contestants.append(Contestant(BENEATH, _one_by_one(model, few), FEW))
+        alone = kernels(model, thousand)
+        if alone is not None:
+            contestants.append(Contestant(KERNEL, alone, THOUSAND))
+        contestants += [single_peer(peer, model.n) for peer in peers]
+        us = measure(contestants, rounds)
+        goals = {OURS: 12.0} | ({KERNEL: 3.0} if alone is not None else {})
+        rows.append(row(f"{name}: all postures, one pose", us, goals))
+        for poses in (thousand, T):
+            contestants = [
+                Contestant(OURS, lambda m=model, x=poses: rm.igm(m, x), len(poses)),
+                Contestant(BENEATH, beneath(model, poses), len(poses)),
+            ]
+            contestants += [
+                Contestant(f"{p.name}, batch", lambda p=p, x=poses: p.batch(x), len(poses))
+                for p in peers
+                if p.batch is not None
+            ]
+            us = measure(contestants, rounds if len(poses) < BATCH else max(rounds // 3, 3))
+            rows.append(row(f"{name}: all postures, batch of {len(poses)}", us, {OURS: 2.5}))
+    return rows
+
+
+def _one_by_one(model: rm.RobotModel, poses: Array) -> Callable[[], None]:
+    chain = joint_chain(model)
+    solver = prepare(chain)
+    assert solver is not None
+    U = np.ascontiguousarray(np.linalg.inv(chain.base) @ poses)[:, None]
+    references = np.zeros((1, chain.k))
+    return loop(lambda x: postures(solver, x, references, Tolerances()), U)
+
+
+def general_rows(rounds: int, slow: bool) -> list[Row]:
+    """Up to sixteen postures of arms without a closed form."""
+    rows = []
+    arms = {
+        "crx10ia": rm.load("crx10ia"),
+        "xarm6": rm.load("xarm6"),
+        "Manocha and Canny's arm": igm_arms.manocha_canny(),
+        "a random 6R arm": igm_arms.random_arm(0),
+    }
+    for name, model in arms.items():
+        T = reachable(model, THOUSAND)
+        contestants = [
+            Contestant(f"{OURS}, batch of {THOUSAND}", lambda m=model, x=T: rm.igm(m, x), THOUSAND),
+            Contestant(OURS, loop(lambda x, m=model: rm.igm(m, x), T[:FEW]), FEW),
+        ]
+        contestants += [single_peer(peer, model.n) for peer in peers_of(model, name)]
+        us = measure(contestants, max(rounds // 3, 3))
+        goals = {f"{OURS}, batch of {THOUSAND}": 450.0}
+        rows.append(row(f"{name}: up to 16 postures", us, goals))
+    fresh = (igm_arms.random_arm(seed) for seed in range(1000, 2000))
+
+    def new_robot() -> None:
+        model = next(fresh)
+        rm.igm(model, igm_peers.model_pose(model))
+
+    contestants = [Contestant(OURS, new_robot, 1)]
+    if slow and igm_peers.module("ssik") is not None:
+        model = igm_arms.random_arm(999)
+
+        def theirs() -> None:
+            arm = igm_peers.ssik_arm(model)
+            arm.prepare()
+            arm.solve(igm_peers.model_pose(model), **igm_peers.SSIK)
+
+        contestants.append(Contestant("ssik, own robot", theirs, 1, once=True))
+    us = measure(contestants, max(rounds // 3, 3))
+    rows.append(row("a new general 6R arm: the first call, preparation included", us, {OURS: 2e6}))
+    return rows
+
+
+def arm_angle_rows(rounds: int) -> list[Row]:
+    """S-R-S arms: the eight postures for each arm angle."""
+    model = rm.load("iiwa14")
+    T = reachable(model, THOUSAND)
+    angles = np.linspace(-np.pi, np.pi, 16, endpoint=False)
+    contestants = [
+        Contestant(
+            f"{OURS}, {THOUSAND} poses x 16 angles",
+            lambda: rm.igm(model, T, arm_angle=angles), 16 * THOUSAND,
+        ),
+        Contestant(
+            f"{OURS}, one pose x 16 angles",
+            loop(lambda x: rm.igm(model, x, arm_angle=angles), T[:FEW]), 16 * FEW,
+        ),
+        Contestant(
+            f"{OURS}, one pose, one angle",
+            loop(lambda x: rm.igm(model, x, arm_angle=0.3), T[:FEW]), FEW,
+        ),
+    ]  # fmt: skip
+    peer = igm_peers.module("ssik")
+    if peer is not None:
+        arm = peer.Manipulator.from_prebuilt("iiwa14")
+        poses = T[:FEW]
+        found = np.median([len(arm.solve(x, **igm_peers.SSIK)) for x in poses[:20]])
+        contestants.append(
+            Contestant(
+                f"ssik, prebuilt, one pose, {found:.0f} postures",
+                loop(lambda x: arm.solve(x, **igm_peers.SSIK), poses),
+                FEW * max(round(found / 8), 1),
+            )
+        )
+    us = measure(contestants, rounds)
+    goals = {f"{OURS}, {THOUSAND} poses x 16 angles": 5.0}
+    return [row("iiwa14: eight postures for one arm angle", us, goals)]
+
+
+def other_rows(rounds: int) -> list[Row]:
+    """Calibrated neighbours of structured arms, and arms of five and three joints."""
+    rows = []
+    for name in ("puma560", "ur5e"):
+        model = igm_arms.calibrated(rm.load(name), 1e-3, 2e-3, np.random.default_rng(0))
+        T = reachable(model, THOUSAND)
+        contestants = _both(model, T)
+        contestants += [single_peer(peer, model.n) for peer in peers_of(model)]
+        us = measure(contestants, max(rounds // 3, 3))
+        rows.append(row(f"{name}, calibrated (1 mm, 2 mrad off)", us, {}))
+    arms = {
+        "xarm5": rm.load("xarm5"),
+        "the first five joints of the rx90": igm_arms.first_joints(rm.load("rx90"), 5),
+        "the first three joints of the puma560": igm_arms.first_joints(rm.load("puma560"), 3),
+        "the laboratory's TRR": rm.load("lab_trr"),
+    }
+    for name, model in arms.items():
+        T = reachable(model, THOUSAND)
+        contestants = _both(model, T)
+        peers = peers_of(model, name)
+        contestants += [single_peer(peer, model.n) for peer in peers]
+        us = measure(contestants, max(rounds // 3, 3))
+        rows.append(row(f"{name}: all postures", us, {}))
+    return rows
+
+
+def _both(model: rm.RobotModel, T: Array) -> list[Contestant]:
+    return [
+        Contestant(OURS, loop(lambda x: rm.igm(model, x), T[:FEW]), FEW),
+        Contestant(f"{OURS}, batch of {len(T)}", lambda: rm.igm(model, T), len(T)),
+    ]
+
+
+# --- report --------------------------------------------------------------------------------------
+
+
+def report(rows: list[Row], about: dict[str, str], rounds: int) -> str:
+    """The results as Markdown, with ratios to ours."""
+    lines = ["# Closed-form inverse models: measured side by side", ""]
+    lines += [f"- {key}: {value}" for key, value in about.items()]
+    lines += [
+        "",
+        f"Medians of {rounds} rounds (fewer for the long rows) in us a pose, one thread; in "
+        "brackets the ratio to ours, the first of the row. Poses are those of random postures "
+        "over whole turns; EAIK's batches are asked of one thread; ssik is asked for every branch "
+        "once, without limits; `prebuilt` arms are ssik's own, with its native code.",
+        "",
+        "| work | ours | beneath it | others | goal | met |",
+        "|---|---|---|---|---|---|",
+    ]
+    for r in rows:
+        names = list(r.microseconds)
+        first = r.microseconds[names[0]]
+        own = [name for name in names[1:] if name.startswith(OURS)]
+        beneath = "; ".join(f"{_short(name)} {r.microseconds[name]:.2f}" for name in own)
+        others = "; ".join(
+            f"{name} {r.microseconds[name]:.1f} ({r.microseconds[name] / first:.1f}x)"
+            for name in names
+            if not name.startswith(OURS)
+        )
+        met = "" if r.met is None else ("yes" if r.met else "no")
+        label = _short(names[0])
+        ours = f"{first:.2f}" + ("" if names[0] == OURS else f" ({label})")
+        lines.append(f"| {r.work} | {ours} | {beneath} | {others} | {r.goal} | {met} |")
+    return "\n".join(lines) + "\n"
+
+
+def _short(name: str) -> str:
+    return name.removeprefix(OURS).removeprefix(", ") or "one by one"
+
+
+def main() -> None:
+    """Measure, print and keep the results."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
+    parser.add_argument("--rounds", type=int, default=15)
+    parser.add_argument(
+        "--slow", action="store_true", help="ssik's minutes for a robot of one's own"
+    )
+    arguments = parser.parse_args()
+    missing = igm_peers.absent()
+    if missing:
+        print(f"Not installed, so left out: {', '.join(missing)}.")
+    rows = structured_rows(arguments.rounds)
+    rows += general_rows(arguments.rounds, arguments.slow)
+    rows += arm_angle_rows(arguments.rounds) + other_rows(arguments.rounds)
+    about = machine()
+    text = report(rows, about, arguments.rounds)
+    print(text)
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    (arguments.out / "igm.md").write_text(text, encoding="utf-8")
+    kept = {"machine": about, "rows": [asdict(r) for r in rows]}
+    (arguments.out / "igm.json").write_text(json.dumps(kept, indent=2) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
