@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._arrays import Array
 from .alike import prepare_alike
@@ -56,7 +57,7 @@ class DependentJoints:
         return f"joint {number} at its reference; {self.first.method}"
 
 
-def dependent_joint(J: Array, choose: Array) -> int | None:
+def dependent_joint(J: Array, choose: NDArray[np.bool_]) -> int | None:
     """The first joint that may be held without the tool losing a direction; None if all count.
 
     Parameters
@@ -162,11 +163,11 @@ def _(solver: DependentJoints, U: Array, references: Array, tolerances: Toleranc
             break
         # around the reference, so that equal references share chains
         part = _at(solver, wanted[empty] + step, U[empty], references[empty], tolerances)
-        there = part.valid.any(axis=1)
+        there = np.flatnonzero(part.valid.any(axis=1))
         rest = np.setdiff1d(np.arange(N), empty[there])
         new = empty[there], rows_of(part, there)
         out = assembled(N, solver.chain.k, [(rest, rows_of(out, rest)), new])
-        empty = empty[~there]
+        empty = np.delete(empty, there)
     return out
 
 

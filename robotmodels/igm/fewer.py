@@ -31,6 +31,7 @@ TESTS = 32  # random postures of the self-test
 TRIED = 12  # extensions with a closed form that are tested, best conditioned first
 TRIED_LOOSE = 4  # the same of those without, which take a second each to prepare
 SINGULAR = 1e-6  # singular values of the Jacobian beside the largest that count as zero
+EXACT = 1e-8  # tolerances up to which every extension has the postures near its folds
 SAME = 30.0  # postures that differ by so many tolerances are one
 LOOSER = 30.0  # tolerances of the extended arm beside those of the call
 ROUGH = 1e-2  # how far virtual joints may be from zero before the posture is improved
@@ -140,7 +141,8 @@ def _(solver: FewerJoints, U: Array, references: Array, tolerances: Tolerances) 
             break
         part, unsure = _one_way(solver, way, U[asked], references[asked], tolerances)
         gathered = _joined(gathered, asked, part)
-        doubt[asked] = unsure
+        # what is off by more than rounding may miss a fold of this extension and not of others
+        doubt[asked] = unsure | (max(tolerances) > EXACT)
     found = checked(
         chain, U, gathered.q, gathered.valid, tolerances, double=np.zeros_like(gathered.valid),
         rough=_rough(tolerances),
@@ -261,13 +263,19 @@ def _chosen(
         if worth > -6.0:
             ranked.append((worth, layout, longer, places))
     ranked.sort(key=lambda row: -row[0])
+    # the best of every kind first: others like it are singular in much the same postures
+    first: dict[tuple[Triple, int, int, int], int] = {}
+    for place, row in enumerate(ranked):
+        first.setdefault(row[1][:4], place)
+    leaders = set(first.values())
+    ranked = [row for i, row in enumerate(ranked) if i in leaders] + [
+        row for i, row in enumerate(ranked) if i not in leaders
+    ]
     U = tool_poses(chain, q)
     ways: list[Extension] = []
-    taken: list[tuple[Triple, int, int, int]] = []
     for _, layout, longer, places in ranked:
-        kind = layout[:4]
-        if kind in taken or tried == 0 or len(ways) == WAYS:
-            continue
+        if tried == 0 or len(ways) == WAYS:
+            break
         if layout.triple is not Triple.ANY and plan_loop(longer) is None:
             continue
         tried -= 1
@@ -276,7 +284,6 @@ def _chosen(
             continue
         way = Extension(solver, places, layout)
         if _gives_back(FewerJoints(chain, (way,), length), U, q):
-            taken.append(kind)
             ways.append(way)
     return ways
 
