@@ -13,10 +13,19 @@ import numpy as np
 from numba import types
 
 from ...kernels._compile import MATRIX, OUT2, OUT3, STACK, VECTOR, Floats, Ints, compiled
+from ._pairs import two_angles, type_4, type_5, type_8
 from ._types import (
-    FREE_1, FREE_2, atan2, polynomial, quartic, two_angles, type_1, type_2, type_2_zero,
-    type_3, type_3_direct, type_4, type_5, type_8,
-)  # fmt: skip
+    FREE_1,
+    FREE_2,
+    atan2,
+    polynomial,
+    quartic,
+    type_1,
+    type_2,
+    type_2_zero,
+    type_3,
+    type_3_direct,
+)
 
 STEP = 24
 MOST_STEPS = 8
@@ -30,7 +39,9 @@ _MARKS = types.Array(types.int64, 2, "C")
 
 
 @compiled()
-def operate(plan: Ints, numbers: Floats, at: int, of: int, start: int, stop: int, x: Floats) -> None:
+def operate(
+    plan: Ints, numbers: Floats, at: int, of: int, start: int, stop: int, x: Floats
+) -> None:
     """``x_d = f x_a x_b + g x_c x_e`` for a range of operations and every lane."""
     lanes = x.shape[1]
     for i in range(start, stop):
@@ -45,8 +56,18 @@ def operate(plan: Ints, numbers: Floats, at: int, of: int, start: int, stop: int
 
 
 @compiled()
-def solve(plan: Ints, at: int, x: Floats, lane: int, slack: float, zero: float, small: float,
-          wanted: Floats, found: Floats, o: int) -> tuple[int, int]:  # fmt: skip
+def solve(
+    plan: Ints,
+    at: int,
+    x: Floats,
+    lane: int,
+    slack: float,
+    zero: float,
+    small: float,
+    wanted: Floats,
+    found: Floats,
+    o: int,
+) -> tuple[int, int]:
     """Solutions of one step from the coefficients in the registers."""
     code = plan[at]
     first, second = wanted[plan[at + 7], lane], wanted[plan[at + 8], lane]
@@ -81,8 +102,9 @@ def solve(plan: Ints, at: int, x: Floats, lane: int, slack: float, zero: float, 
 
 
 @compiled()
-def solve_lanes(plan: Ints, at: int, x: Floats, small: float, found: Floats, o: int, weak: Ints
-                ) -> int:  # fmt: skip
+def solve_lanes(
+    plan: Ints, at: int, x: Floats, small: float, found: Floats, o: int, weak: Ints
+) -> int:
     """The two commonest types in vector code, for lanes whose amplitude is not small.
 
     Returns the number of solutions, 0 for other types; ``weak`` marks lanes that `solve` must do.
@@ -115,8 +137,9 @@ def solve_lanes(plan: Ints, at: int, x: Floats, small: float, found: Floats, o: 
 
 
 @compiled()
-def errors_of(plan: Ints, results: int, x: Floats, numbers: Floats, lever: int, errors: Floats
-              ) -> None:  # fmt: skip
+def errors_of(
+    plan: Ints, results: int, x: Floats, numbers: Floats, lever: int, errors: Floats
+) -> None:
     """The larger of the tool's position error [m] and the rotation angle [rad], of every lane.
 
     ``results`` is where the registers of the twelve elements of both sides stand.
@@ -184,8 +207,9 @@ def run_plan(
 
     ``plan`` and ``numbers`` are a `Program` in two arrays. ``tolerances``: overshoot beside the
     amplitude that counts as a double root, amplitudes that are zero and that are small beside
-    their usual size, largest error accepted [m, rad]. Row n of ``marks (N, 2 + 2 S)``: number of postures, flags of the
-    pose, and of each posture the bits of free unknowns and of the branches taken.
+    their usual size, largest error accepted [m, rad]. Row n of ``marks (N, 2 + 2 S)``: number of
+    postures, flags of the pose, and of each posture the bits of free unknowns and of the branches
+    taken.
     """
     k, m, at_steps, at_starts = int(plan[0]), int(plan[1]), int(plan[2]), int(plan[3])
     at_operations, at_results, at_sigma = int(plan[4]), int(plan[5]), int(plan[6])
@@ -272,7 +296,16 @@ def run_plan(
                         widest[level] = max(widest[level], common)
                         continue
                     solutions, flag = solve(
-                        plan, step, x, lane, tolerances[0], zero, small, wanted, found, 24 * level
+                        plan,
+                        step,
+                        x,
+                        lane,
+                        tolerances[0],
+                        zero,
+                        small,
+                        wanted,
+                        found,
+                        24 * level,
                     )
                     number[level, lane], flags[level, lane] = solutions, flag
                     marks[start + lane, 1] |= flag

@@ -1,10 +1,11 @@
 """Solutions of the equations of Paul's catalogue.
 
-Every function writes up to four solutions to a column of ``found``, six rows for each: value, cosine
-and sine of the first unknown (a length has its value and 1, 0), then of the second. It returns how
-many and a bit field: 1 double root or overshoot, 2 first unknown free, 4 second unknown free, 8 small amplitude.
-What is free takes its reference. ``slack`` is the overshoot beside the amplitude that still counts
-as a double root; ``small`` the amplitude beside which rounding of the coefficients shows.
+Every function writes up to four solutions to a column of ``found``, six rows for each: value,
+cosine and sine of the first unknown (a length has its value and 1, 0), then of the second. It
+returns how many and a bit field: 1 double root or overshoot, 2 first unknown free, 4 second unknown
+free, 8 small amplitude. What is free takes its reference. ``slack`` is the overshoot beside the
+amplitude that still counts as a double root; ``small`` the amplitude beside which rounding of the
+coefficients shows.
 """
 
 from __future__ import annotations
@@ -53,8 +54,9 @@ def atan2(y: float, x: float) -> float:
 
 
 @compiled()
-def put_angle(found: Floats, o: int, i: int, at: int, lane: int, value: float, C: float, S: float
-              ) -> None:  # fmt: skip
+def put_angle(
+    found: Floats, o: int, i: int, at: int, lane: int, value: float, C: float, S: float
+) -> None:
     """Solution i of an angle."""
     row = o + 6 * i + at
     found[row, lane], found[row + 1, lane], found[row + 2, lane] = value, C, S
@@ -73,8 +75,16 @@ def put_length(found: Floats, o: int, i: int, at: int, lane: int, value: float) 
 
 
 @compiled()
-def type_1(X: float, Y: float, zero: float, small: float, reference: float, found: Floats, o: int, lane: int
-           ) -> tuple[int, int]:  # fmt: skip
+def type_1(
+    X: float,
+    Y: float,
+    zero: float,
+    small: float,
+    reference: float,
+    found: Floats,
+    o: int,
+    lane: int,
+) -> tuple[int, int]:
     """``X r = Y``."""
     if abs(X) <= zero:
         put_length(found, o, 0, 0, lane, reference)
@@ -84,8 +94,16 @@ def type_1(X: float, Y: float, zero: float, small: float, reference: float, foun
 
 
 @compiled()
-def type_2_zero(X: float, Y: float, zero: float, small: float, reference: float, found: Floats, o: int, lane: int
-                ) -> tuple[int, int]:  # fmt: skip
+def type_2_zero(
+    X: float,
+    Y: float,
+    zero: float,
+    small: float,
+    reference: float,
+    found: Floats,
+    o: int,
+    lane: int,
+) -> tuple[int, int]:
     """``X S + Y C = 0``: ``theta = atan2(-Y, X)`` and ``theta + pi``."""
     rho = sqrt(X * X + Y * Y)
     if rho <= zero:
@@ -98,8 +116,18 @@ def type_2_zero(X: float, Y: float, zero: float, small: float, reference: float,
 
 
 @compiled()
-def type_2(X: float, Y: float, Z: float, slack: float, zero: float, small: float,
-           reference: float, found: Floats, o: int, lane: int) -> tuple[int, int]:  # fmt: skip
+def type_2(
+    X: float,
+    Y: float,
+    Z: float,
+    slack: float,
+    zero: float,
+    small: float,
+    reference: float,
+    found: Floats,
+    o: int,
+    lane: int,
+) -> tuple[int, int]:
     """``X S + Y C = Z``.
 
     ``S = (X Z + e Y sqrt(X^2 + Y^2 - Z^2)) / (X^2 + Y^2)`` and
@@ -135,8 +163,16 @@ def type_2(X: float, Y: float, Z: float, slack: float, zero: float, small: float
 
 
 @compiled()
-def type_3_direct(A: float, B: float, zero: float, small: float, reference: float, found: Floats, o: int, lane: int
-                  ) -> tuple[int, int]:  # fmt: skip
+def type_3_direct(
+    A: float,
+    B: float,
+    zero: float,
+    small: float,
+    reference: float,
+    found: Floats,
+    o: int,
+    lane: int,
+) -> tuple[int, int]:
     """``X1 S = A, X1 C = B`` with ``X1 > 0``."""
     rho = sqrt(A * A + B * B)
     if rho <= zero:
@@ -148,8 +184,20 @@ def type_3_direct(A: float, B: float, zero: float, small: float, reference: floa
 
 
 @compiled()
-def type_3(X1: float, Y1: float, Z1: float, X2: float, Y2: float, Z2: float, zero: float,
-           small: float, reference: float, found: Floats, o: int, lane: int) -> tuple[int, int]:  # fmt: skip
+def type_3(
+    X1: float,
+    Y1: float,
+    Z1: float,
+    X2: float,
+    Y2: float,
+    Z2: float,
+    zero: float,
+    small: float,
+    reference: float,
+    found: Floats,
+    o: int,
+    lane: int,
+) -> tuple[int, int]:
     """``X1 S + Y1 C = Z1, X2 S + Y2 C = Z2``."""
     det = X1 * Y2 - X2 * Y1
     size = sqrt((X1 * X1 + Y1 * Y1) * (X2 * X2 + Y2 * Y2))
@@ -174,140 +222,32 @@ def type_3(X1: float, Y1: float, Z1: float, X2: float, Y2: float, Z2: float, zer
 
 
 @compiled()
-def type_4(X1: float, Y1: float, X2: float, Y2: float, zero: float, small: float,
-           reference: float, found: Floats, o: int, lane: int) -> tuple[int, int]:  # fmt: skip
-    """``X1 r S = Y1, X2 r C = Y2``: a length ``r = +-sqrt((Y1 / X1)^2 + (Y2 / X2)^2)``, an angle."""
-    if min(abs(X1), abs(X2)) <= zero:
-        return 0, SMALL
-    A, B = Y1 / X1, Y2 / X2
-    r = sqrt(A * A + B * B)
-    if r <= zero:
-        put_length(found, o, 0, 0, lane, 0.0)
-        put_free(found, o, 0, 3, lane, reference)
-        return 1, FREE_2
-    value, C, S = atan2(A, B), B / r, A / r
-    put_length(found, o, 0, 0, lane, r)
-    put_angle(found, o, 0, 3, lane, value, C, S)
-    put_length(found, o, 1, 0, lane, -r)
-    put_angle(found, o, 1, 3, lane, value - pi if value > 0.0 else value + pi, -C, -S)
-    return 2, SMALL if r <= small or min(abs(X1), abs(X2)) <= small else 0
-
-
-@compiled()
 def quadratic(a: float, h: float, c: float, slack: float, roots: Floats) -> tuple[int, int]:
     """``a r^2 + 2 h r + c = 0``: solutions and flags."""
     room, size = h * h - a * c, h * h + abs(a * c)
     if room < -slack * size:
         return 0, SMALL if room > -1e-6 * size else 0
-    if room <= 1e-12 * size:
-        if room <= 0.0:
-            roots[0] = -h / a
-            return 1, DOUBLE
+    if room <= 0.0:
+        roots[0] = -h / a
+        return 1, DOUBLE
     whole = -(h + (sqrt(room) if h >= 0.0 else -sqrt(room)))
     roots[0], roots[1] = whole / a, c / whole if whole != 0.0 else 0.0
     return 2, DOUBLE if room <= 1e-12 * size else 0
 
 
 @compiled()
-def type_5(X1: float, Y1: float, Z1: float, X2: float, Y2: float, Z2: float, slack: float,
-           zero: float, small: float, found: Floats, o: int, lane: int) -> tuple[int, int]:  # fmt: skip
-    """``X1 S = Y1 + Z1 r, X2 C = Y2 + Z2 r``: a length, then an angle."""
-    if min(abs(X1), abs(X2)) <= zero:
-        return 0, SMALL
-    u0, u1, v0, v1 = Y1 / X1, Z1 / X1, Y2 / X2, Z2 / X2
-    a = u1 * u1 + v1 * v1
-    if a <= zero:
-        return 0, SMALL
-    roots = np.empty(2)
-    count, flags = quadratic(a, u0 * u1 + v0 * v1, u0 * u0 + v0 * v0 - 1.0, slack, roots)
-    for i in range(count):
-        S, C = u0 + u1 * roots[i], v0 + v1 * roots[i]
-        rho = sqrt(S * S + C * C)
-        put_length(found, o, i, 0, lane, roots[i])
-        put_angle(found, o, i, 3, lane, atan2(S, C), C / rho, S / rho)
-    return count, flags | (SMALL if min(abs(X1), abs(X2)) <= small else 0)
-
-
-@compiled()
-def two_angles(W1: float, W2: float, X: float, Y: float, Z1: float, Z2: float, sense: float,
-               slack: float, zero: float, small: float, reference_i: float, reference_j: float,
-               found: Floats, o: int, lane: int) -> tuple[int, int]:  # fmt: skip
-    """``W1 Cj + W2 Sj = X Ci + Y Si + Z1, sense (W1 Sj - W2 Cj) = X Si - Y Ci + Z2``.
-
-    Squared and added they are of type 2 in i: ``B1 Si + B2 Ci = B3`` with
-    ``B1 = 2 (Z1 Y + Z2 X)``, ``B2 = 2 (Z1 X - Z2 Y)`` and
-    ``B3 = W1^2 + W2^2 - X^2 - Y^2 - Z1^2 - Z2^2``; then j is of type 3.
-    """
-    W = W1 * W1 + W2 * W2
-    # half of B1, B2, B3
-    B1, B2 = Z1 * Y + Z2 * X, Z1 * X - Z2 * Y
-    B3 = 0.5 * (W - X * X - Y * Y - Z1 * Z1 - Z2 * Z2)
-    limit = max(zero * sqrt(W), zero * zero)
-    count, flags = type_2(B1, B2, B3, slack, limit, small * sqrt(W), reference_i, found, o, lane)
-    for n in range(count):
-        C, S = found[o + 6 * n + 1, lane], found[o + 6 * n + 2, lane]
-        one = X * C + Y * S + Z1
-        two = sense * (X * S - Y * C + Z2)
-        Sj, Cj = W2 * one + W1 * two, W1 * one - W2 * two
-        rho = sqrt(Sj * Sj + Cj * Cj)
-        if rho <= zero * zero:
-            put_free(found, o, n, 3, lane, reference_j)
-            flags |= FREE_2
-        else:
-            put_angle(found, o, n, 3, lane, atan2(Sj, Cj), Cj / rho, Sj / rho)
-    return count, flags
-
-
-@compiled()
-def type_8(X: float, Y: float, Z1: float, Z2: float, slack: float, zero: float, small: float,
-           reference_i: float, reference_j: float, found: Floats, o: int, lane: int) -> tuple[int, int]:  # fmt: skip
-    """``X Ci + Y C(i+j) = Z1, X Si + Y S(i+j) = Z2``: the angle i, then the sum.
-
-    ``Cj = (Z1^2 + Z2^2 - X^2 - Y^2) / (2 X Y)``, ``Sj = +-sqrt(1 - Cj^2)``, and i is of type 3:
-    ``(X + Y Cj) Ci - Y Sj Si = Z1``, ``Y Sj Ci + (X + Y Cj) Si = Z2``.
-    """
-    reach = Z1 * Z1 + Z2 * Z2
-    product = 2.0 * X * Y
-    top = reach - X * X - Y * Y
-    # (X + Y)^2 - reach and reach - (X - Y)^2, times each other: (2 X Y Sj)^2
-    size = abs(product)
-    if size <= zero * zero:
-        return 0, SMALL
-    room = (size - top) * (size + top)
-    flags = 0
-    if room <= 1e-12 * size * size:
-        if abs(top) - size > slack * size:
-            return 0, SMALL if abs(top) - size < 1e-6 * size else 0
-        flags = DOUBLE
-    root = sqrt(room) if room > 0.0 else 0.0
-    Cj = top / product if room > 0.0 else (1.0 if top * product > 0.0 else -1.0)
-    Sj = root / size
-    A = X + Y * Cj
-    if sqrt(reach) <= zero:
-        # the second end lies on the first axis: i is free
-        put_free(found, o, 0, 0, lane, reference_i)
-        C, S = found[o + 1, lane], found[o + 2, lane]
-        put_angle(found, o, 0, 3, lane, atan2(S * Cj + C * Sj, C * Cj - S * Sj), C * Cj - S * Sj,
-                  S * Cj + C * Sj)  # fmt: skip
-        return 1, flags | FREE_1
-    if sqrt(reach) <= small:
-        flags |= SMALL
-    count = 2 if root > 0.0 else 1
-    for n in range(count):
-        B = Y * Sj if n == 0 else -Y * Sj
-        C, S = A * Z1 + B * Z2, A * Z2 - B * Z1
-        rho = sqrt(C * C + S * S)
-        C, S = C / rho, S / rho
-        put_angle(found, o, n, 0, lane, atan2(S, C), C, S)
-        sine = Sj if n == 0 else -Sj
-        c, s = C * Cj - S * sine, S * Cj + C * sine
-        put_angle(found, o, n, 3, lane, atan2(s, c), c, s)
-    return count, flags
-
-
-@compiled()
-def quartic(a0: float, a1: float, a2: float, a3: float, a4: float, slack: float, reference: float,
-            found: Floats, o: int, lane: int) -> tuple[int, int]:  # fmt: skip
+def quartic(
+    a0: float,
+    a1: float,
+    a2: float,
+    a3: float,
+    a4: float,
+    slack: float,
+    reference: float,
+    found: Floats,
+    o: int,
+    lane: int,
+) -> tuple[int, int]:
     """``a0 + a1 C + a2 S + a3 cos(2 theta) + a4 sin(2 theta) = 0``."""
     g, roots = np.empty(5), np.empty(4)
     g[0], g[1], g[2], g[3], g[4] = a0, a1, a2, a3, a4
@@ -328,8 +268,18 @@ def quartic(a0: float, a1: float, a2: float, a3: float, a4: float, slack: float,
 
 
 @compiled()
-def polynomial(a0: float, a1: float, a2: float, a3: float, a4: float, slack: float,
-               reference: float, found: Floats, o: int, lane: int) -> tuple[int, int]:  # fmt: skip
+def polynomial(
+    a0: float,
+    a1: float,
+    a2: float,
+    a3: float,
+    a4: float,
+    slack: float,
+    reference: float,
+    found: Floats,
+    o: int,
+    lane: int,
+) -> tuple[int, int]:
     """``a0 + a1 r + a2 r^2 + a3 r^3 + a4 r^4 = 0``."""
     roots = np.empty(4)
     if a3 == 0.0 and a4 == 0.0 and a2 != 0.0:

@@ -1,65 +1,19 @@
-"""The types of equations that Paul's method comes down to, and how they are recognised."""
+"""How the types of equations are recognised, and which of them is taken first."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from enum import Enum
 from itertools import combinations, permutations
 
 import numpy as np
 
 from ..._arrays import Array
+from .equation_type import EquationType
 from .equations import Equation
-from .expressions import ZERO, Expression, Graph, negative
+from .expressions import ZERO, Expression, Graph, Kind, negative
 from .polynomials import part
 from .unknowns import Joints
-
-
-class EquationType(Enum):
-    """Types of equations, numbered as in the literature; two more that lead to a polynomial.
-
-    References
-    ----------
-    W. Khalil, E. Dombre, *Modeling, Identification and Control of Robots*, section 4.4 and
-    appendix 1, for the types.
-
-    Examples
-    --------
-    >>> EquationType.TYPE_2.formula
-    'X S + Y C = Z'
-    """
-
-    formula: str
-    code: int
-    branches: int
-
-    TYPE_1 = "type 1", "X r = Y", 1, 1
-    TYPE_2 = "type 2", "X S + Y C = Z", 2, 2
-    TYPE_2_ZERO = "type 2 with Z = 0", "X S + Y C = 0", 9, 2
-    TYPE_3 = "type 3", "X1 S + Y1 C = Z1, X2 S + Y2 C = Z2", 3, 1
-    TYPE_3_DIRECT = "type 3 with X1 = Y2, Y1 = X2 = 0", "X1 S = Z1, X1 C = Z2", 10, 1
-    TYPE_4 = "type 4", "X1 r S = Y1, X2 r C = Y2", 4, 2
-    TYPE_5 = "type 5", "X1 S = Y1 + Z1 r, X2 C = Y2 + Z2 r", 5, 2
-    TYPE_6 = "type 6", "W Sj = X Ci + Y Si + Z1, W Cj = X Si - Y Ci + Z2", 6, 2
-    TYPE_7 = (
-        "type 7", "W1 Cj + W2 Sj = X Ci + Y Si + Z1, +-(W1 Sj - W2 Cj) = X Si - Y Ci + Z2", 7, 2,
-    )  # fmt: skip
-    TYPE_8 = "type 8", "X Ci + Y C(i+j) = Z1, X Si + Y S(i+j) = Z2", 8, 2
-    QUARTIC = "polynomial", "a0 + a1 C + a2 S + a3 cos(2 theta) + a4 sin(2 theta) = 0", 11, 4
-    POLYNOMIAL = "polynomial", "a0 + a1 r + a2 r^2 + a3 r^3 + a4 r^4 = 0", 12, 4
-
-    def __new__(cls, title: str, formula: str, code: int, branches: int):  # noqa: ANN204
-        """Attach the formula, the number the kernel knows it by and the most solutions."""
-        one = object.__new__(cls)
-        one._value_ = (title, code)
-        one.formula, one.code, one.branches = formula, code, branches
-        return one
-
-    @property
-    def title(self) -> str:
-        """Its name."""
-        return self.value[0]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -196,7 +150,8 @@ def _angles(number: int, group: list[Equation], joints: Joints) -> Iterable[Cand
         if k[0]:
             one = Candidate(EquationType.TYPE_2, (number,), (X, Y, negative(k)), (e,), ())
         else:
-            one = Candidate(EquationType.TYPE_2_ZERO, (number,), _signed(graph, X, Y), (e,), ())
+            signed = _signed(number, X, Y, joints)
+            one = Candidate(EquationType.TYPE_2_ZERO, (number,), signed, (e,), ())
         yield _costed(one, graph, joints)
     rows.sort(key=lambda row: (not _is_position(row[0], joints), row[0].length))
     for a, b in combinations(rows[:_MOST_ROWS], 2):
@@ -232,17 +187,42 @@ def _direct(
     return (sign * X1[0], X1[1]), (sign * Z1[0], Z1[1]), (same * Z2[0], Z2[1])
 
 
-def _signed(graph: Graph, X: Expression, Y: Expression) -> tuple[Expression, Expression]:
-    """The sign with which ``atan2(-Y, X)`` needs fewer minus signs."""
+def _signed(
+    number: int, X: Expression, Y: Expression, joints: Joints
+) -> tuple[Expression, Expression]:
+    """The sign of type 2 with Z = 0: ``atan2(-Y, X)`` is the solution that is named first.
+
+    Of a wrist it is the one with a positive sine of the angle between the aligned axes, as in the
+    book; else the one that needs fewer minus signs.
+    """
+    graph = joints.graph
+    other = positive_sine(number, X, Y, joints)
+    if other is not None:
+        return (X, Y) if other[1] > 0 else (negative(X), negative(Y))
 
     def weight(e: Expression) -> int:
         node = graph.nodes[e[1]]
-        parts = node.parts if node.kind.name == "SUM" else ((1.0, e[1]),)
+        parts = node.parts if node.kind is Kind.SUM else ((1.0, e[1]),)
         return sum(1 if e[0] * f > 0 else -1 for f, _ in parts)
 
     if weight(X) - weight(Y) < 0:
         return negative(X), negative(Y)
     return X, Y
+
+
+def positive_sine(
+    number: int, X: Expression, Y: Expression, joints: Joints
+) -> tuple[int, float] | None:
+    """A joint whose sine is ``X C - Y S`` up to a factor, and that factor."""
+    graph = joints.graph
+    angle = joints.samples(number)
+    along = graph.values(X) * np.cos(angle) - graph.values(Y) * np.sin(angle)
+    own = [j for j, _ in joints.unknowns[number].terms]
+    for j in joints.group:
+        ratio = along / np.sin(joints.postures[:, j])
+        if j not in own and np.ptp(ratio) <= 1e-9 * np.abs(ratio).max():
+            return j, float(ratio[0])
+    return None
 
 
 def _pair(i: int, j: int, first: Equation, second: Equation, joints: Joints) -> Candidate | None:
@@ -257,7 +237,9 @@ def _pair(i: int, j: int, first: Equation, second: Equation, joints: Joints) -> 
     return _two_angles(i, j, first, second, joints)
 
 
-def _products(i: int, j: int, first: Equation, second: Equation, joints: Joints) -> Candidate | None:
+def _products(
+    i: int, j: int, first: Equation, second: Equation, joints: Joints
+) -> Candidate | None:
     """Type 4: an angle i and a length j that multiplies its sine and cosine."""
     r, C, S = 2 * j, 2 * i, 2 * i + 1
     p, q = first.polynomial, second.polynomial
@@ -310,7 +292,7 @@ def _two_angles(
         if not graph.is_constant(sj1) or not graph.is_constant(cj1):
             continue
         if not cj1[0] and not sj[0] and sj1 == cj:
-            positive = 1.0 if graph.values(sj1)[0] > 0 else -1.0
+            positive = 1.0 if sj1[0] > 0 else -1.0
             values = tuple((positive * f, n) for f, n in (sj1, *right))
             return Candidate(EquationType.TYPE_6, (i, j), values, pair, ())
         for sense in (1.0, -1.0):
@@ -342,7 +324,7 @@ def _type_8(
         return None
     if not graph.is_constant(first[0]) or not graph.is_constant(first[2]):
         return None
-    sign = 1.0 if graph.values(first[2])[0] > 0 else -1.0
+    sign = 1.0 if first[2][0] > 0 else -1.0
     terms = (first[2], first[0], negative(first[4]), negative(second[4]))
     values = tuple((sign * f, n) for f, n in terms)
     return Candidate(EquationType.TYPE_8, (i, j), values, pair, ())

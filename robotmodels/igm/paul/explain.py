@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from ...model import RobotModel
 from ..loop import JointChain
 from ..structure import Family, plan_loop
-from .catalogue import EquationType
+from .equation_type import EquationType
 from .plan import PaulPlan, derive_plan
 from .wording import Wording
 

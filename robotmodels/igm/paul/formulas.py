@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from .catalogue import EquationType
+from .equation_type import EquationType
 from .expressions import ONE, UNIT, Expression, negative
 
 if TYPE_CHECKING:
@@ -233,7 +233,7 @@ def _squares(page: _Page, widths: list[Expression], X: Expression, Y: Expression
 def _seven(page: _Page) -> Lines:
     W1, W2, X, Y, Z1, Z2, sense = (page.short(e) for e in page.step.coefficients)
     (Si, Sj), (Ci, Cj) = page.sin, page.cos
-    product, add = page.graph.product, page.graph.sum
+    product = page.graph.product
     one = page.sum((X, Ci), (Y, Si), (Z1, None))
     two = page.sum((X, Si), (negative(Y), Ci), (Z2, None))
     equations = [equal(page.sum((W1, Cj), (W2, Sj)), one),
@@ -274,8 +274,10 @@ def _eight(page: _Page) -> Lines:
     squares = [product(Z1, Z1), product(Z2, Z2), negative(product(X, X)), negative(product(Y, Y))]
     top, bottom = page.write(add(squares)), page.write(product((2.0, ONE), X, Y))
     cosine = equal(C, _over(top, bottom, False))
-    sine = Line(f"{S.text} = e*sqrt(1 - {C.text}**2), e = +1 or -1",
-                rf"{S.latex} &= \varepsilon \sqrt{{1 - {C.latex}^2}}, \quad \varepsilon = \pm 1")
+    sine = Line(
+        f"{S.text} = e*sqrt(1 - {C.text}**2), e = +1 or -1",
+        rf"{S.latex} &= \varepsilon \sqrt{{1 - {C.latex}^2}}, \quad \varepsilon = \pm 1",
+    )
     k1, k2 = Line("k1", "k_1"), Line("k2", "k_2")
     lines = [
         equal(k1, page.sum((X, None), (Y, C))), equal(k2, page.sum((product((sign, ONE), Y), S))),
@@ -310,8 +312,12 @@ def _quartic(page: _Page) -> Lines:
         rf"a_0 + a_1 {C.latex} + a_2 {S.latex} + a_3 \cos 2({theta.latex}) + "
         rf"a_4 \sin 2({theta.latex}) &= 0",
     )
-    return [line], [Line(f"{theta.text}: the real ones of up to four roots",
-                         rf"{theta.latex} &: \text{{the real ones of up to four roots}}")]
+    return [line], [
+        Line(
+            f"{theta.text}: the real ones of up to four roots",
+            rf"{theta.latex} &: \text{{the real ones of up to four roots}}",
+        )
+    ]
 
 
 def _polynomial(page: _Page) -> Lines:

@@ -103,7 +103,7 @@ def normal_form(chain: JointChain, frames: tuple[int, ...]) -> NormalForm:
         tool = _screw(turns[-1], lengths[-1]) @ tool
         exact[-1] = exact[-1] @ _inverse(_screw(turns[-1], lengths[-1]))
         exact[0] = np.eye(4)
-        parts[0] = (0.0,) * 6
+        parts[0] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         turns[0] = lengths[0] = turns[-1] = lengths[-1] = 0.0
     rows = tuple(
         Row(

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from ...errors import InvalidValueError
 from ...model import RobotModel
 from ..loop import JointChain, joint_chain
-from .catalogue import Candidate, EquationType, candidates
+from .catalogue import Candidate, candidates
+from .equation_type import EquationType
 from .equations import Arm, Split
 from .expressions import Expression
 from .normal_form import NormalForm, normal_form

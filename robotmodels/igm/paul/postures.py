@@ -187,5 +187,3 @@ def _free_joints(
             joint = plan.arm.joints.unknowns[number].terms[0][0]
             out[..., joint] |= there & ((bits >> (2 * n + m)) & 1 == 1)
     return out
-
-

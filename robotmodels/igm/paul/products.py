@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from .expressions import UNIT, ZERO, Expression, Graph, negative
-from .polynomials import Polynomial, Vector, constant, minus, plus, scaled, times
+from .polynomials import Vector, constant, minus, plus, scaled, times
 from .unknowns import Joints, Span
 
 Rotation = list[list[Expression]]
@@ -122,10 +122,7 @@ def _turned(segment: _Segment, span: Span | None, v: Vector, joints: Joints) -> 
 
 
 def _mapped(R: Rotation, v: Vector, graph: Graph) -> Vector:
-    out: list[Polynomial] = []
-    for row in R:
-        out.append(plus(graph, *(scaled(graph, e, p) for e, p in zip(row, v, strict=True))))
-    return out
+    return [plus(graph, *(scaled(graph, e, p) for e, p in zip(row, v, strict=True))) for row in R]
 
 
 def _times(A: Rotation, B: Rotation, graph: Graph) -> Rotation:

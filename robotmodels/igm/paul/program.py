@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..._arrays import Array, read_only
-from .catalogue import EquationType
+from .equation_type import EquationType
 from .equations import Arm, Split
 from .expressions import ONE, ZERO, Expression, Graph, Kind
 from .polynomials import part
@@ -187,7 +187,8 @@ def lowered(arm: Arm, steps: Sequence[Step]) -> Program:
             if joints.unknowns[number].slides:
                 value = C
             register = table.new()
-            table.new(), table.new()
+            for _ in range(2):
+                table.new()
             table.give(value, n + 1, register)
             if not joints.unknowns[number].slides:
                 table.give(C, n + 1, register + 1)
@@ -204,8 +205,7 @@ def lowered(arm: Arm, steps: Sequence[Step]) -> Program:
     arm.K = [_as_is(arm, j) for j in range(form.k)]
     sides = min((_check(arm, s, table, reached) for s in range(form.k + 1)), key=lambda c: c[0])[1]
     arm.K = nominal
-    for e in sides:
-        results.append(table.expression(e)[0])
+    results += [table.expression(e)[0] for e in sides]
     order = sorted(range(len(table.operations)), key=lambda i: max(table.operations[i][0], 0))
     operations = [table.operations[i] for i in order]
     levels = np.array([max(level, 0) for level, _, _ in operations], dtype=np.int64)

@@ -8,9 +8,10 @@ import numpy as np
 
 from ..._arrays import Array
 from ...model import RobotModel
-from .catalogue import EquationType
+from .catalogue import positive_sine
+from .equation_type import EquationType
 from .equations import Split
-from .expressions import Expression, Kind
+from .expressions import Expression, Kind, negative
 from .formulas import Line, solution_of
 from .plan import PaulPlan, Step
 from .writing import Writer
@@ -66,8 +67,8 @@ class Wording:
             # the name stands for the sum with its first term positive
             self.short[e[1]] = (sign * float(np.sign(e[0])), name[1])
             meaning = self.graph.nodes[name[1]].parts[0]
-            lines.append(Line(*(f"{n} = {w(meaning)}" for n, w in zip(
-                (f"B{number}", f"B_{{{number}}}"), self.writers, strict=True))))  # fmt: skip
+            text, latex = (write(meaning) for write in self.writers)
+            lines.append(Line(f"B{number} = {text}", f"B_{{{number}}} &= {latex}"))
         factor, named = self.short[e[1]]
         return (e[0] * factor, named), lines
 
@@ -124,7 +125,9 @@ class Wording:
         ]
         if solution.definitions:
             text += ["  with", *(f"    {line.text}" for line in solution.definitions)]
-        text += ["  hence", *(f"    {line.text}" for line in formulas)]
+        new = [line.text for line in formulas if line not in solution.equations]
+        if new:
+            text += ["  hence", *(f"    {words}" for words in new)]
         if undetermined:
             text.append(f"  {undetermined}")
         latex_names = r" \text{ and } ".join(self.unknown(u, True) for u in self._given(step))
@@ -176,9 +179,16 @@ class Wording:
         first = self.unknown(step.unknowns[0])
         takes = f"there {first} takes the value of q_ref (0 without one) and counts once"
         if step.type is EquationType.TYPE_2_ZERO:
-            X, Y = step.coefficients
+            X, Y = (negative(e) if write(e).startswith("-") else e for e in step.coefficients)
             where = f"{write(X)} = 0 and {write(Y)} = 0"
-            return f"{first} is free where {where}{self._meaning(step)}: {takes}."
+            other = positive_sine(
+                step.unknowns[0], step.coefficients[0], step.coefficients[1], self.joints
+            )
+            which = ""
+            if other is not None:
+                frame = self.joints.frame(other[0])
+                which = f"{first} has S{frame} > 0 and {first}' has S{frame} < 0. "
+            return f"{which}{first} is free where {where}{self._meaning(step)}: {takes}."
         if step.type is EquationType.TYPE_2:
             return (
                 "The two solutions fall together where X**2 + Y**2 = Z**2; where it is smaller the "
@@ -212,7 +222,7 @@ class Wording:
         for m in range(self.plan.form.k):
             across = np.linalg.norm(np.cross(axis, self.axes[:, m]), axis=1)
             if m != j and across.max() > 1e-6 and _proportional(size, across):
-                a, b = sorted((self.plan.form.rows[i].frame for i in (j, m)))
+                a, b = sorted(self.plan.form.rows[i].frame for i in (j, m))
                 return f" (axes {a} and {b} are aligned)"
         for m in range(self.plan.form.k):
             away = self.origins[:, m] - origin
@@ -292,7 +302,9 @@ class Wording:
             why.append("Z the base and what the table has before the first motion")
         if right:
             why.append("E what it has after the last motion, and the tool")
-        return f"{words}: the desired pose [1.11], {elements}" + "".join(f", {w}" for w in why) + "."
+        return (
+            f"{words}: the desired pose [1.11], {elements}" + "".join(f", {w}" for w in why) + "."
+        )
 
 
 def _axes(plan: PaulPlan) -> tuple[Array, Array]:
@@ -309,6 +321,3 @@ def _axes(plan: PaulPlan) -> tuple[Array, Array]:
 def _proportional(a: Array, b: Array) -> bool:
     """Whether two lists of positive numbers have a constant ratio."""
     return bool(np.abs(a * b[0] - b * a[0]).max() <= 1e-9 * (a[0] * b.max() + b[0] * a.max()))
-
-
-

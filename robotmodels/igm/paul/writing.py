@@ -40,7 +40,9 @@ class Writer:
             sign, words = terms[0]
             return f"{'-' if sign < 0 else ''}{words}{times}{symbol}"
         left, right = (r"\left(", r"\right)") if self.latex else ("(", ")")
-        return f"{left}{self(e)}{right}{times}{symbol}"
+        sign = "-" if all(sign < 0 for sign, _ in terms) else ""
+        inner = self((-e[0], e[1])) if sign else self(e)
+        return f"{sign}{left}{inner}{right}{times}{symbol}"
 
     def sum(self, terms: list[tuple[Expression, str]]) -> str:
         """Expressions times symbols (1 for an empty one), added."""
@@ -65,14 +67,23 @@ class Writer:
         flat = self._flat(e)
         flat.sort(key=lambda t: self._order(t[1]))
         lead = next((i for i, t in enumerate(flat) if t[0] > 0), 0)
-        if lead and self._moves_first(flat[lead][1], flat[0][1]):
+        if lead and not self._nested(flat[0][1]):
             flat.insert(0, flat.pop(lead))
         return [(1 if f > 0 else -1, self._term(abs(f), node)) for f, node in flat]
 
-    def _moves_first(self, positive: int, negative: int) -> bool:
-        """Whether a positive term is put before a negative one: unless that is the longer."""
-        leaves = self.graph.leaves
-        return leaves((1.0, positive)) >= leaves((1.0, negative))
+    def _nested(self, number: int) -> bool:
+        """Whether a sum is in it: such a term stays in front with its minus, as in the book."""
+        node = self.graph.nodes[number]
+        if node.kind is Kind.PRODUCT:
+            parts = {n for _, n in node.parts}
+            return len(parts) > 1 and any(self._is_sum(n) for n in parts)
+        return False
+
+    def _is_sum(self, number: int) -> bool:
+        node = self.graph.nodes[number]
+        if node.kind is Kind.NAMED:
+            return node.name.startswith("B")
+        return node.kind is Kind.SUM
 
     def _flat(self, e: Expression) -> list[Expression]:
         factor, number = e
