@@ -291,11 +291,11 @@ def _fastest(
     """
     at_rest = L == 0.0
     a, j = (1.5, 6.0) if law is TimeLaw.SMOOTHED_TRAPEZOIDAL else (1.0, 4.0)
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):
         # ramps limited by acceleration alone, and by jerk alone: each bounds V from above
         full = np.sqrt(2.0 * L / (a / A + a / B))
         if law is not TimeLaw.TRAPEZOIDAL:
-            full = np.minimum(full, np.cbrt(L * L * J / j))
+            full = np.minimum(full, np.cbrt(L) ** 2 * np.cbrt(J / j))
     full = np.where(at_rest, 0.0, full)
     # V (up + down) is convex in V, so Newton's method comes down from there to its root and stays
     for _ in range(60 if law is not TimeLaw.TRAPEZOIDAL else 0):

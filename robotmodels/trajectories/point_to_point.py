@@ -278,20 +278,21 @@ def along_line(
     together = bounds is None or synchronisation is Synchronisation.COORDINATED
     # one law for all joints of a motion, or one law each
     way = (end - start)[:, None, :] if together else (end - start)[:, :, None]
+    laws = 1 if together else n  # of each motion
     length = np.abs(way).max(axis=-1, initial=0.0).reshape(-1)
     with np.errstate(invalid="ignore", divide="ignore"):
         direction = np.where(way != 0.0, way / length.reshape(*way.shape[:2], 1), 0.0)
     if bounds is None:
         assert T is not None
-        pieces = law_of_duration(law, length, np.repeat(T, length.size // max(R, 1)))
+        pieces = law_of_duration(law, length, np.repeat(T, laws))
         least = np.zeros(R)
     else:
         pieces = law_of_limits(law, length, limits_along(bounds, direction))
-        totals = pieces.durations.sum(axis=-1).reshape(R, -1)
+        totals = pieces.durations.sum(axis=-1).reshape(R, laws)
         least = totals.max(axis=-1, initial=0.0)
-    refuse_short(T, least, length.reshape(R, -1))
-    pieces = _timed(pieces, T, least, synchronisation, length.size // max(R, 1))
-    return _assembled(pieces, start, direction, batch, scalar, T)
+    refuse_short(T, least, length.reshape(R, laws))
+    pieces = _timed(pieces, T, least, synchronisation, laws)
+    return _assembled(pieces, laws, start, direction, batch, scalar, T)
 
 
 def _timed(
@@ -318,12 +319,11 @@ def _timed(
 
 
 def _assembled(
-    pieces: Pieces, start: Array, direction: Array, batch: tuple[int, ...], scalar: bool,
-    T: Array | None,
+    pieces: Pieces, columns: int, start: Array, direction: Array, batch: tuple[int, ...],
+    scalar: bool, T: Array | None,
 ) -> Trajectory:  # fmt: skip
     R, n = start.shape
     K, powers = pieces.coefficients.shape[1:]
-    columns = pieces.durations.shape[0] // R if R else 1
     breaks = np.zeros((R, columns, K + 1))
     breaks[..., 1:] = np.cumsum(pieces.durations, axis=-1).reshape(R, columns, K)
     if T is not None:

@@ -1,0 +1,604 @@
+"""Joint motions: limits kept, least times, continuity, ratios, ends, and refusals."""
+
+import pickle
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+from robotmodels.errors import InvalidValueError, ShapeError
+from robotmodels.trajectories import (
+    MotionLimits,
+    Synchronisation,
+    TimeLaw,
+    Trajectory,
+    along_line,
+    bang_bang,
+    blended_lines,
+    cubic,
+    jerk_limited,
+    joint_trajectory,
+    linear,
+    quintic,
+    smoothed_trapezoidal,
+    trapezoidal,
+)
+from robotmodels.trajectories.piecewise import PiecewisePolynomial
+
+LAWS = list(TimeLaw)
+# the highest derivative that is continuous inside the motion
+CONTINUOUS = {
+    TimeLaw.LINEAR: 4,
+    TimeLaw.CUBIC: 4,
+    TimeLaw.QUINTIC: 4,
+    TimeLaw.BANG_BANG: 1,
+    TimeLaw.TRAPEZOIDAL: 1,
+    TimeLaw.SMOOTHED_TRAPEZOIDAL: 2,
+    TimeLaw.JERK_LIMITED: 2,
+}
+# and the highest that is zero at both ends
+AT_REST = {
+    TimeLaw.LINEAR: 0,
+    TimeLaw.CUBIC: 1,
+    TimeLaw.QUINTIC: 2,
+    TimeLaw.BANG_BANG: 1,
+    TimeLaw.TRAPEZOIDAL: 1,
+    TimeLaw.SMOOTHED_TRAPEZOIDAL: 2,
+    TimeLaw.JERK_LIMITED: 2,
+}
+
+
+def random_limits(rng, law, n):
+    jumps = law in (TimeLaw.TRAPEZOIDAL, TimeLaw.BANG_BANG)
+    return MotionLimits(
+        velocity=rng.uniform(0.3, 3.0, n),
+        acceleration=rng.uniform(0.5, 10.0, n),
+        jerk=np.inf if jumps else rng.uniform(2.0, 100.0, n),
+        velocity_lower=-rng.uniform(0.3, 3.0, n),
+        acceleration_lower=-rng.uniform(0.5, 10.0, n),
+    )
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_limits_hold_and_ends_are_met_on_10000_random_motions(law, rng):
+    """Not one bit above a limit, anywhere on the motion; one limit of some joint is used in full."""
+    for _ in range(20):
+        n = int(rng.integers(1, 5))
+        limits = random_limits(rng, law, n)
+        q0, q1 = rng.normal(size=(2, 500, n)) * 10.0 ** rng.uniform(-5.0, 2.0, (1, 500, 1))
+        q1 = np.where(rng.random((500, n)) < 0.2, q0, q1)
+        move = along_line(law, q0, q1, None, limits)
+        peaks = [move.motion.extremes(order) for order in (1, 2, 3)]
+        bounds = [
+            (limits.velocity_lower, limits.velocity),
+            (limits.acceleration_lower, limits.acceleration),
+            (-limits.jerk, limits.jerk),
+        ]
+        used = np.zeros(500)
+        for (low, high), (least, most) in zip(peaks, bounds, strict=True):
+            if np.isinf(most).any():
+                continue
+            assert (high <= most).all()
+            assert (low >= least).all()
+            used = np.maximum(used, np.maximum(high / most, low / least).max(axis=-1))
+        moving = (q0 != q1).any(axis=-1)
+        assert (used[moving] > 1.0 - 1e-12).all()
+        assert (move.duration[~moving] == 0.0).all()
+        for i in range(0, 500, 100):
+            one = along_line(law, q0[i], q1[i], None, limits)
+            ends = one.q([0.0, one.duration])
+            size = 1e-12 * max(1.0, np.abs([q0[i], q1[i]]).max())
+            assert np.abs(ends - [q0[i], q1[i]]).max() < size
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_ratio_is_kept_along_the_whole_path(law, rng):
+    q0, q1 = rng.normal(size=(2, 6))
+    q1[2] = q0[2]
+    move = along_line(law, q0, q1, None, random_limits(rng, law, 6))
+    s = move.at(np.linspace(0.0, move.duration, 301))
+    way = (s.q - q0) @ (q1 - q0) / ((q1 - q0) @ (q1 - q0))
+    assert np.abs(s.q - q0 - way[:, None] * (q1 - q0)).max() < 1e-12
+    assert (np.diff(way) > -1e-15).all()
+    assert (s.q[:, 2] == q0[2]).all()
+    assert not s.v[:, 2].any()
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_derivatives_and_continuity(law, rng):
+    """Each derivative is that of the one below (central differences); jumps only where they may."""
+    q0, q1 = rng.normal(size=(2, 3))
+    move = along_line(law, q0, q1, None, random_limits(rng, law, 3))
+    T, h = move.duration, 1e-5
+    breaks = move.motion.breaks[0]
+    t = np.linspace(0.01, 0.99, 57) * T
+    t = t[np.abs(t[:, None] - breaks).min(axis=-1) > 2 * h]
+    parts = (move.q, move.v, move.a, move.jerk)
+    for low, high in zip(parts[:-1], parts[1:], strict=True):
+        numeric = (low(t + h) - low(t - h)) / (2 * h)
+        assert np.abs(numeric - high(t)).max() < 1e-6 * max(1.0, np.abs(high(t)).max())
+    inner = breaks[1:-1]
+    for order in range(min(CONTINUOUS[law], 3) + 1):
+        for at in inner:
+            jump = parts[order](at + 1e-10) - parts[order](at - 1e-10)
+            steep = np.abs(parts[min(order + 1, 3)](t)).max() + 1.0
+            assert np.abs(jump).max() < 1e-8 * steep
+    for order in range(1, AT_REST[law] + 1):
+        assert (
+            np.abs(parts[order](np.array([0.0, T]))).max() < 1e-12 * np.abs(parts[order](t)).max()
+        )
+
+
+def least_times(L, V, A, B, J):
+    """Closed forms, written independently of the package."""
+    full = np.sqrt(2 * L / (1 / A + 1 / B))
+    trapezoid = L / V + V / 2 * (1 / A + 1 / B) if full > V else 2 * L / full
+    bang = max(2 * L / V, np.sqrt(2 * L * (1 / A + 1 / B)))
+    low = min(A, B)
+    return {
+        TimeLaw.LINEAR: L / V,
+        TimeLaw.CUBIC: max(1.5 * L / V, (6 * L / low) ** 0.5, (12 * L / J) ** (1 / 3)),
+        TimeLaw.QUINTIC: max(
+            1.875 * L / V, (10 / 3**0.5 * L / low) ** 0.5, (60 * L / J) ** (1 / 3)
+        ),
+        TimeLaw.BANG_BANG: bang,
+        TimeLaw.TRAPEZOIDAL: trapezoid,
+    }
+
+
+@pytest.mark.parametrize("law", [law for law in LAWS if law in least_times(1, 1, 1, 1, 1)])
+def test_least_times_are_the_closed_forms(law, rng):
+    for _ in range(300):
+        L, V, A, B, J = 10.0 ** rng.uniform(-2.0, 2.0, 5)
+        limits = MotionLimits(
+            velocity=V,
+            acceleration=A,
+            acceleration_lower=-B,
+            jerk=np.inf if law in (TimeLaw.TRAPEZOIDAL, TimeLaw.BANG_BANG) else J,
+        )
+        T = along_line(law, 0.3, 0.3 + L, None, limits).duration
+        assert abs(T / least_times(0.3 + L - 0.3, V, A, B, J)[law] - 1.0) < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("law", "ramp"),
+    [
+        (TimeLaw.SMOOTHED_TRAPEZOIDAL, lambda V, A, J: max(1.5 * V / A, (6 * V / J) ** 0.5)),
+        (
+            TimeLaw.JERK_LIMITED,
+            lambda V, A, J: V / A + A / J if V * J > A * A else 2 * (V / J) ** 0.5,
+        ),
+    ],
+)
+def test_least_times_of_smooth_ramps_by_bisection(law, ramp, rng):
+    """The greatest velocity whose ramps fit, found by bisection; no other velocity is quicker."""
+    for _ in range(200):
+        L, V, A, B, J = 10.0 ** rng.uniform(-2.0, 2.0, 5)
+
+        def time(v, A=A, B=B, J=J, L=L):
+            return L / v + 0.5 * (ramp(v, A, J) + ramp(v, B, J))
+
+        def fits(v, A=A, B=B, J=J, L=L):
+            return v * (ramp(v, A, J) + ramp(v, B, J)) <= 2 * L
+
+        low, high = 0.0, V
+        if fits(V):
+            low = V
+        for _ in range(200):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if fits(middle) else (low, middle)
+        limits = MotionLimits(V, A, J, acceleration_lower=-B)
+        T = along_line(law, 0.0, L, None, limits).duration
+        assert abs(T / time(low) - 1.0) < 1e-12
+        assert all(T <= time(v) * (1 + 1e-12) for v in low * rng.uniform(0.2, 1.0, 20))
+
+
+@pytest.mark.parametrize("jerk", [False, True])
+def test_no_motion_is_quicker_by_linear_programming(jerk, rng):
+    """The farthest that any motion gets in 2 % less than the least time falls short, and in 2 %
+    more it gets there: the inputs on the cells of a grid are the unknowns of a linear program.
+
+    For limited acceleration the first half is rigorous: the averages over the cells of any motion
+    are a point of the program, and its distance differs by no more than the error that is added.
+    """
+    N = 100 if jerk else 200
+    for _ in range(8):
+        V, A, B = rng.uniform(0.5, 2.0, 3)
+        L, J = rng.uniform(0.5, 3.0), rng.uniform(3.0, 20.0)
+        limits = MotionLimits(V, A, J if jerk else np.inf, acceleration_lower=-B)
+        T = (jerk_limited if jerk else trapezoidal)(0.0, L, limits=limits).duration
+
+        def farthest(T, V=V, A=A, B=B, J=J):
+            h, none = T / N, np.zeros((1, N))
+            cell = np.tri(N)  # cell i acts on all nodes after it
+            if jerk:
+                a = np.vstack((none, cell * h))
+                v = np.vstack((none, np.cumsum(h * a[:-1] + 0.5 * h * h * np.eye(N), axis=0)))
+                way = (h * v[:-1] + 0.5 * h * h * a[:-1] + h**3 / 6.0 * np.eye(N)).sum(axis=0)
+                rows, room = [a[1:], -a[1:], v[1:], -v[1:]], [A, B, V, V]
+                rest, bounds, error = np.vstack((a[-1:], v[-1:])), (-J, J), 0.0
+            else:
+                v = np.vstack((none, cell * h))
+                way = 0.5 * h * (v[1:] + v[:-1]).sum(axis=0)
+                rows, room = [v[1:], -v[1:]], [V, V]
+                rest, bounds, error = v[-1:], (-B, A), (A + B) * h * T / 8.0
+            found = linprog(-way, np.vstack(rows), np.repeat(room, N), rest, [0.0] * len(rest),
+                            [bounds] * N)  # fmt: skip
+            assert found.status == 0
+            return -found.fun, error
+
+        reach, error = farthest(0.98 * T)
+        assert reach + error < L
+        assert farthest(1.02 * T)[0] > L
+
+
+def test_given_duration_slows_down_and_refuses_too_short(rng):
+    limits = MotionLimits([1.0, 2.0], [2.0, 1.0], [10.0, 5.0])
+    for law in LAWS:
+        own = MotionLimits(1.0, 2.0) if law in (TimeLaw.TRAPEZOIDAL, TimeLaw.BANG_BANG) else limits
+        least = along_line(law, [0.0, 1.0], [1.0, 0.5], None, own).duration
+        slow = along_line(law, [0.0, 1.0], [1.0, 0.5], 1.7 * least, own)
+        assert slow.duration == 1.7 * least
+        assert slow.check(own).stretch < 0.7
+        assert np.abs(slow.q(1.7 * least) - [1.0, 0.5]).max() < 1e-15
+        with pytest.raises(InvalidValueError, match=f"least is {least:.9g}"[:18]):
+            along_line(law, [0.0, 1.0], [1.0, 0.5], 0.99 * least, own)
+        # the least itself is accepted
+        assert along_line(law, [0.0, 1.0], [1.0, 0.5], least, own).duration == least
+
+
+def test_laws_of_a_duration_alone():
+    for law in LAWS[:-1]:
+        move = along_line(law, [0.0], [2.0], 3.0, None)
+        assert move.duration == 3.0
+        assert np.abs(move.q([0.0, 1.5, 3.0]).ravel() - [0.0, 1.0, 2.0]).max() < 1e-15
+    assert abs(trapezoidal(0.0, 1.0, 3.0).v(1.5) - 0.5) < 1e-15
+    assert abs(bang_bang(0.0, 1.0, 1.0).v(0.5) - 2.0) < 1e-15
+    with pytest.raises(InvalidValueError, match="limits"):
+        along_line(TimeLaw.JERK_LIMITED, 0.0, 1.0, 1.0, None)
+
+
+def test_joints_may_share_only_the_time_or_nothing(rng):
+    limits = MotionLimits([1.0, 1.0, 1.0], [1.0, 8.0, 1.0])
+    q0, q1 = np.zeros(3), np.array([4.0, -1.0, 0.0])
+    alone = [trapezoidal(0.0, w, limits=MotionLimits(1.0, a)).duration
+             for w, a in ((4.0, 1.0), (-1.0, 8.0))]  # fmt: skip
+    together = trapezoidal(q0, q1, limits=limits)
+    same = trapezoidal(q0, q1, limits=limits, synchronisation=Synchronisation.SAME_TIME)
+    free = trapezoidal(q0, q1, limits=limits, synchronisation=Synchronisation.INDEPENDENT)
+    assert abs(same.duration - max(alone)) < 1e-12
+    assert abs(free.duration - max(alone)) < 1e-12
+    assert together.duration >= same.duration
+    assert abs(free.q(alone[1])[1] - q1[1]) < 1e-12
+    assert abs(same.q(alone[1])[1] - q1[1]) > 0.1
+    for move in (together, same, free):
+        assert move.check(limits, 0.0).kept
+        assert np.abs(move.q([0.0, move.duration]) - [q0, q1]).max() < 1e-12
+        assert not move.a(np.linspace(0.0, move.duration, 50))[:, 2].any()
+    slow = trapezoidal(q0, q1, 9.0, limits, Synchronisation.SAME_TIME)
+    assert slow.duration == 9.0
+    assert slow.check(limits).kept
+
+
+def test_motions_that_stay_or_hardly_move():
+    limits = MotionLimits(1.0, 1.0, 1.0)
+    for make in (linear, cubic, quintic, smoothed_trapezoidal, jerk_limited):
+        stay = make([1.0, 2.0], [1.0, 2.0], limits=limits)
+        assert stay.duration == 0.0
+        assert np.array_equal(stay.q([-1.0, 0.0, 1.0]), [[1.0, 2.0]] * 3)
+        assert stay.check(limits).kept
+        wait = make([1.0, 2.0], [1.0, 2.0], 5.0, limits)
+        assert wait.duration == 5.0
+        assert not wait.v([0.0, 2.0, 5.0]).any()
+        tiny = make([0.0, 0.0], [1e-300, -1e-305], limits=limits)
+        assert np.isfinite(tiny.q(tiny.duration / 2)).all()
+    with pytest.raises(InvalidValueError, match="positive time"):
+        quintic(0.0, 1.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: trapezoidal(0.0, 1.0), "duration, limits or both"),
+        (lambda: trapezoidal(0.0, 1.0, limits=MotionLimits(0.0, 1.0)), "is 0"),
+        (lambda: trapezoidal(0.0, 1.0, limits=MotionLimits(1.0, 0.0)), "is 0"),
+        (lambda: trapezoidal(0.0, 1.0, limits=MotionLimits(1.0)), "acceleration"),
+        (lambda: trapezoidal(0.0, 1.0, limits=MotionLimits(1.0, 1.0, 1.0)), "jerk"),
+        (lambda: bang_bang(0.0, 1.0, limits=MotionLimits(1.0, 1.0, 1.0)), "jerk"),
+        (lambda: linear(0.0, 1.0, limits=MotionLimits(acceleration=1.0)), "velocity"),
+        (lambda: quintic(0.0, 1.0, limits=MotionLimits()), "needs a limit"),
+        (lambda: jerk_limited(0.0, 1.0, limits=MotionLimits(1.0, 1.0)), "jerk"),
+        (lambda: jerk_limited(0.0, 1.0), "limits"),
+        (lambda: quintic(0.0, np.nan, 1.0), "finite"),
+        (lambda: quintic(0.0, 1.0, -1.0), "at least 0"),
+        (lambda: quintic([0.0, 1.0], [1.0, 2.0, 3.0], 1.0), "same joints"),
+        (lambda: quintic(0.0, 1.0, [1.0, 2.0]), "duration"),
+        (lambda: trapezoidal([0.0] * 3, [1.0] * 3, limits=MotionLimits([1.0, 2.0], 1.0)), "joints"),
+        (lambda: trapezoidal(0.0, 3.0, limits=MotionLimits(1.0, 1.0, upper=2.0)), "outside"),
+        (lambda: trapezoidal(0.0, 3.0, limits=1.0), "MotionLimits"),
+        (lambda: MotionLimits(np.nan), "NaN"),
+        (lambda: MotionLimits(-1.0), "at least 0"),
+        (lambda: MotionLimits(1.0, velocity_lower=0.5), "at most 0"),
+        (lambda: MotionLimits(1.0, lower=1.0, upper=0.0), "at most upper"),
+        (lambda: MotionLimits([1.0, 2.0], [1.0, 2.0, 3.0]), "different numbers"),
+        (lambda: along_line("trapezoidal", 0.0, 1.0, 1.0, None), "TimeLaw"),
+        (lambda: trapezoidal(0.0, 1.0, 1.0, synchronisation=True), "Synchronisation"),
+        (lambda: joint_trajectory(0.0, 1.0, 2.5), "whole number"),
+        (lambda: joint_trajectory(0.0, 1.0, [0.0, 1.0, 0.5]), "ascend"),
+    ],
+)
+def test_infeasible_requests_are_refused(call, message):
+    with pytest.raises((InvalidValueError, ShapeError), match=message):
+        call()
+
+
+def test_zero_limits_of_joints_that_stay_do_not_matter():
+    move = trapezoidal([0.0, 1.0], [1.0, 1.0], limits=MotionLimits([1.0, 0.0], [1.0, 0.0]))
+    assert abs(move.duration - 2.0) < 1e-12
+
+
+def test_batch_is_the_motions_one_by_one(rng):
+    limits = MotionLimits(1.0, 2.0, 9.0)
+    q0, q1 = rng.normal(size=(2, 3, 4, 5))
+    q1[0, 1] = q0[0, 1]
+    for how in Synchronisation:
+        many = smoothed_trapezoidal(q0, q1, limits=limits, synchronisation=how)
+        assert many.duration.shape == (3, 4)
+        t = np.linspace(-0.1, many.duration.max() + 0.1, 23)
+        s = many.at(t)
+        assert s.q.shape == (3, 4, 23, 5)
+        for i in np.ndindex(3, 4):
+            one = smoothed_trapezoidal(q0[i], q1[i], limits=limits, synchronisation=how)
+            assert abs(one.duration - many.duration[i]) < 1e-13
+            for name in ("q", "v", "a", "jerk"):
+                alone, row = getattr(one.at(t), name), getattr(s, name)[i]
+                same = np.abs(alone - row) < 1e-10
+                # a sample at a jump of the jerk may fall on either side of it
+                assert same.all() or (name == "jerk" and same.mean() > 0.95)
+    empty = trapezoidal(np.zeros((0, 3)), np.ones((0, 3)), limits=MotionLimits(1.0, 1.0))
+    assert empty.duration.shape == (0,)
+    assert empty.q([0.0, 1.0]).shape == (0, 2, 3)
+    times = quintic(np.zeros((2, 3)), np.ones((2, 3)), [1.0, 2.0])
+    assert np.array_equal(times.duration, [1.0, 2.0])
+
+
+# --- polynomials between states ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("make", "order"), [(cubic, 3), (quintic, 5)])
+def test_polynomials_meet_their_end_states(make, order, rng):
+    for _ in range(50):
+        q0, q1, v0, v1, a0, a1 = rng.normal(size=(6, 4))
+        T = rng.uniform(0.3, 5.0)
+        more = {} if order == 3 else {"a0": a0, "a1": a1}
+        s = make(q0, q1, T, v0=v0, v1=v1, **more).at([0.0, T])
+        assert np.abs(s.q - [q0, q1]).max() < 1e-12
+        assert np.abs(s.v - [v0, v1]).max() < 1e-12
+        if more:
+            assert np.abs(s.a - [a0, a1]).max() < 1e-11
+
+
+@pytest.mark.parametrize(("make", "order"), [(cubic, 3), (quintic, 5)])
+def test_least_duration_of_polynomials_with_end_states(make, order, rng):
+    """Beside a dense scan of durations: none that is shorter keeps the limits."""
+    limits = MotionLimits(1.5, 4.0, 30.0)
+    checked = 0
+    for _ in range(14):
+        q1, v0, v1 = rng.uniform(-1.0, 1.0, (3, 2)) * [[2.0], [1.0], [1.0]]
+        more = (
+            {} if order == 3 else dict(zip(("a0", "a1"), rng.uniform(-1, 1, (2, 2)), strict=True))
+        )
+        try:
+            move = make([0.0, 0.0], q1, limits=limits, v0=v0, v1=v1, **more)
+        except InvalidValueError as error:
+            assert "no duration keeps" in str(error)
+            trials = np.geomspace(1e-2, 1e2, 300)
+        else:
+            checked += 1
+            assert move.check(limits, 1e-12).kept
+            trials = move.duration * np.linspace(0.02, 0.9999, 300)
+        many = make(np.zeros((300, 2)), q1, trials, v0=v0, v1=v1, **more).motion
+        kept = np.ones(300, np.bool_)
+        for k, most in ((1, 1.5), (2, 4.0), (3, 30.0)):
+            kept &= np.abs(many.extremes(k)).max(axis=(0, -1)) < most * (1 - 1e-9)
+        assert not kept.any()
+    assert checked >= 6
+    with pytest.raises(InvalidValueError, match="least duration"):
+        make(0.0, 1.0, 0.1, limits, v0=0.5)
+    assert make(0.0, 1.0, 3.0, limits, v0=0.5).duration == 3.0
+
+
+# --- jerk-limited motions ------------------------------------------------------------------------
+
+
+def by_ruckig(state, limits, n, T=None):
+    ruckig = pytest.importorskip("ruckig")
+    given = ruckig.InputParameter(n)
+    for side, end in (("current", "0"), ("target", "1")):
+        for word, letter in (("position", "q"), ("velocity", "v"), ("acceleration", "a")):
+            setattr(given, f"{side}_{word}", list(state[letter + end]))
+    bounds = limits.for_joints(n)
+    given.max_velocity, given.min_velocity = list(bounds.velocity), list(bounds.velocity_lower)
+    given.max_acceleration = list(bounds.acceleration)
+    given.min_acceleration = list(bounds.acceleration_lower)
+    given.max_jerk = list(bounds.jerk)
+    if T is not None:
+        given.minimum_duration = T
+    found = ruckig.Trajectory(n)
+    ruckig.Ruckig(n).calculate(given, found)
+    return found
+
+
+def random_states(rng, n):
+    state = {"q0": rng.normal(size=n), "q1": rng.normal(size=n)}
+    return state | {k: rng.uniform(-0.25, 0.25, n) for k in ("v0", "v1", "a0", "a1")}
+
+
+def test_rest_to_rest_is_as_quick_as_ruckig(rng):
+    for _ in range(200):
+        limits = random_limits(rng, TimeLaw.JERK_LIMITED, 1)
+        L = float(rng.normal() * 10.0 ** rng.uniform(-3.0, 1.0))
+        rest = {k: np.zeros(1) for k in ("q0", "v0", "v1", "a0", "a1")} | {"q1": [L]}
+        theirs = by_ruckig(rest, limits, 1)
+        ours = jerk_limited([0.0], [L], limits=limits)
+        assert abs(ours.duration - theirs.duration) < 1e-8 * theirs.duration
+        t = np.linspace(0.0, min(ours.duration, theirs.duration), 9)
+        assert np.abs(ours.q(t)[:, 0] - [theirs.at_time(x)[0][0] for x in t]).max() < 1e-8
+
+
+@pytest.mark.parametrize("longer", [None, 1.6])
+def test_any_states_equal_ruckig(longer, rng):
+    for _ in range(120):
+        n = int(rng.integers(1, 4))
+        limits, state = random_limits(rng, TimeLaw.JERK_LIMITED, n), random_states(rng, n)
+        theirs = by_ruckig(state, limits, n)
+        T = None if longer is None else theirs.duration * longer
+        if T is not None:
+            theirs = by_ruckig(state, limits, n, T)
+            if abs(theirs.duration - T) > 1e-9:  # this time cannot be had with these states
+                with pytest.raises(InvalidValueError, match="least"):
+                    jerk_limited(**state, duration=T, limits=limits,
+                                 synchronisation=Synchronisation.SAME_TIME)  # fmt: skip
+                continue
+        move = jerk_limited(
+            **state, duration=T, limits=limits, synchronisation=Synchronisation.SAME_TIME
+        )
+        assert abs(move.duration - theirs.duration) < 1e-8
+        t = np.linspace(0.0, move.duration, 17)
+        s = move.at(t)
+        want = np.array([theirs.at_time(x) for x in t])
+        assert np.abs(s.q - want[:, 0]).max() < 1e-8
+        assert np.abs(s.v - want[:, 1]).max() < 1e-7
+        for k, name in enumerate("qva"):
+            ends = getattr(s, name)[[0, -1]]
+            assert np.abs(ends - [state[name + "0"], state[name + "1"]]).max() < 1e-12, k
+        assert move.check(limits, 1e-8).kept
+
+
+def test_coordinated_states_stay_on_their_line(rng):
+    for _ in range(40):
+        q0, u = rng.normal(size=(2, 4))
+        u[1] = 0.0
+        u /= np.abs(u).max()
+        L, v0, v1, a0 = rng.uniform(-0.4, 0.4, 4)
+        limits = random_limits(rng, TimeLaw.JERK_LIMITED, 4)
+        move = jerk_limited(
+            q0, q0 + 5 * L * u, limits=limits, v0=v0 * u * 0.5, v1=v1 * u * 0.5, a0=a0 * u
+        )
+        s = move.at(np.linspace(0.0, move.duration, 101))
+        way = (s.q - q0) @ u / (u @ u)
+        assert np.abs(s.q - q0 - way[:, None] * u).max() < 1e-12
+        assert np.abs(s.v[[0, -1]] - 0.5 * np.outer([v0, v1], u)).max() < 1e-12
+        assert np.abs(s.q[-1] - q0 - 5 * L * u).max() < 1e-12
+        assert move.check(limits, 1e-8).kept
+    with pytest.raises(InvalidValueError, match="SAME_TIME"):
+        jerk_limited([0.0, 0.0], [1.0, 1.0], limits=MotionLimits(1, 1, 1), v0=[0.1, 0.2])
+
+
+def test_states_that_the_limits_do_not_allow():
+    limits = MotionLimits(1.0, 2.0, 5.0)
+    same = {"limits": limits, "synchronisation": Synchronisation.SAME_TIME}
+    with pytest.raises(InvalidValueError, match="velocity of 1.5"):
+        jerk_limited(0.0, 1.0, **same, v0=1.5)
+    with pytest.raises(InvalidValueError, match="velocity of 1.3"):
+        jerk_limited(0.0, 1.0, **same, v0=0.9, a0=2.0)
+    with pytest.raises(InvalidValueError, match="acceleration of -3"):
+        jerk_limited(0.0, 1.0, **same, a1=-3.0)
+    with pytest.raises(InvalidValueError, match="must be 0"):
+        jerk_limited(0.0, 1.0, limits=limits, v1=0.5, synchronisation=Synchronisation.INDEPENDENT)
+    with pytest.raises(InvalidValueError, match="swings"):
+        jerk_limited(0.0, 0.0, limits=MotionLimits(1.0, 2.0, 5.0, lower=0.0, upper=0.1), v0=0.9)
+    with pytest.raises(InvalidValueError, match="least"):
+        jerk_limited(0.0, 1.0, 0.5, **same, v0=0.5)
+
+
+def test_independent_joints_start_moving_and_wait(rng):
+    limits = MotionLimits(1.0, 2.0, 5.0)
+    move = jerk_limited([0.0, 0.0, 3.0], [1.0, 4.0, 3.0], limits=limits, v0=[0.5, 0.0, 0.0],
+                        synchronisation=Synchronisation.INDEPENDENT)  # fmt: skip
+    alone = jerk_limited(0.0, 1.0, limits=limits, v0=0.5)
+    assert move.duration > alone.duration + 1.0
+    assert abs(move.q(alone.duration + 0.1)[0] - 1.0) < 1e-12
+    assert np.abs(move.q(move.duration) - [1.0, 4.0, 3.0]).max() < 1e-12
+
+
+# --- the type ------------------------------------------------------------------------------------
+
+
+def test_shapes_scalars_and_samples():
+    move = quintic([0.0, 1.0], [1.0, 0.0], 2.0)
+    assert move.q(0.5).shape == (2,)
+    assert move.v(np.zeros((3, 4))).shape == (3, 4, 2)
+    assert move.a([]).shape == (0, 2)
+    number = quintic(0.0, 1.0, 2.0)
+    assert number.q(0.5).shape == ()
+    assert number.jerk([0.0, 1.0]).shape == (2,)
+    s = move.resample(11)
+    assert np.array_equal(np.asarray(s), s.q)
+    assert len(s) == 11
+    assert not s.q.flags.writeable
+    copy = pickle.loads(pickle.dumps(move))
+    assert np.array_equal(copy.q([0.3, 0.7]), move.q([0.3, 0.7]))
+    shuffled = np.array([1.5, 0.2, 1.0, 0.7, 2.0, 0.0])
+    assert np.abs(move.q(shuffled) - [move.q(t) for t in shuffled]).max() < 1e-15
+
+
+def test_before_and_after():
+    move = trapezoidal([0.0], [1.0], 2.0)
+    assert np.array_equal(move.q([-1.0, 3.0]), [[0.0], [1.0]])
+    assert not move.a([-1.0, 3.0]).any()
+    passing = quintic(0.0, 1.0, 1.0, v1=0.5)
+    assert passing.q(-1.0) == 0.0
+    with pytest.raises(InvalidValueError, match="after the end"):
+        passing.q(1.1)
+    with pytest.raises(InvalidValueError, match="before the start"):
+        linear(0.0, 1.0, 1.0).q(-0.1)
+    with pytest.raises(InvalidValueError, match="finite"):
+        move.q(np.nan)
+    assert passing.resample(period=0.3).t[-1] == pytest.approx(0.9)
+    assert move.resample(period=0.5).t.size == 5
+    with pytest.raises(InvalidValueError, match="either"):
+        move.resample()
+
+
+def test_extremes_are_exact(rng):
+    """Beside a dense sampling, on polynomials of every order, with leading zeros."""
+    for order in range(1, 7):
+        c = rng.normal(size=(30, 1, order + 1, 3))
+        c[:10, :, -1] = 0.0
+        c[10:15, :, -1] *= 1e-13
+        motion = PiecewisePolynomial(np.broadcast_to([[0.0, 2.0]], (30, 1, 2)), c)
+        t = np.broadcast_to(np.linspace(0.0, 2.0, 4001), (30, 4001))
+        (q,) = motion.derivatives(t, (0,))
+        low, high = motion.extremes(0)
+        # between two samples a polynomial rises above both by its curvature only
+        tight = 1e-6 * np.abs(c).sum(axis=(1, 2)) * order**2
+        assert (low <= q.min(axis=1) + 1e-13).all()
+        assert (high >= q.max(axis=1) - 1e-13).all()
+        assert (low >= q.min(axis=1) - tight).all()
+        assert (high <= q.max(axis=1) + tight).all()
+
+
+def test_report_names_what_is_exceeded():
+    move = blended_lines([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]], segment_times=1.0, blend_times=0.2)
+    report = move.check(MotionLimits([2.0, 0.5], 2.0))
+    assert not report.kept
+    assert any("joint 2: velocity 1, allowed 0.5" in line for line in report.violations())
+    assert report.stretch == pytest.approx(2.0)
+    assert move.check(MotionLimits(jerk=1e9)).jerk.max() == np.inf
+    assert isinstance(move, Trajectory)
+
+
+def test_joint_trajectory_is_a_quintic():
+    path = joint_trajectory([0.0, 0.0], [1.0, 2.0], 5)
+    x = np.linspace(0.0, 1.0, 5)
+    s = 10 * x**3 - 15 * x**4 + 6 * x**5
+    assert np.abs(path.q - s[:, None] * [1.0, 2.0]).max() < 1e-15
+    t = np.array([2.0, 2.5, 4.0])
+    moved = joint_trajectory([0.0], [1.0], t, v0=[0.5])
+    assert np.array_equal(moved.t, t)
+    assert moved.v[0, 0] == pytest.approx(0.5)
+    assert moved.q[-1, 0] == 1.0
+    assert joint_trajectory([0.0], [1.0], 0).q.shape == (0, 1)
+    assert joint_trajectory([0.0], [1.0], 1).q[0, 0] == 0.0
+    assert joint_trajectory(np.zeros((4, 2)), np.ones((4, 2)), 7).q.shape == (4, 7, 2)
