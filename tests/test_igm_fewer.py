@@ -224,8 +224,13 @@ def test_poses_with_few_digits(word):
     check(chain, U, found, 2e-4)
     # beside a fold an angle is good to the root of what the pose is off by
     assert lost(chain, found, q, 3e-2).size == 0
-    exact = postures(solver(word), tool(chain, q[40:]), q[40:], EXACT)
-    np.testing.assert_array_equal(found.valid[40:].sum(axis=1), exact.valid.sum(axis=1))
+    # no posture more, none less, but for pairs that the digits cannot tell apart
+    exact = postures(solver(word), tool(chain, q), q, EXACT)
+    n, i, j = np.nonzero(exact.valid[:, :, None] & exact.valid[:, None])
+    close = (i < j) & (gaps(chain, exact.q[n, i], exact.q[n, j]) < 0.03)
+    clear = np.setdiff1d(np.arange(40, 100), n[close])
+    assert clear.size > 50
+    np.testing.assert_array_equal(found.valid[clear].sum(axis=1), exact.valid[clear].sum(axis=1))
 
 
 def test_a_superfluous_joint_takes_its_reference():
