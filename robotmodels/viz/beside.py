@@ -73,6 +73,6 @@ def beside(model: RobotModel, q: Array, columns: int) -> tuple[list[RobotModel],
         row, column = divmod(k, wide)
         shift = se3.translation(column * step[0], -row * step[1], 0.0)
         robots.append(model.with_base(shift @ model.base))
-        foot = shift @ se3.translation(*(model.base[:3, 3] - (0.0, 0.25 * size, 0.0)))
+        foot = shift @ se3.translation(*(model.base[:3, 3] - (0.0, 0.32 * size, 0.0)))
         numbers.append(Node(f"numbers/{k + 1}", foot, Label(str(k + 1), 0.7 * size), _INK))
     return robots, numbers
