@@ -19,6 +19,7 @@ from ._check import forward, jacobian, missing, wrapped
 
 SINGULAR = 1e-6  # singular values that count as zero at a posture
 MET = 1e-11  # error up to which a posture is a member
+MERGED = 2e-6  # double roots are postures closer than this; rounding parts them by half of it
 PROBE = 0.02  # step that tells a family from a double root [rad]
 STRIDE = 0.1  # first step along a curve
 LONGEST = 0.4  # longest one: far less than half a turn
@@ -191,21 +192,12 @@ def sought(sigma, D, U, q, held):
     return error_at(sigma, D, U, q, e)
 
 
-@compiled(types.void(INTS, STACK, MATRIX, OUT1, INT, INT))
-def on_fold(sigma, D, U, q, held, spare):
-    """Move a posture beside a fold onto it, in place: there two postures of every pose are one.
-
-    The error falls with the square of the way and leaves half of the digits open; the singular
-    value falls with the way itself.
-    """
+@compiled()
+def bend(sigma, D, q, W, s, V, i):
+    """Change of singular value i along its own direction: its slope where it passes zero."""
     k = sigma.size
-    P, axes, J = np.empty((3, 4)), np.empty((k, 6)), np.empty((6, k))
-    W, s, V = np.empty((6, k)), np.empty(k), np.empty((k, k))
-    f = decomposed(sigma, D, q, held, W, s, V)
-    i = f - spare - 1
-    if not 0 <= i < 6 or not 1e-300 < s[i] < 1e-4:
-        return
-    trial, e, change = np.empty(k), np.empty(6), 0.0
+    P, axes, J, trial = np.empty((3, 4)), np.empty((k, 6)), np.empty((6, k)), np.empty(k)
+    change = 0.0
     for side in range(2):
         step = 1e-4 if side == 0 else -1e-4
         for m in range(k):
@@ -215,8 +207,26 @@ def on_fold(sigma, D, U, q, held, spare):
         for r in range(6):
             for m in range(k):
                 change += W[r, i] / s[i] * J[r, m] * V[m, i] / (2.0 * step)
+    return change
+
+
+@compiled(types.void(INTS, STACK, MATRIX, OUT1, INT, INT))
+def on_fold(sigma, D, U, q, held, spare):
+    """Move a posture beside a fold onto it, in place: there two postures of every pose are one.
+
+    The error falls with the square of the way and leaves half of the digits open; the singular
+    value falls with the way itself.
+    """
+    k = sigma.size
+    W, s, V = np.empty((6, k)), np.empty(k), np.empty((k, k))
+    f = decomposed(sigma, D, q, held, W, s, V)
+    i = f - spare - 1
+    if not 0 <= i < 6 or not 1e-300 < s[i] < 1e-4:
+        return
+    change = bend(sigma, D, q, W, s, V, i)
     if abs(change) < 1e-3:
         return
+    trial, e = np.empty(k), np.empty(6)
     for m in range(k):
         trial[m] = q[m] - s[i] / change * V[m, i]
     if error_at(sigma, D, U, trial, e) <= 1e-13:
@@ -306,6 +316,19 @@ def candidates(V, first, f, out):
     return count
 
 
+@compiled()
+def first_flat(s, f):
+    """Place of the first of the falling singular values that counts as zero.
+
+    With slides run out far beyond the arm small angles matter more than their size tells.
+    """
+    limit = SINGULAR * min(1.0, (10.0 / s[0]) ** 2) if f > 0 and s[0] > 0.0 else SINGULAR
+    first = f
+    while first > 0 and s[first - 1] < limit:
+        first -= 1
+    return first
+
+
 @compiled(_COUNTS(INTS, STACK, MATRIX, VECTOR, INT, OUT2))
 def directions(sigma, D, U, q, held, out):
     """Unit vectors along which the arm moves while the pose stays, in rows of out.
@@ -315,9 +338,7 @@ def directions(sigma, D, U, q, held, out):
     k = sigma.size
     W, s, V = np.empty((6, k)), np.empty(k), np.empty((k, k))
     f = decomposed(sigma, D, q, held, W, s, V)
-    first = f
-    while first > 0 and s[first - 1] < SINGULAR:
-        first -= 1
+    first = first_flat(s, f)
     null = f - first
     if null == 0:
         return 0, 0
@@ -440,9 +461,7 @@ def is_settled(sigma, D, U, q, free, W, s, V):
     """
     k = sigma.size
     f = decomposed(sigma, D, q, 0, W, s, V)
-    first = f
-    while first > 0 and s[first - 1] < SINGULAR:
-        first -= 1
+    first = first_flat(s, f)
     null, freed = f - first, 0
     for m in range(k):
         freed += (free >> m) & 1
@@ -522,6 +541,7 @@ def singular_postures(sigma, D, q, there, double, member):
     k = sigma.size
     P, axes, J = np.empty((3, 4)), np.empty((k, 6)), np.empty((6, k))
     rows = np.empty((24, k))
+    W, s, V = np.empty((6, k)), np.empty(k), np.empty((k, k))
     for n in range(q.shape[0]):
         for r in range(q.shape[1]):
             double[n, r] = member[n, r] = False
@@ -533,3 +553,9 @@ def singular_postures(sigma, D, q, there, double, member):
                 continue
             count, null = directions(sigma, D, P, q[n, r], 0, rows)
             double[n, r], member[n, r] = null > 0 and count == 0, count > 0
+            if null == 1 and count == 0 and k == 6:
+                # the other root is twice as far as the singularity, if there is one near
+                decomposed(sigma, D, q[n, r], 0, W, s, V)
+                if s[5] > 1e-12:
+                    slope = abs(bend(sigma, D, q[n, r], W, s, V, 5))
+                    double[n, r] = 2.0 * s[5] < MERGED * slope

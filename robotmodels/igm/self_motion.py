@@ -138,7 +138,8 @@ def singular_postures(
     from ._self_motion import singular_postures as singular
 
     D, unit = shortened(chain)
-    double, member = np.zeros((2, *found.valid.shape), np.bool_)
+    double = np.zeros(found.valid.shape, np.bool_)
+    member = np.zeros(found.valid.shape, np.bool_)
     q = np.ascontiguousarray(found.q)
     if unit != 1.0 and np.any(chain.sigma == 1):
         q = np.where(chain.sigma == 1, q / unit, q)
