@@ -21,7 +21,7 @@ from .dependent import DependentJoints, prepare_dependent
 from .extensions import Layout, Triple, layout_like, layouts, loose_layouts
 from .gather import MERGE, merged, rows_of
 from .loop import JointChain
-from .motion import jacobians, lever, random_postures, scaled, tool_poses
+from .motion import jacobians, lever, random_postures, scaled, singular_rows, tool_poses
 from .solver import Found, Prepare, Solver, Tolerances, nothing_found, postures
 from .structure import plan_loop
 from .virtual import with_virtual_joints
@@ -220,11 +220,10 @@ def _judged(solver: FewerJoints, U: Array, found: Found) -> Found:
     """Mark double roots and infinite families."""
     n, s = np.nonzero(found.valid)
     J = scaled(jacobians(solver.chain, found.q[n, s]), solver.length)
-    _, values, rows = np.linalg.svd(J, full_matrices=False)
-    singular = np.flatnonzero(values[:, -1] <= SINGULAR * values[:, 0])
+    singular, null = singular_rows(J, SINGULAR)
     if singular.size == 0:
         return found
-    n, s, null = n[singular], s[singular], rows[singular, -1]
+    n, s = n[singular], s[singular]
     moves = _moves(solver.chain, U[n], found.q[n, s], null)
     found.family[n, s], found.double[n, s] = moves, ~moves
     return found

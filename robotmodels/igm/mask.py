@@ -20,7 +20,7 @@ from .dependent import DependentJoints, prepare_dependent
 from .fewer import prepare_fewer
 from .gather import assembled, merged, rows_of
 from .loop import JointChain
-from .motion import lever, tool_poses
+from .motion import lever, singular_rows, tool_poses
 from .self_motion import settle_families
 from .solver import Found, Prepare, Solver, Tolerances, nothing_found, postures
 from .swing import judged, prepare_swing
@@ -308,12 +308,13 @@ def _of_the_arm(
     if n.size == 0:
         return arm
     J[:, : 3 - len(components.freed_translations)] /= solver.length
-    values = np.linalg.svd(J, compute_uv=False)
-    singular = values[:, -1] <= SINGULAR * np.maximum(values[:, 0], 1e-300)
-    if not singular.any():
+    flat, _ = singular_rows(J, SINGULAR)
+    if flat.size == 0:
         return arm
-    parts = [(np.setdiff1d(np.arange(len(U)), n[singular]), arm)]
-    parts[0] = (parts[0][0], rows_of(arm, parts[0][0]))
+    singular = np.zeros(n.size, np.bool_)
+    singular[flat] = True
+    regular = np.setdiff1d(np.arange(len(U)), n[singular])
+    parts = [(regular, rows_of(arm, regular))]
     for pose in np.unique(n[singular]):
         marked = np.zeros(arm.valid.shape[1], np.bool_)
         marked[s[singular & (n == pose)]] = True

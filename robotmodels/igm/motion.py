@@ -6,6 +6,7 @@ Plain array code: it runs when an arm is prepared and on the few postures that a
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._arrays import Array
 from .loop import JointChain
@@ -96,6 +97,41 @@ def scaled(J: Array, length: float) -> Array:
     J = J.copy()
     J[:, :3] /= length
     return J
+
+
+def singular_rows(J: Array, relative: float) -> tuple[NDArray[np.int64], Array]:
+    """Jacobians whose smallest singular value is next to nothing.
+
+    Parameters
+    ----------
+    J : ndarray, shape (N, a, k), a >= k
+        Jacobians, lengths in units of the arm.
+    relative : float
+        Singular values beside the largest that count as zero.
+
+    Returns
+    -------
+    rows : ndarray of int, shape (m,)
+        Which.
+    directions : ndarray, shape (m, k)
+        In which the joints move and the tool does not, of length 1.
+
+    Examples
+    --------
+    >>> rows, directions = singular_rows(np.array([np.eye(2), [[1.0, 1.0], [0.0, 0.0]]]), 1e-6)
+    >>> rows, np.abs(directions).round(3)
+    (array([1]), array([[0.707, 0.707]]))
+    """
+    k = J.shape[2]
+    G = np.swapaxes(J, 1, 2) @ J
+    trace = np.maximum(np.trace(G, axis1=1, axis2=2), 1e-300)
+    # the smallest eigenvalue is no less than what is left of the product where the others are
+    # equal: few matrices are decomposed
+    least = np.linalg.det(G / trace[:, None, None]) * max(k - 1, 1) ** (k - 1)
+    doubtful = np.flatnonzero(least <= 4.0 * relative**2)
+    _, values, rows = np.linalg.svd(J[doubtful], full_matrices=False)
+    small = values[:, -1] <= relative * np.maximum(values[:, 0], 1e-300)
+    return doubtful[small], rows[small, -1]
 
 
 def _walk(chain: JointChain, q: Array) -> tuple[Array, list[Array], list[Array]]:
