@@ -44,7 +44,9 @@ GRID = 48
 KEPT = 128
 """Chains with locked joints that an arm remembers."""
 WALKED = 8
-"""Members of the families of a pose that are walked along them."""
+"""Members of the families of a pose, nearest to the reference, that are walked along them."""
+SPREAD = 24
+"""Members from all over the families that are walked as well."""
 _MOVES = 1e-6  # part of a null space below which a joint stands still
 _SAME = 1e-7  # values of free joints closer than this are one [rad, m]
 _CHUNK = 64  # poses that are searched at a time
@@ -378,9 +380,13 @@ def _nearest(solver: Redundant, U: Array, references: Array, tolerances: Toleran
     N = U.shape[0]
     q, valid = members(solver, U, references, tolerances)
     q, valid = q.reshape(N, -1, chain.k), valid.reshape(N, -1)
-    # those are walked along their families that are nearest in the first free joint
+    # those are walked along their families that are nearest in the first free joint, and some more
     near = np.where(valid, np.abs(_way(chain, q, references))[..., order[0]], np.inf)
-    first = np.argsort(near, axis=1, kind="stable")[:, :WALKED]
+    near = np.argsort(near, axis=1, kind="stable")
+    count = valid.sum(axis=1, keepdims=True)
+    spread = np.minimum(WALKED + np.arange(SPREAD) * np.maximum(count - WALKED, 0) // SPREAD,
+                        valid.shape[1] - 1)  # fmt: skip
+    first = np.hstack((near[:, :WALKED], np.take_along_axis(near, spread, axis=1)))
     q = np.take_along_axis(q, first[..., None], axis=1)
     valid = np.take_along_axis(valid, first, axis=1)
     out, rows = [nothing_found(0, 1, chain.k)], [np.zeros(0, np.int64)]

@@ -1,0 +1,118 @@
+"""The curves that a one-dimensional family of postures is made of, walked from its members."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import Array
+from .general import shortened
+from .loop import JointChain
+
+__all__ = ["MemberCurve", "curves_through"]
+
+POINTS = 4000
+"""Points of a curve for which room is made at first."""
+APART = 0.02
+"""Way from a curve within which a member counts as one of it [rad, lengths of the arm]."""
+
+
+class MemberCurve(NamedTuple):
+    """A piece of a curve.
+
+    Parameters
+    ----------
+    points : ndarray, shape (M, k)
+        Postures in their order [rad or m]; angles go on beyond whole turns.
+    tangents : ndarray, shape (M, k)
+        Unit directions, lengths in units of the arm.
+    """
+
+    points: Array
+    tangents: Array
+
+
+def curves_through(chain: JointChain, U: Array, q: Array, most: int = 64) -> list[MemberCurve]:
+    """Walk the curves on which members of a family lie, each once.
+
+    Parameters
+    ----------
+    chain : JointChain
+        One joint more than the task has components.
+    U : ndarray, shape (4, 4)
+        The pose [m].
+    q : ndarray, shape (B, k)
+        Postures that meet it [rad or m].
+    most : int
+        Curves that are walked.
+
+    Returns
+    -------
+    list of MemberCurve
+        A curve that does not close comes in two pieces.
+
+    Examples
+    --------
+    >>> from robotmodels.igm.loop import joint_chain
+    >>> from robotmodels.igm.motion import tool_poses
+    >>> from robotmodels.robots import load
+    >>> chain, q = joint_chain(load("panda")), np.array([[0.1, 0.2, 0.3, -1.4, 0.5, 1.6, 0.7]])
+    >>> curve = curves_through(chain, tool_poses(chain, q)[0], q)[0]
+    >>> U = tool_poses(chain, curve.points)
+    >>> bool(np.abs(U - U[0]).max() < 1e-10)
+    True
+    """
+    from ._self_motion import walked
+
+    D, unit = shortened(chain)
+    sigma = np.ascontiguousarray(chain.sigma)
+    lengths = np.where(sigma == 1, unit, 1.0)
+    goal = U.copy()
+    goal[:3, 3] /= unit
+    members = np.ascontiguousarray(q / lengths)
+    waiting = np.ones(len(members), np.bool_)
+    # a direction to set out in: whichever the null space has, seen from one that is no axis
+    along = np.cos(1.0 + 2.3 * np.arange(chain.k))
+    curves: list[MemberCurve] = []
+    while waiting.any() and len(curves) < most:
+        start = members[int(np.argmax(waiting))]
+        waiting[int(np.argmax(waiting))] = False
+        for sign in (1.0, -1.0):
+            room = POINTS
+            while True:
+                points, tangents = np.empty((room, chain.k)), np.empty((room, chain.k))
+                n, closed = walked(
+                    sigma, D, goal, start, sign * along, 0, points, tangents, np.empty(room)
+                )
+                if n < room:
+                    break
+                room *= 2
+            waiting &= ~_on_curve(sigma, members, points[:n], waiting)
+            curves.append(MemberCurve(points[:n] * lengths, tangents[:n]))
+            if closed:
+                break
+    return curves
+
+
+def _on_curve(
+    sigma: NDArray[np.int64], members: Array, points: Array, asked: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Members, of those asked for, that lie on a curve given by its points."""
+    on = np.zeros(len(members), np.bool_)
+    if len(points) < 2:
+        return on
+    chords = np.diff(points, axis=0)
+    squares = np.maximum((chords**2).sum(axis=1), 1e-30)
+    chosen = np.flatnonzero(asked)
+    # in parts: members times chords times joints are kept below a megabyte or so
+    size = max(1, 20_000 // len(chords))
+    for first in range(0, chosen.size, size):
+        part = chosen[first : first + size]
+        d = members[part, None] - points[:-1]
+        d = np.where(sigma == 0, np.remainder(d + np.pi, 2.0 * np.pi) - np.pi, d)
+        share = np.clip((d * chords).sum(axis=2) / squares, 0.0, 1.0)
+        off = d - share[..., None] * chords
+        on[part] = ((off**2).sum(axis=2) < APART**2).any(axis=1)
+    return on
