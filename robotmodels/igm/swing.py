@@ -123,8 +123,8 @@ def prepare_swing(chain: JointChain, components: Components, position: Prepare) 
     >>> from robotmodels.robots import load
     >>> asked = (True, True, True, False, False, True)
     >>> arm = prepare_masked(joint_chain(load("cobra_s600")), asked, False, prepare)
-    >>> arm.searched
-    0
+    >>> arm.method[:32]
+    'roots of the twist along joint 4'
     """
     length, k = lever(chain), chain.k
     J = _sampled_jacobians(chain, components, length)
