@@ -1,6 +1,7 @@
 """Joint motions: limits kept, least times, continuity, ratios, ends, and refusals."""
 
 import pickle
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -61,7 +62,7 @@ def random_limits(rng, law, n):
 
 @pytest.mark.parametrize("law", LAWS)
 def test_limits_hold_and_ends_are_met_on_10000_random_motions(law, rng):
-    """Not one bit above a limit, anywhere on the motion; one limit of some joint is used in full."""
+    """Not one bit above a limit, anywhere on the motion; some limit is used in full."""
     for _ in range(20):
         n = int(rng.integers(1, 5))
         limits = random_limits(rng, law, n)
@@ -114,7 +115,7 @@ def test_derivatives_and_continuity(law, rng):
     t = np.linspace(0.01, 0.99, 57) * T
     t = t[np.abs(t[:, None] - breaks).min(axis=-1) > 2 * h]
     parts = (move.q, move.v, move.a, move.jerk)
-    for low, high in zip(parts[:-1], parts[1:], strict=True):
+    for low, high in pairwise(parts):
         numeric = (low(t + h) - low(t - h)) / (2 * h)
         assert np.abs(numeric - high(t)).max() < 1e-6 * max(1.0, np.abs(high(t)).max())
     inner = breaks[1:-1]
@@ -190,7 +191,7 @@ def test_least_times_of_smooth_ramps_by_bisection(law, ramp, rng):
         limits = MotionLimits(V, A, J, acceleration_lower=-B)
         T = along_line(law, 0.0, L, None, limits).duration
         assert abs(T / time(low) - 1.0) < 1e-12
-        assert all(T <= time(v) * (1 + 1e-12) for v in low * rng.uniform(0.2, 1.0, 20))
+        assert all(time(v) * (1 + 1e-12) >= T for v in low * rng.uniform(0.2, 1.0, 20))
 
 
 @pytest.mark.parametrize("jerk", [False, True])
@@ -390,8 +391,7 @@ def test_least_duration_of_polynomials_with_end_states(make, order, rng):
         )
         try:
             move = make([0.0, 0.0], q1, limits=limits, v0=v0, v1=v1, **more)
-        except InvalidValueError as error:
-            assert "no duration keeps" in str(error)
+        except InvalidValueError:  # no duration keeps them
             trials = np.geomspace(1e-2, 1e2, 300)
         else:
             checked += 1
@@ -498,9 +498,9 @@ def test_coordinated_states_stay_on_their_line(rng):
 def test_states_that_the_limits_do_not_allow():
     limits = MotionLimits(1.0, 2.0, 5.0)
     same = {"limits": limits, "synchronisation": Synchronisation.SAME_TIME}
-    with pytest.raises(InvalidValueError, match="velocity of 1.5"):
+    with pytest.raises(InvalidValueError, match=r"velocity of 1\.5"):
         jerk_limited(0.0, 1.0, **same, v0=1.5)
-    with pytest.raises(InvalidValueError, match="velocity of 1.3"):
+    with pytest.raises(InvalidValueError, match=r"velocity of 1\.3"):
         jerk_limited(0.0, 1.0, **same, v0=0.9, a0=2.0)
     with pytest.raises(InvalidValueError, match="acceleration of -3"):
         jerk_limited(0.0, 1.0, **same, a1=-3.0)

@@ -163,8 +163,8 @@ def _full_speed(step: Array, limits: MotionLimits) -> Array:
     """Times of lines at the greatest velocity, shape (m - 1,)."""
     V = np.where(step > 0.0, limits.velocity, -limits.velocity_lower)
     moves = step != 0.0
-    for bound, name in ((V, "velocity"), (np.minimum(limits.acceleration,
-                        -limits.acceleration_lower) + 0.0 * V, "acceleration")):  # fmt: skip
+    A = np.minimum(limits.acceleration, -limits.acceleration_lower)
+    for bound, name in ((V, "velocity"), (np.broadcast_to(A, V.shape), "acceleration")):
         if (moves & (bound == 0.0)).any():
             j = int(np.argwhere(moves & (bound == 0.0))[0][-1])
             raise InvalidValueError(

@@ -94,7 +94,8 @@ class PoseTrajectory:
         >>> move.pose(0.5)[:3, 3]
         array([0.1, 0. , 0. ])
         """
-        s = self.law.q(t)
+        # the last pose is met to the last digit, though the law ends a rounding beside it
+        s = np.where(np.asarray(t) >= self.duration, self.path.end, self.law.q(t))
         return self.path.poses(s.reshape(-1)).reshape(*s.shape, 4, 4)
 
     def twist(self, t: ArrayLike) -> Array:
