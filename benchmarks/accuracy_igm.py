@@ -299,7 +299,7 @@ def printed_postures() -> tuple[int, float]:
 
 @dataclass(frozen=True)
 class Union:
-    """One pose of each of many random arms, all formulations of the elimination beside each other."""
+    """One pose of each of many random arms: the formulations of the elimination side by side."""
 
     arms: int
     found: int
@@ -364,14 +364,22 @@ NOTES = """
 """
 
 
+def brief(r: Row) -> str:
+    """One line while the run goes on."""
+    return (
+        f"{r.arm}, {r.solver}: lost {r.lost} regular and {r.lost_singular} of {r.singular} "
+        f"singular, residual {r.residual:.1e}, odd {r.odd}, {r.microseconds:.1f} us a pose"
+    )
+
+
 def report(rows: list[Row], printed: tuple[int, float], union: Union | None, about: dict) -> str:
     """The results as Markdown."""
     lines = ["# Inverse geometric models: completeness and accuracy", ""]
     lines += [f"- {key}: {value}" for key, value in about.items()]
     lines += [
         "",
-        "| arm | solver | poses (singular) | lost | lost, singular | off q_ref | searched | residual "
-        "| above | NaN | odd | unknown | limits | order | us |",
+        "| arm | solver | poses (singular) | lost | lost, singular | off q_ref | searched "
+        "| residual | above | NaN | odd | unknown | limits | order | us |",
         "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     for r in rows:
@@ -417,7 +425,10 @@ def main() -> None:
     arguments = parser.parse_args()
     rows = []
     for name in arguments.only:
-        rows += [row for row in (ours(name, arguments.poses), theirs(name, arguments.poses)) if row]
+        for row in (ours(name, arguments.poses), theirs(name, arguments.poses)):
+            if row is not None:
+                rows.append(row)
+                print(brief(row), flush=True)
     printed = printed_postures()
     union = random_arms(arguments.arms) if arguments.arms else None
     about = machine()

@@ -26,11 +26,8 @@ from igm_peers import Peer, machine, peers_of
 from numpy.typing import NDArray
 
 import robotmodels as rm
-from robotmodels.igm.closed_form import MOST, SLACK, ClosedForm
-from robotmodels.igm.families import prepare
-from robotmodels.igm.loop import joint_chain
-from robotmodels.igm.solver import Tolerances, postures
-from robotmodels.igm.structure import Family
+from robotmodels.igm.by_plan import TOLERANCES
+from robotmodels.igm.known import known_arm
 
 Array = NDArray[np.float64]
 
@@ -38,13 +35,12 @@ FEW, BATCH = 200, 100_000
 THOUSAND = 1000
 STRUCTURED = ("puma560", "rx90", "irb6640", "kr6_r900", "ur5", "ur5e")
 OURS = "robotmodels"
-BENEATH = "robotmodels, family beneath rm.igm"
-KERNEL = "robotmodels, kernels alone"
+KERNEL = "robotmodels, kernel"
 
 
 @dataclass(frozen=True)
 class Contestant:
-    """One way to do the work of a row; ``weight`` times slower, ``rounds`` are so many fewer."""
+    """One way to do the work of a row; what takes minutes is done ``once``."""
 
     name: str
     run: Callable[[], object]
@@ -82,7 +78,7 @@ def row(work: str, us: dict[str, float], goals: dict[str, float]) -> Row:
     """A line with its goals, each for one contestant."""
     print(f"{work}: " + "; ".join(f"{name} {value:.2f}" for name, value in us.items()), flush=True)
     text = ", ".join(
-        f"<= {goal:g} us" + (" in the kernels" if name == KERNEL else "")
+        f"<= {goal:g} us" + (" in the kernel" if name == KERNEL else "")
         for name, goal in goals.items()
     )
     met = all(us[name] <= goal for name, goal in goals.items()) if goals else None
@@ -117,52 +113,26 @@ def single_peer(peer: Peer, n: int) -> Contestant:
 # --- what stands beneath rm.igm -------------------------------------------------------------------
 
 
-def beneath(model: rm.RobotModel, T: Array) -> Callable[[], object]:
-    """The prepared family on the poses of one call."""
-    chain = joint_chain(model)
-    solver = prepare(chain)
-    assert solver is not None
-    U = np.ascontiguousarray(np.linalg.inv(chain.base) @ T)
-    references = np.zeros((len(T), chain.k))
-    return lambda: postures(solver, U, references, Tolerances())
+def kernel(model: rm.RobotModel, T: Array) -> Callable[[], object] | None:
+    """The compiled plan on the poses of one call: checked, ordered and labelled postures.
 
-
-def kernels(model: rm.RobotModel, T: Array) -> Callable[[], object] | None:
-    """The compiled closed form and its check on buffers that are kept, without any Python between.
-
-    None for arms of other families.
+    None for arms that Paul's method does not serve.
     """
-    from robotmodels.igm._concurrent import concurrent_postures
-    from robotmodels.igm._parallel import parallel_postures
-    from robotmodels.igm._verify import verified_postures
+    from robotmodels.igm._regular import regular_postures
 
-    chain = joint_chain(model)
-    solver = prepare(chain)
-    if not isinstance(solver, ClosedForm):
+    arm = known_arm(model)
+    plan, numbers = arm.plan, arm.numbers
+    if plan is None:
         return None
-    plan = solver.plan
-    U = np.ascontiguousarray(np.linalg.inv(chain.base) @ T)
-    N = len(T)
-    found, marks, counts = np.zeros((N, MOST, 6)), np.zeros((N, MOST), np.int64), np.zeros(N, int)
-    q, valid = np.full((N, MOST, 6), np.nan), np.zeros((N, MOST), np.bool_)
-    free, references = np.zeros((N, MOST, 6), np.bool_), np.zeros((N, 6))
-    first = np.ascontiguousarray(plan.sigma[:3])
-    pose = (U, plan.constants, plan.slot, plan.left, plan.right, int(plan.inverted))
-
-    def run() -> None:
-        if plan.family is Family.CONCURRENT:
-            concurrent_postures(
-                *pose, first, int(plan.backwards), plan.meeting, plan.size, SLACK, references,
-                found, marks, counts,
-            )  # fmt: skip
-        else:
-            parallel_postures(*pose, plan.size, SLACK, references, found, marks, counts)
-        verified_postures(
-            U, chain.sigma, chain.D, plan.order, plan.sense, 1e-9, found, marks, counts, q, valid,
-            free,
-        )  # fmt: skip
-
-    return run
+    N, S, n = len(T), plan.most, model.n
+    poses, references = np.ascontiguousarray(T), np.zeros((N, n))
+    q, residual = np.empty((N, S, n)), np.empty((N, S))
+    flags, code = np.empty((2, N, S), np.bool_), np.empty((N, S), np.int16)
+    status = np.empty(N, np.int8)
+    return lambda: regular_postures(
+        plan.instructions, numbers, TOLERANCES, poses, references, False, plan.branch_of_way,
+        arm.joints, False, q, residual, flags, code, status,
+    )  # fmt: skip
 
 
 # --- rows ----------------------------------------------------------------------------------------
@@ -177,8 +147,7 @@ def structured_rows(rounds: int) -> list[Row]:
         few, thousand = T[:FEW], np.ascontiguousarray(T[:THOUSAND])
         peers = peers_of(model, name)
         contestants = [Contestant(OURS, loop(lambda x, m=model: rm.igm(m, x), few), FEW)]
-        contestants.append(Contestant(BENEATH, _one_by_one(model, few), FEW))
-        alone = kernels(model, thousand)
+        alone = kernel(model, thousand)
         if alone is not None:
             contestants.append(Contestant(KERNEL, alone, THOUSAND))
         contestants += [single_peer(peer, model.n) for peer in peers]
@@ -186,10 +155,7 @@ def structured_rows(rounds: int) -> list[Row]:
         goals = {OURS: 12.0} | ({KERNEL: 3.0} if alone is not None else {})
         rows.append(row(f"{name}: all postures, one pose", us, goals))
         for poses in (thousand, T):
-            contestants = [
-                Contestant(OURS, lambda m=model, x=poses: rm.igm(m, x), len(poses)),
-                Contestant(BENEATH, beneath(model, poses), len(poses)),
-            ]
+            contestants = [Contestant(OURS, lambda m=model, x=poses: rm.igm(m, x), len(poses))]
             contestants += [
                 Contestant(f"{p.name}, batch", lambda p=p, x=poses: p.batch(x), len(poses))
                 for p in peers
@@ -198,15 +164,6 @@ def structured_rows(rounds: int) -> list[Row]:
             us = measure(contestants, rounds if len(poses) < BATCH else max(rounds // 3, 3))
             rows.append(row(f"{name}: all postures, batch of {len(poses)}", us, {OURS: 2.5}))
     return rows
-
-
-def _one_by_one(model: rm.RobotModel, poses: Array) -> Callable[[], None]:
-    chain = joint_chain(model)
-    solver = prepare(chain)
-    assert solver is not None
-    U = np.ascontiguousarray(np.linalg.inv(chain.base) @ poses)[:, None]
-    references = np.zeros((1, chain.k))
-    return loop(lambda x: postures(solver, x, references, Tolerances()), U)
 
 
 def general_rows(rounds: int, slow: bool) -> list[Row]:
@@ -330,7 +287,8 @@ def report(rows: list[Row], about: dict[str, str], rounds: int) -> str:
         f"Medians of {rounds} rounds (fewer for the long rows) in us a pose, one thread; in "
         "brackets the ratio to ours, the first of the row. Poses are those of random postures "
         "over whole turns; EAIK's batches are asked of one thread; ssik is asked for every branch "
-        "once, without limits; `prebuilt` arms are ssik's own, with its native code.",
+        "once, without limits; `prebuilt` arms are ssik's own, with its native code. `kernel` is "
+        "the compiled plan alone, per pose of a call with 1000, without Python between.",
         "",
         "| work | ours | beneath it | others | goal | met |",
         "|---|---|---|---|---|---|",
@@ -362,7 +320,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
     parser.add_argument("--rounds", type=int, default=15)
     parser.add_argument(
-        "--slow", action="store_true", help="ssik's minutes for a robot of one's own"
+        "--slow", action="store_true", help="minutes of ssik for a robot of one's own"
     )
     arguments = parser.parse_args()
     missing = igm_peers.absent()

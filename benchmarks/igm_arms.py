@@ -56,7 +56,7 @@ def manocha_canny() -> rm.RobotModel:
 
 
 def manocha_canny_pose(model: rm.RobotModel) -> Array:
-    """Its pose: the hand is printed to four decimals, the mean over the postures knows it better."""
+    """Its pose, better known by the mean over the postures than by the hand as printed."""
     T = np.mean(rm.dgm(model, np.deg2rad(MANOCHA_CANNY_POSTURES)), axis=0)
     V, _, W = np.linalg.svd(T[:3, :3])
     T[:3, :3] = V @ W

@@ -145,7 +145,10 @@ def newton_search(
     q = uniform(model, N * starts, rng)
     done: list[tuple[NDArray[np.int64], Array]] = []
     for _ in range(steps):
-        step, e = newton_step(model, T[pose], q, 1e-6)
+        e, J = missing(model, T[pose], q), rm.jacobian(model, q)
+        Jt = np.swapaxes(J, 1, 2)
+        # a little damping keeps the steps finite at singular postures
+        step = (Jt @ np.linalg.solve(J @ Jt + 1e-12 * np.eye(6), e[..., None]))[..., 0]
         met = np.abs(e).max(axis=1) < 1e-11
         done.append((pose[met], q[met]))
         pose, q, step = pose[~met], q[~met], step[~met]
