@@ -1,0 +1,29 @@
+"""The README's examples run as they are printed, one after the other."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+TEXT = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+BLOCKS = re.findall(r"^```python\n(.*?)^```$", TEXT, flags=re.MULTILINE | re.DOTALL)
+
+
+def test_python_examples(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    for block in BLOCKS:
+        exec(compile(block, "README.md", "exec"), names)
+    rm, found = names["rm"], names["found"]
+    assert found.q.shape == (8, 6)
+    assert "off by 180 deg" in rm.igm(names["trr"], POSE_B).reason()
+    np.testing.assert_allclose(
+        rm.igm(names["trr"], POSE_B, mask=[1, 1, 1, 0, 0, 0]).q, [[0.2, 0, 0]], atol=1e-6
+    )
+    assert rm.igm(names["iiwa"], names["T"], arm_angle=[0.0, 0.5]).q.shape == (2, 8, 7)
+    assert (tmp_path / "ur5.html").stat().st_size > 500_000
+    assert (tmp_path / "arm.urdf").is_file()
+    assert "rx90" in capsys.readouterr().out
+
+
+POSE_B = [[-1, 0, 0, 0.4], [0, 1, 0, 0.2], [0, 0, -1, 0.5], [0, 0, 0, 1]]
