@@ -149,7 +149,9 @@ def test_the_three_singular_positions_of_the_rx90():
     both[:, 4] = 0.0
     found = rm.igm(model, rm.dgm(model, both), both)
     assert distance(model, found.q[:, 0], both).max() < 1e-6
-    assert np.all(found.free_joints[:, 0] == np.isin(np.arange(6), [0, 3]))
+    # two curves of postures cross there: one turns the wrist alone, the other the shoulder
+    assert np.all(found.free_joints[:, 0, 3])
+    assert np.all(np.any(found.free_joints[:, :, 0], axis=1))
     elbow = q.copy()
     elbow[:, 2] = 0.5 * np.pi  # C3 = 0
     found = rm.igm(model, rm.dgm(model, elbow), elbow)

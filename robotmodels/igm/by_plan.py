@@ -10,16 +10,20 @@ from numpy.typing import NDArray
 from .._arrays import Array, read_only
 from ..model import RobotModel
 from .branches import SIDES, branches
+from .closed_form import ClosedForm, closed_form_postures
 from .loop import JointChain
 from .motion import random_postures, tool_poses
 from .paul.plan import PaulPlan, derive_plan
 from .paul.postures import SLACK, SMALL, ZERO
 from .solver import Found, Solver, Tolerances, postures
+from .thorough import thorough_postures
 
 TESTS = 128
 """Random poses at which a plan has to find what the family finds before it is used."""
 ACCEPTED = 1e-9
 """Largest error of a posture of the plan [m, rad]."""
+ROUGH = 1e-2
+"""Errors up to which candidates at singular positions are improved [m, rad]."""
 TOLERANCES = read_only([SLACK, ZERO, SMALL, ACCEPTED])
 
 
@@ -124,7 +128,11 @@ def prepare_by_plan(model: RobotModel, family: Solver) -> ByPlan | None:
 
 
 def run(
-    plan: PaulPlan, numbers: Array, poses: Array, references: Array
+    plan: PaulPlan,
+    numbers: Array,
+    poses: Array,
+    references: Array,
+    tolerances: Array = TOLERANCES,
 ) -> tuple[Array, Array, NDArray[np.int64]]:
     """Let the kernel run a plan.
 
@@ -138,6 +146,8 @@ def run(
         Poses [m].
     references : ndarray, shape (N, k)
         Reference postures [rad or m].
+    tolerances : ndarray, shape (4,)
+        See `TOLERANCES`.
 
     Returns
     -------
@@ -154,7 +164,7 @@ def run(
     N, k, S = poses.shape[0], references.shape[1], plan.program.branches
     q, residual = np.empty((N, S, k)), np.empty((N, S))
     marks = np.empty((N, 2 + 2 * S), np.int64)
-    run_plan(plan.program.plan, numbers, TOLERANCES, poses, references, q, residual, marks)
+    run_plan(plan.program.plan, numbers, tolerances, poses, references, q, residual, marks)
     return q, residual, marks
 
 
@@ -183,8 +193,23 @@ def numbers_for_world(plan: PaulPlan, to_base: Array) -> Array:
 
 @postures.register
 def _(solver: ByPlan, U: Array, references: Array, tolerances: Tolerances) -> Found:
-    # the plan's tolerances are the exact ones, and so is its knowledge of what is free
-    return postures(solver.family, U, references, tolerances)
+    if not isinstance(solver.family, ClosedForm) or max(tolerances) > ACCEPTED:
+        return postures(solver.family, U, references, tolerances)
+    chain, loop, plan = solver.chain, solver.family.plan, solver.plan
+    assert plan.program is not None
+    numbers = plan.program.numbers
+
+    def candidates(poses: Array, wanted: Array, slack: float) -> tuple[Array, NDArray[np.bool_]]:
+        a, there, _ = closed_form_postures(loop, chain, poses, wanted, slack, ROUGH)
+        limits = np.array([slack, ZERO, SMALL, ROUGH])
+        b, _, marks = run(plan, numbers, poses, wanted, limits)
+        return (
+            np.concatenate([a, b], axis=1),
+            np.concatenate([there, np.arange(b.shape[1]) < marks[:, :1]], axis=1),
+        )
+
+    # at a singular position the plan and the family do not lose the same digits
+    return thorough_postures(chain, candidates, U, references, tolerances)
 
 
 @branches.register

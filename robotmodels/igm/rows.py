@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -21,9 +21,10 @@ from .components import Components, asked_jacobians
 from .known import KnownArm
 from .loop import JointChain
 from .motion import lever
-from .self_motion import Settled, double_roots, settle_families
+from .self_motion import Settled, settle_families, singular_postures
 from .solver import Found, Solver, Tolerances, nothing_found, postures
 from .status import IGMStatus
+from .thorough import MET
 from .why import search
 
 _IMPROPER = -1000  # what the kernel of plans says before it has done anything
@@ -272,9 +273,7 @@ def _settled(call: Call, U: Array, psi: Array | None, references: Array) -> Sett
         found = postures(solver, U, references, tolerances)
     whole = call.task.mask == WHOLE_POSE
     if solver is not None and whole and solver.chain.k <= 6:
-        if solver.chain.k == 6:
-            found.double[...] |= double_roots(solver.chain, found)
-        return settle_families(solver.chain, U, found, references, tolerances)
+        return _of_six(solver.chain, U, found, references, tolerances)
     moving = np.zeros(found.q.shape, np.bool_)
     if solver is not None and psi is None and whole:
         from ._moving import moving_joints
@@ -287,6 +286,44 @@ def _settled(call: Call, U: Array, psi: Array | None, references: Array) -> Sett
         moving |= moving_for_mask(solver.chain, call.task, U, found)
     moving |= found.free
     return Settled(*(getattr(found, field.name) for field in fields(Found)), moving=moving)
+
+
+def _of_six(
+    chain: JointChain, U: Array, found: Found, references: Array, tolerances: Tolerances
+) -> Settled:
+    """Families settled at the reference, double roots marked."""
+    if chain.k < 6:
+        return settle_families(chain, U, found, references, tolerances)
+    double, member = singular_postures(chain, found)
+    found.double[...] |= double
+    # a double root good to half of its digits can hide that a wrist behind it is aligned
+    asked = replace(found, family=found.family | member)
+    settled = settle_families(chain, U, asked, references, tolerances)
+    # beside a family the reference may be only nearly as good as the posture itself
+    worse = _worst(settled) > np.maximum(_worst(found), MET)
+    rows = np.flatnonzero(worse)
+    if rows.size == 0:
+        return settled
+    part = Found(*(getattr(found, name)[rows] for name in _FOUND))
+    part = settle_families(chain, U[rows], part, references[rows], tolerances)
+    S = max(settled.q.shape[1], part.q.shape[1])
+    wide = {}
+    for name in (*_FOUND, "moving"):
+        whole, piece = getattr(settled, name), getattr(part, name)
+        nothing = np.nan if whole.dtype == np.float64 else False
+        wide[name] = np.full((len(U), S, *whole.shape[2:]), nothing, whole.dtype)
+        wide[name][:, : whole.shape[1]] = whole
+        wide[name][rows] = nothing
+        wide[name][rows, : piece.shape[1]] = piece
+    return Settled(**wide)
+
+
+_FOUND = tuple(field.name for field in fields(Found))
+
+
+def _worst(found: Found) -> Array:
+    """Largest error of the postures of each pose, shape (N,)."""
+    return np.where(found.valid, found.residual, 0.0).max(axis=1, initial=0.0)
 
 
 def moving_for_mask(chain: JointChain, task: Task, U: Array, found: Found) -> NDArray[np.bool_]:
