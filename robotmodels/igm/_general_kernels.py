@@ -32,6 +32,7 @@ from numba import types
 from ..kernels._compile import (
     INT,
     INTS,
+    MATRIX,
     NOTHING,
     OUT1,
     OUT2,
@@ -41,7 +42,15 @@ from ..kernels._compile import (
     compiled,
 )
 
-__all__ = ["assemble", "bring_home", "flat_singularities", "follow_valleys", "partners", "postures"]
+__all__ = [
+    "assemble",
+    "bring_home",
+    "fall_into_valleys",
+    "flat_singularities",
+    "follow_valleys",
+    "partners",
+    "postures",
+]
 
 FLOAT = types.float64
 COUNTS = types.Array(types.int64, 1, "C")
@@ -1039,6 +1048,56 @@ def slide_down(sigma, D, U, q, u, v, work):
         for i in range(6):
             q[i] += e[i] - onto * v[i]
     return along, rest, small
+
+
+@compiled(NOTHING(INTS, STACK, STACK, MATRIX, OUT3, COUNTS))
+def fall_into_valleys(sigma, D, goals, starts, valleys, count):
+    """From ``starts (S, 6)`` fall to where the pose is met but for the flattest direction.
+
+    Those that end in a valley go into ``valleys (N, S, 6)``. A family may have been so small that
+    nothing is left of it at poses aside; Newton's method itself would leap along the valley.
+    """
+    T, z, o = np.empty((3, 4)), np.empty((6, 3)), np.empty((6, 3))
+    J, pivots, e = np.empty((6, 6)), np.empty(6, np.int64), np.empty(6)
+    u, v, q = np.empty(6), np.empty(6), np.empty(6)
+    for n in range(goals.shape[0]):
+        count[n] = 0
+        for k in range(starts.shape[0]):
+            for i in range(6):
+                q[i] = starts[k, i]
+            rest, small = np.inf, np.inf
+            for _ in range(30):
+                pose_of(sigma, D, q, T, z, o)
+                missing(goals[n], T, e)
+                jacobian_of(sigma, T, z, o, J)
+                factor(J, pivots)
+                small = smallest_vectors(J, pivots, u, v)
+                along, size = 0.0, 0.0
+                for i in range(6):
+                    along += u[i] * e[i]
+                    size += e[i] * e[i]
+                rest = sqrt(max(size - along * along, 0.0))
+                if rest < 1e-6:
+                    break
+                for i in range(6):
+                    e[i] -= along * u[i]
+                solve_one(J, pivots, e)
+                onto, largest = 0.0, 0.0
+                for i in range(6):
+                    onto += e[i] * v[i]
+                for i in range(6):
+                    e[i] -= onto * v[i]
+                    largest = max(largest, abs(e[i]))
+                if not largest < 1e100:
+                    break
+                scale = min(1.0, 0.5 / largest)
+                for i in range(6):
+                    q[i] += scale * e[i]
+            # a family leaves next to nothing missing along the valley
+            if rest < 1e-6 and small < VALLEY and abs(along) < VALLEY:
+                for i in range(6):
+                    valleys[n, count[n], i] = q[i]
+                count[n] += 1
 
 
 @compiled(NOTHING(INTS, STACK, STACK, VECTOR, STACK, INTS, OUT3, COUNTS))

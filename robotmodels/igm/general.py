@@ -45,6 +45,7 @@ TOLERANCE = 1e-13  # residual of a posture [m, or the arm's length if that is mo
 POOR = 1e-9  # quality of the elimination below which another representation is asked as well
 WAYS = 12  # representations kept
 ASIDE = 16  # poses nearby that are solved where doubts are left
+FALLS = 100  # starts from anywhere where doubts are left
 ROUGH = 1e-4  # way that polishing moved a posture above which it is asked as well [rad]
 
 
@@ -512,6 +513,11 @@ def _solve(solver: GeneralSolver, goals: Array) -> _Found:
             kernels.bring_home(*arm, aside.q, aside.count, part.q, part.count)
             kernels.follow_valleys(*arm, aside.q, aside.count, part.q, part.count)
         kernels.follow_valleys(*arm, part.q.copy(), part.count.copy(), part.q, part.count)
+        starts = np.random.default_rng(0).uniform(-np.pi, np.pi, (FALLS, 6))
+        starts[:, solver.sigma == 1] /= np.pi
+        valleys, number = np.empty((chosen.size, FALLS, 6)), np.zeros(chosen.size, np.int64)
+        kernels.fall_into_valleys(*arm[:3], starts, valleys, number)
+        kernels.follow_valleys(*arm, valleys, number, part.q, part.count)
         kernels.partners(*arm, part.q, part.count, part.double)
         found.put(chosen, part)
     found.double &= found.there
