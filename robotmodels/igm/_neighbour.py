@@ -15,12 +15,12 @@ from ..kernels._compile import INTS, NOTHING, OUT3, STACK, Floats, Ints, compile
 from ._check import forward, jacobian, missing, wrapped
 from ._neighbour_linear import anywhere, factor, smallest_singular, solve
 
-Work = tuple[Floats, Floats, Floats, Ints, Floats, Floats, Floats]
+Work = tuple[Floats, Floats, Floats, Ints, Floats, Floats, Floats, Floats]
 
 MERGE = 1e-6  # postures closer than this in every joint are one [rad, or lengths of the arm]
 MET = 1e-11  # error of a posture that has arrived
 EXACT = 1e-8  # error of a posture of the neighbour, and not only its best approach
-FLOOR = 2e-14  # error below which a step gains nothing
+FLOOR = 3e-15  # error below which a step gains nothing
 LONGEST = 0.5  # longest step of a joint
 
 PATH = types.Array(types.float64, 4, "C", readonly=True)
@@ -36,7 +36,7 @@ def workspace() -> Work:
     """Arrays that `newton` and the functions built on it write to."""
     return (
         np.zeros((3, 4)), np.zeros((6, 6)), np.zeros((6, 6)), np.zeros(6, np.int64),
-        np.zeros(6), np.zeros(6), np.zeros(6),
+        np.zeros(6), np.zeros(6), np.zeros(6), np.zeros(6),
     )  # fmt: skip
 
 
@@ -51,16 +51,24 @@ def error_at(sigma: Ints, D: Floats, U: Floats, q: Floats, work: Work) -> float:
 @compiled()
 def factored_jacobian(sigma: Ints, work: Work) -> None:
     """LU factors of the Jacobian where the arm was last put."""
-    P, axes, J, pivots, _, _, _ = work
+    P, axes, J, pivots, _, _, _, _ = work
     jacobian(sigma, P, axes, J)
     factor(J, pivots)
 
 
 @compiled()
 def newton(sigma: Ints, D: Floats, U: Floats, q: Floats, steps: int, work: Work) -> float:
-    """Newton's method from ``q (6,)``, in place; the error left. A step that does not help is halved."""
-    e, trial, way = work[4], work[5], work[6]
+    """Newton's method from ``q (6,)``, in place; the error left.
+
+    A step that does not help is halved. Near the end it is taken all the same: along a valley that
+    bends, a step misses by more than it corrects, and the next one makes up for it.
+    """
+    e, trial, way, best = work[4], work[5], work[6], work[7]
     error = error_at(sigma, D, U, q, work)
+    least = error
+    for k in range(6):
+        best[k] = q[k]
+    worse = 0
     for _ in range(steps):
         if not FLOOR < error < np.inf:
             break
@@ -79,15 +87,24 @@ def newton(sigma: Ints, D: Floats, U: Floats, q: Floats, steps: int, work: Work)
             for k in range(6):
                 trial[k] = q[k] + scale * way[k]
             then = error_at(sigma, D, U, trial, work)
-            if then < error or error < 1e-9:
+            if then < error or error < 1e-7:
                 break
             scale *= 0.5
         if not then < error:
-            break
+            worse += 1
+            # rounding, or no convergence
+            if error >= 1e-7 or error < 1e-14 or worse > 3:
+                break
         error = then
         for k in range(6):
             q[k] = trial[k]
-    return error
+        if error < least:
+            least = error
+            for k in range(6):
+                best[k] = q[k]
+    for k in range(6):
+        q[k] = best[k]
+    return least
 
 
 @compiled()
@@ -136,7 +153,7 @@ def arrivals(
     doubtful: NDArray[np.bool_],
     doubt: NDArray[np.bool_],
 ) -> None:
-    """Newton's method from every candidate ``(N, C, 6)`` of the neighbour ``near`` to the arm ``D``.
+    """Newton's method from every candidate ``(N, C, 6)`` of the neighbour ``near`` to arm ``D``.
 
     ``exact (N,)`` counts the candidates that are postures of the neighbour and not only its best
     approach; those that miss by more than ``reach`` are taken out of ``there``. Candidates are

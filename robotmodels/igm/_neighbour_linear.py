@@ -92,7 +92,7 @@ def anywhere(u: Floats) -> None:
 
 @compiled()
 def smallest_singular(A: Floats, pivots: Ints, u: Floats, v: Floats, rounds: int) -> float:
-    """Smallest singular value from the factors by inverse iteration from u; its vectors ``u, v``."""
+    """Smallest singular value by inverse iteration from u; its vectors in ``u, v``."""
     grown = 1.0
     for _ in range(rounds):
         for i in range(6):

@@ -2,10 +2,10 @@
 
 Where a structured arm has an infinite family of postures (an aligned wrist, a wrist centre on
 the shoulder's axis), its neighbour has a few isolated ones along what is left of the family, far
-from each other; where it has a fold (a stretched elbow), two that are close. Both lie on the curve
-of postures that miss the pose only along the left null vector u of the Jacobian: a valley of the
-error. The curve is walked along the right null vector v, and a posture is where what is missing
-changes sign.
+from each other; where it has a fold (a stretched elbow), two that are close. Both lie on a
+curve of postures at which the other five joints do for the pose what they can while one is kept: a
+valley of the error. The curve is walked, driven by the joint that moves most, and a posture is
+where what is missing changes sign.
 """
 
 from __future__ import annotations
@@ -34,33 +34,45 @@ from ._neighbour import (
     newton,
     workspace,
 )
-from ._neighbour_linear import anywhere, smallest_singular, solve
+from ._neighbour_linear import anywhere, smallest_singular, solve, solve_transposed, unit
 
 STRIDE = 0.1  # step along a valley [rad]
-STRIDES = 160  # steps one way
+SHORTEST = STRIDE / 40  # step at which it is given up
+STRIDES = 240  # steps one way
 POINTS = 4000  # points of valleys remembered for a pose
 LOST = 1e-3  # error beside the valley above which the curve was lost
 NARROW = 10  # points that the infinite family of a tolerance has at least
 
-Curve = tuple[Floats, Floats, Floats]
+Curve = tuple[Floats, Floats, Floats, Ints]
 
 
 @compiled()
 def slide(
-    sigma: Ints, D: Floats, U: Floats, q: Floats, u: Floats, v: Floats, rounds: int, work: Work
+    sigma: Ints,
+    D: Floats,
+    U: Floats,
+    q: Floats,
+    joint: int,
+    u: Floats,
+    v: Floats,
+    rounds: int,
+    work: Work,
 ) -> tuple[float, float, float]:
-    """Bring ``q`` to the curve, in place; what is missing along u, beside it, and the value of u, v.
+    """Bring ``q`` to the curve with one joint kept: what is missing along u, and beside it.
 
-    ``u`` is where the search for the singular vectors starts.
+    ``u`` is the direction that the other five joints cannot give, ``v`` the direction of the
+    curve. The third result is the distance of the joint's column of the Jacobian from the others'.
     """
-    e = work[4]
-    along, beside, small = 0.0, np.inf, np.inf
-    iterations = 3
+    J, pivots, e = work[2], work[3], work[4]
+    along, beside, apart = 0.0, np.inf, np.inf
     for turn in range(rounds + 1):
         error_at(sigma, D, U, q, work)
         factored_jacobian(sigma, work)
-        small = smallest_singular(work[2], work[3], u, v, iterations)
-        iterations = 2
+        for i in range(6):
+            u[i] = 0.0
+        u[joint] = 1.0
+        solve_transposed(J, pivots, u)
+        apart = 1.0 / unit(u)
         along, size = 0.0, 0.0
         for i in range(6):
             along += u[i] * e[i]
@@ -70,17 +82,39 @@ def slide(
         beside = sqrt(size)
         if turn == rounds or beside < 1e-3 * abs(along) or beside < 1e-14 or not beside < 0.5:
             break
-        solve(work[2], work[3], e)
-        onto, largest = 0.0, 0.0
+        # u is square to the other columns, so that the step leaves the joint where it is
+        solve(J, pivots, e)
+        e[joint] = 0.0
+        largest = 0.0
         for i in range(6):
-            onto += e[i] * v[i]
-        for i in range(6):
-            e[i] -= onto * v[i]
             largest = max(largest, abs(e[i]))
-        scale = min(1.0, 0.5 / largest) if largest > 0.0 else 1.0
+        scale = 0.5 / largest if largest > 0.5 else 1.0
         for i in range(6):
             q[i] += scale * e[i]
-    return along, beside, small
+    for i in range(6):
+        v[i] = u[i]
+    solve(J, pivots, v)
+    unit(v)
+    return along, beside, apart
+
+
+@compiled()
+def product(a: Floats, b: Floats) -> float:
+    """Scalar product in six dimensions."""
+    total = 0.0
+    for i in range(6):
+        total += a[i] * b[i]
+    return total
+
+
+@compiled()
+def foremost(v: Floats) -> int:
+    """The joint that moves most."""
+    best = 0
+    for i in range(1, 6):
+        if abs(v[i]) > abs(v[best]):
+            best = i
+    return best
 
 
 @compiled()
@@ -96,54 +130,65 @@ def walk(
 ) -> tuple[int, int]:
     """Walk the curve through ``origin`` both ways while the Jacobian stays nearly singular.
 
-    No further than to where more than ``far`` is missing.
-    The points, what is missing along u at each and the u are written to ``curve``, in order, one
-    sense of u throughout. Returns the first and one past the last row in use.
+    No further than to where more than ``far`` is missing. The points, what is missing at each, its
+    u (one sense throughout) and the joint that drives are written to ``curve``, in order; where the
+    driving joint changes the point stands twice. Returns the first and one past the last row.
     """
-    points, missing, us = curve
+    points, missing, us, drivers = curve
     middle = STRIDES + 2
     first, last = middle, middle + 1
     q, u, v = np.zeros(6), np.zeros(6), np.zeros(6)
-    ahead = np.zeros(6)
+    ahead, start = np.zeros(6), np.zeros(6)
     closed = False
+    for i in range(6):
+        q[i] = origin[i]
+    error_at(sigma, D, U, q, work)
+    factored_jacobian(sigma, work)
+    anywhere(u)
+    smallest_singular(work[2], work[3], u, v, 3)
+    driver = foremost(v)
+    along, beside, apart = slide(sigma, D, U, q, driver, u, v, 6, work)
+    if not (beside < LOST and apart < valley and abs(along) < far):
+        return middle, middle
+    points[middle], us[middle], missing[middle], drivers[middle] = q, u, along, driver
+    start[:] = v
     for side in range(2):
         if closed:
             break
+        at, way = middle, STRIDE
         for i in range(6):
-            q[i] = origin[i]
-        anywhere(u)
-        along, beside, small = slide(sigma, D, U, q, u, v, 4, work)
-        if side == 0:
-            if not (beside < LOST and small < valley and abs(along) < far):
-                return middle, middle
-            for i in range(6):
-                points[middle, i], us[middle, i] = q[i], u[i]
-            missing[middle] = along
-        at = middle
-        for i in range(6):
-            u[i] = us[middle, i]
-            ahead[i] = v[i] if side == 0 else -v[i]
+            ahead[i] = start[i] if side == 0 else -start[i]
         left = STRIDES
         while left > 0:
             left -= 1
-            for i in range(6):
-                q[i] = points[at, i] + STRIDE * ahead[i]
-            along, beside, small = slide(sigma, D, U, q, u, v, 3, work)
-            if not (beside < LOST and small < valley):
+            driver = drivers[at]
+            best = foremost(ahead)
+            if abs(ahead[driver]) < 0.5 * abs(ahead[best]):
+                driver = best
+                q[:] = points[at]
+                way_on = 0.0
+            else:
+                for i in range(6):
+                    q[i] = points[at, i] + way * ahead[i]
+                way_on = way
+            along, beside, apart = slide(sigma, D, U, q, driver, u, v, 4, work)
+            same, forth = product(u, us[at]), product(v, ahead)
+            good = beside < LOST and apart < valley and abs(forth) > 0.7
+            if way_on > 0.0 and not (good and abs(same) > 0.7):
+                way *= 0.5
+                if way < SHORTEST:
+                    break
+                continue
+            if not good:
                 break
-            # singular vectors have no sign of their own: keep going, keep the side
-            same, forth = 0.0, 0.0
-            for i in range(6):
-                same += u[i] * us[at, i]
-                forth += v[i] * ahead[i]
-            if abs(forth) < 0.3:
-                break
+            way = min(1.5 * way, STRIDE)
             at += 1 if side == 0 else -1
             for i in range(6):
                 points[at, i] = q[i]
                 us[at, i] = u[i] if same >= 0.0 else -u[i]
                 ahead[i] = v[i] if forth >= 0.0 else -v[i]
             missing[at] = along if same >= 0.0 else -along
+            drivers[at] = driver
             first, last = min(first, at), max(last, at + 1)
             if abs(along) > far:
                 break
@@ -157,15 +202,12 @@ def walk(
 
 @compiled()
 def _at(
-    sigma: Ints, D: Floats, U: Floats, side: Floats, q: Floats, work: Work
-) -> float:  # fmt: skip
-    """What is missing along u at the point of the curve next to q, u on the side of ``side``."""
-    u, v = side.copy(), np.zeros(6)
-    along, _, _ = slide(sigma, D, U, q, u, v, 4, work)
-    same = 0.0
-    for i in range(6):
-        same += u[i] * side[i]
-    return along if same >= 0.0 else -along
+    sigma: Ints, D: Floats, U: Floats, side: Floats, driver: int, q: Floats, work: Work
+) -> float:
+    """What is missing at the point of the curve next to q, u on the side of ``side``."""
+    u, v = np.zeros(6), np.zeros(6)
+    along, _, _ = slide(sigma, D, U, q, driver, u, v, 4, work)
+    return along if product(u, side) >= 0.0 else -along
 
 
 @compiled()
@@ -178,6 +220,7 @@ def _between(
     b: Floats,
     at_b: float,
     side: Floats,
+    driver: int,
     found: Floats,
     count: int,
     work: Work,
@@ -186,10 +229,10 @@ def _between(
     low, high, q = a.copy(), b.copy(), np.zeros(6)
     f_low, f_high = at_a, at_b
     for _ in range(30):
-        share = f_low / (f_low - f_high)
+        share = f_low / (f_low - f_high) if f_low != f_high else 0.5
         for i in range(6):
             q[i] = low[i] + share * (high[i] - low[i])
-        f = _at(sigma, D, U, side, q, work)
+        f = _at(sigma, D, U, side, driver, q, work)
         if abs(f) < 1e-12:
             break
         # the false position that does not stick at one end (Illinois)
@@ -218,7 +261,7 @@ def _near_zero(
     work: Work,
 ) -> int:
     """Two postures, or a double one, between rows at - 1 and at + 1 without a change of sign."""
-    points, missing, us = curve
+    points, missing, us, drivers = curve
     f0, f1, f2 = missing[at - 1], missing[at], missing[at + 1]
     bend = f0 - 2.0 * f1 + f2
     a, b, c, q = points[at - 1].copy(), points[at].copy(), points[at + 1].copy(), np.zeros(6)
@@ -241,10 +284,10 @@ def _near_zero(
         low, high, xl, xh = (a, b, x0, x1) if x < x1 else (b, c, x1, x2)
         for i in range(6):
             q[i] = low[i] + (x - xl) / (xh - xl) * (high[i] - low[i])
-        f = _at(sigma, D, U, us[at], q, work)
+        f = _at(sigma, D, U, us[at], drivers[at], q, work)
         if f * sign <= 0.0:
-            count = _between(sigma, D, U, a, f0, q, f, us[at], found, count, work)
-            return _between(sigma, D, U, q, f, c, f2, us[at], found, count, work)
+            count = _between(sigma, D, U, a, f0, q, f, us[at], drivers[at], found, count, work)
+            return _between(sigma, D, U, q, f, c, f2, us[at], drivers[at], found, count, work)
         if f * sign < f1 * sign:
             if x < x1:
                 c[:], x2, f2 = b, x1, f1
@@ -264,32 +307,6 @@ def _near_zero(
 
 
 @compiled()
-def _driven(
-    sigma: Ints, D: Floats, U: Floats, joint: int, value: float, q: Floats, work: Work
-) -> bool:
-    """Move along the curve until a joint has a value; whether it got there."""
-    u, v = np.zeros(6), np.zeros(6)
-    anywhere(u)
-    for _ in range(12):
-        slide(sigma, D, U, q, u, v, 2, work)
-        gap = value - q[joint]
-        if sigma[joint] == 0:
-            gap = wrapped(gap)
-        if abs(gap) < 1e-13:
-            break
-        if abs(v[joint]) < 1e-6:
-            return False
-        for i in range(6):
-            step = v[i] * gap / v[joint]
-            q[i] += max(-STRIDE, min(STRIDE, step))
-    gap = value - q[joint]
-    if sigma[joint] == 0:
-        gap = wrapped(gap)
-    q[joint] += gap
-    return abs(gap) < 1e-9
-
-
-@compiled()
 def _family(
     sigma: Ints,
     D: Floats,
@@ -298,6 +315,7 @@ def _family(
     first: int,
     last: int,
     reference: Floats,
+    touch: float,
     found: Floats,
     free: Ints,
     count: int,
@@ -308,6 +326,7 @@ def _family(
     Postures on it that were found before make room for them.
     """
     points = curve[0]
+    u, v = np.zeros(6), np.zeros(6)
     kept = 0
     for j in range(count):
         on = False
@@ -339,7 +358,9 @@ def _family(
             share = gap / (gap - after) if gap != after else 0.0
             for i in range(6):
                 q[i] = points[m, i] + share * (points[m + 1, i] - points[m, i])
-            if _driven(sigma, D, U, joint, reference[joint], q, work):
+            q[joint] = points[m, joint] + gap
+            _, beside, _ = slide(sigma, D, U, q, joint, u, v, 12, work)
+            if beside < touch:
                 before = count
                 count = keep(sigma, q, found, count)
                 if count > before:
@@ -421,8 +442,10 @@ def valleys(
     """
     work = workspace()
     rows = 2 * STRIDES + 8
-    curve = (np.zeros((rows, 6)), np.zeros(rows), np.zeros((rows, 6)))
-    points, missing, us = curve
+    curve = (
+        np.zeros((rows, 6)), np.zeros(rows), np.zeros((rows, 6)), np.zeros(rows, np.int64)
+    )  # fmt: skip
+    points, missing, us, drivers = curve
     known = np.zeros((POINTS, 6))
     u, v, q = np.zeros(6), np.zeros(6), np.zeros(6)
     # an error of this length is within both tolerances
@@ -439,8 +462,6 @@ def valleys(
                     continue
                 for i in range(6):
                     q[i] = starts[n, at, i]
-                anywhere(u)
-                slide(sigma, D, goals[n], q, u, v, 8, work)
             else:
                 for i in range(6):
                     q[i] = found[n, k - C, i]
@@ -470,7 +491,7 @@ def valleys(
                 most = max(most, abs(missing[m]))
             if last - first >= NARROW and most <= touch:
                 count[n] = _family(
-                    sigma, D, goals[n], curve, first, last, references[n],
+                    sigma, D, goals[n], curve, first, last, references[n], touch,
                     found[n], free[n], count[n], work,
                 )  # fmt: skip
                 continue
@@ -478,9 +499,13 @@ def valleys(
                 if missing[m] * missing[m + 1] <= 0.0:
                     count[n] = _between(
                         sigma, D, goals[n], points[m], missing[m], points[m + 1], missing[m + 1],
-                        us[m], found[n], count[n], work,
+                        us[m], drivers[m + 1], found[n], count[n], work,
                     )  # fmt: skip
-                elif m > first and missing[m] * missing[m - 1] > 0.0:
+                elif (
+                    m > first
+                    and missing[m] * missing[m - 1] > 0.0
+                    and drivers[m - 1] == drivers[m] == drivers[m + 1]
+                ):
                     if abs(missing[m]) <= min(abs(missing[m - 1]), abs(missing[m + 1])):
                         count[n] = _near_zero(
                             sigma, D, goals[n], curve, m, touch, found[n], count[n], work

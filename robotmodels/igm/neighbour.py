@@ -502,8 +502,32 @@ def _search(solver: Neighbour, U: Array, part: _Search, tolerances: Tolerances) 
     there[same & ~unsure[chosen, None]] = False
     starts, there = starts.reshape(chosen.size, -1, 6), there.reshape(chosen.size, -1)
     arrived = np.zeros_like(there)
-    kernels.tried(sigma, solver.path[-1], rest.goals, starts, there, arrived, rest.found, rest.count)
+    kernels.tried(
+        sigma, solver.path[-1], rest.goals, starts, there, arrived, rest.found, rest.count
+    )
     _walk(solver, rest, starts, there & ~arrived, tolerances)
+    _ask_general(solver, U[chosen], rest, tolerances)
+    part.found[chosen], part.count[chosen] = rest.found, rest.count
+    part.double[chosen], part.free[chosen] = rest.double, rest.free
+
+
+def _ask_general(solver: Neighbour, U: Array, part: _Search, tolerances: Tolerances) -> None:
+    """Add what the elimination finds where the postures are still odd in number, in place."""
+    from . import _neighbour as kernels
+
+    chosen = np.flatnonzero((part.count + part.double.sum(axis=1)) % 2 == 1)
+    general = _general(solver.chain) if chosen.size else None
+    if general is None:
+        return
+    rest = _Search(*(np.ascontiguousarray(array[chosen]) for array in part))
+    starts, there, _ = general_postures(general, U[chosen])
+    starts[:, :, solver.chain.sigma == 1] /= solver.unit
+    arrived = np.zeros_like(there)
+    kernels.tried(
+        np.ascontiguousarray(solver.chain.sigma), solver.path[-1], rest.goals, starts, there,
+        arrived, rest.found, rest.count,
+    )  # fmt: skip
+    _walk(solver, rest, starts, np.zeros_like(there), tolerances)
     part.found[chosen], part.count[chosen] = rest.found, rest.count
     part.double[chosen], part.free[chosen] = rest.double, rest.free
 
@@ -551,6 +575,3 @@ def _general(chain: JointChain) -> GeneralSolver | None:
     """The elimination for the arm itself, where it is well conditioned."""
     solver = prepare_general(chain)
     return solver if solver is not None and solver.reliable else None
-
-
-__all__ += ["general_postures"]
