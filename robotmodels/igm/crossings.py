@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from math import gcd
 
@@ -52,6 +52,10 @@ class Relations:
         """``A q - b``, the nearest way round, of postures ``(B, k)`` of poses ``(B,)``."""
         wanted = self.b if self.b.ndim == 1 else self.b[pose]
         return self.nearest(q @ self.A.T - wanted)
+
+    def of(self, rows: slice) -> Relations:
+        """The relations of some poses."""
+        return self if self.b.ndim == 1 else replace(self, b=self.b[rows])
 
     def nearest(self, r: Array) -> Array:
         """Differences modulo the periods."""

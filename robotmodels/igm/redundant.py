@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from .. import se3
 from .._arrays import Array, read_only
 from .arm_angle import prepare_arm_angle
+from .check import checked
 from .lock import at_ends, locked_chain, stacked, whole_postures
 from .loop import JointChain
 from .motion import jacobians
@@ -43,10 +44,10 @@ GRID = 48
 """Values of the last free joint at which members of a family are looked for."""
 KEPT = 128
 """Chains with locked joints that an arm remembers."""
-WALKED = 8
-"""Members of the families of a pose, nearest to the reference, that are walked along them."""
-SPREAD = 24
-"""Members from all over the families that are walked as well."""
+MANY = 256
+"""Values, of several free joints together, at which members are looked for."""
+WALKED = 8, 3
+"""Members of a pose that are walked along their family: of one dimension, of more."""
 _MOVES = 1e-6  # part of a null space below which a joint stands still
 _SAME = 1e-7  # values of free joints closer than this are one [rad, m]
 _CHUNK = 64  # poses that are searched at a time
@@ -184,7 +185,12 @@ def prepare_redundant(
     arms = LockedArms(chain, prepare)
     # a value that is special for no arm: at 0 axes may be aligned that are not elsewhere
     typical = tuple(0.5 + 0.1 * i for i in range(dimension))
-    choices = islice(combinations(real.tolist(), dimension), TRIALS)
+    # joints that swing far along the family first: an elbow hardly moves
+    swing = _swings(chain)
+    choices = sorted(
+        islice(combinations(real.tolist(), dimension), TRIALS),
+        key=lambda joints: -min(swing[list(joints)]),
+    )
     for sampled in (order, *choices):
         inner = arms.solver(sampled, () if at_an_end(sampled, chain.k) else typical)
         if inner is not None:
@@ -199,6 +205,8 @@ def _(solver: Redundant, U: Array, references: Array, tolerances: Tolerances) ->
     if solver.order == solver.sampled:
         values = references[:, list(solver.order)]
         found = locked_postures(solver.arms, solver.order, values, U, references, tolerances)
+    elif len(solver.order) == 1:
+        found = _from_other_joints(solver, U, references, tolerances)
     missing = np.flatnonzero(~found.valid.any(axis=1))
     parts, rows = [found], [np.arange(N)]
     for start in range(0, missing.size, _CHUNK):
@@ -350,6 +358,31 @@ def _moving_in_order(chain: JointChain, real: NDArray[np.int64]) -> tuple[tuple[
     return tuple(order), dimension
 
 
+def _from_other_joints(
+    solver: Redundant, U: Array, references: Array, tolerances: Tolerances
+) -> Found:
+    """Postures at the reference of the free joint where the arm without it has no family."""
+    from .crossings import Relations
+    from .relations import Related
+
+    (joint,) = solver.order
+    row = np.eye(solver.chain.k)[[joint]]
+    period = np.where(solver.chain.sigma[[joint]] == 0, 2.0 * np.pi, 0.0)
+    wanted = Relations(row, references[:, [joint]], period)
+    related = Related(solver.chain, wanted, solver.sampled[0], solver.inner, solver.arms)
+    found = postures(related, U, references, tolerances)
+    found.q[..., joint] = np.where(found.valid, references[:, [joint]], np.nan)
+    return found
+
+
+def _swings(chain: JointChain) -> Array:
+    """How much joints move along the family, on average over random postures, shape (k,)."""
+    rng = np.random.default_rng(1)
+    J = jacobians(chain, rng.uniform(-2.0, 2.0, (40, chain.k)))
+    along = np.linalg.svd(J)[2][:, 6:]
+    return np.linalg.norm(along, axis=1).mean(axis=0)
+
+
 # --- where no posture exists at the reference ----------------------------------------------------
 
 
@@ -359,7 +392,8 @@ def _samples(solver: Redundant, U: Array) -> Array:
     reach = np.linalg.norm(chain.D[:, :3, 3], axis=1).sum()
     reach += float(np.linalg.norm(U[:, :3, 3], axis=1).max(initial=0.0))
     m = len(solver.sampled)
-    spread = np.arange(GRID) + 0.5
+    ends = at_an_end(solver.sampled, chain.k)
+    spread = np.arange(GRID if m == 1 or not ends else MANY) + 0.5
     if m == 1:
         unit = spread[:, None] / GRID
     else:
@@ -367,7 +401,7 @@ def _samples(solver: Redundant, U: Array) -> Array:
         # values, because each is a chain to prepare
         steps = np.sqrt(np.array([2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0])[:m])
         unit = np.mod(spread[:, None] * 4.0 * steps, 1.0)
-        if not at_an_end(solver.sampled, chain.k):
+        if not ends:
             unit = (np.floor(unit * 4) + 0.5) / 4
             unit = np.unique(unit, axis=0)
     turning = chain.sigma[list(solver.sampled)] == 0
@@ -380,13 +414,10 @@ def _nearest(solver: Redundant, U: Array, references: Array, tolerances: Toleran
     N = U.shape[0]
     q, valid = members(solver, U, references, tolerances)
     q, valid = q.reshape(N, -1, chain.k), valid.reshape(N, -1)
-    # those are walked along their families that are nearest in the first free joint, and some more
-    near = np.where(valid, np.abs(_way(chain, q, references))[..., order[0]], np.inf)
-    near = np.argsort(near, axis=1, kind="stable")
-    count = valid.sum(axis=1, keepdims=True)
-    spread = np.minimum(WALKED + np.arange(SPREAD) * np.maximum(count - WALKED, 0) // SPREAD,
-                        valid.shape[1] - 1)  # fmt: skip
-    first = np.hstack((near[:, :WALKED], np.take_along_axis(near, spread, axis=1)))
+    # those are walked along their families that are nearest in the free joints, the first of all
+    near = np.abs(_way(chain, q, references))[..., order]
+    near = np.where(valid, near @ 0.1 ** np.arange(len(order)), np.inf)
+    first = np.argsort(near, axis=1, kind="stable")[:, : WALKED[len(order) > 1]]
     q = np.take_along_axis(q, first[..., None], axis=1)
     valid = np.take_along_axis(valid, first, axis=1)
     out, rows = [nothing_found(0, 1, chain.k)], [np.zeros(0, np.int64)]
@@ -407,18 +438,32 @@ def _nearest(solver: Redundant, U: Array, references: Array, tolerances: Toleran
             # the nearest value of each joint, given the ones before
             away = np.abs(_way(chain, found.q[0], references[n]))[:, j]
             keep &= away <= np.min(away[keep], initial=np.inf) + _SAME
-        out.append(_packed(found, keep))
-        rows.append(np.array([n]))
+        if keep.any():
+            out.append(
+                _completed(solver, U[n : n + 1], references[n : n + 1], found, keep, tolerances)
+            )
+            rows.append(np.array([n]))
     found = stacked(out, rows, N)
     return found
 
 
-def _packed(found: Found, keep: NDArray[np.bool_]) -> Found:
-    """Chosen rows of a single pose."""
-    return Found(
-        found.q[:, keep], found.valid[:, keep], found.residual[:, keep], found.double[:, keep],
-        found.free[:, keep], found.family[:, keep],
-    )  # fmt: skip
+def _completed(
+    solver: Redundant,
+    U: Array,
+    references: Array,
+    found: Found,
+    keep: NDArray[np.bool_],
+    tolerances: Tolerances,
+) -> Found:
+    """Chosen rows of a single pose, and all others that have their values of the free joints."""
+    chain, order = solver.chain, list(solver.order)
+    q = found.q[:, keep]
+    if solver.order == solver.sampled:
+        values = q[:, 0, order]
+        others = locked_postures(solver.arms, solver.order, values, U, references, tolerances)
+        q = np.concatenate((q, others.q[:, others.valid[0]]), axis=1)
+    held = np.array(np.broadcast_to(np.isin(np.arange(chain.k), order), q.shape), order="C")
+    return checked(chain, U, q, np.ones(q.shape[:2], np.bool_), tolerances, free=held)
 
 
 def _way(chain: JointChain, q: Array, references: Array) -> Array:

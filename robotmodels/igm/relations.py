@@ -196,13 +196,14 @@ def _(solver: Related, U: Array, references: Array, tolerances: Tolerances) -> F
     out = nothing_found(N, MOST, chain.k)
     for start in range(0, N, _CHUNK):
         rows = slice(start, start + _CHUNK)
-        q, pose = _starts(solver, U[rows], references[rows], tolerances)
-        q, converged = solved_with_relations(chain, U[rows], solver.wanted, q, pose)
+        wanted = solver.wanted.of(rows)
+        q, pose = _starts(solver, wanted, U[rows], references[rows], tolerances)
+        q, converged = solved_with_relations(chain, U[rows], wanted, q, pose)
         q, pose = q[converged], pose[converged]
         # angles in (-pi, pi]: a relation without a period must hold for these
         turning = chain.sigma == 0
         q[:, turning] = np.pi - np.remainder(np.pi - q[:, turning], 2.0 * np.pi)
-        held = np.abs(solver.wanted.error(q, pose)).max(axis=1, initial=0.0) <= MET
+        held = np.abs(wanted.error(q, pose)).max(axis=1, initial=0.0) <= MET
         candidates, there = _gathered(q[held], pose[held], len(U[rows]))
         found = checked(chain, U[rows], candidates, there, tolerances, most=MOST)
         for name in ("q", "valid", "residual"):
@@ -239,7 +240,7 @@ def _moving(chain: JointChain) -> list[int]:
 
 
 def _starts(
-    solver: Related, U: Array, references: Array, tolerances: Tolerances
+    solver: Related, wanted: Relations, U: Array, references: Array, tolerances: Tolerances
 ) -> tuple[Array, NDArray[np.int64]]:
     """Postures from which Newton's method starts, and their poses."""
     chain, N = solver.chain, U.shape[0]
@@ -259,11 +260,11 @@ def _starts(
     )  # fmt: skip
     pose = np.repeat(np.arange(N), GRID)[:, None].repeat(found.q.shape[1], axis=1)[found.valid]
     q = found.q[found.valid]
-    near = within_reach(chain, solver.wanted, q, pose)
+    near = within_reach(chain, wanted, q, pose)
     starts, poses_of = [q[near]], [pose[near]]
     for n in np.unique(pose):
         for curve in curves_through(chain, U[n], q[pose == n]):
-            beside = _brackets(solver.wanted, curve, int(n), chain.sigma)
+            beside = _brackets(wanted, curve, int(n), chain.sigma)
             starts.append(beside)
             poses_of.append(np.full(len(beside), n))
     starts, poses_of = np.concatenate(starts), np.concatenate(poses_of)
