@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -11,6 +12,14 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_floats, read_only
 from ..errors import InvalidValueError, ShapeError
 from .trajectory import Trajectory
+
+# what multiplies the cosines and the sines in q, v, a and jerk, apart from powers of k w
+_TURNED: tuple[Callable[[Array, Array], tuple[Array, Array]], ...] = (
+    lambda a, b: (-b, a),
+    lambda a, b: (a, b),
+    lambda a, b: (b, -a),
+    lambda a, b: (-a, -b),
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,9 +103,18 @@ class FourierSeries:
         list of ndarray, shapes (N, n)
             One for each order.
         """
-        coefficients = np.vstack((self.mean, self.a, self.b))
-        waves = _waves(t, self.period, len(self.a))
-        return [_basis(*waves, self.period, order) @ coefficients for order in orders]
+        H = len(self.a)
+        c, s = _waves(t, self.period, H)
+        k = (2.0 * np.pi / self.period * np.arange(1, H + 1))[:, None]
+        out = []
+        for order in orders:
+            of_c, of_s = (part * k ** (order - 1) for part in _TURNED[order % 4](self.a, self.b))
+            value = c @ of_c
+            value += s @ of_s
+            if order == 0:
+                value += self.mean
+            out.append(value)
+        return out
 
     def extremes(self, order: int) -> tuple[Array, Array]:
         """Least and greatest value of a derivative over a period, shapes (n,).
@@ -115,9 +133,9 @@ class FourierSeries:
         H, w = len(self.a), 2.0 * np.pi / self.period
         k = np.arange(1, H + 1)
         # the next derivative in harmonics: sum_k c_k cos(k w t) + s_k sin(k w t)
-        power = (k * w)[:, None] ** order
-        turned = [(self.a, self.b), (self.b, -self.a), (-self.a, -self.b), (-self.b, self.a)]
-        c, s = (power * part for part in turned[order % 4])
+        c, s = (
+            (k * w)[:, None] ** order * part for part in _TURNED[(order + 1) % 4](self.a, self.b)
+        )
         low, high = np.empty(self.n), np.empty(self.n)
         for j in range(self.n):
             half = 0.5 * (c[:, j] - 1j * s[:, j])
