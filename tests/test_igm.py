@@ -153,12 +153,16 @@ def test_the_three_singular_positions_of_the_rx90():
     assert np.all(found.free_joints[:, 0, 3])
     assert np.all(np.any(found.free_joints[:, :, 0], axis=1))
     elbow = q.copy()
-    elbow[:, 2] = 0.5 * np.pi  # C3 = 0
+    elbow[:, 2] = -0.5 * np.pi  # C3 = 0, stretched
     found = rm.igm(model, rm.dgm(model, elbow), elbow)
     assert distance(model, found.q[:, 0], elbow).max() < 1e-6
     assert np.all(found.double[:, 0])
     assert np.all(found.status == rm.IGMStatus.REACHED)
     assert np.nanmax(found.residual) <= 1e-12
+    elbow[:, 2] = 0.5 * np.pi  # C3 = 0, folded: O_4 is in O_1, about which the arm turns freely
+    found = rm.igm(model, rm.dgm(model, elbow), elbow)
+    assert np.all(found.status == rm.IGMStatus.REACHED_FAMILY)
+    assert distance(model, found.q[:, 0], elbow).max() < 1e-6
 
 
 def test_batches_single_poses_and_nothing():

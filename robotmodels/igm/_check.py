@@ -17,7 +17,7 @@ from ..kernels._compile import INT, INTS, STACK, VECTOR, Floats, Ints, compiled
 
 MERGE = 1e-6  # postures closer than this in every joint are one [rad, m]
 EXACT = 2e-13  # error below which nothing is left to improve [m, rad]
-DEPENDENT = 1e-10  # singular values beside the largest that count as zero
+CUTS = (1e-10, 1e-7, 1e-5, 1e-3)  # singular values beside the largest that count as zero
 
 _FLAGS = types.Array(types.boolean, 2, "C")
 _OUT3 = types.Array(types.float64, 3, "C")
@@ -106,7 +106,7 @@ def improved(
     """
     k = sigma.size
     P, axes, J, e = np.zeros((3, 4)), np.zeros((k, 6)), np.zeros((6, k)), np.zeros(6)
-    trial = np.zeros(k)
+    trial, nearer, after = np.zeros(k), np.zeros(k), np.zeros(6)
     forward(sigma, D, q, P, axes)
     way, angle = missing(U, P, e)
     for _ in range(steps):
@@ -118,15 +118,26 @@ def improved(
             e[i] *= weight
             for m in range(k):
                 J[i, m] = 0.0 if held[m] == 1 else J[i, m] * weight
-        trial[:] = q + np.linalg.lstsq(J, e, DEPENDENT)[0][:k]
-        forward(sigma, D, trial, P, axes)
-        next_way, next_angle = missing(U, P, e)
         now = max(way / tolerances[0], angle / tolerances[1])
-        if not max(next_way / tolerances[0], next_angle / tolerances[1]) < now:
+        best, least_way, least_angle = now, way, angle
+        # beside a fold the whole step may lead astray: then without its longest parts
+        for cut in CUTS:
+            trial[:] = q + np.linalg.lstsq(J, e, cut)[0][:k]
+            forward(sigma, D, trial, P, axes)
+            next_way, next_angle = missing(U, P, after)
+            size = max(next_way / tolerances[0], next_angle / tolerances[1])
+            if size < best:
+                best, least_way, least_angle = size, next_way, next_angle
+                nearer[:] = trial
+            if best < 0.5 * now:
+                break
+        if not best < now:
             break
         for m in range(k):
-            q[m] = trial[m]
-        way, angle = next_way, next_angle
+            q[m] = nearer[m]
+        way, angle = least_way, least_angle
+        forward(sigma, D, q, P, axes)
+        missing(U, P, e)
     return way, angle
 
 

@@ -10,6 +10,7 @@ from .lock import locked_chain
 from .loop import JointChain
 from .mask import prepare_masked
 from .neighbour import prepare_neighbour
+from .prismatic import prepare_prismatic
 from .redundant import prepare_redundant
 from .solver import Solver
 
@@ -66,6 +67,9 @@ def prepare(chain: JointChain) -> Solver | None:
         closed = prepare_closed_form(chain)
         if closed is not None:
             return closed
+        prismatic = prepare_prismatic(chain)
+        if prismatic is not None:
+            return prismatic
         neighbour = prepare_neighbour(chain)
         if neighbour is not None:
             return neighbour
