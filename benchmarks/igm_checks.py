@@ -79,10 +79,10 @@ def joined(model: rm.RobotModel, T: Array, a: Array, b: Array, most: float, step
         alive[rows] = residual(model, T[rows], trial) <= most
         # from one isolated posture to another is one whole jump
         alive[rows] &= step <= length[rows] / 3.0
-        if k == steps // 4:
+        if k == steps // 8:
             # held back
             left = np.linalg.norm(difference(model, b[rows], trial), axis=1)
-            alive[rows] &= left < 0.97 * length[rows]
+            alive[rows] &= left < 0.98 * length[rows]
     return alive & (np.abs(difference(model, at, b)).max(axis=1, initial=0.0) < 1e-5)
 
 
