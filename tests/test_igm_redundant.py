@@ -188,6 +188,26 @@ def test_a_virtual_joint_at_the_base_is_left_open_too():
     assert np.all(np.nanmax(gap, axis=1) <= 0.8 + 1e-9)
 
 
+def test_a_point_for_a_ur5_at_a_reference_that_does_not_reach_it():
+    """A spherical joint at the tool leaves the orientation open: three joints take part."""
+    chain = joint_chain(load("ur5"))
+    ball = [
+        VirtualJoint(6, chain.D[6] @ se3.rotation(axis, angle), 0)
+        for axis, angle in (("z", 0.0), ("x", np.pi / 2), ("y", np.pi / 2))
+    ]
+    longer, _ = with_virtual_joints(chain, ball)
+    solver = prepare_redundant(longer, prepare)
+    assert solver.order[:2] == (0, 1)
+    q = np.zeros((4, 9))
+    q[:, :6] = random_postures(chain, 4, seed=12)
+    q[:, 6:] = 0.4, 1.0, -0.3
+    U = poses(longer, q)
+    found = postures(solver, U, np.zeros_like(q), Tolerances())
+    assert met(longer, found, U) <= 1e-12
+    assert found.valid.any(axis=1).all()
+    assert not found.free[..., 6:].any()
+
+
 def test_a_joint_that_does_not_move_is_not_freed():
     """Four parallel axes, joints 2 to 5, move among themselves while joint 1 stands still."""
     D = np.tile(np.eye(4), (9, 1, 1))

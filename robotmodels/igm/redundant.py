@@ -111,6 +111,10 @@ class Redundant:
     sampled : tuple of int
         Joints by which members of a family are found: the same if the arm without them has a
         family of its own.
+    last : tuple of int
+        The last joints that may be set, by which members are found as well: what stands at the
+        reference may leave few poses in reach, a wrist leaves most. Empty where they are the same
+        or have no family without them.
     inner : str
         Method of the joints that are left.
     arms : LockedArms
@@ -120,6 +124,7 @@ class Redundant:
     chain: JointChain
     order: tuple[int, ...]
     sampled: tuple[int, ...]
+    last: tuple[int, ...]
     inner: str
     arms: LockedArms = field(repr=False)
 
@@ -194,7 +199,10 @@ def prepare_redundant(
     for sampled in (order, *choices):
         inner = arms.solver(sampled, () if at_an_end(sampled, chain.k) else typical)
         if inner is not None:
-            return Redundant(chain, order, sampled, inner.method, arms)
+            last = tuple(real[-dimension:].tolist())
+            if last == sampled or arms.solver(last, typical) is None:
+                last = ()
+            return Redundant(chain, order, sampled, last, inner.method, arms)
     return None
 
 
@@ -288,21 +296,26 @@ def members(
 
     Returns
     -------
-    q : ndarray, shape (N, G, S, k)
-        Postures at G choices of the values of the joints ``solver.sampled`` [rad or m].
-    valid : ndarray of bool, shape (N, G, S)
+    q : ndarray, shape (N, C, k)
+        Postures at many values of the joints ``solver.sampled`` and ``solver.last`` [rad or m].
+    valid : ndarray of bool, shape (N, C)
         Rows in use.
     """
-    chain, N = solver.chain, U.shape[0]
-    grid = _samples(solver, U)
-    G = grid.shape[0]
-    tiled = np.repeat(U, G, axis=0)
-    values = np.tile(grid, (N, 1))
-    found = locked_postures(
-        solver.arms, solver.sampled, values, tiled, np.repeat(references, G, axis=0), tolerances
-    )
-    S = found.q.shape[1]
-    return found.q.reshape(N, G, S, chain.k), found.valid.reshape(N, G, S)
+    N, k = U.shape[0], solver.chain.k
+    parts = []
+    for joints in (solver.sampled, solver.last):
+        if not joints:
+            continue
+        grid = _samples(solver.chain, joints, U)
+        G = len(grid)
+        found = locked_postures(
+            solver.arms, joints, np.tile(grid, (N, 1)), np.repeat(U, G, axis=0),
+            np.repeat(references, G, axis=0), tolerances,
+        )  # fmt: skip
+        S = found.q.shape[1]
+        parts.append((found.q.reshape(N, G * S, k), found.valid.reshape(N, G * S)))
+    q, valid = zip(*parts, strict=True)
+    return np.concatenate(q, axis=1), np.concatenate(valid, axis=1)
 
 
 # --- which joints --------------------------------------------------------------------------------
@@ -386,13 +399,12 @@ def _swings(chain: JointChain) -> Array:
 # --- where no posture exists at the reference ----------------------------------------------------
 
 
-def _samples(solver: Redundant, U: Array) -> Array:
-    """Values of the sampled joints at which members of families are looked for, shape (G, m)."""
-    chain = solver.chain
+def _samples(chain: JointChain, joints: tuple[int, ...], U: Array) -> Array:
+    """Values of joints at which members of families are looked for, shape (G, m)."""
     reach = np.linalg.norm(chain.D[:, :3, 3], axis=1).sum()
     reach += float(np.linalg.norm(U[:, :3, 3], axis=1).max(initial=0.0))
-    m = len(solver.sampled)
-    ends = at_an_end(solver.sampled, chain.k)
+    m = len(joints)
+    ends = at_an_end(joints, chain.k)
     spread = np.arange(GRID if m == 1 or not ends else MANY) + 0.5
     if m == 1:
         unit = spread[:, None] / GRID
@@ -404,7 +416,7 @@ def _samples(solver: Redundant, U: Array) -> Array:
         if not ends:
             unit = (np.floor(unit * 4) + 0.5) / 4
             unit = np.unique(unit, axis=0)
-    turning = chain.sigma[list(solver.sampled)] == 0
+    turning = chain.sigma[list(joints)] == 0
     return np.where(turning, np.pi, reach) * (2.0 * unit - 1.0)
 
 
@@ -413,7 +425,6 @@ def _nearest(solver: Redundant, U: Array, references: Array, tolerances: Toleran
     chain, order = solver.chain, list(solver.order)
     N = U.shape[0]
     q, valid = members(solver, U, references, tolerances)
-    q, valid = q.reshape(N, -1, chain.k), valid.reshape(N, -1)
     # those are walked along their families that are nearest in the free joints, the first of all
     near = np.abs(_way(chain, q, references))[..., order]
     near = np.where(valid, near @ 0.1 ** np.arange(len(order)), np.inf)
