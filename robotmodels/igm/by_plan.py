@@ -109,6 +109,7 @@ def prepare_by_plan(model: RobotModel, family: Solver) -> ByPlan | None:
     S = rows.shape[1]
     sure = marks[:, 1] == 0
     there = (np.arange(S) < marks[:, :1]) & sure[:, None]
+    rows[~there] = np.nan
     away = np.abs(_short(chain, rows[:, :, None] - by_family.q[:, None])).max(axis=-1)
     away = np.where(there[:, :, None] & by_family.valid[:, None], away, np.inf)
     same = away.min(axis=2, initial=np.inf) < 1e-6

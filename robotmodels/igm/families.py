@@ -74,6 +74,7 @@ def prepare(chain: JointChain) -> Solver | None:
         if neighbour is not None:
             return neighbour
         general = prepare_general(chain)
-        if general is not None and general.reliable:
+        # with doubts at most poses it is slow, but all that counts is that nothing is missing
+        if general is not None and (general.reliable or general.misses == general.odd == 0):
             return GeneralArm(chain, general)
     return None
