@@ -51,7 +51,8 @@ def gaps(chain, found, q):
     return np.where(np.isnan(d), np.inf, d)
 
 
-def solved(solver, U, references=None, tolerances=Tolerances()):
+def solved(solver, U, references=None, tolerances=None):
+    tolerances = Tolerances() if tolerances is None else tolerances
     wanted = np.zeros((len(U), 6)) if references is None else references
     found = postures(solver, U, wanted, tolerances)
     assert np.all(np.isnan(found.q) == ~found.valid[..., None])
@@ -60,7 +61,7 @@ def solved(solver, U, references=None, tolerances=Tolerances()):
 
 
 def multi_start(chain, U, starts, seed=1):
-    """Postures of one pose by Newton's method from random starts, written apart from the package."""
+    """Postures of one pose by Newton's method from random starts, apart from the package."""
     rng = np.random.default_rng(seed)
     q = rng.uniform(-np.pi, np.pi, (starts, 6))
     q[:, chain.sigma == 1] *= 0.3
@@ -118,13 +119,13 @@ def test_other_arms_have_none():
     for name in ("crx10ia", "xarm6", "lab_rrt", "iiwa14", "cobra_s600"):
         assert prepare_neighbour(joint_chain(load(name))) is None
     arm = load("rx90")
-    far = arm.with_table(arm.table.replace(d=arm.table.d + [0, 0, 0, 0, 0.05, 0]))
+    far = arm.with_table(arm.table.replace(d=arm.table.d + np.array([0, 0, 0, 0, 0.05, 0])))
     assert prepare_neighbour(joint_chain(far)) is None
 
 
 def test_the_method_says_how_far_the_neighbour_is():
     arm = load("rx90")
-    worn = arm.with_table(arm.table.replace(d=arm.table.d + [0, 0, 0, 0, 1.2e-3, 0]))
+    worn = arm.with_table(arm.table.replace(d=arm.table.d + np.array([0, 0, 0, 0, 1.2e-3, 0])))
     solver = prepare_neighbour(joint_chain(worn))
     assert "to within 1.2 mm and 0 deg" in solver.method
     arm = load("ur5e")
@@ -138,9 +139,9 @@ def test_the_method_says_how_far_the_neighbour_is():
 
 @pytest.mark.parametrize("name", CONCURRENT + PARALLEL)
 def test_the_posture_is_found_again_and_nothing_else_is_returned(name):
-    for seed in range(6):
+    for seed in range(5):
         model, solver = prepared(name, seed)
-        q = random_postures(solver.chain, 350, seed)
+        q = random_postures(solver.chain, 60, seed)
         U = poses(solver, model, q)
         found = solved(solver, U)
         assert np.nanmax(found.residual) <= 1e-12
@@ -148,8 +149,7 @@ def test_the_posture_is_found_again_and_nothing_else_is_returned(name):
         errors = np.abs(poses(solver, model, x) - U[:, None]).max(axis=(-1, -2))
         assert errors[found.valid].max() <= 2e-12
         lost = gaps(solver.chain, found.q, q).min(axis=1) > 1e-6
-        # the wrist of the Stanford arm passes through the shoulder, where quadratics end abruptly
-        assert lost.sum() <= (1 if name == "stanford_arm" else 0)
+        assert not lost.any()
         count = found.valid.sum(axis=1) + found.double.sum(axis=1)
         assert np.all(count % 2 == 0)
 
@@ -157,7 +157,7 @@ def test_the_posture_is_found_again_and_nothing_else_is_returned(name):
 @pytest.mark.parametrize("name", CONCURRENT + PARALLEL)
 def test_the_count_is_that_of_two_hundred_starts(name):
     model, solver = prepared(name, 1)
-    q = random_postures(solver.chain, 12, seed=7)
+    q = random_postures(solver.chain, 6, seed=7)
     U = poses(solver, model, q)
     found = solved(solver, U)
     missing = 0
@@ -183,7 +183,7 @@ def test_rounded_urdf_numbers(name, digits):
     model = arm.with_table(table.replace(**columns))
     solver = prepare_neighbour(joint_chain(model))
     assert solver is not None
-    q = random_postures(solver.chain, 400, seed=digits)
+    q = random_postures(solver.chain, 200, seed=digits)
     q[:100, 4] = np.repeat([0.0, 1e-9, 1e-6, 1e-3], 25)
     U = poses(solver, model, q)
     found = solved(solver, U)

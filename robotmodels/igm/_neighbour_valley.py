@@ -20,7 +20,6 @@ from ..kernels._compile import INTS, MATRIX, NOTHING, OUT3, STACK, VECTOR, Float
 from ._check import wrapped
 from ._neighbour import (
     COUNTS,
-    DOUBTS,
     FLAGS,
     FLAGS_IN,
     MARKS,
@@ -192,11 +191,11 @@ def walk(
             first, last = min(first, at), max(last, at + 1)
             if abs(along) > far:
                 break
-            if side == 0 and not closed and at - middle > 10:
-                if distance(sigma, q, points[middle]) < STRIDE:
-                    # two steps more, so that the ends overlap
-                    closed = True
-                    left = 2
+            once = side == 0 and not closed and at - middle > 10
+            if once and distance(sigma, q, points[middle]) < STRIDE:
+                # two steps more, so that the ends overlap
+                closed = True
+                left = 2
     return first, last
 
 
@@ -413,8 +412,7 @@ def _is_double(sigma: Ints, D: Floats, root: Floats, work: Work) -> bool:
 @compiled(
     NOTHING(
         INTS, STACK, STACK, STACK, FLAGS_IN, MATRIX, VECTOR, types.float64, types.float64,
-        types.float64,
-        OUT3, COUNTS, FLAGS, MARKS, DOUBTS,
+        types.float64, types.float64, OUT3, COUNTS, FLAGS, MARKS,
     )
 )  # fmt: skip
 def valleys(
@@ -428,17 +426,18 @@ def valleys(
     small: float,
     valley: float,
     far: float,
+    spread: float,
     found: Floats,
     count: Ints,
     double: NDArray[np.bool_],
     free: Ints,
-    walked: NDArray[np.bool_],
 ) -> None:
-    """Search the valleys that run through ``starts (N, C, 6)`` and through nearly singular postures.
+    """Search the valleys through ``starts (N, C, 6)`` and through nearly singular postures.
 
     ``tolerances`` are of the position in lengths of the arm and of the angle. A curve along which
     every point is within them is an infinite family: of it the members at the reference are kept,
-    with the number of the freed joint (from 1) in ``free (N, 16)``.
+    with the number of the freed joint (from 1) in ``free (N, 16)``. Of starts that are closer than
+    ``spread`` one is taken.
     """
     work = workspace()
     rows = 2 * STRIDES + 8
@@ -459,6 +458,14 @@ def valleys(
                 at = k
                 k += 1
                 if not there[n, at]:
+                    continue
+                alike = False
+                for m in range(C):
+                    if m < at and there[n, m]:
+                        alike = alike or distance(sigma, starts[n, m], starts[n, at]) < spread
+                    if m >= at or alike:
+                        break
+                if alike:
                     continue
                 for i in range(6):
                     q[i] = starts[n, at, i]
@@ -481,7 +488,6 @@ def valleys(
             first, last = walk(sigma, D, goals[n], q, valley, far, curve, work)
             if last == first:
                 continue
-            walked[n] = True
             for m in range(first, last):
                 if remembered < POINTS:
                     known[remembered] = points[m]
@@ -505,10 +511,10 @@ def valleys(
                     m > first
                     and missing[m] * missing[m - 1] > 0.0
                     and drivers[m - 1] == drivers[m] == drivers[m + 1]
+                    and abs(missing[m]) <= min(abs(missing[m - 1]), abs(missing[m + 1]))
                 ):
-                    if abs(missing[m]) <= min(abs(missing[m - 1]), abs(missing[m + 1])):
-                        count[n] = _near_zero(
-                            sigma, D, goals[n], curve, m, touch, found[n], count[n], work
-                        )
+                    count[n] = _near_zero(
+                        sigma, D, goals[n], curve, m, touch, found[n], count[n], work
+                    )
         for k in range(count[n]):
             double[n, k] = free[n, k] == 0 and _is_double(sigma, D, found[n, k], work)

@@ -37,8 +37,11 @@ STAGES = 16  # arms between the neighbour and the arm, for branches that have to
 REACH = 6.0  # deviations by which a best approach of the neighbour may miss
 NEARLY_SINGULAR = 3.0  # deviations up to which a singular value may hide more postures
 JUMP = 6.0  # deviations by which a joint of a regular branch may move
+VALLEY = 1.5  # roots of the deviation up to which a valley is followed
 FAR = 6.0  # deviations missing in a valley beyond which it is left
 ASIDE = 24  # poses nearby that are asked where doubts are left
+SPREAD = 0.25  # distance of starts nearby above which both are followed [rad]
+FEW = 8  # and where the neighbour's reach may end without a sign
 MOST = 16  # postures of one pose
 CHUNK = 1024
 
@@ -66,8 +69,7 @@ class Neighbour:
         Largest distance of the two arms' poses at the same joint values, in units of the arm and
         radians: the scale of what can happen near singular postures.
     abrupt : bool
-        Whether the neighbour's closed form ends without a best approach where its reach does: it
-        solves quadratics or quartics there.
+        Whether the neighbour's closed form can end without a best approach.
     path : ndarray, shape (17, 7, 4, 4)
         Constants from the neighbour's to the arm's, lengths in ``unit``.
     """
@@ -320,14 +322,12 @@ def _square(change: _Change, plan: LoopPlan) -> _Change | None:
 
 
 def _abrupt(plan: LoopPlan) -> bool:
-    """Whether the closed form solves more than equations of type 2."""
-    if plan.family is Family.PARALLEL:
-        square = (0.0, 0.0, 0.0)
-        if plan.slot not in (3, 4):
-            E, F = plan.constants[3], plan.constants[4]
-            square = (E[2, 2], F[2, 2], np.hypot(F[0, 3], F[1, 3]))
-        return plan.slot in (3, 4) or max(np.abs(square)) > 1e-9
-    if plan.sigma[:3].any():
+    """Whether the closed form can end without a best approach that is next to the arm's posture.
+
+    A quadratic or quartic gives no best approach. Three parallel axes give one for the turn of the
+    wrist that the pose asks for, and beside an aligned wrist the arm may take any other.
+    """
+    if plan.family is Family.PARALLEL or plan.sigma[:3].any():
         return True
     for place in (0, 1):
         E = plan.constants[place]
@@ -417,9 +417,12 @@ def _solve(
     chosen = np.flatnonzero(doubt)
     if chosen.size:
         part = _Search(
-            *(np.ascontiguousarray(array[chosen]) for array in
-              (goals, scaled, candidates, there, arrived, doubtful, exact, found, count, double, free))
-        )  # fmt: skip
+            *(
+                np.ascontiguousarray(array[chosen])
+                for array in (goals, scaled, candidates, there, arrived, doubtful)
+            ),
+            *(np.ascontiguousarray(array[chosen]) for array in (exact, found, count, double, free)),
+        )
         _search(solver, U[chosen], part, tolerances)
         found[chosen], count[chosen] = part.found, part.count
         double[chosen], free[chosen] = part.double, part.free
@@ -459,7 +462,7 @@ def _small(solver: Neighbour) -> float:
 
 def _valley(solver: Neighbour) -> float:
     """Singular value at which a valley ends: folds are as far as the root of the deviation."""
-    return min(max(2.5 * np.sqrt(solver.deviation), 1e-3), 0.4)
+    return min(max(VALLEY * np.sqrt(solver.deviation), 1e-3), 0.4)
 
 
 def _scaled(solver: Neighbour, U: Array, references: Array) -> tuple[Array, Array]:
@@ -492,20 +495,39 @@ def _search(solver: Neighbour, U: Array, part: _Search, tolerances: Tolerances) 
     uneven = (part.count + part.double.sum(axis=1)) % 2 == 1
     own = part.there.sum(axis=1)
     unsure = uneven | (np.minimum(part.count, part.exact) < own)
-    chosen = np.flatnonzero(unsure | (own < 8) if solver.abrupt else unsure)
+    _ask_aside(solver, U, part, np.flatnonzero(unsure), ASIDE, tolerances)
+    if solver.abrupt:
+        _ask_aside(solver, U, part, np.flatnonzero(~unsure & (own < 8)), FEW, tolerances)
+
+
+def _ask_aside(
+    solver: Neighbour,
+    U: Array,
+    part: _Search,
+    chosen: NDArray[np.int64],
+    shifts: int,
+    tolerances: Tolerances,
+) -> None:
+    """Start from the neighbour's postures at poses nearby, in place.
+
+    With few shifts only from poses with another number of postures: without those there is no edge
+    of the neighbour's reach nearby.
+    """
+    from . import _neighbour as kernels
+
     if chosen.size == 0:
         return
     rest = _Search(*(np.ascontiguousarray(array[chosen]) for array in part))
-    starts, there = _aside(solver, U[chosen], rest.references)
-    # where the poses nearby have no more postures than the pose, there is no edge between
-    same = there.sum(axis=2) == own[chosen, None]
-    there[same & ~unsure[chosen, None]] = False
+    starts, there = _aside(solver, U[chosen], rest.references, shifts)
+    if shifts < ASIDE:
+        there[there.sum(axis=2) == rest.there.sum(axis=1)[:, None]] = False
     starts, there = starts.reshape(chosen.size, -1, 6), there.reshape(chosen.size, -1)
     arrived = np.zeros_like(there)
+    sigma = np.ascontiguousarray(solver.chain.sigma)
     kernels.tried(
         sigma, solver.path[-1], rest.goals, starts, there, arrived, rest.found, rest.count
     )
-    _walk(solver, rest, starts, there & ~arrived, tolerances)
+    _walk(solver, rest, starts, there & ~arrived, tolerances, SPREAD)
     _ask_general(solver, U[chosen], rest, tolerances)
     part.found[chosen], part.count[chosen] = rest.found, rest.count
     part.double[chosen], part.free[chosen] = rest.double, rest.free
@@ -532,13 +554,15 @@ def _ask_general(solver: Neighbour, U: Array, part: _Search, tolerances: Toleran
     part.double[chosen], part.free[chosen] = rest.double, rest.free
 
 
-def _aside(solver: Neighbour, U: Array, references: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Postures of the neighbour at poses nearby, ``(N, 24, 8, 6)``, lengths in units of the arm."""
-    shifts = _shifts(solver)
+def _aside(
+    solver: Neighbour, U: Array, references: Array, count: int
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Postures of the neighbour at poses nearby ``(N, count, 8, 6)``, lengths in arm units."""
+    shifts = _shifts(solver)[:count]
     aside = (U[:, None] @ shifts).reshape(-1, 4, 4)
     scale = np.where(solver.chain.sigma == 1, solver.unit, 1.0)
-    q, there = _candidates(solver, aside, np.repeat(scale * references, len(shifts), axis=0))
-    return q.reshape(len(U), -1, 8, 6), there.reshape(len(U), -1, 8)
+    q, there = _candidates(solver, aside, np.repeat(scale * references, count, axis=0))
+    return q.reshape(len(U), count, 8, 6), there.reshape(len(U), count, 8)
 
 
 def _walk(
@@ -547,6 +571,7 @@ def _walk(
     starts: Array,
     there: NDArray[np.bool_],
     tolerances: Tolerances,
+    spread: float = 0.0,
 ) -> None:
     """Search the valleys through starts and nearly singular postures, in place."""
     from . import _neighbour_valley as kernels
@@ -555,7 +580,7 @@ def _walk(
         np.ascontiguousarray(solver.chain.sigma), solver.path[-1], part.goals, starts, there,
         part.references, np.array([tolerances.position / solver.unit, tolerances.orientation]),
         _small(solver), _valley(solver), FAR * solver.deviation,
-        part.found, part.count, part.double, part.free, np.zeros(len(part.goals), np.bool_),
+        spread, part.found, part.count, part.double, part.free,
     )  # fmt: skip
 
 
