@@ -290,14 +290,14 @@ def report(rows: list[Row], about: dict[str, str], rounds: int) -> str:
         "once, without limits; `prebuilt` arms are ssik's own, with its native code. `kernel` is "
         "the compiled plan alone, per pose of a call with 1000, without Python between.",
         "",
-        "| work | ours | beneath it | others | goal | met |",
+        "| work | ours | ours otherwise | others | goal | met |",
         "|---|---|---|---|---|---|",
     ]
     for r in rows:
         names = list(r.microseconds)
         first = r.microseconds[names[0]]
         own = [name for name in names[1:] if name.startswith(OURS)]
-        beneath = "; ".join(f"{_short(name)} {r.microseconds[name]:.2f}" for name in own)
+        otherwise = "; ".join(f"{_short(name)} {r.microseconds[name]:.2f}" for name in own)
         others = "; ".join(
             f"{name} {r.microseconds[name]:.1f} ({r.microseconds[name] / first:.1f}x)"
             for name in names
@@ -306,7 +306,7 @@ def report(rows: list[Row], about: dict[str, str], rounds: int) -> str:
         met = "" if r.met is None else ("yes" if r.met else "no")
         label = _short(names[0])
         ours = f"{first:.2f}" + ("" if names[0] == OURS else f" ({label})")
-        lines.append(f"| {r.work} | {ours} | {beneath} | {others} | {r.goal} | {met} |")
+        lines.append(f"| {r.work} | {ours} | {otherwise} | {others} | {r.goal} | {met} |")
     return "\n".join(lines) + "\n"
 
 

@@ -76,8 +76,8 @@ def first_joints(model: rm.RobotModel, count: int) -> rm.RobotModel:
     table = model.table
     part = slice(0, count)
     short = rm.DHTable(
-        sigma=table.sigma[part], alpha=table.alpha[part], d=table.d[part],
-        theta=table.theta[part], r=table.r[part],
+        antecedent=table.antecedent[part], sigma=table.sigma[part], alpha=table.alpha[part],
+        d=table.d[part], theta=table.theta[part], r=table.r[part],
     )  # fmt: skip
     tool = np.eye(4)
     tool[:3, 3] = 0.3, 0.05, 0.1

@@ -169,6 +169,8 @@ def ik_geo(model: rm.RobotModel, _: str = "") -> Iterator[Peer]:
     if peer is None or chain.k != 6 or (chain.sigma != 0).any():
         return
     method = rm.igm(model, model_pose(model)).method
+    if "within" in method:
+        return  # structured up to calibration errors, of which it knows nothing
     frames = frames_at_zero(model)
     axes, points, end = frames[:6, :3, 2], frames[:, :3, 3].copy(), frames[6, :3, :3]
     # its solvers want the meeting point of axes as the point on each of them
