@@ -23,7 +23,14 @@ from .dynamics import (
     potential_energy,
 )
 from .geometry import DHTable, link_transforms
-from .igm import IGMSolutions, IGMStatus, igm, igm_numeric
+from .igm import (
+    IGMSolutions,
+    IGMStatus,
+    InverseModelExplanation,
+    explain_igm,
+    igm,
+    igm_numeric,
+)
 from .inertia import InertialParameters
 from .kinematics import dgm, dkm, jacobian, jacobian_rate, link_poses
 from .model import RobotModel, to_urdf, write_urdf
@@ -40,7 +47,7 @@ from .symoro import read_par
 from .urdf import NamedFrame
 
 if TYPE_CHECKING:
-    from . import viz
+    from . import trajectories, viz
 
 __version__ = "0.1.0"
 
@@ -50,6 +57,7 @@ __all__ = [
     "DriveParameters",
     "IGMSolutions",
     "IGMStatus",
+    "InverseModelExplanation",
     "InertialParameters",
     "NamedFrame",
     "RobotModel",
@@ -61,6 +69,7 @@ __all__ = [
     "energy_regressor",
     "errors",
     "explain_dgm",
+    "explain_igm",
     "gravity_torque",
     "idm",
     "igm",
@@ -80,13 +89,14 @@ __all__ = [
     "to_urdf",
     "torque_regressor",
     "torque_regressor_chunks",
+    "trajectories",
     "viz",
     "write_urdf",
 ]
 
 
 def __getattr__(name: str) -> ModuleType:
-    """Import the pictures when they are first asked for."""
-    if name == "viz":
-        return importlib.import_module(".viz", __name__)
+    """Import trajectories and pictures when they are first asked for."""
+    if name in ("trajectories", "viz"):
+        return importlib.import_module(f".{name}", __name__)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -331,6 +331,10 @@ def reversed_arm(model):
         ({"lock": {0: np.nan}}, InvalidValueError, "finite"),
         ({"lock": [1]}, InvalidValueError, "mapping"),
         ({"arm_angle": 0.3}, InvalidValueError, "arm_angle"),
+        ({"relations": [1]}, InvalidValueError, "pair"),
+        ({"relations": ([[1.0] * 7], [0.0])}, ShapeError, "relations"),
+        ({"relations": ([[1.0] * 6], [0.0])}, InvalidValueError, "more than six"),
+        ({"relations": ([[1.0] * 6], [0.0]), "lock": {0: 1}}, InvalidValueError, "together"),
         ({"model": "rx90"}, InvalidValueError, "RobotModel"),
     ],
 )
@@ -338,3 +342,91 @@ def test_mistakes_are_named(change, error, words):
     given = {"model": rm.load("rx90"), "T": np.eye(4), **change}
     with pytest.raises(error, match=words):
         rm.igm(**given)
+
+
+def test_redundant_arms_by_lock_arm_angle_and_relations():
+    model = rm.load("iiwa14")
+    q = np.random.default_rng(4).uniform(-1.5, 1.5, (20, 7))
+    T = rm.dgm(model, q)
+    # the arm angle of the reference: the posture itself is among the eight
+    found = checked(model, T, rm.igm(model, T, q))
+    assert distance(model, found.q[:, 0], q).max() < 1e-9
+    assert np.all(found.count == 8)
+    assert np.all(found.status == rm.IGMStatus.REACHED_FAMILY)
+    assert not found.free_joints.any()
+    moves = [True, True, True, False, True, True, True]
+    assert np.all(found.family_joints[:, 0] == moves)
+    # angles as an axis behind the poses
+    by_angle = checked(
+        model, np.repeat(T[:, None], 3, axis=1), rm.igm(model, T, arm_angle=[-0.5, 0.0, 2.0])
+    )
+    assert by_angle.q.shape == (20, 3, 8, 7)
+    assert np.all(by_angle.status == rm.IGMStatus.REACHED)
+    one = rm.igm(model, T, arm_angle=2.0)
+    np.testing.assert_allclose(one.q, by_angle.q[:, 2], atol=1e-12)
+    # each joint that moves with the elbow may be locked, by column or by name
+    for column in (0, 2, 4, 6):
+        for name in (column, str(model.table.names[model.table.joint_rows[column]])):
+            locked = rm.igm(model, T[0], q[0], lock={name: q[0, column]})
+            assert distance(model, locked.q[0], q[0]) < 1e-8
+            np.testing.assert_allclose(locked.q[:, column], q[0, column], atol=1e-12)
+            assert locked.status == rm.IGMStatus.REACHED
+            assert not locked.free_joints.any()
+    A = np.zeros((1, 7))
+    A[0, [0, 2]] = 1.0, -2.0
+    related = rm.igm(model, T[0], q[0], relations=(A, A @ q[0]))
+    assert distance(model, related.q[0], q[0]) < 1e-8
+    away = np.remainder(related.q @ A[0] - A[0] @ q[0] + np.pi, 2 * np.pi) - np.pi
+    assert np.abs(away).max() < 1e-9
+
+
+def test_free_joints_of_a_redundant_arm_ascend():
+    model = rm.load("panda")
+    q = np.array([0.1, 0.2, 0.3, -1.4, 0.5, 1.6, 0.7])
+    T = rm.dgm(model, q)
+    found = checked(model, T, rm.igm(model, T, q))
+    assert distance(model, found.q[0], q) < 1e-9
+    assert np.all(found.free_joints == (np.arange(7) == 0))
+    np.testing.assert_allclose(found.q[:, 0], 0.1, atol=1e-12)
+    assert np.all(found.family_joints == (np.arange(7) > 0))
+    # no posture at the reference: the nearest value at which there is one
+    away = rm.igm(model, T, q + np.array([3.0, 0, 0, 0, 0, 0, 0]))
+    assert away.count > 0
+    assert np.nanmax(away.residual) <= 1e-12
+    assert np.all(away.free_joints[:, 0])
+
+
+def test_masks_through_the_one_call():
+    """The exercise's poses A and B, pointing with five components, and a point for six joints."""
+    trr = rm.load("lab_trr")
+    A = [[0, 0, -1, 0.1414], [0, 1, 0, -0.3], [1, 0, 0, 0.8414], [0, 0, 0, 1]]
+    B = [[-1, 0, 0, 0.4], [0, 1, 0, 0.2], [0, 0, -1, 0.5], [0, 0, 0, 1]]
+    assert rm.igm(trr, A).count == 0
+    found = rm.igm(trr, A, position_tolerance=1e-4, orientation_tolerance=1e-4)
+    np.testing.assert_allclose(found.q, [[-0.3, -np.pi / 4, -np.pi / 4]], atol=1e-4)
+    assert rm.igm(trr, B).status == rm.IGMStatus.ORIENTATION_NOT_AVAILABLE
+    assert "off by 180 deg" in rm.igm(trr, B).reason()
+    point = [1, 1, 1, 0, 0, 0]
+    reached = rm.igm(trr, B, mask=point)
+    np.testing.assert_allclose(reached.q, [[0.2, 0, 0]], atol=1e-7)
+    assert reached.double.all()
+    path = rm.trajectories.cartesian_trajectory(np.array(A, float), np.array(B, float), 50)
+    along = rm.igm(trr, path, mask=point)
+    assert np.all(along.status == rm.IGMStatus.REACHED)
+    five = rm.load("xarm5")
+    q = np.random.default_rng(2).uniform(-1.5, 1.5, (10, 5))
+    T = rm.dgm(five, q)
+    # the tool may turn about its axis
+    turned = T.copy()
+    turned[:, :3, :2] = np.stack([T[:, :3, 1], -T[:, :3, 0]], axis=-1)
+    pointed = rm.igm(five, turned, q, mask=[1, 1, 1, 1, 1, 0], mask_axes="tool")
+    assert np.all(pointed.count > 0)
+    again = rm.dgm(five, pointed.q[:, 0])
+    np.testing.assert_allclose(again[:, :3, 2:], T[:, :3, 2:], atol=1e-9)
+    rx90 = rm.load("rx90")
+    q = random_q(rx90, 5, 6)
+    T = rm.dgm(rx90, q)
+    placed = rm.igm(rx90, T, q, mask=point)
+    assert np.all(placed.status == rm.IGMStatus.REACHED_FAMILY)
+    assert distance(rx90, placed.q[:, 0], q).max() < 1e-6
+    assert np.all(placed.free_joints[:, 0].sum(axis=-1) == 3)

@@ -2,7 +2,15 @@
 
 from .inverse import igm
 from .numeric import igm_numeric
+from .paul import InverseModelExplanation, explain_igm
 from .solutions import IGMSolutions
 from .status import IGMStatus
 
-__all__ = ["IGMSolutions", "IGMStatus", "igm", "igm_numeric"]
+__all__ = [
+    "IGMSolutions",
+    "IGMStatus",
+    "InverseModelExplanation",
+    "explain_igm",
+    "igm",
+    "igm_numeric",
+]

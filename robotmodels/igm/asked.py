@@ -33,12 +33,15 @@ class Task:
         Columns of q that keep a value [rad or m], ascending.
     by_arm_angle : bool
         Whether arm angles are given.
+    relations : tuple of (tuple of float, float)
+        Rows of ``A`` and right sides of ``A q = b``.
     """
 
     mask: tuple[bool, ...] = WHOLE_POSE
     in_tool_axes: bool = False
     locks: tuple[tuple[int, float], ...] = ()
     by_arm_angle: bool = False
+    relations: tuple[tuple[tuple[float, ...], float], ...] = ()
 
 
 def mask_of(mask: ArrayLike | None) -> NDArray[np.bool_]:
@@ -163,3 +166,40 @@ def locks_of(
             )
         columns[column] = float(value)
     return tuple(sorted(columns.items()))
+
+
+def relations_of(
+    model: RobotModel, relations: tuple[ArrayLike, ArrayLike] | None
+) -> tuple[tuple[tuple[float, ...], float], ...]:
+    """Rows of added relations between joints.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot.
+    relations : (array_like (m, n), array_like (m,)), optional
+        ``A`` and ``b`` of ``A q = b``.
+
+    Returns
+    -------
+    tuple of (tuple of float, float)
+        A row of ``A`` and its right side, for each relation.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Not a pair, or of the wrong shapes, or not finite.
+    """
+    if relations is None:
+        return ()
+    if not isinstance(relations, tuple) or len(relations) != 2:
+        raise InvalidValueError(
+            "relations: expected a pair (A, b) of A q = b, A of shape (m, n) and b of shape (m,)."
+        )
+    A, b = as_floats(relations[0], "relations: A"), as_floats(relations[1], "relations: b")
+    if A.ndim != 2 or A.shape[1] != model.n or b.shape != A.shape[:1]:
+        raise ShapeError(
+            f"relations: expected A of shape (m, {model.n}) and b of shape (m,), got {A.shape} "
+            f"and {b.shape}."
+        )
+    return tuple((tuple(row), right) for row, right in zip(A.tolist(), b.tolist(), strict=True))

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from ..errors import InvalidValueError
 from .asked import WHOLE_POSE, Task
 from .closed_form import prepare_closed_form
 from .fewer import prepare_fewer
@@ -12,6 +15,7 @@ from .mask import prepare_masked
 from .neighbour import prepare_neighbour
 from .prismatic import prepare_prismatic
 from .redundant import prepare_redundant
+from .relations import prepare_related
 from .solver import Solver
 
 
@@ -34,6 +38,19 @@ def prepare_task(chain: JointChain, task: Task) -> Solver | None:
     locks = {places[column]: value for column, value in task.locks if column in places}
     if locks:
         chain = locked_chain(chain, locks)
+    if task.relations:
+        if chain.k <= 6:
+            raise InvalidValueError(
+                f"relations: the tool is moved by {chain.k} joints; only more than six leave "
+                "something to relate."
+            )
+        A = np.array([row for row, _ in task.relations])
+        still = np.setdiff1d(np.arange(A.shape[1]), chain.columns)
+        if A[:, still].any():
+            raise InvalidValueError(
+                "relations: a joint that does not move the tool cannot be part of one."
+            )
+        return prepare_related(chain, A[:, chain.columns], [b for _, b in task.relations], prepare)
     if task.mask != WHOLE_POSE:
         return prepare_masked(chain, task.mask, task.in_tool_axes, prepare)
     return prepare(chain)

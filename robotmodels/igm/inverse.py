@@ -13,7 +13,7 @@ from .. import se3
 from .._arrays import Array, as_core, as_vector, batch_rows, read_only
 from ..errors import InvalidValueError
 from ..model import RobotModel
-from .asked import Task, above_zero, locks_of, mask_of
+from .asked import Task, above_zero, locks_of, mask_of, relations_of
 from .known import known_arm, solver_for
 from .rows import Call, Rows, rows_by_family, rows_by_plan, rows_of_doubtful
 from .solutions import IGMSolutions
@@ -36,6 +36,7 @@ def igm(
     arm_angle: ArrayLike | None = None,
     position_tolerance: float = 1e-9,
     orientation_tolerance: float = 1e-9,
+    relations: tuple[ArrayLike, ArrayLike] | None = None,
 ) -> IGMSolutions:
     """Inverse geometric model (inverse kinematics): all postures that bring the tool to a pose.
 
@@ -78,6 +79,10 @@ def igm(
         digits take wider tolerances.
     orientation_tolerance : float
         Radians, on the rotation that is missing.
+    relations : (array_like (m, n), array_like (m,)), optional
+        Added relations ``A q = b`` between the joints of a redundant arm, as many as it has
+        joints more than six (the book's second strategy; locking is the first). Not together with
+        ``lock``, ``mask`` or ``arm_angle``.
 
     Returns
     -------
@@ -123,7 +128,8 @@ def igm(
     if not isinstance(limits, (bool, np.bool_)):
         raise InvalidValueError(f"limits: expected True or False, got {limits!r}.")
     arm = known_arm(model)
-    ordinary = mask is None and lock is None and arm_angle is None
+    extras = (mask, lock, arm_angle, relations)
+    ordinary = all(extra is None for extra in extras)
     if ordinary and position_tolerance == 1e-9 == orientation_tolerance:
         task, tolerances = _WHOLE, _EXACT
     else:
@@ -136,7 +142,13 @@ def igm(
             in_tool_axes=mask_axes == "tool",
             locks=locks_of(model, lock),
             by_arm_angle=arm_angle is not None,
+            relations=relations_of(model, relations),
         )
+        if relations is not None and sum(extra is not None for extra in extras) > 1:
+            raise InvalidValueError(
+                "relations: not together with mask, lock or arm_angle; a locked joint is a "
+                "relation too, with a single 1 in its row."
+            )
     given, limits = q_ref is not None, bool(limits)
     solver = arm.plan if task is _WHOLE else None
     rows = None
