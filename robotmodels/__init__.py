@@ -8,8 +8,7 @@ Pinocchio are imported here, the rest where it is used.
 from __future__ import annotations
 
 import importlib
-from types import ModuleType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from . import errors
 from .drive import DriveParameters, Transmission
@@ -23,14 +22,7 @@ from .dynamics import (
     potential_energy,
 )
 from .geometry import DHTable, link_transforms
-from .igm import (
-    IGMSolutions,
-    IGMStatus,
-    InverseModelExplanation,
-    explain_igm,
-    igm,
-    igm_numeric,
-)
+from .igm import IGMSolutions, IGMStatus, igm, igm_numeric
 from .inertia import InertialParameters
 from .kinematics import dgm, dkm, jacobian, jacobian_rate, link_poses
 from .model import RobotModel, to_urdf, write_urdf
@@ -48,6 +40,7 @@ from .urdf import NamedFrame
 
 if TYPE_CHECKING:
     from . import trajectories, viz
+    from .igm.paul import InverseModelExplanation, explain_igm
 
 __version__ = "0.1.0"
 
@@ -95,8 +88,13 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> ModuleType:
-    """Import trajectories and pictures when they are first asked for."""
+_ON_DEMAND = {"InverseModelExplanation": ".igm.paul", "explain_igm": ".igm.paul"}
+
+
+def __getattr__(name: str) -> Any:
+    """Import trajectories, pictures and derivations when they are first asked for."""
     if name in ("trajectories", "viz"):
         return importlib.import_module(f".{name}", __name__)
+    if name in _ON_DEMAND:
+        return getattr(importlib.import_module(_ON_DEMAND[name], __name__), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

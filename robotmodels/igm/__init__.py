@@ -2,15 +2,12 @@
 
 from .inverse import igm
 from .numeric import igm_numeric
-from .paul import InverseModelExplanation, explain_igm
 from .solutions import IGMSolutions
 from .status import IGMStatus
 
 __all__ = [
     "IGMSolutions",
     "IGMStatus",
-    "InverseModelExplanation",
-    "explain_igm",
     "igm",
     "igm_numeric",
 ]

@@ -13,7 +13,6 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from .._arrays import Array
 from .loop import JointChain
@@ -67,6 +66,8 @@ def thorough_postures(
     twice = np.flatnonzero(_two_singularities(chain, first))
     if twice.size == 0:
         return first
+    from scipy.spatial.transform import Rotation
+
     goals, wanted = U[twice], references[twice]
     size, rng = lever(chain), np.random.default_rng(0)
     parts = [(first.q[twice], first.valid[twice])]
