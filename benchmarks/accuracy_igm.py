@@ -133,8 +133,8 @@ def ours(name: str, count: int) -> Row:
         error = np.full(found.valid.shape, 0.0)
         error[i, s] = residual(model, T[i], found.q[i, s])
         worst = max(worst, float(error.max(initial=0.0)))
-        note("above_goal", (error > GOAL).any(axis=1), q[part])
-        note("nan", (np.isnan(found.q).any(axis=2) & found.valid).any(axis=1), q[part])
+        note("above_goal", error.max(axis=1, initial=0.0) > GOAL, q[part])
+        note("nan", np.sum(np.isnan(found.q).any(axis=2) & found.valid, axis=1) > 0, q[part])
         note("odd", odd(model, found.q, found.valid, found.double), q[part])
         bar.step(len(T))
     regular = q[kind == 0]
@@ -324,7 +324,8 @@ def random_arms(count: int) -> Union:
             if lost or uneven or union > found:
                 seeds.append(seed)
             bar.step()
-    return Union(count, *totals.tolist(), seeds)
+    a, b, c, d, e = map(int, totals)
+    return Union(count, a, b, c, d, e, seeds)
 
 
 def random_arm(seed: int) -> tuple[int, int, bool, bool, bool]:

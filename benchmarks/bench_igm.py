@@ -157,7 +157,7 @@ def structured_rows(rounds: int) -> list[Row]:
         for poses in (thousand, T):
             contestants = [Contestant(OURS, lambda m=model, x=poses: rm.igm(m, x), len(poses))]
             contestants += [
-                Contestant(f"{p.name}, batch", lambda p=p, x=poses: p.batch(x), len(poses))
+                Contestant(f"{p.name}, batch", lambda f=p.batch, x=poses: f(x), len(poses))
                 for p in peers
                 if p.batch is not None
             ]

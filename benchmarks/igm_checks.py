@@ -122,9 +122,9 @@ def _or_joined(
     there = there.copy()
     pose, row = np.nonzero(valid & ~there[:, None])
     if pose.size:
-        ends = q[pose], rows[pose, row]
-        found = joined(model, T[pose], *ends, most, steps)
-        found |= joined(model, T[pose], *ends[::-1], most, steps)
+        a, b = q[pose], rows[pose, row]
+        found = joined(model, T[pose], a, b, most, steps)
+        found |= joined(model, T[pose], b, a, most, steps)
         there[pose[found]] = True
     return there
 

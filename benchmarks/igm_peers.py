@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,8 +56,8 @@ class Peer:
     """
 
     name: str
-    solve: Callable[[Array], object]
-    postures: Callable[[object], Array]
+    solve: Callable[[Array], Any]
+    postures: Callable[[Any], Array]
     direct: Callable[[Array], Array]
     batch: Callable[[Array], list] | None = None
 
@@ -213,8 +214,8 @@ SSIK = {"respect_limits": False, "enumerate_windings": False}
 """All branches, each once, as the others give them."""
 
 
-def _rows_of_ssik(n: int) -> Callable[[object], Array]:
-    return lambda found: np.array([s.q for s in found]).reshape(-1, n)  # type: ignore[attr-defined]
+def _rows_of_ssik(n: int) -> Callable[[Any], Array]:
+    return lambda found: np.array([s.q for s in found]).reshape(-1, n)
 
 
 def ssik(model: rm.RobotModel, _: str = "", general: bool = False) -> Iterator[Peer]:
@@ -285,6 +286,6 @@ def toolbox_puma(model: rm.RobotModel, name: str = "") -> Iterator[Peer]:
     yield Peer(
         NOT_EVERY_POSTURE[0],
         robot.ikine_a,
-        lambda found: np.array([found.q]) if found.success else np.empty((0, 6)),  # type: ignore[attr-defined]
+        lambda found: np.array([found.q]) if found.success else np.empty((0, 6)),
         lambda q: robot.fkine(q).A,
     )

@@ -206,7 +206,7 @@ def root(
     many[..., joint] = grid
     values = f(model, many.reshape(-1, model.n)).reshape(len(q), GRID)
     change = values[:, :-1] * values[:, 1:] < 0.0
-    there = change.any(axis=1)
+    there = np.asarray(change.any(axis=1), np.bool_)
     place = np.argmax(change * rng.random(change.shape), axis=1)
     low, high = grid[place], grid[place + 1]
     sign = np.sign(values[np.arange(len(q)), place])
