@@ -11,7 +11,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from ..kernels._compile import INTS, NOTHING, OUT3, STACK, Floats, Ints, compiled
+from ..kernels._compile import INTS, NOTHING, OUT2, OUT3, STACK, Floats, Ints, compiled
 from ._check import forward, jacobian, missing, wrapped
 from ._neighbour_linear import anywhere, factor, smallest_singular, solve
 
@@ -133,7 +133,7 @@ def keep(sigma: Ints, q: Floats, found: Floats, count: int) -> int:
 @compiled(
     NOTHING(
         INTS, STACK, STACK, STACK, OUT3, FLAGS, types.float64, types.float64,
-        types.float64, OUT3, COUNTS, FLAGS, COUNTS, FLAGS, DOUBTS,
+        types.float64, OUT3, COUNTS, FLAGS, COUNTS, FLAGS, OUT2, DOUBTS,
     )
 )  # fmt: skip
 def arrivals(
@@ -151,6 +151,7 @@ def arrivals(
     arrived: NDArray[np.bool_],
     exact: Ints,
     doubtful: NDArray[np.bool_],
+    moved: Floats,
     doubt: NDArray[np.bool_],
 ) -> None:
     """Newton's method from every candidate ``(N, C, 6)`` of the neighbour ``near`` to arm ``D``.
@@ -158,7 +159,7 @@ def arrivals(
     ``exact (N,)`` counts the candidates that are postures of the neighbour and not only its best
     approach; those that miss by more than ``reach`` are taken out of ``there``. Candidates are
     overwritten by where they arrived. A branch is ``doubtful (N, C)``, and its pose in ``doubt``,
-    where it did not arrive, moved by more than ``jump``, met another branch, or ended where the
+    where it did not arrive, ``moved`` by more than ``jump``, met another branch, or ended where the
     smallest singular value of the Jacobian is below ``small``.
     """
     work = workspace()
@@ -182,10 +183,10 @@ def arrivals(
             arrived[n, c] = True
             before = count[n]
             count[n] = keep(sigma, q, found[n], count[n])
-            moved = distance(sigma, q, candidates[n, c])
+            moved[n, c] = distance(sigma, q, candidates[n, c])
             for k in range(6):
                 candidates[n, c, k] = q[k]
-            if count[n] == before or moved > jump or not start_is_exact:
+            if count[n] == before or moved[n, c] > jump or not start_is_exact:
                 doubtful[n, c] = doubt[n] = True
                 continue
             factored_jacobian(sigma, work)

@@ -38,6 +38,9 @@ from ._neighbour_linear import anywhere, smallest_singular, solve, solve_transpo
 STRIDE = 0.1  # step along a valley [rad]
 SHORTEST = STRIDE / 40  # step at which it is given up
 STRIDES = 240  # steps one way
+MOST_MOVED = 0.05  # of a start, that is taken into account [rad]
+ALIKE = 1e-3  # distance of best approaches that are one [rad]
+WIDE = 0.4  # distance of the Jacobian from singular at which any valley ends
 POINTS = 4000  # points of valleys remembered for a pose
 LOST = 1e-3  # error beside the valley above which the curve was lost
 NARROW = 10  # points that the infinite family of a tolerance has at least
@@ -268,7 +271,7 @@ def _near_zero(
     sign = 1.0 if f1 > 0.0 else -1.0
     if bend * sign <= 0.0 or f1 * sign - (f2 - f0) ** 2 / (8.0 * abs(bend)) > 0.5 * abs(bend):
         return count
-    for _ in range(8):
+    for _ in range(30):
         # vertex of the parabola through the three
         d1, d2 = (f1 - f0) / (x1 - x0), (f2 - f1) / (x2 - x1)
         second = (d2 - d1) / (x2 - x0)
@@ -297,11 +300,18 @@ def _near_zero(
             a[:], x0, f0 = q, x, f
         else:
             c[:], x2, f2 = q, x, f
-        if x2 - x0 < 1e-7:
+        if x2 - x0 < 1e-8:
             break
     # the curve turns back at zero: a double posture, within rounding or the tolerance
     if abs(f1) <= touch:
-        count = keep(sigma, b, found, count)
+        q[:] = b
+        if newton(sigma, D, U, q, 30, work) > MET or distance(sigma, q, b) > STRIDE:
+            q[:] = b
+            # found before, from the other side
+            for j in range(count):
+                if distance(sigma, q, found[j]) < ALIKE:
+                    return count
+        count = keep(sigma, q, found, count)
     return count
 
 
@@ -334,6 +344,8 @@ def _family(
         if not on:
             found[kept], free[kept] = found[j], free[j]
             kept += 1
+    for j in range(kept, free.size):
+        free[j] = 0
     count = kept
     # the first joint that moves
     joint = 5
@@ -374,16 +386,15 @@ def _family(
 
 
 @compiled()
-def _is_double(sigma: Ints, D: Floats, root: Floats, work: Work) -> bool:
+def _is_double(sigma: Ints, D: Floats, goal: Floats, root: Floats, work: Work) -> bool:
     """Whether the partner of a posture at a fold is nearer than 1e-6.
 
     Along the null direction v the error is ``s sigma + s^2 h / 2`` with sigma the smallest
     singular value (left vector u) and ``h = u . d(J v)/ds``: the partner is at ``-2 sigma / h``.
     """
     u, v, w, t = np.zeros(6), np.zeros(6), np.zeros(6), np.zeros(6)
-    U = np.zeros((4, 4))
-    U[0, 0] = U[1, 1] = U[2, 2] = U[3, 3] = 1.0
-    error_at(sigma, D, U, root, work)
+    if error_at(sigma, D, goal, root, work) > MET:
+        return True  # the best approach of a fold that the tolerance reaches
     factored_jacobian(sigma, work)
     anywhere(u)
     small = smallest_singular(work[2], work[3], u, v, 3)
@@ -395,7 +406,7 @@ def _is_double(sigma: Ints, D: Floats, root: Floats, work: Work) -> bool:
     for side in (-1.0, 1.0):
         for i in range(6):
             q[i] = root[i] + side * step * v[i]
-        error_at(sigma, D, U, q, work)
+        error_at(sigma, D, goal, q, work)
         factored_jacobian(sigma, work)
         for i in range(6):
             w[i] = u[i]
@@ -411,8 +422,9 @@ def _is_double(sigma: Ints, D: Floats, root: Floats, work: Work) -> bool:
 
 @compiled(
     NOTHING(
-        INTS, STACK, STACK, STACK, FLAGS_IN, MATRIX, VECTOR, types.float64, types.float64,
-        types.float64, types.float64, OUT3, COUNTS, FLAGS, MARKS,
+        INTS, STACK, STACK, STACK, FLAGS_IN, MATRIX, MATRIX, VECTOR,
+        types.float64, types.float64, types.float64, types.float64, types.float64,
+        OUT3, COUNTS, FLAGS, MARKS,
     )
 )  # fmt: skip
 def valleys(
@@ -421,8 +433,10 @@ def valleys(
     goals: Floats,
     starts: Floats,
     there: NDArray[np.bool_],
+    moved: Floats,
     references: Floats,
     tolerances: Floats,
+    deviation: float,
     small: float,
     valley: float,
     far: float,
@@ -433,6 +447,10 @@ def valleys(
     free: Ints,
 ) -> None:
     """Search the valleys through ``starts (N, C, 6)`` and through nearly singular postures.
+
+    A valley is left where the Jacobian is ``valley`` times the root of the deviation from singular,
+    or where ``far`` deviations are missing; a start that moved further than the deviation on its
+    way from the neighbour (``moved (N, C)``) shows that it counts for more there.
 
     ``tolerances`` are of the position in lengths of the arm and of the angle. A curve along which
     every point is within them is an infinite family: of it the members at the reference are kept,
@@ -467,9 +485,11 @@ def valleys(
                         break
                 if alike:
                     continue
+                scale = max(deviation, min(moved[n, at], MOST_MOVED))
                 for i in range(6):
                     q[i] = starts[n, at, i]
             else:
+                scale = deviation
                 for i in range(6):
                     q[i] = found[n, k - C, i]
                 k += 1
@@ -485,7 +505,9 @@ def valleys(
                     break
             if passed:
                 continue
-            first, last = walk(sigma, D, goals[n], q, valley, far, curve, work)
+            narrow = min(max(valley * sqrt(scale), 1e-3), WIDE)
+            end = max(far * scale, 2.0 * touch)
+            first, last = walk(sigma, D, goals[n], q, narrow, end, curve, work)
             if last == first:
                 continue
             for m in range(first, last):
@@ -517,4 +539,4 @@ def valleys(
                         sigma, D, goals[n], curve, m, touch, found[n], count[n], work
                     )
         for k in range(count[n]):
-            double[n, k] = free[n, k] == 0 and _is_double(sigma, D, found[n, k], work)
+            double[n, k] = free[n, k] == 0 and _is_double(sigma, D, goals[n], found[n, k], work)
