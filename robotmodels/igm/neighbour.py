@@ -34,7 +34,7 @@ VALLEY = 1.5  # roots of the deviation up to which the Jacobian is singular enou
 FAR = 6.0  # deviations missing in a valley beyond which it is left
 ASIDE = 24  # poses nearby that are asked where doubts are left
 SPREAD = 0.25  # distance of starts nearby above which both are followed [rad]
-FEW = 8  # and where the neighbour's reach may end without a sign
+FEW = 8  # and where three parallel axes may be next to others
 MOST = 16  # postures of one pose
 CHUNK = 1024
 
@@ -291,9 +291,11 @@ def _search(solver: Neighbour, U: Array, part: _Search, tolerances: Tolerances) 
     # a family within the tolerance stands for all of its members
     settled = (part.free > 0).any(axis=1)
     unsure = (uneven | (np.minimum(part.count, part.exact) < own)) & ~settled
-    _ask_aside(solver, U, part, np.flatnonzero(unsure), ASIDE, tolerances)
+    _ask_aside(solver, U, part, np.flatnonzero(unsure), ASIDE, False, tolerances)
     if solver.abrupt:
-        _ask_aside(solver, U, part, np.flatnonzero(~unsure & ~settled & (own < 8)), FEW, tolerances)
+        chosen = np.flatnonzero(~unsure & ~settled & (own < 8))
+        shifts = FEW if solver.plan.family is Family.PARALLEL else ASIDE
+        _ask_aside(solver, U, part, chosen, shifts, True, tolerances)
 
 
 def _ask_aside(
@@ -302,12 +304,13 @@ def _ask_aside(
     part: _Search,
     chosen: NDArray[np.int64],
     shifts: int,
+    at_edges: bool,
     tolerances: Tolerances,
 ) -> None:
     """Start from the neighbour's postures at poses nearby, in place.
 
-    With few shifts only from poses with another number of postures: without those there is no edge
-    of the neighbour's reach nearby.
+    ``at_edges`` asks only poses with another number of postures: without those there is no edge of
+    the neighbour's reach nearby.
     """
     from . import _neighbour as kernels
 
@@ -315,7 +318,7 @@ def _ask_aside(
         return
     rest = part.rows(chosen)
     starts, there = _aside(solver, U[chosen], rest.references, shifts)
-    if shifts < ASIDE:
+    if at_edges:
         there[there.sum(axis=2) == rest.there.sum(axis=1)[:, None]] = False
     starts, there = starts.reshape(chosen.size, -1, 6), there.reshape(chosen.size, -1)
     arrived = np.zeros_like(there)
