@@ -285,6 +285,12 @@ def _search(solver: Neighbour, U: Array, part: _Search, tolerances: Tolerances) 
         sigma, solver.path, part.goals, part.candidates, part.there, part.arrived,
         part.found, part.count,
     )  # fmt: skip
+    # near singular postures the reference may be all that leads to the posture that is meant
+    ones = np.ones((len(U), 1), np.bool_)
+    kernels.tried(
+        sigma, solver.path[-1], part.goals, np.ascontiguousarray(part.references[:, None]), ones,
+        np.zeros_like(ones), part.found, part.count,
+    )  # fmt: skip
     _walk(solver, part, part.candidates, part.doubtful, part.moved, tolerances)
     uneven = (part.count + part.double.sum(axis=1)) % 2 == 1
     own = part.there.sum(axis=1)
