@@ -88,6 +88,11 @@ __all__ = [
 ]
 
 
+def __dir__() -> list[str]:
+    """What is imported on demand is there as well."""
+    return sorted({*globals(), *__all__})
+
+
 _ON_DEMAND = {"InverseModelExplanation": ".igm.paul", "explain_igm": ".igm.paul"}
 
 

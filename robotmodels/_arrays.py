@@ -324,5 +324,6 @@ def _shape_message(name: str, core: tuple[int, ...], shape: tuple[int, ...]) -> 
     elif len(core) == 1 and len(shape) >= 2 and shape[-2] == core[0]:
         message += f" The axes look transposed: rows are samples, so pass {name}.T."
     elif core == (4, 4) and len(shape) == 3 and shape[:2] == (4, 4):
-        message += " This is MATLAB's order (4, 4, N): move the last axis to the front."
+        message += " This is MATLAB's order (4, 4, N): "
+        message += "robotmodels.se3.poses_from_matlab brings it to (N, 4, 4)."
     return message

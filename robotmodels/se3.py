@@ -168,7 +168,8 @@ def as_pose(T: Any, name: str = "T") -> Array:
         raise NotARotationError(
             f"{name}: the 3x3 block is not a rotation{row}: R R^T differs from 1 by "
             f"{float(off[i]):.2g} and det R = {float(np.linalg.det(R)[i]):.6g}; at most "
-            f"{ROTATION_TOLERANCE:g} is accepted and rounded away. Re-orthonormalise it first."
+            f"{ROTATION_TOLERANCE:g} is accepted and rounded away. Make it one first, for "
+            "example with scipy.spatial.transform.Rotation.from_matrix(R).as_matrix()."
         )
     T = T.copy()
     T[..., 3, :] = 0.0, 0.0, 0.0, 1.0

@@ -92,7 +92,7 @@ def arranged(
     order = np.zeros(S, dtype=np.int64)
     most = 0
     for p in range(N):
-        count, dropped, endless = 0, 0, False
+        count, dropped, endless, loose = 0, 0, False, False
         for i in range(S):
             if not there[p, i]:
                 continue
@@ -111,6 +111,8 @@ def arranged(
                         reachable = False
             if not reachable:
                 dropped += 1
+                for m in range(k):
+                    loose = loose or moving[p, i, m]
                 continue
             keys[i] = 0.0
             if given:
@@ -147,6 +149,7 @@ def arranged(
         if count > 0:
             status[p] = _FAMILY if endless else _REACHED
         else:
-            status[p] = _OUTSIDE if dropped > 0 else _NOTHING
+            # another member of a family may lie within the limits: left to a search
+            status[p] = _OUTSIDE if dropped > 0 and not loose else _NOTHING
         most = max(most, count)
     return most

@@ -21,6 +21,7 @@ _FLAGS3 = types.Array(types.boolean, 3, "C")
 _CODES2, _CODES1 = types.Array(types.int16, 2, "C"), types.Array(types.int8, 1, "C")
 
 IMPROPER = -1000
+FARTHEST = 1e6
 
 _REACHED, _OUTSIDE = int(IGMStatus.REACHED), int(IGMStatus.OUTSIDE_LIMITS)
 _NOTHING = int(IGMStatus.NOT_CONVERGED)
@@ -151,7 +152,7 @@ def regular_postures(
         return IMPROPER
     for p in range(references.shape[0]):
         for m in range(references.shape[1]):
-            if not np.isfinite(references[p, m]):
+            if not abs(references[p, m]) <= FARTHEST:
                 return IMPROPER
     marks = np.empty((poses.shape[0], 2 + 2 * q.shape[1]), np.int64)
     run_plan(plan, numbers, tolerances, poses, references, q, residual, marks)

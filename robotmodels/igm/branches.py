@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import singledispatch
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from .arm_angle import ArmAngle
 from .closed_form import ClosedForm
+from .fewer import FewerJoints
 from .solver import Found, Solver
 from .structure import Family
 
@@ -47,8 +49,9 @@ def branches(solver: Solver, found: Found) -> tuple[NDArray[np.int16], tuple[str
     determinant of the velocities of W. Of three parallel axes: ``shoulder`` and ``wrist`` are the
     signs of the same product taken from either end, ``elbow`` says to which side the middle axis
     stands. Seven joints with an arm angle: the triple products of the axes of shoulder and wrist,
-    and the side to which the elbow bends. A sign changes only at the singular position of that name. Several postures of one pose
-    with the same signs (arms with a quartic) get a number behind.
+    and the side to which the elbow bends. A sign changes only at the singular position of that
+    name. Arms of fewer joints have the sides of the arm that virtual joints make of them. Several
+    postures of one pose with the same signs (arms with a quartic) get a number behind.
     """
     return ranked(np.zeros(found.valid.shape, np.int16), ("",), found)
 
@@ -64,6 +67,17 @@ def _(solver: ClosedForm, found: Found) -> tuple[NDArray[np.int16], tuple[str, .
         found.q, found.valid, code,
     )  # fmt: skip
     return ranked(code, SIDES, found)
+
+
+@branches.register
+def _(solver: FewerJoints, found: Found) -> tuple[NDArray[np.int16], tuple[str, ...]]:
+    way = solver.ways[0]
+    if not isinstance(way.solver, ClosedForm):
+        return ranked(np.zeros(found.valid.shape, np.int16), ("",), found)
+    # the virtual joints are at zero
+    longer = np.zeros((*found.q.shape[:2], way.solver.chain.k))
+    longer[..., way.places] = found.q
+    return branches(way.solver, replace(found, q=longer))
 
 
 @branches.register

@@ -10,13 +10,17 @@ from numpy.typing import NDArray
 from .._arrays import Array, read_only
 from ..model import RobotModel
 from .branches import SIDES, branches
+from .check import checked
 from .closed_form import ClosedForm, closed_form_postures
+from .gather import assembled, rows_of
 from .loop import JointChain
 from .motion import random_postures, tool_poses
 from .paul.plan import PaulPlan, derive_plan
 from .paul.postures import SLACK, SMALL, ZERO
+from .self_motion import singular_postures
 from .solver import Found, Solver, Tolerances, postures
-from .thorough import thorough_postures
+from .structure import Family
+from .thorough import MET, thorough_postures, two_singularities
 
 TESTS = 128
 """Random postures that a plan has to give back before it is used."""
@@ -70,7 +74,9 @@ class ByPlan:
     @property
     def method(self) -> str:
         """The family, in words."""
-        return f"Paul's equations; singular poses by: {self.family.method}"
+        if isinstance(self.family, ClosedForm):
+            return f"Paul's equations; {self.family.method}"
+        return "Paul's equations"
 
 
 def prepare_by_plan(model: RobotModel, family: Solver) -> ByPlan | None:
@@ -205,13 +211,33 @@ def _(solver: ByPlan, U: Array, references: Array, tolerances: Tolerances) -> Fo
             np.concatenate([there, np.arange(b.shape[1]) < marks[:, :1]], axis=1),
         )
 
-    # at a singular position the plan and the family do not lose the same digits
-    return thorough_postures(chain, candidates, U, references, tolerances)
+    if loop.family is not Family.CONCURRENT:
+        # at a singular position the plan and the family do not lose the same digits
+        return thorough_postures(chain, candidates, U, references, tolerances)
+    # a wrist or shoulder that is aligned and nothing else is what the family is made for
+    q, valid, free = closed_form_postures(loop, chain, U, references)
+    found = checked(chain, U, q, valid, tolerances, free=free)
+    marks = run(plan, numbers, U, references)[2]
+    fewer = marks[:, 0] > found.valid.sum(axis=1)
+    rest = np.flatnonzero(fewer | ~_plain(chain, found))
+    if rest.size == 0:
+        return found
+    part = thorough_postures(chain, candidates, U[rest], references[rest], tolerances)
+    others = np.setdiff1d(np.arange(len(U)), rest)
+    return assembled(len(U), chain.k, [(others, rows_of(found, others)), (rest, part)])
 
 
 @branches.register
 def _(solver: ByPlan, found: Found) -> tuple[NDArray[np.int16], tuple[str, ...]]:
     return branches(solver.family, found)
+
+
+def _plain(chain: JointChain, found: Found) -> NDArray[np.bool_]:
+    """Poses whose postures are met, and singular only where the family says so, shape (N,)."""
+    double, member = singular_postures(chain, found)
+    near = two_singularities(chain, found)
+    unsaid = double | (member != found.family) | (found.residual > MET)
+    return ~near & ~np.any(unsaid & found.valid, axis=1)
 
 
 def _short(chain: JointChain, way: Array) -> Array:

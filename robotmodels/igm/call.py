@@ -22,6 +22,9 @@ from .solver import Tolerances
 NO_FAMILY = "numeric search for one posture: no family of closed forms serves this arm"
 """What a result says of its method where there is none but the search."""
 
+FARTHEST = 1e6
+"""Largest joint value of a reference [rad or m]: beyond, adding whole turns costs digits."""
+
 _WHOLE, _EXACT = Task(), Tolerances()
 
 
@@ -100,8 +103,13 @@ def _as_they_are(
     model: RobotModel, T: ArrayLike, q_ref: ArrayLike | None, limits: bool
 ) -> tuple[tuple[int, ...], Array, Array]:
     """Batch shape, poses (N, 4, 4), references (N, n); unchecked where that costs nothing."""
-    plain = type(T) is np.ndarray and T.dtype == np.float64 and T.flags.c_contiguous
-    if not plain or T.shape[-2:] != (4, 4) or not (q_ref is None or T.ndim == 2):
+    if (
+        not isinstance(T, np.ndarray)
+        or T.dtype != np.float64
+        or not T.flags.c_contiguous
+        or T.shape[-2:] != (4, 4)
+        or (q_ref is not None and T.ndim != 2)
+    ):
         return _checked(model, T, q_ref, limits)
     poses = T.reshape(-1, 4, 4)
     if q_ref is None:
@@ -119,6 +127,11 @@ def _checked(
     poses = se3.as_pose(T)
     flat = poses.reshape(*poses.shape[:-2], 16)
     reference = np.zeros(model.n) if q_ref is None else as_vector(q_ref, model.n, "q_ref")
+    if np.abs(reference).max(initial=0.0) > FARTHEST:
+        raise InvalidValueError(
+            f"q_ref: expected joint values within +-{FARTHEST:g} rad or m, got "
+            f"{float(np.abs(reference).max()):g}; whole turns more say nothing."
+        )
     batch, (rows, references) = batch_rows((flat, reference), ("T", "q_ref"))
     if limits:
         references = np.clip(references, model.lower, model.upper)

@@ -7,10 +7,12 @@ import numpy as np
 from ..errors import InvalidValueError
 from .asked import WHOLE_POSE, Task
 from .closed_form import prepare_closed_form
+from .dependent import prepare_dependent
 from .fewer import prepare_fewer
 from .general import GeneralArm, prepare_general
 from .lock import locked_chain
 from .loop import JointChain
+from .many_starts import prepare_many_starts
 from .mask import prepare_masked
 from .neighbour import prepare_neighbour
 from .prismatic import prepare_prismatic
@@ -81,6 +83,10 @@ def prepare(chain: JointChain) -> Solver | None:
     if chain.k > 6:
         return prepare_redundant(chain, prepare)
     if chain.k == 6:
+        # an arm in a plane, say, whose joints are more than its freedoms
+        dependent = prepare_dependent(chain, prepare)
+        if dependent is not None:
+            return dependent
         closed = prepare_closed_form(chain)
         if closed is not None:
             return closed
@@ -94,4 +100,5 @@ def prepare(chain: JointChain) -> Solver | None:
         # with doubts at most poses it is slow, but all that counts is that nothing is missing
         if general is not None and (general.reliable or general.misses == general.odd == 0):
             return GeneralArm(chain, general)
+        return prepare_many_starts(chain)
     return None

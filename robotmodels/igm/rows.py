@@ -259,6 +259,11 @@ def _settled(call: Call, U: Array, psi: Array | None, references: Array) -> Sett
         found = nothing_found(len(U), 1, references.shape[1])
     elif psi is not None:
         if not isinstance(solver, ArmAngle):
+            if call.task.locks or call.task.mask != WHOLE_POSE:
+                raise InvalidValueError(
+                    "arm_angle: not together with a locked joint or a mask; each of them already "
+                    "says which of the infinitely many postures are meant."
+                )
             raise InvalidValueError(
                 "arm_angle: this arm has none, which takes seven revolute joints with three axes "
                 "that meet in a shoulder and three in a wrist; lock a joint instead, if there are "

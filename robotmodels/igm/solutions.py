@@ -241,8 +241,12 @@ class IGMSolutions:
             head = f"pose {', '.join(map(str, i))}: " if i else ""
             lines.append(f"  {head}{self.reason(i)}")
             for s in np.flatnonzero(self.valid[i]):
-                numbers = " ".join(f"{v:9.5f}" for v in self.q[i][s])
+                # no minus before a zero
+                numbers = " ".join(f"{round(float(v), 5) + 0.0:9.5f}" for v in self.q[i][s])
                 where = "" if self.within_limits[i][s] else ", outside the limits"
+                where += ", double root" if self.double[i][s] else ""
+                where += _named("free", self.free_joints[i][s])
+                where += _named("moving with it", self.family_joints[i][s])
                 label = self.labels[self.code[i][s]]
                 branch = f"  {label}" if label else ""
                 lines.append(
@@ -261,14 +265,23 @@ class IGMSolutions:
     def _status(self, i: int | tuple[int, ...]) -> tuple[IGMStatus, tuple[int, ...]]:
         at = tuple(i) if isinstance(i, tuple) else (i,)
         try:
-            codes = np.asarray(self.status[at])
+            # a single pose is also the first of one
+            codes = self.status if self.status.ndim == 0 and at == (0,) else self.status[at]
+            codes = np.asarray(codes)
         except (IndexError, TypeError):
             codes = self.status[None]
         if codes.ndim:
             raise InvalidValueError(
                 f"i: expected the index of one pose among {self.status.shape}, got {i!r}."
             )
-        return IGMStatus(int(codes)), at
+        return IGMStatus(int(codes)), at if self.status.ndim else ()
+
+
+def _named(what: str, joints: NDArray[np.bool_]) -> str:
+    """Which joints are marked, as columns of q."""
+    if not joints.any():
+        return ""
+    return f", {what}: " + " ".join(f"q[{m}]" for m in np.flatnonzero(joints))
 
 
 _NAMES = tuple(field.name for field in fields(IGMSolutions))

@@ -352,6 +352,8 @@ def _starts(
     ]
     others = np.delete(np.arange(k), solver.searched)
     start = np.zeros((N, G, S), np.bool_)
+    if S == 0:
+        return start
     least = there.copy()
     neighbours = []
     for side in (1, -1):

@@ -63,7 +63,7 @@ def thorough_postures(
         families several members: `settle_families` makes them one.
     """
     first = _home(chain, [candidates(U, references, OVERSHOOT)], U, tolerances)
-    twice = np.flatnonzero(_two_singularities(chain, first))
+    twice = np.flatnonzero(two_singularities(chain, first))
     if twice.size == 0:
         return first
     from scipy.spatial.transform import Rotation
@@ -112,10 +112,23 @@ def _home(
     return Found(*(np.ascontiguousarray(getattr(found, name)[:, :most]) for name in _FIELDS))
 
 
-def _two_singularities(chain: JointChain, found: Found) -> NDArray[np.bool_]:
-    """Poses with a posture at which two singular values are small, or with none, shape (N,)."""
+def two_singularities(chain: JointChain, found: Found) -> NDArray[np.bool_]:
+    """Poses with a posture at which two singular values are small, or with none.
+
+    Parameters
+    ----------
+    chain : JointChain
+        The arm.
+    found : Found
+        Its postures.
+
+    Returns
+    -------
+    ndarray of bool, shape (N,)
+        Where two singular positions come together, or no posture says that they do not.
+    """
     n, s = np.nonzero(found.valid)
-    out = ~found.valid.any(axis=1)
+    out = np.logical_not(np.any(found.valid, axis=1)).reshape(-1)
     J = jacobians(chain, found.q[n, s])
     J[:, :3] /= lever(chain)
     values = np.linalg.svd(J, compute_uv=False)
