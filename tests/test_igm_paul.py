@@ -784,12 +784,33 @@ def test_every_robot_of_the_catalogue_is_explained(name):
     [
         ("crx10ia", "Raghavan"),
         ("xarm6", "Raghavan"),
-        ("panda", "arm angle"),
-        ("iiwa14", "arm angle"),
+        ("panda", "a locked joint (`lock` of `igm`), as the arm has no arm angle"),
+        ("erd:baxter_left_arm", "a locked joint"),
+        ("iiwa14", "the arm angle (`arm_angle` of `igm`), as shoulder and wrist are spherical"),
     ],
 )
 def test_what_takes_over(name, method):
     assert method in told_of(name).takes_over
+
+
+@pytest.mark.parametrize(
+    ("name", "step", "words"),
+    [
+        ("ur5", 1, "axes 2 and 6 are parallel"),
+        ("ur3e", 1, "axes 2 and 6 are parallel"),
+        ("rx90", 2, "axes 4 and 6 are aligned"),
+        ("irb140", 2, "axes 4 and 6 are aligned"),
+        ("gantry", 3, "axes 4 and 6 are aligned"),
+    ],
+)
+def test_axes_that_cannot_meet_are_parallel_not_aligned(name, step, words):
+    assert words in told_of(name).steps[step].undetermined
+
+
+@pytest.mark.parametrize("model", ["rx90", None, rm.load("rx90").table])
+def test_only_a_model_is_explained(model):
+    with pytest.raises(InvalidValueError, match="model: expected a RobotModel, got "):
+        explain_igm(model)
 
 
 def test_pieper_takes_over_where_a_wrist_needs_a_quartic():

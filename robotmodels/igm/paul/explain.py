@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ...model import RobotModel
+from ...model import RobotModel, check_model
+from ..arm_angle import prepare_arm_angle
 from ..loop import JointChain
 from ..structure import Family, plan_loop
 from .equation_type import EquationType
@@ -124,7 +125,7 @@ def explain_igm(model: RobotModel) -> InverseModelExplanation:
     Raises
     ------
     InvalidValueError
-        No joint moves the tool.
+        ``model`` is not a RobotModel, or no joint moves its tool.
 
     References
     ----------
@@ -139,6 +140,7 @@ def explain_igm(model: RobotModel) -> InverseModelExplanation:
     >>> print("; ".join(rx90.steps[2].formulas))
     θ4 = atan2(S1*ax - C1*ay, -C23*(C1*ax + S1*ay) - S23*az); θ4' = θ4 + π
     """
+    check_model(model)
     plan = derive_plan(model)
     words = Wording(plan)
     steps = []
@@ -163,7 +165,12 @@ def _successor(chain: JointChain) -> str:
     if chain.k > 7:
         return "locked joints (`lock` of `igm`), or the numeric solver `igm_numeric`"
     if chain.k == 7:
-        return "the arm angle where shoulder and wrist are spherical, else a locked joint"
+        if prepare_arm_angle(chain) is not None:
+            return "the arm angle (`arm_angle` of `igm`), as shoulder and wrist are spherical"
+        return (
+            "a locked joint (`lock` of `igm`), as the arm has no arm angle: that needs seven "
+            "revolute joints with a spherical shoulder and a spherical wrist"
+        )
     if chain.k < 6:
         return "`igm`, which adds virtual joints to make six, or the numeric solver `igm_numeric`"
     loop = plan_loop(chain)

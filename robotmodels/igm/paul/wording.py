@@ -223,7 +223,8 @@ class Wording:
             across = np.linalg.norm(np.cross(axis, self.axes[:, m]), axis=1)
             if m != j and across.max() > 1e-6 and _proportional(size, across):
                 a, b = sorted(self.plan.form.rows[i].frame for i in (j, m))
-                return f" (axes {a} and {b} are aligned)"
+                how = "aligned" if self._meet(j, m) else "parallel"
+                return f" (axes {a} and {b} are {how})"
         for m in range(self.plan.form.k):
             away = self.origins[:, m] - origin
             lateral = np.linalg.norm(np.cross(axis, away), axis=1)
@@ -231,6 +232,16 @@ class Wording:
                 frame = self.plan.form.rows[j].frame
                 return f" (O{self.plan.form.rows[m].frame} is on the axis of joint {frame})"
         return ""
+
+    def _meet(self, j: int, m: int) -> bool:
+        """Whether two axes meet in the same point of the first one at every sample posture."""
+        a, b = self.axes[:, j], self.axes[:, m]
+        across = np.cross(a, b)
+        between = self.origins[:, m] - self.origins[:, j]
+        rounding = 1e-9 * float(np.abs(self.origins).max())
+        gap = (between * across).sum(axis=1)
+        along = (np.cross(between, b) * across).sum(axis=1) / (across**2).sum(axis=1)
+        return bool(np.abs(gap).max() <= rounding and np.ptp(along) <= rounding)
 
     def whole(
         self, model: RobotModel, steps: list[tuple[str, str]], takes_over: str
