@@ -1112,7 +1112,7 @@ def follow_valleys(sigma, D, goals, tolerance, starts, starting, found, count):
     T, z, o = np.empty((3, 4)), np.empty((6, 3)), np.empty((6, 3))
     J, pivots, e, best = np.empty((6, 6)), np.empty(6, np.int64), np.empty(6), np.empty(6)
     u, v, before, behind = np.empty(6), np.empty(6), np.empty(6), np.empty(6)
-    q, origin, trial = np.empty(6), np.empty(6), np.empty(6)
+    q, origin, trial, aside = np.empty(6), np.empty(6), np.empty(6), np.empty(6)
     path = np.empty((POINTS, 6))
     work = (T, z, o, J, pivots, e, best)
     for n in range(goals.shape[0]):
@@ -1123,11 +1123,16 @@ def follow_valleys(sigma, D, goals, tolerance, starts, starting, found, count):
                 break
             for i in range(6):
                 origin[i] = starts[n, k, i]
-            rest, small = np.inf, np.inf
+            along, rest, small = np.inf, np.inf, np.inf
             for _ in range(4):
-                _, rest, small = slide_down(sigma, D, goals[n], origin, u, v, work)
+                along, rest, small = slide_down(sigma, D, goals[n], origin, u, v, work)
             if rest > 1e-6 or small > VALLEY:
                 continue
+            # where nothing is missing along it either the valley is the family: a member is kept
+            if max(abs(along), rest) < 5e-13:
+                for i in range(6):
+                    trial[i] = origin[i] if sigma[i] == 1 else wrapped(origin[i])
+                count[n] = keep(sigma, trial, found[n], count[n])
             known = False
             for j in range(points):
                 if is_near(sigma, path[j], origin, 2.0 * STRIDE):
@@ -1163,11 +1168,21 @@ def follow_valleys(sigma, D, goals, tolerance, starts, starting, found, count):
                         before[i] = v[i] if ahead > 0.0 else -v[i]
                         behind[i] = u[i] if same > 0.0 else -u[i]
                     # on the family itself nothing is missing anywhere, and rounding changes signs
-                    if now * last < 0.0 and max(abs(now), abs(last)) > 1e-12:
+                    if now * last < 0.0 and max(abs(now), abs(last)) > 1e-14:
                         share = last / (last - now)
                         for i in range(6):
                             trial[i] += share * (q[i] - trial[i])
-                        if newton(sigma, D, goals[n], tolerance, trial, work):
+                            aside[i] = trial[i]
+                        met = newton(sigma, D, goals[n], tolerance, trial, work)
+                        if not met:
+                            # Newton's method leaps along the valley where it is as good as level
+                            for i in range(6):
+                                trial[i] = aside[i]
+                            now_there, rest, _ = slide_down(sigma, D, goals[n], trial, u, v, work)
+                            met = max(abs(now_there), rest) < 5e-13
+                            for i in range(6):
+                                trial[i] = trial[i] if sigma[i] == 1 else wrapped(trial[i])
+                        if met:
                             count[n] = keep(sigma, trial, found[n], count[n])
                     last = now
                     if points < POINTS:

@@ -40,6 +40,7 @@ __all__ = [
 ]
 
 MOST = 16  # postures a six-joint arm can have at one pose
+ROOM = 48  # rows while solving: an infinite family takes any number, and must leave some
 CHUNK = 256  # poses worked on at a time: 2 MB of equations
 TOLERANCE = 1e-13  # residual of a posture [m, or the arm's length if that is more; rad]
 POOR = 1e-9  # quality of the elimination below which another representation is asked as well
@@ -145,9 +146,11 @@ class GeneralArm:
 
 @postures.register
 def _(solver: GeneralArm, U: Array, references: Array, tolerances: Tolerances) -> Found:
+    from .self_motion import singular_postures  # which needs `shortened` from here
+
     q, valid, double = general_postures(solver.solver, U)
     found = checked(solver.chain, U, q, valid, tolerances, double=double)
-    found.family[...] = on_infinite_family(solver.solver, found.q, found.valid) & found.valid
+    found.family[...] = singular_postures(solver.chain, found)[1]
     return found
 
 
@@ -226,7 +229,8 @@ def general_postures(
     q : ndarray, shape (N, 16, 6)
         Postures, packed, angles in (-pi, pi] [rad or m]; NaN in the rows without one.
     valid : ndarray of bool, shape (N, 16)
-        Rows that hold a posture. Each meets its pose to 1e-13 m and rad.
+        Rows that hold a posture. Each meets its pose to 1e-13 m and rad, beside infinite families
+        to 1e-12.
     double : ndarray of bool, shape (N, 16)
         Rows that hold two postures merged to less than 1e-6.
 
@@ -251,9 +255,10 @@ def general_postures(
     for first in range(0, N, CHUNK):
         rows = slice(first, first + CHUNK)
         found = _solve(solver, goals[rows])
-        there = found.there
-        valid[rows], double[rows] = there, found.double & there
-        q[rows][there] = found.q[there]
+        _shorten(solver, found)
+        there = found.there[:, :MOST]
+        valid[rows], double[rows] = there, found.double[:, :MOST] & there
+        q[rows][there] = found.q[:, :MOST][there]
     q[:, :, solver.sigma == 1] *= solver.unit
     return q, valid, double
 
@@ -400,17 +405,17 @@ def _closings(D: Array, direction: int, goals: Array) -> Array:
 
 
 class _Found:
-    """Postures of N poses as they are gathered: q (N, 16, 6), count (N,), double (N, 16)."""
+    """Postures of N poses as they are gathered: q (N, 48, 6), count (N,), double (N, 48)."""
 
     def __init__(self, N: int) -> None:
-        self.q = np.zeros((N, MOST, 6))
+        self.q = np.zeros((N, ROOM, 6))
         self.count = np.zeros(N, np.int64)
-        self.double = np.zeros((N, MOST), np.bool_)
+        self.double = np.zeros((N, ROOM), np.bool_)
 
     @property
     def there(self) -> NDArray[np.bool_]:
-        """Rows in use, shape (N, 16)."""
-        return np.arange(MOST) < self.count[:, None]
+        """Rows in use, shape (N, 48)."""
+        return np.arange(ROOM) < self.count[:, None]
 
     def rows(self, chosen: NDArray[np.int64]) -> _Found:
         """A copy of some poses."""
@@ -500,7 +505,7 @@ def _solve(solver: GeneralSolver, goals: Array) -> _Found:
         part = found.rows(chosen)
         doubt[chosen] = _one_way(solver, way, goals[chosen], part)[0]
         found.put(chosen, part)
-    chosen = np.flatnonzero(doubt & (found.count < MOST))
+    chosen = np.flatnonzero(doubt & (found.count != MOST))
     if chosen.size:
         # Where roots merge the equations lose digits, or all meaning; a little aside they do not.
         # A pair that is complex on one side of a fold is real on the other, so both are tried.
@@ -522,6 +527,23 @@ def _solve(solver: GeneralSolver, goals: Array) -> _Found:
         found.put(chosen, part)
     found.double &= found.there
     return found
+
+
+def _shorten(solver: GeneralSolver, found: _Found) -> None:
+    """Where there are more rows than postures can be, members of infinite families go first."""
+    from . import _general_kernels as kernels
+
+    chosen = np.flatnonzero(found.count > MOST)
+    if chosen.size == 0:
+        return
+    part = found.rows(chosen)
+    flat = np.zeros((chosen.size, ROOM), np.bool_)
+    kernels.flat_singularities(solver.sigma, solver.D, part.q, part.count, flat)
+    order = np.argsort(np.where(part.there, flat, 2), axis=1, kind="stable")
+    part.q = np.take_along_axis(part.q, order[..., None], axis=1)
+    part.double = np.take_along_axis(part.double, order, axis=1)
+    part.count = np.minimum(part.count, MOST)
+    found.put(chosen, part)
 
 
 # --- choosing -----------------------------------------------------------------------------------

@@ -9,6 +9,7 @@ missing across both directions of sliding. It is solved as a trigonometric polyn
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -310,7 +311,9 @@ def _all_joints(
     return c, s
 
 
-def _spectrum(D: Array, sigma: NDArray[np.int64], four: FourRevolute, U: Array) -> Array:
+def _spectrum(
+    D: Array, sigma: NDArray[np.int64], four: FourRevolute, U: Array
+) -> NDArray[np.complex128]:
     """Coefficients of exp(i m u), m = 0 ... SAMPLES/2, of the polynomial in the spare motion.
 
     The second early joint has two angles for each u, complex ones where they are not real. The
@@ -329,12 +332,12 @@ def _spectrum(D: Array, sigma: NDArray[np.int64], four: FourRevolute, U: Array) 
     for way in (root, -root):
         with np.errstate(divide="ignore", invalid="ignore"):
             E = (Z + way) / (X - 1j * Y)
-            v = 0.5 * (E + 1.0 / E), -0.5j * (E - 1.0 / E)
+            v: Any = 0.5 * (E + 1.0 / E), -0.5j * (E - 1.0 / E)  # complex where no angle is real
         a, b, missing = _slides(D, sigma, *_all_joints(four, M, (cu, su), v), U[:, None])
         total *= np.sum(np.cross(a, b) * missing, axis=-1)
     # real for real u: conjugate ways swap
     waves = np.fft.rfft(total.real, axis=-1) / SAMPLES
-    return waves * np.exp(-1j * OFFSET * np.arange(SAMPLES // 2 + 1))
+    return np.asarray(waves * np.exp(-1j * OFFSET * np.arange(SAMPLES // 2 + 1)), np.complex128)
 
 
 def _with_two(chain: JointChain, four: FourRevolute, U: Array) -> tuple[Array, NDArray[np.bool_]]:
@@ -386,7 +389,7 @@ def _with_two(chain: JointChain, four: FourRevolute, U: Array) -> tuple[Array, N
     return found.reshape(N, 2 * count, 6), np.concatenate([there, there], axis=1)
 
 
-def _angles(poly: Array) -> tuple[Array, NDArray[np.bool_]]:
+def _angles(poly: NDArray[np.complex128]) -> tuple[Array, NDArray[np.bool_]]:
     """Arguments of the roots of polynomials (N, m + 1), lowest first, that are on the circle."""
     N, m = poly.shape[0], poly.shape[1] - 1
     if m == 0:
@@ -401,4 +404,4 @@ def _angles(poly: Array) -> tuple[Array, NDArray[np.bool_]]:
     z = np.linalg.eigvals(companion)
     with np.errstate(divide="ignore"):
         off = np.abs(np.log(np.abs(z)))
-    return np.angle(z), off < NEAR_CIRCLE
+    return np.angle(z).astype(np.float64), off < NEAR_CIRCLE
