@@ -27,6 +27,9 @@ from .structure import Family, LoopPlan
 
 __all__ = ["OFFSET_TOLERANCE", "TILT_TOLERANCE", "Neighbour", "prepare_neighbour"]
 
+SHARE = 0.04
+"""Offset beside half the length of the arm above which it is no error any more."""
+
 REACH = 6.0  # deviations by which a best approach of the neighbour may miss
 NEARLY_SINGULAR = 3.0  # deviations up to which a singular value may hide more postures
 JUMP = 6.0  # deviations by which a joint of a regular branch may move
@@ -101,7 +104,8 @@ def prepare_neighbour(chain: JointChain) -> Neighbour | None:
     Returns
     -------
     Neighbour or None
-        None if no axis triple meets within `OFFSET_TOLERANCE` or is parallel within
+        None if no axis triple meets within `OFFSET_TOLERANCE` (of a small arm within `SHARE` of
+        half its length) or is parallel within
         `TILT_TOLERANCE`.
 
     Examples
@@ -118,6 +122,7 @@ arm and brought home by Newton steps
     if chain.k != 6:
         return None
     own = arm.slid(chain.D)
+    unit = max(0.5 * float(np.linalg.norm(own[1:, :3, 3], axis=1).sum()), 1e-3)
     best: tuple[float, arm.Change, LoopPlan] | None = None
     for first in range(4):
         if chain.sigma[first : first + 3].any():
@@ -127,7 +132,7 @@ arm and brought home by Newton steps
             (Family.PARALLEL, arm.parallel),
         ):
             change = make(own, first)
-            if change is None or not change.small:
+            if change is None or not change.small or change.offset > SHARE * unit:
                 continue
             found = arm.planned(chain, change, family)
             if found is not None and (best is None or found[0].size < best[0]):
@@ -135,7 +140,6 @@ arm and brought home by Newton steps
     if best is None:
         return None
     _, change, plan = best
-    unit = max(0.5 * float(np.linalg.norm(own[1:, :3, 3], axis=1).sum()), 1e-3)
     deviation = arm.deviation(chain.sigma, change.D, own, unit)
     return Neighbour(
         chain=chain,
