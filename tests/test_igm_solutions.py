@@ -36,7 +36,8 @@ def solutions(**changes):
 def empty_batch(S):
     return IGMSolutions(
         q=np.empty((0, S, 2)), valid=np.empty((0, S)), residual=np.empty((0, S)),
-        within_limits=np.empty((0, S)), code=np.empty((0, S)), labels=("front",), status=np.empty(0),
+        within_limits=np.empty((0, S)), code=np.empty((0, S)), labels=("front",),
+        status=np.empty(0),
         double=np.empty((0, S)), free_joints=np.empty((0, S, 2)),
         family_joints=np.empty((0, S, 2)), method="by hand", periodic=[True, True],
     )  # fmt: skip

@@ -9,7 +9,6 @@ import numpy as np
 from ..kernels._compile import Floats, Ints, compiled
 from ._equations import ANY, DOUBLE, NONE, type_2
 
-
 # sine between axes below which they count as aligned: any first angle is then good to 1e-12
 ALIGNED = 4e-13
 
