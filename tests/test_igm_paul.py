@@ -763,13 +763,114 @@ def test_ur5_sums_of_angles():
     assert told.steps[4].formulas[-1] == "θ4 = (θ2 + θ3 + θ4) - (θ2 + θ3)"
 
 
+WORDS_NOT_TYPESET = re.compile("sqrt|alpha|theta")
+ENVIRONMENT = re.compile(r"\\begin\{(align\*|equation\*)\}\n(.*?)\n\\end\{\1\}", re.DOTALL)
+
+
+def assert_sound_latex(latex):
+    """Balanced, every row aligned once, nothing outside mathematics that belongs inside."""
+    nested = []
+    for what, name in re.findall(r"\\(begin|end)\{([^}]*)\}", latex):
+        if what == "begin":
+            nested.append(name)
+        else:
+            assert nested.pop() == name
+    assert not nested
+    depth = 0
+    for brace in re.findall(r"(?<!\\)[{}]", latex):
+        depth += 1 if brace == "{" else -1
+        assert depth >= 0
+    assert depth == 0
+    for name, body in ENVIRONMENT.findall(latex):
+        assert body.count(r"\left") == body.count(r"\right")
+        assert "\n\n" not in body
+        if name == "align*":
+            assert all(row.count("&") == 1 for row in body.split("\\\\\n")), body
+        else:
+            head, *rows = [row for row in body.splitlines() if "&" in row]
+            assert all(row.count("&") == head.count("&") for row in rows)
+    words = re.sub(r"(?<!\\)\$[^$]*\$", "", ENVIRONMENT.sub("", latex))
+    assert words.isascii()
+    assert not re.search(r"(?<!\\)[_^&#%$]", words), words
+    assert set(re.findall(r"\\([a-z]+)", words)) <= {
+        "textbf", "texttt", "textasciicircum", "textasciitilde",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["lab_rrt", "cobra_s600", "ur5", "erd:kinova", "erd:borinot_arm"])
+def test_latex_is_read_by_a_parser_of_it(name):
+    from matplotlib.mathtext import MathTextParser
+
+    parser, latex = MathTextParser("path"), told_of(name).latex
+    rows = [row for kind, body in ENVIRONMENT.findall(latex) if kind == "align*"
+            for row in body.split(" \\\\\n")]  # fmt: skip
+    inline = re.findall(r"\$([^$]+)\$", ENVIRONMENT.sub("", latex))
+    assert len(rows) > 3
+    for formula in {*rows, *inline}:
+        parser.parse(f"${formula.replace('&', '')}$")
+
+
+def test_latex_says_what_the_text_says():
+    latex = told_of("lab_rrt").latex
+    assert r"2 & 0 & -\pi/2 & 0 & \theta_{2} + \pi/2 & 0" in latex
+    assert r"$\mathbf{U}_0 = \mathbf{T}$: the desired pose" in latex
+    assert r"$\mathbf{E}$ the tool" in latex
+    assert r"RL_{1} &= 0.5 \quad (r_{1})" in latex
+    assert r"$q_{2} = \theta_{2} - \frac{\pi}{2}$" in latex
+    assert r"$\theta_{1}$ is free where $P_{x} = 0$ and $P_{y} = 0$ ($O_{3}$ is on" in latex
+    assert latex.count(r"r_{3} &=") == 1
+    latex = told_of("rx90").latex
+    assert r"$\theta_{4}$ has $S_{5} > 0$ and $\theta_{4}'$ has $S_{5} < 0$." in latex
+    assert "fall together where $X^2 + Y^2 = Z^2$ (stretched or folded)" in latex
+    assert r"D_{3} &= 0.45 \quad (d_{3})" in latex
+    assert r"with $X_{1} = Y_{2}, \; Y_{1} = X_{2} = 0$: $X_{1} \, S = Z_{1}" in latex
+    assert r"\text{(squared and added)}" in latex
+    ur5, cobra = told_of("ur5").latex, told_of("cobra_s600").latex
+    assert r"\mathbf{U}_0 = \mathbf{Z}^{-1} \, \mathbf{T} \, \mathbf{E}^{-1}" in ur5
+    assert r"\theta_{3} &= (\theta_{2} + \theta_{3}) - \theta_{2}" in ur5
+    assert cobra.count("r_{3} &=") == 1
+    assert "S_{1+2-4}" in cobra
+    assert "12-4" not in cobra
+    assert r"$S_{1+2-4}$ of $\theta_{1} + \theta_{2} - \theta_{4}$" in cobra
+
+
+def test_offsets_are_multiples_of_pi_where_they_are():
+    assert "offset: q2 = θ2 - π/2." in told_of("lab_rrt").text
+    assert "offset: q2 = θ2 + π/2, q3 = θ3 - π/2, q6 = θ6 - π." in told_of("tx40").text
+    assert "q2 = θ2 + 1.38491787287, q3" in told_of("xarm5").text
+    assert "offset" not in told_of("erd:ur5").text  # 5e-12 rad: the table prints none either
+    for name in COMPLETE:
+        assert "1.5707963" not in told_of(name).text + told_of(name).latex
+
+
+def test_an_offset_is_of_the_joint_that_the_model_counts():
+    """Frame 2 is fixed and joint 1 of the model is a side branch: numbers of q, frames of θ."""
+    table = rm.DHTable(
+        antecedent=[0, 0, 2, 3], sigma=[0, 0, 0, 2], d=[0, 0.1, 0.3, 0.2],
+        alpha=[0, 0, RIGHT, 0], theta=[0, 0, RIGHT / 2, 0], mu=[1, 1, 1, 0],
+    )  # fmt: skip
+    told = explain_igm(rm.RobotModel.from_table(table))
+    assert [step.joints for step in told.steps] == [("θ2",), ("θ3",)]
+    assert "offset: q3 = θ3 - π/4." in told.text
+
+
+def test_names_of_any_letters_are_typeset():
+    table = rm.DHTable(antecedent=[0], sigma=[0], d=[0.0])
+    model = rm.RobotModel.from_table(table, name="a_b & 50% {c} #1 $x^2~")
+    told = explain_igm(model)
+    assert_sound_latex(told.latex)
+    assert r"a\_b \& 50\% \{c\} \#1 \$x\textasciicircum{}2\textasciitilde{}" in told.latex
+
+
 @pytest.mark.parametrize("name", [n for n in rm.robots() if not n.startswith("erd:")])
 def test_every_robot_of_the_catalogue_is_explained(name):
     told = told_of(name)
     assert str(told) == told.text
     assert told._repr_latex_() == told.latex
-    assert told.latex.count(r"\begin{align*}") == len(told.steps) == told.latex.count(r"\end{align")
-    assert told.latex.count("{") == told.latex.count("}")
+    assert_sound_latex(told.latex)
+    assert all(step.latex in told.latex for step in told.steps)
+    for word in re.findall("[A-Za-z]{4,}", WORDS_NOT_TYPESET.sub("", told.text)):
+        assert word in told.latex, word
     assert name in repr(told)
     if told.complete:
         assert "At most" in told.text

@@ -10,6 +10,7 @@ from ..loop import JointChain
 from ..structure import Family, plan_loop
 from .equation_type import EquationType
 from .plan import PaulPlan, derive_plan
+from .whole import whole
 from .wording import Wording
 
 
@@ -74,7 +75,7 @@ class InverseModelExplanation:
     plan : PaulPlan
         The plan that is printed, the same that the kernel runs.
     text, latex : str
-        The derivation; the LaTeX is a series of amsmath environments.
+        The derivation; the LaTeX says the same, as paragraphs and amsmath environments.
 
     Examples
     --------
@@ -154,7 +155,8 @@ def explain_igm(model: RobotModel) -> InverseModelExplanation:
         )  # fmt: skip
     remaining = tuple(words.variable(j) for j in plan.remaining)
     takes_over = "" if plan.complete else _successor(plan.chain)
-    text, latex = words.whole(model, [(s.text, s.latex) for s in steps], takes_over)
+    told = [(step.text, step.latex) for step in steps]
+    text, latex = whole(model, words, told, takes_over)
     return InverseModelExplanation(
         model.name, tuple(steps), plan.complete, remaining, takes_over, plan, text, latex
     )

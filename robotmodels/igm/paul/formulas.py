@@ -7,18 +7,11 @@ from typing import TYPE_CHECKING
 
 from .equation_type import EquationType
 from .expressions import ONE, UNIT, Expression, negative
+from .prose import Line, equal
 
 if TYPE_CHECKING:
     from .plan import Step
     from .wording import Wording
-
-
-@dataclass(frozen=True, slots=True)
-class Line:
-    """A formula as text and as LaTeX."""
-
-    text: str
-    latex: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,11 +59,6 @@ class _Page:
     def define(self, name: str, e: Expression, latex: str = "") -> None:
         value = self.write(e)
         self.definitions.append(Line(f"{name} = {value.text}", f"{latex or name} &= {value.latex}"))
-
-
-def equal(left: Line, right: Line) -> Line:
-    """An equation."""
-    return Line(f"{left.text} = {right.text}", f"{left.latex} &= {right.latex}")
 
 
 def _arc(angle: Line, y: Line, x: Line) -> Line:
@@ -223,7 +211,8 @@ def _squares(page: _Page, widths: list[Expression], X: Expression, Y: Expression
     two = (2.0, ONE)
     S, C = page.sin[0], page.cos[0]
     page.definitions.append(Line(f"squared and added: X*{S.text} + Y*{C.text} = Z",
-                                 rf"X {S.latex} + Y {C.latex} &= Z"))  # fmt: skip
+                                 rf"X \, {S.latex} + Y \, {C.latex} &= Z \quad "
+                                 r"\text{(squared and added)}"))  # fmt: skip
     page.define("X", add((product(two, Z1, Y), product(two, Z2, X))))
     page.define("Y", add((product(two, Z1, X), negative(product(two, Z2, Y)))))
     squares = [negative(product(e, e)) for e in (X, Y, Z1, Z2)]

@@ -112,11 +112,13 @@ class Joints:
 
     def _letters(self, terms: tuple[tuple[int, float], ...], latex: bool = False) -> str:
         wide = max(row.frame for row in self.form.rows) > 9
+        # in LaTeX a sum that subtracts shows all its signs: S_{12-4} reads as 12 minus 4
+        signed = latex and any(sign < 0 for _, sign in terms)
+        between = "+" if signed else ("," if latex else "_") if wide else ""
         out = ""
         for j, sign in terms:
             minus = ("-" if latex else "m") if sign < 0 else ""
-            comma = ("," if latex else "_") if wide and out and not minus else ""
-            out += comma + minus + str(self.frame(j))
+            out += (minus or (between if out else "")) + str(self.frame(j))
         return out
 
     def unknown(self, key: Span | int) -> int:

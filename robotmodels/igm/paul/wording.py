@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..._arrays import Array
-from ...model import RobotModel
 from .catalogue import positive_sine
 from .equation_type import EquationType
 from .equations import Split
 from .expressions import Expression, Kind, negative
-from .formulas import Line, solution_of
+from .formulas import solution_of
 from .plan import PaulPlan, Step
+from .prose import Line, Prose, display, joined, said, type_formula
 from .writing import Writer
 
 
@@ -53,6 +53,10 @@ class Wording:
             name = self.variable(j, latex)
             out += f" {'-' if sign < 0 else '+'} {name}" if out else name
         return out
+
+    def line(self, number: int) -> Line:
+        """An unknown in both kinds of print."""
+        return Line(self.unknown(number), self.unknown(number, True))
 
     def shortened(self, e: Expression) -> tuple[Expression, list[Line]]:
         """A name B1, B2, ... for a sum that depends on the pose, and its line if it is new."""
@@ -99,50 +103,47 @@ class Wording:
         space = r" \, " if latex else " "
         return f"{space.join(left)} = {space.join(right)}"
 
-    def _where(self, split: Split) -> str:
+    def _where(self, split: Split) -> Prose:
+        equation = Line(self.matrix_equation(split), self.matrix_equation(split, True))
         out = ", both sides inverted" if split.inverse else ""
         if split.twist:
             out += f", in the axes before joint {split.s + 1}"
-        return out
+        return said("{}" + out, equation)
 
     def step(self, number: int, step: Step) -> Told:
         """One step in words."""
-        names = tuple(self.unknown(u) for u in self._given(step))
+        given = self._given(step)
         solution = solution_of(step, self)
         undetermined = self._undetermined(step)
-        derived = self._derived(number)
-        formulas = (*solution.formulas, *derived)
-        splits = list(dict.fromkeys(step.splits))
-        equation = "; ".join(self.matrix_equation(s) + self._where(s) for s in splits)
+        formulas = (*solution.formulas, *self._derived(number))
+        new = [line for line in formulas if line not in solution.equations]
+        equation = joined([self._where(s) for s in dict.fromkeys(step.splits)], "; ")
         elements = ", ".join(f"({r + 1}, {c + 1})" for r, c in step.elements)
-        kind = f"{step.type.title}: {step.type.formula}"
         several = "s" * (len(step.elements) > 1)
         count = f"{step.type.branches} solutions" if step.type.branches > 1 else "one solution"
-        text = [
-            f"Step {number + 1}: {' and '.join(names)} ({count}), {kind}",
-            f"  {equation}, element{several} {elements}",
-            *(f"    {line.text}" for line in solution.equations),
-        ]
-        if solution.definitions:
-            text += ["  with", *(f"    {line.text}" for line in solution.definitions)]
-        new = [line.text for line in formulas if line not in solution.equations]
-        if new:
-            text += ["  hence", *(f"    {words}" for words in new)]
-        if undetermined:
-            text.append(f"  {undetermined}")
-        latex_names = r" \text{ and } ".join(self.unknown(u, True) for u in self._given(step))
-        rows = [line.latex for line in (*solution.equations, *solution.definitions, *formulas)]
-        heading = (
-            rf"\textbf{{Step {number + 1}:}} ${latex_names}$, {step.type.title}, from "
-            + "; ".join(f"${self.matrix_equation(s, True)}$" for s in splits)
-            + f", element{several} {elements}"
+        title, _, case = step.type.title.partition(" with ")
+        name = said(title + " with {}", type_formula(case)) if case else said(title)
+        kind = said("{}: {}", name, type_formula(step.type.formula))
+        heading = f"Step {number + 1}:"
+        first = said(
+            " {} (" + count + "), {}", joined([self.line(u) for u in given], " and "), kind
         )
-        latex = heading + "\n\\begin{align*}\n" + " \\\\\n".join(rows) + "\n\\end{align*}"
+        second = said("{}, element" + several + f" {elements}", equation)
+        text = [f"{heading}{first.text}", f"  {second.text}"]
+        latex = [rf"\textbf{{{heading}}}{first.latex}.", f"{second.latex}:"]
+        groups = (("", solution.equations), ("with", solution.definitions), ("hence", new))
+        for word, lines in groups:
+            if lines:
+                text += [f"  {word}"] * bool(word) + [f"    {line.text}" for line in lines]
+                latex += [word] * bool(word) + [display(list(lines))]
+        if undetermined:
+            text.append(f"  {undetermined.text}")
+            latex.append(undetermined.latex)
         return Told(
-            names, self.matrix_equation(step.splits[0]),
+            tuple(self.unknown(u) for u in given), self.matrix_equation(step.splits[0]),
             tuple(line.text for line in solution.equations),
-            tuple(line.text for line in (*solution.definitions, *formulas)), undetermined,
-            "\n".join(text), latex,
+            tuple(line.text for line in (*solution.definitions, *formulas)),
+            undetermined.text if undetermined else "", "\n".join(text), "\n".join(latex),
         )  # fmt: skip
 
     def _given(self, step: Step) -> tuple[int, ...]:
@@ -169,53 +170,66 @@ class Wording:
                     name = f"({name})" if " " in name else name
                     words += f" {'-' if sign < 0 else '+'} {name}" if words else (
                         f"-{name}" if sign < 0 else name)  # fmt: skip
-                both.append(f"{self.variable(j, latex)} = {words}")
+                both.append(f"{self.variable(j, latex)} {'&=' if latex else '='} {words}")
             lines.append(Line(*both))
         return lines
 
-    def _undetermined(self, step: Step) -> str:
+    def _undetermined(self, step: Step) -> Prose | None:
         """Where the step has no single answer, and what is done there."""
-        write = self.writers[0]
-        first = self.unknown(step.unknowns[0])
-        takes = f"there {first} takes the value of q_ref (0 without one) and counts once"
+        first = self.line(step.unknowns[0])
+        takes = said("there {} takes the value of `q_ref` (0 without one) and counts once", first)
+        squares = Line("X**2 + Y**2 = Z**2", "X^2 + Y^2 = Z^2")
         if step.type is EquationType.TYPE_2_ZERO:
-            X, Y = (negative(e) if write(e).startswith("-") else e for e in step.coefficients)
-            where = f"{write(X)} = 0 and {write(Y)} = 0"
-            other = positive_sine(
-                step.unknowns[0], step.coefficients[0], step.coefficients[1], self.joints
-            )
-            which = ""
-            if other is not None:
-                frame = self.joints.frame(other[0])
-                which = f"{first} has S{frame} > 0 and {first}' has S{frame} < 0. "
-            return f"{which}{first} is free where {where}{self._meaning(step)}: {takes}."
-        if step.type is EquationType.TYPE_2:
-            return (
-                "The two solutions fall together where X**2 + Y**2 = Z**2; where it is smaller the "
-                f"pose is out of reach. {first} is free where X = Y = Z = 0: {takes}."
-            )
-        if step.type in (EquationType.TYPE_6, EquationType.TYPE_7):
-            return (
-                "The two solutions fall together where X**2 + Y**2 = Z**2 (stretched or folded); "
-                f"where it is smaller the pose is out of reach. {first} is free where "
-                f"X = Y = Z = 0: {takes}."
-            )
+            where = said("{} and {}", *(self._vanishes(e) for e in step.coefficients))
+            which = self._which(step, first)
+            meaning = self._meaning(step)
+            return said("{}{} is free where {}{}: {}.", which, first, where, meaning, takes)
+        if step.type in (EquationType.TYPE_2, EquationType.TYPE_6, EquationType.TYPE_7):
+            elbow = "" if step.type is EquationType.TYPE_2 else " (stretched or folded)"
+            return said(
+                "The two solutions fall together where {}" + elbow + "; where it is smaller the "
+                "pose is out of reach. {} is free where {}: {}.",
+                squares, first, Line("X = Y = Z = 0", "X = Y = Z = 0"), takes,
+            )  # fmt: skip
         if step.type is EquationType.TYPE_8:
-            return (
-                "The two solutions fall together where the cosine is 1 or -1 (stretched or "
+            return said(
+                "The two solutions fall together where the cosine is 1 or {} (stretched or "
                 "folded); where it is larger in size the pose is out of reach. "
-                f"{first} is free where Z1 = Z2 = 0: {takes}."
-            )
+                "{} is free where {}: {}.",
+                Line("-1", "-1"), first, type_formula("Z1 = Z2 = 0"), takes,
+            )  # fmt: skip
         if step.type is EquationType.TYPE_4:
-            return f"{self.unknown(step.unknowns[1])} is free where Y1 = Y2 = 0."
+            second = self.line(step.unknowns[1])
+            return said("{} is free where {}.", second, type_formula("Y1 = Y2 = 0"))
         if step.type is EquationType.TYPE_1 and not self.graph.is_constant(step.coefficients[0]):
-            return f"{first} is not determined where {write(step.coefficients[0])} = 0."
-        return ""
+            X = self._vanishes(step.coefficients[0], signed=True)
+            return said("{} is not determined where {}.", first, X)
+        return None
 
-    def _meaning(self, step: Step) -> str:
+    def _vanishes(self, e: Expression, signed: bool = False) -> Line:
+        """An expression, without a minus in front unless ``signed``, equal to zero."""
+        if not signed and self.writers[0](e).startswith("-"):
+            e = negative(e)
+        text, latex = (write(e) for write in self.writers)
+        return Line(f"{text} = 0", f"{latex} = 0")
+
+    def _which(self, step: Step, first: Line) -> Prose:
+        """Which of the two solutions has which sign of the sine that follows."""
+        X, Y = step.coefficients
+        other = positive_sine(step.unknowns[0], X, Y, self.joints)
+        if other is None:
+            return Prose("", "")
+        frame = self.joints.frame(other[0])
+        turned = Line(f"{first.text}'", f"{first.latex}'")
+        above = Line(f"S{frame} > 0", f"S_{{{frame}}} > 0")
+        below = Line(f"S{frame} < 0", f"S_{{{frame}}} < 0")
+        return said("{} has {} and {} has {}. ", first, above, turned, below)
+
+    def _meaning(self, step: Step) -> Prose:
         """What it means for the arm that the amplitude of an equation vanishes."""
+        nothing = Prose("", "")
         if self.joints.unknowns[step.unknowns[0]].span is None:
-            return ""
+            return nothing
         j = self.joints.unknowns[step.unknowns[0]].terms[0][0]
         size = np.hypot(*(self.graph.values(e) for e in step.coefficients))
         axis, origin = self.axes[:, j], self.origins[:, j]
@@ -224,14 +238,15 @@ class Wording:
             if m != j and across.max() > 1e-6 and _proportional(size, across):
                 a, b = sorted(self.plan.form.rows[i].frame for i in (j, m))
                 how = "aligned" if self._meet(j, m) else "parallel"
-                return f" (axes {a} and {b} are {how})"
+                return said(f" (axes {a} and {b} are {how})")
         for m in range(self.plan.form.k):
             away = self.origins[:, m] - origin
             lateral = np.linalg.norm(np.cross(axis, away), axis=1)
             if m != j and lateral.max() > 1e-6 and _proportional(size, lateral):
-                frame = self.plan.form.rows[j].frame
-                return f" (O{self.plan.form.rows[m].frame} is on the axis of joint {frame})"
-        return ""
+                frame, of = self.plan.form.rows[j].frame, self.plan.form.rows[m].frame
+                O = Line(f"O{of}", f"O_{{{of}}}")  # noqa: E741
+                return said(f" ({{}} is on the axis of joint {frame})", O)
+        return nothing
 
     def _meet(self, j: int, m: int) -> bool:
         """Whether two axes meet in the same point of the first one at every sample posture."""
@@ -242,80 +257,6 @@ class Wording:
         gap = (between * across).sum(axis=1)
         along = (np.cross(between, b) * across).sum(axis=1) / (across**2).sum(axis=1)
         return bool(np.abs(gap).max() <= rounding and np.ptp(along) <= rounding)
-
-    def whole(
-        self, model: RobotModel, steps: list[tuple[str, str]], takes_over: str
-    ) -> tuple[str, str]:
-        """The whole explanation, as text and LaTeX."""
-        plan = self.plan
-        text = [f"Inverse geometric model of {model.name} by Paul's method", "", str(model.table)]
-        text += ["", self._pose_line(model)]
-        if plan.arm.constants:
-            text += ["", "Constants"]
-            text += [f"  {n} = {v:.12g}  ({meaning})" for n, _, v, meaning in plan.arm.constants]
-        for told, _ in steps:
-            text += ["", told]
-        text += [""]
-        latex = [rf"\textbf{{Inverse geometric model of {model.name} by Paul's method}}"]
-        latex += [told for _, told in steps]
-        if plan.complete:
-            each = " x ".join(str(s.type.branches) for s in plan.steps if s.type.branches > 1)
-            most = plan.most_postures
-            how = f" ({each})" if each and each != str(most) else ""
-            count = f"At most {most} posture{'s' * (most != 1)}{how}; "
-            count += "each is checked on the whole pose before it is returned."
-            text.append(count)
-            latex.append(count.replace(" x ", r" $\times$ "))
-        else:
-            rest = ", ".join(self.variable(j) for j in plan.remaining)
-            why = (
-                "there are more joints than components of a pose"
-                if plan.form.k > 6
-                else "no element of any matrix equation, however it is multiplied, has one or two "
-                "unknowns in a form of the catalogue"
-            )
-            stop = f"Paul's method stops here: {rest} remain, because {why}."
-            over = f"What takes over: {takes_over}."
-            text += [stop, over]
-            latex += [self._greek(stop), self._greek(over)]
-        offsets = [
-            f"q{j + 1} = {self.variable(j)} {'-' if r.offset > 0 else '+'} {abs(r.offset):.12g}"
-            for j, r in enumerate(plan.form.rows) if abs(r.offset) > 1e-15
-        ]  # fmt: skip
-        if offsets and plan.complete:
-            text.append("Joint variables with an offset: " + ", ".join(offsets) + ".")
-        if any(s.type.code in (9, 3, 10) for s in plan.steps):
-            note = "atan2 keeps the quadrant that arctan(y/x) loses; two solutions are both kept."
-            text.append(note)
-            latex.append(note)
-        return "\n".join(text), "\n\n".join(latex)
-
-    def _greek(self, words: str) -> str:
-        for j in range(self.plan.form.k):
-            words = words.replace(self.variable(j), f"${self.variable(j, True)}$")
-        return words
-
-    def _pose_line(self, model: RobotModel) -> str:
-        form = self.plan.form
-        plain = np.allclose(model.base, np.eye(4), atol=1e-13)
-        elements = "with the elements sx nx ax Px, sy ny ay Py, sz nz az Pz [1.13]"
-        if form.k < 6:
-            first = "U0 = T" if plain else "U0 = Z^-1 T"
-            tail = "" if self.plan.arm.E is None else ", E the tool"
-            if not np.allclose(form.before, np.eye(4), atol=1e-13):
-                first, tail = "U0 = Z^-1 T", f"{tail}, Z the base and the constant before joint 1"
-            return f"{first}: the desired pose, {elements}{tail}."
-        left = not plain or not np.allclose(form.before, np.eye(4), atol=1e-13)
-        right = not np.allclose(form.after, np.eye(4), atol=1e-13)
-        words = "U0 = " + ("Z^-1 T" if left else "T") + (" E^-1" if right else "")
-        why = []
-        if left:
-            why.append("Z the base and what the table has before the first motion")
-        if right:
-            why.append("E what it has after the last motion, and the tool")
-        return (
-            f"{words}: the desired pose [1.11], {elements}" + "".join(f", {w}" for w in why) + "."
-        )
 
 
 def _axes(plan: PaulPlan) -> tuple[Array, Array]:

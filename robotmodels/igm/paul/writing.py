@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import groupby
 
 from .expressions import ONE, Expression, Graph, Kind
+from .prose import number as number_line
 
 _RANK = {Kind.ONE: 0, Kind.JOINT: 1, Kind.NAMED: 1, Kind.POSE: 2, Kind.CONSTANT: 3, Kind.PRODUCT: 4,
          Kind.SUM: 5}  # fmt: skip
@@ -115,7 +116,8 @@ class Writer:
         factors.sort(key=lambda n: (_RANK[self.graph.nodes[n].kind], self.graph.nodes[n].name, n))
         words = []
         if number != 1.0 or node == ONE:
-            words.append(f"{number:.12g}")
+            printed = number_line(number)
+            words.append(printed.latex if self.latex else printed.text)
         for n, equal in groupby(n for n in factors if n != ONE):
             power = len(list(equal))
             words.append(self._factor(n, power))

@@ -1,0 +1,179 @@
+"""The whole explanation: table, meaning of the symbols, steps, and what is left to say."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from ...model import RobotModel
+from ...table_text import SMALLEST
+from .plan import PaulPlan
+from .prose import (
+    Line,
+    Prose,
+    angle,
+    display,
+    escaped,
+    joined,
+    number,
+    said,
+    table_latex,
+)
+from .unknowns import Span
+from .wording import Wording
+
+_ARCS = (9, 3, 10)
+"""Codes of the types whose solution is an arc tangent of the pose."""
+
+
+def whole(
+    model: RobotModel, words: Wording, steps: list[tuple[str, str]], takes_over: str
+) -> tuple[str, str]:
+    """The explanation of an arm as text and LaTeX; ``steps`` are its steps in both."""
+    plan, constants = words.plan, words.plan.arm.constants
+    title = f"Inverse geometric model of {model.name} by Paul's method"
+    table = str(model.table)
+    text, latex = [title, "", table], [rf"\textbf{{{escaped(title)}}}", table_latex(table)]
+    before = [_pose_line(model, plan)]
+    if notation := _notation(words, "\n".join(told for told, _ in steps)):
+        before.append(notation)
+    for line in before:
+        text += ["", line.text]
+        latex.append(line.latex)
+    if constants:
+        text += ["", "Constants"]
+        text += [f"  {n} = {v:.12g}  ({meaning})" for n, _, v, meaning in constants]
+        rows = [Line("", rf"{symbol} &= {number(v).latex} \quad ({_meaning(meaning)})")
+                for _, symbol, v, meaning in constants]  # fmt: skip
+        latex.append("Constants\n" + display(rows))
+    for told, typeset in steps:
+        text += ["", told]
+        latex.append(typeset)
+    text.append("")
+    for line in _end(words, takes_over):
+        text.append(line.text)
+        latex.append(line.latex)
+    return "\n".join(text), "\n\n".join(latex)
+
+
+def _end(words: Wording, takes_over: str) -> list[Prose]:
+    """How many postures or what remains, the offsets, and the quadrants."""
+    plan = words.plan
+    lines = []
+    if plan.complete:
+        branches = [str(s.type.branches) for s in plan.steps if s.type.branches > 1]
+        most = plan.most_postures
+        each = Line(" x ".join(branches), r" \times ".join(branches))
+        how = said(" ({})", each) if len(branches) > 1 else Prose("", "")
+        lines.append(said(
+            f"At most {most} posture{'s' * (most != 1)}{{}}; "
+            "each is checked on the whole pose before it is returned.", how,
+        ))  # fmt: skip
+    else:
+        rest = joined([_variable(words, j) for j in plan.remaining], ", ")
+        why = (
+            "there are more joints than components of a pose"
+            if plan.form.k > 6
+            else "no element of any matrix equation, however it is multiplied, has one or two "
+            "unknowns in a form of the catalogue"
+        )
+        lines.append(said("Paul's method stops here: {} remain, because " + why + ".", rest))
+        lines.append(said(f"What takes over: {takes_over}."))
+    if plan.steps and (offsets := _offsets(words)):
+        lines.append(said("Joint variables with an offset: {}.", joined(offsets, ", ")))
+    if any(s.type.code in _ARCS for s in plan.steps):
+        lines.append(
+            said("atan2 keeps the quadrant that arctan(y/x) loses; two solutions are both kept.")
+        )
+    return lines
+
+
+def _variable(words: Wording, j: int) -> Line:
+    return Line(words.variable(j), words.variable(j, True))
+
+
+def _offsets(words: Wording) -> list[Line]:
+    """Joint variables as the model counts them, where the rows count them from elsewhere."""
+    lines = []
+    for j, row in enumerate(words.plan.form.rows):
+        size = (number if row.sigma else angle)(abs(row.offset))
+        if abs(row.offset) < SMALLEST:  # the table shows none either
+            continue
+        sign, q = "-" if row.offset > 0 else "+", int(words.plan.chain.columns[j]) + 1
+        x = _variable(words, j)
+        lines.append(
+            Line(f"q{q} = {x.text} {sign} {size.text}",
+                 f"q_{{{q}}} = {x.latex} {sign} {size.latex}")
+        )  # fmt: skip
+    return lines
+
+
+def _notation(words: Wording, text: str) -> Prose | None:
+    """What C, S and their numbers stand for, with the sums of angles that occur."""
+    used = set(re.findall(r"\b[CS]([\dm_]+)\b", text))
+    if not used:
+        return None
+    sums = []
+    joints = words.joints
+    for group, members in enumerate(joints.members):
+        for a in range(len(members)):
+            for b in range(a + 2, len(members) + 1):
+                u = joints.unknown(Span(group, a, b))
+                item = joints.unknowns[u]
+                if item.name in used:
+                    names = [Line(f"{c}{item.name}", f"{c}_{{{item.latex}}}") for c in ("C", "S")]
+                    sums.append(said("{} and {} of {}", *names, words.line(u)))
+    own = (Line("Cj", "C_{j}"), Line("Sj", "S_{j}"), Line("θj", r"\theta_{j}"))
+    tail = said(", {}", joined(sums, ", ")) if sums else Prose("", "")
+    return said("{} and {} are cosine and sine of {}{}.", *own, tail)
+
+
+def _meaning(words: str) -> str:
+    """The meaning of a constant in mathematics: ``cosine of alpha2``, ``r3``, ``x of the tool``."""
+    head, of, symbol = words.rpartition(" of ")
+    if symbol == "the tool":
+        axis = head if len(head) == 1 else f"{head[0]}_{{{head[1:]}}}"
+        return rf"{axis} \text{{ of the tool}}"
+    letters = symbol.rstrip("0123456789")
+    digits = symbol.removeprefix(letters)
+    name = f"\\{letters}" if len(letters) > 1 else letters
+    return (rf"\text{{{head} of }} " if of else "") + f"{name}_{{{digits}}}"
+
+
+def _pose_line(model: RobotModel, plan: PaulPlan) -> Prose:
+    """What U0, Z and E are."""
+    form = plan.form
+    plain = np.allclose(model.base, np.eye(4), atol=1e-13)
+    moved = not np.allclose(form.before, np.eye(4), atol=1e-13)
+    left, right = moved or not plain, False
+    meanings = []
+    if form.k < 6:
+        if moved:
+            meanings.append("{Z} the base and the constant before joint 1")
+        elif left:
+            meanings.append("{Z} the base")
+        if plan.arm.E is not None:
+            meanings.append("{E} the tool")
+    else:
+        right = not np.allclose(form.after, np.eye(4), atol=1e-13)
+        if left:
+            meanings.append("{Z} the base and what the table has before the first motion")
+        if right:
+            meanings.append("{E} what it has after the last motion, and the tool")
+    Z, E = Line("Z", r"\mathbf{Z}"), Line("E", r"\mathbf{E}")
+    why = [said(m.replace("{Z}", "{}").replace("{E}", "{}"), Z if "{Z}" in m else E)
+           for m in meanings]  # fmt: skip
+    U0 = Line(
+        "U0 = " + "Z^-1 " * left + "T" + " E^-1" * right,
+        r"\mathbf{U}_0 = " + r"\mathbf{Z}^{-1} \, " * left + r"\mathbf{T}"
+        + r" \, \mathbf{E}^{-1}" * right,
+    )  # fmt: skip
+    rows = [
+        Line(" ".join(c + a for c in "snaP"), r" \; ".join(f"{c}_{{{a}}}" for c in "snaP"))
+        for a in "xyz"
+    ]
+    cite = " [1.11]" if form.k >= 6 else ""
+    tail = said(", {}", joined(why, ", ")) if why else Prose("", "")
+    return said("{}: the desired pose" + cite + ", with the elements {}, {}, {} [1.13]{}.",
+                U0, *rows, tail)  # fmt: skip
