@@ -151,7 +151,9 @@ def test_same_postures_as_the_closed_forms(name):
     plan, model = plan_of(name), rm.load(name)
     U = poses_of(model, plan, postures_at_random(plan, 2000, seed=5))
     mine = paul_postures(plan, U)
-    q, valid, _ = closed_form_postures(plan_loop(plan.chain), plan.chain, U)
+    loop = plan_loop(plan.chain)
+    assert loop is not None
+    q, valid, _ = closed_form_postures(loop, plan.chain, U)
     sure = ~mine.delicate
     assert sure.sum() > 1980
     assert (mine.valid.sum(axis=1) == valid.sum(axis=1))[sure].all()
@@ -832,6 +834,26 @@ def test_latex_says_what_the_text_says():
     assert "S_{1+2-4}" in cobra
     assert "12-4" not in cobra
     assert r"$S_{1+2-4}$ of $\theta_{1} + \theta_{2} - \theta_{4}$" in cobra
+
+
+@pytest.mark.parametrize("name", ["lab_rrt", "ur5", "panda", "gantry", "crx10ia"])
+def test_a_notebook_shows_markdown(name):
+    """Notebooks typeset Markdown and the mathematics in it, no other LaTeX."""
+    told = told_of(name)
+    shown = told._repr_markdown_()
+    title, _, rest = shown.partition("\n\n")
+    escaped_name = name.replace("_", r"\_")
+    assert title == f"**Inverse geometric model of {escaped_name} by Paul's method**"
+    assert rest.startswith("$$\n\\begin{array}{c|")
+    blocks = re.findall(r"^\$\$\n(.*?)\n\$\$$", shown, re.MULTILINE | re.DOTALL)
+    assert len(blocks) == len(ENVIRONMENT.findall(told.latex))
+    words = re.sub(r"\$\$.*?\$\$", "", shown, flags=re.DOTALL)
+    assert words.count("**Step") == len(told.steps)
+    words = re.sub(r"\$[^$]+\$", "", words)
+    assert set(re.findall(r"\\.", words)) <= {r"\_"}
+    assert "*}" not in shown
+    if not told.complete:
+        assert "`igm`" in shown or "elimination" in shown
 
 
 def test_offsets_are_multiples_of_pi_where_they_are():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ...latex_text import markdown
 from ...model import RobotModel, check_model
 from ..arm_angle import prepare_arm_angle
 from ..loop import JointChain
@@ -101,8 +102,12 @@ class InverseModelExplanation:
         found = "all joints" if self.complete else f"all but {', '.join(self.remaining)}"
         return f"<InverseModelExplanation of {self.robot}: {found} by Paul's method>"
 
-    def _repr_latex_(self) -> str:
+    def _repr_markdown_(self) -> str:
         """What a notebook shows."""
+        return markdown(self.latex)
+
+    def _repr_latex_(self) -> str:
+        """What a notebook that becomes a LaTeX document shows."""
         return self.latex
 
 

@@ -7,17 +7,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from math import pi
 
+from ...latex_text import escaped, powers
 from ...table_text import SMALLEST
-
-_SPECIAL = {
-    "\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
-    "<": "$<$", ">": "$>$", "*": "$*$", "|": "$|$",
-} | {c: f"\\{c}" for c in "&%$#_{}"}  # fmt: skip
-_GREEK = {
-    "α": r"\alpha", "β": r"\beta", "γ": r"\gamma", "θ": r"\theta", "μ": r"\mu", "π": r"\pi",
-    "σ": r"\sigma",
-}  # fmt: skip
-_DIGITS = str.maketrans("₀₁₂₃₄₅₆₇₈₉", "0123456789")
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,16 +43,10 @@ def joined(parts: list[Line] | list[Prose], by: str) -> Prose:
     return said(by.join(["{}"] * len(parts)), *parts)
 
 
-def escaped(words: str) -> str:
-    """Words as LaTeX, ``code`` between backticks in a fixed width."""
-    plain = "".join(_SPECIAL.get(c, c) for c in words)
-    return re.sub("`([^`]*)`", r"\\texttt{\1}", plain)
-
-
 def number(value: float) -> Line:
     """A number with twelve digits."""
     text = f"{value:.12g}"
-    return Line(text, _powers(text))
+    return Line(text, powers(text))
 
 
 def angle(value: float) -> Line:
@@ -97,26 +82,3 @@ def type_formula(words: str) -> Line:
     latex = re.sub(r"\b([A-Za-z])(\d|[ij]\b)", r"\1_{\2}", latex)
     latex = re.sub(r"(?<=[\w}]) (?=[A-Za-z])", r" \\, ", latex)
     return Line(words, latex.replace(", ", r", \; ").replace(r"\, \; ", r"\, "))
-
-
-def table_latex(table: str) -> str:
-    """The printed table of a robot as a LaTeX array: same columns, same cells."""
-    rows = [line.strip("│").split("│") for line in table.splitlines() if line.startswith("│")]
-    head, *body = [[_cell(cell.strip()) for cell in row] for row in rows]
-    lines = " \\\\\n".join(" & ".join(row) for row in body)
-    columns = "c|" + "c" * (len(head) - 1)
-    return (
-        f"\\begin{{equation*}}\n\\begin{{array}}{{{columns}}}\n{' & '.join(head)} \\\\\n"
-        f"\\hline\n{lines}\n\\end{{array}}\n\\end{{equation*}}"
-    )
-
-
-def _cell(words: str) -> str:
-    words = re.sub("[₀-₉]+", lambda m: f"_{{{m[0].translate(_DIGITS)}}}", words)
-    words = re.sub(r"^([σμγαβθdbr])j$", r"\1_{j}", words)
-    words = re.sub("[αβγθμπσ]", lambda m: _GREEK[m[0]], words)
-    return _powers(words)
-
-
-def _powers(words: str) -> str:
-    return re.sub(r"(?<=\d)e([+-]?\d+)", lambda m: rf" \cdot 10^{{{int(m[1])}}}", words)

@@ -6,20 +6,11 @@ import re
 
 import numpy as np
 
+from ...latex_text import escaped, table_latex
 from ...model import RobotModel
 from ...table_text import SMALLEST
 from .plan import PaulPlan
-from .prose import (
-    Line,
-    Prose,
-    angle,
-    display,
-    escaped,
-    joined,
-    number,
-    said,
-    table_latex,
-)
+from .prose import Line, Prose, angle, display, joined, number, said
 from .unknowns import Span
 from .wording import Wording
 

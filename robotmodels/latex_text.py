@@ -1,0 +1,106 @@
+"""LaTeX of explanations: words, tables, and the same as Markdown for notebooks."""
+
+from __future__ import annotations
+
+import re
+
+_SPECIAL = {
+    "\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
+    "<": "$<$", ">": "$>$", "*": "$*$", "|": "$|$",
+} | {c: f"\\{c}" for c in "&%$#_{}"}  # fmt: skip
+_GREEK = {
+    "α": r"\alpha", "β": r"\beta", "γ": r"\gamma", "θ": r"\theta", "μ": r"\mu", "π": r"\pi",
+    "σ": r"\sigma",
+}  # fmt: skip
+_DIGITS = str.maketrans("₀₁₂₃₄₅₆₇₈₉", "0123456789")
+_DISPLAY = re.compile(r"\\begin\{(align\*|equation\*)\}\n(.*?)\n\\end\{\1\}", re.DOTALL)
+_LETTERS = (
+    (r"\textbackslash{}", r"\\"), (r"\textasciitilde{}", r"\~"), (r"\textasciicircum{}", "^"),
+)  # fmt: skip
+
+
+def escaped(words: str) -> str:
+    r"""Words as LaTeX outside mathematics; what is between backticks in a fixed width.
+
+    Examples
+    --------
+    >>> print(escaped("`q_ref` of lab_rr"))
+    \texttt{q\_ref} of lab\_rr
+    """
+    plain = "".join(_SPECIAL.get(c, c) for c in words)
+    return re.sub("`([^`]*)`", r"\\texttt{\1}", plain)
+
+
+def powers(number: str) -> str:
+    r"""A printed number as LaTeX: powers of ten are written as such.
+
+    Examples
+    --------
+    >>> print(powers("1.5e-07"))
+    1.5 \cdot 10^{-7}
+    """
+    return re.sub(r"(?<=\d)e([+-]?\d+)", lambda m: rf" \cdot 10^{{{int(m[1])}}}", number)
+
+
+def table_latex(table: str) -> str:
+    r"""The printed table of a robot as an array: the same columns and cells.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> print(table_latex(str(load("lab_rrt").table)).splitlines()[2])
+    j & \sigma_{j} & \alpha_{j} & d_{j} & \theta_{j} & r_{j} \\
+    """
+    rows = [line.strip("│").split("│") for line in table.splitlines() if line.startswith("│")]
+    head, *body = [[_cell(cell.strip()) for cell in row] for row in rows]
+    lines = " \\\\\n".join(" & ".join(row) for row in body)
+    columns = "c|" + "c" * (len(head) - 1)
+    return (
+        f"\\begin{{equation*}}\n\\begin{{array}}{{{columns}}}\n{' & '.join(head)} \\\\\n"
+        f"\\hline\n{lines}\n\\end{{array}}\n\\end{{equation*}}"
+    )
+
+
+def _cell(words: str) -> str:
+    words = re.sub("[₀-₉]+", lambda m: f"_{{{m[0].translate(_DIGITS)}}}", words)
+    words = re.sub(r"^([σμγαβθdbr])j$", r"\1_{j}", words)
+    words = re.sub("[αβγθμπσ]", lambda m: _GREEK[m[0]], words)
+    return powers(words)
+
+
+def markdown(latex: str) -> str:
+    r"""LaTeX of an explanation as Markdown, which notebooks typeset: they read no LaTeX but maths.
+
+    Parameters
+    ----------
+    latex : str
+        Paragraphs with ``textbf``, ``texttt`` and inline mathematics, and ``align*`` and
+        ``equation*`` environments.
+
+    Returns
+    -------
+    str
+        Bold between ``**``, displayed mathematics between ``$$``.
+
+    Examples
+    --------
+    >>> print(markdown(r"\textbf{A\_b}, $x$"))
+    **A\_b**, $x$
+    """
+    out, end = [], 0
+    for block in _DISPLAY.finditer(latex):
+        body = block[2]
+        if block[1] == "align*":
+            body = f"\\begin{{aligned}}\n{body}\n\\end{{aligned}}"
+        out += [_words(latex[end : block.start()]), f"$$\n{body}\n$$"]
+        end = block.end()
+    out.append(_words(latex[end:]))
+    return "\n\n".join(part for part in out if part)
+
+
+def _words(latex: str) -> str:
+    words = re.sub(r"\\textbf\{((?:[^{}\\]|\\.|\{\})*)\}", r"**\1**", latex.strip())
+    words = re.sub(r"\\texttt\{([^}]*)\}", lambda m: f"`{m[1]}`".replace(r"\_", "_"), words)
+    for typeset, letter in _LETTERS:
+        words = words.replace(typeset, letter)
+    return words
