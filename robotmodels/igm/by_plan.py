@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -169,6 +171,14 @@ def run(
     marks = np.empty((N, 2 + 2 * S), np.int64)
     run_plan(plan.program.plan, numbers, tolerances, poses, references, q, residual, marks)
     return q, residual, marks
+
+
+@cache
+def plan_kernel() -> Callable[..., int]:
+    """The kernel of plans, imported when the first arm is prepared: see `regular_postures`."""
+    from ._regular import regular_postures
+
+    return regular_postures
 
 
 def numbers_for_world(plan: PaulPlan, to_base: Array) -> Array:

@@ -14,6 +14,7 @@ from .._arrays import Array, as_core, as_vector, batch_rows, read_only
 from ..errors import InvalidValueError
 from ..model import RobotModel
 from .asked import Task, above_zero, locks_of, mask_of, relations_of
+from .by_plan import TOLERANCES
 from .known import known_arm, solver_for
 from .rows import Call, Rows, rows_by_family, rows_by_plan, rows_of_doubtful
 from .solutions import IGMSolutions
@@ -26,6 +27,8 @@ FARTHEST = 1e6
 """Largest joint value of a reference [rad or m]: beyond, adding whole turns costs digits."""
 
 _WHOLE, _EXACT = Task(), Tolerances()
+_FLOAT = np.dtype(np.float64)
+_ALL = read_only(np.ones(6), np.bool_)
 
 
 def solved(
@@ -42,6 +45,18 @@ def solved(
     relations: tuple[ArrayLike, ArrayLike] | None,
 ) -> IGMSolutions:
     """The inverse geometric model; see `igm`."""
+    if (
+        mask is lock is arm_angle is relations is None
+        and limits is False
+        and mask_axes == "world"
+        and position_tolerance == 1e-9 == orientation_tolerance
+        and type(T) is np.ndarray
+        and T.shape == (4, 4)
+        and type(model) is RobotModel
+    ):
+        found = _single(model, T, q_ref)
+        if found is not None:
+            return found
     if not isinstance(model, RobotModel):
         raise InvalidValueError(f"model: expected a RobotModel, got {type(model).__name__}.")
     if mask_axes not in ("world", "tool"):
@@ -97,6 +112,38 @@ def solved(
             rows = rows_by_family(call, poses, references, psi)
     method = NO_FAMILY if solver is None else solver.method
     return _solutions(batch, rows, method, arm.never if limits else arm.turns, task)
+
+
+def _single(model: RobotModel, T: Array, q_ref: ArrayLike | None) -> IGMSolutions | None:
+    """One pose by the plan of the arm, in as few steps as can be; None if it takes more."""
+    arm = known_arm(model)
+    kernel = arm.kernel
+    if kernel is None or T.dtype is not _FLOAT or not T.flags.c_contiguous:
+        return None
+    if q_ref is None:
+        reference = arm.zero
+    elif type(q_ref) is np.ndarray and q_ref.dtype is _FLOAT and q_ref.shape == arm.turns.shape:
+        reference = np.ascontiguousarray(q_ref).reshape(1, -1)
+    else:
+        return None
+    S, n = arm.most, arm.turns.size
+    q, residual, flags = np.empty((1, S, n)), np.empty((1, S)), np.empty((2, 1, S), np.bool_)
+    code, status = np.empty((1, S), np.int16), np.empty(1, np.int8)
+    most = kernel(
+        arm.instructions, arm.numbers, TOLERANCES, T.reshape(1, 4, 4), reference,
+        q_ref is not None, arm.branch_of_way, arm.joints, False, q, residual, flags, code, status,
+    )  # fmt: skip
+    if most < 0:
+        return None
+    for array in (q, residual, flags, code, status):
+        array.setflags(write=False)
+    still = _small_still((most,))
+    loose = _small_still((most, n))
+    return IGMSolutions.checked_before(
+        q[0, :most], flags[0, 0, :most], residual[0, :most], flags[1, 0, :most], code[0, :most],
+        arm.labels, status.reshape(()), still, loose, loose, arm.method, arm.turns, _ALL, None,
+        None, None,
+    )  # fmt: skip
 
 
 def _as_they_are(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import weakref
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,7 +14,7 @@ from .._arrays import Array, read_only
 from ..geometry import REVOLUTE
 from ..model import RobotModel
 from .asked import Task
-from .by_plan import ByPlan, numbers_for_world, prepare_by_plan
+from .by_plan import ByPlan, numbers_for_world, plan_kernel, prepare_by_plan
 from .families import prepare_task
 from .loop import joint_chain
 from .solver import Solver
@@ -42,6 +43,12 @@ class KnownArm:
         Paul's equations, where they solve the arm and every joint moves the tool.
     numbers : ndarray or None
         Of the plan's program, for poses in the world.
+    kernel : callable or None
+        What runs the plan.
+    instructions, branch_of_way, labels, most, method
+        Of the plan, so that a single pose need not ask for them.
+    zero : ndarray, shape (1, n)
+        The reference where none is given.
     solvers : dict
         What was prepared for tasks.
     """
@@ -53,6 +60,13 @@ class KnownArm:
     joints: Array
     plan: ByPlan | None
     numbers: Array | None
+    kernel: Callable[..., int] | None
+    instructions: NDArray[np.uint32] | None
+    branch_of_way: NDArray[np.int16] | None
+    labels: tuple[str, ...]
+    most: int
+    method: str
+    zero: Array
     solvers: dict[Task, Solver | None] = field(default_factory=dict)
 
 
@@ -128,5 +142,12 @@ def _prepared(model: RobotModel) -> KnownArm:
         joints=read_only(np.array([model.lower, model.upper, turns])),
         plan=plan,
         numbers=None if plan is None else numbers_for_world(plan.plan, to_base),
+        kernel=None if plan is None else plan_kernel(),
+        instructions=None if plan is None else plan.instructions,
+        branch_of_way=None if plan is None else plan.branch_of_way,
+        labels=() if plan is None else plan.labels,
+        most=0 if plan is None else plan.most,
+        method="" if plan is None else plan.method,
+        zero=read_only(np.zeros((1, model.n))),
         solvers={whole: family if plan is None else plan},
     )

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
-from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +14,7 @@ from ..model import RobotModel
 from .arm_angle import ArmAngle, arm_angle_postures
 from .asked import WHOLE_POSE, Task
 from .branches import branches
-from .by_plan import TOLERANCES
+from .by_plan import TOLERANCES, plan_kernel
 from .components import Components, asked_jacobians
 from .known import KnownArm
 from .loop import JointChain
@@ -178,21 +176,13 @@ def rows_by_plan(
     q, residual = np.empty((N, S, n)), np.empty((N, S))
     flags, code = np.empty((2, N, S), np.bool_), np.empty((N, S), np.int16)
     status = np.empty(N, np.int8)
-    most = _kernel()(
+    most = plan_kernel()(
         plan.instructions, numbers, TOLERANCES, poses, references, given, plan.branch_of_way,
         arm.joints, limits, q, residual, flags, code, status,
     )  # fmt: skip
     if most == _IMPROPER:
         return None
     return Rows(q, flags[0], residual, flags[1], code, status, plan.labels, most)
-
-
-@cache
-def _kernel() -> Callable[..., int]:
-    """The kernel of plans, imported when the first pose is solved."""
-    from ._regular import regular_postures
-
-    return regular_postures
 
 
 def rows_of_doubtful(call: Call, poses: Array, references: Array, rows: Rows) -> Rows:

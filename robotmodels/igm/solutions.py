@@ -132,8 +132,8 @@ class IGMSolutions:
         more than that.
         """
         result = object.__new__(cls)
-        for name, value in zip(_NAMES, values, strict=True):
-            _put(result, name, value)
+        for put, value in zip(_PUT, values, strict=True):
+            put(result, value)
         return result
 
     @property
@@ -285,7 +285,8 @@ def _named(what: str, joints: NDArray[np.bool_]) -> str:
 
 
 _NAMES = tuple(field.name for field in fields(IGMSolutions))
-_put = object.__setattr__
+# the slots themselves: quicker than by name
+_PUT = tuple(getattr(IGMSolutions, name).__set__ for name in _NAMES)
 
 
 def posture_distance(a: Array, b: Array, periodic: NDArray[np.bool_]) -> Array:
