@@ -62,7 +62,7 @@ def igm(
         an array are added behind those of ``T``. Without it the angle of ``q_ref`` is taken.
     position_tolerance : float
         Metres. What is missing of the position may be as long as this. For poses given with few
-        digits take wider tolerances.
+        digits take wider tolerances; what is singular is decided on the pose as it is given.
     orientation_tolerance : float
         Radians, on the rotation that is missing.
     relations : (array_like (m, n), array_like (m,)), optional
@@ -85,6 +85,10 @@ def igm(
     Notes
     -----
     A posture is returned after a forward pass over the table; ``residual`` is what that found.
+    Regular poses of an arm with a closed form take microseconds. At singular positions and beside
+    them (within some 1e-6) candidates are gathered from several sides and infinite families are
+    walked to the reference, which takes milliseconds. Redundant arms are quick at a ``q_ref`` from
+    which the pose can be reached; finding the nearest value that can takes a search.
     Poses without one are given to a short numeric search, `igm_numeric`, which says why: too far,
     too near, or the orientation not available there. An arm outside every family (more joints
     than can be solved, or a degenerate one) gets the single posture of that search, and

@@ -35,7 +35,7 @@ class IGMSolutions:
         The larger of the position error in metres and the rotation angle in radians, over what
         was asked, from a forward pass.
     within_limits : ndarray of bool, shape (..., S)
-        Whether the row is a solution inside the joint limits.
+        Whether the row is a solution inside the joint limits as it stands, no whole turns added.
     code : ndarray of int16, shape (..., S)
         Number of the branch, which of ``labels`` it has; -1 in rows without a solution.
     labels : tuple of str
