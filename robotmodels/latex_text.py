@@ -14,6 +14,7 @@ _GREEK = {
 }  # fmt: skip
 _DIGITS = str.maketrans("₀₁₂₃₄₅₆₇₈₉", "0123456789")
 _DISPLAY = re.compile(r"\\begin\{(align\*|equation\*)\}\n(.*?)\n\\end\{\1\}", re.DOTALL)
+_SYMBOL = re.compile(r"\b(alpha|beta|gamma|theta|[θbdr])(\d+)\b|\b([snaxyz])([xyz]?)\b(?= of the )")
 _LETTERS = (
     (r"\textbackslash{}", r"\\"), (r"\textasciitilde{}", r"\~"), (r"\textasciicircum{}", "^"),
 )  # fmt: skip
@@ -40,6 +41,28 @@ def powers(number: str) -> str:
     1.5 \cdot 10^{-7}
     """
     return re.sub(r"(?<=\d)e([+-]?\d+)", lambda m: rf" \cdot 10^{{{int(m[1])}}}", number)
+
+
+def meaning_latex(words: str) -> str:
+    r"""What a constant is, in mathematics: its symbols typeset, the words as text.
+
+    Examples
+    --------
+    >>> print(meaning_latex("cosine of alpha2"), meaning_latex("x of the tool"))
+    \text{cosine of }\alpha_{2} x\text{ of the tool}
+    """
+    out, end = "", 0
+    for symbol in _SYMBOL.finditer(words):
+        letter, number, axis, column = symbol.groups()
+        if before := words[end : symbol.start()]:
+            out += rf"\text{{{escaped(before)}}}"
+        if letter:
+            name = _GREEK.get(letter) or (letter if len(letter) == 1 else f"\\{letter}")
+            out += f"{name}_{{{number}}}"
+        else:
+            out += f"{axis}_{{{column}}}" if column else axis
+        end = symbol.end()
+    return out + (rf"\text{{{escaped(words[end:])}}}" if words[end:] else "")
 
 
 def table_latex(table: str) -> str:

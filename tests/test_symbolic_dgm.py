@@ -200,6 +200,25 @@ def test_opposite_axes_are_subtracted():
     assert "C_{2-3}" in crx.latex
 
 
+def test_latex_says_what_the_text_says():
+    tool = from_rpy([0.3, 0.0, 0.2], [0.1, 0, 0])
+    model = rm.load("cobra_s600").with_base(from_rpy([0, 0, 0], [0, 0, 1e-5])).with_tool(tool)
+    explanation = explain_dgm(model)
+    latex = explanation.latex
+    for word in re.findall(r"\b[A-Z]?[a-z]{3,}\b", explanation.text):
+        assert word in latex, word
+    assert r"3 & 1 & \pi & 0.275 & 0 & r_{3} \\" in latex
+    assert r"D_{3} &= 0.275 \, \mathrm{m} \quad (d_{3})" in latex
+    assert r"1 \cdot 10^{-5} \, \mathrm{m} \quad (z\text{ of the base})" in latex
+    assert r"(\text{angle about }z\text{ of the tool})" in latex
+    assert r"C_{1+2-4} &= \cos\left(\theta_{1} + \theta_{2} - \theta_{4}\right)" in latex
+    assert r"$\mathbf{Z}$, the pose of $R_{0}$ in the world" in latex
+    words = re.sub(r"\\begin\{(\w+\*)\}.*?\\end\{\1\}", "", latex, flags=re.DOTALL)
+    words = re.sub(r"\$[^$]*\$", "", words)
+    assert words.isascii()
+    assert not re.search(r"(?<!\\)[_^&#%$]", words), words
+
+
 @pytest.mark.parametrize("turn", [RIGHT, -RIGHT, 0.3])
 def test_parallel_axes_on_both_sides_of_a_prismatic_joint(turn, rng):
     """Also if the sliding direction is oblique: the two constant rotations cancel."""
@@ -330,6 +349,16 @@ def test_it_is_a_value():
     assert pickle.loads(pickle.dumps(a)) == a
     assert repr(a) == "<DirectModelExplanation of lab_rr: pose of the tool in the world>"
     assert a._repr_latex_() == a.latex
+    shown = a._repr_markdown_()
+    title = r"**Direct geometric model of lab\_rr: pose of the tool in the world**"
+    assert shown.startswith(title + "\n\n$$\n\\begin{array}{c|")
+    blocks = a.latex.count(r"\begin{align*}") + a.latex.count(r"\begin{equation*}")
+    assert (
+        shown.count("$$\n\\begin{") + shown.count("$$\n{}^") + shown.count("$$\n\\mathbf") == blocks
+    )
+    assert len(re.findall(r"^\$\$$", shown, re.MULTILINE)) == 2 * blocks
+    words = re.sub(r"\$[^$]+\$", "", re.sub(r"\$\$.*?\$\$", "", shown, flags=re.DOTALL))
+    assert set(re.findall(r"\\.", words)) == {r"\_"}
     with pytest.raises(AttributeError):
         a.text = ""
 

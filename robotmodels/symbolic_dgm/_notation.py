@@ -243,6 +243,8 @@ class Notation:
 
 def _subscript(angle: Angle, comma: str) -> str:
     """LaTeX subscript of a sine or cosine: joints by number, constants by symbol."""
+    if any(t.sign < 0 for t in angle.terms):
+        comma = "+"  # all the signs: 12-4 reads as 12 minus 4
     out = ""
     for t in angle.terms:
         plus = comma if t.joint else "+"

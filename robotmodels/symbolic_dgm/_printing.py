@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
+from ..latex_text import escaped, meaning_latex, powers, table_latex
 from ._notation import Notation
 from .result import DirectModelExplanation, SymbolicTransform
 
@@ -79,30 +80,52 @@ def _components_text(matrix: Any, notation: Notation) -> list[str]:
     ]
 
 
-def derivation_latex(e: DirectModelExplanation, motions: Sequence[str], notation: Notation) -> str:
-    """The derivation as amsmath environments; ``motions`` of the factors, of Z and of E."""
-    blocks = []
+def derivation_latex(
+    e: DirectModelExplanation, table: str, motions: Sequence[str], notation: Notation
+) -> str:
+    """The same as paragraphs and amsmath environments; ``motions`` of the factors, Z and E."""
+    title = escaped(f"Direct geometric model of {e.robot}: pose of {e.frame} in the world")
+    blocks = [rf"\textbf{{{title}}}", table_latex(table)]
     meanings = [(notation.latex[s], notation.meanings[s][1]) for s, _ in e.abbreviations]
     values = [
-        (notation.latex[c.symbol], rf"{_number_latex(c.value)} \, \mathrm{{{c.unit}}}")
+        (
+            notation.latex[c.symbol],
+            rf"{powers(f'{c.value:.10g}')} \, \mathrm{{{c.unit}}} \quad "
+            rf"({meaning_latex(c.meaning)})",
+        )
         for c in notation.constants
     ]
-    blocks += [_aligned(lines) for lines in (values, meanings) if lines]
+    for heading, lines in (("Constants", values), ("Abbreviations", meanings)):
+        if lines:
+            blocks += [heading, _aligned(lines)]
     *rows, Z, E = motions
+    if e.factors:
+        blocks.append(r"Transformation of each row, $\mathbf{T}(a(j), j)$ [1.3]")
     blocks += [
         _matrix_latex(step, motion, notation) for step, motion in zip(e.factors, rows, strict=True)
     ]
+    if len(e.products) > 1:
+        blocks.append("Products from the right")
     for step in e.products[:-1]:
         factors = r" \, ".join(map(_name_latex, step.motion.split()))
         blocks.append(_matrix_latex(step, factors, notation))
     chain = r" \, ".join(_name_latex(t.name) for t in e.factors) or "1"
+    blocks.append(
+        rf"Components of ${_name_latex(e.product.name)} = {chain}$ [1.4]: its columns are $s$, "
+        "$n$, $a$, $P$"
+    )
     blocks += _result_latex(replace(e.product, motion=chain), notation)
     if e.base or e.tool:
-        for step, motion in ((e.base, Z), (e.tool, E)):
+        last, frame = e.product.name[2:], escaped(e.frame)
+        steps = (e.base, Z, "$R_{0}$ in the world"), (e.tool, E, f"{frame} in $R_{{{last}}}$")
+        for step, motion, what in steps:
             if step:
+                blocks.append(f"${_name_latex(step.name)}$, the pose of {what}")
                 blocks.append(_matrix_latex(step, motion, notation))
         whole = [_name_latex(t.name) for t in (e.base, e.product, e.tool) if t]
-        blocks += _result_latex(SymbolicTransform("T", r" \, ".join(whole), e.pose), notation)
+        of = r" \, ".join(whole)
+        blocks.append(f"Components of ${of}$ [1.10], the pose of {frame} in the world")
+        blocks += _result_latex(SymbolicTransform("T", of, e.pose), notation)
     return "\n\n".join(blocks)
 
 
@@ -139,11 +162,6 @@ def _components_latex(name: str, motion: str, matrix: Any, notation: Notation) -
         expr = matrix[k % 3, k // 3]
         lines.append((f"{component[0]}_{component[1]}", notation.text(expr, latex=True)))
     return _aligned(lines)
-
-
-def _number_latex(value: float) -> str:
-    digits, _, power = f"{value:.10g}".partition("e")
-    return rf"{digits} \cdot 10^{{{int(power)}}}" if power else digits
 
 
 def _aligned(lines: Iterable[tuple[str, str]]) -> str:

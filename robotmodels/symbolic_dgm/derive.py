@@ -127,5 +127,5 @@ def explain_dgm(
     return replace(
         draft,
         text=derivation_text(draft, str(table), notation),
-        latex=derivation_latex(draft, motions, notation),
+        latex=derivation_latex(draft, str(table), motions, notation),
     )

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_vector
+from ..latex_text import markdown
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +69,8 @@ class DirectModelExplanation:
     constants : tuple of (sympy.Symbol, float)
         The values of lengths (metres) and angles (radians) of this robot.
     text, latex : str
-        The derivation for people; the LaTeX is a series of amsmath environments.
+        The derivation for people; the LaTeX says the same, as paragraphs and amsmath
+        environments.
 
     Examples
     --------
@@ -178,8 +180,12 @@ class DirectModelExplanation:
     def __repr__(self) -> str:
         return f"<DirectModelExplanation of {self.robot}: pose of {self.frame} in the world>"
 
-    def _repr_latex_(self) -> str:
+    def _repr_markdown_(self) -> str:
         """What a notebook shows."""
+        return markdown(self.latex)
+
+    def _repr_latex_(self) -> str:
+        """What a notebook that becomes a LaTeX document shows."""
         return self.latex
 
 

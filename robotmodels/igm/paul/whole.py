@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 
-from ...latex_text import escaped, table_latex
+from ...latex_text import escaped, meaning_latex, table_latex
 from ...model import RobotModel
 from ...table_text import SMALLEST
 from .plan import PaulPlan
@@ -35,7 +35,7 @@ def whole(
     if constants:
         text += ["", "Constants"]
         text += [f"  {n} = {v:.12g}  ({meaning})" for n, _, v, meaning in constants]
-        rows = [Line("", rf"{symbol} &= {number(v).latex} \quad ({_meaning(meaning)})")
+        rows = [Line("", rf"{symbol} &= {number(v).latex} \quad ({meaning_latex(meaning)})")
                 for _, symbol, v, meaning in constants]  # fmt: skip
         latex.append("Constants\n" + display(rows))
     for told, typeset in steps:
@@ -118,18 +118,6 @@ def _notation(words: Wording, text: str) -> Prose | None:
     own = (Line("Cj", "C_{j}"), Line("Sj", "S_{j}"), Line("θj", r"\theta_{j}"))
     tail = said(", {}", joined(sums, ", ")) if sums else Prose("", "")
     return said("{} and {} are cosine and sine of {}{}.", *own, tail)
-
-
-def _meaning(words: str) -> str:
-    """The meaning of a constant in mathematics: ``cosine of alpha2``, ``r3``, ``x of the tool``."""
-    head, of, symbol = words.rpartition(" of ")
-    if symbol == "the tool":
-        axis = head if len(head) == 1 else f"{head[0]}_{{{head[1:]}}}"
-        return rf"{axis} \text{{ of the tool}}"
-    letters = symbol.rstrip("0123456789")
-    digits = symbol.removeprefix(letters)
-    name = f"\\{letters}" if len(letters) > 1 else letters
-    return (rf"\text{{{head} of }} " if of else "") + f"{name}_{{{digits}}}"
 
 
 def _pose_line(model: RobotModel, plan: PaulPlan) -> Prose:
