@@ -17,6 +17,8 @@ from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.igm.closed_form import closed_form_postures, plan_loop
 from robotmodels.igm.paul import derive_plan, explain_igm, paul_postures
 from robotmodels.igm.paul._run import solve
+from robotmodels.igm.paul.equation_type import EquationType
+from robotmodels.igm.paul.prose import type_formula
 from robotmodels.kernels._compile import VECTOR, compiled
 
 ORACLES = Path(__file__).parent / "oracles"
@@ -810,6 +812,18 @@ def test_latex_is_read_by_a_parser_of_it(name):
     assert len(rows) > 3
     for formula in {*rows, *inline}:
         parser.parse(f"${formula.replace('&', '')}$")
+
+
+@pytest.mark.parametrize("type_", list(EquationType))
+def test_formulas_of_the_types_are_typeset(type_):
+    from matplotlib.mathtext import MathTextParser
+
+    formula = type_formula(type_.formula)
+    MathTextParser("path").parse(f"${formula.latex}$")
+    assert formula.text == type_.formula
+    assert not re.search(r"[A-Za-z]\d|theta(?<!\\theta)|\+-", formula.latex)
+    if type_ is EquationType.TYPE_7:
+        assert r"\pm (W_{1} \, S_{j} - W_{2} \, C_{j}) = X \, S_{i}" in formula.latex
 
 
 def test_latex_says_what_the_text_says():

@@ -323,6 +323,7 @@ def test_base_and_tool_have_their_steps(rng):
     explanation = explain_dgm(model)
     check(model, explanation, rng)
     for step, pose in ((explanation.base, model.base), (explanation.tool, model.tool)):
+        assert step is not None
         names = {s.name for s in step.matrix.free_symbols}
         assert len(names) == 9
         assert step.name in "ZE"
@@ -360,7 +361,7 @@ def test_it_is_a_value():
     words = re.sub(r"\$[^$]+\$", "", re.sub(r"\$\$.*?\$\$", "", shown, flags=re.DOTALL))
     assert set(re.findall(r"\\.", words)) == {r"\_"}
     with pytest.raises(AttributeError):
-        a.text = ""
+        a.text = ""  # pyright: ignore[reportAttributeAccessIssue]
 
 
 @pytest.mark.parametrize(

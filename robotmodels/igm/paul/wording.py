@@ -221,6 +221,8 @@ class Wording:
             return Prose("", "")
         frame = self.joints.frame(other[0])
         turned = Line(f"{first.text}'", f"{first.latex}'")
+        if " " in first.text:
+            turned = Line(f"({first.text})'", f"({first.latex})'")
         above = Line(f"S{frame} > 0", f"S_{{{frame}}} > 0")
         below = Line(f"S{frame} < 0", f"S_{{{frame}}} < 0")
         return said("{} has {} and {} has {}. ", first, above, turned, below)
