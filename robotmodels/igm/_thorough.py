@@ -116,9 +116,17 @@ def brought_home(U: Floats, sigma: Ints, D: Floats, q: Floats) -> float:
 
 @compiled()
 def alike(
-    U: Floats, sigma: Ints, D: Floats, a: Floats, b: Floats, P: Floats, axes: Floats, e: Floats
+    U: Floats,
+    sigma: Ints,
+    D: Floats,
+    a: Floats,
+    b: Floats,
+    good: float,
+    P: Floats,
+    axes: Floats,
+    e: Floats,
 ) -> bool:
-    """Whether two postures are one, or what lies between them is as good as they are."""
+    """Whether two postures are one, or what lies between them is as ``good`` as they are."""
     k = sigma.size
     turn, between = np.zeros(k), np.zeros(k)
     gap = 0.0
@@ -132,7 +140,7 @@ def alike(
             between[m] = a[m] + part * turn[m]
         forward(sigma, D, between, P, axes)
         way, angle = missing(U, P, e)
-        if max(way, angle) > BETWEEN:
+        if max(way, angle) > good:
             return False
     return True
 
@@ -174,7 +182,8 @@ def home_postures(
                     x[m] = wrapped(x[m])
             known = -1
             for j in range(count):
-                if alike(poses[n], sigma, D, q[n, j], x, P, axes, e):
+                good = max(BETWEEN, 3.0 * max(error, residual[n, j]))
+                if alike(poses[n], sigma, D, q[n, j], x, min(good, 2e-12), P, axes, e):
                     known = j
                     break
             if known >= 0:
