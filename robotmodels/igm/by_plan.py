@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from .._arrays import Array, read_only
 from ..model import RobotModel
-from .branches import SIDES, branches
+from .branches import SIDES, branches, ranked
 from .check import checked
 from .closed_form import ClosedForm, closed_form_postures
 from .gather import assembled, rows_of
@@ -239,6 +239,9 @@ def _(solver: ByPlan, U: Array, references: Array, tolerances: Tolerances) -> Fo
 
 @branches.register
 def _(solver: ByPlan, found: Found) -> tuple[NDArray[np.int16], tuple[str, ...]]:
+    if solver.branch_of_way.size == 0:
+        # the sides of the family are not those of the plan: ranks serve both
+        return ranked(np.zeros(found.valid.shape, np.int16), ("",), found)
     return branches(solver.family, found)
 
 

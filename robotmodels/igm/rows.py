@@ -206,6 +206,11 @@ def rows_of_doubtful(call: Call, poses: Array, references: Array, rows: Rows) ->
     """
     doubtful = np.flatnonzero(rows.status == IGMStatus.NOT_CONVERGED)
     part = rows_by_family(call, poses[doubtful], references[doubtful])
+    labels, shorter = sorted((rows.labels, part.labels), key=len, reverse=True)
+    if labels[: len(shorter)] != shorter:
+        # the plan and the family have words of their own
+        labels = rows.labels + part.labels
+        part = part._replace(code=np.where(part.valid, part.code + len(rows.labels), -1))
     N, S, n = rows.q.shape
     most, wide = max(-1 - rows.most, part.most), max(S, part.most)
 
@@ -232,7 +237,7 @@ def rows_of_doubtful(call: Call, poses: Array, references: Array, rows: Rows) ->
         inside=joined("inside", False),
         code=joined("code", -1),
         status=rows.status,
-        labels=max(rows.labels, part.labels, key=len),
+        labels=labels,
         most=most,
         double=joined("double", False),
         free=joined("free", False),
