@@ -84,7 +84,7 @@ def test_wrong_shapes_say_what_came_and_what_to_do(shape, advice):
 
 
 def test_matlab_order_of_poses_is_recognised():
-    with pytest.raises(ShapeError, match="move the last axis to the front"):
+    with pytest.raises(ShapeError, match="poses_from_matlab"):
         as_core(np.zeros((4, 4, 10)), (4, 4), "T")
 
 

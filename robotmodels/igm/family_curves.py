@@ -18,6 +18,7 @@ SAME = 1e-6  # postures closer than this in every joint are one
 STILL = 1e-6  # range, or part of a direction, below which a joint does not move
 STARTS = 16  # starts of the search for other curves
 POINTS = 4000  # points of a curve, doubled until it fits
+MOST_POINTS = 16000  # but not beyond this
 
 
 @dataclass(slots=True)
@@ -230,7 +231,8 @@ def _walk(family: Family, start: Array, along: Array, held: int) -> tuple[Curve,
         n, closed = walked(
             family.sigma, family.D, family.U, start, along, held, points, tangents, flat
         )
-        if n < room:
+        # one that still runs on then winds beside itself: rounding keeps it from closing
+        if n < room or room >= MOST_POINTS:
             return Curve(held, points[:n], tangents[:n], flat[:n]), bool(closed)
         room *= 2
 
