@@ -430,3 +430,22 @@ def test_masks_through_the_one_call():
     assert np.all(placed.status == rm.IGMStatus.REACHED_FAMILY)
     assert distance(rx90, placed.q[:, 0], q).max() < 1e-6
     assert np.all(placed.free_joints[:, 0].sum(axis=-1) == 3)
+
+
+def test_a_family_whose_curve_does_not_close():
+    """Wrist aligned and elbow stretched to rounding: the walk along the family has to end."""
+    model = rm.load("ur5e")
+    q = np.array(
+        [
+            -1.3277221066477949,
+            -1.5804047667774181,
+            -2.7642736666289568e-17,
+            1.5040466962268813,
+            3.141592653589793,
+            -2.5498385378908077,
+        ]
+    )
+    T = rm.dgm(model, q)
+    found = checked(model, T, rm.igm(model, T, q))
+    assert found.status == rm.IGMStatus.REACHED_FAMILY
+    assert distance(model, found.q[0], q) < 1e-6
