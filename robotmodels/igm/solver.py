@@ -120,4 +120,4 @@ def postures(solver: Solver, U: Array, references: Array, tolerances: Tolerances
     Found
         The postures.
     """
-    raise NotImplementedError(f"no family is registered for {type(solver).__name__}")
+    raise TypeError(f"no family is registered for {type(solver).__name__}")
