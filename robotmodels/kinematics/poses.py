@@ -1,0 +1,122 @@
+"""Direct geometric model: poses of the tool and of every frame of the table.
+
+Seed book section 1.2.2. One configuration goes through Pinocchio, a batch through the compiled
+recursions in table order; tests hold both equal.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from .._arrays import Array, as_vector, batch_rows
+from ..model import RobotModel, check_model
+
+
+def dgm(model: RobotModel, q: ArrayLike, frame: str | int | None = None) -> Array:
+    """Direct geometric model: pose of the tool or another frame in the world.
+
+    Also called forward kinematics, ``fkine``, forward geometry.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, n joints.
+    q : array_like, shape (..., n)
+        Joint variables in table order, rad or m.
+    frame : str or int, optional
+        Name or number of a frame; default the tool.
+
+    Returns
+    -------
+    ndarray, shape (..., 4, 4)
+        World pose, ``Z T(0, tip) E`` for the tool; position in metres.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        ``q`` of the wrong length, or with NaN or infinity.
+    FrameNotFoundError
+        No such frame; the nearest names are in the message.
+
+    References
+    ----------
+    Seed book eq. [1.4] and [1.10].
+
+    Examples
+    --------
+    >>> from robotmodels.geometry import DHTable
+    >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.3]))
+    >>> dgm(arm, [np.pi / 2, 0.0])[:3, 3].round(12)
+    array([0. , 0.3, 0. ])
+    >>> dgm(arm, np.zeros((1000, 2))).shape
+    (1000, 4, 4)
+    """
+    check_model(model)
+    q = as_vector(q, model.n, "q")
+    twin = model.twin
+    point = twin.frame(frame)
+    if q.ndim == 1 and twin.serves_poses:
+        data = twin.data()
+        pin.forwardKinematics(twin.model, data, twin.to_pin(q))
+        placement = pin.updateFramePlacement(twin.model, data, point.pin_id)
+        return np.ascontiguousarray(placement.homogeneous)
+    from ..kernels.poses import tip_poses
+
+    batch, (rows,) = batch_rows((q,), ("q",))
+    out = np.empty((rows.shape[0], 4, 4))
+    tip_poses(rows, *model.chain, *point.kernel_arguments, out)
+    return out.reshape(*batch, 4, 4)
+
+
+def link_poses(model: RobotModel, q: ArrayLike) -> Array:
+    """World poses of all frames of the table, R_1 to R_f.
+
+    Also called ``fkine_all``. The tool is not among them: see `dgm`.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, n joints and f frames.
+    q : array_like, shape (..., n)
+        Joint variables, rad or m.
+
+    Returns
+    -------
+    ndarray, shape (..., f, 4, 4)
+        Poses, positions in metres.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        ``q`` of the wrong length, or with NaN or infinity.
+
+    References
+    ----------
+    Seed book eq. [1.4].
+
+    Examples
+    --------
+    >>> from robotmodels.geometry import DHTable
+    >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.3]))
+    >>> link_poses(arm, [0.0, 0.0])[:, 0, 3]
+    array([0. , 0.3])
+    """
+    check_model(model)
+    q = as_vector(q, model.n, "q")
+    twin = model.twin
+    if q.ndim == 1 and twin.serves_poses:
+        data = twin.data()
+        pin.forwardKinematics(twin.model, data, twin.to_pin(q))
+        poses = np.empty((model.f, 4, 4))
+        for j in range(model.f):
+            frame = twin.frame(j + 1)
+            poses[j] = pin.updateFramePlacement(twin.model, data, frame.pin_id).homogeneous
+        return poses
+    from ..kernels.poses import link_poses as kernel
+
+    batch, (rows,) = batch_rows((q,), ("q",))
+    out = np.empty((rows.shape[0], model.f, 4, 4))
+    kernel(rows, *model.chain, out)
+    return out.reshape(*batch, model.f, 4, 4)
