@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..kernels._compile import INT, MATRIX, STACK, VECTOR, Floats, Ints, compiled
 from ..kernels.rotations import improper_pose
 from ._arrange import AT_LIMIT, before, turned_inside
+from .asked import FARTHEST, IMPROPER
 from .paul._run import run_plan
 from .status import IGMStatus
 
@@ -20,8 +21,6 @@ _FLOATS3, _FLOATS2 = types.Array(types.float64, 3, "C"), types.Array(types.float
 _FLAGS3 = types.Array(types.boolean, 3, "C")
 _CODES2, _CODES1 = types.Array(types.int16, 2, "C"), types.Array(types.int8, 1, "C")
 
-IMPROPER = -1000
-FARTHEST = 1e6
 
 _REACHED, _OUTSIDE = int(IGMStatus.REACHED), int(IGMStatus.OUTSIDE_LIMITS)
 _NOTHING = int(IGMStatus.NOT_CONVERGED)

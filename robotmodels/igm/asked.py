@@ -17,6 +17,10 @@ from ..errors import InvalidValueError, ShapeError, nearest_names
 from ..model import RobotModel
 
 WHOLE_POSE = (True,) * 6
+FARTHEST = 1e6
+"""Largest joint value of a reference [rad or m]: beyond, adding whole turns costs digits."""
+IMPROPER = -1000
+"""What the kernel of plans says of a pose or reference that the border has to look at."""
 
 
 @dataclass(frozen=True, slots=True)

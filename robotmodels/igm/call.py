@@ -13,7 +13,7 @@ from .. import se3
 from .._arrays import Array, as_core, as_vector, batch_rows, read_only
 from ..errors import InvalidValueError
 from ..model import RobotModel
-from .asked import Task, above_zero, locks_of, mask_of, relations_of
+from .asked import FARTHEST, Task, above_zero, locks_of, mask_of, relations_of
 from .by_plan import TOLERANCES
 from .known import known_arm, solver_for
 from .rows import Call, Rows, rows_by_family, rows_by_plan, rows_of_doubtful
@@ -22,9 +22,6 @@ from .solver import Tolerances
 
 NO_FAMILY = "numeric search for one posture: no family of closed forms serves this arm"
 """What a result says of its method where there is none but the search."""
-
-FARTHEST = 1e6
-"""Largest joint value of a reference [rad or m]: beyond, adding whole turns costs digits."""
 
 _WHOLE, _EXACT = Task(), Tolerances()
 _FLOAT = np.dtype(np.float64)

@@ -12,7 +12,7 @@ from .._arrays import Array
 from ..errors import InvalidValueError
 from ..model import RobotModel
 from .arm_angle import ArmAngle, arm_angle_postures
-from .asked import WHOLE_POSE, Task
+from .asked import IMPROPER, WHOLE_POSE, Task
 from .branches import branches
 from .by_plan import TOLERANCES, plan_kernel
 from .components import Components, asked_jacobians
@@ -24,8 +24,6 @@ from .solver import Found, Solver, Tolerances, nothing_found, postures
 from .status import IGMStatus
 from .thorough import MET
 from .why import search
-
-_IMPROPER = -1000  # what the kernel of plans says before it has done anything
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -180,7 +178,7 @@ def rows_by_plan(
         plan.instructions, numbers, TOLERANCES, poses, references, given, plan.branch_of_way,
         arm.joints, limits, q, residual, flags, code, status,
     )  # fmt: skip
-    if most == _IMPROPER:
+    if most == IMPROPER:
         return None
     return Rows(q, flags[0], residual, flags[1], code, status, plan.labels, most)
 
