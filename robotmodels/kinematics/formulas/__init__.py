@@ -1,0 +1,1 @@
+"""The Jacobian and its singular positions as formulas."""
