@@ -1,0 +1,227 @@
+"""The Jacobian as a product of three matrices, of which only the third can be singular.
+
+Seed book section 1.3.1.3, after M. Renaud, "Contribution à la modélisation et à la commande
+dynamique des robots manipulateurs", 1980.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import se3
+from .._arrays import Array, as_vector, read_only
+from ..geometry import PRISMATIC
+from ..model import FrameOfInterest, RobotModel, check_model
+from .poses import link_poses
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JacobianFactors:
+    """The three matrices of the book: ``J = rotation transport reduced``.
+
+    The first two are invertible whatever the configuration, so that rank, singular positions and
+    (for six joints) the inverse are those of the third.
+
+    Parameters
+    ----------
+    rotation : ndarray, shape (..., 6, 6)
+        ``diag(R_i, R_i)``, the axes of the projection frame i in the world.
+    transport : ndarray, shape (..., 6, 6)
+        ``[1, -[L]x; 0, 1]`` with ``L`` from the origin of the intermediate frame j to that of the
+        frame whose Jacobian it is, in the axes of i, metres: from the velocity of the point of
+        the body at O_j to that at the frame's origin.
+    reduced : ndarray, shape (..., 6, n)
+        ``iJ_{n,j}``, rows ``[v; w]``: column k is ``[a_k; 0]`` if prismatic and
+        ``[a_k x L_{k,j}; a_k]`` if revolute, in the axes of i, with ``L_{k,j}`` from O_k to O_j;
+        zero if the joint does not move the frame.
+    projection, intermediate : str
+        Names of the frames i and j.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> factors = jacobian_factors(load("rx90"), [0.1, 0.2, 0.3, 0.4, 0.5, 0.6], 3, 4)
+    >>> factors.reduced[:3, 3:].any(), factors.intermediate
+    (np.False_, 'joint_4')
+    """
+
+    rotation: Array
+    transport: Array
+    reduced: Array
+    projection: str
+    intermediate: str
+
+    @property
+    def jacobian(self) -> Array:
+        """The product of the three, shape (..., 6, n): world axes, at the frame's origin."""
+        return self.rotation @ (self.transport @ self.reduced)
+
+    def inverse_times(self, twist: ArrayLike) -> Array:
+        """Joint velocities of least norm whose twist is nearest the given one, matrix by matrix.
+
+        The inverses of the first two are written down (a transposed rotation, the opposite
+        lever); only the third is solved, which is why the book wants it simple. Where it is
+        singular nothing is damped: values below 1e-12 of the largest count as zero. Nearest is
+        meant in the components of the third matrix, metres and radians alike.
+
+        Parameters
+        ----------
+        twist : array_like, shape (..., 6)
+            ``[v; w]`` in world axes at the frame's origin, m/s and rad/s.
+
+        Returns
+        -------
+        ndarray, shape (..., n)
+            Joint velocities, rad/s or m/s.
+
+        Raises
+        ------
+        ShapeError, InvalidValueError
+            Not six finite numbers in each row.
+
+        Examples
+        --------
+        >>> from robotmodels.robots import load
+        >>> factors = jacobian_factors(load("rx90"), [0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
+        >>> twist = np.array([0.1, 0.0, 0.2, 0.0, 0.3, 0.0])
+        >>> np.allclose(factors.jacobian @ factors.inverse_times(twist), twist)
+        True
+        """
+        twist = as_vector(twist, 6, "twist")
+        seen = np.einsum("...ji,...j->...i", self.rotation, twist)
+        w = seen[..., 3:]
+        # [1, -[L]x; 0, 1] has the inverse [1, [L]x; 0, 1]
+        lever = -self.transport[..., :3, 3:]
+        at_j = np.concatenate([seen[..., :3] + np.einsum("...ij,...j->...i", lever, w), w], axis=-1)
+        inverse = np.linalg.pinv(self.reduced, rcond=1e-12)
+        return np.einsum("...ij,...j->...i", inverse, at_j)
+
+
+def jacobian_factors(
+    model: RobotModel,
+    q: ArrayLike,
+    projection: str | int | None = None,
+    intermediate: str | int | None = None,
+    frame: str | int | None = None,
+) -> JacobianFactors:
+    """Decomposition of the Jacobian into three matrices, the first two of full rank.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, n joints.
+    q : array_like, shape (..., n)
+        Joint variables, rad or m.
+    projection, intermediate : str or int, optional
+        Names or numbers of the frames i, in whose axes the third matrix is, and j, at whose
+        origin; 0 is R_0. Any frame will do. Defaults as the book advises, halfway along the k
+        frames that carry ``frame``: i is number k/2 of them (R_3 of six) and j the next (R_4).
+    frame : str or int, optional
+        Frame whose Jacobian it is; default the tool.
+
+    Returns
+    -------
+    JacobianFactors
+        Their product is ``jacobian(model, q, frame)``.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        ``q`` of the wrong length, or with NaN or infinity.
+    FrameNotFoundError
+        No such frame.
+
+    References
+    ----------
+    Seed book section 1.3.1.3.
+
+    Examples
+    --------
+    >>> from robotmodels.kinematics import jacobian
+    >>> from robotmodels.robots import load
+    >>> rx90, q = load("rx90"), [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
+    >>> np.allclose(jacobian_factors(rx90, q, 3, 4).jacobian, jacobian(rx90, q), atol=1e-14)
+    True
+    """
+    check_model(model)
+    q = as_vector(q, model.n, "q")
+    point = model.twin.frame(frame)
+    middle_i, middle_j = middle_frames(point)
+    i = model.twin.frame(middle_i if projection is None else projection)
+    j = model.twin.frame(middle_j if intermediate is None else intermediate)
+    poses = link_poses(model, q)
+    batch = q.shape[:-1]
+    base = np.broadcast_to(model.base, (*batch, 1, 4, 4))
+    poses = np.concatenate([base, poses], axis=-3)
+    axes = poses[..., i.parent, :3, :3] @ i.rotation
+    at = _origin(poses, j)
+    lever = np.einsum("...ji,...j->...i", axes, _origin(poses, point) - at)
+
+    rotation = np.zeros((*batch, 6, 6))
+    rotation[..., :3, :3] = rotation[..., 3:, 3:] = axes
+    transport = np.zeros((*batch, 6, 6))
+    transport[..., range(6), range(6)] = 1.0
+    transport[..., :3, 3:] = -se3.skew(lever)
+    reduced = np.zeros((*batch, 6, model.n))
+    moving = set(point.path.tolist())
+    for column, row in enumerate(model.table.joint_rows):
+        if int(row) + 1 not in moving:
+            continue
+        a = poses[..., row + 1, :3, 2]
+        if model.table.sigma[row] == PRISMATIC:
+            reduced[..., :3, column] = a
+        else:
+            reduced[..., :3, column] = np.cross(a, at - poses[..., row + 1, :3, 3])
+            reduced[..., 3:, column] = a
+    reduced = np.concatenate(
+        [
+            np.einsum("...ji,...jk->...ik", axes, reduced[..., :3, :]),
+            np.einsum("...ji,...jk->...ik", axes, reduced[..., 3:, :]),
+        ],
+        axis=-2,
+    )
+    names = (model.twin.names.frames[0], *map(str, model.table.names))
+    return JacobianFactors(
+        rotation=read_only(rotation),
+        transport=read_only(transport),
+        reduced=read_only(reduced),
+        projection=_name(middle_i if projection is None else projection, names),
+        intermediate=_name(middle_j if intermediate is None else intermediate, names),
+    )
+
+
+def middle_frames(point: FrameOfInterest) -> tuple[int, int]:
+    """The projection and intermediate frame that the book advises: halfway along a path.
+
+    Parameters
+    ----------
+    point : FrameOfInterest
+        The frame whose Jacobian it is.
+
+    Returns
+    -------
+    int, int
+        Numbers of the frames i and j; 0 where nothing comes before.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> middle_frames(load("rx90").twin.frame(None))
+    (3, 4)
+    """
+    path = [0, *(int(j) for j in point.path)]
+    half = (len(path) - 1) // 2
+    return path[half], path[min(half + 1, len(path) - 1)]
+
+
+def _origin(poses: Array, frame: FrameOfInterest) -> Array:
+    """World position of a frame's origin."""
+    pose = poses[..., frame.parent, :, :]
+    return pose[..., :3, 3] + pose[..., :3, :3] @ frame.position
+
+
+def _name(frame: str | int, names: tuple[str, ...]) -> str:
+    return frame if isinstance(frame, str) else str(names[frame])
