@@ -1,0 +1,462 @@
+"""What the Matplotlib figures share: units, styles of lines, panels, legends beside the data."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from enum import Enum
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import Array, as_exact
+from ..errors import InvalidValueError, MissingExtraError, ShapeError
+from ..geometry import FIXED, PRISMATIC
+from ..model import RobotModel
+from ..visual import Color
+from .palette import PALETTE
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COLUMN, PAGE = 3.5, 7.1
+"""Widths of one column and of two in print, inches. Texts are sized for them."""
+
+INK: Color = (0.1, 0.1, 0.1, 1.0)
+PALE: Color = (0.62, 0.62, 0.62, 1.0)
+ALERT: Color = (0.80, 0.15, 0.10, 1.0)
+"""Texts; helping lines; what lies beyond a limit."""
+
+LABEL_SIZE, SMALL_SIZE = 8.0, 7.0
+"""Of the texts, points."""
+
+LINE_WIDTH, LIMIT_WIDTH = 1.3, 0.8
+LIMIT_DASHES = (0, (4.0, 2.5))
+
+_DPI = 150  # a column is then 525 pixels wide in a notebook
+# the palette, the hues that are far from each other first, and yellow, pale on white, late
+_ORDER = (0, 3, 2, 4, 7, 5, 1, 6)
+_DASHES = (
+    (0, ()), (0, (5.0, 1.5)), (0, (1.3, 1.1)), (0, (6.0, 1.3, 1.3, 1.3)), (0, (9.0, 2.0)),
+    (0, (3.0, 1.0, 1.0, 1.0, 1.0, 1.0)), (0, (2.2, 2.2)),
+)  # fmt: skip
+
+
+class Unit(Enum):
+    """Units of a joint in a figure; data are in SI units and radians always.
+
+    Examples
+    --------
+    >>> Unit.DEGREE.of(2), round(Unit.DEGREE.factor, 3)
+    ('deg/s²', 57.296)
+    """
+
+    RADIAN = "rad"
+    DEGREE = "deg"
+    METRE = "m"
+    MILLIMETRE = "mm"
+    NONE = "1"
+    UNSTATED = "rad or m"
+
+    @property
+    def factor(self) -> float:
+        """What a value in SI units is multiplied by."""
+        factors = {Unit.DEGREE: 180.0 / np.pi, Unit.MILLIMETRE: 1e3}
+        return factors.get(self, 1.0)
+
+    def of(self, order: int) -> str:
+        """Unit of a derivative by time.
+
+        Parameters
+        ----------
+        order : int
+            0 position, 1 velocity, to 3 jerk.
+
+        Returns
+        -------
+        str
+            Such as ``rad/s²``.
+        """
+        per = ("", "/s", "/s²", "/s³")[order]
+        return " or ".join(part + per for part in self.value.split(" or "))
+
+
+class LineStyle(NamedTuple):
+    """How one of several lines looks: told apart without colours too."""
+
+    color: Color
+    dashes: tuple[float, tuple[float, ...]]
+
+
+def line_style(k: int) -> LineStyle:
+    """Style of line number k.
+
+    Parameters
+    ----------
+    k : int
+        From 0. The first 112 differ.
+
+    Returns
+    -------
+    LineStyle
+        Colour and dashes.
+
+    Examples
+    --------
+    >>> line_style(0).dashes, len({line_style(k) for k in range(112)})
+    ((0, ()), 112)
+    """
+    hues = len(_ORDER)
+    color = PALETTE[_ORDER[k % hues] + hues * (k // hues % 2)]
+    return LineStyle(color, _DASHES[k % len(_DASHES)])
+
+
+def joint_names(names: Sequence[str] | None, n: int, model: RobotModel | None = None) -> list[str]:
+    """Names of joints for a legend.
+
+    Parameters
+    ----------
+    names : sequence of str, length n, or None
+        As given by the caller.
+    n : int
+        Number of joints.
+    model : RobotModel, optional
+        Whose names are used otherwise.
+
+    Returns
+    -------
+    list of str
+        Without names and model ``joint 1`` to ``joint n``.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Not one text for each joint; a model of another number of joints.
+
+    Examples
+    --------
+    >>> joint_names(None, 2)
+    ['joint 1', 'joint 2']
+    """
+    if model is not None:
+        _check_model(model, n)
+    if names is not None:
+        return texts(names, n, "names", "joints")
+    if model is None:
+        return [f"joint {j + 1}" for j in range(n)]
+    kinds = model.table.sigma
+    return [name for name, kind in zip(model.table.names, kinds, strict=True) if kind != FIXED]
+
+
+def joint_units(
+    units: Unit | str | Sequence[Unit | str] | None,
+    n: int,
+    model: RobotModel | None = None,
+) -> list[Unit]:
+    """Units of joints for their axes.
+
+    Parameters
+    ----------
+    units : Unit or str, or sequence of them, length n, or None
+        As given by the caller, also by their symbols; one stands for all joints.
+    n : int
+        Number of joints.
+    model : RobotModel, optional
+        Whose joint types tell them otherwise: rad or m.
+
+    Returns
+    -------
+    list of Unit
+        Without units and model `Unit.UNSTATED`.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        An unknown unit; not one for each joint; degrees for a prismatic joint of the model or
+        metres for a revolute one; a model of another number of joints.
+
+    Examples
+    --------
+    >>> joint_units(["deg", "mm"], 2)
+    [<Unit.DEGREE: 'deg'>, <Unit.MILLIMETRE: 'mm'>]
+    """
+    lengths = None
+    if model is not None:
+        _check_model(model, n)
+        lengths = model.table.sigma[model.table.sigma != FIXED] == PRISMATIC
+    if units is None:
+        if lengths is None:
+            return [Unit.UNSTATED] * n
+        return [Unit.METRE if long else Unit.RADIAN for long in lengths]
+    if isinstance(units, (Unit, str)):
+        given = [as_unit(units)] * n
+    else:
+        given = [as_unit(unit) for unit in units]
+    if len(given) != n:
+        raise ShapeError(f"units: expected one for each of the {n} joints, got {len(given)}.")
+    for j, unit in enumerate(given):
+        wrong = (Unit.RADIAN, Unit.DEGREE) if lengths is not None and lengths[j] else (
+            Unit.METRE, Unit.MILLIMETRE)  # fmt: skip
+        if lengths is not None and unit in wrong:
+            kind = "prismatic" if lengths[j] else "revolute"
+            raise InvalidValueError(f"units: joint {j + 1} is {kind}, got {unit.value!r}.")
+    return given
+
+
+def as_unit(unit: Unit | str) -> Unit:
+    """A unit from itself or its symbol.
+
+    Parameters
+    ----------
+    unit : Unit or str
+        As given by the caller.
+
+    Returns
+    -------
+    Unit
+        The unit.
+
+    Raises
+    ------
+    InvalidValueError
+        No unit of a joint.
+
+    Examples
+    --------
+    >>> as_unit("mm")
+    <Unit.MILLIMETRE: 'mm'>
+    """
+    try:
+        return Unit(unit)
+    except ValueError:
+        known = ", ".join(repr(each.value) for each in Unit)
+        raise InvalidValueError(f"units: expected one of {known}, got {unit!r}.") from None
+
+
+def texts(values: Any, count: int, name: str, of: str) -> list[str]:
+    """One text for each of several things.
+
+    Parameters
+    ----------
+    values : sequence of str
+        As given by the caller.
+    count : int
+        Number of things.
+    name, of : str
+        The argument and the things, for messages.
+
+    Returns
+    -------
+    list of str
+        The texts.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        No sequence of texts, or not so many.
+
+    Examples
+    --------
+    >>> texts(("a", "b"), 2, "names", "joints")
+    ['a', 'b']
+    """
+    if isinstance(values, str) or not isinstance(values, Iterable):
+        raise InvalidValueError(f"{name}: expected a list of texts, got {values!r:.60}.")
+    words = [str(value) for value in values]
+    if len(words) != count:
+        raise ShapeError(f"{name}: expected one for each of the {count} {of}, got {len(words)}.")
+    return words
+
+
+def new_figure(width: float, height: float, size: ArrayLike | None = None) -> Figure:
+    """An empty figure, laid out so that nothing overlaps. No pyplot: no display, no global state.
+
+    Parameters
+    ----------
+    width, height : float
+        Inches.
+    size : array_like, shape (2,), optional
+        Width and height that the caller wants instead.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Shows itself in a notebook.
+
+    Raises
+    ------
+    MissingExtraError
+        Matplotlib is not installed.
+    ShapeError, InvalidValueError
+        A size that is not two positive numbers.
+
+    Examples
+    --------
+    >>> new_figure(3.5, 2.0).get_size_inches()
+    array([3.5, 2. ])
+    """
+    given = np.array((width, height)) if size is None else as_exact(size, (2,), "size")
+    if (given <= 0.0).any():
+        raise InvalidValueError(f"size: expected positive inches, got {given}.")
+    try:
+        from .plot_figure import PlotFigure
+    except ImportError as error:
+        raise MissingExtraError(
+            "figures need Matplotlib; run: pip install 'matplotlib>=3.10'"
+        ) from error
+    figure = PlotFigure(
+        figsize=(float(given[0]), float(given[1])),
+        dpi=_DPI,
+        facecolor="white",
+        layout="constrained",
+    )
+    engine: Any = figure.get_layout_engine()
+    engine.set(w_pad=0.04, h_pad=0.03, wspace=0.02, hspace=0.02)
+    return figure
+
+
+def panels(figure: Figure, rows: int, columns: int = 1, **options: Any) -> Any:
+    """Axes in rows and columns, in the common style.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+        An empty one.
+    rows, columns : int
+        How many.
+    **options
+        Of ``Figure.subplots``.
+
+    Returns
+    -------
+    ndarray of Axes, shape (rows, columns)
+        Empty axes.
+
+    Examples
+    --------
+    >>> panels(new_figure(3.5, 2.0), 2).shape
+    (2, 1)
+    """
+    grid = figure.subplots(rows, columns, squeeze=False, **options)
+    for axes in grid.flat:
+        styled(axes)
+    return grid
+
+
+def styled(axes: Axes) -> Axes:
+    """Fonts, colours and grid of axes, whatever style is set for Matplotlib as a whole.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        To be changed.
+
+    Returns
+    -------
+    Axes
+        The same.
+    """
+    axes.set_facecolor("white")
+    for side, spine in axes.spines.items():
+        spine.set(color=PALE, linewidth=0.6, visible=side in ("left", "bottom"))
+    axes.tick_params(
+        which="both", labelsize=SMALL_SIZE, labelcolor=INK, color=PALE, length=2.5, width=0.6
+    )
+    axes.grid(True, color="0.9", linewidth=0.5, linestyle="-")
+    axes.set_axisbelow(True)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.label.set(size=LABEL_SIZE, color=INK)
+        axis.get_offset_text().set(size=SMALL_SIZE, color=INK)
+    axes.title.set(size=LABEL_SIZE, color=INK)
+    axes.margins(x=0.01, y=0.07)
+    return axes
+
+
+def legend_above(figure: Figure, handles: Sequence[Any]) -> None:
+    """A legend over all panels, outside of them, in as many columns as fit.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+        To be changed.
+    handles : sequence of Artist
+        What it explains; each has its label. Without any there is no legend.
+    """
+    if not handles:
+        return
+    # an average letter is half as wide as it is high; 2.6 letters' heights go to the line
+    letters = max(len(str(handle.get_label())) for handle in handles)
+    each = (0.55 * letters + 5.2) * SMALL_SIZE / 72.0
+    columns = int(np.clip(figure.get_figwidth() // each, 1, len(handles)))
+    rows = -(-len(handles) // columns)
+    figure.legend(
+        handles=handles,
+        loc="outside upper center",
+        ncols=-(-len(handles) // rows),
+        fontsize=SMALL_SIZE,
+        labelcolor=INK,
+        frameon=False,
+        handlelength=2.6,
+        columnspacing=1.4,
+        handletextpad=0.5,
+        labelspacing=0.3,
+        borderpad=0.1,
+    )
+
+
+def titled(figure: Figure, title: str | None) -> None:
+    """A title over the figure, if there is one.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+        To be changed.
+    title : str or None
+        Its text.
+    """
+    if title is not None:
+        figure.suptitle(str(title), size=LABEL_SIZE + 1.0, color=INK)
+
+
+def limit_lines(
+    axes: Axes, lower: Array, upper: Array, colors: Sequence[Color], names: Sequence[str]
+) -> int:
+    """Dashed lines at limits; one grey line where all joints have the same.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        To be drawn on.
+    lower, upper : ndarray, shape (n,)
+        In the unit of the axes; infinite ones are no limits.
+    colors, names : sequence, length n
+        Of the joints.
+
+    Returns
+    -------
+    int
+        How many lines were drawn.
+    """
+    count = 0
+    for side, values in (("lower", lower), ("upper", upper)):
+        common = len(values) > 1 and bool(np.ptp(values) == 0.0 if np.isfinite(values).all() else 0)
+        for j in range(1 if common else len(values)):
+            if np.isfinite(values[j]):
+                axes.axhline(
+                    float(values[j]),
+                    color=PALE if common else colors[j],
+                    linewidth=LIMIT_WIDTH,
+                    linestyle=LIMIT_DASHES,
+                    zorder=1.5,
+                    label=f"_{side} limit of {'all joints' if common else names[j]}",
+                )
+                count += 1
+    return count
+
+
+def _check_model(model: Any, n: int) -> None:
+    if not isinstance(model, RobotModel):
+        raise InvalidValueError(f"model: expected a RobotModel, got {type(model).__name__}.")
+    if model.n != n:
+        raise ShapeError(f"model: expected a robot of {n} joints, got {model.name!r} of {model.n}.")
