@@ -1,0 +1,268 @@
+"""How singular positions are met: pseudo-inverse, filtered or damped singular values.
+
+All of them solve ``A y = b`` with the Jacobian ``A`` and the twist ``b`` made comparable: linear
+rows divided by a characteristic length, columns by the square roots of the joints' weights. The
+singular values of ``A`` are then numbers of order one: ``1 / sigma`` is the speed of the joints
+[rad/s] that a turn of 1 rad/s, or a motion of one length per second, takes in that direction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from math import inf, isfinite, sqrt
+
+from ...errors import InvalidValueError
+
+THRESHOLD = 0.04
+"""Default singular value below which a direction counts as weak: at 2 or 3 deg from the singular
+positions of an industrial arm."""
+
+LARGEST_DAMPING = 0.02
+"""Default damping at a singular position."""
+
+
+class Damping(Enum):
+    """Which directions are damped, and when.
+
+    Examples
+    --------
+    >>> Damping.WEAK_DIRECTIONS.value
+    'each direction whose singular value is below the threshold, by its own'
+    """
+
+    WEAK_DIRECTIONS = "each direction whose singular value is below the threshold, by its own"
+    SMALLEST_SINGULAR_VALUE = "all directions, by the smallest singular value"
+    MANIPULABILITY = "all directions, by the product of the singular values"
+    CONSTANT = "all directions, always"
+
+
+_KINDS = {
+    Damping.CONSTANT: 2,
+    Damping.WEAK_DIRECTIONS: 3,
+    Damping.SMALLEST_SINGULAR_VALUE: 4,
+    Damping.MANIPULABILITY: 5,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class PseudoInverse:
+    """The regular solution: exact, of least weighted norm, unbounded near singular positions.
+
+    Parameters
+    ----------
+    tolerance : float
+        Singular values up to this, relative to the largest, count as zero: their directions are
+        left out.
+
+    Raises
+    ------
+    InvalidValueError
+        A tolerance outside [0, 1).
+
+    References
+    ----------
+    Seed book sections 1.3.2.1 and 1.3.2.4.
+
+    Examples
+    --------
+    >>> PseudoInverse().gain
+    inf
+    """
+
+    tolerance: float = 1e-10
+
+    def __post_init__(self) -> None:
+        _set_number(self, "tolerance", 0.0)
+        if self.tolerance >= 1.0:
+            raise InvalidValueError(f"tolerance: expected less than 1, got {self.tolerance!r}.")
+
+    @property
+    def gain(self) -> float:
+        """Largest joint speed per speed of the twist, both comparable: without bound."""
+        return inf
+
+    @property
+    def kernel_arguments(self) -> tuple[int, float, float, float]:
+        """Kind, threshold, largest damping and largest speed."""
+        return 0, self.tolerance, 0.0, inf
+
+
+@dataclass(frozen=True, slots=True)
+class FilteredInverse:
+    """Singular value filtering: the inverse of a small singular value fades out.
+
+    ``1 / sigma`` above the threshold e, ``s (3 - 2 s) / e`` with ``s = sigma / e`` below: the same
+    value and slope at the threshold, 0 at a singular position. Directions above it are exact.
+
+    Parameters
+    ----------
+    threshold : float
+        Singular value below which a direction is filtered.
+
+    Raises
+    ------
+    InvalidValueError
+        A threshold that is not positive.
+
+    References
+    ----------
+    Seed book section 1.3.2.2; A. A. Maciejewski and C. A. Klein, Numerical filtering for the
+    operation of robotic manipulators through kinematically singular configurations, 1988.
+
+    Examples
+    --------
+    >>> FilteredInverse(0.05).gain
+    22.5
+    """
+
+    threshold: float = THRESHOLD
+
+    def __post_init__(self) -> None:
+        _set_number(self, "threshold", 0.0, above=True)
+
+    @property
+    def gain(self) -> float:
+        """Largest joint speed per speed of the twist, both comparable: 9 / (8 threshold)."""
+        return 1.125 / self.threshold
+
+    @property
+    def kernel_arguments(self) -> tuple[int, float, float, float]:
+        """Kind, threshold, largest damping and largest speed."""
+        return 1, self.threshold, 0.0, inf
+
+
+@dataclass(frozen=True, slots=True)
+class DampedInverse:
+    """Damped least squares: ``sigma / (sigma^2 + lambda^2)`` in place of ``1 / sigma``.
+
+    Parameters
+    ----------
+    threshold : float
+        Singular value below which damping sets in (for `Damping.MANIPULABILITY` the product of
+        them); not used by `Damping.CONSTANT`.
+    largest : float
+        Damping ``lambda`` at a singular position. With e the threshold,
+        ``lambda^2 = largest^2 (1 - (sigma / e)^2)`` below it, where sigma is that of the direction
+        (`Damping.WEAK_DIRECTIONS`) or the smallest one; for `Damping.MANIPULABILITY`
+        ``lambda = largest (1 - w / e)`` with their product w.
+    damping : Damping
+        Which directions are damped. The default leaves all directions above the threshold exact.
+    largest_speed : float, optional
+        Bound on the speed of the joints that the task takes: the weighted norm of its part of
+        ``v`` [rad/s], ``sqrt(sum(joint_weights v^2))``. Where more would be needed, one more
+        damping, the least that suffices, is added: the error is then the least possible within
+        the bound (for what is not damped otherwise).
+
+    Raises
+    ------
+    InvalidValueError
+        Numbers that are negative or not finite, a largest speed of zero, or a ``damping`` that is
+        none.
+
+    References
+    ----------
+    Seed book section 1.3.2.2; Y. Nakamura and H. Hanafusa 1986 (manipulability), A. A. Maciejewski
+    and C. A. Klein 1988 (weak directions), S. Chiaverini 1997 (smallest singular value), A. S. Deo
+    and I. D. Walker 1993 (bounded speed).
+
+    Examples
+    --------
+    >>> round(DampedInverse(threshold=0.04, largest=0.02).gain, 3)
+    28.868
+    >>> DampedInverse(damping=Damping.CONSTANT, largest=0.05).gain
+    10.0
+    """
+
+    threshold: float = THRESHOLD
+    largest: float = LARGEST_DAMPING
+    damping: Damping = Damping.WEAK_DIRECTIONS
+    largest_speed: float | None = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.damping, Damping):
+            raise InvalidValueError(
+                "damping: expected a member of Damping such as Damping.WEAK_DIRECTIONS, got "
+                f"{self.damping!r}."
+            )
+        by_product = self.damping is Damping.MANIPULABILITY
+        _set_number(self, "threshold", 0.0, above=by_product)
+        _set_number(self, "largest", 0.0)
+        if self.largest_speed is not None:
+            _set_number(self, "largest_speed", 0.0, above=True)
+
+    @property
+    def gain(self) -> float:
+        """Largest joint speed per speed of the twist, both comparable, by the damping alone.
+
+        ``1 / (2 largest)`` for a constant damping; infinite where the damping may vanish beside a
+        singular position (`Damping.MANIPULABILITY`, a threshold of zero).
+        """
+        if self.damping is Damping.MANIPULABILITY or self.largest == 0.0:
+            return inf
+        if self.damping is Damping.CONSTANT:
+            return 0.5 / self.largest
+        if self.threshold == 0.0:
+            return inf
+        # s / (s^2 + r^2 (1 - s^2)) for s in [0, 1] is largest at s^2 = r^2 / (1 - r^2), or at 1
+        r = self.largest / self.threshold
+        if r * r >= 0.5:
+            return 1.0 / self.threshold
+        return 0.5 / (self.largest * sqrt(1.0 - r * r))
+
+    @property
+    def kernel_arguments(self) -> tuple[int, float, float, float]:
+        """Kind, threshold, largest damping and largest speed."""
+        speed = inf if self.largest_speed is None else self.largest_speed
+        return _KINDS[self.damping], self.threshold, self.largest, speed
+
+
+InverseMethod = PseudoInverse | FilteredInverse | DampedInverse
+
+
+def as_method(method: InverseMethod | None) -> InverseMethod:
+    """The method asked for; None is `DampedInverse` with its defaults.
+
+    Parameters
+    ----------
+    method : PseudoInverse, FilteredInverse, DampedInverse or None
+        What was given.
+
+    Returns
+    -------
+    PseudoInverse, FilteredInverse or DampedInverse
+        The method.
+
+    Raises
+    ------
+    InvalidValueError
+        Anything else.
+
+    Examples
+    --------
+    >>> as_method(None).largest
+    0.02
+    """
+    if method is None:
+        return _DEFAULT
+    if not isinstance(method, InverseMethod):
+        raise InvalidValueError(
+            "method: expected a PseudoInverse, FilteredInverse or DampedInverse, got "
+            f"{method!r:.80}; a class needs its parentheses, DampedInverse()."
+        )
+    return method
+
+
+def _set_number(owner: object, name: str, lowest: float, above: bool = False) -> None:
+    value = getattr(owner, name)
+    try:
+        number = float(value) if not isinstance(value, (bool, str)) else None
+    except (TypeError, ValueError):
+        number = None
+    if number is None or not isfinite(number) or number < lowest or (above and number == lowest):
+        wanted = f"above {lowest:g}" if above else f"of at least {lowest:g}"
+        raise InvalidValueError(f"{name}: expected a finite number {wanted}, got {value!r}.")
+    object.__setattr__(owner, name, number)
+
+
+_DEFAULT = DampedInverse()
