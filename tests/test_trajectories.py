@@ -602,3 +602,26 @@ def test_joint_trajectory_is_a_quintic():
     assert joint_trajectory([0.0], [1.0], 0).q.shape == (0, 1)
     assert joint_trajectory([0.0], [1.0], 1).q[0, 0] == 0.0
     assert joint_trajectory(np.zeros((4, 2)), np.ones((4, 2)), 7).q.shape == (4, 7, 2)
+
+
+@pytest.mark.parametrize("together", [True, False])
+def test_pieces_are_evaluated_at_any_order_of_times(together, rng):
+    """Beside the sum of powers written out; pieces without a length, one joint and twenty."""
+    for n in (1, 2, 20):
+        K, c = 6, 1 if together else n
+        lengths = rng.uniform(0.1, 1.0, (c, K)) * (rng.random((c, K)) < 0.7)
+        lengths[:, 2] = 0.5
+        breaks = np.concatenate((np.zeros((c, 1)), np.cumsum(lengths, axis=-1)), axis=-1)
+        motion = PiecewisePolynomial(breaks, rng.normal(size=(K, 5, n)), lengths)
+        end = breaks[:, -1].min()
+        t = np.concatenate((rng.uniform(0.0, end, 60), breaks[breaks <= end], [0.0, end, 0.0]))
+        found = motion.derivatives(t, (3, 0, 7, 1))
+        for i, j in np.ndindex(t.size, n):
+            g = 0 if together else j
+            live = np.flatnonzero(lengths[g] > 0.0)
+            k = max([k for k in live if breaks[g, k] <= t[i]] or [live[0]])
+            p = np.polynomial.Polynomial(motion.coefficients[k, :, j])
+            x, h = (t[i] - breaks[g, k]) / lengths[g, k], lengths[g, k]
+            for values, order in zip(found, (3, 0, 7, 1), strict=True):
+                want = p.deriv(order)(x) / h**order
+                assert abs(values[i, j] - want) < 1e-12 * max(1.0, h**-order)

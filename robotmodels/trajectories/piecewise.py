@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from itertools import pairwise
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -94,12 +94,20 @@ class PiecewisePolynomial:
         list of ndarray, shapes (..., N, n)
             One for each order. At a break the value of the piece that begins there.
         """
-        out = [np.empty((*t.shape, self.n)) for _ in orders]
-        if self.batch:
-            self._by_gathering(t, orders, out)
-        else:
-            self._by_slices(t, orders, out)
-        return out
+        from ..kernels.piecewise_polynomials import piecewise_derivatives
+
+        *_, K, powers, n = self.coefficients.shape
+        M, c = prod(self.batch), self.breaks.shape[-2]
+        out = np.empty((len(orders), M, t.shape[-1], n))
+        piecewise_derivatives(
+            np.ascontiguousarray(t).reshape(M, t.shape[-1]),
+            self.breaks.reshape(M, c, K + 1),
+            self.lengths.reshape(M, c, K),
+            self.coefficients.reshape(M, K, powers, n),
+            np.asarray(orders, np.int64),
+            out,
+        )
+        return [values.reshape(*t.shape, n) for values in out]
 
     def extremes(self, order: int) -> tuple[Array, Array]:
         """Least and greatest value of a derivative over the motion, exact on every piece.
@@ -144,50 +152,6 @@ class PiecewisePolynomial:
             before = np.where(live[..., k, :], last[..., k, :], before)
             started = started | live[..., k, :]
         return down < -_ROUNDING * scale, up > _ROUNDING * scale
-
-    def _by_slices(self, t: Array, orders: tuple[int, ...], out: list[Array]) -> None:
-        """One motion: each piece takes its run of the sorted times at once."""
-        order = None if t.size < 2 or bool((t[1:] >= t[:-1]).all()) else np.argsort(t)
-        times = t if order is None else t[order]
-        together = self.breaks.shape[0] == 1
-        powers = np.ones((self.coefficients.shape[-2], t.size))
-        derived = [_derived(self.coefficients, m) for m in orders]
-        for j, breaks in enumerate(self.breaks):
-            column = slice(None) if together else j
-            lengths = self.lengths[j]
-            edges = [0, *np.searchsorted(times, breaks[1:-1]).tolist(), len(times)]
-            live = np.flatnonzero(lengths > 0.0)
-            if live.size:  # the end belongs to the last piece that has a length
-                edges[live[-1] + 1 :] = [len(times)] * (len(lengths) - live[-1])
-            for k, (first, last) in enumerate(pairwise(edges)):
-                if first == last:
-                    continue
-                h = float(lengths[k]) or 1.0
-                X = powers[:, : last - first]
-                x = (times[first:last] - breaks[k]) / h
-                for i in range(1, len(X)):
-                    np.multiply(X[i - 1], x, out=X[i])
-                rows = slice(first, last) if order is None else order[first:last]
-                for result, m, d in zip(out, orders, derived, strict=True):
-                    result[rows, column] = X[: d.shape[-2]].T @ (d[k][:, column] / h**m)
-
-    def _by_gathering(self, t: Array, orders: tuple[int, ...], out: list[Array]) -> None:
-        """Several motions: the coefficients of every time's piece are brought together."""
-        for j in range(self.n):
-            breaks = self.breaks[..., min(j, self.breaks.shape[-2] - 1), :]
-            lengths = self.lengths[..., min(j, self.lengths.shape[-2] - 1), :]
-            piece = (t[..., None] >= breaks[..., None, 1:-1]).sum(axis=-1)
-            # the end belongs to the last piece that has a length
-            last = np.where(lengths > 0.0, np.arange(lengths.shape[-1]), 0).max(axis=-1)
-            piece = np.minimum(piece, last[..., None])
-            start = np.take_along_axis(breaks, piece, axis=-1)
-            h = np.take_along_axis(lengths, piece, axis=-1)
-            h = np.where(h > 0.0, h, 1.0)
-            x = (t - start) / h
-            c = np.take_along_axis(self.coefficients[..., j], piece[..., None], axis=-2)
-            for result, m in zip(out, orders, strict=True):
-                d = np.moveaxis(_derived(c[..., None], m)[..., 0], -1, 0)
-                result[..., j] = _horner(d, x) / h**m
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), tuple(getattr(self, field.name) for field in fields(self))
