@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_exact
 from ..errors import InvalidValueError, MissingExtraError, ShapeError
-from ..geometry import FIXED, PRISMATIC
+from ..geometry import PRISMATIC
 from ..model import RobotModel
 from ..visual import Color
 from .palette import PALETTE
@@ -145,8 +145,7 @@ def joint_names(names: Sequence[str] | None, n: int, model: RobotModel | None = 
         return texts(names, n, "names", "joints")
     if model is None:
         return [f"joint {j + 1}" for j in range(n)]
-    kinds = model.table.sigma
-    return [name for name, kind in zip(model.table.names, kinds, strict=True) if kind != FIXED]
+    return [str(model.table.names[row]) for row in model.table.joint_rows]
 
 
 def joint_units(
@@ -184,7 +183,7 @@ def joint_units(
     lengths = None
     if model is not None:
         _check_model(model, n)
-        lengths = model.table.sigma[model.table.sigma != FIXED] == PRISMATIC
+        lengths = model.table.sigma[model.table.joint_rows] == PRISMATIC
     if units is None:
         if lengths is None:
             return [Unit.UNSTATED] * n
@@ -373,8 +372,8 @@ def styled(axes: Axes) -> Axes:
     return axes
 
 
-def legend_above(figure: Figure, handles: Sequence[Any]) -> None:
-    """A legend over all panels, outside of them, in as many columns as fit.
+def legend_above(figure: Figure, handles: Sequence[Any], title: str | None = None) -> None:
+    """A legend over all panels, outside of them, in as many columns as fit; and a title over it.
 
     Parameters
     ----------
@@ -382,15 +381,20 @@ def legend_above(figure: Figure, handles: Sequence[Any]) -> None:
         To be changed.
     handles : sequence of Artist
         What it explains; each has its label. Without any there is no legend.
+    title : str, optional
+        Of the figure.
     """
+    text = {"size": LABEL_SIZE + 1.0, "color": INK}
     if not handles:
+        if title is not None:
+            figure.suptitle(str(title), **text)
         return
-    # an average letter is half as wide as it is high; 2.6 letters' heights go to the line
+    # an average letter is half as wide as it is high; as much as five letters goes to the line
     letters = max(len(str(handle.get_label())) for handle in handles)
     each = (0.55 * letters + 5.2) * SMALL_SIZE / 72.0
     columns = int(np.clip(figure.get_figwidth() // each, 1, len(handles)))
     rows = -(-len(handles) // columns)
-    figure.legend(
+    legend = figure.legend(
         handles=handles,
         loc="outside upper center",
         ncols=-(-len(handles) // rows),
@@ -402,27 +406,15 @@ def legend_above(figure: Figure, handles: Sequence[Any]) -> None:
         handletextpad=0.5,
         labelspacing=0.3,
         borderpad=0.1,
+        title=title,  # as a title of the figure it would stand on the legend
     )
-
-
-def titled(figure: Figure, title: str | None) -> None:
-    """A title over the figure, if there is one.
-
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-        To be changed.
-    title : str or None
-        Its text.
-    """
-    if title is not None:
-        figure.suptitle(str(title), size=LABEL_SIZE + 1.0, color=INK)
+    legend.get_title().set(**text)
 
 
 def limit_lines(
     axes: Axes, lower: Array, upper: Array, colors: Sequence[Color], names: Sequence[str]
-) -> int:
-    """Dashed lines at limits; one grey line where all joints have the same.
+) -> None:
+    """Dashed lines at limits in the joints' colours; grey where all joints have the same.
 
     Parameters
     ----------
@@ -432,15 +424,9 @@ def limit_lines(
         In the unit of the axes; infinite ones are no limits.
     colors, names : sequence, length n
         Of the joints.
-
-    Returns
-    -------
-    int
-        How many lines were drawn.
     """
-    count = 0
     for side, values in (("lower", lower), ("upper", upper)):
-        common = len(values) > 1 and bool(np.ptp(values) == 0.0 if np.isfinite(values).all() else 0)
+        common = bool(np.isfinite(values).all() and np.ptp(values) == 0.0)
         for j in range(1 if common else len(values)):
             if np.isfinite(values[j]):
                 axes.axhline(
@@ -449,10 +435,8 @@ def limit_lines(
                     linewidth=LIMIT_WIDTH,
                     linestyle=LIMIT_DASHES,
                     zorder=1.5,
-                    label=f"_{side} limit of {'all joints' if common else names[j]}",
+                    label=f"_{side} limit of {' and '.join(names) if common else names[j]}",
                 )
-                count += 1
-    return count
 
 
 def _check_model(model: Any, n: int) -> None:
