@@ -31,6 +31,8 @@ from robotmodels.trajectories import (
     straight_line,
     trapezoidal,
 )
+from robotmodels.trajectories.follow import _following
+from robotmodels.trajectories.path_task import _inverted
 from robotmodels.trajectories.rotations import rotation_about, rotation_vector
 
 
@@ -533,3 +535,39 @@ def test_joint_path_shapes_and_refusals():
         joint_path(arm, straight_line(T[0], T[0], 1.0), t=[0.0, 1.0])
     with pytest.raises(InvalidValueError, match="RobotModel"):
         joint_path("rx90", T)
+
+
+def test_small_inverses_beside_lapack(rng):
+    for n in (1, 3, 6):
+        A = rng.normal(size=(200, n, n))
+        A[:, :, 0] *= 10.0 ** rng.uniform(-8.0, 2.0, (200, 1))
+        inverse, conditioning, sign = _inverted(A)
+        want = np.linalg.inv(A)
+        norm = np.linalg.norm
+        bound = 1e-14 * np.linalg.cond(A) * norm(want, axis=(1, 2))
+        assert (norm(inverse - want, axis=(1, 2)) <= bound).all()
+        by_norms = n / (norm(A, axis=(1, 2)) * norm(want, axis=(1, 2)))
+        assert np.abs(conditioning / by_norms - 1.0).max() < 1e-6
+        assert np.array_equal(sign, np.sign(np.linalg.det(A)))
+    A[7, 2] = 0.0  # one singular matrix: the others are as before
+    pseudo, conditioning, sign = _inverted(A)
+    assert conditioning[7] < 1e-15
+    assert sign[7] == 0.0
+    assert np.abs(pseudo[7] - np.linalg.pinv(A[7])).max() < 1e-8 * np.abs(pseudo[7]).max()
+    assert np.abs(pseudo[8] - inverse[8]).max() <= bound[8]
+
+
+def test_postures_go_on_by_the_shortest_step(rng):
+    q = rng.uniform(-np.pi, np.pi, (1, 5, 4)) + np.zeros((40, 1, 1))
+    q[:, :, 0] += np.linspace(0.0, 1.0, 40)[:, None]  # all turn through the half turn
+    q[:, :, :2] = np.remainder(q[:, :, :2] + np.pi, 2 * np.pi) - np.pi
+    order = np.array([rng.permutation(5) if k % 7 == 3 else np.arange(5) for k in range(40)])
+    mixed = np.take_along_axis(q, order[..., None], axis=1)
+    valid = np.ones((40, 5), np.bool_)
+    valid[20] = order[20] != 2  # one branch is lost
+    following = _following(mixed, valid, np.array([True, True, True, False]))
+    for k in range(39):
+        for s in range(5):
+            if valid[k, s] and valid[k + 1, list(order[k + 1]).index(order[k, s])]:
+                assert order[k + 1, following[k, s]] == order[k, s]
+    assert _following(mixed[:1], valid[:1], np.ones(4, np.bool_)).shape == (0, 5)

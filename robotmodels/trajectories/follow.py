@@ -1,20 +1,18 @@
-"""Which of the postures of every pose belong together, and the Jacobians on the way."""
+"""Which of the postures of every pose belong together."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from .._arrays import Array
 from ..geometry import REVOLUTE
 from ..igm import IGMSolutions
 from ..igm.solutions import posture_distance
-from ..kinematics import jacobian
 from ..model import RobotModel
-from .rotations import rotation_vector
 
 _NEAR = 0.05
 """A posture with the same number that is as near as this goes on from the last, rad or m."""
@@ -73,7 +71,8 @@ def follow(
         One posture of each pose that has any.
     """
     N, n = len(T), model.n
-    q, branch = np.full((N, n), np.nan), np.zeros(N, found.branch.dtype)
+    names = np.array((*found.labels, ""))
+    q, branch = np.full((N, n), np.nan), np.zeros(N, names.dtype)
     status = np.array(found.status)
     index = np.flatnonzero(found.valid.any(axis=-1)) if N else np.zeros(0, np.int64)
     reached = np.zeros(N, np.bool_)
@@ -88,13 +87,44 @@ def follow(
         s = int(np.where(valid[0], distance, np.inf).argmin())
     else:
         s = _best_start(postures, valid, found.within_limits[index], following, revolute)
-    # postures with free joints depend on the reference: they are solved again from the one before
     loose: NDArray[np.bool_] = np.any(found.free_joints[index], axis=-1)
+    picks, settled = [s] * len(index), {}
+    if loose.any():
+        picks, settled = _settled(
+            postures, valid, names[found.code[index]], loose, following, s, revolute, start,
+            lambda k, near: solve(int(index[k]), near),
+        )  # fmt: skip
+    elif (following != np.arange(following.shape[-1])).any():
+        after = following.tolist()
+        for k in range(1, len(index)):
+            picks[k] = after[k - 1][picks[k - 1]]
+    q[index] = postures[np.arange(len(index)), picks]
+    branch[index] = names[found.code[index, picks]]
+    for k, (posture, label) in settled.items():
+        q[index[k]], branch[index[k]] = posture, label
+    return Followed(q, reached, status, branch, found.reason)
+
+
+def _settled(
+    postures: Array,
+    valid: NDArray[np.bool_],
+    branch: NDArray[np.str_],
+    loose: NDArray[np.bool_],
+    following: NDArray[np.int64],
+    s: int,
+    revolute: NDArray[np.bool_],
+    start: Array | None,
+    solve: Callable[[int, Array], IGMSolutions],
+) -> tuple[list[int], dict[int, tuple[Array, str]]]:
+    """Numbers of the postures taken, and those that were solved again, with their labels.
+
+    Postures with free joints depend on the reference, which is the posture before.
+    """
     after, again = following.tolist(), False
-    picks = [s] * len(index)
+    picks = [s] * len(postures)
     settled: dict[int, tuple[Array, str]] = {}
     before = start
-    for k in range(len(index)):
+    for k in range(len(postures)):
         if again and before is not None:
             distance = posture_distance(postures[k], before, revolute)
             s = int(np.where(valid[k], distance, np.inf).argmin())
@@ -105,17 +135,13 @@ def follow(
         if again:
             reference = before if k == 0 or k - 1 in settled else postures[k - 1, picks[k - 1]]
             if reference is not None:
-                one = solve(int(index[k]), reference)
+                one = solve(k, reference)
                 distance = posture_distance(one.q, reference, revolute)
                 best = int(np.where(one.valid, distance, np.inf).argmin())
                 settled[k] = one.q[best], str(one.branch[best])
             before = settled[k][0] if k in settled else postures[k, s]
-            settled.setdefault(k, (before, str(found.branch[index[k], s])))
-    q[index] = postures[np.arange(len(index)), picks]
-    branch[index] = found.branch[index, picks]
-    for k, (posture, label) in settled.items():
-        q[index[k]], branch[index[k]] = posture, label
-    return Followed(q, reached, status, branch, found.reason)
+            settled.setdefault(k, (before, str(branch[k, s])))
+    return picks, settled
 
 
 def follow_singly(
@@ -203,143 +229,17 @@ def continuous(
     return out
 
 
-class Task:
-    """The Jacobians of what is asked of the tool, along the path.
+def _following(
+    postures: Array, valid: NDArray[np.bool_], revolute: NDArray[np.bool_]
+) -> NDArray[np.int64]:
+    """For every posture the one of the next pose that goes on from it, shape (M - 1, S)."""
+    from ..kernels.posture_chains import following_postures
 
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-    T : ndarray, shape (N, 4, 4)
-        Poses, m.
-    q : ndarray, shape (N, n)
-        Postures; NaN where there is none.
-    reached : ndarray of bool, shape (N,)
-        Which rows hold a posture.
-    mask : array_like, shape (6,), or None
-        Components that are asked for.
-    mask_axes : str
-        ``"world"`` or ``"tool"``.
-
-    Attributes
-    ----------
-    conditioning : ndarray, shape (N,)
-        Inverse of the condition number in the Frobenius norm, 1 at best; NaN without a posture.
-    sign : ndarray, shape (N,)
-        Of the determinant where the Jacobian is square, else 0.
-    square : bool
-        Whether the posture follows from the task.
-    """
-
-    __slots__ = (
-        "_asked",
-        "_inverse",
-        "_length",
-        "_poses",
-        "_tool",
-        "conditioning",
-        "sign",
-        "square",
-    )
-
-    def __init__(
-        self,
-        model: RobotModel,
-        T: Array,
-        q: Array,
-        reached: NDArray[np.bool_],
-        mask: ArrayLike | None,
-        mask_axes: str,
-    ) -> None:
-        N, n = q.shape
-        self._asked = np.ones(6, np.bool_) if mask is None else np.asarray(mask, np.bool_)
-        self._tool, self._poses = mask_axes == "tool", T
-        J = jacobian(model, q[reached], reference="local" if self._tool else "world_aligned")
-        lever = np.linalg.norm(J[:, :3], axis=-2).max(initial=0.0)
-        self._length = float(lever) if lever > 0.0 else 1.0
-        J[:, :3] /= self._length
-        J = J[:, self._asked]
-        self.square = J.shape[-1] == J.shape[-2]
-        self.conditioning, self.sign = np.full(N, np.nan), np.zeros(N)
-        self._inverse = np.full((N, n, J.shape[-2]), np.nan)
-        inverse, conditioning, sign = _inverted(J)
-        self._inverse[reached], self.conditioning[reached] = inverse, conditioning
-        self.sign[reached] = sign
-
-    def rates(self, twists: Array) -> Array:
-        """Joint velocities (N, n) for twists (N, 6) in world axes; the least of many."""
-        return (self._inverse @ self._rows(twists, self._poses)[..., None])[..., 0]
-
-    def foreseen(self) -> Array:
-        """Steps (N - 1, n) from pose to pose that the Jacobians at both ends foresee."""
-        T = self._poses
-        step = np.empty((max(len(T) - 1, 0), 6))
-        step[:, :3] = np.diff(T[:, :3, 3], axis=0)
-        step[:, 3:] = rotation_vector(T[1:, :3, :3] @ np.swapaxes(T[:-1, :3, :3], -1, -2))
-        mean = 0.5 * (self._inverse[1:] + self._inverse[:-1])
-        return (mean @ self._rows(step, T[:-1])[..., None])[..., 0]
-
-    def _rows(self, twists: Array, T: Array) -> Array:
-        """The components asked for, positions in units of the lever."""
-        twists = np.array(twists)
-        if self._tool:
-            axes = np.swapaxes(T[:, :3, :3], -1, -2)
-            twists[:, :3] = (axes @ twists[:, :3, None])[..., 0]
-            twists[:, 3:] = (axes @ twists[:, 3:, None])[..., 0]
-        twists[:, :3] /= self._length
-        return twists[:, self._asked]
-
-
-def _inverted(J: Array) -> tuple[Any, Any, Any]:
-    """(Pseudo-)inverses, conditioning and sign of the determinant of Jacobians (M, m, n)."""
-    m, n = J.shape[-2:]
-    r = min(m, n)
-    size = np.sqrt(np.einsum("kij,kij->k", J, J))
-    if m == n:
-        try:
-            inverse = np.linalg.inv(J)
-        except np.linalg.LinAlgError:
-            inverse = None  # one of them is singular to the last digit
-        if inverse is not None:
-            other = np.sqrt(np.einsum("kij,kij->k", inverse, inverse))
-            with np.errstate(over="ignore", invalid="ignore"):
-                conditioning = r / (size * other)
-            return inverse, np.nan_to_num(conditioning), np.sign(np.linalg.det(J))
-    U, s, Vt = np.linalg.svd(J, full_matrices=False)
-    live = s > 1e-14 * s[:, :1]
-    with np.errstate(divide="ignore"):
-        other = np.sqrt((1.0 / (s * s)).sum(axis=-1))
-        factor = np.where(live, 1.0 / np.where(live, s, 1.0), 0.0)
-    inverse = np.swapaxes(Vt, -1, -2) @ (factor[..., None] * np.swapaxes(U, -1, -2))
-    with np.errstate(invalid="ignore"):
-        conditioning = np.where(size > 0.0, r / (size * other), 0.0)
-    sign = np.sign(np.linalg.det(J)) if m == n else np.zeros(len(J))
-    return inverse, conditioning, sign
-
-
-def _following(postures: Array, valid: NDArray[np.bool_], revolute: NDArray[np.bool_]) -> NDArray:
-    """For every posture the one of the next pose that goes on from it, shape (M - 1, S).
-
-    Postures come in the order of their branches, so that it is usually the one with the same
-    number. Where that is not near, all are compared, angles by their chords: a product of matrices.
-    """
     M, S = valid.shape
-    following = np.tile(np.arange(S), (max(M - 1, 0), 1))
-    turn = 2.0 * np.pi
-    with np.errstate(invalid="ignore"):
-        way = np.abs(postures[1:] - postures[:-1])
-        way = np.where(revolute, np.minimum(way, np.abs(turn - way)), way).max(axis=-1, initial=0.0)
-        far = np.flatnonzero(~((way < _NEAR) | ~valid[:-1]).all(axis=-1))
-    if far.size == 0:
-        return following
-    q = np.where(valid[..., None], postures, 0.0)
-    angle, stroke = q[..., revolute], q[..., ~revolute]
-    c, s = np.cos(angle), np.sin(angle)
-    half = 0.5 * (stroke * stroke).sum(axis=-1, keepdims=True)
-    here = np.concatenate((c, s, stroke, np.ones_like(half)), axis=-1)[far]
-    there = np.concatenate((c, s, stroke, -half), axis=-1)[far + 1]
-    alike = here @ np.ascontiguousarray(np.swapaxes(there, -1, -2))
-    following[far] = np.where(valid[far + 1][:, None, :], alike, -np.inf).argmax(axis=-1)
+    following = np.empty((max(M - 1, 0), S), np.int64)
+    following_postures(
+        np.ascontiguousarray(postures), np.ascontiguousarray(valid), revolute, _NEAR, following
+    )
     return following
 
 

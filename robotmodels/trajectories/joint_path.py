@@ -21,8 +21,9 @@ from ..errors import InvalidValueError, ShapeError
 from ..geometry import FIXED
 from ..igm import IGMSolutions, igm
 from ..model import RobotModel
-from .follow import Task, continuous, follow, follow_singly
+from .follow import continuous, follow, follow_singly
 from .path_events import PathEvent, PathEventKind, path_events
+from .path_task import Task
 from .pose_trajectory import PoseTrajectory
 
 

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from .._arrays import Array
 from ..model import RobotModel
-from .follow import Followed, Task
+from .follow import Followed
+from .path_task import Task
 
 _JUMP = 0.1
 """A step that differs from what the Jacobian foresees by this much, and by half of itself, is no
@@ -162,9 +163,12 @@ def _jumps(q: Array, reached: NDArray[np.bool_], task: Task) -> tuple[Array, NDA
     step = np.diff(q, axis=0)
     adjacent = reached[1:] & reached[:-1]
     with np.errstate(invalid="ignore"):
-        off = np.abs(step - task.foreseen()).max(axis=-1, initial=0.0)
         size = np.abs(step).max(axis=-1, initial=0.0)
-        jump = adjacent & (size > _JUMP) & ~(off <= np.maximum(_JUMP, 0.5 * size))
+    jump = adjacent & (size > _JUMP)
+    wide = np.flatnonzero(jump)
+    if wide.size:
+        off = np.abs(step[wide] - task.foreseen(wide)).max(axis=-1, initial=0.0)
+        jump[wide] = ~(off <= np.maximum(_JUMP, 0.5 * size[wide]))
     # after a gap the posture goes on where it can; any other one is a jump
     ends = np.flatnonzero(reached)
     for i, j in pairwise(ends.tolist()):

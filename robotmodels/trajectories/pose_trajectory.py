@@ -94,8 +94,12 @@ class PoseTrajectory:
         >>> move.pose(0.5)[:3, 3]
         array([0.1, 0. , 0. ])
         """
+        s = self.law.q(t)
+        return self._poses(np.asarray(t, dtype=np.float64), s)
+
+    def _poses(self, t: Array, s: Array) -> Array:
         # the last pose is met to the last digit, though the law ends a rounding beside it
-        s = np.where(np.asarray(t) >= self.duration, self.path.end, self.law.q(t))
+        s = np.where(t >= self.duration, self.path.end, s)
         return self.path.poses(s.reshape(-1)).reshape(*s.shape, 4, 4)
 
     def twist(self, t: ArrayLike) -> Array:
@@ -152,7 +156,10 @@ class PoseTrajectory:
         times = as_floats(t, "t")
         if times.ndim != 1:
             raise ShapeError(f"t: expected shape (N,), got {times.shape}.")
-        return PoseSamples(times, self.pose(times), self.twist(times), self.acceleration(times))
+        law = self.law.at(times)
+        s, v, a = np.asarray(law.q), law.v[:, None], law.a[:, None]
+        rate, change = self.path.rates(s)
+        return PoseSamples(times, self._poses(times, s), rate * v, rate * a + change * (v * v))
 
     def resample(self, samples: int | None = None, period: float | None = None) -> PoseSamples:
         """The motion on a regular grid of time.
@@ -174,7 +181,7 @@ class PoseTrajectory:
         InvalidValueError
             As `Trajectory.resample`.
         """
-        return self.at(self.law.resample(samples, period).t)
+        return self.at(self.law.grid(samples, period))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.path, self.law)

@@ -248,6 +248,29 @@ class Trajectory:
         >>> quintic(0.0, 1.0, duration=1.0).resample(period=0.3).t
         array([0. , 0.3, 0.6, 0.9, 1.2])
         """
+        return self.at(self.grid(samples, period))
+
+    def grid(self, samples: int | None = None, period: float | None = None) -> Array:
+        """The times of `resample`; arguments and errors as there.
+
+        Parameters
+        ----------
+        samples : int, optional
+            How many, from 0 to the duration.
+        period : float, optional
+            Seconds between them instead.
+
+        Returns
+        -------
+        ndarray, shape (N,)
+            Times, s.
+
+        Examples
+        --------
+        >>> from robotmodels.trajectories import quintic
+        >>> quintic(0.0, 1.0, duration=1.0).grid(3)
+        array([0. , 0.5, 1. ])
+        """
         if (samples is None) == (period is None):
             raise InvalidValueError("resample: give either samples or period.")
         if self.motion.batch:
@@ -258,7 +281,7 @@ class Trajectory:
                 raise InvalidValueError(
                     f"samples: expected a whole number from 1, got {samples!r}."
                 )
-            return self.at(np.linspace(0.0, T, int(samples)))
+            return np.linspace(0.0, T, int(samples))
         step = float(as_floats(period, "period"))  # type: ignore[arg-type]
         if step <= 0.0:
             raise InvalidValueError(f"period: expected a positive time, got {step:g} s.")
@@ -267,9 +290,9 @@ class Trajectory:
         if abs(count - near) <= 1e-9 * max(1.0, count):  # a multiple up to rounding
             t = step * np.arange(near + 1.0)
             t[-1] = min(t[-1], T) if near else 0.0
-            return self.at(t)
+            return t
         at_rest = self.repeats or self.holds or not self._moving(np.array([T]))
-        return self.at(step * np.arange(int(count) + 1.0 + at_rest))
+        return step * np.arange(int(count) + 1.0 + at_rest)
 
     def check(self, limits: MotionLimits, tolerance: float = 1e-9) -> LimitsReport:
         """Compare the motion with limits, everywhere on it and not at samples only.
