@@ -1,0 +1,265 @@
+"""Manipulability of a whole twist or some of its components: one number, and ratios along twists.
+
+The six-dimensional ellipsoids as numbers; `velocity_ellipsoid` and `force_ellipsoid` are their
+three-dimensional halves, which can be drawn.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .._arrays import Array, as_core, as_exact, as_vector, batch_shape, read_only
+from ..errors import InvalidValueError, ShapeError
+from ..model import RobotModel, check_model
+from .ellipsoids import joint_scale
+from .jacobians import Reference, jacobian
+from .static_wrench import as_tolerance, positive_length
+
+_ON = 1e-9
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Manipulability:
+    """How well joints move m components of the twist. Read-only.
+
+    Parameters
+    ----------
+    singular_values : ndarray, shape (..., m)
+        Of the weighted Jacobian, largest first; zero beyond the rank.
+    rank : ndarray of int64, shape (...)
+        Number of singular values above 0.
+    jacobian : ndarray, shape (..., m, n)
+        Rows of the components times the joint velocities of the ball, m/s and rad/s.
+    weights : ndarray, shape (m,)
+        What the rows were multiplied by to be comparable: 1 / length for linear ones next to
+        angular ones, else 1.
+
+    Raises
+    ------
+    ShapeError
+        Fields that do not fit each other.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> found = manipulability(load("rx90"), [0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
+    >>> found.rank, found.measure.round(4)
+    (array(6), np.float64(0.0209))
+    """
+
+    singular_values: Array
+    rank: NDArray[np.int64]
+    jacobian: Array
+    weights: Array
+
+    def __post_init__(self) -> None:
+        *batch, m = np.shape(self.singular_values)
+        shapes = {
+            "singular_values": (np.float64, (*batch, m)),
+            "rank": (np.int64, tuple(batch)),
+            "jacobian": (np.float64, (*batch, m, np.shape(self.jacobian)[-1])),
+            "weights": (np.float64, (m,)),
+        }
+        for name, (dtype, shape) in shapes.items():
+            array = read_only(getattr(self, name), dtype)
+            if array.shape != shape:
+                raise ShapeError(f"{name}: expected shape {shape}, got {array.shape}.")
+            object.__setattr__(self, name, array)
+
+    @property
+    def measure(self) -> Array:
+        """Yoshikawa's manipulability ``sqrt(det(J J^T))``, shape (...): 0 where rank < m.
+
+        The product of the singular values. With the components of the whole twist its unit is
+        (m/s)^3 (rad/s)^3 over that of the length cubed.
+        """
+        return np.asarray(self.singular_values.prod(axis=-1))
+
+    @property
+    def condition(self) -> Array:
+        """Largest singular value over the smallest, shape (...): from 1, infinite where rank < m.
+
+        It depends on the length that makes metres comparable with radians.
+        """
+        s = self.singular_values
+        last = s[..., -1]
+        return np.divide(s[..., 0], last, out=np.full(last.shape, np.inf), where=last > 0)
+
+    def velocity_transmission(self, twist: ArrayLike) -> Array:
+        """Largest multiple of a twist that joint velocities of the ball give.
+
+        Parameters
+        ----------
+        twist : array_like, shape (..., m)
+            The m components, m/s and rad/s, not all zero; what was masked out may be anything.
+
+        Returns
+        -------
+        ndarray, shape (...)
+            ``1 / sqrt(x^T (J J^T)^-1 x)``; 0 for a twist that cannot be. The length does not
+            matter.
+
+        Raises
+        ------
+        ShapeError, InvalidValueError
+            Not m numbers, NaN or infinity; zeros.
+
+        References
+        ----------
+        S. L. Chiu, "Task compatibility of manipulator postures", International Journal of Robotics
+        Research 7(5), 1988.
+        """
+        x = self._component_vector(twist, "twist") * self.weights
+        U, s = self._left()
+        along = np.einsum("...ik,...i->...k", U, x)
+        moves = s > 0
+        v = np.divide(along, s, out=np.zeros_like(along), where=moves)
+        outside = np.linalg.norm(np.where(moves, 0.0, along), axis=-1)
+        possible = outside <= _ON * np.linalg.norm(x, axis=-1)
+        size = np.linalg.norm(v, axis=-1)
+        return np.divide(1.0, size, out=np.zeros_like(size), where=possible & (size > 0))
+
+    def force_transmission(self, wrench: ArrayLike) -> Array:
+        """Largest multiple of a wrench that the dual ball of joint torques balances.
+
+        Parameters
+        ----------
+        wrench : array_like, shape (..., m)
+            The m components of force and moment, N and N m, not all zero; the others are zero.
+
+        Returns
+        -------
+        ndarray, shape (...)
+            ``1 / sqrt(w^T J J^T w)`` for torques with ``sum_i (s_i tau_i)^2 <= 1``, s_i the joint
+            velocities of the ball; infinity for a wrench that the structure carries.
+
+        Raises
+        ------
+        ShapeError, InvalidValueError
+            As `velocity_transmission`.
+
+        References
+        ----------
+        Chiu 1988.
+        """
+        w = self._component_vector(wrench, "wrench") / self.weights
+        U, s = self._left()
+        tau = s * np.einsum("...ik,...i->...k", U, w)
+        size = np.linalg.norm(tau, axis=-1)
+        felt = size > _ON * np.linalg.norm(w, axis=-1) * s[..., 0]
+        return np.divide(1.0, size, out=np.full(size.shape, np.inf), where=felt)
+
+    def _left(self) -> tuple[Array, Array]:
+        """Left singular vectors (..., m, m) and the singular values of the weighted Jacobian."""
+        return _left_vectors(self.weights[:, None] * self.jacobian)[0], self.singular_values
+
+    def _component_vector(self, value: ArrayLike, name: str) -> Array:
+        x = as_core(value, self.weights.shape, name)
+        batch_shape((x, self.singular_values), (name, "manipulability"))
+        if (np.abs(x).max(axis=-1, initial=0.0) == 0).any():
+            raise InvalidValueError(f"{name}: expected a direction, got zeros.")
+        return x
+
+
+def manipulability(
+    model: RobotModel,
+    q: ArrayLike,
+    frame: str | int | None = None,
+    reference: Reference = "world_aligned",
+    mask: ArrayLike | None = None,
+    joint_velocity: ArrayLike | None = None,
+    length: float = 1.0,
+    tolerance: float = 1e-9,
+) -> Manipulability:
+    """Singular values, Yoshikawa's measure and condition of the Jacobian.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, n joints.
+    q : array_like, shape (..., n)
+        Joint variables, rad or m.
+    frame : str or int, optional
+        Name or number of the frame; default the tool.
+    reference : {"world_aligned", "local", "world"}
+        Axes and point of the twist, as in `jacobian`.
+    mask : array_like, shape (6,), optional
+        Which components count: six 0/1 numbers ``[vx vy vz wx wy wz]``, at least one 1. Default
+        all; ``[1, 1, 1, 0, 0, 0]`` are the linear ones.
+    joint_velocity : array_like, shape (n,), optional
+        Half axes of the ball of joint velocities (rad/s, m/s), as in `velocity_ellipsoid`.
+    length : float
+        Metres that count as much as a radian where both kinds of row are asked for. The default
+        of 1 m is the measure of most books; the size of the robot makes a fairer condition.
+    tolerance : float
+        Singular values below this part of the size of the whole Jacobian are zero.
+
+    Returns
+    -------
+    Manipulability
+        Its measure, condition, and ratios along twists and wrenches.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Arguments of the wrong length or with NaN or infinity; a mask without a 1; a length that
+        is not positive.
+    FrameNotFoundError
+        No such frame.
+
+    References
+    ----------
+    Khalil and Dombre, sections 5.8.1 and 5.8.2; T. Yoshikawa, "Manipulability of robotic
+    mechanisms", International Journal of Robotics Research 4(2), 1985.
+
+    Examples
+    --------
+    A planar arm of two links: l1 l2 |sin q2|.
+
+    >>> from robotmodels.geometry import DHTable
+    >>> from robotmodels.se3 import translation
+    >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.3]),
+    ...                             tool=translation(0.2, 0, 0))
+    >>> found = manipulability(arm, [0.0, np.pi / 6], mask=[1, 1, 0, 0, 0, 0])
+    >>> found.measure.round(12)
+    np.float64(0.03)
+    """
+    check_model(model)
+    rows = _asked_rows(mask)
+    own = positive_length(model, None)
+    relative = as_tolerance(tolerance)
+    scale = joint_scale(model, joint_velocity, "joint_velocity", 0.0)
+    J = jacobian(model, as_vector(q, model.n, "q"), frame, reference) * scale
+    size = np.linalg.norm(J[..., :3, :], axis=(-2, -1)) / own
+    size = size + np.linalg.norm(J[..., 3:, :], axis=(-2, -1))
+    mixed = rows[:3].any() and rows[3:].any()
+    weights = np.repeat((1.0 / positive_length(model, length) if mixed else 1.0, 1.0), 3)
+    # the size in the unit of the rows asked for
+    unit = np.max(np.where(rows, weights * np.repeat((own, 1.0), 3), 0.0))
+    J, weights = J[..., rows, :], weights[rows]
+    _, s = _left_vectors(weights[:, None] * J)
+    s = np.where(s > relative * unit * size[..., None], s, 0.0)
+    return Manipulability(s, (s > 0).sum(axis=-1), J, weights)
+
+
+def _left_vectors(J: Array) -> tuple[Array, Array]:
+    """Left singular vectors (..., m, m) and m singular values of matrices (..., m, n)."""
+    m, n = J.shape[-2:]
+    padded = np.concatenate((J, np.zeros((*J.shape[:-1], max(m - n, 0)))), axis=-1)
+    U, s, _ = np.linalg.svd(padded, full_matrices=False)
+    return U, s
+
+
+def _asked_rows(mask: ArrayLike | None) -> NDArray[np.bool_]:
+    """Which of the six components count."""
+    if mask is None:
+        return np.ones(6, dtype=bool)
+    numbers = as_exact(np.asarray(mask, dtype=float), (6,), "mask")
+    if not np.isin(numbers, (0.0, 1.0)).all() or not numbers.any():
+        raise InvalidValueError(
+            f"mask: expected six numbers 0 or 1 and at least one 1, got {numbers.tolist()}."
+        )
+    return numbers == 1
