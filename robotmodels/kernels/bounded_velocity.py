@@ -1,0 +1,334 @@
+"""Nearest joint velocities inside bounds, and the largest part of a task that they leave.
+
+What a task leaves free is ``v = x + s w + F^T y``: s is the part of the task, F has orthonormal
+rows, y is free. For a given s the nearest v to a wish is a strictly convex quadratic programme in
+y, solved by the dual active set method of D. Goldfarb and A. Idnani (1983): it starts from the
+wish, adds the bound that is violated most, drops those that stop to press, and either ends at the
+solution or with some bounds that exclude each other. Such a set of bounds says how far s has to
+fall (a Farkas certificate is linear in s), so that s comes down to the largest value possible in
+a few steps, exactly but for rounding. Numba does not see a change of this file from the modules
+that use it: after an edit, delete ``__pycache__``.
+"""
+
+from math import inf, sqrt
+
+import numpy as np
+
+from ._compile import Floats, Ints, compiled
+
+__all__ = ["complement", "largest_part"]
+
+_DEPENDENT = 1e-12
+"""Length of what is left of a column of F, beside orthonormal rows, that counts as zero."""
+
+_ROUNDING = 1e-13
+"""Violation of a bound, relative to the velocities, that counts as none."""
+
+_CUTS = 60
+_STEPS_PER_JOINT = 40
+
+
+@compiled()
+def complement(V: Floats, r: int, d: int) -> None:
+    """Complete r orthonormal rows of ``V (>= d, >= d)`` to a basis of the space of d dimensions."""
+    left = np.empty(d)
+    for c in range(d):
+        left[c] = 1.0
+        for i in range(r):
+            left[c] -= V[i, c] * V[i, c]
+    for k in range(r, d):
+        best = 0
+        for c in range(1, d):
+            if left[c] > left[best]:
+                best = c
+        for c in range(d):
+            V[k, c] = 0.0
+        V[k, best] = 1.0
+        for _ in range(2):  # twice is enough
+            for i in range(k):
+                inner = 0.0
+                for c in range(d):
+                    inner += V[i, c] * V[k, c]
+                for c in range(d):
+                    V[k, c] -= inner * V[i, c]
+        total = 0.0
+        for c in range(d):
+            total += V[k, c] * V[k, c]
+        length = sqrt(total)
+        for c in range(d):
+            V[k, c] /= length
+            left[c] -= V[k, c] * V[k, c]
+
+
+@compiled()
+def dependence(
+    F: Floats,
+    f: int,
+    p: int,
+    side: float,
+    active: Ints,
+    sides: Floats,
+    k: int,
+    E: Floats,
+    R: Floats,
+    r: Floats,
+    z: Floats,
+) -> float:
+    """Write the normal of a bound as a combination of those of the active bounds and a rest.
+
+    The normal of a bound of joint j is its side (1 upper, -1 lower) times column j of F. E, R are
+    the orthogonal factors of the active ones, as kept by `append_normal`.
+
+    Parameters
+    ----------
+    F, f : (>= f, n), int
+        Free directions as rows.
+    p, side : int, float
+        The bound.
+    active, sides, k : (n,) int64, (n,), int
+        The k active bounds.
+    E, R : (>= k, >= f), (>= k, >= k)
+        Orthonormal rows and the triangle with normal_i = sum_j R[j, i] E_j.
+    r, z : (>= k,), (>= f,)
+        Written: coefficients of the active normals, and the rest, orthogonal to them.
+
+    Returns
+    -------
+    float
+        Squared length of the rest.
+    """
+    for c in range(f):
+        z[c] = side * F[c, p]
+    for i in range(k):
+        r[i] = 0.0
+    for _ in range(2):
+        for i in range(k):
+            inner = 0.0
+            for c in range(f):
+                inner += E[i, c] * z[c]
+            r[i] += inner
+            for c in range(f):
+                z[c] -= inner * E[i, c]
+    for i in range(k - 1, -1, -1):
+        for j in range(i + 1, k):
+            r[i] -= R[i, j] * r[j]
+        r[i] /= R[i, i]
+    total = 0.0
+    for c in range(f):
+        total += z[c] * z[c]
+    return total
+
+
+@compiled()
+def factorise(F: Floats, f: int, active: Ints, sides: Floats, k: int, E: Floats, R: Floats) -> None:
+    """Orthogonal factors of the normals of the k active bounds."""
+    for i in range(k):
+        for c in range(f):
+            E[i, c] = sides[i] * F[c, active[i]]
+            R[c, i] = 0.0
+        for _ in range(2):
+            for j in range(i):
+                inner = 0.0
+                for c in range(f):
+                    inner += E[j, c] * E[i, c]
+                R[j, i] += inner
+                for c in range(f):
+                    E[i, c] -= inner * E[j, c]
+        total = 0.0
+        for c in range(f):
+            total += E[i, c] * E[i, c]
+        R[i, i] = sqrt(total)
+        for c in range(f):
+            E[i, c] /= R[i, i]
+
+
+@compiled()
+def nearest_inside(
+    x: Floats,
+    F: Floats,
+    f: int,
+    wish: Floats,
+    lower: Floats,
+    upper: Floats,
+    v: Floats,
+    active: Ints,
+    sides: Floats,
+    press: Floats,
+    r: Floats,
+    z: Floats,
+    E: Floats,
+    R: Floats,
+) -> tuple[int, int, float, float]:
+    """Nearest ``v = x + F^T y`` to a wish with ``lower <= v <= upper``.
+
+    Parameters
+    ----------
+    x : (n,)
+        Orthogonal to the rows of F.
+    F, f : (>= f, n), int
+        Orthonormal rows.
+    wish, lower, upper : (n,)
+        What v should be near, and its bounds.
+    v : (n,)
+        Written: the solution; if there is none, where the search ended.
+    active, sides, press : (n,) int64, (n,), (n,)
+        Written: joints of the active bounds, 1 for upper and -1 for lower ones, and how they
+        press (multipliers, not negative).
+    r, z, E, R : work
+
+    Returns
+    -------
+    k : int
+        Number of active bounds.
+    joint : int
+        -1 if v is the solution; otherwise the joint whose bound the active ones exclude.
+    side : float
+        Of that bound.
+    size : float
+        Of the velocities; rounding is relative to it.
+    """
+    n = x.shape[0]
+    for j in range(n):
+        v[j] = x[j]
+    for c in range(f):
+        inner = 0.0
+        for j in range(n):
+            inner += F[c, j] * wish[j]
+        for j in range(n):
+            v[j] += inner * F[c, j]
+    size = 0.0
+    for j in range(n):
+        size = max(size, abs(x[j]), abs(v[j]))
+    k = 0
+    for _ in range(_STEPS_PER_JOINT * (n + 1)):
+        joint, side, worst = -1, 0.0, _ROUNDING * size
+        for j in range(n):
+            if v[j] - upper[j] > worst:
+                joint, side, worst = j, 1.0, v[j] - upper[j]
+            if lower[j] - v[j] > worst:
+                joint, side, worst = j, -1.0, lower[j] - v[j]
+        if joint < 0:
+            break
+        pressure = 0.0
+        while True:
+            factorise(F, f, active, sides, k, E, R)
+            square = dependence(F, f, joint, side, active, sides, k, E, R, r, z)
+            dual, leaving = inf, -1
+            for i in range(k):
+                if r[i] > 0.0 and press[i] < dual * r[i]:
+                    dual, leaving = press[i] / r[i], i
+            primal = inf
+            if square > _DEPENDENT * _DEPENDENT:
+                bound = upper[joint] if side > 0.0 else lower[joint]
+                primal = max(0.0, side * (v[joint] - bound)) / square
+            step = min(dual, primal)
+            if step == inf:
+                return k, joint, side, size
+            if primal < inf:
+                for j in range(n):
+                    for c in range(f):
+                        v[j] -= step * F[c, j] * z[c]
+            pressure += step
+            for i in range(k):
+                press[i] -= step * r[i]
+            if primal <= dual:
+                active[k], sides[k], press[k] = joint, side, pressure
+                k += 1
+                break
+            for i in range(leaving, k - 1):
+                active[i], sides[i], press[i] = active[i + 1], sides[i + 1], press[i + 1]
+            k -= 1
+    return k, -1, 0.0, size
+
+
+@compiled()
+def largest_part(
+    x: Floats,
+    w: Floats,
+    F: Floats,
+    f: int,
+    wish: Floats,
+    lower: Floats,
+    upper: Floats,
+    v: Floats,
+    at: Ints,
+    stuck: Ints,
+    base: Floats,
+    active: Ints,
+    sides: Floats,
+    press: Floats,
+    r: Floats,
+    z: Floats,
+    E: Floats,
+    R: Floats,
+) -> float:
+    """Largest s in [0, 1] with some ``v = x + s w + F^T y`` inside the bounds, and the nearest v.
+
+    Parameters
+    ----------
+    x, w : (n,)
+        Orthogonal to the rows of F.
+    F, f, wish, lower, upper : see `nearest_inside`
+    v : (n,)
+        Written: the velocities nearest to the wish among those of the largest s, never outside.
+    at : (n,) int64
+        Written: 1 and -1 for joints at their upper and lower bound.
+    stuck : (n,) int64
+        Written: 1 for joints that have to stay at their bounds because s is the largest possible.
+    base, active, sides, press, r, z, E, R : work
+
+    Returns
+    -------
+    float
+        s, or -1 where no s in [0, 1] fits.
+    """
+    n = x.shape[0]
+    s, size, k = 1.0, 0.0, 0
+    for j in range(n):
+        stuck[j] = 0
+    for _ in range(_CUTS):
+        for j in range(n):
+            base[j] = x[j] + s * w[j]
+        k, joint, side, size = nearest_inside(
+            base, F, f, wish, lower, upper, v, active, sides, press, r, z, E, R
+        )
+        if joint < 0:
+            break
+        bound = upper[joint] if side > 0.0 else lower[joint]
+        slope = side * w[joint]
+        room = side * (bound - x[joint])
+        terms, most = abs(slope), abs(room)
+        for i in range(k):
+            bound = upper[active[i]] if sides[i] > 0.0 else lower[active[i]]
+            part = -r[i] * sides[i] * w[active[i]]
+            space = -r[i] * sides[i] * (bound - x[active[i]])
+            slope += part
+            room += space
+            terms, most = max(terms, abs(part)), max(most, abs(space), abs(r[i]) * size)
+        if not slope > _DEPENDENT * terms:
+            return -1.0
+        part = room / slope
+        if part < 0.0:
+            if room < -_ROUNDING * max(size, most):
+                return -1.0
+            part = 0.0
+        if not part < s:
+            break  # what is left is rounding
+        s = part
+        for j in range(n):
+            stuck[j] = 0
+        stuck[joint] = 1 if side > 0.0 else -1
+        for i in range(k):
+            if r[i] < -_DEPENDENT:
+                stuck[active[i]] = 1 if sides[i] > 0.0 else -1
+    for j in range(n):
+        at[j] = stuck[j]
+    for i in range(k):
+        at[active[i]] = 1 if sides[i] > 0.0 else -1
+    near = _ROUNDING * size
+    for j in range(n):
+        if at[j] > 0 or (at[j] == 0 and v[j] >= upper[j] - near):
+            v[j], at[j] = upper[j], 1
+        elif at[j] < 0 or v[j] <= lower[j] + near:
+            v[j], at[j] = lower[j], -1
+    return s
