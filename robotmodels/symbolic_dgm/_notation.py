@@ -184,7 +184,8 @@ class Notation:
     def facts(self, expr: Any) -> _Facts:
         known = self._facts.get(expr)
         if known is None:
-            of = [self.facts(arg) for arg in expr.args]
+            parts = [expr.base] * int(expr.exp) if expr.is_Pow else expr.args
+            of = [self.facts(arg) for arg in parts]
             known = _Facts(
                 sum(f.leaves for f in of),
                 any(f.moves for f in of),
@@ -233,12 +234,21 @@ class Notation:
         if number != 1 or not factors:
             text = sympy.latex(number) if latex else str(number)
             words.append(text if latex or not factors or text.isalnum() else f"({text})")
-        symbols = sorted((f for f in factors if f in self._rank), key=self._rank.__getitem__)
-        words += [self.latex[f] if latex else str(f) for f in symbols]
+        powers = [f.as_base_exp() for f in factors]
+        symbols = sorted(
+            ((f, k) for f, k in powers if f in self._rank), key=lambda power: self._rank[power[0]]
+        )
+        words += [_power(self.latex[f] if latex else str(f), k, latex) for f, k in symbols]
         left, right = (r"\left(", r"\right)") if latex else ("(", ")")
-        sums = [f for f in factors if f not in self._rank]
-        words += [f"{left}{self.text(f, latex)}{right}" for f in sums]
+        sums = [(f, k) for f, k in powers if f not in self._rank]
+        words += [_power(f"{left}{self.text(f, latex)}{right}", k, latex) for f, k in sums]
         return sign, (r" \, " if latex else "*").join(words)
+
+
+def _power(base: str, exponent: Any, latex: bool) -> str:
+    if exponent == 1:
+        return base
+    return f"{base}^{{{exponent}}}" if latex else f"{base}**{exponent}"
 
 
 def _subscript(angle: Angle, comma: str) -> str:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_vector
 from ..latex_text import markdown
+from ._numbers import number_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,11 +168,11 @@ class DirectModelExplanation:
         known: dict[Any, Any] = dict(self.constants)
         known |= {symbol: q[..., i] for i, symbol in enumerate(self.variables)}
         for symbol, meaning in self.abbreviations:
-            known[symbol] = _number(meaning, known)
+            known[symbol] = number_of(meaning, known)
         T = np.empty((*q.shape[:-1], 4, 4))
         for i in range(4):
             for j in range(4):
-                T[..., i, j] = _number(self.pose[i, j], known)
+                T[..., i, j] = number_of(self.pose[i, j], known)
         return T
 
     def __str__(self) -> str:
@@ -187,23 +188,3 @@ class DirectModelExplanation:
     def _repr_latex_(self) -> str:
         """What a notebook that becomes a LaTeX document shows."""
         return self.latex
-
-
-def _number(expr: Any, known: dict[Any, Any]) -> Any:
-    """Value of an expression; ``known`` has the symbols' and takes up those of its parts."""
-    value = known.get(expr)
-    if value is None:
-        if expr.is_number:
-            value = float(expr)
-        else:
-            of = [_number(arg, known) for arg in expr.args]
-            if expr.is_Add:
-                value = sum(of)
-            elif expr.is_Mul:
-                value = of[0]
-                for factor in of[1:]:
-                    value = value * factor
-            else:  # the only functions of the abbreviations
-                value = {"cos": np.cos, "sin": np.sin}[expr.func.__name__](of[0])
-        known[expr] = value
-    return value
