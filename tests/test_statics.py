@@ -1,0 +1,353 @@
+"""The static model and its inverse on random robots: virtual work, equilibrium, what is left open."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given
+from identities.random_robots import (
+    any_models,
+    models,
+    random_bodies,
+    random_model,
+    random_pose,
+    random_state,
+    robot_size,
+    seeds,
+)
+
+import robotmodels as rm
+from robotmodels import se3
+from robotmodels.errors import (
+    FrameNotFoundError,
+    InvalidValueError,
+    NotARotationError,
+    ShapeError,
+)
+from robotmodels.kinematics.static_wrench import StaticStatus, StaticWrench, static_wrench
+from robotmodels.kinematics.statics import static_torque, transported_wrench
+
+REFERENCES = ("world_aligned", "local", "world")
+H = np.pi / 2
+
+
+def close(actual, expected, tolerance):
+    assert np.shape(actual) == np.shape(expected)
+    np.testing.assert_allclose(actual, expected, rtol=0, atol=tolerance)
+
+
+def planar(*lengths):
+    """Revolute joints about parallel axes, the last length is the tool's."""
+    rows = [{"sigma": 0, "d": d} for d in (0.0, *lengths[:-1])]
+    tool = se3.translation(lengths[-1], 0.0, 0.0)
+    return rm.RobotModel.from_table(rm.DHTable.from_rows(rows), tool=tool, name="planar")
+
+
+# ---------------------------------------------------------------- torques
+
+
+@given(model=any_models(), seed=seeds)
+def test_torque_is_that_of_the_dynamic_model_at_rest(model, seed):
+    rng = np.random.default_rng(seed)
+    q, _, _ = random_state(model, rng, 3)
+    w, rest = 10.0 * rng.normal(size=(3, 6)), np.zeros(model.n)
+    size = max(robot_size(model, row) for row in q)
+    held = rm.idm(model, q, rest, rest, w, drive=False)
+    weight = rm.gravity_torque(model, q)
+    tolerance = 1e-12 * (100.0 * size + np.abs(held).max() + np.abs(weight).max())
+    close(static_torque(model, q, w), held - weight, tolerance)
+    close(static_torque(model, q, w, gravity=True), held, tolerance)
+    for x, u, tau in zip(q, w, held, strict=True):
+        close(static_torque(model, x, u, gravity=True), tau, tolerance)
+
+
+@given(model=any_models(), seed=seeds)
+def test_power_in_is_power_out(model, seed):
+    """Virtual work, for every frame and reference: tau . v = w . twist."""
+    rng = np.random.default_rng(seed)
+    q, v, _ = random_state(model, rng)
+    w = rng.normal(size=6)
+    size = robot_size(model, q) * max(1.0, np.abs(v).sum())
+    for frame in (None, 0, *range(1, model.f + 1), *model.table.names):
+        for reference in REFERENCES:
+            tau = static_torque(model, q, w, frame, reference)
+            close(tau @ v, w @ rm.dkm(model, q, v, frame, reference), 1e-12 * size)
+
+
+@given(model=any_models(), seed=seeds)
+def test_work_along_a_finite_motion(model, seed):
+    """A constant force at the world's end of the tool: its work is the integral of tau dq."""
+    rng = np.random.default_rng(seed)
+    q, v, _ = random_state(model, rng)
+    v = v / max(1.0, np.abs(v).sum())
+    f = rng.normal(size=3)
+    # Gauss-Legendre of the path q + s v; frequencies below 1 rad per unit: exact to rounding
+    nodes, weights = np.polynomial.legendre.leggauss(12)
+    s = 0.5 * (nodes + 1.0)
+    tau = static_torque(model, q + s[:, None] * v, [*f, 0, 0, 0])
+    moved = rm.dgm(model, q + v)[:3, 3] - rm.dgm(model, q)[:3, 3]
+    close(0.5 * weights @ (tau @ v), f @ moved, 1e-12 * robot_size(model, q) * 10)
+
+
+@given(model=any_models(), seed=seeds)
+def test_the_same_wrench_elsewhere_needs_the_same_torques(model, seed):
+    rng = np.random.default_rng(seed)
+    q, _, _ = random_state(model, rng, 2)
+    w = rng.normal(size=(2, 6))
+    T = rm.dgm(model, q)
+    turn = T.copy()
+    turn[:, :3, 3] = 0.0
+    tolerance = 1e-12 * max(robot_size(model, row) for row in q) ** 2
+    tau = static_torque(model, q, w, reference="local")
+    close(static_torque(model, q, transported_wrench(w, T), reference="world"), tau, tolerance)
+    close(static_torque(model, q, transported_wrench(w, turn)), tau, tolerance)
+    # what the tool does, the frame that carries it does
+    carried = transported_wrench(w, model.tool)
+    close(static_torque(model, q, carried, model.tip, "local"), tau, tolerance)
+
+
+def test_transport_is_that_of_pinocchio_and_composes(rng):
+    w = rng.normal(size=(5, 6))
+    A, B = random_pose(rng), np.array([random_pose(rng) for _ in range(5)])
+    acted = [pin.SE3(b).act(pin.Force(x)).vector for b, x in zip(B, w, strict=True)]
+    close(transported_wrench(w, B), acted, 1e-14)
+    close(transported_wrench(transported_wrench(w, B), A), transported_wrench(w, A @ B), 1e-13)
+    close(transported_wrench(transported_wrench(w, B), se3.inverse(B)), w, 1e-13)
+    close(transported_wrench(w[0], B), [transported_wrench(w[0], b) for b in B], 1e-15)
+    close(transported_wrench(w[0], pin.SE3(A)), transported_wrench(w[0], A), 0)
+    assert transported_wrench(w[:0], A).shape == (0, 6)
+    assert transported_wrench(w[:, None], B).shape == (5, 5, 6)
+
+
+def test_a_lever_by_hand():
+    """10 N upwards at 0.5 m: the joint gives 5 N m; a slide across it gives 10 N."""
+    arm = planar(0.3, 0.2)
+    close(static_torque(arm, [0.0, 0.0], [0, 10.0, 0, 0, 0, 0]), [5.0, 2.0], 1e-15)
+    slide = rm.RobotModel.from_table(rm.DHTable.from_rows([{"sigma": 1, "alpha": -H}]))
+    close(static_torque(slide, [0.7], [0, 10.0, 0, 1, 2, 3]), [10.0], 1e-14)
+
+
+@pytest.mark.parametrize("batch", [(), (1,), (2, 3), (0,), (2, 0)], ids=str)
+def test_leading_axes_are_the_batch(batch, rng):
+    model = random_model(rng, f=7, tree=True, fixed=True)
+    q, v, _ = random_state(model, rng, *batch)
+    w = rng.normal(size=(*batch, 6))
+    for gravity in (False, True):
+        tau = static_torque(model, q, w, gravity=gravity)
+        assert tau.shape == (*batch, model.n)
+        assert tau.flags.c_contiguous
+        found = static_wrench(model, q, v, gravity=gravity)
+        assert found.wrench.shape == (*batch, 6)
+        assert found.residual.shape == (*batch, model.n)
+        for i in np.ndindex(*batch):
+            close(tau[i], static_torque(model, q[i], w[i], gravity=gravity), 1e-11)
+            single = static_wrench(model, q[i], v[i], gravity=gravity)
+            close(found.wrench[i], single.wrench, 1e-9 * max(1, np.abs(single.wrench).max()))
+            assert found.reason(i) == single.reason()
+    # one configuration, many wrenches, and the other way round
+    assert static_torque(model, q, w[..., None, :, :] if batch else w).shape[-1] == model.n
+    assert static_wrench(model, np.zeros(model.n), v).wrench.shape == (*batch, 6)
+    assert static_wrench(model, q, np.zeros(model.n)).wrench.shape == (*batch, 6)
+
+
+def test_no_joint_at_all():
+    fixed = rm.RobotModel.from_table(rm.DHTable.from_rows([{"sigma": 2, "d": 0.2}]))
+    assert static_torque(fixed, [], np.ones(6), gravity=True).shape == (0,)
+    found = static_wrench(fixed, np.zeros((2, 0)), [])
+    assert (found.undetermined == 6).all()
+    assert (found.status == StaticStatus.UNDETERMINED).all()
+    assert not found.wrench.any()
+    L = found.directions[0] / [1, 1, 1, 0.2, 0.2, 0.2]
+    close(L @ L.T, np.eye(6), 1e-14)
+
+
+# ---------------------------------------------------------------- the inverse
+
+
+def weighted(model, q, length, reference="world_aligned", frame=None):
+    """The Jacobian without units, and the factors of its rows and joints."""
+    joints = np.where(model.table.sigma[model.table.joint_rows] == 1, length, 1.0)
+    rows = np.repeat((1.0 / length, 1.0), 3)
+    return rows[:, None] * rm.jacobian(model, q, frame, reference) * joints, rows, joints
+
+
+@given(model=any_models(), seed=seeds)
+def test_equilibrium_and_what_is_left_open(model, seed):
+    """Any torques are a balanced part and a residual; any wrench is found up to what is free."""
+    rng = np.random.default_rng(seed)
+    q, tau, _ = random_state(model, rng)
+    length = rng.uniform(0.2, 2.0)
+    for reference in REFERENCES:
+        J, rows, joints = weighted(model, q, length, reference)
+        s = np.linalg.svd(J, compute_uv=False)
+        rank = int((s > 1e-9 * s.max(initial=0.0)).sum())
+        # rounding over the smallest value kept, and what is lost with the largest one dropped
+        largest = s.max(initial=0.0)
+        dropped = s[rank] if rank < len(s) else 0.0
+        condition = largest / s[rank - 1] if rank else 1.0
+        noise = 1e-13 * condition + 10 * dropped * (1.0 / s[rank - 1] if rank else 1.0)
+        w = rng.normal(size=6)
+        for torques in (tau, static_torque(model, q, w, reference=reference)):
+            found = static_wrench(model, q, torques, reference=reference, length=length)
+            size = max(1.0, np.linalg.norm(joints * torques))
+            back = static_torque(model, q, found.wrench, reference=reference)
+            close(joints * (back + found.residual), joints * torques, noise * size)
+            # the residual is what no wrench balances, and it moves no tool
+            close(J @ (joints * found.residual), np.zeros(6), noise * size * max(1.0, largest))
+            # free wrenches: as many as the rank lacks, orthonormal, without torque
+            k = int(found.undetermined)
+            assert k == 6 - rank
+            free = found.directions[:k]
+            unit = free / np.repeat((1.0, length), 3)
+            close(unit @ unit.T, np.eye(k), 1e-13)
+            assert not found.directions[k:].any()
+            felt = static_torque(model, q, free, reference=reference) if k else np.zeros((0, 1))
+            bound = (1e-13 * largest + dropped) * length
+            assert np.linalg.norm(joints * felt, axis=-1).max(initial=0.0) <= 2 * bound
+            # the smallest wrench has nothing of them
+            normal = found.wrench / np.repeat((1.0, length), 3)
+            close(unit @ normal, np.zeros(k), 1e-12 * max(1.0, np.linalg.norm(normal)))
+            assert bool(found.status & 1) == (k > 0)
+        if dropped < 1e-14 * largest:
+            assert not found.status & 2
+        if rank == 6:
+            close(found.wrench, w, noise * 10 * max(1.0, length, 1 / length))
+
+
+@given(model=models(max_frames=8, fixed=False, tree=False, prismatic=False), seed=seeds)
+def test_status_follows_from_rank_and_joints(model, seed):
+    rng = np.random.default_rng(seed)
+    q, tau, _ = random_state(model, rng)
+    found = static_wrench(model, q, tau)
+    rank = 6 - int(found.undetermined)
+    open_ = rank < 6
+    # torques drawn at random leave the range of J^T wherever it is smaller than the joint space
+    expected = StaticStatus(open_ + 2 * (rank < model.n))
+    assert found.status == expected
+    assert found.reason() == expected.sentence
+
+
+def test_six_axes_regular_and_at_the_wrist_singularity():
+    arm = rm.load("rx90")
+    w = np.array([1.0, 2.0, 3.0, 0.4, 0.5, 0.6])
+    q = np.array([[0.1, 0.2, 1.3, 0.4, 0.5, 0.6], [0.1, 0.2, 1.3, 0.4, 0.0, 0.6]])
+    found = static_wrench(arm, q, static_torque(arm, q, w))
+    assert found.status.tolist() == [StaticStatus.DETERMINED, StaticStatus.UNDETERMINED]
+    assert found.undetermined.tolist() == [0, 1]
+    close(found.wrench[0], w, 1e-11)
+    # the rest of the wrench is along the one direction that the structure carries
+    direction, rest = found.directions[1, 0], w - found.wrench[1]
+    L = 0.9
+    unit = direction / [1, 1, 1, L, L, L]
+    close(direction * (unit @ (rest / [1, 1, 1, L, L, L])), rest, 1e-12)
+    # about the wrist's centre its moment is on none of the three axes that meet there
+    poses = rm.link_poses(arm, q[1])
+    tool_from_wrist = se3.translation(*(rm.dgm(arm, q[1]) - poses[4])[:3, 3])
+    at_wrist = transported_wrench(direction, tool_from_wrist)
+    close(poses[3:, :3, 2] @ at_wrist[3:], np.zeros(3), 1e-14)
+    close(static_torque(arm, q[1], direction), np.zeros(6), 1e-14)
+
+
+def test_opposed_torques_of_a_redundant_arm_balance_nothing():
+    """Four parallel axes in the plane: three wrenches, one self-motion, three free directions."""
+    arm = planar(0.4, 0.3, 0.3, 0.1)
+    q = [0.3, 0.8, -0.5, 0.4]
+    J = rm.jacobian(arm, q)
+    motion = np.linalg.svd(J)[2][3]
+    found = static_wrench(arm, q, 5.0 * motion)
+    assert found.status == StaticStatus.UNBALANCED_UNDETERMINED
+    assert int(found.undetermined) == 3
+    close(found.residual, 5.0 * motion, 1e-13)
+    close(found.wrench, np.zeros(6), 1e-12)
+    # out of the plane: a force along z and moments about x and y
+    assert not found.directions[:3, [0, 1, 5]].round(13).any()
+    held = static_wrench(arm, q, J.T @ [1.0, 2.0, 0, 0, 0, 0.5] + 1e-3 * motion)
+    close(held.wrench, [1.0, 2.0, 0, 0, 0, 0.5], 1e-12)
+    close(held.residual, 1e-3 * motion, 1e-13)
+    assert held.status == StaticStatus.UNBALANCED_UNDETERMINED
+    # a residual that is allowed for
+    assert static_wrench(arm, q, J.T @ np.ones(6) + 1e-6 * motion, tolerance=1e-4).status == 1
+
+
+@pytest.mark.parametrize("name", ["rx90", "iiwa14", "stanford_arm", "planar_3r", "gantry"])
+def test_torques_that_hold_the_weight_hold_no_wrench(name, rng):
+    """What is left of the weight is rounding, not an unbalanced torque."""
+    model = rm.load(name)
+    model = model.with_inertia(random_bodies(rng, model.f)).with_base(random_pose(rng))
+    q, _, _ = random_state(model, rng, 20)
+    weight = rm.gravity_torque(model, q)
+    assert np.abs(weight).max() > 1.0
+    found = static_wrench(model, q, weight, gravity=True)
+    assert not (found.status & 2).any()
+    close(found.wrench, np.zeros((20, 6)), 1e-9)
+    w = np.array([3.0, -2.0, 1.0, 0.1, 0.2, 0.3])
+    tau = static_torque(model, q, w, gravity=True)
+    found = static_wrench(model, q, tau, gravity=True)
+    assert not (found.status & 2).any()
+    close(static_torque(model, q, found.wrench, gravity=True), tau, 1e-11)
+    if model.n >= 6:
+        assert not found.undetermined.any()
+        close(found.wrench, np.tile(w, (20, 1)), 1e-9)
+
+
+@pytest.mark.parametrize("angle", [1e-3, 1e-5, 1e-7, 3e-9, 1e-11, 0.0])
+def test_near_a_singular_position_nothing_is_called_unbalanced(angle):
+    """Seven joints with the elbow nearly stretched: torques of a wrench stay balanced."""
+    arm = rm.load("iiwa14")
+    q = np.array([0.3, 0.7, 0.2, angle, 0.5, 0.9, -0.2])
+    w = np.array([1.0, -2.0, 3.0, 0.3, 0.2, 0.1])
+    found = static_wrench(arm, q, static_torque(arm, q, w))
+    assert not found.status & 2
+    back = static_torque(arm, q, found.wrench)
+    close(back, static_torque(arm, q, w), 1e-7)
+
+
+def test_length_weighs_moments_against_forces(rng):
+    """One revolute joint: a force at the tool or a moment; a short length prefers the force."""
+    arm = planar(0.5)
+    for length in (0.01, 0.5, 100.0):
+        found = static_wrench(arm, [0.0], [2.0], length=length)
+        lever = np.array([0, 0.5, 0, 0, 0, 1.0])  # J^T
+        weights = np.repeat((1.0, length**2), 3)
+        close(found.wrench, 2.0 * weights * lever / (lever @ (weights * lever)), 1e-12)
+    assert static_wrench(arm, [0.0], [2.0]).wrench.tolist() == (
+        static_wrench(arm, [0.0], [2.0], length=0.5).wrench.tolist())  # fmt: skip
+
+
+def test_result_is_read_only_and_checked():
+    found = static_wrench(planar(0.3, 0.2), [0.1, 0.2], [1.0, 2.0])
+    for name in ("wrench", "status", "undetermined", "directions", "residual"):
+        assert not getattr(found, name).flags.writeable
+    assert found.status.dtype == np.int8
+    with pytest.raises(ShapeError, match="wrench"):
+        StaticWrench(np.zeros(5), np.int8(0), np.int64(0), np.zeros((6, 6)), np.zeros(2))
+
+
+def test_mistakes_are_named():
+    arm = planar(0.3, 0.2)
+    q, w = [0.1, 0.2], np.zeros(6)
+    with pytest.raises(ShapeError, match="wrench"):
+        static_torque(arm, q, w[:5])
+    with pytest.raises(InvalidValueError, match="wrench"):
+        static_torque(arm, q, w + np.nan)
+    with pytest.raises(ShapeError, match="broadcast"):
+        static_torque(arm, np.zeros((2, 2)), np.zeros((3, 6)))
+    with pytest.raises(InvalidValueError, match="world_aligned"):
+        static_torque(arm, q, w, reference="base")
+    with pytest.raises(FrameNotFoundError):
+        static_torque(arm, q, w, "J9")
+    with pytest.raises(ShapeError, match="tau"):
+        static_wrench(arm, q, [1.0])
+    with pytest.raises(ShapeError, match="broadcast"):
+        static_wrench(arm, np.zeros((2, 2)), np.zeros((3, 2)))
+    for length in (0.0, -1.0, np.inf):
+        with pytest.raises(InvalidValueError, match="length"):
+            static_wrench(arm, q, q, length=length)
+    for tolerance in (0.0, 1.0, -1e-9):
+        with pytest.raises(InvalidValueError, match="tolerance"):
+            static_wrench(arm, q, q, tolerance=tolerance)
+    with pytest.raises(NotARotationError):
+        transported_wrench(w, np.ones((4, 4)))
+    with pytest.raises(ShapeError, match="broadcast"):
+        transported_wrench(np.zeros((3, 6)), np.tile(np.eye(4), (2, 1, 1)))
+    with pytest.raises(AttributeError):
+        static_torque(arm, q, w).nothing  # noqa: B018
