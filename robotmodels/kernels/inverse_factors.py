@@ -18,9 +18,6 @@ WEAK_DIRECTIONS = 3
 SMALLEST_SINGULAR_VALUE = 4
 MANIPULABILITY = 5
 
-ROUNDING = 1e-13
-"""Singular values up to this, beside the largest, are the rounding errors of zeros."""
-
 _NEWTON_STEPS = 100
 
 
@@ -50,6 +47,7 @@ def inverse_factors(
     sigma: Floats,
     inner: Floats,
     k: int,
+    zero: float,
     factors: Floats,
 ) -> float:
     """Factors f by which ``y = sum f_i (u_i . b) v_i`` solves ``A y = b``.
@@ -62,6 +60,8 @@ def inverse_factors(
         Singular values of A, descending, and ``u_i . b``.
     k : int
         How many.
+    zero : float
+        Singular values up to this are the rounding errors of zeros: some 1e-13 of the size of A.
     factors : (>= k,)
         Written: 1 / sigma where the method changes nothing, less otherwise.
 
@@ -75,11 +75,11 @@ def inverse_factors(
     first, last = sigma[0], sigma[k - 1]
     if kind == PSEUDO_INVERSE:
         for i in range(k):
-            factors[i] = 1.0 / sigma[i] if sigma[i] > threshold * first else 0.0
+            factors[i] = 1.0 / sigma[i] if sigma[i] > max(threshold * first, zero) else 0.0
         return 0.0
     if kind == FILTERED:
         for i in range(k):
-            if sigma[i] >= threshold and sigma[i] > ROUNDING * first:
+            if sigma[i] >= threshold and sigma[i] > zero:
                 factors[i] = 1.0 / sigma[i]
             else:
                 ratio = min(sigma[i] / threshold, 1.0)
@@ -93,7 +93,7 @@ def inverse_factors(
     for i in range(k):
         square = squared_damping(kind, threshold, largest, sigma[i], last, volume)
         damping = max(damping, square)
-        if sigma[i] <= ROUNDING * first:
+        if sigma[i] <= zero:
             factors[i] = 0.0
         elif square == 0.0:
             factors[i] = 1.0 / sigma[i]
@@ -109,7 +109,7 @@ def inverse_factors(
         total, slope = 0.0, 0.0
         for i in range(k):
             square = squared_damping(kind, threshold, largest, sigma[i], last, volume) + mu
-            if sigma[i] <= ROUNDING * first:
+            if sigma[i] <= zero:
                 continue
             bottom = sigma[i] * sigma[i] + square
             factors[i] = sigma[i] / bottom

@@ -1,0 +1,256 @@
+"""From a request to a solution: one compiled pass, or levels where tasks or limits are given."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache, lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..._arrays import Array, batch_rows
+from ...model import RobotModel
+from ..jacobians import reference_of
+from .methods import as_method
+from .request import Request, secondary_motion
+from .scaling import WHOLE_TWIST, KnownFrame, Scaling, general_rank, known_frame, scaling_of
+from .solution import IKMSolution
+from .status import IKMStatus
+
+_SINGULAR, _TOO_FEW = int(IKMStatus.SINGULAR), int(IKMStatus.TOO_FEW_JOINTS)
+
+
+def solved(model: RobotModel, request: Request) -> IKMSolution:
+    """The inverse kinematic model, of the first or the second order.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot.
+    request : Request
+        What is asked.
+
+    Returns
+    -------
+    IKMSolution
+        Joint velocities or accelerations.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError, FrameNotFoundError
+        As `ikm`.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> from robotmodels.kinematics.inverse.ikm import ikm
+    >>> ikm(load("rx90"), [[0.1, 0.2, 1.3, 0.4, 0.5, 0.6]] * 3, [0.1, 0, 0, 0, 0, 0]).v.shape
+    (3, 6)
+    """
+    reference = reference_of(request.reference)[1]
+    known = known_frame(model, request.frame)
+    scaling = scaling_of(model, known, request.mask, request.joint_weights, request.length)
+    method = as_method(request.method)
+    q, rate, v = request.q, request.rate, request.v
+    if (
+        q.ndim == rate.ndim == 1
+        and scaling is known.usual
+        and v is request.secondary is request.limits is None
+        and not (request.augmented or request.tasks)
+    ):
+        return _one(model, known, q, rate, reference, method)
+    extra = None
+    if request.secondary is not None:
+        extra = secondary_motion(model, q, request.secondary)
+    if request.augmented or request.tasks or request.limits not in (None, False):
+        from .by_levels import solved_by_levels
+
+        return solved_by_levels(model, request, known, scaling, method, reference, extra)
+    parts = {"q": q, request.rate_name: rate, "v": v, "secondary": extra}
+    given = {name: part for name, part in parts.items() if part is not None}
+    batch, laid = batch_rows(tuple(given.values()), tuple(given))
+    rows = dict(zip(given, laid, strict=True))
+    q, rate, v, extra = (rows.get(name) for name in parts)
+    assert q is not None
+    assert rate is not None
+    N, n = q.shape
+    k = min(scaling.asked.size, n)
+    drift = None
+    if v is not None:
+        drift = drift_rows(model, known, q, v, reference)
+        rate = rate - drift
+    out = np.empty((N, n))
+    achieved, error, reachable = np.empty((N, 6)), np.empty((N, 6)), np.empty((N, 6))
+    values, damping = np.empty((N, k)), np.empty(N)
+    status, rank = np.empty(N, np.int8), np.empty(N, np.int8)
+    _kernel()(
+        q, rate, _none(n) if extra is None else extra, *model.chain, *known.point.kernel_arguments,
+        reference, scaling.asked, scaling.rows, scaling.columns, *method.kernel_arguments,
+        out, status, achieved, error, reachable, values, rank, damping,
+    )  # fmt: skip
+    if drift is not None:
+        drift *= scaling.mask
+        achieved += drift
+        reachable += drift
+    tell_structure(model, known, scaling, reference, status, rank)
+    limits = np.ones(N), np.zeros((N, n), np.bool_), np.empty((N, 0))
+    out, status, achieved, error, reachable, values, rank, damping, scale, limited, still = (
+        frozen(array, batch)
+        for array in (
+            out, status, achieved, error, reachable, values, rank, damping, *limits,
+        )
+    )  # fmt: skip
+    accelerations = None
+    if v is not None:
+        accelerations, out = out, frozen(v.copy(), batch)
+    return IKMSolution.checked_before(
+        out, status, achieved, error, reachable, values, rank, damping, scale, limited,
+        scaling.mask, (), still, accelerations,
+    )  # fmt: skip
+
+
+def drift_rows(model: RobotModel, known: KnownFrame, q: Array, v: Array, reference: int) -> Array:
+    """What the frame's twist changes by without joint accelerations, ``dJ/dt v``.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, n joints.
+    known : KnownFrame
+        The frame.
+    q, v : ndarray, shape (N, n)
+        Joint variables and velocities.
+    reference : int
+        The kernels' number of the reference.
+
+    Returns
+    -------
+    ndarray, shape (N, 6)
+        m/s^2 and rad/s^2.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> arm = load("lab_rr")
+    >>> drift_rows(arm, known_frame(arm, None), np.zeros((1, 2)), np.ones((1, 2)), 0).shape
+    (1, 6)
+    """
+    from ...kernels.accelerations import accelerations
+
+    out = np.empty((q.shape[0], 6))
+    accelerations(
+        q, v, np.zeros_like(q), *model.chain, *known.point.kernel_arguments, reference, out
+    )
+    return out
+
+
+def tell_structure(
+    model: RobotModel,
+    known: KnownFrame,
+    scaling: Scaling,
+    reference: int,
+    status: NDArray[np.int8],
+    rank: NDArray[np.int8],
+) -> None:
+    """Tell robots that never produce all rows asked for from singular positions of others.
+
+    Parameters
+    ----------
+    model, known, scaling, reference
+        The request.
+    status : ndarray of int8, shape (N,)
+        Changed in place, from SINGULAR to TOO_FEW_JOINTS where the rank is what it always is.
+    rank : ndarray of int8, shape (N,)
+        Ranks at the configurations.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> arm, status, rank = load("lab_rr"), np.array([2], np.int8), np.array([2], np.int8)
+    >>> known = known_frame(arm, None)
+    >>> tell_structure(arm, known, known.usual, 0, status, rank)
+    >>> status
+    array([3], dtype=int8)
+    """
+    if status.size == 1 and status.item() != _SINGULAR:
+        return
+    lacking = status == _SINGULAR
+    if lacking.any():
+        usual = general_rank(model, known, scaling, reference)
+        status[lacking & (rank >= usual)] = _TOO_FEW
+
+
+def frozen(array: NDArray[Any], batch: tuple[int, ...]) -> NDArray[Any]:
+    """Rows of a result in the shape of the call, read-only.
+
+    Parameters
+    ----------
+    array : ndarray, shape (N, ...)
+        Rows, which nobody else writes to.
+    batch : tuple of int
+        Leading axes of the call.
+
+    Returns
+    -------
+    ndarray, shape (*batch, ...)
+        A view.
+
+    Examples
+    --------
+    >>> frozen(np.zeros((6, 4)), (2, 3)).shape
+    (2, 3, 4)
+    """
+    array = array.reshape(*batch, *array.shape[1:])
+    array.setflags(write=False)
+    return array
+
+
+def _one(
+    model: RobotModel, known: KnownFrame, q: Array, twist: Array, reference: int, method: Any
+) -> IKMSolution:
+    """One twist and nothing else, in as few steps as can be."""
+    n = q.size
+    k = min(6, n)
+    out, codes = np.empty(n + 19 + k), np.empty(2, np.int8)
+    _one_kernel()(
+        known.whole, known.numbers, q, twist, reference, *method.kernel_arguments, out, codes
+    )
+    if codes[0] == _SINGULAR:
+        tell_structure(model, known, known.usual, reference, codes[:1], codes[1:])
+    out.setflags(write=False)
+    codes.setflags(write=False)
+    scale, limited, still = _unlimited(n)
+    return IKMSolution.checked_before(
+        out[:n], codes[0, ...], out[n : n + 6], out[n + 6 : n + 12], out[n + 12 : n + 18],
+        out[n + 18 : n + 18 + k], codes[1, ...], out[n + 18 + k, ...], scale, limited,
+        WHOLE_TWIST, (), still, None,
+    )  # fmt: skip
+
+
+@cache
+def _kernel() -> Callable[..., None]:
+    from ...kernels.inverse_velocity import inverse_velocities
+
+    return inverse_velocities
+
+
+@cache
+def _one_kernel() -> Callable[..., None]:
+    from ...kernels.inverse_velocity import one_inverse_velocity
+
+    return one_inverse_velocity
+
+
+@lru_cache(maxsize=64)
+def _none(n: int) -> Array:
+    return np.empty((0, n))
+
+
+@lru_cache(maxsize=64)
+def _unlimited(n: int) -> tuple[Array, NDArray[np.bool_], Array]:
+    """Scale, limited and task scales of a single row without limits."""
+    arrays = np.ones(()), np.zeros(n, np.bool_), np.empty(0)
+    for array in arrays:
+        array.setflags(write=False)
+    return arrays
