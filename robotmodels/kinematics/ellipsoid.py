@@ -125,8 +125,8 @@ class Ellipsoid:
         -------
         ndarray, shape (...)
             The largest velocity that is along ``direction`` alone, or force; 0 where a flat
-            ellipsoid has no such velocity, infinity where an open one has no bound. A direction
-            within 1e-12 rad of a flat or open axis is taken to be on it.
+            ellipsoid has no such velocity, infinity where an open one has no bound. There a
+            direction within 1e-12 rad of an axis or of the plane of two is taken to be on it.
 
         Raises
         ------
@@ -142,8 +142,8 @@ class Ellipsoid:
         regular = (r > 0) & np.isfinite(r)
         bend = np.divide(c, r, out=np.zeros(np.broadcast_shapes(c.shape, r.shape)), where=regular)
         curved = np.linalg.norm(bend, axis=-1)
-        leaves = np.any((np.abs(c) > _ON) & (r == 0), axis=-1)
-        bounded = np.any((np.abs(c) > _ON) & np.isfinite(r), axis=-1)
+        leaves = np.any((c != 0) & (r == 0), axis=-1)
+        bounded = np.any((c != 0) & np.isfinite(r), axis=-1)
         radius = np.divide(1.0, curved, out=np.full(curved.shape, np.inf), where=bounded & ~leaves)
         return np.where(leaves, 0.0, radius)
 
@@ -169,7 +169,7 @@ class Ellipsoid:
         c, r = self._components(direction), self.radii
         open_ = ~np.isfinite(r)
         extent = np.linalg.norm(c * np.where(open_, 0.0, r), axis=-1)
-        return np.where(np.any((np.abs(c) > _ON) & open_, axis=-1), np.inf, extent)
+        return np.where(np.any((c != 0) & open_, axis=-1), np.inf, extent)
 
     def boundary(self, polar: int = 13, around: int = 24) -> Array:
         """Points of the surface on a grid of polar angles and meridians about the third axis.
@@ -230,4 +230,5 @@ class Ellipsoid:
             raise InvalidValueError("direction: expected a vector of some length, got zeros.")
         d = d / size
         d = d / np.linalg.norm(d, axis=-1, keepdims=True)
-        return np.einsum("...ji,...j->...i", self.axes, d)
+        c = np.einsum("...ji,...j->...i", self.axes, d)
+        return np.where((np.abs(c) <= _ON) & (self.rank < 3)[..., None], 0.0, c)

@@ -1,0 +1,560 @@
+"""Velocity and force ellipsoids and manipulability: definition, duality, invariance, flat ones."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from identities.random_robots import (
+    any_models,
+    models,
+    random_model,
+    random_pose,
+    random_rotation,
+    random_state,
+    robot_size,
+    seeds,
+)
+
+import robotmodels as rm
+from robotmodels import se3
+from robotmodels.errors import FrameNotFoundError, InvalidValueError, ShapeError
+from robotmodels.kinematics.ellipsoid import Ellipsoid, EllipsoidQuantity
+from robotmodels.kinematics.ellipsoids import (
+    OtherPart,
+    TwistPart,
+    force_ellipsoid,
+    velocity_ellipsoid,
+)
+from robotmodels.kinematics.manipulability import Manipulability, manipulability
+
+H = np.pi / 2
+PARTS = list(TwistPart)
+OTHERS = list(OtherPart)
+ROWS = {TwistPart.LINEAR: slice(0, 3), TwistPart.ANGULAR: slice(3, 6)}
+
+
+def close(actual, expected, tolerance):
+    assert np.shape(actual) == np.shape(expected)
+    np.testing.assert_allclose(actual, expected, rtol=0, atol=tolerance)
+
+
+def planar(*lengths):
+    """Revolute joints about parallel axes, the last length is the tool's."""
+    rows = [{"sigma": 0, "d": d} for d in (0.0, *lengths[:-1])]
+    tool = se3.translation(lengths[-1], 0.0, 0.0)
+    return rm.RobotModel.from_table(rm.DHTable.from_rows(rows), tool=tool, name="planar")
+
+
+def matrix(ellipsoid):
+    """``U diag(r^2) U^T``: the same for every choice of axes."""
+    return (ellipsoid.axes * ellipsoid.radii[..., None, :] ** 2) @ np.swapaxes(
+        ellipsoid.axes, -1, -2
+    )
+
+
+# ---------------------------------------------------------------- what it is
+
+
+@pytest.mark.parametrize("part", PARTS)
+@given(model=any_models(), seed=seeds)
+def test_it_is_the_image_of_the_ball(part, model, seed):
+    """With the other half free: J S S J^T. Its axes are a rotation, its radii are sorted."""
+    rng = np.random.default_rng(seed)
+    q, _, _ = random_state(model, rng, 2)
+    scale = rng.uniform(0.1, 3.0, size=model.n)
+    for frame in (None, 1):
+        found = velocity_ellipsoid(model, q, part, frame, scale)
+        J = rm.jacobian(model, q, frame)[:, ROWS[part]] * scale
+        size = max(robot_size(model, x) for x in q) * np.linalg.norm(scale)
+        close(matrix(found), J @ np.swapaxes(J, -1, -2), 1e-13 * size**2)
+        close(found.centre, rm.dgm(model, q, frame)[:, :3, 3], 0)
+        close(np.linalg.det(found.axes), np.ones(2), 1e-12)
+        close(np.swapaxes(found.axes, -1, -2) @ found.axes, np.tile(np.eye(3), (2, 1, 1)), 1e-13)
+        assert (np.diff(found.radii) <= 0).all()
+        close(found.rank, (found.radii > 0).sum(axis=-1), 0)
+        # no joint velocity of the ball leaves it, and some reach its boundary
+        x = rng.normal(size=(50, model.n))
+        v = (x / np.linalg.norm(x, axis=-1, keepdims=True)) @ np.swapaxes(J, -1, -2)
+        for direction in rng.normal(size=(3, 3)):
+            unit = direction / np.linalg.norm(direction)
+            extent = found.extent_along(direction)
+            assert ((v @ unit).max(axis=-1) <= extent + 1e-8 * size).all()
+            close(extent, np.linalg.norm(unit @ J, axis=-1), 1e-8 * size)
+
+
+@given(model=models(max_frames=8, fixed=False), seed=seeds)
+def test_other_half_at_zero_is_a_cut(model, seed):
+    """Joint velocities that leave the other half at rest: by an independent null space."""
+    rng = np.random.default_rng(seed)
+    q, _, _ = random_state(model, rng)
+    size = robot_size(model, q)
+    for part, other in (PARTS, PARTS[::-1]):
+        J = rm.jacobian(model, q)
+        hidden = J[ROWS[other]]
+        _, s, Vt = np.linalg.svd(hidden)
+        largest = max(np.linalg.norm(J), 1.0)
+        rank = int((s > 1e-7 * largest).sum())
+        if rank < len(s) and s[rank] > 1e-12 * largest:
+            continue  # neither singular nor regular: the two rules may differ
+        cut = J[ROWS[part]] @ Vt[rank:].T
+        found = velocity_ellipsoid(model, q, part, other=OtherPart.ZERO)
+        free = velocity_ellipsoid(model, q, part)
+        close(matrix(found), cut @ cut.T, 1e-8 * size**2)
+        # a part of the whole
+        for direction in rng.normal(size=(5, 3)):
+            assert found.extent_along(direction) <= free.extent_along(direction) + 1e-9 * size
+        assert found.volume <= free.volume * (1 + 1e-9) + 1e-12
+
+
+def test_a_wrist_turns_without_shifting_its_centre():
+    """RX-90: the tool at the wrist's centre shifts without turning only by the first three joints
+    with the wrist turning back; it turns without shifting by the wrist alone."""
+    arm = rm.load("rx90")
+    q = [0.1, 0.2, 0.9, 0.4, 0.5, 0.6]
+    found = velocity_ellipsoid(arm, q, TwistPart.ANGULAR, frame=4, other=OtherPart.ZERO)
+    # frame 4 has its origin at the wrist's centre and is before joints 5 and 6
+    assert int(found.rank) == 1
+    z4 = rm.link_poses(arm, q)[3, :3, 2]
+    close(np.abs(found.axes[:, 0] @ z4), 1.0, 1e-12)
+    close(found.radii, [1.0, 0.0, 0.0], 1e-12)
+    whole = velocity_ellipsoid(arm, q, TwistPart.ANGULAR, frame=6, other=OtherPart.ZERO)
+    J = rm.jacobian(arm, q, 6)[3:, 3:]
+    close(matrix(whole), J @ J.T, 1e-12)
+
+
+def test_a_planar_arm_by_hand():
+    """Right angle between links of 0.3 and 0.2 m; and stretched out, where it is a segment."""
+    arm = planar(0.3, 0.2)
+    bent = velocity_ellipsoid(arm, [0.0, H])
+    J = np.array([[-0.2, -0.2], [0.3, 0.0]])
+    radii = np.linalg.svd(J, compute_uv=False)
+    close(bent.radii, [*radii, 0.0], 1e-15)
+    close(np.abs(bent.axes[:, 2]), [0, 0, 1], 1e-15)
+    close(bent.centre, [0.3, 0.2, 0.0], 1e-15)
+    assert bent.quantity is EllipsoidQuantity.LINEAR_VELOCITY
+    assert bent.quantity.unit == "m/s"
+    assert (int(bent.rank), float(bent.volume), float(bent.isotropy)) == (2, 0.0, 0.0)
+    straight = velocity_ellipsoid(arm, [H, 0.0])
+    close(straight.radii, [np.hypot(0.5, 0.2), 0.0, 0.0], 1e-15)
+    close(np.abs(straight.axes[:, 0]), [1, 0, 0], 1e-15)
+    turning = velocity_ellipsoid(arm, [H, 0.0], TwistPart.ANGULAR)
+    close(turning.radii, [np.sqrt(2), 0, 0], 1e-15)
+    assert turning.quantity.unit == "rad/s"
+    # its forces: any along the arm, any across the plane
+    force = force_ellipsoid(arm, [H, 0.0])
+    assert force.radii[:2].tolist() == [np.inf, np.inf]
+    close(force.radii[2], 1 / np.hypot(0.5, 0.2), 1e-14)
+    close(force.radius_along([0, 1, 0]), np.inf, 0)
+    close(force.radius_along([1, 0, 0]), 1 / np.hypot(0.5, 0.2), 1e-14)
+    assert np.isinf(force.volume)
+    assert (force.quantity.unit, int(force.rank), float(force.isotropy)) == ("N", 1, 0.0)
+    assert force_ellipsoid(arm, [H, 0.0], TwistPart.ANGULAR).quantity.unit == "N m"
+
+
+def test_a_gantry_is_a_ball():
+    """Three slides: a sphere of 1 m/s; with their limits a box's ellipsoid; it never turns."""
+    rows = [{"sigma": 1}, {"sigma": 1, "alpha": -H, "theta": H}, {"sigma": 1, "alpha": -H}]
+    gantry = rm.RobotModel.from_table(rm.DHTable.from_rows(rows))
+    J = rm.jacobian(gantry, np.zeros(3))[:3]
+    close(J @ J.T, np.eye(3), 1e-15)
+    ball = velocity_ellipsoid(gantry, np.zeros(3))
+    close(ball.radii, np.ones(3), 1e-15)
+    close(ball.isotropy, 1.0, 1e-14)
+    close(ball.volume, 4 * np.pi / 3, 1e-14)
+    close(velocity_ellipsoid(gantry, np.zeros(3), other=OtherPart.ZERO).radii, np.ones(3), 1e-15)
+    limits = [0.5, 2.0, 1.0]
+    found = velocity_ellipsoid(gantry, np.zeros(3), joint_velocity=limits)
+    close(found.radii, [2.0, 1.0, 0.5], 1e-15)
+    close([found.radius_along(J[:, k]) for k in range(3)], limits, 1e-15)
+    still = velocity_ellipsoid(gantry, np.zeros((2, 3)), TwistPart.ANGULAR)
+    assert not still.radii.any()
+    assert not still.rank.any()
+    assert np.isinf(force_ellipsoid(gantry, np.zeros(3), TwistPart.ANGULAR).radii).all()
+    # a locked slide: the ball is flat
+    flat = velocity_ellipsoid(gantry, np.zeros(3), joint_velocity=[1.0, 0.0, 1.0])
+    close(flat.radii, [1, 1, 0], 1e-15)
+
+
+# ---------------------------------------------------------------- duality
+
+
+@pytest.mark.parametrize("other", OTHERS)
+@pytest.mark.parametrize("part", PARTS)
+@given(model=any_models(), seed=seeds)
+def test_forces_are_dual_to_velocities(part, other, model, seed):
+    """Same axes, reciprocal radii; widths and radii along any direction are reciprocal."""
+    rng = np.random.default_rng(seed)
+    q, _, _ = random_state(model, rng, 2)
+    torque = rng.uniform(0.5, 2.0, size=model.n)
+    force = force_ellipsoid(model, q, part, None, torque, other)
+    opposite = OtherPart.FREE if other is OtherPart.ZERO else OtherPart.ZERO
+    velocity = velocity_ellipsoid(model, q, part, None, 1 / torque, opposite)
+    with np.errstate(divide="ignore"):
+        np.testing.assert_allclose(force.radii, 1 / velocity.radii[:, ::-1], rtol=1e-12)
+    close(force.rank, velocity.rank, 0)
+    close(np.abs(np.einsum("...ij,...ij->...j", force.axes, velocity.axes[..., ::-1])),
+          np.ones((2, 3)), 1e-12)  # fmt: skip
+    close(np.linalg.det(force.axes), np.ones(2), 1e-12)
+    # along the axes too, where flat ellipsoids have no velocity and forces no bound
+    for direction in (*rng.normal(size=(3, 3)), *np.moveaxis(force.axes, -1, 0)):
+        with np.errstate(divide="ignore"):
+            np.testing.assert_allclose(
+                force.radius_along(direction), 1 / velocity.extent_along(direction), rtol=1e-9
+            )
+            np.testing.assert_allclose(
+                velocity.radius_along(direction), 1 / force.extent_along(direction), rtol=1e-9
+            )
+
+
+@given(model=any_models(), seed=seeds)
+def test_forces_of_the_boundary_take_torques_of_the_ball(model, seed):
+    rng = np.random.default_rng(seed)
+    q, _, _ = random_state(model, rng)
+    torque = rng.uniform(0.5, 20.0, size=model.n)
+    for part in PARTS:
+        found = force_ellipsoid(model, q, part, joint_torque=torque)
+        wrench = np.zeros((3, 6))
+        finite = np.isfinite(found.radii)
+        wrench[:, ROWS[part]] = (found.axes * np.where(finite, found.radii, 1.0)).T
+        tau = wrench @ rm.jacobian(model, q) / torque
+        size = np.linalg.norm(tau, axis=-1)
+        close(size, np.where(finite, 1.0, 0.0), 1e-6)
+
+
+def test_any_moment_helps_a_force(rng):
+    """With a free moment the most force is what the best moment allows: by minimisation."""
+    arm = rm.load("rx90")
+    q = [0.1, 0.2, 0.9, 0.4, 0.5, 0.6]
+    torque = np.array([200.0, 150.0, 80.0, 30.0, 20.0, 5.0])
+    free = force_ellipsoid(arm, q, joint_torque=torque, other=OtherPart.FREE)
+    none = force_ellipsoid(arm, q, joint_torque=torque)
+    B = rm.jacobian(arm, q).T / torque[:, None]
+    for f in rng.normal(size=(5, 3)):
+        f = f / np.linalg.norm(f)
+        moment, *_ = np.linalg.lstsq(B[:, 3:], -B[:, :3] @ f, rcond=None)
+        best = np.linalg.norm(B @ np.concatenate((f, moment)))
+        close(free.radius_along(f), 1 / best, 1e-9 / best)
+        assert free.radius_along(f) >= none.radius_along(f)
+
+
+# ---------------------------------------------------------------- invariance
+
+
+@pytest.mark.parametrize("other", OTHERS)
+@given(model=any_models(), seed=seeds)
+def test_the_world_turns_axes_and_keeps_radii(other, model, seed):
+    rng = np.random.default_rng(seed)
+    q, _, _ = random_state(model, rng)
+    Z = random_pose(rng, 0.5)
+    moved = model.with_base(Z @ model.base)
+    turned = model.with_tool(model.tool @ se3.rotation("y", 0.7), model.tip)
+    R = Z[:3, :3]
+    size = robot_size(moved, q)
+    for part in PARTS:
+        a = velocity_ellipsoid(model, q, part, other=other)
+        b = velocity_ellipsoid(moved, q, part, other=other)
+        c = velocity_ellipsoid(turned, q, part, other=other)
+        if a.rank == b.rank == c.rank:  # radii near the threshold may fall on either side
+            close(b.radii, a.radii, 1e-9 * size)
+            close(matrix(b), R @ matrix(a) @ R.T, 1e-9 * size**2)
+            close(matrix(c), matrix(a), 1e-9 * size**2)
+        close(b.centre, R @ a.centre + Z[:3, 3], 1e-13 * size)
+        direction = rng.normal(size=3)
+        close(b.extent_along(R @ direction), a.extent_along(direction), 1e-8 * size)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_regular_arms_keep_every_number(seed):
+    """Random 6R and 7R arms in a moved and turned world: radii to rounding, force radii too."""
+    rng = np.random.default_rng(seed)
+    model = random_model(rng, f=6 + seed % 2, prismatic=seed % 3 == 0)
+    q, _, _ = random_state(model, rng)
+    moved = model.with_base(random_pose(rng) @ model.base)
+    for function in (velocity_ellipsoid, force_ellipsoid):
+        for part in PARTS:
+            for other in OTHERS:
+                a, b = (function(m, q, part, other=other) for m in (model, moved))
+                close(a.rank, b.rank, 0)
+                np.testing.assert_allclose(b.radii, a.radii, rtol=1e-8, atol=1e-13)
+                np.testing.assert_allclose(b.isotropy, a.isotropy, rtol=1e-8, atol=1e-13)
+                np.testing.assert_allclose(b.volume, a.volume, rtol=1e-8, atol=1e-13)
+
+
+def test_units_of_length_scale_radii():
+    """The same robot a thousand times larger: linear radii a thousand times, angular the same."""
+    rows = [{"sigma": 0, "d": d, "alpha": a} for d, a in ((0, 0), (0.2, H), (0.3, 0.4))]
+    small, large = (
+        rm.RobotModel.from_table(
+            rm.DHTable.from_rows([r | {"d": k * r["d"]} for r in rows]),
+            tool=se3.translation(0.1 * k, 0.05 * k, 0),
+        )
+        for k in (1.0, 1e3)
+    )
+    q = [0.3, 0.8, -0.4]
+    for other in OTHERS:
+        a, b = (velocity_ellipsoid(m, q, other=other) for m in (small, large))
+        np.testing.assert_allclose(b.radii, 1e3 * a.radii, rtol=1e-10)
+        close(a.rank, b.rank, 0)
+        a, b = (velocity_ellipsoid(m, q, TwistPart.ANGULAR, other=other) for m in (small, large))
+        np.testing.assert_allclose(b.radii, a.radii, rtol=1e-10)
+
+
+# ---------------------------------------------------------------- flat ones, directions, points
+
+
+@pytest.mark.parametrize("name", ["planar_2r", "planar_3r", "lab_rr", "lab_rrt", "cobra_s600"])
+def test_arms_with_few_joints_have_flat_ellipsoids(name, rng):
+    model = rm.load(name)
+    q, _, _ = random_state(model, rng, 30)
+    ranks = [np.linalg.matrix_rank(rm.jacobian(model, q)[:, ROWS[p]], tol=1e-9) for p in PARTS]
+    for part, rank in zip(PARTS, ranks, strict=True):
+        found = velocity_ellipsoid(model, q, part)
+        close(found.rank, rank, 0)
+        assert ((found.radii > 0).sum(axis=-1) == rank).all()
+        force = force_ellipsoid(model, q, part)
+        assert (np.isinf(force.radii).sum(axis=-1) == 3 - rank).all()
+
+
+@pytest.mark.parametrize("small", [0.0, 1e-15, 1e-12, 1e-7, 1e-4])
+def test_near_a_singular_position(small):
+    """An arm stretched but for a small angle: its short radius is small, not noise, then zero."""
+    arm = planar(0.3, 0.2)
+    found = velocity_ellipsoid(arm, [0.7, small])
+    expected = 0.06 * np.sin(small) / np.hypot(0.5, 0.2)
+    shown = expected if small > 1e-8 else 0.0
+    np.testing.assert_allclose(found.radii[1], shown, rtol=1e-6)
+    assert int(found.rank) == 1 + (shown > 0)
+    assert np.isinf(force_ellipsoid(arm, [0.7, small]).radii).sum() == 2 - (shown > 0)
+    # asked for, the small radius is shown
+    fine = velocity_ellipsoid(arm, [0.7, small], tolerance=1e-14)
+    assert int(fine.rank) == 1 + (small > 1e-13)
+
+
+def test_a_tool_on_the_last_axis_moves_by_rounding_only():
+    """All axes through the tool: the linear ellipsoid is a point, whatever rounding says."""
+    rows = [{"sigma": 0, "alpha": a} for a in (0.3, H, -H)]
+    base = se3.translation(123.4, -56.7, 8.9) @ se3.rotation("x", 1.1)
+    wrist = rm.RobotModel.from_table(rm.DHTable.from_rows(rows), base=base)
+    found = velocity_ellipsoid(wrist, [0.3, 0.4, 0.5])
+    assert int(found.rank) == 0
+    assert not found.radii.any()
+    assert found.radius_along([1, 2, 3]) == 0.0
+    assert found.extent_along([1, 2, 3]) == 0.0
+    assert int(velocity_ellipsoid(wrist, [0.3, 0.4, 0.5], TwistPart.ANGULAR).rank) == 3
+    assert (force_ellipsoid(wrist, [0.3, 0.4, 0.5]).radius_along(np.eye(3)) == np.inf).all()
+
+
+def test_directions_in_and_out_of_a_flat_ellipsoid(rng):
+    """Rounding of the plane's normal does not make a direction in the plane impossible."""
+    R = random_rotation(rng)
+    base = np.eye(4)
+    base[:3, :3] = R
+    arm = planar(0.3, 0.2).with_base(base)
+    found = velocity_ellipsoid(arm, [0.4, 0.9])
+    u, w = R @ [0.6, 0.8, 0.0], R @ [0.6, 0.8, 1e-6]
+    J = rm.jacobian(arm, [0.4, 0.9])[:3]
+    joint, *_ = np.linalg.lstsq(J, u, rcond=None)
+    close(found.radius_along(u), 1 / np.linalg.norm(joint), 1e-12)
+    close(found.radius_along(-5.0 * u), found.radius_along(u), 1e-15)
+    close(found.radius_along(1e-300 * u), found.radius_along(u), 1e-15)
+    assert found.radius_along(w) == 0.0
+    force = force_ellipsoid(arm, [0.4, 0.9])
+    assert force.radius_along(R[:, 2]) == np.inf
+    assert force.extent_along(u) < np.inf
+    assert force.extent_along(w) == np.inf
+    assert found.radius_along(R.T).shape == (3,)
+
+
+@given(model=models(max_frames=7), seed=seeds)
+def test_boundary_points_are_on_the_boundary(model, seed):
+    rng = np.random.default_rng(seed)
+    q, _, _ = random_state(model, rng, 2)
+    found = velocity_ellipsoid(model, q)
+    points = found.boundary(5, 9)
+    assert points.shape == (2, 5, 9, 3)
+    close(points[:, :, 0], points[:, :, -1], 1e-12 * max(1.0, found.radii.max()))
+    whole = found.rank == 3
+    scaled = np.einsum("bji,bpkj->bpki", found.axes, points)[whole] / found.radii[whole, None, None]
+    close(np.linalg.norm(scaled, axis=-1), np.ones(scaled.shape[:-1]), 1e-6)
+    # the grid goes to every end
+    reach = np.linalg.norm(found.boundary(13, 25), axis=-1).max(axis=(-2, -1))
+    np.testing.assert_allclose(reach, found.radii[:, 0], rtol=1e-12)
+    open_ = force_ellipsoid(model, q)
+    nan = np.isnan(open_.boundary(5, 9)).all(axis=(-3, -2, -1))
+    assert nan.tolist() == (open_.rank < 3).tolist()
+
+
+# ---------------------------------------------------------------- batches and mistakes
+
+
+@pytest.mark.parametrize("function", [velocity_ellipsoid, force_ellipsoid])
+@pytest.mark.parametrize("batch", [(), (1,), (2, 3), (0,), (2, 0)], ids=str)
+def test_leading_axes_are_the_batch(function, batch, rng):
+    model = random_model(rng, f=7, tree=True, fixed=True)
+    q, _, _ = random_state(model, rng, *batch)
+    for other in OTHERS:
+        found = function(model, q, other=other)
+        assert found.radii.shape == (*batch, 3)
+        assert found.volume.shape == found.isotropy.shape == found.rank.shape == batch
+        assert found.radius_along([1.0, 0.0, 0.0]).shape == batch
+        assert not found.radii.flags.writeable
+        for i in np.ndindex(*batch):
+            single, row = function(model, q[i], other=other), found.at(i)
+            assert row.radii.shape == (3,)
+            assert row.quantity is found.quantity
+            np.testing.assert_allclose(row.radii, single.radii, rtol=1e-9, atol=1e-14)
+            close(row.centre, single.centre, 1e-13)
+    found = manipulability(model, q)
+    assert found.measure.shape == found.condition.shape == found.rank.shape == batch
+    assert found.velocity_transmission(np.eye(6)[0]).shape == batch
+
+
+@pytest.mark.parametrize("rows", [[], [0], [1], [0, 0]], ids=str)
+def test_fewer_joints_than_directions(rows):
+    table = rm.DHTable.from_rows([{"sigma": s, "d": 0.3} for s in [*rows, 2]])
+    model = rm.RobotModel.from_table(table)
+    for q in (np.full(model.n, 0.4), np.full((2, model.n), 0.4)):
+        found = velocity_ellipsoid(model, q)
+        assert (found.rank == model.n).all()
+        assert (found.radii > 0).sum() == model.n * (q.ndim if q.ndim == 1 else 2)
+        assert (np.isinf(force_ellipsoid(model, q).radii).sum(axis=-1) == 3 - model.n).all()
+        assert (manipulability(model, q).measure == 0).all()
+        assert (manipulability(model, q).condition == np.inf).all()
+
+
+def test_mistakes_are_named():
+    arm = rm.load("rx90")
+    q = np.zeros(6)
+    for function, name in (
+        (velocity_ellipsoid, "joint_velocity"),
+        (force_ellipsoid, "joint_torque"),
+    ):
+        with pytest.raises(ShapeError, match=r"^q: "):
+            function(arm, q[:5])
+        with pytest.raises(InvalidValueError, match="TwistPart"):
+            function(arm, q, "linear")
+        with pytest.raises(InvalidValueError, match="OtherPart"):
+            function(arm, q, other="zero")
+        with pytest.raises(FrameNotFoundError):
+            function(arm, q, frame="J9")
+        with pytest.raises(ShapeError, match=f"{name}.*6 joints"):
+            function(arm, q, **{name: [1.0, 2.0]})
+        for bad in (-1.0, np.nan, np.inf):
+            with pytest.raises(InvalidValueError, match=f"{name}.*'joint_2'"):
+                function(arm, q, **{name: [1, bad, 1, 1, 1, 1]})
+        with pytest.raises(InvalidValueError, match="length"):
+            function(arm, q, length=0.0)
+        with pytest.raises(InvalidValueError, match="tolerance"):
+            function(arm, q, tolerance=0.0)
+    with pytest.raises(InvalidValueError, match="above 0"):
+        force_ellipsoid(arm, q, joint_torque=[1, 0, 1, 1, 1, 1])
+    found = velocity_ellipsoid(arm, q)
+    for bad in ([0, 0, 0], [np.nan, 0, 0]):
+        with pytest.raises(InvalidValueError, match="direction"):
+            found.radius_along(bad)
+    with pytest.raises(ShapeError, match="direction"):
+        found.extent_along([1, 0])
+    with pytest.raises(ShapeError, match="broadcast"):
+        velocity_ellipsoid(arm, np.zeros((3, 6))).radius_along(np.eye(3)[:2])
+    with pytest.raises(InvalidValueError, match="boundary"):
+        found.boundary(2, 10)
+    with pytest.raises(ShapeError, match=r"radii|axes"):
+        Ellipsoid(EllipsoidQuantity.FORCE, np.zeros(3), np.eye(2), np.ones(3), np.int64(3))
+
+
+# ---------------------------------------------------------------- manipulability
+
+
+def test_measure_of_known_arms():
+    """Yoshikawa's planar arm, and the determinant of the RX-90 in closed form."""
+    q = np.linspace(-3.0, 3.0, 40)
+    arm = planar(0.3, 0.2)
+    mask = [1, 1, 0, 0, 0, 0]
+    found = manipulability(arm, np.stack((0.3 + 0 * q, q), axis=-1), mask=mask)
+    close(found.measure, 0.06 * np.abs(np.sin(q)), 1e-15)
+    rx90 = rm.load("rx90")
+    q = np.random.default_rng(2).uniform(-2, 2, size=(30, 6))
+    c3, s5 = np.cos(q[:, 2]), np.sin(q[:, 4])
+    reach = 0.45 * (np.sin(q[:, 1] + q[:, 2]) - np.cos(q[:, 1]))
+    close(manipulability(rx90, q).measure, np.abs(0.45 * 0.45 * c3 * s5 * reach), 1e-12)
+    # the length divides three rows
+    close(manipulability(rx90, q, length=0.5).measure, 8 * manipulability(rx90, q).measure, 1e-12)
+
+
+@given(model=any_models(), seed=seeds)
+def test_singular_values_are_those_of_the_rows(model, seed):
+    rng = np.random.default_rng(seed)
+    q, _, _ = random_state(model, rng, 2)
+    mask = rng.integers(0, 2, size=6)
+    mask[rng.integers(6)] = 1
+    keep = mask == 1
+    m = int(keep.sum())
+    length, scale = rng.uniform(0.3, 2.0), rng.uniform(0.5, 2.0, size=model.n)
+    found = manipulability(model, q, None, "local", mask, scale, length)
+    mixed = keep[:3].any() and keep[3:].any()
+    weights = np.repeat((1 / length if mixed else 1.0, 1.0), 3)[keep]
+    A = weights[:, None] * rm.jacobian(model, q, None, "local")[:, keep] * scale
+    size = max(robot_size(model, x) for x in q) * 10
+    s = np.zeros((2, m))
+    s[:, : min(m, model.n)] = np.linalg.svd(A, compute_uv=False)
+    close(found.singular_values, s, 1e-8 * size)
+    gram = A @ np.swapaxes(A, -1, -2)
+    close(found.measure**2, np.linalg.det(gram), 1e-8 * size ** (2 * m))
+
+
+@given(model=models(max_frames=8, prismatic=True), seed=seeds)
+def test_ratios_along_twists_and_wrenches(model, seed):
+    """By least squares: joint velocities of a twist, torques of a wrench; the length is no part."""
+    rng = np.random.default_rng(seed)
+    q, v, _ = random_state(model, rng)
+    J = rm.jacobian(model, q)
+    s = np.linalg.svd(J, compute_uv=False)
+    if not s.size or s[0] < 1e-6 or ((s < 1e-6 * s[0]) & (s > 1e-13 * s[0])).any():
+        return
+    twist, w = J @ v, rng.normal(size=6)
+    least = np.linalg.lstsq(J, twist, rcond=1e-9)[0]
+    for length in (0.2, 1.0, 3.0):
+        found = manipulability(model, q, length=length)
+        np.testing.assert_allclose(
+            found.velocity_transmission(twist), 1 / np.linalg.norm(least), rtol=1e-6
+        )
+        np.testing.assert_allclose(
+            found.force_transmission(w), 1 / np.linalg.norm(J.T @ w), rtol=1e-6
+        )
+        # both along the same six numbers: what is easy to move is hard to push
+        both = found.velocity_transmission(w) * found.force_transmission(w)
+        assert found.rank < 6 or both * (w @ w) <= 1 + 1e-9
+
+
+def test_ratios_where_there_is_no_motion():
+    arm = planar(0.3, 0.2)
+    found = manipulability(arm, [[0.0, 0.0], [0.0, 0.5]], mask=[1, 1, 1, 0, 0, 0])
+    close(found.velocity_transmission([1.0, 0.0, 0.0])[0], 0.0, 0)
+    assert found.velocity_transmission([1.0, 0.0, 0.0])[1] > 0
+    assert (found.velocity_transmission([0.0, 0.0, 2.0]) == 0).all()
+    assert found.force_transmission([1.0, 0.0, 0.0])[0] == np.inf
+    assert np.isfinite(found.force_transmission([1.0, 0.0, 0.0])[1])
+    assert (found.force_transmission([0.0, 0.0, 1.0]) == np.inf).all()
+    # as the ellipsoids say
+    disc = velocity_ellipsoid(arm, [0.0, 0.5])
+    close(disc.radius_along([1, 0, 0]), found.velocity_transmission([1.0, 0, 0])[1], 1e-12)
+    force = force_ellipsoid(arm, [0.0, 0.5])
+    close(force.radius_along([1, 0, 0]), found.force_transmission([1.0, 0, 0])[1], 1e-12)
+
+
+def test_manipulability_names_mistakes():
+    arm, q = planar(0.3, 0.2), [0.1, 0.2]
+    for mask in ([0] * 6, [1, 1, 2, 0, 0, 0]):
+        with pytest.raises(InvalidValueError, match="mask"):
+            manipulability(arm, q, mask=mask)
+    with pytest.raises(ShapeError, match="mask"):
+        manipulability(arm, q, mask=[1, 1, 1])
+    with pytest.raises(InvalidValueError, match="length"):
+        manipulability(arm, q, length=-1.0)
+    found = manipulability(arm, q, mask=[1, 1, 0, 0, 0, 0])
+    with pytest.raises(ShapeError, match="twist"):
+        found.velocity_transmission(np.ones(6))
+    with pytest.raises(InvalidValueError, match="wrench"):
+        found.force_transmission([0.0, 0.0])
+    assert not found.jacobian.flags.writeable
+    with pytest.raises(ShapeError, match="weights"):
+        Manipulability(np.ones(2), np.int64(2), np.ones((2, 3)), np.ones(3))
