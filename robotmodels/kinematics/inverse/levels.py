@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -59,9 +60,7 @@ class Level:
     def __post_init__(self) -> None:
         J = as_floats(self.J, "J")
         if J.ndim != 3:
-            raise ShapeError(
-                f"J: expected shape (N, m, n), got {J.shape}; one sample is (1, m, n)."
-            )
+            raise ShapeError(f"J: expected shape (N, m, n), got {J.shape}; one is (1, m, n).")
         N, m, _ = J.shape
         _set(self, "J", J)
         _set(self, "rate", as_exact(self.rate, (N, m), "rate"))
@@ -202,13 +201,14 @@ def level_velocities(
     row_weights = np.ones(M) if whole is None or whole.weights is None else whole.weights
     v, scale, mixed = np.empty((N, n)), np.empty((N, len(levels))), np.empty((N, len(levels)))
     error, singular_values = np.empty((N, M)), np.empty((N, M))
+    numbers = np.array(as_method(method).kernel_arguments, dtype=np.float64)
+    low, high = bounds or (wish, wish)
     kernel(
-        J, rate, drift, row_weights, starts, wish, *(bounds or (wish, wish)), int(bounds is not None),
-        np.sqrt(weights), np.array(as_method(method).kernel_arguments, dtype=np.float64),
-        v, scale, mixed, error, singular_values,
+        J, rate, drift, row_weights, starts, wish, low, high, int(bounds is not None),
+        np.sqrt(weights), numbers, v, scale, mixed, error, singular_values,
     )  # fmt: skip
     limited = np.zeros((N, n), bool) if bounds is None else (v <= bounds[0]) | (v >= bounds[1])
-    parts = [slice(a, b) for a, b in zip(starts[:-1], starts[1:], strict=True)]
+    parts = [slice(a, b) for a, b in pairwise(starts)]
     return LevelVelocities(
         v, scale, limited, mixed > 0.0,
         tuple(np.ascontiguousarray(error[:, part]) for part in parts),
