@@ -25,6 +25,7 @@ from robotmodels.trajectories import (
     trapezoidal,
 )
 from robotmodels.trajectories.piecewise import PiecewisePolynomial
+from robotmodels.trajectories.polynomial_durations import excess, least_duration
 
 LAWS = list(TimeLaw)
 # the highest derivative that is continuous inside the motion
@@ -406,6 +407,64 @@ def test_least_duration_of_polynomials_with_end_states(make, order, rng):
     with pytest.raises(InvalidValueError, match="least duration"):
         make(0.0, 1.0, 0.1, limits, v0=0.5)
     assert make(0.0, 1.0, 3.0, limits, v0=0.5).duration == 3.0
+
+
+@pytest.mark.parametrize("order", [3, 5])
+def test_least_durations_to_the_last_digits(order, rng):
+    """Beside closed forms, where there are any; and just below it a limit is exceeded."""
+    make, law = ((cubic, TimeLaw.CUBIC), (quintic, TimeLaw.QUINTIC))[order == 5]
+    for _ in range(40):  # from rest, one limit after the other
+        L, bound = 10.0 ** rng.uniform(-2.0, 2.0, 2)
+        name = ("velocity", "acceleration", "jerk")[int(rng.integers(3))]
+        limits = MotionLimits(**{name: bound})
+        state = dict.fromkeys(("q0", "v0", "v1", "a0", "a1"), np.zeros(1)) | {"q1": np.array([L])}
+        found = least_duration(order, state, limits.for_joints(1))
+        assert found == pytest.approx(along_line(law, 0.0, L, None, limits).duration, rel=1e-12)
+    for v, V in rng.uniform(0.1, 1.0, (20, 2)) * [1.0, 5.0] + [0.0, 1.0]:
+        # the velocity of a cubic that keeps v at both ends is v + 1.5 (D / T - v) in the middle
+        T = cubic(0.0, 1.0, limits=MotionLimits(V), v0=v, v1=v).duration
+        assert pytest.approx(1.5 / (V + 0.5 * v), rel=1e-12) == T
+    for _ in range(30):  # states on their limits, and all limits at once
+        V, A, J = rng.uniform(0.5, 2.0, 3) * [1.0, 4.0, 30.0]
+        low, high = -rng.uniform(0.0, 0.3, 2)
+        limits = MotionLimits(V, A, J, lower=low, upper=1.0 - high)
+        states = {"v0": rng.choice([0.0, V, 0.3]), "v1": rng.choice([0.0, -0.2, 0.1])}
+        q0 = low if rng.random() < 0.5 else 0.0
+        try:
+            T = make(q0, 1.0, limits=limits, **states).duration
+        except InvalidValueError as error:
+            assert "no duration" in str(error)  # noqa: PT017
+            continue
+        with pytest.raises(InvalidValueError, match=r"the least"):
+            make(q0, 1.0, T * 0.8, limits, **states)
+
+
+def test_durations_that_are_too_long_for_polynomials():
+    """A start that accelerates carries the joint away when there is too much time."""
+    limits = MotionLimits(1.5, 4.0, 30.0)
+    least = quintic(0.0, 1.0, limits=limits, a0=0.5).duration
+    with pytest.raises(InvalidValueError, match=rf"keeps them is {least:.12g} s\. No longer one"):
+        quintic(0.0, 1.0, 50.0, limits, a0=0.5)
+    with pytest.raises(
+        InvalidValueError, match=r"v0 of joint 2 is 2.*least limit that will do is 2"
+    ):
+        quintic([0.0, 0.0], [1.0, 1.0], limits=limits, v0=[0.0, 2.0])
+    with pytest.raises(InvalidValueError, match="however short"):
+        cubic(0.0, 0.0, limits=MotionLimits(1.0), v0=0.1, v1=-0.1)
+    # two intervals of durations: between them a limit of position is exceeded
+    two = MotionLimits(3.0, 6.0, 40.0, lower=-0.5, upper=0.1)
+    state = {"v0": -1.1, "v1": -1.4, "a0": 0.2, "a1": -1.1}
+    least = quintic(0.0, -0.4, limits=two, **state).duration
+    with pytest.raises(InvalidValueError, match=r"longer than that given is 1\.0[56]") as refusal:
+        quintic(0.0, -0.4, 0.5, two, **state)
+    assert f"keeps them is {least:.12g} s" in str(refusal.value)
+    one = {k: np.array([v]) for k, v in (state | {"q0": 0.0, "q1": -0.4}).items()}
+    second = least_duration(5, one, two.for_joints(1), 0.5)
+    trials = np.linspace(least * 1.001, second * 0.9999, 500)
+    kept = excess(5, one, trials, two.for_joints(1)) <= 0.0
+    assert np.count_nonzero(np.diff(kept)) == 1
+    assert kept[0]
+    assert quintic(0.0, -0.4, second * (1 + 1e-9), two, **state).check(two).kept
 
 
 # --- jerk-limited motions ------------------------------------------------------------------------

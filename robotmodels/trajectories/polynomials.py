@@ -12,6 +12,7 @@ from .laws import TimeLaw
 from .limits import MotionLimits
 from .piecewise import PiecewisePolynomial
 from .point_to_point import along_line
+from .polynomial_durations import between_states, excess, least_duration
 from .trajectory import Trajectory
 
 
@@ -153,20 +154,14 @@ def _between_states(
     if T is not None:
         refuse_short(T, np.zeros(R), np.ones((R, 1)))
     if bounds is not None:
-        least = np.array([0.0] * R)
-        for i in range(R):
-            state = {name: value[i] for name, value in states.items()}
-            if T is not None and _excess(order, state, T[i : i + 1], bounds)[0] <= ROUNDING:
-                continue
-            least[i] = _least_duration(order, state, bounds)
-            if T is not None:
-                raise InvalidValueError(
-                    f"duration: with {T[i]:.9g} s the limits are not kept; the least duration "
-                    f"that keeps them is {least[i]:.12g} s."
-                )
-        T = least if T is None else T
+        rows = [{name: value[i] for name, value in states.items()} for i in range(R)]
+        if T is None:
+            T = np.array([_least(order, row, bounds) for row in rows])
+        for row, time in zip(rows, T, strict=True):
+            if excess(order, row, np.array([time]), bounds)[0] > ROUNDING:
+                _refuse(order, row, bounds, float(time))
     assert T is not None
-    c = _coefficients(order, states, T[:, None])
+    c = between_states(order, states, T[:, None])
     motion = PiecewisePolynomial(
         np.stack((np.zeros(R), T), axis=-1).reshape(*batch, 1, 2),
         np.moveaxis(c, 0, -2).reshape(*batch, 1, order + 1, n),
@@ -174,111 +169,36 @@ def _between_states(
     return Trajectory(motion, scalar)
 
 
-def _coefficients(order: int, states: dict[str, Array], T: Array) -> Array:
-    """Powers of the normalised time, shape (order + 1, R, n), from states (R, n) or (n,)."""
-    q0, D = states["q0"], states["q1"] - states["q0"]
-    v0, v1 = states["v0"] * T, states["v1"] * T
-    a0, a1 = states["a0"] * T * T, states["a1"] * T * T
-    if order == 3:
-        rows = (q0 + 0.0 * T, v0, 3.0 * D - 2.0 * v0 - v1, -2.0 * D + v0 + v1)
-    else:
-        rows = (
-            q0 + 0.0 * T,
-            v0,
-            0.5 * a0,
-            10.0 * D - 6.0 * v0 - 4.0 * v1 - 1.5 * a0 + 0.5 * a1,
-            -15.0 * D + 8.0 * v0 + 7.0 * v1 + 1.5 * a0 - a1,
-            6.0 * D - 3.0 * (v0 + v1) - 0.5 * a0 + 0.5 * a1,
-        )
-    return np.stack(rows)
-
-
-def _excess(order: int, state: dict[str, Array], T: Array, limits: MotionLimits) -> Array:
-    """By how much limits are exceeded at best and worst, relative, for durations (G,)."""
-    c = np.moveaxis(_coefficients(order, state, T[:, None]), 0, -2)[:, None]
-    motion = PiecewisePolynomial(np.stack((np.zeros_like(T), T), axis=-1)[:, None], c)
-    worst = np.full(T.shape, -np.inf)
-    for k, (least, most) in enumerate(
-        (
-            (limits.lower, limits.upper),
-            (limits.velocity_lower, limits.velocity),
-            (limits.acceleration_lower, limits.acceleration),
-            (-limits.jerk, limits.jerk),
-        )
-    ):
-        low, high = motion.extremes(k)
-        size = np.maximum(np.abs(least), np.abs(most))
-        size = np.where(np.isfinite(size), np.maximum(size, 1e-9), 1.0)
-        over = np.maximum((high - most) / size, (least - low) / size)
-        worst = np.maximum(worst, over.max(axis=-1))
-    return worst
-
-
-def _least_duration(order: int, state: dict[str, Array], limits: MotionLimits) -> float:
-    """Least duration with which the polynomials keep the limits.
-
-    The durations that do need not form one interval, so they are looked for on a grid of times,
-    in which every dip of the excess is followed to its bottom, before the least is refined.
-    """
-    D = np.abs(state["q1"] - state["q0"])
-    v = np.maximum(np.abs(state["v0"]), np.abs(state["v1"]))
-    a = np.maximum(np.abs(state["a0"]), np.abs(state["a1"]))
-    V = np.minimum(limits.velocity, -limits.velocity_lower)
-    A = np.minimum(limits.acceleration, -limits.acceleration_lower)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        scales = np.concatenate(
-            (D / V, np.sqrt(D / A), np.cbrt(D / limits.jerk), v / A, np.sqrt(v / limits.jerk),
-             a / limits.jerk, D / v, np.sqrt(D / a), v / a)
-        )  # fmt: skip
-    scales = scales[np.isfinite(scales) & (scales > 0.0)]
-    if scales.size == 0:
-        return 0.0 if not D.any() else 1.0
-    grid = np.geomspace(scales.min() / 30.0, scales.max() * 30.0, 600)
-    excess = _excess(order, state, grid, limits)
-    for k in range(1, grid.size - 1):
-        if excess[k] > 0.0 and excess[k] <= excess[k - 1] and excess[k] <= excess[k + 1]:
-            T, bottom = _bottom(order, state, limits, grid[k - 1], grid[k + 1])
-            if bottom <= 0.0:
-                grid, excess = np.insert(grid, k, T), np.insert(excess, k, bottom)
-                break
-        elif excess[k] <= 0.0:
-            break
-    kept = excess <= 0.0
-    if not kept.any():
-        T = float(grid[excess.argmin()])
+def _least(order: int, state: dict[str, Array], limits: MotionLimits) -> float:
+    for rate, least, most in (("v", limits.velocity_lower, limits.velocity),
+                              ("a", limits.acceleration_lower, limits.acceleration)):  # fmt: skip
+        for name in (rate + "0", rate + "1"):
+            wrong = (state[name] > most) | (state[name] < least)
+            if wrong.any():
+                j = int(wrong.argmax())
+                raise InvalidValueError(
+                    f"limits: {name} of joint {j + 1} is {state[name][j]:.9g}, outside its limits "
+                    f"{least[j]:.9g} to {most[j]:.9g}; the least limit that will do is "
+                    f"{abs(state[name][j]):.12g}."
+                )
+    T = least_duration(order, state, limits)
+    if T is None:
         raise InvalidValueError(
-            "limits: no duration keeps the limits with these states at the ends; the nearest to "
-            f"it, {T:.6g} s, exceeds one by {100.0 * float(excess.min()):.3g} %."
+            "limits: no duration keeps them with these states at the ends; give slower states or "
+            "greater limits, or take jerk_limited, which finds a motion between any states."
         )
-    k = int(kept.argmax())
-    if k == 0:
-        return float(grid[0])
-    below, T = float(grid[k - 1]), float(grid[k])
-    while T - below > 1e-15 * T:
-        trials = np.linspace(below, T, 18)[1:-1]
-        kept = _excess(order, state, trials, limits) <= 0.0
-        k = int(kept.argmax()) if kept.any() else len(trials)
-        new_T = T if k == len(trials) else float(trials[k])
-        below = float(trials[k - 1]) if k else below
-        if new_T == T and k != len(trials):
-            break
-        T = new_T
-        if np.nextafter(below, T) >= T:
-            break
     return T
 
 
-def _bottom(
-    order: int, state: dict[str, Array], limits: MotionLimits, low: float, high: float
-) -> tuple[float, float]:
-    """Duration of least excess between two durations."""
-    T, best = low, np.inf
-    for _ in range(12):
-        trials = np.linspace(low, high, 17)
-        excess = _excess(order, state, trials, limits)
-        k = int(excess.argmin())
-        T, best = float(trials[k]), float(excess[k])
-        low, high = float(trials[max(k - 1, 0)]), float(trials[min(k + 1, 16)])
-        if best <= 0.0:
-            break
-    return T, best
+def _refuse(order: int, state: dict[str, Array], limits: MotionLimits, T: float) -> None:
+    least = _least(order, state, limits)
+    message = f"with {T:.9g} s the limits are not kept; the least duration that keeps them is"
+    message = f"duration: {message} {least:.12g} s."
+    if least < T:
+        longer = least_duration(order, state, limits, T)
+        message += (
+            " No longer one does."
+            if longer is None
+            else f" The least that is longer than that given is {longer:.12g} s."
+        )
+    raise InvalidValueError(message)
