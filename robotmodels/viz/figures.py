@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from enum import Enum
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -367,9 +368,25 @@ def styled(axes: Axes) -> Axes:
     for axis in (axes.xaxis, axes.yaxis):
         axis.label.set(size=LABEL_SIZE, color=INK)
         axis.get_offset_text().set(size=SMALL_SIZE, color=INK)
-    axes.title.set(size=LABEL_SIZE, color=INK)
     axes.margins(x=0.01, y=0.07)
     return axes
+
+
+def heading(axes: Axes, text: str, width: float) -> None:
+    """A text over axes, in lines that do not reach the next ones.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+        To be changed.
+    text : str
+        The text; its own line breaks are kept.
+    width : float
+        Of the panel with its margins, inches.
+    """
+    letters = max(int(0.8 * width * 72.0 / (0.55 * LABEL_SIZE)), 4)
+    lines = [wrap(line, letters, break_long_words=False) or [""] for line in text.split("\n")]
+    axes.set_title("\n".join(part for line in lines for part in line), size=LABEL_SIZE, color=INK)
 
 
 def legend_above(figure: Figure, handles: Sequence[Any], title: str | None = None) -> None:
@@ -391,7 +408,7 @@ def legend_above(figure: Figure, handles: Sequence[Any], title: str | None = Non
         return
     # an average letter is half as wide as it is high; as much as five letters goes to the line
     letters = max(len(str(handle.get_label())) for handle in handles)
-    each = (0.55 * letters + 5.2) * SMALL_SIZE / 72.0
+    each = (0.5 * letters + 5.2) * SMALL_SIZE / 72.0
     columns = int(np.clip(figure.get_figwidth() // each, 1, len(handles)))
     rows = -(-len(handles) // columns)
     legend = figure.legend(

@@ -16,6 +16,7 @@ from .figures import (
     PAGE,
     Unit,
     as_unit,
+    heading,
     joint_names,
     legend_above,
     line_style,
@@ -124,7 +125,7 @@ def plot_profiles(
         lines = [line for line in axes.get_lines() if not str(line.get_label()).startswith("_")]
         if side_by_side:
             name, _, time = str(lines[0].get_label()).rpartition(", ")
-            axes.set_title(f"{name}\n{time}")
+            heading(axes, f"{name}\n{time}", wide / columns)
         else:
             handles += lines
     legend_above(figure, handles + limit_handles(figure), title)
