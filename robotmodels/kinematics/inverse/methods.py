@@ -14,11 +14,12 @@ from math import inf, isfinite, sqrt
 
 from ...errors import InvalidValueError
 
-THRESHOLD = 0.01
-"""Default singular value below which a direction counts as weak: it takes joints at 100 rad/s for
-one length of the robot per second. One random configuration in ten of an industrial arm has one."""
+THRESHOLD = 0.003
+"""Default singular value below which a direction counts as weak: some 3 deg from the singular
+positions of an industrial arm, one random configuration in thirty. At it, the joints turn at 300
+rad/s for one length of the robot per second, at 20 rad/s for some centimetres per second."""
 
-LARGEST_DAMPING = 0.007
+LARGEST_DAMPING = 0.0021
 """Default damping at a singular position: the gain is then nearly the least for the threshold."""
 
 
@@ -165,7 +166,7 @@ class DampedInverse:
 
     Examples
     --------
-    >>> round(DampedInverse(threshold=0.01, largest=0.007).gain, 3)
+    >>> round(DampedInverse(threshold=0.01, largest=0.007).gain, 2)
     100.02
     >>> DampedInverse(damping=Damping.CONSTANT, largest=0.05).gain
     10.0
@@ -238,7 +239,7 @@ def as_method(method: InverseMethod | None) -> InverseMethod:
     Examples
     --------
     >>> as_method(None).largest
-    0.007
+    0.0021
     """
     if method is None:
         return _DEFAULT

@@ -154,8 +154,8 @@ class IKMSolution:
         --------
         >>> from robotmodels.robots import load
         >>> from robotmodels.kinematics.inverse.ikm import ikm
-        >>> ikm(load("lab_rr"), [0.1, 0.2], [0.0, 0.0, 0.5, 0.0, 0.0, 0.0]).reason()[:58]
-        'The motion has a part that cannot be produced: the robot h'
+        >>> ikm(load("lab_rr"), [0.1, 0.2], [0.0, 0.0, 0.5, 0.0, 0.0, 0.0]).reason()
+        'The motion has a part that cannot be produced: too few degrees of freedom. It misses ...'
         """
         at = i if isinstance(i, tuple) else (i,)
         try:

@@ -66,7 +66,7 @@ def solved(model: RobotModel, request: Request) -> IKMSolution:
     if request.augmented or request.tasks or request.limits not in (None, False):
         from .by_levels import solved_by_levels
 
-        return solved_by_levels(model, request, known, scaling, method, reference, extra)
+        return solved_by_levels(model, request, known, scaling, reference, extra)
     parts = {"q": q, request.rate_name: rate, "v": v, "secondary": extra}
     given = {name: part for name, part in parts.items() if part is not None}
     batch, laid = batch_rows(tuple(given.values()), tuple(given))
@@ -152,6 +152,7 @@ def tell_structure(
     reference: int,
     status: NDArray[np.int8],
     rank: NDArray[np.int8],
+    added: int = 0,
 ) -> None:
     """Tell robots that never produce all rows asked for from singular positions of others.
 
@@ -163,6 +164,8 @@ def tell_structure(
         Changed in place, from SINGULAR to TOO_FEW_JOINTS where the rank is what it always is.
     rank : ndarray of int8, shape (N,)
         Ranks at the configurations.
+    added : int
+        Rows of tasks that augment the twist, each of which may add one to the rank.
 
     Examples
     --------
@@ -177,7 +180,7 @@ def tell_structure(
         return
     lacking = status == _SINGULAR
     if lacking.any():
-        usual = general_rank(model, known, scaling, reference)
+        usual = min(general_rank(model, known, scaling, reference) + added, model.n)
         status[lacking & (rank >= usual)] = _TOO_FEW
 
 
@@ -201,7 +204,7 @@ def frozen(array: NDArray[Any], batch: tuple[int, ...]) -> NDArray[Any]:
     >>> frozen(np.zeros((6, 4)), (2, 3)).shape
     (2, 3, 4)
     """
-    array = array.reshape(*batch, *array.shape[1:])
+    array = array.reshape((*batch, *array.shape[1:]))
     array.setflags(write=False)
     return array
 

@@ -30,7 +30,7 @@ class IKMStatus(IntEnum):
     IN_PART = 1, "The motion is met in part: its weak directions are kept slow near a singularity."
     SINGULAR = 2, "The motion has a part that cannot be produced at this singular position."
     TOO_FEW_JOINTS = (
-        3, "The motion has a part that cannot be produced: the robot has too few degrees of freedom.",
+        3, "The motion has a part that cannot be produced: too few degrees of freedom.",
     )  # fmt: skip
     LIMITED = 4, "The motion is kept within the limits of the joints, which cannot follow it."
 
