@@ -18,7 +18,6 @@ from ._vectors import (
     matrix,
     product,
     put_matrix,
-    put_vector,
     scale,
     times,
     vector,

@@ -133,7 +133,7 @@ def angles_of(sequence: AngleSequence, R: Array) -> tuple[Array, Array]:
     angles[..., 0] = _half_open(phi)
     angles[..., 1] = np.arctan2(-gz, s) if sequence.level else np.arctan2(s, gz)
     angles[..., 2] = third_angle(sequence, R, phi)
-    return angles, locked
+    return angles + 0.0, locked  # no negative zeros
 
 
 def third_angle(sequence: AngleSequence, R: Array, phi: Array) -> Array:
@@ -154,9 +154,7 @@ def third_angle(sequence: AngleSequence, R: Array, phi: Array) -> Array:
         Rad.
     """
     px, py = horizontal(sequence, phi)
-    sine, cosine = (
-        px * R[..., 1, k] - py * R[..., 0, k] for k in (sequence.sine, sequence.cosine)
-    )
+    sine, cosine = (px * R[..., 1, k] - py * R[..., 0, k] for k in (sequence.sine, sequence.cosine))
     return _half_open(np.arctan2(sequence.sign * sine, cosine))
 
 
@@ -220,9 +218,7 @@ def angles_near(
     return np.where((worse & ~locked)[..., None], second, first)
 
 
-def at_lock(
-    sequence: AngleSequence, R: Array, angles: Array, locked: Array, phi: Array
-) -> Array:
+def at_lock(sequence: AngleSequence, R: Array, angles: Array, locked: Array, phi: Array) -> Array:
     """The angles with the first one given where it is free.
 
     Parameters
@@ -305,23 +301,20 @@ def continuous_angles(sequence: AngleSequence, R: Array, near: Array | None) -> 
     angles, locked = angles_of(sequence, R)
     if not len(angles):
         return angles
-    free = np.flatnonzero(~locked)
-    # both solutions are the same distance apart as their mirror images, so whether to change the
-    # solution at a step does not depend on which one it was: the parity of the changes decides
-    chosen = angles[free]
-    other = chosen + other_solution(sequence, chosen)
-    if near is not None:
-        before = np.concatenate([near[None], chosen[:-1]])
-    else:
-        before = np.concatenate([chosen[:1], chosen[:-1]])
-    changes = _turned_distance(other - before) < _turned_distance(chosen - before)
-    angles[free] = np.where((np.cumsum(changes) % 2 == 1)[:, None], other, chosen)
     if locked.any():
         # the free first angle keeps the value it had, or where it had none the one it will have
+        free = np.flatnonzero(~locked)
         last = np.maximum.accumulate(np.where(locked, -1, np.arange(len(angles))))
         start = near[0] if near is not None else (angles[free[0], 0] if len(free) else 0.0)
         phi = np.where(last < 0, start, angles[last, 0])
         angles = at_lock(sequence, R, angles, locked, phi)
+    # the other solutions are as far apart as the solutions themselves, so whether to change at a
+    # step does not depend on which of the two it was: the parity of the changes decides
+    other = angles + other_solution(sequence, angles)
+    before = np.concatenate([angles[:1] if near is None else near[None], angles[:-1]])
+    changes = _turned_distance(other - before) < _turned_distance(angles - before)
+    mirrored = np.cumsum(changes & ~locked) % 2 == 1
+    angles = np.where(mirrored[:, None], other, angles)
     if near is not None:
         angles[0] += whole_turns(near - angles[0])
     return np.unwrap(angles, axis=0)

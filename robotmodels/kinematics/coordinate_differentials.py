@@ -136,9 +136,7 @@ def _angles_rate(
     phi_jt = (_outer(g_t, g_j) + _outer(g, g_jt) - 2.0 * _outer(g, g_j) * s_t / s) / s**2
     theta_jt = g_t[..., 2] * s_j + g[..., 2] * s_jt - s_t * g_j[..., 2] - s * g_jt[..., 2]
     psi_jt = v_t * u_j + v * u_jt - u_t * v_j - u * v_jt - 2.0 * (v * u_j - u * v_j) * s_t / s
-    return np.stack(
-        np.broadcast_arrays(phi_jt, theta_jt, sequence.sign * psi_jt / s**2), axis=-1
-    )
+    return np.stack(np.broadcast_arrays(phi_jt, theta_jt, sequence.sign * psi_jt / s**2), axis=-1)
 
 
 def _pivot(R: Array, *derivatives: Array) -> tuple[Array, list[Array]]:

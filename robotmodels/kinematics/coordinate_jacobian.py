@@ -79,9 +79,7 @@ def coordinate_jacobian(
     differentiated_poses(rows, *model.chain, *point.kernel_arguments, poses, T_j)
     y = coordinates_of_poses(poses, kind, close)[:, 3:]
     with np.errstate(divide="ignore", invalid="ignore"):
-        y_j = orientation_differential(
-            kind, y[:, None], poses[:, None, :3, :3], T_j[..., :3]
-        )
+        y_j = orientation_differential(kind, y[:, None], poses[:, None, :3, :3], T_j[..., :3])
     return _assembled(batch, T_j, y_j, singular_coordinates(y, kind))
 
 
@@ -134,9 +132,7 @@ def coordinate_jacobian_rate(
     batch, (rows, speeds), close = _laid_out((q, v), ("q", "v"), kind, near)
     poses, T_j = _room(rows, model.n)
     T_jt = np.empty(T_j.shape)
-    differentiated_pose_rates(
-        rows, speeds, *model.chain, *point.kernel_arguments, poses, T_j, T_jt
-    )
+    differentiated_pose_rates(rows, speeds, *model.chain, *point.kernel_arguments, poses, T_j, T_jt)
     y = coordinates_of_poses(poses, kind, close)[:, 3:]
     R_t = np.einsum("ij,ijkl->ikl", speeds, T_j[..., :3])
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -164,9 +160,7 @@ def _laid_out(
         batch = np.broadcast_shapes(batch, close.shape[:-1])
     count = int(np.prod(batch))
     rows = [
-        np.ascontiguousarray(np.broadcast_to(x, (*batch, x.shape[-1]))).reshape(
-            count, x.shape[-1]
-        )
+        np.ascontiguousarray(np.broadcast_to(x, (*batch, x.shape[-1]))).reshape(count, x.shape[-1])
         for x in (vectors if close is None else (*vectors, close))
     ]
     return batch, rows[: len(vectors)], None if close is None else rows[-1]

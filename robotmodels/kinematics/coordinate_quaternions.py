@@ -1,4 +1,4 @@
-"""Orientations as unit quaternions, scalar first, and as rotation vectors, which go through them."""
+"""Orientations as unit quaternions, scalar first, and as rotation vectors by way of them."""
 
 from __future__ import annotations
 

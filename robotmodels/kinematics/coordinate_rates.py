@@ -31,9 +31,7 @@ can be promised.
 """
 
 
-def coordinate_rates(
-    T: Any, kind: str | OrientationKind, near: ArrayLike | None = None
-) -> Array:
+def coordinate_rates(T: Any, kind: str | OrientationKind, near: ArrayLike | None = None) -> Array:
     """Matrices E that take the twist of a frame to the rates of its coordinates, ``dX/dt = E V``.
 
     Parameters
@@ -78,9 +76,7 @@ def coordinate_rates(
     return _beside_position(orientation_rates(x[..., 3:], kind))
 
 
-def twist_from_rates(
-    T: Any, kind: str | OrientationKind, near: ArrayLike | None = None
-) -> Array:
+def twist_from_rates(T: Any, kind: str | OrientationKind, near: ArrayLike | None = None) -> Array:
     """Matrices that take the rates of coordinates to the twist; a left inverse of the others.
 
     Parameters
@@ -345,7 +341,7 @@ def _quaternion_rates(Q: Array) -> Array:
 
 def _column_rates(columns: Array) -> Array:
     """``du = w x u`` for unit vectors one behind the other; linear in them."""
-    vectors = columns.reshape(*columns.shape[:-1], -1, 3)
+    vectors = columns.reshape(*columns.shape[:-1], columns.shape[-1] // 3, 3)
     return -skew(vectors).reshape(*columns.shape, 3)
 
 
@@ -369,6 +365,10 @@ def _beside_position(block: Array, position: float = 1.0) -> Array:
     for k in range(3):
         out[..., k, k] = position
     out[..., 3:, 3:] = block
+    if np.isnan(block).any():
+        # rates that do not exist are whole rows that are not a number
+        lost = np.isnan(block).any(axis=-1)
+        out[..., 3:, :3] = np.where(lost[..., None], np.nan, 0.0)
     return out
 
 

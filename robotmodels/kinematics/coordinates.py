@@ -132,7 +132,7 @@ def pose_from_coordinates(x: ArrayLike, kind: str | OrientationKind) -> Array:
     elif kind is OrientationKind.QUATERNION:
         T[..., :3, :3] = rotation_of_quaternions(_unit(y))
     else:
-        axes = y.reshape(*y.shape[:-1], -1, 3)
+        axes = y.reshape(*y.shape[:-1], y.shape[-1] // 3, 3)
         T[..., :3, 1:3] = np.swapaxes(axes[..., -2:, :], -1, -2)
         T[..., :3, 0] = (
             axes[..., 0, :]
@@ -207,7 +207,9 @@ def continuous_coordinates(
     R = np.swapaxes(T[..., :3, :3].reshape(count, rows, 3, 3), 0, 1)
     out = np.empty((count, rows, kind.dimension - 3))
     for i in range(rows):
-        out[:, i] = _continuous(np.ascontiguousarray(R[i]), kind, None if start is None else start[i])
+        out[:, i] = _continuous(
+            np.ascontiguousarray(R[i]), kind, None if start is None else start[i]
+        )
     out = in_order(kind, out).reshape(count, *others, kind.dimension - 3)
     return np.concatenate([T[..., :3, 3], out], axis=-1)
 

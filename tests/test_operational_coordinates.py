@@ -1,0 +1,832 @@
+"""Operational coordinates: poses as vectors and back, rates, the Jacobian by differentiation.
+
+Oracles: SciPy's Rotation where conventions coincide, brute force over the equivalent coordinates,
+finite differences of fourth order, and the screw Jacobian as the other way to the same matrix.
+"""
+
+import itertools
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given
+from identities.random_robots import any_models, random_model, random_state, robot_size, seeds
+from scipy.spatial.transform import Rotation
+
+import robotmodels as rm
+from robotmodels import se3
+from robotmodels.errors import (
+    FrameNotFoundError,
+    InvalidValueError,
+    NotARotationError,
+    ShapeError,
+)
+from robotmodels.kinematics.coordinate_jacobian import (
+    coordinate_jacobian,
+    coordinate_jacobian_rate,
+)
+from robotmodels.kinematics.coordinate_kinds import OrientationKind, orientation_kind
+from robotmodels.kinematics.coordinate_rates import (
+    SINGULAR,
+    coordinate_rates,
+    coordinate_rates_rate,
+    is_representation_singular,
+    twist_from_rates,
+)
+from robotmodels.kinematics.coordinates import (
+    continuous_coordinates,
+    operational_coordinates,
+    pose_from_coordinates,
+)
+
+EPS = np.finfo(float).eps
+TURN = 2 * np.pi
+KINDS = tuple(OrientationKind)
+EULER = (OrientationKind.EULER, OrientationKind.EULER_ZYZ)
+ROLL = (OrientationKind.ROLL_PITCH_YAW, OrientationKind.ROLL_PITCH_YAW_URDF)
+ANGLES = (*EULER, *ROLL)
+SCIPY = {"euler": "ZXZ", "euler_zyz": "ZYZ", "roll_pitch_yaw": "ZYX", "roll_pitch_yaw_urdf": "xyz"}
+
+every_kind = pytest.mark.parametrize("kind", KINDS, ids=str)
+every_angle = pytest.mark.parametrize("kind", ANGLES, ids=str)
+
+
+def poses(R, rng):
+    T = np.zeros((*R.shape[:-2], 4, 4))
+    T[..., :3, :3], T[..., 3, 3] = R, 1.0
+    T[..., :3, 3] = rng.normal(size=(*T.shape[:-2], 3))
+    return T
+
+
+def random_poses(rng, *batch):
+    count = int(np.prod(batch))
+    R = Rotation.random(count, rng=rng).as_matrix() if count else np.zeros((0, 3, 3))
+    return se3.as_pose(poses(R, rng)).reshape(*batch, 4, 4)
+
+
+def special_rotations():
+    """All quarter turns, and rotations by nearly nothing and nearly half a turn about any axis."""
+    rng = np.random.default_rng(7)
+    signed = [
+        np.eye(3)[list(p)] * np.array(s)[:, None]
+        for p in itertools.permutations(range(3))
+        for s in itertools.product((1.0, -1.0), repeat=3)
+    ]
+    yield from (R for R in signed if np.linalg.det(R) > 0)
+    axes = [*np.eye(3), *-np.eye(3), *rng.normal(size=(6, 3)), [1, 1, 0], [0, 1e-9, 1]]
+    for axis in axes:
+        u = np.asarray(axis) / np.linalg.norm(axis)
+        for gap in (0.0, 1e-300, 1e-17, 1e-16, 1e-15, 1e-12, 1e-8, 1e-5, 1e-2):
+            for angle in (gap, np.pi - gap):
+                yield rotation_by(u * angle)
+
+
+def rotation_by(v):
+    """Rotation of a rotation vector, from its quaternion."""
+    angle = np.linalg.norm(v)
+    e = 0.5 * np.sinc(angle / TURN) * np.asarray(v, dtype=float)
+    w, K = np.cos(angle / 2), se3.skew(e)
+    return np.eye(3) + 2 * w * K + 2 * K @ K
+
+
+def five_point(f, h):
+    """First derivative at 0, error of the order of h^4."""
+    return (8 * (f(h) - f(-h)) - (f(2 * h) - f(-2 * h))) / (12 * h)
+
+
+def second_difference(f, h):
+    """Second derivative at 0, error of the order of h^4."""
+    return (16 * (f(h) + f(-h)) - 30 * f(0.0) - (f(2 * h) + f(-2 * h))) / (12 * h * h)
+
+
+def moved(T, twist, t):
+    """Poses that have moved for a time t with a twist that stays the same in world axes."""
+    T = T.copy()
+    T[..., :3, :3] = rotation_by(twist[3:] * t) @ T[..., :3, :3]
+    T[..., :3, 3] += twist[:3] * t
+    return T
+
+
+def same(x, y, tolerance):
+    assert np.shape(x) == np.shape(y)
+    np.testing.assert_allclose(x, y, rtol=0, atol=tolerance)
+
+
+# --- kinds -------------------------------------------------------------------------------------
+
+
+@every_kind
+def test_words_of_a_kind(kind):
+    word = kind.value
+    for spelt in (kind, word, word.replace("_", "-"), f" {word.replace('_', '  ').upper()} "):
+        assert orientation_kind(spelt) is kind
+    assert kind.dimension == len(kind.labels) == operational_coordinates(np.eye(4), kind).size
+    assert len(set(kind.labels)) == kind.dimension
+
+
+@pytest.mark.parametrize(
+    ("word", "kind"),
+    [
+        ("rpy", OrientationKind.ROLL_PITCH_YAW),
+        ("RPY URDF", OrientationKind.ROLL_PITCH_YAW_URDF),
+        ("euler-zxz", OrientationKind.EULER),
+    ],
+)
+def test_short_words(word, kind):
+    assert orientation_kind(word) is kind
+
+
+@pytest.mark.parametrize("word", ["eule", "", "quaternions", "eulerzyz", 3, None, b"rpy", ["rpy"]])
+def test_unknown_words_are_refused_with_the_known_ones(word):
+    for call in (
+        lambda: operational_coordinates(np.eye(4), word),
+        lambda: pose_from_coordinates(np.zeros(6), word),
+        lambda: continuous_coordinates([np.eye(4)], word),
+        lambda: coordinate_rates(np.eye(4), word),
+        lambda: twist_from_rates(np.eye(4), word),
+        lambda: coordinate_rates_rate(np.eye(4), np.zeros(6), word),
+        lambda: is_representation_singular(np.eye(4), word),
+        lambda: coordinate_jacobian(rm.load("rx90"), np.zeros(6), word),
+        lambda: coordinate_jacobian_rate(rm.load("rx90"), np.zeros(6), np.zeros(6), word),
+    ):
+        with pytest.raises(InvalidValueError, match=r"'euler'.*'direction_cosines'.*'rpy'"):
+            call()
+
+
+# --- there and back ----------------------------------------------------------------------------
+
+
+@every_kind
+def test_random_poses_come_back(kind, rng):
+    T = random_poses(rng, 2000)
+    x = operational_coordinates(T, kind)
+    assert x.shape == (2000, kind.dimension)
+    assert np.array_equal(x[:, :3], T[:, :3, 3])
+    back = pose_from_coordinates(x, kind)
+    assert np.abs(back - T).max() < 10 * EPS
+    assert np.array_equal(back[:, 3], T[:, 3])
+
+
+@every_kind
+def test_special_rotations_come_back(kind, rng):
+    T = poses(np.array(list(special_rotations())), rng)
+    back = pose_from_coordinates(operational_coordinates(T, kind), kind)
+    assert np.abs(back - T).max() < 12 * EPS
+
+
+@every_angle
+@pytest.mark.parametrize("gap", [0.0, 1e-17, 1e-16, 5e-16, 1e-15, 1e-14, 1e-12, 1e-8, 1e-4])
+def test_angles_are_exact_at_and_near_gimbal_lock(kind, gap, rng):
+    x = rng.uniform(-np.pi, np.pi, size=(200, 6))
+    lock = np.array([0.0, np.pi]) if kind in EULER else np.array([np.pi, -np.pi]) / 2
+    x[:, 4] = lock[np.arange(200) % 2] + gap * np.where(np.arange(200) % 4 < 2, 1.0, -1.0)
+    T = se3.as_pose(pose_from_coordinates(x, kind))
+    for near in (None, x, x + rng.normal(size=x.shape)):
+        y = operational_coordinates(T, kind, near)
+        assert np.abs(pose_from_coordinates(y, kind) - T).max() < 12 * EPS
+    if gap == 0.0:
+        y = operational_coordinates(T, kind)
+        assert (y[:, 5 if kind is ROLL[1] else 3] == 0.0).all()
+        assert is_representation_singular(T, kind).all()
+        same(operational_coordinates(T, kind, near=x), x, 20 * EPS)
+
+
+@every_angle
+def test_angles_are_those_of_scipy(kind, rng):
+    T = random_poses(rng, 1000)
+    expected = Rotation.from_matrix(T[:, :3, :3]).as_euler(SCIPY[kind.value])
+    difference = operational_coordinates(T, kind)[:, 3:] - expected
+    same(difference - TURN * np.rint(difference / TURN), np.zeros((1000, 3)), 1e-12)
+    x = np.concatenate([np.zeros((1000, 3)), rng.normal(size=(1000, 3)) * 4], axis=1)
+    expected = Rotation.from_euler(SCIPY[kind.value], x[:, 3:]).as_matrix()
+    same(pose_from_coordinates(x, kind)[:, :3, :3], expected, 1e-14)
+
+
+def test_quaternion_and_vector_are_those_of_scipy(rng):
+    T = random_poses(rng, 1000)
+    R = Rotation.from_matrix(T[:, :3, :3])
+    Q = R.as_quat(canonical=True, scalar_first=True)
+    same(operational_coordinates(T, "quaternion")[:, 3:], Q, 1e-14)
+    same(operational_coordinates(T, "angle axis")[:, 3:], R.as_rotvec(), 1e-13)
+
+
+def test_columns_are_those_of_the_book(rng):
+    T = random_poses(rng, 5)
+    s, n, a, P = (T[:, :3, k] for k in range(4))
+    assert np.array_equal(
+        operational_coordinates(T, "direction cosines"), np.concatenate([P, s, n, a], axis=1)
+    )
+    assert np.array_equal(operational_coordinates(T, "two axes"), np.concatenate([P, n, a], axis=1))
+
+
+def test_angles_are_those_of_the_products_of_rotations():
+    x, y, z = (lambda t, axis=axis: se3.rotation(axis, t) for axis in "xyz")
+    for kind, T in (
+        ("euler", z(0.3) @ x(0.2) @ z(0.1)),
+        ("euler zyz", z(0.3) @ y(0.2) @ z(0.1)),
+        ("rpy", z(0.3) @ y(0.2) @ x(0.1)),
+        ("rpy urdf", z(0.1) @ y(0.2) @ x(0.3)),
+    ):
+        same(operational_coordinates(T, kind)[3:], [0.3, 0.2, 0.1], 4 * EPS)
+
+
+def test_khalils_roll_is_about_z_and_urdfs_about_x(rng):
+    for T in random_poses(rng, 50):
+        khalil = operational_coordinates(T, "roll_pitch_yaw")[3:]
+        same(khalil[::-1], se3.to_rpy(T[:3, :3]), 8 * EPS)
+        same(operational_coordinates(T, "roll_pitch_yaw_urdf")[3:], se3.to_rpy(T[:3, :3]), 8 * EPS)
+    assert operational_coordinates(se3.rotation("z", 0.5), "rpy")[3] == pytest.approx(0.5)
+
+
+@every_kind
+def test_ranges(kind, rng):
+    R = np.concatenate([list(special_rotations()), random_poses(rng, 2000)[:, :3, :3]])
+    y = operational_coordinates(poses(R, rng), kind)[:, 3:]
+    if kind in ANGLES:
+        assert not np.signbit(y[y == 0.0]).any()
+        outer = y[:, [0, 2]]
+        assert ((outer > -np.pi) & (outer <= np.pi)).all()
+        low, high = (0.0, np.pi) if kind in EULER else (-np.pi / 2, np.pi / 2)
+        assert ((y[:, 1] >= low) & (y[:, 1] <= high)).all()
+    if kind is OrientationKind.QUATERNION:
+        first = y[np.arange(len(y)), (y != 0).argmax(axis=1)]
+        assert (y[:, 0] >= 0).all()
+        assert (first > 0).all()
+    if kind is OrientationKind.ANGLE_AXIS:
+        assert np.linalg.norm(y, axis=1).max() <= np.pi * (1 + 2 * EPS)
+
+
+def test_half_turns_have_one_sign():
+    for R, axis in (
+        (np.diag([1.0, -1, -1]), [1, 0, 0]),
+        (np.diag([-1.0, 1, -1]), [0, 1, 0]),
+        (np.diag([-1.0, -1, 1]), [0, 0, 1]),
+    ):
+        T = np.eye(4)
+        T[:3, :3] = R
+        assert operational_coordinates(T, "quaternion")[3:].tolist() == [0, *axis]
+        same(operational_coordinates(T, "angle_axis")[3:], np.pi * np.array(axis), 0)
+
+
+@pytest.mark.parametrize("angle", [1e-300, 1e-200, 1e-100, 1e-20, 1e-9, 1e-3])
+def test_small_rotation_vectors_keep_their_digits(angle, rng):
+    v = rng.normal(size=(50, 3)) * angle
+    x = np.concatenate([np.zeros((50, 3)), v], axis=1)
+    y = operational_coordinates(pose_from_coordinates(x, "angle_axis"), "angle_axis")
+    np.testing.assert_allclose(y[:, 3:], v, rtol=0, atol=4 * EPS * angle)
+
+
+def test_angles_and_vectors_of_many_turns(rng):
+    x = np.concatenate([np.zeros((50, 3)), 20 * rng.normal(size=(50, 3))], axis=1)
+    for kind in (*ANGLES, OrientationKind.ANGLE_AXIS):
+        T = pose_from_coordinates(x, kind)
+        same(operational_coordinates(T, kind, near=x), x, 1e-13)
+
+
+# --- the border --------------------------------------------------------------------------------
+
+
+@every_kind
+@pytest.mark.parametrize("batch", [(), (1,), (3,), (2, 3), (0,), (2, 0, 3)], ids=str)
+def test_leading_axes_are_the_batch(kind, batch, rng):
+    T, m = random_poses(rng, *batch), kind.dimension
+    twist = rng.normal(size=(*batch, 6))
+    x = operational_coordinates(T, kind)
+    results = {
+        (m,): (x, lambda i: operational_coordinates(T[i], kind)),
+        (4, 4): (pose_from_coordinates(x, kind), lambda i: pose_from_coordinates(x[i], kind)),
+        (m, 6): (coordinate_rates(T, kind), lambda i: coordinate_rates(T[i], kind)),
+        (6, m): (twist_from_rates(T, kind), lambda i: twist_from_rates(T[i], kind)),
+        (m, 6, 0): (
+            coordinate_rates_rate(T, twist, kind),
+            lambda i: coordinate_rates_rate(T[i], twist[i], kind),
+        ),
+        (): (
+            is_representation_singular(T, kind),
+            lambda i: is_representation_singular(T[i], kind),
+        ),
+    }
+    for core, (many, one) in results.items():
+        core = core[:2]
+        assert many.shape == (*batch, *core)
+        assert many.flags.c_contiguous
+        assert many.dtype == (float if core else bool)
+        for index in np.ndindex(*batch):
+            same(many[index], one(index), 1e-14)
+
+
+@every_kind
+def test_near_and_twist_broadcast(kind, rng):
+    T = random_poses(rng, 3, 2)
+    near = operational_coordinates(random_poses(rng, 2), kind)
+    twist = rng.normal(size=6)
+    for function in (
+        operational_coordinates,
+        coordinate_rates,
+        twist_from_rates,
+        is_representation_singular,
+        lambda T, kind, near: coordinate_rates_rate(T, twist, kind, near),
+    ):
+        many = function(T, kind, near)
+        for i, j in np.ndindex(3, 2):
+            same(many[i, j], function(T[i, j], kind, near[j]), 1e-14)
+        assert function(T[0, 0], kind, near).shape == many.shape[1:]
+        with pytest.raises(ShapeError, match="broadcast"):
+            function(T, kind, np.zeros((3, kind.dimension)) + near[0])
+
+
+@every_kind
+def test_results_are_fresh(kind, rng):
+    T = random_poses(rng, 4)
+    kept = T.copy()
+    x = operational_coordinates(T, kind)
+    for result in (x, operational_coordinates(T, kind, x), continuous_coordinates(T, kind)):
+        result[...] = 0.0
+    x = operational_coordinates(T, kind)
+    back = pose_from_coordinates(x, kind)
+    back[...] = 0.0
+    assert np.array_equal(T, kept)
+    assert np.array_equal(x, operational_coordinates(T, kind))
+
+
+def test_anything_like_a_pose_is_taken(rng):
+    T = random_poses(rng)
+    for given_pose in (T, T.tolist(), pin.SE3(T), np.asfortranarray(T)):
+        assert np.array_equal(
+            operational_coordinates(given_pose, "euler"), operational_coordinates(T, "euler")
+        )
+
+
+@every_kind
+def test_wrong_coordinates_are_refused(kind):
+    m = kind.dimension
+    good = operational_coordinates(np.eye(4), kind)
+    for call in (
+        lambda x: pose_from_coordinates(x, kind),
+        lambda x: operational_coordinates(np.eye(4), kind, near=x),
+        lambda x: continuous_coordinates([np.eye(4)], kind, near=x),
+        lambda x: coordinate_jacobian(rm.load("rx90"), np.zeros(6), kind, near=x),
+    ):
+        with pytest.raises(ShapeError, match=kind.labels[-1]):
+            call(np.zeros(m + 1))
+        with pytest.raises(ShapeError):
+            call(0.0)
+        with pytest.raises(InvalidValueError, match="nan"):
+            call(np.where(np.arange(m) == 4, np.nan, good))
+
+
+@pytest.mark.parametrize("bad", [np.zeros((4, 3)), np.diag([1.0, 1, -1, 1]), np.eye(4) * 1.1])
+def test_wrong_poses_are_refused(bad):
+    error = ShapeError if bad.shape != (4, 4) else NotARotationError
+    for function in (operational_coordinates, coordinate_rates, twist_from_rates):
+        with pytest.raises(error):
+            function(bad, "euler")
+    with pytest.raises(ShapeError, match="operational_coordinates"):
+        continuous_coordinates(np.eye(4), "euler")
+
+
+@pytest.mark.parametrize("kind", ["quaternion", "direction_cosines", "two_axes"])
+def test_orientations_that_are_nearly_or_not_at_all_rotations(kind, rng):
+    x = operational_coordinates(random_poses(rng, 4), kind)
+    noise = rng.uniform(-1, 1, size=x.shape)
+    noise[:, :3] = 0.0
+    T = pose_from_coordinates(x + 2e-7 * noise, kind)
+    R = T[:, :3, :3]
+    assert np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max() < 8 * EPS
+    assert np.abs(operational_coordinates(T, kind, near=x) - x).max() < 1e-6
+    off = x.copy()
+    off[2, 3:] *= 1.001
+    with pytest.raises(NotARotationError, match=r"x.*row 2"):
+        pose_from_coordinates(off, kind)
+    off[2, 3:] = 0.0
+    with pytest.raises(NotARotationError):
+        pose_from_coordinates(off, kind)
+
+
+def test_axes_that_mirror_are_refused():
+    with pytest.raises(NotARotationError, match="direction cosines"):
+        pose_from_coordinates([0, 0, 0, -1, 0, 0, 0, 1, 0, 0, 0, 1], "direction_cosines")
+
+
+# --- near --------------------------------------------------------------------------------------
+
+
+def equivalents(kind, y):
+    """Coordinates of the orientations of the same rotation, some turns around."""
+    if kind in ANGLES:
+        first, middle, last = y
+        mirrored = -middle if kind in EULER else np.pi - middle
+        for base in (y, (first + np.pi, mirrored, last + np.pi)):
+            for turns in itertools.product(range(-2, 3), repeat=3):
+                yield np.add(base, np.multiply(TURN, turns))
+    elif kind is OrientationKind.QUATERNION:
+        yield from (y, -y)
+    elif kind is OrientationKind.ANGLE_AXIS:
+        angle = np.linalg.norm(y)
+        yield from (y * (1 + TURN * k / angle) for k in range(-3, 4))
+    else:
+        yield y
+
+
+@every_kind
+def test_near_is_the_nearest_of_all_equivalents(kind, rng):
+    for T in random_poses(rng, 60):
+        x = operational_coordinates(T, kind)
+        near = x + np.r_[0, 0, 0, 4 * rng.normal(size=x.size - 3)].clip(-9, 9)
+        y = operational_coordinates(T, kind, near)
+        distances = [np.linalg.norm(e - near[3:]) for e in equivalents(kind, x[3:])]
+        assert np.linalg.norm(y[3:] - near[3:]) == pytest.approx(min(distances), abs=1e-13)
+        assert np.abs(pose_from_coordinates(y, kind) - T).max() < 40 * EPS
+        same(operational_coordinates(T, kind, near=y), y, 1e-14)
+
+
+def wandering(rng, count, size=1.0):
+    """A smooth motion that turns over several times."""
+    t = np.linspace(0, 1, count)
+    phases = rng.uniform(0, TURN, size=(3, 3))
+    turns = rng.normal(size=(3, 3)) * 4 * size
+    angles = np.sin(TURN * np.outer(t, (1, 2, 3))[:, None] + phases) @ turns
+    angles = np.einsum("tij,j->ti", np.sin(TURN * t[:, None, None] * [1, 2, 3] + phases), [4, 2, 1])
+    R = Rotation.from_rotvec(size * angles).as_matrix()
+    T = np.zeros((count, 4, 4))
+    T[:, :3, :3], T[:, 3, 3] = R, 1.0
+    T[:, :3, 3] = np.sin(np.outer(t, [1, 2, 3]))
+    return se3.as_pose(T)
+
+
+@every_kind
+@pytest.mark.parametrize("with_near", [False, True])
+def test_a_sequence_is_each_sample_near_the_one_before(kind, with_near, rng):
+    for size in (0.01, 1.0):
+        T = wandering(rng, 300, size)
+        # samples of exactly no rotation, and at gimbal lock of each kind, in the middle and at ends
+        T[[0, 50, 51, 299], :3, :3] = np.eye(3)
+        T[[100, 101], :3, :3] = se3.rotation("y", np.pi / 2)[:3, :3]
+        T[[150], :3, :3] = se3.rotation("x", np.pi)[:3, :3]
+        T[[151, 152], :3, :3] = (se3.rotation("y", -np.pi / 2) @ se3.rotation("x", 1))[:3, :3]
+        near = None
+        if with_near:
+            near = operational_coordinates(T[0], kind, near=10 * rng.normal(size=kind.dimension))
+            near[3:] += 0.3 * rng.normal(size=kind.dimension - 3)
+        x = continuous_coordinates(T, kind, near)
+        if with_near:
+            same(x[0], operational_coordinates(T[0], kind, near), 1e-13)
+        for i in range(1, len(T)):
+            same(x[i], operational_coordinates(T[i], kind, near=x[i - 1]), 1e-12)
+        assert np.abs(pose_from_coordinates(x, kind) - T).max() < 60 * EPS
+
+
+@every_kind
+def test_a_smooth_motion_has_smooth_coordinates(kind, rng):
+    """Steps shrink with the sampling: no jump of pi, 2 pi or a sign is left."""
+    T = wandering(rng, 20001)
+    x = continuous_coordinates(T, kind)
+    E = coordinate_rates(T, kind)[:, 3:, 3:]
+    turned = np.linalg.norm(Rotation.from_matrix(T[1:, :3, :3] @ T[:-1, :3, :3].swapaxes(1, 2))
+                            .as_rotvec(), axis=1)  # fmt: skip
+    fast = np.linalg.norm(E, axis=(1, 2))
+    if kind is OrientationKind.ANGLE_AXIS:
+        # its rates belong to the vectors of the sequence, which leave the ball of radius pi
+        fast = np.linalg.norm(coordinate_rates(T, kind, near=x)[:, 3:, 3:], axis=(1, 2))
+    usual = fast[1:] * turned < 0.05
+    assert usual.mean() > 0.95
+    steps = np.linalg.norm(np.diff(x[:, 3:], axis=0), axis=1)
+    assert (steps[usual] <= 1.1 * (fast[1:] * turned)[usual] + 1e-12).all()
+
+
+@every_angle
+def test_a_motion_straight_through_gimbal_lock_keeps_its_outer_angles(kind):
+    theta = np.linspace(-0.5, 0.5, 11)
+    x = np.zeros((11, 6))
+    x[:, 3], x[:, 4], x[:, 5] = 0.7, theta + (0.0 if kind in EULER else np.pi / 2), -1.2
+    T = pose_from_coordinates(x, kind)
+    same(continuous_coordinates(T, kind, near=x[0]), x, 1e-14)
+    y = continuous_coordinates(T, kind)
+    same(np.diff(y[:, [3, 5]], axis=0), np.zeros((10, 2)), 1e-14)
+
+
+@every_angle
+def test_a_sequence_that_begins_at_gimbal_lock_begins_with_the_angle_it_leaves_with(kind):
+    x = np.zeros((5, 6))
+    first = 5 if kind is ROLL[1] else 3
+    x[:, first] = 0.7
+    x[:, 4] = (0.0 if kind in EULER else np.pi / 2) - np.array([0, 0, 0.1, 0.2, 0.3])
+    x[:, 4] = np.abs(x[:, 4])
+    x[:, 8 - first] = [0.1, 0.2, 0.3, 0.4, 0.5]
+    same(continuous_coordinates(pose_from_coordinates(x, kind), kind), x, 1e-14)
+
+
+def test_a_sequence_that_stays_at_gimbal_lock():
+    """A SCARA robot: all rotations about the vertical."""
+    turning = np.linspace(0, 20, 500)
+    T = np.array([se3.rotation("z", t) for t in turning])
+    for kind in EULER:
+        x = continuous_coordinates(T, kind)
+        same(x[:, 3:5], np.zeros((500, 2)), 0)
+        same(x[:, 5], turning, 1e-13)
+    same(continuous_coordinates(T, "rpy")[:, 3], turning, 1e-13)
+    same(continuous_coordinates(T, "angle_axis")[:, 5], turning, 1e-13)
+
+
+@every_kind
+def test_sequences_side_by_side(kind, rng):
+    T = np.stack([wandering(rng, 40) for _ in range(6)], axis=1).reshape(40, 2, 3, 4, 4)
+    near = operational_coordinates(T[0], kind) + 0.5 * rng.normal(size=(2, 3, kind.dimension))
+    for start in (None, near, near[0, 0], near[:1]):
+        x = continuous_coordinates(T, kind, start)
+        assert x.shape == (40, 2, 3, kind.dimension)
+        assert x.flags.c_contiguous
+        for i, j in np.ndindex(2, 3):
+            own = None if start is None else np.broadcast_to(start, near.shape)[i, j]
+            assert np.array_equal(x[:, i, j], continuous_coordinates(T[:, i, j], kind, own))
+    for shape in ((0, 4, 4), (0, 3, 4, 4), (5, 0, 4, 4)):
+        empty = continuous_coordinates(np.zeros(shape), kind)
+        assert empty.shape == (*shape[:-2], kind.dimension)
+    assert continuous_coordinates(np.zeros((0, 4, 4)), kind, near[0, 0]).shape[0] == 0
+    assert continuous_coordinates(T[:1], kind).shape[0] == 1
+    with pytest.raises(ShapeError, match="near"):
+        continuous_coordinates(T, kind, near[:, :2])
+
+
+# --- rates -------------------------------------------------------------------------------------
+
+
+def tame_poses(kind, rng, count):
+    """Poses and coordinates of any solution, away from the singularities."""
+    x = np.zeros((4 * count, kind.dimension))
+    T = random_poses(rng, 4 * count)
+    x = operational_coordinates(T, kind)
+    x = operational_coordinates(T, kind, near=x + 4 * rng.normal(size=x.shape))
+    tame = np.abs(coordinate_rates(T, kind, near=x)).max(axis=(1, 2)) < 4
+    return T[tame][:count], x[tame][:count]
+
+
+@every_kind
+def test_rates_are_the_differences_of_coordinates(kind, rng):
+    T, x = tame_poses(kind, rng, 40)
+    assert len(T) >= 30
+    E, h = coordinate_rates(T, kind, near=x), 2e-4
+    for _ in range(3):
+        twist = rng.normal(size=6)
+
+        def coordinates(t, twist=twist):
+            return operational_coordinates(moved(T, twist, t), kind, x)
+
+        difference = five_point(coordinates, h)
+        same(E @ twist, difference, 1e-9)
+
+
+@every_kind
+def test_rates_of_rates_are_the_differences_of_rates(kind, rng):
+    T, x = tame_poses(kind, rng, 40)
+    for _ in range(3):
+        twist = rng.normal(size=6)
+
+        def coordinates(t, twist=twist):
+            return operational_coordinates(moved(T, twist, t), kind, x)
+
+        def rates(t, twist=twist):
+            return coordinate_rates(moved(T, twist, t), kind, x)
+
+        dE = coordinate_rates_rate(T, twist, kind, near=x)
+        same(dE, five_point(rates, 2e-4), 1e-7)
+        assert np.abs(dE).max() > 0.1
+        # a twist that stays the same in world axes has no acceleration
+        same(dE @ twist, second_difference(coordinates, 2e-3), 1e-5)
+
+
+@every_kind
+def test_twist_from_rates_is_a_left_inverse(kind, rng):
+    T, x = tame_poses(kind, rng, 200)
+    E, B = coordinate_rates(T, kind, near=x), twist_from_rates(T, kind, near=x)
+    same(B @ E, np.broadcast_to(np.eye(6), (len(T), 6, 6)), 1e-14)
+    if kind not in (*ANGLES, OrientationKind.ANGLE_AXIS):
+        # least squares: what is admissible is found by an orthogonal projection
+        same(B, np.linalg.pinv(E), 1e-13)
+    else:
+        same(E @ B, np.broadcast_to(np.eye(6), (len(T), 6, 6)), 1e-13)
+
+
+@pytest.mark.parametrize(
+    "angle", [0.0, 1e-160, 1e-12, 1e-8, 1e-5, 1e-3, 0.1, 1.0, 1.99, 2.0, 2.01, 3.0, np.pi - 1e-9,
+              np.pi, np.pi + 1e-9, 4.0, 6.0, TURN - 1e-3, TURN + 1e-3, 10.0]
+)  # fmt: skip
+def test_rates_of_rotation_vectors_of_every_length(angle, rng):
+    v = rng.normal(size=(20, 3))
+    x = np.concatenate([np.zeros((20, 3)), angle * v / np.linalg.norm(v, axis=1)[:, None]], axis=1)
+    T = se3.as_pose(pose_from_coordinates(x, "angle_axis"))
+    E, B = coordinate_rates(T, "angle_axis", x), twist_from_rates(T, "angle_axis", x)
+    scale = np.abs(E).max()
+    assert np.isfinite(E).all()
+    same(B @ E, np.broadcast_to(np.eye(6), (20, 6, 6)), 1e-14 * scale * (1 + angle))
+    # the twist of a rotation vector that changes, by differences of the rotations themselves
+    rate, h = rng.normal(size=3), 1e-3
+    step = np.r_[0, 0, 0, rate]
+    dR = five_point(lambda t: pose_from_coordinates(x + t * step, "angle_axis")[:, :3, :3], h)
+    W = dR @ T[:, :3, :3].swapaxes(1, 2)
+    w = np.stack([W[:, 2, 1], W[:, 0, 2], W[:, 1, 0]], axis=1)
+    same(B[:, 3:, 3:] @ rate, w, 1e-10)
+    if scale < 20:
+        twist = rng.normal(size=6)
+        difference = five_point(lambda t: coordinate_rates(moved(T, twist, t), "angle_axis", x), h)
+        dE = coordinate_rates_rate(T, twist, "angle_axis", x)
+        same(dE, difference, 1e-9 if scale < 3 else 1e-4)
+
+
+def test_kinds_without_singularities(rng):
+    T = poses(np.array(list(special_rotations())), rng)
+    for kind in KINDS[4:]:
+        assert not is_representation_singular(T, kind).any()
+        assert np.isfinite(coordinate_rates(T, kind)).all()
+        B, E = twist_from_rates(T, kind), coordinate_rates(T, kind)
+        same(B @ E, np.broadcast_to(np.eye(6), (len(T), 6, 6)), 1e-14)
+        twist = rng.normal(size=(len(T), 6))
+        assert np.isfinite(coordinate_rates_rate(T, twist, kind)).all()
+
+
+@every_angle
+@pytest.mark.parametrize("gap", [0.0, 1e-16, 1e-13, 2e-12, 1e-9])
+def test_rates_do_not_exist_at_gimbal_lock(kind, gap, rng):
+    x = rng.uniform(-3, 3, size=(100, 6))
+    x[:, 4] = (0.0 if kind in EULER else np.pi / 2) + gap
+    T = pose_from_coordinates(x, kind)
+    singular = is_representation_singular(T, kind)
+    assert (singular == (gap < SINGULAR)).all()
+    for E, block in (
+        (coordinate_rates(T, kind), np.eye(3)),
+        (coordinate_rates_rate(T, np.ones(6), kind), np.zeros((3, 3))),
+    ):
+        assert np.isnan(E[:, 3:]).all() == (gap < SINGULAR)
+        assert np.isnan(E[:, 3:]).any() == (gap < SINGULAR)
+        same(E[:, :3, :3], np.broadcast_to(block, (100, 3, 3)), 0)
+        same(E[:, :3, 3:], np.zeros((100, 3, 3)), 0)
+        same(E[:, 3:, :3], np.full((100, 3, 3), np.nan if gap < SINGULAR else 0.0), 0)
+    # the twist of given rates exists always, but not for every twist are there rates
+    B = twist_from_rates(T, kind)
+    assert np.isfinite(B).all()
+    assert (np.linalg.svd(B, compute_uv=False)[:, -1] < 2 * max(gap, EPS)).all()
+
+
+def test_rates_of_rotation_vectors_do_not_exist_at_whole_turns(rng):
+    v = rng.normal(size=(20, 3))
+    near = np.concatenate([np.zeros((20, 3)), v / np.linalg.norm(v, axis=1)[:, None]], axis=1)
+    T = np.broadcast_to(np.eye(4), (20, 4, 4))
+    assert not is_representation_singular(T, "angle_axis").any()
+    assert not is_representation_singular(T, "angle_axis", near=near).any()
+    for turns in (TURN, -2 * TURN):
+        assert is_representation_singular(T, "angle_axis", near=turns * near).all()
+        assert np.isnan(coordinate_rates(T, "angle_axis", turns * near)[:, 3:]).all()
+        dE = coordinate_rates_rate(T, np.ones(6), "angle_axis", turns * near)
+        assert np.isnan(dE[:, 3:]).all()
+
+
+# --- Jacobian of the coordinates ---------------------------------------------------------------
+
+
+def growth(*matrices):
+    """How much the rates of the angles enlarge rounding."""
+    return max(1.0, *(float(np.nanmax(np.abs(M), initial=0.0)) for M in matrices))
+
+
+@given(model=any_models(), seed=seeds)
+def test_differentiated_model_is_the_screw_jacobian_in_other_coordinates(model, seed):
+    rng = np.random.default_rng(seed)
+    q, v, _ = random_state(model, rng, 3)
+    size = max(robot_size(model, row) for row in q)
+    for frame in (None, 0, int(rng.integers(1, model.f + 1))):
+        T, twist = rm.dgm(model, q, frame), rm.dkm(model, q, v, frame)
+        J, dJ = rm.jacobian(model, q, frame), rm.jacobian_rate(model, q, v, frame)
+        for kind in KINDS:
+            x = operational_coordinates(T, kind)
+            for near in (None, x + 4 * rng.normal(size=x.shape)):
+                E = coordinate_rates(T, kind, near)
+                dE = coordinate_rates_rate(T, twist, kind, near)
+                scale, speed = growth(E), growth(twist)
+                # rounding of the pose turns the axes of nearly locked angles by eps * scale
+                tolerance = size * (1e-12 + 1e-14 * scale**2)
+                same(coordinate_jacobian(model, q, kind, frame, near), E @ J, tolerance)
+                rate = coordinate_jacobian_rate(model, q, v, kind, frame, near)
+                tolerance = size * speed * (1e-12 + 1e-14 * scale**3)
+                same(rate, E @ dJ + dE @ J, tolerance)
+
+
+def tame_robots(rng, count, kind):
+    """Random robots of every sort with a configuration where the coordinates change gently."""
+    found = 0
+    while found < count:
+        model = random_model(
+            rng, f=int(rng.integers(2, 8)), tree=bool(found % 2), fixed=True, tip="any"
+        )
+        q, v, a = random_state(model, rng)
+        E = coordinate_rates(rm.dgm(model, q), kind)
+        if np.abs(E).max() < 4:  # also False for NaN
+            found += 1
+            yield model, q, v, a
+
+
+@every_kind
+def test_coordinate_jacobian_is_the_difference_of_coordinates(kind, rng):
+    for model, q, v, a in tame_robots(rng, 12, kind):
+        size = robot_size(model, q)
+        x = operational_coordinates(rm.dgm(model, q), kind)
+        x[3:] = operational_coordinates(rm.dgm(model, q), kind, x + 4 * rng.normal(size=x.size))[3:]
+
+        def coordinates(p, model=model, x=x):
+            return operational_coordinates(rm.dgm(model, p), kind, near=x)
+
+        def jacobian(t, model=model, q=q, v=v, x=x):
+            return coordinate_jacobian(model, q + t * v, kind, near=x)
+
+        J = coordinate_jacobian(model, q, kind, near=x)
+        for j, e in enumerate(np.eye(model.n)):
+            same(J[:, j], five_point(lambda t, q=q, e=e: coordinates(q + t * e), 2e-4), 1e-8 * size)
+        dJ = coordinate_jacobian_rate(model, q, v, kind, near=x)
+        speed = np.abs(v).sum()
+        same(dJ, five_point(jacobian, 2e-4 / speed), 1e-7 * size * speed)
+        second = second_difference(
+            lambda t, q=q, v=v, a=a: coordinates(q + t * v + t * t / 2 * a), 2e-3 / speed
+        )
+        same(J @ a + dJ @ v, second, 1e-4 * size * speed**2)
+
+
+@every_kind
+@pytest.mark.parametrize("batch", [(), (1,), (3,), (2, 3), (0,), (2, 0, 3)], ids=str)
+def test_batches_of_coordinate_jacobians(kind, batch):
+    model = random_model(np.random.default_rng(3), f=7, tree=True, fixed=True)
+    q, v, _ = random_state(model, np.random.default_rng(5), *batch)
+    shape = (*batch, kind.dimension, model.n)
+    J, dJ = coordinate_jacobian(model, q, kind), coordinate_jacobian_rate(model, q, v, kind)
+    assert J.shape == dJ.shape == shape
+    assert J.flags.c_contiguous
+    assert dJ.flags.c_contiguous
+    for i in np.ndindex(*batch):
+        same(J[i], coordinate_jacobian(model, q[i], kind), 1e-13)
+        same(dJ[i], coordinate_jacobian_rate(model, q[i], v[i], kind), 1e-12)
+
+
+def test_broadcasting_of_coordinate_jacobians(rng):
+    model = rm.load("rx90")
+    q, v, _ = random_state(model, rng, 3)
+    near = operational_coordinates(rm.dgm(model, q), "euler") + rng.normal(size=(2, 3, 6))
+    J = coordinate_jacobian(model, q, "euler", near=near)
+    dJ = coordinate_jacobian_rate(model, q[0], v, "euler", near=near)
+    assert J.shape == dJ.shape == (2, 3, 6, 6)
+    for i, j in np.ndindex(2, 3):
+        same(J[i, j], coordinate_jacobian(model, q[j], "euler", near=near[i, j]), 1e-13)
+        one = coordinate_jacobian_rate(model, q[0], v[j], "euler", near=near[i, j])
+        same(dJ[i, j], one, 1e-11)
+    assert coordinate_jacobian(model, q[0], "euler", near=near).shape == (2, 3, 6, 6)
+    with pytest.raises(ShapeError, match="broadcast"):
+        coordinate_jacobian_rate(model, q, v[:2], "euler")
+    with pytest.raises(ShapeError, match="broadcast"):
+        coordinate_jacobian(model, q, "euler", near=near[:, :2])
+
+
+def test_mistakes_of_coordinate_jacobians():
+    model = rm.load("rx90")
+    with pytest.raises(ShapeError):
+        coordinate_jacobian(model, np.zeros(5), "euler")
+    with pytest.raises(InvalidValueError):
+        coordinate_jacobian_rate(model, np.zeros(6), np.full(6, np.nan), "euler")
+    with pytest.raises(FrameNotFoundError):
+        coordinate_jacobian(model, np.zeros(6), "euler", frame="nope")
+    with pytest.raises(InvalidValueError, match="model"):
+        coordinate_jacobian("rx90", np.zeros(6), "euler")
+
+
+@every_kind
+def test_a_joint_that_is_not_on_the_way_to_the_frame_has_a_zero_column(kind):
+    table = rm.DHTable(antecedent=[0, 1, 1], sigma=[0, 1, 0], alpha=[0.3, 0.4, 0.5], d=[0.1] * 3)
+    model = rm.RobotModel.from_table(table, base=se3.rotation("x", 1) @ se3.rotation("y", 1), tip=2)
+    q, v = [0.1, 0.2, 0.3], [1.0, 2.0, 3.0]
+    for frame, off in ((None, [2]), (3, [1]), (1, [1, 2]), (0, [0, 1, 2])):
+        for J in (
+            coordinate_jacobian(model, q, kind, frame),
+            coordinate_jacobian_rate(model, q, v, kind, frame),
+        ):
+            assert np.isfinite(J).all()
+            assert (J[:, off] == 0.0).all()
+
+
+def test_a_singular_representation_is_not_a_singular_robot():
+    """A planar arm has Euler angles at gimbal lock everywhere; its position is none the worse."""
+    arm = rm.RobotModel.from_table(rm.DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.3]))
+    q, v = np.array([[0.0, 0.5], [0.3, -1.0]]), np.ones((2, 2))
+    for kind in EULER:
+        for J in (
+            coordinate_jacobian(arm, q, kind),
+            coordinate_jacobian_rate(arm, q, v, kind),
+        ):
+            assert np.isnan(J[:, 3:]).all()
+            assert np.isfinite(J[:, :3]).all()
+        same(coordinate_jacobian(arm, q, kind)[:, :3], rm.jacobian(arm, q)[:, :3], 1e-15)
+    J = coordinate_jacobian(arm, q, "rpy")
+    same(J[:, 3:], np.broadcast_to([[1.0, 1], [0, 0], [0, 0]], (2, 3, 2)), 1e-15)
+
+
+def test_the_books_robot_at_its_singular_positions_has_finite_rates():
+    model = rm.load("rx90")
+    for q in (np.zeros(6), [0, 0.3, -np.pi / 2, 0.1, 0.2, 0.3], [0.1, 0.2, 0.3, 0.4, 0.0, 0.5]):
+        T, J = rm.dgm(model, q), rm.jacobian(model, q)
+        for kind in KINDS[4:]:
+            same(coordinate_jacobian(model, q, kind), coordinate_rates(T, kind) @ J, 1e-14)
