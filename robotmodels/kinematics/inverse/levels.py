@@ -70,8 +70,8 @@ class Level:
             weights = as_exact(self.weights, (m,), "weights")
             if not (weights > 0.0).all():
                 raise InvalidValueError(
-                    f"weights: expected positive numbers, got {weights}; leave a row out instead of "
-                    "giving it no weight."
+                    f"weights: expected positive numbers, got {weights}; leave rows out rather than "
+                    "giving them none."
                 )
             _set(self, "weights", weights)
 
