@@ -74,6 +74,7 @@ class SymbolicChain:
         plain, pairs = self._generators()
         self.ring = TrigRing(plain, pairs)
         self._rotations: dict[tuple[int, int], Rows] = {}
+        self._constants: dict[Any, float] | None = None
         self.steps: dict[int, Step] = {j: self._step(m) for j, m in moves.items()}
         self.moving = self._moving_generators()
 
@@ -170,7 +171,9 @@ class SymbolicChain:
             else:
                 way = self.between(a, b)
                 last = self._single(way[-2], b)
-                known = last if len(way) == 2 else self.ring.product(self.rotation(a, way[-2]), last)
+                known = (
+                    last if len(way) == 2 else self.ring.product(self.rotation(a, way[-2]), last)
+                )
             self._rotations[a, b] = known
         return known
 
@@ -222,6 +225,8 @@ class SymbolicChain:
 
     def constants(self) -> dict[Any, float]:
         """Values of the symbols that do not move: lengths, and cosines and sines of angles."""
+        if self._constants is not None:
+            return dict(self._constants)
         known = {c.symbol: c.value for c in self.notation.constants}
         for pair in self.ring.pairs:
             for k in pair:
@@ -229,7 +234,8 @@ class SymbolicChain:
                 meaning = self.notation.abbreviations[symbol]
                 if not meaning.free_symbols & set(self.variables):
                     known[symbol] = float(meaning.subs(known))
-        return known
+        self._constants = known
+        return dict(known)
 
     def numbers(self, q: Array) -> dict[Any, Any]:
         """Values of all generators, vectorised over the leading axes of q."""
@@ -253,9 +259,10 @@ class SymbolicChain:
             if self.table.sigma[j - 1] != REVOLUTE:
                 continue
             before = self._joint_before(j)
-            same = before is not None and np.linalg.norm(
-                np.cross(poses[before - 1], poses[j - 1])
-            ) <= 1e-12
+            same = (
+                before is not None
+                and np.linalg.norm(np.cross(poses[before - 1], poses[j - 1])) <= 1e-12
+            )
             for group in groups:
                 if same and before in group:
                     group.append(j)
