@@ -1,0 +1,335 @@
+"""Base parameters: rules against numbers, torques kept, SYMORO's tables, what the book prints."""
+
+import json
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sympy
+from identities.random_robots import random_bodies, random_drive, random_pose, random_table
+
+import robotmodels as rm
+from robotmodels.base_parameters import BaseMethod, base_parameters
+from robotmodels.base_parameters.formulas import constants_of
+from robotmodels.errors import InvalidValueError, ShapeError
+from robotmodels.regressors import parameter_names, parameter_vector, torque_regressor
+
+GRAVITIES = ((0.0, 0.0, -9.81), (0.0, -9.81, 0.0), (-9.81, 0.0, 0.0), (0.0, 0.0, 0.0))
+CATALOGUE = [name for name in rm.robots() if not name.startswith("erd:")]
+
+
+def any_robot(rng):
+    """Anything: trees, fixed frames, gamma and b, oblique axes, rotated bases, gravity or none."""
+    f = int(rng.integers(1, 9))
+    table = random_table(rng, f, tree=bool(rng.random() < 0.4), fixed=bool(rng.random() < 0.3))
+    # between parallel and not parallel there is a range that no rank can decide
+    beta = np.where(abs(table.beta) < 1e-2, 0.0, table.beta)
+    base = None if rng.random() < 0.5 else random_pose(rng)
+    gravity = rng.normal(size=3) if rng.random() < 0.3 else GRAVITIES[rng.integers(4)]
+    columns = {c: getattr(table, c) for c in ("gamma", "b", "alpha", "d", "theta", "r")}
+    table = rm.DHTable(antecedent=table.antecedent, sigma=table.sigma, beta=beta, **columns)
+    return rm.RobotModel.from_table(table, base=base, gravity=gravity)
+
+
+def right_angled_robot(rng):
+    """Right angles and few lengths: parallel, perpendicular, collinear and meeting axes abound."""
+    f = int(rng.integers(1, 8))
+    tree = rng.random() < 0.4
+    antecedent = [int(rng.integers(0, j + 1)) if tree else j for j in range(f)]
+    sigma = rng.choice([0, 0, 1, 1, 2] if rng.random() < 0.3 else [0, 1], size=f)
+    if (sigma == 2).all():
+        sigma[0] = 0
+
+    def angles():
+        return rng.integers(-2, 3, size=f) * np.pi / 2 * (rng.random(f) < 0.6)
+
+    def lengths():
+        return np.where(rng.random(f) < 0.6, 0.0, rng.choice([0.3, 0.5], size=f))
+
+    table = rm.DHTable(
+        antecedent=antecedent, sigma=sigma, alpha=angles(), d=lengths(), theta=angles(),
+        r=lengths(), gamma=angles() * tree, b=lengths() * tree,
+    )  # fmt: skip
+    return rm.RobotModel.from_table(table, gravity=GRAVITIES[rng.integers(4)])
+
+
+def equal(one, other):
+    assert one.names == other.names
+    size = max(1.0, abs(other.matrix).max(initial=0.0))
+    assert np.allclose(one.matrix, other.matrix, rtol=0, atol=1e-9 * size)
+    assert one.no_effect == other.no_effect
+
+
+def keeps_torque(base, model, rng, drive):
+    q, v, a = rng.uniform(-2, 2, (3, 20, model.n))
+    W = torque_regressor(model, q, v, a, drive=drive)
+    pi = parameter_vector(model, drive)
+    torque = W @ pi
+    size = max(1.0, abs(W).max() * abs(pi).max())
+    assert np.allclose(base.reduce(W) @ base.values(model), torque, rtol=0, atol=1e-10 * size)
+
+
+@pytest.mark.parametrize("drive", [True, False])
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_rules_and_numbers_agree_on_the_catalogue(name, drive, rng):
+    model = rm.load(name)
+    model = model.with_inertia(random_bodies(rng, model.f))
+    if model.transmission is None:
+        model = model.with_drive(random_drive(rng, model.n))
+    rules = base_parameters(model, drive=drive)
+    numbers = base_parameters(model, "numeric", drive=drive)
+    equal(rules, numbers)
+    kept, dependent = numbers.gap
+    assert kept > 0.1
+    assert dependent < 1e-13
+    keeps_torque(rules, model, rng, drive)
+
+
+@pytest.mark.parametrize("build", [any_robot, right_angled_robot])
+def test_rules_and_numbers_agree_on_random_robots(build):
+    rng = np.random.default_rng(7)
+    for _ in range(200):
+        model = build(rng)
+        equal(base_parameters(model), base_parameters(model, "numeric"))
+
+
+@pytest.mark.parametrize("build", [any_robot, right_angled_robot])
+def test_base_parameters_keep_the_torques_of_any_robot(build):
+    rng = np.random.default_rng(8)
+    for _ in range(40):
+        model = build(rng)
+        model = model.with_inertia(random_bodies(rng, model.f))
+        model = model.with_drive(random_drive(rng, model.n))
+        for drive in (True, False):
+            keeps_torque(base_parameters(model, drive=drive), model, rng, drive)
+
+
+@pytest.mark.parametrize("size", [1e-3, 1e3])
+def test_the_rank_does_not_depend_on_the_size_of_the_robot(size):
+    for name in ("rx90", "stanford_arm", "cobra_s600", "gantry"):
+        table = rm.load(name).table
+        lengths = {c: size * getattr(table, c) for c in ("b", "d", "r")}
+        scaled = rm.DHTable(
+            antecedent=table.antecedent, sigma=table.sigma, alpha=table.alpha, theta=table.theta,
+            gamma=table.gamma, **lengths,
+        )  # fmt: skip
+        model = rm.RobotModel.from_table(scaled, base=rm.load(name).base)
+        assert base_parameters(model, "numeric").names == base_parameters(rm.load(name)).names
+
+
+# --- what others print ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["rx90", "scara", "two_arm_tree"])
+def test_symoro(name):
+    folder = Path(__file__).parent / "oracles"
+    table = json.loads((folder / f"symoro_{name}.json").read_text(encoding="utf-8"))["table"]
+    oracle = json.loads((folder / "symoro_base_parameters.json").read_text("utf-8"))[name]
+    keys = [{"j": "number", "ant": "antecedent"}.get(k, k) for k in table["columns"]]
+    rows = [dict(zip(keys, [x or 0.0 for x in values], strict=True)) for values in table["rows"]]
+    for row in rows:
+        del row["number"]
+        row["antecedent"], row["sigma"] = int(row["antecedent"]), int(row["sigma"])
+        row["mu"] = int(row["mu"])
+    model = rm.RobotModel.from_table(rm.DHTable.from_rows(rows))
+    for method in ("symbolic", "numeric"):
+        base = base_parameters(model, method)
+        own = {
+            name: {k: v for k, v in parts.items() if not k.startswith("offset")}
+            for name, parts in base.regrouping.items()
+            if not name.startswith(("Fv", "Fc", "offset"))
+        }
+        theirs = {
+            kept.replace("IA", "Ia"): {k.replace("IA", "Ia"): v for k, v in parts.items()}
+            for kept, parts in oracle["grouping"].items()
+        }
+        assert len(own) == oracle["dimension"]
+        assert own.keys() == theirs.keys()
+        for kept, parts in own.items():
+            assert parts == pytest.approx(theirs[kept], abs=1e-9)
+        assert list(base.no_effect) == [n.replace("IA", "Ia") for n in oracle["no_effect"]]
+
+
+def test_rx90_prints_as_the_book():
+    base = base_parameters(rm.load("rx90"))
+    inertial = [n for n in base.names if not n.startswith(("Fv", "Fc", "offset"))]
+    assert len(inertial) == 40
+    assert len(base.no_effect) == 11
+    assert "ZZ1R = ZZ1 + Ia1 + YY2 + YY3 + D3^2*(M3 + M4 + M5 + M6)" in base.text
+    assert "XX3R = XX3 + YY4 - YY3 + 2*RL4*MZ4 + RL4^2*(M4 + M5 + M6)" in base.text
+    assert "D3 = 0.45 m, RL4 = 0.45 m" in base.text
+    assert r"ZZ_{1R} &= ZZ_{1} + \mathrm{Ia}_{1}" in base.latex
+
+
+def test_ten_frames_and_more_have_their_numbers():
+    rows = [{"sigma": 0, "alpha": np.pi / 2 * (j % 2), "d": 0.1} for j in range(11)]
+    base = base_parameters(rm.RobotModel.from_table(rm.DHTable.from_rows(rows)))
+    assert base.names == base_parameters(base.model, "numeric").names
+    assert "D10" in base.text
+
+
+@pytest.mark.parametrize("build", [any_robot, right_angled_robot])
+def test_formulas_have_the_values_of_the_numbers(build):
+    rng = np.random.default_rng(3)
+    for _ in range(6):
+        base = base_parameters(build(rng))
+        values = {c.text: c.value for c in constants_of(base.model)}
+        for formula, row in zip(base.formulas, base.matrix, strict=True):
+            found = np.zeros_like(row)
+            for term in formula.terms:
+                text = {"": "1", "-": "-1"}.get(term.text, term.text).replace("^", "**")
+                value = float(sympy.sympify(text, locals=_symbols(values)).evalf(subs=values))
+                assert value == pytest.approx(term.coefficient, rel=1e-5, abs=1e-9)
+                for name in term.parameters:
+                    found[base.parameter_names.index(name)] = value
+            assert np.allclose(found, row, rtol=1e-5, atol=1e-9)
+
+
+def _symbols(values):
+    return {name: sympy.Symbol(name) for name in values}
+
+
+# --- cases that other programs get wrong ---------------------------------------------------------
+
+
+def table_of(*rows):
+    return rm.DHTable.from_rows(rows)
+
+
+def test_prismatic_along_the_first_revolute_axis():
+    base = base_parameters(
+        rm.RobotModel.from_table(table_of({"sigma": 0}, {"sigma": 1, "d": 0.3})), drive=False
+    )
+    assert dict(base.regrouping["ZZ1"]) == pytest.approx({"ZZ1": 1, "ZZ2": 1, "MX2": 0.6})
+    assert base.names == ("ZZ1", "M2")
+
+
+def test_prismatic_across_the_first_revolute_axis_keeps_the_right_moments():
+    quarter = np.pi / 2
+    for theta, kept in ((0.0, ("MX2", "MZ2")), (quarter, ("MY2", "MZ2"))):
+        table = table_of({"sigma": 0}, {"sigma": 1, "alpha": quarter, "theta": theta})
+        base = base_parameters(rm.RobotModel.from_table(table), drive=False)
+        assert tuple(n for n in base.names if n.startswith("M") and n != "M2") == kept
+
+
+def test_rotor_inertia_with_a_horizontal_first_axis():
+    table = table_of({"sigma": 0, "alpha": np.pi / 2}, {"sigma": 0, "d": 0.4})
+    base = base_parameters(rm.RobotModel.from_table(table))
+    assert "Ia1" in base.regrouping["ZZ1"]
+    assert "Ia2" in base.names
+
+
+def test_gravity_loaded_prismatic_joint_keeps_its_mass_and_rotor():
+    for method in ("symbolic", "numeric"):
+        base = base_parameters(rm.RobotModel.from_table(table_of({"sigma": 1})), method)
+        assert base.names == ("M1", "Ia1", "Fv1", "Fc1")
+        assert base.regrouping["M1"]["offset1"] == pytest.approx(
+            1 / 9.81
+        )  # tau = M (a + g) + offset
+
+
+def test_ur10_with_friction_and_rotors():
+    base = base_parameters(rm.load("ur10e"))
+    assert len([n for n in base.names if not n.startswith("offset")]) == 52
+
+
+def test_coupled_motors_of_the_tx40():
+    model = rm.load("tx40")
+    base = base_parameters(model)
+    assert base.names[-3:] == ("Iam6", "Fvm6", "Fcm6")
+    # the rotors of two parallel axes and the inertia they carry make the coupling term up
+    planar = rm.load("planar_2r").with_transmission(
+        rm.Transmission([[1.0, 0.0], [-1.0, 1.0]], Iam=[0.0, 0.1])
+    )
+    for method in ("symbolic", "numeric"):
+        assert "Iam2" not in base_parameters(planar, method).names
+
+
+# --- the numeric method on motion and with constraints -------------------------------------------
+
+
+def test_motion_that_shows_less_keeps_less(rng):
+    model = rm.load("rx90")
+    q, v, a = rng.normal(size=(3, 400, 6))
+    still = np.array([1, 1, 1, 0, 0, 0.0])
+    whole = base_parameters(model, "numeric", motion=(q, v, a))
+    assert whole.names == base_parameters(model).names
+    part = base_parameters(model, "numeric", motion=(q * still, v * still, a * still))
+    assert len(part) < len(whole)
+    W = torque_regressor(model, q * still, v * still, a * still)
+    again = part.reduce(W) @ part.matrix
+    assert np.allclose(again, W, atol=1e-8 * abs(W).max())
+
+
+def test_joints_bound_to_each_other(rng):
+    model = rm.load("planar_3r")
+    model = model.with_inertia(random_bodies(rng, 3)).with_drive(random_drive(rng, 3))
+    G = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+    base = base_parameters(model, "numeric", constraint=G)
+    assert len(base) < len(base_parameters(model))
+    u, du, ddu = rng.normal(size=(3, 30, 2))
+    W = torque_regressor(model, u @ G.T, du @ G.T, ddu @ G.T)
+    torque = np.einsum("ku,nkp->nup", G, W)
+    assert np.allclose(base.reduce(torque) @ base.matrix, torque, atol=1e-9 * abs(W).max())
+    same = base_parameters(model, "numeric", constraint=rm.Transmission(np.eye(3)))
+    assert same.names == base_parameters(model).names
+
+
+# --- the result ----------------------------------------------------------------------------------
+
+
+def test_null_space_is_unseen(rng):
+    model = rm.load("stanford_arm")
+    base = base_parameters(model)
+    W = torque_regressor(model, *rng.normal(size=(3, 50, 6)))
+    assert base.null_space.shape == (84, 84 - len(base))
+    assert abs(W @ base.null_space).max() < 1e-11
+    assert abs(base.matrix @ base.null_space).max() < 1e-14
+    names = {*base.no_effect, *base.alone, *base.in_combination}
+    assert names == set(parameter_names(model))
+    assert "XY4" in base.alone
+    assert {"YY5", "ZZ4"} <= set(base.in_combination)
+
+
+def test_result_is_a_value():
+    base = base_parameters(rm.load("cobra_s600"))
+    again = pickle.loads(pickle.dumps(base))
+    assert again.names == base.names
+    assert again.text == base.text
+    assert not again.matrix.flags.writeable
+    with pytest.raises(TypeError):
+        base.regrouping["ZZ1"]["ZZ1"] = 2.0
+    assert repr(base) == "<BaseParameters of 'cobra_s600': 22 of 56, 27 without effect, symbolic>"
+
+
+def test_values_belong_to_the_structure():
+    base = base_parameters(rm.load("rx90"))
+    assert base.values(rm.load("puma560")).shape == (58,)
+    with pytest.raises(InvalidValueError, match="other standard parameters"):
+        base.values(rm.load("planar_2r"))
+    with pytest.raises(ShapeError, match="a column for each"):
+        base.reduce(np.ones((4, 60)))
+
+
+def test_mistakes_are_named():
+    model = rm.load("planar_2r")
+    with pytest.raises(InvalidValueError, match="'symbolic', 'numeric', got 'khalil'"):
+        base_parameters(model, "khalil")
+    with pytest.raises(InvalidValueError, match="constraint: the symbolic method"):
+        base_parameters(model, constraint=np.eye(2))
+    with pytest.raises(InvalidValueError, match="log is empty"):
+        base_parameters(model, "numeric", motion=(np.zeros((0, 2)),) * 3)
+    with pytest.raises(InvalidValueError, match="three arrays"):
+        base_parameters(model, "numeric", motion=np.zeros((5, 2)))
+    with pytest.raises(InvalidValueError, match="tolerance"):
+        base_parameters(model, "numeric", tolerance=0.0)
+    with pytest.raises(ShapeError, match=r"constraint: expected shape \(2, u\)"):
+        base_parameters(model, "numeric", constraint=np.eye(3))
+    with pytest.raises(InvalidValueError, match="nothing moves"):
+        base_parameters(model, "numeric", constraint=np.zeros((2, 1)))
+
+
+def test_enum_and_word_are_one():
+    model = rm.load("planar_2r")
+    assert base_parameters(model, BaseMethod.NUMERIC).names == base_parameters(model).names

@@ -1,0 +1,64 @@
+"""Numerics of linear models: independent columns."""
+
+import numpy as np
+import pytest
+
+from robotmodels.errors import InvalidValueError, ShapeError
+from robotmodels.estimation import column_basis
+
+
+def test_random_ranks(rng):
+    for _ in range(50):
+        p, r = int(rng.integers(1, 12)), int(rng.integers(1, 12))
+        W = rng.normal(size=(40, min(r, p))) @ rng.normal(size=(min(r, p), p))
+        W *= 10.0 ** rng.uniform(-4, 4, size=p)
+        basis = column_basis(W, empty=1e-14)
+        assert basis.rank == min(r, p)
+        again = W[:, basis.kept] @ basis.coefficients
+        assert np.allclose(again, W, rtol=0, atol=1e-8 * abs(W).max(axis=0))
+
+
+def test_earlier_columns_are_kept(rng):
+    W = rng.normal(size=(20, 3)) @ rng.normal(size=(3, 6))
+    assert column_basis(W).kept.tolist() == [0, 1, 2]
+    assert column_basis(W, order=[5, 4, 3, 2, 1, 0]).kept.tolist() == [3, 4, 5]
+
+
+def test_the_triangular_factor_is_enough(rng):
+    W = rng.normal(size=(100, 4)) @ rng.normal(size=(4, 7))
+    whole, factor = column_basis(W), column_basis(np.linalg.qr(W, mode="r"))
+    assert whole.kept.tolist() == factor.kept.tolist()
+    assert np.allclose(whole.coefficients, factor.coefficients, atol=1e-10)
+
+
+def test_gap_and_empty_columns(rng):
+    W = rng.normal(size=(30, 5))
+    W[:, 2] = 0.0
+    W[:, 4] = W[:, 0] - W[:, 1]
+    basis = column_basis(W)
+    assert basis.empty.tolist() == [2]
+    assert basis.dependent.tolist() == [4]
+    assert basis.coefficients[:, 4].tolist() == pytest.approx([1.0, -1.0, 0.0])
+    kept, dependent = basis.gap
+    assert kept > 0.1
+    assert dependent < 1e-14
+
+
+def test_nothing_and_less():
+    assert column_basis(np.zeros((3, 2))).rank == 0
+    assert column_basis(np.zeros((0, 2))).empty.tolist() == [0, 1]
+    assert column_basis(np.zeros((3, 0))).rank == 0
+    wide = column_basis([[1.0, 2.0, 3.0]])
+    assert wide.kept.tolist() == [0]
+    assert wide.coefficients.tolist() == [[1.0, 2.0, 3.0]]
+
+
+def test_mistakes_are_named():
+    with pytest.raises(ShapeError, match="expected a matrix"):
+        column_basis([1.0, 2.0])
+    with pytest.raises(InvalidValueError, match="order"):
+        column_basis(np.eye(2), order=[0, 0])
+    with pytest.raises(InvalidValueError, match="scale"):
+        column_basis(np.eye(2), scale=[1.0, 0.0])
+    with pytest.raises(InvalidValueError):
+        column_basis([[np.nan, 1.0]])
