@@ -50,14 +50,16 @@ AT_REST = {
 }
 
 
-def random_limits(rng, law, n):
+def random_limits(rng, law, n, same_jerk=False):
     jumps = law in (TimeLaw.TRAPEZOIDAL, TimeLaw.BANG_BANG)
+    jerk_lower = -rng.uniform(2.0, 100.0, n)
     return MotionLimits(
         velocity=rng.uniform(0.3, 3.0, n),
         acceleration=rng.uniform(0.5, 10.0, n),
         jerk=np.inf if jumps else rng.uniform(2.0, 100.0, n),
         velocity_lower=-rng.uniform(0.3, 3.0, n),
         acceleration_lower=-rng.uniform(0.5, 10.0, n),
+        jerk_lower=-np.inf if jumps else None if same_jerk else jerk_lower,
     )
 
 
@@ -74,7 +76,7 @@ def test_limits_hold_and_ends_are_met_on_10000_random_motions(law, rng):
         bounds = [
             (limits.velocity_lower, limits.velocity),
             (limits.acceleration_lower, limits.acceleration),
-            (-limits.jerk, limits.jerk),
+            (limits.jerk_lower, limits.jerk),
         ]
         used = np.zeros(500)
         for (low, high), (least, most) in zip(peaks, bounds, strict=True):
@@ -86,11 +88,13 @@ def test_limits_hold_and_ends_are_met_on_10000_random_motions(law, rng):
         moving = (q0 != q1).any(axis=-1)
         assert (used[moving] > 1.0 - 1e-12).all()
         assert (move.duration[~moving] == 0.0).all()
-        for i in range(0, 500, 100):
-            one = along_line(law, q0[i], q1[i], None, limits)
-            ends = one.q([0.0, one.duration])
-            size = 1e-12 * max(1.0, np.abs([q0[i], q1[i]]).max())
-            assert np.abs(ends - [q0[i], q1[i]]).max() < size
+        times = np.stack((np.zeros(500), move.duration), axis=-1)
+        (ends,) = move.motion.derivatives(times, (0,))
+        size = np.abs([q0, q1]).max(axis=(0, 2))
+        off = np.abs(ends - np.stack((q0, q1), axis=1)).max(axis=(1, 2))
+        assert (off < 1e-12 * np.maximum(1.0, size)).all()
+        one = along_line(law, q0[0], q1[0], None, limits)
+        assert one.duration == pytest.approx(move.duration[0], rel=1e-15)
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -131,7 +135,7 @@ def test_derivatives_and_continuity(law, rng):
         )
 
 
-def least_times(L, V, A, B, J):
+def least_times(L, V, A, B, J, K):
     """Closed forms, written independently of the package."""
     full = np.sqrt(2 * L / (1 / A + 1 / B))
     trapezoid = L / V + V / 2 * (1 / A + 1 / B) if full > V else 2 * L / full
@@ -139,49 +143,61 @@ def least_times(L, V, A, B, J):
     low = min(A, B)
     return {
         TimeLaw.LINEAR: L / V,
-        TimeLaw.CUBIC: max(1.5 * L / V, (6 * L / low) ** 0.5, (12 * L / J) ** (1 / 3)),
+        TimeLaw.CUBIC: max(1.5 * L / V, (6 * L / low) ** 0.5, (12 * L / K) ** (1 / 3)),
         TimeLaw.QUINTIC: max(
-            1.875 * L / V, (10 / 3**0.5 * L / low) ** 0.5, (60 * L / J) ** (1 / 3)
+            1.875 * L / V,
+            (10 / 3**0.5 * L / low) ** 0.5,
+            (60 * L / J) ** (1 / 3),
+            (30 * L / K) ** (1 / 3),
         ),
         TimeLaw.BANG_BANG: bang,
         TimeLaw.TRAPEZOIDAL: trapezoid,
     }
 
 
-@pytest.mark.parametrize("law", [law for law in LAWS if law in least_times(1, 1, 1, 1, 1)])
+@pytest.mark.parametrize("law", [law for law in LAWS if law in least_times(1, 1, 1, 1, 1, 1)])
 def test_least_times_are_the_closed_forms(law, rng):
     for _ in range(300):
-        L, V, A, B, J = 10.0 ** rng.uniform(-2.0, 2.0, 5)
-        limits = MotionLimits(
-            velocity=V,
-            acceleration=A,
-            acceleration_lower=-B,
-            jerk=np.inf if law in (TimeLaw.TRAPEZOIDAL, TimeLaw.BANG_BANG) else J,
-        )
+        L, V, A, B, J, K = 10.0 ** rng.uniform(-2.0, 2.0, 6)
+        limits = MotionLimits(V, A, J, acceleration_lower=-B, jerk_lower=-K)
+        if law in (TimeLaw.TRAPEZOIDAL, TimeLaw.BANG_BANG):
+            limits = limits.without_jerk()
         T = along_line(law, 0.3, 0.3 + L, None, limits).duration
-        assert abs(T / least_times(0.3 + L - 0.3, V, A, B, J)[law] - 1.0) < 1e-12
+        assert abs(T / least_times(0.3 + L - 0.3, V, A, B, J, K)[law] - 1.0) < 1e-12
+
+
+def smoothed_ramp(V, A, J, K):
+    """Time and distance of a ramp from rest to V whose acceleration is a parabola."""
+    T = max(1.5 * V / A, (6 * V / min(J, K)) ** 0.5)
+    return T, 0.5 * V * T
+
+
+def jerk_limited_ramp(V, A, J, K):
+    """Time and distance of a ramp of three phases, by its velocities at their ends."""
+    a = min(A, (2 * V / (1 / J + 1 / K)) ** 0.5)
+    v1, v2 = 0.5 * a * a / J, V - 0.5 * a * a / K
+    t1, t2, t3 = a / J, (v2 - v1) / a, a / K
+    return t1 + t2 + t3, J * t1**3 / 6 + 0.5 * (v1 + v2) * t2 + V * t3 - K * t3**3 / 6
 
 
 @pytest.mark.parametrize(
     ("law", "ramp"),
     [
-        (TimeLaw.SMOOTHED_TRAPEZOIDAL, lambda V, A, J: max(1.5 * V / A, (6 * V / J) ** 0.5)),
-        (
-            TimeLaw.JERK_LIMITED,
-            lambda V, A, J: V / A + A / J if V * J > A * A else 2 * (V / J) ** 0.5,
-        ),
+        (TimeLaw.SMOOTHED_TRAPEZOIDAL, smoothed_ramp),
+        (TimeLaw.JERK_LIMITED, jerk_limited_ramp),
     ],
 )
 def test_least_times_of_smooth_ramps_by_bisection(law, ramp, rng):
     """The greatest velocity whose ramps fit, found by bisection; no other velocity is quicker."""
     for _ in range(200):
-        L, V, A, B, J = 10.0 ** rng.uniform(-2.0, 2.0, 5)
+        L, V, A, B, J, K = 10.0 ** rng.uniform(-2.0, 2.0, 6)
 
-        def time(v, A=A, B=B, J=J, L=L):
-            return L / v + 0.5 * (ramp(v, A, J) + ramp(v, B, J))
+        def time(v, A=A, B=B, J=J, K=K, L=L):
+            (t0, d0), (t1, d1) = ramp(v, A, J, K), ramp(v, B, J, K)
+            return t0 + t1 + (L - d0 - d1) / v
 
-        def fits(v, A=A, B=B, J=J, L=L):
-            return v * (ramp(v, A, J) + ramp(v, B, J)) <= 2 * L
+        def fits(v, A=A, B=B, J=J, K=K, L=L):
+            return ramp(v, A, J, K)[1] + ramp(v, B, J, K)[1] <= L
 
         low, high = 0.0, V
         if fits(V):
@@ -189,10 +205,13 @@ def test_least_times_of_smooth_ramps_by_bisection(law, ramp, rng):
         for _ in range(200):
             middle = 0.5 * (low + high)
             low, high = (middle, high) if fits(middle) else (low, middle)
-        limits = MotionLimits(V, A, J, acceleration_lower=-B)
+        limits = MotionLimits(V, A, J, acceleration_lower=-B, jerk_lower=-K)
         T = along_line(law, 0.0, L, None, limits).duration
         assert abs(T / time(low) - 1.0) < 1e-12
         assert all(time(v) * (1 + 1e-12) >= T for v in low * rng.uniform(0.2, 1.0, 20))
+        # forth and back are each other's mirror images
+        mirrored = MotionLimits(V, B, K, acceleration_lower=-A, jerk_lower=-J)
+        assert along_line(law, 0.0, -L, None, mirrored).duration == pytest.approx(T, rel=1e-12)
 
 
 @pytest.mark.parametrize("jerk", [False, True])
@@ -206,11 +225,12 @@ def test_no_motion_is_quicker_by_linear_programming(jerk, rng):
     N = 100 if jerk else 200
     for _ in range(8):
         V, A, B = rng.uniform(0.5, 2.0, 3)
-        L, J = rng.uniform(0.5, 3.0), rng.uniform(3.0, 20.0)
-        limits = MotionLimits(V, A, J if jerk else np.inf, acceleration_lower=-B)
+        L, J, K = rng.uniform(0.5, 3.0), *rng.uniform(3.0, 20.0, 2)
+        limits = MotionLimits(V, A, J, acceleration_lower=-B, jerk_lower=-K)
+        limits = limits if jerk else limits.without_jerk()
         T = (jerk_limited if jerk else trapezoidal)(0.0, L, limits=limits).duration
 
-        def farthest(T, V=V, A=A, B=B, J=J):
+        def farthest(T, V=V, A=A, B=B, J=J, K=K):
             h, none = T / N, np.zeros((1, N))
             cell = np.tri(N)  # cell i acts on all nodes after it
             if jerk:
@@ -218,7 +238,7 @@ def test_no_motion_is_quicker_by_linear_programming(jerk, rng):
                 v = np.vstack((none, np.cumsum(h * a[:-1] + 0.5 * h * h * np.eye(N), axis=0)))
                 way = (h * v[:-1] + 0.5 * h * h * a[:-1] + h**3 / 6.0 * np.eye(N)).sum(axis=0)
                 rows, room = [a[1:], -a[1:], v[1:], -v[1:]], [A, B, V, V]
-                rest, bounds, error = np.vstack((a[-1:], v[-1:])), (-J, J), 0.0
+                rest, bounds, error = np.vstack((a[-1:], v[-1:])), (-K, J), 0.0
             else:
                 v = np.vstack((none, cell * h))
                 way = 0.5 * h * (v[1:] + v[:-1]).sum(axis=0)
@@ -413,18 +433,18 @@ def test_least_duration_of_polynomials_with_end_states(make, order, rng):
 def test_least_durations_to_the_last_digits(order, rng):
     """Beside closed forms, where there are any; and just below it a limit is exceeded."""
     make, law = ((cubic, TimeLaw.CUBIC), (quintic, TimeLaw.QUINTIC))[order == 5]
-    for _ in range(40):  # from rest, one limit after the other
+    for _ in range(20):  # from rest, one limit after the other
         L, bound = 10.0 ** rng.uniform(-2.0, 2.0, 2)
         name = ("velocity", "acceleration", "jerk")[int(rng.integers(3))]
         limits = MotionLimits(**{name: bound})
         state = dict.fromkeys(("q0", "v0", "v1", "a0", "a1"), np.zeros(1)) | {"q1": np.array([L])}
         found = least_duration(order, state, limits.for_joints(1))
         assert found == pytest.approx(along_line(law, 0.0, L, None, limits).duration, rel=1e-12)
-    for v, V in rng.uniform(0.1, 1.0, (20, 2)) * [1.0, 5.0] + [0.0, 1.0]:
+    for v, V in rng.uniform(0.1, 1.0, (10, 2)) * [1.0, 5.0] + [0.0, 1.0]:
         # the velocity of a cubic that keeps v at both ends is v + 1.5 (D / T - v) in the middle
         T = cubic(0.0, 1.0, limits=MotionLimits(V), v0=v, v1=v).duration
         assert pytest.approx(1.5 / (V + 0.5 * v), rel=1e-12) == T
-    for _ in range(30):  # states on their limits, and all limits at once
+    for _ in range(12):  # states on their limits, and all limits at once
         V, A, J = rng.uniform(0.5, 2.0, 3) * [1.0, 4.0, 30.0]
         low, high = -rng.uniform(0.0, 0.3, 2)
         limits = MotionLimits(V, A, J, lower=low, upper=1.0 - high)
@@ -495,7 +515,7 @@ def random_states(rng, n):
 
 def test_rest_to_rest_is_as_quick_as_ruckig(rng):
     for _ in range(200):
-        limits = random_limits(rng, TimeLaw.JERK_LIMITED, 1)
+        limits = random_limits(rng, TimeLaw.JERK_LIMITED, 1, same_jerk=True)
         L = float(rng.normal() * 10.0 ** rng.uniform(-3.0, 1.0))
         rest = {k: np.zeros(1) for k in ("q0", "v0", "v1", "a0", "a1")} | {"q1": [L]}
         theirs = by_ruckig(rest, limits, 1)
@@ -509,7 +529,8 @@ def test_rest_to_rest_is_as_quick_as_ruckig(rng):
 def test_any_states_equal_ruckig(longer, rng):
     for _ in range(120):
         n = int(rng.integers(1, 4))
-        limits, state = random_limits(rng, TimeLaw.JERK_LIMITED, n), random_states(rng, n)
+        limits = random_limits(rng, TimeLaw.JERK_LIMITED, n, same_jerk=True)
+        state = random_states(rng, n)
         theirs = by_ruckig(state, limits, n)
         T = None if longer is None else theirs.duration * longer
         if T is not None:
@@ -684,3 +705,27 @@ def test_pieces_are_evaluated_at_any_order_of_times(together, rng):
             for values, order in zip(found, (3, 0, 7, 1), strict=True):
                 want = p.deriv(order)(x) / h**order
                 assert abs(values[i, j] - want) < 1e-12 * max(1.0, h**-order)
+
+
+def test_jerk_that_is_limited_one_way_only():
+    """The acceleration may then fall at once, and the closed form still keeps what is limited."""
+    limits = MotionLimits(10.0, 10.0, 2.0, jerk_lower=-np.inf)
+    move = jerk_limited(0.0, 1.0, limits=limits)
+    # each half of the way takes the time t with 2 t^3 / 6 = 1 / 2
+    half = (6.0 * 0.5 / 2.0) ** (1.0 / 3.0)
+    assert move.duration == pytest.approx(2.0 * half, rel=1e-12)
+    assert move.check(limits, 0.0).kept
+    assert limits.without_jerk().jerk_lower == -np.inf
+    assert limits.jerk_lower == -np.inf
+    with pytest.raises(InvalidValueError, match="at most 0"):
+        MotionLimits(1.0, 1.0, 1.0, jerk_lower=1.0)
+    with pytest.raises(InvalidValueError, match="without_jerk"):
+        trapezoidal(0.0, 1.0, limits=MotionLimits(1.0, 1.0, 1.0))
+    assert trapezoidal(0.0, 1.0, limits=MotionLimits(1.0, 1.0, 1.0).without_jerk()).duration > 1.0
+    # between moving states the smaller limit holds both ways
+    limits = MotionLimits(1.0, 2.0, 9.0, jerk_lower=-5.0)
+    moving = jerk_limited(0.0, 1.0, limits=limits, v0=0.3)
+    assert moving.duration == pytest.approx(
+        jerk_limited(0.0, 1.0, limits=MotionLimits(1.0, 2.0, 5.0), v0=0.3).duration, rel=1e-12
+    )
+    assert moving.check(limits).kept

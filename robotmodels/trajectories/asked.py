@@ -89,7 +89,8 @@ def limits_along(limits: MotionLimits, direction: Array) -> LineLimits:
         along("velocity", least_v, limits.velocity),
         along("acceleration", least_a, limits.acceleration),
         along("acceleration", -limits.acceleration, -least_a),
-        along("jerk", -limits.jerk, limits.jerk),
+        along("jerk", limits.jerk_lower, limits.jerk),
+        along("jerk", -limits.jerk, -limits.jerk_lower),
         along("velocity", -limits.velocity, -least_v, needed=False),
     )
 

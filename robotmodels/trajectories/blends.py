@@ -180,15 +180,16 @@ def _full_speed(step: Array, limits: MotionLimits) -> Array:
 
 def _least_blends(step: Array, T: Array, limits: MotionLimits, smooth: bool) -> Array:
     """Least times of blends, shape (m,)."""
-    if not smooth and np.isfinite(limits.jerk).any():
+    J = np.minimum(limits.jerk, -limits.jerk_lower)  # a smooth blend needs both alike
+    if not smooth and np.isfinite(J).any():
         raise InvalidValueError(
             "limits: the acceleration of a parabolic blend jumps, which keeps no limit of jerk; "
-            "leave jerk out, or pass smooth=True."
+            "pass limits.without_jerk(), or smooth=True."
         )
     v = np.where(T[:, None] > 0.0, step / np.where(T > 0.0, T, 1.0)[:, None], 0.0)
     change = np.diff(v, axis=0, prepend=0.0, append=0.0)
     A = np.where(change > 0.0, limits.acceleration, -limits.acceleration_lower)
-    by_j = np.sqrt(6.0 * np.abs(change) / limits.jerk) if smooth else np.zeros_like(change)
+    by_j = np.sqrt(6.0 * np.abs(change) / J) if smooth else np.zeros_like(change)
     with np.errstate(divide="ignore", invalid="ignore"):
         by_a = (QUARTIC if smooth else PARABOLA) * np.abs(change) / A
     tb = np.where(change != 0.0, np.maximum(by_a, by_j), 0.0)

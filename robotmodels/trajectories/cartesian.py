@@ -299,11 +299,16 @@ def _timed(
     size = np.array([path.length, abs(path.turn)])
     of_s = None
     if bounds is not None:
-        V, A, B, J, _ = limits_along(bounds, size[None, None, :])
+        V, A, B, J, K, _ = limits_along(bounds, size[None, None, :])
         if path.radius > 0.0 and np.isfinite(bounds.acceleration[0]):
             V, A, B = _held_down(path, float(bounds.acceleration[0]), float(V[0]), A[0], B[0])
         of_s = MotionLimits(
-            velocity=V, acceleration=A, jerk=J, velocity_lower=-V, acceleration_lower=-B
+            velocity=V,
+            acceleration=A,
+            jerk=J,
+            velocity_lower=-V,
+            acceleration_lower=-B,
+            jerk_lower=-K,
         )
     goal = 1.0 if size.any() else 0.0
     moves = along_line(law, np.zeros(1), np.array([goal]), duration, of_s)
@@ -329,9 +334,11 @@ def _of_space(limits: MotionLimits | None) -> MotionLimits | None:
             "MotionLimits(velocity=[0.5, 1.0], acceleration=[2.0, 4.0])."
         )
     bounds = limits.for_joints(2)
-    if (bounds.velocity_lower != -bounds.velocity).any() or (
-        bounds.acceleration_lower != -bounds.acceleration
-    ).any():
+    if (
+        (bounds.velocity_lower != -bounds.velocity).any()
+        or (bounds.acceleration_lower != -bounds.acceleration).any()
+        or (bounds.jerk_lower != -bounds.jerk).any()
+    ):
         raise InvalidValueError("limits: those of a path in space are lengths, alike both ways.")
     if np.isfinite(bounds.lower).any() or np.isfinite(bounds.upper).any():
         raise InvalidValueError("limits: a path in space has no limits of position.")

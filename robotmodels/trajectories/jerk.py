@@ -49,8 +49,9 @@ def jerk_limited(
     duration : array_like, shape () or (...), optional
         Seconds; default the least.
     limits : MotionLimits
-        Of velocity, acceleration and jerk; velocity and acceleration may be asymmetric or, apart
-        from jerk, infinite.
+        Of velocity, acceleration and jerk, which may be asymmetric; all but that of jerk may be
+        infinite. Where a state at an end moves, ruckig keeps the smaller limit of jerk both ways:
+        only from rest to rest is the motion then the quickest.
     v0, v1, a0, a1 : array_like, shape () or (..., n)
         Velocities and accelerations at the ends, rad or m, per s and s^2.
     synchronisation : Synchronisation
@@ -149,10 +150,10 @@ def _on_line(state: dict[str, Array], limits: MotionLimits, T: float | None) -> 
             "The velocities and accelerations at the ends are not along the line from q0 to q1, "
             "so the joints cannot stay on it; pass synchronisation=Synchronisation.SAME_TIME."
         )
-    V, A, B, J, back = (float(v[0]) for v in limits_along(limits, u[None, None, :]))
+    V, A, B, J, K, back = (float(v[0]) for v in limits_along(limits, u[None, None, :]))
     one = {name: along[k : k + 1] for k, name in enumerate(("q1", *_STATES[2:]))}
     one["q0"] = np.zeros(1)
-    box = _Box(*(np.array([v]) for v in (V, -back, A, -B, J)))
+    box = _Box(*(np.array([v]) for v in (V, -back, A, -B, min(J, K))))
     breaks, c, lengths = _ruckig(one, box, T, Synchronisation.SAME_TIME)
     c = c * u
     c[:, 0] += state["q0"]
@@ -172,9 +173,12 @@ def _of_joints(
     D = state["q1"] - state["q0"]
     moves = (D != 0.0) | np.any([state[name] != 0.0 for name in _STATES[2:]], axis=0)
     rows = [
-        getattr(limits, name)[moves]
-        for name in ("velocity", "velocity_lower", "acceleration", "acceleration_lower", "jerk")
-    ]
+        row[moves]
+        for row in (
+            limits.velocity, limits.velocity_lower, limits.acceleration,
+            limits.acceleration_lower, np.minimum(limits.jerk, -limits.jerk_lower),
+        )
+    ]  # fmt: skip
     breaks, c = np.zeros((n, _PHASES + 2)), np.zeros((_PHASES + 1, 4, n))
     lengths = np.zeros((n, _PHASES + 1))
     active = {name: value[moves] for name, value in state.items()}

@@ -14,6 +14,7 @@ import numpy as np
 
 from .._arrays import Array
 from ..errors import InvalidValueError
+from .seven_phases import seven_phases
 
 _MARGIN = 1.0 + 1e-14
 """Durations are this much above the least, so that rounding does not exceed a limit."""
@@ -49,8 +50,8 @@ class LineLimits(NamedTuple):
         Greatest ``s'``.
     acceleration, deceleration : ndarray
         Greatest ``s''`` and ``-s''``.
-    jerk : ndarray
-        Greatest absolute ``s'''``.
+    jerk, jerk_down : ndarray
+        Greatest ``s'''`` and ``-s'''``.
     back : ndarray
         Greatest ``-s'``, which motions from rest to rest never need.
     """
@@ -59,6 +60,7 @@ class LineLimits(NamedTuple):
     acceleration: Array
     deceleration: Array
     jerk: Array
+    jerk_down: Array
     back: Array
 
 
@@ -106,32 +108,34 @@ def law_of_limits(law: TimeLaw, distance: Array, limits: LineLimits) -> Pieces:
     Examples
     --------
     >>> one, none = np.ones(1), np.full(1, np.inf)
-    >>> law_of_limits(TimeLaw.TRAPEZOIDAL, 2 * one, LineLimits(one, one, one, none, one)).durations
+    >>> limits = LineLimits(one, one, one, none, none, one)
+    >>> law_of_limits(TimeLaw.TRAPEZOIDAL, 2 * one, limits).durations
     array([[1., 1., 1.]])
     """
     moves = distance > 0.0
-    V, A, B, J, _ = (np.where(moves, limit, np.inf) for limit in limits)
+    V, A, B, J, K, _ = (np.where(moves, limit, np.inf) for limit in limits)
     L = np.where(moves, distance, 0.0)
-    if law in (TimeLaw.BANG_BANG, TimeLaw.TRAPEZOIDAL) and np.isfinite(J).any():
+    any_jerk = np.minimum(J, K)
+    if law in (TimeLaw.BANG_BANG, TimeLaw.TRAPEZOIDAL) and np.isfinite(any_jerk).any():
         raise InvalidValueError(
-            f"limits: the acceleration of {law.name} jumps, which keeps no limit of jerk; leave "
-            "jerk out, or take SMOOTHED_TRAPEZOIDAL or JERK_LIMITED."
+            f"limits: the acceleration of {law.name} jumps, which keeps no limit of jerk; pass "
+            "limits.without_jerk(), or take SMOOTHED_TRAPEZOIDAL or JERK_LIMITED."
         )
     needed = {
         TimeLaw.LINEAR: ("velocity", V),
-        TimeLaw.CUBIC: ("velocity, acceleration or jerk", np.minimum.reduce([V, A, B, J])),
-        TimeLaw.QUINTIC: ("velocity, acceleration or jerk", np.minimum.reduce([V, A, B, J])),
+        TimeLaw.CUBIC: ("velocity, acceleration or jerk", np.minimum.reduce([V, A, B, any_jerk])),
+        TimeLaw.QUINTIC: ("velocity, acceleration or jerk", np.minimum.reduce([V, A, B, any_jerk])),
         TimeLaw.BANG_BANG: ("velocity or acceleration", np.minimum(V, np.maximum(A, B))),
         TimeLaw.TRAPEZOIDAL: ("acceleration, both ways", np.maximum(A, B)),
         TimeLaw.SMOOTHED_TRAPEZOIDAL: (
-            "jerk, or of acceleration both ways", np.minimum(np.maximum(A, B), J),
+            "jerk, or of acceleration both ways", np.minimum(np.maximum(A, B), any_jerk),
         ),
-        TimeLaw.JERK_LIMITED: ("jerk", J),
+        TimeLaw.JERK_LIMITED: ("jerk", any_jerk),
     }  # fmt: skip
     what, limit = needed[law]
     if np.isinf(limit[moves]).any():
         raise InvalidValueError(f"limits: {law.name} needs a limit of {what}.")
-    pieces = _quickest(law, L, V, A, B, J)
+    pieces = _quickest(law, L, V, A, B, J, K)
     return Pieces(pieces.durations * _MARGIN, pieces.coefficients)
 
 
@@ -179,24 +183,29 @@ _POLYNOMIALS = {
 }
 
 
-def _quickest(law: TimeLaw, L: Array, V: Array, A: Array, B: Array, J: Array) -> Pieces:
+def _quickest(law: TimeLaw, L: Array, V: Array, A: Array, B: Array, J: Array, K: Array) -> Pieces:
     """The law with the least duration that real numbers allow."""
     if law is TimeLaw.LINEAR:
         return law_of_duration(law, L, L / V)
     if law is TimeLaw.CUBIC:
         T = np.maximum(1.5 * L / V, np.sqrt(6.0 * L / np.minimum(A, B)))
-        return law_of_duration(law, L, np.maximum(T, np.cbrt(12.0 * L / J)))
+        # its jerk is constant, and downwards
+        return law_of_duration(law, L, np.maximum(T, np.cbrt(12.0 * L / K)))
     if law is TimeLaw.QUINTIC:
         peak = 10.0 / np.sqrt(3.0)
         T = np.maximum(1.875 * L / V, np.sqrt(peak * L / np.minimum(A, B)))
-        return law_of_duration(law, L, np.maximum(T, np.cbrt(60.0 * L / J)))
+        # upwards at the ends, half as much downwards in the middle
+        by_jerk = np.cbrt(np.maximum(60.0 * L / J, 30.0 * L / K))
+        return law_of_duration(law, L, np.maximum(T, by_jerk))
+    if law is TimeLaw.JERK_LIMITED:
+        return Pieces(*seven_phases(L, V, A, B, J, K))
     if law is TimeLaw.BANG_BANG:
         up, down = 1.0 / A, 1.0 / B
         T = np.maximum(2.0 * L / V, np.sqrt(2.0 * L * (up + down)))
         both = np.where(up + down > 0.0, up + down, 1.0)
         share = np.where(up + down > 0.0, up / both, 0.5)
         return _ramped(law, L, 2.0 * L, T, share, 1.0 - share)
-    V, up, down = _fastest(law, L, V, A, B, J)
+    V, up, down = _fastest(law, L, V, A, B, np.minimum(J, K))
     ramps = up + down
     with np.errstate(divide="ignore", invalid="ignore"):
         cruise = np.where(L > 0.0, L / V - 0.5 * ramps, 0.0)
@@ -204,8 +213,6 @@ def _quickest(law: TimeLaw, L: Array, V: Array, A: Array, B: Array, J: Array) ->
         # without a cruise the ramps alone cover the distance, to the last digit
         V = np.where(L > 0.0, np.where(none, 2.0 * L / ramps, V), 0.0)
     cruise = np.where(none, 0.0, cruise)
-    if law is TimeLaw.JERK_LIMITED:
-        return _seven_phases(L, V, A, B, J, up, cruise, down)
     return _three_phases(law, L, V, up, cruise, down)
 
 
@@ -233,52 +240,13 @@ def _three_phases(
     return Pieces(np.stack((up, cruise, down), axis=-1), c)
 
 
-def _seven_phases(
-    L: Array, V: Array, A: Array, B: Array, J: Array, up: Array, cruise: Array, down: Array
-) -> Pieces:
-    """Ramps of constant jerk, none, and its opposite; cruise between them."""
-    R = L.size
-    h, c = np.zeros((R, 7)), np.zeros((R, 7, 4))
-    h[:, 3] = cruise
-    c[:, 3, 0], c[:, 3, 1] = 0.5 * V * up, V * cruise
-    for first, limit, ramp in ((0, A, up), (4, B, down)):
-        # time of one jerk: half of a ramp that never reaches its greatest acceleration
-        with np.errstate(divide="ignore", invalid="ignore"):
-            bend = np.where(ramp > 0.0, np.minimum(limit / J, 0.5 * ramp), 0.0)
-        level = np.maximum(ramp - 2.0 * bend, 0.0)
-        # the acceleration that makes the ramp reach V exactly
-        a = V / np.where(ramp > bend, ramp - bend, 1.0)
-        h[:, first], h[:, first + 1], h[:, first + 2] = bend, level, bend
-        up_ramp = first == 0
-        sign = 1.0 if up_ramp else -1.0
-        v1, v2 = 0.5 * a * bend, V - 0.5 * a * bend
-        if not up_ramp:
-            v1, v2 = v2, v1
-        start = np.zeros(R) if up_ramp else L - 0.5 * V * ramp
-        v0 = np.zeros(R) if up_ramp else V
-        p1 = start + v0 * bend + sign * a * bend**2 / 6.0
-        p2 = p1 + 0.5 * (v1 + v2) * level
-        c[:, first, 0], c[:, first, 1], c[:, first, 3] = start, v0 * bend, sign * a * bend**2 / 6.0
-        c[:, first + 1, 0], c[:, first + 1, 1] = p1, v1 * level
-        c[:, first + 1, 2] = 0.5 * sign * a * level**2
-        c[:, first + 2, 0], c[:, first + 2, 1] = p2, v2 * bend
-        c[:, first + 2, 2] = 0.5 * sign * a * bend**2
-        c[:, first + 2, 3] = -sign * a * bend**2 / 6.0
-    return Pieces(h, c)
-
-
 def _ramp_time(law: TimeLaw, V: Array, A: Array, J: Array) -> tuple[Array, Array]:
     """Least time of a ramp from rest to a velocity, and V times its derivative."""
     if law is TimeLaw.TRAPEZOIDAL:
         return V / A, V / A
-    if law is TimeLaw.SMOOTHED_TRAPEZOIDAL:
-        # a parabola of acceleration peaks at 1.5 V / time and starts with the jerk 6 V / time^2
-        by_a, by_j = 1.5 * V / A, np.sqrt(6.0 * V / J)
-        return np.maximum(by_a, by_j), np.where(by_a >= by_j, by_a, 0.5 * by_j)
-    with np.errstate(invalid="ignore"):
-        reached = V * J >= A * A
-        short = 2.0 * np.sqrt(V / J)
-        return np.where(reached, V / A + A / J, short), np.where(reached, V / A, 0.5 * short)
+    # a parabola of acceleration peaks at 1.5 V / time and starts with the jerk 6 V / time^2
+    by_a, by_j = 1.5 * V / A, np.sqrt(6.0 * V / J)
+    return np.maximum(by_a, by_j), np.where(by_a >= by_j, by_a, 0.5 * by_j)
 
 
 def _fastest(
@@ -290,12 +258,12 @@ def _fastest(
     V as long as the ramps, which cover ``V (up + down) / 2``, fit into the distance.
     """
     at_rest = L == 0.0
-    a, j = (1.5, 6.0) if law is TimeLaw.SMOOTHED_TRAPEZOIDAL else (1.0, 4.0)
+    a = 1.5 if law is TimeLaw.SMOOTHED_TRAPEZOIDAL else 1.0
     with np.errstate(divide="ignore", invalid="ignore"):
         # ramps limited by acceleration alone, and by jerk alone: each bounds V from above
         full = np.sqrt(2.0 * L / (a / A + a / B))
         if law is not TimeLaw.TRAPEZOIDAL:
-            full = np.minimum(full, np.cbrt(L) ** 2 * np.cbrt(J / j))
+            full = np.minimum(full, np.cbrt(L) ** 2 * np.cbrt(J / 6.0))
     full = np.where(at_rest, 0.0, full)
     # V (up + down) is convex in V, so Newton's method comes down from there to its root and stays
     for _ in range(60 if law is not TimeLaw.TRAPEZOIDAL else 0):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, Self
 
 import numpy as np
@@ -24,9 +24,9 @@ class MotionLimits:
     acceleration : array_like, shape () or (n,)
         Greatest acceleration, rad/s^2 or m/s^2.
     jerk : array_like, shape () or (n,)
-        Greatest absolute jerk, rad/s^3 or m/s^3.
-    velocity_lower, acceleration_lower : array_like, shape () or (n,), optional
-        Least velocity and acceleration, not above zero; default the greatest with the sign changed.
+        Greatest jerk, rad/s^3 or m/s^3.
+    velocity_lower, acceleration_lower, jerk_lower : array_like, shape () or (n,), optional
+        The least ones, not above zero; default the greatest with the sign changed.
     lower, upper : array_like, shape () or (n,)
         Limits of position, rad or m.
 
@@ -49,12 +49,13 @@ class MotionLimits:
     jerk: Array = np.inf  # type: ignore[assignment]
     velocity_lower: Array = None  # type: ignore[assignment]
     acceleration_lower: Array = None  # type: ignore[assignment]
+    jerk_lower: Array = None  # type: ignore[assignment]
     lower: Array = -np.inf  # type: ignore[assignment]
     upper: Array = np.inf  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         given = {field.name: getattr(self, field.name) for field in fields(self)}
-        for side in ("velocity", "acceleration"):
+        for side in ("velocity", "acceleration", "jerk"):
             if given[f"{side}_lower"] is None:
                 given[f"{side}_lower"] = -as_reals(given[side], side)
         arrays = {name: as_reals(value, name) for name, value in given.items()}
@@ -67,7 +68,10 @@ class MotionLimits:
                 raise InvalidValueError(f"{name}: a limit is NaN; infinity means no limit.")
             if name in ("velocity", "acceleration", "jerk") and (array < 0.0).any():
                 raise InvalidValueError(f"{name}: expected limits of at least 0, got {array}.")
-            if name in ("velocity_lower", "acceleration_lower") and (array > 0.0).any():
+            if (
+                name in ("velocity_lower", "acceleration_lower", "jerk_lower")
+                and (array > 0.0).any()
+            ):
                 raise InvalidValueError(f"{name}: expected limits of at most 0, got {array}.")
         try:
             shape = np.broadcast_shapes(*(array.shape for array in arrays.values()))
@@ -143,6 +147,22 @@ class MotionLimits:
         return type(self)(
             **{f.name: np.broadcast_to(getattr(self, f.name), n) for f in fields(self)}
         )
+
+    def without_jerk(self) -> Self:
+        """The same limits but none of jerk, for laws whose acceleration jumps.
+
+        Returns
+        -------
+        MotionLimits
+            Of as many joints.
+
+        Examples
+        --------
+        >>> MotionLimits(1.0, 2.0, 10.0).without_jerk().jerk
+        array(inf)
+        """
+        free = np.full(self.jerk.shape, np.inf)
+        return replace(self, jerk=free, jerk_lower=-free)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), tuple(getattr(self, field.name) for field in fields(self))
@@ -221,7 +241,7 @@ class LimitsReport:
             ("position", *self.position, of.lower, of.upper),  # type: ignore[list-item]
             ("velocity", *self.velocity, of.velocity_lower, of.velocity),
             ("acceleration", *self.acceleration, of.acceleration_lower, of.acceleration),
-            ("jerk", *self.jerk, -of.jerk, of.jerk),
+            ("jerk", *self.jerk, of.jerk_lower, of.jerk),
         ]
 
 

@@ -163,7 +163,7 @@ def _bounds(limits: MotionLimits) -> tuple[tuple[Array, Array], ...]:
         (limits.lower, limits.upper),
         (limits.velocity_lower, limits.velocity),
         (limits.acceleration_lower, limits.acceleration),
-        (-limits.jerk, limits.jerk),
+        (limits.jerk_lower, limits.jerk),
     )
 
 
@@ -174,14 +174,15 @@ def _scales(state: dict[str, Array], limits: MotionLimits) -> Array:
     a = np.maximum(np.abs(state["a0"]), np.abs(state["a1"]))
     V = np.minimum(limits.velocity, -limits.velocity_lower)
     A = np.minimum(limits.acceleration, -limits.acceleration_lower)
+    J = np.minimum(limits.jerk, -limits.jerk_lower)
     room = np.minimum(
         np.maximum(limits.upper - np.maximum(state["q0"], state["q1"]), 0.0),
         np.maximum(np.minimum(state["q0"], state["q1"]) - limits.lower, 0.0),
     )
     with np.errstate(divide="ignore", invalid="ignore"):
         times = np.concatenate(
-            (D / V, np.sqrt(D / A), np.cbrt(D / limits.jerk), v / A, np.sqrt(v / limits.jerk),
-             a / limits.jerk, D / v, np.sqrt(D / a), v / a, V / a, room / v, np.sqrt(room / a))
+            (D / V, np.sqrt(D / A), np.cbrt(D / J), v / A, np.sqrt(v / J),
+             a / J, D / v, np.sqrt(D / a), v / a, V / a, room / v, np.sqrt(room / a))
         )  # fmt: skip
     times = times[np.isfinite(times) & (times > 0.0)]
     return times if times.size else np.ones(1)
