@@ -220,7 +220,7 @@ def constants_of(model: RobotModel) -> tuple[Constant, ...]:
 def _rows_of_symbols(
     model: RobotModel,
 ) -> tuple[list[RowConstants], list[Array], list[Constant]]:
-    """What `regrouped` takes, as formulas; motion about or along the joint's own axis is left out."""
+    """What `regrouped` takes, as formulas; motion of the joint itself is left out."""
     import sympy
 
     table, found = model.table, restraints(model)

@@ -30,9 +30,8 @@ def table_text(base: BaseParameters) -> str:
     --------
     >>> from robotmodels.robots import load
     >>> from robotmodels.base_parameters import base_parameters
-    >>> print(base_parameters(load("lab_rrt"), drive=False).text[:79])
-    lab_rrt: 12 base parameters of 30 standard ones (symbolic)
-      ZZ1R = ZZ1 + YY2
+    >>> print(table_text(base_parameters(load("lab_rrt"), drive=False)).splitlines()[1])
+      ZZ1R = ZZ1 + YY2 + ZZ3
     """
     lines = [
         f"{base.model.name}: {len(base)} base parameters of {len(base.parameter_names)} "
