@@ -1,0 +1,1017 @@
+"""Inverse kinematic model: the decomposition, the methods, both orders, tasks and limits.
+
+The kernels are held against NumPy's decomposition, written out here once more.
+"""
+
+import pickle
+
+import numpy as np
+import pytest
+from hypothesis import given
+from identities.random_robots import any_models, models, random_state, robot_size, seeds
+
+import robotmodels as rm
+from robotmodels.errors import FrameNotFoundError, InvalidValueError, ShapeError
+from robotmodels.kernels.svd import decompositions
+from robotmodels.kinematics.inverse.bounds import JointBounds
+from robotmodels.kinematics.inverse.ikm import ikm
+from robotmodels.kinematics.inverse.joint_task import JointTask
+from robotmodels.kinematics.inverse.methods import (
+    DampedInverse,
+    Damping,
+    FilteredInverse,
+    PseudoInverse,
+)
+from robotmodels.kinematics.inverse.scaling import characteristic_length
+from robotmodels.kinematics.inverse.second_order import ikm_second_order
+from robotmodels.kinematics.inverse.solution import IKMSolution
+from robotmodels.kinematics.inverse.status import IKMStatus
+from robotmodels.kinematics.inverse.twist_task import TwistTask
+from robotmodels.kinematics.velocities import dkm_second_order
+
+REFERENCES = ("world_aligned", "local", "world")
+POSITION = [1, 1, 1, 0, 0, 0]
+TENTH = np.deg2rad(0.1)
+METHODS = {
+    "default": DampedInverse(),
+    "pseudo": PseudoInverse(),
+    "filtered": FilteredInverse(0.2),
+    "weak": DampedInverse(0.3, 0.1),
+    "constant": DampedInverse(largest=0.1, damping=Damping.CONSTANT),
+    "smallest": DampedInverse(0.3, 0.1, Damping.SMALLEST_SINGULAR_VALUE),
+    "manipulability": DampedInverse(0.05, 0.1, Damping.MANIPULABILITY),
+}
+
+
+# --- the same in NumPy -------------------------------------------------------------------------
+
+
+def factors(method, s):
+    """Factor of each of the singular values s (k,)."""
+    if isinstance(method, PseudoInverse):
+        keep = s > max(method.tolerance * s[0], 1e-13)
+        return np.where(keep, 1.0, 0.0) / np.where(keep, s, 1.0)
+    if isinstance(method, FilteredInverse):
+        ratio = np.minimum(s / method.threshold, 1.0)
+        below = ratio * (3 - 2 * ratio) / method.threshold
+        return np.where(s < method.threshold, below, 1 / np.maximum(s, method.threshold))
+    e, most = method.threshold, method.largest
+    square = {
+        Damping.CONSTANT: most**2 * np.ones_like(s),
+        Damping.WEAK_DIRECTIONS: most**2 * np.maximum(1 - (s / e) ** 2, 0),
+        Damping.SMALLEST_SINGULAR_VALUE: most**2 * np.maximum(1 - (s[-1:] / e) ** 2, 0)
+        * np.ones_like(s),
+        Damping.MANIPULABILITY: most**2 * np.maximum(1 - s.prod() / e, 0) ** 2 * np.ones_like(s),
+    }[method.damping]  # fmt: skip
+    tiny = s <= 1e-13
+    return np.where(tiny, 0.0, s / np.where(tiny, 1.0, s**2 + square))
+
+
+def scales(model, length=None, joint_weights=None, frame=None):
+    """Factors of rows and of columns."""
+    length = characteristic_length(model, frame) if length is None else length
+    rows = np.array([1 / length] * 3 + [1.0] * 3)
+    sliding = model.table.sigma[model.table.joint_rows] == 1
+    weights = np.where(sliding, length**-2.0, 1.0) if joint_weights is None else joint_weights
+    return rows, 1 / np.sqrt(weights)
+
+
+def solved(J, twist, method, rows, columns, asked):
+    """Joint velocities and singular values by NumPy."""
+    A = (rows[:, None] * J * columns)[asked]
+    U, s, Vt = np.linalg.svd(A, full_matrices=False)
+    return columns * (Vt.T @ (factors(method, s) * (U.T @ (rows * twist)[asked]))), s, U
+
+
+def close(actual, expected, tolerance=1e-12):
+    assert np.shape(actual) == np.shape(expected)
+    np.testing.assert_allclose(actual, expected, rtol=0, atol=tolerance)
+
+
+# --- decomposition -----------------------------------------------------------------------------
+
+
+def decomposed(A):
+    A = np.ascontiguousarray(A, dtype=float)
+    N, m, n = A.shape
+    k = min(m, n)
+    U, S, V = (np.full(shape, np.nan) for shape in ((N, m, k), (N, k), (N, n, k)))
+    decompositions(A, U, S, V)
+    return U, S, V
+
+
+def check_decomposition(A, rank=None):
+    U, S, V = decomposed(A)
+    size = np.abs(A).max(initial=0.0) or 1.0
+    close((U * S[:, None]) @ np.swapaxes(V, 1, 2) / size, A / size, 1e-14)
+    close(S / size, np.linalg.svd(A / size, compute_uv=False), 2e-14)
+    assert (np.diff(S) <= 0).all()
+    assert (S >= 0).all()
+    k = S.shape[1] if rank is None else rank
+    for X in (U[..., :k], V[..., :k]):
+        close(np.swapaxes(X, 1, 2) @ X, np.tile(np.eye(k), (len(A), 1, 1)), 1e-13)
+
+
+@pytest.mark.parametrize("m", range(1, 9))
+@pytest.mark.parametrize("n", range(1, 11))
+def test_decomposition_of_any_shape(m, n, rng):
+    check_decomposition(rng.normal(size=(40, m, n)))
+
+
+@pytest.mark.parametrize(("m", "n"), [(6, 6), (6, 7), (6, 4), (3, 7), (5, 9)])
+@pytest.mark.parametrize("rank", [0, 1, 2, 3])
+def test_decomposition_of_lower_rank(m, n, rank, rng):
+    A = rng.normal(size=(40, m, rank)) @ rng.normal(size=(40, rank, n))
+    check_decomposition(A, rank)
+    assert (decomposed(A)[1][:, rank:] < 1e-14).all()
+
+
+@pytest.mark.parametrize("size", [1e-200, 1e-30, 1.0, 1e30, 1e200])
+def test_decomposition_of_any_size(size, rng):
+    check_decomposition(size * rng.normal(size=(20, 6, 7)))
+    check_decomposition(size * np.stack([np.eye(6), np.ones((6, 6)), np.diag(np.arange(6.0))]), 1)
+
+
+@pytest.mark.parametrize("step", [0.5, 1e-3, 1e-8, 1e-20])
+@pytest.mark.parametrize(("m", "n"), [(6, 6), (6, 7), (4, 8)])
+def test_small_singular_values_keep_their_digits(step, m, n, rng):
+    """Graded orthogonal rows in any order: the singular values are the grades, to 1e-15."""
+    grades = step ** np.arange(m)
+    for _ in range(10):
+        Q = np.linalg.qr(rng.normal(size=(n, n)))[0][:m]
+        A = (grades[:, None] * Q)[rng.permutation(m)]
+        np.testing.assert_allclose(decomposed(A[None])[1][0], grades, rtol=4e-15)
+    # rows that are not orthogonal: |det| is the product of the singular values
+    X = rng.normal(size=(200, m, m))
+    S = decomposed(grades[:, None] * X)[1]
+    product = np.abs(np.linalg.det(X))
+    np.testing.assert_allclose((S / grades).prod(axis=1), product, rtol=2e-12)
+
+
+def test_decomposition_of_nothing():
+    for shape in ((0, 6, 6), (3, 6, 0), (3, 0, 5)):
+        assert decomposed(np.empty(shape))[1].shape == (shape[0], min(shape[1:]))
+
+
+# --- first order against NumPy -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", METHODS)
+@given(model=models(), seed=seeds)
+def test_every_method_is_its_formula(name, model, seed):
+    rng = np.random.default_rng(seed)
+    method = METHODS[name]
+    q, _, _ = random_state(model, rng, 4)
+    twist = rng.normal(size=(4, 6))
+    reference = REFERENCES[seed % 3]
+    mask = rng.random(6) < 0.6
+    mask[seed % 6] = True
+    frame = int(rng.integers(0, model.f + 1))
+    length, weights = rng.uniform(0.2, 2.0), rng.uniform(0.1, 10.0, model.n)
+    found = ikm(model, q, twist, frame, reference, mask, method, weights, length)
+    rows, columns = scales(model, length, weights)
+    for i in range(4):
+        J = rm.jacobian(model, q[i], frame, reference)
+        v, s, _ = solved(J, twist[i], method, rows, columns, mask)
+        gain = factors(method, s).max(initial=1.0)
+        close(found.singular_values[i], s, 1e-13 * max(1.0, s.max(initial=0)))
+        # a perturbation of J by e changes v by some e gain^2
+        if gain < 1e5:
+            close(found.v[i], v, 1e-13 * (1 + gain**2) * (1 + s.max(initial=0)) * 10)
+        close(
+            found.achieved[i], mask * (J @ found.v[i]), 1e-12 * max(1.0, np.abs(found.v[i]).max())
+        )
+        close(found.achieved[i] + found.error[i], mask * twist[i], 1e-9)
+
+
+@given(model=any_models(), seed=seeds)
+def test_the_range_of_the_jacobian_is_told(model, seed):
+    rng = np.random.default_rng(seed)
+    q, v, _ = random_state(model, rng, 5)
+    twist = rng.normal(size=(5, 6))
+    twist[0], twist[1] = rm.dkm(model, q[0], v[0]), 0.0
+    found = ikm(model, q, twist)
+    rows, columns = scales(model)
+    for i in range(5):
+        A = rows[:, None] * rm.jacobian(model, q[i]) * columns
+        U, s, _ = np.linalg.svd(A, full_matrices=False)
+        size = np.linalg.norm(A)
+        if ((s > 1e-12 * size) & (s < 1e-8 * size)).any():
+            continue  # neither singular nor regular
+        rank = int((s > 1e-10 * size).sum())
+        assert found.rank[i] == rank
+        reachable = U[:, :rank] @ (U[:, :rank].T @ (rows * twist[i]))
+        close(found.reachable[i] * rows, reachable, 1e-9)
+        missing = np.linalg.norm(rows * twist[i] - reachable)
+        code = found.status[i]
+        if missing > 1e-6:
+            assert code in (IKMStatus.SINGULAR, IKMStatus.TOO_FEW_JOINTS)
+        elif code == IKMStatus.MET:
+            close(found.error[i], np.zeros(6), 1e-8 * max(1.0, np.abs(twist[i]).max()))
+        else:
+            assert code == IKMStatus.IN_PART
+            assert s[rank - 1] < DampedInverse().threshold
+    assert found.status[1] == IKMStatus.MET
+    close(found.v[1], np.zeros(model.n), 0.0)
+
+
+@pytest.mark.parametrize("name", ["rx90", "puma560", "stanford_arm", "ur5", "iiwa14", "panda"])
+@pytest.mark.parametrize("reference", REFERENCES)
+def test_regular_positions_are_exact(name, reference, rng):
+    model = rm.load(name)
+    q = rng.uniform(-2.0, 2.0, (500, model.n))
+    twist = rng.normal(size=(500, 6))
+    found = ikm(model, q, twist, reference=reference)
+    regular = found.singular_values[:, -1] >= 0.02
+    assert regular.mean() > 0.5
+    assert (found.status[regular] == IKMStatus.MET).all()
+    assert (found.damping[regular] == 0).all()
+    close(found.error[regular], np.zeros((regular.sum(), 6)))
+    v = np.einsum("nij,nj->ni", np.linalg.pinv(rm.jacobian(model, q, None, reference)), twist)
+    if name != "stanford_arm":  # the usual weights of revolute joints are those of pinv
+        close(found.v[regular], v[regular], 1e-10)
+    assert (found.status == IKMStatus.IN_PART).any() or found.singular_values.min() > 0.003
+    assert (found.singular_values[found.status == IKMStatus.IN_PART, -1] < 0.003).all()
+
+
+def test_a_single_row_is_a_batch_of_one(rng):
+    for name in ("rx90", "iiwa14", "planar_3r", "cobra_s600", "gantry"):
+        model = rm.load(name)
+        for q in rng.uniform(-1.0, 1.0, (5, model.n)):
+            twist = rng.normal(size=6)
+            one, row = ikm(model, q, twist), ikm(model, [q], [twist])
+            for field in IKMSolution.__dataclass_fields__:
+                a, b = getattr(one, field), getattr(row, field)
+                if field in ("mask", "a", "task_errors"):
+                    assert np.array_equal(a, b) or a is b
+                    continue
+                assert b.shape == (1, *a.shape)
+                assert a.dtype == b.dtype
+                np.testing.assert_array_equal(a, b[0])
+
+
+@pytest.mark.parametrize("batch", [(), (1,), (3,), (2, 3), (0,), (2, 0, 3)], ids=str)
+def test_leading_axes_are_the_batch(batch, rng):
+    model = rm.load("iiwa14")
+    q, twist = rng.normal(size=(*batch, 7)), rng.normal(size=(*batch, 6))
+    task = JointTask([0.1], joints=[2])
+    calls = (
+        lambda q, x: ikm(model, q, x, secondary=np.ones(7)),
+        lambda q, x: ikm(model, q, x, mask=POSITION, tasks=[task], limits=True),
+        lambda q, x: ikm(model, q, x, mask=POSITION, augmented=[task]),
+        lambda q, x: ikm_second_order(model, q, 0.1 * q, x),
+        lambda q, x: ikm_second_order(model, q, 0.1 * q, x, mask=POSITION, tasks=[task]),
+    )
+    for call in calls:
+        found = call(q, twist)
+        values = found.v if found.a is None else found.a
+        assert values.shape == found.v.shape == found.limited.shape == (*batch, 7)
+        for name in ("status", "rank", "damping", "scale"):
+            assert getattr(found, name).shape == batch
+        for name in ("achieved", "error", "reachable"):
+            assert getattr(found, name).shape == (*batch, 6)
+        assert found.singular_values.shape[:-1] == found.task_scales.shape[:-1] == batch
+        assert all(error.shape == (*batch, 1) for error in found.task_errors)
+        for index in np.ndindex(*batch):
+            one = call(q[index], twist[index])
+            single = one.v if one.a is None else one.a
+            close(values[index], single, 1e-11 * max(1.0, np.abs(single).max()))
+
+
+def test_axes_broadcast(rng):
+    model = rm.load("rx90")
+    q, twist = rng.normal(size=(4, 6)), rng.normal(size=(3, 1, 6))
+    found = ikm(model, q, twist)
+    assert found.v.shape == (3, 4, 6)
+    np.testing.assert_array_equal(found.v[2, 1], ikm(model, q[1], twist[2, 0]).v)
+    assert ikm(model, q[0], twist[:, 0]).v.shape == (3, 6)
+    assert ikm(model, q[:0], twist[0]).v.shape == (0, 6)
+    with pytest.raises(ShapeError, match=r"q \(4, 6\), twist \(3, 6\)"):
+        ikm(model, q, twist[:, 0])
+
+
+def test_more_rows_than_one_chunk_of_the_kernel(rng):
+    model = rm.load("rx90")
+    q, twist = rng.normal(size=(1000, 6)), rng.normal(size=(1000, 6))
+    whole = ikm(model, q, twist)
+    for i in (0, 127, 128, 129, 511, 999):
+        np.testing.assert_array_equal(whole.v[i], ikm(model, q[i], twist[i]).v)
+
+
+def test_arguments_stay_and_results_are_fresh(rng):
+    model = rm.load("iiwa14")
+    q, v, z = rng.normal(size=(3, 4, 7))
+    twist = rng.normal(size=(4, 6))
+    kept = [x.copy() for x in (q, v, z, twist)]
+    for call in (
+        lambda: ikm(model, q, twist, secondary=z),
+        lambda: ikm(model, q, twist, secondary=z, limits=True),
+        lambda: ikm_second_order(model, q, v, twist, secondary=z),
+    ):
+        first = call()
+        for x, copy in zip((q, v, z, twist), kept, strict=True):
+            np.testing.assert_array_equal(x, copy)
+            assert x.flags.writeable
+            for field in IKMSolution.__dataclass_fields__:
+                value = getattr(first, field)
+                if isinstance(value, np.ndarray):
+                    assert not value.flags.writeable
+                    assert not np.shares_memory(value, x)
+
+
+# --- scaling and weights -----------------------------------------------------------------------
+
+
+def in_millimetres(model):
+    """The same robot with lengths in another unit."""
+    table = model.table
+    lengths = {name: 1000.0 * getattr(table, name) for name in ("b", "d", "r")}
+    angles = {name: getattr(table, name) for name in ("gamma", "beta", "alpha", "theta")}
+    sliding = table.sigma[table.joint_rows] == 1
+    unit = np.where(sliding, 1000.0, 1.0)
+    pose, tool = model.base.copy(), model.tool.copy()
+    pose[:3, 3] *= 1000.0
+    tool[:3, 3] *= 1000.0
+    large = rm.RobotModel.from_table(
+        rm.DHTable(
+            antecedent=table.antecedent, sigma=table.sigma, lower=unit * model.lower,
+            upper=unit * model.upper, **lengths, **angles,
+        ),
+        base=pose, tool=tool, tip=model.tip,
+    )  # fmt: skip
+    return large, unit
+
+
+@given(model=models(), seed=seeds)
+def test_the_motion_does_not_depend_on_the_unit_of_length(model, seed):
+    rng = np.random.default_rng(seed)
+    q, _, _ = random_state(model, rng, 3)
+    twist = rng.normal(size=(3, 6))
+    large, unit = in_millimetres(model)
+    length = characteristic_length(model)
+    if length == 1.0:
+        length = 0.7  # a robot without lengths has none in any unit
+    a = ikm(model, q, twist, length=length)
+    millimetres = np.array([1000.0] * 3 + [1.0] * 3)
+    b = ikm(large, q * unit, twist * millimetres, length=1000.0 * length)
+    size = max(1.0, np.abs(a.v).max(initial=0.0))
+    close(a.singular_values, b.singular_values, 1e-11)
+    close(a.v, b.v / unit, 1e-5 * size)
+
+
+def test_the_length_of_a_robot_is_its_own(rng):
+    assert characteristic_length(rm.load("rx90")) == pytest.approx(0.9)
+    tool = np.eye(4)
+    tool[2, 3] = 0.3
+    assert characteristic_length(rm.load("rx90").with_tool(tool)) == pytest.approx(1.2)
+    assert characteristic_length(rm.load("rx90"), 3) == pytest.approx(0.45)
+    assert characteristic_length(rm.load("rx90"), 1) == 1.0
+    model = rm.load("rx90")
+    moved = model.with_base(np.array([[0, -1, 0, 5], [1, 0, 0, 6], [0, 0, 1, 7], [0, 0, 0, 1.0]]))
+    assert characteristic_length(moved) == characteristic_length(model)
+    large, _ = in_millimetres(model)
+    assert characteristic_length(large) == pytest.approx(900.0)
+
+
+@given(model=models(tree=False, fixed=False), seed=seeds)
+def test_weights_make_the_least_weighted_motion(model, seed):
+    """Of all joint velocities that give the same, v has the least weighted norm."""
+    rng = np.random.default_rng(seed)
+    q, v, _ = random_state(model, rng)
+    weights = 10.0 ** rng.uniform(-1, 1, model.n)
+    twist = rm.dkm(model, q, v)
+    found = ikm(model, q, twist, mask=POSITION, joint_weights=weights, method=PseudoInverse(1e-6))
+    if found.status != IKMStatus.MET:
+        return
+    J = rm.jacobian(model, q)[:3]
+    null = np.linalg.svd(J)[2][np.linalg.matrix_rank(J, tol=1e-9) :]
+    close(null @ (weights * found.v), np.zeros(len(null)), 1e-6 * max(1.0, np.abs(found.v).max()))
+    assert (weights * found.v**2).sum() <= (weights * v**2).sum() * (1 + 1e-9)
+
+
+# --- near singular positions -------------------------------------------------------------------
+
+
+def rx90_near(what, away=TENTH):
+    """Posture of an RX-90 next to one singular position, regular otherwise, and the factors.
+
+    Its Jacobian is singular where C3 = 0 (elbow), S5 = 0 (wrist) or S23 RL4 - C2 D3 = 0 (shoulder).
+    """
+    q = np.array([0.3, -0.3, 0.6, -0.8, 1.1, 0.5])
+    D3 = RL4 = 0.45
+    if what == "elbow":
+        q[2] = -np.pi / 2 + away  # stretched; folded, at +90 deg, the shoulder is singular too
+    elif what == "wrist":
+        q[4] = away
+    else:
+        q[1] = np.arctan2(D3 - np.sin(q[2]) * RL4, np.cos(q[2]) * RL4) + away
+    S23, C2 = np.sin(q[1] + q[2]), np.cos(q[1])
+    return q, np.array([np.cos(q[2]), np.sin(q[4]), (S23 * RL4 - C2 * D3) / RL4])
+
+
+@pytest.mark.parametrize(("what", "factor"), [("elbow", 0), ("wrist", 1), ("shoulder", 2)])
+def test_a_tenth_of_a_degree_from_the_singular_positions_of_an_rx90(what, factor, rng):
+    model = rm.load("rx90")
+    q, determinant_factors = rx90_near(what)
+    assert abs(determinant_factors[factor]) < 2e-3
+    assert (abs(np.delete(determinant_factors, factor)) > 0.2).all()
+    rows, _ = scales(model)
+    twist = rng.normal(size=(2000, 6)) * 10.0 ** rng.uniform(-3, 1, (2000, 1))
+    size = np.linalg.norm(rows * twist, axis=1)
+    found, exact = ikm(model, q, twist), ikm(model, q, twist, method=PseudoInverse())
+    assert (found.status == IKMStatus.IN_PART).all()
+    assert (found.rank == 6).all()
+
+    # bounded, where the exact solution is not
+    speed = np.linalg.norm(found.v, axis=1)
+    assert (speed <= DampedInverse().gain * size).all()
+    assert np.linalg.norm(exact.v, axis=1).max() > 10 * speed.max()
+    assert np.median(np.linalg.norm(exact.v, axis=1) / speed) > 5
+
+    # only the weak direction misses anything
+    J = rows[:, None] * rm.jacobian(model, q)
+    U = np.linalg.svd(J)[0]
+    error = found.error * rows
+    assert (np.abs(error @ U[:, :5]) <= 1e-12 * np.maximum(size, 1)[:, None]).all()
+
+    # plain damping of the same size misses more, for every twist
+    for damping in (found.damping[0], DampedInverse().largest):
+        plain = ikm(
+            model, q, twist, method=DampedInverse(largest=damping, damping=Damping.CONSTANT)
+        )
+        missing = np.linalg.norm(plain.error * rows, axis=1)
+        assert (np.linalg.norm(error, axis=1) < missing).all()
+
+
+def approach(model, what, aways):
+    return np.array([rx90_near(what, away)[0] for away in aways])
+
+
+@pytest.mark.parametrize("what", ["elbow", "wrist", "shoulder"])
+@pytest.mark.parametrize("name", ["default", "filtered", "weak", "smallest", "constant"])
+def test_speeds_are_bounded_all_the_way_through_a_singular_position(what, name, rng):
+    model, method = rm.load("rx90"), METHODS[name]
+    q = approach(model, what, np.linspace(-0.05, 0.05, 201))
+    twist = rng.normal(size=(20, 1, 6))
+    found = ikm(model, q, twist, method=method)
+    size = np.linalg.norm(scales(model)[0] * twist, axis=-1)
+    assert np.isfinite(method.gain)
+    assert (np.linalg.norm(found.v, axis=-1) <= method.gain * size * (1 + 1e-12)).all()
+    assert found.status[0, 100] == IKMStatus.SINGULAR
+    assert found.rank[0, 100] == 5
+
+
+@pytest.mark.parametrize("what", ["elbow", "wrist", "shoulder"])
+def test_at_a_singular_position_the_reachable_part_is_given(what, rng):
+    model = rm.load("rx90")
+    q, _ = rx90_near(what, 0.0)
+    twist = rng.normal(size=(100, 6))
+    found = ikm(model, q, twist)
+    assert (found.status == IKMStatus.SINGULAR).all()
+    close(found.achieved, found.reachable, 1e-11)
+    close(ikm(model, q, found.reachable).error, np.zeros((100, 6)), 1e-11)
+    assert (ikm(model, q, found.reachable).status == IKMStatus.MET).all()
+    assert (np.linalg.norm(found.error, axis=1) > 1e-6).all()
+    assert "singular" in found.reason(0)
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_the_gain_is_a_bound(name, rng):
+    """Singular values from zero to large: no direction exceeds the gain, and some come near it."""
+    method = METHODS[name]
+    s = np.sort(10.0 ** rng.uniform(-6, 1, (4000, 6)))[:, ::-1]
+    s[:1000, -1] = np.linspace(0.0, 0.5, 1000)
+    s = np.sort(s)[:, ::-1]
+    most = max(factors(method, row).max() for row in s)
+    assert most <= method.gain * (1 + 1e-12)
+    if np.isfinite(method.gain) and method.gain < 100:
+        assert most > 0.9 * method.gain
+
+
+def test_a_filter_is_smooth_at_its_threshold():
+    e = 0.1
+    method = FilteredInverse(e)
+    near = factors(method, np.array([e + 1e-6, e, e - 1e-6]))
+    assert np.diff(near) == pytest.approx([1e-6 / e**2] * 2, rel=1e-4)
+    assert factors(method, np.array([1.0, 0.0]))[1] == 0.0
+
+
+def bounded(J, b, speed):
+    """min |A y - b| with |y| <= speed, by bisection."""
+    U, s, Vt = np.linalg.svd(J)
+    c = U.T @ b
+    norm = lambda mu: np.linalg.norm(s * c / (s**2 + mu))  # noqa: E731
+    low, high = 0.0, 1.0
+    if norm(0.0) <= speed:
+        return Vt.T @ (c / s)
+    while norm(high) > speed:
+        high *= 4.0
+    for _ in range(200):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if norm(middle) > speed else (low, middle)
+    return Vt.T @ (s * c / (s**2 + high))
+
+
+@pytest.mark.parametrize("speed", [0.01, 0.5, 3.0, 100.0])
+def test_a_largest_speed_is_kept_at_the_least_error(speed, rng):
+    model = rm.load("rx90")
+    q = np.concatenate([rng.uniform(-2, 2, (200, 6)), approach(model, "wrist", [1e-4, 1e-7])])
+    twist = rng.normal(size=(202, 6))
+    rows, _ = scales(model)
+    free = DampedInverse(threshold=0.0, largest=0.0, largest_speed=speed)
+    found = ikm(model, q, twist, method=free)
+    norm = np.linalg.norm(found.v, axis=1)
+    assert (norm <= speed * (1 + 1e-15)).all()
+    exact = ikm(model, q, twist, method=PseudoInverse())
+    within = np.linalg.norm(exact.v, axis=1) <= speed
+    np.testing.assert_array_equal(found.v[within], exact.v[within])
+    close(norm[~within], np.full((~within).sum(), speed), 1e-12 * speed)
+    assert (found.damping[~within] > 0).all()
+    J = rows[:, None] * rm.jacobian(model, q)
+    for i in range(200):
+        close(found.v[i], bounded(J[i], rows * twist[i], speed), 1e-8 * speed)
+    # together with the damping of weak directions, and weighted
+    weights = np.array([1.0, 2.0, 0.5, 3.0, 1.0, 0.1])
+    both = ikm(model, q, twist, method=DampedInverse(largest_speed=speed), joint_weights=weights)
+    assert (np.sqrt((weights * both.v**2).sum(axis=1)) <= speed * (1 + 1e-15)).all()
+    at = ikm(model, approach(model, "wrist", [0.0]), twist[:1], method=free)
+    assert np.linalg.norm(at.v) <= speed * (1 + 1e-15)
+    assert at.rank == 5
+
+
+def test_no_damping_where_the_direction_asked_for_is_strong(rng):
+    """Next to the wrist's singular position a motion that is not the lost one stays exact."""
+    model = rm.load("rx90")
+    q, _ = rx90_near("wrist")
+    twist = rm.dkm(model, q, [0.1, -0.2, 0.3, 0.4, -0.1, 0.4])
+    found = ikm(model, q, twist)
+    J = scales(model)[0][:, None] * rm.jacobian(model, q)
+    U = np.linalg.svd(J)[0]
+    strong = (U[:, :5] @ U[:, :5].T @ (scales(model)[0] * twist)) / scales(model)[0]
+    found = ikm(model, q, strong)
+    assert found.status == IKMStatus.MET
+    assert found.damping > 0
+    close(found.error, np.zeros(6))
+
+
+# --- robots that cannot do everything ----------------------------------------------------------
+
+
+def test_robots_of_few_joints_say_so(rng):
+    for name, rank in (("planar_2r", 2), ("planar_3r", 3), ("lab_rr", 2), ("lab_rrt", 3),
+                       ("cobra_s600", 4), ("xarm5", 5)):  # fmt: skip
+        model = rm.load(name)
+        q = rng.uniform(0.2, 0.9, (50, model.n))
+        found = ikm(model, q, rng.normal(size=(50, 6)))
+        assert (found.rank == rank).all()
+        assert (found.status == IKMStatus.TOO_FEW_JOINTS).all()
+        twist = rm.dkm(model, q, rng.normal(size=q.shape))
+        met = ikm(model, q, twist, method=PseudoInverse())
+        assert (met.status == IKMStatus.MET).all()
+        close(met.error, np.zeros((50, 6)), 1e-11)
+    # stretched, a planar arm is singular as well
+    stretched = ikm(rm.load("planar_3r"), [0.3, 0.0, 0.0], [1.0, 0, 0, 0, 0, 0])
+    assert stretched.rank == 2
+    assert stretched.status == IKMStatus.SINGULAR
+    planar = ikm(rm.load("planar_3r"), [0.3, 0.4, 0.5], [1.0, 0.2, 0, 0, 0, 0.3],
+                 mask=[1, 1, 0, 0, 0, 1])  # fmt: skip
+    assert planar.status == IKMStatus.MET
+
+
+def test_more_joints_than_freedom(rng):
+    """Seven parallel axes have rank three; it is their structure."""
+    table = rm.DHTable(antecedent=range(7), sigma=[0] * 7, d=[0, 0.3, 0.2, 0.25, 0.2, 0.1, 0.1])
+    model = rm.RobotModel.from_table(table)
+    found = ikm(model, rng.normal(size=(20, 7)), rng.normal(size=(20, 6)))
+    assert (found.rank == 3).all()
+    assert (found.status == IKMStatus.TOO_FEW_JOINTS).all()
+    close(found.reachable[:, [2, 3, 4]], np.zeros((20, 3)), 1e-13)
+    close(found.achieved, found.reachable, 1e-11)
+
+
+def test_no_joint_at_all():
+    table = rm.DHTable.from_rows([{"sigma": 2, "d": 0.2}, {"sigma": 2, "r": 0.5}])
+    model = rm.RobotModel.from_table(table)
+    for found in (ikm(model, [], np.ones(6)), ikm(model, [[]], np.ones((1, 6)))):
+        assert found.v.size == found.singular_values.size == 0
+        assert (found.status == IKMStatus.TOO_FEW_JOINTS).all()
+        assert (found.rank == 0).all()
+    assert ikm(model, [], np.zeros(6)).status == IKMStatus.MET
+
+
+def test_joints_that_are_not_on_the_way_stay(rng):
+    model = rm.load("rx90")
+    found = ikm(model, rng.normal(size=6), rng.normal(size=6), frame=3, mask=POSITION)
+    np.testing.assert_array_equal(found.v[3:], np.zeros(3))
+    z = rng.normal(size=6)
+    found = ikm(model, rng.normal(size=6), rng.normal(size=6), frame=3, mask=POSITION, secondary=z)
+    close(found.v[3:], z[3:])
+
+
+# --- secondary motions -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", METHODS)
+@given(model=models(), seed=seeds)
+def test_a_secondary_motion_never_disturbs_the_task(name, model, seed):
+    rng = np.random.default_rng(seed)
+    q, z, _ = random_state(model, rng, 3)
+    twist = rng.normal(size=(3, 6))
+    mask = [POSITION, [1, 1, 1, 1, 1, 1], [0, 0, 1, 1, 0, 0]][seed % 3]
+    reference = REFERENCES[seed % 3]
+    weights = 10.0 ** rng.uniform(-1, 1, model.n)
+    options = {"reference": reference, "mask": mask, "method": METHODS[name],
+               "joint_weights": weights}  # fmt: skip
+    without = ikm(model, q, twist, **options)
+    found = ikm(model, q, twist, secondary=z, **options)
+    J = rm.jacobian(model, q, None, reference)
+    moved = np.einsum("nij,nj->ni", J, found.v - without.v) * mask
+    size = max(robot_size(model, row) for row in q)
+    close(moved, np.zeros((3, 6)), 1e-12 * size * max(1.0, np.abs(z).max()))
+    np.testing.assert_array_equal(found.status, without.status)
+    # what is left of z is the nearest motion, in the weighted norm, that does not move the task
+    rows, columns = scales(model, None, weights)
+    for i in range(3):
+        A = (rows[:, None] * J[i] * columns)[np.array(mask) == 1]
+        _, s, Vt = np.linalg.svd(A, full_matrices=False)
+        V = Vt[(s > 1e-14 * np.linalg.norm(A))].T
+        if ((s > 1e-17) & (s < 1e-9)).any():
+            continue  # which of these are zero is a matter of rounding
+        y = z[i] / columns
+        close((found.v - without.v)[i], columns * (y - V @ (V.T @ y)), 1e-8 * np.abs(y).max())
+
+
+@pytest.mark.parametrize("what", ["elbow", "wrist", "shoulder"])
+def test_also_next_to_and_at_singular_positions(what, rng):
+    model = rm.load("rx90")
+    q = approach(model, what, [1e-2, 1e-4, 1e-8, 0.0])
+    twist, z = rng.normal(size=(4, 6)), rng.normal(size=6)
+    for method in METHODS.values():
+        a, b = (ikm(model, q, twist, method=method, secondary=x) for x in (None, z))
+        moved = np.einsum("nij,nj->ni", rm.jacobian(model, q), b.v - a.v)
+        close(moved, np.zeros((4, 6)), 1e-12)
+    # at the singular position the self-motion is free
+    assert np.linalg.norm(b.v[3] - a.v[3]) > 0.1
+
+
+class Towards:
+    """A criterion: minus the distance from a posture."""
+
+    def __init__(self, goal, gain):
+        self.goal, self.gain = np.asarray(goal), gain
+
+    def gradient(self, model, q):
+        return self.gain * (self.goal - q)
+
+
+def test_criteria_and_sums_of_them(rng):
+    model = rm.load("panda")
+    q, twist, z = rng.normal(size=(3, 7)), rng.normal(size=(3, 6)), rng.normal(size=(3, 7))
+    towards, back = Towards(np.ones(7), 2.0), Towards(np.zeros(7), 0.5)
+    plain = ikm(model, q, twist, secondary=2 * (1 - q) - 0.5 * q + z)
+    found = ikm(model, q, twist, secondary=[towards, z, back])
+    close(found.v, plain.v)
+    one = ikm(model, q[0], twist[0], secondary=towards)
+    close(one.v, ikm(model, q[0], twist[0], secondary=2 * (1 - q[0])).v)
+    assert np.linalg.norm(one.v - ikm(model, q[0], twist[0]).v) > 1e-3
+    # one posture, many twists
+    assert ikm(model, q[0], twist, secondary=towards).v.shape == (3, 7)
+
+
+# --- tasks and limits --------------------------------------------------------------------------
+
+
+def test_levels_alone_are_the_plain_solution(rng):
+    """A task that asks for what happens anyway changes nothing, whatever solves it."""
+    model = rm.load("iiwa14")
+    q, twist = rng.uniform(-2, 2, (50, 7)), rng.normal(size=(50, 6))
+    wide = JointBounds(velocity=1e9, lower=-1e9, upper=1e9)
+    z = rng.normal(size=(50, 7))
+    for method in (PseudoInverse(), DampedInverse(), DampedInverse(0.1, 0.05)):
+        for mask in (None, POSITION):
+            plain = ikm(model, q, twist, mask=mask, method=method, secondary=z)
+            found = ikm(model, q, twist, mask=mask, method=method, secondary=z, limits=wide)
+            size = np.maximum(np.abs(plain.v).max(axis=1, keepdims=True), 1.0)
+            close((found.v - plain.v) / size, np.zeros((50, 7)), 1e-8)
+            np.testing.assert_array_equal(found.status, plain.status)
+            np.testing.assert_array_equal(found.rank, plain.rank)
+            for name in ("achieved", "error", "reachable", "singular_values", "damping"):
+                close(getattr(found, name), getattr(plain, name), 1e-8)
+            assert not found.limited.any()
+            assert (found.scale == 1.0).all()
+
+
+def test_tasks_in_order_never_disturb_those_above(rng):
+    model = rm.load("iiwa14")
+    q = rng.uniform(-2, 2, (40, 7))
+    twist = rng.normal(size=(40, 6))
+    tasks = [
+        TwistTask(rng.normal(size=(40, 6)), frame=4, mask=[0, 0, 1, 0, 0, 0]),
+        JointTask(rng.normal(size=(40, 3)), joints=[0, 1, 2]),
+        JointTask(rng.normal(size=(40, 2)), joints=[5, 6]),
+    ]
+    J = rm.jacobian(model, q)[:, :3]
+    alone = ikm(model, q, twist, mask=POSITION)
+    errors = None
+    for count in range(1, 4):
+        found = ikm(model, q, twist, mask=POSITION, tasks=tasks[:count])
+        moved = np.einsum("nij,nj->ni", J, found.v - alone.v)
+        close(moved, np.zeros((40, 3)), 1e-11)
+        close(found.error, alone.error, 1e-11)
+        assert len(found.task_errors) == count
+        assert found.task_scales.shape == (40, count)
+        if errors is not None:
+            for before, after in zip(errors, found.task_errors, strict=False):
+                close(before, after, 1e-9)
+        errors = found.task_errors
+    regular = found.singular_values[:, -1] > 0.05
+    assert np.abs(found.task_errors[0][regular]).max(axis=1).min() < 1e-12
+    close(found.task_errors[1], tasks[1].rate - found.v[:, :3])
+
+
+def test_augmented_tasks_are_of_the_same_importance(rng):
+    model = rm.load("panda")
+    q, twist = rng.uniform(-1, 1, (30, 7)), rng.normal(size=(30, 6))
+    rate = rng.normal(size=(30, 1))
+    found = ikm(model, q, twist, augmented=[JointTask(rate, joints=[2])])
+    assert found.singular_values.shape == (30, 7)
+    rows, _ = scales(model)
+    for i in range(30):
+        J = np.vstack([rm.jacobian(model, q[i]), np.eye(7)[2]])
+        A = np.r_[rows, 1.0][:, None] * J
+        close(found.singular_values[i], np.linalg.svd(A, compute_uv=False), 1e-12)
+        if found.singular_values[i, -1] > 0.01:
+            close(found.v[i], np.linalg.solve(J, np.r_[twist[i], rate[i]]), 1e-9)
+            assert found.status[i] == IKMStatus.MET
+    # more than seven joints can do
+    over = ikm(model, q[0], twist[0], augmented=[JointTask([0.5, 0.1], joints=[2, 0])])
+    assert over.status == IKMStatus.TOO_FEW_JOINTS
+    assert np.linalg.norm(over.error) > 1e-3
+    assert np.linalg.norm(over.task_errors[0]) > 1e-3
+    close(over.achieved, rm.dkm(model, q[0], over.v), 1e-11)
+
+
+def test_limits_hold_and_the_direction_is_kept(rng):
+    model = rm.load("panda")
+    q = rng.uniform(model.lower, model.upper, (200, 7))
+    twist = 3.0 * rng.normal(size=(200, 6))
+    found = ikm(model, q, twist, limits=True, method=PseudoInverse())
+    assert (np.abs(found.v) <= model.table.velocity).all()
+    slowed = found.scale < 1 - 1e-9
+    assert slowed.sum() > 20
+    assert (found.status[slowed] == IKMStatus.LIMITED).all()
+    assert (found.status[~slowed] == IKMStatus.MET).all()
+    assert found.limited[slowed].any(axis=1).all()
+    close(found.achieved, found.scale[:, None] * twist, 1e-9)
+    close(found.achieved, rm.dkm(model, q, found.v), 1e-11)
+    assert "limits" in found.reason(int(np.flatnonzero(slowed)[0]))
+    bounds = JointBounds(velocity=0.2, step=0.01)
+    slow = ikm(model, q, twist, limits=bounds, method=PseudoInverse())
+    assert (np.abs(slow.v) <= 0.2).all()
+    assert (slow.scale <= found.scale + 1e-12).all()
+
+
+def test_limits_and_tasks_of_the_second_order(rng):
+    model = rm.load("panda")
+    q, v = (
+        0.5 * (model.lower + model.upper) + 0.1 * rng.normal(size=(20, 7)),
+        rng.normal(size=(20, 7)),
+    )
+    v *= 0.2
+    wanted = rng.normal(size=(20, 6))
+    bounds = JointBounds(acceleration=5.0, step=0.01)
+    found = ikm_second_order(
+        model, q, v, wanted, mask=POSITION, tasks=[JointTask([0.3], joints=[0])], limits=bounds
+    )
+    low, high = bounds.acceleration_bounds(model, q, v)
+    assert (found.a >= low).all()
+    assert (found.a <= high).all()
+    achieved = dkm_second_order(model, q, v, found.a)
+    close(found.achieved[:, :3], achieved[:, :3], 1e-10)
+    close(found.error[:, :3], (wanted - achieved)[:, :3], 1e-10)
+    close(found.task_errors[0][:, 0], 0.3 - found.a[:, 0])
+    met = found.status == IKMStatus.MET
+    assert met.any()
+    close(found.error[met], np.zeros((met.sum(), 6)), 1e-9)
+    np.testing.assert_array_equal(found.v, v)
+
+
+# --- second order ------------------------------------------------------------------------------
+
+
+def rate(function, step=2e-3):
+    """Derivative at zero, of fourth order."""
+    f = [function(k * step) for k in (-2, -1, 1, 2)]
+    return (f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * step)
+
+
+@pytest.mark.parametrize("reference", REFERENCES)
+@given(model=any_models(), seed=seeds)
+def test_accelerations_are_the_differences_of_twists(reference, model, seed):
+    q, v, a = random_state(model, np.random.default_rng(seed))
+    frame = [None, 0, model.f, 1][seed % 4]
+    expected = rate(lambda t: rm.dkm(model, q + v * t + a * t**2 / 2, v + a * t, frame, reference))
+    speed = max(1.0, np.abs(v).sum() + np.sqrt(np.abs(a).sum()))
+    tolerance = robot_size(model, q) * (1e-12 * speed**6 + 1e-11 * speed)
+    single = dkm_second_order(model, q, v, a, frame, reference)
+    close(single, expected, tolerance)
+    batch = dkm_second_order(model, [q, q], [v, v], [a, a], frame, reference)
+    close(batch, [single, single], 1e-12 * robot_size(model, q) * speed**2)
+    J = rm.jacobian(model, q, frame, reference)
+    dJ = rm.jacobian_rate(model, q, v, frame, reference)
+    close(single, J @ a + dJ @ v, 1e-12 * robot_size(model, q) * speed**2)
+
+
+@pytest.mark.parametrize("reference", REFERENCES)
+@given(model=models(), seed=seeds)
+def test_the_second_order_inverse_gives_the_acceleration(reference, model, seed):
+    """Joint accelerations whose motion has the acceleration asked for, by differences of twists."""
+    rng = np.random.default_rng(seed)
+    q, v, a0 = random_state(model, rng)
+    wanted = dkm_second_order(model, q, v, a0, None, reference)
+    found = ikm_second_order(model, q, v, wanted, reference=reference)
+    close(found.v, v, 0.0)
+    size = robot_size(model, q)
+    close(found.achieved, dkm_second_order(model, q, v, found.a, None, reference),
+          1e-11 * size * max(1.0, np.abs(found.a).max()))  # fmt: skip
+    close(found.achieved + found.error, wanted, 1e-11 * size)
+    if found.singular_values[-1] < 0.05:
+        return
+    assert found.status == IKMStatus.MET
+    twist = lambda t: rm.dkm(  # noqa: E731
+        model, q + v * t + found.a * t**2 / 2, v + found.a * t, None, reference
+    )
+    speed = max(1.0, np.abs(v).sum() + np.sqrt(np.abs(found.a).sum()))
+    close(rate(twist), wanted, size * (1e-12 * speed**6 + 1e-11 * speed))
+
+
+@given(model=models(), seed=seeds)
+def test_second_order_is_first_order_of_what_is_left(model, seed):
+    rng = np.random.default_rng(seed)
+    q, v, z = random_state(model, rng, 3)
+    wanted = rng.normal(size=(3, 6))
+    drift = dkm_second_order(model, q, v, np.zeros_like(v))
+    options = {"mask": POSITION, "method": METHODS["weak"], "secondary": z}
+    found = ikm_second_order(model, q, v, wanted, **options)
+    plain = ikm(model, q, wanted - drift, **options)
+    close(found.a, plain.v, 1e-9 * max(1.0, np.abs(plain.v).max()))
+    np.testing.assert_array_equal(found.status, plain.status)
+    close(found.reachable, plain.reachable + drift * POSITION, 1e-9 * max(1, np.abs(drift).max()))
+    single = ikm_second_order(model, q[0], v[0], wanted[0], mask=POSITION, method=METHODS["weak"],
+                              secondary=z[0])  # fmt: skip
+    close(found.a[0], single.a, 1e-9 * max(1.0, np.abs(single.a).max()))
+
+
+def test_a_straight_line_with_accelerations(rng):
+    """A seven-joint arm follows a line under integrated accelerations, at rest at both ends."""
+    model = rm.load("iiwa14")
+    q, v, step = np.array([0.1, 0.5, 0.2, -1.2, 0.3, 0.8, 0.1]), np.zeros(7), 2e-3
+    start = rm.dgm(model, q)[:3, 3]
+    way = np.array([-0.15, 0.2, -0.1])
+    for k in range(500):
+        t = k * step
+        s, ds, dds = t**3 * (10 - 15 * t + 6 * t**2), 30 * (t - t**2) ** 2, 60 * t * (1 - t) * (
+            1 - 2 * t)  # fmt: skip
+        behind = start + s * way - rm.dgm(model, q)[:3, 3]
+        slower = ds * way - rm.dkm(model, q, v)[:3]
+        wanted = np.r_[dds * way + 400 * behind + 40 * slower, -40 * rm.dkm(model, q, v)[3:]]
+        a = ikm_second_order(model, q, v, wanted, secondary=-5 * v).a
+        q, v = q + step * v + 0.5 * step**2 * a, v + step * a
+    close(rm.dgm(model, q)[:3, 3], start + way, 1e-3)
+    assert np.abs(v).max() < 0.02
+
+
+# --- the result --------------------------------------------------------------------------------
+
+
+def test_the_result_is_frozen_and_pickles(rng):
+    model = rm.load("panda")
+    q, twist = rng.normal(size=(2, 3, 7)), rng.normal(size=6)
+    task = JointTask([0.1], joints=[2])
+    for found in (
+        ikm(model, q, twist),
+        ikm(model, q[0, 0], twist),
+        ikm(model, q, twist, tasks=[task], augmented=[task], limits=True),
+        ikm_second_order(model, q, q, twist),
+    ):
+        copy = pickle.loads(pickle.dumps(found))
+        assert repr(copy) == repr(found)
+        for field in IKMSolution.__dataclass_fields__:
+            a, b = getattr(found, field), getattr(copy, field)
+            for x, y in zip(a, b, strict=True) if isinstance(a, tuple) else [(a, b)]:
+                np.testing.assert_array_equal(x, y)
+                if x is not None:
+                    assert not x.flags.writeable
+                    assert not y.flags.writeable
+        with pytest.raises(AttributeError):
+            found.v = 1.0
+
+
+def test_every_row_has_a_sentence(rng):
+    model = rm.load("rx90")
+    q = np.array([rx90_near("wrist", away)[0] for away in (0.5, 1e-3, 0.0)])
+    found = ikm(model, q, [0.1, 0.2, 0.3, 0.1, 0.2, 0.3])
+    assert [IKMStatus(code).name for code in found.status] == ["MET", "IN_PART", "SINGULAR"]
+    assert found.reason(0) == "The motion is met."
+    assert "near a singularity" in found.reason(1)
+    assert "m/s and" in found.reason(2)
+    assert "rad/s." in found.reason((2,))
+    assert repr(found).count("row") == 4
+    assert "3 x" not in repr(found)
+    many = ikm(model, np.tile(q, (10, 1)), [0.1, 0.2, 0.3, 0.1, 0.2, 0.3])
+    assert "10 x The motion is met." in repr(many)
+    only = ikm(model, q, [0.1, 0.2, 0.3, 0.1, 0.2, 0.3], mask=[0, 0, 0, 1, 1, 1])
+    assert "m/s and" not in only.reason(2)
+    second = ikm_second_order(model, q, q, [0.1, 0.2, 0.3, 0.1, 0.2, 0.3])
+    assert "m/s^2" in second.reason(2)
+    assert "accelerations" in repr(second)
+    one = ikm(model, q[0], np.ones(6))
+    assert one.reason() == one.reason(0)
+    for wrong in (3, (0, 0), "a", None, slice(2)):
+        with pytest.raises(InvalidValueError, match="one row"):
+            found.reason(wrong)
+    with pytest.raises(InvalidValueError, match="one row"):
+        found.reason()
+
+
+def test_fields_that_do_not_fit_are_refused(rng):
+    found = ikm(rm.load("rx90"), rng.normal(size=(3, 6)), np.ones(6))
+    fields = {name: getattr(found, name) for name in IKMSolution.__dataclass_fields__}
+    for name, value in (("status", np.zeros(2)), ("error", np.zeros((3, 5))),
+                        ("task_errors", (np.zeros((2, 1)),)), ("mask", np.ones(5))):  # fmt: skip
+        with pytest.raises(ShapeError, match=name):
+            IKMSolution(**{**fields, name: value})
+    values = np.zeros((3, 6))
+    made = IKMSolution(**{**fields, "v": values})
+    values[0] = 1.0
+    assert (made.v == 0).all()
+
+
+# --- mistakes ----------------------------------------------------------------------------------
+
+
+class Short:
+    """A criterion whose gradient is none."""
+
+    def gradient(self, model, q):
+        return q[..., :-1]
+
+
+def test_mistakes_are_named():
+    model, q, x = rm.load("rx90"), np.zeros(6), np.zeros(6)
+    nan = np.array([0, 0, 0, 0, 0, np.nan])
+    cases = (
+        (lambda: ikm("rx90", q, x), InvalidValueError, "model"),
+        (lambda: ikm(model, q[:5], x), ShapeError, "q"),
+        (lambda: ikm(model, q, x[:5]), ShapeError, "twist"),
+        (lambda: ikm(model, q, nan), InvalidValueError, "twist"),
+        (lambda: ikm(model, nan, x), InvalidValueError, "q"),
+        (lambda: ikm(model, q, x, "J9"), FrameNotFoundError, "J9"),
+        (lambda: ikm(model, q, x, True), FrameNotFoundError, "True"),
+        (lambda: ikm(model, q, x, 1.0), FrameNotFoundError, "1.0"),
+        (lambda: ikm(model, q, x, reference="tool"), InvalidValueError, "world_aligned"),
+        (lambda: ikm(model, q, x, mask=[1, 1, 1]), ShapeError, "mask"),
+        (lambda: ikm(model, q, x, mask=[0] * 6), InvalidValueError, "mask"),
+        (lambda: ikm(model, q, x, mask=[2, 0, 0, 0, 0, 0]), InvalidValueError, "mask"),
+        (lambda: ikm(model, q, x, method="dls"), InvalidValueError, "method"),
+        (lambda: ikm(model, q, x, method=DampedInverse), InvalidValueError, "parentheses"),
+        (lambda: ikm(model, q, x, joint_weights=[1.0] * 5), ShapeError, "joint_weights"),
+        (lambda: ikm(model, q, x, joint_weights=[0.0] * 6), InvalidValueError, "joint_weights"),
+        (lambda: ikm(model, q, x, length=0.0), InvalidValueError, "length"),
+        (lambda: ikm(model, q, x, length=[1.0]), InvalidValueError, "length"),
+        (lambda: ikm(model, q, x, length=np.inf), InvalidValueError, "length"),
+        (lambda: ikm(model, q, x, secondary=[0.0] * 5), ShapeError, "secondary"),
+        (lambda: ikm(model, q[:6], x, secondary=Short()), ShapeError, "gradient"),
+        (lambda: ikm(model, q, x, secondary="z"), InvalidValueError, "secondary"),
+        (lambda: ikm(model, q, x, tasks=[1.0]), InvalidValueError, "tasks"),
+        (lambda: ikm(model, q, x, augmented=[JointTask]), InvalidValueError, "augmented"),
+        (lambda: ikm(model, q, x, limits=3.0), InvalidValueError, "limits"),
+        (lambda: ikm_second_order(model, q, x[:5], x), ShapeError, "v"),
+        (lambda: ikm_second_order(model, q, x, nan), InvalidValueError, "acceleration"),
+        (lambda: dkm_second_order(model, q, x, x[:5]), ShapeError, "a"),
+        (lambda: PseudoInverse(-1.0), InvalidValueError, "tolerance"),
+        (lambda: PseudoInverse(1.0), InvalidValueError, "tolerance"),
+        (lambda: FilteredInverse(0.0), InvalidValueError, "threshold"),
+        (lambda: DampedInverse(-0.1), InvalidValueError, "threshold"),
+        (lambda: DampedInverse(largest=np.nan), InvalidValueError, "largest"),
+        (lambda: DampedInverse(largest_speed=0.0), InvalidValueError, "largest_speed"),
+        (lambda: DampedInverse(damping="constant"), InvalidValueError, "Damping"),
+        (lambda: DampedInverse(threshold=0.0, damping=Damping.MANIPULABILITY),
+         InvalidValueError, "threshold"),
+    )  # fmt: skip
+    for call, error, words in cases:
+        with pytest.raises(error, match=words):
+            call()
+
+
+@pytest.mark.parametrize("batch", [(), (1,), (2, 3), (0,)], ids=str)
+def test_accelerations_of_any_batch(batch, rng):
+    model = rm.load("stanford_arm")
+    q, v, a = rng.normal(size=(3, *batch, 6))
+    found = dkm_second_order(model, q, v, a)
+    assert found.shape == (*batch, 6)
+    assert found.flags.c_contiguous
+    assert found.flags.writeable
+    for index in np.ndindex(*batch):
+        close(found[index], dkm_second_order(model, q[index], v[index], a[index]))
+    assert dkm_second_order(model, q, v, np.zeros(6)).shape == (*batch, 6)
