@@ -26,15 +26,15 @@ from robotmodels.kinematics.coordinate_jacobian import (
     coordinate_jacobian_rate,
 )
 from robotmodels.kinematics.coordinate_kinds import OrientationKind, orientation_kind
+from robotmodels.kinematics.coordinate_orientation_rates import SINGULAR
 from robotmodels.kinematics.coordinate_rates import (
-    SINGULAR,
     coordinate_rates,
     coordinate_rates_rate,
     is_representation_singular,
     twist_from_rates,
 )
+from robotmodels.kinematics.coordinate_sequences import continuous_coordinates
 from robotmodels.kinematics.coordinates import (
-    continuous_coordinates,
     operational_coordinates,
     pose_from_coordinates,
 )

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._arrays import Array
 from .coordinate_kinds import OrientationKind
@@ -102,7 +103,7 @@ def inclination(sequence: AngleSequence, theta: Array) -> tuple[Array, Array]:
     return np.sin(theta), np.cos(theta)
 
 
-def angles_of(sequence: AngleSequence, R: Array) -> tuple[Array, Array]:
+def angles_of(sequence: AngleSequence, R: Array) -> tuple[Array, NDArray[np.bool_]]:
     """The three angles of rotations, and where the first is free.
 
     The third angle is found by back-substitution of the first, so that the three give the rotation
@@ -189,7 +190,7 @@ def rotation_of_angles(sequence: AngleSequence, angles: Array) -> Array:
 
 
 def angles_near(
-    sequence: AngleSequence, R: Array, angles: Array, locked: Array, near: Array
+    sequence: AngleSequence, R: Array, angles: Array, locked: NDArray[np.bool_], near: Array
 ) -> Array:
     """The angles of the same rotations that are nearest to given ones.
 
@@ -218,7 +219,9 @@ def angles_near(
     return np.where((worse & ~locked)[..., None], second, first)
 
 
-def at_lock(sequence: AngleSequence, R: Array, angles: Array, locked: Array, phi: Array) -> Array:
+def at_lock(
+    sequence: AngleSequence, R: Array, angles: Array, locked: NDArray[np.bool_], phi: Array
+) -> Array:
     """The angles with the first one given where it is free.
 
     Parameters

@@ -9,6 +9,7 @@ is a derivative in the first direction, in _t in that of the motion, in _jt the 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._arrays import Array
 from .coordinate_angles import ANGLE_SEQUENCES, AngleSequence, inclination
@@ -139,7 +140,7 @@ def _angles_rate(
     return np.stack(np.broadcast_arrays(phi_jt, theta_jt, sequence.sign * psi_jt / s**2), axis=-1)
 
 
-def _pivot(R: Array, *derivatives: Array) -> tuple[Array, list[Array]]:
+def _pivot(R: Array, *derivatives: Array) -> tuple[NDArray[np.intp], list[Array]]:
     """The largest component's number k, and row k of ``4 Q Q^T`` for each derivative of R."""
     diagonal = np.diagonal(products_of(R), axis1=-2, axis2=-1)
     k = diagonal.argmax(axis=-1)[..., None]

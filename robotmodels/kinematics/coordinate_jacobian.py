@@ -9,13 +9,13 @@ coordinates with respect to these entries. The screws of the joints take no part
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, as_vector, batch_shape
 from ..model import RobotModel, check_model
 from .coordinate_differentials import orientation_differential, orientation_differential_rate
 from .coordinate_kinds import OrientationKind, orientation_kind
-from .coordinate_rates import singular_coordinates
+from .coordinate_orientation_rates import singular_coordinates
 from .coordinates import coordinates_of_poses, near_coordinates
 
 
@@ -171,7 +171,9 @@ def _room(rows: Array, n: int) -> tuple[Array, Array]:
     return np.empty((len(rows), 4, 4)), np.empty((len(rows), n, 3, 4))
 
 
-def _assembled(batch: tuple[int, ...], T_j: Array, y_j: Array, singular: Array) -> Array:
+def _assembled(
+    batch: tuple[int, ...], T_j: Array, y_j: Array, singular: NDArray[np.bool_]
+) -> Array:
     """Position rows and orientation rows, one column for each joint."""
     N, n, k = y_j.shape
     J = np.empty((N, k + 3, n))

@@ -10,6 +10,7 @@ from __future__ import annotations
 from math import factorial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._arrays import Array
 
@@ -107,7 +108,7 @@ def inverse_left_factor_slope(t: Array) -> Array:
     return np.where(small, _sum(_GAMMA_SLOPE, t), (0.5 * turning - 1.0) / safe**2)
 
 
-def _split(t: Array) -> tuple[Array, Array]:
+def _split(t: Array) -> tuple[NDArray[np.bool_], Array]:
     """Where the series serves, and values that are safe to divide by."""
     small = t < _SERIES_BELOW
     return small, np.where(small, _SERIES_BELOW, t)
