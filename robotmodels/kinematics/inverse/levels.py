@@ -70,8 +70,8 @@ class Level:
             weights = as_exact(self.weights, (m,), "weights")
             if not (weights > 0.0).all():
                 raise InvalidValueError(
-                    f"weights: expected positive numbers, got {weights}; leave rows out rather than "
-                    "giving them none."
+                    f"weights: expected positive numbers, got {weights}; leave rows out that "
+                    "should have none."
                 )
             _set(self, "weights", weights)
 
