@@ -8,13 +8,15 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_vector
 from ..errors import InvalidValueError, ShapeError
+from ..kinematics.ellipsoid import Ellipsoid
 from ..model import RobotModel
 from ..visual import Color
 from .beside import FROM_THE_FRONT, beside
 from .compose import as_color, as_many, as_models, as_opacity, compose, unique_names
+from .ellipsoid import as_ellipsoids, draw_ellipsoids
 from .nodes import Node
 from .palette import PALETTE, as_legend
-from .robot import Look, draw_robot
+from .robot import DrawnRobot, Look, draw_robot
 from .scene import Scene
 
 
@@ -34,6 +36,8 @@ def show(
     height: int = 480,
     columns: int | None = None,
     legend: Sequence[str] | None = None,
+    ellipsoids: Ellipsoid | Sequence[Ellipsoid] | None = None,
+    ellipsoid_scale: float | None = None,
 ) -> Scene:
     """Draw a robot, several postures of it over each other, or several robots; also called plot.
 
@@ -73,6 +77,12 @@ def show(
     legend : sequence of str, optional
         A text for each posture drawn (those of the first robot first), listed in a corner of the
         picture with its colour.
+    ellipsoids : Ellipsoid or sequence of Ellipsoid, optional
+        Of velocities or forces, drawn at the tools they belong to; a batch gives one for each
+        posture. Flat ones are discs or bars; infinite ones are cut, with dashes where they go on.
+    ellipsoid_scale : float, optional
+        Metres drawn for 1 m/s, 1 rad/s, 1 N or 1 N m. By default a round number for each quantity
+        that fits the robot. The legend tells it.
 
     Returns
     -------
@@ -112,13 +122,21 @@ def show(
                 "where their bases are, see RobotModel.with_base."
             )
         drawn, numbers = beside(drawn[0], postures[0], columns)
+        if ellipsoids is not None:
+            raise InvalidValueError(
+                "ellipsoids: they are where the robot is, not beside it; leave columns out."
+            )
         view = FROM_THE_FRONT if view is None else view
         postures, colors = [p[None] for p in postures[0]], [[c] for c in colors[0]]
     robots = [
         draw_robot(item, p, f"robots/{label}", look, c)
         for item, p, label, c in zip(drawn, postures, unique_names(drawn), colors, strict=True)
     ]
-    return compose(title, robots, numbers, box, grid, view, height, legend=key)
+    shown = draw_ellipsoids(
+        as_ellipsoids(ellipsoids), max(robot.size for robot in robots), ellipsoid_scale
+    )
+    robots.append(DrawnRobot(shown.nodes, shown.points, (), 0.0))
+    return compose(title, robots, numbers, box, grid, view, height, legend=(*key, *shown.legend))
 
 
 def _as_postures(value: ArrayLike | None, model: RobotModel) -> Array:
