@@ -372,8 +372,33 @@ def styled(axes: Axes) -> Axes:
     return axes
 
 
+def wrapped(text: str, width: float) -> str:
+    """A text in lines that fit over or under a panel.
+
+    Parameters
+    ----------
+    text : str
+        The text; its own line breaks are kept.
+    width : float
+        Of the panel with its margins, inches.
+
+    Returns
+    -------
+    str
+        With more line breaks. Long words stay whole.
+
+    Examples
+    --------
+    >>> wrapped("smoothed trapezoidal", 1.1).split()
+    ['smoothed', 'trapezoidal']
+    """
+    letters = max(int(0.8 * width * 72.0 / (0.55 * LABEL_SIZE)), 4)
+    lines = [wrap(line, letters, break_long_words=False) or [""] for line in text.split("\n")]
+    return "\n".join(part for line in lines for part in line)
+
+
 def heading(axes: Axes, text: str, width: float) -> None:
-    """A text over axes, in lines that do not reach the next ones.
+    """A text over axes that does not reach the next ones.
 
     Parameters
     ----------
@@ -384,9 +409,7 @@ def heading(axes: Axes, text: str, width: float) -> None:
     width : float
         Of the panel with its margins, inches.
     """
-    letters = max(int(0.8 * width * 72.0 / (0.55 * LABEL_SIZE)), 4)
-    lines = [wrap(line, letters, break_long_words=False) or [""] for line in text.split("\n")]
-    axes.set_title("\n".join(part for line in lines for part in line), size=LABEL_SIZE, color=INK)
+    axes.set_title(wrapped(text, width), size=LABEL_SIZE, color=INK)
 
 
 def legend_above(figure: Figure, handles: Sequence[Any], title: str | None = None) -> None:

@@ -30,6 +30,7 @@ from .figures import (
     new_figure,
     panels,
     texts,
+    wrapped,
 )
 from .plot_trajectory import as_limits, draw_line, limit_handles
 
@@ -182,7 +183,7 @@ def plot_inverse_velocities(
                 _powers(axes, "y", _data(axes))
     near = np.median(np.abs(x)) < 0.25 * np.abs(x).max()
     for axes in grid[-1]:
-        axes.set_xlabel(f"{distance_name} ({unit.value})")
+        axes.set_xlabel(wrapped(f"{distance_name} ({unit.value})", wide / columns))
         if near if logarithmic is None else logarithmic:
             _powers(axes, "x", x)
     figure.align_ylabels()
@@ -258,7 +259,7 @@ def _data(axes: Any) -> Array:
 
 def _powers(axes: Any, which: str, values: Array) -> None:
     """A scale of powers where values differ by more than a decade or two; around zero linear."""
-    from matplotlib.ticker import LogFormatterMathtext, NullLocator, SymmetricalLogLocator
+    from matplotlib.ticker import FixedLocator, LogFormatterMathtext, NullLocator
 
     sizes = np.abs(values[np.isfinite(values)])
     most = float(sizes.max(initial=0.0))
@@ -269,13 +270,18 @@ def _powers(axes: Any, which: str, values: Array) -> None:
         axes.set(**{f"{which}scale": "log"})
         return
     least = 10.0 ** np.floor(np.log10(float(some.min())))
-    getattr(axes, f"set_{which}scale")("symlog", linthresh=least, linscale=0.5)
+    signed = bool((values < 0.0).any())
+    getattr(axes, f"set_{which}scale")("symlog", linthresh=least, linscale=1.0 if signed else 0.5)
+    # as many powers as there is room for, and zero
+    lowest, highest = round(np.log10(least)) + signed, int(np.floor(np.log10(most)))
+    step = -(-(highest - lowest + 1) // (3 if signed else 5))
+    powers = 10.0 ** np.arange(highest, lowest - 1, -step)
     axis = getattr(axes, f"{which}axis")
-    locator = SymmetricalLogLocator(base=10.0, linthresh=least)
-    locator.set_params(numticks=7)
-    axis.set_major_locator(locator)
+    axis.set_major_locator(FixedLocator(sorted({*powers, 0.0, *(-powers if signed else ())})))
     axis.set_minor_locator(NullLocator())
     axis.set_major_formatter(LogFormatterMathtext(linthresh=least))
+    if not signed:
+        axes.set(**{f"{which}lim": (0.0, 1.5 * most)})
 
 
 def _limits(

@@ -146,7 +146,7 @@ def _range(axes: Axes, lower: float, upper: float) -> None:
         high = max(upper + margin, data.y1 + 0.3 * margin)
         axes.set_yticks([lower, 0.5 * (lower + upper), upper])
         axes.yaxis.set_major_formatter(
-            lambda value, _: f"{value:.4g}".replace("-", "\N{MINUS SIGN}")
+            lambda value, _: f"{value:.3g}".replace("-", "\N{MINUS SIGN}")
         )
     else:  # a limit that is far away, or none, is no reason to make the line flat
         low = lower if np.isfinite(lower) and lower > low else low

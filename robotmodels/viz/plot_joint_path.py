@@ -61,9 +61,9 @@ def plot_joint_path(
 ) -> Figure:
     """The joints along a path of poses, their velocities, the conditioning, and the events.
 
-    The lowest panel has a row for every kind of event that happens. Where the path leaves the
-    reach the other panels are shaded; where it is singular, the posture changes or jumps they
-    have thin lines in the colour of the event.
+    The lowest panel has a row for every kind of event that happens. In its colour the other
+    panels are shaded where the path leaves the reach or stays singular, and have a thin line where
+    it is singular at one pose, where the posture changes and where it jumps.
 
     Parameters
     ----------
@@ -188,12 +188,21 @@ def _events(
                       marker=marker, markersize=3.6, markeredgewidth=0.0,
                       label=f"_ends of {text}")  # fmt: skip
             for panel in above:
-                if kind is PathEventKind.OUT_OF_REACH:
-                    panel.axvspan(start, stop, color="0.88", linewidth=0.0, zorder=0.5)
-                elif kind not in (PathEventKind.OUTSIDE_LIMITS, PathEventKind.TOO_FAST):
-                    middle = 0.5 * (start + stop)
-                    panel.axvline(middle, color=color, linewidth=0.7, zorder=1.2,
-                                  label=f"_{text}")  # fmt: skip
+                _trace(panel, kind, start, stop)
+
+
+def _trace(axes: Axes, kind: PathEventKind, start: float, stop: float) -> None:
+    """What a panel shows of an event: runs without posture or with a poor one, and moments."""
+    if kind in (PathEventKind.OUTSIDE_LIMITS, PathEventKind.TOO_FAST):
+        return  # seen on the lines of the joints
+    text, color, _ = EVENT_STYLES[kind]
+    runs = (PathEventKind.OUT_OF_REACH, PathEventKind.SINGULAR)
+    if kind in runs and stop > start:
+        axes.axvspan(start, stop, color=color, alpha=0.2, linewidth=0.0, zorder=0.5,
+                     label=f"_{text}")  # fmt: skip
+    else:
+        axes.axvline(0.5 * (start + stop), color=color, linewidth=0.7, zorder=1.2,
+                     label=f"_{text}")  # fmt: skip
 
 
 def span(event: PathEvent, timed: bool) -> tuple[float, float]:

@@ -224,8 +224,11 @@ def _fill(figure: Figure, axes: Any, edges: Array) -> None:
         axes.set_box_aspect(edges, zoom=zoom)
         figure.draw_without_rendering()
         taken = axes.get_tightbbox()
-        zoom *= min((width - 2.0 * pad) / taken.width, (top - 2.0 * pad) / taken.height)
-        shift += 0.5 * np.array((width, top)) - 0.5 * (taken.min + taken.max)
+        fit = min((width - 2.0 * pad) / taken.width, (top - 2.0 * pad) / taken.height)
+        off = 0.5 * np.array((width, top)) - 0.5 * (taken.min + taken.max)
+        if abs(fit - 1.0) < 0.01 and np.abs(off).max() < pad:
+            break
+        zoom, shift = zoom * fit, shift + off
 
 
 def _style(axes: Any, unit: Unit, view: Array, edges: Array) -> None:

@@ -144,6 +144,7 @@ def _map(figure: Figure, axes: Axes, grid: SingularityMap, degrees: bool) -> Non
         _ticks(axis, unit)
     bar: Any = figure.colorbar(image, ax=axes, pad=0.02, aspect=25)
     bar.ax.tick_params(labelsize=SMALL_SIZE, labelcolor=INK, color=PALE, length=2.5, width=0.6)
+    bar.ax.set_facecolor("white")
     bar.outline.set(edgecolor=PALE, linewidth=0.6)
     bar.ax.yaxis.get_offset_text().set(size=SMALL_SIZE, color=INK)
     unit = grid.units[2].replace("^2", "²").replace("^3", "³")
