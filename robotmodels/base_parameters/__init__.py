@@ -4,6 +4,16 @@ Seed book section 1.5.3.
 """
 
 from .find import base_parameters
+from .prior import uniform_bodies
 from .result import BaseMethod, BaseParameters
+from .standard import PhysicalStatus, StandardParameters, standard_parameters
 
-__all__ = ["BaseMethod", "BaseParameters", "base_parameters"]
+__all__ = [
+    "BaseMethod",
+    "BaseParameters",
+    "PhysicalStatus",
+    "StandardParameters",
+    "base_parameters",
+    "standard_parameters",
+    "uniform_bodies",
+]

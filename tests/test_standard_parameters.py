@@ -1,0 +1,139 @@
+"""From base parameters back to a robot of real bodies."""
+
+import sys
+
+import numpy as np
+import pytest
+from identities.random_robots import random_bodies, random_drive
+
+import robotmodels as rm
+from robotmodels.base_parameters import (
+    PhysicalStatus,
+    base_parameters,
+    standard_parameters,
+    uniform_bodies,
+)
+from robotmodels.base_parameters.prior import pseudo_inertias
+from robotmodels.errors import InertiaError, InvalidValueError, MissingExtraError, ShapeError
+
+ROBOTS = ("rx90", "iiwa14", "gantry", "cobra_s600", "planar_2r", "stanford_arm")
+
+
+def robot(name, rng):
+    model = rm.load(name)
+    model = model.with_inertia(random_bodies(rng, model.f))
+    return model.with_drive(random_drive(rng, model.n))
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_the_robot_has_the_base_parameters_and_real_bodies(name, rng):
+    model = robot(name, rng)
+    base = base_parameters(model)
+    prior = uniform_bodies(model, 30.0)
+    found = standard_parameters(base, base.values(model), prior=prior)
+    assert found.status is PhysicalStatus.EXACT
+    assert np.allclose(found.deviation, 0.0, atol=1e-12)
+    assert found.inertia.is_physical.all()
+    again = found.of(model)
+    q, v, a = rng.uniform(-2, 2, (3, 30, model.n))
+    torque = rm.idm(model, q, v, a)
+    assert np.allclose(rm.idm(again, q, v, a), torque, atol=1e-10 * abs(torque).max())
+
+
+def test_the_urdf_of_it_has_the_same_torques(rng):
+    model = robot("rx90", rng).with_drive(None)
+    base = base_parameters(model, drive=False)
+    found = standard_parameters(base, base.values(model), prior=uniform_bodies(model, 30.0))
+    again = rm.RobotModel.from_urdf(rm.to_urdf(found.of(model)))
+    q, v, a = rng.uniform(-2, 2, (3, 30, 6))
+    assert np.allclose(rm.idm(again, q, v, a), rm.idm(model, q, v, a), atol=1e-9)
+
+
+def test_nothing_is_nearer_to_the_prior(rng):
+    """Small steps along what no torque shows do not come nearer without leaving real bodies."""
+    model = robot("planar_2r", rng)
+    base = base_parameters(model)
+    prior = uniform_bodies(model, 10.0)
+    found = standard_parameters(base, base.values(model), prior=prior)
+    P0 = pseudo_inertias(prior)
+    whiten = np.linalg.inv(np.linalg.cholesky(P0))
+
+    def change(inertia):
+        P = whiten @ (pseudo_inertias(inertia) - P0) @ np.swapaxes(whiten, 1, 2)
+        return np.sqrt((P**2).sum()), np.linalg.eigvalsh(P + np.eye(4)).min()
+
+    distance, least = change(found.inertia)
+    assert least > 0.99e-3
+    pi = np.concatenate([found.inertia.values.ravel(), np.zeros(8)])
+    for _ in range(200):
+        step = base.null_space @ (1e-4 * rng.normal(size=base.null_space.shape[1]))
+        moved = rm.InertialParameters((pi + step)[:20].reshape(2, 10))
+        if abs(step[20:]).max() > 0:  # the drives' share of the distance is not compared here
+            step[20:] = 0
+        nearer, least = change(moved)
+        assert nearer >= distance - 1e-4 or least < 1e-3
+
+
+def test_the_prior_itself_is_kept(rng):
+    model = robot("rx90", rng)
+    base = base_parameters(model)
+    found = standard_parameters(base, base.values(model))
+    assert found.distance < 1e-6
+    assert np.allclose(found.inertia.values, model.inertia.values, atol=1e-7)
+
+
+def test_base_parameters_of_no_robot(rng):
+    model = robot("planar_2r", rng)
+    base = base_parameters(model)
+    values = base.values(model)
+    values[base.names.index("ZZ2")] = -1.0
+    found = standard_parameters(base, values, prior=uniform_bodies(model, 10.0))
+    assert found.status is PhysicalStatus.NEAREST
+    assert "nearest" in found.status.value
+    assert abs(found.deviation).max() > 0.5
+    assert found.inertia.is_physical.all()
+    # with the weights of a regressor it is the torques that are nearest
+    W = base.reduce(rm.torque_regressor(model, *rng.normal(size=(3, 40, 2)))).reshape(-1, len(base))
+    by_torque = standard_parameters(
+        base, values, prior=uniform_bodies(model, 10.0), weights=np.linalg.qr(W, mode="r")
+    )
+    missed = [np.linalg.norm(W @ one.deviation) for one in (by_torque, found)]
+    assert missed[0] <= missed[1] * (1 + 1e-6)
+
+
+def test_uniform_bodies():
+    model = rm.load("rx90")
+    bodies = uniform_bodies(model, 80.0)
+    assert bodies.mass.sum() == pytest.approx(80.0)
+    assert bodies.is_physical.all()
+    one = rm.RobotModel.from_table(rm.DHTable(antecedent=[0], sigma=[0]))
+    ball = uniform_bodies(one, 2.0, radius=0.1)
+    assert ball.values[0, [0, 3, 5, 9]] == pytest.approx([0.008, 0.008, 0.008, 2.0])
+    with pytest.raises(InvalidValueError, match="mass: expected a positive"):
+        uniform_bodies(model, 0.0)
+    with pytest.raises(InvalidValueError, match="radius"):
+        uniform_bodies(model, 1.0, radius=-1.0)
+
+
+def test_mistakes_are_named(rng):
+    model = robot("planar_2r", rng)
+    base = base_parameters(model)
+    values = base.values(model)
+    with pytest.raises(InertiaError, match="prior: link 1 is no body"):
+        standard_parameters(base, values, prior=rm.InertialParameters.zeros(2))
+    with pytest.raises(ShapeError, match="values"):
+        standard_parameters(base, values[:-1])
+    with pytest.raises(InvalidValueError, match="margin"):
+        standard_parameters(base, values, margin=0.0)
+    with pytest.raises(InvalidValueError, match="prior: expected 2 links"):
+        standard_parameters(base, values, prior=rm.InertialParameters.zeros(3))
+    with pytest.raises(InvalidValueError, match="drive_prior"):
+        standard_parameters(base, values, drive_prior=rm.DriveParameters.zeros(3))
+
+
+def test_without_the_solver(monkeypatch, rng):
+    monkeypatch.setitem(sys.modules, "clarabel", None)
+    model = robot("planar_2r", rng)
+    base = base_parameters(model)
+    with pytest.raises(MissingExtraError, match=r"robotmodels\[cones\]"):
+        standard_parameters(base, base.values(model))
