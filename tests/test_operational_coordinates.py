@@ -21,23 +21,23 @@ from robotmodels.errors import (
     NotARotationError,
     ShapeError,
 )
-from robotmodels.kinematics.coordinate_jacobian import (
+from robotmodels.kinematics.coordinates._orientation_rates import SINGULAR
+from robotmodels.kinematics.coordinates.conversion import (
+    operational_coordinates,
+    pose_from_coordinates,
+)
+from robotmodels.kinematics.coordinates.jacobian import (
     coordinate_jacobian,
     coordinate_jacobian_rate,
 )
-from robotmodels.kinematics.coordinate_kinds import OrientationKind, orientation_kind
-from robotmodels.kinematics.coordinate_orientation_rates import SINGULAR
-from robotmodels.kinematics.coordinate_rates import (
+from robotmodels.kinematics.coordinates.kinds import OrientationKind, orientation_kind
+from robotmodels.kinematics.coordinates.rates import (
     coordinate_rates,
     coordinate_rates_rate,
     is_representation_singular,
     twist_from_rates,
 )
-from robotmodels.kinematics.coordinate_sequences import continuous_coordinates
-from robotmodels.kinematics.coordinates import (
-    operational_coordinates,
-    pose_from_coordinates,
-)
+from robotmodels.kinematics.coordinates.sequences import continuous_coordinates
 
 EPS = np.finfo(float).eps
 TURN = 2 * np.pi

@@ -1,0 +1,299 @@
+"""Operational coordinates: a pose as a vector X, and back.
+
+Seed book section 1.2.2, eq. [1.5] to [1.9]. The kinds are those of `OrientationKind`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..._arrays import Array, as_vector
+from ...errors import NotARotationError, ShapeError
+from ...se3 import ROTATION_TOLERANCE, as_pose
+from ._angles import (
+    ANGLE_SEQUENCES,
+    angles_near,
+    angles_of,
+    rotation_of_angles,
+)
+from ._quaternions import (
+    quaternions_near,
+    quaternions_of,
+    quaternions_of_vectors,
+    rotation_of_quaternions,
+    vectors_near,
+    vectors_of,
+)
+from .kinds import OrientationKind, orientation_kind
+
+
+def operational_coordinates(
+    T: Any, kind: str | OrientationKind, near: ArrayLike | None = None
+) -> Array:
+    """Operational coordinates of poses: the position, then the orientation in the chosen form.
+
+    Parameters
+    ----------
+    T : array_like, shape (..., 4, 4)
+        Poses, metres.
+    kind : OrientationKind or str
+        How the orientation is written; `OrientationKind` says in which order and what range.
+        **Khalil's roll is about z**; ``"rpy_urdf"`` is the order of URDF.
+    near : array_like, shape (..., m), optional
+        Coordinates of the same kind, such as those of the sample before; the leading axes
+        broadcast. Of all coordinates of the same pose the nearest to these are taken: the other
+        solution of three angles, the opposite quaternion, whole turns; at gimbal lock the first
+        angle of ``near``, and the third takes what is left.
+
+    Returns
+    -------
+    ndarray, shape (..., m)
+        ``Px Py Pz`` in metres and the orientation: m = 6 with three angles (rad) or a rotation
+        vector (rad), 7 with a quaternion, 9 with two axes, 12 with direction cosines. The pose
+        comes back to rounding, also at and near gimbal lock (where, without ``near``, the first
+        angle is 0) and near half a turn.
+
+    Raises
+    ------
+    InvalidValueError
+        An unknown kind; NaN or infinity.
+    ShapeError, NotARotationError
+        As `robotmodels.se3.as_pose`; ``near`` of the wrong length.
+
+    References
+    ----------
+    Seed book eq. [1.5] to [1.9]. W. Khalil, E. Dombre, *Modeling, Identification and Control of
+    Robots*, chapter 3.
+
+    Examples
+    --------
+    >>> from robotmodels.se3 import rotation, translation
+    >>> T = translation(1, 2, 3) @ rotation("z", 0.3) @ rotation("x", 0.2) @ rotation("z", 0.1)
+    >>> operational_coordinates(T, "euler").round(12)
+    array([1. , 2. , 3. , 0.3, 0.2, 0.1])
+    >>> operational_coordinates(T, "euler", near=[1, 2, 3, -2.8, -0.2, 3.3]).round(2)
+    array([ 1.  ,  2.  ,  3.  , -2.84, -0.2 ,  3.24])
+    """
+    kind = orientation_kind(kind)
+    T = as_pose(T)
+    return coordinates_of_poses(T, kind, near_coordinates(near, kind, T.shape[:-2]))
+
+
+def pose_from_coordinates(x: ArrayLike, kind: str | OrientationKind) -> Array:
+    """Poses of operational coordinates; the way back from `operational_coordinates`.
+
+    Parameters
+    ----------
+    x : array_like, shape (..., m)
+        Position in metres, then the orientation. Angles and rotation vectors may be any.
+    kind : OrientationKind or str
+        How the orientation is written.
+
+    Returns
+    -------
+    ndarray, shape (..., 4, 4)
+        Poses. A quaternion, direction cosines or two axes that are off by more than rounding, but
+        no more than 1e-6, are brought onto the nearest rotation.
+
+    Raises
+    ------
+    InvalidValueError
+        An unknown kind; NaN or infinity.
+    ShapeError
+        ``x`` of the wrong length.
+    NotARotationError
+        A quaternion that is not of unit length, or axes that are not of unit length, square and
+        right-handed.
+
+    References
+    ----------
+    Seed book eq. [1.8] and [1.9].
+
+    Examples
+    --------
+    >>> pose_from_coordinates([0, 0, 0.5, 0, 0, 1, 0], "quaternion").diagonal()
+    array([-1.,  1., -1.,  1.])
+    """
+    kind = orientation_kind(kind)
+    x = as_coordinates(x, kind, "x")
+    T = np.zeros((*x.shape[:-1], 4, 4))
+    T[..., :3, 3], T[..., 3, 3] = x[..., :3], 1.0
+    y = x[..., 3:]
+    if kind in ANGLE_SEQUENCES:
+        T[..., :3, :3] = rotation_of_angles(ANGLE_SEQUENCES[kind], in_order(kind, y))
+    elif kind is OrientationKind.ANGLE_AXIS:
+        T[..., :3, :3] = rotation_of_quaternions(quaternions_of_vectors(y))
+    elif kind is OrientationKind.QUATERNION:
+        T[..., :3, :3] = rotation_of_quaternions(_unit(y))
+    else:
+        axes = y.reshape(*y.shape[:-1], y.shape[-1] // 3, 3)
+        T[..., :3, 1:3] = np.swapaxes(axes[..., -2:, :], -1, -2)
+        T[..., :3, 0] = (
+            axes[..., 0, :]
+            if kind is OrientationKind.DIRECTION_COSINES
+            else np.cross(axes[..., 0, :], axes[..., 1, :])
+        )
+        T = as_pose(T, f"x ({kind.value.replace('_', ' ')})")
+    return T
+
+
+def coordinates_of_poses(T: Array, kind: OrientationKind, near: Array | None) -> Array:
+    """`operational_coordinates` of what has been checked.
+
+    Parameters
+    ----------
+    T : ndarray, shape (..., 4, 4)
+        Proper poses.
+    kind : OrientationKind
+        How the orientation is written.
+    near : ndarray, shape (..., m), or None
+        As `near_coordinates` returns it.
+
+    Returns
+    -------
+    ndarray, shape (..., m)
+        The coordinates.
+    """
+    R, p = T[..., :3, :3], T[..., :3, 3]
+    y = None if near is None else in_order(kind, near[..., 3:])
+    if kind in ANGLE_SEQUENCES:
+        sequence = ANGLE_SEQUENCES[kind]
+        o, locked = angles_of(sequence, R)
+        if y is not None:
+            o = angles_near(sequence, R, o, locked, y)
+        o = in_order(kind, o)
+    elif kind is OrientationKind.QUATERNION:
+        o = quaternions_of(R)
+        if y is not None:
+            o = quaternions_near(o, y)
+    elif kind is OrientationKind.ANGLE_AXIS:
+        o = vectors_of(R) if y is None else vectors_near(R, y)
+    else:
+        o = columns_of(R, kind)
+        if y is not None:
+            o = np.broadcast_to(o, np.broadcast_shapes(o.shape, y.shape))
+    return np.concatenate([np.broadcast_to(p, (*o.shape[:-1], 3)), o], axis=-1)
+
+
+def as_coordinates(x: ArrayLike, kind: OrientationKind, name: str) -> Array:
+    """Finite coordinates of a kind.
+
+    Parameters
+    ----------
+    x : array_like, shape (..., m)
+        Numbers.
+    kind : OrientationKind
+        Which they are.
+    name : str
+        Used in error messages.
+
+    Returns
+    -------
+    ndarray, shape (..., m)
+        Checked.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Another length of the last axis, with the names of the coordinates; NaN or infinity.
+    """
+    try:
+        return as_vector(x, kind.dimension, name)
+    except ShapeError as error:
+        raise ShapeError(
+            f"{error} The coordinates {kind.value!r} are {', '.join(kind.labels)}."
+        ) from None
+
+
+def near_coordinates(
+    near: ArrayLike | None, kind: OrientationKind, batch: tuple[int, ...]
+) -> Array | None:
+    """Checked coordinates to be near to, whose leading axes broadcast with those of a batch.
+
+    Parameters
+    ----------
+    near : array_like, shape (..., m), or None
+        What the caller gave.
+    kind : OrientationKind
+        Which coordinates.
+    batch : tuple of int
+        Leading axes of the poses.
+
+    Returns
+    -------
+    ndarray, shape (..., m), or None
+        Checked.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        As `as_coordinates`; leading axes that do not broadcast.
+    """
+    if near is None:
+        return None
+    checked = as_coordinates(near, kind, "near")
+    try:
+        np.broadcast_shapes(batch, checked.shape[:-1])
+    except ValueError:
+        raise ShapeError(
+            f"The leading (batch) axes do not broadcast against each other: poses {batch}, near "
+            f"{checked.shape}. Give each the same number of rows, or a single row."
+        ) from None
+    return checked
+
+
+def in_order(kind: OrientationKind, orientation: Array) -> Array:
+    """Three angles from the order in which they are listed to that of the rotations, or back.
+
+    Parameters
+    ----------
+    kind : OrientationKind
+        How the orientation is written.
+    orientation : ndarray, shape (..., k)
+        The orientation, without the position.
+
+    Returns
+    -------
+    ndarray, shape (..., k)
+        Itself, or reversed where the kind lists its angles backwards.
+    """
+    sequence = ANGLE_SEQUENCES.get(kind)
+    return orientation[..., ::-1] if sequence and sequence.backwards else orientation
+
+
+def columns_of(R: Array, kind: OrientationKind) -> Array:
+    """The columns s, n, a of matrices, or n and a, one behind the other.
+
+    Parameters
+    ----------
+    R : ndarray, shape (..., 3, 3)
+        Rotations, or derivatives of rotations.
+    kind : OrientationKind
+        Direction cosines or two axes.
+
+    Returns
+    -------
+    ndarray, shape (..., 9) or (..., 6)
+        The columns.
+    """
+    first = 0 if kind is OrientationKind.DIRECTION_COSINES else 1
+    columns = np.swapaxes(R, -1, -2)[..., first:, :]
+    return columns.reshape(*R.shape[:-2], 3 * (3 - first))
+
+
+def _unit(Q: Array) -> Array:
+    """Quaternions of unit length; refused when they are not nearly so."""
+    length = np.linalg.norm(Q, axis=-1, keepdims=True)
+    off = np.abs(length[..., 0] - 1.0)
+    if off.size and off.max() > ROTATION_TOLERANCE:
+        i = np.unravel_index(int(off.argmax()), off.shape) if off.ndim else ()
+        row = f" (row {', '.join(map(str, i))})" if i else ""
+        raise NotARotationError(
+            f"x: the quaternion Q1 Q2 Q3 Q4 must have length 1{row}, got "
+            f"{float(length[(*i, 0)]):.9g}; at most {ROTATION_TOLERANCE:g} off is accepted and "
+            "rounded away. Divide it by its length if it is meant as a direction."
+        )
+    return Q / length
