@@ -7,7 +7,8 @@ import pickle
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from identities.random_robots import any_models, models, random_state, robot_size, seeds
 
 import robotmodels as rm
@@ -156,8 +157,8 @@ def test_decomposition_of_nothing():
 # --- first order against NumPy -----------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", METHODS)
-@given(model=models(), seed=seeds)
+@given(model=models(), seed=seeds, name=st.sampled_from(sorted(METHODS)))
+@settings(max_examples=4 * settings().max_examples)
 def test_every_method_is_its_formula(name, model, seed):
     rng = np.random.default_rng(seed)
     method = METHODS[name]
@@ -611,8 +612,8 @@ def test_joints_that_are_not_on_the_way_stay(rng):
 # --- secondary motions -------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", METHODS)
-@given(model=models(), seed=seeds)
+@given(model=models(), seed=seeds, name=st.sampled_from(sorted(METHODS)))
+@settings(max_examples=3 * settings().max_examples)
 def test_a_secondary_motion_never_disturbs_the_task(name, model, seed):
     rng = np.random.default_rng(seed)
     q, z, _ = random_state(model, rng, 3)

@@ -17,7 +17,7 @@ from ..jacobians import Reference
 from .methods import InverseMethod
 from .request import Request, Secondary
 from .solution import IKMSolution
-from .solve import solved
+from .solve import solved, solved_alone
 
 if TYPE_CHECKING:
     from .bounds import JointBounds
@@ -123,6 +123,12 @@ def ikm(
     """
     check_model(model)
     q, twist = as_vector(q, model.n, "q"), as_vector(twist, 6, "twist")
+    if (
+        mask is joint_weights is length is secondary is limits is None
+        and augmented == () == tasks
+        and q.ndim == 1 == twist.ndim
+    ):
+        return solved_alone(model, q, twist, frame, reference, method)
     return solved(
         model,
         Request(

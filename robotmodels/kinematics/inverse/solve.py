@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..._arrays import Array, batch_rows
 from ...model import RobotModel
 from ..jacobians import reference_of
-from .methods import as_method
+from .methods import InverseMethod, as_method
 from .request import Request, secondary_motion
 from .scaling import WHOLE_TWIST, KnownFrame, Scaling, general_rank, known_frame, scaling_of
 from .solution import IKMSolution
@@ -53,13 +53,6 @@ def solved(model: RobotModel, request: Request) -> IKMSolution:
     scaling = scaling_of(model, known, request.mask, request.joint_weights, request.length)
     method = as_method(request.method)
     q, rate, v = request.q, request.rate, request.v
-    if (
-        q.ndim == rate.ndim == 1
-        and scaling is known.usual
-        and v is request.secondary is request.limits is None
-        and not (request.augmented or request.tasks)
-    ):
-        return _one(model, known, q, rate, reference, method)
     extra = None
     if request.secondary is not None:
         extra = secondary_motion(model, q, request.secondary)
@@ -107,6 +100,63 @@ def solved(model: RobotModel, request: Request) -> IKMSolution:
     return IKMSolution.checked_before(
         out, status, achieved, error, reachable, values, rank, damping, scale, limited,
         scaling.mask, (), still, accelerations,
+    )  # fmt: skip
+
+
+def solved_alone(
+    model: RobotModel,
+    q: Array,
+    twist: Array,
+    frame: str | int | None,
+    reference: str,
+    method: InverseMethod | None,
+) -> IKMSolution:
+    """One row with nothing but a twist, in as few steps as can be.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, n joints.
+    q, twist : ndarray, shapes (n,), (6,)
+        Joint variables and twist.
+    frame, reference, method
+        As in `ikm`.
+
+    Returns
+    -------
+    IKMSolution
+        Of a single row.
+
+    Raises
+    ------
+    InvalidValueError, FrameNotFoundError
+        As `ikm`.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> arm = load("rx90")
+    >>> solved_alone(arm, np.full(6, 0.5), np.zeros(6), None, "local", None).reason()
+    'The motion is met.'
+    """
+    number = reference_of(reference)[1]
+    known = known_frame(model, frame)
+    n = q.size
+    k = min(6, n)
+    out, codes = np.empty(n + 19 + k), np.empty(2, np.int8)
+    _one_kernel()(
+        known.whole, known.numbers, q, twist, number, *as_method(method).kernel_arguments, out,
+        codes,
+    )  # fmt: skip
+    if codes[0] == _SINGULAR:
+        tell_structure(model, known, known.usual, number, codes[:1], codes[1:])
+    out.setflags(write=False)
+    codes.setflags(write=False)
+    scale, limited, still = _unlimited(n)
+    return IKMSolution.checked_before(
+        out[:n], codes[0, ...], out[n : n + 6], out[n + 6 : n + 12], out[n + 12 : n + 18],
+        out[n + 18 : n + 18 + k], codes[1, ...], out[n + 18 + k, ...], scale, limited,
+        WHOLE_TWIST, (), still, None,
     )  # fmt: skip
 
 
@@ -207,28 +257,6 @@ def frozen(array: NDArray[Any], batch: tuple[int, ...]) -> NDArray[Any]:
     array = array.reshape((*batch, *array.shape[1:]))
     array.setflags(write=False)
     return array
-
-
-def _one(
-    model: RobotModel, known: KnownFrame, q: Array, twist: Array, reference: int, method: Any
-) -> IKMSolution:
-    """One twist and nothing else, in as few steps as can be."""
-    n = q.size
-    k = min(6, n)
-    out, codes = np.empty(n + 19 + k), np.empty(2, np.int8)
-    _one_kernel()(
-        known.whole, known.numbers, q, twist, reference, *method.kernel_arguments, out, codes
-    )
-    if codes[0] == _SINGULAR:
-        tell_structure(model, known, known.usual, reference, codes[:1], codes[1:])
-    out.setflags(write=False)
-    codes.setflags(write=False)
-    scale, limited, still = _unlimited(n)
-    return IKMSolution.checked_before(
-        out[:n], codes[0, ...], out[n : n + 6], out[n + 6 : n + 12], out[n + 12 : n + 18],
-        out[n + 18 : n + 18 + k], codes[1, ...], out[n + 18 + k, ...], scale, limited,
-        WHOLE_TWIST, (), still, None,
-    )  # fmt: skip
 
 
 @cache
