@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -186,7 +187,7 @@ class SymbolicChain:
         """Steps from the origin of a to that of b: each a vector in the axes of a node."""
         way = self.between(a, b)
         out = []
-        for near, far in zip(way, way[1:], strict=False):
+        for near, far in pairwise(way):
             if self.parent.get(far) == near:
                 out.append((near, self.steps[far][1]))
             else:

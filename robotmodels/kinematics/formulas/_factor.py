@@ -76,14 +76,13 @@ def with_meaning(
     numbers = tuple(j for j, place in chain.joints.items() if place in factor.joints)
     kind, sentence = arm.kind_of_joints(numbers), ""
     if square:
-        sentence = f"the columns of the Jacobian that depend on {_joint_names(numbers)} do not "
-        sentence += "give all directions"
+        sentence = "axes and points show nothing special, but the columns become dependent"
     if factor.never_zero:
         return replace(factor, kind=kind, meaning="it never vanishes with these constants")
     q = _zeros(factor, chain.model)
     event = None if q is None else arm.event(q)
     if event is not None:
-        kind, sentence = event.kind, event.sentence
+        kind, sentence = event.kind or kind, event.sentence
     return replace(factor, kind=kind, meaning=sentence)
 
 

@@ -136,7 +136,8 @@ def jacobian_latex(e: Any, last: int, notation: Notation) -> str:
     R = rf"\mathbf{{R}}_{{{i}}}"
     title = escaped(f"Jacobian of {e.robot}: motion of {e.frame} in the world")
     product = (
-        rf"\mathbf{{J}} = \begin{{bmatrix}} {R} & \mathbf{{0}} \\ \mathbf{{0}} & {R} \end{{bmatrix}}"
+        rf"\mathbf{{J}} = \begin{{bmatrix}} {R} & \mathbf{{0}} \\ \mathbf{{0}} & {R} "
+        r"\end{bmatrix}"
         r" \begin{bmatrix} \mathbf{1} & -\hat{\mathbf{L}} \\ \mathbf{0} & \mathbf{1} "
         rf"\end{{bmatrix}} {name}"
     )

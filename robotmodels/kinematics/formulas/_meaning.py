@@ -23,7 +23,7 @@ _TOLERANCE = 1e-7
 class Event:
     """Something that happens where a factor vanishes and not elsewhere."""
 
-    kind: SingularityKind
+    kind: SingularityKind | None  # None: the joints decide
     sentence: str
 
 
@@ -111,7 +111,9 @@ class ArmGeometry:
         turning = [k for k in places if self.turns[k]]
         out: list[tuple[Callable[[_Scene], bool], Event]] = []
 
-        def add(happens: Callable[[_Scene], bool], kind: SingularityKind, sentence: str) -> None:
+        def add(
+            happens: Callable[[_Scene], bool], kind: SingularityKind | None, sentence: str
+        ) -> None:
             out.append((happens, Event(kind, sentence)))
 
         stretched = "the arm is stretched or folded"
@@ -153,7 +155,7 @@ class ArmGeometry:
                 )  # fmt: skip
         for a in places[:-2]:
             add(
-                _perpendicular(a, a + 2), self._kind_of_places((a, a + 1, a + 2)),
+                _perpendicular(a, a + 2), None,
                 f"axes {names[a]} and {names[a + 2]} are perpendicular",
             )  # fmt: skip
         return out
@@ -164,13 +166,6 @@ class ArmGeometry:
         if a >= len(self.numbers) - 3:
             return SingularityKind.WRIST
         return SingularityKind.SHOULDER if b <= 2 else SingularityKind.ELBOW
-
-    def _kind_of_places(self, places: tuple[int, ...]) -> SingularityKind:
-        if self.whole_arm and min(places) >= len(self.numbers) - 3:
-            return SingularityKind.WRIST
-        if self.whole_arm and max(places) <= 3 and len(self.numbers) > 6:
-            return SingularityKind.SHOULDER
-        return SingularityKind.OTHER
 
     def kind_of_joints(self, numbers: tuple[int, ...]) -> SingularityKind:
         """By the joints alone, for a factor without an event."""

@@ -19,6 +19,8 @@ from ._jacobian_printing import (
 from .singularity_explanation import SingularityExplanation, SingularityFactor
 
 _MOST_MINORS = 40
+_LONGEST = 300
+_LONG = "a long polynomial"
 
 Powers = tuple[tuple[SingularityFactor, int], ...]
 MinorWords = tuple[tuple[int, ...], tuple[int, ...], Powers]
@@ -63,13 +65,20 @@ def _shown(e: SingularityExplanation, constant: Any) -> list[Any]:
 
 
 def _power_text(factor: SingularityFactor) -> str:
-    return factor.text if factor.power == 1 else f"({factor.text})**{factor.power}"
+    return _power(factor.text, factor.power)
+
+
+def _power(text: str, exponent: int) -> str:
+    if exponent == 1:
+        return text
+    return f"{text}**{exponent}" if text.isidentifier() else f"({text})**{exponent}"
 
 
 def _joined(words: Sequence[str]) -> str:
     if len(words) == 1:
         return words[0]
-    return " * ".join(f"({w})" if " " in w else w for w in words) or "1"
+    whole = " * ".join(f"({w})" if " " in w else w for w in words)
+    return f"-{whole[5:]}" if whole.startswith("-1 * ") else whole
 
 
 def _minor_words(minor: MinorWords) -> str:
@@ -81,7 +90,8 @@ def _minor_words(minor: MinorWords) -> str:
 
 
 def _minor_factors(minor: MinorWords) -> list[str]:
-    return [f.text if k == 1 else f"({f.text})**{k}" for f, k in minor[2]] or ["1"]
+    words = [(f.text if len(f.text) <= _LONGEST else _LONG, k) for f, k in minor[2]]
+    return [_power(text, k) for text, k in words] or ["1"]
 
 
 def explanation_latex(
@@ -102,7 +112,10 @@ def explanation_latex(
     if minors:
         blocks.append(escaped(f"Minors of the third matrix ({e.task}), up to constants"))
         for minor in minors[:_MOST_MINORS]:
-            factors = [_power_latex(f, k) for f, k in minor[2]] or ["1"]
+            factors = [
+                _power_latex(f, k) if len(f.text) <= _LONGEST else rf"\text{{{_LONG}}}"
+                for f, k in minor[2]
+            ] or ["1"]
             blocks.append(_equation(rf"\text{{{_minor_words(minor)}: }} {_joined_latex(factors)}"))
     for factor in e.factors:
         words = escaped(f"{factor.kind.value}: {factor.meaning}".rstrip(": "))
@@ -125,6 +138,8 @@ def explanation_latex(
 def _power_latex(factor: SingularityFactor, power: int) -> str:
     if power == 1:
         return factor.latex
+    if factor.text.isidentifier():
+        return f"{factor.latex}^{{{power}}}"
     return rf"\left({factor.latex}\right)^{{{power}}}"
 
 
@@ -133,7 +148,12 @@ def _joined_latex(words: Sequence[str]) -> str:
         return words[0]
     sums = [" + " in w or " - " in w or w.startswith("-") for w in words]
     both = zip(words, sums, strict=True)
-    return r" \, ".join(rf"\left({w}\right)" if long else w for w, long in both)
+    whole = [rf"\left({w}\right)" if long and k else w for k, (w, long) in enumerate(both)]
+    if whole[0] == "-1":
+        return "-" + r" \, ".join(whole[1:])
+    if sums[0] and (" + " in whole[0] or " - " in whole[0]):
+        whole[0] = rf"\left({whole[0]}\right)"
+    return r" \, ".join(whole)
 
 
 def _equation(body: str) -> str:

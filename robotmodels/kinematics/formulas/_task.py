@@ -125,6 +125,13 @@ def task_of(patterns: Patterns, count: int) -> Task:
     """
     columns = range(count)
     rank = patterns.rank
+    if count <= 3 and patterns.position_rank == count:
+        frames = {ij: f[:3] for ij, f in patterns.filled.items() if ij[1] == TOOL}
+        task = _row_minors(patterns, frames, count)
+        words = f"the position of the frame, rows {_row_words(task[0].rows)}"
+        if len(task) > 1:
+            words = "the position of the frame"
+        return Task(words, task, len(task) == 1, True, position_only=True)
     if rank == 6 or rank == patterns.fewest_rows():
         rows = range(6) if rank == 6 else None
         subsets = list(combinations(columns, rank)) if comb(count, rank) <= MOST_MINORS else []
@@ -135,13 +142,6 @@ def task_of(patterns: Patterns, count: int) -> Task:
         return Task(words, minors, count == rank, True, too_many=not subsets)
     if rank < count:
         return Task("all six rows", (), False, False)
-    if count <= 3 and patterns.position_rank == count:
-        frames = {ij: f[:3] for ij, f in patterns.filled.items() if ij[1] == TOOL}
-        task = _row_minors(patterns, frames, count)
-        words = f"the position of the frame, rows {_row_words(task[0].rows)}"
-        if len(task) > 1:
-            words = "the position of the frame"
-        return Task(words, task, len(task) == 1, True, position_only=True)
     task = _row_minors(patterns, patterns.filled, count)
     return Task("all six rows", task, len(task) == 1, True)
 

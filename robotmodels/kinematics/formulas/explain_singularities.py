@@ -12,6 +12,7 @@ from ...model import RobotModel, check_model
 from ._blocks import Block, triangular_blocks
 from ._chain import TOOL, SymbolicChain
 from ._collect import cleaned, formula
+from ._conditions import families
 from ._factor import factor_of, numbers_of, unit_text, with_meaning
 from ._factoring import factored
 from ._meaning import ArmGeometry
@@ -166,6 +167,49 @@ def _order_sign(blocks: Sequence[Block]) -> int:
     return sign
 
 
+class _FactorBook:
+    """Factors as a person reads them, each made once."""
+
+    def __init__(self, chain: SymbolicChain, arm: ArmGeometry, square: bool) -> None:
+        self.chain, self.arm, self.square = chain, arm, square
+        self.signs: dict[Any, int] = {}  # drawn out of each
+        self._formulas: dict[Any, SingularityFactor] = {}
+        self._made: dict[Any, SingularityFactor] = {}
+
+    def formula(self, p: Any, power: int = 1) -> SingularityFactor:
+        """Without its meaning."""
+        if p not in self._formulas:
+            made = (_long_factor(p, self.chain), 1) if isinstance(p, tuple) else None
+            self._formulas[p], self.signs[p] = made or factor_of(p, power, self.chain)
+        return self._formulas[p]
+
+    def __call__(self, p: Any, power: int = 1) -> SingularityFactor:
+        if p not in self._made:
+            draft = self.formula(p, power)
+            self._made[p] = with_meaning(draft, self.chain, self.arm, self.square)
+        return self._made[p]
+
+    def order(self, p: Any) -> tuple[Any, ...]:
+        return _ORDER[self(p).kind], self(p).joints, self(p).text
+
+    def impossible(self, factors: frozenset[Any]) -> bool:
+        """Whether two factors of one joint alone vanish at different values of it."""
+        alone: dict[int, set[float]] = {}
+        for p in factors:
+            factor = self.formula(p)
+            if factor.never_zero:
+                return True
+            if len(factor.joints) != 1 or factor.solved_joint is None:
+                continue
+            zeros = factor.zeros(np.zeros(len(factor.numbers.variables)))
+            values = {round(float(z) % (2 * np.pi), 6) for z in zeros if not np.isnan(z)}
+            joint = factor.joints[0]
+            alone[joint] = alone[joint] & values if joint in alone else values
+            if not alone[joint]:
+                return True
+        return False
+
+
 def _explained(
     empty: SingularityExplanation,
     chain: SymbolicChain,
@@ -174,26 +218,16 @@ def _explained(
     products: tuple[Product, ...],
     arm: ArmGeometry,
 ) -> SingularityExplanation:
-    made: dict[Any, SingularityFactor] = {}
-    signs: dict[Any, int] = {}
-    for product in products:
-        for p, power in product.factors:
-            if p in made:
-                continue
-            if isinstance(p, tuple):
-                made[p], signs[p] = _long_factor(p, product, chain), 1
-            else:
-                made[p], signs[p] = factor_of(p, power if task.square else 1, chain)
-            made[p] = with_meaning(made[p], chain, arm, task.square)
-    keys = sorted(made, key=lambda p: (_ORDER[made[p].kind], made[p].joints))
-    factors = tuple(made[p] for p in keys)
-    conditions = _conditions(products, made, keys)
+    book = _FactorBook(chain, arm, task.square)
     constant, projection, intermediate, matrix, rows = None, "", "", None, ()
-    number = float("nan")
-    expressions = [f.expression for f in factors if f.expression is not None]
-    if task.square and products:
+    number, expressions = float("nan"), []
+    sets: list[frozenset[Any]] | None
+    if task.square:
         (product,) = products
-        signed = product.constant * int(np.prod([signs[p] ** k for p, k in product.factors]))
+        factors = tuple(book(p, power) for p, power in product.factors)
+        sets = [frozenset({p}) for p, _ in product.factors if not book(p).never_zero]
+        signs = [book.signs[p] ** power for p, power in product.factors]
+        signed = product.constant * int(np.prod(signs))
         number = float(chain.ring.values(signed, chain.constants(), ()))
         constant = formula(signed, chain)
         minor, rows = product.minor, product.minor.rows
@@ -201,29 +235,34 @@ def _explained(
         intermediate = _frame_name(minor.intermediate, chain, empty.frame)
         matrix = _matrix(minor, numbers, chain)
         expressions.append(matrix)
+        keys = [p for p, _ in product.factors]
+    else:
+        minors = [[p for p, _ in product.factors] for product in products]
+        sets = families(minors, chain, book.impossible)
+        keys = list(dict.fromkeys(p for s in sets for p in s)) if sets is not None else []
+    factors = tuple(book(p) for p in sorted(keys, key=book.order))
     chain.notation.check_new_names()
+    expressions += [f.expression for f in factors if f.expression is not None]
     draft = replace(
-        empty, status=_status(task, factors), task=task.words, factors=factors,
-        conditions=conditions, constant=number, unit=unit_text(_degree(task, numbers, chain)),
-        projection=projection, intermediate=intermediate, matrix=matrix, rows=rows,
+        empty, status=_status(task, factors, sets), task=task.words, factors=factors,
+        conditions=_conditions(sets or [], book), constant=number,
+        unit=unit_text(_degree(task, numbers, chain)), projection=projection,
+        intermediate=intermediate, matrix=matrix, rows=rows,
         numbers=numbers_of(chain, expressions),
     )  # fmt: skip
-    return _printed(draft, chain, constant, _minor_words(task, products, numbers, made))
+    words = [] if task.square else _minor_words(products, numbers, book)
+    return _printed(draft, chain, constant, words)
 
 
 def _minor_words(
-    task: Task,
-    products: Sequence[Product],
-    numbers: Sequence[int],
-    made: Mapping[Any, SingularityFactor],
+    products: Sequence[Product], numbers: Sequence[int], book: _FactorBook
 ) -> list[MinorWords]:
-    if task.square:
-        return []
     out = []
     for product in products:
         minor = product.minor
         left_out = tuple(k for c, k in enumerate(numbers) if c not in minor.columns)
-        out.append((left_out, minor.rows, tuple((made[p], k) for p, k in product.factors)))
+        factors = tuple((book.formula(p), power) for p, power in product.factors)
+        out.append((left_out, minor.rows, factors))
     return out
 
 
@@ -240,7 +279,11 @@ def _printed(
     )
 
 
-def _status(task: Task, factors: Sequence[SingularityFactor]) -> SingularityStatus:
+def _status(
+    task: Task, factors: Sequence[SingularityFactor], sets: Sequence[Any] | None
+) -> SingularityStatus:
+    if sets is None:
+        return SingularityStatus.TOO_MANY_FAMILIES
     if any(factor.expression is None for factor in factors):
         return SingularityStatus.TOO_LONG
     if not task.square:
@@ -259,9 +302,7 @@ def _degree(task: Task, numbers: list[int], chain: SymbolicChain) -> int:
     return sum(row < 3 for row in minor.rows) - strokes
 
 
-def _long_factor(
-    M: tuple[tuple[Poly, ...], ...], product: Product, chain: SymbolicChain
-) -> SingularityFactor:
+def _long_factor(M: tuple[tuple[Poly, ...], ...], chain: SymbolicChain) -> SingularityFactor:
     """A determinant that is too long to be written out: computed from its entries."""
     import sympy
 
@@ -301,40 +342,16 @@ def _frame_name(node: int, chain: SymbolicChain, frame: str) -> str:
 
 
 def _conditions(
-    products: Sequence[Product], made: Mapping[Any, SingularityFactor], keys: Sequence[Any]
+    sets: Iterable[frozenset[Any]], book: _FactorBook
 ) -> tuple[SingularityCondition, ...]:
-    """The smallest sets of factors of which every minor has one."""
-    sets: set[frozenset[Any]] = {frozenset()}
-    for product in products:
-        factors = [p for p, _ in product.factors if not made[p].never_zero]
-        grown = {s if s & set(factors) else None for s in sets} - {None}
-        grown |= {s | {p} for s in sets if not s & set(factors) for p in factors}
-        kept = {s for s in grown if s is not None and not _impossible(s, made)}
-        sets = {s for s in kept if not any(other < s for other in kept)}
-    place = {p: k for k, p in enumerate(keys)}
+    """Conditions of the sets, the shortest first."""
     out = []
-    for s in sorted(sets, key=lambda s: (len(s), sorted(place[p] for p in s))):
-        factors = tuple(made[p] for p in sorted(s, key=place.__getitem__))
+    for s in sorted(sets, key=lambda s: (len(s), sorted(map(book.order, s)))):
+        factors = tuple(book(p) for p in sorted(s, key=book.order))
         if not factors:
-            continue
+            continue  # no minor: the rank is never full
         kinds = {factor.kind for factor in factors}
         kind = kinds.pop() if len(kinds) == 1 else SingularityKind.OTHER
         text = " and ".join(f"{factor.text} = 0" for factor in factors)
         out.append(SingularityCondition(factors, kind, text))
     return tuple(out)
-
-
-def _impossible(factors: Iterable[Any], made: Mapping[Any, SingularityFactor]) -> bool:
-    """Whether two factors of one joint alone vanish at different values of it."""
-    alone: dict[int, set[float]] = {}
-    for p in factors:
-        factor = made[p]
-        if len(factor.joints) != 1 or factor.solved_joint is None:
-            continue
-        zeros = factor.zeros(np.zeros(len(factor.numbers.variables)))
-        values = {round(float(z) % (2 * np.pi), 6) for z in zeros if not np.isnan(z)}
-        joint = factor.joints[0]
-        alone[joint] = alone[joint] & values if joint in alone else values
-        if not alone[joint]:
-            return True
-    return False

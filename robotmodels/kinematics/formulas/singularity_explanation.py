@@ -61,6 +61,10 @@ class SingularityStatus(Enum):
         "A determinant has too many terms to be written out; the factor that stands for it is "
         "computed from its matrix."
     )
+    TOO_MANY_FAMILIES = (
+        "The matrix is not square, and the ways in which all its minors vanish are too many to be "
+        "followed."
+    )
     NEVER_FULL_RANK = (
         "The matrix has less than full rank in every position: some joints move the frame alike "
         "wherever they stand."
@@ -275,7 +279,7 @@ class SingularityExplanation:
     task : str
         Which rows of the third matrix count, in words.
     factors : tuple of SingularityFactor
-        Each once; for a matrix that is not square, those of all minors.
+        Each once; for a matrix that is not square, those of the conditions.
     conditions : tuple of SingularityCondition
         The families of singular positions.
     constant : float
