@@ -41,19 +41,21 @@ def sparse_basis(vectors: Array, tolerance: float = 1e-9) -> Array:
     k = vectors.shape[0]
     if k == 0:
         return vectors.copy()
+    if k == 1:
+        return normalised(vectors[0])[None]
     orthonormal = np.linalg.qr(vectors.T)[0].T
-    best, most = orthonormal, (-1, 0.0)
-    for pivots in _pivot_choices(orthonormal):
-        block = orthonormal[:, pivots]
-        weakest = np.linalg.svd(block, compute_uv=False)[-1]
-        if weakest < 0.02:
-            continue
-        basis = np.linalg.solve(block, orthonormal)
-        basis /= np.abs(basis).max(axis=1, keepdims=True)
-        # of equally sparse ones the best conditioned; rounding must not decide
-        rank = int((np.abs(basis) < tolerance).sum()), round(float(weakest), 6)
-        if rank > most:
-            best, most = basis, rank
+    choices = _pivot_choices(orthonormal)
+    blocks = orthonormal[:, choices].transpose(1, 0, 2)
+    weakest = np.linalg.svd(blocks, compute_uv=False)[:, -1]
+    choices = [c for c, weak in zip(choices, weakest, strict=True) if weak > 0.02]
+    if not choices:
+        return np.array([normalised(row) for row in orthonormal])
+    blocks, weakest = blocks[weakest > 0.02], weakest[weakest > 0.02]
+    bases = np.linalg.solve(blocks, np.broadcast_to(orthonormal, (len(choices), *vectors.shape)))
+    sizes = np.abs(bases)
+    zeros = (sizes < tolerance * sizes.max(axis=2, keepdims=True)).sum(axis=(1, 2))
+    # of equally sparse ones the best conditioned; rounding must not decide
+    best = bases[np.lexsort((-weakest.round(6), -zeros))[0]]
     return np.array([normalised(row) for row in best])
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_exact, read_only
+from .._arrays import Array, as_exact, as_floats, read_only
 from ..model import RobotModel
 from ..table_text import length_text
 from .poses import dgm
@@ -231,26 +231,14 @@ def report_of(
     1
     """
     M = whole.dimension
-    U, sigma, Vt = np.linalg.svd(task_jacobians(task, q))
+    sigma, lost, null, missing, zero = _spaces(task, q, whole, tolerance)
     top = float(sigma.max(initial=0.0))
     r = min(int((sigma > tolerance * top).sum()), M)
     weakest = float(sigma[M - 1] / top) if M and top > 0.0 else 0.0
-    zero = max(1e-9, 10.0 * float(sigma[r]) / top) if r < min(M, len(sigma)) and top else 1e-9
-    missing = _missing(task, whole)
-    lost = _without(U[:, r:], missing) if r < M else np.zeros((task.rows, 0))
-    null = _without(Vt[r:].T, np.eye(task.model.n)[:, ~task.moving])
     motions = self_motions(task, q, lost, null, zero)
     side, opening = workspace_side(task, q, lost, null, motions, missing, M - r)
     in_task = lost_in_task_axes(task, lost)
-    named: tuple[tuple[SingularityKind | None, str], ...] = ()
-    if r < M:
-        wrenches = np.zeros((lost.shape[1], 6))
-        wrenches[:, task.mask] = (lost * task.row_scale[:, None]).T
-        if task.mask_axes == "tool":
-            wrenches = _turned(task, q, wrenches)
-        named = kinds_in_words(
-            task, q, arm_structure(task), motions, wrenches, whole.redundancy, zero
-        )
+    named = _named(task, q, whole, motions, lost, zero) if r < M else ()
     status = SingularityStatus.REGULAR
     if r < M:
         status = SingularityStatus.SINGULAR
@@ -280,6 +268,70 @@ def report_of(
         length=task.length,
         tolerance=tolerance,
     )
+
+
+def names_of(
+    task: SingularTask, q: Array, whole: OperationalDimension, tolerance: float
+) -> tuple[tuple[SingularityKind | None, str], ...]:
+    """Only the names of a singular configuration, without the rest of its report.
+
+    Parameters
+    ----------
+    task : SingularTask
+        What is asked about.
+    q : ndarray, shape (n,)
+        Configuration, rad or m.
+    whole : OperationalDimension
+        Of the same task.
+    tolerance : float
+        As `classify_singularity`.
+
+    Returns
+    -------
+    tuple of (SingularityKind or None, str)
+        As `kinds_in_words`; empty where the configuration is regular.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> arm = load("rx90")
+    >>> names_of(singular_task(arm), np.zeros(6), operational_dimension(arm), 1e-9)
+    ((<SingularityKind.WRIST: 2>, 'wrist: the axes of joints 4 and 6 are aligned'),)
+    """
+    _, lost, null, _, zero = _spaces(task, q, whole, tolerance)
+    if not lost.shape[1]:
+        return ()
+    return _named(task, q, whole, self_motions(task, q, lost, null, zero), lost, zero)
+
+
+def _spaces(
+    task: SingularTask, q: Array, whole: OperationalDimension, tolerance: float
+) -> tuple[Array, Array, Array, Array, float]:
+    """Singular values, lost directions, self-motions, what is always missing, what is zero."""
+    M = whole.dimension
+    U, sigma, Vt = np.linalg.svd(task_jacobians(task, q))
+    top = float(sigma.max(initial=0.0))
+    r = min(int((sigma > tolerance * top).sum()), M)
+    zero = max(1e-9, 10.0 * float(sigma[r]) / top) if r < min(M, len(sigma)) and top else 1e-9
+    missing = _missing(task, whole)
+    lost = _without(U[:, r:], missing) if r < M else np.zeros((task.rows, 0))
+    null = _without(Vt[r:].T, np.eye(task.model.n)[:, ~task.moving])
+    return as_floats(sigma, "sigma"), lost, null, missing, zero
+
+
+def _named(
+    task: SingularTask,
+    q: Array,
+    whole: OperationalDimension,
+    motions: tuple[SelfMotion, ...],
+    lost: Array,
+    zero: float,
+) -> tuple[tuple[SingularityKind | None, str], ...]:
+    wrenches = np.zeros((lost.shape[1], 6))
+    wrenches[:, task.mask] = (lost * task.row_scale[:, None]).T
+    if task.mask_axes == "tool":
+        wrenches = _turned(task, q, wrenches)
+    return kinds_in_words(task, q, arm_structure(task), motions, wrenches, whole.redundancy, zero)
 
 
 def _missing(task: SingularTask, whole: OperationalDimension) -> Array:

@@ -1,0 +1,241 @@
+"""Ranks and dimensions of operational spaces: known arms, and invariance on random robots."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from identities.random_robots import models, random_model, random_pose, random_state
+
+import robotmodels as rm
+from robotmodels import se3
+from robotmodels.errors import FrameNotFoundError, InvalidValueError, ShapeError
+from robotmodels.kinematics.rank import jacobian_rank, operational_dimension
+from robotmodels.kinematics.singular_bases import sparse_basis
+from robotmodels.kinematics.singular_task import (
+    characteristic_length,
+    singular_task,
+    task_derivatives,
+    task_jacobians,
+)
+
+# robot: dimension, of position, of orientation, joints, what is never produced in world axes
+KNOWN = {
+    "rx90": (6, 3, 3, 6, ""),
+    "ur5": (6, 3, 3, 6, ""),
+    "puma560": (6, 3, 3, 6, ""),
+    "stanford_arm": (6, 3, 3, 6, ""),
+    "gantry": (6, 3, 3, 6, ""),
+    "iiwa14": (6, 3, 3, 7, ""),
+    "cobra_s600": (4, 3, 1, 4, "wx, wy"),
+    "planar_2r": (2, 2, 1, 2, "vz, wx, wy"),
+    "planar_3r": (3, 2, 1, 3, "vz, wx, wy"),
+    "lab_trr": (3, 3, 1, 3, "wx, wz"),
+    "xarm5": (5, 3, 3, 5, ""),
+}
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_dimension_of_known_robots(name):
+    arm = rm.load(name)
+    found = operational_dimension(arm)
+    M, position, orientation, joints, never = KNOWN[name]
+    assert found.dimension == M
+    assert (found.position_dimension, found.orientation_dimension) == (position, orientation)
+    assert (found.joints, found.redundancy) == (joints, joints - M)
+    assert found.never_in_world == never
+    assert found.gap > 1e6
+    assert found.singular_values[M - 1] > 1e-2
+    assert str(M) in str(found).splitlines()[0]
+    q = np.random.default_rng(1).uniform(-2, 2, size=(20, arm.n))
+    for row in found.missing_in_world:
+        assert np.abs(row @ rm.jacobian(arm, q)).max() < 1e-12
+
+
+def test_two_joints_have_constraints_in_the_tool_axes():
+    arm = rm.load("lab_rr")
+    found = operational_dimension(arm)
+    assert found.never_in_frame == "vx, vy - 0.2 wz, vz + 0.2 wy"
+    q = np.random.default_rng(1).uniform(-3, 3, size=(20, 2))
+    assert np.abs(found.missing_in_frame @ rm.jacobian(arm, q, reference="local")).max() < 1e-14
+
+
+def test_local_dimension_and_order():
+    arm = rm.load("iiwa14")
+    q = np.zeros((2, 7))
+    q[1] = 0.1, 0.4, 0.3, 0.0, 0.5, 0.9, 0.7
+    found = operational_dimension(arm, q=q)
+    np.testing.assert_array_equal(found.local_dimension, [3, 5])
+    np.testing.assert_array_equal(found.singularity_order, [3, 1])
+    assert "3 to 5" in str(found)
+    assert operational_dimension(arm).local_dimension is None
+    assert operational_dimension(arm).singularity_order is None
+
+
+def test_parts_of_the_task():
+    arm = rm.load("planar_2r")
+    q = [[0.3, 0.0], [0.3, 1.0]]
+    np.testing.assert_array_equal(jacobian_rank(arm, q).rank, [2, 2])
+    np.testing.assert_array_equal(jacobian_rank(arm, q, mask=[1, 1, 1, 0, 0, 0]).rank, [1, 2])
+    np.testing.assert_array_equal(jacobian_rank(arm, q, mask=[0, 0, 0, 1, 1, 1]).rank, [1, 1])
+    pointing = operational_dimension(rm.load("rx90"), mask=[1, 1, 1, 1, 1, 0], mask_axes="tool")
+    assert (pointing.dimension, pointing.redundancy) == (5, 1)
+
+
+@pytest.mark.parametrize("batch", [(), (1,), (2, 3), (0,), (2, 0)], ids=str)
+def test_batches(batch):
+    arm = random_model(np.random.default_rng(3), f=7, tree=True, fixed=True)
+    q = random_state(arm, np.random.default_rng(5), *batch)[0]
+    found = jacobian_rank(arm, q)
+    assert found.rank.shape == found.gap.shape == batch
+    assert found.singular_values.shape == (*batch, min(6, arm.n))
+    for i in np.ndindex(*batch):
+        one = jacobian_rank(arm, q[i])
+        assert one.rank == found.rank[i]
+        np.testing.assert_allclose(one.singular_values, found.singular_values[i], atol=1e-13)
+    assert not found.rank.flags.writeable
+
+
+@given(case=models(max_frames=8))
+def test_invariance_under_base_frame_and_units(case):
+    """Rank and singular values see neither where the robot stands nor its unit of length."""
+    rng = np.random.default_rng(7)
+    q = random_state(case, rng, 3)[0]
+    found = jacobian_rank(case, q)
+    moved = jacobian_rank(case.with_base(random_pose(rng)), q)
+    assert moved.length == found.length
+    np.testing.assert_array_equal(moved.rank, found.rank)
+    np.testing.assert_allclose(moved.singular_values, found.singular_values, atol=1e-12)
+    # another point of the last body: other singular values, the same rank
+    tool = case.with_tool(random_pose(rng), tip=case.tip)
+    np.testing.assert_array_equal(jacobian_rank(tool, q).rank, found.rank)
+    table, k = case.table, 1000.0
+    prismatic = table.sigma[table.joint_rows] == 1
+    stretch = np.where(prismatic, k, 1.0)
+    big = table.replace(b=k * table.b, d=k * table.d, r=k * table.r,
+                        lower=stretch * table.lower, upper=stretch * table.upper)  # fmt: skip
+    E = case.tool.copy()
+    E[:3, 3] *= k
+    large = jacobian_rank(case.with_table(big).with_tool(E, tip=case.tip), q * stretch)
+    np.testing.assert_array_equal(large.rank, found.rank)
+    if found.length != 1.0:
+        np.testing.assert_allclose(large.length, k * found.length, rtol=1e-12)
+        np.testing.assert_allclose(large.singular_values, found.singular_values, atol=1e-11)
+
+
+@given(case=models(max_frames=8))
+def test_dimension_on_random_robots(case):
+    """The dimension is the rank of the screws at a random configuration, in any frame."""
+    found = operational_dimension(case)
+    q = np.random.default_rng(11).uniform(-1, 1, size=case.n)
+    lower, upper = np.maximum(case.lower, -3.0), np.minimum(case.upper, 3.0)
+    q = 0.5 * (lower + upper) + 0.5 * q * (upper - lower)
+    if found.gap > 1e3:  # joints that are nearly but not quite parallel have ranks of a size
+        for reference in ("world_aligned", "local", "world"):
+            J = rm.jacobian(case, q, reference=reference)
+            assert np.linalg.matrix_rank(J, tol=1e-9 * max(1.0, np.abs(J).max())) <= found.dimension
+    path = case.twin.frame(None).path
+    assert found.joints == sum(case.table.sigma[j - 1] != 2 for j in path)
+    assert found.dimension <= min(6, found.joints)
+    J = rm.jacobian(case, q)
+    assert np.abs(found.missing_in_world @ J).max(initial=0.0) < 1e-9
+    J = rm.jacobian(case, q, reference="local")
+    assert np.abs(found.missing_in_frame @ J).max(initial=0.0) < 1e-9
+
+
+@given(case=models(max_frames=7))
+def test_derivatives_by_finite_differences(case):
+    for mask, axes in ((None, "world"), ([1, 0, 1, 1, 1, 0], "tool")):
+        task = singular_task(case, mask=mask, mask_axes=axes)
+        q = random_state(case, np.random.default_rng(2))[0]
+        found = task_derivatives(task, q)
+        assert found.shape == (case.n, task.rows, case.n)
+        scale = max(1.0, float(np.abs(task_jacobians(task, q)).max()))
+        for i in range(case.n):
+            h = np.eye(case.n)[i] * task.joint_scale
+            steps = [
+                (task_jacobians(task, q + e * h) - task_jacobians(task, q - e * h)) / (2 * e)
+                for e in (1e-3, 5e-4)
+            ]
+            limit = (4 * steps[1] - steps[0]) / 3
+            np.testing.assert_allclose(found[i], limit, rtol=0, atol=1e-9 * scale)
+
+
+def test_joints_of_another_branch_do_not_count():
+    table = rm.DHTable(antecedent=[0, 1, 1], sigma=[0, 0, 0], d=[0, 0.3, 0.2])
+    arm = rm.RobotModel.from_table(table, tool=se3.translation(0.1, 0, 0), tip=2)
+    found = operational_dimension(arm)
+    assert (found.joints, found.dimension, found.redundancy) == (2, 2, 0)
+    assert operational_dimension(arm, frame=1).joints == 1
+    base = operational_dimension(arm, frame=0, q=np.zeros(3))
+    assert (base.joints, base.dimension) == (0, 0)
+    assert base.local_dimension == 0
+
+
+def test_robot_without_a_moving_joint_before_the_frame():
+    table = rm.DHTable(antecedent=[0, 1], sigma=[2, 0], d=[0.4, 0.3])
+    arm = rm.RobotModel.from_table(table)
+    assert operational_dimension(arm, frame=1).dimension == 0
+    assert jacobian_rank(arm, [0.3], frame=1).rank == 0
+    # a point on its axis: position does not move at all, whatever rounding says
+    assert operational_dimension(arm).position_dimension == 0
+    assert operational_dimension(arm).orientation_dimension == 1
+
+
+def test_nearly_parallel_joints_show_in_the_gap():
+    rows = [{"sigma": 0}, {"sigma": 0, "d": 0.4}, {"sigma": 0, "d": 0.3, "alpha": 1e-7}]
+    arm = rm.RobotModel.from_table(rm.DHTable.from_rows(rows), tool=se3.translation(0.2, 0, 0))
+    found = operational_dimension(arm)
+    assert found.dimension == 3
+    four = rm.DHTable.from_rows([*rows, {"sigma": 0, "d": 0.2}])
+    near = operational_dimension(rm.RobotModel.from_table(four))
+    assert near.dimension == 4
+    assert 1e-10 < near.singular_values[3] < 1e-6
+    coarse = operational_dimension(rm.RobotModel.from_table(four), tolerance=1e-5)
+    assert coarse.dimension == 3
+    assert 1e4 < coarse.gap < np.inf
+
+
+def test_characteristic_length():
+    assert characteristic_length(rm.load("rx90")) == 0.9
+    assert characteristic_length(rm.load("planar_3r")) == 3.0
+    assert characteristic_length(rm.load("gantry")) == 1.0  # no axis is at a distance
+    limited = rm.load("rx90")
+    free = limited.with_table(limited.table.replace(lower=[-9.0] * 6, upper=[9.0] * 6))
+    assert characteristic_length(free) == characteristic_length(limited)
+
+
+def test_sparse_basis_depends_on_the_space_alone():
+    rng = np.random.default_rng(0)
+    space = np.zeros((2, 7))
+    space[0, [2, 4]] = 1.0, -1.0
+    space[1, [0, 1, 3, 5]] = 0.3, 0.5, 1.0, -0.4
+    for _ in range(20):
+        found = sparse_basis(rng.normal(size=(2, 2)) @ space)
+        order = np.argsort((found != 0.0).sum(axis=1))
+        np.testing.assert_allclose(found[order], space, atol=1e-12)
+    wide = np.linalg.qr(rng.normal(size=(20, 10)))[0].T  # too many choices to try them all
+    found = sparse_basis(wide)
+    assert (found == 0.0).sum() == 90
+    assert np.linalg.matrix_rank(np.vstack([found, wide])) == 10
+
+
+def test_mistakes_are_refused():
+    arm = rm.load("rx90")
+    q = np.zeros(6)
+    for bad in ([1, 1, 1], [0] * 6, [1, 1, 1, 1, 1, 2]):
+        with pytest.raises((InvalidValueError, ShapeError), match="mask"):
+            jacobian_rank(arm, q, mask=bad)
+    for word, value in (("length", 0.0), ("length", -1.0), ("tolerance", 0.0), ("length", np.nan)):
+        with pytest.raises(InvalidValueError, match=word):
+            jacobian_rank(arm, q, **{word: value})
+    with pytest.raises(InvalidValueError, match="mask_axes"):
+        jacobian_rank(arm, q, mask_axes="base")
+    with pytest.raises(FrameNotFoundError):
+        jacobian_rank(arm, q, frame="nope")
+    with pytest.raises(ShapeError):
+        jacobian_rank(arm, np.zeros(5))
+    with pytest.raises(InvalidValueError, match="samples"):
+        operational_dimension(arm, samples=0)
+    with pytest.raises(InvalidValueError, match="rng"):
+        operational_dimension(arm, rng="seed")
+    with pytest.raises(InvalidValueError, match="model"):
+        operational_dimension("rx90")
