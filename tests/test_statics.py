@@ -156,8 +156,10 @@ def test_no_joint_at_all():
     assert (found.undetermined == 6).all()
     assert (found.status == StaticStatus.UNDETERMINED).all()
     assert not found.wrench.any()
-    L = found.directions[0] / [1, 1, 1, 0.2, 0.2, 0.2]
-    close(L @ L.T, np.eye(6), 1e-14)
+    close(found.directions[0] @ found.directions[0].T, np.eye(6), 1e-14)  # a length of 1 m
+    found = static_wrench(fixed, [], [], length=0.2)
+    unit = found.directions / [1, 1, 1, 0.2, 0.2, 0.2]
+    close(unit @ unit.T, np.eye(6), 1e-14)
 
 
 # ---------------------------------------------------------------- the inverse

@@ -88,7 +88,7 @@ def velocity_ellipsoid(
         without turning, or turns about its origin.
     length : float, optional
         Metres that make linear velocities comparable with angular ones; it serves to tell a small
-        radius from a zero only. Default the characteristic length of the robot.
+        radius from a zero only. Default the size of the robot, from its table.
     tolerance : float
         Radii below this part of the size of the Jacobian, ``[J_v; length J_w] S`` for the linear
         part, are zero.

@@ -13,8 +13,9 @@ from .._arrays import Array, as_exact, as_vector, batch_shape, read_only
 from ..errors import InvalidValueError, ShapeError
 from ..geometry import PRISMATIC
 from ..model import RobotModel, check_model
-from ..visual import characteristic_length
+from ..visual import characteristic_length as table_length
 from .jacobians import Reference, jacobian
+from .singular_task import characteristic_length
 from .statics import weight_torque
 
 _EPS = float(np.finfo(np.float64).eps)
@@ -31,30 +32,22 @@ class StaticStatus(IntEnum):
     Examples
     --------
     >>> StaticStatus(2).sentence
-    'No wrench balances the torques: the residual would move the robot while its tool rests.'
+    'No wrench balances the torques: the residual would move joints while the tool rests.'
     """
 
     sentence: str
 
     DETERMINED = 0, "One wrench balances the torques."
     UNDETERMINED = (
-        1,
-        (
-            "Many wrenches balance the torques: what is along the undetermined directions is carried "
-            "by the structure. The smallest is given."
-        ),
-    )
+        1, "Many wrenches balance the torques, as the structure carries some alone; the smallest.",
+    )  # fmt: skip
     UNBALANCED = (
-        2,
-        ("No wrench balances the torques: the residual would move the robot while its tool rests."),
-    )
+        2, "No wrench balances the torques: the residual would move joints while the tool rests.",
+    )  # fmt: skip
     UNBALANCED_UNDETERMINED = (
-        3,
-        (
-            "No wrench balances the torques: the residual would move the robot while its tool rests. "
-            "Many balance the others; the smallest is given."
-        ),
-    )
+        3, "No wrench balances the residual, which would move joints while the tool rests; many "
+        "balance the other torques, as the structure carries some alone; the smallest.",
+    )  # fmt: skip
 
     def __new__(cls, value: int, sentence: str = "") -> Self:
         """Attach the sentence to the number."""
@@ -160,7 +153,7 @@ def static_wrench(
     length : float, optional
         Metres that make forces comparable with moments, ``[f; m / length]``, and forces of
         prismatic joints with torques: they decide which wrench is the smallest. Default the
-        characteristic length of the robot.
+        reach of the frame, `characteristic_length`, as in `jacobian_rank`.
     tolerance : float
         Singular values of the dimensionless Jacobian below this part of the largest count as
         zero; a residual below this part of the torques, or what rounding leaves, as balanced.
@@ -198,7 +191,7 @@ def static_wrench(
     n = model.n
     q, tau = as_vector(q, n, "q"), as_vector(tau, n, "tau")
     batch = batch_shape((q, tau), ("q", "tau"))
-    L = positive_length(model, length)
+    L = characteristic_length(model, frame) if length is None else positive_length(model, length)
     threshold = as_tolerance(tolerance)
     weight = weight_torque(model, q) if gravity else np.zeros(n)
     # All in N m: joint forces times the length, forces times the length
@@ -239,7 +232,8 @@ def positive_length(model: RobotModel, length: float | None) -> float:
     model : RobotModel
         The robot.
     length : float or None
-        What the caller passed; None is the characteristic length of the robot.
+        What the caller passed; None is the longest branch of the table with tool and strokes,
+        which is enough to tell small from zero.
 
     Returns
     -------
@@ -259,7 +253,7 @@ def positive_length(model: RobotModel, length: float | None) -> float:
     0.3
     """
     if length is None:
-        return characteristic_length(model.table, model.tool)
+        return table_length(model.table, model.tool)
     value = float(as_exact(length, (), "length"))
     if value <= 0:
         raise InvalidValueError(f"length: expected metres above 0, got {value:g}.")
