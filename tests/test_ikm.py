@@ -984,6 +984,7 @@ def test_mistakes_are_named():
         (lambda: ikm(model, q, x, secondary=[0.0] * 5), ShapeError, "secondary"),
         (lambda: ikm(model, q[:6], x, secondary=Short()), ShapeError, "gradient"),
         (lambda: ikm(model, q, x, secondary="z"), InvalidValueError, "secondary"),
+        (lambda: ikm(model, q, x, secondary=Short), InvalidValueError, "parentheses"),
         (lambda: ikm(model, q, x, tasks=[1.0]), InvalidValueError, "tasks"),
         (lambda: ikm(model, q, x, augmented=[JointTask]), InvalidValueError, "augmented"),
         (lambda: ikm(model, q, x, limits=3.0), InvalidValueError, "limits"),

@@ -82,10 +82,11 @@ def orthogonal_rows(B: Floats, p: int, d: int, w: int, lengths: Floats) -> None:
                 if abs(inner) <= _EPS * sqrt(a) * sqrt(b):
                     continue
                 turned = True
-                ratio = (b - a) / (2.0 * inner)
-                if abs(ratio) > 1e150:
-                    tangent = 0.5 / ratio
+                if abs(b - a) > 2e9 * abs(inner):
+                    # the limit of the formula, without its overflow
+                    tangent = inner / (b - a)
                 else:
+                    ratio = (b - a) / (2.0 * inner)
                     tangent = 1.0 / (abs(ratio) + sqrt(1.0 + ratio * ratio))
                     if ratio < 0.0:
                         tangent = -tangent

@@ -25,6 +25,9 @@ from .status import IKMStatus
 _KEPT = 1.0 - 1e-9
 """Scale of the twist below which limits have slowed it, but for rounding."""
 
+_MOST_ROWS = 127
+"""What an int8 can count."""
+
 
 def solved_by_levels(
     model: RobotModel,
@@ -94,6 +97,11 @@ def solved_by_levels(
     augmented = [_level(model, q, v, task, "augmented") for task in request.augmented]
     lower = [_level(model, q, v, task, "tasks") for task in request.tasks]
     first = stacked([main, *augmented])
+    if min(first.m, model.n) > _MOST_ROWS:
+        raise InvalidValueError(
+            f"augmented: expected at most {_MOST_ROWS} rows together with the twist, got "
+            f"{first.m}; give some of them as tasks of lower priority."
+        )
     found = level_velocities(
         [first, *lower],
         None if extra is None else _rows(extra),

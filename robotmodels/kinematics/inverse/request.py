@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..._arrays import Array, as_vector, batch_shape
+from ...errors import InvalidValueError
 from ...model import RobotModel
 
 if TYPE_CHECKING:
@@ -116,6 +117,11 @@ def secondary_motion(model: RobotModel, q: Array, secondary: Secondary) -> Array
     >>> secondary_motion(load("lab_rr"), np.zeros(2), [0.1, 0.2])
     array([0.1, 0.2])
     """
+    if isinstance(secondary, type):
+        raise InvalidValueError(
+            f"secondary: expected an array or a criterion, got the class {secondary.__name__}; a "
+            f"class needs its parentheses, {secondary.__name__}(...)."
+        )
     if isinstance(secondary, HasGradient):
         return as_vector(secondary.gradient(model, q), model.n, "secondary.gradient(model, q)")
     if isinstance(secondary, (list, tuple)) and any(isinstance(s, HasGradient) for s in secondary):
