@@ -358,6 +358,51 @@ def test_circles(rng):
         circle(np.eye(4), [0, 0, 1], [0, 0, 1], duration=1.0)
 
 
+@pytest.mark.parametrize("law", TimeLaw)
+def test_circles_use_their_limits_in_full(law, rng):
+    """The lengths of the vectors are sampled; no other shape of the law is quicker."""
+    jumps = law in (TimeLaw.LINEAR, TimeLaw.BANG_BANG, TimeLaw.TRAPEZOIDAL)
+    for radius in (0.1, 2.0):
+        V, A, J = rng.uniform(0.3, 1.5), rng.uniform(1.0, 4.0), rng.uniform(10.0, 60.0)
+        limits = MotionLimits([V, 4.0], [A, 9.0], np.inf if jumps else [J, 90.0])
+        start = random_pose(rng)
+        start[:3, 3] = [radius, 0.0, 0.0]
+        move = circle(start, [0, 0, 0.2], [0, 0, 1.0], 2.5, limits=limits, law=law, turning=True)
+        T, motion = move.duration, move.law.motion
+        t = np.unique(np.concatenate((np.linspace(0.0, T, 20001), motion.breaks[0])))
+        eps = 1e-12 * T
+        t = np.clip(np.concatenate((t - eps, t + eps)), 0.0, T)  # both sides of jumps
+        s = move.law.at(t)
+        L, r = 2.5 * radius, radius
+        v, a, j = (np.linalg.norm(x, axis=-1) for x in (
+            move.twist(t)[:, :3], move.acceleration(t)[:, :3],
+            np.stack((L * s.jerk - (L * s.v) ** 3 / r**2, 3 * L * L * s.v * s.a / r), axis=-1),
+        ))  # fmt: skip
+        shares = [v.max() / V, 2.5 * np.abs(s.v).max() / 4.0, a.max() / A]
+        shares += [2.5 * np.abs(s.a).max() / 9.0] if law is not TimeLaw.LINEAR else []
+        shares += [] if jumps else [j.max() / J, 2.5 * np.abs(s.jerk).max() / 90.0]
+        assert max(shares) <= 1.0 + 1e-12
+        assert max(shares) > 1.0 - 1e-6
+        with pytest.raises(InvalidValueError, match="least is"):
+            circle(start, [0, 0, 0.2], [0, 0, 1.0], 2.5, 0.99 * T, limits, law, turning=True)
+        slow = circle(start, [0, 0, 0.2], [0, 0, 1.0], 2.5, 2.0 * T, limits, law, turning=True)
+        assert slow.duration == 2.0 * T
+
+
+def test_trapezoid_on_a_circle_is_the_quickest(rng):
+    """A scan of cruise velocities, each with the acceleration that is left beside the centre's."""
+    for _ in range(20):
+        r, A, angle = rng.uniform(0.1, 2.0), rng.uniform(1.0, 4.0), rng.uniform(0.3, 6.0)
+        L, V = r * angle, rng.uniform(0.3, 3.0)
+        limits = MotionLimits([V, np.inf], [A, np.inf])
+        T = circle(se3.translation(r, 0, 0), [0, 0, 0], [0, 0, 1], angle, limits=limits).duration
+        v = np.linspace(0.0, min(V, np.sqrt(A * r)), 20002)[1:-1]
+        along = np.sqrt(A * A - (v * v / r) ** 2)
+        times = np.where(v * v / along <= L, L / v + v / along, np.inf)
+        assert T <= times.min() * (1.0 + 1e-12)
+        assert T >= times.min() / 1.001
+
+
 @pytest.mark.parametrize("smooth", [False, True])
 def test_blended_poses(smooth, rng):
     for _ in range(6):

@@ -2,7 +2,7 @@
 
 Seed book section 4.3. Limits are those of two quantities: translation in m, then rotation in rad,
 for instance ``MotionLimits(velocity=[0.5, 1.0], acceleration=[2.0, 4.0])``; they bound the lengths
-of the vectors of velocity and acceleration.
+of the vectors of velocity, acceleration and jerk.
 """
 
 from __future__ import annotations
@@ -15,13 +15,14 @@ from numpy.typing import ArrayLike
 from .. import se3
 from .._arrays import Array, as_exact, as_floats
 from ..errors import InvalidValueError, ShapeError
-from .asked import ROUNDING, given_durations, limits_along
+from .asked import ROUNDING, given_durations, limits_along, refuse_short
 from .blends import PARABOLA, QUARTIC, schedule
+from .circle_timing import CircleLimits, circle_law
 from .laws import TimeLaw
 from .limits import MotionLimits
 from .paths import BlendedPoses, FixedAxisPath, arc, line
 from .piecewise import PiecewisePolynomial
-from .point_to_point import along_line
+from .point_to_point import Synchronisation, along_line, assembled, stretched
 from .pose_trajectory import PoseTrajectory
 from .rotations import rotation_about, rotation_vector
 from .trajectory import Trajectory
@@ -164,9 +165,9 @@ def circle(
     duration : float, optional
         Seconds; default the least that the limits allow.
     limits : MotionLimits, optional
-        Of translation and rotation. The acceleration is that along the circle and that towards
-        its centre together: the velocity is held down where the latter would take more than half
-        of its square.
+        Of translation and rotation. Those of acceleration and jerk bound what is along the circle
+        and what is towards its centre together; the motion is the quickest of its law that keeps
+        them.
     law : TimeLaw
         How the motion is distributed over the time.
     turning : bool
@@ -300,28 +301,34 @@ def _timed(
     of_s = None
     if bounds is not None:
         V, A, B, J, K, _ = limits_along(bounds, size[None, None, :])
-        if path.radius > 0.0 and np.isfinite(bounds.acceleration[0]):
-            V, A, B = _held_down(path, float(bounds.acceleration[0]), float(V[0]), A[0], B[0])
         of_s = MotionLimits(
-            velocity=V,
-            acceleration=A,
-            jerk=J,
-            velocity_lower=-V,
-            acceleration_lower=-B,
-            jerk_lower=-K,
-        )
-    goal = 1.0 if size.any() else 0.0
-    moves = along_line(law, np.zeros(1), np.array([goal]), duration, of_s)
+            velocity=V, acceleration=A, jerk=J,
+            velocity_lower=-V, acceleration_lower=-B, jerk_lower=-K,
+        )  # fmt: skip
+    goal = np.ones(1) if size.any() else np.zeros(1)
+    if (
+        bounds is not None
+        and path.radius > 0.0
+        and np.isfinite([bounds.acceleration[0], bounds.jerk[0]]).any()
+    ):
+        along_line(law, np.zeros(1), goal, None, of_s)  # what the law needs of the limits
+        T = given_durations(duration, ())
+        pieces = circle_law(law, _of_circle(path, bounds))
+        least = pieces.durations.sum(axis=-1)
+        refuse_short(T, least, np.ones((1, 1)))
+        pieces = stretched(pieces, T, least, Synchronisation.COORDINATED, 1)
+        moves = assembled(pieces, 1, np.zeros((1, 1)), np.ones((1, 1, 1)), (), True, T)
+    else:
+        moves = along_line(law, np.zeros(1), goal, duration, of_s)
     return PoseTrajectory(path, Trajectory(moves.motion, scalar=True))
 
 
-def _held_down(path: FixedAxisPath, most: float, V: float, A: float, B: float) -> Any:
-    """Limits of s on a circle: the acceleration towards the centre takes its part."""
-    length, r = path.length, path.radius
-    V = min(V, float(np.sqrt(most * r * np.sqrt(0.5))) / length)
-    inwards = (V * length) ** 2 / r
-    along = float(np.sqrt(most * most - inwards * inwards)) / length
-    return np.array([V]), np.array([min(A, along)]), np.array([min(B, along)])
+def _of_circle(path: FixedAxisPath, limits: MotionLimits) -> CircleLimits:
+    V, A, J = (
+        (float(bound[0]), float(bound[1]))
+        for bound in (limits.velocity, limits.acceleration, limits.jerk)
+    )
+    return CircleLimits(path.length, path.radius, abs(path.turn), V, A, J)
 
 
 def _of_space(limits: MotionLimits | None) -> MotionLimits | None:

@@ -173,7 +173,7 @@ def law_of_duration(law: TimeLaw, distance: Array, duration: Array) -> Pieces:
         return Pieces(T[:, None], L[:, None, None] * np.array([[_POLYNOMIALS[law]]]))
     phase = 0.5 if law is TimeLaw.BANG_BANG else _PHASE
     part = np.full(L.shape, phase)
-    return _ramped(law, L, L / (1.0 - phase), T, part, part)
+    return ramped(law, L, L / (1.0 - phase), T, part, part)
 
 
 _POLYNOMIALS = {
@@ -204,7 +204,7 @@ def _quickest(law: TimeLaw, L: Array, V: Array, A: Array, B: Array, J: Array, K:
         T = np.maximum(2.0 * L / V, np.sqrt(2.0 * L * (up + down)))
         both = np.where(up + down > 0.0, up + down, 1.0)
         share = np.where(up + down > 0.0, up / both, 0.5)
-        return _ramped(law, L, 2.0 * L, T, share, 1.0 - share)
+        return ramped(law, L, 2.0 * L, T, share, 1.0 - share)
     V, up, down = _fastest(law, L, V, A, B, np.minimum(J, K))
     ramps = up + down
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -216,8 +216,23 @@ def _quickest(law: TimeLaw, L: Array, V: Array, A: Array, B: Array, J: Array, K:
     return _three_phases(law, L, V, up, cruise, down)
 
 
-def _ramped(law: TimeLaw, L: Array, VT: Array, T: Array, up: Array, down: Array) -> Pieces:
-    """Ramps that take given parts of the duration; ``VT`` is the cruise velocity times it."""
+def ramped(law: TimeLaw, L: Array, VT: Array, T: Array, up: Array, down: Array) -> Pieces:
+    """Trapezoidal laws whose ramps take given parts of the duration.
+
+    Parameters
+    ----------
+    law : TimeLaw
+        Whether the ramps are smooth.
+    L, VT, T : ndarray, shape (R,)
+        Distances, cruise velocities times durations, durations.
+    up, down : ndarray, shape (R,)
+        Parts of the duration that the ramps take.
+
+    Returns
+    -------
+    Pieces
+        Of each row.
+    """
     pieces = _three_phases(law, L, VT, up, 1.0 - up - down, down)
     return Pieces(pieces.durations * T[:, None], pieces.coefficients)
 

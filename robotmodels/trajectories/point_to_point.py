@@ -291,14 +291,33 @@ def along_line(
         totals = pieces.durations.sum(axis=-1).reshape(R, laws)
         least = totals.max(axis=-1, initial=0.0)
     refuse_short(T, least, length.reshape(R, laws))
-    pieces = _timed(pieces, T, least, synchronisation, laws)
-    return _assembled(pieces, laws, start, direction, batch, scalar, T)
+    pieces = stretched(pieces, T, least, synchronisation, laws)
+    return assembled(pieces, laws, start, direction, batch, scalar, T)
 
 
-def _timed(
+def stretched(
     pieces: Pieces, T: Array | None, least: Array, how: Synchronisation, laws: int
 ) -> Pieces:
-    """Stretch the laws of each motion to its duration, and let those that arrive early wait."""
+    """Stretch the laws of each motion to its duration, and let those that arrive early wait.
+
+    Parameters
+    ----------
+    pieces : Pieces
+        Of all laws.
+    T : ndarray, shape (R,), or None
+        Durations asked for, s.
+    least : ndarray, shape (R,)
+        Least durations of the motions, s.
+    how : Synchronisation
+        Whether the laws end together.
+    laws : int
+        How many each motion has.
+
+    Returns
+    -------
+    Pieces
+        With a piece more where a law waits.
+    """
     total = pieces.durations.sum(axis=-1)
     goal = np.repeat(least if T is None else T, laws)
     if T is None and how is Synchronisation.INDEPENDENT:
@@ -318,10 +337,34 @@ def _timed(
     )
 
 
-def _assembled(
+def assembled(
     pieces: Pieces, columns: int, start: Array, direction: Array, batch: tuple[int, ...],
     scalar: bool, T: Array | None,
 ) -> Trajectory:  # fmt: skip
+    """The trajectory of laws along directions.
+
+    Parameters
+    ----------
+    pieces : Pieces
+        Of ``columns`` laws of each motion.
+    columns : int
+        1, or one for each joint.
+    start : ndarray, shape (R, n)
+        Where the motions begin, rad or m.
+    direction : ndarray, shape (R, 1, n) or (R, n, 1)
+        Motion of the joints per unit of the law.
+    batch : tuple of int
+        Leading axes.
+    scalar : bool
+        Whether positions are numbers.
+    T : ndarray, shape (R,), or None
+        Durations that were asked for, s.
+
+    Returns
+    -------
+    Trajectory
+        Of n joints.
+    """
     R, n = start.shape
     K, powers = pieces.coefficients.shape[1:]
     breaks = np.zeros((R, columns, K + 1))

@@ -105,7 +105,26 @@ def seven_phases(L: Array, V: Array, A: Array, B: Array, J: Array, K: Array) -> 
         none = cruise <= 1e-14 * (first.time + last.time)
         # without a cruise the ramps alone cover the distance, to the last digit
         V = np.where(none & (ramps > 0.0), V * (L / ramps), V)
-    cruise = np.where(none, 0.0, cruise)
+    return phases(L, V, first, np.where(none, 0.0, cruise), last)
+
+
+def phases(L: Array, V: Array, first: Ramp, cruise: Array, last: Ramp) -> tuple[Array, Array]:
+    """Durations and coefficients of the phases of two ramps and the cruise between them.
+
+    Parameters
+    ----------
+    L, V : ndarray, shape (R,)
+        Distances and velocities of the cruise.
+    first, last : Ramp
+        From rest, and, run backwards, to rest.
+    cruise : ndarray, shape (R,)
+        Seconds.
+
+    Returns
+    -------
+    durations, coefficients : ndarray, shapes (R, 7) and (R, 7, 4)
+        As `seven_phases`.
+    """
     h, c = np.zeros((L.size, 7)), np.zeros((L.size, 7, 4))
     h[:, :3] = np.stack((first.rise, first.level, first.fall), axis=-1)
     h[:, 3] = cruise
