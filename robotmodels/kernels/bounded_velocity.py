@@ -218,7 +218,7 @@ def nearest_inside(
                 if r[i] > 0.0 and press[i] < dual * r[i]:
                     dual, leaving = press[i] / r[i], i
             primal = inf
-            if square > _DEPENDENT * _DEPENDENT:
+            if k < f and square > _DEPENDENT * _DEPENDENT:
                 bound = upper[joint] if side > 0.0 else lower[joint]
                 primal = max(0.0, side * (v[joint] - bound)) / square
             step = min(dual, primal)
