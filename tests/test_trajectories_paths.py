@@ -395,12 +395,12 @@ def test_trapezoid_on_a_circle_is_the_quickest(rng):
         r, A, angle = rng.uniform(0.1, 2.0), rng.uniform(1.0, 4.0), rng.uniform(0.3, 6.0)
         L, V = r * angle, rng.uniform(0.3, 3.0)
         limits = MotionLimits([V, np.inf], [A, np.inf])
-        T = circle(se3.translation(r, 0, 0), [0, 0, 0], [0, 0, 1], angle, limits=limits).duration
+        move = circle(se3.translation(r, 0, 0), [0, 0, 0], [0, 0, 1], angle, limits=limits)
         v = np.linspace(0.0, min(V, np.sqrt(A * r)), 20002)[1:-1]
         along = np.sqrt(A * A - (v * v / r) ** 2)
         times = np.where(v * v / along <= L, L / v + v / along, np.inf)
-        assert T <= times.min() * (1.0 + 1e-12)
-        assert T >= times.min() / 1.001
+        assert move.duration <= times.min() * (1.0 + 1e-12)
+        assert move.duration >= times.min() / 1.001
 
 
 @pytest.mark.parametrize("smooth", [False, True])
