@@ -10,15 +10,17 @@ import matplotlib
 import matplotlib.style
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.text import Text
+from matplotlib.transforms import Bbox
 
 from robotmodels import se3
 from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.geometry import DHTable
 from robotmodels.kinematics import dgm, jacobian
-from robotmodels.kinematics.formulas.singularity_map import SingularityMap
+from robotmodels.kinematics.formulas.singularity_map import SingularityMap, singularity_map
 from robotmodels.kinematics.inverse.ikm import ikm
 from robotmodels.model import RobotModel
 from robotmodels.robots import load
@@ -40,7 +42,7 @@ from robotmodels.trajectories import (
     straight_line,
     trapezoidal,
 )
-from robotmodels.viz.figures import INK, Unit, joint_names, joint_units, line_style
+from robotmodels.viz.figures import line_style
 from robotmodels.viz.plot_inverse_velocities import plot_inverse_velocities
 from robotmodels.viz.plot_joint_motion import plot_joint_motion
 from robotmodels.viz.plot_joint_path import plot_joint_path
@@ -48,6 +50,7 @@ from robotmodels.viz.plot_pose_path import plot_pose_path
 from robotmodels.viz.plot_profiles import plot_profiles
 from robotmodels.viz.plot_singularities import plot_singularities
 from robotmodels.viz.plot_trajectory import plot_trajectory
+from robotmodels.viz.plot_units import Unit, joint_names, joint_units
 
 RX90 = load("rx90")
 H = np.pi / 2
@@ -162,7 +165,14 @@ def test_nothing_covers_anything_else(name):
     """Panels with their texts are apart from each other and from the legend, and on the page."""
     figure = FIGURES[name]()
     figure.draw_without_rendering()
-    boxes = [axes.get_tightbbox() for axes in figure.axes if axes.get_visible()]
+    renderer = FigureCanvasAgg(figure).get_renderer()
+    boxes = []
+    for axes in figure.axes:
+        if axes.name == "3d":  # its rectangle is larger than what is drawn
+            sides = (axes.xaxis, axes.yaxis, axes.zaxis)
+            boxes.append(Bbox.union([axis.get_tightbbox(renderer) for axis in sides]))
+        elif axes.get_visible():
+            boxes.append(axes.get_tightbbox())
     boxes += [each.get_window_extent() for each in figure.legends]
     slack = 2.0  # pixels: tick labels may reach a little over the end of their axis
     for box in boxes:
@@ -562,6 +572,11 @@ def test_pose_path_of_turns_on_the_spot_and_of_one_pose():
         (first,) = lines(axes, "tool x")
         assert np.linalg.norm(np.diff(first.get_data_3d(), axis=1)) == pytest.approx(0.1)
     bare = plot_pose_path(turn, frames=0)
+    line = straight_line(np.eye(4), se3.translation(0.2, 0.1, 0.0), duration=1.0).resample(
+        samples=5
+    )
+    drawn = lines(plot_pose_path(line).axes[0], "path")[0].get_data_3d()
+    np.testing.assert_array_equal(drawn, line.T[:, :3, 3].T)
     assert legend(bare) == ["path", "start", "end"]
     view = plot_pose_path(turn, view=(0.5, 0.25)).axes[0]
     assert np.radians([view.azim, view.elev]) == pytest.approx([0.5, 0.25])
@@ -619,6 +634,33 @@ def test_map_is_drawn_in_degrees_with_zero_in_the_middle():
     assert radians.get_xlim() == pytest.approx((-np.pi, np.pi))
 
 
+def test_the_bold_line_of_a_robot_is_where_it_is_singular():
+    q = np.array([0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
+    grid = singularity_map(RX90, ("joint_2", "joint_3"), at=q, samples=(80, 84))
+    axes = plot_singularities(grid, RX90).axes[0]
+    points = np.radians(contour_points(axes))
+    assert len(points) > 300
+    on_line = np.tile(q, (len(points), 1))
+    on_line[:, [1, 2]] = points
+    most = np.abs(grid.values).max()
+    assert np.abs(np.linalg.det(jacobian(RX90, on_line))).max() < 2e-3 * most
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("joint_2 (deg)", "joint_3 (deg)")
+
+
+def test_zeros_on_the_grid_cross_without_corners():
+    """Lines of zeros through values that are zero themselves, at one of them and beside one."""
+    for na in (20, 21):
+        a, b = np.linspace(-1.0, 1.0, na), np.linspace(-1.0, 1.0, 21)
+        x, y = np.radians(
+            contour_points(plot_singularities(wrist_map(np.outer(a, b), a, b)).axes[0])
+        ).T
+        assert np.minimum(np.abs(x), np.abs(y)).max() < 1e-6
+        for along, across in ((x, y), (y, x)):
+            at = np.sort(along[np.abs(across) < 1e-6])
+            assert at[[0, -1]] == pytest.approx([-1.0, 1.0])
+            assert np.diff(at).max() < 0.11
+
+
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_zeros_that_are_touched_are_drawn_as_well(sign):
     a, b = np.linspace(-1.0, 1.0, 21), np.linspace(0.0, 0.5, 11)
@@ -629,6 +671,16 @@ def test_zeros_that_are_touched_are_drawn_as_well(sign):
     assert np.ptp(points[:, 1]) == pytest.approx(0.5)
     assert figure.axes[0].get_ylabel() == "wrist (m)"
     assert figure.axes[1].get_ylabel() == "value"
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_zeros_at_the_end_of_a_map_are_drawn(sign):
+    a, b = np.linspace(0.0, 1.0, 21), np.linspace(0.0, 0.5, 11)
+    points = contour_points(
+        plot_singularities(wrist_map(sign * (a[:, None] + 0 * b), a, b)).axes[0]
+    )
+    np.testing.assert_allclose(points[:, 0], 0.0, atol=1e-9)
+    assert np.radians(np.ptp(points[:, 1])) == pytest.approx(0.5)
 
 
 def test_maps_without_zeros_zero_everywhere_and_with_gaps():
@@ -843,7 +895,3 @@ def test_joint_motion_refuses_what_does_not_fit():
         plot_joint_motion(SCARA, t, np.full((5, 3), np.inf))
     with pytest.raises(InvalidValueError, match="columns"):
         plot_joint_motion(SCARA, t, q, columns=1.5)
-
-
-def test_ink_is_dark():
-    assert sum(INK[:3]) < 0.5

@@ -1,9 +1,8 @@
-"""What the Matplotlib figures share: units, styles of lines, panels, legends beside the data."""
+"""What the Matplotlib figures share: sizes, styles of lines, panels, legends beside the data."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from enum import Enum
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -12,8 +11,6 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_exact
 from ..errors import InvalidValueError, MissingExtraError, ShapeError
-from ..geometry import PRISMATIC
-from ..model import RobotModel
 from ..visual import Color
 from .palette import PALETTE
 
@@ -44,45 +41,6 @@ _DASHES = (
 )  # fmt: skip
 
 
-class Unit(Enum):
-    """Units of a joint in a figure; data are in SI units and radians always.
-
-    Examples
-    --------
-    >>> Unit.DEGREE.of(2), round(Unit.DEGREE.factor, 3)
-    ('deg/s²', 57.296)
-    """
-
-    RADIAN = "rad"
-    DEGREE = "deg"
-    METRE = "m"
-    MILLIMETRE = "mm"
-    NONE = "1"
-    UNSTATED = "rad or m"
-
-    @property
-    def factor(self) -> float:
-        """What a value in SI units is multiplied by."""
-        factors = {Unit.DEGREE: 180.0 / np.pi, Unit.MILLIMETRE: 1e3}
-        return factors.get(self, 1.0)
-
-    def of(self, order: int) -> str:
-        """Unit of a derivative by time.
-
-        Parameters
-        ----------
-        order : int
-            0 position, 1 velocity, to 3 jerk.
-
-        Returns
-        -------
-        str
-            Such as ``rad/s²``.
-        """
-        per = ("", "/s", "/s²", "/s³")[order]
-        return " or ".join(part + per for part in self.value.split(" or "))
-
-
 class LineStyle(NamedTuple):
     """How one of several lines looks: told apart without colours too."""
 
@@ -111,127 +69,6 @@ def line_style(k: int) -> LineStyle:
     hues = len(_ORDER)
     color = PALETTE[_ORDER[k % hues] + hues * (k // hues % 2)]
     return LineStyle(color, _DASHES[k % len(_DASHES)])
-
-
-def joint_names(names: Sequence[str] | None, n: int, model: RobotModel | None = None) -> list[str]:
-    """Names of joints for a legend.
-
-    Parameters
-    ----------
-    names : sequence of str, length n, or None
-        As given by the caller.
-    n : int
-        Number of joints.
-    model : RobotModel, optional
-        Whose names are used otherwise.
-
-    Returns
-    -------
-    list of str
-        Without names and model ``joint 1`` to ``joint n``.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Not one text for each joint; a model of another number of joints.
-
-    Examples
-    --------
-    >>> joint_names(None, 2)
-    ['joint 1', 'joint 2']
-    """
-    if model is not None:
-        _check_model(model, n)
-    if names is not None:
-        return texts(names, n, "names", "joints")
-    if model is None:
-        return [f"joint {j + 1}" for j in range(n)]
-    return [str(model.table.names[row]) for row in model.table.joint_rows]
-
-
-def joint_units(
-    units: Unit | str | Sequence[Unit | str] | None,
-    n: int,
-    model: RobotModel | None = None,
-) -> list[Unit]:
-    """Units of joints for their axes.
-
-    Parameters
-    ----------
-    units : Unit or str, or sequence of them, length n, or None
-        As given by the caller, also by their symbols; one stands for all joints.
-    n : int
-        Number of joints.
-    model : RobotModel, optional
-        Whose joint types tell them otherwise: rad or m.
-
-    Returns
-    -------
-    list of Unit
-        Without units and model `Unit.UNSTATED`.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        An unknown unit; not one for each joint; degrees for a prismatic joint of the model or
-        metres for a revolute one; a model of another number of joints.
-
-    Examples
-    --------
-    >>> joint_units(["deg", "mm"], 2)
-    [<Unit.DEGREE: 'deg'>, <Unit.MILLIMETRE: 'mm'>]
-    """
-    lengths = None
-    if model is not None:
-        _check_model(model, n)
-        lengths = model.table.sigma[model.table.joint_rows] == PRISMATIC
-    if units is None:
-        if lengths is None:
-            return [Unit.UNSTATED] * n
-        return [Unit.METRE if long else Unit.RADIAN for long in lengths]
-    if isinstance(units, (Unit, str)):
-        given = [as_unit(units)] * n
-    else:
-        given = [as_unit(unit) for unit in units]
-    if len(given) != n:
-        raise ShapeError(f"units: expected one for each of the {n} joints, got {len(given)}.")
-    for j, unit in enumerate(given):
-        wrong = (Unit.RADIAN, Unit.DEGREE) if lengths is not None and lengths[j] else (
-            Unit.METRE, Unit.MILLIMETRE)  # fmt: skip
-        if lengths is not None and unit in wrong:
-            kind = "prismatic" if lengths[j] else "revolute"
-            raise InvalidValueError(f"units: joint {j + 1} is {kind}, got {unit.value!r}.")
-    return given
-
-
-def as_unit(unit: Unit | str) -> Unit:
-    """A unit from itself or its symbol.
-
-    Parameters
-    ----------
-    unit : Unit or str
-        As given by the caller.
-
-    Returns
-    -------
-    Unit
-        The unit.
-
-    Raises
-    ------
-    InvalidValueError
-        No unit of a joint.
-
-    Examples
-    --------
-    >>> as_unit("mm")
-    <Unit.MILLIMETRE: 'mm'>
-    """
-    try:
-        return Unit(unit)
-    except ValueError:
-        known = ", ".join(repr(each.value) for each in Unit)
-        raise InvalidValueError(f"units: expected one of {known}, got {unit!r}.") from None
 
 
 def texts(values: Any, count: int, name: str, of: str) -> list[str]:
@@ -477,10 +314,3 @@ def limit_lines(
                     zorder=1.5,
                     label=f"_{side} limit of {' and '.join(names) if common else names[j]}",
                 )
-
-
-def _check_model(model: Any, n: int) -> None:
-    if not isinstance(model, RobotModel):
-        raise InvalidValueError(f"model: expected a RobotModel, got {type(model).__name__}.")
-    if model.n != n:
-        raise ShapeError(f"model: expected a robot of {n} joints, got {model.name!r} of {model.n}.")

@@ -19,11 +19,7 @@ from .figures import (
     INK,
     PAGE,
     LineStyle,
-    Unit,
-    as_unit,
     heading,
-    joint_names,
-    joint_units,
     legend_above,
     limit_lines,
     line_style,
@@ -33,6 +29,7 @@ from .figures import (
     wrapped,
 )
 from .plot_trajectory import as_limits, draw_line, limit_handles
+from .plot_units import Unit, as_unit, joint_names, joint_units
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

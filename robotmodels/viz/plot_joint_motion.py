@@ -19,15 +19,13 @@ from .figures import (
     LIMIT_WIDTH,
     PAGE,
     SMALL_SIZE,
-    Unit,
-    joint_names,
-    joint_units,
     legend_above,
     line_style,
     new_figure,
     panels,
 )
 from .plot_trajectory import draw_line
+from .plot_units import Unit, joint_names, joint_units
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

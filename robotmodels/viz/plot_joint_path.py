@@ -15,22 +15,11 @@ from ..trajectories.joint_path import JointPath
 from ..trajectories.limits import MotionLimits
 from ..trajectories.path_events import PathEvent, PathEventKind
 from ..visual import Color
-from .figures import (
-    COLUMN,
-    INK,
-    PAGE,
-    SMALL_SIZE,
-    Unit,
-    joint_names,
-    joint_units,
-    legend_above,
-    line_style,
-    new_figure,
-    panels,
-)
+from .figures import COLUMN, INK, PAGE, SMALL_SIZE, legend_above, line_style, new_figure, panels
 from .palette import PALETTE
 from .plot_sampling import Drawn
 from .plot_trajectory import QUANTITIES, as_limits, draw_limits, draw_line, limit_handles
+from .plot_units import Unit, joint_names, joint_units
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

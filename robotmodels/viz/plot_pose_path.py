@@ -14,19 +14,9 @@ from ..errors import InvalidValueError, ShapeError
 from ..trajectories.joint_path import JointPath
 from ..trajectories.pose_trajectory import PoseSamples, PoseTrajectory
 from ..visual import Color
-from .figures import (
-    COLUMN,
-    INK,
-    LABEL_SIZE,
-    LINE_WIDTH,
-    PALE,
-    SMALL_SIZE,
-    Unit,
-    as_unit,
-    legend_above,
-    new_figure,
-)
+from .figures import COLUMN, INK, LABEL_SIZE, LINE_WIDTH, PALE, SMALL_SIZE, legend_above, new_figure
 from .plot_joint_path import EVENT_STYLES
+from .plot_units import Unit, as_unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -213,22 +203,42 @@ def _fill(figure: Figure, axes: Any, edges: Array) -> None:
 
     The layout of Matplotlib does not know how far the texts of axes in space reach.
     """
-    figure.draw_without_rendering()
     figure.set_layout_engine("none")
+    figure.draw_without_rendering()
     width, height = figure.bbox.size
     top = min((legend.get_window_extent().y0 for legend in figure.legends), default=height)
     pad = 0.01 * width
+    room, middle = np.array((width, top)) - 2.0 * pad, 0.5 * np.array((width, top))
     zoom, shift = 1.0, np.zeros(2)
-    for _ in range(6):  # texts do not grow with the box
+    for _ in range(5):  # texts do not grow with the box
         axes.set_position((shift[0] / width, shift[1] / height, 1.0, top / height))
         axes.set_box_aspect(edges, zoom=zoom)
         figure.draw_without_rendering()
-        taken = axes.get_tightbbox()
-        fit = min((width - 2.0 * pad) / taken.width, (top - 2.0 * pad) / taken.height)
-        off = 0.5 * np.array((width, top)) - 0.5 * (taken.min + taken.max)
-        if abs(fit - 1.0) < 0.01 and np.abs(off).max() < pad:
+        low, high = _taken(axes)
+        fit, off = float((room / (high - low)).min()), middle - 0.5 * (low + high)
+        if 0.98 < fit < 1.02 and np.abs(off).max() < pad:
             break
-        zoom, shift = zoom * fit, shift + off
+        zoom, shift = zoom * fit, shift + fit * off
+    for artist in axes.get_children():
+        artist.set_clip_on(False)  # the box may stand a little outside of its rectangle
+
+
+def _taken(axes: Any) -> tuple[Array, Array]:
+    """Least and greatest pixels of the box and of the texts on it, as they were drawn last."""
+    from mpl_toolkits.mplot3d.proj3d import proj_transform
+
+    corners = np.array(np.meshgrid(axes.get_xlim(), axes.get_ylim(), axes.get_zlim()))
+    xs, ys, zs = corners.reshape(3, -1)
+    x, y, _ = proj_transform(xs, ys, zs, axes.get_proj())
+    points = [axes.transData.transform(np.column_stack((x, y)))]
+    for name in "xyz":
+        axis = getattr(axes, f"{name}axis")
+        start, stop = sorted(getattr(axes, f"get_{name}lim")())
+        # numbers of ticks beyond the ends of an axis are not drawn
+        ticks = [t.label1 for t in axis.get_major_ticks() if start <= t.get_loc() <= stop]
+        points += [text.get_window_extent().get_points() for text in (axis.label, *ticks)]
+    every = np.concatenate(points)
+    return every.min(axis=0), every.max(axis=0)
 
 
 def _style(axes: Any, unit: Unit, view: Array, edges: Array) -> None:

@@ -11,19 +11,7 @@ from numpy.typing import ArrayLike
 from ..errors import InvalidValueError
 from ..trajectories.limits import MotionLimits
 from ..trajectories.trajectory import Samples, Trajectory
-from .figures import (
-    COLUMN,
-    PAGE,
-    Unit,
-    as_unit,
-    heading,
-    joint_names,
-    legend_above,
-    line_style,
-    new_figure,
-    panels,
-    texts,
-)
+from .figures import COLUMN, PAGE, heading, legend_above, line_style, new_figure, panels, texts
 from .plot_sampling import drawn
 from .plot_trajectory import (
     QUANTITIES,
@@ -33,6 +21,7 @@ from .plot_trajectory import (
     draw_line,
     limit_handles,
 )
+from .plot_units import Unit, as_unit, joint_names
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -21,13 +21,12 @@ from .figures import (
     PAGE,
     PALE,
     SMALL_SIZE,
-    Unit,
-    as_unit,
     heading,
     legend_above,
     new_figure,
     panels,
 )
+from .plot_units import Unit, as_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,6 +34,7 @@ if TYPE_CHECKING:
 
 _COLORS = "PuOr"  # diverging, and told apart by colour-blind readers
 _EVERY = 10  # of the postures of a long path has a marker
+_ASIDE = 1e-9  # of a cell
 _ZERO = 1e-12  # beside the greatest value
 
 
@@ -150,15 +150,39 @@ def _map(figure: Figure, axes: Axes, grid: SingularityMap, degrees: bool) -> Non
     unit = grid.units[2].replace("^2", "²").replace("^3", "³")
     bar.set_label("value" if unit == "1" else f"value ({unit})", size=LABEL_SIZE, color=INK)
     if most == 0.0:
-        axes.text(0.5, 0.5, "zero everywhere:\nsingular in all\nof these postures", color=INK,
-                  transform=axes.transAxes, size=SMALL_SIZE, ha="center", va="center")  # fmt: skip
+        axes.text(
+            0.5, 0.5, "zero everywhere:\nsingular in all\nof these postures", color=INK,
+            transform=axes.transAxes, size=SMALL_SIZE, ha="center", va="center", zorder=5.0,
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.85},
+        )  # fmt: skip
         return
-    # zeros up to rounding are zeros; a line that values touch from above is found on the negative
-    z = np.ma.where(np.abs(z) <= _ZERO * most, 0.0, z)
-    for sign in (1.0, -1.0):
-        if (sign * z <= 0.0).any() and (sign * z > 0.0).any():
-            lines = axes.contour(x, y, sign * z, levels=[0.0], colors=[INK], linewidths=2.0)
+    for level in _crossings(np.where(np.abs(z) <= _ZERO * most, 0.0, z.filled(np.nan))):
+        if (level > 0.0).any() and (level <= 0.0).any():
+            level = np.ma.masked_invalid(level)
+            lines = axes.contour(x, y, level, levels=[0.0], colors=[INK], linewidths=2.0)
             lines.set_label("_zero")
+
+
+def _crossings(z: Array) -> list[Array]:
+    """Arrays whose contours at zero, from above, are the zeros of one with exact zeros.
+
+    A contour that meets values that are zero themselves turns its corners askew and sees zeros
+    from one side only. So a zero between values of different signs takes the side of a neighbour,
+    at a distance too small to be seen; those that are touched from below, or end the map, are
+    left to an array of their own with the sign changed.
+    """
+    z = z.copy()
+    for axis in (0, 1):
+        w = np.moveaxis(z, axis, 0)  # a view
+        here = (w[1:-1] == 0.0) & (w[:-2] * w[2:] < 0.0)
+        w[1:-1][here] = _ASIDE * w[2:][here]
+    left = np.pad(z == 0.0, 1)
+    below = np.pad(z < 0.0, 1)
+    rows, columns = z.shape
+    around = [(slice(i, i + rows), slice(j, j + columns)) for i in range(3) for j in range(3)]
+    touched = np.pad(left[1:-1, 1:-1] & np.any([below[part] for part in around], axis=0), 1)
+    near = np.any([touched[part] for part in around], axis=0)
+    return [z, np.where(near, -z, np.nan)]
 
 
 def _ticks(axis: Any, unit: str) -> None:

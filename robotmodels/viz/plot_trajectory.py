@@ -22,9 +22,6 @@ from .figures import (
     LINE_WIDTH,
     PAGE,
     PALE,
-    Unit,
-    joint_names,
-    joint_units,
     legend_above,
     limit_lines,
     line_style,
@@ -32,6 +29,7 @@ from .figures import (
     panels,
 )
 from .plot_sampling import Drawn, drawn
+from .plot_units import Unit, joint_names, joint_units
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
