@@ -1,0 +1,91 @@
+"""Inverse dynamic model, with everything that loads the joints."""
+
+from __future__ import annotations
+
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from .._arrays import Array, as_vector, batch_shape
+from ..friction import Friction, check_friction
+from ..model import RobotModel, check_model
+from .rigid import rigid_torques
+from .wrench import wrench_torque
+
+
+def idm(
+    model: RobotModel,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    wrench: ArrayLike | None = None,
+    drive: bool = True,
+    friction: Friction | None = None,
+) -> Array:
+    """Inverse dynamic model: joint torques of a motion.
+
+    Also called inverse dynamics, ``rnea``, ``rne``.
+
+    ``tau = M(q) a + C(q, v) v + g(q) + J^T wrench + Ia a + Fv v + Fc sign(v) + offset + friction``
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, n joints.
+    q, v, a : array_like, shape (..., n)
+        Joint variables (rad or m), velocities and accelerations; the leading axes broadcast.
+    wrench : array_like, shape (..., 6), optional
+        Force and moment ``[f; m]`` (N, N m) that the tool exerts on the environment, at the tool
+        point, in world axes.
+    drive : bool
+        Whether rotor inertia, friction and offsets of the model's drives are included.
+    friction : Friction, optional
+        A friction model that acts besides the Fv, Fc and offset of the drives, see
+        `robotmodels.friction`; ``model.with_drive(...)`` takes those away.
+
+    Returns
+    -------
+    ndarray, shape (..., n)
+        Torques (N m) or forces (N) in table order.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Arguments of the wrong length, or with NaN or infinity.
+
+    References
+    ----------
+    Seed book sections 1.5.1 (eq. of motion, friction, rotors, external forces) and 1.5.2.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from robotmodels.geometry import DHTable
+    >>> from robotmodels.inertia import InertialParameters
+    >>> link = InertialParameters.from_com([2.0], [[0.1, 0, 0]], [np.zeros((3, 3))])
+    >>> pendulum = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]), link,
+    ...                                  gravity=(0, -9.81, 0))
+    >>> idm(pendulum, [0.0], [0.0], [0.0])
+    array([1.962])
+    """
+    check_model(model)
+    n = model.n
+    q, v, a = as_vector(q, n, "q"), as_vector(v, n, "v"), as_vector(a, n, "a")
+    if wrench is not None:
+        wrench = as_vector(wrench, 6, "wrench")
+        batch_shape((q, v, a, wrench), ("q", "v", "a", "wrench"))
+    if friction is not None:
+        check_friction(friction, n)
+    twin = model.twin
+    if q.ndim == v.ndim == a.ndim == 1 and twin.serves_dynamics:
+        to_pin = twin.to_pin
+        rigid = pin.rnea(twin.model, twin.data(), to_pin(q), to_pin(v), to_pin(a))
+        tau = twin.from_pin(rigid)
+    else:
+        tau = rigid_torques(model, q, v, a)
+    if drive and (drives := model.drive_matrices) is not None:
+        tau = tau + drives.torque(v, a)
+    if wrench is not None:
+        tau = tau + wrench_torque(model, q, wrench)
+    if friction is not None:
+        tau = tau + friction.torque(v)
+    return tau
