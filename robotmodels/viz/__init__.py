@@ -1,9 +1,37 @@
-"""Pictures of robots: `show` and `animate` give a `Scene`, a meshcat page that needs no network."""
+"""Pictures of robots: `show` and `animate` give a `Scene`, `plot_*` a Matplotlib figure.
+
+A scene is a meshcat page that needs no network. Figures need the extra ``plots``; Matplotlib is
+imported when the first one is drawn.
+"""
 
 from .animate import animate
 from .camera import Camera
 from .motion import Motion
+from .plot_ellipsoids import plot_ellipsoids
+from .plot_inverse_velocities import plot_inverse_velocities
+from .plot_joint_motion import plot_joint_motion
+from .plot_joint_path import plot_joint_path
+from .plot_pose_path import plot_pose_path
+from .plot_profiles import plot_profiles
+from .plot_singularities import plot_singularities
+from .plot_trajectory import plot_trajectory
+from .plot_units import Unit
 from .scene import Scene
 from .show import show
 
-__all__ = ["Camera", "Motion", "Scene", "animate", "show"]
+__all__ = [
+    "Camera",
+    "Motion",
+    "Scene",
+    "Unit",
+    "animate",
+    "plot_ellipsoids",
+    "plot_inverse_velocities",
+    "plot_joint_motion",
+    "plot_joint_path",
+    "plot_pose_path",
+    "plot_profiles",
+    "plot_singularities",
+    "plot_trajectory",
+    "show",
+]
