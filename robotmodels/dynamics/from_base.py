@@ -1,0 +1,217 @@
+"""Inverse dynamics from base parameters alone, with the fewest operations."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .._arrays import Array, as_exact, as_vector, batch_rows, batch_shape
+from ..drive import DriveParameters, Transmission
+from ..errors import InvalidValueError
+from ..friction import Friction, check_friction
+from ..inertia import InertialParameters
+from ..model import RobotModel, check_model
+from .wrench import wrench_torque
+
+
+class Base(Protocol):
+    """What is asked of base parameters; `BaseParameters` has it."""
+
+    @property
+    def model(self) -> RobotModel:
+        """The robot they belong to."""
+        ...
+
+    @property
+    def drive(self) -> bool:
+        """Whether drive parameters are among them."""
+        ...
+
+    @property
+    def kept(self) -> NDArray[np.int64]:
+        """Numbers of the kept ones among the standard parameters."""
+        ...
+
+
+def base_model(model: RobotModel, base: Base, values: ArrayLike) -> RobotModel:
+    """The robot whose standard parameters are base parameters, and zero where none is kept.
+
+    It moves as the robot does: `idm`, `ddm`, `mass_matrix`, `coriolis_matrix` and
+    `gravity_torque`, with drives included, are the same. Its links are no real bodies (first
+    moments without mass), so nothing is to be read from one of them alone, and the rotors are
+    partly in the links: what ``drive=False`` leaves has no meaning of its own where the base
+    parameters include drives.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot; geometry, base, tool and gravity are taken from it.
+    base : BaseParameters
+        Which b parameters are kept.
+    values : array_like, shape (b,)
+        Their values, such as identified ones or ``base.values(model)``.
+
+    Returns
+    -------
+    RobotModel
+        A new model. Drive parameters are those of the model if there are none among the base ones.
+
+    Raises
+    ------
+    InvalidValueError
+        Base parameters of a robot of another structure; NaN or infinity.
+    ShapeError
+        Not one value for each base parameter.
+
+    References
+    ----------
+    Seed book section 1.5.3.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> from robotmodels.base_parameters import base_parameters
+    >>> arm = load("puma560")
+    >>> base = base_parameters(arm)
+    >>> base_model(arm, base, base.values(arm)).inertia.mass
+    array([0., 0., 0., 0., 0., 0.])
+    """
+    check_model(model)
+    b = as_exact(values, (len(base.kept),), "values")
+    other = base.model
+    if (
+        not np.array_equal(model.table.sigma, other.table.sigma)
+        or not np.array_equal(model.table.antecedent, other.table.antecedent)
+        or _coupled(model) != _coupled(other)
+    ):
+        raise InvalidValueError(
+            f"base: these are base parameters of {other.name!r}, whose frames or coupled motors "
+            f"are not those of {model.name!r}; ask for those of the model itself."
+        )
+    f, n = model.f, model.n
+    coupled = np.array(_coupled(model), dtype=np.int64) - 1
+    full = np.zeros(10 * f + (4 * n + 3 * coupled.size if base.drive else 0))
+    full[base.kept] = b
+    bodies = model.with_inertia(InertialParameters(full[: 10 * f].reshape(f, 10)))
+    if not base.drive:
+        return bodies
+    drives = full[10 * f : 10 * f + 4 * n].reshape(4, n)
+    bodies = bodies.with_drive(DriveParameters(*drives))
+    if coupled.size and (K := model.transmission) is not None:
+        terms = np.zeros((3, n))
+        terms[:, coupled] = full[10 * f + 4 * n :].reshape(3, coupled.size)
+        bodies = bodies.with_transmission(Transmission(K.matrix, K.offset, *terms))
+    return bodies
+
+
+def idm_from_base(
+    model: RobotModel,
+    base: Base,
+    values: ArrayLike,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    wrench: ArrayLike | None = None,
+    friction: Friction | None = None,
+) -> Array:
+    """Inverse dynamic model from base parameters alone: the torques of `idm`, drives included.
+
+    The recursion leaves out what zero parameters multiply, which most are in a base set.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, n joints; its own inertial parameters are not used.
+    base : BaseParameters
+        Which b parameters are kept.
+    values : array_like, shape (b,)
+        Their values. If there are no drive parameters among them, those of the model act.
+    q, v, a : array_like, shape (..., n)
+        Joint variables (rad or m), velocities and accelerations; the leading axes broadcast.
+    wrench : array_like, shape (..., 6), optional
+        What the tool exerts on the environment, see `idm`.
+    friction : Friction, optional
+        A friction model that acts besides the drives, see `idm`.
+
+    Returns
+    -------
+    ndarray, shape (..., n)
+        Torques (N m) or forces (N) in table order.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Arguments of the wrong length, or with NaN or infinity; base parameters of another robot.
+
+    References
+    ----------
+    Seed book section 1.5.3; W. Khalil and J.-F. Kleinfinger, "Minimum operations and minimum
+    parameters of the dynamic models of tree structure robots", IEEE J-RA 3(6), 1987.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> from robotmodels.base_parameters import base_parameters
+    >>> from robotmodels.dynamics import idm
+    >>> arm = load("puma560")
+    >>> base = base_parameters(arm)
+    >>> motion = np.ones((3, 6))
+    >>> tau = idm_from_base(arm, base, base.values(arm), *motion)
+    >>> bool(np.allclose(tau, idm(arm, *motion), rtol=1e-12))
+    True
+    """
+    robot = base_model(model, base, values)
+    n = model.n
+    q, v, a = as_vector(q, n, "q"), as_vector(v, n, "v"), as_vector(a, n, "a")
+    if wrench is not None:
+        wrench = as_vector(wrench, 6, "wrench")
+        batch_shape((q, v, a, wrench), ("q", "v", "a", "wrench"))
+    if friction is not None:
+        check_friction(friction, n)
+    from ..kernels.base_newton_euler import base_torques
+
+    batch, rows = batch_rows((q, v, a), ("q", "v", "a"))
+    tau = np.empty(rows[0].shape)
+    pi = robot.inertia.values
+    base_torques(*rows, *robot.chain, pi, robot.gravity, needed_parts(robot), tau)
+    tau = tau.reshape(*batch, n)
+    if (drives := robot.drive_matrices) is not None:
+        tau = tau + drives.torque(v, a)
+    if wrench is not None:
+        tau = tau + wrench_torque(model, q, wrench)
+    if friction is not None:
+        tau = tau + friction.torque(v)
+    return tau
+
+
+def needed_parts(model: RobotModel) -> NDArray[np.int64]:
+    """Bits that tell the recursion which work a model's zero parameters save.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, f frames.
+
+    Returns
+    -------
+    ndarray of int, shape (f,)
+        See `robotmodels.kernels.base_newton_euler`.
+    """
+    from ..kernels.base_newton_euler import INERTIA, LOADED, MASS, MOMENTS, ROTATES
+
+    pi, antecedent = model.inertia.values, model.table.antecedent
+    bits = MASS * (pi[:, 9] != 0.0) + MOMENTS * pi[:, 6:9].any(axis=1)
+    bits = (bits + INERTIA * pi[:, :6].any(axis=1)).astype(np.int64)
+    bits |= LOADED * (bits > 0)
+    bits |= np.where(bits & MOMENTS, ROTATES, 0)
+    moves = (model.table.sigma == 1) | model.chain.position.any(axis=1)
+    for k in range(model.f - 1, -1, -1):
+        if (outer := int(antecedent[k]) - 1) >= 0 and bits[k] & LOADED:
+            bits[outer] |= LOADED | (ROTATES if moves[k] else 0)
+    return bits
+
+
+def _coupled(model: RobotModel) -> tuple[Any, ...]:
+    return () if model.transmission is None else model.transmission.coupled_motors

@@ -1,0 +1,166 @@
+"""A payload on a robot: one more body on the link that carries it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import Array, as_exact, as_floats
+from ..errors import InertiaError, InvalidValueError, ShapeError
+from ..inertia import InertialParameters
+from ..model import RobotModel, check_model
+
+
+def with_payload(
+    model: RobotModel,
+    mass: float,
+    com: ArrayLike,
+    inertia: ArrayLike | None = None,
+    frame: str | int | None = None,
+) -> RobotModel:
+    """The robot with a body more, rigidly fixed to one of its frames.
+
+    Models are values: the robot without payload stays as it is, so that a payload elsewhere is
+    another call with it. From a robot with payload, `without_payload` takes it off again.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot.
+    mass : float
+        Kilograms, not negative.
+    com : array_like, shape (3,)
+        Centre of mass in the frame, metres.
+    inertia : array_like, shape (3, 3), optional
+        Symmetric tensor about the centre of mass, in the axes of the frame, kg m^2; default a point
+        mass.
+    frame : str or int, optional
+        Name or number of the frame that ``com`` and ``inertia`` are given in and that carries the
+        body; default the tool.
+
+    Returns
+    -------
+    RobotModel
+        A new model; its tool and its named postures are those of the old one.
+
+    Raises
+    ------
+    InertiaError
+        No body has this mass and inertia.
+    InvalidValueError
+        The frame is the base's, whose bodies load no joint; NaN or infinity.
+    FrameNotFoundError, ShapeError
+        No such frame; arguments of the wrong shape.
+
+    References
+    ----------
+    Seed book section 1.5.1; W. Khalil, M. Gautier and P. Lemoine, "Identification of the payload
+    inertial parameters of industrial manipulators", IEEE ICRA 2007.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> from robotmodels.dynamics import gravity_torque
+    >>> arm = load("planar_2r").with_gravity((0, -9.81, 0))
+    >>> loaded = with_payload(arm, 2.0, [0.0, 0.0, 0.0])
+    >>> (gravity_torque(loaded, [0, 0]) - gravity_torque(arm, [0, 0])).round(3)
+    array([39.24, 19.62])
+    """
+    return _with_body(model, mass, com, inertia, frame, 1.0)
+
+
+def without_payload(
+    model: RobotModel,
+    mass: float,
+    com: ArrayLike,
+    inertia: ArrayLike | None = None,
+    frame: str | int | None = None,
+) -> RobotModel:
+    """The robot with a body less: undoes `with_payload` with the same arguments.
+
+    The body is subtracted from the link that carries it; what remains of a parameter below the
+    rounding of the subtraction becomes zero.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot.
+    mass, com, inertia, frame
+        As for `with_payload`.
+
+    Returns
+    -------
+    RobotModel
+        A new model. Its link is not physical if the body was not part of it
+        (`InertialParameters.is_physical`).
+
+    Raises
+    ------
+    InertiaError, InvalidValueError, FrameNotFoundError, ShapeError
+        As `with_payload`.
+
+    References
+    ----------
+    Seed book section 1.5.1.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> arm = load("planar_2r")
+    >>> payload = 2.0, [0.1, 0.0, 0.0]
+    >>> bool(np.allclose(without_payload(with_payload(arm, *payload), *payload).inertia.values,
+    ...                  arm.inertia.values, atol=1e-14))
+    True
+    """
+    return _with_body(model, mass, com, inertia, frame, -1.0)
+
+
+def _with_body(
+    model: RobotModel,
+    mass: float,
+    com: ArrayLike,
+    inertia: ArrayLike | None,
+    frame: str | int | None,
+    sign: float,
+) -> RobotModel:
+    check_model(model)
+    place = model.twin.frame(frame)
+    if place.parent == 0:
+        raise InvalidValueError(
+            f"frame: {frame!r} is fixed to the base, where a body loads no joint; give a frame of "
+            "a link."
+        )
+    body = _body(mass, com, inertia)
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = place.rotation, place.position
+    row = InertialParameters(body[None]).moved(pose[None]).values[0]
+    values = model.inertia.values.copy()
+    old = values[place.parent - 1]
+    new = old + sign * row
+    if sign < 0.0:
+        rounding = 4.0 * np.finfo(np.float64).eps * (np.abs(old) + np.abs(row))
+        new[np.abs(new) <= rounding] = 0.0
+    values[place.parent - 1] = new
+    return model.with_inertia(InertialParameters(values))
+
+
+def _body(mass: float, com: ArrayLike, inertia: ArrayLike | None) -> Array:
+    m = as_floats(mass, "mass")
+    if m.ndim != 0:
+        raise ShapeError(f"mass: expected one number, got shape {m.shape}.")
+    point = as_exact(com, (3,), "com")
+    tensor = np.zeros((3, 3)) if inertia is None else as_exact(inertia, (3, 3), "inertia")
+    if m < 0.0:
+        raise InertiaError(
+            f"mass: a payload's mass cannot be negative, got {float(m)} kg; without_payload(...) "
+            "takes a body off."
+        )
+    if m == 0.0 and not tensor.any():
+        return np.zeros(10)
+    body = InertialParameters.from_com(m[None], point[None], tensor[None])
+    # about the centre of mass, where what is wrong with it is not hidden by the mass far away
+    central = InertialParameters.from_com(m[None], np.zeros((1, 3)), tensor[None])
+    report = central.consistency()
+    if not report.is_physical:
+        raise InertiaError(f"No body is this payload: {'; '.join(report.links[0].problems)}.")
+    return body.values[0]

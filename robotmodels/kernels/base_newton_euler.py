@@ -1,0 +1,138 @@
+"""Joint torques from base parameters: Newton-Euler without what the zero parameters multiply.
+
+Seed book section 1.5.3 (W. Khalil and J.-F. Kleinfinger 1987): most parameters of a base set are
+zero, above all the masses. A link is told by bits what of it counts, and what its outboard links
+need; work for nothing is left out.
+"""
+
+import numpy as np
+
+from ._compile import CHAIN, INTS, MATRIX, NOTHING, OUT2, VECTOR, Floats, Ints, compiled
+from ._inertia import inertia_of, inertia_times
+from ._motion import coordinate, link_acceleration, link_transform, rotation_acceleration
+from ._vectors import (
+    add,
+    cross,
+    matrix,
+    put_matrix,
+    put_vector,
+    scale,
+    times,
+    transpose_times,
+    vector,
+    whole_matrix,
+    whole_vector,
+)
+
+__all__ = ["INERTIA", "LOADED", "MASS", "MOMENTS", "ROTATES", "base_torques"]
+
+MASS, MOMENTS, INERTIA = 1, 2, 4  # of the link itself: M, MX MY MZ, XX to ZZ
+LOADED = 8  # it or a link outboard of it has any parameter
+ROTATES = 16  # U is needed: for its own first moments, or for the origins of links outboard
+
+
+@compiled(NOTHING(MATRIX, MATRIX, MATRIX, *CHAIN, MATRIX, VECTOR, INTS, OUT2))
+def base_torques(
+    q: Floats,
+    v: Floats,
+    a: Floats,
+    antecedent: Ints,
+    sigma: Ints,
+    joint: Ints,
+    rotation: Floats,
+    position: Floats,
+    base_rotation: Floats,
+    base_position: Floats,
+    pi: Floats,
+    gravity: Floats,
+    parts: Ints,
+    out: Floats,
+) -> None:
+    """Torques of the rigid links, without drive terms.
+
+    Parameters
+    ----------
+    q, v, a : (N, n)
+        Joint positions, velocities, accelerations [rad or m, and per s, s^2].
+    antecedent, ..., base_position
+        The `Chain`.
+    pi : (f, 10)
+        XX XY XZ YY YZ ZZ MX MY MZ M of each link in its frame, most of them zero.
+    gravity : (3,)
+        Acceleration of gravity in the world [m/s^2].
+    parts : (f,)
+        Bits of each link: MASS, MOMENTS, INERTIA, LOADED, ROTATES.
+    out : (N, n)
+        Written: torques [N m or N].
+    """
+    f = antecedent.shape[0]
+    R = np.empty((f + 1, 3, 3))
+    P = np.empty((f + 1, 3))
+    w = np.zeros((f + 1, 3))
+    dw = np.zeros((f + 1, 3))
+    U = np.zeros((f + 1, 3, 3))
+    u = np.empty((f + 1, 3))
+    force = np.empty((f + 1, 3))
+    moment = np.empty((f + 1, 3))
+    g = transpose_times(whole_matrix(base_rotation), whole_vector(gravity))
+    put_vector(u, 0, (-g[0], -g[1], -g[2]))
+    nothing = (0.0, 0.0, 0.0)
+    for i in range(q.shape[0]):
+        for k in range(f):
+            bits = parts[k]
+            if not bits & LOADED:
+                continue
+            b = antecedent[k]
+            c = joint[k]
+            Rj, Pj = link_transform(
+                sigma[k], coordinate(q, i, c), matrix(rotation, k), vector(position, k)
+            )
+            wj, dwj, uj = link_acceleration(
+                sigma[k],
+                Rj,
+                Pj,
+                coordinate(v, i, c),
+                coordinate(a, i, c),
+                vector(w, b),
+                vector(dw, b),
+                matrix(U, b),
+                vector(u, b),
+            )
+            J, MS, M = inertia_of(pi, k)
+            F = nothing
+            N = nothing
+            if bits & INERTIA:
+                N = add(inertia_times(J, dwj), cross(wj, inertia_times(J, wj)))
+            if bits & ROTATES:
+                Uj = rotation_acceleration(wj, dwj)
+                put_matrix(U, k + 1, Uj)
+                if bits & MOMENTS:
+                    F = times(Uj, MS)
+                    N = add(N, cross(MS, uj))
+            if bits & MASS:
+                F = add(F, scale(M, uj))
+            put_matrix(R, k + 1, Rj)
+            put_vector(P, k + 1, Pj)
+            put_vector(w, k + 1, wj)
+            put_vector(dw, k + 1, dwj)
+            put_vector(u, k + 1, uj)
+            put_vector(force, k + 1, F)
+            put_vector(moment, k + 1, N)
+        for j in range(f, 0, -1):
+            if not parts[j - 1] & LOADED:
+                if sigma[j - 1] != 2:
+                    out[i, joint[j - 1]] = 0.0
+                continue
+            F = vector(force, j)
+            N = vector(moment, j)
+            if sigma[j - 1] == 0:
+                out[i, joint[j - 1]] = N[2]
+            elif sigma[j - 1] == 1:
+                out[i, joint[j - 1]] = F[2]
+            b = antecedent[j - 1]
+            if b > 0:
+                Rj = matrix(R, j)
+                Fb = times(Rj, F)
+                Nb = add(times(Rj, N), cross(vector(P, j), Fb))
+                put_vector(force, b, add(vector(force, b), Fb))
+                put_vector(moment, b, add(vector(moment, b), Nb))
