@@ -62,22 +62,12 @@ def complement(V: Floats, r: int, d: int) -> None:
 
 @compiled()
 def dependence(
-    F: Floats,
-    f: int,
-    p: int,
-    side: float,
-    active: Ints,
-    sides: Floats,
-    k: int,
-    E: Floats,
-    R: Floats,
-    r: Floats,
-    z: Floats,
+    F: Floats, f: int, p: int, side: float, k: int, E: Floats, R: Floats, r: Floats, z: Floats
 ) -> float:
     """Write the normal of a bound as a combination of those of the active bounds and a rest.
 
     The normal of a bound of joint j is its side (1 upper, -1 lower) times column j of F. E, R are
-    the orthogonal factors of the active ones, as kept by `append_normal`.
+    the orthogonal factors of the active ones, see `factorise`.
 
     Parameters
     ----------
@@ -85,8 +75,8 @@ def dependence(
         Free directions as rows.
     p, side : int, float
         The bound.
-    active, sides, k : (n,) int64, (n,), int
-        The k active bounds.
+    k : int
+        Number of active bounds.
     E, R : (>= k, >= f), (>= k, >= k)
         Orthonormal rows and the triangle with normal_i = sum_j R[j, i] E_j.
     r, z : (>= k,), (>= f,)
@@ -120,9 +110,11 @@ def dependence(
 
 
 @compiled()
-def factorise(F: Floats, f: int, active: Ints, sides: Floats, k: int, E: Floats, R: Floats) -> None:
-    """Orthogonal factors of the normals of the k active bounds."""
-    for i in range(k):
+def factorise(
+    F: Floats, f: int, active: Ints, sides: Floats, done: int, k: int, E: Floats, R: Floats
+) -> None:
+    """Orthogonal factors of the normals of the k active bounds, from those of the first ones."""
+    for i in range(done, k):
         for c in range(f):
             E[i, c] = sides[i] * F[c, active[i]]
             R[c, i] = 0.0
@@ -199,7 +191,7 @@ def nearest_inside(
     size = 0.0
     for j in range(n):
         size = max(size, abs(x[j]), abs(v[j]))
-    k = 0
+    k, done = 0, 0
     for _ in range(_STEPS_PER_JOINT * (n + 1)):
         joint, side, worst = -1, 0.0, _ROUNDING * size
         for j in range(n):
@@ -211,8 +203,9 @@ def nearest_inside(
             break
         pressure = 0.0
         while True:
-            factorise(F, f, active, sides, k, E, R)
-            square = dependence(F, f, joint, side, active, sides, k, E, R, r, z)
+            factorise(F, f, active, sides, done, k, E, R)
+            done = k
+            square = dependence(F, f, joint, side, k, E, R, r, z)
             dual, leaving = inf, -1
             for i in range(k):
                 if r[i] > 0.0 and press[i] < dual * r[i]:
@@ -238,6 +231,7 @@ def nearest_inside(
             for i in range(leaving, k - 1):
                 active[i], sides[i], press[i] = active[i + 1], sides[i + 1], press[i + 1]
             k -= 1
+            done = leaving
     return k, -1, 0.0, size
 
 
