@@ -76,6 +76,7 @@ class SymbolicChain:
         self.ring = TrigRing(plain, pairs)
         self._rotations: dict[tuple[int, int], Rows] = {}
         self._constants: dict[Any, float] | None = None
+        self.coefficients: dict[Poly, Any] = {}  # already written as formulas
         self.steps: dict[int, Step] = {j: self._step(m) for j, m in moves.items()}
         self.moving = self._moving_generators()
 

@@ -174,10 +174,14 @@ def _part_expression(part: _Part, chain: SymbolicChain) -> Any:
 def _coefficient(p: Poly, chain: SymbolicChain) -> Any:
     import sympy
 
-    expr = p.as_expr()
-    roots = dict(zip(chain.ring.roots, (sympy.sqrt(2), sympy.sqrt(3)), strict=True))
-    expr = expr.xreplace(roots)
-    return sympy.factor_terms(expr) if expr.is_Add else expr
+    known = chain.coefficients.get(p)
+    if known is None:
+        expr = p.as_expr()
+        roots = dict(zip(chain.ring.roots, (sympy.sqrt(2), sympy.sqrt(3)), strict=True))
+        expr = expr.xreplace(roots)
+        known = sympy.factor_terms(expr) if expr.is_Add else expr
+        chain.coefficients[p] = known
+    return known
 
 
 def _flat(terms: _Terms, chain: SymbolicChain) -> Any:

@@ -19,7 +19,7 @@ from ._ring import Poly
 _LONGEST = 200
 """Polynomials of more terms are not factored beyond their sines, cosines and strokes."""
 _LONGEST_IN_TANGENTS = 400
-_PRIMES = (101, 103, 107, 109, 113, 127, 131, 137, 139, 149, 151, 157, 163, 167, 173, 179, 181, 191)
+_PRIMES = (3, 7, 11, 19, 23, 31, 43, 47, 59, 67, 71, 79, 83, 103, 107, 127, 131, 139, 151, 163)
 
 
 @dataclass(frozen=True, slots=True)

@@ -76,7 +76,7 @@ class Patterns:
             for j in [*frames, TOOL]:
                 name = at_frame if j == TOOL else j
                 J = jacobian_factors(model, q, i, name, frame).reduced[..., places]
-                self.filled[i, j] = (np.abs(J) > _ZERO).any(axis=0)
+                self.filled[i, j] = np.asarray(np.any(np.abs(J) > _ZERO, axis=0))
         at_tool = jacobian_factors(model, q, 0, at_frame, frame).reduced[..., places]
         self.rank = _rank(at_tool)
         self.position_rank = _rank(at_tool[..., :3, :])

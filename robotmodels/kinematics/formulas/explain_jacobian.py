@@ -11,8 +11,8 @@ import numpy as np
 from ...errors import InvalidValueError
 from ...model import FrameOfInterest, RobotModel, check_model
 from ..factors import jacobian_factors, middle_frames
-from ._chain import TOOL, WORLD, SymbolicChain
-from ._collect import cleaned, formula
+from ._chain import TOOL, SymbolicChain
+from ._entries import column_entries, column_length, lever_entries, rotation_entries
 from ._factor import numbers_of
 from ._jacobian_printing import jacobian_latex, jacobian_text
 from ._meaning import random_postures
@@ -68,25 +68,28 @@ def explain_jacobian(
     Examples
     --------
     >>> from robotmodels.robots import load
-    >>> print(explain_jacobian(load("rx90"), 3, 4).text[-300:])
+    >>> print(explain_jacobian(load("rx90"), 3, 4).text[-384:])
+    3J6,4, rows vx, vy, vz, wx, wy, wz
+    <BLANKLINE>
+      ⎡               0  -RL4 + S3*D3  -RL4  0   0       0 ⎤
+      ⎢               0         C3*D3     0  0   0       0 ⎥
+      ⎢ S23*RL4 - C2*D3             0     0  0   0       0 ⎥
+      ⎢             S23             0     0  0  S4  -C4*S5 ⎥
+      ⎢             C23             0     0  1   0      C5 ⎥
+      ⎣               0             1     1  0  C4   S4*S5 ⎦
     """
+    import sympy
+
     check_model(model)
     point = model.twin.frame(frame)
-    i = None if projection is None else _node(model, projection, frame, point, "projection")
-    j = None if intermediate is None else _node(model, intermediate, frame, point, "intermediate")
+    i = None if projection is None else _node(model, projection, point, "projection")
+    j = None if intermediate is None else _node(model, intermediate, point, "intermediate")
     chain = SymbolicChain(model, point, [k for k in (i, j) if k is not None and k > 0], symbols)
     if i is None or j is None:
         i, j = _simplest(model, frame, point, chain, i, j)
-    import sympy
-
-    def written(entries: list[list[Any]]) -> Any:
-        return sympy.ImmutableDenseMatrix(
-            [[formula(cleaned(p, chain), chain) for p in row] for row in entries]
-        )
-
-    rotation = written(chain.rotation(WORLD, i))
-    lever = written([[v] for v in chain.lever(i, j, TOOL)])
-    reduced = _written_reduced(chain, i, j)
+    rotation = sympy.ImmutableDenseMatrix(rotation_entries(chain, i))
+    lever = sympy.ImmutableDenseMatrix([[v] for v in lever_entries(chain, i, j)])
+    reduced = _reduced(chain, i, j)
     chain.notation.check_new_names()
     label = "the tool" if frame is None else f"R_{frame}" if not isinstance(frame, str) else frame
     names = [label if node == TOOL else f"R_{node}" for node in (i, j)]
@@ -111,15 +114,20 @@ def explain_jacobian(
     )
 
 
-def _written_reduced(chain: SymbolicChain, i: int, j: int) -> Any:
+def _reduced(chain: SymbolicChain, i: int, j: int) -> Any:
     import sympy
 
     out = sympy.zeros(6, len(chain.variables))
     for k in chain.path:
         if k in chain.joints:
-            for row, p in enumerate(chain.column(k, i, j)):
-                out[row, chain.joints[k]] = formula(cleaned(p, chain), chain)
+            for row, entry in enumerate(column_entries(chain, k, i, j)):
+                out[row, chain.joints[k]] = entry
     return sympy.ImmutableDenseMatrix(out)
+
+
+def _length(chain: SymbolicChain, i: int, j: int) -> int:
+    """How many symbols the third matrix has when multiplied out."""
+    return sum(column_length(chain, k, i, j) for k in chain.path if k in chain.joints)
 
 
 def _simplest(
@@ -139,31 +147,25 @@ def _simplest(
     found = []
     for a in frames if i is None else [i]:
         for b in frames if j is None else [j]:
-            names = [at_frame if node == TOOL else node for node in (a, b)]
-            J = jacobian_factors(model, q, *names, frame).reduced
+            c, d = (at_frame if node == TOOL else node for node in (a, b))
+            J = jacobian_factors(model, q, c, d, frame).reduced
             entries = int((np.abs(J) > 1e-11).any(axis=0).sum())
             away = abs(place.get(a, 0) - place[middle[0]]) + abs(place.get(b, 0) - place[middle[1]])
             found.append((entries, away, a, b))
     found.sort()
     best = []
     for entries, away, a, b in found[:_COMPARED]:
-        leaves = sum(chain.notation.facts(x).leaves for x in _written_reduced(chain, a, b))
-        best.append((entries + leaves, away, a, b))
+        best.append((entries + _length(chain, a, b), away, a, b))
     return min(best)[2:]
 
 
-def _node(
-    model: RobotModel,
-    wanted: str | int,
-    frame: str | int | None,
-    point: FrameOfInterest,
-    name: str,
-) -> int:
+def _node(model: RobotModel, wanted: str | int, point: FrameOfInterest, name: str) -> int:
     """Number of a frame of the table, or the frame of interest itself."""
     found = model.twin.frame(wanted)
     if not found.position.any() and np.array_equal(found.rotation, np.eye(3)):
         return found.parent
-    if found is point or found is model.twin.frame(frame):
+    same = found.parent == point.parent and np.array_equal(found.position, point.position)
+    if same and np.array_equal(found.rotation, point.rotation):
         return TOOL
     raise InvalidValueError(
         f"{name}: formulas need a frame of the table, and {wanted!r} is fixed to frame "

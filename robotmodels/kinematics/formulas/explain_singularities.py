@@ -76,8 +76,9 @@ def explain_singularities(
 
     Notes
     -----
-    Constants are kept as symbols while factoring. Entries that are zero to rounding in random
-    postures count as zero, and sums of constants that cancel to 1e-12 of their size are dropped.
+    Constants are kept as symbols while factoring. Entries below 1e-11 in random postures count as
+    zero, directions that are lost to 1e-9 as lost, and sums of constants that cancel to 1e-12 of
+    their size are dropped.
 
     References
     ----------
@@ -196,10 +197,12 @@ class _FactorBook:
         """Whether two factors of one joint alone vanish at different values of it."""
         alone: dict[int, set[float]] = {}
         for p in factors:
+            if isinstance(p, tuple) or len(self.chain.joints_of(p)) != 1:
+                continue
             factor = self.formula(p)
             if factor.never_zero:
                 return True
-            if len(factor.joints) != 1 or factor.solved_joint is None:
+            if factor.solved_joint is None:
                 continue
             zeros = factor.zeros(np.zeros(len(factor.numbers.variables)))
             values = {round(float(z) % (2 * np.pi), 6) for z in zeros if not np.isnan(z)}
