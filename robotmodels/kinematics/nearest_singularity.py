@@ -19,7 +19,7 @@ from ..geometry import PRISMATIC
 from ..model import RobotModel
 from ..table_text import boxed, length_text
 from .rank import OperationalDimension, operational_dimension
-from .singular_search import FoundPoints, SearchSpace, nearest_points
+from .singular_search import FoundPoints, SearchSpace, nearest_points, slope_along
 from .singular_task import MaskAxes, SingularTask, generator_of, singular_task, whole_number
 from .singular_words import SingularityKind
 from .singularities import names_of
@@ -28,7 +28,7 @@ _ON_SET = 1e-10
 _STATIONARY = 1e-7
 _SAME = 1e-5
 _BESIDE = 8
-_ALREADY, _ASIDE = 1e-9, 1e-4
+_ALREADY, _ASIDE, _FLAT = 1e-9, 1e-4, 3e-6
 
 
 class NearestStatus(IntEnum):
@@ -110,6 +110,9 @@ class NearestSingularities:
     escape : ndarray, shape (S, n)
         Joint direction, rad or m per unit of distance, normal to the singular set there: the
         weakest singular value rises along it. Towards ``home``.
+    slope : ndarray, shape (S,)
+        Of the weakest singular value along ``escape``, per unit of distance: nearly 0 where the
+        singular set is touched twice, or where two sets cross.
     codimension : ndarray of int, shape (S,)
         Number of conditions on the joints that the set makes there: 1 is a surface.
     kind : tuple of tuple of SingularityKind
@@ -132,8 +135,8 @@ class NearestSingularities:
     --------
     >>> from robotmodels.robots import load
     >>> found = nearest_singularity(load("rx90"), [0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
-    >>> found.distance[0], found.kind[0][0].name
-    (np.float64(0.5), 'WRIST')
+    >>> found.distance[:2], [kinds[0].name for kinds in found.kind[:2]]
+    (array([0.3894, 0.5   ]), ['SHOULDER', 'WRIST'])
     """
 
     home: Array
@@ -141,6 +144,7 @@ class NearestSingularities:
     distance: Array
     direction: Array
     escape: Array
+    slope: Array
     codimension: NDArray[np.int64]
     kind: tuple[tuple[SingularityKind, ...], ...]
     words: tuple[tuple[str, ...], ...]
@@ -173,7 +177,7 @@ class NearestSingularities:
         >>> from robotmodels.robots import load
         >>> found = nearest_singularity(load("rx90"), [0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
         >>> found.of(SingularityKind.WRIST), found.of(SingularityKind.OTHER)
-        (0, None)
+        (1, None)
         """
         return next((i for i, kinds in enumerate(self.kind) if kind in kinds), None)
 
@@ -318,8 +322,7 @@ def _with_crossings(
     Their nearest points are likely to be where they meet it, and there they have no tangent.
     Seen from a little beside the set they are ordinary.
     """
-    aside = np.random.default_rng(1).normal(size=space.home.shape)
-    seen_from = replace(space, home=space.home + _ASIDE * aside / np.linalg.norm(aside))
+    seen_from = replace(space, home=space.home + _ASIDE * found.escape[rows[0]])
     others = _confirmed(seen_from, nearest_points(seen_from, first), limits, most)
     away = np.linalg.norm(others.x[:, None] - found.x[rows][None], axis=2)
     others = _picked(others, away.min(axis=1) > 10.0 * _ASIDE)
@@ -373,22 +376,23 @@ def _distinct(space: SearchSpace, found: FoundPoints, limits: bool, most: int) -
 
 
 def _confirmed(space: SearchSpace, found: FoundPoints, limits: bool, most: int) -> FoundPoints:
-    """Without the points that have nearer ones beside them, as where two sets cross.
+    """Only the points to which starts beside them come back.
 
-    There the set has no tangent and the gradients vanish, so that the conditions of a nearest
-    point say nothing; starts beside it do.
+    Where two sets cross, neither has a tangent and the gradients vanish, so that the conditions
+    of a nearest point say nothing: starts beside such a point slide away along one of them.
     """
     rows = _distinct(space, found, limits, most)
-    rng = np.random.default_rng(0)
-    aside = rng.normal(size=(len(rows), _BESIDE, found.x.shape[1]))
+    n = found.x.shape[1]
+    aside = np.random.default_rng(0).normal(size=(len(rows), _BESIDE, n))
     aside *= 2e-3 / np.linalg.norm(aside, axis=2, keepdims=True)
     starts = found.x[rows][:, None] + aside
-    around = nearest_points(space, starts.reshape(-1, found.x.shape[1]))
-    nearness = np.linalg.norm(around.x - space.home, axis=1)
-    nearness = np.where(around.weakest <= _ON_SET, nearness, np.inf).reshape(len(rows), _BESIDE)
-    distance = np.linalg.norm(found.x - space.home, axis=1)
-    keep = np.zeros(len(distance), dtype=bool)
-    keep[rows] = nearness.min(axis=1, initial=np.inf) > distance[rows] - 1e-5
+    around = nearest_points(space, starts.reshape(-1, n))
+    away = around.x.reshape(starts.shape) - found.x[rows][:, None]
+    back = np.linalg.norm(away, axis=2) < _SAME
+    keep = np.zeros(len(found.x), dtype=bool)
+    # a set that is touched twice has no slope either, but all starts come back to it
+    flat = found.slope[rows] < _FLAT
+    keep[rows] = np.where(flat, back.all(axis=1), back.any(axis=1))
     return _picked(found, keep)
 
 
@@ -406,9 +410,9 @@ def _result(
     """Names and statuses; what is not stationary is kept only where it stands for a kind alone."""
     task, n = space.task, len(home)
     if found is None:
-        none = np.zeros((0, n))
+        none: Array = np.zeros((0, n))
         empty = np.zeros(0, dtype=np.int64)
-        found = FoundPoints(none, none[:, 0], none[:, 0], empty, none, none.astype(bool))
+        found = FoundPoints(none, none[:, 0], none[:, 0], none[:, 0], empty, none, none > 0.0)
     named = {i: names_of(task, found.x[i] * space.unit, whole, 1e-9) for i in rows}
     stationary = found.tangential <= _STATIONARY
     known = {name for i in rows if stationary[i] for name in named[i]}
@@ -434,6 +438,7 @@ def _result(
         distance=read_only(distance),
         direction=read_only(direction.reshape(-1, n)),
         escape=read_only((found.escape[rows] * space.unit).reshape(-1, n)),
+        slope=read_only([slope_along(space, found.x[i], found.escape[i]) for i in rows]),
         codimension=read_only(found.codimension[rows], np.int64),
         kind=tuple(
             tuple(dict.fromkeys(kind for kind, _ in named[i] if kind is not None)) for i in rows

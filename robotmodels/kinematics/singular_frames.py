@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._arrays import Array, read_only
-from ..errors import FrameNotFoundError
+from ..errors import FrameNotFoundError, InvalidValueError
 from .poses import dgm, link_poses
 from .singular_bases import normalised, sparse_basis
 from .singular_task import SingularTask
@@ -140,8 +140,8 @@ def simplest_frame(
 
     Raises
     ------
-    FrameNotFoundError
-        ``axes`` or ``point`` is not on the way to the frame.
+    FrameNotFoundError, InvalidValueError
+        As `check_frames`.
 
     Examples
     --------
@@ -159,15 +159,9 @@ def simplest_frame(
     links = link_poses(model, q)
     for j in model.twin.frame(task.frame).path:
         poses[int(j)] = links[int(j) - 1]
-    for asked in (axes, point):
-        if asked is not None and asked not in poses:
-            raise FrameNotFoundError(
-                "frame number", asked, [str(k) for k in poses if k is not None],
-                "Lost directions are given in frames from the base to the one asked about.",
-            )  # fmt: skip
+    check_frames(task, axes, point)
     whole = task.is_whole
-    vectors = all(len(set(task.mask[k : k + 3].tolist())) == 1 for k in (0, 3))
-    if not vectors:
+    if not _has_vectors(task):
         return lost_in_task_axes(task, lost)
     start = tool[:3, :3] if task.mask_axes == "tool" else np.eye(3)
     spaces = _wide(task, lost).T, _wide(task, missing).T
@@ -189,6 +183,46 @@ def simplest_frame(
                 best = rank, found
     assert best is not None  # the frame itself is always among them
     return best[1]
+
+
+def check_frames(task: SingularTask, axes: int | None, point: int | None) -> None:
+    """Refuse frames in which lost directions cannot be given.
+
+    Parameters
+    ----------
+    task : SingularTask
+        What is asked about.
+    axes, point : int or None
+        Numbers of frames.
+
+    Raises
+    ------
+    FrameNotFoundError
+        A number that is neither 0 nor on the way to the frame.
+    InvalidValueError
+        Axes or a point, where the components that count do not turn or move to them.
+
+    Examples
+    --------
+    >>> from robotmodels.kinematics.singular_task import singular_task
+    >>> from robotmodels.robots import load
+    >>> check_frames(singular_task(load("rx90")), 4, 4)
+    """
+    known = [0, *(int(j) for j in task.model.twin.frame(task.frame).path)]
+    for asked in (axes, point):
+        if asked is not None and asked not in known:
+            raise FrameNotFoundError(
+                "frame number", asked, map(str, known),
+                "Lost directions are given in frames from the base to the one asked about.",
+            )  # fmt: skip
+    if point is not None and not task.is_whole:
+        raise InvalidValueError(
+            "point: with a mask the lost directions belong to the frame's origin; leave it out."
+        )
+    if axes is not None and not _has_vectors(task):
+        raise InvalidValueError(
+            "axes: this mask takes single components, which belong to its own axes; leave it out."
+        )
 
 
 def combination_text(row: Array, names: tuple[str, ...]) -> str:
@@ -219,6 +253,11 @@ def combination_text(row: Array, names: tuple[str, ...]) -> str:
         sign = "-" if value < 0 else "+"
         text += f" {sign} {size}{name}" if text else f"{'-' * int(value < 0)}{size}{name}"
     return text
+
+
+def _has_vectors(task: SingularTask) -> bool:
+    """Whether velocity and angular velocity each count as a whole or not at all."""
+    return all(len(set(task.mask[k : k + 3].tolist())) == 1 for k in (0, 3))
 
 
 def _wide(task: SingularTask, lost: Array) -> Array:

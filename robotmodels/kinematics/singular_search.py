@@ -70,6 +70,8 @@ class FoundPoints:
     tangential : ndarray, shape (N,)
         What the way back to the start has along the set, in units of distance; limits that hold
         a joint are counted as normals.
+    slope : ndarray, shape (N,)
+        Size of the gradients along ``escape``, per unit of distance; 0 where sets cross.
     codimension : ndarray of int, shape (N,)
         Independent normals of the set.
     escape : ndarray, shape (N, n)
@@ -79,13 +81,14 @@ class FoundPoints:
 
     Examples
     --------
-    >>> FoundPoints(*(np.zeros((0, 6)),) * 6).x.shape
+    >>> FoundPoints(*(np.zeros((0, 6)),) * 7).x.shape
     (0, 6)
     """
 
     x: Array
     weakest: Array
     tangential: Array
+    slope: Array
     codimension: NDArray[np.int64]
     escape: Array
     held: NDArray[np.bool_]
@@ -111,10 +114,10 @@ def nearest_points(space: SearchSpace, starts: Array) -> FoundPoints:
     --------
     >>> from robotmodels.kinematics.singular_task import singular_task
     >>> from robotmodels.robots import load
-    >>> home, free = np.array([0.1, 0.2, 0.3, 0.4, 0.5, 0.6]), np.full(6, np.inf)
+    >>> home, free = np.array([0.1, 0.2, 0.3, 0.4, 0.2, 0.6]), np.full(6, np.inf)
     >>> space = SearchSpace(singular_task(load("rx90")), 6, np.ones(6), home, -free, free)
-    >>> (nearest_points(space, home[None]).x - home).round(9)
-    array([[ 0. , 0. , 0. , 0. , -0.5, 0. ]])
+    >>> (nearest_points(space, home[None]).x - home).round(9) + 0.0
+    array([[ 0. ,  0. ,  0. ,  0. , -0.2,  0. ]])
     """
     x = _to_set(space, starts, 60)
     good = _at(space, x)[1] < 1e-9
@@ -132,7 +135,43 @@ def nearest_points(space: SearchSpace, starts: Array) -> FoundPoints:
     size = np.linalg.norm(escape, axis=1)
     near = size < 1e-9
     escape = np.where(near[:, None], every[:, 0], escape / np.where(near, 1.0, size)[:, None])
-    return FoundPoints(x, weakest, np.linalg.norm(tangent, axis=1), codimension, escape, held)
+    slope = np.linalg.norm(np.einsum("aei,ai->ae", G, escape), axis=1)
+    along = np.linalg.norm(tangent, axis=1)
+    return FoundPoints(x, weakest, along, slope, codimension, escape, held)
+
+
+def slope_along(space: SearchSpace, x: Array, direction: Array) -> float:
+    """Growth of the M-th singular value from a point of the set, per unit of distance.
+
+    Parameters
+    ----------
+    space : SearchSpace
+        What was looked for.
+    x : ndarray, shape (n,)
+        Point of the set, in units of distance.
+    direction : ndarray, shape (n,)
+        Unit vector in the same units.
+
+    Returns
+    -------
+    float
+        Also where more than one singular value vanishes.
+
+    Examples
+    --------
+    >>> from robotmodels.kinematics.singular_task import singular_task
+    >>> from robotmodels.robots import load
+    >>> task = singular_task(load("planar_2r"), mask=[1, 1, 0, 0, 0, 0])
+    >>> space = SearchSpace(task, 2, np.ones(2), np.zeros(2), np.zeros(2), np.zeros(2))
+    >>> round(slope_along(space, np.zeros(2), np.array([0.0, 1.0])), 4)
+    0.2236
+    """
+    U, sigma, Vt = np.linalg.svd(task_jacobians(space.task, x * space.unit), full_matrices=True)
+    rank = int((sigma > 1e-8 * sigma[:1]).sum())
+    rates = task_derivatives(space.task, x * space.unit)
+    along = np.tensordot(direction * space.unit / space.task.joint_scale, rates, axes=1)
+    growth = np.linalg.svd(U[:, rank:].T @ along @ Vt[rank:].T, compute_uv=False)
+    return float(growth[space.dimension - rank - 1])
 
 
 def _at(space: SearchSpace, x: Array) -> tuple[Array, Array, Array]:

@@ -17,7 +17,7 @@ from .poses import dgm
 from .rank import TOLERANCE, OperationalDimension, operational_dimension, task_rank
 from .singular_boundary import WorkspaceSide, workspace_side
 from .singular_flags import SingularityStatus
-from .singular_frames import LostDirections, lost_in_task_axes, simplest_frame
+from .singular_frames import LostDirections, check_frames, lost_in_task_axes, simplest_frame
 from .singular_motion import SelfMotion, self_motions
 from .singular_structure import arm_structure
 from .singular_task import (
@@ -189,6 +189,7 @@ def classify_singularity(
     ...
     """
     task = singular_task(model, frame, mask, mask_axes, length)
+    check_frames(task, axes, point)
     q = as_exact(q, (model.n,), "q")
     tolerance, near = above_zero(tolerance, "tolerance"), above_zero(near, "near")
     whole = operational_dimension(model, frame, None, task.length, TOLERANCE, mask, mask_axes)

@@ -1,0 +1,568 @@
+"""Singular configurations: what is lost and gained at known ones, and the search for them."""
+
+import pickle
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from identities.random_robots import models, random_model, random_pose, random_state
+from scipy.optimize import minimize_scalar
+
+import robotmodels as rm
+from robotmodels import se3
+from robotmodels.errors import FrameNotFoundError, InvalidValueError, ShapeError
+from robotmodels.kinematics.nearest_singularity import (
+    NearestStatus,
+    SearchOutcome,
+    nearest_singularity,
+)
+from robotmodels.kinematics.singular_boundary import WorkspaceSide
+from robotmodels.kinematics.singular_flags import SingularityStatus, singularity_flags
+from robotmodels.kinematics.singular_motion import SelfMotionKind
+from robotmodels.kinematics.singular_words import SingularityKind
+from robotmodels.kinematics.singularities import classify_singularity
+
+PI = np.pi
+SHOULDER, ELBOW, WRIST, OTHER = SingularityKind
+INTERIOR, BOUNDARY = WorkspaceSide.INTERIOR, WorkspaceSide.BOUNDARY
+FINITE, INFINITESIMAL = SelfMotionKind.FINITE, SelfMotionKind.INFINITESIMAL
+# RX-90: S23 RL4 - C2 D3 = 0 with RL4 = D3 where q2 + q3 = pi/2 - q2
+RX90 = {
+    "wrist": [0.1, 0.2, 0.3, 0.4, 0.0, 0.6],
+    "elbow": [0.1, 0.2, -PI / 2, 0.4, 0.5, 0.6],
+    "shoulder": [0.1, 0.3, PI / 2 - 0.6, 0.4, 0.5, 0.6],
+}
+IIWA = np.array([0.1, 0.4, 0.3, 0.8, 0.5, 0.9, 0.7])
+
+
+def iiwa(**values):
+    q = IIWA.copy()
+    for name, value in values.items():
+        q[int(name[1]) - 1] = value
+    return q
+
+
+# robot, configuration: order, kinds, side, first words
+KNOWN = {
+    "ur5 wrist": ("ur5", [0.1, -1, 1.2, 0.4, 0, 0.6], 1, (WRIST,), INTERIOR),
+    "ur5 elbow": ("ur5", [0.1, -1, 0, 0.4, 0.5, 0.6], 1, (ELBOW,), BOUNDARY),
+    "ur5 folded": ("ur5", [0.1, -1, PI, 0.4, 0.5, 0.6], 1, (ELBOW,), BOUNDARY),
+    "puma wrist": ("puma560", [0.1, 0.2, 0.3, 0.4, 0, 0.6], 1, (WRIST,), INTERIOR),
+    "puma elbow": (
+        "puma560", [0.1, 0.2, -PI / 2 + np.arctan2(0.0203, 0.4318), 0.4, 0.5, 0.6],
+        1, (ELBOW,), BOUNDARY,
+    ),
+    "stanford wrist": ("stanford_arm", [0.1, 0.2, 0.3, 0.4, 0, 0.6], 1, (WRIST,), INTERIOR),
+    "stanford axis": ("stanford_arm", [0.1, 0, 0.3, 0.4, 0.5, 0.6], 1, (OTHER,), BOUNDARY),
+    "scara stretched": ("cobra_s600", [0.1, 0, 0.1, 0.4], 1, (ELBOW,), BOUNDARY),
+    "scara folded": ("cobra_s600", [0.1, PI, 0.1, 0.4], 1, (ELBOW,), BOUNDARY),
+    "planar stretched": ("planar_3r", [0.1, 0, 0.3], 1, (ELBOW,), BOUNDARY),
+    "gantry wrist": ("gantry", [0.5, 0.5, 0.5, 0.1, 0, 0.3], 1, (WRIST,), INTERIOR),
+    "iiwa elbow": ("iiwa14", iiwa(q4=0), 1, (ELBOW,), BOUNDARY),
+    "iiwa shoulder": ("iiwa14", iiwa(q2=0, q3=PI / 2), 1, (SHOULDER,), INTERIOR),
+    "iiwa wrist": ("iiwa14", iiwa(q6=0, q5=PI / 2), 1, (WRIST,), INTERIOR),
+    "iiwa both ends": ("iiwa14", iiwa(q2=0, q6=0), 1, (WRIST,), INTERIOR),
+}  # fmt: skip
+
+
+def check_duality(arm, report, mask=None):
+    """Lost wrenches do no work, self-motions move nothing: the definitions, by the Jacobian."""
+    J = rm.jacobian(arm, report.q)
+    scale = max(1.0, float(np.abs(J).max()))
+    rows = report.lost_in_world.wrenches
+    if rows.size:
+        assert np.abs(rows @ J).max() < 1e-8 * scale
+    asked = slice(None) if mask is None else np.array(mask, bool)
+    for motion in report.self_motions:
+        assert np.abs(J[asked] @ motion.velocity).max() < 1e-8 * scale
+    # in the chosen frame: the twists of the joints there, from the poses alone
+    lost = report.lost
+    links = rm.link_poses(arm, report.q)
+    poses = {None: rm.dgm(arm, report.q), 0: arm.base, -1: np.eye(4)}
+    poses |= {j + 1: T for j, T in enumerate(links)}
+    A, P, T = poses[lost.axes], poses[lost.point], poses[None]
+    lever = P[:3, 3] - T[:3, 3]
+    v = J[:3] + np.cross(J[3:].T, lever).T
+    there = np.vstack([A[:3, :3].T @ v, A[:3, :3].T @ J[3:]])
+    if lost.wrenches.size:
+        assert np.abs(lost.wrenches @ there).max() < 1e-8 * scale
+
+
+@pytest.mark.parametrize("name", RX90)
+def test_rx90_by_name(name):
+    arm = rm.load("rx90")
+    report = classify_singularity(arm, RX90[name])
+    assert report.status is SingularityStatus.SINGULAR
+    assert (report.dimension, report.rank, report.order, report.gained) == (6, 5, 1, 1)
+    assert report.kinds == (SingularityKind[name.upper()],)
+    assert report.weakest < 1e-15
+    assert report.gap > 1e10
+    check_duality(arm, report)
+    assert len(report.self_motions) == 1
+    motion = report.self_motions[0]
+    if name == "wrist":
+        assert report.words == ("wrist: the axes of joints 4 and 6 are aligned",)
+        np.testing.assert_allclose(motion.velocity, [0, 0, 0, 1, 0, -1], atol=1e-13)
+        assert (motion.joints, motion.kind, report.side) == ((4, 6), FINITE, INTERIOR)
+        # in R4 the moment is about x4 alone: the turn about x4 is what the wrist has lost
+        book = classify_singularity(arm, RX90[name], axes=4, point=4).lost
+        assert (book.axes, book.point) == (4, 4)
+        wrench = book.wrenches[0] / book.wrenches[0, 3]
+        np.testing.assert_allclose(wrench[3:], [1, 0, 0], atol=1e-13)
+    elif name == "elbow":
+        assert report.words[0].endswith("stretched out")
+        assert (report.lost.axes, report.lost.point) == (4, 4)
+        np.testing.assert_allclose(report.lost.wrenches, [[0, 0, 1, 0, 0, 0]], atol=1e-13)
+        np.testing.assert_allclose(report.lost.twists, [[0, 0, 1, 0, 0, 0]], atol=1e-13)
+        assert {2, 3} <= set(motion.joints)
+        assert 1 not in motion.joints
+        assert (motion.kind, report.side) == (INFINITESIMAL, BOUNDARY)
+        # the arm can only be shortened
+        shoulder = rm.link_poses(arm, report.q)[1, :3, 3]
+        outwards = rm.dgm(arm, report.q)[:3, 3] - shoulder
+        assert report.open_twist[:3] @ outwards < -0.5
+    else:
+        assert report.words == ("shoulder: the wrist centre is on axis 1",)
+        assert report.lost.axes in (2, 3)  # along the parallel axes 2 and 3, at the wrist centre
+        np.testing.assert_allclose(report.lost.wrenches, [[0, 0, 1, 0, 0, 0]], atol=1e-13)
+        assert motion.joints == (1, 4, 5, 6)
+        assert (motion.kind, report.side) == (FINITE, INTERIOR)
+    text = str(report)
+    for part in (report.words[0], report.lost.where, motion.kind.sentence, report.side.sentence):
+        assert part in text
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_known_singular_configurations(name):
+    robot, q, order, kinds, side = KNOWN[name]
+    arm = rm.load(robot)
+    report = classify_singularity(arm, q)
+    assert report.order == order, report
+    assert report.kinds == kinds, report
+    assert report.side is side, report
+    assert len(report.self_motions) == arm.n - report.rank
+    check_duality(arm, report)
+
+
+def test_lost_directions_have_the_sign_of_the_book():
+    """SCARA and planar arms, stretched along x: the radial direction, seen in a link's axes."""
+    scara = classify_singularity(rm.load("cobra_s600"), [0.1, 0, 0.1, 0.4])
+    assert scara.lost.combinations == ("vx",)
+    assert scara.lost.carried == ("fx",)
+    assert scara.words == ("elbow: the axes of joints 1, 2 and 4 lie in one plane, stretched out",)
+    np.testing.assert_allclose(scara.open_twist[:2], -0.6 * np.array([np.cos(0.1), np.sin(0.1)]))
+    folded = classify_singularity(rm.load("cobra_s600"), [0.1, PI, 0.1, 0.4])
+    assert folded.words[0].endswith("folded")
+    assert folded.open_twist[0] > 0.5
+    mask = [1, 1, 1, 0, 0, 0]
+    planar = rm.load("planar_2r")
+    report = classify_singularity(planar, [0.1, 0.0], mask=mask)
+    check_duality(planar, report, mask)
+    assert report.kinds == (ELBOW,)
+    assert report.side is BOUNDARY
+    np.testing.assert_allclose(report.self_motions[0].velocity, [-0.5, 1.0])
+    np.testing.assert_allclose(report.lost_in_world.wrenches[0, :2], [1.0, np.tan(0.1)])
+    # no point of the workspace is beyond: the sampled reach, seen along the lost direction
+    q = np.random.default_rng(0).uniform(-PI, PI, size=(20000, 2))
+    reached = rm.dgm(planar, q)[:, :3, 3] - rm.dgm(planar, report.q)[:3, 3]
+    assert (reached @ report.open_twist[:3]).min() > 0.0
+    assert classify_singularity(planar, [0.1, 0.0]).status is SingularityStatus.REGULAR
+
+
+def test_redundant_arm_keeps_its_regular_self_motion():
+    arm = rm.load("iiwa14")
+    regular = classify_singularity(arm, IIWA)
+    assert (regular.order, regular.gained, len(regular.self_motions)) == (0, 0, 1)
+    assert regular.self_motions[0].kind is FINITE
+    assert regular.side is WorkspaceSide.REGULAR
+    assert regular.lost.wrenches.shape == (0, 6)
+    stretched = classify_singularity(arm, iiwa(q4=0))
+    kinds = {m.joints: m.kind for m in stretched.self_motions}
+    assert kinds[(3, 5)] is FINITE
+    assert sorted(kinds.values()) == [FINITE, INFINITESIMAL]
+    assert stretched.words[0] == "elbow: shoulder, elbow axis 4 and wrist centre are in line"
+    assert stretched.words[1] == "the axes of joints 3 and 5 are aligned"
+
+
+def test_self_motions_as_they_are_called():
+    """Finite ones leave the tool exactly, infinitesimal ones only to the second order."""
+    arm = rm.load("rx90")
+    q = np.array(RX90["wrist"])
+    motion = classify_singularity(arm, q).self_motions[0]
+    T = rm.dgm(arm, q)
+    for s in (0.1, 1.0, -2.0):
+        np.testing.assert_allclose(rm.dgm(arm, q + s * motion.velocity), T, atol=1e-14)
+    q = np.array(RX90["elbow"])
+    report = classify_singularity(arm, q)
+    v, wrench = report.self_motions[0].velocity, report.lost_in_world.wrenches[0]
+    T = rm.dgm(arm, q)
+    along = [wrench[:3] @ (rm.dgm(arm, q + s * v)[:3, 3] - T[:3, 3]) for s in (1e-2, -1e-2, 5e-3)]
+    assert abs(along[0]) > 1e-6
+    assert along[0] * along[1] > 0.0  # to one side only
+    np.testing.assert_allclose(along[0] / along[2], 4.0, rtol=0.05)
+
+
+def test_two_singularities_at_once():
+    arm = rm.load("rx90")
+    folded = classify_singularity(arm, [0.1, 0.2, PI / 2, 0.4, 0.5, 0.6])
+    assert (folded.order, folded.kinds) == (2, (SHOULDER, ELBOW))  # RL4 = D3: on the shoulder
+    check_duality(arm, folded)
+    both = classify_singularity(arm, [0.1, 0.2, -PI / 2, 0.4, 0.0, 0.6])
+    assert set(both.kinds) == {ELBOW, WRIST}
+    check_duality(arm, both)
+    zero = classify_singularity(rm.load("iiwa14"), np.zeros(7))
+    assert (zero.order, len(zero.self_motions)) == (3, 4)
+    assert set(zero.kinds) == {SHOULDER, ELBOW, WRIST}
+    assert zero.side is BOUNDARY
+    check_duality(rm.load("iiwa14"), zero)
+
+
+@pytest.mark.parametrize("name", RX90)
+def test_invariance_under_base_and_tool(name):
+    rng = np.random.default_rng(4)
+    arm = rm.load("rx90")
+    here = classify_singularity(arm, RX90[name], axes=4, point=4)
+    moved = arm.with_base(random_pose(rng))
+    there = classify_singularity(moved, RX90[name], axes=4, point=4)
+    np.testing.assert_allclose(there.singular_values, here.singular_values, atol=1e-13)
+    np.testing.assert_allclose(there.lost.wrenches, here.lost.wrenches, atol=1e-11)
+    assert (there.kinds, there.words, there.side) == (here.kinds, here.words, here.side)
+    check_duality(moved, there)
+    tooled = moved.with_tool(random_pose(rng, 0.2))
+    report = classify_singularity(tooled, RX90[name], length=0.9, axes=4, point=4)
+    assert (report.kinds, report.words, report.side) == (here.kinds, here.words, here.side)
+    np.testing.assert_allclose(report.lost.wrenches, here.lost.wrenches, atol=1e-11)
+    check_duality(tooled, report)
+    wrist = classify_singularity(tooled, RX90[name], frame=6)
+    assert wrist.kinds == here.kinds
+
+
+def test_near_singular_configurations():
+    arm = rm.load("rx90")
+    q = [0.1, 0.2, 0.3, 0.4, 1e-4, 0.6]
+    report = classify_singularity(arm, q)
+    assert report.status is SingularityStatus.NEAR_SINGULAR
+    assert report.order == 0
+    assert 1e-6 < report.weakest < 1e-3
+    wide = classify_singularity(arm, q, tolerance=1e-3)
+    assert wide.status is SingularityStatus.SINGULAR
+    assert wide.kinds == (WRIST,)
+    assert wide.weakest == report.weakest
+    assert classify_singularity(arm, q, near=1e-7).status is SingularityStatus.REGULAR
+
+
+@pytest.mark.parametrize("batch", [(), (3,), (2, 2), (0,)], ids=str)
+def test_flags(batch):
+    arm = rm.load("rx90")
+    q = random_state(arm, np.random.default_rng(0), *batch)[0]
+    if batch:
+        q[..., :1, 4] = 0.0
+        q[..., 1:2, 4] = 1e-4
+    found = singularity_flags(arm, q)
+    assert found.status.shape == found.weakest.shape == found.order.shape == batch
+    assert found.status.dtype == np.int8
+    for i in np.ndindex(*batch):
+        one = classify_singularity(arm, q[i])
+        assert one.status == found.status[i]
+        assert (one.rank, one.order) == (found.rank[i], found.order[i])
+        np.testing.assert_allclose(one.weakest, found.weakest[i], atol=1e-15)
+        assert found.reason(i) == one.status.sentence
+
+
+@settings(max_examples=15)
+@given(case=models(max_frames=7))
+def test_reports_of_random_robots(case):
+    """At any configuration the report is consistent with the Jacobian."""
+    q = random_state(case, np.random.default_rng(3))[0]
+    report = classify_singularity(case, q)
+    sigma = report.singular_values
+    assert report.order == report.dimension - report.rank == report.gained
+    moving = int(sum(case.table.sigma[j - 1] != 2 for j in case.twin.frame(None).path))
+    assert len(report.self_motions) == moving - report.rank
+    if len(sigma) > report.rank and sigma[0] > 0:
+        assert sigma[report.rank] <= 1e-8 * sigma[0]
+    check_duality(case, report)
+    str(report)
+
+
+def test_trees_fixed_frames_and_other_frames():
+    table = rm.DHTable(antecedent=[0, 1, 2, 1, 4], sigma=[0, 0, 2, 0, 0], d=[0, 0.5, 0.4, 0.3, 0.3])
+    arm = rm.RobotModel.from_table(table, base=random_pose(np.random.default_rng(0)))
+    mask = [1, 1, 1, 0, 0, 0]
+    one = classify_singularity(arm, [0.1, 0.0, 0.3, 0.7], frame=3, mask=mask)
+    assert one.kinds == (ELBOW,)
+    assert [m.joints for m in one.self_motions] == [(1, 2)]
+    assert (one.self_motions[0].velocity[2:] == 0.0).all()
+    other = classify_singularity(arm, [0.1, 0.3, 0.0, 0.7], frame=5, mask=mask)
+    # the point is on axis 5, which is so at every configuration
+    assert {m.joints for m in other.self_motions} == {(1, 4), (5,)}
+    assert other.gained == 1
+    assert classify_singularity(arm, [0.1, 0.3, 0.2, 0.7], frame=5, mask=mask).order == 0
+    still = classify_singularity(arm, np.zeros(4), frame=0)
+    assert (still.dimension, still.order, still.self_motions) == (0, 0, ())
+
+
+def test_reports_are_values_and_mistakes_are_refused():
+    arm = rm.load("rx90")
+    report = pickle.loads(pickle.dumps(classify_singularity(arm, RX90["elbow"])))
+    assert report.kinds == (ELBOW,)
+    with pytest.raises(ValueError, match="read-only"):
+        classify_singularity(arm, RX90["elbow"]).q[0] = 1.0
+    with pytest.raises(ShapeError):
+        classify_singularity(arm, np.zeros((2, 6)))
+    with pytest.raises(FrameNotFoundError):
+        classify_singularity(arm, RX90["elbow"], axes=9)
+    with pytest.raises(FrameNotFoundError):
+        classify_singularity(arm, RX90["elbow"], frame=3, axes=5)
+    position = [1, 1, 1, 0, 0, 0]
+    with pytest.raises(InvalidValueError, match="point"):
+        classify_singularity(arm, RX90["elbow"], mask=position, point=4)
+    with pytest.raises(InvalidValueError, match="axes"):
+        classify_singularity(arm, RX90["elbow"], mask=[1, 1, 0, 0, 0, 0], axes=4)
+    in_arm = classify_singularity(arm, RX90["elbow"], mask=position, axes=4)
+    assert in_arm.lost.combinations == ("vz",)
+    with pytest.raises(InvalidValueError, match="near"):
+        classify_singularity(arm, RX90["elbow"], near=0.0)
+    with pytest.raises(InvalidValueError, match="weights"):
+        nearest_singularity(arm, np.zeros(6), weights=[1, 1, 1, 1, 1, 0])
+    with pytest.raises(ShapeError, match="weights"):
+        nearest_singularity(arm, np.zeros(6), weights=[1, 1])
+    with pytest.raises(InvalidValueError, match="limits"):
+        nearest_singularity(arm, np.zeros(6), limits="yes")
+    with pytest.raises(InvalidValueError, match="starts"):
+        nearest_singularity(arm, np.zeros(6), starts=0)
+
+
+# --- search ------------------------------------------------------------------------------------
+
+
+def shoulder_distances(q, D3=0.45, RL4=0.45, w2=1.0, w3=1.0, box=None):
+    """Local minima of the distance to S23 RL4 - C2 D3 = 0, along each solution of q3(q2)."""
+    found = []
+    for branch in (0, 1):
+
+        def third(t, branch=branch):
+            angle = np.arcsin(np.cos(t) * D3 / RL4)
+            q3 = (angle if branch == 0 else PI - angle) - t
+            return q3 + 2 * PI * np.round((q[2] - q3) / (2 * PI))
+
+        def cost(t, third=third):
+            return np.sqrt(w2 * (t - q[1]) ** 2 + w3 * (third(t) - q[2]) ** 2)
+
+        t = q[1] + np.linspace(-PI, PI, 20001)
+        d = cost(t)
+        if box is not None:
+            inside = (t >= box[0][0]) & (t <= box[0][1])
+            inside &= (third(t) >= box[1][0]) & (third(t) <= box[1][1])
+            d = np.where(inside, d, np.inf)
+            found.append((float(d.min()), None))
+            continue
+        for i in np.nonzero((d[1:-1] < d[:-2]) & (d[1:-1] < d[2:]))[0] + 1:
+            best = minimize_scalar(cost, bounds=(t[i - 1], t[i + 1]), method="bounded",
+                                   options={"xatol": 1e-12})  # fmt: skip
+            found.append((float(best.fun), (best.x, third(best.x))))
+    return sorted(found, key=lambda pair: pair[0])
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_rx90_closed_forms(seed):
+    """The three surfaces C3 = 0, S5 = 0 and S23 RL4 - C2 D3 = 0, each at its nearest point."""
+    arm = rm.load("rx90")
+    q = np.random.default_rng(seed).uniform(-1.3, 1.3, size=6)
+    found = nearest_singularity(arm, q)
+    assert found.outcome is SearchOutcome.FOUND
+    assert (np.diff(found.distance) >= 0).all()
+    assert (found.residual <= 1e-10).all()
+    assert (found.stationarity <= 1e-7).all()
+    wrist, elbow, shoulder = (found.of(kind) for kind in (WRIST, ELBOW, SHOULDER))
+    np.testing.assert_allclose(found.distance[wrist], abs(q[4]), atol=1e-9)
+    np.testing.assert_allclose(found.q[wrist], np.where(np.arange(6) == 4, 0, q), atol=1e-9)
+    np.testing.assert_allclose(
+        found.distance[elbow], min(abs(q[2] - PI / 2), abs(q[2] + PI / 2)), atol=1e-9
+    )
+    expected, _ = shoulder_distances(q)[0]
+    corner = abs(q[2] - PI / 2)  # there the folded arm has its wrist centre on the shoulder
+    np.testing.assert_allclose(found.distance[shoulder], min(expected, corner), atol=1e-8)
+    S23, C2 = np.sin(found.q[shoulder, 1] + found.q[shoulder, 2]), np.cos(found.q[shoulder, 1])
+    assert abs(0.45 * S23 - 0.45 * C2) < 1e-9
+    # direction and distance lead there, and the weakest singular value rises on the way back
+    np.testing.assert_allclose(q + found.distance[:, None] * found.direction, found.q, atol=1e-12)
+    np.testing.assert_allclose(found.escape, -found.direction, atol=1e-6)
+    for i in range(found.count):
+        ahead = singularity_flags(arm, found.q[i] + 1e-4 * found.escape[i])
+        top = classify_singularity(arm, found.q[i]).singular_values[0]
+        np.testing.assert_allclose(ahead.weakest * top, 1e-4 * found.slope[i], rtol=1e-2)
+    assert "wrist" in str(found)
+
+
+def test_weights_stretch_the_distance():
+    arm = rm.load("puma560")
+    q = np.array([0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
+    w = np.array([1.0, 9.0, 0.5, 1.0, 4.0, 1.0])
+    found = nearest_singularity(arm, q, weights=w)
+    np.testing.assert_allclose(found.distance[found.of(WRIST)], 1.0, atol=1e-9)
+    apart = np.sqrt((w * (found.q - q) ** 2).sum(axis=1))
+    np.testing.assert_allclose(found.distance, apart, atol=1e-12)
+    # the elbow is a value of joint 3
+    stretched = -PI / 2 + np.arctan2(0.0203, 0.4318)
+    near = min(abs(q[2] - stretched), abs(q[2] - stretched - PI))
+    np.testing.assert_allclose(found.distance[found.of(ELBOW)], np.sqrt(0.5) * near, atol=1e-9)
+    rx90 = rm.load("rx90")
+    found = nearest_singularity(rx90, q, weights=w)
+    expected, point = shoulder_distances(q, w2=9.0, w3=0.5)[0]
+    np.testing.assert_allclose(found.distance[found.of(SHOULDER)], expected, atol=1e-8)
+    np.testing.assert_allclose(found.q[found.of(SHOULDER), 1:3], point, atol=1e-6)
+
+
+def test_limits_are_respected():
+    arm = rm.load("rx90")
+    q = np.array([0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
+    free = nearest_singularity(arm, q)
+    lower, upper = arm.lower.copy(), arm.upper.copy()
+    upper[1], lower[4] = 0.45, 0.1  # the nearest shoulder has q2 = 0.548, the wrist q5 = 0
+    tight = arm.with_table(arm.table.replace(lower=lower, upper=upper))
+    found = nearest_singularity(tight, q, limits=True)
+    assert (found.q >= lower - 1e-12).all()
+    assert (found.q <= upper + 1e-12).all()
+    i = found.of(SHOULDER)
+    assert found.status[i] == NearestStatus.AT_LIMIT
+    np.testing.assert_allclose(found.q[i, 1], 0.45, atol=1e-9)
+    box = (lower[1], upper[1]), (lower[2], upper[2])
+    expected = shoulder_distances(q, box=box)[0][0]
+    np.testing.assert_allclose(found.distance[i], expected, atol=1e-3)
+    assert found.distance[i] > free.distance[free.of(SHOULDER)]
+    wrists = [i for i in range(found.count) if found.kind[i] == (WRIST,)]
+    for i in wrists:
+        assert abs(abs(found.q[i, 4]) - PI) < 1e-9
+    # a start outside the limits
+    outside = nearest_singularity(tight, q + 3.0, limits=True)
+    assert outside.count
+    assert (outside.q <= upper + 1e-12).all()
+
+
+def test_small_arms_by_dense_sampling():
+    """Random spatial arms of three joints, position alone: no point of a grid is nearer."""
+    rng = np.random.default_rng(8)
+    mask = [1, 1, 1, 0, 0, 0]
+    looked = 0
+    for _ in range(6):
+        arm = random_model(rng, f=3, prismatic=False, limits=False)
+        q = random_state(arm, rng)[0]
+        found = nearest_singularity(arm, q, mask=mask)
+        J = rm.jacobian(arm, rng.uniform(-3, 3, size=(50, 3)))[:, :3]
+        if np.abs(np.linalg.det(J)).max() < 1e-5:
+            continue  # an arm whose point hardly ever has three freedoms
+        looked += 1
+        assert found.count
+        side = np.linspace(-1.0, 1.0, 41)
+        radius = found.distance[0]
+        grid = q + radius * np.stack(np.meshgrid(side, side, side), axis=-1).reshape(-1, 3)
+        grid = grid[np.linalg.norm(grid - q, axis=1) < radius * (1 - 1e-9)]
+        det = np.linalg.det(rm.jacobian(arm, grid)[:, :3])
+        assert det.min() * det.max() > 0.0  # it changes sign nowhere nearer
+        beyond = q + 1.05 * radius * found.direction[0]
+        det_here = np.linalg.det(rm.jacobian(arm, q)[:3])
+        det_there = np.linalg.det(rm.jacobian(arm, beyond)[:3])
+        simple = found.slope[0] > 1e-4 and found.codimension[0] == 1
+        assert not simple or det_here * det_there < 0.0
+    assert looked >= 2
+
+
+def test_redundant_arm_has_surfaces_and_curves():
+    """iiwa: S4 = 0 is a surface; S2 = S6 = 0, S2 = C3 = 0 and S6 = C5 = 0 take two conditions."""
+    found = nearest_singularity(rm.load("iiwa14"), IIWA)
+    expected = {
+        0.8: (iiwa(q4=0), 1, (ELBOW,)),
+        np.hypot(0.4, 0.9): (iiwa(q2=0, q6=0), 2, (WRIST,)),
+        np.hypot(0.4, PI / 2 - 0.3): (iiwa(q2=0, q3=PI / 2), 2, (SHOULDER,)),
+        np.hypot(0.9, PI / 2 - 0.5): (iiwa(q6=0, q5=PI / 2), 2, (WRIST,)),
+    }
+    for i, (distance, (q, codimension, kind)) in enumerate(expected.items()):
+        np.testing.assert_allclose(found.distance[i], distance, atol=1e-8)
+        np.testing.assert_allclose(found.q[i], q, atol=1e-7)
+        assert found.codimension[i] == codimension
+        assert found.kind[i] == kind
+    assert (found.status == NearestStatus.NEAREST).all()
+
+
+def test_other_arms():
+    ur5 = nearest_singularity(rm.load("ur5"), [0.1, -1, 1.2, 0.4, 0.5, 0.6])
+    for kind, distance in ((WRIST, 0.5), (ELBOW, 1.2)):
+        np.testing.assert_allclose(ur5.distance[ur5.of(kind)], distance, atol=1e-9)
+    q = ur5.q[ur5.of(SHOULDER)]  # axes 5 and 6 meet in the plane of axis 1 along axis 2
+    links = rm.link_poses(rm.load("ur5"), q)
+    point = links[4, :3, 3]
+    across = np.cross(links[0, :3, 2], links[1, :3, 2])
+    assert abs(across @ (point - links[0, :3, 3])) < 1e-9
+    scara = nearest_singularity(rm.load("cobra_s600"), [0.1, 0.5, 0.1, 0.4])
+    np.testing.assert_allclose(scara.distance, [0.5, PI - 0.5], atol=1e-9)
+    stanford = nearest_singularity(rm.load("stanford_arm"), [0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
+    # the stroke counts in units of the length; det J has a factor r3^2: known to its root only
+    np.testing.assert_allclose(stanford.distance[:3], [0.3 / stanford.length, 0.2, 0.5], atol=1e-6)
+    five = nearest_singularity(rm.load("xarm5"), [0.1, 0.2, -1, 0.1, 0.2])
+    assert (five.residual < 1e-10).all()
+    assert five.count >= 2
+
+
+def test_given_configuration_that_is_singular():
+    arm = rm.load("rx90")
+    found = nearest_singularity(arm, RX90["wrist"])
+    assert found.outcome is SearchOutcome.ALREADY_SINGULAR
+    assert found.distance[0] < 1e-12
+    assert found.kind[0] == (WRIST,)
+    np.testing.assert_allclose(np.abs(found.escape[0]), [0, 0, 0, 0, 1, 0], atol=1e-9)
+    i = found.of(ELBOW)
+    assert i is not None
+    assert found.of(SHOULDER) is not None
+    stretched = [i for i in range(found.count) if ELBOW in found.kind[i]]
+    assert min(abs(found.q[i, 2] + PI / 2) for i in stretched) < 1e-3
+    assert (found.residual < 1e-10).all()
+
+
+def test_nothing_to_find():
+    arm = rm.load("planar_2r")
+    found = nearest_singularity(arm, [0.3, 0.5])
+    assert (found.outcome, found.count) == (SearchOutcome.NONE_FOUND, 0)
+    assert found.q.shape == found.direction.shape == found.escape.shape == (0, 2)
+    assert str(found) == SearchOutcome.NONE_FOUND.sentence
+    assert found.of(ELBOW) is None
+    assert nearest_singularity(arm, [0.3, 0.5], frame=0).count == 0
+
+
+@settings(max_examples=8)
+@given(case=models(max_frames=7, limits=False))
+def test_search_on_random_robots(case):
+    """What is found is singular, and the way to it is normal to the set it is on."""
+    home = random_state(case, np.random.default_rng(5))[0]
+    found = nearest_singularity(case, home, starts=16, most=4)
+    for i in range(found.count):
+        report = classify_singularity(case, found.q[i])
+        assert report.order >= 1
+        assert found.residual[i] <= 1e-10
+        if found.status[i] != NearestStatus.NEAREST or found.codimension[i] != 1:
+            continue
+        if found.distance[i] < 1e-6 or found.slope[i] < 1e-3:
+            continue
+        step = 1e-3 * found.escape[i]
+        ahead = singularity_flags(case, found.q[i] + step).weakest * report.singular_values[0]
+        np.testing.assert_allclose(ahead, 1e-3 * found.slope[i], rtol=0.1)
+        np.testing.assert_allclose(found.escape[i], -found.direction[i], atol=1e-5)
+
+
+def test_scale_of_the_robot_does_not_matter():
+    arm = rm.load("stanford_arm")
+    q = np.array([0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
+    k = 1000.0
+    table = arm.table
+    stretch = np.where(table.sigma == 1, k, 1.0)
+    big = arm.with_table(
+        table.replace(
+            d=k * table.d, r=k * table.r, lower=stretch * table.lower, upper=stretch * table.upper
+        )
+    )
+    tool = arm.tool @ se3.translation(0, 0, 0)
+    tool[:3, 3] *= k
+    found = nearest_singularity(arm, q)
+    large = nearest_singularity(big.with_tool(tool, tip=arm.tip), q * stretch)
+    np.testing.assert_allclose(large.distance, found.distance, atol=1e-6)
+    assert large.kind == found.kind
