@@ -243,8 +243,9 @@ def energy_regressor(model: RobotModel, q: ArrayLike, v: ArrayLike, drive: bool 
 
     arrays = as_vector(q, model.n, "q"), as_vector(v, model.n, "v")
     batch, rows = batch_rows(arrays, ("q", "v"))
-    out = np.empty((rows[0].shape[0], 10 * model.f))
-    energy_regressors(*rows, *model.chain, model.gravity, out)
+    out = np.empty((rows[0].shape[0], 1, 10 * model.f))
+    energy_regressors(*rows, *model.chain, model.gravity, np.arange(10 * model.f), out)
+    out = out[:, 0]
     if drive:
         v = rows[1]
         coupled = [0.5 * np.einsum("ki,ij,kj->k", v, c, v)[:, None] for _, c in _couplings(model)]
@@ -279,7 +280,7 @@ def _fill(model: RobotModel, rows: list[Array], rigid: Array, W: Array | None) -
     """Rigid columns into ``rigid``; if ``W`` is given, these and the drive columns into ``W``."""
     from .kernels.torque_regressor import torque_regressors
 
-    torque_regressors(*rows, *model.chain, model.gravity, rigid)
+    torque_regressors(*rows, *model.chain, model.gravity, np.arange(10 * model.f), rigid)
     if W is None:
         return
     _, v, a = rows

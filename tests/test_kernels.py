@@ -267,8 +267,9 @@ def test_regressors_reproduce_torques_and_energies_of_any_parameters(robot):
     q, v, a = robot.samples()
     pi = robot.rng.normal(size=(robot.f, 10))
     ours = all_of(robot, pi, q, v, a)
-    Y = run(torque_regressors, q, v, a, *robot.chain, robot.gravity, out=(N, robot.n, 10 * robot.f))
-    h = run(energy_regressors, q, v, *robot.chain, robot.gravity, out=(N, 10 * robot.f))
+    c, g, every = robot.chain, robot.gravity, np.arange(10 * robot.f)
+    Y = run(torque_regressors, q, v, a, *c, g, every, out=(N, robot.n, 10 * robot.f))
+    h = run(energy_regressors, q, v, *c, g, every, out=(N, 1, 10 * robot.f))[:, 0]
     close(Y @ pi.ravel(), ours["torques"])
     close(h @ pi.ravel(), ours["kinetic"] + ours["potential"])
     for k in range(robot.f):
@@ -343,8 +344,9 @@ def check_every_kernel(robot, rows):
     all_of(robot, robot.pi, q, v, a)
     run(tip_poses, q, *c, *robot.tip(), out=(rows, 4, 4))
     run(link_poses, q, *c, out=(rows, f, 4, 4))
-    run(torque_regressors, q, v, a, *c, g, out=(rows, n, 10 * f))
-    run(energy_regressors, q, v, *c, g, out=(rows, 10 * f))
+    every = np.arange(10 * f)
+    run(torque_regressors, q, v, a, *c, g, every, out=(rows, n, 10 * f))
+    run(energy_regressors, q, v, *c, g, every, out=(rows, 1, 10 * f))
     for reference in range(3):
         run(jacobians, q, *c, *robot.tip(), reference, out=(rows, 6, n))
         run(jacobian_rates, q, v, *c, *robot.tip(), reference, out=(rows, 6, n))

@@ -6,8 +6,9 @@ h_j made of products of w_j and v_j (kinetic) and of the link's world pose and g
 
 import numpy as np
 
-from ._compile import CHAIN, MATRIX, NOTHING, OUT2, VECTOR, Floats, Ints, compiled
+from ._compile import CHAIN, INTS, MATRIX, NOTHING, OUT3, VECTOR, Floats, Ints, compiled
 from ._motion import coordinate, link_transform, link_velocity
+from ._regressor import put_columns
 from ._vectors import (
     add,
     cross,
@@ -26,7 +27,7 @@ from ._vectors import (
 __all__ = ["energy_regressors"]
 
 
-@compiled(NOTHING(MATRIX, MATRIX, *CHAIN, VECTOR, OUT2))
+@compiled(NOTHING(MATRIX, MATRIX, *CHAIN, VECTOR, INTS, OUT3))
 def energy_regressors(
     q: Floats,
     v: Floats,
@@ -38,6 +39,7 @@ def energy_regressors(
     base_rotation: Floats,
     base_position: Floats,
     gravity: Floats,
+    place: Ints,
     out: Floats,
 ) -> None:
     """Rows h with h @ pi = kinetic + potential energy.
@@ -50,8 +52,10 @@ def energy_regressors(
         The `Chain`.
     gravity : (3,)
         Acceleration of gravity in the world [m/s^2].
-    out : (N, 10 f)
-        Written: by link XX XY XZ YY YZ ZZ MX MY MZ M.
+    place : (10 f,)
+        Column of ``out`` of each parameter, by link XX XY XZ YY YZ ZZ MX MY MZ M; -1 leaves it out.
+    out : (N, 1, c)
+        Written; zero in columns that no parameter has.
     """
     f = antecedent.shape[0]
     g = whole_vector(gravity)
@@ -62,6 +66,8 @@ def energy_regressors(
     put_matrix(R, 0, whole_matrix(base_rotation))
     put_vector(p, 0, whole_vector(base_position))
     for i in range(q.shape[0]):
+        for column in range(out.shape[2]):
+            out[i, 0, column] = 0.0
         for k in range(f):
             b = antecedent[k]
             c = joint[k]
@@ -80,14 +86,16 @@ def energy_regressors(
             put_vector(speed, k + 1, u)
             first = cross(u, w)
             fall = transpose_times(Rk, g)
-            x = 10 * k
-            out[i, x] = 0.5 * w[0] * w[0]
-            out[i, x + 1] = w[0] * w[1]
-            out[i, x + 2] = w[0] * w[2]
-            out[i, x + 3] = 0.5 * w[1] * w[1]
-            out[i, x + 4] = w[1] * w[2]
-            out[i, x + 5] = 0.5 * w[2] * w[2]
-            out[i, x + 6] = first[0] - fall[0]
-            out[i, x + 7] = first[1] - fall[1]
-            out[i, x + 8] = first[2] - fall[2]
-            out[i, x + 9] = 0.5 * dot(u, u) - dot(g, pk)
+            columns = (
+                0.5 * w[0] * w[0],
+                w[0] * w[1],
+                w[0] * w[2],
+                0.5 * w[1] * w[1],
+                w[1] * w[2],
+                0.5 * w[2] * w[2],
+                first[0] - fall[0],
+                first[1] - fall[1],
+                first[2] - fall[2],
+                0.5 * dot(u, u) - dot(g, pk),
+            )
+            put_columns(out, i, 0, place, k, columns)

@@ -2,20 +2,17 @@
 
 Seed book section 1.6.3; C. Atkeson, C. An and J. Hollerbach 1986. Each of a link's ten parameters,
 set to one, asks for a wrench; its power on the unit motion that a joint inboard gives to the link
-is the entry of that joint's row. In link axes, with U the matrix of `rotation_acceleration` and u
-the acceleration of the origin, the wrenches are
-
-    M: [u; 0],    MX MY MZ: [U_k; e_k x u],    XX..ZZ: [0; column of J dw + w x J w].
+is the entry of that joint's row.
 """
 
 import numpy as np
 
-from ._compile import CHAIN, MATRIX, NOTHING, OUT3, VECTOR, Floats, Ints, compiled
+from ._compile import CHAIN, INTS, MATRIX, NOTHING, OUT3, VECTOR, Floats, Ints, compiled
 from ._motion import coordinate, link_acceleration, link_transform, rotation_acceleration
+from ._regressor import put_columns, wrench_columns
 from ._vectors import (
     add,
     cross,
-    dot,
     matrix,
     product,
     put_matrix,
@@ -31,7 +28,7 @@ from ._vectors import (
 __all__ = ["torque_regressors"]
 
 
-@compiled(NOTHING(MATRIX, MATRIX, MATRIX, *CHAIN, VECTOR, OUT3))
+@compiled(NOTHING(MATRIX, MATRIX, MATRIX, *CHAIN, VECTOR, INTS, OUT3))
 def torque_regressors(
     q: Floats,
     v: Floats,
@@ -44,6 +41,7 @@ def torque_regressors(
     base_rotation: Floats,
     base_position: Floats,
     gravity: Floats,
+    place: Ints,
     out: Floats,
 ) -> None:
     """Regressors of the rigid links, without drive terms.
@@ -56,8 +54,10 @@ def torque_regressors(
         The `Chain`.
     gravity : (3,)
         Acceleration of gravity in the world [m/s^2].
-    out : (N, n, 10 f)
-        Written: by link XX XY XZ YY YZ ZZ MX MY MZ M; zero where a link does not load a joint.
+    place : (10 f,)
+        Column of ``out`` of each parameter, by link XX XY XZ YY YZ ZZ MX MY MZ M; -1 leaves it out.
+    out : (N, n, c)
+        Written; zero where a link does not load a joint, and in columns that no parameter has.
     """
     f = antecedent.shape[0]
     # Pose of the links in R_0, motion in their own axes
@@ -71,6 +71,10 @@ def torque_regressors(
     put_vector(p, 0, (0.0, 0.0, 0.0))
     g = transpose_times(whole_matrix(base_rotation), whole_vector(gravity))
     put_vector(u, 0, (-g[0], -g[1], -g[2]))
+    nothing = (0.0, 0.0, 0.0)
+    used = np.zeros(f, dtype=np.bool_)
+    for x in range(10 * f):
+        used[x // 10] |= place[x] >= 0
     for i in range(q.shape[0]):
         for row in range(out.shape[1]):
             for column in range(out.shape[2]):
@@ -102,37 +106,18 @@ def torque_regressors(
             put_vector(dw, k + 1, dwj)
             put_matrix(U, k + 1, Uj)
             put_vector(u, k + 1, uj)
-            # Moments of unit second moments: the entries of J dw + w x J w, found again in U
-            XX = (dwj[0], wj[0] * wj[2], -wj[0] * wj[1])
-            XY = (-Uj[6], Uj[7], Uj[0] - Uj[4])
-            XZ = (Uj[3], Uj[8] - Uj[0], -Uj[5])
-            YY = (-wj[1] * wj[2], dwj[1], wj[0] * wj[1])
-            YZ = (Uj[4] - Uj[8], -Uj[1], Uj[2])
-            ZZ = (wj[1] * wj[2], -wj[0] * wj[2], dwj[2])
-            x = 10 * k
+            if not used[k]:
+                continue
             inner = k + 1
             while inner > 0:
                 row = joint[inner - 1]
                 z = transpose_times(Rk, (R[inner, 0, 2], R[inner, 1, 2], R[inner, 2, 2]))
                 if sigma[inner - 1] == 0:
-                    # Unit motion of the link about the joint's axis: [t; z]
+                    # Unit motion of the link about the joint's axis
                     t = cross(z, transpose_times(Rk, subtract(pk, vector(p, inner))))
-                    pull = transpose_times(Uj, t)
-                    turn = cross(uj, z)
-                    out[i, row, x] = dot(z, XX)
-                    out[i, row, x + 1] = dot(z, XY)
-                    out[i, row, x + 2] = dot(z, XZ)
-                    out[i, row, x + 3] = dot(z, YY)
-                    out[i, row, x + 4] = dot(z, YZ)
-                    out[i, row, x + 5] = dot(z, ZZ)
-                    out[i, row, x + 6] = pull[0] + turn[0]
-                    out[i, row, x + 7] = pull[1] + turn[1]
-                    out[i, row, x + 8] = pull[2] + turn[2]
-                    out[i, row, x + 9] = dot(t, uj)
+                    columns = wrench_columns(t, z, wj, dwj, Uj, uj)
+                    put_columns(out, i, row, place, k, columns)
                 elif sigma[inner - 1] == 1:
-                    pull = transpose_times(Uj, z)
-                    out[i, row, x + 6] = pull[0]
-                    out[i, row, x + 7] = pull[1]
-                    out[i, row, x + 8] = pull[2]
-                    out[i, row, x + 9] = dot(z, uj)
+                    columns = wrench_columns(z, nothing, wj, dwj, Uj, uj)
+                    put_columns(out, i, row, place, k, columns)
                 inner = antecedent[inner - 1]

@@ -1,0 +1,67 @@
+"""The ten columns of one link on the motion of one joint, and where they go.
+
+A motion is given in link axes: t the velocity of the link's origin, z its angular velocity. All
+columns are linear in it, so the unit motion of a joint gives that joint's row, and the link's own
+velocity gives the power.
+"""
+
+from ._compile import Floats, Ints, compiled
+from ._vectors import Matrix, Vector, cross, dot, transpose_times
+
+Ten = tuple[float, float, float, float, float, float, float, float, float, float]
+
+
+@compiled()
+def wrench_columns(t: Vector, z: Vector, w: Vector, dw: Vector, U: Matrix, u: Vector) -> Ten:
+    """Power on the motion of the wrenches that unit parameters need to accelerate.
+
+    In link axes, with U the matrix of `rotation_acceleration` and u the acceleration of the
+    origin, these are M: [u; 0], MX MY MZ: [U_k; e_k x u], XX..ZZ: [0; column of J dw + w x J w].
+    The entries of the last are found again in U.
+    """
+    pull = transpose_times(U, t)
+    turn = cross(u, z)
+    xy, xz, yz = w[0] * w[1], w[0] * w[2], w[1] * w[2]
+    return (
+        z[0] * dw[0] + z[1] * xz - z[2] * xy,
+        z[1] * U[7] - z[0] * U[6] + z[2] * (U[0] - U[4]),
+        z[0] * U[3] + z[1] * (U[8] - U[0]) - z[2] * U[5],
+        z[1] * dw[1] - z[0] * yz + z[2] * xy,
+        z[0] * (U[4] - U[8]) - z[1] * U[1] + z[2] * U[2],
+        z[2] * dw[2] + z[0] * yz - z[1] * xz,
+        pull[0] + turn[0],
+        pull[1] + turn[1],
+        pull[2] + turn[2],
+        dot(t, u),
+    )
+
+
+@compiled()
+def momentum_columns(t: Vector, z: Vector, w: Vector, v: Vector) -> Ten:
+    """Product of the motion with the momenta that unit parameters give a link of twist [v; w].
+
+    M: [v; 0], MX MY MZ: [w x e_k; e_k x v], XX..ZZ: [0; column of J w].
+    """
+    a = cross(t, w)
+    b = cross(v, z)
+    return (
+        z[0] * w[0],
+        z[0] * w[1] + z[1] * w[0],
+        z[0] * w[2] + z[2] * w[0],
+        z[1] * w[1],
+        z[1] * w[2] + z[2] * w[1],
+        z[2] * w[2],
+        a[0] + b[0],
+        a[1] + b[1],
+        a[2] + b[2],
+        dot(t, v),
+    )
+
+
+@compiled()
+def put_columns(out: Floats, i: int, row: int, place: Ints, k: int, columns: Ten) -> None:
+    """Write the columns of link k into row ``out[i, row]`` where ``place`` wants them."""
+    x = 10 * k
+    for c in range(10):
+        if place[x + c] >= 0:
+            out[i, row, place[x + c]] = columns[c]
