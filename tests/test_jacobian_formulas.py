@@ -311,7 +311,7 @@ def test_conditions_are_where_rank_is_lost(name, explained, rng):
         for factor in sorted(condition.factors, key=lambda f: len(f.joints)):
             side = rng.integers(0, 2)
             q[:, factor.solved_joint] = factor.zeros(q)[:, side]
-        q = q[~np.isnan(q).any(axis=1)]
+            q = q[~np.isnan(q).any(axis=1)]
         q = q[condition.holds(q, 1e-8)]
         assert len(q) >= 10
         s = np.linalg.svd(rm.jacobian(model, q), compute_uv=False)

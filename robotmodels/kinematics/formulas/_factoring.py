@@ -51,7 +51,12 @@ def factored(p: Poly, chain: SymbolicChain) -> Factored:
             content, one = _normal(one)
             constant = constant * content
             found[one] = found.get(one, 0) + 1
-    return Factored(constant, tuple(found.items()), complete)
+    # what SymPy's divisions return is equal to the same polynomial, but hashes otherwise
+    fresh: dict[Poly, int] = {}
+    for one, power in found.items():
+        same = ring.ring(dict(one))
+        fresh[same] = fresh.get(same, 0) + power
+    return Factored(constant, tuple(fresh.items()), complete)
 
 
 def _normal(p: Poly) -> tuple[Any, Poly]:
