@@ -1,0 +1,199 @@
+"""Following poses by joint velocities: the inverse kinematic model, step after step.
+
+What `joint_path` does with postures, this does with velocities, and so for every robot: with more
+joints than the task needs the rest is free for criteria, lower tasks and bounds; near singular
+positions the tool falls behind instead of the joints racing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .._arrays import Array, as_exact, read_only
+from ..errors import InvalidValueError
+from ..kinematics.inverse.bounds import JointBounds
+from ..kinematics.inverse.ikm import ikm
+from ..kinematics.inverse.methods import InverseMethod
+from ..kinematics.inverse.request import Secondary
+from ..kinematics.inverse.solution import IKMSolution
+from ..kinematics.inverse.tasks import Task
+from ..kinematics.poses import dgm
+from ..model import RobotModel, check_model
+from .pose_trajectory import PoseTrajectory
+from .rotations import rotation_vector
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ResolvedMotion:
+    """Joints that follow a trajectory of poses by their velocities.
+
+    Parameters
+    ----------
+    t : ndarray, shape (N,)
+        Times, s.
+    q : ndarray, shape (N, n)
+        Postures, rad or m.
+    v : ndarray, shape (N, n)
+        Velocities from each time to the next, rad/s or m/s; the last row repeats the one before.
+    status : ndarray of int8, shape (N,)
+        Codes of `IKMStatus`.
+    position_error, orientation_error : ndarray, shape (N,)
+        How far the tool is behind in what was asked for, m and rad.
+
+    Examples
+    --------
+    >>> ResolvedMotion.__slots__[:3]
+    ('t', 'q', 'v')
+    """
+
+    t: Array
+    q: Array
+    v: Array
+    status: NDArray[np.int8]
+    position_error: Array
+    orientation_error: Array
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            dtype = np.int8 if field.name == "status" else np.float64
+            object.__setattr__(self, field.name, read_only(getattr(self, field.name), dtype))
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        return np.array(self.q, dtype=dtype, copy=copy)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), tuple(getattr(self, field.name) for field in fields(self))
+
+
+def resolved_motion(
+    model: RobotModel,
+    poses: PoseTrajectory,
+    q_start: ArrayLike,
+    samples: int = 400,
+    feedback: float = 10.0,
+    mask: ArrayLike | None = None,
+    method: InverseMethod | None = None,
+    joint_weights: ArrayLike | None = None,
+    secondary: Secondary | None = None,
+    augmented: Sequence[Task] = (),
+    tasks: Sequence[Task] = (),
+    limits: JointBounds | bool | None = None,
+) -> ResolvedMotion:
+    """Follow a trajectory of the tool by joint velocities.
+
+    Also called resolved motion rate control, closed-loop inverse kinematics, ``rrmc``. Each step
+    asks `ikm`, half a step ahead, for the velocity that the trajectory has there, plus ``feedback``
+    times what the tool is behind: the error falls with the square of the step. With ``limits`` it
+    asks where the joints are, so that no bound is passed, and the error falls with the step.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, n joints.
+    poses : PoseTrajectory
+        Of the tool: `straight_line`, `circle`, `blended_poses` ...
+    q_start : array_like, shape (n,)
+        Posture to begin with, rad or m; it need not be on the trajectory.
+    samples : int
+        Postures, from the start to the end.
+    feedback : float
+        Rate at which errors die out, 1/s; at most one over the time of a step.
+    mask : array_like, shape (6,), optional
+        Ones for the components of the twist, in world axes, that are asked for.
+    method, joint_weights, secondary, augmented, tasks, limits
+        As in `ikm`; tasks of lower priority, criteria and limits are taken at every step.
+
+    Returns
+    -------
+    ResolvedMotion
+        Postures, velocities, and how far the tool is behind.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        A posture of the wrong length; fewer than two samples; a feedback that is negative or
+        faster than the steps; what is no `PoseTrajectory`.
+
+    References
+    ----------
+    Seed book section 1.3.2; D. E. Whitney, "Resolved motion rate control of manipulators and human
+    prostheses", IEEE Trans. Man-Machine Systems 10(2), 1969.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> from robotmodels.trajectories import straight_line
+    >>> arm = load("panda")
+    >>> q = np.array([0.1, -0.3, 0.2, -2.0, 0.1, 1.8, 0.5])
+    >>> start = dgm(arm, q)
+    >>> goal = start.copy()
+    >>> goal[:3, 3] += [0.1, 0.2, -0.1]
+    >>> motion = resolved_motion(arm, straight_line(start, goal, duration=2.0), q)
+    >>> bool(motion.position_error.max() < 1e-5)
+    True
+    """
+    check_model(model)
+    if not isinstance(poses, PoseTrajectory):
+        raise InvalidValueError(
+            "poses: expected a PoseTrajectory (straight_line, circle, blended_poses), which knows "
+            f"its velocity, got {type(poses).__name__}; joint_path follows plain arrays of poses."
+        )
+    q = np.array(as_exact(q_start, (model.n,), "q_start"))
+    if samples < 2:
+        raise InvalidValueError(f"samples: expected at least 2, got {samples}.")
+    t = np.linspace(0.0, float(poses.duration), samples)
+    step = float(t[1])
+    if not 0.0 <= feedback * step <= 1.0:
+        fastest = f"{1.0 / step:.4g}" if step > 0 else "infinity"
+        raise InvalidValueError(
+            f"feedback: expected between 0 and {fastest} 1/s, one over the step of {step:.4g} s, "
+            f"got {feedback}; take more samples, or a smaller feedback."
+        )
+    asked = np.ones(6) if mask is None else np.asarray(mask, dtype=np.float64)
+    ahead = t[:-1] + 0.5 * step
+    goals, twists, halfway = poses.pose(t), poses.twist(t), poses.twist(ahead)
+
+    def asked_of(posture: Array, twist: Array) -> IKMSolution:
+        return ikm(
+            model, posture, twist, None, "world_aligned", mask, method, joint_weights, None,
+            secondary, augmented, tasks, limits,
+        )  # fmt: skip
+
+    Q, V = np.empty((samples, model.n)), np.empty((samples, model.n))
+    status = np.zeros(samples, dtype=np.int8)
+    behind = np.empty((samples, 6))
+    for k in range(samples):
+        Q[k] = q
+        behind[k] = _behind(goals[k], dgm(model, q))
+        if k == samples - 1:
+            break
+        posture = q
+        if limits is None:
+            posture = q + 0.5 * step * asked_of(q, twists[k] + feedback * behind[k]).v
+        found = asked_of(posture, halfway[k] + feedback * behind[k])
+        V[k], status[k] = found.v, found.status
+        q = q + step * found.v
+    V[-1], status[-1] = V[-2], status[-2]
+    missed = behind * asked
+    return ResolvedMotion(
+        t,
+        Q,
+        V,
+        status,
+        np.linalg.norm(missed[:, :3], axis=1),
+        np.linalg.norm(missed[:, 3:], axis=1),
+    )
+
+
+def _behind(goal: Array, now: Array) -> Array:
+    """Translation and rotation vector from where the tool is to where it should be."""
+    turn = rotation_vector(goal[:3, :3] @ now[:3, :3].T)
+    return np.concatenate((goal[:3, 3] - now[:3, 3], turn))

@@ -1,0 +1,100 @@
+"""Following poses by joint velocities."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+import robotmodels as rm
+from robotmodels.errors import InvalidValueError, ShapeError
+from robotmodels.kinematics.inverse import IKMStatus, JointBounds, JointLimitCriterion
+from robotmodels.se3 import rotation
+from robotmodels.trajectories import straight_line
+from robotmodels.trajectories.resolved_motion import resolved_motion
+
+PANDA = [1.45, -0.74, -1.41, -0.72, 0.58, 2.38, 0.22]
+
+
+@pytest.fixture(scope="module")
+def panda():
+    return rm.load("panda")
+
+
+def line_of(model, q, way, duration=4.0, turn=None):
+    start = rm.dgm(model, q)
+    goal = start.copy()
+    goal[:3, 3] += way
+    if turn is not None:
+        goal[:3, :3] = rotation("z", turn)[:3, :3] @ goal[:3, :3]
+    return straight_line(start, goal, duration=duration)
+
+
+def margin(model, q):
+    return np.minimum(q - model.lower, model.upper - q).min()
+
+
+def test_the_error_falls_with_the_square_of_the_step(panda):
+    q = np.array([0.1, -0.3, 0.2, -2.0, 0.1, 1.8, 0.5])
+    line = line_of(panda, q, [0.1, 0.2, -0.1], turn=0.6)
+    errors = [
+        max(motion.position_error.max(), motion.orientation_error.max())
+        for motion in (resolved_motion(panda, line, q, samples=k) for k in (101, 201, 401))
+    ]
+    assert errors[0] > 3.4 * errors[1] > 3.4**2 * errors[2]
+    assert errors[2] < 1e-5
+
+
+def test_criteria_and_bounds_keep_the_limits_and_the_line(panda):
+    line = line_of(panda, PANDA, [0.2, 0.19, -0.53])
+    plain = resolved_motion(panda, line, PANDA)
+    kept = resolved_motion(panda, line, PANDA, secondary=JointLimitCriterion(gain=10.0))
+    bounded = resolved_motion(panda, line, PANDA, limits=JointBounds(step=line.duration / 399))
+    assert margin(panda, plain.q) < -0.04
+    assert margin(panda, kept.q) > 0.04
+    assert margin(panda, bounded.q) >= -1e-12
+    for motion in (plain, kept):
+        assert motion.position_error.max() < 1e-5
+        assert motion.orientation_error.max() < 1e-5
+    # while joints are held the tool falls behind, and says so, and then catches up
+    assert (bounded.status == IKMStatus.LIMITED).any()
+    assert bounded.position_error.max() < 5e-3
+    assert bounded.position_error[-1] < 1e-5
+
+
+def test_an_error_at_the_start_dies_out(panda):
+    q = np.array([0.1, -0.3, 0.2, -2.0, 0.1, 1.8, 0.5])
+    line = line_of(panda, q, [0.1, 0.1, 0.0])
+    motion = resolved_motion(panda, line, q + 0.02, feedback=5.0)
+    assert motion.position_error[0] > 1e-3
+    assert motion.position_error[-1] < 1e-5
+
+
+def test_a_mask_leaves_the_rest_free(panda):
+    trr = rm.load("lab_trr")
+    q = np.array([-0.3, -0.8, -0.9])
+    line = line_of(trr, q, [0.1, 0.2, -0.1])
+    motion = resolved_motion(trr, line, q, mask=[1, 1, 1, 0, 0, 0])
+    assert motion.position_error.max() < 1e-5
+    assert motion.orientation_error.max() == 0.0
+    assert (motion.status == 0).all()
+
+
+def test_result_is_a_value(panda):
+    motion = resolved_motion(panda, line_of(panda, PANDA, [0.0, 0.0, 0.05]), PANDA, samples=60)
+    again = pickle.loads(pickle.dumps(motion))
+    assert np.array_equal(again.q, motion.q)
+    assert len(motion) == 60
+    assert np.array_equal(np.asarray(motion), motion.q)
+    assert not motion.q.flags.writeable
+
+
+def test_mistakes_are_named(panda):
+    line = line_of(panda, PANDA, [0.0, 0.0, 0.05])
+    with pytest.raises(InvalidValueError, match="joint_path follows plain arrays"):
+        resolved_motion(panda, np.eye(4)[None], PANDA)
+    with pytest.raises(InvalidValueError, match=r"feedback: expected between 0 and 99\.75"):
+        resolved_motion(panda, line, PANDA, feedback=200.0)
+    with pytest.raises(InvalidValueError, match="samples"):
+        resolved_motion(panda, line, PANDA, samples=1)
+    with pytest.raises(ShapeError, match="q_start"):
+        resolved_motion(panda, line, PANDA[:-1])
