@@ -89,7 +89,7 @@ def explain_singularities(
     >>> from robotmodels.robots import load
     >>> for factor in explain_singularities(load("rx90")).factors:
     ...     print(factor.kind.value, "|", factor.text, "|", factor.solution)
-    shoulder | S23*RL4 - C2*D3 | θ2 = atan2(-S3*RL4 + D3, C3*RL4) or that plus π
+    shoulder | S23*RL4 - C2*D3 | θ2 = atan2(D3 - S3*RL4, C3*RL4) or that plus π
     elbow | C3 | θ3 = -π/2 or π/2
     wrist | S5 | θ5 = 0 or π
     """

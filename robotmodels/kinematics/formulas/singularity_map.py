@@ -109,7 +109,7 @@ def singularity_map(
     --------
     >>> from robotmodels.robots import load
     >>> grid = singularity_map(load("rx90"), (2, 4), samples=(3, 3), ranges=[[-1, 1], [0, 3]])
-    >>> grid.names, grid.values[1, 0]
+    >>> grid.names, float(grid.values[1, 0])
     (('joint_3', 'joint_5'), 0.0)
     """
     from .explain_singularities import explain_singularities
