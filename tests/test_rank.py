@@ -8,9 +8,9 @@ from identities.random_robots import models, random_model, random_pose, random_s
 import robotmodels as rm
 from robotmodels import se3
 from robotmodels.errors import FrameNotFoundError, InvalidValueError, ShapeError
-from robotmodels.kinematics.rank import jacobian_rank, operational_dimension
-from robotmodels.kinematics.singular_bases import sparse_basis
-from robotmodels.kinematics.singular_task import (
+from robotmodels.kinematics.singular.bases import sparse_basis
+from robotmodels.kinematics.singular.rank import jacobian_rank, operational_dimension
+from robotmodels.kinematics.singular.task import (
     characteristic_length,
     singular_task,
     task_derivatives,

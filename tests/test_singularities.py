@@ -11,17 +11,17 @@ from scipy.optimize import minimize_scalar
 import robotmodels as rm
 from robotmodels import se3
 from robotmodels.errors import FrameNotFoundError, InvalidValueError, ShapeError
-from robotmodels.kinematics.nearest_singularity import (
+from robotmodels.kinematics.singular.boundary import WorkspaceSide
+from robotmodels.kinematics.singular.classification import classify_singularity
+from robotmodels.kinematics.singular.flags import SingularityStatus, singularity_flags
+from robotmodels.kinematics.singular.motion import SelfMotionKind
+from robotmodels.kinematics.singular.nearest import (
     NearestStatus,
     SearchOutcome,
     nearest_singularity,
 )
-from robotmodels.kinematics.rank import jacobian_rank
-from robotmodels.kinematics.singular_boundary import WorkspaceSide
-from robotmodels.kinematics.singular_flags import SingularityStatus, singularity_flags
-from robotmodels.kinematics.singular_motion import SelfMotionKind
-from robotmodels.kinematics.singular_words import SingularityKind
-from robotmodels.kinematics.singularities import classify_singularity
+from robotmodels.kinematics.singular.rank import jacobian_rank
+from robotmodels.kinematics.singular.words import SingularityKind
 
 PI = np.pi
 SHOULDER, ELBOW, WRIST, OTHER = SingularityKind

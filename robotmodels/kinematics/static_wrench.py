@@ -15,7 +15,7 @@ from ..geometry import PRISMATIC
 from ..model import RobotModel, check_model
 from ..visual import characteristic_length as table_length
 from .jacobians import Reference, jacobian
-from .singular_task import characteristic_length
+from .singular.task import characteristic_length
 from .statics import weight_torque
 
 _EPS = float(np.finfo(np.float64).eps)

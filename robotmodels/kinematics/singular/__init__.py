@@ -1,0 +1,34 @@
+"""Rank and singular configurations: what is lost, what still moves, where the next one is.
+
+Seed book sections 1.3.1.4 and 1.3.2.3.
+"""
+
+from .boundary import WorkspaceSide
+from .classification import SingularityReport, classify_singularity
+from .flags import SingularityFlags, SingularityStatus, singularity_flags
+from .frames import LostDirections
+from .motion import SelfMotion, SelfMotionKind
+from .nearest import NearestSingularities, NearestStatus, SearchOutcome, nearest_singularity
+from .rank import JacobianRank, OperationalDimension, jacobian_rank, operational_dimension
+from .words import SingularityKind
+
+__all__ = [
+    "JacobianRank",
+    "LostDirections",
+    "NearestSingularities",
+    "NearestStatus",
+    "OperationalDimension",
+    "SearchOutcome",
+    "SelfMotion",
+    "SelfMotionKind",
+    "SingularityFlags",
+    "SingularityKind",
+    "SingularityReport",
+    "SingularityStatus",
+    "WorkspaceSide",
+    "classify_singularity",
+    "jacobian_rank",
+    "nearest_singularity",
+    "operational_dimension",
+    "singularity_flags",
+]

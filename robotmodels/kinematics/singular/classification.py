@@ -1,0 +1,352 @@
+"""Singular configurations: what is lost there, what is gained, and what they are called.
+
+Seed book sections 1.3.1.4 and 1.3.2.3.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..._arrays import Array, as_exact, as_floats, read_only
+from ...model import RobotModel
+from ...table_text import length_text
+from ..poses import dgm
+from .boundary import WorkspaceSide, workspace_side
+from .flags import SingularityStatus
+from .frames import LostDirections, check_frames, lost_in_task_axes, simplest_frame
+from .motion import SelfMotion, self_motions
+from .rank import TOLERANCE, OperationalDimension, operational_dimension, task_rank
+from .structure import arm_structure
+from .task import (
+    MaskAxes,
+    SingularTask,
+    above_zero,
+    singular_task,
+    task_jacobians,
+)
+from .words import SingularityKind, kinds_in_words
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SingularityReport:
+    """One configuration: what it has lost, what it has gained. Read-only; `print` it.
+
+    Parameters
+    ----------
+    status : SingularityStatus
+        Regular, near singular or singular.
+    q : ndarray, shape (n,)
+        The configuration, rad or m.
+    dimension, rank, order : int
+        M, local rank r, and M - r.
+    singular_values : ndarray, shape (k,)
+        Descending, no unit.
+    weakest : float
+        The M-th of them over the first: the measure of the distance to a singularity.
+    gap : float
+        Smallest singular value that counts over the largest that does not.
+    kinds : tuple of SingularityKind
+        Shoulder, elbow, wrist or other.
+    words : tuple of str
+        The same as sentences.
+    side : WorkspaceSide
+        Boundary or interior, of what the robot reaches near this configuration.
+    lost : LostDirections
+        Combinations that cannot be produced, where they have the most zeros.
+    lost_in_world : LostDirections
+        The same in the axes of the task (world axes unless the mask's are the tool's) at the
+        frame's origin.
+    open_twist : ndarray, shape (6,), or None
+        At a boundary: the lost direction towards the side that is open, ``[v; w]`` in the axes of
+        ``lost_in_world``, unit length when metres are divided by ``length``.
+    self_motions : tuple of SelfMotion
+        Joint motions that leave the frame still.
+    gained : int
+        How many more of them than at regular configurations.
+    length, tolerance : float
+        Characteristic length in metres, and what counts as zero.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> report = classify_singularity(load("rx90"), [0.1, 0.2, -np.pi / 2, 0.4, 0.5, 0.6])
+    >>> report.kinds[0].name, report.side.name, report.lost.combinations
+    ('ELBOW', 'BOUNDARY', ('vz',))
+    """
+
+    status: SingularityStatus
+    q: Array
+    dimension: int
+    rank: int
+    order: int
+    singular_values: Array
+    weakest: float
+    gap: float
+    kinds: tuple[SingularityKind, ...]
+    words: tuple[str, ...]
+    side: WorkspaceSide
+    lost: LostDirections
+    lost_in_world: LostDirections
+    open_twist: Array | None
+    self_motions: tuple[SelfMotion, ...]
+    gained: int
+    length: float
+    tolerance: float
+
+    def __str__(self) -> str:
+        """Describe it in sentences."""
+        lines = [
+            self.status.sentence,
+            f"Rank {self.rank} of {self.dimension}, weakest singular value "
+            f"{self.weakest:.3g} of the largest (length {length_text(self.length)} m)",
+            *self.words,
+        ]
+        if self.lost.combinations:
+            lines.append(f"Cannot be produced, {self.lost.where}:")
+            lines += [f"  {text} = 0 whatever the joints do" for text in self.lost.combinations]
+            lines += [f"  carried without torque: {text}" for text in self.lost.carried]
+            lines.append(self.side.sentence)
+        for motion in self.self_motions:
+            names = ", ".join(map(str, motion.joints))
+            rates = ", ".join(length_text(float(x)) for x in motion.velocity)
+            lines.append(f"Self-motion of joints {names}: ({rates}). {motion.kind.sentence}")
+        if self.self_motions:
+            lines.append(f"Self-motions gained beside a regular configuration: {self.gained}")
+        return "\n".join(lines)
+
+
+def classify_singularity(
+    model: RobotModel,
+    q: ArrayLike,
+    frame: str | int | None = None,
+    length: float | None = None,
+    tolerance: float = TOLERANCE,
+    near: float = 1e-2,
+    mask: ArrayLike | None = None,
+    mask_axes: MaskAxes = "world",
+    axes: int | None = None,
+    point: int | None = None,
+) -> SingularityReport:
+    """What a configuration has lost and gained beside a regular one, in numbers and in words.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, n joints.
+    q : array_like, shape (n,)
+        One configuration, rad or m.
+    frame : str or int, optional
+        Name or number of a frame; default the tool.
+    length : float, optional
+        Characteristic length L in metres: linear rows are divided by it, strokes of prismatic
+        joints count in it. Default the reach, `characteristic_length`, which does not depend on
+        where the robot stands.
+    tolerance : float
+        Singular values below this fraction of the largest are zero. A wider one classifies a
+        configuration near a singular one as if it were there: the components that are then
+        small are given as they are.
+    near : float
+        Fraction below which a singular value that is not zero is called weak.
+    mask : array_like, shape (6,), optional
+        Ones for the components ``vx vy vz wx wy wz`` that count; default all.
+    mask_axes : {"world", "tool"}
+        Axes of the components.
+    axes, point : int, optional
+        Numbers of the frames in whose axes and at whose origin the lost directions are to be
+        given, the projection and the intermediate frame of the book; 0 is R_0. Default: where
+        they have the most zeros.
+
+    Returns
+    -------
+    SingularityReport
+        Lost directions, self-motions, kind, side of the workspace.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError, FrameNotFoundError
+        ``q`` of the wrong length; a length, tolerance or mask that cannot be; no such frame.
+
+    References
+    ----------
+    Seed book sections 1.3.1.3, 1.3.1.4 and 1.3.2.3. D. Oblak and D. Kohli, Boundary surfaces,
+    limit surfaces, crossable and noncrossable surfaces in workspace of mechanical manipulators,
+    ASME J. Mechanisms 110, 1988, for the second-order test of a boundary.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> print(classify_singularity(load("rx90"), [0.1, 0.2, -np.pi / 2, 0.4, 0.5, 0.6]))
+    Singular: the robot has lost freedoms.
+    Rank 5 of 6, weakest singular value ... of the largest (length 0.9 m)
+    elbow: axes 2 and 3 and the wrist centre lie in one plane, stretched out
+    Cannot be produced, axes of R4, at the origin of R4:
+      vz = 0 whatever the joints do
+      carried without torque: fz
+    On a boundary: along the lost direction the tool can move to one side only.
+    ...
+    """
+    task = singular_task(model, frame, mask, mask_axes, length)
+    check_frames(task, axes, point)
+    q = as_exact(q, (model.n,), "q")
+    tolerance, near = above_zero(tolerance, "tolerance"), above_zero(near, "near")
+    whole = operational_dimension(model, frame, None, task.length, TOLERANCE, mask, mask_axes)
+    return report_of(task, q, whole, tolerance, near, axes, point)
+
+
+def report_of(
+    task: SingularTask,
+    q: Array,
+    whole: OperationalDimension,
+    tolerance: float,
+    near: float,
+    axes: int | None = None,
+    point: int | None = None,
+) -> SingularityReport:
+    """`classify_singularity` of a task whose dimension is known.
+
+    Parameters
+    ----------
+    task : SingularTask
+        What is asked about.
+    q : ndarray, shape (n,)
+        Configuration, rad or m.
+    whole : OperationalDimension
+        Of the same task.
+    tolerance, near, axes, point
+        As `classify_singularity`.
+
+    Returns
+    -------
+    SingularityReport
+        The report.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> arm = load("rx90")
+    >>> task, whole = singular_task(arm), operational_dimension(arm)
+    >>> report_of(task, np.zeros(6), whole, 1e-9, 1e-2).order
+    1
+    """
+    M = whole.dimension
+    sigma, lost, null, missing, zero = _spaces(task, q, whole, tolerance)
+    top = float(sigma.max(initial=0.0))
+    r = min(int((sigma > tolerance * top).sum()), M)
+    weakest = float(sigma[M - 1] / top) if M and top > 0.0 else 0.0
+    motions = self_motions(task, q, lost, null, zero)
+    side, opening = workspace_side(task, q, lost, null, motions, missing, M - r)
+    in_task = lost_in_task_axes(task, lost)
+    named = _named(task, q, whole, motions, lost, zero) if r < M else ()
+    status = SingularityStatus.REGULAR
+    if r < M:
+        status = SingularityStatus.SINGULAR
+    elif weakest < near and M:
+        status = SingularityStatus.NEAR_SINGULAR
+    open_twist = None
+    if opening is not None:
+        open_twist = np.zeros(6)
+        open_twist[task.mask] = opening / task.row_scale
+    return SingularityReport(
+        status=status,
+        q=read_only(q),
+        dimension=M,
+        rank=r,
+        order=M - r,
+        singular_values=read_only(sigma),
+        weakest=weakest,
+        gap=float(task_rank(task, q, tolerance).gap),
+        kinds=tuple(dict.fromkeys(kind for kind, _ in named if kind is not None)),
+        words=tuple(text for _, text in named),
+        side=side,
+        lost=simplest_frame(task, q, lost, missing, zero, axes, point) if r < M else in_task,
+        lost_in_world=in_task,
+        open_twist=None if open_twist is None else read_only(open_twist),
+        self_motions=motions,
+        gained=M - r,
+        length=task.length,
+        tolerance=tolerance,
+    )
+
+
+def names_of(
+    task: SingularTask, q: Array, whole: OperationalDimension, tolerance: float
+) -> tuple[tuple[SingularityKind | None, str], ...]:
+    """Only the names of a singular configuration, without the rest of its report.
+
+    Parameters
+    ----------
+    task : SingularTask
+        What is asked about.
+    q : ndarray, shape (n,)
+        Configuration, rad or m.
+    whole : OperationalDimension
+        Of the same task.
+    tolerance : float
+        As `classify_singularity`.
+
+    Returns
+    -------
+    tuple of (SingularityKind or None, str)
+        As `kinds_in_words`; empty where the configuration is regular.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> arm = load("rx90")
+    >>> names_of(singular_task(arm), np.zeros(6), operational_dimension(arm), 1e-9)
+    ((<SingularityKind.WRIST: 2>, 'wrist: the axes of joints 4 and 6 are aligned'),)
+    """
+    _, lost, null, _, zero = _spaces(task, q, whole, tolerance)
+    if not lost.shape[1]:
+        return ()
+    return _named(task, q, whole, self_motions(task, q, lost, null, zero), lost, zero)
+
+
+def _spaces(
+    task: SingularTask, q: Array, whole: OperationalDimension, tolerance: float
+) -> tuple[Array, Array, Array, Array, float]:
+    """Singular values, lost directions, self-motions, what is always missing, what is zero."""
+    M = whole.dimension
+    U, sigma, Vt = np.linalg.svd(task_jacobians(task, q))
+    top = float(sigma.max(initial=0.0))
+    r = min(int((sigma > tolerance * top).sum()), M)
+    zero = max(1e-9, 10.0 * float(sigma[r]) / top) if r < min(M, len(sigma)) and top else 1e-9
+    missing = _missing(task, whole)
+    lost = _without(U[:, r:], missing) if r < M else np.zeros((task.rows, 0))
+    null = _without(Vt[r:].T, np.eye(task.model.n)[:, ~task.moving])
+    return as_floats(sigma, "sigma"), lost, null, missing, zero
+
+
+def _named(
+    task: SingularTask,
+    q: Array,
+    whole: OperationalDimension,
+    motions: tuple[SelfMotion, ...],
+    lost: Array,
+    zero: float,
+) -> tuple[tuple[SingularityKind | None, str], ...]:
+    wrenches = np.zeros((lost.shape[1], 6))
+    wrenches[:, task.mask] = (lost * task.row_scale[:, None]).T
+    if task.mask_axes == "tool":
+        wrenches = _turned(task, q, wrenches)
+    return kinds_in_words(task, q, arm_structure(task), motions, wrenches, whole.redundancy, zero)
+
+
+def _missing(task: SingularTask, whole: OperationalDimension) -> Array:
+    """Orthonormal directions without units that no configuration has, shape (m, s)."""
+    rows = whole.missing_in_frame if task.mask_axes == "tool" else whole.missing_in_world
+    return np.linalg.qr((rows[:, task.mask] / task.row_scale).T)[0]
+
+
+def _without(space: Array, part: Array) -> Array:
+    """Orthonormal basis of what a space has outside a part of it."""
+    U, sigma, _ = np.linalg.svd(space - part @ (part.T @ space), full_matrices=False)
+    return U[:, sigma > 0.5]
+
+
+def _turned(task: SingularTask, q: Array, wrenches: Array) -> Array:
+    R = dgm(task.model, q, task.frame)[:3, :3]
+    return (wrenches.reshape(-1, 2, 3) @ R.T).reshape(-1, 6)

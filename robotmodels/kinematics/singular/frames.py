@@ -1,0 +1,304 @@
+"""Lost directions where they are simplest: in whose axes, and at which point.
+
+A wrench that no motor feels has other components at another point, and so has the combination of
+velocities that cannot be produced. In the right frame most of them are zero; the book finds that
+frame by choosing the projection and the intermediate frame of the Jacobian.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..._arrays import Array, read_only
+from ...errors import FrameNotFoundError, InvalidValueError
+from ..poses import dgm, link_poses
+from .bases import normalised, sparse_basis
+from .task import SingularTask
+
+WORLD = -1
+"""In place of a frame's number: the axes of the world."""
+
+_VELOCITY = ("vx", "vy", "vz", "wx", "wy", "wz")
+_WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LostDirections:
+    """Combinations of velocities that cannot be produced, in chosen axes at a chosen point.
+
+    Parameters
+    ----------
+    axes : int or None
+        Number of the frame whose axes the components are in; 0 is R_0, `WORLD` the world, None
+        the frame that was asked for (the tool).
+    point : int or None
+        Number of the frame at whose origin they are taken; None the same.
+    wrenches : ndarray, shape (p, 6)
+        Rows ``c = [f; m]``: ``c . [v; w] = 0`` for every twist the joints can produce, and by
+        duality the wrench c is carried without any joint torque. Largest component 1, forces in
+        N for moments in N m.
+    twists : ndarray, shape (p, 6)
+        Rows ``[v; w]``, m/s and rad/s: the twists that have nothing of what can be produced,
+        orthogonal to it when metres are divided by the characteristic length. Where a wrench is
+        a pure force or a pure moment, its twist has the same numbers whatever that length is.
+
+    Examples
+    --------
+    >>> along_z = np.array([[0.0, 0.0, 1.0, 0.0, 0.0, 0.0]])
+    >>> lost = LostDirections(4, 4, along_z, along_z)
+    >>> lost.where, lost.combinations
+    ('axes of R4, at the origin of R4', ('vz',))
+    """
+
+    axes: int | None
+    point: int | None
+    wrenches: Array
+    twists: Array
+
+    @property
+    def where(self) -> str:
+        """Axes and point in words."""
+        names = {None: "the frame itself", WORLD: "the world"}
+        axes, point = (names.get(k, f"R{k}") for k in (self.axes, self.point))
+        return f"axes of {axes}, at the origin of {point}"
+
+    @property
+    def combinations(self) -> tuple[str, ...]:
+        """Combinations of velocity components that stay zero, in words."""
+        return tuple(combination_text(row, _VELOCITY) for row in self.wrenches)
+
+    @property
+    def carried(self) -> tuple[str, ...]:
+        """Wrenches that are carried without torque, in words."""
+        return tuple(combination_text(row, _WRENCH) for row in self.wrenches)
+
+
+def lost_in_task_axes(task: SingularTask, lost: Array) -> LostDirections:
+    """Lost directions in the axes of the task (the world's, or the frame's own), at its origin.
+
+    Parameters
+    ----------
+    task : SingularTask
+        What is asked about.
+    lost : ndarray, shape (m, p)
+        Orthonormal, without units, in the components of the task.
+
+    Returns
+    -------
+    LostDirections
+        At the origin of the frame.
+
+    Examples
+    --------
+    >>> from robotmodels.kinematics.singular.task import singular_task
+    >>> from robotmodels.robots import load
+    >>> task = singular_task(load("planar_2r"), mask=[1, 1, 0, 0, 0, 0])
+    >>> lost_in_task_axes(task, np.array([[1.0], [0.0]])).combinations
+    ('vx',)
+    """
+    axes = None if task.mask_axes == "tool" else WORLD
+    return _expressed(task, _wide(task, lost).T, axes, None, 1e-9)
+
+
+def simplest_frame(
+    task: SingularTask,
+    q: Array,
+    lost: Array,
+    missing: Array,
+    zero: float,
+    axes: int | None = None,
+    point: int | None = None,
+) -> LostDirections:
+    """Lost directions in the axes and at the point where they have the most zeros.
+
+    Axes and points are those of R_0, of the frames from the base to the frame that is asked
+    about, and of that frame itself. Among equals the same frame for both comes first, then what
+    is nearest to the frame. Where only some components of the motion count, the
+    point stays; where these are not whole vectors, so do the axes.
+
+    Parameters
+    ----------
+    task : SingularTask
+        What is asked about.
+    q : ndarray, shape (n,)
+        Configuration, rad or m.
+    lost : ndarray, shape (m, p)
+        Orthonormal lost directions, without units.
+    missing : ndarray, shape (m, s)
+        Orthonormal directions that no configuration has.
+    zero : float
+        Components below this fraction of the largest count as zeros.
+    axes, point : int, optional
+        Number of the frame to take, instead of looking for the simplest.
+
+    Returns
+    -------
+    LostDirections
+        The simplest that was found.
+
+    Raises
+    ------
+    FrameNotFoundError, InvalidValueError
+        As `check_frames`.
+
+    Examples
+    --------
+    >>> from robotmodels.kinematics.singular.task import singular_task, task_jacobians
+    >>> from robotmodels.robots import load
+    >>> task, q = singular_task(load("rx90")), np.array([0.1, 0.2, -np.pi / 2, 0.4, 0.5, 0.6])
+    >>> lost = np.linalg.svd(task_jacobians(task, q))[0][:, 5:]
+    >>> found = simplest_frame(task, q, lost, np.zeros((6, 0)), 1e-9)
+    >>> found.where, found.combinations
+    ('axes of R4, at the origin of R4', ('vz',))
+    """
+    model = task.model
+    tool = dgm(model, q, task.frame)
+    poses: dict[int | None, Array] = {None: tool, 0: model.base}
+    links = link_poses(model, q)
+    for j in model.twin.frame(task.frame).path:
+        poses[int(j)] = links[int(j) - 1]
+    check_frames(task, axes, point)
+    whole = task.is_whole
+    if not _has_vectors(task):
+        return lost_in_task_axes(task, lost)
+    start = tool[:3, :3] if task.mask_axes == "tool" else np.eye(3)
+    spaces = _wide(task, lost).T, _wide(task, missing).T
+    best: tuple[tuple[float, ...], LostDirections] | None = None
+    for k, A in poses.items():
+        for j, P in poses.items():
+            if j is not None and not whole:
+                continue
+            if (axes not in (None, k)) or (whole and point not in (None, j)):
+                continue
+            turn, lever = A[:3, :3].T @ start, start.T @ (tool[:3, 3] - P[:3, 3])
+            rows = _complement(task, *(_moved(s, turn, lever) for s in spaces))
+            found = _expressed(task, rows, k, j, zero)
+            size = np.abs(found.wrenches).max(axis=1, keepdims=True, initial=0.0)
+            zeros = int((np.abs(found.wrenches) <= zero * size).sum())
+            nearness = [model.f + 1 if i is None else i for i in (j, k)]
+            rank = (-zeros, k != j, -nearness[0], -nearness[1])
+            if best is None or rank < best[0]:
+                best = rank, found
+    assert best is not None  # the frame itself is always among them
+    return best[1]
+
+
+def check_frames(task: SingularTask, axes: int | None, point: int | None) -> None:
+    """Refuse frames in which lost directions cannot be given.
+
+    Parameters
+    ----------
+    task : SingularTask
+        What is asked about.
+    axes, point : int or None
+        Numbers of frames.
+
+    Raises
+    ------
+    FrameNotFoundError
+        A number that is neither 0 nor on the way to the frame.
+    InvalidValueError
+        Axes or a point, where the components that count do not turn or move to them.
+
+    Examples
+    --------
+    >>> from robotmodels.kinematics.singular.task import singular_task
+    >>> from robotmodels.robots import load
+    >>> check_frames(singular_task(load("rx90")), 4, 4)
+    """
+    known = [0, *(int(j) for j in task.model.twin.frame(task.frame).path)]
+    for asked in (axes, point):
+        if asked is not None and asked not in known:
+            raise FrameNotFoundError(
+                "frame number", asked, map(str, known),
+                "Lost directions are given in frames from the base to the one asked about.",
+            )  # fmt: skip
+    if point is not None and not task.is_whole:
+        raise InvalidValueError(
+            "point: with a mask the lost directions belong to the frame's origin; leave it out."
+        )
+    if axes is not None and not _has_vectors(task):
+        raise InvalidValueError(
+            "axes: this mask takes single components, which belong to its own axes; leave it out."
+        )
+
+
+def combination_text(row: Array, names: tuple[str, ...]) -> str:
+    """A linear combination in words.
+
+    Parameters
+    ----------
+    row : ndarray, shape (m,)
+        Coefficients.
+    names : tuple of str, length m
+        What they multiply.
+
+    Returns
+    -------
+    str
+        For instance ``vx - 0.5 wz``; what is below 1e-9 is left out.
+
+    Examples
+    --------
+    >>> combination_text(np.array([1.0, 0.0, -0.5]), ("a", "b", "c"))
+    'a - 0.5 c'
+    """
+    text = ""
+    for value, name in zip(row, names, strict=True):
+        if abs(value) < 1e-9:
+            continue
+        size = "" if abs(abs(value) - 1.0) < 1e-12 else f"{abs(value):.4g} "
+        sign = "-" if value < 0 else "+"
+        text += f" {sign} {size}{name}" if text else f"{'-' * int(value < 0)}{size}{name}"
+    return text
+
+
+def _has_vectors(task: SingularTask) -> bool:
+    """Whether velocity and angular velocity each count as a whole or not at all."""
+    return all(len(set(task.mask[k : k + 3].tolist())) == 1 for k in (0, 3))
+
+
+def _wide(task: SingularTask, lost: Array) -> Array:
+    """Wrenches (6, p) of directions without units: f per metre, m per radian."""
+    wide = np.zeros((6, lost.shape[1]))
+    wide[task.mask] = lost * task.row_scale[:, None]
+    return wide
+
+
+def _moved(wrenches: Array, turn: Array, lever: Array) -> Array:
+    """Wrenches (p, 6) at another point and in other axes; the lever leads from there to here."""
+    force, moment = wrenches[:, :3], wrenches[:, 3:]
+    moment = moment + np.cross(lever, force)
+    return np.hstack([force @ turn.T, moment @ turn.T])
+
+
+def _complement(task: SingularTask, lost: Array, missing: Array) -> Array:
+    """Lost wrenches freed of what is always missing, in the metric of the task at that point."""
+    if not len(missing):
+        return lost
+    scale = np.repeat([task.length, 1.0], 3)
+    fixed = np.linalg.qr((missing * scale).T)[0]
+    rows = lost * scale
+    return (rows - rows @ fixed @ fixed.T) / scale
+
+
+def _expressed(
+    task: SingularTask,
+    wrenches: Array,
+    axes: int | None,
+    point: int | None,
+    zero: float,
+) -> LostDirections:
+    """Sparse rows, found in units that compare."""
+    scale = np.repeat([task.length, 1.0], 3)
+    rows = sparse_basis(wrenches * scale, zero)
+    clean = [normalised(row / scale) for row in rows]
+    twists = [normalised(row * scale) for row in rows]
+    return LostDirections(
+        axes=axes,
+        point=point,
+        wrenches=read_only(np.reshape(clean, (-1, 6))),
+        twists=read_only(np.reshape(twists, (-1, 6))),
+    )

@@ -1,0 +1,452 @@
+"""Search of singular configurations near a given one.
+
+Seed book section 1.3.2.3: the solution near singular positions needs to know where they are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from enum import IntEnum
+from math import pi
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..._arrays import Array, as_exact, read_only
+from ...errors import InvalidValueError
+from ...geometry import PRISMATIC
+from ...model import RobotModel
+from ...table_text import boxed, length_text
+from .classification import names_of
+from .rank import OperationalDimension, operational_dimension
+from .search import FoundPoints, SearchSpace, nearest_points, slope_along
+from .task import MaskAxes, SingularTask, generator_of, singular_task, whole_number
+from .words import SingularityKind
+
+_ON_SET = 1e-10
+_STATIONARY = 1e-7
+_SAME = 1e-5
+_BESIDE = 8
+_ALREADY, _ASIDE, _FLAT = 1e-9, 1e-4, 3e-6
+
+
+class NearestStatus(IntEnum):
+    """What one found configuration is; fits int8.
+
+    Attributes
+    ----------
+    sentence : str
+        What a person reads.
+
+    Examples
+    --------
+    >>> NearestStatus.NEAREST.sentence
+    'Singular, and none of the same kind in its neighbourhood is nearer.'
+    """
+
+    sentence: str
+
+    NEAREST = 0, "Singular, and none of the same kind in its neighbourhood is nearer."
+    AT_LIMIT = 1, "Singular, and none that respects the joint limits is nearer there."
+    NOT_STATIONARY = 2, "Singular, but a nearer one in its neighbourhood is not excluded."
+    CROSSING = (
+        3, "Singular in another way than the given configuration, and the nearest to within 1e-4.",
+    )  # fmt: skip
+
+    def __new__(cls, value: int, sentence: str = "") -> Self:
+        """Attach the sentence to the number."""
+        status = int.__new__(cls, value)
+        status._value_ = value
+        status.sentence = sentence
+        return status
+
+
+class SearchOutcome(IntEnum):
+    """What a search came to.
+
+    Attributes
+    ----------
+    sentence : str
+        What a person reads.
+
+    Examples
+    --------
+    >>> SearchOutcome.NONE_FOUND.name
+    'NONE_FOUND'
+    """
+
+    sentence: str
+
+    FOUND = 0, "Singular configurations were found."
+    ALREADY_SINGULAR = 1, "The given configuration is singular itself."
+    NONE_FOUND = 2, "No singular configuration was found from any start."
+
+    def __new__(cls, value: int, sentence: str = "") -> Self:
+        """Attach the sentence to the number."""
+        outcome = int.__new__(cls, value)
+        outcome._value_ = value
+        outcome.sentence = sentence
+        return outcome
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NearestSingularities:
+    """Singular configurations by their distance from a given one. Read-only; `print` it.
+
+    S rows, the nearest first; none twice, also not by whole turns of a joint unless limits were
+    asked for.
+
+    Parameters
+    ----------
+    home : ndarray, shape (n,)
+        The given configuration, rad or m.
+    q : ndarray, shape (S, n)
+        Singular configurations, rad or m.
+    distance : ndarray, shape (S,)
+        From ``home``, weighted: ``sqrt(sum of w (dq)^2)``, strokes in units of ``length``.
+    direction : ndarray, shape (S, n)
+        ``(q - home) / distance``, rad or m per unit of distance; zero where the distance is.
+    escape : ndarray, shape (S, n)
+        Joint direction, rad or m per unit of distance, normal to the singular set there: the
+        weakest singular value rises along it. Towards ``home``.
+    slope : ndarray, shape (S,)
+        Of the weakest singular value along ``escape``, per unit of distance: nearly 0 where the
+        singular set is touched twice, or where two sets cross.
+    codimension : ndarray of int, shape (S,)
+        Number of conditions on the joints that the set makes there: 1 is a surface.
+    kind : tuple of tuple of SingularityKind
+        Names of each.
+    words : tuple of tuple of str
+        Sentences of each.
+    residual : ndarray, shape (S,)
+        Weakest singular value over the largest: 0 is exactly singular.
+    stationarity : ndarray, shape (S,)
+        Part of the way home that lies along the set, in units of distance: 0 is nearest;
+        infinite where sets cross.
+    status : ndarray of int8, shape (S,)
+        Codes of `NearestStatus`.
+    outcome : SearchOutcome
+        Of the whole search.
+    length : float
+        Characteristic length, metres.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> found = nearest_singularity(load("rx90"), [0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
+    >>> found.distance[:2], [kinds[0].name for kinds in found.kind[:2]]
+    (array([0.3894, 0.5   ]), ['SHOULDER', 'WRIST'])
+    """
+
+    home: Array
+    q: Array
+    distance: Array
+    direction: Array
+    escape: Array
+    slope: Array
+    codimension: NDArray[np.int64]
+    kind: tuple[tuple[SingularityKind, ...], ...]
+    words: tuple[tuple[str, ...], ...]
+    residual: Array
+    stationarity: Array
+    status: NDArray[np.int8]
+    outcome: SearchOutcome
+    length: float
+
+    @property
+    def count(self) -> int:
+        """Number of configurations found."""
+        return len(self.q)
+
+    def of(self, kind: SingularityKind) -> int | None:
+        """Row of the nearest configuration of a kind.
+
+        Parameters
+        ----------
+        kind : SingularityKind
+            Shoulder, elbow, wrist or other.
+
+        Returns
+        -------
+        int or None
+            Its row; None if there is none.
+
+        Examples
+        --------
+        >>> from robotmodels.robots import load
+        >>> found = nearest_singularity(load("rx90"), [0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
+        >>> found.of(SingularityKind.WRIST), found.of(SingularityKind.OTHER)
+        (1, None)
+        """
+        return next((i for i, kinds in enumerate(self.kind) if kind in kinds), None)
+
+    def reason(self, i: int = 0) -> str:
+        """What one of them is, in a sentence.
+
+        Parameters
+        ----------
+        i : int
+            Row.
+
+        Returns
+        -------
+        str
+            The sentence of its status.
+
+        Examples
+        --------
+        >>> from robotmodels.robots import load
+        >>> nearest_singularity(load("rx90"), [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]).reason()
+        'Singular, and none of the same kind in its neighbourhood is nearer.'
+        """
+        return NearestStatus(int(self.status[i])).sentence
+
+    def __str__(self) -> str:
+        """Table of what was found."""
+        if not self.count:
+            return self.outcome.sentence
+        columns = [
+            ("distance", [f"{d:.4g}" for d in self.distance]),
+            *(
+                (f"q{j + 1}", [length_text(round(float(x), 9)) for x in self.q[:, j]])
+                for j in range(self.q.shape[1])
+            ),
+            ("what", ["; ".join(words) for words in self.words]),
+        ]
+        return f"{self.outcome.sentence}\n{boxed(columns)}"
+
+
+def nearest_singularity(
+    model: RobotModel,
+    q: ArrayLike,
+    frame: str | int | None = None,
+    limits: bool = False,
+    weights: ArrayLike | None = None,
+    length: float | None = None,
+    mask: ArrayLike | None = None,
+    mask_axes: MaskAxes = "world",
+    starts: int = 48,
+    most: int = 16,
+    rng: np.random.Generator | int | None = None,
+) -> NearestSingularities:
+    """Singular configurations nearest to a given one, in joint space.
+
+    From several starts, Newton's iteration goes to where the rank drops below the dimension of
+    the operational space, then along that set to the point nearest to the given configuration.
+    What comes out are local minima of the distance, the nearest first: usually one or two for
+    each kind of singularity. That none was missed is not proven.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, n joints.
+    q : array_like, shape (n,)
+        The given configuration, rad or m.
+    frame : str or int, optional
+        Name or number of a frame; default the tool.
+    limits : bool
+        Whether only configurations inside the joint limits count.
+    weights : array_like, shape (n,), optional
+        Of the squares of the joint differences, above 0; default 1. Strokes are in units of the
+        characteristic length.
+    length : float, optional
+        Characteristic length, metres; default the reach, `characteristic_length`.
+    mask : array_like, shape (6,), optional
+        Ones for the components ``vx vy vz wx wy wz`` that count; default all.
+    mask_axes : {"world", "tool"}
+        Axes of the components.
+    starts : int
+        How many starts, the given configuration included.
+    most : int
+        How many configurations to keep.
+    rng : numpy.random.Generator or int, optional
+        Generator or seed of the other starts; default a fixed seed.
+
+    Returns
+    -------
+    NearestSingularities
+        Configurations, distances, directions, kinds; no row where none was found.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError, FrameNotFoundError
+        ``q`` or ``weights`` of the wrong length, NaN or infinity; weights, counts or a length
+        that are not above zero; no such frame.
+
+    References
+    ----------
+    Seed book section 1.3.2.3.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> found = nearest_singularity(load("rx90"), [0.1, 0.2, -1.2, 0.4, 0.5, 0.6])
+    >>> [found.words[i][0].split(":")[0] for i in range(2)], found.distance[:2]
+    (['elbow', 'wrist'], array([0.3708, 0.5 ]))
+    """
+    task = singular_task(model, frame, mask, mask_axes, length)
+    home = as_exact(q, (model.n,), "q")
+    if not isinstance(limits, (bool, np.bool_)):
+        raise InvalidValueError(f"limits: expected True or False, got {limits!r}.")
+    w = np.ones(model.n) if weights is None else as_exact(weights, (model.n,), "weights")
+    if not (w > 0.0).all():
+        raise InvalidValueError(f"weights: expected numbers above 0, got {w.tolist()}.")
+    count, most = whole_number(starts, "starts", 1), whole_number(most, "most", 1)
+    whole = operational_dimension(model, frame, None, task.length, mask=mask, mask_axes=mask_axes)
+    unit = task.joint_scale / np.sqrt(w)
+    free = np.full(model.n, np.inf)
+    space = SearchSpace(
+        task=task,
+        dimension=whole.dimension,
+        unit=unit,
+        home=home / unit,
+        lower=model.lower / unit if limits else -free,
+        upper=model.upper / unit if limits else free,
+    )
+    first = _starts(task, home, count, bool(limits), generator_of(rng)) / unit
+    if whole.dimension == 0:  # it never moves: nothing to lose
+        return _result(space, home, None, [], whole)
+    found = _confirmed(space, nearest_points(space, first), bool(limits), most)
+    rows = _distinct(space, found, bool(limits), most)
+    if rows and np.linalg.norm(found.x[rows[0]] - space.home) < _ALREADY:
+        found, rows = _with_crossings(space, first, found, rows, bool(limits), most)
+    return _result(space, home, found, rows, whole)
+
+
+def _with_crossings(
+    space: SearchSpace, first: Array, found: FoundPoints, rows: list[int], limits: bool, most: int
+) -> tuple[FoundPoints, list[int]]:
+    """Also the other sets that meet the one on which the given configuration is.
+
+    Their nearest points are likely to be where they meet it, and there they have no tangent.
+    Seen from a little beside the set they are ordinary.
+    """
+    seen_from = replace(space, home=space.home + _ASIDE * found.escape[rows[0]])
+    others = _confirmed(seen_from, nearest_points(seen_from, first), limits, most)
+    away = np.linalg.norm(others.x[:, None] - found.x[rows][None], axis=2)
+    others = _picked(others, away.min(axis=1) > 10.0 * _ASIDE)
+    # what is not exactly stationary from home is marked by infinity, and so are these
+    others = replace(others, tangential=np.full(len(others.x), np.inf))
+    both = FoundPoints(
+        *(
+            np.concatenate([getattr(found, f.name), getattr(others, f.name)])
+            for f in fields(FoundPoints)
+        )
+    )
+    return both, _distinct(space, both, limits, most)
+
+
+def _starts(
+    task: SingularTask, home: Array, count: int, limits: bool, rng: np.random.Generator
+) -> Array:
+    """The given configuration, others around it, and others anywhere."""
+    model, n = task.model, task.model.n
+    prismatic = model.table.sigma[model.table.joint_rows] == PRISMATIC
+    reach = np.where(prismatic, task.length, pi)
+    far = np.where(np.arange(count) % 2, 1.0, 0.2)
+    starts = home + reach * far[:, None] * rng.uniform(-1.0, 1.0, size=(count, n))
+    starts[0] = home
+    if limits:
+        starts = np.clip(starts, model.lower, model.upper)
+    return starts
+
+
+def _distinct(space: SearchSpace, found: FoundPoints, limits: bool, most: int) -> list[int]:
+    """Rows of points that are on the set, each once, the nearest first."""
+    model = space.task.model
+    turning = model.table.sigma[model.table.joint_rows] != PRISMATIC
+    turn = np.where(turning, 2.0 * pi / space.unit, np.inf)
+    distance = np.linalg.norm(found.x - space.home, axis=1)
+    # converged ones come first among equals, so that a stray copy does not stand for them
+    order = np.lexsort((found.tangential, distance.round(6)))
+    kept: list[int] = []
+    for i in order:
+        if not found.weakest[i] <= _ON_SET:
+            continue
+        away = found.x[kept] - found.x[i]
+        if not limits:
+            whole = np.where(turning, np.round(away / turn), 0.0)
+            away = away - np.where(turning, whole * np.where(turning, turn, 0.0), 0.0)
+        if not (np.linalg.norm(away, axis=1) < _SAME).any():
+            kept.append(int(i))
+        if len(kept) == most:
+            break
+    return kept
+
+
+def _confirmed(space: SearchSpace, found: FoundPoints, limits: bool, most: int) -> FoundPoints:
+    """Only the points to which starts beside them come back.
+
+    Where two sets cross, neither has a tangent and the gradients vanish, so that the conditions
+    of a nearest point say nothing: starts beside such a point slide away along one of them.
+    """
+    rows = _distinct(space, found, limits, most)
+    n = found.x.shape[1]
+    aside = np.random.default_rng(0).normal(size=(len(rows), _BESIDE, n))
+    aside *= 2e-3 / np.linalg.norm(aside, axis=2, keepdims=True)
+    starts = found.x[rows][:, None] + aside
+    around = nearest_points(space, starts.reshape(-1, n))
+    away = around.x.reshape(starts.shape) - found.x[rows][:, None]
+    back = np.linalg.norm(away, axis=2) < _SAME
+    keep = np.zeros(len(found.x), dtype=bool)
+    # a set that is touched twice has no slope either, but all starts come back to it
+    flat = found.slope[rows] < _FLAT
+    keep[rows] = np.where(flat, back.all(axis=1), back.any(axis=1))
+    return _picked(found, keep)
+
+
+def _picked(found: FoundPoints, keep: NDArray[np.bool_]) -> FoundPoints:
+    return FoundPoints(*(getattr(found, field.name)[keep] for field in fields(FoundPoints)))
+
+
+def _result(
+    space: SearchSpace,
+    home: Array,
+    found: FoundPoints | None,
+    rows: list[int],
+    whole: OperationalDimension,
+) -> NearestSingularities:
+    """Names and statuses; what is not stationary is kept only where it stands for a kind alone."""
+    task, n = space.task, len(home)
+    if found is None:
+        none: Array = np.zeros((0, n))
+        empty = np.zeros(0, dtype=np.int64)
+        found = FoundPoints(none, none[:, 0], none[:, 0], none[:, 0], empty, none, none > 0.0)
+    named = {i: names_of(task, found.x[i] * space.unit, whole, 1e-9) for i in rows}
+    stationary = found.tangential <= _STATIONARY
+    known = {name for i in rows if stationary[i] for name in named[i]}
+    crossing = np.isinf(found.tangential)
+    rows = [i for i in rows if stationary[i] or crossing[i] or not known.issuperset(named[i])]
+    x = found.x[rows]
+    distance = np.linalg.norm(x - space.home, axis=1)
+    apart = distance > 1e-9
+    size = np.where(apart, distance, 1.0)[:, None]
+    direction = np.where(apart[:, None], (x - space.home) / size, 0.0) * space.unit
+    status = np.where(
+        stationary[rows],
+        np.where(found.held[rows].any(axis=1), NearestStatus.AT_LIMIT, NearestStatus.NEAREST),
+        np.where(crossing[rows], NearestStatus.CROSSING, NearestStatus.NOT_STATIONARY),
+    )
+    outcome = SearchOutcome.NONE_FOUND
+    if rows:
+        there = distance[0] < _ALREADY
+        outcome = SearchOutcome.ALREADY_SINGULAR if there else SearchOutcome.FOUND
+    return NearestSingularities(
+        home=read_only(home),
+        q=read_only((x * space.unit).reshape(-1, n)),
+        distance=read_only(distance),
+        direction=read_only(direction.reshape(-1, n)),
+        escape=read_only((found.escape[rows] * space.unit).reshape(-1, n)),
+        slope=read_only([slope_along(space, found.x[i], found.escape[i]) for i in rows]),
+        codimension=read_only(found.codimension[rows], np.int64),
+        kind=tuple(
+            tuple(dict.fromkeys(kind for kind, _ in named[i] if kind is not None)) for i in rows
+        ),
+        words=tuple(tuple(text for _, text in named[i]) for i in rows),
+        residual=read_only(found.weakest[rows]),
+        stationarity=read_only(found.tangential[rows]),
+        status=read_only(status, np.int8),
+        outcome=outcome,
+        length=task.length,
+    )

@@ -1,0 +1,325 @@
+"""Search of the points of the singular set nearest to a configuration, many starts at once.
+
+The rank of J drops below M where the block ``S = U^T J V`` vanishes, with U and V the singular
+vectors from the M-th on. Along the joints it changes as ``G = U^T (dJ/dq) V``, up to the second
+order, so that ``-G^+ S`` is Newton's step of least length to the set, and the rows of G span its
+normals. On the set, the nearest point is where the way back to the start has nothing tangential.
+Everything here is in joint units in which distance is Euclidean.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..._arrays import Array
+from .task import SingularTask, task_derivatives, task_jacobians
+
+_WEAK = 1e-3  # normals beside the strongest one below which they are none
+_ON_SET = 1e-13
+_STATIONARY = 1e-10
+_DIFFERENCE = 1e-5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SearchSpace:
+    """Joints in units of distance, and the set that is looked for.
+
+    Parameters
+    ----------
+    task : SingularTask
+        m components of a robot of n joints.
+    dimension : int
+        M: the set is where the rank is below it.
+    unit : ndarray, shape (n,)
+        Radians or metres of one unit of distance.
+    home : ndarray, shape (n,)
+        Where distances are measured from, in these units.
+    lower, upper : ndarray, shape (n,)
+        Limits, maybe infinite, in these units.
+
+    Examples
+    --------
+    >>> from robotmodels.kinematics.singular.task import singular_task
+    >>> from robotmodels.robots import load
+    >>> free = np.full(6, np.inf)
+    >>> SearchSpace(singular_task(load("rx90")), 6, np.ones(6), np.zeros(6), -free, free).dimension
+    6
+    """
+
+    task: SingularTask
+    dimension: int
+    unit: Array
+    home: Array
+    lower: Array
+    upper: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FoundPoints:
+    """Where a search ended. N points.
+
+    Parameters
+    ----------
+    x : ndarray, shape (N, n)
+        Points in units of distance.
+    weakest : ndarray, shape (N,)
+        The M-th singular value over the first.
+    tangential : ndarray, shape (N,)
+        What the way back to the start has along the set, in units of distance; limits that hold
+        a joint are counted as normals.
+    slope : ndarray, shape (N,)
+        Size of the gradients along ``escape``, per unit of distance; 0 where sets cross.
+    codimension : ndarray of int, shape (N,)
+        Independent normals of the set.
+    escape : ndarray, shape (N, n)
+        Unit normal: towards the start, where it is not on the set.
+    held : ndarray of bool, shape (N, n)
+        Joints held by a limit.
+
+    Examples
+    --------
+    >>> FoundPoints(*(np.zeros((0, 6)),) * 7).x.shape
+    (0, 6)
+    """
+
+    x: Array
+    weakest: Array
+    tangential: Array
+    slope: Array
+    codimension: NDArray[np.int64]
+    escape: Array
+    held: NDArray[np.bool_]
+
+
+def nearest_points(space: SearchSpace, starts: Array) -> FoundPoints:
+    """Points of the singular set that are nearest to home, locally.
+
+    Parameters
+    ----------
+    space : SearchSpace
+        What is looked for.
+    starts : ndarray, shape (N, n)
+        Where to start, in units of distance.
+
+    Returns
+    -------
+    FoundPoints
+        One for each start, in their order: some may not have come to the set, or not be
+        stationary on it.
+
+    Examples
+    --------
+    >>> from robotmodels.kinematics.singular.task import singular_task
+    >>> from robotmodels.robots import load
+    >>> home, free = np.array([0.1, 0.2, 0.3, 0.4, 0.2, 0.6]), np.full(6, np.inf)
+    >>> space = SearchSpace(singular_task(load("rx90")), 6, np.ones(6), home, -free, free)
+    >>> (nearest_points(space, home[None]).x - home).round(9) + 0.0
+    array([[ 0. ,  0. ,  0. ,  0. , -0.2,  0. ]])
+    """
+    x = _to_set(space, starts, 60)
+    good = _at(space, x)[1] < 1e-9
+    if good.any():
+        x[good] = _polished(space, _descended(space, x[good], 30))
+    held = _held(space, x)
+    _, weakest, G = _at(space, x)
+    rest = np.where(held, 0.0, space.home - x)
+    normals, _ = _normals(np.where(held[:, None], 0.0, G))
+    across = np.einsum("ari,ai->ar", normals, rest)
+    tangent = rest - np.einsum("ari,ar->ai", normals, across)
+    every, codimension = _normals(G)
+    towards = space.home - x
+    escape = np.einsum("ari,ar->ai", every, np.einsum("ari,ai->ar", every, towards))
+    size = np.linalg.norm(escape, axis=1)
+    near = size < 1e-9
+    escape = np.where(near[:, None], every[:, 0], escape / np.where(near, 1.0, size)[:, None])
+    slope = np.linalg.norm(np.einsum("aei,ai->ae", G, escape), axis=1)
+    along = np.linalg.norm(tangent, axis=1)
+    return FoundPoints(x, weakest, along, slope, codimension, escape, held)
+
+
+def slope_along(space: SearchSpace, x: Array, direction: Array) -> float:
+    """Growth of the M-th singular value from a point of the set, per unit of distance.
+
+    Parameters
+    ----------
+    space : SearchSpace
+        What was looked for.
+    x : ndarray, shape (n,)
+        Point of the set, in units of distance.
+    direction : ndarray, shape (n,)
+        Unit vector in the same units.
+
+    Returns
+    -------
+    float
+        Also where more than one singular value vanishes.
+
+    Examples
+    --------
+    >>> from robotmodels.kinematics.singular.task import singular_task
+    >>> from robotmodels.robots import load
+    >>> task = singular_task(load("planar_2r"), mask=[1, 1, 0, 0, 0, 0])
+    >>> space = SearchSpace(task, 2, np.ones(2), np.zeros(2), np.zeros(2), np.zeros(2))
+    >>> round(slope_along(space, np.zeros(2), np.array([0.0, 1.0])), 4)
+    0.2236
+    """
+    U, sigma, Vt = np.linalg.svd(task_jacobians(space.task, x * space.unit), full_matrices=True)
+    rank = int((sigma > 1e-8 * sigma[:1]).sum())
+    rates = task_derivatives(space.task, x * space.unit)
+    along = np.tensordot(direction * space.unit / space.task.joint_scale, rates, axes=1)
+    growth = np.linalg.svd(U[:, rank:].T @ along @ Vt[rank:].T, compute_uv=False)
+    return float(growth[space.dimension - rank - 1])
+
+
+def _at(space: SearchSpace, x: Array) -> tuple[Array, Array, Array]:
+    """Blocks S (N, e), weakest singular values (N,), and gradients G (N, e, n)."""
+    task, M, q = space.task, space.dimension, x * space.unit
+    U, sigma, Vt = np.linalg.svd(task_jacobians(task, q), full_matrices=True)
+    U, V = U[:, :, M - 1 :], Vt[:, M - 1 :]
+    S = np.zeros((len(x), U.shape[2], V.shape[1]))
+    k = min(S.shape[1:])
+    S[:, range(k), range(k)] = sigma[:, M - 1 :]
+    derivatives = task_derivatives(task, q) * (space.unit / task.joint_scale)[:, None, None]
+    half = np.matmul(derivatives, V.transpose(0, 2, 1)[:, None])
+    G = np.matmul(U.transpose(0, 2, 1)[:, None], half)
+    top = np.where(sigma[:, 0] > 0.0, sigma[:, 0], 1.0)
+    N, e = len(x), S.shape[1] * S.shape[2]
+    return S.reshape(N, e), sigma[:, M - 1] / top, G.reshape(N, x.shape[1], e).swapaxes(1, 2)
+
+
+def _normals(G: Array) -> tuple[Array, NDArray[np.int64]]:
+    """Orthonormal rows (N, e, n) spanning those of G, zero beyond their number (N,)."""
+    _, size, Vt = np.linalg.svd(G, full_matrices=False)
+    counts = size > _WEAK * np.maximum(size[:, :1], 1e-12)
+    return Vt * counts[..., None], counts.sum(axis=1)
+
+
+def _step(S: Array, G: Array) -> Array:
+    """Newton's steps of least length to the set, damped by the distance from it."""
+    U, size, Vt = np.linalg.svd(G, full_matrices=False)
+    off = np.linalg.norm(S, axis=1, keepdims=True)
+    damped = size / np.maximum(size**2 + 0.1 * off, 1e-300)
+    step = -np.einsum("ari,ar->ai", Vt, damped * np.einsum("aer,ae->ar", U, S))
+    length = np.linalg.norm(step, axis=1, keepdims=True)
+    return step * np.minimum(1.0, 0.5 / np.maximum(length, 1e-300))
+
+
+def _to_set(space: SearchSpace, x: Array, steps: int) -> Array:
+    """Newton's iteration to the set, inside the limits."""
+    x = np.clip(x, space.lower, space.upper)
+    for _ in range(steps):
+        S, weakest, G = _at(space, x)
+        off = weakest > _ON_SET
+        if not off.any():
+            break
+        step = _step(S, G)
+        for _ in range(2):  # joints at a limit do not take part in a step that leads outside
+            stuck = ((x <= space.lower) & (step < 0.0)) | ((x >= space.upper) & (step > 0.0))
+            if not stuck.any():
+                break
+            step = _step(S, np.where(stuck[:, None], 0.0, G))
+        x = np.where(off[:, None], np.clip(x + step, space.lower, space.upper), x)
+    return x
+
+
+def _descended(space: SearchSpace, x: Array, steps: int) -> Array:
+    """Points of the set moved along it towards home, as long as this shortens the way."""
+    pace = np.ones(len(x))
+    for _ in range(steps):
+        if not len(x):
+            break
+        tangent = _tangent(space, x)
+        length = np.linalg.norm(tangent, axis=1)
+        if (length * (pace > 1e-3) < 1e-7).all():
+            break
+        there = _to_set(space, x + pace[:, None] * tangent, 12)
+        now, then = (np.linalg.norm(p - space.home, axis=1) for p in (x, there))
+        better = (then < now - 1e-4 * pace * length**2) & (_at(space, there)[1] < 1e-9)
+        x = np.where(better[:, None], there, x)
+        pace = np.where(better, np.minimum(1.0, 2.0 * pace), 0.25 * pace)
+    return x
+
+
+def _held(space: SearchSpace, x: Array) -> NDArray[np.bool_]:
+    """Joints at a limit beyond which the set comes nearer to home."""
+    tight = 1e-9
+    low, high = x <= space.lower + tight, x >= space.upper - tight
+    held = low | high
+    G = _at(space, x)[2] if held.any() else np.zeros((len(x), 1, x.shape[1]))
+    for _ in range(x.shape[1]):
+        if not held.any():
+            break
+        # multipliers of the set from the joints that are free; then each limit must push inwards
+        normals = np.where(held[:, None], 0.0, G)
+        back = x - space.home
+        inverse = np.linalg.pinv(normals, rcond=_WEAK)
+        lam = -np.einsum("aie,ai->ae", inverse, np.where(held, 0.0, back))
+        push = back + np.einsum("aei,ae->ai", G, lam)
+        wrong = held & ((low & (push < -1e-9)) | (high & (push > 1e-9)))
+        if not wrong.any():
+            break
+        held &= ~wrong
+    return held
+
+
+def _tangent(space: SearchSpace, x: Array) -> Array:
+    """The way home along the set and inside the limits."""
+    G = _at(space, x)[2]
+    held = np.zeros(x.shape, dtype=bool)
+    tangent = np.zeros(x.shape)
+    for _ in range(x.shape[1] + 1):
+        normals, _ = _normals(np.where(held[:, None], 0.0, G))
+        back = np.where(held, 0.0, space.home - x)
+        tangent = back - np.einsum("ari,ar->ai", normals, np.einsum("ari,ai->ar", normals, back))
+        leaves = ~held & (
+            ((x <= space.lower) & (tangent < 0.0)) | ((x >= space.upper) & (tangent > 0.0))
+        )
+        if not leaves.any():
+            break
+        held |= leaves
+    return tangent
+
+
+def _polished(space: SearchSpace, x: Array) -> Array:
+    """Newton's iteration on both conditions at once: on the set, and nothing tangential."""
+    n = x.shape[1]
+    held = _held(space, x)
+    for _ in range(12):
+        F = _conditions(space, x, held)
+        size = np.linalg.norm(F, axis=1)
+        active = (size > 0.01 * _STATIONARY) & (size < 0.3)
+        if not active.any():
+            break
+        at = x[active]
+        shifts = _DIFFERENCE * np.eye(n)
+        points = np.concatenate([at[:, None] + shifts, at[:, None] - shifts], axis=1)
+        stay = np.repeat(held[active], 2 * n, axis=0)
+        values = _conditions(space, points.reshape(-1, n), stay).reshape(len(at), 2 * n, n)
+        slope = ((values[:, :n] - values[:, n:]) / (2.0 * _DIFFERENCE)).swapaxes(1, 2)
+        slope = np.where(held[active][:, :, None], np.eye(n), slope)
+        step = -np.einsum("aij,aj->ai", np.linalg.pinv(slope, rcond=1e-9), F[active])
+        length = np.linalg.norm(step, axis=1, keepdims=True)
+        there = at + step * np.minimum(1.0, 0.3 / np.maximum(length, 1e-300))
+        there = np.clip(there, space.lower, space.upper)
+        smaller = np.linalg.norm(_conditions(space, there, held[active]), axis=1) < size[active]
+        if not smaller.any():
+            break
+        x = x.copy()
+        x[active] = np.where(smaller[:, None], there, at)
+    return x
+
+
+def _conditions(space: SearchSpace, x: Array, held: NDArray[np.bool_]) -> Array:
+    """What must vanish, (N, n): the way home along the set plus the step to the set."""
+    S, _, G = _at(space, x)
+    G = np.where(held[:, None], 0.0, G)
+    U, size, Vt = np.linalg.svd(G, full_matrices=False)
+    counts = size > _WEAK * np.maximum(size[:, :1], 1e-12)
+    inverse = np.where(counts, 1.0 / np.where(counts, size, 1.0), 0.0)
+    to_set = np.einsum("ari,ar->ai", Vt, inverse * np.einsum("aer,ae->ar", U, S))
+    back = np.where(held, 0.0, x - space.home)
+    across = np.einsum("ari,ar->ai", Vt, counts * np.einsum("ari,ai->ar", Vt, back))
+    return back - across + to_set

@@ -1,0 +1,396 @@
+"""The task whose rank is asked for: which frame, which components, and in which units they compare.
+
+Rows of a Jacobian are in metres and radians per unit of a joint, and joints turn or slide. Singular
+values mean something only once they are numbers without a unit: linear rows are divided by a
+characteristic length L, and a prismatic joint counts its stroke in units of L.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite, pi, tau
+from operator import index
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..._arrays import Array, as_exact, as_floats, read_only
+from ...errors import InvalidValueError
+from ...geometry import PRISMATIC, REVOLUTE
+from ...model import RobotModel, check_model
+from ..jacobians import Reference, jacobian, jacobian_rate
+
+MaskAxes = Literal["world", "tool"]
+
+_REFERENCES: dict[MaskAxes, Reference] = {"world": "world_aligned", "tool": "local"}
+_SEED = 20
+_SAMPLES = 64
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SingularTask:
+    """A frame of a robot and the components of its motion that count, with their scales.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, n joints.
+    frame : str, int or None
+        The frame; None is the tool.
+    mask : ndarray of bool, shape (6,)
+        Which of ``vx vy vz wx wy wz`` count.
+    mask_axes : {"world", "tool"}
+        Axes of the components: the world's or the frame's own, both at the frame's origin.
+    length : float
+        Characteristic length L, metres.
+    moving : ndarray of bool, shape (n,)
+        Joints between the base and the frame; the others never move it.
+    row_scale : ndarray, shape (m,)
+        ``1/L`` for linear rows, 1 for angular rows, of the m components that count.
+    joint_scale : ndarray, shape (n,)
+        Joint units: 1 rad, or L metres.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> singular_task(load("rx90")).length
+    0.9
+    """
+
+    model: RobotModel
+    frame: str | int | None
+    mask: NDArray[np.bool_]
+    mask_axes: MaskAxes
+    length: float
+    moving: NDArray[np.bool_]
+    row_scale: Array
+    joint_scale: Array
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether all six components count."""
+        return bool(self.mask.all())
+
+    @property
+    def rows(self) -> int:
+        """Number of components that count."""
+        return int(self.mask.sum())
+
+
+def singular_task(
+    model: RobotModel,
+    frame: str | int | None = None,
+    mask: ArrayLike | None = None,
+    mask_axes: MaskAxes = "world",
+    length: float | None = None,
+) -> SingularTask:
+    """Check what is asked about and settle its units.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, n joints.
+    frame : str or int, optional
+        Name or number of a frame; default the tool.
+    mask : array_like, shape (6,), optional
+        Ones for the components ``vx vy vz wx wy wz`` that count; default all.
+    mask_axes : {"world", "tool"}
+        Axes of the components.
+    length : float, optional
+        Characteristic length, metres; default `characteristic_length`.
+
+    Returns
+    -------
+    SingularTask
+        The task.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError, FrameNotFoundError
+        A mask that is not six zeros and ones or is empty; axes or a length that cannot be; no
+        such frame.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> singular_task(load("planar_2r"), mask=[1, 1, 1, 0, 0, 0]).rows
+    3
+    """
+    check_model(model)
+    path = model.twin.frame(frame).path
+    if mask_axes not in _REFERENCES:
+        raise InvalidValueError(f"mask_axes: expected 'world' or 'tool', got {mask_axes!r}.")
+    asked = np.ones(6) if mask is None else np.asarray(mask)
+    asked = as_exact(asked.astype(float) if asked.dtype == bool else asked, (6,), "mask")
+    if not np.isin(asked, (0.0, 1.0)).all() or not asked.any():
+        raise InvalidValueError(
+            f"mask: expected zeros and ones for vx vy vz wx wy wz, at least one of them 1, "
+            f"got {asked.tolist()}."
+        )
+    if length is None:
+        length = characteristic_length(model, frame)
+    elif not float(as_exact(length, (), "length")) > 0.0:
+        raise InvalidValueError(f"length: expected metres above 0, got {length!r}.")
+    on_path = np.zeros(model.f + 1, dtype=bool)
+    on_path[path] = True
+    keep = asked.astype(bool)
+    scale = np.repeat([1.0 / float(length), 1.0], 3)[keep]
+    kinds = _kinds(model)
+    return SingularTask(
+        model=model,
+        frame=frame,
+        mask=read_only(keep, np.bool_),
+        mask_axes=mask_axes,
+        length=float(length),
+        moving=read_only(on_path[1:][model.table.joint_rows], np.bool_),
+        row_scale=read_only(scale),
+        joint_scale=read_only(np.where(kinds == PRISMATIC, float(length), 1.0)),
+    )
+
+
+def task_jacobians(task: SingularTask, q: Array) -> Array:
+    """Jacobians of a task without units.
+
+    Parameters
+    ----------
+    task : SingularTask
+        m components of a robot of n joints.
+    q : ndarray, shape (..., n)
+        Joint variables, rad or m.
+
+    Returns
+    -------
+    ndarray, shape (..., m, n)
+        Rows divided and columns multiplied by their scales.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> task = singular_task(load("planar_2r"), mask=[1, 1, 0, 0, 0, 0])
+    >>> task_jacobians(task, np.zeros(2))
+    array([[0. , 0. ],
+           [1. , 0.5]])
+    """
+    J = jacobian(task.model, q, task.frame, _REFERENCES[task.mask_axes])
+    return J[..., task.mask, :] * (task.row_scale[:, None] * task.joint_scale)
+
+
+def task_derivatives(task: SingularTask, q: Array) -> Array:
+    """Derivatives of `task_jacobians` with respect to the joints, in joint units.
+
+    Parameters
+    ----------
+    task : SingularTask
+        m components of a robot of n joints.
+    q : ndarray, shape (..., n)
+        Joint variables, rad or m.
+
+    Returns
+    -------
+    ndarray, shape (..., n, m, n)
+        Entry ``[..., i, :, :]`` is the derivative of the Jacobian along joint i.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> task = singular_task(load("planar_2r"), mask=[1, 1, 0, 0, 0, 0])
+    >>> task_derivatives(task, np.zeros(2))[1]
+    array([[-0.5, -0.5],
+           [ 0. ,  0. ]])
+    """
+    along = np.diag(task.joint_scale)
+    reference = _REFERENCES[task.mask_axes]
+    rates = jacobian_rate(task.model, q[..., None, :], along, task.frame, reference)
+    return rates[..., task.mask, :] * (task.row_scale[:, None] * task.joint_scale)
+
+
+def spread_configurations(model: RobotModel, count: int, rng: np.random.Generator) -> Array:
+    """Configurations spread over the joint ranges.
+
+    Ranges are the limits; where these are infinite, one turn, or a stroke of the robot's size.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, n joints.
+    count : int
+        How many.
+    rng : numpy.random.Generator
+        Where chance comes from.
+
+    Returns
+    -------
+    ndarray, shape (count, n)
+        Joint variables, rad or m.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> spread_configurations(load("rx90"), 5, np.random.default_rng(0)).shape
+    (5, 6)
+    """
+    width = np.where(_kinds(model) == PRISMATIC, 2.0 * _table_size(model), tau)
+    lower, upper = _finite_range(model.lower, model.upper, width)
+    return lower + (upper - lower) * rng.random((count, model.n))
+
+
+def characteristic_length(model: RobotModel, frame: str | int | None = None) -> float:
+    """Reach of a frame: its greatest distance from a revolute axis that moves it.
+
+    It depends neither on where the robot stands nor on where along its axis each frame of the
+    table is placed, and it does not see the limits of revolute joints.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, n joints.
+    frame : str or int, optional
+        Name or number of a frame; default the tool.
+
+    Returns
+    -------
+    float
+        Metres, rounded up to two significant digits; 1 where no axis is at a distance, as for a
+        gantry with a wrist: its rank and singular values do not depend on a length.
+
+    Raises
+    ------
+    InvalidValueError, FrameNotFoundError
+        Not a model; no such frame.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> characteristic_length(load("rx90"))
+    0.9
+    """
+    check_model(model)
+    width = np.where(_kinds(model) == PRISMATIC, 2.0 * _table_size(model), tau)
+    turning = _kinds(model) == REVOLUTE
+    lower, upper = _finite_range(
+        np.where(turning, -pi, model.lower), np.where(turning, pi, model.upper), width
+    )
+    rng = np.random.default_rng(_SEED)
+    q = lower + (upper - lower) * rng.random((_SAMPLES, model.n))
+    levers = np.linalg.norm(jacobian(model, q, frame)[:, :3, turning], axis=1)
+    reach = float(levers.max(initial=0.0))
+    # a lever of rounding size beside the lengths of the table is no lever
+    if reach <= 1e-12 * _table_size(model):
+        return 1.0
+    # few digits: a number to read, and the same one whatever rounding the samples bring
+    unit = 10.0 ** (np.floor(np.log10(reach)) - 1)
+    return float(f"{np.ceil(reach / unit - 1e-6) * unit:.2g}")
+
+
+def above_zero(value: float, name: str) -> float:
+    """A finite number above zero, such as a tolerance.
+
+    Parameters
+    ----------
+    value : float
+        The number.
+    name : str
+        Used in error messages.
+
+    Returns
+    -------
+    float
+        The number.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Anything else.
+
+    Examples
+    --------
+    >>> above_zero(1, "tolerance")
+    1.0
+    """
+    number = float(as_exact(value, (), name))
+    if not (number > 0.0 and isfinite(number)):
+        raise InvalidValueError(f"{name}: expected a finite number above 0, got {value!r}.")
+    return number
+
+
+def whole_number(value: int, name: str, least: int) -> int:
+    """A whole number that is not too small, such as a count.
+
+    Parameters
+    ----------
+    value : int
+        The number.
+    name : str
+        Used in error messages.
+    least : int
+        The least that is allowed.
+
+    Returns
+    -------
+    int
+        The number.
+
+    Raises
+    ------
+    InvalidValueError
+        Anything else.
+
+    Examples
+    --------
+    >>> whole_number(3, "samples", 1)
+    3
+    """
+    try:
+        number = index(value)
+    except TypeError:
+        number = least - 1
+    if isinstance(value, (bool, np.bool_)) or number < least:
+        raise InvalidValueError(
+            f"{name}: expected a whole number of at least {least}, got {value!r}."
+        )
+    return number
+
+
+def generator_of(rng: np.random.Generator | int | None) -> np.random.Generator:
+    """A generator: itself, of a seed, or of a fixed seed.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator or int, optional
+        Generator or seed.
+
+    Returns
+    -------
+    numpy.random.Generator
+        The generator.
+
+    Raises
+    ------
+    InvalidValueError
+        Anything else.
+
+    Examples
+    --------
+    >>> int(generator_of(1).integers(10)) == int(generator_of(1).integers(10))
+    True
+    """
+    if isinstance(rng, np.random.Generator):
+        return rng
+    return np.random.default_rng(_SEED if rng is None else whole_number(rng, "rng", 0))
+
+
+def _kinds(model: RobotModel) -> NDArray[np.int64]:
+    return model.table.sigma[model.table.joint_rows]
+
+
+def _table_size(model: RobotModel) -> float:
+    lengths = np.linalg.norm(model.chain.position, axis=1).sum()
+    return float(lengths + np.linalg.norm(model.tool[:3, 3])) or 1.0
+
+
+def _finite_range(lower: Array, upper: Array, width: Array) -> tuple[Array, Array]:
+    low, high = np.isfinite(lower), np.isfinite(upper)
+    first = np.where(low, lower, np.where(high, upper - width, -0.5 * width))
+    last = np.where(high, upper, np.where(low, lower + width, 0.5 * width))
+    return as_floats(first, "lower"), as_floats(last, "upper")
