@@ -729,3 +729,45 @@ def test_jerk_that_is_limited_one_way_only():
         jerk_limited(0.0, 1.0, limits=MotionLimits(1.0, 2.0, 5.0), v0=0.3).duration, rel=1e-12
     )
     assert moving.check(limits).kept
+
+
+def test_states_of_any_size_and_many_joints(rng):
+    """ruckig alone fails far from 1, and with joints that have little in common."""
+    refused = 0
+    for k in range(60):
+        n = (1, 2, 6, 20)[k % 4]
+        size, time = 10.0 ** rng.uniform(-6.0, 6.0, 2)
+        V, A, J = rng.uniform(0.3, 3.0, (3, n)) * [
+            [size / time],
+            [size / time**2],
+            [size / time**3],
+        ]
+        limits = MotionLimits(V, A, J, velocity_lower=-0.5 * V, jerk_lower=-0.7 * J)
+        q0, q1 = rng.normal(size=(2, n)) * size * 10.0 ** rng.uniform(-2.0, 2.0, n)
+        more = {"v0": V * rng.uniform(-0.2, 0.2, n), "a0": A * rng.uniform(-0.05, 0.05, n)}
+        more |= {"limits": limits, "synchronisation": Synchronisation.SAME_TIME}
+        T = None
+        for _ in range(2):
+            try:
+                move = jerk_limited(q0, q1, T, **more)
+            except InvalidValueError as error:
+                refused += 1
+                assert "least" in str(error)  # noqa: PT017
+                continue
+            assert move.check(limits, 1e-8).kept
+            ends = np.abs(move.q([0.0, move.duration]) - [q0, q1]).max()
+            assert ends < 1e-11 * np.abs(move.motion.extremes(0)).max()
+            assert T is None or move.duration == T
+            T = 1.7 * move.duration
+    assert refused <= 6
+
+
+def test_twenty_points_of_huge_and_tiny_motions(rng):
+    for law in LAWS:
+        for scale in (1e-150, 1e-9, 1e9, 1e150):
+            limits = random_limits(rng, law, 20)
+            q0, q1 = rng.normal(size=(2, 20)) * scale
+            move = along_line(law, q0, q1, None, limits)
+            assert np.isfinite(move.duration)
+            assert np.abs(move.q(move.duration) - q1).max() <= 1e-12 * np.abs(q1).max()
+            assert move.check(limits, 1e-12).kept

@@ -114,6 +114,8 @@ def jerk_limited(
         lengths.reshape(*batch, n, _PHASES + 1),
     )
     moves = Trajectory(motion, scalar)
+    if np.isinf(bounds.lower).all() and np.isinf(bounds.upper).all():
+        return moves
     low, high = motion.extremes(0)
     outside = (low < bounds.lower - 1e-9) | (high > bounds.upper + 1e-9)
     if outside.any():
@@ -190,51 +192,28 @@ def _of_joints(
 
 def _ruckig(state: dict[str, Array], box: _Box, T: float | None, how: Synchronisation) -> Any:
     """Breaks (k, K + 1), coefficients (K, 4, k) and lengths (k, K) of k joints."""
-    import ruckig
-
     k = state["q0"].size
     _refuse_states(state, box)
-    given = ruckig.InputParameter(k)
-    given.current_position, given.target_position = state["q0"].tolist(), state["q1"].tolist()
-    given.current_velocity, given.target_velocity = state["v0"].tolist(), state["v1"].tolist()
-    given.current_acceleration = state["a0"].tolist()
-    given.target_acceleration = state["a1"].tolist()
-    given.max_velocity, given.min_velocity = box.velocity.tolist(), box.velocity_lower.tolist()
-    given.max_acceleration = box.acceleration.tolist()
-    given.min_acceleration = box.acceleration_lower.tolist()
-    given.max_jerk = box.jerk.tolist()
     independent = how is Synchronisation.INDEPENDENT and T is None
-    modes = ruckig.Synchronization
-    given.synchronization = modes.No if independent else modes.Time
-    if T is not None:
-        given.minimum_duration = T
-    found = ruckig.Trajectory(k)
-    try:
-        code = ruckig.Ruckig(k).calculate(given, found)
-    except ruckig.RuckigError as error:
-        raise InvalidValueError(f"No motion between these states: {error}.") from None
-    if code not in (ruckig.Result.Working, ruckig.Result.Finished):
-        raise InvalidValueError(f"No motion between these states was found: {code.name}.")
-    if T is not None and abs(found.duration - T) > ROUNDING * max(T, found.duration):
+    found = _phases(state, box, T, independent)
+    if isinstance(found, str) and k > 1:
+        found = _one_by_one(state, box, T, independent)
+    if isinstance(found, str):
+        message = f"No motion between these states was found by ruckig: {found}."
+        if T is not None:
+            breaks, _, _ = _ruckig(state, box, None, how)
+            message = f"duration: {message} The least duration is {breaks.max():.12g} s."
+        raise InvalidValueError(message)
+    duration, h, phases = found
+    if T is not None and abs(duration - T) > ROUNDING * max(T, duration):
         raise InvalidValueError(
             f"duration: with {T:.9g} s the limits are not kept; the least duration from there on "
-            f"with which they are is {found.duration:.12g} s."
+            f"with which they are is {duration:.12g} s."
         )
-    breaks, c = np.zeros((k, _PHASES + 2)), np.zeros((_PHASES + 1, 4, k))
-    lengths = np.zeros((k, _PHASES + 1))
-    for i, profile in enumerate(found.profiles[0]):
-        h = np.array([*profile.brake.t, *profile.t])
-        jerk = np.array([*profile.brake.j, *profile.j])
-        h[:2] = np.where(np.cumsum(h[:2]) <= profile.brake.duration * (1 + 1e-12), h[:2], 0.0)
-        start = np.array([state[name][i] for name in ("q0", "v0", "a0")])
-        goal = np.array([state[name][i] for name in ("q1", "v1", "a1")])
-        h = _polished(h, jerk, start, goal)
-        x = _states(h, jerk, start)[:-1]
-        lengths[i, :-1], breaks[i, 1:-1] = h, np.cumsum(h)
-        c[:-1, :, i] = np.stack(
-            (x[:, 0], x[:, 1] * h, 0.5 * x[:, 2] * h**2, jerk * h**3 / 6.0), axis=-1
-        )
-        c[-1, 0, i] = goal[0]
+    breaks, lengths = np.zeros((k, _PHASES + 2)), np.zeros((k, _PHASES + 1))
+    lengths[:, :-1], breaks[:, 1:-1] = h, np.cumsum(h, axis=-1)
+    c = np.zeros((_PHASES + 1, 4, k))
+    c[:-1], c[-1, 0] = np.moveaxis(phases, 0, -1), state["q1"]
     breaks[:, -1] = breaks.max() if T is None else T
     if independent:
         lengths[:, -1] = breaks[:, -1] - breaks[:, -2]
@@ -244,52 +223,96 @@ def _ruckig(state: dict[str, Array], box: _Box, T: float | None, how: Synchronis
     return breaks, c, lengths
 
 
-def _states(h: Array, jerk: Array, start: Array) -> Array:
-    """Position, velocity and acceleration at the ends of the phases, shape (K + 1, 3)."""
-    x = np.empty((h.size + 1, 3))
-    x[0] = p, v, a = start
-    for k, (t, j) in enumerate(zip(h.tolist(), jerk.tolist(), strict=True)):
-        p += t * (v + t * (0.5 * a + t * j / 6.0))
-        v += t * (a + 0.5 * t * j)
-        a += t * j
-        x[k + 1] = p, v, a
-    return x
+def _phases(
+    state: dict[str, Array], box: _Box, T: float | None, independent: bool
+) -> tuple[float, Array, Array] | str:
+    """Duration, and durations (k, 9) and coefficients (k, 9, 4) of phases; or what ruckig says."""
+    import ruckig
+
+    from ..kernels.jerk_phases import polished_phases
+
+    k = state["q0"].size
+    s, unit = _units(state, box)  # metres or radians of each joint, and seconds, to the unit
+    v, a = unit / s, unit * unit / s
+    start = np.stack((np.zeros(k), state["v0"] * v, state["a0"] * a), axis=-1)
+    goal = np.stack(((state["q1"] - state["q0"]) / s, state["v1"] * v, state["a1"] * a), axis=-1)
+    given = ruckig.InputParameter(k)
+    given.current_position, given.current_velocity, given.current_acceleration = start.T.tolist()
+    given.target_position, given.target_velocity, given.target_acceleration = goal.T.tolist()
+    given.max_velocity = (box.velocity * v).tolist()
+    given.min_velocity = (box.velocity_lower * v).tolist()
+    given.max_acceleration = (box.acceleration * a).tolist()
+    given.min_acceleration = (box.acceleration_lower * a).tolist()
+    given.max_jerk = (box.jerk * a * unit).tolist()
+    modes = ruckig.Synchronization
+    given.synchronization = modes.No if independent else modes.Time
+    if T is not None:
+        given.minimum_duration = T / unit
+    found = ruckig.Trajectory(k)
+    try:
+        code = ruckig.Ruckig(k).calculate(given, found).name
+    except (ruckig.RuckigError, ValueError) as error:  # or a number for which it has no name
+        code = str(error).strip().partition("\n")[0]
+    if code not in ("Working", "Finished"):
+        return code
+    h, jerk = np.empty((k, _PHASES)), np.empty((k, _PHASES))
+    for i, profile in enumerate(found.profiles[0]):
+        brake = profile.brake
+        h[i], jerk[i] = (*brake.t, *profile.t), (*brake.j, *profile.j)
+        h[i, :2] = np.where(np.cumsum(h[i, :2]) <= brake.duration * (1 + 1e-12), h[i, :2], 0.0)
+    # where ruckig is asked for a time it meets positions to 1e-8 only
+    polished, phases = np.empty((k, _PHASES)), np.empty((k, _PHASES, 4))
+    polished_phases(h, jerk, start, goal, polished, phases)
+    phases *= s[:, None, None]
+    phases[..., 0] += state["q0"][:, None]
+    return found.duration * unit, polished * unit, phases
 
 
-def _polished(h: Array, jerk: Array, start: Array, goal: Array) -> Array:
-    """Durations of the phases that meet the goal to rounding.
+def _one_by_one(
+    state: dict[str, Array], box: _Box, T: float | None, independent: bool
+) -> tuple[float, Array, Array] | str:
+    """As `_phases`, each joint in units of its own: for joints that have little in common."""
+    joints = [
+        ({name: value[i : i + 1] for name, value in state.items()},
+         _Box(*(bound[i : i + 1] for bound in box)))
+        for i in range(state["q0"].size)
+    ]  # fmt: skip
+    common = T
+    for _ in range(50):
+        found = [_phases(own, limits, common, independent) for own, limits in joints]
+        for one in found:
+            if isinstance(one, str):
+                return one
+        rows = [one for one in found if not isinstance(one, str)]
+        longest = max(duration for duration, _, _ in rows)
+        if independent or (common is not None and longest <= common * (1.0 + ROUNDING)):
+            h, phases = (np.concatenate(parts) for parts in list(zip(*rows, strict=True))[1:])
+            return longest, h, phases
+        # one joint cannot take the time of the others: all take the next that it can
+        common = longest
+    return "no duration that all joints can take"
 
-    Where ruckig is asked for a time it meets positions to 1e-8. Newton steps of least length bring
-    that to rounding; they keep the whole time, and the acceleration of every phase without jerk.
+
+def _units(state: dict[str, Array], box: _Box) -> tuple[Array, float]:
+    """Units of length (k,) and time with which numbers are near to 1: ruckig expects such.
+
+    They are powers of two, so that no digit is lost.
     """
-    free = h > 1e-9
-    scale = np.array([1.0 + abs(goal[0]), 1.0, 1.0])
-    level = [k for k in range(h.size) if free[k] and jerk[k] == 0.0]
-    x = _states(h, jerk, start)
-    error = (goal - x[-1]) / scale
-    if np.abs(error).max() <= 1e-14 or not free.any():
-        return h
-    held, better = x[level, 2], h
-    for _ in range(4):
-        left = better.sum() - np.cumsum(better)
-        v, a = x[1:, 1], x[1:, 2]
-        rows = [
-            (v + left * (a + 0.5 * left * jerk)) / scale[0],
-            a + left * jerk,
-            jerk,
-            np.ones(h.size),
-            *(np.where(np.arange(h.size) < k, jerk, 0.0) for k in level),
-        ]
-        wanted = np.concatenate((error, [h.sum() - better.sum()], held - x[level, 2]))
-        step = np.zeros(h.size)
-        step[free] = np.linalg.lstsq(np.stack(rows)[:, free], wanted, rcond=1e-12)[0]
-        trial = np.maximum(better + step, 0.0)
-        x_trial = _states(trial, jerk, start)
-        new = (goal - x_trial[-1]) / scale
-        if np.abs(new).max() >= np.abs(error).max():
-            break
-        better, x, error = trial, x_trial, new
-    return better
+    D = np.abs(state["q1"] - state["q0"])
+    v = np.maximum(np.abs(state["v0"]), np.abs(state["v1"]))
+    a = np.maximum(np.abs(state["a0"]), np.abs(state["a1"]))
+    V = np.minimum(box.velocity, -box.velocity_lower)
+    A = np.minimum(box.acceleration, -box.acceleration_lower)
+    ends = a / box.jerk  # until the states at the ends have come to rest
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ends = ends + v / A + np.sqrt(v / box.jerk)
+        size = D + v * ends + a * ends * ends
+        times = ends + np.where(size > 0.0, size / V + np.sqrt(size / A), 0.0)
+    times = times + np.cbrt(size / box.jerk)
+    times = times[np.isfinite(times)]
+    unit = 2.0 ** np.round(np.log2(times.max(initial=0.0) or 1.0))
+    s: Array = np.exp2(np.round(np.log2(np.where(size > 0.0, size, 1.0))))
+    return s, float(unit)
 
 
 def _refuse_states(state: dict[str, Array], box: _Box) -> None:
@@ -312,7 +335,7 @@ def _refuse_states(state: dict[str, Array], box: _Box) -> None:
             ("velocity", high, low, box.velocity, box.velocity_lower),
             ("acceleration", a, a, box.acceleration, box.acceleration_lower),
         ):
-            bad = (most > upper * slack + 1e-15) | (least < lower * slack - 1e-15)
+            bad = (most > upper * slack) | (least < lower * slack)
             if bad.any():
                 j = int(bad.argmax())
                 need = most[j] if most[j] > upper[j] * slack else least[j]

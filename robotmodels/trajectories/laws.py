@@ -287,7 +287,7 @@ def _fastest(
         slope = np.where(at_rest, 1.0, up + down + rise + fall)
         step = np.where(at_rest, 0.0, (full * (up + down) - 2.0 * L) / slope)
         full = full - step
-        if (np.abs(step) <= 4e-16 * full).all():
-            break
+        if (np.abs(step) <= 1e-10 * full).all():
+            break  # the next step would be nothing: they square
     V = np.where(at_rest, 0.0, np.minimum(V, full))
     return V, _ramp_time(law, V, A, J)[0], _ramp_time(law, V, B, J)[0]

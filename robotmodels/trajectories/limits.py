@@ -144,9 +144,13 @@ class MotionLimits:
             raise ShapeError(
                 f"limits: expected limits of {n} joints, got limits of {self.velocity.size}."
             )
-        return type(self)(
-            **{f.name: np.broadcast_to(getattr(self, f.name), n) for f in fields(self)}
-        )
+        if self.velocity.shape == (n,):
+            return self
+        result = object.__new__(type(self))  # valid as it is: no check again
+        for field in fields(self):
+            value = read_only(np.full(n, getattr(self, field.name)))
+            object.__setattr__(result, field.name, value)
+        return result
 
     def without_jerk(self) -> Self:
         """The same limits but none of jerk, for laws whose acceleration jumps.

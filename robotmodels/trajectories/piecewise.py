@@ -125,7 +125,7 @@ class PiecewisePolynomial:
         h = np.swapaxes(self.lengths, -1, -2)  # (..., K, c)
         live = h > 0.0
         step = np.where(live, h, 1.0)
-        c = _derived(self.coefficients, order) / step[..., None, :] ** order
+        c = _in_time(_derived(self.coefficients, order), step, order)
         low, high = _range_on_unit_interval(c)
         none = ~live.any(axis=-2)
         low = np.where(live, low, np.inf).min(axis=-2)
@@ -140,7 +140,7 @@ class PiecewisePolynomial:
 
     def _jumps(self, order: int, live: Any, step: Array) -> tuple[Any, Any]:
         """Whether a derivative jumps down, and up, between pieces beyond rounding, (..., n)."""
-        c = _derived(self.coefficients, order) / step[..., None, :] ** order
+        c = _in_time(_derived(self.coefficients, order), step, order)
         first, last = c[..., 0, :], c.sum(axis=-2)
         live = np.broadcast_to(live, first.shape)
         scale = np.abs(np.where(live[..., None, :], c, 0.0)).sum(axis=-2).max(axis=-2)
@@ -163,6 +163,13 @@ def _derived(c: Array, order: int) -> Array:
         if c.shape[-2] == 1:
             return np.zeros_like(c)
         c = c[..., 1:, :] * np.arange(1.0, c.shape[-2])[:, None]
+    return c
+
+
+def _in_time(c: Array, step: Array, order: int) -> Array:
+    """Derivatives by x as derivatives by time; one by one, as the power of a step may vanish."""
+    for _ in range(order):
+        c = c / step[..., None, :]
     return c
 
 

@@ -243,7 +243,8 @@ def along_line(
     duration : array_like, shape () or (...), or None
         Seconds.
     limits : MotionLimits or None
-        Kept inside the motion.
+        Kept inside the motion. Independent joints that arrive early have the end of their law
+        inside it, with the jump that a linear, cubic, bang-bang or trapezoidal law ends with.
     synchronisation : Synchronisation
         How the joints are kept in step.
 

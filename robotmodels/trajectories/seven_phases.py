@@ -173,6 +173,6 @@ def _cruise(L: Array, V: Array, A: Array, B: Array, up: Array, down: Array) -> A
         slope = np.where(moves, first.slope + last.slope, 1.0)
         step = np.where(moves, (first.distance + last.distance - L) / slope, 0.0)
         full = full - step
-        if (np.abs(step) <= 4e-16 * full).all():
-            break
+        if (np.abs(step) <= 1e-10 * full).all():
+            break  # the next step would be nothing: they square
     return np.where(moves, np.minimum(V, full), 0.0)
