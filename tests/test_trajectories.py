@@ -555,6 +555,20 @@ def test_any_states_equal_ruckig(longer, rng):
         assert move.check(limits, 1e-8).kept
 
 
+def test_limits_hold_between_random_states(rng):
+    """As from rest to rest, but ruckig's phases: limits to rounding, ends to 1e-12."""
+    for _ in range(15):
+        limits = random_limits(rng, TimeLaw.JERK_LIMITED, 3, same_jerk=True)
+        state = {k: rng.normal(size=(100, 3)) for k in ("q0", "q1")}
+        state |= {k: rng.uniform(-0.25, 0.25, (100, 3)) for k in ("v0", "v1", "a0", "a1")}
+        move = jerk_limited(**state, limits=limits, synchronisation=Synchronisation.SAME_TIME)
+        assert move.check(limits, 1e-12).kept
+        times = np.stack((np.zeros(100), move.duration), axis=-1)
+        for name, values in zip("qva", move.motion.derivatives(times, (0, 1, 2)), strict=True):
+            want = np.stack((state[name + "0"], state[name + "1"]), axis=1)
+            assert np.abs(values - want).max() < 1e-12
+
+
 def test_coordinated_states_stay_on_their_line(rng):
     for _ in range(40):
         q0, u = rng.normal(size=(2, 4))

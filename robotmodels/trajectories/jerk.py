@@ -256,10 +256,13 @@ def _phases(
     if code not in ("Working", "Finished"):
         return code
     h, jerk = np.empty((k, _PHASES)), np.empty((k, _PHASES))
+    brakes = np.empty((k, 1))
     for i, profile in enumerate(found.profiles[0]):
         brake = profile.brake
-        h[i], jerk[i] = (*brake.t, *profile.t), (*brake.j, *profile.j)
-        h[i, :2] = np.where(np.cumsum(h[i, :2]) <= brake.duration * (1 + 1e-12), h[i, :2], 0.0)
+        h[i], jerk[i], brakes[i] = (*brake.t, *profile.t), (*brake.j, *profile.j), brake.duration
+    # phases of a brake that is not used hold what was there before
+    used = np.cumsum(h[:, :2], axis=-1) <= brakes * (1.0 + 1e-12)
+    h[:, :2] = np.where(used, h[:, :2], 0.0)
     # where ruckig is asked for a time it meets positions to 1e-8 only
     polished, phases = np.empty((k, _PHASES)), np.empty((k, _PHASES, 4))
     polished_phases(h, jerk, start, goal, polished, phases)
