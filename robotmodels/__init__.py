@@ -10,7 +10,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from . import errors
+from . import errors, kinematics
 from .drive import DriveParameters, Transmission
 from .dynamics import (
     coriolis_matrix,
@@ -24,7 +24,7 @@ from .dynamics import (
 from .geometry import DHTable, link_transforms
 from .igm import IGMSolutions, IGMStatus, igm, igm_numeric
 from .inertia import InertialParameters
-from .kinematics import dgm, dkm, jacobian, jacobian_rate, link_poses
+from .kinematics import dgm, dkm, dkm_second_order, jacobian, jacobian_rate, link_poses
 from .model import RobotModel, to_urdf, write_urdf
 from .regressors import (
     energy_regressor,
@@ -40,49 +40,113 @@ from .urdf import NamedFrame
 
 if TYPE_CHECKING:
     from . import trajectories, viz
+    from .minimal_parameters import (
+        BaseParameters,
+        StandardParameters,
+        base_parameters,
+        standard_parameters,
+        uniform_bodies,
+    )
     from .igm.paul import InverseModelExplanation, explain_igm
+    from .kinematics import (
+        DampedInverse,
+        FilteredInverse,
+        IKMSolution,
+        IKMStatus,
+        JacobianExplanation,
+        OrientationKind,
+        PseudoInverse,
+        SingularityExplanation,
+        classify_singularity,
+        coordinate_jacobian,
+        explain_jacobian,
+        explain_singularities,
+        force_ellipsoid,
+        ikm,
+        ikm_second_order,
+        jacobian_factors,
+        manipulability,
+        nearest_singularity,
+        operational_coordinates,
+        operational_dimension,
+        pose_from_coordinates,
+        static_torque,
+        static_wrench,
+        velocity_ellipsoid,
+    )
 
 __version__ = "0.1.0"
 
 __all__ = [
+    "BaseParameters",
     "DHTable",
+    "DampedInverse",
     "DirectModelExplanation",
     "DriveParameters",
+    "FilteredInverse",
     "IGMSolutions",
     "IGMStatus",
-    "InverseModelExplanation",
+    "IKMSolution",
+    "IKMStatus",
     "InertialParameters",
+    "InverseModelExplanation",
+    "JacobianExplanation",
     "NamedFrame",
+    "OrientationKind",
+    "PseudoInverse",
     "RobotModel",
+    "SingularityExplanation",
+    "StandardParameters",
     "Transmission",
+    "base_parameters",
+    "classify_singularity",
+    "coordinate_jacobian",
     "coriolis_matrix",
     "ddm",
     "dgm",
     "dkm",
+    "dkm_second_order",
     "energy_regressor",
     "errors",
     "explain_dgm",
     "explain_igm",
+    "explain_jacobian",
+    "explain_singularities",
+    "force_ellipsoid",
     "gravity_torque",
     "idm",
     "igm",
     "igm_numeric",
+    "ikm",
+    "ikm_second_order",
     "jacobian",
+    "jacobian_factors",
     "jacobian_rate",
+    "kinematics",
     "kinetic_energy",
     "link_poses",
     "link_transforms",
     "load",
+    "manipulability",
     "mass_matrix",
+    "nearest_singularity",
+    "operational_coordinates",
+    "operational_dimension",
     "parameter_names",
     "parameter_vector",
+    "pose_from_coordinates",
     "potential_energy",
     "read_par",
     "robots",
+    "standard_parameters",
+    "static_torque",
+    "static_wrench",
     "to_urdf",
     "torque_regressor",
     "torque_regressor_chunks",
     "trajectories",
+    "uniform_bodies",
+    "velocity_ellipsoid",
     "viz",
     "write_urdf",
 ]
@@ -93,13 +157,52 @@ def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
 
 
-_ON_DEMAND = {"InverseModelExplanation": ".igm.paul", "explain_igm": ".igm.paul"}
+_ROOMS = {
+    ".minimal_parameters": (
+        "BaseParameters",
+        "StandardParameters",
+        "base_parameters",
+        "standard_parameters",
+        "uniform_bodies",
+    ),
+    ".igm.paul": (
+        "InverseModelExplanation",
+        "explain_igm",
+    ),
+    ".kinematics": (
+        "DampedInverse",
+        "FilteredInverse",
+        "IKMSolution",
+        "IKMStatus",
+        "JacobianExplanation",
+        "OrientationKind",
+        "PseudoInverse",
+        "SingularityExplanation",
+        "classify_singularity",
+        "coordinate_jacobian",
+        "explain_jacobian",
+        "explain_singularities",
+        "force_ellipsoid",
+        "ikm",
+        "ikm_second_order",
+        "jacobian_factors",
+        "manipulability",
+        "nearest_singularity",
+        "operational_coordinates",
+        "operational_dimension",
+        "pose_from_coordinates",
+        "static_torque",
+        "static_wrench",
+        "velocity_ellipsoid",
+    ),
+}
+_ROOM_OF = {name: room for room, names in _ROOMS.items() for name in names}
 
 
 def __getattr__(name: str) -> Any:
-    """Import trajectories, pictures and derivations when they are first asked for."""
+    """Import rooms, pictures and derivations when they are first asked for."""
     if name in ("trajectories", "viz"):
         return importlib.import_module(f".{name}", __name__)
-    if name in _ON_DEMAND:
-        return getattr(importlib.import_module(_ON_DEMAND[name], __name__), name)
+    if name in _ROOM_OF:
+        return getattr(importlib.import_module(_ROOM_OF[name], __name__), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -10,8 +10,8 @@ import sympy
 from identities.random_robots import random_bodies, random_drive, random_pose, random_table
 
 import robotmodels as rm
-from robotmodels.base_parameters import BaseMethod, base_parameters
-from robotmodels.base_parameters.formulas import constants_of
+from robotmodels.minimal_parameters import BaseMethod, base_parameters
+from robotmodels.minimal_parameters.formulas import constants_of
 from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.regressors import parameter_names, parameter_vector, torque_regressor
 

@@ -17,6 +17,7 @@ from identities.random_robots import (
 import robotmodels as rm
 from robotmodels import se3
 from robotmodels.errors import FrameNotFoundError, InvalidValueError, ShapeError
+from robotmodels.kinematics.dexterity import Manipulability, manipulability
 from robotmodels.kinematics.ellipsoid import Ellipsoid, EllipsoidQuantity
 from robotmodels.kinematics.ellipsoids import (
     OtherPart,
@@ -24,7 +25,6 @@ from robotmodels.kinematics.ellipsoids import (
     force_ellipsoid,
     velocity_ellipsoid,
 )
-from robotmodels.kinematics.manipulability import Manipulability, manipulability
 
 H = np.pi / 2
 PARTS = list(TwistPart)

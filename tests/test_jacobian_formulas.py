@@ -19,7 +19,7 @@ from robotmodels.kinematics.formulas.explain_jacobian import explain_jacobian
 from robotmodels.kinematics.formulas.explain_singularities import explain_singularities
 from robotmodels.kinematics.formulas.singularity_explanation import (
     SingularityKind,
-    SingularityStatus,
+    FormulaStatus,
 )
 from robotmodels.kinematics.formulas.singularity_map import singularity_map
 
@@ -212,7 +212,7 @@ def test_product_of_factors_is_the_determinant(name, explained, rng):
 )
 def test_shoulder_elbow_wrist(name, shoulder, elbow, explained):
     e = explained(name)
-    assert e.status is SingularityStatus.FACTORED
+    assert e.status is FormulaStatus.FACTORED
     assert factor_texts(e) == {("shoulder", shoulder), ("elbow", elbow), ("wrist", "S5")}
     assert e.factor(WRIST).solution == "θ5 = 0 or π"
     spherical = "parallel" if name.startswith("ur") else "aligned"
@@ -260,7 +260,7 @@ def test_positioners_lose_their_position(name, explained, rng):
 @pytest.mark.parametrize("name", ["crx10ia", "xarm6"])
 def test_arms_whose_determinant_does_not_factor_say_so(name, explained):
     e = explained(name)
-    assert e.status is SingularityStatus.NOT_FACTORED
+    assert e.status is FormulaStatus.NOT_FACTORED
     assert "does not factor" in e.text
     assert len(e.factors) == 1
     assert e.factors[0].solved_joint is not None
@@ -292,7 +292,7 @@ def test_seven_joints_with_spherical_shoulder_and_wrist(name, explained):
     """M. Shimizu et al., "Analytical inverse kinematic computation for 7-DOF redundant
     manipulators with joint limits", 2008: the elbow stretched, and pairs of joints."""
     e = explained(name)
-    assert e.status is SingularityStatus.MINORS
+    assert e.status is FormulaStatus.MINORS
     assert {c.text for c in e.conditions} == {
         "S4 = 0", "S2 = 0 and C3 = 0", "S2 = 0 and S6 = 0", "C5 = 0 and S6 = 0",
     }  # fmt: skip
@@ -376,9 +376,9 @@ def test_trees_and_fixed_frames(rng):
     D = np.linalg.det(rm.jacobian(model, q)[..., moving])
     np.testing.assert_allclose(e.determinant(q), D, rtol=0, atol=1e-13)
     other = explain_singularities(model, 5)
-    assert other.status is not SingularityStatus.NO_JOINTS
+    assert other.status is not FormulaStatus.NO_JOINTS
     none = explain_singularities(model, 2)
-    assert none.status is SingularityStatus.NO_JOINTS
+    assert none.status is FormulaStatus.NO_JOINTS
     assert none.values(q).shape == (50, 0)
 
 
@@ -391,7 +391,7 @@ def test_random_arms(seed):
     q = postures(model, rng, 30)
     D = np.linalg.det(rm.jacobian(model, q))
     J = rm.jacobian(model, q)
-    if e.status is SingularityStatus.NEVER_FULL_RANK:
+    if e.status is FormulaStatus.NEVER_FULL_RANK:
         assert np.linalg.svd(J, compute_uv=False)[:, -1].max() < 1e-8
         np.testing.assert_array_equal(e.determinant(q), 0.0)
     else:
@@ -405,7 +405,7 @@ def test_long_determinants_come_from_their_matrix(monkeypatch, rng):
     monkeypatch.setattr(module, "_MOST_TERMS", 5)
     model = rm.load("xarm6")
     e = explain_singularities(model)
-    assert e.status is SingularityStatus.TOO_LONG
+    assert e.status is FormulaStatus.TOO_LONG
     q = postures(model, rng, 20)
     D = np.linalg.det(rm.jacobian(model, q))
     np.testing.assert_allclose(e.determinant(q), D, rtol=0, atol=1e-13)
@@ -419,7 +419,7 @@ def test_always_singular():
     rows = [{"sigma": 0, "alpha": a, "d": d} for a, d in ((0, 0), (0, 0.3), (0, 0.3)) * 2]
     rows[5]["alpha"] = 0.5
     e = explain_singularities(rm.RobotModel.from_table(rm.DHTable.from_rows(rows)))
-    assert e.status in (SingularityStatus.NEVER_FULL_RANK, SingularityStatus.MINORS)
+    assert e.status in (FormulaStatus.NEVER_FULL_RANK, FormulaStatus.MINORS)
     twice = [{"sigma": 0, "alpha": a} for a in (0, 0, np.pi / 2, np.pi / 2, np.pi / 2, np.pi / 2)]
     e = explain_singularities(rm.RobotModel.from_table(rm.DHTable.from_rows(twice)))
     assert e.text

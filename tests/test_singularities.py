@@ -21,7 +21,7 @@ from robotmodels.kinematics.singular.nearest import (
     nearest_singularity,
 )
 from robotmodels.kinematics.singular.rank import jacobian_rank
-from robotmodels.kinematics.singular.words import SingularityKind
+from robotmodels.kinematics.singularity_kind import SingularityKind
 
 PI = np.pi
 SHOULDER, ELBOW, WRIST, OTHER = SingularityKind

@@ -7,13 +7,13 @@ import pytest
 from identities.random_robots import random_bodies, random_drive
 
 import robotmodels as rm
-from robotmodels.base_parameters import (
+from robotmodels.minimal_parameters import (
     PhysicalStatus,
     base_parameters,
     standard_parameters,
     uniform_bodies,
 )
-from robotmodels.base_parameters.prior import pseudo_inertias
+from robotmodels.minimal_parameters.prior import pseudo_inertias
 from robotmodels.errors import InertiaError, InvalidValueError, MissingExtraError, ShapeError
 
 ROBOTS = ("rx90", "iiwa14", "gantry", "cobra_s600", "planar_2r", "stanford_arm")

@@ -23,7 +23,7 @@ from robotmodels.errors import (
     NotARotationError,
     ShapeError,
 )
-from robotmodels.kinematics.static_wrench import StaticStatus, StaticWrench, static_wrench
+from robotmodels.kinematics.equilibrium import StaticStatus, StaticWrench, static_wrench
 from robotmodels.kinematics.statics import static_torque, transported_wrench
 
 REFERENCES = ("world_aligned", "local", "world")

@@ -16,9 +16,9 @@ from .._arrays import Array, as_reals, as_vector
 from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel, check_model
 from .ellipsoid import Ellipsoid, EllipsoidQuantity
+from .equilibrium import as_tolerance, positive_length
 from .jacobians import jacobian
 from .poses import dgm
-from .static_wrench import as_tolerance, positive_length
 
 
 class TwistPart(Enum):

@@ -11,12 +11,13 @@ import numpy as np
 
 from ..._arrays import Array
 from ...symbolic_dgm._angles import greek
+from ..singularity_kind import SingularityKind
 from ._chain import SymbolicChain
 from ._collect import formula
 from ._meaning import ArmGeometry, random_postures
 from ._numbers import FormulaNumbers
 from ._ring import Poly
-from .singularity_explanation import SingularityFactor, SingularityKind
+from .singularity_explanation import SingularityFactor
 
 
 @dataclass(frozen=True, slots=True)

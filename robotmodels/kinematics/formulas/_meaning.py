@@ -13,7 +13,7 @@ from ..._arrays import Array
 from ...geometry import PRISMATIC, REVOLUTE
 from ...model import RobotModel
 from ..poses import dgm, link_poses
-from .singularity_explanation import SingularityKind
+from ..singularity_kind import SingularityKind
 
 _TOLERANCE = 1e-7
 """Square roots at double zeros leave half of the digits."""

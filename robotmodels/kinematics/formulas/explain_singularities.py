@@ -20,11 +20,11 @@ from ._ring import Poly
 from ._singularity_printing import MinorWords, explanation_latex, explanation_text
 from ._task import Minor, Patterns, Task, task_of
 from .singularity_explanation import (
+    FormulaStatus,
     SingularityCondition,
     SingularityExplanation,
     SingularityFactor,
     SingularityKind,
-    SingularityStatus,
 )
 
 _MOST_TERMS = 600
@@ -99,7 +99,7 @@ def explain_singularities(
     numbers = [j for j in chain.path if j in chain.joints]
     label = "the tool" if frame is None else f"R_{frame}" if not isinstance(frame, str) else frame
     empty = SingularityExplanation(
-        robot=model.name, frame=label, status=SingularityStatus.NO_JOINTS, task="no rows",
+        robot=model.name, frame=label, status=FormulaStatus.NO_JOINTS, task="no rows",
         factors=(), conditions=(), constant=float("nan"), unit="1", projection="",
         intermediate="", matrix=None, rows=(), numbers=numbers_of(chain, []), text="", latex="",
     )  # fmt: skip
@@ -109,9 +109,9 @@ def explain_singularities(
     patterns = Patterns(model, frame, chain.path, [chain.joints[j] for j in numbers])
     task = task_of(patterns, len(numbers))
     if not task.full_rank or task.too_many:
-        status = SingularityStatus.NEVER_FULL_RANK
+        status = FormulaStatus.NEVER_FULL_RANK
         if task.too_many:
-            status = SingularityStatus.TOO_MANY_JOINTS
+            status = FormulaStatus.TOO_MANY_JOINTS
         nothing = float("nan") if task.too_many or len(numbers) != 6 else 0.0
         chain.notation.check_new_names()
         draft = replace(empty, status=status, task=task.words, constant=nothing)
@@ -284,18 +284,18 @@ def _printed(
 
 def _status(
     task: Task, factors: Sequence[SingularityFactor], sets: Sequence[Any] | None
-) -> SingularityStatus:
+) -> FormulaStatus:
     if sets is None:
-        return SingularityStatus.TOO_MANY_FAMILIES
+        return FormulaStatus.TOO_MANY_FAMILIES
     if any(factor.expression is None for factor in factors):
-        return SingularityStatus.TOO_LONG
+        return FormulaStatus.TOO_LONG
     if not task.square:
-        return SingularityStatus.MINORS
+        return FormulaStatus.MINORS
     if len(factors) == 1 and len(factors[0].joints) >= 3:
-        return SingularityStatus.NOT_FACTORED
+        return FormulaStatus.NOT_FACTORED
     if any(factor.solved_joint is None for factor in factors):
-        return SingularityStatus.NOT_SOLVED
-    return SingularityStatus.FACTORED
+        return FormulaStatus.NOT_SOLVED
+    return FormulaStatus.FACTORED
 
 
 def _degree(task: Task, numbers: list[int], chain: SymbolicChain) -> int:

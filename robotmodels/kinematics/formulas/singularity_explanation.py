@@ -12,38 +12,16 @@ from numpy.typing import ArrayLike
 from ..._arrays import Array, as_vector
 from ...errors import InvalidValueError
 from ...latex_text import markdown
+from ..singularity_kind import SingularityKind
 from ._numbers import FormulaNumbers
 
 
-class SingularityKind(Enum):
-    """Where in an arm a singular position arises.
-
-    The geometry on the zeros of the factor decides: SHOULDER where the wrist centre comes to the
-    first axis (or into the plane through it that is parallel to the second axis), or two of the
-    first three axes are aligned; ELBOW where the arm is stretched or folded (neighbouring parallel
-    axes and the wrist centre, or three parallel axes, come into one plane, or two axes in the
-    middle are aligned); WRIST where two of the last three axes are aligned or parallel. Where
-    nothing of that happens, a factor in the variables of the last three (first three) of six or
-    more joints alone is WRIST (SHOULDER), any other is OTHER.
-
-    Examples
-    --------
-    >>> SingularityKind("elbow")
-    <SingularityKind.ELBOW: 'elbow'>
-    """
-
-    SHOULDER = "shoulder"
-    ELBOW = "elbow"
-    WRIST = "wrist"
-    OTHER = "other"
-
-
-class SingularityStatus(Enum):
+class FormulaStatus(Enum):
     """How far the formulas go; the value is a sentence.
 
     Examples
     --------
-    >>> SingularityStatus.FACTORED.value
+    >>> FormulaStatus.FACTORED.value
     'The determinant is the product of the factors.'
     """
 
@@ -274,7 +252,7 @@ class SingularityExplanation:
     ----------
     robot, frame : str
         Names of the robot and of the frame whose motion it is.
-    status : SingularityStatus
+    status : FormulaStatus
         How far the formulas go.
     task : str
         Which rows of the third matrix count, in words.
@@ -306,7 +284,7 @@ class SingularityExplanation:
 
     robot: str
     frame: str
-    status: SingularityStatus
+    status: FormulaStatus
     task: str
     factors: tuple[SingularityFactor, ...]
     conditions: tuple[SingularityCondition, ...]

@@ -17,7 +17,8 @@ from ...geometry import PRISMATIC
 from ...model import RobotModel, check_model
 
 if TYPE_CHECKING:
-    from .singularity_explanation import SingularityFactor, SingularityKind
+    from ..singularity_kind import SingularityKind
+    from .singularity_explanation import SingularityFactor
 
 
 @dataclass(frozen=True, slots=True, eq=False)

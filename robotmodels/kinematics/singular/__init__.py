@@ -10,7 +10,6 @@ from .frames import LostDirections
 from .motion import SelfMotion, SelfMotionKind
 from .nearest import NearestSingularities, NearestStatus, SearchOutcome, nearest_singularity
 from .rank import JacobianRank, OperationalDimension, jacobian_rank, operational_dimension
-from .words import SingularityKind
 
 __all__ = [
     "JacobianRank",
@@ -22,7 +21,6 @@ __all__ = [
     "SelfMotion",
     "SelfMotionKind",
     "SingularityFlags",
-    "SingularityKind",
     "SingularityReport",
     "SingularityStatus",
     "WorkspaceSide",

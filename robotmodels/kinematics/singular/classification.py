@@ -14,6 +14,7 @@ from ..._arrays import Array, as_exact, as_floats, read_only
 from ...model import RobotModel
 from ...table_text import length_text
 from ..poses import dgm
+from ..singularity_kind import SingularityKind
 from .boundary import WorkspaceSide, workspace_side
 from .flags import SingularityStatus
 from .frames import LostDirections, check_frames, lost_in_task_axes, simplest_frame
@@ -27,7 +28,7 @@ from .task import (
     singular_task,
     task_jacobians,
 )
-from .words import SingularityKind, kinds_in_words
+from .words import kinds_in_words
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -297,7 +298,7 @@ def names_of(
     >>> from robotmodels.robots import load
     >>> arm = load("rx90")
     >>> names_of(singular_task(arm), np.zeros(6), operational_dimension(arm), 1e-9)
-    ((<SingularityKind.WRIST: 2>, 'wrist: the axes of joints 4 and 6 are aligned'),)
+    ((<SingularityKind.WRIST: 'wrist'>, 'wrist: the axes of joints 4 and 6 are aligned'),)
     """
     _, lost, null, _, zero = _spaces(task, q, whole, tolerance)
     if not lost.shape[1]:

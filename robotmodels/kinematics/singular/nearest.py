@@ -18,11 +18,11 @@ from ...errors import InvalidValueError
 from ...geometry import PRISMATIC
 from ...model import RobotModel
 from ...table_text import boxed, length_text
+from ..singularity_kind import SingularityKind
 from .classification import names_of
 from .rank import OperationalDimension, operational_dimension
 from .search import FoundPoints, SearchSpace, nearest_points, slope_along
 from .task import MaskAxes, SingularTask, generator_of, singular_task, whole_number
-from .words import SingularityKind
 
 _ON_SET = 1e-10
 _STATIONARY = 1e-7

@@ -3,47 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from enum import IntEnum
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..._arrays import Array
 from ..poses import dgm, link_poses
+from ..singularity_kind import SingularityKind
 from .motion import SelfMotion, SelfMotionKind
 from .structure import ArmStructure, sines
 from .task import SingularTask
-
-
-class SingularityKind(IntEnum):
-    """Usual names of singular configurations of arms with a shoulder, an elbow and a wrist.
-
-    Attributes
-    ----------
-    sentence : str
-        What a person reads.
-
-    Examples
-    --------
-    >>> SingularityKind.WRIST.sentence
-    'wrist: two of its axes are aligned or parallel'
-    """
-
-    sentence: str
-
-    SHOULDER = 0, "shoulder: the first joint does not move the wrist"
-    ELBOW = 1, "elbow: the arm is stretched out or folded"
-    WRIST = 2, "wrist: two of its axes are aligned or parallel"
-    OTHER = 3, "none of shoulder, elbow and wrist"
-
-    def __new__(cls, value: int, sentence: str = "") -> Self:
-        """Attach the sentence to the number."""
-        kind = int.__new__(cls, value)
-        kind._value_ = value
-        kind.sentence = sentence
-        return kind
-
 
 _WRIST_CENTRE = "other: not all motions of the wrist centre are free"
 _SHOULDER = "shoulder: its turns do not give the wrist centre all motions"

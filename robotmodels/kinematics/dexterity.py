@@ -15,8 +15,8 @@ from .._arrays import Array, as_core, as_exact, as_vector, batch_shape, read_onl
 from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel, check_model
 from .ellipsoids import joint_scale
+from .equilibrium import as_tolerance, positive_length
 from .jacobians import Reference, jacobian
-from .static_wrench import as_tolerance, positive_length
 
 _ON = 1e-9
 

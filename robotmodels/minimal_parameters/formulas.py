@@ -1,0 +1,338 @@
+"""What a base parameter stands for, term by term: coefficients in symbols of the table.
+
+The rules are the same that give the numbers (`rules`), run on symbols: ``Dj``, ``RLj``, ``BLj`` for
+d, r, b of row j, cosines and sines of the angles that are no multiple of 30 or 45 degrees.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import Array
+from ..geometry import PRISMATIC, REVOLUTE
+from ..model import RobotModel
+from ..regressors import parameter_names
+from ..symbolic_dgm._angles import ROUNDING, exact_turns
+from .restraint import Turning, restraints
+from .rules import RowConstants, loads_of, regrouped
+
+_LONGEST = 40
+"""Operations in a coefficient beyond which its number tells more."""
+
+_GREEK = {"G": r"\gamma", "B": r"\beta", "A": r"\alpha", "TH": r"\theta"}
+
+
+@dataclass(frozen=True, slots=True)
+class Term:
+    """A coefficient and the standard parameters that have it in common.
+
+    Parameters
+    ----------
+    coefficient : float
+        Its number.
+    text, latex : str
+        In symbols; empty for 1, and the number itself where it has no symbol. A sum is in brackets,
+        a sign in front belongs to it.
+    parameters : tuple of str
+        Standard parameters.
+
+    Examples
+    --------
+    >>> Term(0.25, "D2^2", "D_{2}^{2}", ("M2", "M3")).parameters
+    ('M2', 'M3')
+    """
+
+    coefficient: float
+    text: str
+    latex: str
+    parameters: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Formula:
+    """One kept parameter and the terms it stands for, itself first.
+
+    Parameters
+    ----------
+    name : str
+        Its standard name.
+    terms : tuple of Term
+        In the order in which they are printed.
+
+    Examples
+    --------
+    >>> Formula("ZZ1", (Term(1.0, "", "", ("ZZ1", "Ia1")),)).is_regrouped
+    True
+    """
+
+    name: str
+    terms: tuple[Term, ...]
+
+    @property
+    def is_regrouped(self) -> bool:
+        """Whether it stands for more than itself: then it is printed with an R."""
+        return sum(len(term.parameters) for term in self.terms) > 1
+
+
+def numeric_formulas(
+    names: Sequence[str], kept: NDArray[np.int64], matrix: Array
+) -> tuple[Formula, ...]:
+    """Formulas whose coefficients are numbers.
+
+    Parameters
+    ----------
+    names : sequence of str, length p
+        Standard parameters.
+    kept : ndarray of int, shape (b,)
+        Numbers of the kept ones.
+    matrix : ndarray, shape (b, p)
+        Their combinations.
+
+    Returns
+    -------
+    tuple of Formula
+        One per kept parameter.
+
+    Examples
+    --------
+    >>> found = numeric_formulas(["ZZ1", "M2"], np.array([0]), np.array([[1.0, 0.25]]))
+    >>> found[0].terms[1].text
+    '0.25'
+    """
+    out = []
+    for number, row in zip(kept, matrix, strict=True):
+        groups: dict[tuple[float, str, str], list[int]] = {}
+        for k in np.flatnonzero(row):
+            value = float(row[k])
+            shown = f"{abs(value):.6g}"
+            text = "" if shown == "1" else shown
+            sign = "-" if value < 0 else ""
+            groups.setdefault((float(sign + shown), sign + text, sign + text), []).append(int(k))
+        out.append(_formula(names, int(number), groups))
+    return tuple(out)
+
+
+def symbolic_formulas(
+    model: RobotModel, drive: bool, kept: NDArray[np.int64], matrix: Array
+) -> tuple[Formula, ...]:
+    """Formulas whose coefficients are made of the symbols of the table.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot.
+    drive : bool
+        Whether drive parameters are among the standard ones.
+    kept : ndarray of int, shape (b,)
+        Numbers of the kept ones.
+    matrix : ndarray, shape (b, p)
+        The same combinations in numbers: they say which terms there are.
+
+    Returns
+    -------
+    tuple of Formula
+        One per kept parameter. Coefficients of coupled motors, which no rule gives, are numbers,
+        and so are formulas longer than a line or two (oblique axes one behind the other).
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> from robotmodels.minimal_parameters import base_parameters
+    >>> base = base_parameters(load("rx90"))
+    >>> [(term.text, term.parameters) for term in base.formulas[0].terms]
+    [('', ('ZZ1', 'Ia1', 'YY2', 'YY3')), ('D3^2', ('M3', 'M4', 'M5', 'M6'))]
+    """
+    import sympy
+
+    rows, directions, _ = _rows_of_symbols(model)
+    found = regrouped(model, rows, directions, drive)
+    names = parameter_names(model, drive)
+    printed: dict[Any, tuple[str, str]] = {}
+    out = []
+    for number, row in zip(kept, matrix, strict=True):
+        symbols = found.get(int(number), {})
+        groups: dict[tuple[float, str, str], list[int]] = {}
+        for k in np.flatnonzero(row):
+            value = float(row[k])
+            formula = sympy.sympify(symbols.get(int(k), float(f"{value:.6g}")))
+            if sympy.count_ops(formula) > _LONGEST:
+                formula = sympy.Float(f"{value:.6g}", 6)
+            if formula not in printed:
+                printed[formula] = _printed(formula)
+            groups.setdefault((round(value, 12), *printed[formula]), []).append(int(k))
+        out.append(_formula(names, int(number), groups))
+    return tuple(out)
+
+
+@dataclass(frozen=True, slots=True)
+class Constant:
+    """A symbol of the formulas and its value.
+
+    Parameters
+    ----------
+    text, latex : str
+        The symbol.
+    value : float
+        In SI units.
+    unit : str
+        m, rad or m/s^2.
+
+    Examples
+    --------
+    >>> Constant("D3", "D_{3}", 0.45, "m").value
+    0.45
+    """
+
+    text: str
+    latex: str
+    value: float
+    unit: str
+
+
+def constants_of(model: RobotModel) -> tuple[Constant, ...]:
+    """The symbols of a robot's formulas.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot.
+
+    Returns
+    -------
+    tuple of Constant
+        In the order of the table; not all of them occur in the formulas.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> constants_of(load("rx90"))[0]
+    Constant(text='D3', latex='D_{3}', value=0.45, unit='m')
+    """
+    return tuple(_rows_of_symbols(model)[2])
+
+
+def _rows_of_symbols(
+    model: RobotModel,
+) -> tuple[list[RowConstants], list[Array], list[Constant]]:
+    """What `regrouped` takes, as formulas; motion of the joint itself is left out."""
+    import sympy
+
+    table, found = model.table, restraints(model)
+    symbols = _Symbols()
+    rows: list[RowConstants] = []
+    directions: list[Array] = []
+    weight = float(np.linalg.norm(model.gravity))
+    for j, load in enumerate(loads_of(model), start=1):
+        own, sigma = found[j], table.sigma[j - 1]
+        T = symbols.turned(2, table.gamma, "G", j) @ symbols.shifted(2, table.b, "BL", j)
+        T = T @ symbols.turned(1, table.beta, "B", j) @ symbols.turned(0, table.alpha, "A", j)
+        T = T @ symbols.shifted(0, table.d, "D", j)
+        if sigma != REVOLUTE:
+            T = T @ symbols.turned(2, table.theta, "TH", j)
+        if sigma != PRISMATIC:
+            T = T @ symbols.shifted(2, table.r, "RL", j)
+        pull: Any = load
+        if sigma == PRISMATIC and load and abs(abs(load) - weight) <= 1e-12 * weight:
+            pull = symbols.gravity(weight) * (1 if load > 0 else -1)
+        rows.append(RowConstants(T[:3, :3], T[:3, 3], pull))
+        if sigma == REVOLUTE or own.turning is not Turning.ONE_DIRECTION:
+            e = np.array([sympy.Integer(round(float(c))) for c in own.direction], dtype=object)
+        else:
+            e = directions[table.antecedent[j - 1] - 1] @ T[:3, :3]
+        directions.append(e)
+    return rows, directions, symbols.constants
+
+
+class _Symbols:
+    """Elementary motions as matrices of symbols; values that are exact stay numbers."""
+
+    def __init__(self) -> None:
+        self.constants: list[Constant] = []
+
+    def turned(self, axis: int, column: Array, letter: str, j: int) -> Array:
+        import sympy
+
+        value = float(column[j - 1])
+        T = np.array(sympy.eye(4), dtype=object)
+        turns = exact_turns(value)
+        if turns is None:
+            angle: Any = self._symbol(letter, _GREEK[letter], j, value, "rad")
+        else:
+            angle = sympy.pi * sympy.Rational(turns.numerator, turns.denominator)
+        C, S = sympy.cos(angle), sympy.sin(angle)
+        i, k = ((1, 2), (2, 0), (0, 1))[axis]
+        T[i, i], T[k, k], T[i, k], T[k, i] = C, C, -S, S
+        return T
+
+    def shifted(self, axis: int, column: Array, letter: str, j: int) -> Array:
+        import sympy
+
+        T = np.array(sympy.eye(4), dtype=object)
+        value = float(column[j - 1])
+        if abs(value) > ROUNDING:
+            T[axis, 3] = self._symbol(letter, letter, j, value, "m")
+        return T
+
+    def gravity(self, weight: float) -> Any:
+        import sympy
+
+        if all(constant.text != "G" for constant in self.constants):
+            self.constants.append(Constant("G", "G", weight, "m/s^2"))
+        return sympy.Symbol("G")
+
+    def _symbol(self, letter: str, latex: str, j: int, value: float, unit: str) -> Any:
+        import sympy
+
+        symbol = sympy.Symbol(f"{letter}{j}")
+        self.constants.append(Constant(str(symbol), f"{latex}_{{{j}}}", value, unit))
+        return symbol
+
+
+def _formula(
+    names: Sequence[str], number: int, groups: dict[tuple[float, str, str], list[int]]
+) -> Formula:
+    """Itself first, then what has the coefficient 1, then the rest by frame."""
+
+    def order(k: int) -> tuple[int, int]:
+        frame = int("".join(c for c in names[k] if c.isdigit()))
+        return frame, k
+
+    terms = []
+    for (value, text, latex), members in groups.items():
+        members.sort(key=lambda k: (k != number, *order(k)))
+        shown = tuple(names[k] for k in members)
+        terms.append(
+            (number not in members, text != "", *order(members[0]), value, text, latex, shown)
+        )
+    terms.sort()
+    return Formula(names[number], tuple(Term(v, t, x, shown) for *_, v, t, x, shown in terms))
+
+
+def _printed(formula: Any) -> tuple[str, str]:
+    """The shortest form of a coefficient, as text and LaTeX; empty for 1."""
+    import sympy
+
+    plain = sympy.expand(formula)
+    for cosine in sorted(plain.atoms(sympy.cos), key=str):
+        sine = sympy.sin(cosine.args[0])
+        others = [
+            sympy.expand(plain.subs(a**2, 1 - b**2)) for a, b in ((cosine, sine), (sine, cosine))
+        ]
+        plain = min((plain, *others), key=sympy.count_ops)
+    short = min((plain, sympy.factor_terms(plain)), key=sympy.count_ops)
+    if short == 1:
+        return "", ""
+    if short == -1:
+        return "-", "-"
+    text, latex = str(short).replace("**", "^"), sympy.latex(short)
+    for letter, greek in _GREEK.items():
+        latex = re.sub(rf"\\b{letter}_{{", lambda _, g=greek: g + "_{", latex)
+    if short.is_Add:
+        text, latex = f"({text})", rf"\left({latex}\right)"
+    return text, latex

@@ -1,0 +1,159 @@
+"""Bodies to start from where nothing is known: uniform solids along the links."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._arrays import Array
+from ..errors import InertiaError, InvalidValueError
+from ..inertia import InertialParameters
+from ..model import RobotModel, check_model
+from ..se3 import skew
+
+_SLENDERNESS = 0.08
+"""Radius of the solids relative to the reach of the robot."""
+
+
+def uniform_bodies(
+    model: RobotModel, mass: float, radius: float | None = None
+) -> InertialParameters:
+    """Uniform solids along the links: a prior for the parameters that no torque shows.
+
+    Each link is a round bar with spherical ends from the origin of its frame to those of the
+    frames it carries, and to the tool at the tip; a sphere where it has no length. All have one
+    density.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, f frames.
+    mass : float
+        Mass of all moving links together, kg.
+    radius : float, optional
+        Of the bars, metres; default 0.08 of the summed lengths of the robot.
+
+    Returns
+    -------
+    InertialParameters
+        Of f frames, physical.
+
+    Raises
+    ------
+    InvalidValueError
+        A mass or radius that is not positive.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> bodies = uniform_bodies(load("rx90"), mass=100.0)
+    >>> float(bodies.mass.sum().round(9)), bool(bodies.is_physical.all())
+    (100.0, True)
+    """
+    check_model(model)
+    chain = model.chain
+    reach = float(np.linalg.norm(chain.position, axis=1).sum()) + float(
+        np.linalg.norm(model.tool[:3, 3])
+    )
+    thick = _SLENDERNESS * (reach if reach > 0 else 1.0) if radius is None else float(radius)
+    for name, value in (("mass", mass), ("radius", thick)):
+        if not (np.isfinite(value) and value > 0):
+            raise InvalidValueError(f"{name}: expected a positive number, got {value}.")
+    ends: list[list[Array]] = [[] for _ in range(model.f + 1)]
+    for k in range(model.f):
+        ends[int(chain.antecedent[k])].append(chain.position[k])
+    ends[model.tip].append(np.asarray(model.tool[:3, 3]))
+    values = np.array([_solid(ends[j], thick) for j in range(1, model.f + 1)])
+    return InertialParameters(values * (mass / values[:, 9].sum()))
+
+
+def pseudo_inertias(bodies: InertialParameters) -> Array:
+    """Pseudo-inertia matrices: positive definite for every body with extent in three directions.
+
+    Parameters
+    ----------
+    bodies : InertialParameters
+        Of f frames.
+
+    Returns
+    -------
+    ndarray, shape (f, 4, 4)
+        ``[[S, h], [h^T, m]]``, S the second moments ``tr(J)/2 - J`` (kg m^2), h the first (kg m).
+
+    References
+    ----------
+    P. Wensing, S. Kim and J.-J. Slotine, "Linear matrix inequalities for physically consistent
+    inertial parameter identification", IEEE RA-L 3(1), 2018.
+
+    Examples
+    --------
+    >>> pseudo_inertias(InertialParameters([[2, 0, 0, 2, 0, 2, 0, 0, 0, 1.0]]))[0].diagonal()
+    array([1., 1., 1., 1.])
+    """
+    J = bodies.tensors
+    P = np.zeros((bodies.f, 4, 4))
+    half = 0.5 * np.trace(J, axis1=1, axis2=2)
+    P[:, :3, :3] = half[:, None, None] * np.eye(3) - J
+    P[:, :3, 3] = P[:, 3, :3] = bodies.first_moments
+    P[:, 3, 3] = bodies.mass
+    return P
+
+
+def check_definite(bodies: InertialParameters, name: str) -> Array:
+    """Pseudo-inertias of bodies that must all have mass and extent.
+
+    Parameters
+    ----------
+    bodies : InertialParameters
+        Of f frames.
+    name : str
+        Used in error messages.
+
+    Returns
+    -------
+    ndarray, shape (f, 4, 4)
+        Positive definite.
+
+    Raises
+    ------
+    InertiaError
+        A body without mass or extent, or one that is not physical.
+
+    Examples
+    --------
+    >>> check_definite(InertialParameters([[2, 0, 0, 2, 0, 2, 0, 0, 0, 1.0]]), "prior").shape
+    (1, 4, 4)
+    """
+    P = pseudo_inertias(bodies)
+    least, most = np.linalg.eigvalsh(P)[:, 0], np.linalg.eigvalsh(P)[:, -1]
+    bad = least <= 1e-12 * np.maximum(most, 1e-300)
+    if bad.any():
+        j = int(np.flatnonzero(bad)[0])
+        raise InertiaError(
+            f"{name}: link {j + 1} is no body with mass and extent in three directions (smallest "
+            f"eigenvalue of its pseudo-inertia {least[j]:.3g}); give a CAD model of every link, or "
+            "uniform_bodies(model, mass)."
+        )
+    return P
+
+
+def _solid(ends: list[Array], radius: float) -> Array:
+    """Ten parameters of bars from the origin to the ends, density 1."""
+    total = np.zeros(10)
+    bars = [end for end in ends if np.linalg.norm(end) > 0]
+    ball = 4.0 / 3.0 * np.pi * radius**3
+    total += _body(ball, np.zeros(3), 0.4 * ball * radius**2 * np.eye(3))
+    for end in bars:
+        length = float(np.linalg.norm(end))
+        u = end / length
+        mass = np.pi * radius**2 * length
+        along = np.outer(u, u)
+        across = mass * (3.0 * radius**2 + length**2) / 12.0
+        central = 0.5 * mass * radius**2 * along + across * (np.eye(3) - along)
+        total += _body(mass, 0.5 * end, central)
+    return total
+
+
+def _body(mass: float, centre: Array, central: Array) -> Array:
+    S = skew(centre)
+    J = central - mass * S @ S
+    return np.array([*J[np.triu_indices(3)], *(mass * centre), mass])

@@ -1,0 +1,167 @@
+"""How the first joints of a path restrain the motion of the links behind them.
+
+The rules of base parameters for one joint (seed book section 1.5.3) hold wherever a link can move
+freely. Near the base it cannot: before the first revolute joint it only translates, and as long as
+all revolute axes are parallel it turns about one direction only, which stands still in the world
+and in the link. Found here once for all links, from the table's constants.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+
+from .._arrays import Array
+from ..geometry import FIXED, REVOLUTE
+from ..model import RobotModel
+
+PARALLEL = 1e-9
+"""Sine of an angle, cosine of one, or length in metres below which two axes are one direction,
+perpendicular, or through one point."""
+
+
+class Turning(Enum):
+    """Which rotations a link can have."""
+
+    NONE = "none: only prismatic joints before it"
+    ONE_DIRECTION = "about one direction"
+    FREE = "about more than one direction"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Restraint:
+    """What is left of the freedom of a link, in the axes of its frame.
+
+    Parameters
+    ----------
+    turning : Turning
+        Which rotations it can have.
+    direction : ndarray, shape (3,)
+        Unit vector of the one direction it turns about; zeros where there is none or several.
+    slides : tuple of ndarray, shapes (3,)
+        Directions of the prismatic joints before it, as long as they keep their place relative to
+        the link or to its direction of rotation (not those of a link that turns freely).
+    centre : ndarray, shape (3,), or None
+        A point of the link that no joint but a sliding one moves, metres: on the axis it turns
+        about, or the point where all axes meet; None where there is none.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> [restraint.turning.name for restraint in restraints(load("rx90"))[:3]]
+    ['NONE', 'ONE_DIRECTION', 'FREE']
+    """
+
+    turning: Turning
+    direction: Array
+    slides: tuple[Array, ...]
+    centre: Array | None
+
+    def slides_along(self, direction: Array) -> bool:
+        """Whether a prismatic joint before it moves it along a direction, in part or wholly."""
+        return any(abs(slide @ direction) > PARALLEL for slide in self.slides)
+
+    def slides_across(self, direction: Array) -> bool:
+        """Whether a prismatic joint before it moves it in another direction."""
+        return any(not parallel(slide, direction) for slide in self.slides)
+
+
+_STANDING = Restraint(Turning.NONE, np.zeros(3), (), np.zeros(3))
+
+
+def parallel(a: Array, b: Array) -> bool:
+    """Whether two unit vectors have one direction, either way round.
+
+    Parameters
+    ----------
+    a, b : ndarray, shape (3,)
+        Unit vectors.
+
+    Returns
+    -------
+    bool
+        By the sine of the angle.
+
+    Examples
+    --------
+    >>> parallel(np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, -1.0]))
+    True
+    """
+    return float(np.linalg.norm(np.cross(a, b))) <= PARALLEL
+
+
+def restraints(model: RobotModel) -> tuple[Restraint, ...]:
+    """The restraint of every link, R_0 first.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, f frames.
+
+    Returns
+    -------
+    tuple of Restraint
+        f + 1 of them; number j is that of frame j.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> restraints(load("cobra_s600"))[4].turning.name
+    'ONE_DIRECTION'
+    """
+    chain = model.chain
+    found = [_STANDING]
+    for k in range(model.f):
+        before = found[int(chain.antecedent[k])]
+        R, P = chain.rotation[k], chain.position[k]
+        after = _with_joint(before, int(chain.sigma[k]), R[:, 2], P)
+        found.append(
+            Restraint(
+                after.turning,
+                after.direction @ R,
+                tuple(slide @ R for slide in after.slides),
+                None if after.centre is None else (after.centre - P) @ R,
+            )
+        )
+    return tuple(found)
+
+
+def _with_joint(before: Restraint, sigma: int, z: Array, P: Array) -> Restraint:
+    """The restraint behind a joint with axis z through P, still in the axes of the antecedent."""
+    if sigma == FIXED:
+        return before
+    if sigma != REVOLUTE:
+        slides = (*before.slides, z) if before.turning is not Turning.FREE else ()
+        return replace(before, slides=slides, centre=_after_sliding(before, z))
+    if before.turning is Turning.NONE:
+        return Restraint(Turning.ONE_DIRECTION, z, before.slides, P)
+    centre = _common_point(before, z, P)
+    if before.turning is Turning.ONE_DIRECTION and parallel(z, before.direction):
+        return replace(before, centre=centre)
+    return Restraint(Turning.FREE, np.zeros(3), (), None if before.slides else centre)
+
+
+def _after_sliding(before: Restraint, z: Array) -> Array | None:
+    """A slide along the only axis moves a point of the axis along it, and no other in the plane."""
+    if before.turning is Turning.NONE:
+        return before.centre
+    keeps = before.turning is Turning.ONE_DIRECTION and parallel(z, before.direction)
+    return before.centre if keeps else None
+
+
+def _common_point(before: Restraint, z: Array, P: Array) -> Array | None:
+    """A point on the axis (z, P) and on the axes before it; any point of a common axis."""
+    if before.centre is None:
+        return None
+    way = before.centre - P
+    if before.turning is Turning.FREE:
+        return before.centre if float(np.linalg.norm(np.cross(z, way))) <= PARALLEL else None
+    e = before.direction
+    if parallel(z, e):
+        return P if float(np.linalg.norm(np.cross(z, way))) <= PARALLEL else None
+    # both axes pass through P + s z = centre + t e
+    s, t = np.linalg.lstsq(np.stack((z, -e), axis=1), way, rcond=None)[0]
+    point = P + s * z
+    return point if float(np.linalg.norm(point - before.centre - t * e)) <= PARALLEL else None

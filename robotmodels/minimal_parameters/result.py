@@ -1,0 +1,248 @@
+"""What `base_parameters` returns: the parameters that are kept and what each stands for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from functools import cached_property
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .._arrays import Array, as_floats, read_only
+from ..errors import InvalidValueError, ShapeError
+from ..model import RobotModel, check_model
+from ..regressors import parameter_names, parameter_vector
+from .formulas import Formula, numeric_formulas, symbolic_formulas
+from .printing import table_latex, table_text
+
+
+class BaseMethod(Enum):
+    """How base parameters were found.
+
+    Examples
+    --------
+    >>> BaseMethod("numeric")
+    <BaseMethod.NUMERIC: 'numeric'>
+    """
+
+    SYMBOLIC = "symbolic"
+    NUMERIC = "numeric"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BaseParameters:
+    """The fewest inertial (and drive) parameters that give the same torques. Read-only, picklable.
+
+    Also called minimal, identifiable or barycentric parameters.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot.
+    drive : bool
+        Whether its drive parameters are among the p standard parameters.
+    kept : ndarray of int, shape (b,)
+        Which of them are kept, by number.
+    matrix : ndarray, shape (b, p)
+        ``beta = matrix @ pi``: base parameters from standard parameters.
+    method : BaseMethod
+        How they were found.
+    gap : (float, float), optional
+        Of the numeric method: sine of the smallest angle of a kept column to those kept before it,
+        and of the largest of a dependent one. Far apart, the rank is beyond doubt.
+
+    Raises
+    ------
+    ShapeError
+        Fields that do not fit each other.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> from robotmodels.minimal_parameters import base_parameters
+    >>> base = base_parameters(load("planar_2r"), drive=False)
+    >>> base.names
+    ('ZZ1', 'ZZ2', 'MX2', 'MY2')
+    >>> dict(base.regrouping["ZZ1"])
+    {'ZZ1': 1.0, 'M2': 1.0}
+    """
+
+    model: RobotModel
+    drive: bool
+    kept: NDArray[np.int64]
+    matrix: Array
+    method: BaseMethod
+    gap: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "kept", read_only(self.kept, np.int64))
+        object.__setattr__(self, "matrix", read_only(self.matrix))
+        shape = (len(self.kept), len(self.parameter_names))
+        if self.matrix.shape != shape:
+            raise ShapeError(f"matrix: expected shape {shape}, got {self.matrix.shape}.")
+
+    def __len__(self) -> int:
+        return len(self.kept)
+
+    @cached_property
+    def parameter_names(self) -> tuple[str, ...]:
+        """The p standard parameters."""
+        return parameter_names(self.model, self.drive)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The kept parameters by their standard names, in the order of the columns."""
+        return tuple(self.parameter_names[k] for k in self.kept)
+
+    @cached_property
+    def no_effect(self) -> tuple[str, ...]:
+        """Standard parameters that no torque shows."""
+        return tuple(np.array(self.parameter_names)[~self.matrix.any(axis=0)].tolist())
+
+    @cached_property
+    def alone(self) -> tuple[str, ...]:
+        """Standard parameters that are determined one by one."""
+        single = (self.matrix != 0).sum(axis=1) == 1
+        return tuple(self.parameter_names[k] for k in self.kept[single])
+
+    @cached_property
+    def in_combination(self) -> tuple[str, ...]:
+        """Standard parameters that are determined only together with others."""
+        apart = {*self.no_effect, *self.alone}
+        return tuple(name for name in self.parameter_names if name not in apart)
+
+    @cached_property
+    def regrouping(self) -> Mapping[str, Mapping[str, float]]:
+        """Of each kept parameter, the coefficients of all that it stands for, itself included."""
+        names = self.parameter_names
+        return MappingProxyType(
+            {
+                name: MappingProxyType({names[k]: float(row[k]) for k in np.flatnonzero(row)})
+                for name, row in zip(self.names, self.matrix, strict=True)
+            }
+        )
+
+    @cached_property
+    def null_space(self) -> Array:
+        """Changes of the standard parameters that no torque shows, shape (p, p - b).
+
+        One column for each parameter that is not kept: it changes by 1, and the kept ones make up
+        for it.
+        """
+        p = len(self.parameter_names)
+        others = np.setdiff1d(np.arange(p), self.kept)
+        changes = np.zeros((p, len(others)))
+        changes[others, np.arange(len(others))] = 1.0
+        changes[self.kept] = -self.matrix[:, others]
+        return read_only(changes)
+
+    def reduce(self, W: ArrayLike) -> Array:
+        """The columns of a regressor that belong to the base parameters.
+
+        Parameters
+        ----------
+        W : array_like, shape (..., p)
+            Regressor with a column for each standard parameter, such as `torque_regressor`.
+
+        Returns
+        -------
+        ndarray, shape (..., b)
+            ``reduce(W) @ values(model)`` equals ``W @ parameter_vector(model)``.
+
+        Raises
+        ------
+        ShapeError
+            Another number of columns.
+
+        Examples
+        --------
+        >>> from robotmodels.robots import load
+        >>> from robotmodels.minimal_parameters import base_parameters
+        >>> base_parameters(load("planar_2r"), drive=False).reduce(np.ones((5, 2, 20))).shape
+        (5, 2, 4)
+        """
+        W = as_floats(W, "W")
+        p = len(self.parameter_names)
+        if W.ndim < 1 or W.shape[-1] != p:
+            raise ShapeError(
+                f"W: expected shape (..., {p}), a column for each standard parameter (with or "
+                f"without drives as these base parameters), got {W.shape}."
+            )
+        return np.ascontiguousarray(W[..., self.kept])
+
+    def values(self, model: RobotModel) -> Array:
+        """Base parameters of a model's own standard parameters.
+
+        Parameters
+        ----------
+        model : RobotModel
+            A robot of the same structure.
+
+        Returns
+        -------
+        ndarray, shape (b,)
+            ``matrix @ parameter_vector(model)``.
+
+        Raises
+        ------
+        InvalidValueError
+            A model with other standard parameters.
+
+        Examples
+        --------
+        >>> from robotmodels.robots import load
+        >>> from robotmodels.minimal_parameters import base_parameters
+        >>> arm = load("planar_2r")
+        >>> base_parameters(arm).values(arm).shape
+        (11,)
+        """
+        check_model(model)
+        if parameter_names(model, self.drive) != self.parameter_names:
+            raise InvalidValueError(
+                f"model: {model.name!r} has other standard parameters than {self.model.name!r}, "
+                "whose base parameters these are; ask for those of the model itself."
+            )
+        return self.matrix @ parameter_vector(model, self.drive)
+
+    @cached_property
+    def formulas(self) -> tuple[Formula, ...]:
+        """What each kept parameter stands for, term by term.
+
+        Of the symbolic method with the coefficients in symbols of the table, else in numbers.
+        """
+        if self.method is BaseMethod.SYMBOLIC:
+            return symbolic_formulas(self.model, self.drive, self.kept, self.matrix)
+        return self.numbers
+
+    @cached_property
+    def numbers(self) -> tuple[Formula, ...]:
+        """The formulas with numbers as coefficients."""
+        return numeric_formulas(self.parameter_names, self.kept, self.matrix)
+
+    @cached_property
+    def text(self) -> str:
+        """The table of the book, as text."""
+        return table_text(self)
+
+    @cached_property
+    def latex(self) -> str:
+        """The same in LaTeX."""
+        return table_latex(self)
+
+    def _repr_markdown_(self) -> str:
+        return f"```text\n{self.text}\n```"
+
+    def __str__(self) -> str:
+        return self.text
+
+    def __repr__(self) -> str:
+        return (
+            f"<BaseParameters of {self.model.name!r}: {len(self)} of {len(self.parameter_names)}, "
+            f"{len(self.no_effect)} without effect, {self.method.name.lower()}>"
+        )
+
+    def __reduce__(self) -> tuple[object, ...]:  # rebuilt, so that its arrays are read-only again
+        return type(self), (self.model, self.drive, self.kept, self.matrix, self.method, self.gap)
