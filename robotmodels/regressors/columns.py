@@ -1,0 +1,174 @@
+"""Which columns a regressor has, and which of them are asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InvalidValueError, ShapeError, nearest_names
+from ..friction import Friction, LinearFriction, check_friction, check_linear
+from ..inertia import PARAMETERS
+from ..model import RobotModel
+
+DRIVE_KINDS = ("Ia", "Fv", "Fc", "offset")
+COUPLED_KINDS = ("Iam", "Fvm", "Fcm")
+LINKS = "links"
+
+Blocks = Mapping[str, tuple[str, ...]]
+"""Names of the columns, by kind: the ten of each link, then one kind of the drives at a time."""
+
+
+@runtime_checkable
+class KeptColumns(Protocol):
+    """What is asked of base parameters; `BaseParameters` has it."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the kept standard parameters."""
+        ...
+
+    @property
+    def kept(self) -> NDArray[np.int64]:
+        """Their numbers."""
+        ...
+
+
+Columns = Sequence[int] | Sequence[str] | NDArray[np.int64] | NDArray[np.bool_] | KeptColumns
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ChosenColumns:
+    """Columns of a regressor and where each standard parameter goes.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Of the chosen columns, in order.
+    places : mapping of str to ndarray of int
+        By kind, the column of each parameter of that kind, -1 if it is not chosen.
+    """
+
+    names: tuple[str, ...]
+    places: Mapping[str, NDArray[np.int64]]
+
+    @property
+    def count(self) -> int:
+        """Number of columns."""
+        return len(self.names)
+
+    def has(self, *kinds: str) -> bool:
+        """Whether any column of these kinds is chosen."""
+        return any((self.places[kind] >= 0).any() for kind in kinds if kind in self.places)
+
+
+def coupled_motors(model: RobotModel) -> tuple[int, ...]:
+    """Numbers of the motors that more than one joint turns."""
+    return () if model.transmission is None else model.transmission.coupled_motors
+
+
+def friction_of(model: RobotModel, friction: Friction | None) -> LinearFriction | None:
+    """The friction model, checked for regressors."""
+    return None if friction is None else check_linear(check_friction(friction, model.n))
+
+
+def standard_blocks(model: RobotModel, drive: bool, friction: Friction | None) -> Blocks:
+    """Columns of the torque and of what is derived from it."""
+    frames = [int(row) + 1 for row in model.table.joint_rows]
+    motors = [frames[m - 1] for m in coupled_motors(model)]
+    blocks: dict[str, tuple[str, ...]] = {LINKS: _link_names(model)}
+    if drive:
+        blocks |= {kind: tuple(f"{kind}{j}" for j in frames) for kind in DRIVE_KINDS}
+        blocks |= {kind: tuple(f"{kind}{j}" for j in motors) for kind in COUPLED_KINDS}
+    if (linear := friction_of(model, friction)) is not None:
+        for kind in linear.kinds:
+            if kind in blocks:
+                raise InvalidValueError(
+                    f"friction: there are {kind} columns already, of the drives or of another part "
+                    "of the friction model; leave the model out that repeats them."
+                )
+            blocks[kind] = tuple(f"{kind}{j}" for j in frames)
+    return blocks
+
+
+def energy_blocks(model: RobotModel, drive: bool) -> Blocks:
+    """Columns of the energy: friction and offsets have none."""
+    blocks = standard_blocks(model, drive, None)
+    return {kind: blocks[kind] for kind in (LINKS, "Ia", "Iam") if kind in blocks}
+
+
+def chosen_columns(blocks: Blocks, columns: Columns | None) -> ChosenColumns:
+    """Find the columns that are asked for.
+
+    Parameters
+    ----------
+    blocks : mapping of str to tuple of str
+        All columns.
+    columns : indices, names, mask, BaseParameters or None
+        None takes all.
+
+    Returns
+    -------
+    ChosenColumns
+        In the order they are asked for.
+
+    Raises
+    ------
+    InvalidValueError
+        A column that is not there, or is asked for twice.
+    ShapeError
+        A mask of another length.
+    """
+    every = tuple(name for names in blocks.values() for name in names)
+    if columns is None:
+        chosen = np.arange(len(every))
+    else:
+        chosen = np.array(_numbers(every, columns), dtype=np.int64).reshape(-1)
+        if np.unique(chosen).size != chosen.size:
+            raise InvalidValueError("columns: a column is asked for twice; give each once.")
+    place = np.full(len(every), -1, dtype=np.int64)
+    place[chosen] = np.arange(chosen.size)
+    ends = np.cumsum([len(names) for names in blocks.values()])[:-1]
+    pieces = (np.ascontiguousarray(piece) for piece in np.split(place, ends))
+    return ChosenColumns(tuple(every[k] for k in chosen), dict(zip(blocks, pieces, strict=True)))
+
+
+def _numbers(every: tuple[str, ...], columns: Columns) -> list[int]:
+    if isinstance(columns, KeptColumns):
+        return [_number(every, name) for name in columns.names]
+    if isinstance(columns, str) or not isinstance(columns, (Sequence, np.ndarray)):
+        raise InvalidValueError(
+            "columns: expected numbers or names of columns, or base parameters, got "
+            f"{columns!r:.80}."
+        )
+    if isinstance(columns, np.ndarray) and columns.dtype == bool:
+        if columns.shape != (len(every),):
+            raise ShapeError(f"columns: expected a mask of {len(every)}, got {columns.shape}.")
+        return np.flatnonzero(columns).tolist()
+    return [_number(every, column) for column in columns]
+
+
+def _number(every: tuple[str, ...], column: object) -> int:
+    if isinstance(column, str):
+        if column not in every:
+            near = nearest_names(column, every)
+            raise InvalidValueError(
+                f"columns: there is no column {column!r} here"
+                + (f"; the nearest are {', '.join(near)}." if near else ".")
+                + " Friction and offsets have none in an energy, drives none with drive=False."
+            )
+        return every.index(column)
+    if isinstance(column, (bool, np.bool_)) or not isinstance(column, (int, np.integer)):
+        raise InvalidValueError(f"columns: expected numbers or names, got {column!r:.80}.")
+    if not 0 <= column < len(every):
+        raise InvalidValueError(
+            f"columns: numbers are from 0 to {len(every) - 1} here, got {int(column)}."
+        )
+    return int(column)
+
+
+def _link_names(model: RobotModel) -> tuple[str, ...]:
+    return tuple(f"{p}{j}" for j in range(1, model.f + 1) for p in PARAMETERS)
