@@ -72,7 +72,7 @@ def base_model(model: RobotModel, base: Base, values: ArrayLike) -> RobotModel:
     Examples
     --------
     >>> from robotmodels.robots import load
-    >>> from robotmodels.base_parameters import base_parameters
+    >>> from robotmodels.minimal_parameters import base_parameters
     >>> arm = load("puma560")
     >>> base = base_parameters(arm)
     >>> base_model(arm, base, base.values(arm)).inertia.mass
@@ -153,7 +153,7 @@ def idm_from_base(
     Examples
     --------
     >>> from robotmodels.robots import load
-    >>> from robotmodels.base_parameters import base_parameters
+    >>> from robotmodels.minimal_parameters import base_parameters
     >>> from robotmodels.dynamics import idm
     >>> arm = load("puma560")
     >>> base = base_parameters(arm)

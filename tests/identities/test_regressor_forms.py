@@ -1,0 +1,252 @@
+"""Power, energy, momentum and filtered forms of the dynamic model, on random robots."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from identities.random_robots import any_models, models, random_state, seeds
+
+import robotmodels as rm
+from robotmodels.minimal_parameters import base_parameters
+from robotmodels.dynamics import idm
+from robotmodels.friction import AsymmetricFriction, StribeckFriction
+from robotmodels.regressors import (
+    LowPass,
+    energy_difference_regressor,
+    energy_parameter_names,
+    energy_regressor,
+    filtered_regressor,
+    joint_work,
+    momentum_regressor,
+    parameter_names,
+    parameter_vector,
+    power_regressor,
+    torque_regressor,
+)
+
+
+def close(actual, expected, tolerance=1e-12):
+    """Equal relative to the largest number, at least one."""
+    actual, expected = np.asarray(actual), np.asarray(expected)
+    assert actual.shape == expected.shape
+    scale = max(1.0, np.abs(expected).max(initial=0.0))
+    np.testing.assert_allclose(actual, expected, rtol=0, atol=tolerance * scale)
+
+
+def random_friction(rng, n):
+    if rng.random() < 0.5:
+        return AsymmetricFriction(*rng.uniform(0.1, 3.0, (4, n)))
+    return StribeckFriction(*rng.uniform(0.1, 3.0, (4, n)), exponent=rng.uniform(0.7, 2.5, n))
+
+
+def friction_beside(rng, model, drive):
+    """A friction model whose names the drives do not have."""
+    if not drive:
+        return random_friction(rng, model.n)
+    return AsymmetricFriction(*rng.uniform(0.1, 3.0, (4, model.n)))
+
+
+def motion(model, rng, t):
+    """A smooth motion q(t) with its derivatives, each (N, n)."""
+    q0, v0, _ = random_state(model, rng)
+    rate = rng.uniform(0.5, 1.5, model.n)
+    phase = np.outer(t, rate) + v0
+    return q0 + np.sin(phase), rate * np.cos(phase), -(rate**2) * np.sin(phase)
+
+
+@given(model=any_models(), seed=seeds, drive=st.booleans())
+def test_power_is_the_torque_regressor_on_the_velocity(model, seed, drive):
+    rng = np.random.default_rng(seed)
+    q, v, a = random_state(model, rng, 3)
+    friction = friction_beside(rng, model, drive)
+    W = torque_regressor(model, q, v, a, drive, friction=friction)
+    d = power_regressor(model, q, v, a, drive, friction=friction)
+    close(d, np.einsum("kj,kjp->kp", v, W))
+    parameters = parameter_vector(model, drive, friction)
+    assert parameters.shape == (len(parameter_names(model, drive, friction)),)
+    tau = idm(model, q, v, a, drive=drive, friction=friction)
+    close(W @ parameters, tau)
+    close(d @ parameters, (tau * v).sum(axis=1), 1e-11)
+
+
+@given(model=any_models(), seed=seeds)
+def test_power_is_the_rate_of_the_energy_column_by_column(model, seed):
+    """Analytic power against differences of the energy along the motion, without dissipation."""
+    q, v, a = random_state(model, np.random.default_rng(seed))
+    kept = energy_parameter_names(model)
+    d = power_regressor(model, q, v, a, columns=kept)
+    h = 1e-3
+    # eighth-order central difference along q + v t + a t^2 / 2
+    weights = {1: 4 / 5, 2: -1 / 5, 3: 4 / 105, 4: -1 / 280}
+
+    def energy(t):
+        return energy_regressor(model, q + v * t + a * t**2 / 2, v + a * t)
+
+    slope = sum(w * (energy(k * h) - energy(-k * h)) for k, w in weights.items()) / h
+    scale = 1.0 + np.linalg.norm(v) + np.linalg.norm(a)
+    close(d, slope, 1e-11 * scale**2)
+
+
+@given(model=any_models(), seed=seeds, drive=st.booleans())
+def test_momentum_form_is_the_torque_without_acceleration(model, seed, drive):
+    """P pi = A v; S pi = C^T v - Q - friction; dP/dt - S is the torque regressor."""
+    rng = np.random.default_rng(seed)
+    q, v, a = random_state(model, rng, 2)
+    friction = friction_beside(rng, model, drive)
+    P, S = momentum_regressor(model, q, v, drive, friction=friction)
+    parameters = parameter_vector(model, drive, friction)
+    close(P @ parameters, np.einsum("kij,kj->ki", rm.mass_matrix(model, q, drive), v))
+    C = rm.coriolis_matrix(model, q, v)
+    resistance = idm(model, q, v, 0 * v, drive=drive, friction=friction)
+    resistance -= idm(model, q, v, 0 * v, drive=False)
+    expected = np.einsum("kji,kj->ki", C, v) - rm.gravity_torque(model, q) - resistance
+    close(S @ parameters, expected, 1e-11)
+    h = 1e-3
+    weights = {1: 4 / 5, 2: -1 / 5, 3: 4 / 105, 4: -1 / 280}
+
+    def momentum(t):
+        return momentum_regressor(
+            model, q + v * t + a * t**2 / 2, v + a * t, drive, friction=friction
+        ).momentum
+
+    slope = sum(w * (momentum(k * h) - momentum(-k * h)) for k, w in weights.items()) / h
+    W = torque_regressor(model, q, v, a, drive, friction=friction)
+    scale = 1.0 + np.linalg.norm(v) + np.linalg.norm(a)
+    close(slope - S, W, 1e-11 * scale**2)
+
+
+@given(model=any_models(), seed=seeds)
+def test_any_subset_of_columns_is_that_of_the_whole(model, seed):
+    rng = np.random.default_rng(seed)
+    q, v, a = random_state(model, rng, 2)
+    names = parameter_names(model)
+    some = rng.permutation(len(names))[: rng.integers(0, len(names) + 1)]
+    chosen = [names[k] for k in some]
+    mask = np.isin(np.arange(len(names)), some)
+    for function, x in (
+        (torque_regressor, (q, v, a)),
+        (power_regressor, (q, v, a)),
+        (lambda *x, **k: momentum_regressor(*x, **k).momentum, (q, v)),
+        (lambda *x, **k: momentum_regressor(*x, **k).force, (q, v)),
+    ):
+        whole = function(model, *x)
+        np.testing.assert_array_equal(function(model, *x, columns=some), whole[..., some])
+        np.testing.assert_array_equal(function(model, *x, columns=chosen), whole[..., some])
+        np.testing.assert_array_equal(function(model, *x, columns=mask), whole[..., mask])
+    stored = energy_parameter_names(model)
+    part = [name for name in chosen if name in stored]
+    where = [stored.index(name) for name in part]
+    np.testing.assert_array_equal(
+        energy_regressor(model, q, v, columns=part), energy_regressor(model, q, v)[..., where]
+    )
+    assert parameter_names(model, columns=some) == tuple(chosen)
+
+
+@given(model=models(max_frames=6), seed=seeds)
+def test_base_parameters_choose_their_columns(model, seed):
+    q, v, a = random_state(model, np.random.default_rng(seed), 3)
+    base = base_parameters(model)
+    W = torque_regressor(model, q, v, a, columns=base)
+    np.testing.assert_array_equal(W, base.reduce(torque_regressor(model, q, v, a)))
+    d = power_regressor(model, q, v, a, columns=base)
+    close(d, np.einsum("kj,kjb->kb", v, W))
+    t = np.array([0.0, 0.4, 1.0])
+    rows = energy_difference_regressor(model, t, q, v, columns=base)
+    whole = energy_difference_regressor(model, t, q, v)
+    np.testing.assert_array_equal(rows, whole[:, base.kept])
+    for x, y in zip(
+        momentum_regressor(model, q, v, columns=base), momentum_regressor(model, q, v), strict=True
+    ):
+        np.testing.assert_array_equal(x, base.reduce(y))
+
+
+@given(model=models(max_frames=5, transmission=True, drive=True), seed=seeds)
+def test_energy_differences_are_the_work_of_the_torques(model, seed):
+    """Along a motion, over long stretches and short ones, drives included."""
+    rng = np.random.default_rng(seed)
+    t = np.linspace(0.0, 1.0, 1001)
+    q, v, a = motion(model, rng, t)
+    tau = idm(model, q, v, a)
+    work = np.trapezoid((tau * v).sum(axis=1), t)
+    row = energy_difference_regressor(model, t, q, v, knots=[0, 1000])
+    assert row.shape == (1, len(parameter_names(model)))
+    power = np.abs(tau * v).sum(axis=1).max()
+    assert abs(row[0] @ parameter_vector(model) - work) < 1e-5 * power
+    np.testing.assert_allclose(joint_work(t, v, tau, [0, 1000]), [work], atol=1e-5 * power)
+    rows = energy_difference_regressor(model, t, q, v)
+    close(rows.sum(axis=0), row[0], 1e-11)
+    knots = np.r_[0, 1 + np.flatnonzero(rng.random(999) < 0.05), 1000]
+    parts = energy_difference_regressor(model, t, q, v, knots=knots)
+    close(parts, np.add.reduceat(rows, knots[:-1]), 1e-11)
+
+
+@given(model=models(max_frames=4), seed=seeds)
+def test_friction_between_samples_is_exact_for_linear_velocity(model, seed):
+    """Through zero as well; against a fine quadrature of the power."""
+    rng = np.random.default_rng(seed)
+    n = model.n
+    t = np.array([0.0, 0.7, 1.0])
+    v = rng.normal(size=(3, n))
+    v[0, 0] = 0.0
+    q = np.cumsum(np.r_[np.zeros((1, n)), np.diff(t)[:, None] * (v[1:] + v[:-1]) / 2], axis=0)
+    friction = AsymmetricFriction(*rng.uniform(0.1, 3.0, (4, n)))
+    kinds = ("Fv", "Fc", "offset", "Fvm", "Fcm", *friction.kinds)
+    names = [p for p in parameter_names(model, True, friction) if p.startswith(kinds)]
+    rows = energy_difference_regressor(model, t, q, v, columns=names, friction=friction)
+    nodes, weights = np.polynomial.legendre.leggauss(20)
+    for k in range(2):
+        # every joint and every coupled motor may turn in between: quadrature from turn to turn
+        turns = {0.0, 1.0}
+        w = np.eye(n) if model.transmission is None else model.transmission.weights
+        for z in np.vstack([np.eye(n), w]) @ v[k : k + 2].T:
+            if z[0] * z[1] < 0:
+                turns.add(z[0] / (z[0] - z[1]))
+        turns = sorted(turns)
+        expected = 0.0
+        for first, last in zip(turns[:-1], turns[1:], strict=True):
+            s = first + (last - first) * (nodes + 1) / 2
+            speed = v[k] + s[:, None] * (v[k + 1] - v[k])
+            power = power_regressor(
+                model, 0 * speed, speed, 0 * speed, columns=names, friction=friction
+            )
+            expected = expected + (last - first) / 2 * (weights @ power)
+        close(rows[k], (t[k + 1] - t[k]) * expected, 1e-12)
+
+
+@pytest.mark.parametrize("order", [1, 2, 4])
+@given(model=models(max_frames=4), seed=seeds)
+def test_filtered_form_is_the_filtered_torque(order, model, seed):
+    """F(W) parameters = F(tau) from the first sample on, to the square of the period."""
+    from scipy.signal import butter
+
+    low_pass = (
+        LowPass.first_order(20.0)
+        if order == 1
+        else LowPass.from_scipy(butter(order, 20.0, analog=True))
+    )
+    rng = np.random.default_rng(seed)
+    errors = []
+    state = rng.bit_generator.state
+    smooth = [p for p in parameter_names(model) if not p.startswith(("Fc", "offset"))]
+    for N in (201, 801):
+        rng.bit_generator.state = state
+        t = np.linspace(0.0, 1.0, N)
+        q, v, a = motion(model, rng, t)
+        W = filtered_regressor(model, t[1], q, v, low_pass, columns=smooth)
+        direct = low_pass.filter(torque_regressor(model, q, v, a, columns=smooth), t[1])
+        assert not W[0].any()
+        errors.append(np.abs(W - direct).max() / max(1.0, np.abs(direct).max()))
+    assert errors[1] < 1e-3
+    assert errors[1] < errors[0] / 8 or errors[1] < 1e-12
+
+
+@given(model=any_models(), seed=seeds)
+def test_filtered_friction_is_that_of_the_torque(model, seed):
+    """Columns that need no momentum are filtered alike, whatever their jumps."""
+    rng = np.random.default_rng(seed)
+    t = np.linspace(0.0, 1.0, 50)
+    q, v, a = motion(model, rng, t)
+    dry = [p for p in parameter_names(model) if p.startswith(("Fv", "Fc", "offset"))]
+    low_pass = LowPass.first_order(5.0)
+    W = filtered_regressor(model, t[1], q, v, low_pass, columns=dry)
+    close(W, low_pass.filter(torque_regressor(model, q, v, a, columns=dry), t[1]), 1e-13)
