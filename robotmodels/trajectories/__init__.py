@@ -27,6 +27,7 @@ from .point_to_point import (
 )
 from .polynomials import cubic, quintic
 from .pose_trajectory import PoseSamples, PoseTrajectory
+from .resolved_motion import ResolvedMotion, resolved_motion
 from .sampled import cartesian_trajectory, joint_trajectory
 from .splines import SplineEnds, cubic_spline, quintic_spline
 from .trajectory import Samples, Trajectory
@@ -40,6 +41,7 @@ __all__ = [
     "PathEventKind",
     "PoseSamples",
     "PoseTrajectory",
+    "ResolvedMotion",
     "Samples",
     "SplineEnds",
     "Synchronisation",
@@ -62,6 +64,7 @@ __all__ = [
     "linear",
     "quintic",
     "quintic_spline",
+    "resolved_motion",
     "smoothed_trapezoidal",
     "straight_line",
     "trapezoidal",
