@@ -16,6 +16,7 @@ from ._arrays import Array, as_floats, as_vector, read_only, same_value, value_h
 from .errors import InvalidValueError, ShapeError
 
 _SLOWEST = 5e-324  # the smallest velocity that has a sign
+_NOTHING = 1e-300  # what viscous friction takes at it
 
 
 @runtime_checkable
@@ -79,7 +80,7 @@ class _JointFriction:
     @property
     def breakaway(self) -> Array:
         """Torques between which a joint at rest sticks, shape (2, n): lower, upper."""
-        return np.sort([self.torque(np.full(self.n, s * _SLOWEST)) for s in (-1.0, 1.0)], axis=0)
+        return _breakaway(self)
 
     def basis(self, v: ArrayLike) -> Array:
         """Torque per unit of each parameter of its joint.
@@ -391,7 +392,7 @@ class FrictionSum:
     @property
     def breakaway(self) -> Array:
         """Torques between which a joint at rest sticks, shape (2, n): lower, upper."""
-        return np.sort([self.torque(np.full(self.n, s * _SLOWEST)) for s in (-1.0, 1.0)], axis=0)
+        return _breakaway(self)
 
     def basis(self, v: ArrayLike) -> Array:
         """Torque per unit of each parameter, see `LinearFriction`."""
@@ -404,6 +405,12 @@ class FrictionSum:
     @property
     def _linear(self) -> tuple[LinearFriction, ...]:
         return tuple(check_linear(part) for part in self.parts)
+
+
+def _breakaway(friction: Friction) -> Array:
+    """Limits of the torque from below and above zero velocity, sorted."""
+    limits = [friction.torque(np.full(friction.n, s * _SLOWEST)) for s in (-1.0, 1.0)]
+    return np.sort(np.where(np.abs(limits) < _NOTHING, 0.0, limits), axis=0)
 
 
 def check_friction(friction: object, n: int, name: str = "friction") -> Friction:

@@ -8,10 +8,28 @@ from identities.random_robots import random_model, random_state
 
 import robotmodels as rm
 from robotmodels.errors import InvalidValueError, ShapeError
+from robotmodels.minimal_parameters import base_parameters
+from robotmodels.regressors import (
+    LowPass,
+    energy_difference_regressor,
+    energy_difference_regressor_chunks,
+    energy_parameter_names,
+    energy_regressor_chunks,
+    filtered_regressor,
+    filtered_regressor_chunks,
+    joint_work,
+    momentum_regressor,
+    momentum_regressor_chunks,
+    power_regressor,
+    power_regressor_chunks,
+)
 
 FUNCTIONS = {
     "torque": (rm.torque_regressor, 3),
     "torque without drives": (lambda m, *x: rm.torque_regressor(m, *x, drive=False), 3),
+    "power": (power_regressor, 3),
+    "momentum": (lambda m, *x: momentum_regressor(m, *x).momentum, 2),
+    "momentum's force": (lambda m, *x: momentum_regressor(m, *x).force, 2),
     "energy": (rm.energy_regressor, 2),
     "energy without rotors": (lambda m, *x: rm.energy_regressor(m, *x, drive=False), 2),
 }
@@ -71,6 +89,9 @@ def test_leading_axes_are_the_batch(case, model, batch):
     core = {
         "torque": (n, 10 * f + 4 * n),
         "torque without drives": (n, 10 * f),
+        "power": (10 * f + 4 * n,),
+        "momentum": (n, 10 * f + 4 * n),
+        "momentum's force": (n, 10 * f + 4 * n),
         "energy": (10 * f + n,),
         "energy without rotors": (10 * f,),
     }[next(k for k, v in FUNCTIONS.items() if v == case)]
@@ -180,3 +201,256 @@ def test_memory_does_not_grow_with_the_log(model):
     finally:
         tracemalloc.stop()
     assert peak < 64 * 3 * rows < 20_000 * rows
+
+
+FILTER = LowPass.first_order(30.0)
+
+
+def chunked(model, q, v, a, size):
+    """Of every form: all at once, and the pieces."""
+    t = np.cumsum(np.full(len(q), 0.01))
+    knots = np.arange(0, len(q), 3)
+    momentum = momentum_regressor(model, q, v)
+    momenta = [(rows, P.copy(), S.copy())
+               for rows, (P, S) in momentum_regressor_chunks(model, q, v, size=size)]  # fmt: skip
+    return {
+        "torque": (
+            rm.torque_regressor(model, q, v, a),
+            rm.torque_regressor_chunks(model, q, v, a, size=size),
+        ),
+        "torque of some columns": (
+            rm.torque_regressor(model, q, v, a, columns=[3, 70, 9]),
+            rm.torque_regressor_chunks(model, q, v, a, size=size, columns=[3, 70, 9]),
+        ),
+        "power": (
+            power_regressor(model, q, v, a),
+            power_regressor_chunks(model, q, v, a, size=size),
+        ),
+        "energy": (
+            rm.energy_regressor(model, q, v),
+            energy_regressor_chunks(model, q, v, size=size),
+        ),
+        "momentum": (momentum.momentum, [(rows, P) for rows, P, _ in momenta]),
+        "momentum's force": (momentum.force, [(rows, S) for rows, _, S in momenta]),
+        "energy difference": (
+            energy_difference_regressor(model, t, q, v),
+            energy_difference_regressor_chunks(model, t, q, v, size=size),
+        ),
+        "energy difference between knots": (
+            energy_difference_regressor(model, t, q, v, knots=knots),
+            energy_difference_regressor_chunks(model, t, q, v, size=size, knots=knots),
+        ),
+        "filtered": (
+            filtered_regressor(model, 0.01, q, v, FILTER),
+            filtered_regressor_chunks(model, 0.01, q, v, FILTER, size=size),
+        ),
+    }
+
+
+@pytest.mark.parametrize("N", [0, 1, 7, 300])
+@pytest.mark.parametrize("size", [1, 4, 1000])
+def test_pieces_of_every_form_are_the_whole(model, N, size):
+    for form, (whole, chunks) in chunked(model, *states(model, 3, N), size).items():
+        seen = np.zeros(len(whole), dtype=int)
+        for rows, part in chunks:
+            assert 0 < len(part) <= size
+            np.testing.assert_allclose(part, whole[rows], rtol=1e-12, atol=1e-12, err_msg=form)
+            seen[rows] += 1
+        assert (seen == 1).all()
+
+
+def test_no_form_needs_the_whole_stack(model):
+    q, v, a = states(model, 3, 4000)
+    for _, chunks in chunked(model, q[:8], v[:8], a[:8], 64).values():
+        list(chunks)  # compile
+    t = np.linspace(0.0, 1.0, 4000)
+    stack = 8 * q.size * rm.parameter_vector(model).size
+    calls = {
+        "power": lambda: power_regressor_chunks(model, q, v, a, size=64),
+        "energy": lambda: energy_regressor_chunks(model, q, v, size=64),
+        "momentum": lambda: momentum_regressor_chunks(model, q, v, size=64),
+        "difference": lambda: energy_difference_regressor_chunks(model, t, q, v, size=64),
+        "filtered": lambda: filtered_regressor_chunks(model, 0.01, q, v, FILTER, size=64),
+    }
+    for name, call in calls.items():
+        tracemalloc.start()
+        try:
+            for _ in call():
+                pass
+            _, peak = tracemalloc.get_traced_memory()
+        finally:
+            tracemalloc.stop()
+        assert peak < stack / 10, name
+
+
+# --- columns ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("columns", "error", "words"),
+    [
+        (["ZZ1", "ZZ1"], InvalidValueError, "twice"),
+        ([3, 3], InvalidValueError, "twice"),
+        (["Zz1"], InvalidValueError, "'Zz1'.*ZZ1"),
+        ([-1], InvalidValueError, "from 0 to"),
+        ([10_000], InvalidValueError, "from 0 to"),
+        ([0.5], InvalidValueError, "numbers or names"),
+        ([True], InvalidValueError, "numbers or names"),
+        ("ZZ1", InvalidValueError, "columns"),
+        (3, InvalidValueError, "columns"),
+        (np.ones(3, dtype=bool), ShapeError, "mask"),
+    ],
+    ids=str,
+)
+def test_columns_that_are_not_there_are_named(case, model, columns, error, words):
+    function, count = case
+    if function not in (rm.torque_regressor, rm.energy_regressor, power_regressor):
+        function, count = momentum_regressor, 2
+    with pytest.raises(error, match=words):
+        function(model, *states(model, count), columns=columns)
+
+
+def test_no_column_at_all(model):
+    q, v, a = states(model, 3, 2)
+    assert rm.torque_regressor(model, q, v, a, columns=[]).shape == (2, model.n, 0)
+    assert power_regressor(model, q, v, a, columns=[]).shape == (2, 0)
+    assert filtered_regressor(model, 0.1, q, v, FILTER, columns=[]).shape == (2, model.n, 0)
+
+
+def test_friction_is_no_energy(model):
+    q, v, _ = states(model, 3)
+    with pytest.raises(InvalidValueError, match=r"'Fv.*no"):
+        rm.energy_regressor(model, q, v, columns=[f"Fv{model.table.joint_rows[0] + 1}"])
+    with pytest.raises(InvalidValueError, match="energy"):
+        rm.energy_regressor(model, q, v, columns=base_parameters(model))
+    rigid = base_parameters(model, drive=False)
+    h = rm.energy_regressor(model, [q, 0 * q], [v, 0 * v], columns=rigid)
+    energy = [
+        rm.kinetic_energy(model, x, y, drive=False) + rm.potential_energy(model, x)
+        for x, y in ((q, v), (0 * q, 0 * v))
+    ]
+    np.testing.assert_allclose((h[0] - h[1]) @ rigid.values(model), energy[0] - energy[1],
+                               rtol=1e-9)  # fmt: skip
+    assert rm.energy_regressor(model, q, v).shape[-1] == len(energy_parameter_names(model))
+
+
+# --- samples in time -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "words"),
+    [
+        ({"t": [0.0, 1.0, 1.0]}, InvalidValueError, "ascending"),
+        ({"t": [0.0, 1.0]}, ShapeError, "^q: expected shape"),
+        ({"t": [[0.0]]}, ShapeError, "^t: "),
+        ({"t": [0.0, np.nan, 1.0]}, InvalidValueError, "^t: "),
+        ({"knots": [0, 3]}, InvalidValueError, "knots"),
+        ({"knots": [1, 0]}, InvalidValueError, "knots"),
+        ({"knots": [0.0, 1.0]}, InvalidValueError, "knots"),
+    ],
+    ids=str,
+)
+def test_mistakes_in_times(model, change, error, words):
+    q, v, _ = states(model, 3, 3)
+    arguments = {"t": [0.0, 1.0, 2.0], "knots": None} | change
+    for function in (energy_difference_regressor, energy_difference_regressor_chunks):
+        with pytest.raises(error, match=words):
+            function(model, arguments["t"], q, v, knots=arguments["knots"])
+    if "^q" not in words:
+        with pytest.raises(error, match=words):
+            joint_work(arguments["t"], v, v, arguments["knots"])
+
+
+def test_hardly_any_samples(model):
+    q, v, _ = states(model, 3, 3)
+    p = rm.parameter_vector(model).size
+    for count in (0, 1):
+        rows = energy_difference_regressor(model, np.arange(count), q[:count], v[:count])
+        assert rows.shape == (0, p)
+        assert joint_work(np.arange(count), v[:count], v[:count]).shape == (0,)
+    assert energy_difference_regressor(model, np.arange(3), q, v, knots=[]).shape == (0, p)
+    assert energy_difference_regressor(model, np.arange(3), q, v, knots=[1]).shape == (0, p)
+    assert filtered_regressor(model, 0.1, q[:0], v[:0], FILTER).shape == (0, model.n, p)
+
+
+# --- filters ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 5])
+def test_filters_answer_as_their_transfer_functions(order):
+    """A harmonic through a Butterworth filter, after the transient, and its derivative."""
+    from scipy.signal import butter, freqs
+
+    from robotmodels.regressors.low_pass import FilterRun
+
+    b, a = butter(order, 40.0, analog=True)
+    omega, dt = 25.0, 2e-4
+    t = np.arange(0.0, 1.5, dt)
+    u = np.sin(omega * t)
+    _, (H,) = freqs(b, a, [omega])
+    late = t > 1.2
+    for system in ((b, a), butter(order, 40.0, analog=True, output="zpk")):
+        low_pass = LowPass.from_scipy(system)
+        assert low_pass.order == order
+        y = low_pass.filter(u, dt)
+        expected = (H * np.exp(1j * omega * t)).imag
+        np.testing.assert_allclose(y[late], expected[late], atol=3e-6)
+        dy = FilterRun(low_pass, dt).derivatives(u[:, None])[:, 0]
+        np.testing.assert_allclose(
+            dy[late], (1j * omega * H * np.exp(1j * omega * t)).imag[late], atol=1e-4
+        )
+    assert LowPass.first_order(40.0).filter(np.ones((4, 2, 3)), dt).shape == (4, 2, 3)
+
+
+def test_a_ramp_and_its_derivative_are_exact():
+    from robotmodels.regressors.low_pass import FilterRun
+
+    low_pass, dt = LowPass.first_order(3.0), 0.1
+    t = np.arange(20) * dt
+    ramp = 5.0 + 2.0 * t
+    expected = 2.0 * (1.0 - np.exp(-3.0 * t))  # the derivative 2, filtered from rest
+    np.testing.assert_allclose(FilterRun(low_pass, dt).derivatives(ramp[:, None])[:, 0], expected,
+                               atol=1e-13)  # fmt: skip
+    step = 1.0 - np.exp(-3.0 * t)
+    np.testing.assert_allclose(low_pass.filter(np.ones(20), dt), step, atol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("make", "error", "words"),
+    [
+        (lambda: LowPass.first_order(0.0), InvalidValueError, "cutoff"),
+        (lambda: LowPass.first_order([1.0]), InvalidValueError, "cutoff"),
+        (lambda: LowPass([[1.0]], [1.0], [1.0]), InvalidValueError, "stable"),
+        (lambda: LowPass([1.0], [1.0], [1.0]), ShapeError, "A:"),
+        (lambda: LowPass([[-1.0]], [1.0, 2.0], [1.0]), ShapeError, "B:"),
+        (lambda: LowPass.from_scipy(([1.0, 1.0], [1.0, 2.0])), InvalidValueError, "falls off"),
+        (lambda: LowPass.from_scipy(([1.0], [1.0, -2.0])), InvalidValueError, "stable"),
+        (lambda: LowPass.from_scipy("butter"), InvalidValueError, "SciPy"),
+        (lambda: LowPass.from_scipy(3.0), InvalidValueError, "SciPy"),
+        (lambda: FILTER.filter([1.0], 0.0), InvalidValueError, "dt"),
+        (lambda: FILTER.filter(1.0, 1.0), ShapeError, "u:"),
+    ],
+)
+def test_mistakes_in_filters(make, error, words):
+    with pytest.raises(error, match=words):
+        make()
+
+
+def test_mistakes_in_filtered_regressors(model):
+    q, v, _ = states(model, 3, 3)
+    for function in (filtered_regressor, filtered_regressor_chunks):
+        with pytest.raises(InvalidValueError, match="low_pass"):
+            function(model, 0.1, q, v, 30.0)
+        with pytest.raises(InvalidValueError, match="dt"):
+            function(model, -0.1, q, v, FILTER)
+        with pytest.raises(ShapeError, match="q, v"):
+            function(model, 0.1, q[0], v[0], FILTER)
+        with pytest.raises(ShapeError, match="q, v"):
+            function(model, 0.1, q, v[:2], FILTER)
+
+
+def test_discrete_filters_are_refused():
+    from scipy.signal import dlti
+
+    with pytest.raises(InvalidValueError, match="continuous"):
+        LowPass.from_scipy(dlti([1.0], [1.0, 0.5], dt=0.1))

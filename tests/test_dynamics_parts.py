@@ -1,0 +1,202 @@
+"""Christoffel blocks, payloads, coupled rotors, base parameters: by hand, and at the border."""
+
+import numpy as np
+import pytest
+from identities.random_robots import random_model, random_state
+
+import robotmodels as rm
+from robotmodels.dynamics import (
+    base_model,
+    christoffel_blocks,
+    idm_from_base,
+    with_payload,
+    without_payload,
+)
+from robotmodels.errors import (
+    FrameNotFoundError,
+    InertiaError,
+    InvalidValueError,
+    ShapeError,
+)
+from robotmodels.minimal_parameters import base_parameters, uniform_bodies
+
+
+def planar(l1=0.5, m=(1.0, 2.0), c=(0.2, 0.1)):
+    links = rm.InertialParameters.from_com(m, [[x, 0, 0] for x in c], np.zeros((2, 3, 3)))
+    table = rm.DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, l1])
+    return rm.RobotModel.from_table(table, links, gravity=(0, -9.81, 0))
+
+
+# --- blocks ------------------------------------------------------------------------------------
+
+
+def test_blocks_of_the_planar_arm_are_the_textbooks():
+    """h = -m2 l1 c2 sin q2: tau1 = ... + h (2 v1 v2 + v2^2), tau2 = ... - h v1^2."""
+    q2 = 0.7
+    h = -2.0 * 0.5 * 0.1 * np.sin(q2)
+    B, C = christoffel_blocks(planar(), [0.3, q2])
+    np.testing.assert_allclose(B, [[2 * h], [0.0]], atol=1e-15)
+    np.testing.assert_allclose(C, [[0.0, h], [-h, 0.0]], atol=1e-15)
+
+
+@pytest.mark.parametrize("batch", [(), (3,), (2, 3), (0,), (2, 0)], ids=str)
+def test_blocks_have_batches(batch):
+    model = random_model(np.random.default_rng(3), f=6, tree=True, fixed=True)
+    q, _, _ = random_state(model, np.random.default_rng(1), *batch)
+    B, C = christoffel_blocks(model, q)
+    n = model.n
+    assert B.shape == (*batch, n, n * (n - 1) // 2)
+    assert C.shape == (*batch, n, n)
+    assert B.flags.c_contiguous
+    assert C.flags.c_contiguous
+    with pytest.raises(ShapeError, match=r"^q: "):
+        christoffel_blocks(model, np.zeros(n + 1))
+
+
+@pytest.mark.parametrize("n", [0, 1])
+def test_blocks_of_hardly_any_joint(n):
+    table = rm.DHTable.from_rows([{"sigma": 2}, *[{"sigma": 1}] * n])
+    model = rm.RobotModel.from_table(table)
+    B, C = christoffel_blocks(model, np.zeros((4, n)))
+    assert B.shape == (4, n, 0)
+    assert C.shape == (4, n, n)
+
+
+# --- coupled rotors ----------------------------------------------------------------------------
+
+
+def test_rotors_of_a_tx40_wrist_turn_with_two_joints():
+    """Rotor energies in motor speeds: Ia and Iam make up R^T Jm R, and torques follow."""
+    R = np.diag([32.0, 32.0, 45.0, -48.0, 45.0, 32.0])
+    R[5, 4] = 32.0
+    Jm = 1e-4 * np.arange(1.0, 7.0)
+    whole = R.T @ np.diag(Jm) @ R
+    last = np.eye(6)[5]
+    wrist = rm.Transmission(np.linalg.inv(R), Iam=Jm[5] * 32.0**2 * last)
+    drive = rm.DriveParameters(Ia=np.diag(whole))
+    model = rm.load("tx40")
+    model = model.with_inertia(uniform_bodies(model, 30.0))
+    robot = model.with_drive(drive).with_transmission(wrist)
+    q, v, a = random_state(model, np.random.default_rng(0), 4)
+    rigid = model.with_drive(None).with_transmission(None)
+    M = rm.mass_matrix(rigid, q)
+    np.testing.assert_allclose(rm.mass_matrix(robot, q) - M, np.tile(whole, (4, 1, 1)), atol=1e-13)
+    speeds = v @ R.T
+    energy = rm.kinetic_energy(robot, q, v) - rm.kinetic_energy(rigid, q, v)
+    np.testing.assert_allclose(energy, 0.5 * (Jm * speeds**2).sum(axis=1), rtol=1e-12)
+    tau = rm.idm(robot, q, v, a)
+    np.testing.assert_allclose(
+        tau - rm.idm(rigid, q, v, a), (Jm * (a @ R.T)) @ R, rtol=1e-11, atol=1e-12
+    )
+    np.testing.assert_allclose(rm.ddm(robot, q, v, tau), a, atol=1e-11)
+    base = base_parameters(robot)
+    assert "Iam6" in base.names
+    np.testing.assert_allclose(
+        idm_from_base(robot, base, base.values(robot), q, v, a), tau, atol=1e-11
+    )
+
+
+# --- payloads ----------------------------------------------------------------------------------
+
+
+def test_a_payload_adds_up_with_the_link_it_is_on():
+    arm = planar().with_tool(_along(0.3))
+    loaded = with_payload(arm, 2.0, [0.1, 0.0, 0.0], np.diag([0.1, 0.2, 0.3]))
+    row = loaded.inertia.values[1] - arm.inertia.values[1]
+    expected = [0.1, 0, 0, 0.2 + 2 * 0.16, 0, 0.3 + 2 * 0.16, 2 * 0.4, 0, 0, 2.0]
+    np.testing.assert_allclose(row, expected, atol=1e-15)
+    np.testing.assert_array_equal(loaded.inertia.values[0], arm.inertia.values[0])
+    np.testing.assert_array_equal(loaded.tool, arm.tool)
+    on_link = with_payload(arm, 2.0, [0.4, 0.0, 0.0], np.diag([0.1, 0.2, 0.3]), frame=2)
+    np.testing.assert_allclose(on_link.inertia.values, loaded.inertia.values, atol=1e-15)
+    turned = arm.with_tool([[0, -1, 0, 0.3], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+    turned = with_payload(turned, 2.0, [0.0, -0.1, 0.0], np.diag([0.2, 0.1, 0.3]))
+    np.testing.assert_allclose(turned.inertia.values, loaded.inertia.values, atol=1e-15)
+
+
+def _along(x):
+    T = np.eye(4)
+    T[0, 3] = x
+    return T
+
+
+def test_what_is_taken_off_leaves_nothing_behind():
+    bare = planar().with_inertia(None)
+    payload = 0.7, [0.1, 0.3, -0.2], np.diag([0.3, 0.2, 0.11])
+    loaded = with_payload(bare, *payload)
+    np.testing.assert_array_equal(without_payload(loaded, *payload).inertia.values, 0.0)
+    twice = with_payload(loaded, 0.1, [0.5, 0.1, 0.0])
+    left = without_payload(twice, *payload).inertia.values
+    np.testing.assert_allclose(
+        left, with_payload(bare, 0.1, [0.5, 0.1, 0.0]).inertia.values, atol=1e-15
+    )
+    assert not without_payload(planar(), 5.0, [0, 0, 0]).inertia.is_physical[1]
+    same = with_payload(bare, 0.0, [1.0, 0.0, 0.0])
+    np.testing.assert_array_equal(same.inertia.values, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "words"),
+    [
+        ((-1.0, [0, 0, 0]), InertiaError, "negative"),
+        ((1.0, [0, 0]), ShapeError, "com"),
+        (([1.0], [0, 0, 0]), ShapeError, "mass"),
+        ((np.nan, [0, 0, 0]), InvalidValueError, "mass"),
+        ((1.0, [0, 0, 0], [1, 1, 1]), ShapeError, "inertia"),
+        ((1.0, [0, 0, 0], np.diag([1.0, 0.1, 0.1])), InertiaError, "triangle"),
+        ((1.0, [9, 0, 0], np.diag([1.0, 0.1, 0.1])), InertiaError, "triangle"),
+        ((1.0, [0, 0, 0], np.diag([-1.0, 1.0, 1.0])), InertiaError, "moment"),
+        ((0.0, [0, 0, 0], np.eye(3)), InertiaError, "mass"),
+        ((1.0, [0, 0, 0], [[1, 2, 0], [0, 1, 0], [0, 0, 1]]), InertiaError, "symmetric"),
+        ((1.0, [0, 0, 0], None, "flange"), FrameNotFoundError, "flange"),
+        ((1.0, [0, 0, 0], None, 0), InvalidValueError, "base"),
+    ],
+)
+def test_mistakes_in_payloads(arguments, error, words):
+    for function in (with_payload, without_payload):
+        with pytest.raises(error, match=words):
+            function(planar(), *arguments)
+
+
+# --- base parameters ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["rx90", "puma560", "cobra_s600", "stanford_arm", "gantry"])
+@pytest.mark.parametrize("drive", [True, False])
+def test_base_parameters_give_the_torques_of_the_catalogue(name, drive):
+    model = rm.load(name)
+    rng = np.random.default_rng(0)
+    model = model.with_inertia(uniform_bodies(model, 60.0)).with_drive(
+        rm.DriveParameters(*rng.uniform(0.1, 3.0, (4, model.n)))
+    )
+    q, v, a = random_state(model, rng, 50)
+    base = base_parameters(model, drive=drive)
+    values = base.values(model)
+    tau = rm.idm(model, q, v, a)
+    scale = np.abs(tau).max()
+    np.testing.assert_allclose(
+        idm_from_base(model, base, values, q, v, a), tau, rtol=0, atol=1e-12 * scale
+    )
+    robot = base_model(model, base, values)
+    np.testing.assert_allclose(rm.idm(robot, q, v, a), tau, rtol=0, atol=1e-12 * scale)
+    np.testing.assert_allclose(rm.ddm(robot, q, v, tau), a, atol=1e-9)
+    M = rm.mass_matrix(model, q)
+    np.testing.assert_allclose(rm.mass_matrix(robot, q), M, rtol=0, atol=1e-12 * np.abs(M).max())
+    assert np.count_nonzero(robot.inertia.values) < np.count_nonzero(model.inertia.values)
+    single = idm_from_base(model, base, values, q[0], v[0], a[0])
+    assert single.shape == (model.n,)
+    np.testing.assert_allclose(single, tau[0], rtol=0, atol=1e-12 * scale)
+    assert idm_from_base(model, base, values, q[:0], v[:0], a[:0]).shape == (0, model.n)
+
+
+def test_base_parameters_of_another_robot_are_refused():
+    arm = planar()
+    base = base_parameters(arm)
+    q = np.zeros(2)
+    with pytest.raises(ShapeError, match=r"^values: "):
+        idm_from_base(arm, base, base.values(arm)[1:], q, q, q)
+    other = random_model(np.random.default_rng(0), f=3)
+    with pytest.raises(InvalidValueError, match="base parameters of"):
+        base_model(other, base, base.values(arm))
+    with pytest.raises(ShapeError, match=r"^v: "):
+        idm_from_base(arm, base, base.values(arm), q, [0.0], q)

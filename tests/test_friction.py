@@ -1,0 +1,192 @@
+"""Friction models: values by hand, columns, breakaway, mistakes."""
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+
+import robotmodels as rm
+from robotmodels.dynamics import ddm, idm
+from robotmodels.errors import InvalidValueError, ShapeError
+from robotmodels.friction import (
+    AsymmetricFriction,
+    CoulombFriction,
+    Friction,
+    FrictionSum,
+    LinearFriction,
+    StribeckFriction,
+    TorqueOffset,
+    ViscousFriction,
+)
+from robotmodels.regressors import parameter_names, parameter_vector, torque_regressor
+
+TWO = [1.0, 2.0]
+MODELS = {
+    "viscous": lambda: ViscousFriction(TWO),
+    "Coulomb": lambda: CoulombFriction(TWO),
+    "offset": lambda: TorqueOffset(TWO),
+    "asymmetric": lambda: AsymmetricFriction(TWO, [3.0, 4.0], [5.0, 6.0], [7.0, 8.0]),
+    "Stribeck": lambda: StribeckFriction(TWO, [3.0, 4.0], [5.0, 6.0], [0.1, 0.2]),
+    "sum": lambda: FrictionSum((ViscousFriction(TWO), CoulombFriction([3.0, 4.0]))),
+}
+
+
+@pytest.fixture(params=MODELS)
+def friction(request):
+    return MODELS[request.param]()
+
+
+def arm(**options):
+    table = rm.DHTable.from_rows([{"sigma": 0}, {"sigma": 2, "d": 0.1}, {"sigma": 1, "d": 0.2}])
+    return rm.RobotModel.from_table(table, **options)
+
+
+@pytest.mark.parametrize(
+    ("name", "v", "torque"),
+    [
+        ("viscous", [0.5, -0.5], [0.5, -1.0]),
+        ("Coulomb", [0.5, -0.5], [1.0, -2.0]),
+        ("Coulomb", [0.0, -0.0], [0.0, 0.0]),
+        ("offset", [0.5, -0.5], [1.0, 2.0]),
+        ("asymmetric", [0.5, -0.5], [3.5, -11.0]),
+        ("asymmetric", [0.0, 0.0], [0.0, 0.0]),
+        ("Stribeck", [0.1, -0.2], [0.1 + 3 + 2 / np.e, -(0.4 + 4 + 2 / np.e)]),
+        ("Stribeck", [0.0, 1e300], [0.0, 2e300]),
+        ("sum", [0.5, -0.5], [3.5, -5.0]),
+    ],
+)
+def test_torques_by_hand(name, v, torque):
+    np.testing.assert_allclose(MODELS[name]().torque(v), torque, rtol=1e-14)
+
+
+@pytest.mark.parametrize("batch", [(), (1,), (3,), (2, 3), (0,)], ids=str)
+def test_leading_axes_are_the_batch(friction, batch):
+    v = np.random.default_rng(0).normal(size=(*batch, 2))
+    torque, basis = friction.torque(v), friction.basis(v)
+    assert torque.shape == (*batch, 2)
+    assert basis.shape == (*batch, len(friction.kinds), 2)
+    np.testing.assert_allclose((basis * friction.parameters).sum(axis=-2), torque, rtol=1e-13)
+    for index in np.ndindex(*batch):
+        np.testing.assert_array_equal(friction.torque(v[index]), torque[index])
+    v0 = v.copy()
+    torque[...] = np.nan
+    basis[...] = np.nan
+    np.testing.assert_array_equal(v, v0)
+
+
+def test_they_are_values(friction):
+    for other in (copy.deepcopy(friction), pickle.loads(pickle.dumps(friction))):
+        assert other == friction
+        assert hash(other) == hash(friction)
+    assert friction != CoulombFriction([9.0, 9.0])
+    assert friction != "friction"
+    assert isinstance(friction, Friction)
+    assert isinstance(friction, LinearFriction)
+    with pytest.raises((AttributeError, TypeError)):
+        friction.Fv = 1.0
+    with pytest.raises(ValueError, match="read-only"):
+        (friction.parts[0] if isinstance(friction, FrictionSum) else friction).__getattribute__(
+            (friction.kinds)[0]
+        )[0] = 1.0
+
+
+def test_a_joint_sticks_between_its_breakaway_torques():
+    asymmetric = MODELS["asymmetric"]()
+    np.testing.assert_array_equal(asymmetric.breakaway, [[-7.0, -8.0], [3.0, 4.0]])
+    np.testing.assert_array_equal(MODELS["Stribeck"]().breakaway, [[-5.0, -6.0], [5.0, 6.0]])
+    np.testing.assert_array_equal(MODELS["viscous"]().breakaway, np.zeros((2, 2)))
+    both = FrictionSum((CoulombFriction([3.0, 4.0]), TorqueOffset(TWO)))
+    np.testing.assert_array_equal(both.breakaway, [[-2.0, -2.0], [4.0, 6.0]])
+
+
+def test_symmetric_parameters_are_coulomb_and_viscous():
+    v = np.random.default_rng(0).normal(size=(5, 2))
+    symmetric = AsymmetricFriction([1, 2], [3, 4], [1, 2], [3, 4])
+    plain = FrictionSum((ViscousFriction([1, 2]), CoulombFriction([3, 4])))
+    np.testing.assert_allclose(symmetric.torque(v), plain.torque(v), rtol=1e-15)
+    fallen = StribeckFriction([1, 2], [3, 4], [3, 4], [0.1, 0.1])
+    np.testing.assert_allclose(fallen.torque(v), plain.torque(v), rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("make", "error", "words"),
+    [
+        (lambda: ViscousFriction(1.0), ShapeError, "Fv"),
+        (lambda: ViscousFriction([[1.0]]), ShapeError, "Fv"),
+        (lambda: CoulombFriction([np.nan]), InvalidValueError, "Fc"),
+        (lambda: AsymmetricFriction([1], [1, 2], [1], [1]), ShapeError, "Fcp"),
+        (lambda: StribeckFriction([1], [1], [1], [0.0]), InvalidValueError, "vs"),
+        (lambda: StribeckFriction([1], [1], [1], [1.0], [-1]), InvalidValueError, "exponent"),
+        (lambda: FrictionSum(()), InvalidValueError, "at least one"),
+        (lambda: FrictionSum((ViscousFriction([1]), "x")), InvalidValueError, "parts"),
+        (
+            lambda: FrictionSum((ViscousFriction([1]), ViscousFriction([1, 2]))),
+            ShapeError,
+            "1 joints, got 2",
+        ),
+        (lambda: ViscousFriction([1.0]).torque([1.0, 2.0]), ShapeError, "^v:"),
+    ],
+)
+def test_mistakes_are_named(make, error, words):
+    with pytest.raises(error, match=words):
+        make()
+
+
+@pytest.mark.parametrize("bad", ["viscous", 3.0, [1.0, 2.0], ViscousFriction], ids=str)
+@pytest.mark.parametrize("function", [idm, ddm, torque_regressor])
+def test_what_is_no_friction_model_is_named(function, bad):
+    with pytest.raises(InvalidValueError, match="friction"):
+        function(arm(), *np.zeros((3, 2)), friction=bad)
+    with pytest.raises(ShapeError, match="2 joints, got 3"):
+        function(arm(), *np.zeros((3, 2)), friction=ViscousFriction([1.0, 2.0, 3.0]))
+
+
+def test_a_model_of_your_own_is_taken():
+    class Quadratic:
+        n = 2
+
+        def torque(self, v):
+            return 3.0 * np.asarray(v) * np.abs(v)
+
+    robot = arm(drive=rm.DriveParameters(Ia=[0.5, 0.5]))
+    v = np.array([2.0, -1.0])
+    plain = rm.idm(robot, 0 * v, v, v)
+    np.testing.assert_allclose(
+        idm(robot, 0 * v, v, v, friction=Quadratic()) - plain, [12.0, -3.0], rtol=1e-14
+    )
+    both = FrictionSum((Quadratic(), ViscousFriction(TWO)))
+    np.testing.assert_allclose(both.torque(v), [14.0, -5.0])
+    with pytest.raises(InvalidValueError, match="Quadratic is not linear"):
+        torque_regressor(robot, v, v, v, friction=Quadratic())
+    with pytest.raises(InvalidValueError, match="Quadratic is not linear"):
+        torque_regressor(robot, v, v, v, friction=both)
+
+
+def test_columns_are_named_by_frame_and_come_last():
+    robot = arm()
+    friction = MODELS["asymmetric"]()
+    names = parameter_names(robot, True, friction)
+    assert names[:-8] == parameter_names(robot)
+    assert names[-8:] == ("Fvp1", "Fvp3", "Fcp1", "Fcp3", "Fvn1", "Fvn3", "Fcn1", "Fcn3")
+    np.testing.assert_array_equal(
+        parameter_vector(robot, True, friction)[-8:], friction.parameters.ravel()
+    )
+    stribeck = MODELS["Stribeck"]()
+    assert parameter_names(robot, False, stribeck)[-6:] == (
+        "Fv1", "Fv3", "Fc1", "Fc3", "Fs1", "Fs3",
+    )  # fmt: skip
+    v = np.array([0.05, -0.3])
+    W = torque_regressor(robot, v, v, v, drive=False, friction=stribeck)
+    np.testing.assert_allclose(
+        W[:, -6:] @ stribeck.parameters.ravel(), stribeck.torque(v), rtol=1e-14
+    )
+
+
+@pytest.mark.parametrize("name", ["viscous", "Coulomb", "offset", "Stribeck"])
+def test_a_name_that_the_drives_have_is_not_given_twice(name):
+    with pytest.raises(InvalidValueError, match="already"):
+        parameter_names(arm(), True, MODELS[name]())
+    twice = FrictionSum((ViscousFriction(TWO), ViscousFriction(TWO)))
+    with pytest.raises(InvalidValueError, match="already"):
+        parameter_names(arm(), False, twice)
