@@ -1,0 +1,25 @@
+"""Simulation: the motion that follows from torques, and what the torques of a motion are made of.
+
+Seed book sections 1.5 and 1.5.1. `simulate` integrates the direct dynamic model with SciPy's
+adaptive integrators; dry friction sticks and slips at events. Nothing of SciPy is imported before
+the first call.
+"""
+
+from .dynamics_map import DynamicsMap, dynamics_map
+from .result import Simulation
+from .simulate import simulate
+from .status import Integrator, SimulationEvent, SimulationEventKind, SimulationStatus
+from .torque_parts import TorqueParts, torque_parts
+
+__all__ = [
+    "DynamicsMap",
+    "Integrator",
+    "Simulation",
+    "SimulationEvent",
+    "SimulationEventKind",
+    "SimulationStatus",
+    "TorqueParts",
+    "dynamics_map",
+    "simulate",
+    "torque_parts",
+]

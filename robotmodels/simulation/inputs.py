@@ -1,0 +1,278 @@
+"""The border of a simulation: times, laws of torque and wrench, tolerances."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import isfinite, nextafter
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import Array, as_floats, as_vector
+from ..errors import InvalidValueError, ShapeError
+
+Law = Callable[[float, Array, Array], ArrayLike]
+"""Torques or a wrench at time t, positions q and velocities v."""
+
+_NO_KNOTS = np.empty(0)
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Values at times, linear between them.
+
+    Parameters
+    ----------
+    t : ndarray, shape (N,)
+        Ascending times, s.
+    values : ndarray, shape (N, k)
+        Values at them.
+
+    Examples
+    --------
+    >>> Table(np.array([0.0, 2.0]), np.array([[0.0], [4.0]]))(0.5, np.empty(0), np.empty(0))
+    array([1.])
+    """
+
+    t: Array
+    values: Array
+
+    def __call__(self, t: float, q: Array, v: Array) -> Array:
+        """Value at a time."""
+        k = int(np.searchsorted(self.t, t, side="right")) - 1
+        k = min(max(k, 0), len(self.t) - 2)
+        s = (t - self.t[k]) / (self.t[k + 1] - self.t[k])
+        return (1.0 - s) * self.values[k] + s * self.values[k + 1]
+
+
+@dataclass(frozen=True, slots=True)
+class Constant:
+    """The same values always.
+
+    Parameters
+    ----------
+    values : ndarray, shape (k,)
+        The values.
+
+    Examples
+    --------
+    >>> Constant(np.array([1.0]))(0.5, np.empty(0), np.empty(0))
+    array([1.])
+    """
+
+    values: Array
+
+    def __call__(self, t: float, q: Array, v: Array) -> Array:
+        """The values."""
+        return self.values
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """A law of the caller's, whose answers are checked: NaN would end as steps too small.
+
+    Parameters
+    ----------
+    law : callable
+        Of (t, q, v).
+    size : int
+        Length of its answers.
+    name : str
+        Of the argument, for messages.
+
+    Examples
+    --------
+    >>> Checked(lambda t, q, v: [2.0 * t], 1, "control")(0.5, np.zeros(1), np.zeros(1))
+    array([1.])
+    """
+
+    law: Law
+    size: int
+    name: str
+
+    def __call__(self, t: float, q: Array, v: Array) -> Array:
+        """The law's answer."""
+        value = np.asarray(self.law(t, q.copy(), v.copy()))
+        if value.shape != (self.size,):
+            raise ShapeError(
+                f"{self.name}: expected an answer of shape ({self.size},), got {value.shape} at "
+                f"t = {t:.9g} s."
+            )
+        if value.dtype != np.float64 or not isfinite(sum(value.tolist())):
+            return as_floats(value, f"{self.name} at t = {t:.9g} s")
+        return value
+
+
+def as_law(law: Law | ArrayLike | None, size: int, t: Array | None, name: str) -> Any:
+    """A law from what the caller gave, and the times at which it has kinks.
+
+    Parameters
+    ----------
+    law : callable, array_like of shape (size,) or (N, size), or None
+        As given by the caller.
+    size : int
+        Length of its values.
+    t : ndarray, shape (N,), or None
+        Times of the rows of an array; None if the caller gave a duration only.
+    name : str
+        For messages.
+
+    Returns
+    -------
+    law : Checked, Table, Constant or None
+        To be called with (t, q, v).
+    knots : ndarray
+        Times of its kinks.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        An array of another shape, with NaN or infinity.
+
+    Examples
+    --------
+    >>> as_law([1.0, 2.0], 2, None, "control")[0].values
+    array([1., 2.])
+    """
+    if law is None:
+        return None, _NO_KNOTS
+    if callable(law):
+        return Checked(law, size, name), _NO_KNOTS
+    values = as_floats(law, name)
+    if values.shape == (size,):
+        return Constant(values.copy()), _NO_KNOTS
+    if values.ndim == 2 and t is None:
+        raise ShapeError(
+            f"{name}: rows of values belong to the times t, but t is a duration; give the times, "
+            f"or {name} as a function of (t, q, v)."
+        )
+    if t is None or values.shape != (len(t), size):
+        rows = "" if t is None else f", or ({len(t)}, {size}) for the times t"
+        raise ShapeError(
+            f"{name}: expected a function of (t, q, v), or an array of shape ({size},){rows}; got "
+            f"shape {values.shape}."
+        )
+    if len(t) == 1:
+        return Constant(values[0].copy()), _NO_KNOTS
+    return Table(t, values.copy()), t[1:-1]
+
+
+def as_times(t: ArrayLike) -> tuple[float, float, Array | None]:
+    """Start, end, and the times of the samples if the caller gave them.
+
+    Parameters
+    ----------
+    t : array_like
+        A duration, or ascending times (N,).
+
+    Returns
+    -------
+    start, end : float
+        Seconds.
+    times : ndarray, shape (N,), or None
+        None for a duration.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Neither; a negative duration, times that do not ascend, NaN or infinity.
+
+    Examples
+    --------
+    >>> as_times(2.0)
+    (0.0, 2.0, None)
+    """
+    times = as_floats(t, "t")
+    if times.ndim == 0:
+        if times < 0.0:
+            raise InvalidValueError(f"t: expected a duration that is not negative, got {times} s.")
+        return 0.0, float(times), None
+    if times.ndim != 1 or not times.size:
+        raise ShapeError(
+            f"t: expected a duration, or times of shape (N,) with N at least 1, got {times.shape}."
+        )
+    if (np.diff(times) <= 0.0).any():
+        k = int(np.flatnonzero(np.diff(times) <= 0.0)[0])
+        raise InvalidValueError(
+            f"t: expected ascending times, got {times[k]} s and then {times[k + 1]} s at [{k + 1}]."
+        )
+    return float(times[0]), float(times[-1]), times.copy()
+
+
+def as_state(values: ArrayLike, n: int, name: str) -> Array:
+    """One state of the joints.
+
+    Parameters
+    ----------
+    values : array_like, shape (n,)
+        As given by the caller.
+    n : int
+        Number of joints.
+    name : str
+        For messages.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        A copy.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Another shape, also a batch; NaN or infinity.
+
+    Examples
+    --------
+    >>> as_state([1, 2], 2, "q0")
+    array([1., 2.])
+    """
+    array = as_vector(values, n, name)
+    if array.ndim != 1:
+        raise ShapeError(
+            f"{name}: expected one state of shape ({n},), got {array.shape}; simulate several "
+            "one after the other."
+        )
+    return array.copy()
+
+
+def as_positive(value: Any, name: str, infinite: bool = False) -> float:
+    """One positive number.
+
+    Parameters
+    ----------
+    value : float
+        As given by the caller.
+    name : str
+        For messages.
+    infinite : bool
+        Whether infinity is allowed.
+
+    Returns
+    -------
+    float
+        The number.
+
+    Raises
+    ------
+    InvalidValueError
+        Another value.
+
+    Examples
+    --------
+    >>> as_positive(1, "rtol")
+    1.0
+    """
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = np.nan
+    if not number > 0.0 or (np.isinf(number) and not infinite):
+        raise InvalidValueError(f"{name}: expected a positive number, got {value!r:.60}.")
+    return number
+
+
+def before(t: float, start: float) -> float:
+    """The last instant before t, not before the start."""
+    return max(nextafter(t, start), start)

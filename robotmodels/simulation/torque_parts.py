@@ -1,0 +1,131 @@
+"""The torques of a motion, split into what they are for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import Array, as_vector, batch_shape, read_only
+from ..dynamics import gravity_torque, idm
+from ..friction import Friction, check_friction
+from ..model import RobotModel, check_model
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TorqueParts:
+    """Joint torques of a motion by their causes; together they are the torques of `idm`.
+
+    Parameters
+    ----------
+    inertia : ndarray, shape (..., n)
+        ``M(q) a``, with rotors, N m or N.
+    coriolis : ndarray, shape (..., n)
+        Coriolis and centrifugal torques ``C(q, v) v``.
+    gravity : ndarray, shape (..., n)
+        ``g(q)``.
+    friction : ndarray, shape (..., n)
+        Viscous and dry friction and offsets of the drives, and of a friction model.
+    wrench : ndarray, shape (..., n)
+        ``J^T wrench``.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> parts = torque_parts(load("rx90"), np.zeros(6), np.ones(6), np.zeros(6))
+    >>> parts.coriolis.shape, bool(parts.inertia.any())
+    ((6,), False)
+    """
+
+    inertia: Array
+    coriolis: Array
+    gravity: Array
+    friction: Array
+    wrench: Array
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            object.__setattr__(self, field.name, read_only(getattr(self, field.name)))
+
+    @property
+    def total(self) -> Array:
+        """Sum of all parts, shape (..., n)."""
+        return self.inertia + self.coriolis + self.gravity + self.friction + self.wrench
+
+    def __reduce__(self) -> tuple[Any, ...]:  # rebuilt, so that a copy is read-only as well
+        return type(self), tuple(getattr(self, field.name) for field in fields(self))
+
+
+def torque_parts(
+    model: RobotModel,
+    q: ArrayLike,
+    v: ArrayLike,
+    a: ArrayLike,
+    wrench: ArrayLike | None = None,
+    drive: bool = True,
+    friction: Friction | None = None,
+) -> TorqueParts:
+    """Split the torques of a motion into inertia, Coriolis, gravity, friction and wrench.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, n joints.
+    q, v, a : array_like, shape (..., n)
+        Joint variables (rad or m), velocities and accelerations; the leading axes broadcast.
+    wrench : array_like, shape (..., 6), optional
+        What the tool exerts on the environment, see `idm`.
+    drive : bool
+        Whether rotor inertia, friction and offsets of the model's drives are included.
+    friction : Friction, optional
+        A friction model that acts besides them.
+
+    Returns
+    -------
+    TorqueParts
+        Arrays (..., n) of all of them.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Arguments of the wrong length, or with NaN or infinity.
+
+    References
+    ----------
+    Seed book sections 1.5.1.1 to 1.5.1.5.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> arm, state = load("rx90"), np.random.default_rng(0).normal(size=(3, 6))
+    >>> bool(np.allclose(torque_parts(arm, *state).total, idm(arm, *state), atol=1e-12))
+    True
+    """
+    check_model(model)
+    n = model.n
+    q, v, a = as_vector(q, n, "q"), as_vector(v, n, "v"), as_vector(a, n, "a")
+    arrays, names = [q, v, a], ["q", "v", "a"]
+    if wrench is not None:
+        arrays.append(as_vector(wrench, 6, "wrench"))
+        names.append("wrench")
+    batch = batch_shape(tuple(arrays), tuple(names))
+    q, v, a = (np.broadcast_to(x, (*batch, n)) for x in (q, v, a))
+    still = np.zeros((*batch, n))
+    gravity = gravity_torque(model, q)
+    # each from a call of its own, so that none loses digits beside a larger one
+    weightless = model.with_gravity(np.zeros(3))
+    inertia = idm(weightless, q, still, a, drive=False)
+    coriolis = idm(weightless, q, v, still, drive=False)
+    taken = np.zeros((*batch, n))
+    drives = model.drive_matrices if drive else None
+    if drives is not None:
+        inertia = inertia + a @ drives.rotor
+        taken = taken + drives.torque(v, None)
+    if friction is not None:
+        taken = taken + check_friction(friction, n).torque(v)
+    tool = still
+    if wrench is not None:
+        tool = idm(weightless, q, still, still, wrench=arrays[3], drive=False)
+    return TorqueParts(inertia, coriolis, gravity, taken, tool)

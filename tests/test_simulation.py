@@ -1,0 +1,583 @@
+"""Simulation against closed forms, conservation laws and the inverse model."""
+
+import logging
+import pickle
+
+import numpy as np
+import pytest
+from identities.random_robots import random_model, random_state
+from scipy.special import ellipj, ellipk
+
+from robotmodels.drive import DriveParameters, Transmission
+from robotmodels.dynamics import ddm, gravity_torque, idm, mass_matrix, with_payload
+from robotmodels.errors import (
+    InertiaError,
+    InvalidValueError,
+    RobotModelsError,
+    ShapeError,
+    SingularMassMatrixError,
+)
+from robotmodels.friction import (
+    AsymmetricFriction,
+    CoulombFriction,
+    FrictionSum,
+    StribeckFriction,
+    TorqueOffset,
+    ViscousFriction,
+)
+from robotmodels.geometry import DHTable
+from robotmodels.inertia import InertialParameters
+from robotmodels.model import RobotModel
+from robotmodels.robots import load
+from robotmodels.simulation import (
+    Integrator,
+    SimulationEventKind,
+    SimulationStatus,
+    dynamics_map,
+    simulate,
+    torque_parts,
+)
+
+G = 9.81
+KINDS = SimulationEventKind
+
+
+def points(masses, lengths):
+    """Links that are points."""
+    n = len(masses)
+    com = np.zeros((n, 3))
+    com[:, 0] = lengths
+    return InertialParameters.from_com(masses, com, np.zeros((n, 3, 3)))
+
+
+def pendulum(mass=2.0, length=0.4, **drive):
+    """Hangs down at q = -pi/2."""
+    return RobotModel.from_table(
+        DHTable(antecedent=[0], sigma=[0]), points([mass], [length]), gravity=(0, -G, 0),
+        drive=DriveParameters(**drive) if drive else None, name="pendulum",
+    )  # fmt: skip
+
+
+def slider(mass=2.0, **drive):
+    """A mass on a level rail."""
+    return RobotModel.from_table(
+        DHTable(antecedent=[0], sigma=[1], lower=[-1.0], upper=[0.5]), points([mass], [0.0]),
+        gravity=(0, 0, 0), drive=DriveParameters(**drive) if drive else None, name="slider",
+    )  # fmt: skip
+
+
+def double_pendulum(**drive):
+    links = InertialParameters.from_com(
+        [1.0, 0.8], [[0.25, 0, 0], [0.2, 0, 0]], [np.diag([0.0, 0.02, 0.02])] * 2
+    )
+    return RobotModel.from_table(
+        DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.5]), links, gravity=(0, -G, 0),
+        drive=DriveParameters(**drive) if drive else None, name="double pendulum",
+    )  # fmt: skip
+
+
+def holds(model, sim, wrench=None, drive=True):
+    """The motion is the one of its torques: inverse model plus what friction took."""
+    bare = model.with_drive(DriveParameters(Ia=model.drive.Ia, offset=model.drive.offset))
+    if model.transmission is not None:
+        K = model.transmission
+        bare = bare.with_transmission(Transmission(K.matrix, K.offset, Iam=K.Iam))
+    return idm(bare, sim.q, sim.v, sim.a, wrench=wrench, drive=drive) + sim.friction - sim.tau
+
+
+# --- closed forms ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("method", Integrator)
+def test_pendulum_swings_as_the_elliptic_functions_say(method):
+    length, start = 0.4, 1.9  # from the vertical
+    t = np.linspace(0.0, 3.0, 61)
+    fine = method in (Integrator.DOP853, Integrator.RK45)
+    sim = simulate(pendulum(length=length), [start - np.pi / 2], [0.0], t=t, method=method,
+                   rtol=1e-10 if fine else 1e-8, atol=1e-12)  # fmt: skip
+    k = np.sin(start / 2)
+    sn, _, _, _ = ellipj(ellipk(k * k) - np.sqrt(G / length) * t, k * k)
+    expected = 2.0 * np.arcsin(k * sn) - np.pi / 2
+    tolerance = {"DOP853": 1e-9, "RK45": 1e-8, "Radau": 1e-6, "BDF": 1e-4}[method.value]
+    assert np.abs(sim.q[:, 0] - expected).max() < tolerance
+    assert sim.status is SimulationStatus.FINISHED
+
+
+def test_falling_arms_keep_their_energy():
+    for model, q, T in (
+        (double_pendulum(), [0.0, 0.3], 5.0),
+        (load("rx90"), np.full(6, 0.3), 1.0),
+        (load("panda"), np.full(7, 0.2), 0.5),
+    ):
+        sim = simulate(model, q, np.zeros(model.n), t=T)
+        assert sim.status is SimulationStatus.FINISHED
+        assert sim.kinetic.max() > 1.0
+        assert sim.relative_drift < 1e-9
+        assert np.abs(sim.energy - sim.energy[0]).max() < 1e-9 * np.ptp(sim.potential)
+        assert sim.t[-1] == T
+        assert sim.drift_rate * T == pytest.approx(sim.drift[-1])
+
+
+def test_tolerance_is_what_drift_follows():
+    drifts = [simulate(double_pendulum(), [0.0, 0.3], [0, 0], t=2.0, rtol=r, atol=r).relative_drift
+              for r in (1e-5, 1e-8, 1e-11)]  # fmt: skip
+    assert drifts[0] > 1e-8
+    assert drifts[0] > 30 * drifts[1] > 900 * drifts[2]
+
+
+def test_damped_slider_decays_exponentially():
+    t = np.linspace(0.0, 3.0, 31)
+    sim = simulate(slider(2.0, Ia=[0.5], Fv=[1.5]), [0.1], [2.0], t=t)
+    rate = 1.5 / 2.5
+    assert np.allclose(sim.v[:, 0], 2.0 * np.exp(-rate * t), atol=1e-10)
+    assert np.allclose(sim.q[:, 0], 0.1 + 2.0 / rate * (1 - np.exp(-rate * t)), atol=1e-10)
+    # 2.5 kg of mass and rotor at 2 m/s
+    assert np.allclose(sim.friction_work + sim.kinetic, 5.0, atol=1e-9)
+
+
+# --- dry friction ------------------------------------------------------------------------------
+
+
+def test_slider_on_dry_friction_stops_stays_and_breaks_away():
+    mass, Fc, slope, speed = 2.0, 3.0, 4.1, 1.45
+    begin = 2.0  # the force grows from then on
+    t = np.linspace(0.0, 4.0, 401)
+    sim = simulate(slider(mass, Fc=[Fc]), [0.0], [speed],
+                   lambda t, q, v: [slope * max(t - begin, 0)], t, breaks=[begin])  # fmt: skip
+    stop, away = speed * mass / Fc, begin + Fc / slope
+    assert [(e.kind, e.joint, e.motor) for e in sim.events] == [
+        (KINDS.STUCK, 0, False), (KINDS.BROKE_AWAY, 0, False)]  # fmt: skip
+    assert sim.events[0].t == pytest.approx(stop, abs=1e-12)
+    assert sim.events[1].t == pytest.approx(away, abs=1e-8)
+    after = np.maximum(t - away, 0.0)
+    moving = np.minimum(t, stop)
+    expected = speed * moving - 0.5 * Fc / mass * moving**2 + slope * after**3 / 6 / mass
+    assert np.abs(sim.q[:, 0] - expected).max() < 1e-8
+    rest = (t > stop) & (t <= away)
+    assert (sim.v[rest] == 0.0).all()
+    assert (sim.a[rest] == 0.0).all()
+    assert np.array_equal(sim.sticking[:, 0], rest)
+    assert np.allclose(sim.friction[rest], sim.tau[rest])
+    assert np.allclose(sim.friction[t < stop], Fc)
+    assert sim.relative_drift < 1e-12
+
+
+def test_pendulum_comes_to_rest_off_the_vertical():
+    model = pendulum(Fc=[2.0])
+    sim = simulate(model, [0.5], [0.0], t=8.0)
+    load_at_rest = gravity_torque(model, sim.q[-1])[0]
+    assert sim.sticking[-1, 0]
+    assert 0.05 < abs(load_at_rest) <= 2.0
+    assert sim.friction[-1, 0] == pytest.approx(-load_at_rest)
+    assert sim.friction_work[-1] == pytest.approx(sim.energy[0] - sim.energy[-1], rel=1e-10)
+    swings = [e for e in sim.events if e.kind is KINDS.REVERSED]
+    assert len(swings) >= 2
+    assert sim.events[-1].kind is KINDS.STUCK
+    # each swing loses 2 Fc times its angle, exactly: check the first turning point by energy
+    first = simulate(model, [0.5], [0.0], t=[0.0, swings[0].t])
+    way = abs(first.q[-1, 0] - 0.5)
+    assert first.energy[0] - first.energy[-1] == pytest.approx(2.0 * way, rel=1e-9)
+
+
+def test_what_is_at_rest_at_the_start_sticks_or_not():
+    held = simulate(pendulum(Fc=[8.0]), [0.0], [0.0], t=1.0)  # 2 kg at 0.4 m: 7.848 N m
+    assert held.sticking.all()
+    assert not held.v.any()
+    assert held.friction[0, 0] == pytest.approx(-2.0 * 0.4 * G)
+    assert held.drift[-1] == 0.0
+    falls = simulate(pendulum(Fc=[7.8]), [0.0], [0.0], t=[0.0, 0.1])
+    assert not falls.sticking.any()
+    assert falls.a[0, 0] == pytest.approx((-7.848 + 7.8) / 0.32)
+
+
+def test_joints_stick_one_by_one_and_the_others_move_on():
+    model = double_pendulum(Fc=[1.0, 0.05])
+    sim = simulate(model, [0.2, 0.3], [0.0, 0.0], t=np.linspace(0, 12, 300))
+    one = sim.sticking[:, 0] & ~sim.sticking[:, 1]
+    assert one.sum() > 3
+    assert np.abs(sim.a[one, 1]).max() > 0.1
+    assert sim.sticking[-1].all()
+    assert np.abs(holds(model, sim)).max() < 1e-10
+    assert (np.abs(sim.friction) <= np.array([1.0, 0.05]) * (1 + 1e-8)).all()
+    slips = ~sim.sticking & (np.abs(sim.v) > 1e-6)
+    assert np.allclose(sim.friction[slips], (np.sign(sim.v) * [1.0, 0.05])[slips], atol=1e-12)
+    assert sim.relative_drift < 1e-8
+    assert {e.kind for e in sim.events} >= {KINDS.STUCK, KINDS.BROKE_AWAY, KINDS.REVERSED}
+
+
+def test_smoothing_approaches_the_events_and_creeps():
+    model = double_pendulum(Fc=[1.0, 0.3])
+    t = np.linspace(0.0, 2.0, 21)
+    exact = simulate(model, [0.2, 0.3], [0.0, 0.0], t=t)
+    errors = []
+    for width in (3e-2, 3e-3):
+        near = simulate(model, [0.2, 0.3], [0, 0], t=t, smoothing=width, rtol=1e-8, atol=1e-9)
+        assert not near.events
+        assert near.relative_drift < 1e-6
+        errors.append(np.abs(near.q - exact.q).max())
+    assert errors[1] < 0.3 * errors[0] < 0.1
+    creeping = simulate(pendulum(Fc=[8.0]), [0.0], [0.0], t=1.0, smoothing=[0.01], method="Radau")
+    # tanh(v / w) = load / Fc, where it has crept to
+    weight = gravity_torque(pendulum(), creeping.q[-1])[0]
+    assert weight < 7.848
+    assert creeping.v[-1, 0] == pytest.approx(-0.01 * np.arctanh(weight / 8.0), rel=1e-4)
+
+
+def test_friction_models_beside_the_drives():
+    t = np.linspace(0.0, 2.0, 41)
+    rail = slider()
+    own = simulate(slider(Fv=[0.4], Fc=[1.0]), [0.0], [0.9], lambda t, q, v: [0.5 * np.sin(3 * t)],
+                   t)  # fmt: skip
+    model = FrictionSum((ViscousFriction([0.4]), CoulombFriction([1.0])))
+    given = simulate(rail, [0.0], [0.9], lambda t, q, v: [0.5 * np.sin(3 * t)], t, friction=model)
+    assert np.allclose(own.q, given.q, atol=1e-10)
+    assert np.allclose(own.friction, given.friction, atol=1e-8)
+    assert np.array_equal(own.sticking, given.sticking)
+    assert own.sticking[-1, 0]
+    # directions that differ: breaks away at 4 N backwards, holds 2 N forwards
+    gears = AsymmetricFriction(Fvp=[0.1], Fcp=[2.5], Fvn=[0.2], Fcn=[4.0])
+    for force, moves in ((2.4, False), (2.6, True), (-3.9, False), (-4.1, True)):
+        sim = simulate(rail, [0.0], [0.0], [force], t, friction=gears)
+        assert bool(sim.v[-1, 0]) is moves
+        assert sim.v[-1, 0] * force >= 0.0
+    # Stribeck: static friction first, then less, so that the slider runs away
+    falling = StribeckFriction(Fv=[0.0], Fc=[1.0], Fs=[2.0], vs=[0.05])
+    slow = simulate(rail, [0.0], [0.0], lambda t, q, v: [2.0 * t], t=t, friction=falling)
+    assert [e.kind for e in slow.events] == [KINDS.BROKE_AWAY]
+    assert slow.events[0].t == pytest.approx(1.0, abs=1e-8)
+    assert 0.8 < slow.v[-1, 0] < 1.0  # 0.5 m/s with Fc = 2 always, 1 m/s with Fc = 1
+    # an offset is no dry friction
+    pushed = simulate(rail, [0.0], [0.0], None, t, friction=TorqueOffset([1.0]))
+    assert np.allclose(pushed.a, -0.5)
+    assert not pushed.events
+    smooth = simulate(rail, [0.0], [0.9], None, t, friction=gears, smoothing=1e-4, method="Radau",
+                      rtol=1e-8)  # fmt: skip
+    sharp = simulate(rail, [0.0], [0.9], None, t, friction=gears)
+    assert np.abs(smooth.q - sharp.q).max() < 1e-4
+
+
+def coupled_wrist(Fcm=0.5, Fc=(0.3, 0.2)):
+    """Two joints whose second motor turns with both, as a TX40's wrist."""
+    K = Transmission([[1.0, 0.0], [-1.0, 1.0]], Iam=[0, 0.05], Fvm=[0, 0.1], Fcm=[0, Fcm])
+    return double_pendulum(Ia=[0.1, 0.1], Fv=[0.05, 0.05], Fc=Fc).with_transmission(K)
+
+
+@pytest.mark.parametrize("Fc", [(0.0, 0.0), (0.3, 0.2)])
+def test_shafts_of_coupled_motors_stick(Fc):
+    model = coupled_wrist(Fc=Fc)
+    sim = simulate(model, [-0.7, 0.5], [0.0, 0.0], t=np.linspace(0.0, 5.0, 251))
+    assert np.abs(holds(model, sim)).max() < 1e-9
+    assert sim.relative_drift < 1e-8
+    assert any(e.motor for e in sim.events)
+    K = model.transmission
+    assert K is not None
+    w = K.weights[1]
+    stuck = np.array([e.t for e in sim.events if e.motor and e.kind is KINDS.STUCK])
+    assert stuck.size
+    # right after the shaft sticks it does stand still, though the joints may move
+    after = simulate(model, [-0.7, 0.5], [0.0, 0.0], t=[0.0, stuck[0], stuck[0] + 1e-4])
+    assert abs(after.v[2] @ w) < 1e-9
+    if any(Fc):
+        assert sim.sticking[-1].all()  # all three hold: one more than there are joints
+        assert np.abs(gravity_torque(model, sim.q[-1])).max() > 0.05
+        assert not sim.v[-1].any()
+    else:
+        slips = np.abs(sim.v @ w) > 1e-6
+        dry = (np.sign(sim.v @ w) * 0.5)[:, None] * w
+        K = model.drive_matrices
+        assert np.allclose(sim.friction[slips], (sim.v @ K.viscous + dry)[slips], atol=1e-10)
+
+
+def test_more_friction_than_joints_holds_and_breaks_away():
+    model = coupled_wrist().with_gravity((0, 0, 0))
+    sim = simulate(model, [0, 0], [0, 0], lambda t, q, v: [0.0, 0.2 * t], np.linspace(0, 6, 121))
+    assert sim.events
+    assert sim.events[0].kind is KINDS.BROKE_AWAY
+    # joint 2 has 0.2 of its own, and 0.5 of the shaft that is carried on by joint 1: at most 0.3
+    # of it is held there, the rest against the shaft
+    assert sim.events[0].t == pytest.approx(0.5 / 0.2, abs=1e-6)
+    assert np.abs(holds(model, sim)).max() < 1e-9
+
+
+# --- the motion against the models ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_motion_fits_the_inverse_model(seed):
+    rng = np.random.default_rng(seed)
+    model = random_model(rng, f=5, tree=seed % 2 == 1, fixed=seed % 3 == 1, drive=True,
+                         transmission=seed % 3 == 2)  # fmt: skip
+    q, v, _ = random_state(model, rng)
+    force = rng.normal(size=6)
+    t = np.linspace(0.0, 0.4, 21)
+    A, B = rng.normal(size=(2, model.n))
+    sim = simulate(model, q, v, lambda t, q, v: A * np.sin(5 * t) - B * q - v, t, force)
+    assert sim.status is SimulationStatus.FINISHED
+    assert np.array_equal(sim.t, t)
+    size = np.abs(sim.tau).max() + np.abs(sim.friction).max() + 10.0
+    assert np.abs(holds(model, sim, force)).max() < 1e-9 * size
+    assert sim.relative_drift < 1e-8
+    moving = ~sim.sticking.any(axis=1) & (np.abs(sim.v) > 1e-6).all(axis=1)
+    a = ddm(model, sim.q[moving], sim.v[moving], sim.tau[moving], wrench=force)
+    assert np.abs(a - sim.a[moving]).max(initial=0.0) < 1e-8 * np.abs(sim.a).max()
+
+
+def test_computed_torques_follow_a_wanted_motion():
+    """idm of a motion as the control: the simulation is that motion."""
+    model = load("rx90").with_drive(DriveParameters(Ia=np.full(6, 0.1), Fv=np.ones(6)))
+    model = with_payload(model, 3.0, [0.0, 0.0, 0.1])
+    size = np.array([0.3, -0.2, 0.4, 0.5, 0.1, -0.6])
+    wrench = np.array([1.0, 2.0, 3.0, 0.1, 0.2, 0.3])
+
+    def motion(t):
+        c, s = np.cos(3 * t), np.sin(3 * t)
+        return size * (1 - c), 3 * size * s, 9 * size * c
+
+    def control(t, q, v):
+        return idm(model, *motion(t), wrench=wrench)
+
+    t = np.linspace(0.0, 0.5, 11)
+    sim = simulate(model, *motion(0.0)[:2], control, t, wrench)
+    expected = np.array([motion(time)[0] for time in t])
+    assert np.abs(sim.q - expected).max() < 1e-8
+    assert np.abs(sim.wrench_work).max() > 1e-2
+    assert sim.relative_drift < 1e-9
+
+
+def test_drives_can_be_left_out():
+    model = double_pendulum(Ia=[1.0, 1.0], Fv=[1.0, 1.0], Fc=[3.0, 3.0], offset=[1.0, 1.0])
+    bare = double_pendulum()
+    t = np.linspace(0.0, 1.0, 11)
+    one, two = (simulate(m, [0, 0.2], [0, 0], None, t, drive=False) for m in (model, bare))
+    assert np.array_equal(one.q, two.q)
+    assert np.array_equal(one.kinetic, two.kinetic)
+
+
+def test_torques_at_times_are_linear_between_them():
+    t = np.array([0.0, 0.5, 0.6, 2.0])
+    tau = np.array([[0.0], [4.0], [-1.0], [2.0]])
+    sim = simulate(slider(), [0.0], [0.0], tau, t)
+    # the integral of piecewise linear forces is exact by trapezes
+    v = np.concatenate([[0.0], np.cumsum(np.diff(t) * (tau[1:, 0] + tau[:-1, 0]) / 2)]) / 2.0
+    assert np.allclose(sim.v[:, 0], v, atol=1e-13)
+    assert np.allclose(sim.tau, tau)
+    held = simulate(slider(), [0.0], [0.0], [4.0], t)
+    assert np.allclose(held.q[:, 0], t**2, atol=1e-13)
+    assert np.allclose(held.control_work, 4.0 * t**2, atol=1e-12)
+    pushing = np.tile([0.0, 0.0, 4.0, 0, 0, 0], (4, 1))
+    against = simulate(slider(), [0.0], [0.0], None, t, pushing)
+    assert np.allclose(against.q, -held.q, atol=1e-13)
+    assert np.allclose(against.wrench_work, -4.0 * t**2, atol=1e-12)
+
+
+def test_jumps_of_a_sampled_controller_cost_nothing_at_breaks():
+    t = np.array([0.0, 1.0])
+    breaks = np.arange(1, 10) / 10
+
+    def control(t, q, v):
+        return [1.0 - 2.0 * (np.searchsorted(breaks, t, side="right") % 2)]
+
+    sim = simulate(slider(), [0.0], [0.0], control, t, breaks=breaks)
+    assert sim.v[-1, 0] == pytest.approx(0.0, abs=1e-14)
+    assert sim.q[-1, 0] == pytest.approx(5 * 2 * 0.25 * 0.1**2, abs=1e-14)
+    blind = simulate(slider(), [0.0], [0.0], control, t)
+    assert blind.evaluations > 3 * sim.evaluations
+
+
+# --- structures and ends -----------------------------------------------------------------------
+
+
+def test_a_robot_without_joints_stands():
+    fixed = RobotModel.from_table(DHTable(antecedent=[0], sigma=[2]), points([1.0], [0.3]))
+    for t in (1.0, [0.0, 0.5, 1.0]):
+        sim = simulate(fixed, [], [], t=t)
+        assert sim.q.shape == (len(sim.t), 0)
+        assert sim.t[-1] == 1.0
+        assert sim.relative_drift == 0.0
+        assert sim.status is SimulationStatus.FINISHED
+
+
+def test_one_instant_and_no_duration():
+    for t in (0.0, [3.0]):
+        sim = simulate(pendulum(), [0.0], [0.0], t=t)
+        assert sim.q.shape == (1, 1)
+        assert sim.a[0, 0] == pytest.approx(-G / 0.4)
+        assert sim.drift_rate == 0.0
+    assert sim.t[0] == 3.0
+
+
+def test_a_limit_stops_the_motion():
+    limits = simulate(slider(), [0.0], [1.0], None, np.linspace(0, 2, 21), stop_at_limits=True)
+    assert limits.status is SimulationStatus.LIMIT_REACHED
+    assert limits.t[-1] == pytest.approx(0.5, abs=1e-12)
+    assert limits.q[-1, 0] == pytest.approx(0.5, abs=1e-12)
+    assert (limits.events[-1].kind, limits.events[-1].joint) == (KINDS.LIMIT, 0)
+    assert "reaches a limit" in str(limits)
+    free = simulate(slider(), [0.0], [1.0], None, np.linspace(0, 2, 21))
+    assert free.q[-1, 0] == pytest.approx(2.0)
+    inward = simulate(slider(), [0.5], [-1.0], None, 1.0, stop_at_limits=True)
+    assert inward.status is SimulationStatus.FINISHED
+    outward = simulate(slider(), [0.5], [1.0], None, 1.0, stop_at_limits=True)
+    assert outward.status is SimulationStatus.LIMIT_REACHED
+    assert outward.t[-1] == pytest.approx(0.0, abs=1e-9)
+    with pytest.raises(InvalidValueError, match=r"joint 1 starts at 0\.6, outside its limits"):
+        simulate(slider(), [0.6], [0.0], t=1.0, stop_at_limits=True)
+
+
+def test_ends_before_the_end_say_why():
+    few = simulate(double_pendulum(), [0, 0], [0, 0], t=10.0, max_evaluations=100)
+    assert few.status is SimulationStatus.NOT_CONVERGED
+    assert 0 < few.t[-1] < 10.0
+    assert few.evaluations < 200
+    assert "used up" in few.reason
+
+    def grows(t, q, v):
+        return [np.exp(min(q[0], 700.0))]
+
+    wild = simulate(slider(), [0.0], [1.0], grows, t=10.0)
+    assert wild.status is SimulationStatus.STEP_TOO_SMALL
+    assert wild.t[-1] < 3.0
+    assert np.isfinite(wild.q).all()
+    # parameters of no body: the mass matrix vanishes on the way
+    ghost = RobotModel.from_table(
+        DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 1.0]),
+        InertialParameters([[0, 0, 0, 0, 0, 0.5, 0, 0, 0, 0], [0, 0, 0, 0, 0, 1.0, 1.0, 0, 0, 0]]),
+        gravity=(0, 0, 0),
+    )
+    crossing = [q for q in np.linspace(0, np.pi, 400) if np.linalg.det(mass_matrix(ghost, [0, q]))
+                < 0.0]  # fmt: skip
+    assert crossing
+    lost = simulate(ghost, [0.0, np.pi / 2], [0.0, -1.0], t=10.0)
+    assert lost.status in (SimulationStatus.SINGULAR, SimulationStatus.STEP_TOO_SMALL)
+    assert lost.t[-1] < 10.0
+
+
+def test_progress_is_told(caplog):
+    seen = []
+    simulate(double_pendulum(), [0, 0], [0, 0], t=1.0, progress=seen.append)
+    assert seen[-1] == 1.0
+    assert len(seen) > 10
+    assert (np.diff(seen) > 0).all()
+    with caplog.at_level(logging.INFO, logger="robotmodels.simulation"):
+        simulate(pendulum(), [0.0], [0.0], t=0.1, progress=True)
+    assert "simulated 100 %" in caplog.text
+
+
+def test_a_simulation_is_a_value():
+    sim = simulate(pendulum(Fc=[2.0]), [0.5], [0.0], t=0.3)
+    again = pickle.loads(pickle.dumps(sim))
+    assert np.array_equal(again.q, sim.q)
+    assert again.events == sim.events
+    with pytest.raises(ValueError, match="read-only"):
+        sim.q[0] = 1.0
+    with pytest.raises(ValueError, match="read-only"):
+        again.kinetic[0] = 1.0
+    assert "evaluations of the model" in str(sim)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"q0": [0.0, 1.0]}, "q0: expected shape"),
+        ({"q0": [[0.0]]}, "q0: expected one state"),
+        ({"v0": [np.nan]}, "v0: expected finite"),
+        ({"t": -1.0}, "not negative"),
+        ({"t": [0.0, 1.0, 1.0]}, "ascending times, got 1.0 s and then 1.0 s"),
+        ({"t": []}, "t: expected a duration"),
+        ({"control": [1.0, 2.0]}, r"control: expected a function of \(t, q, v\), or an array of"),
+        ({"control": [[1.0], [2.0]]}, "rows of values belong to the times t"),
+        ({"control": [[1.0], [2.0]], "t": [0, 1, 2]}, r"or \(3, 1\) for the times t"),
+        ({"control": [np.inf]}, "control: expected finite"),
+        ({"control": lambda t, q, v: [1.0, 2.0]}, r"answer of shape \(1,\), got \(2,\) at t = 0"),
+        ({"control": lambda t, q, v: [np.nan if t > 0.5 else 0.0]}, "control at t = 0.5.*nan"),
+        ({"wrench": [1.0]}, r"array of shape \(6,\)"),
+        ({"wrench": lambda t, q, v: np.zeros(3)}, r"wrench: expected an answer of shape \(6,\)"),
+        ({"friction": CoulombFriction([1.0, 2.0])}, "friction of 1 joints, got 2"),
+        ({"friction": CoulombFriction([-1.0])}, "dry friction of joint 1 is negative"),
+        ({"smoothing": 0.0}, "smoothing: expected positive"),
+        ({"smoothing": [1.0, 1.0]}, "smoothing: expected one velocity"),
+        ({"method": "euler"}, "method: expected one of 'DOP853'"),
+        ({"rtol": 1e-16}, "rtol: steps cannot"),
+        ({"atol": -1.0}, "atol: expected a positive"),
+        ({"max_step": "x"}, "max_step: expected a positive"),
+        ({"max_evaluations": 0}, "max_evaluations: expected a whole number"),
+        ({"progress": 3}, "progress: expected a flag"),
+        ({"breaks": [[0.5]]}, "breaks: expected times"),
+        ({"model": "rx90"}, "load it first"),
+    ],
+)
+def test_mistakes_are_named(arguments, message):
+    given = {"model": pendulum(), "q0": [0.0], "v0": [0.0], "t": 1.0} | arguments
+    with pytest.raises(RobotModelsError, match=message) as caught:
+        simulate(given.pop("model"), given.pop("q0"), given.pop("v0"), **given)
+    assert isinstance(caught.value, (ShapeError, InvalidValueError))
+
+
+def test_mass_matrices_that_cannot_be_inverted_are_named():
+    with pytest.raises(SingularMassMatrixError, match="moves no inertia"):
+        simulate(load("planar_2r"), [0, 0], [0, 0], t=1.0)
+    negative = slider().with_inertia(InertialParameters([[0] * 9 + [-1.0]]))
+    assert simulate(negative, [0.0], [0.0], [1.0], t=1.0).v[-1, 0] == pytest.approx(-1.0)
+    with pytest.raises(InertiaError, match="not positive definite at q0"):
+        simulate(negative, [0.0], [0.0], t=1.0, friction=CoulombFriction([1.0]))
+    width = simulate(negative, [0.0], [1.0], t=0.1, friction=CoulombFriction([1.0]), smoothing=0.1)
+    assert width.status is SimulationStatus.FINISHED
+
+
+# --- parts and maps ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_parts_of_the_torque_make_the_whole(seed):
+    rng = np.random.default_rng(seed)
+    model = random_model(rng, f=5, tree=True, fixed=True, drive=True, transmission=seed > 1)
+    q, v, a = random_state(model, rng, 3, 2)
+    w = rng.normal(size=(2, 6))
+    friction = CoulombFriction(np.ones(model.n))
+    parts = torque_parts(model, q, v, a, w, friction=friction)
+    whole = idm(model, q, v, a, wrench=w, friction=friction)
+    assert np.abs(parts.total - whole).max() < 1e-12 * np.abs(whole).max()
+    assert np.allclose(parts.inertia, np.einsum("...ij,...j", mass_matrix(model, q), a))
+    assert np.array_equal(parts.gravity, gravity_torque(model, q))
+    twice = torque_parts(model, q, 2 * v, a)
+    assert np.allclose(twice.coriolis, 4 * parts.coriolis)
+    bare = torque_parts(model, q, v, a, drive=False)
+    assert not bare.friction.any()
+    assert not bare.wrench.any()
+    assert np.allclose(bare.total, idm(model, q, v, a, drive=False))
+    assert np.array_equal(pickle.loads(pickle.dumps(bare)).gravity, bare.gravity)
+
+
+def test_maps_over_joints():
+    arm = load("rx90")
+    line = dynamics_map(arm, 2, q=np.full(6, 0.1), samples=5)
+    panda = load("panda")
+    assert dynamics_map(panda, 3, samples=2).ranges[0] == pytest.approx(
+        [panda.lower[3], panda.upper[3]]
+    )
+    for k, value in enumerate(line.ranges[0]):
+        q = np.full(6, 0.1)
+        q[2] = value
+        assert np.allclose(line.mass[k], mass_matrix(arm, q))
+        assert np.allclose(line.gravity[k], gravity_torque(arm, q), atol=1e-12)
+    face = dynamics_map(arm, (1, 2), ranges=[[-1, 1], [0, 2]], samples=(3, 4))
+    assert np.allclose(face.gravity[2, 1], gravity_torque(arm, [0, 1, 2 / 3, 0, 0, 0]))
+    coupling = face.coupling
+    assert np.allclose(np.einsum("...ii->...i", coupling), 1.0)
+    assert np.abs(coupling).max() <= 1.0 + 1e-12
+    massless = dynamics_map(load("planar_2r"), 0, samples=2)
+    assert np.isnan(massless.coupling).all()
+    assert dynamics_map(slider(), 0, samples=2).ranges[0] == pytest.approx([-1.0, 0.5])
+    assert dynamics_map(pendulum(), 0, samples=2).ranges[0] == pytest.approx([-np.pi, np.pi])
+    assert pickle.loads(pickle.dumps(face)).joints == (1, 2)
+    for wrong, message in (
+        ({"joints": (1, 1)}, "one or two different joints"),
+        ({"joints": 6}, "numbers from 0 to 5"),
+        ({"joints": "a"}, "one or two different joints"),
+        ({"joints": (0, 1, 2)}, "one or two different joints"),
+        ({"joints": 0, "ranges": [1, 0]}, "ascending ends"),
+        ({"joints": (0, 1), "ranges": [0, 1]}, r"expected shape \(2, 2\)"),
+        ({"joints": 0, "samples": 1}, "samples: expected 1 numbers"),
+    ):
+        with pytest.raises(RobotModelsError, match=message):
+            dynamics_map(arm, **wrong)
