@@ -9,30 +9,10 @@ __all__ = ["filtered"]
 
 
 @compiled()
-def step_states(
-    u: Floats,
-    k: int,
-    step: Floats,
-    present: Floats,
-    coming: Floats,
-    state: Floats,
-    last: Floats,
-) -> None:
-    """Bring the states of all channels to sample k."""
-    m = step.shape[0]
-    if m == 1:
-        for c in range(u.shape[1]):
-            state[0, c] = step[0, 0] * state[0, c] + present[0] * last[c] + coming[0] * u[k, c]
-        return
-    new = np.empty(m)
-    for c in range(u.shape[1]):
-        for r in range(m):
-            x = present[r] * last[c] + coming[r] * u[k, c]
-            for s in range(m):
-                x += step[r, s] * state[s, c]
-            new[r] = x
-        for r in range(m):
-            state[r, c] = new[r]
+def add_scaled(y: Floats, factor: float, x: Floats) -> None:
+    """Add ``factor x`` to y, channel by channel: a plain loop, which the compiler makes wide."""
+    for c in range(y.shape[0]):
+        y[c] += factor * x[c]
 
 
 @compiled(
@@ -72,12 +52,21 @@ def filtered(
         Written.
     """
     m = step.shape[0]
+    new = np.empty(state.shape)
     for k in range(u.shape[0]):
         if k > 0 or not first:
-            step_states(u, k, step, present, coming, state, last)
-        for c in range(u.shape[1]):
-            y = through * u[k, c]
             for r in range(m):
-                y += output[r] * state[r, c]
-            out[k, c] = y
-            last[c] = u[k, c]
+                new[r] = 0.0
+                add_scaled(new[r], present[r], last)
+                add_scaled(new[r], coming[r], u[k])
+                for s in range(m):
+                    if step[r, s] != 0.0:
+                        add_scaled(new[r], step[r, s], state[s])
+            state[:] = new
+        out[k] = 0.0
+        if through != 0.0:
+            add_scaled(out[k], through, u[k])
+        for r in range(m):
+            if output[r] != 0.0:
+                add_scaled(out[k], output[r], state[r])
+        last[:] = u[k]

@@ -16,7 +16,7 @@ from .columns import ChosenColumns, Columns, chosen_columns, friction_of, standa
 from .low_pass import FilterRun, LowPass, check_period
 from .momentum import fill_momenta
 
-_PIECE = 128
+_PIECE = 128  # four buffers of it stay near the processor
 
 
 def filtered_regressor(
@@ -120,7 +120,7 @@ def filtered_regressor_chunks(
     rows : slice
         Which samples the piece is for.
     W : ndarray, shape (k, n, p)
-        Their regressor.
+        Their regressor. The next piece overwrites it.
 
     Raises
     ------
@@ -173,11 +173,17 @@ def _stream(
     size: int,
 ) -> Iterator[tuple[slice, Array]]:
     N, n = q.shape
-    P, S = np.empty((2, min(size, max(N, 1)), n, chosen.count))
+    P, S, W, F = np.empty((4, min(size, max(N, 1)), n, chosen.count))
     momentum, force = FilterRun(low_pass, dt), FilterRun(low_pass, dt)
     for piece in pieces(N, P.shape[0]):
         k = piece.stop - piece.start
         fill_momenta(model, chosen, friction, (q[piece], v[piece]), P[:k], S[:k])
-        W = momentum.derivatives(P[:k].reshape(k, -1))
-        W -= force.values(S[:k].reshape(k, -1))
-        yield piece, W.reshape(k, n, chosen.count)
+        momentum.derivatives(_channels(P, k), _channels(W, k))
+        force.values(_channels(S, k), _channels(F, k))
+        W[:k] -= F[:k]
+        yield piece, W[:k]
+
+
+def _channels(buffer: Array, k: int) -> Array:
+    """The first k samples of a buffer, every entry a channel."""
+    return buffer[:k].reshape(k, buffer.shape[1] * buffer.shape[2])

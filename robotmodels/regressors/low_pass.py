@@ -179,7 +179,10 @@ class LowPass:
         if signal.ndim < 1:
             raise ShapeError("u: expected samples along the first axis, got one number.")
         run = FilterRun(self, check_period(dt))
-        return run.values(signal.reshape(signal.shape[0], -1)).reshape(signal.shape)
+        rows = np.ascontiguousarray(signal.reshape(signal.shape[0], -1))
+        out = np.empty(rows.shape)
+        run.values(rows, out)
+        return out.reshape(signal.shape)
 
     def __reduce__(self) -> tuple[Any, ...]:  # rebuilt, so that a copy is read-only as well
         return type(self), (self.A, self.B, self.C)
@@ -212,23 +215,21 @@ class FilterRun:
         self.state: Array | None = None
         self.last: Array | None = None
 
-    def values(self, u: Array) -> Array:
-        """Filtered signal ``(k, c)``, from a state of rest."""
-        return self._run(u, np.zeros(self.low_pass.order), self.low_pass.C, 0.0)
+    def values(self, u: Array, out: Array) -> None:
+        """Write the filtered signal ``(k, c)``, from a state of rest."""
+        self._run(u, np.zeros(self.low_pass.order), self.low_pass.C, 0.0, out)
 
-    def derivatives(self, u: Array) -> Array:
-        """Filtered derivative of the signal ``(k, c)``; the derivative is filtered from rest."""
+    def derivatives(self, u: Array, out: Array) -> None:
+        """Write the filtered derivative of the signal ``(k, c)``; that is filtered from rest."""
         A, B, C = self.low_pass.A, self.low_pass.B, self.low_pass.C
         rest = np.asarray(-np.linalg.solve(A, B), np.float64)
-        return self._run(u, rest, C @ A, float(C @ B))
+        self._run(u, rest, C @ A, float(C @ B), out)
 
-    def _run(self, u: Array, rest: Array, output: Array, through: float) -> Array:
+    def _run(self, u: Array, rest: Array, output: Array, through: float, out: Array) -> None:
         from ..kernels.state_space import filtered
 
-        u = np.ascontiguousarray(u)
-        out = np.empty(u.shape)
         if not u.shape[0]:
-            return out
+            return
         first = self.state is None or self.last is None
         if first:
             self.state, self.last = rest[:, None] * u[0], np.zeros(u.shape[1])
@@ -236,7 +237,6 @@ class FilterRun:
             u, self.state_step, self.present, self.coming, output, through, first,
             self.state, self.last, out,
         )  # fmt: skip
-        return out
 
 
 def check_period(dt: float) -> float:
