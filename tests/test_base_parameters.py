@@ -10,9 +10,9 @@ import sympy
 from identities.random_robots import random_bodies, random_drive, random_pose, random_table
 
 import robotmodels as rm
+from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.minimal_parameters import BaseMethod, base_parameters
 from robotmodels.minimal_parameters.formulas import constants_of
-from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.regressors import parameter_names, parameter_vector, torque_regressor
 
 GRAVITIES = ((0.0, 0.0, -9.81), (0.0, -9.81, 0.0), (-9.81, 0.0, 0.0), (0.0, 0.0, 0.0))

@@ -24,11 +24,11 @@ from robotmodels.kinematics.inverse.methods import (
     FilteredInverse,
     PseudoInverse,
 )
-from robotmodels.kinematics.inverse.scaling import characteristic_length
 from robotmodels.kinematics.inverse.second_order import ikm_second_order
 from robotmodels.kinematics.inverse.solution import IKMSolution
 from robotmodels.kinematics.inverse.status import IKMStatus
 from robotmodels.kinematics.inverse.twist_task import TwistTask
+from robotmodels.kinematics.lengths import characteristic_length
 from robotmodels.kinematics.velocities import dkm_second_order
 
 REFERENCES = ("world_aligned", "local", "world")

@@ -20,9 +20,9 @@ from robotmodels.kinematics.inverse.methods import (
     PseudoInverse,
 )
 from robotmodels.kinematics.inverse.position_task import PositionTask
-from robotmodels.kinematics.inverse.scaling import characteristic_length
 from robotmodels.kinematics.inverse.tasks import Task
 from robotmodels.kinematics.inverse.twist_task import TwistTask
+from robotmodels.kinematics.lengths import characteristic_length
 
 EXACT = PseudoInverse()
 METHODS = [

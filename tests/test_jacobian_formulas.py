@@ -18,8 +18,8 @@ from robotmodels.kinematics.formulas._factoring import factored
 from robotmodels.kinematics.formulas.explain_jacobian import explain_jacobian
 from robotmodels.kinematics.formulas.explain_singularities import explain_singularities
 from robotmodels.kinematics.formulas.singularity_explanation import (
-    SingularityKind,
     FormulaStatus,
+    SingularityKind,
 )
 from robotmodels.kinematics.formulas.singularity_map import singularity_map
 

@@ -7,6 +7,7 @@ import pytest
 from identities.random_robots import random_bodies, random_drive
 
 import robotmodels as rm
+from robotmodels.errors import InertiaError, InvalidValueError, MissingExtraError, ShapeError
 from robotmodels.minimal_parameters import (
     PhysicalStatus,
     base_parameters,
@@ -14,7 +15,6 @@ from robotmodels.minimal_parameters import (
     uniform_bodies,
 )
 from robotmodels.minimal_parameters.prior import pseudo_inertias
-from robotmodels.errors import InertiaError, InvalidValueError, MissingExtraError, ShapeError
 
 ROBOTS = ("rx90", "iiwa14", "gantry", "cobra_s600", "planar_2r", "stanford_arm")
 

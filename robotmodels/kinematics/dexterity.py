@@ -15,8 +15,9 @@ from .._arrays import Array, as_core, as_exact, as_vector, batch_shape, read_onl
 from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel, check_model
 from .ellipsoids import joint_scale
-from .equilibrium import as_tolerance, positive_length
+from .equilibrium import as_tolerance
 from .jacobians import Reference, jacobian
+from .lengths import length_of
 
 _ON = 1e-9
 
@@ -229,14 +230,14 @@ def manipulability(
     """
     check_model(model)
     rows = _asked_rows(mask)
-    own = positive_length(model, None)
+    own = length_of(model, frame, None)
     relative = as_tolerance(tolerance)
     scale = joint_scale(model, joint_velocity, "joint_velocity", 0.0)
     J = jacobian(model, as_vector(q, model.n, "q"), frame, reference) * scale
     size = np.linalg.norm(J[..., :3, :], axis=(-2, -1)) / own
     size = size + np.linalg.norm(J[..., 3:, :], axis=(-2, -1))
     mixed = rows[:3].any() and rows[3:].any()
-    weights = np.repeat((1.0 / positive_length(model, length) if mixed else 1.0, 1.0), 3)
+    weights = np.repeat((1.0 / length_of(model, frame, length) if mixed else 1.0, 1.0), 3)
     # the size in the unit of the rows asked for
     unit = np.max(np.where(rows, weights * np.repeat((own, 1.0), 3), 0.0))
     J, weights = J[..., rows, :], weights[rows]

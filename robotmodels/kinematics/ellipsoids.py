@@ -16,8 +16,9 @@ from .._arrays import Array, as_reals, as_vector
 from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel, check_model
 from .ellipsoid import Ellipsoid, EllipsoidQuantity
-from .equilibrium import as_tolerance, positive_length
+from .equilibrium import as_tolerance
 from .jacobians import jacobian
+from .lengths import length_of
 from .poses import dgm
 
 
@@ -212,7 +213,7 @@ def _principal(
         raise InvalidValueError(f"part: expected a member of TwistPart, got {part!r}.")
     if not isinstance(other, OtherPart):
         raise InvalidValueError(f"other: expected a member of OtherPart, got {other!r}.")
-    L, relative = positive_length(model, length), as_tolerance(tolerance)
+    L, relative = length_of(model, frame, length), as_tolerance(tolerance)
     J = jacobian(model, as_vector(q, model.n, "q"), frame) * scale
     # at least three columns, so that there are three singular values and vectors
     J = np.concatenate((J, np.zeros((*J.shape[:-1], max(3 - model.n, 0)))), axis=-1)

@@ -13,9 +13,8 @@ from .._arrays import Array, as_exact, as_vector, batch_shape, read_only
 from ..errors import InvalidValueError, ShapeError
 from ..geometry import PRISMATIC
 from ..model import RobotModel, check_model
-from ..visual import characteristic_length as table_length
 from .jacobians import Reference, jacobian
-from .singular.task import characteristic_length
+from .lengths import length_of
 from .statics import weight_torque
 
 _EPS = float(np.finfo(np.float64).eps)
@@ -191,7 +190,7 @@ def static_wrench(
     n = model.n
     q, tau = as_vector(q, n, "q"), as_vector(tau, n, "tau")
     batch = batch_shape((q, tau), ("q", "tau"))
-    L = characteristic_length(model, frame) if length is None else positive_length(model, length)
+    L = length_of(model, frame, length)
     threshold = as_tolerance(tolerance)
     weight = weight_torque(model, q) if gravity else np.zeros(n)
     # All in N m: joint forces times the length, forces times the length
@@ -222,42 +221,6 @@ def static_wrench(
     return StaticWrench(
         wrench, status, 6 - rank, np.swapaxes(carried, -1, -2) + 0.0, residual / joints
     )
-
-
-def positive_length(model: RobotModel, length: float | None) -> float:
-    """The length that makes metres and radians comparable.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    length : float or None
-        What the caller passed; None is the longest branch of the table with tool and strokes,
-        which is enough to tell small from zero.
-
-    Returns
-    -------
-    float
-        Metres.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        No positive number.
-
-    Examples
-    --------
-    >>> from robotmodels.geometry import DHTable
-    >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.3]))
-    >>> positive_length(arm, None)
-    0.3
-    """
-    if length is None:
-        return table_length(model.table, model.tool)
-    value = float(as_exact(length, (), "length"))
-    if value <= 0:
-        raise InvalidValueError(f"length: expected metres above 0, got {value:g}.")
-    return value
 
 
 def as_tolerance(value: float) -> float:

@@ -22,7 +22,6 @@ from .levels import Level, LevelVelocities, level_velocities
 from .linear_task import LinearTask
 from .methods import DampedInverse, Damping, FilteredInverse, InverseMethod, PseudoInverse
 from .position_task import PositionTask
-from .scaling import characteristic_length
 from .second_order import ikm_second_order
 from .solution import IKMSolution
 from .status import IKMStatus
@@ -55,7 +54,6 @@ __all__ = [
     "Sphere",
     "Task",
     "TwistTask",
-    "characteristic_length",
     "ikm",
     "ikm_second_order",
     "level_velocities",

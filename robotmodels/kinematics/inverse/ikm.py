@@ -69,7 +69,7 @@ def ikm(
     length : float, optional
         Metres: a velocity of one length per second counts like a turn of 1 rad/s where a compromise
         between rows, a singular value or a damping is concerned. Default
-        `characteristic_length`, the size of the robot. Where the twist is met it changes nothing.
+        `characteristic_length`, the reach of the frame. Where the twist is met it changes nothing.
     secondary : array_like, shape (..., n), criterion, or sequence of them, optional
         Joint velocities that a redundant robot may have besides, as far as they do not disturb the
         twist: ``(I - J^+ J) z``, exactly, also where J is damped. A criterion is an object whose

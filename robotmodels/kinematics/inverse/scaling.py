@@ -13,6 +13,7 @@ from ..._arrays import Array, as_exact, as_reals, read_only
 from ...errors import InvalidValueError
 from ...geometry import PRISMATIC
 from ...model import FrameOfInterest, RobotModel
+from ..lengths import characteristic_length
 
 _SAMPLES = 24
 _RANK = 1e-10
@@ -117,45 +118,13 @@ def known_frame(model: RobotModel, frame: str | int | None) -> KnownFrame:
         point = model.twin.frame(frame)
         from ...kernels.inverse_velocity import packed
 
-        length = _size(model, point)
+        length = characteristic_length(model, frame)
         usual = _scaling(model, length, None, None)
         numbers = packed(
             model.chain, point.kernel_arguments, usual.asked, usual.rows, usual.columns
         )
         known = frames[frame] = KnownFrame(point, length, usual, *numbers)
     return known
-
-
-def characteristic_length(model: RobotModel, frame: str | int | None = None) -> float:
-    """A length of the robot by which velocities in m/s and in rad/s are compared.
-
-    The lengths of the links from the first joint to the frame, summed, with the finite strokes of
-    prismatic joints: how far the frame can be from the first axis. 1 m for a robot without any.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    frame : str or int, optional
-        Name or number of a frame; default the tool.
-
-    Returns
-    -------
-    float
-        Metres.
-
-    Raises
-    ------
-    FrameNotFoundError
-        No such frame.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> characteristic_length(load("rx90"))
-    0.9
-    """
-    return known_frame(model, frame).length
 
 
 def scaling_of(
@@ -290,16 +259,6 @@ def _mask(mask: ArrayLike) -> NDArray[np.bool_]:
             f"got {mask!r}."
         )
     return read_only(values != 0.0, np.bool_)
-
-
-def _size(model: RobotModel, point: FrameOfInterest) -> float:
-    frames = point.path - 1
-    total = np.linalg.norm(model.chain.position[frames[1:]], axis=-1).sum()
-    total += np.linalg.norm(point.position)
-    columns = model.chain.joint[frames[model.chain.sigma[frames] == PRISMATIC]]
-    strokes = np.maximum(np.abs(model.lower[columns]), np.abs(model.upper[columns]))
-    total += strokes[np.isfinite(strokes)].sum()
-    return float(total) or 1.0
 
 
 def _sliding(model: RobotModel) -> NDArray[np.bool_]:

@@ -174,7 +174,7 @@ def task_length(model: RobotModel, frame: str | int | None, length: float | None
     >>> task_length(load("rx90"), None, None)
     0.9
     """
-    from .scaling import characteristic_length
+    from ..lengths import characteristic_length
 
     if length is None:
         return characteristic_length(model, frame)

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..._arrays import Array, as_floats, as_vector, read_only
 from ...model import RobotModel
 from ..jacobians import jacobian
+from ..lengths import spread_configurations
 from .bases import normalised, sparse_basis
 from .frames import combination_text
 from .task import (
@@ -22,7 +23,6 @@ from .task import (
     above_zero,
     generator_of,
     singular_task,
-    spread_configurations,
     task_jacobians,
     whole_number,
 )

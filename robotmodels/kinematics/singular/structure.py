@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from ..._arrays import Array
 from ...geometry import REVOLUTE
+from ..lengths import spread_configurations
 from ..poses import link_poses
-from .task import SingularTask, generator_of, spread_configurations
+from .task import SingularTask, generator_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,24 +8,24 @@ characteristic length L, and a prismatic joint counts its stroke in units of L.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite, pi, tau
+from math import isfinite
 from operator import index
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..._arrays import Array, as_exact, as_floats, read_only
+from ..._arrays import Array, as_exact, read_only
 from ...errors import InvalidValueError
-from ...geometry import PRISMATIC, REVOLUTE
+from ...geometry import PRISMATIC
 from ...model import RobotModel, check_model
 from ..jacobians import Reference, jacobian, jacobian_rate
+from ..lengths import length_of
 
 MaskAxes = Literal["world", "tool"]
 
 _REFERENCES: dict[MaskAxes, Reference] = {"world": "world_aligned", "tool": "local"}
 _SEED = 20
-_SAMPLES = 64
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,24 +128,21 @@ def singular_task(
             f"mask: expected zeros and ones for vx vy vz wx wy wz, at least one of them 1, "
             f"got {asked.tolist()}."
         )
-    if length is None:
-        length = characteristic_length(model, frame)
-    elif not float(as_exact(length, (), "length")) > 0.0:
-        raise InvalidValueError(f"length: expected metres above 0, got {length!r}.")
+    length = length_of(model, frame, length)
     on_path = np.zeros(model.f + 1, dtype=bool)
     on_path[path] = True
     keep = asked.astype(bool)
-    scale = np.repeat([1.0 / float(length), 1.0], 3)[keep]
-    kinds = _kinds(model)
+    scale = np.repeat([1.0 / length, 1.0], 3)[keep]
+    kinds = model.table.sigma[model.table.joint_rows]
     return SingularTask(
         model=model,
         frame=frame,
         mask=read_only(keep, np.bool_),
         mask_axes=mask_axes,
-        length=float(length),
+        length=length,
         moving=read_only(on_path[1:][model.table.joint_rows], np.bool_),
         row_scale=read_only(scale),
-        joint_scale=read_only(np.where(kinds == PRISMATIC, float(length), 1.0)),
+        joint_scale=read_only(np.where(kinds == PRISMATIC, length, 1.0)),
     )
 
 
@@ -203,84 +200,6 @@ def task_derivatives(task: SingularTask, q: Array) -> Array:
     reference = _REFERENCES[task.mask_axes]
     rates = jacobian_rate(task.model, q[..., None, :], along, task.frame, reference)
     return rates[..., task.mask, :] * (task.row_scale[:, None] * task.joint_scale)
-
-
-def spread_configurations(model: RobotModel, count: int, rng: np.random.Generator) -> Array:
-    """Configurations spread over the joint ranges.
-
-    Ranges are the limits; where these are infinite, one turn, or a stroke of the robot's size.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-    count : int
-        How many.
-    rng : numpy.random.Generator
-        Where chance comes from.
-
-    Returns
-    -------
-    ndarray, shape (count, n)
-        Joint variables, rad or m.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> spread_configurations(load("rx90"), 5, np.random.default_rng(0)).shape
-    (5, 6)
-    """
-    width = np.where(_kinds(model) == PRISMATIC, 2.0 * _table_size(model), tau)
-    lower, upper = _finite_range(model.lower, model.upper, width)
-    return lower + (upper - lower) * rng.random((count, model.n))
-
-
-def characteristic_length(model: RobotModel, frame: str | int | None = None) -> float:
-    """Reach of a frame: its greatest distance from a revolute axis that moves it.
-
-    It depends neither on where the robot stands nor on where along its axis each frame of the
-    table is placed, and it does not see the limits of revolute joints.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-    frame : str or int, optional
-        Name or number of a frame; default the tool.
-
-    Returns
-    -------
-    float
-        Metres, rounded up to two significant digits; 1 where no axis is at a distance, as for a
-        gantry with a wrist: its rank and singular values do not depend on a length.
-
-    Raises
-    ------
-    InvalidValueError, FrameNotFoundError
-        Not a model; no such frame.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> characteristic_length(load("rx90"))
-    0.9
-    """
-    check_model(model)
-    width = np.where(_kinds(model) == PRISMATIC, 2.0 * _table_size(model), tau)
-    turning = _kinds(model) == REVOLUTE
-    lower, upper = _finite_range(
-        np.where(turning, -pi, model.lower), np.where(turning, pi, model.upper), width
-    )
-    rng = np.random.default_rng(_SEED)
-    q = lower + (upper - lower) * rng.random((_SAMPLES, model.n))
-    levers = np.linalg.norm(jacobian(model, q, frame)[:, :3, turning], axis=1)
-    reach = float(levers.max(initial=0.0))
-    # a lever of rounding size beside the lengths of the table is no lever
-    if reach <= 1e-12 * _table_size(model):
-        return 1.0
-    # few digits: a number to read, and the same one whatever rounding the samples bring
-    unit = 10.0 ** (np.floor(np.log10(reach)) - 1)
-    return float(f"{np.ceil(reach / unit - 1e-6) * unit:.2g}")
 
 
 def above_zero(value: float, name: str) -> float:
@@ -378,19 +297,3 @@ def generator_of(rng: np.random.Generator | int | None) -> np.random.Generator:
     if isinstance(rng, np.random.Generator):
         return rng
     return np.random.default_rng(_SEED if rng is None else whole_number(rng, "rng", 0))
-
-
-def _kinds(model: RobotModel) -> NDArray[np.int64]:
-    return model.table.sigma[model.table.joint_rows]
-
-
-def _table_size(model: RobotModel) -> float:
-    lengths = np.linalg.norm(model.chain.position, axis=1).sum()
-    return float(lengths + np.linalg.norm(model.tool[:3, 3])) or 1.0
-
-
-def _finite_range(lower: Array, upper: Array, width: Array) -> tuple[Array, Array]:
-    low, high = np.isfinite(lower), np.isfinite(upper)
-    first = np.where(low, lower, np.where(high, upper - width, -0.5 * width))
-    last = np.where(high, upper, np.where(low, lower + width, 0.5 * width))
-    return as_floats(first, "lower"), as_floats(last, "upper")
