@@ -199,14 +199,26 @@ def needed_parts(model: RobotModel) -> NDArray[np.int64]:
     ndarray of int, shape (f,)
         See `robotmodels.kernels.base_newton_euler`.
     """
-    from ..kernels.base_newton_euler import INERTIA, LOADED, MASS, MOMENTS, ROTATES
+    from ..kernels.base_newton_euler import (
+        INERTIA,
+        LOADED,
+        MASS,
+        MOMENTS,
+        OFFSET,
+        ROTATES,
+        TWISTED,
+    )
 
     pi, antecedent = model.inertia.values, model.table.antecedent
     bits = MASS * (pi[:, 9] != 0.0) + MOMENTS * pi[:, 6:9].any(axis=1)
     bits = (bits + INERTIA * pi[:, :6].any(axis=1)).astype(np.int64)
     bits |= LOADED * (bits > 0)
     bits |= np.where(bits & MOMENTS, ROTATES, 0)
+    C = model.chain.rotation
+    about_x = (C[:, 0] == [1.0, 0.0, 0.0]).all(axis=1) & (C[:, 1:, 0] == 0.0).all(axis=1)
+    about_x &= (C[:, 1, 1] == C[:, 2, 2]) & (C[:, 1, 2] == -C[:, 2, 1])
     moves = (model.table.sigma == 1) | model.chain.position.any(axis=1)
+    bits |= OFFSET * moves + TWISTED * (about_x & (model.table.sigma == 0))
     for k in range(model.f - 1, -1, -1):
         if (outer := int(antecedent[k]) - 1) >= 0 and bits[k] & LOADED:
             bits[outer] |= LOADED | (ROTATES if moves[k] else 0)

@@ -1,16 +1,19 @@
 """Joint torques from base parameters: Newton-Euler without what the zero parameters multiply.
 
 Seed book section 1.5.3 (W. Khalil and J.-F. Kleinfinger 1987): most parameters of a base set are
-zero, above all the masses. A link is told by bits what of it counts, and what its outboard links
-need; work for nothing is left out.
+zero, above all the masses, and so is much of a table. A link is told by bits what of it counts,
+and what its outboard links need; work for nothing is left out.
 """
+
+from math import cos, sin
 
 import numpy as np
 
 from ._compile import CHAIN, INTS, MATRIX, NOTHING, OUT2, VECTOR, Floats, Ints, compiled
 from ._inertia import inertia_of, inertia_times
-from ._motion import coordinate, link_acceleration, link_transform, rotation_acceleration
+from ._motion import coordinate, link_transform, rotation_acceleration
 from ._vectors import (
+    Vector,
     add,
     cross,
     matrix,
@@ -24,11 +27,27 @@ from ._vectors import (
     whole_vector,
 )
 
-__all__ = ["INERTIA", "LOADED", "MASS", "MOMENTS", "ROTATES", "base_torques"]
+__all__ = ["INERTIA", "LOADED", "MASS", "MOMENTS", "OFFSET", "ROTATES", "TWISTED", "base_torques"]
 
 MASS, MOMENTS, INERTIA = 1, 2, 4  # of the link itself: M, MX MY MZ, XX to ZZ
 LOADED = 8  # it or a link outboard of it has any parameter
 ROTATES = 16  # U is needed: for its own first moments, or for the origins of links outboard
+OFFSET = 32  # its origin is not that of its antecedent
+TWISTED = 64  # revolute, and the constant rotation is about x (alpha), as in most tables
+
+
+@compiled()
+def inward(ca: float, sa: float, c: float, s: float, x: Vector) -> Vector:
+    """Turn a vector about x by -alpha, then about z by -theta: from the antecedent's axes."""
+    y = ca * x[1] + sa * x[2]
+    return (c * x[0] + s * y, c * y - s * x[0], ca * x[2] - sa * x[1])
+
+
+@compiled()
+def outward(ca: float, sa: float, c: float, s: float, x: Vector) -> Vector:
+    """The inverse of `inward`: to the antecedent's axes."""
+    y = s * x[0] + c * x[1]
+    return (c * x[0] - s * x[1], ca * y - sa * x[2], sa * y + ca * x[2])
 
 
 @compiled(NOTHING(MATRIX, MATRIX, MATRIX, *CHAIN, MATRIX, VECTOR, INTS, OUT2))
@@ -61,7 +80,7 @@ def base_torques(
     gravity : (3,)
         Acceleration of gravity in the world [m/s^2].
     parts : (f,)
-        Bits of each link: MASS, MOMENTS, INERTIA, LOADED, ROTATES.
+        Bits of each link: MASS, MOMENTS, INERTIA, LOADED, ROTATES, OFFSET, TWISTED.
     out : (N, n)
         Written: torques [N m or N].
     """
@@ -74,6 +93,7 @@ def base_torques(
     u = np.empty((f + 1, 3))
     force = np.empty((f + 1, 3))
     moment = np.empty((f + 1, 3))
+    turn = np.empty((f, 2))
     g = transpose_times(whole_matrix(base_rotation), whole_vector(gravity))
     put_vector(u, 0, (-g[0], -g[1], -g[2]))
     nothing = (0.0, 0.0, 0.0)
@@ -84,20 +104,34 @@ def base_torques(
                 continue
             b = antecedent[k]
             c = joint[k]
-            Rj, Pj = link_transform(
-                sigma[k], coordinate(q, i, c), matrix(rotation, k), vector(position, k)
-            )
-            wj, dwj, uj = link_acceleration(
-                sigma[k],
-                Rj,
-                Pj,
-                coordinate(v, i, c),
-                coordinate(a, i, c),
-                vector(w, b),
-                vector(dw, b),
-                matrix(U, b),
-                vector(u, b),
-            )
+            dq = coordinate(v, i, c)
+            ddq = coordinate(a, i, c)
+            ub = vector(u, b)
+            if bits & TWISTED:
+                Pj = vector(position, k)
+                ca, sa = rotation[k, 1, 1], rotation[k, 2, 1]
+                cq, sq = cos(q[i, c]), sin(q[i, c])
+                turn[k, 0], turn[k, 1] = cq, sq
+                if bits & OFFSET:
+                    ub = add(ub, times(matrix(U, b), Pj))
+                wj = inward(ca, sa, cq, sq, vector(w, b))
+                dwj = inward(ca, sa, cq, sq, vector(dw, b))
+                uj = inward(ca, sa, cq, sq, ub)
+            else:
+                Rj, Pj = link_transform(
+                    sigma[k], coordinate(q, i, c), matrix(rotation, k), vector(position, k)
+                )
+                put_matrix(R, k + 1, Rj)
+                if bits & OFFSET:
+                    ub = add(ub, times(matrix(U, b), Pj))
+                wj = transpose_times(Rj, vector(w, b))
+                dwj = transpose_times(Rj, vector(dw, b))
+                uj = transpose_times(Rj, ub)
+            if sigma[k] == 0:
+                dwj = (dwj[0] + wj[1] * dq, dwj[1] - wj[0] * dq, dwj[2] + ddq)
+                wj = (wj[0], wj[1], wj[2] + dq)
+            else:
+                uj = (uj[0] + 2.0 * wj[1] * dq, uj[1] - 2.0 * wj[0] * dq, uj[2] + ddq)
             J, MS, M = inertia_of(pi, k)
             F = nothing
             N = nothing
@@ -111,7 +145,6 @@ def base_torques(
                     N = add(N, cross(MS, uj))
             if bits & MASS:
                 F = add(F, scale(M, uj))
-            put_matrix(R, k + 1, Rj)
             put_vector(P, k + 1, Pj)
             put_vector(w, k + 1, wj)
             put_vector(dw, k + 1, dwj)
@@ -131,8 +164,16 @@ def base_torques(
                 out[i, joint[j - 1]] = F[2]
             b = antecedent[j - 1]
             if b > 0:
-                Rj = matrix(R, j)
-                Fb = times(Rj, F)
-                Nb = add(times(Rj, N), cross(vector(P, j), Fb))
+                if parts[j - 1] & TWISTED:
+                    ca, sa = rotation[j - 1, 1, 1], rotation[j - 1, 2, 1]
+                    cq, sq = turn[j - 1, 0], turn[j - 1, 1]
+                    Fb = outward(ca, sa, cq, sq, F)
+                    Nb = outward(ca, sa, cq, sq, N)
+                else:
+                    Rj = matrix(R, j)
+                    Fb = times(Rj, F)
+                    Nb = times(Rj, N)
+                if parts[j - 1] & OFFSET:
+                    Nb = add(Nb, cross(vector(P, j), Fb))
                 put_vector(force, b, add(vector(force, b), Fb))
                 put_vector(moment, b, add(vector(moment, b), Nb))
