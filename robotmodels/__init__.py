@@ -40,13 +40,6 @@ from .urdf import NamedFrame
 
 if TYPE_CHECKING:
     from . import trajectories, viz
-    from .minimal_parameters import (
-        BaseParameters,
-        StandardParameters,
-        base_parameters,
-        standard_parameters,
-        uniform_bodies,
-    )
     from .igm.paul import InverseModelExplanation, explain_igm
     from .kinematics import (
         DampedInverse,
@@ -73,6 +66,13 @@ if TYPE_CHECKING:
         static_torque,
         static_wrench,
         velocity_ellipsoid,
+    )
+    from .minimal_parameters import (
+        BaseParameters,
+        StandardParameters,
+        base_parameters,
+        standard_parameters,
+        uniform_bodies,
     )
 
 __version__ = "0.1.0"

@@ -21,9 +21,17 @@ def test_python_examples(tmp_path, monkeypatch, capsys):
         rm.igm(names["trr"], POSE_B, mask=[1, 1, 1, 0, 0, 0]).q, [[0.2, 0, 0]], atol=1e-6
     )
     assert rm.igm(names["iiwa"], names["T"], arm_angle=[0.0, 0.5]).q.shape == (2, 8, 7)
+    assert names["fast"].reason() == "The motion is met."
+    np.testing.assert_allclose(
+        rm.dkm(names["rx90"], names["q"], names["fast"].v), [0.1, 0, -0.2, 0, 0, 0.3], atol=1e-12
+    )
+    np.testing.assert_allclose(names["motion"].q(names["motion"].duration), names["q"])
+    assert names["path"].complete
     assert (tmp_path / "ur5.html").stat().st_size > 500_000
     assert (tmp_path / "arm.urdf").is_file()
-    assert "rx90" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "rx90" in printed
+    assert "elbow: C3 = 0" in printed
 
 
 POSE_B = [[-1, 0, 0, 0.4], [0, 1, 0, 0.2], [0, 0, -1, 0.5], [0, 0, 0, 1]]
