@@ -1,0 +1,24 @@
+"""Friction models of the joints, beside the viscous and Coulomb terms of `DriveParameters`.
+
+Seed book section 1.5.1.4. A model is a value with ``.torque(v)``; where the torque is linear in
+the parameters, ``.basis(v)`` gives the columns that multiply them, for identification.
+"""
+
+from .asymmetric import AsymmetricFriction
+from .combined import FrictionSum
+from .plain import CoulombFriction, TorqueOffset, ViscousFriction
+from .protocols import Friction, LinearFriction, check_friction, check_linear
+from .stribeck import StribeckFriction
+
+__all__ = [
+    "AsymmetricFriction",
+    "CoulombFriction",
+    "Friction",
+    "FrictionSum",
+    "LinearFriction",
+    "StribeckFriction",
+    "TorqueOffset",
+    "ViscousFriction",
+    "check_friction",
+    "check_linear",
+]

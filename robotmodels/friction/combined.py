@@ -1,0 +1,76 @@
+"""Friction models that act together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import Array
+from ..errors import InvalidValueError
+from .protocols import Friction, LinearFriction, breakaway_torques, check_friction, check_linear
+
+
+@dataclass(frozen=True, slots=True)
+class FrictionSum:
+    """Several friction models that act together.
+
+    Parameters
+    ----------
+    parts : tuple of Friction
+        Models of the same joints, at least one.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Numbers of joints that differ; no part; something that is no friction model.
+
+    Examples
+    --------
+    >>> from robotmodels.friction import CoulombFriction, ViscousFriction
+    >>> both = FrictionSum((ViscousFriction([1.0]), CoulombFriction([2.0])))
+    >>> both.torque([3.0]), both.kinds
+    (array([5.]), ('Fv', 'Fc'))
+    """
+
+    parts: tuple[Friction, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "parts", tuple(self.parts))
+        if not self.parts:
+            raise InvalidValueError("parts: expected at least one friction model.")
+        for part in self.parts:
+            check_friction(part, getattr(self.parts[0], "n", 0), "parts")
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return self.parts[0].n
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Names of a joint's parameters."""
+        return tuple(kind for part in self._linear for kind in part.kinds)
+
+    @property
+    def parameters(self) -> Array:
+        """Their values, shape (k, n)."""
+        return np.concatenate([part.parameters for part in self._linear])
+
+    @property
+    def breakaway(self) -> Array:
+        """Torques between which a joint at rest sticks, shape (2, n): lower, upper."""
+        return breakaway_torques(self)
+
+    def basis(self, v: ArrayLike) -> Array:
+        """Torque per unit of each parameter, see `LinearFriction`."""
+        return np.concatenate([part.basis(v) for part in self._linear], axis=-2)
+
+    def torque(self, v: ArrayLike) -> Array:
+        """Torque that the joints need to overcome friction, shape (..., n)."""
+        return np.sum([part.torque(v) for part in self.parts], axis=0)
+
+    @property
+    def _linear(self) -> tuple[LinearFriction, ...]:
+        return tuple(check_linear(part) for part in self.parts)
