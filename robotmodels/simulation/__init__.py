@@ -9,7 +9,7 @@ from .dynamics_map import DynamicsMap, dynamics_map
 from .result import Simulation
 from .simulate import simulate
 from .status import Integrator, SimulationEvent, SimulationEventKind, SimulationStatus
-from .torque_parts import TorqueParts, torque_parts
+from .torque_parts import TorqueParts, simulated_torque_parts, torque_parts
 
 __all__ = [
     "DynamicsMap",
@@ -21,5 +21,6 @@ __all__ = [
     "TorqueParts",
     "dynamics_map",
     "simulate",
+    "simulated_torque_parts",
     "torque_parts",
 ]

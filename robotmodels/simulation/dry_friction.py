@@ -254,7 +254,8 @@ class DryFriction:
         """Torques on the parts that stick, which are independent."""
         if not self.motor[mode.stuck].any():
             return reaction[self.joint[mode.stuck]]
-        return np.linalg.lstsq(self.rates[mode.stuck].T, reaction, rcond=1e-10)[0]
+        torques = np.linalg.lstsq(self.rates[mode.stuck].T, reaction, rcond=1e-10)[0]
+        return np.asarray(torques, np.float64)
 
     def _held(self, parts: NDArray[np.int64], M: Array, rest: Array) -> Array:
         """Accelerations of parts at rest under the best friction, against those without any."""

@@ -39,6 +39,8 @@ class Simulation:
     control_work, friction_work, wrench_work : ndarray, shape (N,)
         Work since the start that the control did, that friction and the drives' offsets took, and
         that the tool did on the environment, J.
+    drive : bool
+        Whether the model's drives took part.
     events : tuple of SimulationEvent
         Stick, slip and limits, in the order of time.
     status : SimulationStatus
@@ -70,6 +72,7 @@ class Simulation:
     control_work: Array
     friction_work: Array
     wrench_work: Array
+    drive: bool
     events: tuple[SimulationEvent, ...]
     status: SimulationStatus
     evaluations: int

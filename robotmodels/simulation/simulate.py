@@ -82,7 +82,8 @@ def simulate(
         are not looked at.
     breaks : array_like, shape (K,)
         Times at which ``control`` or ``wrench`` jump, such as the instants of a sampled controller:
-        the integration starts anew there. A law's value at a break belongs to the time after it.
+        the integration starts anew there. A law's value at a break belongs to the time after it;
+        breaks before the start and after the end do not matter.
     method : Integrator or str
         Explicit ``DOP853`` (default) and ``RK45``, implicit ``Radau`` and ``BDF``.
     rtol, atol : float
@@ -165,6 +166,7 @@ def simulate(
         control_work=works[:, 0].copy(),
         friction_work=works[:, 1].copy(),
         wrench_work=works[:, 2].copy(),
+        drive=bool(drive),
         events=tuple(path.events),
         status=path.status,
         evaluations=forces.evaluations,

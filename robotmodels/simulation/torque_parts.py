@@ -10,8 +10,10 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_vector, batch_shape, read_only
 from ..dynamics import gravity_torque, idm
+from ..errors import InvalidValueError
 from ..friction import Friction, check_friction
 from ..model import RobotModel, check_model
+from .result import Simulation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,3 +131,51 @@ def torque_parts(
     if wrench is not None:
         tool = idm(weightless, q, still, still, wrench=arrays[3], drive=False)
     return TorqueParts(inertia, coriolis, gravity, taken, tool)
+
+
+def simulated_torque_parts(simulation: Simulation) -> TorqueParts:
+    """Split the torques of a simulated motion, with the friction that held joints at rest.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        Of N samples.
+
+    Returns
+    -------
+    TorqueParts
+        Arrays (N, n); the total are the torques of the control.
+
+    Raises
+    ------
+    InvalidValueError
+        No simulation.
+
+    References
+    ----------
+    Seed book sections 1.5.1.1 to 1.5.1.5.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> from robotmodels.simulation import simulate
+    >>> fall = simulate(load("rx90"), np.zeros(6), np.zeros(6), t=0.1)
+    >>> bool(np.abs(simulated_torque_parts(fall).total).max() < 1e-12)
+    True
+    """
+    if not isinstance(simulation, Simulation):
+        raise InvalidValueError(
+            f"simulation: expected a Simulation, as simulate(...) gives it, got "
+            f"{type(simulation).__name__}."
+        )
+    model = simulation.model
+    parts = torque_parts(model, simulation.q, simulation.v, simulation.a, drive=simulation.drive)
+    offset = model.drive.offset if simulation.drive else np.zeros(model.n)
+    friction = simulation.friction + offset
+    rigid = parts.inertia + parts.coriolis + parts.gravity
+    # what the tool exerts was a law of time: it is what is left
+    left = simulation.tau - rigid - friction
+    sizes = [simulation.tau, parts.inertia, parts.coriolis, parts.gravity, friction]
+    size = np.sum([np.abs(part) for part in sizes], axis=0)
+    left[np.abs(left) <= 1e-9 * size] = 0.0
+    return TorqueParts(parts.inertia, parts.coriolis, parts.gravity, friction, left)
