@@ -301,6 +301,8 @@ def test_demo_draws_the_eight_postures(run, tmp_path):
         text = (tmp_path / f"{name}-postures.html").read_text(encoding="utf-8")
         assert re.findall(r"</span>(\d): shoulder", text) == list("12345678")
         assert f"{name}: 8 postures. The pose is reached." in out
+    assert "ZZ1R = ZZ1 + Ia1 + YY2 + YY3 + D3^2*(M3 + M4 + M5 + M6)" in out
+    assert "By the columns of the regressor: the same parameters" in out
     lost = [float(number) for number in re.findall(r"its postures to (\S+) rad", out)]
     assert len(lost) == 2
     assert max(lost) < 1e-6

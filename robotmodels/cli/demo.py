@@ -15,6 +15,7 @@ from ..dynamics import ddm, gravity_torque, idm
 from ..geometry import link_transforms
 from ..igm import igm
 from ..kinematics import dgm, dkm, jacobian
+from ..minimal_parameters import base_parameters
 from ..model import RobotModel, write_urdf
 from ..robots import load
 from .info import pose_text
@@ -73,6 +74,8 @@ def run(arguments: argparse.Namespace) -> None:
     _say("Staubli RX-90: from the table of the seed book (Table 1.1) to URDF to Pinocchio")
     rx90 = load("rx90")
     _show_models(rx90, _RX90_POSTURE, folder)
+    _say("Base inertial parameters of the RX-90: the fewest that give its torques")
+    _show_base(rx90)
     _say("UR5: from the URDF of example-robot-data to its table")
     ur5 = load("erd:ur5")
     _show_models(ur5, _UR5_POSTURE, folder)
@@ -118,6 +121,17 @@ def table_poses(model: RobotModel, q: Array) -> Array:
     for j in model.table.path(model.tip):
         T = T @ factors[:, j - 1]
     return T @ model.tool
+
+
+def _show_base(model: RobotModel) -> None:
+    rules, numbers = base_parameters(model), base_parameters(model, "numeric")
+    print(rules)
+    kept, dependent = numbers.gap or (0.0, 0.0)
+    same = "the same parameters" if rules.names == numbers.names else "other parameters"
+    print(
+        f"By the columns of the regressor: {same}; angles of kept columns at least {kept:.2f}, of "
+        f"dependent ones at most {dependent:.0e}."
+    )
 
 
 def _show_models(model: RobotModel, q: Array, folder: Path) -> None:
