@@ -179,6 +179,35 @@ def test_pendulum_comes_to_rest_off_the_vertical():
     assert first.energy[0] - first.energy[-1] == pytest.approx(2.0 * way, rel=1e-9)
 
 
+def test_mass_on_a_spring_loses_the_same_at_every_turn():
+    """Amplitudes fall by 2 Fc / k every half period, until the spring cannot break away."""
+    k, Fc, mass, start = 50.0, 1.0, 2.0, 0.45
+    sim = simulate(slider(mass, Fc=[Fc]), [start], [0.0], lambda t, q, v: -k * q,
+                   np.linspace(0.0, 9.0, 91))  # fmt: skip
+    half = np.pi * np.sqrt(mass / k)
+    assert [e.kind for e in sim.events] == [KINDS.REVERSED] * 10 + [KINDS.STUCK]
+    assert [e.t for e in sim.events] == pytest.approx(half * np.arange(1, 12), abs=1e-8)
+    assert sim.q[-1, 0] == pytest.approx(-(start - 11 * 2 * Fc / k), abs=1e-8)
+    assert sim.friction[-1, 0] == pytest.approx(k * 0.01, abs=1e-6)
+
+
+def test_torques_that_change_while_all_joints_stick_are_seen():
+    rail, t = slider(Fc=[1.0]), np.linspace(0.0, 10.0, 11)
+
+    def pulse(t, q, v):
+        return [0.9 + 0.3 * np.exp(-(((t - 3.21) / 0.1) ** 2))]
+
+    sim = simulate(rail, [0.0], [0.0], pulse, t)
+    assert [e.kind for e in sim.events] == [KINDS.BROKE_AWAY, KINDS.STUCK]
+    assert sim.events[0].t == pytest.approx(3.21 - 0.1 * np.sqrt(np.log(3.0)), abs=1e-7)
+    assert sim.q[-1, 0] > 1e-3
+    # a jump that nobody told of
+    step = simulate(rail, [0.0], [0.0], lambda t, q, v: [5.0 if t > 0.333 else 0.0], [0.0, 1.0])
+    assert [e.kind for e in step.events] == [KINDS.BROKE_AWAY]
+    assert step.events[0].t == pytest.approx(0.333, abs=1e-12)
+    assert step.v[-1, 0] == pytest.approx(2.0 * (1.0 - 0.333), abs=1e-9)
+
+
 def test_what_is_at_rest_at_the_start_sticks_or_not():
     held = simulate(pendulum(Fc=[8.0]), [0.0], [0.0], t=1.0)  # 2 kg at 0.4 m: 7.848 N m
     assert held.sticking.all()
@@ -390,7 +419,7 @@ def test_jumps_of_a_sampled_controller_cost_nothing_at_breaks():
 def test_a_robot_without_joints_stands():
     fixed = RobotModel.from_table(DHTable(antecedent=[0], sigma=[2]), points([1.0], [0.3]))
     for t in (1.0, [0.0, 0.5, 1.0]):
-        sim = simulate(fixed, [], [], t=t)
+        sim = simulate(fixed, [], [], lambda t, q, v: [], t, np.ones(6), stop_at_limits=True)
         assert sim.q.shape == (len(sim.t), 0)
         assert sim.t[-1] == 1.0
         assert sim.relative_drift == 0.0
@@ -438,6 +467,17 @@ def test_ends_before_the_end_say_why():
     assert wild.status is SimulationStatus.STEP_TOO_SMALL
     assert wild.t[-1] < 3.0
     assert np.isfinite(wild.q).all()
+
+    class Alternating:
+        sign = 1.0
+
+        def __call__(self, t, q, v):
+            self.sign = -self.sign
+            return [5.0 * self.sign]
+
+    torn = simulate(slider(Fc=[1.0]), [0.0], [0.0], Alternating(), t=1.0, max_evaluations=20000)
+    assert torn.status is SimulationStatus.CHATTERING
+    assert torn.t[-1] < 1e-6
     # parameters of no body: the mass matrix vanishes on the way
     ghost = RobotModel.from_table(
         DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 1.0]),

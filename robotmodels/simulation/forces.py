@@ -45,8 +45,8 @@ class Forces:
     >>> from robotmodels.simulation.dry_friction import dry_friction
     >>> arm = load("planar_2r")
     >>> forces = Forces(arm, None, None, True, None, dry_friction(arm, True, None), None)
-    >>> forces.derivative(0.0, np.zeros(7)).shape
-    (7,)
+    >>> forces.derivative(0.0, np.zeros(8)).shape
+    (8,)
     """
 
     def __init__(
@@ -79,6 +79,8 @@ class Forces:
         self._a, self._h = np.empty((1, n)), np.empty((1, n))
         self._M, self._J = np.empty((1, n, n)), np.empty((1, 6, n))
         self._still = np.zeros((1, n))
+        level = np.abs(dry.rates.T) @ (0.5 * np.abs(dry.upper - dry.lower))
+        self._weights = np.divide(1.0, level, out=np.zeros(n), where=level > 0.0)
         self.evaluations = 0
         self.met_singular = False
         self.latest = np.inf  # laws are asked for times before this one only
@@ -101,34 +103,38 @@ class Forces:
         self._forth, self._back = stuck > 0.0, stuck < 0.0
 
     def derivative(self, t: float, y: Array) -> Array:
-        """Time derivative of positions, velocities and the three works.
+        """Time derivative of positions, velocities, the three works, and of what is held.
+
+        The last one is the torque on the parts that stick, against their breakaway torques: where
+        all joints stand, nothing else would keep the steps short enough to see the torques change.
 
         Parameters
         ----------
         t : float
             Time, s.
-        y : ndarray, shape (2 n + 3,)
-            q, v, work of the control, of friction and of the tool.
+        y : ndarray, shape (2 n + 4,)
+            q, v, work of the control, of friction and of the tool, what was held.
 
         Returns
         -------
-        ndarray, shape (2 n + 3,)
+        ndarray, shape (2 n + 4,)
             NaN where there is no acceleration: an integrator then takes a shorter step.
         """
         n = self.n
         y = np.ascontiguousarray(y)
-        out = np.empty(2 * n + 3)
+        out = np.empty(2 * n + 4)
         if not isfinite(y @ y):  # also where squares overflow: no motion gets so far
             self.evaluations += 1
             out.fill(np.nan)
             return out
         v = y[n : 2 * n]
-        a, tau, friction, tool, _ = self.at(t, y[:n], v)
+        a, tau, friction, tool, reaction = self.at(t, y[:n], v)
         out[:n] = v
         out[n : 2 * n] = a
         out[2 * n] = tau @ v
         out[2 * n + 1] = (friction + self.offset) @ v
         out[2 * n + 2] = tool @ v
+        out[2 * n + 3] = reaction @ self._weights
         return out
 
     def at(self, t: float, q: Array, v: Array) -> tuple[Array, Array, Array, Array, Array]:

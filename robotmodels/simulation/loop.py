@@ -52,7 +52,7 @@ class Path:
         if forces.mode.sticks:
             held = signs == 0.0
         self.t.append(t)
-        self.rows.append((q, v, a, tau.copy(), friction, held, y[2 * n :].copy()))
+        self.rows.append((q, v, a, tau.copy(), friction, held, y[2 * n : 2 * n + 3].copy()))
 
 
 class _Found(NamedTuple):
@@ -95,7 +95,7 @@ def follow(
         Samples to the end, or to where it ended before.
     """
     path = Path()
-    y = np.concatenate([q, v, np.zeros(3)])
+    y = np.concatenate([q, v, np.zeros(4)])
     t, end = cuts[0][0], cuts[-1][0]
     walk = _Walk(forces, path, times, limits, options, t, end)
     walk.set_latest(cuts, 0)
@@ -264,7 +264,8 @@ class _Walk:
                 if found is not None and ts[k - 1] >= found.t:
                     break
                 if margin(float(ts[k])) < 0.0:
-                    time = _root(margin, ts, k)
+                    # past it, so that a jump of the torques is seen as well
+                    time = _beyond(margin, _root(margin, ts, k), float(ts[k]))
                     if earlier(time):
                         found = _Found(time)
                     break
@@ -362,3 +363,12 @@ def _root(g: Callable[[float], float], ts: Array, k: int) -> float:
         return high
     found: Any = brentq(g, low, high, xtol=1e-15 * max(1.0, abs(right)))
     return float(found)
+
+
+def _beyond(g: Callable[[float], float], t: float, end: float) -> float:
+    """The first representable instants after a root at which the function is negative."""
+    step = float(np.spacing(max(abs(t), abs(end))))
+    while t < end and g(t) >= 0.0:
+        t = min(t + step, end)
+        step *= 2.0
+    return t
