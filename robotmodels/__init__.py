@@ -10,16 +10,21 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from . import errors, kinematics
+from . import errors, friction, kinematics, regressors
 from .drive import DriveParameters, Transmission
 from .dynamics import (
+    base_model,
+    christoffel_blocks,
     coriolis_matrix,
     ddm,
     gravity_torque,
     idm,
+    idm_from_base,
     kinetic_energy,
     mass_matrix,
     potential_energy,
+    with_payload,
+    without_payload,
 )
 from .geometry import DHTable, link_transforms
 from .igm import IGMSolutions, IGMStatus, igm, igm_numeric
@@ -27,9 +32,13 @@ from .inertia import InertialParameters
 from .kinematics import dgm, dkm, dkm_second_order, jacobian, jacobian_rate, link_poses
 from .model import RobotModel, to_urdf, write_urdf
 from .regressors import (
+    energy_difference_regressor,
     energy_regressor,
+    filtered_regressor,
+    momentum_regressor,
     parameter_names,
     parameter_vector,
+    power_regressor,
     torque_regressor,
     torque_regressor_chunks,
 )
@@ -39,7 +48,7 @@ from .symoro import read_par
 from .urdf import NamedFrame
 
 if TYPE_CHECKING:
-    from . import trajectories, viz
+    from . import simulation, trajectories, viz
     from .igm.paul import InverseModelExplanation, explain_igm
     from .kinematics import (
         DampedInverse,
@@ -74,6 +83,7 @@ if TYPE_CHECKING:
         standard_parameters,
         uniform_bodies,
     )
+    from .simulation import Simulation, simulate, torque_parts
 
 __version__ = "0.1.0"
 
@@ -95,10 +105,13 @@ __all__ = [
     "OrientationKind",
     "PseudoInverse",
     "RobotModel",
+    "Simulation",
     "SingularityExplanation",
     "StandardParameters",
     "Transmission",
+    "base_model",
     "base_parameters",
+    "christoffel_blocks",
     "classify_singularity",
     "coordinate_jacobian",
     "coriolis_matrix",
@@ -106,15 +119,19 @@ __all__ = [
     "dgm",
     "dkm",
     "dkm_second_order",
+    "energy_difference_regressor",
     "energy_regressor",
     "errors",
     "explain_dgm",
     "explain_igm",
     "explain_jacobian",
     "explain_singularities",
+    "filtered_regressor",
     "force_ellipsoid",
+    "friction",
     "gravity_torque",
     "idm",
+    "idm_from_base",
     "igm",
     "igm_numeric",
     "ikm",
@@ -129,6 +146,7 @@ __all__ = [
     "load",
     "manipulability",
     "mass_matrix",
+    "momentum_regressor",
     "nearest_singularity",
     "operational_coordinates",
     "operational_dimension",
@@ -136,18 +154,25 @@ __all__ = [
     "parameter_vector",
     "pose_from_coordinates",
     "potential_energy",
+    "power_regressor",
     "read_par",
+    "regressors",
     "robots",
+    "simulate",
+    "simulation",
     "standard_parameters",
     "static_torque",
     "static_wrench",
     "to_urdf",
+    "torque_parts",
     "torque_regressor",
     "torque_regressor_chunks",
     "trajectories",
     "uniform_bodies",
     "velocity_ellipsoid",
     "viz",
+    "with_payload",
+    "without_payload",
     "write_urdf",
 ]
 
@@ -195,13 +220,18 @@ _ROOMS = {
         "static_wrench",
         "velocity_ellipsoid",
     ),
+    ".simulation": (
+        "Simulation",
+        "simulate",
+        "torque_parts",
+    ),
 }
 _ROOM_OF = {name: room for room, names in _ROOMS.items() for name in names}
 
 
 def __getattr__(name: str) -> Any:
     """Import rooms, pictures and derivations when they are first asked for."""
-    if name in ("trajectories", "viz"):
+    if name in ("simulation", "trajectories", "viz"):
         return importlib.import_module(f".{name}", __name__)
     if name in _ROOM_OF:
         return getattr(importlib.import_module(_ROOM_OF[name], __name__), name)

@@ -7,6 +7,9 @@ imported when the first one is drawn.
 from .animate import animate
 from .camera import Camera
 from .motion import Motion
+from .plot_dynamics_energy import plot_energy
+from .plot_dynamics_maps import plot_inertia_map
+from .plot_dynamics_torques import plot_torque_parts
 from .plot_ellipsoids import plot_ellipsoids
 from .plot_inverse_velocities import plot_inverse_velocities
 from .plot_joint_motion import plot_joint_motion
@@ -26,12 +29,15 @@ __all__ = [
     "Unit",
     "animate",
     "plot_ellipsoids",
+    "plot_energy",
+    "plot_inertia_map",
     "plot_inverse_velocities",
     "plot_joint_motion",
     "plot_joint_path",
     "plot_pose_path",
     "plot_profiles",
     "plot_singularities",
+    "plot_torque_parts",
     "plot_trajectory",
     "show",
 ]
