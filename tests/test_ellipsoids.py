@@ -431,9 +431,9 @@ def test_mistakes_are_named():
         with pytest.raises(ShapeError, match=r"^q: "):
             function(arm, q[:5])
         with pytest.raises(InvalidValueError, match="TwistPart"):
-            function(arm, q, "linear")
+            function(arm, q, "sideways")
         with pytest.raises(InvalidValueError, match="OtherPart"):
-            function(arm, q, other="zero")
+            function(arm, q, other="nothing")
         with pytest.raises(FrameNotFoundError):
             function(arm, q, frame="J9")
         with pytest.raises(ShapeError, match=f"{name}.*6 joints"):

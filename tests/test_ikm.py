@@ -1018,7 +1018,7 @@ def test_mistakes_are_named():
         (lambda: DampedInverse(-0.1), InvalidValueError, "threshold"),
         (lambda: DampedInverse(largest=np.nan), InvalidValueError, "largest"),
         (lambda: DampedInverse(largest_speed=0.0), InvalidValueError, "largest_speed"),
-        (lambda: DampedInverse(damping="constant"), InvalidValueError, "Damping"),
+        (lambda: DampedInverse(damping="none"), InvalidValueError, "a member of Damping"),
         (lambda: DampedInverse(threshold=0.0, damping=Damping.MANIPULABILITY),
          InvalidValueError, "threshold"),
     )  # fmt: skip

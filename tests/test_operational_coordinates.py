@@ -830,3 +830,19 @@ def test_the_books_robot_at_its_singular_positions_has_finite_rates():
         T, J = rm.dgm(model, q), rm.jacobian(model, q)
         for kind in KINDS[4:]:
             same(coordinate_jacobian(model, q, kind), coordinate_rates(T, kind) @ J, 1e-14)
+
+
+def test_the_sign_at_half_a_turn_does_not_hang_on_rounding(rng):
+    """The differentiated coordinates are those that the pose alone gives."""
+    model = rm.load("rx90")
+    quarters = rng.integers(-4, 5, size=(300, 6)) * np.pi / 4
+    step, v = 1e-6, rng.normal(size=(300, 6))
+    for kind in (OrientationKind.QUATERNION, OrientationKind.ANGLE_AXIS):
+        J = coordinate_jacobian(model, quarters, kind)
+        x = operational_coordinates(rm.dgm(model, quarters), kind)
+        ahead = operational_coordinates(rm.dgm(model, quarters + step * v), kind, near=x)
+        rates = np.einsum("kij,kj->ki", J, v)
+        regular = np.isfinite(rates).all(axis=1)
+        assert regular.mean() > 0.5
+        difference = (ahead - x) / step
+        assert np.allclose(rates[regular], difference[regular], atol=1e-3)

@@ -48,7 +48,7 @@ def test_criteria_and_bounds_keep_the_limits_and_the_line(panda):
     line = line_of(panda, PANDA, [0.2, 0.19, -0.53])
     plain = resolved_motion(panda, line, PANDA)
     kept = resolved_motion(panda, line, PANDA, secondary=JointLimitCriterion(gain=10.0))
-    bounded = resolved_motion(panda, line, PANDA, limits=JointBounds(step=line.duration / 399))
+    bounded = resolved_motion(panda, line, PANDA, limits=True)
     assert margin(panda, plain.q) < -0.04
     assert margin(panda, kept.q) > 0.04
     assert margin(panda, bounded.q) >= -1e-12
@@ -59,6 +59,22 @@ def test_criteria_and_bounds_keep_the_limits_and_the_line(panda):
     assert (bounded.status == IKMStatus.LIMITED).any()
     assert bounded.position_error.max() < 5e-3
     assert bounded.position_error[-1] < 1e-5
+
+
+@pytest.mark.parametrize("samples", [50, 400])
+def test_no_sample_passes_a_limit(panda, samples):
+    """Also with limits that do not know how long a step takes."""
+    q0 = 0.5 * (panda.lower + panda.upper)
+    q0[5] = panda.upper[5] - 0.02
+    q1 = q0.copy()
+    q1[5] += 1.5
+    line = straight_line(rm.dgm(panda, q0), rm.dgm(panda, q1), duration=1.0)
+    for limits in (True, JointBounds()):
+        motion = resolved_motion(panda, line, q0, samples=samples, limits=limits, feedback=5.0)
+        assert margin(panda, motion.q) >= -1e-12
+        assert (abs(motion.v) <= panda.table.velocity * (1 + 1e-12)).all()
+    with pytest.raises(InvalidValueError, match=r"step of 0\.001 s is shorter"):
+        resolved_motion(panda, line, q0, samples=samples, limits=JointBounds(step=1e-3))
 
 
 def test_an_error_at_the_start_dies_out(panda):

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, as_reals, as_vector
+from .._choices import chosen
 from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel, check_model
 from .ellipsoid import Ellipsoid, EllipsoidQuantity
@@ -61,10 +62,10 @@ _FORCE = {
 def velocity_ellipsoid(
     model: RobotModel,
     q: ArrayLike,
-    part: TwistPart = TwistPart.LINEAR,
+    part: TwistPart | str = TwistPart.LINEAR,
     frame: str | int | None = None,
     joint_velocity: ArrayLike | None = None,
-    other: OtherPart = OtherPart.FREE,
+    other: OtherPart | str = OtherPart.FREE,
     length: float | None = None,
     tolerance: float = 1e-9,
 ) -> Ellipsoid:
@@ -123,6 +124,7 @@ def velocity_ellipsoid(
     (array([0.3811, 0.1575, 0.    ]), 2)
     """
     check_model(model)
+    part, other = chosen(TwistPart, part, "part"), chosen(OtherPart, other, "other")
     scale = joint_scale(model, joint_velocity, "joint_velocity", 0.0)
     axes, radii, rank = _principal(model, q, part, frame, scale, other, length, tolerance)
     return Ellipsoid(_VELOCITY[part], dgm(model, q, frame)[..., :3, 3], axes, radii, rank)
@@ -131,10 +133,10 @@ def velocity_ellipsoid(
 def force_ellipsoid(
     model: RobotModel,
     q: ArrayLike,
-    part: TwistPart = TwistPart.LINEAR,
+    part: TwistPart | str = TwistPart.LINEAR,
     frame: str | int | None = None,
     joint_torque: ArrayLike | None = None,
-    other: OtherPart = OtherPart.ZERO,
+    other: OtherPart | str = OtherPart.ZERO,
     length: float | None = None,
     tolerance: float = 1e-9,
 ) -> Ellipsoid:
@@ -188,10 +190,10 @@ def force_ellipsoid(
     array([   inf, 6.351 , 2.6242])
     """
     check_model(model)
+    part, other = chosen(TwistPart, part, "part"), chosen(OtherPart, other, "other")
     torque = joint_scale(model, joint_torque, "joint_torque", np.finfo(np.float64).tiny)
     # projecting on one half is dual to cutting at zero of the other
     dual = OtherPart.FREE if other is OtherPart.ZERO else OtherPart.ZERO
-    dual = dual if isinstance(other, OtherPart) else other
     axes, sigma, rank = _principal(model, q, part, frame, 1.0 / torque, dual, length, tolerance)
     radii = np.divide(1.0, sigma, out=np.full(sigma.shape, np.inf), where=sigma > 0)[..., ::-1]
     axes = _right_handed(axes[..., ::-1])
@@ -209,10 +211,6 @@ def _principal(
     tolerance: float,
 ) -> tuple[Array, Array, NDArray[np.int64]]:
     """Axes, radii (zero below the threshold) and rank of a velocity ellipsoid."""
-    if not isinstance(part, TwistPart):
-        raise InvalidValueError(f"part: expected a member of TwistPart, got {part!r}.")
-    if not isinstance(other, OtherPart):
-        raise InvalidValueError(f"other: expected a member of OtherPart, got {other!r}.")
     L, relative = length_of(model, frame, length), as_tolerance(tolerance)
     J = jacobian(model, as_vector(q, model.n, "q"), frame) * scale
     # at least three columns, so that there are three singular values and vectors

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_core, as_vector, batch_rows
+from .._choices import chosen
 from ..drive import Transmission
 from ..errors import InvalidValueError, ShapeError
 from ..estimation.columns import DEPENDENT
@@ -76,12 +77,7 @@ def base_parameters(
     (36, {'ZZ4': 1.0, 'YY5': 1.0})
     """
     check_model(model)
-    try:
-        chosen = BaseMethod(method)
-    except ValueError:
-        known = ", ".join(repr(m.value) for m in BaseMethod)
-        raise InvalidValueError(f"method: expected one of {known}, got {method!r}.") from None
-    if chosen is BaseMethod.SYMBOLIC:
+    if chosen(BaseMethod, method, "method") is BaseMethod.SYMBOLIC:
         given = {"motion": motion, "constraint": constraint}
         if any(value is not None for value in given.values()) or tolerance != DEPENDENT:
             names = [name for name, value in given.items() if value is not None] or ["tolerance"]

@@ -8,7 +8,7 @@ positions the tool falls behind instead of the joints racing.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -108,8 +108,10 @@ def resolved_motion(
         Rate at which errors die out, 1/s; at most one over the time of a step.
     mask : array_like, shape (6,), optional
         Ones for the components of the twist, in world axes, that are asked for.
-    method, joint_weights, secondary, augmented, tasks, limits
-        As in `ikm`; tasks of lower priority, criteria and limits are taken at every step.
+    method, joint_weights, secondary, augmented, tasks
+        As in `ikm`, taken at every step.
+    limits : JointBounds or bool, optional
+        As in `ikm`; their step is that of the motion, so that no sample passes a limit.
 
     Returns
     -------
@@ -120,7 +122,7 @@ def resolved_motion(
     ------
     ShapeError, InvalidValueError
         A posture of the wrong length; fewer than two samples; a feedback that is negative or
-        faster than the steps; what is no `PoseTrajectory`.
+        faster than the steps; limits with a shorter step; what is no `PoseTrajectory`.
 
     References
     ----------
@@ -157,6 +159,7 @@ def resolved_motion(
             f"feedback: expected between 0 and {fastest} 1/s, one over the step of {step:.4g} s, "
             f"got {feedback}; take more samples, or a smaller feedback."
         )
+    bounds = _bounds_of_steps(limits, step)
     asked = np.ones(6) if mask is None else np.asarray(mask, dtype=np.float64)
     ahead = t[:-1] + 0.5 * step
     goals, twists, halfway = poses.pose(t), poses.twist(t), poses.twist(ahead)
@@ -164,7 +167,7 @@ def resolved_motion(
     def asked_of(posture: Array, twist: Array) -> IKMSolution:
         return ikm(
             model, posture, twist, None, "world_aligned", mask, method, joint_weights, None,
-            secondary, augmented, tasks, limits,
+            secondary, augmented, tasks, bounds,
         )  # fmt: skip
 
     Q, V = np.empty((samples, model.n)), np.empty((samples, model.n))
@@ -176,7 +179,7 @@ def resolved_motion(
         if k == samples - 1:
             break
         posture = q
-        if limits is None:
+        if bounds is None:
             posture = q + 0.5 * step * asked_of(q, twists[k] + feedback * behind[k]).v
         found = asked_of(posture, halfway[k] + feedback * behind[k])
         V[k], status[k] = found.v, found.status
@@ -191,6 +194,23 @@ def resolved_motion(
         np.linalg.norm(missed[:, :3], axis=1),
         np.linalg.norm(missed[:, 3:], axis=1),
     )
+
+
+def _bounds_of_steps(limits: JointBounds | bool | None, step: float) -> JointBounds | None:
+    """The bounds for joints that keep a velocity for one step of the motion."""
+    if limits is None or limits is False:
+        return None
+    bounds = JointBounds() if limits is True else limits
+    if not isinstance(bounds, JointBounds):
+        raise InvalidValueError(f"limits: expected JointBounds, True or None, got {limits!r:.80}.")
+    if bounds.step is None:
+        return replace(bounds, step=step)
+    if bounds.step < step * (1.0 - 1e-9):
+        raise InvalidValueError(
+            f"limits: their step of {bounds.step:.4g} s is shorter than that of the motion, "
+            f"{step:.4g} s, in which joints could pass a limit; leave it out, or take more samples."
+        )
+    return bounds
 
 
 def _behind(goal: Array, now: Array) -> Array:

@@ -9,6 +9,9 @@ import numpy as np
 from ..._arrays import Array
 from ._angles import whole_turns
 
+_ROUNDING = 4 * np.finfo(np.float64).eps
+"""Components of a unit quaternion up to this are zero where signs are chosen."""
+
 
 def products_of(R: Array) -> Array:
     """Symmetric matrices ``4 Q Q^T`` of the quaternions of rotations; affine in the entries of R.
@@ -70,14 +73,17 @@ def quaternions_of(R: Array) -> Array:
     Returns
     -------
     ndarray, shape (..., 4)
-        Scalar first. At half a turn, Q1 = 0, the first of the others that is not 0 is positive.
+        Scalar first. At half a turn, where Q1 is 0 or rounding, the first of the others that is
+        not is positive: the sign does not hang on the last digits of the rotation.
     """
     P = products_of(R)
     largest = np.diagonal(P, axis1=-2, axis2=-1).argmax(axis=-1)
     Q = np.take_along_axis(P, largest[..., None, None], axis=-2)[..., 0, :]
     Q = Q / np.linalg.norm(Q, axis=-1, keepdims=True)
-    leading = np.take_along_axis(Q, (Q != 0.0).argmax(axis=-1)[..., None], axis=-1)
-    return np.where(leading < 0.0, -Q, Q) + 0.0
+    leading = np.take_along_axis(Q, (abs(Q) > _ROUNDING).argmax(axis=-1)[..., None], axis=-1)
+    Q = np.where(leading < 0.0, -Q, Q) + 0.0
+    Q[..., 0] = np.maximum(Q[..., 0], 0.0)
+    return Q
 
 
 def quaternions_near(Q: Array, near: Array) -> Array:

@@ -94,8 +94,8 @@ def solved_by_levels(
         None if drift is None else drift[:, asked],
         scaling.rows[asked],
     )
-    augmented = [_level(model, q, v, task, "augmented") for task in request.augmented]
-    lower = [_level(model, q, v, task, "tasks") for task in request.tasks]
+    augmented = [_level(model, q, v, task, "augmented") for task in _each(request.augmented)]
+    lower = [_level(model, q, v, task, "tasks") for task in _each(request.tasks)]
     first = stacked([main, *augmented])
     if min(first.m, model.n) > _MOST_ROWS:
         raise InvalidValueError(
@@ -156,6 +156,11 @@ def _jacobians(model: RobotModel, known: KnownFrame, q: Array, reference: int) -
     J = np.empty((q.shape[0], 6, model.n))
     jacobians(q, *model.chain, *known.point.kernel_arguments, reference, J)
     return J
+
+
+def _each(tasks: Any) -> Any:
+    """A single task is a sequence of one."""
+    return [tasks] if hasattr(tasks, "level") else tasks
 
 
 def _level(model: RobotModel, q: Array, v: Array | None, task: Any, name: str) -> Level:

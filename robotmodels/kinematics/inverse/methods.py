@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from enum import Enum
 from math import inf, isfinite, sqrt
 
+from ..._choices import chosen
 from ...errors import InvalidValueError
 
 THRESHOLD = 0.003
@@ -178,11 +179,7 @@ class DampedInverse:
     largest_speed: float | None = None
 
     def __post_init__(self) -> None:
-        if not isinstance(self.damping, Damping):
-            raise InvalidValueError(
-                "damping: expected a member of Damping such as Damping.WEAK_DIRECTIONS, got "
-                f"{self.damping!r}."
-            )
+        object.__setattr__(self, "damping", chosen(Damping, self.damping, "damping"))
         by_product = self.damping is Damping.MANIPULABILITY
         _set_number(self, "threshold", 0.0, above=by_product)
         _set_number(self, "largest", 0.0)
