@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from robotmodels import se3
 from robotmodels.errors import InvalidValueError, NotARotationError, ShapeError
+from robotmodels.igm import igm
 from robotmodels.kinematics import dgm, jacobian
 from robotmodels.robots import load
 from robotmodels.trajectories import (
@@ -497,6 +498,33 @@ def test_leaving_the_reach_is_located_and_explained():
     assert "leaves the reach" in repr(path)
     # stretched at the edge: singular, and infinitely fast
     assert path.of_kind(PathEventKind.SINGULAR)[-1].last == event.first - 1
+
+
+def test_a_run_out_of_reach_tells_its_worst_pose():
+    arm, q = load("rx90"), np.radians([0, 60, -110, 0, 50, 0])
+    A = dgm(arm, q)
+    B = A.copy()
+    B[:3, 3] += 0.5
+    T = cartesian_trajectory(A, B, 30)
+    miss = np.linalg.norm(np.nan_to_num(igm(arm, T).missing)[:, :3], axis=-1)
+    (event,) = joint_path(arm, T, q).of_kind(PathEventKind.OUT_OF_REACH)
+    assert event.last == 29
+    assert miss.argmax() == 29
+    assert miss[29] > 0.7
+    assert "pose 29: " in event.detail
+    assert f"misses it by {miss[29]:.4g} m" in event.detail
+    # there and back: the worst is neither the first nor the last
+    (event,) = joint_path(arm, np.concatenate((T, T[::-1])), q).of_kind(PathEventKind.OUT_OF_REACH)
+    assert event.first < 29 < event.last
+    assert f"misses it by {miss[29]:.4g} m" in event.detail
+    # the orientation of a planar arm turns away: by degrees
+    planar = load("lab_rr")
+    C = dgm(planar, [0.2, -0.4])
+    T = np.stack([C @ se3.rotation("x", angle) for angle in (0.0, 0.1, 0.3, 0.2)])
+    (event,) = joint_path(planar, T, [0.2, -0.4]).of_kind(PathEventKind.OUT_OF_REACH)
+    assert (event.first, event.last) == (1, 3)
+    assert "pose 2: " in event.detail
+    assert f"off by {np.degrees(0.3):.4g} deg" in event.detail
 
 
 def test_passing_a_singular_wrist_changes_the_posture():

@@ -31,6 +31,8 @@ class Followed(NamedTuple):
         Codes of `IGMStatus`.
     branch : ndarray of str, shape (N,)
         Labels.
+    missing : ndarray, shape (N, 6)
+        What the closest posture misses of a pose without one, m and rad; NaN where nobody knows.
     reason : callable
         What became of a pose, by its number, in a sentence.
     """
@@ -39,6 +41,7 @@ class Followed(NamedTuple):
     reached: NDArray[np.bool_]
     status: NDArray[np.int8]
     branch: NDArray[np.str_]
+    missing: Array
     reason: Callable[[int], str]
 
 
@@ -73,12 +76,12 @@ def follow(
     N, n = len(T), model.n
     names = np.array((*found.labels, ""))
     q, branch = np.full((N, n), np.nan), np.zeros(N, names.dtype)
-    status = np.array(found.status)
+    status, missing = np.array(found.status), _missing(found)
     index = np.flatnonzero(found.valid.any(axis=-1)) if N else np.zeros(0, np.int64)
     reached = np.zeros(N, np.bool_)
     reached[index] = True
     if index.size == 0:
-        return Followed(q, reached, status, branch, found.reason)
+        return Followed(q, reached, status, branch, missing, found.reason)
     revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
     postures, valid = found.q[index], found.valid[index]
     following = _following(postures, valid, revolute)
@@ -102,7 +105,7 @@ def follow(
     branch[index] = names[found.code[index, picks]]
     for k, (posture, label) in settled.items():
         q[index[k]], branch[index[k]] = posture, label
-    return Followed(q, reached, status, branch, found.reason)
+    return Followed(q, reached, status, branch, missing, found.reason)
 
 
 def _settled(
@@ -170,10 +173,11 @@ def follow_singly(
     """
     q, reached = np.full((N, model.n), np.nan), np.zeros(N, np.bool_)
     status, labels, reasons = np.zeros(N, np.int8), [""] * N, [""] * N
+    missing = np.full((N, 6), np.nan)
     before = start
     for k in range(N):
         one = solve(k, before)
-        status[k], reasons[k] = one.status, one.reason()
+        status[k], reasons[k], missing[k] = one.status, one.reason(), _missing(one)
         if not one.valid.any():
             continue
         s = 0
@@ -183,7 +187,16 @@ def follow_singly(
             s = int(np.where(one.valid, distance, np.inf).argmin())
         before = q[k] = one.q[s]
         reached[k], labels[k] = True, str(one.branch[s])
-    return Followed(q, reached, status, np.array(labels, dtype=np.str_), reasons.__getitem__)
+    branch = np.array(labels, dtype=np.str_)
+    return Followed(q, reached, status, branch, missing, reasons.__getitem__)
+
+
+def _missing(found: IGMSolutions) -> Array:
+    """What the closest postures miss of what was asked for, shape (..., 6)."""
+    lacking = found.missing if found.error is None else found.error[..., 0, :]
+    if lacking is None:
+        return np.full((*found.status.shape, 6), np.nan)
+    return np.where(found.mask, lacking, 0.0)
 
 
 def continuous(

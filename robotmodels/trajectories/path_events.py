@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
+from ..igm import IGMStatus
 from ..model import RobotModel
 from .follow import Followed
 from .path_task import Task
@@ -107,7 +108,7 @@ def path_events(
             text = detail(first, last)
             events.append(PathEvent(kind, first, last, times[first], times[last], text))
 
-    report(PathEventKind.OUT_OF_REACH, ~reached, lambda i, _: rows.reason(i))
+    report(PathEventKind.OUT_OF_REACH, ~reached, lambda i, j: _missed(rows, i, j))
     with np.errstate(invalid="ignore"):
         slack = 1e-9
         over = np.maximum(q - model.upper, model.lower - q)
@@ -156,6 +157,23 @@ def path_events(
     )
     events.sort(key=lambda event: (event.first, event.last))
     yield from events
+
+
+def _missed(rows: Followed, first: int, last: int) -> str:
+    """Why a run of poses is not reached: of every reason the pose that is missed by most."""
+    if first == last:
+        return rows.reason(first)
+    metres = np.linalg.norm(rows.missing[:, :3], axis=-1)
+    angle = np.linalg.norm(rows.missing[:, 3:], axis=-1)
+    texts = []
+    status = rows.status[first : last + 1]
+    for code in dict.fromkeys(status.tolist()):
+        run = first + np.flatnonzero(status == code)
+        turned = code == IGMStatus.ORIENTATION_NOT_AVAILABLE or not (metres[run] > 0.0).any()
+        size = np.nan_to_num((angle if turned else metres)[run], nan=-1.0)
+        k = int(run[size.argmax()])
+        texts.append(f"At worst, pose {k}: {rows.reason(k)}")
+    return " ".join(texts)
 
 
 def _jumps(q: Array, reached: NDArray[np.bool_], task: Task) -> tuple[Array, NDArray[np.bool_]]:
