@@ -1,0 +1,515 @@
+"""Base parameters, regressors and inverse dynamics beside Pinocchio and FIGAROH, in one run.
+
+    OPENBLAS_NUM_THREADS=1 python benchmarks/bench_base_parameters.py [--rounds 5] [--out ...]
+
+Contestants of a row take turns, round after round; figures are medians of the processor's time,
+with the median of the time on the clock beside it. Base parameters: links, rotor inertia and
+friction, of robots told to all through Pinocchio's model of ours. `rank` counts base parameters
+without the offsets, which ours has besides (as the last columns, so that they change no rank
+before them) and FIGAROH is not asked for. The reference is the number of singular values of
+Pinocchio's regressor, columns scaled to length 1, with its gap. Memory: growth of the highest
+resident memory over that before the call, in a process of its own, the motion not counted (of
+Linux alone, elsewhere left out and that is said).
+FIGAROH is optional (`pip install figaroh`); without it its entries are left out and that is said.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import subprocess
+import sys
+import time
+import warnings
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+
+import robotmodels as rm
+from robotmodels import regressors
+from robotmodels.dynamics import idm_from_base
+
+ROBOTS = ("erd:ur10", "rx90", "puma560", "iiwa14")
+BATCH = 100_000
+FEW = 2_000
+SAMPLES = 10_000
+LONG = (100_000, 1_000_000)
+Motion = tuple[np.ndarray, np.ndarray, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Contestant:
+    """One way to do the work; `said` tells of its answer what is worth a note."""
+
+    name: str
+    run: Callable[[], object]
+    samples: int = 1
+    said: Callable[[object], str] = lambda _: ""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One contestant at one work: medians of processor and clock, ratio to the first of them."""
+
+    work: str
+    name: str
+    processor: float | None
+    clock: float | None
+    unit: str
+    ratio: float | None
+    note: str
+    goal: str = ""
+    met: bool | None = None
+
+
+def measured(
+    work: str, field: list[Contestant], rounds: int, unit: str, goals: dict[str, tuple[str, float]]
+) -> list[Row]:
+    """Times of contestants taking turns; `goals` has the text and the limit by name."""
+    notes = {c.name: c.said(c.run()) for c in field}  # compile, page in
+    times: dict[str, list[tuple[float, float]]] = {c.name: [] for c in field}
+    factor = {"ms": 1e3, "us": 1e6}[unit]
+    for _ in range(rounds):
+        for c in field:
+            clock, processor = time.perf_counter(), time.process_time()
+            c.run()
+            spent = time.process_time() - processor, time.perf_counter() - clock
+            times[c.name].append((spent[0] / c.samples * factor, spent[1] / c.samples * factor))
+    median = {name: np.median(values, axis=0).tolist() for name, values in times.items()}
+    first = median[field[0].name][0]
+    rows = []
+    for c in field:
+        processor, clock = median[c.name]
+        goal, limit = goals.get(c.name, ("", np.inf))
+        if goal.startswith("x "):
+            limit *= median[goal[2:]][0]
+            goal = f"<= {goals[c.name][1]:g} x {goal[2:]}"
+        met = processor <= limit if goal else None
+        rows.append(
+            Row(work, c.name, processor, clock, unit, processor / first, notes[c.name], goal, met)
+        )
+    return rows
+
+
+def motion_of(n: int, count: int) -> Motion:
+    """Random motion, filled in place so that nothing else is ever held."""
+    rng = np.random.default_rng(0)
+    arrays = tuple(np.empty((count, n)) for _ in range(3))
+    for x in arrays:
+        rng.random(out=x)
+        x -= 0.5
+        x *= 6.0
+    return arrays
+
+
+class Figaroh:
+    """FIGAROH told the same robot: its regressor and its base parameters, by its defaults."""
+
+    def __init__(self, model: rm.RobotModel) -> None:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            from figaroh.identification import parameter
+            from figaroh.tools import qrdecomposition, regressor
+        self.regressor, self.qr = regressor, qrdecomposition
+        drives = model.drive if model.drive is not None else rm.DriveParameters.zeros(model.n)
+        self.settings = {
+            "has_friction": True, "has_actuator_inertia": True, "has_joint_offset": False,
+            "act_idxv": list(range(model.n)),
+            "fv": drives.Fv.tolist(), "fs": drives.Fc.tolist(), "Ia": drives.Ia.tolist(),
+        }  # fmt: skip
+        self.robot = pin.RobotWrapper(model.pin_model)
+        self.values = parameter.get_standard_parameters(model.pin_model)
+        self.values |= parameter.add_standard_additional_parameters(model.pin_model, self.settings)
+
+    def stack(self, motion: Motion, drive: bool = True) -> np.ndarray:
+        """The regressor of all samples."""
+        config = self.regressor.RegressorConfig(has_friction=drive, has_actuator_inertia=drive)
+        builder = self.regressor.RegressorBuilder(self.robot, config)
+        return builder.build_basic_regressor(*motion, self.settings)
+
+    def base(self, motion: Motion) -> tuple[object, np.ndarray, list[str]]:
+        """Regressor, columns without effect left out, double QR."""
+        W = self.stack(motion)
+        empty, names = self.regressor.get_index_eliminate(W, self.values)
+        W = self.regressor.build_regressor_reduced(W, empty)
+        found = self.qr.QRDecomposer()
+        found.double_decomposition(np.zeros(len(W)), W, names, self.values)
+        return found, W, names
+
+    def said(self, answer: tuple) -> str:
+        """Rank, and how well the base parameters give the torques of all."""
+        found, W, names = answer
+        theta = np.array([self.values[name] for name in names])
+        tau = W @ theta
+        error = np.abs(W[:, found.base_indices] @ (found.M @ theta) - tau).max() / np.abs(tau).max()
+        return f"rank {len(found.base_indices)}, torques kept to {error:.0e}"
+
+
+def figaroh_present() -> bool:
+    """Whether FIGAROH can be imported."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            import figaroh.tools.regressor  # noqa: F401
+    except ImportError:
+        return False
+    return True
+
+
+def rank_of(base: rm.BaseParameters) -> int:
+    """Base parameters without the offsets."""
+    return sum(not name.startswith("offset") for name in base.names)
+
+
+def said_of(base: rm.BaseParameters, motion: Motion) -> str:
+    """Rank, gap, and how well the base parameters give the torques of all."""
+    model = base.model
+    few = [x[:1000] for x in motion]
+    tau = rm.torque_regressor(model, *few) @ rm.parameter_vector(model)
+    own = base.reduce(rm.torque_regressor(model, *few)) @ base.values(model)
+    error = np.abs(own - tau).max() / np.abs(tau).max()
+    gap = "" if base.gap is None else f", gap {base.gap[0]:.2f} / {base.gap[1]:.0e}"
+    return f"rank {rank_of(base)}{gap}, torques kept to {error:.0e}"
+
+
+def reference_rank(model: rm.RobotModel) -> str:
+    """Singular values of Pinocchio's regressor, with columns of rotors and friction."""
+    pm, data, n = model.pin_model, model.pin_model.createData(), model.n
+    stack = []
+    for q, v, a in zip(*motion_of(n, 500), strict=True):
+        links = pin.computeJointTorqueRegressor(pm, data, q, v, a)
+        stack.append(np.hstack((links, np.diag(a), np.diag(v), np.diag(np.sign(v)))))
+    W = np.vstack(stack)
+    length = np.linalg.norm(W, axis=0)
+    seen = length > 1e-10 * length.max()
+    s = np.linalg.svd(W[:, seen] / length[seen], compute_uv=False)
+    rank = int((s > 1e-9 * s[0]).sum())
+    least = s[rank] if rank < len(s) else 0.0
+    return f"rank {rank}, singular values {s[rank - 1]:.0e} / {least:.0e}"
+
+
+def base_parameter_rows(peer: bool, rounds: int) -> list[Row]:
+    """Base parameters of four robots."""
+    rows = []
+    for name in ROBOTS:
+        model = rm.load(name)
+        motion = motion_of(model.n, SAMPLES)
+
+        def said(base: object, motion: Motion = motion) -> str:
+            return said_of(base, motion)
+
+        field = [
+            Contestant("robotmodels, symbolic", lambda m=model: rm.base_parameters(m), said=said),
+            Contestant(
+                "robotmodels, numeric", lambda m=model: rm.base_parameters(m, "numeric"), said=said
+            ),
+            Contestant(
+                "robotmodels, numeric, 1e4 samples",
+                lambda m=model, x=motion: rm.base_parameters(m, "numeric", motion=x), said=said,
+            ),
+        ]  # fmt: skip
+        if peer:
+            figaroh = Figaroh(model)
+            field.append(
+                Contestant(
+                    "FIGAROH, 1e4 samples", lambda f=figaroh, x=motion: f.base(x), said=figaroh.said
+                )
+            )
+        goal = {c.name: ("<= 100 ms", 100.0) for c in field[:2]}
+        rows += measured(name, field, rounds, "ms", goal)
+        rows.append(
+            Row(name, "reference: singular values", None, None, "ms", None, reference_rank(model))
+        )
+    return rows
+
+
+def through(chunks: Iterable[object]) -> None:
+    """Go through the pieces of a stream."""
+    for _ in chunks:
+        pass
+
+
+def loop(call: Callable[..., object], *arrays: np.ndarray) -> Callable[[], None]:
+    """A call for each sample, from Python."""
+
+    def run() -> None:
+        for row in zip(*arrays, strict=True):
+            call(*row)
+
+    return run
+
+
+def regressor_rows(peer: bool, rounds: int) -> list[Row]:
+    """Regressors of the UR10, 1e5 samples, and fewer in loops."""
+    model = rm.load("erd:ur10")
+    motion = motion_of(model.n, BATCH)
+    q, v, _ = motion
+    few: Motion = tuple(x[:FEW] for x in motion)
+    pm, data = model.pin_model, model.pin_model.createData()
+    base = rm.base_parameters(model)
+    links = rm.base_parameters(model, drive=False)
+    goal = {"robotmodels": ("<= 1.2 us", 1.2)}
+
+    def pin_torque(*x: np.ndarray) -> object:
+        return pin.computeJointTorqueRegressor(pm, data, *x)
+
+    def pin_energy(q: np.ndarray, v: np.ndarray) -> object:
+        kinetic = pin.computeKineticEnergyRegressor(pm, data, q, v)
+        return kinetic + pin.computePotentialEnergyRegressor(pm, data, q)
+
+    def torques(**choice: object) -> Callable[[], None]:
+        return lambda: through(rm.torque_regressor_chunks(model, *motion, **choice))
+
+    plain = Contestant("Pinocchio, Python loop", loop(pin_torque, *few), FEW)
+    field = [Contestant("robotmodels", torques(drive=False), BATCH), plain]
+    if peer:
+        figaroh = Figaroh(model)
+        field.append(Contestant("FIGAROH", lambda: figaroh.stack(few, drive=False), FEW))
+    rows = measured("torque, 6 x 60", field, rounds, "us", goal)
+    name = f"torque, base parameters alone, 6 x {len(links)}"
+    field = [Contestant("robotmodels", torques(drive=False, columns=links), BATCH)]
+    rows += measured(name, field, rounds, "us", goal)
+    field = [Contestant("robotmodels", torques(), BATCH)]
+    if peer:
+        field.append(
+            Contestant("FIGAROH, without offsets, 6 x 78", lambda: figaroh.stack(few), FEW)
+        )
+    rows += measured("torque with drives, 6 x 84", field, rounds, "us", {})
+    name = f"torque with drives, base parameters alone, 6 x {len(base)}"
+    rows += measured(
+        name, [Contestant("robotmodels", torques(columns=base), BATCH)], rounds, "us", {}
+    )
+    streams = {
+        "power, 84": lambda: regressors.power_regressor_chunks(model, *motion),
+        "momentum, 6 x 84, and its rate": lambda: regressors.momentum_regressor_chunks(model, q, v),
+    }
+    for work, stream in streams.items():
+        field = [Contestant("robotmodels", lambda s=stream: through(s()), BATCH)]
+        rows += measured(work, field, rounds, "us", {})
+    energy = [
+        Contestant(
+            "robotmodels",
+            lambda: through(regressors.energy_regressor_chunks(model, q, v, drive=False)),
+            BATCH,
+        ),
+        Contestant(
+            "Pinocchio, kinetic and potential, Python loop", loop(pin_energy, *few[:2]), FEW
+        ),
+    ]
+    return rows + measured("energy, 60", energy, rounds, "us", {})
+
+
+def inverse_dynamics_rows(rounds: int) -> list[Row]:
+    """Inverse dynamics of the UR10, 1e5 samples."""
+    model = rm.load("erd:ur10").with_drive(None)
+    motion = motion_of(model.n, BATCH)
+    base = rm.base_parameters(model, drive=False)
+    values = base.values(model)
+    pool = pin.ModelPool(model.pin_model, 1)
+    columns = [np.asfortranarray(x.T) for x in motion]
+    field = [
+        Contestant("robotmodels", lambda: rm.idm(model, *motion), BATCH),
+        Contestant(
+            "robotmodels, from base parameters",
+            lambda: idm_from_base(model, base, values, *motion), BATCH,
+        ),
+        Contestant("rneaInParallel(1)", lambda: pin.rneaInParallel(1, pool, *columns), BATCH),
+    ]  # fmt: skip
+    goal = {"robotmodels": ("x rneaInParallel(1)", 1.3)}
+    return measured("inverse dynamics, 1e5 samples", field, rounds, "us", goal)
+
+
+def standard_rows(rounds: int) -> list[Row]:
+    """Back to a robot: from the robot's own base parameters, and from disturbed ones."""
+    try:
+        import clarabel  # noqa: F401
+    except ImportError:
+        print("Clarabel is not installed: the way back to a robot is left out.")
+        return []
+    rows = []
+    rng = np.random.default_rng(0)
+    for name in ROBOTS:
+        model = rm.load(name)
+        base = rm.base_parameters(model)
+        prior = rm.uniform_bodies(model, float(model.inertia.mass.sum()) or 100.0)
+        own = base.values(model)
+        disturbed = own * rng.normal(1.0, 0.2, len(own))
+
+        def said(found: object, base: rm.BaseParameters = base) -> str:
+            off = np.abs(found.deviation).max()
+            return f"{found.status.name}, off by {off:.0e}, {len(base)} parameters"
+
+        field = [
+            Contestant(
+                case, lambda b=base, x=values, p=prior: rm.standard_parameters(b, x, prior=p),
+                said=said,
+            )
+            for case, values in (("its own base parameters", own), ("20 % off", disturbed))
+        ]  # fmt: skip
+        rows += measured(name, field, rounds, "ms", {})
+    return rows
+
+
+def child(who: str, count: int) -> None:
+    """One call in this process: prints its memory, times and answer."""
+    model = rm.load("erd:ur10")
+    figaroh = Figaroh(model) if who == "FIGAROH" else None
+
+    def answer(motion: Motion) -> object:
+        if figaroh is not None:
+            return figaroh.base(motion)
+        return rm.base_parameters(model, "numeric", motion=motion)
+
+    few = motion_of(model.n, 1000)
+    clock = time.perf_counter()
+    answer(few)  # compiles or loads what is compiled, pages in
+    first = time.perf_counter() - clock
+    motion = motion_of(model.n, count)
+    Path("/proc/self/clear_refs").write_text("5")  # the highest memory starts anew
+    before = highest_memory()
+    clock, processor = time.perf_counter(), time.process_time()
+    found = answer(motion)
+    spent = time.process_time() - processor, time.perf_counter() - clock
+    grown = highest_memory() - before
+    rank = len(found[0].base_indices) if figaroh is not None else rank_of(found)
+    told = {"grown": grown, "processor": spent[0], "clock": spent[1], "first": first, "rank": rank}
+    print(json.dumps(told))
+
+
+def highest_memory() -> float:
+    """Highest resident memory of this process so far, MB. Not `getrusage`: it inherits."""
+    status = Path("/proc/self/status").read_text()
+    line = next(line for line in status.splitlines() if line.startswith("VmHWM"))
+    return int(line.split()[1]) / 1024.0
+
+
+def memory_rows(peer: bool) -> list[dict[str, object]]:
+    """Highest memory of long logs, each in a process of its own; FIGAROH up to 1e5 samples."""
+    if not Path("/proc/self/clear_refs").exists():
+        print("The highest memory of a process is not told here: long logs are left out.")
+        return []
+    asked = [("robotmodels, numeric", count) for count in (SAMPLES, *LONG)]
+    if peer:
+        asked += [("FIGAROH", count) for count in (SAMPLES, LONG[0])]
+    rows = []
+    for who, count in asked:
+        command = [sys.executable, "-W", "ignore", __file__, "--child", who, "--count", str(count)]
+        out = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        rows.append({"name": who, "samples": count, **json.loads(out.splitlines()[-1])})
+    return rows
+
+
+def machine() -> dict[str, str]:
+    """What the figures were measured on, and with which versions."""
+    found = {"robotmodels": rm.__version__}
+    for package in ("pin", "numpy", "numba", "scipy", "clarabel", "figaroh"):
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "not installed"
+    cpu = platform.processor() or platform.machine()
+    info = Path("/proc/cpuinfo")
+    if info.exists():
+        names = [line for line in info.read_text().splitlines() if line.startswith("model name")]
+        cpu = names[0].partition(":")[2].strip() if names else cpu
+    load = f"{os.getloadavg()[0]:.1f} on {os.cpu_count()} cores when the run began"
+    threads = os.environ.get("OPENBLAS_NUM_THREADS", "not set")
+    return {
+        "cpu": cpu, "system": platform.system(), "python": platform.python_version(), **found,
+        "OPENBLAS_NUM_THREADS": threads, "load": load,
+    }  # fmt: skip
+
+
+def report(
+    parts: dict[str, list[Row]], memory: list[dict[str, object]], about: dict[str, str], rounds: int
+) -> str:
+    """The results as Markdown."""
+    lines = ["# Base parameters and regressors: measured side by side", ""]
+    lines += [f"- {key}: {value}" for key, value in about.items()]
+    lines += [
+        "",
+        f"Medians of {rounds} rounds (FIGAROH too) of the processor's time, and of the clock's; "
+        "`x`: ratio to the first line of each work. Goals are of the processor's time.",
+        "`rank`: base parameters of links, rotors and friction, without offsets. `gap`: smallest "
+        "sine of a kept column to those before it / largest of a dependent one.",
+    ]
+    for title, rows in parts.items():
+        if not rows:
+            continue
+        unit = "us a sample" if rows[0].unit == "us" else "ms a call"
+        lines += ["", f"## {title}", ""]
+        lines += [f"| work | contestant | {unit} | clock | x | answer | goal | met |"]
+        lines += ["|---|---|---|---|---|---|---|---|"]
+        for row in rows:
+            met = {True: "yes", False: "no", None: ""}[row.met]
+            figures = (row.processor, row.clock, row.ratio)
+            told = " | ".join("" if x is None else f"{x:.2f}" for x in figures)
+            lines.append(f"| {row.work} | {row.name} | {told} | {row.note} | {row.goal} | {met} |")
+    if not memory:
+        return "\n".join(lines) + "\n"
+    lines += ["", "## Memory and time of long logs: base parameters of the UR10", ""]
+    lines += [
+        "One call each, in a process of its own. `first call`: on 1000 samples, on the clock, with "
+        "what is compiled read from disk. Goal: memory does not grow with the samples.",
+        "",
+    ]
+    lines += [
+        "| contestant | samples | growth of memory, MB | s | clock | us a sample | rank | first "
+        "call, s |"
+    ]
+    lines += ["|---|---|---|---|---|---|---|---|"]
+    for row in memory:
+        each = row["processor"] / row["samples"] * 1e6
+        lines.append(
+            f"| {row['name']} | {row['samples']:.0e} | {row['grown']:.1f} | "
+            f"{row['processor']:.2f} | {row['clock']:.2f} | {each:.1f} | {row['rank']} | "
+            f"{row['first']:.2f} |"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    """Measure, print and keep the results."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--child", help=argparse.SUPPRESS)
+    parser.add_argument("--count", type=int, help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+    if arguments.child:
+        child(arguments.child, arguments.count)
+        return
+    about, rounds = machine(), arguments.rounds
+    peer = figaroh_present()
+    if not peer:
+        print("FIGAROH is not installed: its entries are left out.")
+    parts = {
+        "Base parameters with rotors and friction": base_parameter_rows(peer, rounds),
+        "Regressors of the UR10": regressor_rows(peer, 2 * rounds + 1),
+        "Inverse dynamics of the UR10": inverse_dynamics_rows(2 * rounds + 1),
+        "Back to a robot": standard_rows(rounds),
+    }
+    memory = memory_rows(peer)
+    text = report(parts, memory, about, rounds)
+    print(text)
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    (arguments.out / "base_parameters.md").write_text(text, encoding="utf-8")
+    kept = {
+        "machine": about,
+        "rounds": rounds,
+        "parts": {title: [asdict(row) for row in rows] for title, rows in parts.items()},
+        "memory": memory,
+    }
+    (arguments.out / "base_parameters.json").write_text(
+        json.dumps(kept, indent=2) + "\n", encoding="utf-8"
+    )
+
+
+if __name__ == "__main__":
+    main()
