@@ -17,7 +17,7 @@ from ..jacobians import Reference
 from .methods import InverseMethod
 from .request import Request, Secondary
 from .solution import IKMSolution
-from .solve import solved, solved_alone
+from .solve import check_size, solved, solved_alone
 
 if TYPE_CHECKING:
     from .bounds import JointBounds
@@ -123,6 +123,7 @@ def ikm(
     """
     check_model(model)
     q, twist = as_vector(q, model.n, "q"), as_vector(twist, 6, "twist")
+    check_size(twist, "twist")
     if (
         mask is joint_weights is length is secondary is limits is None
         and augmented == () == tasks

@@ -13,7 +13,7 @@ from ..jacobians import Reference
 from .methods import InverseMethod
 from .request import Request, Secondary
 from .solution import IKMSolution
-from .solve import solved
+from .solve import check_size, solved
 
 if TYPE_CHECKING:
     from .bounds import JointBounds
@@ -88,6 +88,7 @@ def ikm_second_order(
     check_model(model)
     q, v = as_vector(q, model.n, "q"), as_vector(v, model.n, "v")
     acceleration = as_vector(acceleration, 6, "acceleration")
+    check_size(acceleration, "acceleration")
     return solved(
         model,
         Request(

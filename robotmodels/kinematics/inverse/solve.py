@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..._arrays import Array, batch_rows
+from ...errors import InvalidValueError
 from ...model import RobotModel
 from ..jacobians import reference_of
 from .methods import InverseMethod, as_method
@@ -17,6 +18,9 @@ from .request import Request, secondary_motion
 from .scaling import WHOLE_TWIST, KnownFrame, Scaling, general_rank, known_frame, scaling_of
 from .solution import IKMSolution
 from .status import IKMStatus
+
+_LARGEST = 1e100
+"""Entries of a twist beyond which squares of them, and of what they need, may overflow."""
 
 _SINGULAR, _TOO_FEW = int(IKMStatus.SINGULAR), int(IKMStatus.TOO_FEW_JOINTS)
 
@@ -232,6 +236,32 @@ def tell_structure(
     if lacking.any():
         usual = min(general_rank(model, known, scaling, reference) + added, model.n)
         status[lacking & (rank >= usual)] = _TOO_FEW
+
+
+def check_size(rate: Array, name: str) -> None:
+    """Refuse rates whose squares would overflow.
+
+    Parameters
+    ----------
+    rate : ndarray, shape (..., 6)
+        Twists or accelerations.
+    name : str
+        Used in error messages.
+
+    Raises
+    ------
+    InvalidValueError
+        An entry beyond 1e100.
+
+    Examples
+    --------
+    >>> check_size(np.array([0.1, 0.0, 0.0, 0.0, 0.0, 0.2]), "twist")
+    """
+    largest = max(map(abs, rate.tolist())) if rate.ndim == 1 else np.abs(rate).max(initial=0.0)
+    if largest > _LARGEST:
+        raise InvalidValueError(
+            f"{name}: expected entries up to {_LARGEST:g}, got {largest:.3g}; check the units."
+        )
 
 
 def frozen(array: NDArray[Any], batch: tuple[int, ...]) -> NDArray[Any]:
