@@ -566,6 +566,24 @@ def test_a_jump_is_reported():
     assert not path.complete
 
 
+def test_a_jump_across_what_is_out_of_reach_is_between_poses_with_postures():
+    arm, q = load("ur5"), np.radians([0, -60, 80, -20, 60, 10])
+    A = dgm(arm, q)
+    B = A.copy()
+    B[:2, 3] *= -1.0
+    path = joint_path(arm, straight_line(A, B, duration=2.0), q)
+    (gap,) = path.of_kind(PathEventKind.OUT_OF_REACH)
+    (jump,) = path.of_kind(PathEventKind.JUMP)
+    assert (jump.first, jump.last) == (gap.first - 1, gap.last + 1)
+    step = np.abs(path.q[jump.last] - path.q[jump.first])
+    assert step.max() > 0.5 * np.pi
+    assert jump.detail == (
+        f"Joint {step.argmax() + 1} steps by {step.max():.4g}; in between, at pose {gap.first} to "
+        f"{gap.last}, the path is out of reach."
+    )
+    assert (jump.start, jump.stop) == (path.t[jump.first], path.t[jump.last])
+
+
 def test_redundant_arm_goes_on_from_its_posture():
     arm = load("iiwa14")
     q = np.array([0.1, 0.4, 0.3, -1.4, 0.5, 1.0, 0.7])

@@ -21,6 +21,9 @@ _JUMP = 0.1
 """A step that differs from what the Jacobian foresees by this much, and by half of itself, is no
 continuation: rad or m."""
 
+_ASTRAY = 0.5 * np.pi
+"""After a run without postures, a joint that is this far away did not go on, rad or m."""
+
 
 class PathEventKind(Enum):
     """What may happen on the way; the value is the sentence a person reads.
@@ -118,7 +121,7 @@ def path_events(
         outside.any(axis=-1),
         lambda i, j: _worst(over[i : j + 1], "is outside by {:.4g}."),
     )
-    step, jump = _jumps(q, reached, task)
+    step, jump, gaps = _jumps(q, reached, task)
     flips = reached[1:] & reached[:-1] & ~jump & (task.sign[1:] * task.sign[:-1] < 0.0)
     low = reached & (task.conditioning < singular_below)
     # a determinant that changes its sign between two samples passed a singular position
@@ -136,6 +139,11 @@ def path_events(
     for k in np.flatnonzero(jump):
         i, j = int(k), int(k) + 1
         text = _worst(np.abs(step[i : i + 1]), "steps by {:.4g}.")
+        events.append(PathEvent(PathEventKind.JUMP, i, j, times[i], times[j], text))
+    for i, j in gaps:
+        between = f"{i + 1}" + (f" to {j - 1}" if j > i + 2 else "")
+        text = _worst(np.abs(q[j : j + 1] - q[i]), "steps by {:.4g}")
+        text += f"; in between, at pose {between}, the path is out of reach."
         events.append(PathEvent(PathEventKind.JUMP, i, j, times[i], times[j], text))
     changed = reached[1:] & reached[:-1] & ((rows.branch[1:] != rows.branch[:-1]) | flips)
     for k in np.flatnonzero(changed):
@@ -176,8 +184,10 @@ def _missed(rows: Followed, first: int, last: int) -> str:
     return " ".join(texts)
 
 
-def _jumps(q: Array, reached: NDArray[np.bool_], task: Task) -> tuple[Array, NDArray[np.bool_]]:
-    """Steps (N - 1, n), and which of them are no continuation."""
+def _jumps(
+    q: Array, reached: NDArray[np.bool_], task: Task
+) -> tuple[Array, NDArray[np.bool_], list[tuple[int, int]]]:
+    """Steps (N - 1, n), which of them are no continuation, and which poses about a gap."""
     step = np.diff(q, axis=0)
     adjacent = reached[1:] & reached[:-1]
     with np.errstate(invalid="ignore"):
@@ -188,11 +198,12 @@ def _jumps(q: Array, reached: NDArray[np.bool_], task: Task) -> tuple[Array, NDA
         off = np.abs(step[wide] - task.foreseen(wide)).max(axis=-1, initial=0.0)
         jump[wide] = ~(off <= np.maximum(_JUMP, 0.5 * size[wide]))
     # after a gap the posture goes on where it can; any other one is a jump
-    ends = np.flatnonzero(reached)
-    for i, j in pairwise(ends.tolist()):
-        if j > i + 1 and np.abs(q[j] - q[i]).max(initial=0.0) > 0.5 * np.pi:
-            step[j - 1], jump[j - 1] = q[j] - q[i], True
-    return step, jump
+    gaps = [
+        (i, j)
+        for i, j in pairwise(np.flatnonzero(reached).tolist())
+        if j > i + 1 and np.abs(q[j] - q[i]).max(initial=0.0) > _ASTRAY
+    ]
+    return step, jump, gaps
 
 
 def _runs(where: NDArray[np.bool_]) -> list[tuple[int, int]]:
