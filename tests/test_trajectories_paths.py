@@ -584,6 +584,20 @@ def test_a_jump_across_what_is_out_of_reach_is_between_poses_with_postures():
     assert (jump.start, jump.stop) == (path.t[jump.first], path.t[jump.last])
 
 
+def test_a_start_elsewhere_is_reported():
+    arm, q = load("rx90"), np.array(Q["rx90"])
+    T = cartesian_trajectory(dgm(arm, q), dgm(arm, q + 0.1), 20)
+    assert not joint_path(arm, T, q + 0.09).events
+    assert not joint_path(arm, T, q + 2 * np.pi * np.eye(6)[0]).events  # whole turns are kept
+    assert not joint_path(arm, T).events
+    away = np.array([0.0, 0.3, 1.0, 0.0, 0.0, 0.0])
+    path = joint_path(arm, T, q + away)
+    (event,) = path.events
+    assert (event.kind, event.first, event.last) == (PathEventKind.JUMP, 0, 0)
+    assert event.detail == "Joint 3 is 1 away from q_start."
+    assert not path.complete
+
+
 def test_redundant_arm_goes_on_from_its_posture():
     arm = load("iiwa14")
     q = np.array([0.1, 0.4, 0.3, -1.4, 0.5, 1.0, 0.7])

@@ -134,7 +134,8 @@ def joint_path(
     poses : PoseTrajectory or array_like, shape (N, 4, 4)
         World poses of the tool, m.
     q_start : array_like, shape (n,), optional
-        Posture from which the robot comes, rad or m. Joints that do not matter keep its value.
+        Posture from which the robot comes, rad or m. Joints that do not matter keep its value. A
+        first posture that is more than 0.1 away from it is reported as a jump.
     t : array_like, shape (N,), optional
         Times of an array of poses, s, ascending; without them there are no velocities.
     samples : int
@@ -217,7 +218,7 @@ def joint_path(
         v = task.rates(twists)
     else:
         v = _differences(times, q, rows.reached)
-    events = list(path_events(model, times, q, v, rows, task, singular_below))
+    events = list(path_events(model, times, q, v, rows, task, singular_below, start))
     if motion is not None:
         known = partial(_reached, motion, lambda pose: solve(pose, start))
         events = [_located(event, times, known) for event in events]

@@ -80,6 +80,7 @@ def path_events(
     rows: Followed,
     task: Task,
     singular_below: float,
+    start: Array | None = None,
 ) -> Iterator[PathEvent]:
     """Everything that happens on the way, in the order of the path.
 
@@ -97,6 +98,8 @@ def path_events(
         The Jacobians on the way.
     singular_below : float
         Conditioning that counts as singular.
+    start : ndarray, shape (n,), or None
+        Where the robot comes from.
 
     Yields
     ------
@@ -140,6 +143,12 @@ def path_events(
         i, j = int(k), int(k) + 1
         text = _worst(np.abs(step[i : i + 1]), "steps by {:.4g}.")
         events.append(PathEvent(PathEventKind.JUMP, i, j, times[i], times[j], text))
+    if start is not None and reached.any():
+        k = int(reached.argmax())
+        away = np.abs(q[k : k + 1] - start)
+        if away.max(initial=0.0) > (_ASTRAY if k else _JUMP):
+            text = _worst(away, "is {:.4g} away from q_start.")
+            events.append(PathEvent(PathEventKind.JUMP, k, k, times[k], times[k], text))
     for i, j in gaps:
         between = f"{i + 1}" + (f" to {j - 1}" if j > i + 2 else "")
         text = _worst(np.abs(q[j : j + 1] - q[i]), "steps by {:.4g}")
