@@ -314,7 +314,7 @@ def test_values_belong_to_the_structure():
 
 def test_mistakes_are_named():
     model = rm.load("planar_2r")
-    with pytest.raises(InvalidValueError, match="'symbolic', 'numeric', or a member.*'khalil'"):
+    with pytest.raises(InvalidValueError, match=r"'symbolic', 'numeric', or a member.*'khalil'"):
         base_parameters(model, "khalil")
     with pytest.raises(InvalidValueError, match="constraint: the symbolic method"):
         base_parameters(model, constraint=np.eye(2))

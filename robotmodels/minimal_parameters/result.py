@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, as_floats, read_only
 from ..errors import InvalidValueError, ShapeError
+from ..latex_text import markdown
 from ..model import RobotModel, check_model
 from ..regressors import parameter_names, parameter_vector
 from .formulas import Formula, numeric_formulas, symbolic_formulas
@@ -233,7 +234,7 @@ class BaseParameters:
         return table_latex(self)
 
     def _repr_markdown_(self) -> str:
-        return f"```text\n{self.text}\n```"
+        return markdown(self.latex)
 
     def __str__(self) -> str:
         return self.text
