@@ -27,6 +27,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -50,7 +51,7 @@ class Contestant:
     name: str
     run: Callable[[], object]
     samples: int = 1
-    said: Callable[[object], str] = lambda _: ""
+    said: Callable[[Any], str] = lambda _: ""
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,7 @@ def measured(
 def motion_of(n: int, count: int) -> Motion:
     """Random motion, filled in place so that nothing else is ever held."""
     rng = np.random.default_rng(0)
-    arrays = tuple(np.empty((count, n)) for _ in range(3))
+    arrays = np.empty((count, n)), np.empty((count, n)), np.empty((count, n))
     for x in arrays:
         rng.random(out=x)
         x -= 0.5
@@ -133,7 +134,7 @@ class Figaroh:
         builder = self.regressor.RegressorBuilder(self.robot, config)
         return builder.build_basic_regressor(*motion, self.settings)
 
-    def base(self, motion: Motion) -> tuple[object, np.ndarray, list[str]]:
+    def base(self, motion: Motion) -> tuple[Any, np.ndarray, list[str]]:
         """Regressor, columns without effect left out, double QR."""
         W = self.stack(motion)
         empty, names = self.regressor.get_index_eliminate(W, self.values)
@@ -170,7 +171,7 @@ def rank_of(base: rm.BaseParameters) -> int:
 def said_of(base: rm.BaseParameters, motion: Motion) -> str:
     """Rank, gap, and how well the base parameters give the torques of all."""
     model = base.model
-    few = [x[:1000] for x in motion]
+    few: Motion = (motion[0][:1000], motion[1][:1000], motion[2][:1000])
     tau = rm.torque_regressor(model, *few) @ rm.parameter_vector(model)
     own = base.reduce(rm.torque_regressor(model, *few)) @ base.values(model)
     error = np.abs(own - tau).max() / np.abs(tau).max()
@@ -201,7 +202,7 @@ def base_parameter_rows(peer: bool, rounds: int) -> list[Row]:
         model = rm.load(name)
         motion = motion_of(model.n, SAMPLES)
 
-        def said(base: object, motion: Motion = motion) -> str:
+        def said(base: rm.BaseParameters, motion: Motion = motion) -> str:
             return said_of(base, motion)
 
         field = [
@@ -250,7 +251,7 @@ def regressor_rows(peer: bool, rounds: int) -> list[Row]:
     model = rm.load("erd:ur10")
     motion = motion_of(model.n, BATCH)
     q, v, _ = motion
-    few: Motion = tuple(x[:FEW] for x in motion)
+    few: Motion = (motion[0][:FEW], motion[1][:FEW], motion[2][:FEW])
     pm, data = model.pin_model, model.pin_model.createData()
     base = rm.base_parameters(model)
     links = rm.base_parameters(model, drive=False)
@@ -263,7 +264,7 @@ def regressor_rows(peer: bool, rounds: int) -> list[Row]:
         kinetic = pin.computeKineticEnergyRegressor(pm, data, q, v)
         return kinetic + pin.computePotentialEnergyRegressor(pm, data, q)
 
-    def torques(**choice: object) -> Callable[[], None]:
+    def torques(**choice: Any) -> Callable[[], None]:
         return lambda: through(rm.torque_regressor_chunks(model, *motion, **choice))
 
     plain = Contestant("Pinocchio, Python loop", loop(pin_torque, *few), FEW)
@@ -341,7 +342,7 @@ def standard_rows(rounds: int) -> list[Row]:
         own = base.values(model)
         disturbed = own * rng.normal(1.0, 0.2, len(own))
 
-        def said(found: object, base: rm.BaseParameters = base) -> str:
+        def said(found: rm.StandardParameters, base: rm.BaseParameters = base) -> str:
             off = np.abs(found.deviation).max()
             return f"{found.status.name}, off by {off:.0e}, {len(base)} parameters"
 
@@ -361,7 +362,7 @@ def child(who: str, count: int) -> None:
     model = rm.load("erd:ur10")
     figaroh = Figaroh(model) if who == "FIGAROH" else None
 
-    def answer(motion: Motion) -> object:
+    def answer(motion: Motion) -> Any:
         if figaroh is not None:
             return figaroh.base(motion)
         return rm.base_parameters(model, "numeric", motion=motion)
@@ -389,7 +390,7 @@ def highest_memory() -> float:
     return int(line.split()[1]) / 1024.0
 
 
-def memory_rows(peer: bool) -> list[dict[str, object]]:
+def memory_rows(peer: bool) -> list[dict[str, Any]]:
     """Highest memory of long logs, each in a process of its own; FIGAROH up to 1e5 samples."""
     if not Path("/proc/self/clear_refs").exists():
         print("The highest memory of a process is not told here: long logs are left out.")
@@ -427,7 +428,7 @@ def machine() -> dict[str, str]:
 
 
 def report(
-    parts: dict[str, list[Row]], memory: list[dict[str, object]], about: dict[str, str], rounds: int
+    parts: dict[str, list[Row]], memory: list[dict[str, Any]], about: dict[str, str], rounds: int
 ) -> str:
     """The results as Markdown."""
     lines = ["# Base parameters and regressors: measured side by side", ""]
