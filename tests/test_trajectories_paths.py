@@ -1,6 +1,7 @@
 """Motions through points and in space, Fourier series, and the way from poses to joints."""
 
 import pickle
+import sys
 from itertools import pairwise
 
 import numpy as np
@@ -607,6 +608,57 @@ def test_redundant_arm_goes_on_from_its_posture():
     assert np.abs(dgm(arm, path.q) - move.resample(40).T).max() < 1e-9
     assert np.abs(np.diff(path.q, axis=0)).max() < 0.05
     assert not path.of_kind(PathEventKind.JUMP)
+
+
+@pytest.mark.parametrize(
+    ("name", "q"),
+    [
+        ("panda", [0.1, -0.3, 0.2, -2.0, 0.1, 1.8, 0.5]),
+        ("iiwa14", [0.1, 0.4, 0.3, -1.4, 0.5, 1.0, 0.7]),
+        ("lwr4_plus", [0.1, 0.4, 0.3, -1.4, 0.5, 1.0, 0.7]),
+    ],
+)
+def test_redundant_arms_go_on_smoothly(name, q, monkeypatch):
+    arm = load(name)
+    calls = []
+    module = sys.modules["robotmodels.trajectories.joint_path"]
+    monkeypatch.setattr(module, "igm", lambda *a, **k: calls.append(a[2]) or igm(*a, **k))
+    start = dgm(arm, q)
+    end = start @ se3.rotation("x", 0.2)
+    end[:3, 3] += [0.06, 0.06, -0.05]
+    move = straight_line(start, end, duration=1.0)
+    path = joint_path(arm, move, q, samples=500)
+    assert path.complete
+    assert not path.of_kind(PathEventKind.CHANGES_POSTURE)
+    assert np.abs(path.q[0] - q).max() < 1e-9
+    assert np.abs(dgm(arm, path.q) - move.resample(500).T).max() < 2e-9
+    step = np.diff(path.q, axis=0)
+    assert np.abs(step).max() < 0.005
+    assert np.abs(np.diff(path.v, axis=0)).max() < 0.02 * np.abs(path.v).max()
+    if name == "panda":  # no arm angle: least steps, all postures of the first pose only
+        assert len(calls) == 1
+        null = np.linalg.svd(jacobian(arm, 0.5 * (path.q[1:] + path.q[:-1])))[2][:, -1]
+        assert np.abs(np.einsum("ki,ki->k", null, step)).max() < 1e-3 * np.abs(step).max()
+
+
+def test_redundant_arms_find_back_into_their_reach():
+    arm, q = load("panda"), np.array([0.1, -0.3, 0.2, -2.0, 0.1, 1.8, 0.5])
+    near = dgm(arm, q)
+    far = near.copy()
+    far[0, 3] += 0.5
+    out = cartesian_trajectory(near, far, 12)
+    path = joint_path(arm, np.concatenate((out, out[::-1])), q)
+    (gap,) = path.of_kind(PathEventKind.OUT_OF_REACH)
+    reached = np.isfinite(path.q).all(axis=-1)
+    assert 0 < gap.first < 12 <= gap.last < 23
+    assert np.array_equal(np.flatnonzero(~reached), np.arange(gap.first, gap.last + 1))
+    assert (
+        np.abs(dgm(arm, path.q[reached]) - np.concatenate((out, out[::-1]))[reached]).max() < 2e-9
+    )
+    back = path.of_kind(PathEventKind.JUMP)
+    assert bool(back) == bool(
+        np.abs(path.q[gap.last + 1] - path.q[gap.first - 1]).max() > np.pi / 2
+    )
 
 
 def test_limits_and_whole_turns():

@@ -14,6 +14,9 @@ from ..igm import IGMSolutions
 from ..igm.solutions import posture_distance
 from ..model import RobotModel
 
+_STEP = 0.5
+"""A posture found by steps from the last is taken when it is as near as this, rad or m."""
+
 _NEAR = 0.05
 """A posture with the same number that is as near as this goes on from the last, rad or m."""
 
@@ -152,6 +155,7 @@ def follow_singly(
     N: int,
     start: Array | None,
     solve: Callable[[int, Array | None], IGMSolutions],
+    go_on: Callable[[int, Array], IGMSolutions],
 ) -> Followed:
     """Solve pose by pose, each from the posture before: for arms with a choice of postures.
 
@@ -165,28 +169,40 @@ def follow_singly(
         Where the robot comes from.
     solve : callable
         Postures of one pose, by its number, with a reference or None.
+    go_on : callable
+        One posture of a pose, if it is found by steps from the posture before: quicker than all
+        postures where an arm has no closed form that keeps an arm angle.
 
     Returns
     -------
     Followed
         One posture of each pose that has any.
     """
+    revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
     q, reached = np.full((N, model.n), np.nan), np.zeros(N, np.bool_)
     status, labels, reasons = np.zeros(N, np.int8), [""] * N, [""] * N
     missing = np.full((N, 6), np.nan)
-    before = start
+    before, steps = start, False
     for k in range(N):
+        if steps and before is not None and reached[k - 1]:
+            one = go_on(k, before)
+            # from far away the search may end at another branch
+            if one.valid[0] and posture_distance(one.q[0], before, revolute) < _STEP:
+                before = q[k] = one.q[0]
+                reached[k], status[k], reasons[k] = True, one.status, one.reason()
+                missing[k] = 0.0
+                continue
         one = solve(k, before)
         status[k], reasons[k], missing[k] = one.status, one.reason(), _missing(one)
         if not one.valid.any():
             continue
         s = 0
         if before is not None:
-            revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
             distance = posture_distance(one.q, before, revolute)
             s = int(np.where(one.valid, distance, np.inf).argmin())
         before = q[k] = one.q[s]
         reached[k], labels[k] = True, str(one.branch[s])
+        steps = not one.method.endswith("arm angle")
     branch = np.array(labels, dtype=np.str_)
     return Followed(q, reached, status, branch, missing, reasons.__getitem__)
 

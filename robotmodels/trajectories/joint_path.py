@@ -19,7 +19,7 @@ from .. import se3
 from .._arrays import Array, as_exact, as_floats, read_only
 from ..errors import InvalidValueError, ShapeError
 from ..geometry import FIXED
-from ..igm import IGMSolutions, igm
+from ..igm import IGMSolutions, igm, igm_numeric
 from ..model import RobotModel
 from .follow import continuous, follow, follow_singly
 from .path_events import PathEvent, PathEventKind, path_events
@@ -45,7 +45,7 @@ class JointPath:
         Of the Jacobian, from 1 where it is best to 0 where it is singular (the inverse of its
         condition number in the Frobenius norm, positions taken in units of the arm's lever).
     branch : ndarray of str, shape (N,)
-        Labels of the branches.
+        Labels of the branches; empty where a redundant arm went on by steps.
     events : tuple of PathEvent
         What happens, in the order of the path.
 
@@ -125,7 +125,9 @@ def joint_path(
     Also called ``ikine`` of a ``ctraj``. Each pose is solved for all postures, and the posture
     nearest to the last one is taken. Without ``q_start`` the branch is chosen that goes through
     with the fewest jumps, the fewest poses outside the limits, and then the shortest way. Whole
-    turns are chosen so that the joints move continuously.
+    turns are chosen so that the joints move continuously. A redundant arm keeps its arm angle if
+    it has one; others go on by the least steps from the last posture, and are solved for all
+    postures only where that fails.
 
     Parameters
     ----------
@@ -202,6 +204,17 @@ def joint_path(
     def solve(targets: Array, near: Array | None) -> IGMSolutions:
         return igm(model, targets, near, mask, mask_axes, **tolerances)  # type: ignore[arg-type]
 
+    def go_on(i: int, near: Array) -> IGMSolutions:
+        return igm_numeric(
+            model,
+            T[i],
+            near,
+            mask,
+            mask_axes,
+            restarts=0,
+            **tolerances,  # type: ignore[arg-type]
+        )
+
     asked = 6 if mask is None else int(np.count_nonzero(mask))
     joints = model.table.sigma[np.asarray(model.table.path(model.tip)) - 1] != FIXED
     found = None
@@ -211,7 +224,7 @@ def joint_path(
     if found is not None and (found.q.shape[-2] > 1 or not found.method.startswith("numeric")):
         rows = follow(model, T, found, start, lambda i, near: solve(T[i], near))
     else:
-        rows = follow_singly(model, len(T), start, lambda i, near: solve(T[i], near))
+        rows = follow_singly(model, len(T), start, lambda i, near: solve(T[i], near), go_on)
     q = continuous(model, rows.q, rows.reached, start)
     task = Task(model, T, q, rows.reached, mask, mask_axes)
     if twists is not None and task.square:
