@@ -17,6 +17,7 @@ from ..errors import InvalidValueError, ShapeError
 from .asked import ROUNDING, checked_limits, given_durations
 from .limits import MotionLimits
 from .piecewise import PiecewisePolynomial
+from .shown import least_shown
 from .trajectory import Trajectory
 
 PARABOLA, QUARTIC = 1.0, 1.5
@@ -106,7 +107,7 @@ def blended_lines(
             k = int(room.argmin())
             raise InvalidValueError(
                 f"The blends at the ends of line {k + 1} overlap: it needs at least "
-                f"{0.5 * (tb[k] + tb[k + 1]):.9g} s, and has {T[k]:.9g} s."
+                f"{least_shown(0.5 * (tb[k] + tb[k + 1]), 9)} s, and has {T[k]:.9g} s."
             )
     least = float(T.sum() + 0.5 * (tb[0] + tb[-1]))
     wanted = given_durations(duration, ())
@@ -114,7 +115,7 @@ def blended_lines(
         if bounds is not None and wanted[0] < least * (1.0 - ROUNDING):
             raise InvalidValueError(
                 f"duration: {wanted[0]:.9g} s is too short for the limits; the least is "
-                f"{least:.12g} s."
+                f"{least_shown(least)} s."
             )
         if wanted[0] == 0.0:
             raise InvalidValueError("duration: expected a positive time for a motion, got 0 s.")
@@ -123,7 +124,7 @@ def blended_lines(
     if bounds is not None and not (report := trajectory.check(bounds, 1e-9)).kept:
         raise InvalidValueError(
             f"The limits are not kept: {'; '.join(report.violations())}. The least factor on the "
-            f"times is {report.stretch:.12g}."
+            f"times is {least_shown(report.stretch)}."
         )
     return trajectory
 
@@ -142,13 +143,18 @@ def schedule(T: Array, blends: Callable[[Array], Array]) -> tuple[Array, Array]:
     Returns
     -------
     T : ndarray, shape (m - 1,)
-        Times of the lines, increased where their halves of two blends did not fit.
+        Times of the lines, increased where their halves of two blends did not fit. A line of no
+        length, which has no time of its own, is given that of the two halves: the motion stops
+        there.
     tb : ndarray, shape (m,)
         Times of the blends.
     """
+    still = T == 0.0
     for _ in range(500):
         tb = blends(T)
-        need = np.minimum(0.5 * (tb[:-1] + tb[1:]), 4.0 * T)
+        halves = 0.5 * (tb[:-1] + tb[1:])
+        T = np.where(still & np.isfinite(halves), halves, T)
+        need = np.minimum(halves, 4.0 * T)
         if (need <= T * (1.0 + 1e-13)).all():
             break
         # slower lines need shorter blends: the geometric mean is the answer for a line alone

@@ -207,18 +207,18 @@ class BlendedPoses:
         return twist, change
 
     def _fades(self, s: Array) -> tuple[NDArray[np.intp], Array, Array, Array, Array]:
-        """Nearest corner, the twists of its lines, and how far they have gone from it.
+        """Corner of the nearest blend, the twists of its lines, and how far they have gone from it.
 
         The last two are arrays (3, N): times along the line before and the line after, and their
         first two derivatives.
         """
-        t = s - 0.5 * self.blends[0]
-        times = self.times - 0.5 * self.blends[0]
-        corner = np.searchsorted(0.5 * (times[1:] + times[:-1]), t, side="right")
+        # in the middle of what is straight, not of the line: one blend may be much the longer
+        reach = self.times + 0.5 * self.blends, self.times - 0.5 * self.blends
+        corner = np.searchsorted(0.5 * (reach[0][:-1] + reach[1][1:]), s, side="right")
         none = np.zeros((1, 6))
         before = np.concatenate((none, self.twists))[corner]
         after = np.concatenate((self.twists, none))[corner]
-        t, b = t - times[corner], self.blends[corner]
+        t, b = s - self.times[corner], self.blends[corner]
         width = np.where(b > 0.0, b, 1.0)
         x = np.clip(np.where(b > 0.0, t / width + 0.5, t >= 0.0), 0.0, 1.0)
         if self.smooth:

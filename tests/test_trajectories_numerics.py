@@ -1,0 +1,90 @@
+"""Trajectories where numbers are hard: uneven times, far ends, flat arcs, vanishing harmonics."""
+
+import numpy as np
+import pytest
+from identities.random_robots import random_pose
+
+from robotmodels.trajectories import MotionLimits, blended_lines, blended_poses
+from robotmodels.trajectories.rotations import axis_and_angle, rotation_about, rotation_vector
+
+# --- blends of poses -----------------------------------------------------------------------------
+
+
+def along_x(*x):
+    T = np.tile(np.eye(4), (len(x), 1, 1))
+    T[:, 0, 3] = x
+    return T
+
+
+def integrated(move, T):
+    """Pose at the end from the twist alone: a fourth-order Magnus series on short intervals."""
+    times, half = move.path.times, 0.5 * move.path.blends
+    marks = np.unique(np.clip(np.concatenate((times - half, times + half)), 0.0, move.duration))
+    parts = np.linspace(marks[:-1], marks[1:], 257)
+    a, b = parts[:-1].T.ravel(), parts[1:].T.ravel()
+    middle, h, off = 0.5 * (a + b), (b - a)[:, None], (b - a) / np.sqrt(12.0)
+    one, two = move.twist(middle - off), move.twist(middle + off)
+    turn = 0.5 * h * (one + two)[:, 3:] + np.cross(two[:, 3:], one[:, 3:]) * h**2 * np.sqrt(3) / 12
+    last = T.copy()
+    last[:3, 3] += (0.5 * h * (one + two)[:, :3]).sum(axis=0)
+    for R in rotation_about(*axis_and_angle(turn)):
+        last[:3, :3] = R @ last[:3, :3]
+    return last
+
+
+def step_speeds(move, samples=4001):
+    """Greatest speeds of translation and rotation between neighbouring samples."""
+    t = np.linspace(0.0, move.duration, samples)
+    T = move.pose(t)
+    turn = rotation_vector(T[1:, :3, :3] @ np.swapaxes(T[:-1, :3, :3], -1, -2))
+    steps = np.stack((np.diff(T[:, :3, 3], axis=0), turn))
+    return np.linalg.norm(steps, axis=-1).max(axis=-1) / t[1]
+
+
+def assert_sound(T, limits, smooth):
+    move = blended_poses(T, limits, smooth=smooth)
+    assert np.abs(integrated(move, T[0]) - T[-1]).max() < 1e-8
+    assert (step_speeds(move) < limits.velocity * (1.0 + 1e-6)).all()
+    # the given ends are put in at the ends: the poses beside them show whether they had to be
+    beside = np.array([np.nextafter(0.0, 1.0), np.nextafter(move.duration, 0.0)])
+    assert np.abs(move.pose(beside) - T[[0, -1]]).max() < 1e-12
+    assert np.abs(move.twist(beside)).max() < 1e-9
+    t = np.linspace(0.0, move.duration, 2001)
+    a = move.acceleration(t).reshape(-1, 2, 3)
+    bound = limits.acceleration * (1.0 + 1e-9)
+    assert (np.linalg.norm(a, axis=-1).max(axis=0) < bound).all()
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+def test_a_long_blend_beside_a_short_one_makes_no_jump(smooth):
+    limits = MotionLimits(velocity=[1.0, 1.0], acceleration=[0.6, 1.0])
+    assert_sound(along_x(0.0, 1.0, 2.0), limits, smooth)
+    assert_sound(along_x(0.0, 1.0, 2.0, 2.5, 1.0), limits, smooth)
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+def test_blended_poses_go_where_their_twist_takes_them(rng, smooth):
+    for _ in range(30):
+        m = int(rng.integers(2, 6))
+        T = np.stack([random_pose(rng) for _ in range(m)])
+        if rng.random() < 0.3:
+            T[-1, :3, :3] = T[0, :3, :3]  # translations alone
+            T[1:-1, :3, :3] = T[0, :3, :3]
+        v, a = 10.0 ** rng.uniform(-1.0, 1.0, (2, 2))
+        assert_sound(T, MotionLimits(velocity=v, acceleration=a), smooth)
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+@pytest.mark.parametrize("x", [(0, 0, 1), (0, 1, 1), (0, 1, 1, 2), (0, 0, 1, 1, 1, 0)])
+@pytest.mark.parametrize("a", [0.6, 3.0])
+def test_blends_stop_at_a_pose_given_twice(x, a, smooth):
+    assert_sound(along_x(*x), MotionLimits(velocity=[1.0, 1.0], acceleration=[a, 1.0]), smooth)
+    limits = MotionLimits(velocity=1.0, acceleration=a)
+    path = blended_lines(np.array(x, float), limits=limits, smooth=smooth)
+    # as long as the moves one after the other
+    moves = [abs(d) for d in np.diff(x) if d]
+    ramp = 1.0 / a if not smooth else 1.5 / a
+    each = [d + ramp if d >= ramp else 2.0 * np.sqrt(d * ramp) for d in moves]
+    assert path.duration == pytest.approx(sum(each), rel=1e-9)
+    slow = blended_lines(np.array(x, float), 2.0 * path.duration, limits, smooth=smooth)
+    assert slow.duration == pytest.approx(2.0 * path.duration, rel=1e-12)
