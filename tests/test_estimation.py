@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from robotmodels.errors import InvalidValueError, ShapeError
-from robotmodels.estimation import column_basis
+from robotmodels.estimation import column_basis, triangular_factor
 
 
 def test_random_ranks(rng):
@@ -62,3 +62,18 @@ def test_mistakes_are_named():
         column_basis(np.eye(2), scale=[1.0, 0.0])
     with pytest.raises(InvalidValueError):
         column_basis([[np.nan, 1.0]])
+
+
+def test_triangular_factor_of_pieces(rng):
+    W = rng.normal(size=(90, 3, 7))
+    W[:, 0, 3:] = 0.0
+    W[:40, 1, :2] = 0.0  # columns that are seen late
+    W[:, 2, 5] = 0.0
+    normal = np.einsum("kip,kiq->pq", W, W)
+    for cuts in ([], [1], [40], [10, 20, 50, 89]):
+        R = triangular_factor(np.split(W, cuts), 7)
+        assert R.shape == (7, 7)
+        assert np.allclose(np.tril(R, -1), 0.0)
+        assert np.allclose(R.T @ R, normal)
+    assert triangular_factor([], 4).shape == (0, 4)
+    assert triangular_factor([W[:0]], 7).shape == (0, 7)

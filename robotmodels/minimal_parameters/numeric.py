@@ -7,7 +7,7 @@ from math import ceil, sqrt
 import numpy as np
 
 from .._arrays import Array
-from ..estimation import ColumnBasis, column_basis
+from ..estimation import ColumnBasis, column_basis, triangular_factor
 from ..estimation.columns import DEPENDENT
 from ..geometry import PRISMATIC
 from ..model import RobotModel
@@ -15,7 +15,7 @@ from ..regressors import parameter_names, torque_regressor_chunks
 from .result import BaseMethod, BaseParameters
 
 _ROWS_A_COLUMN = 3
-_PIECE = 256
+_PIECE = 1024
 
 
 def base_by_numbers(
@@ -89,14 +89,12 @@ def base_columns(
     units = np.where(slides, size, 1.0)
     if samples is None:
         samples = _random_motion(model, p, size, units, constraint)
-    triangle = np.zeros((0, p))
-    for _, W in torque_regressor_chunks(model, *samples, drive=drive, size=_PIECE):
-        if constraint is None:
-            stack = (W * units[:, None]).reshape(-1, p)
-        else:
-            stack = np.einsum("iu,kip->kup", constraint, W).reshape(-1, p)
-        stack = np.vstack((triangle, stack))
-        triangle = np.linalg.qr(stack, mode="r") if len(stack) > p else stack
+    chunks = torque_regressor_chunks(model, *samples, drive=drive, size=_PIECE)
+    pieces = (
+        W * units[:, None] if constraint is None else np.einsum("iu,kip->kup", constraint, W)
+        for _, W in chunks
+    )
+    triangle = triangular_factor(pieces, p)
     return column_basis(triangle, scale=_natural_sizes(model, drive, size), dependent=tolerance)
 
 
