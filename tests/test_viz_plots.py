@@ -206,16 +206,16 @@ def test_a_figure_shows_itself_and_leaves_pyplot_alone():
     script = """
 import sys
 import robotmodels as rm
-import robotmodels.viz.plot_trajectory as room
+from robotmodels.viz import plot_trajectory
 assert "matplotlib" not in sys.modules
-figure = room.plot_trajectory(rm.trajectories.quintic(0.0, 1.0, duration=1.0))
+figure = plot_trajectory(rm.trajectories.quintic(0.0, 1.0, duration=1.0))
 picture = figure._repr_png_()
 assert picture.startswith(b"\\x89PNG") and len(picture) > 5000
 assert "matplotlib.pyplot" not in sys.modules
 sys.modules["matplotlib.figure"] = None
 del sys.modules["robotmodels.viz.plot_figure"]
 try:
-    room.plot_trajectory(rm.trajectories.quintic(0.0, 1.0, duration=1.0))
+    plot_trajectory(rm.trajectories.quintic(0.0, 1.0, duration=1.0))
 except rm.errors.MissingExtraError as error:
     print(error)
 """
