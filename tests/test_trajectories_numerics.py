@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from identities.random_robots import random_pose
 
-from robotmodels.trajectories import MotionLimits, blended_lines, blended_poses
+from robotmodels.trajectories import MotionLimits, blended_lines, blended_poses, fourier
 from robotmodels.trajectories.rotations import axis_and_angle, rotation_about, rotation_vector
 
 # --- blends of poses -----------------------------------------------------------------------------
@@ -88,3 +88,42 @@ def test_blends_stop_at_a_pose_given_twice(x, a, smooth):
     assert path.duration == pytest.approx(sum(each), rel=1e-9)
     slow = blended_lines(np.array(x, float), 2.0 * path.duration, limits, smooth=smooth)
     assert slow.duration == pytest.approx(2.0 * path.duration, rel=1e-12)
+
+
+# --- harmonics -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("small", [1e-320, 1e-200, 1e-30, 1e-17, 1e-16, 1e-15, 1e-12, 1e-8, 1e-4])
+def test_extremes_of_a_series_whose_last_harmonics_vanish(rng, small):
+    swing = fourier([[1.0], [small]], [[0.0], [0.0]], period=2.0)
+    low, high = swing.motion.extremes(0)
+    assert -low == pytest.approx([1.0 / np.pi], rel=2.0 * small + 1e-15)
+    assert high == pytest.approx([1.0 / np.pi], rel=2.0 * small + 1e-15)
+    t = np.linspace(0.0, 2.0, 20001)
+    for H in (2, 5, 9):
+        for vanishing in range(1, H):
+            a, b = rng.normal(size=(2, H, 2))
+            a[-vanishing:] *= small
+            b[-vanishing:] *= small
+            motion = fourier(a, b, period=2.0).motion
+            for order in range(4):
+                (x,) = motion.derivatives(t, (order,))
+                (curve,) = motion.derivatives(t, (order + 2,))
+                low, high = motion.extremes(order)
+                scale = np.abs(x).max(axis=0)
+                # the extreme is at most half a step from a sample
+                beyond = np.abs(curve).max(axis=0) * t[1] ** 2 / 8.0 + 1e-13 * scale
+                assert (low <= x.min(axis=0) + 1e-14 * scale).all()
+                assert (x.min(axis=0) - beyond <= low).all()
+                assert (high >= x.max(axis=0) - 1e-14 * scale).all()
+                assert (high <= x.max(axis=0) + beyond).all()
+
+
+def test_extremes_of_a_series_of_next_to_nothing():
+    for size in (0.0, 1e-320, 1e-300, 1e300):
+        motion = fourier([[size], [0.5 * size]], [[0.0], [0.0]], mean=[1.0], period=2.0).motion
+        (v,) = motion.derivatives(np.linspace(0.0, 2.0, 2001), (1,))
+        low, high = motion.extremes(1)
+        assert high == pytest.approx(1.5 * size, rel=1e-2)
+        assert (low <= v.min() * (1.0 - 1e-14) + 1e-14 * size).all()
+        assert (low >= v.min() - 1e-5 * size - 5e-324).all()

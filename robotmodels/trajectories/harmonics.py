@@ -128,7 +128,8 @@ class FourierSeries:
         -------
         lower, upper : ndarray, shapes (n,)
             At the zeros of the next derivative, which are the roots of a polynomial in
-            ``exp(i w t)``.
+            ``exp(i w t)``. Its last harmonics below the rounding of its largest would spoil the
+            roots: they are left out of it, and the values widened by all that this may move them.
         """
         H, w = len(self.a), 2.0 * np.pi / self.period
         k = np.arange(1, H + 1)
@@ -138,11 +139,19 @@ class FourierSeries:
         )
         low, high = np.empty(self.n), np.empty(self.n)
         for j in range(self.n):
-            half = 0.5 * (c[:, j] - 1j * s[:, j])
-            roots = np.roots(np.concatenate((half[::-1], (0.0,), half.conj())))
+            size = max(np.abs(c[:, j]).max(initial=0.0), np.abs(s[:, j]).max(initial=0.0))
+            # as parts of the largest, which may itself be next to nothing
+            unit = size if size > 0.0 else 1.0
+            half = c[:, j] / unit - 1j * (s[:, j] / unit)
+            kept = np.flatnonzero(np.abs(half) > np.finfo(float).eps)
+            last = int(kept[-1]) + 1 if kept.size else 0
+            part = half[:last]
+            roots = np.roots(np.concatenate((part[::-1], (0.0,), part.conj())))
             angles = np.concatenate(((0.0,), np.angle(roots[roots != 0.0])))
             (value,) = self.derivatives(angles / w, (order,))
-            low[j], high[j] = value[:, j].min(), value[:, j].max()
+            # what was left out shifts the series by at most its amplitudes, here and at the extreme
+            slack = 2.0 * size * float((np.abs(half[last:]) / (k[last:] * w)).sum())
+            low[j], high[j] = value[:, j].min() - slack, value[:, j].max() + slack
         return low, high
 
     def __reduce__(self) -> tuple[Any, ...]:
