@@ -1,10 +1,13 @@
 """Joint motions: limits kept, least times, continuity, ratios, ends, and refusals."""
 
 import pickle
+import re
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 import pytest
+from identities.random_robots import random_pose
 from scipy.optimize import linprog
 
 from robotmodels.errors import InvalidValueError, ShapeError
@@ -16,12 +19,17 @@ from robotmodels.trajectories import (
     along_line,
     bang_bang,
     blended_lines,
+    blended_poses,
+    circle,
     cubic,
+    cubic_spline,
     jerk_limited,
     joint_trajectory,
     linear,
     quintic,
+    quintic_spline,
     smoothed_trapezoidal,
+    straight_line,
     trapezoidal,
 )
 from robotmodels.trajectories.piecewise import PiecewisePolynomial
@@ -267,6 +275,98 @@ def test_given_duration_slows_down_and_refuses_too_short(rng):
             along_line(law, [0.0, 1.0], [1.0, 0.5], 0.99 * least, own)
         # the least itself is accepted
         assert along_line(law, [0.0, 1.0], [1.0, 0.5], least, own).duration == least
+
+
+def named(error, words):
+    """The number that a message tells after the words."""
+    return float(re.search(words + r" ([0-9.e+-]*[0-9])", str(error.value)).group(1))
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_the_least_duration_of_a_message_is_accepted(law, rng):
+    for k in range(60):
+        n = int(rng.integers(1, 5))
+        limits, how = random_limits(rng, law, n), list(Synchronisation)[rng.integers(3)]
+        q0, q1 = rng.uniform(-2.0, 2.0, (2, n))
+        ask = partial(along_line, law, q0, q1, limits=limits, synchronisation=how)
+        with pytest.raises(InvalidValueError) as refusal:
+            ask(ask(None).duration * rng.uniform(0.1, 0.9999))
+        least = named(refusal, "the least is")
+        assert ask(least).duration == least
+        assert ask(least).check(limits).kept
+        own = MotionLimits(limits.velocity[:1], limits.acceleration[:1], limits.jerk[:1])
+        A, B = random_pose(rng), random_pose(rng)
+        pose = partial(straight_line, A, B, limits=own, law=law)
+        if k % 30 == 0:
+            pose = partial(circle, A, rng.normal(size=3), rng.normal(size=3), limits=own, law=law)
+        with pytest.raises(InvalidValueError) as refusal:
+            pose(duration=pose().duration * 0.7)
+        least = named(refusal, "the least is")
+        assert pose(duration=least).duration == least
+
+
+def test_the_least_durations_between_states_are_accepted(rng):
+    refused = 0
+    for k in range(60):
+        n = int(rng.integers(1, 4))
+        limits = random_limits(rng, TimeLaw.JERK_LIMITED, n, same_jerk=True)
+        q0, q1 = rng.uniform(-2.0, 2.0, (2, n))
+        room = np.minimum(limits.velocity, -limits.velocity_lower)
+        ends = {name: rng.uniform(-0.3, 0.3, n) * room for name in ("v0", "v1")}
+        make = (cubic, quintic, jerk_limited)[k % 3]
+        if make is jerk_limited:
+            make = partial(make, synchronisation=Synchronisation.SAME_TIME)
+        try:
+            least = make(q0, q1, limits=limits, **ends).duration
+        except InvalidValueError:
+            continue  # these states have none
+        with pytest.raises(InvalidValueError) as refusal:
+            make(q0, q1, least * rng.uniform(0.3, 0.99), limits, **ends)
+        # ruckig tells the next from there on, the others the least of all
+        told = named(refusal, "(?:that keeps them|they are|least duration) is")
+        assert make(q0, q1, told, limits, **ends).duration == told
+        refused += 1
+    assert refused > 40
+    for make in (quintic, jerk_limited):
+        for v0 in rng.uniform(0.3, 1.0, 20):
+            with pytest.raises(InvalidValueError) as refusal:
+                make(0.0, 3.0, limits=MotionLimits(0.2, 5.0, 50.0), v0=v0)
+            told = named(refusal, "least limit that will do is")
+            assert make(0.0, 3.0, limits=MotionLimits(told, 5.0, 50.0), v0=v0).duration > 3.0
+
+
+def test_factors_and_blends_of_messages_are_accepted(rng):
+    for smooth in (False, True):
+        for _ in range(15):
+            points = rng.uniform(-2.0, 2.0, (5, 3))
+            limits = MotionLimits(rng.uniform(0.5, 2.0, 3), rng.uniform(1.0, 5.0, 3))
+            ask = partial(blended_lines, points, limits=limits, smooth=smooth)
+            with pytest.raises(InvalidValueError) as refusal:
+                ask(0.9 * ask().duration)
+            told = named(refusal, "the least is")
+            assert ask(told).duration == pytest.approx(told, rel=1e-15)
+            poses = np.stack([random_pose(rng) for _ in range(4)])
+            own = MotionLimits(limits.velocity[:2], limits.acceleration[:2])
+            ask = partial(blended_poses, poses, own, smooth=smooth)
+            with pytest.raises(InvalidValueError) as refusal:
+                ask(0.9 * ask().duration)
+            told = named(refusal, "the least is")
+            assert ask(told).duration == pytest.approx(told, rel=1e-15)
+            times, blends = rng.uniform(0.3, 0.4, 4), rng.uniform(0.1, 0.2, 5)
+            ask = partial(blended_lines, points, limits=limits, smooth=smooth)
+            with pytest.raises(InvalidValueError) as refusal:
+                ask(segment_times=times, blend_times=blends)
+            told = named(refusal, "factor on the times is")
+            assert ask(segment_times=told * times, blend_times=told * blends).check(limits).kept
+            lines = partial(blended_lines, points[:3], smooth=smooth, blend_times=blends[:3])
+            with pytest.raises(InvalidValueError) as refusal:
+                lines(segment_times=[0.01, 9.0])
+            assert lines(segment_times=[named(refusal, "needs at least"), 9.0]).duration > 9.0
+            knots = np.concatenate(((0.0,), np.cumsum(rng.uniform(0.01, 0.02, 4))))
+            for make in (cubic_spline, quintic_spline):
+                with pytest.raises(InvalidValueError) as refusal:
+                    make(points, knots, limits)
+                assert make(points, knots * named(refusal, "factor on the times is"), limits)
 
 
 def test_laws_of_a_duration_alone():

@@ -11,6 +11,7 @@ from .._arrays import Array, as_floats
 from ..errors import InvalidValueError, ShapeError
 from .laws import LineLimits
 from .limits import MotionLimits
+from .shown import least_shown
 
 ROUNDING = 1e-12
 """Relative shortfall of a given duration that is put down to rounding."""
@@ -193,7 +194,8 @@ def refuse_short(T: Array | None, least: Array, length: Array) -> None:
     if short.any():
         i = int(short.argmax())
         raise InvalidValueError(
-            f"duration: {T[i]:.9g} s is too short for the limits; the least is {least[i]:.12g} s."
+            f"duration: {T[i]:.9g} s is too short for the limits; the least is "
+            f"{least_shown(least[i])} s."
         )
     if ((T == 0.0) & (length > 0.0).any(axis=-1)).any():
         raise InvalidValueError("duration: expected a positive time for a motion, got 0 s.")

@@ -25,6 +25,7 @@ from .piecewise import PiecewisePolynomial
 from .point_to_point import Synchronisation, along_line, assembled, stretched
 from .pose_trajectory import PoseTrajectory
 from .rotations import rotation_about, rotation_vector
+from .shown import least_shown
 from .trajectory import Trajectory
 
 
@@ -281,7 +282,7 @@ def blended_poses(
         if wanted[0] < total * (1.0 - ROUNDING):
             raise InvalidValueError(
                 f"duration: {wanted[0]:.9g} s is too short for the limits; the least is "
-                f"{total:.12g} s."
+                f"{least_shown(total)} s."
             )
         times, tb = times * (wanted[0] / total), tb * (wanted[0] / total)
     twists = np.where(times[:, None] > 0.0, step / np.where(times > 0.0, times, 1.0)[:, None], 0.0)

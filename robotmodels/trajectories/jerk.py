@@ -19,6 +19,7 @@ from .laws import TimeLaw
 from .limits import MotionLimits
 from .piecewise import PiecewisePolynomial
 from .point_to_point import Synchronisation, along_line
+from .shown import least_shown
 from .trajectory import Trajectory
 
 _PHASES = 9  # two that bring a start back inside the limits, and seven
@@ -202,13 +203,13 @@ def _ruckig(state: dict[str, Array], box: _Box, T: float | None, how: Synchronis
         message = f"No motion between these states was found by ruckig: {found}."
         if T is not None:
             breaks, _, _ = _ruckig(state, box, None, how)
-            message = f"duration: {message} The least duration is {breaks.max():.12g} s."
+            message = f"duration: {message} The least duration is {least_shown(breaks.max())} s."
         raise InvalidValueError(message)
     duration, h, phases = found
     if T is not None and abs(duration - T) > ROUNDING * max(T, duration):
         raise InvalidValueError(
             f"duration: with {T:.9g} s the limits are not kept; the least duration from there on "
-            f"with which they are is {duration:.12g} s."
+            f"with which they are is {least_shown(duration)} s."
         )
     breaks, lengths = np.zeros((k, _PHASES + 2)), np.zeros((k, _PHASES + 1))
     lengths[:, :-1], breaks[:, 1:-1] = h, np.cumsum(h, axis=-1)
@@ -345,5 +346,5 @@ def _refuse_states(state: dict[str, Array], box: _Box) -> None:
                 raise InvalidValueError(
                     f"limits: v{end} and a{end} need a {what} of {need:.9g}, outside "
                     f"{lower[j]:.9g} to {upper[j]:.9g}; the least limit that will do is "
-                    f"{abs(need):.9g}."
+                    f"{least_shown(abs(need), 9)}."
                 )

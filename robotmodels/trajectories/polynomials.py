@@ -13,6 +13,7 @@ from .limits import MotionLimits
 from .piecewise import PiecewisePolynomial
 from .point_to_point import along_line
 from .polynomial_durations import between_states, excess, least_duration
+from .shown import least_shown
 from .trajectory import Trajectory
 
 
@@ -179,7 +180,7 @@ def _least(order: int, state: dict[str, Array], limits: MotionLimits) -> float:
                 raise InvalidValueError(
                     f"limits: {name} of joint {j + 1} is {state[name][j]:.9g}, outside its limits "
                     f"{least[j]:.9g} to {most[j]:.9g}; the least limit that will do is "
-                    f"{abs(state[name][j]):.12g}."
+                    f"{least_shown(abs(state[name][j]))}."
                 )
     T = least_duration(order, state, limits)
     if T is None:
@@ -193,12 +194,12 @@ def _least(order: int, state: dict[str, Array], limits: MotionLimits) -> float:
 def _refuse(order: int, state: dict[str, Array], limits: MotionLimits, T: float) -> None:
     least = _least(order, state, limits)
     message = f"with {T:.9g} s the limits are not kept; the least duration that keeps them is"
-    message = f"duration: {message} {least:.12g} s."
+    message = f"duration: {message} {least_shown(least)} s."
     if least < T:
         longer = least_duration(order, state, limits, T)
         message += (
             " No longer one does."
             if longer is None
-            else f" The least that is longer than that given is {longer:.12g} s."
+            else f" The least that is longer than that given is {least_shown(longer)} s."
         )
     raise InvalidValueError(message)

@@ -24,8 +24,10 @@ from ..kinematics.inverse.solution import IKMSolution
 from ..kinematics.inverse.tasks import Task
 from ..kinematics.poses import dgm
 from ..model import RobotModel, check_model
+from .asked import ROUNDING
 from .pose_trajectory import PoseTrajectory
 from .rotations import rotation_vector
+from .shown import most_shown
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -153,8 +155,8 @@ def resolved_motion(
         raise InvalidValueError(f"samples: expected at least 2, got {samples}.")
     t = np.linspace(0.0, float(poses.duration), samples)
     step = float(t[1])
-    if not 0.0 <= feedback * step <= 1.0:
-        fastest = f"{1.0 / step:.4g}" if step > 0 else "infinity"
+    if not 0.0 <= feedback * step <= 1.0 + ROUNDING:
+        fastest = most_shown(1.0 / step, 4) if step > 0 else "infinity"
         raise InvalidValueError(
             f"feedback: expected between 0 and {fastest} 1/s, one over the step of {step:.4g} s, "
             f"got {feedback}; take more samples, or a smaller feedback."

@@ -14,6 +14,7 @@ from ..errors import InvalidValueError, ShapeError
 from .asked import ROUNDING, checked_limits
 from .limits import MotionLimits
 from .piecewise import PiecewisePolynomial
+from .shown import least_shown
 from .trajectory import Trajectory
 
 
@@ -201,7 +202,7 @@ class _Knots:
         if not report.kept:
             sentences = "; ".join(report.violations())
             advice = (
-                f"The least factor on the times is {report.stretch:.12g}."
+                f"The least factor on the times is {least_shown(report.stretch)}."
                 if report.stretch > 1.0 and not self.moving
                 else "Choose other points or times."
             )
