@@ -34,6 +34,7 @@ from robotmodels.trajectories import (
 )
 from robotmodels.trajectories.piecewise import PiecewisePolynomial
 from robotmodels.trajectories.polynomial_durations import excess, least_duration
+from robotmodels.trajectories.shown import least_shown
 
 LAWS = list(TimeLaw)
 # the highest derivative that is continuous inside the motion
@@ -563,7 +564,9 @@ def test_durations_that_are_too_long_for_polynomials():
     """A start that accelerates carries the joint away when there is too much time."""
     limits = MotionLimits(1.5, 4.0, 30.0)
     least = quintic(0.0, 1.0, limits=limits, a0=0.5).duration
-    with pytest.raises(InvalidValueError, match=rf"keeps them is {least:.12g} s\. No longer one"):
+    with pytest.raises(
+        InvalidValueError, match=rf"keeps them is {least_shown(least)} s\. No longer one"
+    ):
         quintic(0.0, 1.0, 50.0, limits, a0=0.5)
     with pytest.raises(
         InvalidValueError, match=r"v0 of joint 2 is 2.*least limit that will do is 2"
@@ -577,7 +580,7 @@ def test_durations_that_are_too_long_for_polynomials():
     least = quintic(0.0, -0.4, limits=two, **state).duration
     with pytest.raises(InvalidValueError, match=r"longer than that given is 1\.0[56]") as refusal:
         quintic(0.0, -0.4, 0.5, two, **state)
-    assert f"keeps them is {least:.12g} s" in str(refusal.value)
+    assert f"keeps them is {least_shown(least)} s" in str(refusal.value)
     one = {k: np.array([v]) for k, v in (state | {"q0": 0.0, "q1": -0.4}).items()}
     second = least_duration(5, one, two.for_joints(1), 0.5)
     trials = np.linspace(least * 1.001, second * 0.9999, 500)

@@ -1,6 +1,7 @@
 """Motions through points and in space, Fourier series, and the way from poses to joints."""
 
 import pickle
+import re
 import sys
 from itertools import pairwise
 
@@ -317,6 +318,29 @@ def test_straight_line(law, rng):
     assert not move.twist([-1.0, 99.0]).any()
     with pytest.raises(InvalidValueError, match="least is"):
         straight_line(T0, T1, 0.9 * move.duration, limits, law)
+
+
+def test_limits_in_space_are_of_translation_and_rotation():
+    A, B = np.eye(4), se3.translation(0.3, 0, 0) @ se3.rotation("z", 0.5)
+    no_turn = MotionLimits(velocity=[0.5, 0.0], acceleration=2.0)
+    no_way = MotionLimits(velocity=1.0, acceleration=[0.0, 2.0])
+    three = MotionLimits(velocity=[0.5, 1.0, 1.0], acceleration=2.0)
+    for make in (
+        lambda limits: straight_line(A, B, limits=limits),
+        lambda limits: circular_arc(A, [0.1, 0.2, 0.0], B, limits=limits),
+        lambda limits: circle(A, [0, 1, 0], [0, 0, 1], 1.0, limits=limits, turning=True),
+        lambda limits: blended_poses([A, B], limits),
+    ):
+        for limits, words in (
+            (no_turn, "velocity of rotation"),
+            (no_way, "acceleration of translation"),
+            (three, "translation .m. and rotation .rad."),
+        ):
+            with pytest.raises((InvalidValueError, ShapeError), match=words) as refusal:
+                make(limits)
+            assert not re.search("joint [0-9]|[0-9] joints", str(refusal.value))
+    # what does not move needs no limit
+    assert straight_line(A, se3.translation(1, 0, 0), limits=no_turn).duration > 2.0
 
 
 def test_straight_line_of_a_duration_is_ctraj(rng):

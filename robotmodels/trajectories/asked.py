@@ -47,7 +47,7 @@ def joint_vectors(**given: Any) -> tuple[dict[str, Array], tuple[int, ...], bool
     return rows, shape[:-1], scalar
 
 
-def limits_along(limits: MotionLimits, direction: Array) -> LineLimits:
+def limits_along(limits: MotionLimits, direction: Array, names: tuple[str, ...] = ()) -> LineLimits:
     """Limits of the coordinate that several joints share.
 
     Parameters
@@ -56,6 +56,8 @@ def limits_along(limits: MotionLimits, direction: Array) -> LineLimits:
         Of n joints, arrays of shape (n,).
     direction : ndarray, shape (R, 1, n) or (R, n, 1)
         Motion of the joints per unit of the coordinate: all joints in one row, or one each.
+    names : tuple of str
+        Of what moves, for messages; default the joints by their numbers.
 
     Returns
     -------
@@ -77,6 +79,11 @@ def limits_along(limits: MotionLimits, direction: Array) -> LineLimits:
         zero = (u != 0.0) & (bound == 0.0)
         if needed and zero.any():
             j = int(np.argwhere(zero)[0][-1])
+            if names:
+                raise InvalidValueError(
+                    f"limits: the {name} of {names[j]} is limited to 0, but the path asks for "
+                    f"{names[j]}; any other limit will do, or poses without {names[j]}."
+                )
             raise InvalidValueError(
                 f"limits: a limit of {name} of joint {j + 1} is 0, but it has to move; any "
                 "other limit will do, or leave the joint where it is."

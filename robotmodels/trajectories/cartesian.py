@@ -28,6 +28,8 @@ from .rotations import rotation_about, rotation_vector
 from .shown import least_shown
 from .trajectory import Trajectory
 
+_MOVES = ("translation", "rotation")
+
 
 def straight_line(
     T0: Any,
@@ -271,7 +273,7 @@ def blended_poses(
     for name, bound in (("velocity", bounds.velocity), ("acceleration", bounds.acceleration)):
         wrong = size.any(axis=-1) & ((bound == 0.0) | np.isinf(bound))
         if wrong.any():
-            what = ("translation", "rotation")[int(wrong.argmax())]
+            what = _MOVES[int(wrong.argmax())]
             raise InvalidValueError(f"limits: expected a positive {name} of {what}.")
     with np.errstate(divide="ignore", invalid="ignore"):
         least_T = np.where(size > 0.0, size / bounds.velocity[:, None], 0.0).max(axis=0)
@@ -301,7 +303,7 @@ def _timed(
     size = np.array([path.length, abs(path.turn)])
     of_s = None
     if bounds is not None:
-        V, A, B, J, K, _ = limits_along(bounds, size[None, None, :])
+        V, A, B, J, K, _ = limits_along(bounds, size[None, None, :], _MOVES)
         of_s = MotionLimits(
             velocity=V, acceleration=A, jerk=J,
             velocity_lower=-V, acceleration_lower=-B, jerk_lower=-K,
@@ -340,6 +342,12 @@ def _of_space(limits: MotionLimits | None) -> MotionLimits | None:
         raise InvalidValueError(
             f"limits: expected MotionLimits, got {type(limits).__name__}; write for instance "
             "MotionLimits(velocity=[0.5, 1.0], acceleration=[2.0, 4.0])."
+        )
+    if limits.velocity.shape not in ((), (1,), (2,)):
+        raise ShapeError(
+            "limits: expected limits of two quantities, translation (m) and rotation (rad), or one "
+            f"number for both, got limits of {limits.velocity.size}; those of joints do not bound "
+            "a path in space."
         )
     bounds = limits.for_joints(2)
     if (
