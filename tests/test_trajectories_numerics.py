@@ -4,7 +4,18 @@ import numpy as np
 import pytest
 from identities.random_robots import random_pose
 
-from robotmodels.trajectories import MotionLimits, blended_lines, blended_poses, fourier
+from robotmodels.trajectories import (
+    MotionLimits,
+    Synchronisation,
+    TimeLaw,
+    blended_lines,
+    blended_poses,
+    fourier,
+    jerk_limited,
+    smoothed_trapezoidal,
+    trapezoidal,
+)
+from robotmodels.trajectories.point_to_point import along_line
 from robotmodels.trajectories.rotations import axis_and_angle, rotation_about, rotation_vector
 
 # --- blends of poses -----------------------------------------------------------------------------
@@ -127,3 +138,49 @@ def test_extremes_of_a_series_of_next_to_nothing():
         assert high == pytest.approx(1.5 * size, rel=1e-2)
         assert (low <= v.min() * (1.0 - 1e-14) + 1e-14 * size).all()
         assert (low >= v.min() - 1e-5 * size - 5e-324).all()
+
+
+# --- ends of long motions ------------------------------------------------------------------------
+
+
+def test_a_short_last_piece_of_a_long_motion_ends_at_rest():
+    fast = MotionLimits(velocity=1.0, acceleration=1e4)
+    move = trapezoidal([0.0], [1000.0], limits=fast)
+    assert np.array_equal(move.v(move.duration), [0.0])
+    assert np.array_equal(move.q(move.duration), [1000.0])
+    move = smoothed_trapezoidal([0.0], [1000.0], limits=fast)
+    assert np.abs(move.at(move.duration).v).max() < 1e-12
+    assert np.abs(move.at(move.duration).a).max() < 1e-12
+    move = jerk_limited([0.0], [1000.0], limits=MotionLimits(1.0, 1e3, 1e6))
+    assert np.abs(move.at(move.duration).a).max() < 1e-12
+    # and what does not end at rest ends as it is asked to
+    v1, a1 = np.array([0.5]), np.array([-3.0])
+    move = jerk_limited([0.0], [1000.0], limits=MotionLimits(1.0, 10.0, 100.0), v1=v1, a1=a1)
+    assert np.abs(move.v(move.duration) - v1).max() < 1e-12
+    assert np.abs(move.a(move.duration) - a1).max() < 1e-11
+
+
+@pytest.mark.parametrize("law", TimeLaw)
+def test_end_states_of_random_motions_are_exact(rng, law):
+    jumps = law in (TimeLaw.BANG_BANG, TimeLaw.TRAPEZOIDAL)
+    for i in range(100):
+        q0, q1 = rng.normal(size=(2, 3)) * 10.0 ** rng.uniform(-3.0, 3.0)
+        v, a, j = 10.0 ** rng.uniform([-2.0, -2.0, -1.0], [2.0, 4.0, 6.0])
+        limits = MotionLimits(v, a) if jumps else MotionLimits(v, a, j)
+        how = (Synchronisation.COORDINATED, Synchronisation.SAME_TIME)[i % 2]
+        move = along_line(law, q0, q1, None, limits, how)
+        ends = move.at([0.0, move.duration])
+        peak = [np.abs(np.stack(move.motion.extremes(order))).max() for order in range(3)]
+        assert np.abs(ends.q - [q0, q1]).max() < 1e-12 * peak[0]
+        if law is not TimeLaw.LINEAR:
+            assert np.abs(ends.v).max() < 1e-12 * peak[1]
+        if not jumps and law not in (TimeLaw.LINEAR, TimeLaw.CUBIC):
+            assert np.abs(ends.a).max() < 1e-12 * peak[2]
+        # no jump where one piece follows another, nor where the times of breaks are rounded
+        if law is not TimeLaw.LINEAR:
+            inner = move.motion.breaks.ravel()
+            inner = inner[inner > 0.0]
+            width = 4.0 * np.spacing(move.duration)
+            beside = np.stack((np.nextafter(inner, 0.0), inner))
+            gap = np.abs(np.diff(move.v(beside), axis=0)).max()
+            assert gap <= width * peak[2] + 1e-12 * peak[1]

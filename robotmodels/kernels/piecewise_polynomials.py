@@ -35,6 +35,9 @@ def piecewise_derivatives(
 ) -> None:
     """Derivatives of piecewise polynomials of normalised time.
 
+    Normalised time stays within 0 and 1: the breaks of long motions are rounded to less than a
+    short piece needs, and the motion has to end where its last polynomial does.
+
     Parameters
     ----------
     t : (M, N)
@@ -54,7 +57,7 @@ def piecewise_derivatives(
     count = orders.shape[0]
     last = np.empty(groups, np.int64)
     piece = np.empty(groups, np.int64)
-    begin, length, x = np.empty(n), np.empty(n), np.empty(n)
+    begin, end, length, x = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     here = np.empty((count, powers, n))  # coefficients of the derivatives on the present pieces
     for m in range(M):
         for g in range(groups):
@@ -79,8 +82,10 @@ def piecewise_derivatives(
                     g = 0 if groups == 1 else j
                     k = piece[g]
                     h = lengths[m, g, k]
-                    h = h if h > 0.0 else 1.0
-                    begin[j], length[j] = breaks[m, g, k], h
+                    begin[j], end[j] = breaks[m, g, k], breaks[m, g, k + 1]
+                    if h <= 0.0:  # a motion without duration stays at its start
+                        h, end[j] = 1.0, np.inf
+                    length[j] = h
                     for p in range(count):
                         for i in range(orders[p], powers):
                             c = coefficients[m, k, i, j]
@@ -89,7 +94,8 @@ def piecewise_derivatives(
                                 c = c * (i - r) / h
                             here[p, i, j] = c
             for j in range(n):
-                x[j] = (now - begin[j]) / length[j]
+                part = (now - begin[j]) / length[j]
+                x[j] = 1.0 if now >= end[j] else min(max(part, 0.0), 1.0)
             for p in range(count):
                 if orders[p] >= powers:
                     for j in range(n):
