@@ -10,9 +10,11 @@ import pytest
 from identities.random_robots import random_pose
 from scipy.optimize import linprog
 
+from robotmodels import se3
 from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.trajectories import (
     MotionLimits,
+    SplineEnds,
     Synchronisation,
     TimeLaw,
     Trajectory,
@@ -20,6 +22,7 @@ from robotmodels.trajectories import (
     bang_bang,
     blended_lines,
     blended_poses,
+    cartesian_trajectory,
     circle,
     cubic,
     cubic_spline,
@@ -444,7 +447,13 @@ def test_motions_that_stay_or_hardly_move():
         (lambda: MotionLimits(1.0, velocity_lower=0.5), "at most 0"),
         (lambda: MotionLimits(1.0, lower=1.0, upper=0.0), "at most upper"),
         (lambda: MotionLimits([1.0, 2.0], [1.0, 2.0, 3.0]), "different numbers"),
-        (lambda: along_line("trapezoidal", 0.0, 1.0, 1.0, None), "TimeLaw"),
+        (lambda: along_line("trapeze", 0.0, 1.0, 1.0, None), "'trapezoidal'.*TimeLaw"),
+        (lambda: straight_line(np.eye(4), np.eye(4), 1.0, law=3), "member of TimeLaw"),
+        (lambda: cubic_spline([0.0, 1.0], [0.0, 1.0], ends="loose"), "'natural'.*SplineEnds"),
+        (
+            lambda: jerk_limited(0.0, 1.0, None, MotionLimits(jerk=1.0), synchronisation="all"),
+            "'same_time'.*Synchronisation",
+        ),
         (lambda: trapezoidal(0.0, 1.0, 1.0, synchronisation=True), "Synchronisation"),
         (lambda: joint_trajectory(0.0, 1.0, 2.5), "whole number"),
         (lambda: joint_trajectory(0.0, 1.0, [0.0, 1.0, 0.5]), "ascend"),
@@ -453,6 +462,32 @@ def test_motions_that_stay_or_hardly_move():
 def test_infeasible_requests_are_refused(call, message):
     with pytest.raises((InvalidValueError, ShapeError), match=message):
         call()
+
+
+def test_laws_and_ways_are_given_by_their_names_too():
+    limits = MotionLimits(1.0, 2.0, 10.0)
+    ends, A = ([0.0, 1.0], [1.0, -2.0]), se3.translation(0.4, 0.2, 0.0)
+    t = np.linspace(0.0, 1.0, 7)
+    for law in LAWS[:-1]:
+        for name in (law.name, law.name.lower(), law.name.lower().replace("_", "-")):
+            one, same = (along_line(x, *ends, 1.0, None) for x in (law, name))
+            assert np.array_equal(one.q(t), same.q(t))
+            one, same = (straight_line(np.eye(4), A, 1.0, law=x) for x in (law, name))
+            assert np.array_equal(one.pose(t), same.pose(t))
+            one, same = (cartesian_trajectory(np.eye(4), A, 9, law=x) for x in (law, name))
+            assert np.array_equal(one, same)
+    for how in Synchronisation:
+        for make in (smoothed_trapezoidal, jerk_limited):
+            one, same = (
+                make(*ends, limits=limits, synchronisation=x)
+                for x in (how, how.name.lower().replace("_", " "))
+            )
+            assert np.array_equal(one.q(t), same.q(t))
+    for kind in SplineEnds:
+        one, same = (
+            cubic_spline([0.0, 1.0, 0.0], t[[0, 2, 6]], ends=x) for x in (kind, kind.name.title())
+        )
+        assert np.array_equal(one.q(t), same.q(t))
 
 
 def test_zero_limits_of_joints_that_stay_do_not_matter():

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from .. import se3
 from .._arrays import Array, as_exact, as_floats
+from .._choices import chosen
 from ..errors import InvalidValueError, ShapeError
 from .asked import ROUNDING, given_durations, limits_along, refuse_short
 from .blends import PARABOLA, QUARTIC, schedule
@@ -36,7 +37,7 @@ def straight_line(
     T1: Any,
     duration: float | None = None,
     limits: MotionLimits | None = None,
-    law: TimeLaw = TimeLaw.TRAPEZOIDAL,
+    law: TimeLaw | str = TimeLaw.TRAPEZOIDAL,
 ) -> PoseTrajectory:
     """Straight line from rest to rest, with the shorter rotation about a fixed axis.
 
@@ -51,8 +52,8 @@ def straight_line(
         Seconds; default the least that the limits allow.
     limits : MotionLimits, optional
         Of translation and rotation.
-    law : TimeLaw
-        How the motion is distributed over the time.
+    law : TimeLaw or str
+        How the motion is distributed over the time; a member or its name.
 
     Returns
     -------
@@ -87,7 +88,7 @@ def circular_arc(
     T1: Any,
     duration: float | None = None,
     limits: MotionLimits | None = None,
-    law: TimeLaw = TimeLaw.TRAPEZOIDAL,
+    law: TimeLaw | str = TimeLaw.TRAPEZOIDAL,
 ) -> PoseTrajectory:
     """Arc of the circle through three points, with a rotation about a fixed axis.
 
@@ -104,8 +105,8 @@ def circular_arc(
         Seconds; default the least that the limits allow.
     limits : MotionLimits, optional
         Of translation and rotation, as in `circle`.
-    law : TimeLaw
-        How the motion is distributed over the time.
+    law : TimeLaw or str
+        How the motion is distributed over the time; a member or its name.
 
     Returns
     -------
@@ -150,7 +151,7 @@ def circle(
     angle: float = 2.0 * np.pi,
     duration: float | None = None,
     limits: MotionLimits | None = None,
-    law: TimeLaw = TimeLaw.TRAPEZOIDAL,
+    law: TimeLaw | str = TimeLaw.TRAPEZOIDAL,
     turning: bool = False,
 ) -> PoseTrajectory:
     """Circle about an axis, any angle.
@@ -171,8 +172,8 @@ def circle(
         Of translation and rotation. Those of acceleration and jerk bound what is along the circle
         and what is towards its centre together; the motion is the quickest of its law that keeps
         them.
-    law : TimeLaw
-        How the motion is distributed over the time.
+    law : TimeLaw or str
+        How the motion is distributed over the time; a member or its name.
     turning : bool
         Whether the tool turns with the circle, instead of keeping its orientation.
 
@@ -297,8 +298,9 @@ def blended_poses(
 
 
 def _timed(
-    path: FixedAxisPath, duration: float | None, limits: MotionLimits | None, law: TimeLaw
+    path: FixedAxisPath, duration: float | None, limits: MotionLimits | None, law: TimeLaw | str
 ) -> PoseTrajectory:
+    law = chosen(TimeLaw, law, "law")
     bounds = _of_space(limits)
     size = np.array([path.length, abs(path.turn)])
     of_s = None

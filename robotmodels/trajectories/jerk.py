@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array
+from .._choices import chosen
 from ..errors import InvalidValueError
 from .asked import ROUNDING, checked_limits, given_durations, joint_vectors, limits_along
 from .laws import TimeLaw
@@ -35,7 +36,7 @@ def jerk_limited(
     v1: ArrayLike = 0.0,
     a0: ArrayLike = 0.0,
     a1: ArrayLike = 0.0,
-    synchronisation: Synchronisation = Synchronisation.COORDINATED,
+    synchronisation: Synchronisation | str = Synchronisation.COORDINATED,
 ) -> Trajectory:
     """The quickest motion under limits of velocity, acceleration and jerk, between any states.
 
@@ -55,8 +56,8 @@ def jerk_limited(
         only from rest to rest is the motion then the quickest.
     v0, v1, a0, a1 : array_like, shape () or (..., n)
         Velocities and accelerations at the ends, rad or m, per s and s^2.
-    synchronisation : Synchronisation
-        How the joints are kept in step.
+    synchronisation : Synchronisation or str
+        How the joints are kept in step; a member or its name.
 
     Returns
     -------
@@ -87,10 +88,7 @@ def jerk_limited(
     """
     if limits is None:
         raise InvalidValueError("limits: JERK_LIMITED has no shape without limits; give limits.")
-    if not isinstance(synchronisation, Synchronisation):
-        raise InvalidValueError(
-            f"synchronisation: expected a Synchronisation, got {synchronisation!r}."
-        )
+    synchronisation = chosen(Synchronisation, synchronisation, "synchronisation")
     states, batch, scalar = joint_vectors(q0=q0, q1=q1, v0=v0, v1=v1, a0=a0, a1=a1)
     R, n = states["q0"].shape
     if not any(states[name].any() for name in _STATES[2:]):

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array
+from .._choices import chosen
 from ..errors import InvalidValueError
 from .asked import (
     checked_limits,
@@ -43,7 +44,7 @@ def linear(
     q1: ArrayLike,
     duration: ArrayLike | None = None,
     limits: MotionLimits | None = None,
-    synchronisation: Synchronisation = Synchronisation.COORDINATED,
+    synchronisation: Synchronisation | str = Synchronisation.COORDINATED,
 ) -> Trajectory:
     """Constant velocity. It jumps at both ends: no acceleration limit holds there.
 
@@ -55,8 +56,8 @@ def linear(
         Seconds; default the least that the limits allow.
     limits : MotionLimits, optional
         Kept inside the motion, so that of velocity alone tells here.
-    synchronisation : Synchronisation
-        How the joints are kept in step.
+    synchronisation : Synchronisation or str
+        How the joints are kept in step; a member or its name.
 
     Returns
     -------
@@ -86,7 +87,7 @@ def bang_bang(
     q1: ArrayLike,
     duration: ArrayLike | None = None,
     limits: MotionLimits | None = None,
-    synchronisation: Synchronisation = Synchronisation.COORDINATED,
+    synchronisation: Synchronisation | str = Synchronisation.COORDINATED,
 ) -> Trajectory:
     """Constant acceleration, then constant deceleration, with no cruise between them.
 
@@ -102,8 +103,8 @@ def bang_bang(
         Seconds; default the least that the limits allow.
     limits : MotionLimits, optional
         Of velocity and acceleration.
-    synchronisation : Synchronisation
-        How the joints are kept in step.
+    synchronisation : Synchronisation or str
+        How the joints are kept in step; a member or its name.
 
     Returns
     -------
@@ -132,7 +133,7 @@ def trapezoidal(
     q1: ArrayLike,
     duration: ArrayLike | None = None,
     limits: MotionLimits | None = None,
-    synchronisation: Synchronisation = Synchronisation.COORDINATED,
+    synchronisation: Synchronisation | str = Synchronisation.COORDINATED,
 ) -> Trajectory:
     """Trapezoidal velocity: the quickest motion under limits of velocity and acceleration.
 
@@ -149,8 +150,8 @@ def trapezoidal(
     limits : MotionLimits, optional
         Of velocity and acceleration, which may be asymmetric. Coordinated joints share the law
         that none of them exceeds.
-    synchronisation : Synchronisation
-        How the joints are kept in step.
+    synchronisation : Synchronisation or str
+        How the joints are kept in step; a member or its name.
 
     Returns
     -------
@@ -183,7 +184,7 @@ def smoothed_trapezoidal(
     q1: ArrayLike,
     duration: ArrayLike | None = None,
     limits: MotionLimits | None = None,
-    synchronisation: Synchronisation = Synchronisation.COORDINATED,
+    synchronisation: Synchronisation | str = Synchronisation.COORDINATED,
 ) -> Trajectory:
     """Smoothed trapezoidal velocity: ramps whose acceleration is a parabola of time.
 
@@ -198,8 +199,8 @@ def smoothed_trapezoidal(
         Seconds; default the least that the limits allow with this law.
     limits : MotionLimits, optional
         Of velocity, acceleration and jerk.
-    synchronisation : Synchronisation
-        How the joints are kept in step.
+    synchronisation : Synchronisation or str
+        How the joints are kept in step; a member or its name.
 
     Returns
     -------
@@ -225,19 +226,19 @@ def smoothed_trapezoidal(
 
 
 def along_line(
-    law: TimeLaw,
+    law: TimeLaw | str,
     q0: ArrayLike,
     q1: ArrayLike,
     duration: ArrayLike | None,
     limits: MotionLimits | None,
-    synchronisation: Synchronisation = Synchronisation.COORDINATED,
+    synchronisation: Synchronisation | str = Synchronisation.COORDINATED,
 ) -> Trajectory:
     """Motion from rest to rest by any law, for programs that choose it.
 
     Parameters
     ----------
-    law : TimeLaw
-        How the motion is distributed over the time.
+    law : TimeLaw or str
+        How the motion is distributed over the time; a member or its name.
     q0, q1 : array_like, shape () or (..., n)
         Postures, rad or m.
     duration : array_like, shape () or (...), or None
@@ -245,8 +246,8 @@ def along_line(
     limits : MotionLimits or None
         Kept inside the motion. Independent joints that arrive early have the end of their law
         inside it, with the jump that a linear, cubic, bang-bang or trapezoidal law ends with.
-    synchronisation : Synchronisation
-        How the joints are kept in step.
+    synchronisation : Synchronisation or str
+        How the joints are kept in step; a member or its name.
 
     Returns
     -------
@@ -263,12 +264,8 @@ def along_line(
     >>> along_line(TimeLaw.CUBIC, 0.0, 1.0, None, MotionLimits(velocity=1.5)).duration
     1.00...
     """
-    if not isinstance(law, TimeLaw):
-        raise InvalidValueError(f"law: expected a TimeLaw, got {law!r}.")
-    if not isinstance(synchronisation, Synchronisation):
-        raise InvalidValueError(
-            f"synchronisation: expected a Synchronisation, got {synchronisation!r}."
-        )
+    law = chosen(TimeLaw, law, "law")
+    synchronisation = chosen(Synchronisation, synchronisation, "synchronisation")
     given, batch, scalar = joint_vectors(q0=q0, q1=q1)
     start, end = given["q0"], given["q1"]
     R, n = start.shape

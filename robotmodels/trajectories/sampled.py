@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from .. import se3
 from .._arrays import Array, as_floats
+from .._choices import chosen
 from ..errors import InvalidValueError, ShapeError
 from .laws import TimeLaw, law_of_duration
 from .piecewise import PiecewisePolynomial
@@ -17,7 +18,9 @@ from .rotations import axis_and_angle, rotation_about, rotation_vector
 from .trajectory import Samples, Trajectory
 
 
-def cartesian_trajectory(T0: Any, T1: Any, N: int, law: TimeLaw = TimeLaw.TRAPEZOIDAL) -> Array:
+def cartesian_trajectory(
+    T0: Any, T1: Any, N: int, law: TimeLaw | str = TimeLaw.TRAPEZOIDAL
+) -> Array:
     """Poses on the straight line between two poses, at equal steps of time.
 
     Also called ``ctraj`` (`TimeLaw.LINEAR`: ``trinterp``). The position moves on a line, the
@@ -30,8 +33,8 @@ def cartesian_trajectory(T0: Any, T1: Any, N: int, law: TimeLaw = TimeLaw.TRAPEZ
         First and last poses, m; leading axes broadcast.
     N : int
         Number of poses, both ends included; a single one is ``T0``.
-    law : TimeLaw
-        How the motion is distributed over the time.
+    law : TimeLaw or str
+        How the motion is distributed over the time; a member or its name.
 
     Returns
     -------
@@ -57,7 +60,7 @@ def cartesian_trajectory(T0: Any, T1: Any, N: int, law: TimeLaw = TimeLaw.TRAPEZ
     """
     first, last = se3.as_pose(T0, "T0"), se3.as_pose(T1, "T1")
     N = _whole(N, "N")
-    _check_law(law)
+    law = chosen(TimeLaw, law, "law")
     try:
         batch = np.broadcast_shapes(first.shape[:-2], last.shape[:-2])
     except ValueError:
@@ -148,11 +151,6 @@ def _progress(law: TimeLaw, N: int) -> Array:
     breaks = np.concatenate((np.zeros((1, 1)), np.cumsum(pieces.durations, axis=-1)), axis=-1)
     motion = PiecewisePolynomial(breaks, pieces.coefficients[0][..., None])
     return Trajectory(motion, scalar=True).q(np.linspace(0.0, motion.duration, N))
-
-
-def _check_law(law: TimeLaw) -> None:
-    if not isinstance(law, TimeLaw):
-        raise InvalidValueError(f"law: expected a TimeLaw, got {law!r}.")
 
 
 def _whole(value: Any, name: str) -> int:

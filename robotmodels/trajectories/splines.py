@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_floats
+from .._choices import chosen
 from ..errors import InvalidValueError, ShapeError
 from .asked import ROUNDING, checked_limits
 from .limits import MotionLimits
@@ -38,7 +39,7 @@ def cubic_spline(
     limits: MotionLimits | None = None,
     v0: ArrayLike = 0.0,
     v1: ArrayLike = 0.0,
-    ends: SplineEnds = SplineEnds.CLAMPED,
+    ends: SplineEnds | str = SplineEnds.CLAMPED,
 ) -> Trajectory:
     """Third-order spline through points, with continuous acceleration.
 
@@ -53,8 +54,8 @@ def cubic_spline(
         Kept everywhere on the motion.
     v0, v1 : array_like, shape () or (n,)
         Velocities at the ends of a clamped spline, rad/s or m/s. Other than zero, they need times.
-    ends : SplineEnds
-        What is asked at the ends.
+    ends : SplineEnds or str
+        What is asked at the ends; a member or its name.
 
     Returns
     -------
@@ -80,8 +81,7 @@ def cubic_spline(
     """
     from scipy.interpolate import CubicSpline
 
-    if not isinstance(ends, SplineEnds):
-        raise InvalidValueError(f"ends: expected SplineEnds, got {ends!r}.")
+    ends = chosen(SplineEnds, ends, "ends")
     knots = _Knots(points, times, limits, {"v0": v0, "v1": v1})
     if ends is not SplineEnds.CLAMPED and knots.moving:
         raise InvalidValueError("v0, v1: only a clamped spline takes velocities at its ends.")
