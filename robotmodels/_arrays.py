@@ -5,6 +5,7 @@ Leading axes are batch axes and broadcast against each other; the last axes are 
 
 from __future__ import annotations
 
+from dataclasses import fields
 from math import isfinite
 from typing import Any
 
@@ -255,6 +256,18 @@ def read_only(array: ArrayLike, dtype: type = np.float64) -> NDArray[Any]:
     copy = np.array(array, dtype=dtype, order="C")
     copy.setflags(write=False)
     return copy
+
+
+class Rebuilt:
+    """Base of frozen dataclasses that are rebuilt when they are copied or unpickled.
+
+    NumPy forgets that an array is read-only when it is pickled; the constructor makes it so again.
+    """
+
+    __slots__ = ()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), tuple(getattr(self, f.name) for f in fields(self) if f.init)  # type: ignore[arg-type]
 
 
 def same_value(a: object, b: object) -> bool:

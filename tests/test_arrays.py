@@ -1,8 +1,13 @@
 """The border: what comes in as numbers, and what is refused with a sentence."""
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 
+import robotmodels as rm
+from robotmodels import kinematics as kin
 from robotmodels._arrays import (
     as_core,
     as_exact,
@@ -159,3 +164,25 @@ def test_masked_and_huge_numbers_are_refused():
         as_vector(np.ma.array([0.5], mask=[True]), 1, "q")
     with pytest.raises(InvalidValueError):
         as_vector([10**400], 1, "q")
+
+
+def test_values_are_read_only_after_a_copy_too():
+    model = rm.load("rx90")
+    values = (
+        kin.JointBounds(velocity=[1.0] * 6, step=0.1),
+        kin.JointTask([0.0], joints=(2,)),
+        kin.TwistTask([0.0] * 6),
+        kin.PostureCriterion([0.0] * 6),
+        kin.Sphere([0, 0, 0], 0.1),
+        rm.static_wrench(model, [0.1] * 6, [0.0] * 6),
+        rm.ikm(model, [0.1] * 6, [0.0] * 6),
+        rm.base_parameters(model),
+    )
+    for value in values:
+        for again in (pickle.loads(pickle.dumps(value)), copy.deepcopy(value)):
+            assert type(again) is type(value)
+            for name in value.__dataclass_fields__:
+                field = getattr(again, name)
+                if isinstance(field, np.ndarray):
+                    assert not field.flags.writeable, (type(value).__name__, name)
+                    np.testing.assert_array_equal(field, getattr(value, name))

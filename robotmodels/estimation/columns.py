@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, as_floats, read_only
+from .._arrays import Array, Rebuilt, as_floats, read_only
 from ..errors import InvalidValueError, ShapeError
 
 DEPENDENT = 1e-8
@@ -21,7 +21,7 @@ EMPTY = 1e-10
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ColumnBasis:
+class ColumnBasis(Rebuilt):
     """Columns that span all, and the combinations that give the others. Read-only.
 
     Parameters

@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, as_exact, as_vector, batch_shape, read_only
+from .._arrays import Array, Rebuilt, as_exact, as_vector, batch_shape, read_only
 from ..errors import InvalidValueError, ShapeError
 from ..geometry import PRISMATIC
 from ..model import RobotModel, check_model
@@ -57,7 +57,7 @@ class StaticStatus(IntEnum):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class StaticWrench:
+class StaticWrench(Rebuilt):
     """The wrench that joint torques hold, and what they leave open. Read-only.
 
     Parameters

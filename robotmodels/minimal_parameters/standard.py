@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_exact, read_only
+from .._arrays import Array, Rebuilt, as_exact, read_only
 from ..drive import DriveParameters
 from ..errors import InvalidValueError, MissingExtraError
 from ..inertia import InertialParameters
@@ -37,7 +37,7 @@ class PhysicalStatus(Enum):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class StandardParameters:
+class StandardParameters(Rebuilt):
     """A full set of standard parameters with given base parameters. Read-only.
 
     Parameters

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..._arrays import Array, as_reals, as_vector, batch_rows, batch_shape, read_only
+from ..._arrays import Array, Rebuilt, as_reals, as_vector, batch_rows, batch_shape, read_only
 from ...errors import InvalidValueError, ShapeError
 from ...model import RobotModel, check_model
 
@@ -24,7 +24,7 @@ _ROUNDING = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class JointBounds:
+class JointBounds(Rebuilt):
     """Velocity, position and acceleration limits of the joints.
 
     Parameters

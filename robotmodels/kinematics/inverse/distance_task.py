@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._arrays import Array, as_floats, read_only
+from ..._arrays import Array, Rebuilt, as_floats, read_only
 from ...model import RobotModel
 from ..jacobians import jacobian, jacobian_rate
 from ..poses import dgm
@@ -16,7 +16,7 @@ from .tasks import rates_of_rows, rows_of, task_length
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class DistanceTask:
+class DistanceTask(Rebuilt):
     """Rate of the distance between the origins of two frames, such as the hands of two arms.
 
     Where the origins coincide the distance has no derivative: the row of J is zero there, and the

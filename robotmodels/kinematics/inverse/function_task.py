@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._arrays import Array, as_exact, as_floats, read_only
+from ..._arrays import Array, Rebuilt, as_exact, as_floats, read_only
 from ...errors import InvalidValueError, ShapeError
 from ...model import RobotModel
 from .levels import Level
@@ -19,7 +19,7 @@ _STEP = 1e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FunctionTask:
+class FunctionTask(Rebuilt):
     """Rates of m functions of the configuration, such as an elbow angle, by their gradients.
 
     Parameters

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._arrays import Array, as_core, read_only
+from ..._arrays import Array, Rebuilt, as_core, read_only
 from ...errors import InvalidValueError
 from ...geometry import PRISMATIC
 from ...model import RobotModel
@@ -17,7 +17,7 @@ from .tasks import rates_of_rows, rows_of, task_length
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class JointTask:
+class JointTask(Rebuilt):
     """Velocities of named joints.
 
     Parameters

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._arrays import Array, as_core, as_exact, as_floats, read_only
+from ..._arrays import Array, Rebuilt, as_core, as_exact, as_floats, read_only
 from ...errors import ShapeError
 from ...model import RobotModel
 from .levels import Level
@@ -15,7 +15,7 @@ from .tasks import rates_of_rows, rows_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LinearTask:
+class LinearTask(Rebuilt):
     """Rows ``J v = rate`` given as arrays; where accelerations are asked, ``J a = rate - drift``.
 
     Parameters

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._arrays import Array, as_core, as_exact, read_only
+from ..._arrays import Array, Rebuilt, as_core, as_exact, read_only
 from ...errors import InvalidValueError
 from ...model import RobotModel
 from .levels import Level
@@ -15,7 +15,7 @@ from .tasks import rates_of_rows, rows_of, task_length
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PositionTask:
+class PositionTask(Rebuilt):
     """Velocity of a point fixed to a frame, in world axes.
 
     Parameters

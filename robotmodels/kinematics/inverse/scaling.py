@@ -9,7 +9,7 @@ from math import isfinite
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..._arrays import Array, as_exact, as_reals, read_only
+from ..._arrays import Array, Rebuilt, as_exact, as_reals, read_only
 from ...errors import InvalidValueError
 from ...geometry import PRISMATIC
 from ...model import FrameOfInterest, RobotModel
@@ -22,7 +22,7 @@ WHOLE_TWIST = read_only(np.ones(6), np.bool_)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Scaling:
+class Scaling(Rebuilt):
     """Rows asked for, and the factors of rows and columns.
 
     Parameters
@@ -47,7 +47,7 @@ class Scaling:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class KnownFrame:
+class KnownFrame(Rebuilt):
     """What is kept of a frame of a robot between calls.
 
     Parameters

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._arrays import Array, as_core, as_exact, read_only
+from ..._arrays import Array, Rebuilt, as_core, as_exact, read_only
 from ...errors import InvalidValueError
 from ...model import RobotModel
 from ..jacobians import Reference, jacobian, jacobian_rate, reference_of
@@ -16,7 +16,7 @@ from .tasks import rates_of_rows, rows_of, task_length
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TwistTask:
+class TwistTask(Rebuilt):
     """Twist of a frame: components of ``J v``, or of its rate where accelerations are asked.
 
     Parameters

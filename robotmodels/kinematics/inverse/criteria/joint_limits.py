@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...._arrays import Array, as_reals, as_vector, read_only
+from ...._arrays import Array, Rebuilt, as_reals, as_vector, read_only
 from ....errors import InvalidValueError, ShapeError
 from ....model import RobotModel, check_model
 from .criterion import checked_positive
@@ -16,7 +16,7 @@ __all__ = ["JointLimitCriterion", "ranges"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class JointLimitCriterion:
+class JointLimitCriterion(Rebuilt):
     """``sum(((q - middle) / (upper - lower))^2)`` over joints that have limits; small is good.
 
     Parameters

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...._arrays import Array, as_exact, read_only
+from ...._arrays import Array, Rebuilt, as_exact, read_only
 from ....errors import InvalidValueError
 from ....model import RobotModel
 from ...jacobians import Reference, jacobian, jacobian_rate, reference_of
@@ -19,7 +19,7 @@ _CHUNK = 512
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ManipulabilityCriterion:
+class ManipulabilityCriterion(Rebuilt):
     """Manipulability ``sqrt(det(J J^T))`` of some rows of the Jacobian; large is good.
 
     With fewer joints than rows, ``sqrt(det(J^T J))``: the product of the singular values in both

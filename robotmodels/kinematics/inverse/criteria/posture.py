@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...._arrays import Array, as_exact, as_floats, as_vector, read_only
+from ...._arrays import Array, Rebuilt, as_exact, as_floats, as_vector, read_only
 from ....errors import InvalidValueError, ShapeError
 from ....model import RobotModel, check_model
 from .criterion import checked_positive
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PostureCriterion:
+class PostureCriterion(Rebuilt):
     """Weighted distance from a posture, ``sum(weights (q - q_ref)^2) / 2``; small is good.
 
     Angles are compared as they stand, without whole turns: a joint returns the way it came.

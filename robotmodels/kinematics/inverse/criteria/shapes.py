@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...._arrays import Array, as_exact, as_reals, read_only
+from ...._arrays import Array, Rebuilt, as_exact, as_reals, read_only
 from ....errors import InvalidValueError
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sphere:
+class Sphere(Rebuilt):
     """A solid sphere.
 
     Parameters
@@ -46,7 +46,7 @@ class Sphere:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Plane:
+class Plane(Rebuilt):
     """A half space: everything behind a plane, such as a table or a wall.
 
     Parameters
