@@ -34,6 +34,11 @@ def joint_vectors(**given: Any) -> tuple[dict[str, Array], tuple[int, ...], bool
         The leading axes.
     scalar : bool
         Whether all were numbers.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Vectors that do not fit each other, or of no joints.
     """
     arrays = {name: as_floats(value, name) for name, value in given.items()}
     scalar = all(array.ndim == 0 for array in arrays.values())
@@ -43,8 +48,31 @@ def joint_vectors(**given: Any) -> tuple[dict[str, Array], tuple[int, ...], bool
         got = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
         raise ShapeError(f"Expected vectors of the same joints, got {got}.") from None
     n = shape[-1]
+    refuse_jointless(n, " and ".join(tuple(given)[:2]))
     rows = {k: np.broadcast_to(v, shape).reshape(-1, n) for k, v in arrays.items()}
     return rows, shape[:-1], scalar
+
+
+def refuse_jointless(n: int, name: str) -> None:
+    """Refuse motions of no joints, which have no duration of their own.
+
+    Parameters
+    ----------
+    n : int
+        Number of joints.
+    name : str
+        What was given, as in error messages.
+
+    Raises
+    ------
+    InvalidValueError
+        There are none.
+    """
+    if n == 0:
+        raise InvalidValueError(
+            f"{name}: expected positions of at least one joint, got none; a model without joints "
+            "has no motion."
+        )
 
 
 def limits_along(limits: MotionLimits, direction: Array, names: tuple[str, ...] = ()) -> LineLimits:

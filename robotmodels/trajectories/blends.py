@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_floats
 from ..errors import InvalidValueError, ShapeError
-from .asked import ROUNDING, checked_limits, given_durations
+from .asked import ROUNDING, checked_limits, given_durations, refuse_jointless
 from .limits import MotionLimits
 from .piecewise import PiecewisePolynomial
 from .shown import least_shown
@@ -85,6 +85,7 @@ def blended_lines(
     scalar = q.ndim == 1
     q = q[:, None] if scalar else q
     m, n = q.shape
+    refuse_jointless(n, "points")
     bounds = checked_limits(limits, n, q)
     step = np.diff(q, axis=0)
     if segment_times is None:
