@@ -26,6 +26,7 @@ from robotmodels.trajectories import (
     circle,
     cubic,
     cubic_spline,
+    fourier,
     jerk_limited,
     joint_trajectory,
     linear,
@@ -809,6 +810,57 @@ def test_extremes_are_exact(rng):
         assert (high >= q.max(axis=1) - 1e-13).all()
         assert (low >= q.min(axis=1) - tight).all()
         assert (high <= q.max(axis=1) + tight).all()
+
+
+def test_no_joints_are_refused():
+    none = np.zeros(0)
+    for call in (
+        lambda: joint_trajectory(none, none, 5),
+        lambda: trapezoidal(none, none, 1.0),
+        lambda: quintic(none, none, 1.0, v0=none),
+        lambda: jerk_limited(none, none, limits=MotionLimits(1.0, 1.0, 1.0)),
+        lambda: cubic_spline(np.zeros((3, 0)), [0.0, 1.0, 2.0]),
+        lambda: quintic_spline(np.zeros((3, 0)), [0.0, 1.0, 2.0]),
+        lambda: blended_lines(np.zeros((3, 0)), limits=MotionLimits(1.0, 1.0)),
+    ):
+        with pytest.raises(InvalidValueError, match="at least one joint, got none"):
+            call()
+    # no motions of some joints are no error
+    assert trapezoidal(np.zeros((0, 2)), np.ones(2), 1.0).q(0.5).shape == (0, 2)
+
+
+def test_seconds_between_samples_are_a_period():
+    move = quintic(0.0, 1.0, duration=1.0)
+    for wrong in (0.1, 2.5, 0, -3, np.nan, np.inf, "ten"):
+        with pytest.raises(InvalidValueError, match=r"whole number from 1, got .*period="):
+            move.resample(wrong)
+    assert len(move.resample(3)) == len(move.resample(3.0)) == 3
+
+
+def test_motions_are_shown_in_two_lines():
+    move = quintic([0.0, 1.0, 2.0], [1.0, 3.0, -5.0], 2.0)
+    assert repr(move).startswith("<Trajectory: 3 joints, 2 s\n  greatest velocity 6.562 (joint 3)")
+    assert "5 samples from 0 s to 1 s, 3 joints" in repr(move.at(np.linspace(0.0, 1.0, 5)))
+    assert "1 sample at 0.5 s, 1 joint\n  greatest velocity 1.875," in repr(
+        quintic(0.0, 1.0, 1.0).at(0.5)
+    )
+    many = trapezoidal(np.zeros((4, 2)), np.ones((4, 2)), np.arange(1.0, 5.0))
+    assert "2 joints, 1 to 4 s, batch of motions (4,)" in repr(many)
+    assert "3 samples from 0 s to 1 s, 2 joints, batch of motions (4,)" in repr(
+        many.at([0.0, 0.5, 1.0])
+    )
+    stay = quintic([1.0], [1.0], limits=MotionLimits(1.0))
+    shown = [move, move.at([]), move.at(0.1), many, many.at(1.0), stay, stay.at([[0.0], [1.0]])]
+    shown += [fourier([[1.0, 0.0]], [[0.0, 2.0]]), trapezoidal(np.zeros((0, 2)), np.ones(2), 1.0)]
+    line = straight_line(np.eye(4), se3.translation(0.3, 0.4, 0) @ se3.rotation("z", 1.0), 2.0)
+    assert repr(line) == (
+        "<PoseTrajectory: 2 s, a way of 0.5 m\n  greatest speeds 0.375 m/s and 0.75 rad/s>"
+    )
+    shown += [line, line.resample(7), line.at([]), straight_line(np.eye(4), np.eye(4), 0.0)]
+    for one in shown:
+        assert repr(one).count("\n") == 1
+        assert "array" not in repr(one)
+    assert "periodic" in repr(shown[7])
 
 
 def test_report_names_what_is_exceeded():

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_floats, read_only
 from ..errors import ShapeError
 from .paths import PosePath
+from .shown import seconds_shown
 from .trajectory import Trajectory
 
 
@@ -40,6 +41,9 @@ class PoseSamples:
 
     def __len__(self) -> int:
         return self.t.size
+
+    def __repr__(self) -> str:
+        return f"<PoseSamples: {seconds_shown(self.t)}\n  {_speeds(self.twist)}>"
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
         return np.array(self.T, dtype=dtype, copy=copy)
@@ -183,5 +187,19 @@ class PoseTrajectory:
         """
         return self.at(self.law.grid(samples, period))
 
+    def __repr__(self) -> str:
+        # a path has no extremes of its own: they are looked for at samples
+        seen = self.at(np.linspace(0.0, self.duration, 501))
+        metres = float(np.linalg.norm(np.diff(seen.T[:, :3, 3], axis=0), axis=-1).sum())
+        return (
+            f"<PoseTrajectory: {self.duration:.6g} s, a way of {metres:.4g} m"
+            f"\n  {_speeds(seen.twist)}>"
+        )
+
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.path, self.law)
+
+
+def _speeds(twist: Array) -> str:
+    v, w = (np.linalg.norm(part, axis=-1).max(initial=0.0) for part in (twist[:, :3], twist[:, 3:]))
+    return f"greatest speeds {v:.4g} m/s and {w:.4g} rad/s"

@@ -21,13 +21,14 @@ from ..kinematics.inverse.ikm import ikm
 from ..kinematics.inverse.methods import InverseMethod
 from ..kinematics.inverse.request import Secondary
 from ..kinematics.inverse.solution import IKMSolution
+from ..kinematics.inverse.status import IKMStatus
 from ..kinematics.inverse.tasks import Task
 from ..kinematics.poses import dgm
 from ..model import RobotModel, check_model
 from .asked import ROUNDING
 from .pose_trajectory import PoseTrajectory
 from .rotations import rotation_vector
-from .shown import most_shown
+from .shown import counted, greatest_shown, most_shown, seconds_shown
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,6 +68,17 @@ class ResolvedMotion:
 
     def __len__(self) -> int:
         return len(self.t)
+
+    def __repr__(self) -> str:
+        unmet = int(np.count_nonzero(self.status != IKMStatus.MET))
+        behind = (error.max(initial=0.0) for error in (self.position_error, self.orientation_error))
+        lines = (
+            f"<ResolvedMotion: {seconds_shown(self.t)}, {counted(self.q.shape[-1], 'joint')}, "
+            + (f"{counted(unmet, 'motion')} not met" if unmet else "all met"),
+            greatest_shown([("velocity", self.v)])
+            + "; behind by at most {:.2g} m and {:.2g} rad>".format(*behind),
+        )
+        return "\n  ".join(lines)
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
         return np.array(self.q, dtype=dtype, copy=copy)

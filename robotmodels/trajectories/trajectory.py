@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_floats, read_only
 from ..errors import InvalidValueError
 from .limits import LimitsReport, MotionLimits
+from .shown import counted, greatest_shown, seconds_shown
 
 
 class Motion(Protocol):
@@ -73,6 +74,20 @@ class Samples:
 
     def __len__(self) -> int:
         return self.t.size
+
+    def __repr__(self) -> str:
+        k, shape = self.t.ndim, self.q.shape
+        scalar = len(shape) <= k or shape[-1 - k : -1] != self.t.shape
+        values = [x[..., None] if scalar else x for x in (self.v, self.a, self.jerk)]
+        *batch, n = values[0].shape
+        batch = batch[: len(batch) - k]
+        names = ("velocity", "acceleration", "jerk")
+        lines = (
+            f"<Samples: {seconds_shown(self.t.reshape(-1))}, {counted(n, 'joint')}"
+            f"{_motions(tuple(batch))}",
+            greatest_shown(zip(names, values, strict=True)) + ">",
+        )
+        return "\n  ".join(lines)
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
         return np.array(self.q, dtype=dtype, copy=copy)
@@ -277,11 +292,7 @@ class Trajectory:
             raise InvalidValueError("resample: a batch of motions has no common grid; use at(t).")
         T = self.duration
         if samples is not None:
-            if int(samples) != samples or samples < 1:
-                raise InvalidValueError(
-                    f"samples: expected a whole number from 1, got {samples!r}."
-                )
-            return np.linspace(0.0, T, int(samples))
+            return np.linspace(0.0, T, _count(samples))
         step = float(as_floats(period, "period"))  # type: ignore[arg-type]
         if step <= 0.0:
             raise InvalidValueError(f"period: expected a positive time, got {step:g} s.")
@@ -362,5 +373,35 @@ class Trajectory:
                     f"{float(np.max(end)):g} s that does not rest there; ask for times inside it."
                 )
 
+    def __repr__(self) -> str:
+        names = ("velocity", "acceleration", "jerk")
+        peaks = (np.stack(self.motion.extremes(order)) for order in (1, 2, 3))
+        durations = np.unique(self.motion.duration)
+        T = " to ".join(f"{x:.6g}" for x in durations[[0, -1][: durations.size]])
+        of = f"{counted(self.n, 'joint')}, {T or 0} s" + ", periodic" * self.repeats
+        lines = (
+            f"<Trajectory: {of}{_motions(self.motion.batch)}",
+            greatest_shown(zip(names, peaks, strict=True)) + ">",
+        )
+        return "\n  ".join(lines)
+
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.motion, self.scalar, self.repeats, self.holds)
+
+
+def _motions(batch: tuple[int, ...]) -> str:
+    return f", batch of motions {batch}" if batch else ""
+
+
+def _count(samples: Any) -> int:
+    """A number of samples; seconds in its place are told from it by their fraction."""
+    try:
+        count = int(samples)
+    except (TypeError, ValueError, OverflowError):
+        count = 0
+    if count < 1 or count != samples:
+        raise InvalidValueError(
+            f"samples: expected a whole number from 1, got {samples!r:.40}; the seconds between "
+            "samples are given as period=."
+        )
+    return count
