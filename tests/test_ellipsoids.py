@@ -25,6 +25,7 @@ from robotmodels.kinematics.ellipsoids import (
     force_ellipsoid,
     velocity_ellipsoid,
 )
+from robotmodels.kinematics.inverse.criteria.manipulability import ManipulabilityCriterion
 
 H = np.pi / 2
 PARTS = list(TwistPart)
@@ -417,8 +418,10 @@ def test_fewer_joints_than_directions(rows):
         assert (found.rank == model.n).all()
         assert (found.radii > 0).sum() == model.n * (q.ndim if q.ndim == 1 else 2)
         assert (np.isinf(force_ellipsoid(model, q).radii).sum(axis=-1) == 3 - model.n).all()
-        assert (manipulability(model, q).measure == 0).all()
-        assert (manipulability(model, q).condition == np.inf).all()
+        values = np.linalg.svd(rm.jacobian(model, q), compute_uv=False)
+        close(manipulability(model, q).measure, values.prod(axis=-1), 1e-14)
+        if model.n:
+            close(manipulability(model, q).condition, values[..., 0] / values[..., -1], 1e-12)
 
 
 def test_mistakes_are_named():
@@ -497,8 +500,53 @@ def test_singular_values_are_those_of_the_rows(model, seed):
     s = np.zeros((2, m))
     s[:, : min(m, model.n)] = np.linalg.svd(A, compute_uv=False)
     close(found.singular_values, s, 1e-8 * size)
-    gram = A @ np.swapaxes(A, -1, -2)
-    close(found.measure**2, np.linalg.det(gram), 1e-8 * size ** (2 * m))
+    wide, tall = A @ np.swapaxes(A, -1, -2), np.swapaxes(A, -1, -2) @ A
+    gram = wide if m <= model.n else tall
+    close(found.measure**2, np.linalg.det(gram), 1e-8 * size ** (2 * min(m, model.n)))
+
+
+@pytest.mark.parametrize("name", ["planar_2r", "lab_trr", "cobra_s600", "xarm5", "rx90", "iiwa14"])
+def test_measure_is_that_of_the_criterion(name):
+    """Whatever the number of joints: the product of the min(rows, joints) singular values."""
+    arm = rm.load(name)
+    q = np.random.default_rng(3).uniform(0.2, 1.0, size=(20, arm.n))
+    for length in (1.0, 0.4):
+        criterion = ManipulabilityCriterion(length=length)
+        found = manipulability(arm, q, length=length)
+        np.testing.assert_allclose(found.measure, criterion.value(arm, q), rtol=1e-12)
+        values = np.linalg.svd(found.weights[:, None] * found.jacobian, compute_uv=False)
+        np.testing.assert_allclose(found.condition, values[:, 0] / values[:, -1], rtol=1e-12)
+    mask = [1, 1, 0, 0, 0, 1]
+    criterion = ManipulabilityCriterion(mask=mask)
+    np.testing.assert_allclose(
+        manipulability(arm, q, mask=mask).measure, criterion.value(arm, q), rtol=1e-12, atol=1e-16
+    )
+
+
+def test_measure_of_two_links():
+    arm = rm.load("planar_2r")
+    assert manipulability(arm, [0.3, 0.5]).measure.round(3) == 1.109
+    assert np.isfinite(manipulability(arm, [0.3, 0.5]).condition)
+    position = [1, 1, 0, 0, 0, 0]
+    assert manipulability(arm, [0.3, 0.0], mask=position).measure == 0.0
+    assert manipulability(arm, [0.3, 0.0], mask=position).condition == np.inf
+
+
+def test_reprs_are_short():
+    arm, q = rm.load("rx90"), [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
+    one, many = velocity_ellipsoid(arm, q), force_ellipsoid(arm, np.tile(q, (4, 5, 1)))
+    assert "linear velocity" in repr(one)
+    assert f"{one.radii[0]:.4g}" in repr(one)
+    assert "(4, 5)" in repr(many)
+    assert "rank 3" in repr(many)
+    batch = manipulability(arm, np.random.default_rng(0).uniform(-1, 1, (7, 6)))
+    assert f"{batch.measure.min():.4g} to {batch.measure.max():.4g}" in repr(batch)
+    assert "(7,)" in repr(batch)
+    none = manipulability(arm, np.zeros((0, 6)))
+    assert "measure none" in repr(none)
+    assert repr(rm.jacobian_factors(arm, q)).count("joint_") == 2
+    for found in (one, many, batch, none, rm.jacobian_factors(arm, q)):
+        assert len(repr(found)) < 200
 
 
 @given(model=models(max_frames=8, prismatic=True), seed=seeds)

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import Array, as_core, as_exact, as_vector, batch_shape, read_only
 from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel, check_model
+from .ellipsoid import in_range
 from .ellipsoids import joint_scale
 from .equilibrium import as_tolerance
 from .jacobians import Reference, jacobian
@@ -72,22 +73,40 @@ class Manipulability:
 
     @property
     def measure(self) -> Array:
-        """Yoshikawa's manipulability ``sqrt(det(J J^T))``, shape (...): 0 where rank < m.
+        """Product of the k = min(m, n) singular values that can be, shape (...); 0 where rank < k.
 
-        The product of the singular values. With the components of the whole twist its unit is
-        (m/s)^3 (rad/s)^3 over that of the length cubed.
+        Yoshikawa's manipulability ``sqrt(det(J J^T))`` where there are at least as many joints as
+        components, ``sqrt(det(J^T J))`` where there are fewer. With the components of the whole
+        twist and six joints or more its unit is (m/s)^3 (rad/s)^3 over that of the length cubed.
+        That of `ManipulabilityCriterion` of the same length, except for linear components alone
+        with a length other than 1: they are not divided by it here.
         """
-        return np.asarray(self.singular_values.prod(axis=-1))
+        return np.asarray(self._possible.prod(axis=-1))
 
     @property
     def condition(self) -> Array:
-        """Largest singular value over the smallest, shape (...): from 1, infinite where rank < m.
+        """Largest singular value over the k-th, shape (...): from 1, infinite where rank < k.
 
-        It depends on the length that makes metres comparable with radians.
+        k as for `measure`. It depends on the length that makes metres comparable with radians.
+        NaN for a robot without joints.
         """
-        s = self.singular_values
+        s = self._possible
+        if not s.shape[-1]:
+            return np.full(s.shape[:-1], np.nan)
         last = s[..., -1]
         return np.divide(s[..., 0], last, out=np.full(last.shape, np.inf), where=last > 0)
+
+    @property
+    def _possible(self) -> Array:
+        """The singular values that are not zero only because joints are fewer than components."""
+        return self.singular_values[..., : min(self.jacobian.shape[-2:])]
+
+    def __repr__(self) -> str:
+        return (
+            f"<Manipulability {self.rank.shape}: {self.weights.size} components, "
+            f"{self.jacobian.shape[-1]} joints; measure {in_range(self.measure)}, "
+            f"condition {in_range(self.condition)}, rank {in_range(self.rank)}>"
+        )
 
     def velocity_transmission(self, twist: ArrayLike) -> Array:
         """Largest multiple of a twist that joint velocities of the ball give.
@@ -201,7 +220,8 @@ def manipulability(
     Returns
     -------
     Manipulability
-        Its measure, condition, and ratios along twists and wrenches.
+        Its measure, condition, and ratios along twists and wrenches. For fewer joints than
+        components, measure and condition are those of ``J^T J``: of what the joints can do.
 
     Raises
     ------

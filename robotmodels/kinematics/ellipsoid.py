@@ -98,6 +98,20 @@ class Ellipsoid:
                 raise ShapeError(f"{name}: expected shape {shape}, got {array.shape}.")
             object.__setattr__(self, name, array)
 
+    def __repr__(self) -> str:
+        unit, r = self.quantity.unit, self.radii
+        if r.ndim == 1:
+            radii, centre = (", ".join(f"{x:.4g}" for x in v) for v in (r, self.centre))
+            return (
+                f"<Ellipsoid of {self.quantity.value}: radii {radii} {unit}, rank {self.rank}, "
+                f"centre ({centre}) m>"
+            )
+        ranges = ", ".join(f"r{k + 1} {in_range(r[..., k])}" for k in range(3))
+        return (
+            f"<Ellipsoid of {self.quantity.value}, batch {r.shape[:-1]}: {ranges} {unit}, "
+            f"rank {in_range(self.rank)}>"
+        )
+
     @property
     def volume(self) -> Array:
         """``4/3 pi r_1 r_2 r_3``, shape (...): 0 of a flat ellipsoid, infinite of an open one."""
@@ -232,3 +246,27 @@ class Ellipsoid:
         d = d / np.linalg.norm(d, axis=-1, keepdims=True)
         c = np.einsum("...ji,...j->...i", self.axes, d)
         return np.where((np.abs(c) <= _ON) & (self.rank < 3)[..., None], 0.0, c)
+
+
+def in_range(values: Array | NDArray[np.int64]) -> str:
+    """Least and largest of some numbers in a few digits.
+
+    Parameters
+    ----------
+    values : ndarray
+        Any shape.
+
+    Returns
+    -------
+    str
+        One number where all are the same; ``none`` of none.
+
+    Examples
+    --------
+    >>> in_range(np.array([0.5, 0.25])), in_range(np.array(3))
+    ('0.25 to 0.5', '3')
+    """
+    if not values.size:
+        return "none"
+    low, high = f"{values.min():.4g}", f"{values.max():.4g}"
+    return low if low == high else f"{low} to {high}"

@@ -54,6 +54,14 @@ class JacobianFactors:
     projection: str
     intermediate: str
 
+    def __repr__(self) -> str:
+        *batch, _, n = self.reduced.shape
+        where = f", batch {tuple(batch)}" if batch else ""
+        return (
+            f"<JacobianFactors{where}: rotation (6, 6), transport (6, 6), reduced (6, {n}); "
+            f"projection {self.projection!r}, intermediate {self.intermediate!r}>"
+        )
+
     @property
     def jacobian(self) -> Array:
         """The product of the three, shape (..., 6, n): world axes, at the frame's origin."""
