@@ -381,6 +381,63 @@ def test_animation_times():
     assert rm.viz.animate(RX90, q).motion.keyframes == 12  # nothing moves: two a joint
 
 
+def test_motions_are_animated_at_their_own_times():
+    tr, start = rm.trajectories, np.array([0.1, 0.2, -0.5, 0.4, 0.7, 0.6])
+    move = tr.quintic(start, start + 0.3, duration=1.71)
+    scene = rm.viz.animate(RX90, move)
+    assert scene.motion.samples == 53  # 30 a second, and the end
+    assert scene.motion.duration == 1.71
+    assert rm.viz.animate(RX90, move, fps=10).motion.samples == 19
+    assert rm.viz.animate(RX90, move, dt=0.01).motion.samples == 172
+    t = np.linspace(0.0, 1.71, 9)
+    for j in range(6):
+        np.testing.assert_allclose(replayed(scene, f"joint_{j + 1}", t), move.q(t)[:, j], atol=2e-3)
+    uneven = np.array([1.0, 1.1, 1.5, 1.7])
+    scene = rm.viz.animate(RX90, move.at(uneven))
+    assert scene.motion.duration == pytest.approx(0.7)
+    np.testing.assert_allclose(
+        replayed(scene, "joint_1", uneven - 1.0), move.q(uneven)[:, 0], atol=6e-4
+    )
+    assert rm.viz.animate(RX90, move.at(uneven), dt=1.0).motion.duration == pytest.approx(3.0)
+    line = tr.straight_line(rm.dgm(RX90, start), rm.dgm(RX90, start + 0.1), duration=0.8)
+    path = tr.joint_path(RX90, line, start, samples=50)
+    scene = rm.viz.animate(RX90, path)
+    assert (scene.motion.samples, scene.motion.duration) == (50, pytest.approx(0.8))
+    untimed = tr.joint_path(RX90, line.resample(31).T, start)
+    assert rm.viz.animate(RX90, untimed).motion.duration == pytest.approx(1.0)
+    followed = tr.resolved_motion(RX90, line, start, samples=40)
+    assert rm.viz.animate(RX90, followed).motion.duration == pytest.approx(0.8)
+    two = rm.viz.animate([RX90, RX90], [move, path])  # each in its own time
+    assert two.motion.duration == 1.71
+    out = line.path.last.copy()
+    out[0, 3] += 2.0
+    lost = tr.joint_path(RX90, tr.straight_line(line.path.start, out, 1.0), start, samples=50)
+    first = int(np.isnan(lost.q[:, 0]).argmax())
+    with pytest.raises(InvalidValueError, match=rf"the first is pose {first}; .*q\[:{first}\]"):
+        rm.viz.animate(RX90, lost)
+    assert rm.viz.animate(RX90, lost.q[:first]).motion.samples == first
+
+
+def test_what_is_no_motion_of_joints_is_not_animated():
+    tr = rm.trajectories
+    line = tr.straight_line(np.eye(4), np.eye(4), duration=1.0)
+    limits = tr.MotionLimits(1.0, 2.0)
+    for wrong, message in (
+        (line, "PoseTrajectory; joint_path"),
+        (line.resample(5), "PoseSamples; joint_path"),
+        (limits, "got MotionLimits"),
+        (None, "got NoneType"),
+        (tr.quintic(np.zeros(3), np.ones(3), 1.0), "6 joints, got one of 3"),
+        (tr.quintic(np.zeros((2, 6)), np.ones(6), 1.0), "batch"),
+        (tr.quintic(np.zeros(6), np.zeros(6), 0.0), "takes no time"),
+        (tr.quintic(np.zeros(6), np.ones(6), 1.0).at([0.0]), "at least two samples"),
+        (tr.quintic(np.zeros(6), np.ones(6), 1.0).at([0.5, 0.1]), "ascending"),
+    ):
+        with pytest.raises((InvalidValueError, ShapeError), match=message) as refusal:
+            rm.viz.animate(RX90, wrong)
+        assert len(str(refusal.value)) < 160
+
+
 def test_animation_loops_unless_told_otherwise():
     q = np.zeros((2, 6))
     options = commands(rm.viz.animate(RX90, q), "set_animation")[""]["options"]

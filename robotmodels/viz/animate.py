@@ -9,12 +9,17 @@ from numpy.typing import ArrayLike
 
 from ..kinematics import link_poses
 from ..model import RobotModel
+from ..trajectories.joint_path import JointPath
+from ..trajectories.resolved_motion import ResolvedMotion
+from ..trajectories.trajectory import Samples, Trajectory
 from .compose import as_color, as_many, as_models, as_opacity, compose, unique_names
-from .motion import Motion, Track, as_motion_samples, joint_tracks, keyframes, sample_times
+from .motion import Motion, Track, joint_tracks, keyframes, timed_samples
 from .nodes import Node
 from .robot import DrawnRobot, Look, draw_robot
 from .scene import Scene
 from .surroundings import path_node
+
+Moving = ArrayLike | Trajectory | Samples | JointPath | ResolvedMotion
 
 # Postures looked at to find out how much room the motion takes.
 _SEEN = 60
@@ -22,7 +27,7 @@ _SEEN = 60
 
 def animate(
     model: RobotModel | Sequence[RobotModel],
-    q: ArrayLike | Sequence[ArrayLike],
+    q: Moving | Sequence[Moving],
     dt: float | None = None,
     fps: float | None = None,
     *,
@@ -48,10 +53,11 @@ def animate(
     ----------
     model : RobotModel or sequence of RobotModel
         The robot, or R robots.
-    q : array_like, shape (N, n)
-        Joint variables in radians or metres, N >= 2; for several robots a list of such arrays.
+    q : array_like, shape (N, n), or Trajectory, Samples, JointPath or ResolvedMotion
+        Joint variables in radians or metres, N >= 2, or a motion with its own times; for several
+        robots a list of them. A trajectory is sampled at the frame rate.
     dt : float, optional
-        Seconds from one sample to the next.
+        Seconds from one sample to the next; they replace the times of samples that have some.
     fps : float, optional
         Samples a second, instead of ``dt``; default 30.
     path : bool
@@ -71,7 +77,8 @@ def animate(
     Raises
     ------
     ShapeError, InvalidValueError
-        Wrong joint variables or options.
+        Wrong joint variables or options; what is no motion of joints; a path with poses that are
+        not reached.
     MeshNotFoundError
         A mesh of the source URDF is not where it was looked for.
     MissingExtraError
@@ -84,18 +91,20 @@ def animate(
     >>> q = np.linspace([0.0, 0.0], [1.0, 0.5], 1001)
     >>> animate(arm, q, dt=0.002)
     <Scene 'robot': 11 shapes, 2 s from 1001 samples in 4 keyframes>
+    >>> from robotmodels.trajectories import quintic
+    >>> animate(arm, quintic([0.0, 0.0], [1.0, 0.5], duration=1.5)).motion.duration
+    1.5
     """
     models = as_models(model)
     values = as_many(q, model, len(models), "q")
-    samples = [as_motion_samples(v, m.n, "q") for m, v in zip(models, values, strict=True)]
+    samples = [timed_samples(v, m.n, dt, fps, "q") for m, v in zip(models, values, strict=True)]
     rgba = None if color is None else as_color(color)
     look = Look(bool(frames), bool(names), bool(tool), bool(meshes), as_opacity(opacity))
     labels = unique_names(models)
     robots: list[DrawnRobot] = []
     tracks: list[Track] = []
     paths: list[Node] = []
-    for item, motion, label in zip(models, samples, labels, strict=True):
-        times = sample_times(len(motion), dt, fps)
+    for item, (times, motion), label in zip(models, samples, labels, strict=True):
         some = motion[np.unique(np.linspace(0, len(motion) - 1, _SEEN).astype(int))]
         robot = draw_robot(item, motion[:1], f"robots/{label}", look, [rgba], some)
         tracks += joint_tracks(item, motion, times, robot.moving, robot.size)
@@ -104,6 +113,7 @@ def animate(
             keep = keyframes(times, points, 5e-4 * robot.size)
             paths += path_node(label, points[keep], robot.size)
         robots.append(robot)
-    count = max(len(motion) for motion in samples)
-    played = Motion(tuple(tracks), count, float(sample_times(count, dt, fps)[-1]), bool(loop))
+    count = max(len(motion) for _, motion in samples)
+    end = max(float(times[-1]) for times, _ in samples)
+    played = Motion(tuple(tracks), count, end, bool(loop))
     return compose(", ".join(labels), robots, paths, box, grid, view, height, played)

@@ -12,6 +12,10 @@ from .._arrays import Array, as_vector
 from ..errors import InvalidValueError, ShapeError
 from ..geometry import PRISMATIC
 from ..model import RobotModel
+from ..trajectories.joint_path import JointPath
+from ..trajectories.pose_trajectory import PoseSamples, PoseTrajectory
+from ..trajectories.resolved_motion import ResolvedMotion
+from ..trajectories.trajectory import Samples, Trajectory
 
 # A joint may be off by this much between keyframes, in radians and in parts of the robot's size:
 # less than a pixel.
@@ -150,6 +154,88 @@ def as_motion_samples(value: object, n: int, name: str) -> Array:
             "draw a single posture with show."
         )
     return q
+
+
+def timed_samples(
+    value: object, n: int, dt: float | None, fps: float | None, name: str
+) -> tuple[Array, Array]:
+    """The postures of an animation and their times.
+
+    Parameters
+    ----------
+    value : Trajectory, Samples, JointPath, ResolvedMotion or array_like, shape (N, n)
+        A trajectory is sampled at the frame rate. The times of the others are their own, where
+        they have some and neither ``dt`` nor ``fps`` is given.
+    n : int
+        Number of joints.
+    dt, fps : float, optional
+        As in `sample_times`.
+    name : str
+        Used in error messages.
+
+    Returns
+    -------
+    times : ndarray, shape (N,)
+        Seconds, from 0.
+    q : ndarray, shape (N, n)
+        Joint variables.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        As `as_motion_samples` and `sample_times`; what is no motion of joints; a batch of motions;
+        poses without a posture; times that do not ascend.
+
+    Examples
+    --------
+    >>> from robotmodels.trajectories import quintic
+    >>> times, q = timed_samples(quintic([0.0], [1.0], 0.95), 1, None, 10.0, "q")
+    >>> times.size, times[-1], q[-1]
+    (11, np.float64(0.95), array([1.]))
+    """
+    if isinstance(value, Trajectory):
+        return _sampled(value, n, float(sample_times(2, dt, fps)[1]), name)
+    if isinstance(value, (PoseTrajectory, PoseSamples)):
+        raise InvalidValueError(
+            f"{name}: expected a motion of joints, got {type(value).__name__}; joint_path and "
+            "resolved_motion find the joints that follow poses."
+        )
+    if not isinstance(value, (Samples, JointPath, ResolvedMotion)):
+        if not isinstance(value, (Sequence, np.ndarray)) and not hasattr(value, "__array__"):
+            raise InvalidValueError(
+                f"{name}: expected a Trajectory, Samples, JointPath, ResolvedMotion or an array of "
+                f"shape (N, {n}), got {type(value).__name__}."
+            )
+        q = as_motion_samples(value, n, name)
+        return sample_times(len(q), dt, fps), q
+    if isinstance(value, JointPath) and (lost := np.isnan(value.q).any(axis=-1)).any():
+        first, count = int(lost.argmax()), int(lost.sum())
+        raise InvalidValueError(
+            f"{name}: {count} of the {lost.size} poses of the path have no posture, the first is "
+            f"pose {first}; animate a part that is reached, such as path.q[:{first}]."
+        )
+    q = value.q[:, None] if value.q.ndim == 1 == n else value.q
+    q = as_motion_samples(q, n, name)
+    if dt is not None or fps is not None or np.isnan(value.t).any():
+        return sample_times(len(q), dt, fps), q
+    if value.t.shape != (len(q),) or (np.diff(value.t) <= 0.0).any():
+        raise InvalidValueError(f"{name}: expected samples at ascending times; give dt or fps.")
+    return value.t - value.t[0], q
+
+
+def _sampled(motion: Trajectory, n: int, step: float, name: str) -> tuple[Array, Array]:
+    if motion.motion.batch:
+        raise ShapeError(
+            f"{name}: expected one motion, got a batch of shape {motion.motion.batch}."
+        )
+    if motion.n != n:
+        raise ShapeError(f"{name}: expected a motion of {n} joints, got one of {motion.n}.")
+    T = motion.duration
+    if T <= 0.0:
+        raise InvalidValueError(f"{name}: the motion takes no time; draw its posture with show.")
+    # the last frame is the end, whatever the rate
+    times = np.linspace(0.0, T, max(2, 1 + int(np.ceil(T / step - 1e-9))))
+    return times, motion.q(times).reshape(-1, n)
 
 
 def joint_tracks(
