@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_floats
 from .._choices import chosen
 from ..errors import InvalidValueError, ShapeError
-from .asked import ROUNDING, checked_limits
+from .asked import ROUNDING, checked_limits, refuse_jointless
 from .limits import MotionLimits
 from .piecewise import PiecewisePolynomial
 from .shown import least_shown
@@ -176,6 +176,7 @@ class _Knots:
         self.scalar = q.ndim == 1
         self.points = q[:, None] if self.scalar else q
         n = self.points.shape[1]
+        refuse_jointless(n, "points")
         try:
             self.rates = {k: np.broadcast_to(as_floats(v, k), n) for k, v in rates.items()}
         except ValueError as error:
