@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from identities.random_robots import random_pose
 
+from robotmodels.errors import InvalidValueError
 from robotmodels.trajectories import (
     MotionLimits,
     Synchronisation,
@@ -184,3 +185,38 @@ def test_end_states_of_random_motions_are_exact(rng, law):
             beside = np.stack((np.nextafter(inner, 0.0), inner))
             gap = np.abs(np.diff(move.v(beside), axis=0)).max()
             assert gap <= width * peak[2] + 1e-12 * peak[1]
+
+
+# --- joints that wait ----------------------------------------------------------------------------
+
+
+def test_a_law_that_ends_with_a_jump_is_refused_where_a_joint_waits():
+    independent = Synchronisation.INDEPENDENT
+    limits = MotionLimits(velocity=1.0, acceleration=1.0, jerk=1.0)
+    with pytest.raises(InvalidValueError, match=r"joint 1 arrives early .* CUBIC .* limit of jerk"):
+        along_line(TimeLaw.CUBIC, [0, 0.0], [1, 3.0], None, limits, independent)
+    with pytest.raises(InvalidValueError, match=r"joint 2 .* velocity of LINEAR .* acceleration"):
+        along_line(TimeLaw.LINEAR, [0, 0.0], [3, 1.0], None, limits.without_jerk(), independent)
+    # no joint waits after a motion; no limit is broken by the jump
+    along_line(TimeLaw.CUBIC, [0, 0.0, 0.0], [3, 3.0, 0.0], None, limits, independent)
+    along_line(TimeLaw.CUBIC, [0, 0.0], [1, 3.0], 9.0, limits, independent)
+    along_line(TimeLaw.LINEAR, [0, 0.0], [3, 1.0], None, MotionLimits(velocity=1.0), independent)
+
+
+@pytest.mark.parametrize("law", TimeLaw)
+def test_independent_motions_that_are_made_keep_their_limits(rng, law):
+    made = 0
+    for _ in range(60):
+        q0, q1 = rng.normal(size=(2, 3))
+        q1 = np.where(rng.random(3) < 0.3, q0, q1)
+        v, a, j = 10.0 ** rng.uniform(-1.0, 1.0, 3)
+        a, j = (x if rng.random() < 0.5 else np.inf for x in (a, j))
+        below = {"jerk_lower": -1.0} if rng.random() < 0.3 else {}
+        limits = MotionLimits(v, a, j, **below)
+        try:
+            move = along_line(law, q0, q1, None, limits, Synchronisation.INDEPENDENT)
+        except InvalidValueError:
+            continue
+        made += 1
+        assert move.check(limits).kept
+    assert made

@@ -17,7 +17,7 @@ from .asked import (
     limits_along,
     refuse_short,
 )
-from .laws import Pieces, TimeLaw, law_of_duration, law_of_limits
+from .laws import LineLimits, Pieces, TimeLaw, law_of_duration, law_of_limits
 from .limits import MotionLimits
 from .piecewise import PiecewisePolynomial
 from .trajectory import Trajectory
@@ -245,7 +245,8 @@ def along_line(
         Seconds.
     limits : MotionLimits or None
         Kept inside the motion. Independent joints that arrive early have the end of their law
-        inside it, with the jump that a linear, cubic, bang-bang or trapezoidal law ends with.
+        inside it, with the jump that a linear, cubic, bang-bang or trapezoidal law ends with:
+        limits that the jump does not keep are refused there.
     synchronisation : Synchronisation or str
         How the joints are kept in step; a member or its name.
 
@@ -285,12 +286,36 @@ def along_line(
         pieces = law_of_duration(law, length, np.repeat(T, laws))
         least = np.zeros(R)
     else:
-        pieces = law_of_limits(law, length, limits_along(bounds, direction))
+        along = limits_along(bounds, direction)
+        pieces = law_of_limits(law, length, along)
         totals = pieces.durations.sum(axis=-1).reshape(R, laws)
         least = totals.max(axis=-1, initial=0.0)
+        if T is None and synchronisation is Synchronisation.INDEPENDENT:
+            _refuse_waiting(law, along, totals)
     refuse_short(T, least, length.reshape(R, laws))
     pieces = stretched(pieces, T, least, synchronisation, laws)
     return assembled(pieces, laws, start, direction, batch, scalar, T)
+
+
+def _refuse_waiting(law: TimeLaw, limits: LineLimits, totals: Array) -> None:
+    """Jumps at the end of a law, totals (R, n), are inside the motion where a joint waits."""
+    if law is TimeLaw.LINEAR:
+        jump, kind = "velocity", "acceleration or jerk"
+        bound = np.minimum(limits.deceleration, np.minimum(limits.jerk, limits.jerk_down))
+        others = "take SAME_TIME, or a law that ends at rest"
+    elif law is TimeLaw.CUBIC:
+        jump, kind, bound = "acceleration", "jerk", limits.jerk
+        others = "pass limits.without_jerk(), or take SAME_TIME or QUINTIC"
+    else:  # those of jerk are refused for BANG_BANG and TRAPEZOIDAL anywhere
+        return
+    early = (totals > 0.0) & (totals < totals.max(axis=-1, keepdims=True, initial=0.0))
+    wrong = early & np.isfinite(bound.reshape(totals.shape))
+    if wrong.any():
+        j = int(np.argwhere(wrong)[0][-1])
+        raise InvalidValueError(
+            f"limits: joint {j + 1} arrives early and waits, and the {jump} of {law.name} jumps at "
+            f"its end, which keeps no limit of {kind}; {others}."
+        )
 
 
 def stretched(
