@@ -339,8 +339,14 @@ def test_limits_in_space_are_of_translation_and_rotation():
             with pytest.raises((InvalidValueError, ShapeError), match=words) as refusal:
                 make(limits)
             assert not re.search("joint [0-9]|[0-9] joints", str(refusal.value))
-    # what does not move needs no limit
-    assert straight_line(A, se3.translation(1, 0, 0), limits=no_turn).duration > 2.0
+    # what does not move needs no limit, also where rounding sees a rotation
+    rounded = np.eye(4)
+    rounded[0, 1], rounded[1, 0] = 1e-16, -1e-16
+    assert rotation_vector(rounded[:3, :3]).any()
+    for start in (A, rounded):
+        end = se3.translation(1, 0, 0)
+        assert straight_line(start, end, limits=no_turn).duration > 2.0
+        assert blended_poses([start, end], no_turn).duration > 2.0
 
 
 def test_straight_line_of_a_duration_is_ctraj(rng):

@@ -31,6 +31,9 @@ from .trajectory import Trajectory
 
 _MOVES = ("translation", "rotation")
 
+_NO_TURN = 1e-15
+"""What rounding leaves of no rotation between two equal orientations, rad."""
+
 
 def straight_line(
     T0: Any,
@@ -270,6 +273,7 @@ def blended_poses(
     step = np.empty((len(T) - 1, 6))
     step[:, :3] = np.diff(T[:, :3, 3], axis=0)
     step[:, 3:] = rotation_vector(T[1:, :3, :3] @ np.swapaxes(T[:-1, :3, :3], -1, -2))
+    step[np.linalg.norm(step[:, 3:], axis=-1) <= _NO_TURN, 3:] = 0.0
     size = np.stack((np.linalg.norm(step[:, :3], axis=-1), np.linalg.norm(step[:, 3:], axis=-1)))
     for name, bound in (("velocity", bounds.velocity), ("acceleration", bounds.acceleration)):
         wrong = size.any(axis=-1) & ((bound == 0.0) | np.isinf(bound))
@@ -302,7 +306,8 @@ def _timed(
 ) -> PoseTrajectory:
     law = chosen(TimeLaw, law, "law")
     bounds = _of_space(limits)
-    size = np.array([path.length, abs(path.turn)])
+    turn = abs(path.turn)
+    size = np.array([path.length, turn if turn > _NO_TURN else 0.0])
     of_s = None
     if bounds is not None:
         V, A, B, J, K, _ = limits_along(bounds, size[None, None, :], _MOVES)
