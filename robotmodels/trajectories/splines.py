@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from enum import Enum
-from math import factorial
 from typing import Any
 
 import numpy as np
@@ -97,7 +96,10 @@ def cubic_spline(
         SplineEnds.PERIODIC: "periodic",
     }[ends]
     spline = CubicSpline(knots.times, q, bc_type=condition)
-    trajectory = knots.finished(np.asarray(spline.c), np.asarray(spline.x))
+    # highest power of the time first
+    c = np.moveaxis(np.asarray(spline.c)[::-1], 0, 1)
+    c = c * np.diff(knots.times)[:, None, None] ** np.arange(4.0)[:, None]
+    trajectory = knots.finished(c, knots.times)
     if ends is SplineEnds.PERIODIC:
         return Trajectory(trajectory.motion, trajectory.scalar)
     return trajectory
@@ -141,21 +143,70 @@ def quintic_spline(
     >>> path.q([0.0, 1.0, 2.0]).round(12), path.a([0.0, 2.0]).round(9) + 0.0
     (array([0. , 1. , 0.5]), array([0., 0.]))
     """
-    from scipy.interpolate import make_interp_spline
-
     knots = _Knots(points, times, limits, {"v0": v0, "v1": v1, "a0": a0, "a1": a1})
     rates = knots.rates
+    h = np.diff(knots.times)[:, None]
+    v, a = _quintic_rates(knots.points, h, rates)
+    # between two states: points are met and the acceleration goes on however uneven the times are
+    q, d = knots.points[:-1], np.diff(knots.points, axis=0)
+    V0, V1, A0, A1 = h * v[:-1], h * v[1:], h * h * a[:-1], h * h * a[1:]
+    cubed = 10.0 * d - 6.0 * V0 - 4.0 * V1 - 1.5 * A0 + 0.5 * A1
+    fourth = -15.0 * d + 8.0 * V0 + 7.0 * V1 + 1.5 * A0 - A1
+    fifth = 6.0 * d - 3.0 * (V0 + V1) - 0.5 * (A0 - A1)
+    return knots.finished(np.stack((q, V0, 0.5 * A0, cubed, fourth, fifth), axis=1), knots.times)
+
+
+def _quintic_rates(q: Array, h: Array, ends: dict[str, Array]) -> tuple[Array, Array]:
+    """Velocities and accelerations (m, n) at the points of a fifth-order spline.
+
+    Between two states a piece is known; that the jerk and its derivative go on at the inner
+    points makes a banded system for the states.
+    """
+    from scipy.linalg import solve_banded
+
+    m, n = q.shape
     # in units of the mean interval the equations are well scaled
-    unit = knots.times[-1] / (len(knots.times) - 1)
-    condition: Any = (
-        [(1, rates["v0"] * unit), (2, rates["a0"] * unit**2)],
-        [(1, rates["v1"] * unit), (2, rates["a1"] * unit**2)],
+    unit = float(h.mean())
+    h = h / unit
+    d = np.diff(q, axis=0) / h**3
+    before, after = h[:-1, 0], h[1:, 0]
+    band, right = np.zeros((7, 2 * m)), np.zeros((2 * m, n))
+    band[3, [0, 1, -2, -1]] = 1.0
+    right[[0, 1, -2, -1]] = (
+        ends["v0"] * unit, ends["a0"] * unit**2, ends["v1"] * unit, ends["a1"] * unit**2,
+    )  # fmt: skip
+    inner = 2 * np.arange(1, m - 1)
+    one, two, three = (
+        (before**-p, after**-p, np.minimum(before, after) ** p) for p in (1.0, 2.0, 3.0)
     )
-    spline = make_interp_spline(knots.times / unit, knots.points, k=5, bc_type=condition)
-    left = knots.times[:-1] / unit
-    # Taylor's coefficients at the start of every interval, highest power first
-    c = np.stack([spline(left, nu=k) / (factorial(k) * unit**k) for k in range(5, -1, -1)])
-    return knots.finished(c, knots.times)
+
+    def put(row: Array, column: int, value: Array) -> None:
+        """Entries of the equations at the inner points, ``column`` from their own velocity."""
+        place = inner + column
+        band[3 + row - place, place] = value
+
+    # jerk before less jerk after, v and a of the point before, of this one and of the next
+    jerk, u = inner, two[2]
+    put(jerk, -2, -24.0 * two[0] * u)
+    put(jerk, -1, -3.0 * one[0] * u)
+    put(jerk, 0, 36.0 * (two[1] - two[0]) * u)
+    put(jerk, 1, 9.0 * (one[0] + one[1]) * u)
+    put(jerk, 2, 24.0 * two[1] * u)
+    put(jerk, 3, -3.0 * one[1] * u)
+    right[jerk] = 60.0 * np.diff(d, axis=0) * u[:, None]
+    # and the same of the derivative of the jerk
+    snap, u = inner + 1, three[2]
+    put(snap, -2, -168.0 * three[0] * u)
+    put(snap, -1, -24.0 * two[0] * u)
+    put(snap, 0, -192.0 * (three[0] + three[1]) * u)
+    put(snap, 1, 36.0 * (two[0] - two[1]) * u)
+    put(snap, 2, -168.0 * three[1] * u)
+    put(snap, 3, 24.0 * two[1] * u)
+    right[snap] = -360.0 * (d[:-1] / h[:-1] + d[1:] / h[1:]) * u[:, None]
+    x = solve_banded((3, 3), band, right)
+    v, a = x[::2] / unit, x[1::2] / unit**2
+    v[0], v[-1], a[0], a[-1] = ends["v0"], ends["v1"], ends["a0"], ends["a1"]
+    return v, a
 
 
 class _Knots:
@@ -187,9 +238,8 @@ class _Knots:
         self.times = _chosen_times(self) if times is None else _given_times(times, len(q))
 
     def finished(self, c: Array, x: Array) -> Trajectory:
-        """The trajectory of coefficients (d + 1, K, n), highest power first, and its limits."""
+        """The trajectory of coefficients (K, d + 1, n) of normalised time, and its limits."""
         h = np.diff(x)
-        c = np.moveaxis(c[::-1], 0, 1) * h[:, None, None] ** np.arange(float(len(c)))[:, None]
         motion = PiecewisePolynomial(x[None], c)
         trajectory = Trajectory(motion, self.scalar)
         if self.limits is None:
