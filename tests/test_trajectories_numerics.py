@@ -11,6 +11,7 @@ from robotmodels.trajectories import (
     TimeLaw,
     blended_lines,
     blended_poses,
+    circular_arc,
     cubic_spline,
     fourier,
     jerk_limited,
@@ -18,6 +19,7 @@ from robotmodels.trajectories import (
     smoothed_trapezoidal,
     trapezoidal,
 )
+from robotmodels.trajectories.paths import FixedAxisPath
 from robotmodels.trajectories.point_to_point import along_line
 from robotmodels.trajectories.rotations import axis_and_angle, rotation_about, rotation_vector
 
@@ -261,3 +263,57 @@ def test_splines_of_uneven_times_meet_their_points(rng):
                 given = ((v0, v1), (a0, a1))[order - 1]
                 assert np.abs(first[0] - given[0]).max() < 1e-13 * max(1.0, size[0, 0])
                 assert np.abs(last[-1] - given[1]).max() < 1e-13 * max(1.0, size[-1, 0])
+
+
+# --- arcs ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("height", [0.6, 0.1, 1e-3, 1e-5, 1e-7, 3e-9])
+@pytest.mark.parametrize("side", [1e-3, 1.0, 1e3])
+def test_flat_arcs_meet_their_points(rng, height, side):
+    limits = MotionLimits(velocity=[side, 1.0], acceleration=[side, 1.0])
+    for _ in range(10):
+        T0, T1 = random_pose(rng), random_pose(rng)
+        R = random_pose(rng)[:3, :3]
+        x, rise = rng.uniform(0.2, 0.8), height * rng.choice([-1.0, 1.0])
+        p = np.zeros(3) if side < 1.0 else side * rng.normal(size=3)
+        m = p + side * R @ [x, 4.0 * x * (1.0 - x) * rise, 0.0]
+        e = p + side * R @ [1.0, 0.0, 0.0]
+        T0[:3, 3], T1[:3, 3] = p, e
+        move = circular_arc(T0, m, T1, limits=limits)
+        path = move.path
+        assert isinstance(path, FixedAxisPath)
+        size = max(side, np.abs(p).max())
+        # the last pose is put in at the end: the one beside it shows whether it had to be
+        beside = path.poses(np.array([1.0 - 1e-15]))[0, :3, 3]
+        assert np.abs(beside - e).max() < 1e-14 * size
+        s = np.linspace(0.0, 1.0, 201)
+        X = path.poses(s)[:, :3, 3]
+        near = int(np.abs(np.linalg.norm(X - m, axis=-1)).argmin())
+        # on the way of the points: through the middle one
+        fine = np.linspace(s[max(near - 1, 0)], s[min(near + 1, 200)], 3)
+        for _ in range(60):
+            way = np.linalg.norm(path.poses(fine)[:, :3, 3] - m, axis=-1)
+            k = int(way.argmin())
+            width = 0.6 * (fine[1] - fine[0])
+            fine = np.clip(fine[k] + np.array([-width, 0.0, width]), 0.0, 1.0)
+        assert way.min() < 1e-14 * size
+        # with as much curvature as the three points have, everywhere
+        local = (X - p) @ R
+        chord_m = x * (1.0 - x) - (4.0 * x * (1.0 - x) * rise) ** 2
+        offset = chord_m / (2.0 * 4.0 * x * (1.0 - x) * rise)  # of the centre, below the chord
+        u, w = local[:, 0] / side, local[:, 1] / side
+        assert np.abs(u * (1.0 - u) - w * w - 2.0 * offset * w).max() < max(
+            1e-13, 4e-15 * size / side * max(1.0, abs(offset))
+        )
+        assert np.abs(local[:, 2]).max() < 1e-14 * size
+
+
+def test_points_of_no_arc_are_refused(rng):
+    for offset in (0.0, 5.0, 1e5):
+        for height in (0.0, 1e-10, 1e-12):
+            R, p = random_pose(rng)[:3, :3], offset * rng.normal(size=3)
+            T0, T1 = np.eye(4), np.eye(4)
+            T0[:3, 3], T1[:3, 3] = p, p + R @ [1.0, 0.0, 0.0]
+            with pytest.raises(InvalidValueError, match="straight_line"):
+                circular_arc(T0, p + R @ [0.4, height, 0.0], T1, duration=1.0)

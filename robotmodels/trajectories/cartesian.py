@@ -34,6 +34,10 @@ _MOVES = ("translation", "rotation")
 _NO_TURN = 1e-15
 """What rounding leaves of no rotation between two equal orientations, rad."""
 
+_FLAT = 1e-9
+"""Height of three points beside their longest side below which they are on a line. Down to it an
+arc passes them within some 1e-15 of their coordinates, however far away its centre is."""
+
 
 def straight_line(
     T0: Any,
@@ -119,7 +123,9 @@ def circular_arc(
     Raises
     ------
     ShapeError, InvalidValueError, NotARotationError
-        As `straight_line`; three points on one line, or two that are the same.
+        As `straight_line`; three points on one line, or two that are the same. So near to a line
+        that the arc stands off it by less than 1e-9 of its longest side, or by less than the
+        rounding of the points, it has no plane to speak of.
 
     Examples
     --------
@@ -130,21 +136,28 @@ def circular_arc(
     """
     first, last = se3.as_single_pose(T0, "T0"), se3.as_single_pose(T1, "T1")
     p, m, e = first[:3, 3], as_exact(through, (3,), "through"), last[:3, 3]
-    a, b = m - p, e - p
+    a, b, c = m - p, e - p, e - m
     cross = np.cross(a, b)
     size = float(np.linalg.norm(cross))
-    if size <= 1e-9 * max(float(a @ a), float(b @ b), float((e - m) @ (e - m))):
+    side = max(float(np.linalg.norm(x)) for x in (a, b, c))
+    rounding = 64.0 * np.finfo(float).eps * max(float(np.abs(x).max()) for x in (p, m, e))
+    if size <= side * max(_FLAT * side, rounding):
         raise InvalidValueError(
-            "through: the three points lie on one line, which is no circle; take straight_line, "
-            "or circle for a whole turn."
+            "through: the three points lie on one line, or within a billionth of its length of it, "
+            "which is no circle; take straight_line, or circle for a whole turn."
         )
+    # Angles at the points are halves of the arcs opposite, which keeps their digits where the
+    # centre is far away. With this normal the points come in their order.
+    half = float(np.arctan2(size, a @ c))
+    chord, lean = (b, half) if b @ b >= a @ a else (a, float(np.arctan2(size, b @ c)))
+    chord = chord / np.linalg.norm(chord)
     normal = cross / size
-    centre = p + (np.cross((a @ a) * b - (b @ b) * a, cross)) / (2.0 * size * size)
-    u = p - centre
-    w = np.cross(normal, u)
-    # with this normal the points come in their order, so the angle is between 0 and 2 pi
-    sweep = float(np.arctan2((e - centre) @ w, (e - centre) @ u) % (2.0 * np.pi))
-    return _timed(arc(first, last, centre, normal, sweep), duration, limits, law)
+    normal -= chord * (normal @ chord)
+    normal /= np.linalg.norm(normal)
+    forward: Array = np.cos(lean) * chord - np.sin(lean) * np.cross(normal, chord)
+    radius = float(np.linalg.norm(a) * np.linalg.norm(b) * np.linalg.norm(c)) / (2.0 * size)
+    centre: Array = p + radius * np.cross(normal, forward)
+    return _timed(arc(first, last, centre, normal, 2.0 * half), duration, limits, law)
 
 
 def circle(

@@ -97,8 +97,11 @@ class FixedAxisPath:
         T[:, :3, :3] = rotation_about(self.axis, self.turn * s) @ self.start[:3, :3]
         T[:, :3, 3] = self.start[:3, 3] + s[:, None] * self.shift
         if self.sweep:
-            arm = self.start[:3, 3] - self.centre
-            T[:, :3, 3] = self.centre + rotation_about(self.normal, self.sweep * s) @ arm
+            # what the start is displaced by: a far centre would take its digits
+            across = np.cross(self.normal, self.start[:3, 3] - self.centre)
+            inward = np.cross(self.normal, across)
+            angle = self.sweep * s[:, None]
+            T[:, :3, 3] += np.sin(angle) * across + 2.0 * np.sin(0.5 * angle) ** 2 * inward
         T[:, 3, 3] = 1.0
         T[s == 0.0], T[s == 1.0] = self.start, self.last
         return T
