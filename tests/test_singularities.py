@@ -54,7 +54,7 @@ KNOWN = {
         1, (ELBOW,), BOUNDARY,
     ),
     "stanford wrist": ("stanford_arm", [0.1, 0.2, 0.3, 0.4, 0, 0.6], 1, (WRIST,), INTERIOR),
-    "stanford axis": ("stanford_arm", [0.1, 0, 0.3, 0.4, 0.5, 0.6], 1, (OTHER,), BOUNDARY),
+    "stanford axis": ("stanford_arm", [0.1, 0, 0.3, 0.4, 0.5, 0.6], 1, (SHOULDER,), BOUNDARY),
     "scara stretched": ("cobra_s600", [0.1, 0, 0.1, 0.4], 1, (ELBOW,), BOUNDARY),
     "scara folded": ("cobra_s600", [0.1, PI, 0.1, 0.4], 1, (ELBOW,), BOUNDARY),
     "planar stretched": ("planar_3r", [0.1, 0, 0.3], 1, (ELBOW,), BOUNDARY),
@@ -62,7 +62,7 @@ KNOWN = {
     "iiwa elbow": ("iiwa14", iiwa(q4=0), 1, (ELBOW,), BOUNDARY),
     "iiwa shoulder": ("iiwa14", iiwa(q2=0, q3=PI / 2), 1, (SHOULDER,), INTERIOR),
     "iiwa wrist": ("iiwa14", iiwa(q6=0, q5=PI / 2), 1, (WRIST,), INTERIOR),
-    "iiwa both ends": ("iiwa14", iiwa(q2=0, q6=0), 1, (WRIST,), INTERIOR),
+    "iiwa both ends": ("iiwa14", iiwa(q2=0, q6=0), 1, (SHOULDER, WRIST), INTERIOR),
 }  # fmt: skip
 
 
@@ -167,7 +167,8 @@ def test_lost_directions_have_the_sign_of_the_book():
     q = np.random.default_rng(0).uniform(-PI, PI, size=(20000, 2))
     reached = rm.dgm(planar, q)[:, :3, 3] - rm.dgm(planar, report.q)[:3, 3]
     assert (reached @ report.open_twist[:3]).min() > 0.0
-    assert classify_singularity(planar, [0.1, 0.0]).status is SingularityStatus.REGULAR
+    whole = classify_singularity(planar, [0.1, 0.0], mask=[1] * 6)
+    assert whole.status is SingularityStatus.REGULAR
 
 
 def test_redundant_arm_keeps_its_regular_self_motion():
@@ -474,7 +475,7 @@ def test_redundant_arm_has_surfaces_and_curves():
     found = nearest_singularity(rm.load("iiwa14"), IIWA)
     expected = {
         0.8: (iiwa(q4=0), 1, (ELBOW,)),
-        np.hypot(0.4, 0.9): (iiwa(q2=0, q6=0), 2, (WRIST,)),
+        np.hypot(0.4, 0.9): (iiwa(q2=0, q6=0), 2, (SHOULDER, WRIST)),
         np.hypot(0.4, PI / 2 - 0.3): (iiwa(q2=0, q3=PI / 2), 2, (SHOULDER,)),
         np.hypot(0.9, PI / 2 - 0.5): (iiwa(q6=0, q5=PI / 2), 2, (WRIST,)),
     }
@@ -522,7 +523,7 @@ def test_given_configuration_that_is_singular():
 
 def test_nothing_to_find():
     arm = rm.load("planar_2r")
-    found = nearest_singularity(arm, [0.3, 0.5])
+    found = nearest_singularity(arm, [0.3, 0.5], mask=[1] * 6)
     assert (found.outcome, found.count) == (SearchOutcome.NONE_FOUND, 0)
     assert found.q.shape == found.direction.shape == found.escape.shape == (0, 2)
     assert str(found) == SearchOutcome.NONE_FOUND.sentence
@@ -567,3 +568,182 @@ def test_scale_of_the_robot_does_not_matter():
     large = nearest_singularity(big.with_tool(tool, tip=arm.tip), q * stretch)
     np.testing.assert_allclose(large.distance, found.distance, atol=1e-6)
     assert large.kind == found.kind
+
+
+SMALL = ("planar_2r", "planar_3r", "lab_rr", "lab_rrt", "lab_trr", "cobra_s600", "gantry", "xarm5")
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_all_doors_take_the_same_task_by_default(name):
+    """Where the formulas say singular, so do the numbers, and beside it none of them does."""
+    arm = rm.load(name)
+    explained = rm.explain_singularities(arm)
+    rng = np.random.default_rng(4)
+    looked = 0
+    for factor in explained.factors:
+        alone = any(c.factors == (factor,) for c in explained.conditions)
+        if not alone or factor.never_zero:
+            continue
+        q = rng.uniform(0.2, 0.9, size=arm.n)
+        for zero in factor.zeros(q):
+            if np.isnan(zero):
+                continue
+            q[factor.solved_joint] = zero
+            looked += 1
+            report = classify_singularity(arm, q)
+            assert report.status is SingularityStatus.SINGULAR
+            assert factor.kind in report.kinds
+            assert singularity_flags(arm, q).status == SingularityStatus.SINGULAR
+            found = nearest_singularity(arm, q)
+            assert found.outcome is SearchOutcome.ALREADY_SINGULAR
+            taken = "position" in str(report)
+            assert taken == ("position" in str(found)) == ("position" in explained.task)
+            assert taken == ("position" in repr(singularity_flags(arm, q)))
+            beside = q.copy()
+            beside[factor.solved_joint] += 0.1
+            assert classify_singularity(arm, beside).status is not SingularityStatus.SINGULAR
+    assert looked
+
+
+def test_default_task_of_trees_and_of_frames_on_the_way():
+    arm = rm.load("rx90")
+    q = [0.1, 0.2, -PI / 2, 0.4, 0.5, 0.6]
+    # three joints move R3 and two of them its origin; R2 turns about an axis through its origin
+    for frame in (2, 3):
+        assert classify_singularity(arm, q, frame=frame).mask.all()
+        assert rm.explain_singularities(arm, frame).task != "the position of the frame"
+    tree = rm.RobotModel.from_table(
+        rm.DHTable(antecedent=[0, 1, 2, 1, 4], sigma=[0] * 5, d=[0, 0.3, 0.2, 0.4, 0.1],
+                   alpha=[0, PI / 2, 0, 0.3, 0]),
+        tip=3, tool=se3.translation(0.1, 0, 0),
+    )  # fmt: skip
+    explained = rm.explain_singularities(tree)
+    report = classify_singularity(tree, [0.1, 0.2, 0.0, 0.4, 0.5])
+    assert "position" in explained.task
+    assert (report.status, report.kinds) == (SingularityStatus.SINGULAR, (ELBOW,))
+    assert report.mask.tolist() == [True] * 3 + [False] * 3
+    # what the caller says wins
+    assert classify_singularity(tree, report.q, mask=[1] * 6).status is SingularityStatus.REGULAR
+    with pytest.raises(InvalidValueError, match="mask"):
+        classify_singularity(tree, report.q, point=2)
+
+
+KINDS = (
+    "lab_rr", "lab_rrt", "lab_trr", "planar_2r", "planar_3r", "gantry", "rx90", "tx40", "puma560",
+    "stanford_arm", "cobra_s600", "ur5", "kr6_r900", "iiwa14", "xarm5",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_kinds_are_those_of_the_factors_that_vanish(name):
+    """At zeros of each factor alone, and of those of each condition together."""
+    arm = rm.load(name)
+    explained = rm.explain_singularities(arm)
+    rng = np.random.default_rng(5)
+    slides = arm.table.sigma[arm.table.joint_rows] == 1
+    looked = 0
+    for condition in explained.conditions:
+        for k in range(2):
+            q = np.where(slides, rng.uniform(0.2, 0.8, arm.n), rng.uniform(-2.5, 2.5, arm.n))
+            own = condition.factors
+            if any(f.never_zero or f.solved_joint is None for f in own):
+                continue
+            for factor in own:
+                zeros = factor.zeros(q)
+                zeros = zeros[~np.isnan(zeros)]
+                if len(zeros):
+                    q[factor.solved_joint] = zeros[k % len(zeros)]
+            # factors of shared joints, or none of these values
+            if max(float(np.abs(f.values(q))) for f in own) > 1e-12:
+                continue
+            looked += 1
+            report = classify_singularity(arm, q)
+            vanishing = {f.kind for f in own}
+            if len(own) == 1:
+                vanishing = {f.kind for f in explained.factors if np.abs(f.values(q)) < 1e-9}
+            assert report.status is SingularityStatus.SINGULAR
+            assert set(report.kinds) == vanishing, report
+            assert [text.split(":")[0] for text in report.words[: len(report.kinds)]] == [
+                kind.value for kind in report.kinds
+            ]
+    assert looked
+
+
+@pytest.mark.parametrize("name", ["stanford_arm", "iiwa14", "tx40"])
+def test_kinds_of_the_nearest_are_those_of_the_factors(name):
+    arm = rm.load(name)
+    explained = rm.explain_singularities(arm)
+    q = np.random.default_rng(8).uniform(-1.2, 1.2, size=(2, arm.n))
+    if name == "stanford_arm":
+        q[0] = [0.3, 0, 0.5, 0.3, 0.5, 0.2]
+        assert nearest_singularity(arm, q[0]).kind[0] == (SHOULDER,)
+    for home in q:
+        found = nearest_singularity(arm, home)
+        assert found.count
+        for there, kinds in zip(found.q, found.kind, strict=True):
+            conditions = [c for c in explained.conditions if c.holds(there, 1e-6)]
+            vanishing = {f.kind for c in conditions for f in c.factors}
+            assert set(kinds) == vanishing
+
+
+def test_near_what():
+    """Near a singular configuration the report says near which, and what is weak."""
+    arm = rm.load("rx90")
+    report = classify_singularity(arm, [0, 1, -1.571, 0, 0.5, 0])
+    assert (report.status, report.kinds) == (SingularityStatus.NEAR_SINGULAR, ())
+    assert report.near_kinds == (ELBOW,)
+    assert report.weak.where == "axes of R4, at the origin of R4"
+    assert report.weak.rounded(0.02) == ("vz",)
+    assert "near elbow: " in str(report)
+    # the weak wrench is felt, but hardly
+    felt = report.weak.wrenches[0]
+    links = rm.link_poses(arm, report.q)
+    J = rm.jacobian(arm, report.q, frame=4, reference="local")
+    assert 1e-6 < np.linalg.norm(felt @ J[:, :4]) < 1e-3
+    assert links.shape == (6, 4, 4)
+    both = classify_singularity(arm, [0, 1, -1.571, 0, 0, 0])
+    assert (both.kinds, both.near_kinds) == ((WRIST,), (ELBOW,))
+    assert (both.order, len(both.lost.wrenches), len(both.weak.wrenches)) == (1, 1, 1)
+    regular = classify_singularity(arm, [0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
+    assert (regular.near_kinds, regular.near_words, len(regular.weak.wrenches)) == ((), (), 0)
+    exact = classify_singularity(arm, RX90["wrist"])
+    assert (exact.near_words, len(exact.weak.wrenches)) == ((), 0)
+    aside = classify_singularity(arm, RX90["shoulder"] + 1e-3 * np.eye(6)[1])
+    assert (aside.kinds, aside.near_kinds) == ((), (SHOULDER,))
+    planar = classify_singularity(rm.load("planar_2r"), [0.3, 1e-3])
+    assert planar.near_kinds == (ELBOW,)
+
+
+@pytest.mark.parametrize("name", ["rx90", "iiwa14", "ur5", "gantry", "planar_2r", "lab_trr"])
+def test_table_fits_a_page(name):
+    arm = rm.load(name)
+    found = nearest_singularity(arm, np.full(arm.n, 0.37))
+    lines = str(found).splitlines()
+    assert max(map(len, lines)) <= 100
+    assert any("distance" in line for line in lines)
+    for text in {text for row in found.words for text in row}:
+        assert " ".join(" ".join(lines).split()).count(text) == 1
+    assert "itself" not in str(classify_singularity(arm, found.q[0]))
+
+
+def test_what_the_frame_is_called():
+    arm = rm.load("rx90")
+    assert "axes of the tool" in str(classify_singularity(arm, [0, 1, -1.571, 0, 0, 0]))
+    report = classify_singularity(arm, RX90["elbow"], frame=6, mask_axes="tool")
+    assert report.lost_in_world.where == "axes of R6, at the origin of R6"
+
+
+def test_no_joints_at_all():
+    rigid = rm.RobotModel.from_table(rm.DHTable.from_rows([{"sigma": 2, "d": 0.3}]))
+    found = nearest_singularity(rigid, [])
+    assert (found.outcome, found.q.shape) == (SearchOutcome.NONE_FOUND, (0, 0))
+    assert classify_singularity(rigid, []).status is SingularityStatus.REGULAR
+    assert singularity_flags(rigid, np.zeros((3, 0))).status.tolist() == [0, 0, 0]
+
+
+def test_reprs_of_flags_and_searches():
+    arm = rm.load("rx90")
+    q = [[0.1, 0.2, 0.3, 0.4, x, 0.6] for x in (0.5, 1e-3, 0.0)]
+    text = repr(singularity_flags(arm, q))
+    assert "1 regular, 1 near singular, 1 singular" in text
+    assert len(repr(nearest_singularity(arm, q[0]))) < 200

@@ -11,10 +11,10 @@ import numpy as np
 
 from ..._arrays import Array
 from ...symbolic_dgm._angles import greek
+from ..singular.events import ArmGeometry, random_postures
 from ..singularity_kind import SingularityKind
 from ._chain import SymbolicChain
 from ._collect import formula
-from ._meaning import ArmGeometry, random_postures
 from ._numbers import FormulaNumbers
 from ._ring import Poly
 from .singularity_explanation import SingularityFactor

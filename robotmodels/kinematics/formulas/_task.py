@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from ...model import RobotModel
 from ..factors import jacobian_factors
+from ..singular.events import random_postures
+from ..singular.task import position_decides
 from ._blocks import cost, triangular_blocks
 from ._chain import TOOL
-from ._meaning import random_postures
 
 _ROWS = ("vx", "vy", "vz", "wx", "wy", "wz")
 _ZERO = 1e-11
@@ -79,7 +80,7 @@ class Patterns:
                 self.filled[i, j] = np.asarray(np.any(np.abs(J) > _ZERO, axis=0))
         at_tool = jacobian_factors(model, q, 0, at_frame, frame).reduced[..., places]
         self.rank = _rank(at_tool)
-        self.position_rank = _rank(at_tool[..., :3, :])
+        self.position_only = position_decides(model, frame)
 
     def best(self, rows: Sequence[int] | None, columns: Sequence[int]) -> Minor:
         """The frames in which a square part has the simplest determinant.
@@ -125,7 +126,7 @@ def task_of(patterns: Patterns, count: int) -> Task:
     """
     columns = range(count)
     rank = patterns.rank
-    if count <= 3 and patterns.position_rank == count:
+    if patterns.position_only:
         frames = {ij: f[:3] for ij, f in patterns.filled.items() if ij[1] == TOOL}
         task = _row_minors(patterns, frames, count)
         words = f"the position of the frame, rows {_row_words(task[0].rows)}"

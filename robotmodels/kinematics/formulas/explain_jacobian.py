@@ -11,11 +11,11 @@ import numpy as np
 from ...errors import InvalidValueError
 from ...model import FrameOfInterest, RobotModel, check_model
 from ..factors import jacobian_factors, middle_frames
+from ..singular.events import random_postures
 from ._chain import TOOL, SymbolicChain
 from ._entries import column_entries, column_length, lever_entries, rotation_entries
 from ._factor import numbers_of
 from ._jacobian_printing import jacobian_latex, jacobian_text
-from ._meaning import random_postures
 from .jacobian_explanation import JacobianExplanation
 
 _COMPARED = 6

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from ...model import RobotModel, check_model
+from ...model import FrameOfInterest, RobotModel, check_model
+from ..singular.events import ArmGeometry
 from ._blocks import Block, triangular_blocks
 from ._chain import TOOL, SymbolicChain
 from ._collect import cleaned, formula
 from ._conditions import families
 from ._factor import factor_of, numbers_of, unit_text, with_meaning
 from ._factoring import factored
-from ._meaning import ArmGeometry
 from ._ring import Poly
 from ._singularity_printing import MinorWords, explanation_latex, explanation_text
 from ._task import Minor, Patterns, Task, task_of
@@ -29,6 +30,9 @@ from .singularity_explanation import (
 
 _MOST_TERMS = 600
 """Determinants with more terms are not written out."""
+_MOST_KNOWN = 8
+# by identity: a model's hash reads all of its numbers
+_KNOWN: dict[int, tuple[weakref.ref[RobotModel], dict[Any, SingularityExplanation]]] = {}
 _ORDER = {kind: place for place, kind in enumerate(SingularityKind)}
 
 
@@ -46,9 +50,10 @@ def explain_singularities(
     the determinant of the arm times that of the wrist.
 
     What decides: for six joints the determinant of the Jacobian (base and tool do not matter).
-    For fewer joints the rows that are not zero, if they are as many as the joints (four of a SCARA
-    arm); else for up to three joints the position of the frame (here the tool matters); else all
-    square minors. For more joints than rows all square minors: the matrix loses rank where every
+    For up to three joints the position of the frame, if it has as many freedoms as they are (here
+    the tool matters; `classify_singularity`, `nearest_singularity` and `singularity_flags` take it
+    by default as well); else the rows that are not zero, if they are as many as the joints (four
+    of a SCARA arm); else all square minors. For more joints than rows all square minors: the matrix loses rank where every
     minor has a factor that vanishes, and ``conditions`` are the smallest sets of such factors.
 
     Parameters
@@ -78,7 +83,8 @@ def explain_singularities(
     -----
     Constants are kept as symbols while factoring. Entries below 1e-11 in random postures count as
     zero, directions that are lost to 1e-9 as lost, and sums of constants that cancel to 1e-12 of
-    their size are dropped.
+    their size are dropped. The last results of a model are kept as long as it is: asking again
+    returns the same object.
 
     References
     ----------
@@ -95,6 +101,34 @@ def explain_singularities(
     """
     check_model(model)
     point = model.twin.frame(frame)
+    # in words: what does not fit is refused below
+    names = repr(dict(symbols)) if isinstance(symbols, Mapping) else repr(symbols)
+    key = (point.pin_id, repr(frame), names)
+    known = _known(model)
+    found = known.pop(key, None)
+    if found is None:
+        found = _explanation(model, point, frame, symbols)
+    known[key] = found  # the last one asked for comes last
+    while len(known) > _MOST_KNOWN:
+        known.pop(next(iter(known)))
+    return found
+
+
+def _known(model: RobotModel) -> dict[Any, SingularityExplanation]:
+    """The last explanations of a model, the oldest first."""
+    key = id(model)
+    entry = _KNOWN.get(key)
+    if entry is None or entry[0]() is not model:
+        entry = _KNOWN[key] = (weakref.ref(model, lambda _: _KNOWN.pop(key, None)), {})
+    return entry[1]
+
+
+def _explanation(
+    model: RobotModel,
+    point: FrameOfInterest,
+    frame: str | int | None,
+    symbols: Mapping[str, str] | None,
+) -> SingularityExplanation:
     chain = SymbolicChain(model, point, symbols=symbols)
     numbers = [j for j in chain.path if j in chain.joints]
     label = "the tool" if frame is None else f"R_{frame}" if not isinstance(frame, str) else frame

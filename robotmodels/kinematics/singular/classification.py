@@ -5,10 +5,11 @@ Seed book sections 1.3.1.4 and 1.3.2.3.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..._arrays import Array, as_exact, as_floats, read_only
 from ...model import RobotModel
@@ -16,6 +17,8 @@ from ...table_text import length_text
 from ..poses import dgm
 from ..singularity_kind import SingularityKind
 from .boundary import WorkspaceSide, workspace_side
+from .causes import Cause, arm_geometry, causes_at
+from .events import ArmGeometry
 from .flags import SingularityStatus
 from .frames import LostDirections, check_frames, lost_in_task_axes, simplest_frame
 from .motion import SelfMotion, self_motions
@@ -25,10 +28,15 @@ from .task import (
     MaskAxes,
     SingularTask,
     above_zero,
+    counting_lines,
+    deciding_mask,
     singular_task,
     task_jacobians,
 )
 from .words import kinds_in_words
+
+_SMALL = 0.02
+_TWICE = 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,6 +61,11 @@ class SingularityReport:
         Shoulder, elbow, wrist or other.
     words : tuple of str
         The same as sentences.
+    near_kinds, near_words : tuples of SingularityKind and str
+        Of the singular sets nearby that make the freedoms weak which are not lost.
+    weak : LostDirections
+        Combinations that are weak but not lost, where they have the most small parts: those of
+        singular values between ``tolerance`` and ``near``.
     side : WorkspaceSide
         Boundary or interior, of what the robot reaches near this configuration.
     lost : LostDirections
@@ -67,6 +80,8 @@ class SingularityReport:
         Joint motions that leave the frame still.
     gained : int
         How many more of them than at regular configurations.
+    mask : ndarray of bool, shape (6,)
+        Components that count.
     length, tolerance : float
         Characteristic length in metres, and what counts as zero.
 
@@ -88,12 +103,16 @@ class SingularityReport:
     gap: float
     kinds: tuple[SingularityKind, ...]
     words: tuple[str, ...]
+    near_kinds: tuple[SingularityKind, ...]
+    near_words: tuple[str, ...]
+    weak: LostDirections
     side: WorkspaceSide
     lost: LostDirections
     lost_in_world: LostDirections
     open_twist: Array | None
     self_motions: tuple[SelfMotion, ...]
     gained: int
+    mask: NDArray[np.bool_]
     length: float
     tolerance: float
 
@@ -101,10 +120,15 @@ class SingularityReport:
         """Describe it in sentences."""
         lines = [
             self.status.sentence,
+            *counting_lines(self.mask, self.lost.frame),
             f"Rank {self.rank} of {self.dimension}, weakest singular value "
             f"{self.weakest:.3g} of the largest (length {length_text(self.length)} m)",
             *self.words,
+            *(f"near {text}" for text in self.near_words),
         ]
+        if len(self.weak.wrenches):
+            lines.append(f"Hardly produced, {self.weak.where} (parts below {_SMALL:g} left out):")
+            lines += [f"  {text}" for text in self.weak.rounded(_SMALL)]
         if self.lost.combinations:
             lines.append(f"Cannot be produced, {self.lost.where}:")
             lines += [f"  {text} = 0 whatever the joints do" for text in self.lost.combinations]
@@ -152,7 +176,9 @@ def classify_singularity(
     near : float
         Fraction below which a singular value that is not zero is called weak.
     mask : array_like, shape (6,), optional
-        Ones for the components ``vx vy vz wx wy wz`` that count; default all.
+        Ones for the components ``vx vy vz wx wy wz`` that count. Default all; the position
+        alone, ``[1, 1, 1, 0, 0, 0]``, for a frame moved by at most three joints whose position
+        has as many freedoms as they are (`deciding_mask`), as in `explain_singularities`.
     mask_axes : {"world", "tool"}
         Axes of the components.
     axes, point : int, optional
@@ -189,6 +215,7 @@ def classify_singularity(
     On a boundary: along the lost direction the tool can move to one side only.
     ...
     """
+    mask = deciding_mask(model, frame, mask)
     task = singular_task(model, frame, mask, mask_axes, length)
     check_frames(task, axes, point)
     q = as_exact(q, (model.n,), "q")
@@ -205,6 +232,7 @@ def report_of(
     near: float,
     axes: int | None = None,
     point: int | None = None,
+    arm: ArmGeometry | None = None,
 ) -> SingularityReport:
     """`classify_singularity` of a task whose dimension is known.
 
@@ -218,6 +246,8 @@ def report_of(
         Of the same task.
     tolerance, near, axes, point
         As `classify_singularity`.
+    arm : ArmGeometry, optional
+        Of the task, if it is known.
 
     Returns
     -------
@@ -240,7 +270,12 @@ def report_of(
     motions = self_motions(task, q, lost, null, zero)
     side, opening = workspace_side(task, q, lost, null, motions, missing, M - r)
     in_task = lost_in_task_axes(task, lost)
-    named = _named(task, q, whole, motions, lost, zero) if r < M else ()
+    nothing = lost_in_task_axes(task, np.zeros((task.rows, 0)))
+    hardly = int((sigma[:M] > near * top).sum())
+    causes = _causes(task, q, whole, arm) if min(r, hardly) < M else ()
+    named = _named(task, q, whole, motions, lost, zero, tolerance, causes) if r < M else ()
+    aside = _nearby(causes, named, tolerance, near) if hardly < r else ()
+    weak = _weak(task, q, whole, r, hardly)
     status = SingularityStatus.REGULAR
     if r < M:
         status = SingularityStatus.SINGULAR
@@ -261,19 +296,27 @@ def report_of(
         gap=float(task_rank(task, q, tolerance).gap),
         kinds=tuple(dict.fromkeys(kind for kind, _ in named if kind is not None)),
         words=tuple(text for _, text in named),
+        near_kinds=tuple(dict.fromkeys(kind for kind, _ in aside)),
+        near_words=tuple(text for _, text in aside),
+        weak=simplest_frame(task, q, weak, missing, _SMALL, axes, point) if hardly < r else nothing,
         side=side,
-        lost=simplest_frame(task, q, lost, missing, zero, axes, point) if r < M else in_task,
+        lost=simplest_frame(task, q, lost, missing, zero, axes, point) if r < M else nothing,
         lost_in_world=in_task,
         open_twist=None if open_twist is None else read_only(open_twist),
         self_motions=motions,
         gained=M - r,
+        mask=task.mask,
         length=task.length,
         tolerance=tolerance,
     )
 
 
 def names_of(
-    task: SingularTask, q: Array, whole: OperationalDimension, tolerance: float
+    task: SingularTask,
+    q: Array,
+    whole: OperationalDimension,
+    tolerance: float,
+    arm: ArmGeometry | None = None,
 ) -> tuple[tuple[SingularityKind | None, str], ...]:
     """Only the names of a singular configuration, without the rest of its report.
 
@@ -287,6 +330,8 @@ def names_of(
         Of the same task.
     tolerance : float
         As `classify_singularity`.
+    arm : ArmGeometry, optional
+        Of the task, if it is known.
 
     Returns
     -------
@@ -303,7 +348,9 @@ def names_of(
     _, lost, null, _, zero = _spaces(task, q, whole, tolerance)
     if not lost.shape[1]:
         return ()
-    return _named(task, q, whole, self_motions(task, q, lost, null, zero), lost, zero)
+    motions = self_motions(task, q, lost, null, zero)
+    causes = _causes(task, q, whole, arm)
+    return _named(task, q, whole, motions, lost, zero, tolerance, causes)
 
 
 def _spaces(
@@ -321,6 +368,12 @@ def _spaces(
     return as_floats(sigma, "sigma"), lost, null, missing, zero
 
 
+def _causes(
+    task: SingularTask, q: Array, whole: OperationalDimension, arm: ArmGeometry | None
+) -> tuple[Cause, ...]:
+    return causes_at(task, q, whole.dimension, arm or arm_geometry(task)) if whole.dimension else ()
+
+
 def _named(
     task: SingularTask,
     q: Array,
@@ -328,12 +381,60 @@ def _named(
     motions: tuple[SelfMotion, ...],
     lost: Array,
     zero: float,
+    tolerance: float,
+    causes: tuple[Cause, ...],
 ) -> tuple[tuple[SingularityKind | None, str], ...]:
+    """Kinds of the singular sets on which q is, in the words for what is seen at q."""
     wrenches = np.zeros((lost.shape[1], 6))
     wrenches[:, task.mask] = (lost * task.row_scale[:, None]).T
     if task.mask_axes == "tool":
         wrenches = _turned(task, q, wrenches)
-    return kinds_in_words(task, q, arm_structure(task), motions, wrenches, whole.redundancy, zero)
+    seen = kinds_in_words(task, q, arm_structure(task), motions, wrenches, whole.redundancy, zero)
+    here = [cause for cause in causes if cause.known and cause.weak <= _there(tolerance)]
+    here = here or [cause for cause in causes if not cause.known][:1]
+    if not here:
+        return seen
+    named: list[tuple[SingularityKind | None, str]] = []
+    for kind, text in _ordered(here):
+        words = [(k, t) for k, t in seen if k is kind]
+        named += words or [(kind, f"{kind.value}: {text}")]
+    return tuple(dict.fromkeys([*named, *((k, t) for k, t in seen if k is None)]))
+
+
+def _nearby(
+    causes: tuple[Cause, ...],
+    named: tuple[tuple[SingularityKind | None, str], ...],
+    tolerance: float,
+    near: float,
+) -> tuple[tuple[SingularityKind, str], ...]:
+    """Kinds of the singular sets beside q that make a freedom weak, each with a sentence."""
+    lost = {kind for kind, _ in named}
+    away = [cause for cause in causes if cause.weak > _there(tolerance)]
+    beside = [cause for cause in away if cause.known and cause.weak <= _TWICE * near]
+    # where none is that near to first order, the nearest is what makes it weak
+    beside = beside or away[:1]
+    texts = [(kind, f"{kind.value}: {text}") for kind, text in _ordered(beside)]
+    return tuple((kind, text) for kind, text in texts if kind not in lost)
+
+
+def _ordered(causes: Sequence[Cause]) -> list[tuple[SingularityKind, str]]:
+    """Their events, each once, from the shoulder to the wrist."""
+    order = list(SingularityKind)
+    events = dict.fromkeys(event for cause in causes for event in cause.events)
+    return sorted(events, key=lambda event: order.index(event[0]))
+
+
+def _there(tolerance: float) -> float:
+    """First-order estimates below this are zero."""
+    return max(10.0 * tolerance, 1e-7)
+
+
+def _weak(task: SingularTask, q: Array, whole: OperationalDimension, r: int, hardly: int) -> Array:
+    """Orthonormal weak directions that are not lost."""
+    if hardly >= r:
+        return np.zeros((task.rows, 0))
+    U = np.linalg.svd(task_jacobians(task, q))[0]
+    return _without(as_floats(U[:, hardly:r], "weak"), _missing(task, whole))
 
 
 def _missing(task: SingularTask, whole: OperationalDimension) -> Array:

@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..._arrays import Array, as_vector, read_only
 from ...model import RobotModel
+from .frames import frame_words
 from .rank import TOLERANCE, operational_dimension, task_rank
-from .task import MaskAxes, above_zero, singular_task
+from .task import MaskAxes, above_zero, counting_lines, deciding_mask, singular_task
 
 
 class SingularityStatus(IntEnum):
@@ -59,6 +60,10 @@ class SingularityFlags:
         The M-th singular value over the first: how far from singular, no unit.
     dimension : int
         M, the global number of degrees of freedom.
+    mask : ndarray of bool, shape (6,)
+        Components that count.
+    frame : str
+        What the frame is called, such as ``"the tool"``.
 
     Examples
     --------
@@ -72,6 +77,16 @@ class SingularityFlags:
     order: NDArray[np.int64]
     weakest: Array
     dimension: int
+    mask: NDArray[np.bool_]
+    frame: str
+
+    def __repr__(self) -> str:
+        counts = ", ".join(
+            f"{int((self.status == s).sum())} {s.name.lower().replace('_', ' ')}"
+            for s in SingularityStatus
+        )
+        what = "".join(f"; {line}" for line in counting_lines(self.mask, self.frame))
+        return f"<SingularityFlags {self.status.shape}: {counts}; dimension {self.dimension}{what}>"
 
     def reason(self, i: int | tuple[int, ...] = ()) -> str:
         """What one configuration is, in a sentence.
@@ -137,6 +152,7 @@ def singularity_flags(
     >>> singularity_flags(load("rx90"), q).status
     array([0, 1, 2], dtype=int8)
     """
+    mask = deciding_mask(model, frame, mask)
     task = singular_task(model, frame, mask, mask_axes, length)
     q = as_vector(q, model.n, "q")
     tolerance, near = above_zero(tolerance, "tolerance"), above_zero(near, "near")
@@ -159,4 +175,6 @@ def singularity_flags(
         order=read_only(M - rank, np.int64),
         weakest=read_only(weakest),
         dimension=M,
+        mask=task.mask,
+        frame=frame_words(frame),
     )

@@ -43,6 +43,8 @@ class LostDirections:
         Rows ``[v; w]``, m/s and rad/s: the twists that have nothing of what can be produced,
         orthogonal to it when metres are divided by the characteristic length. Where a wrench is
         a pure force or a pure moment, its twist has the same numbers whatever that length is.
+    frame : str
+        What the frame that was asked for is called, such as ``"the tool"``.
 
     Examples
     --------
@@ -56,13 +58,36 @@ class LostDirections:
     point: int | None
     wrenches: Array
     twists: Array
+    frame: str = "the tool"
 
     @property
     def where(self) -> str:
         """Axes and point in words."""
-        names = {None: "the frame itself", WORLD: "the world"}
+        names = {None: self.frame, WORLD: "the world"}
         axes, point = (names.get(k, f"R{k}") for k in (self.axes, self.point))
         return f"axes of {axes}, at the origin of {point}"
+
+    def rounded(self, least: float) -> tuple[str, ...]:
+        """Combinations without what is small beside their largest coefficient, in words.
+
+        Parameters
+        ----------
+        least : float
+            Coefficients below this are left out.
+
+        Returns
+        -------
+        tuple of str
+            One for each row of ``wrenches``.
+
+        Examples
+        --------
+        >>> row = np.array([[0.0, 1e-3, 1.0, 0.0, 0.0, 0.0]])
+        >>> LostDirections(4, 4, row, row).rounded(0.01)
+        ('vz',)
+        """
+        rows = np.where(np.abs(self.wrenches) < least, 0.0, self.wrenches)
+        return tuple(combination_text(row, _VELOCITY) for row in rows)
 
     @property
     def combinations(self) -> tuple[str, ...]:
@@ -217,12 +242,37 @@ def check_frames(task: SingularTask, axes: int | None, point: int | None) -> Non
             )  # fmt: skip
     if point is not None and not task.is_whole:
         raise InvalidValueError(
-            "point: with a mask the lost directions belong to the frame's origin; leave it out."
+            "point: where not all six components count (with a mask, and by default where up to "
+            "three joints move the position), the lost directions belong to the frame's origin; "
+            "leave it out, or pass mask=[1, 1, 1, 1, 1, 1]."
         )
     if axes is not None and not _has_vectors(task):
         raise InvalidValueError(
             "axes: this mask takes single components, which belong to its own axes; leave it out."
         )
+
+
+def frame_words(frame: str | int | None) -> str:
+    """What a frame is called in a sentence.
+
+    Parameters
+    ----------
+    frame : str, int or None
+        As it was asked for; None is the tool.
+
+    Returns
+    -------
+    str
+        For instance ``the tool`` or ``R3``.
+
+    Examples
+    --------
+    >>> frame_words(None), frame_words(3), frame_words("flange")
+    ('the tool', 'R3', "frame 'flange'")
+    """
+    if frame is None:
+        return "the tool"
+    return f"frame {frame!r}" if isinstance(frame, str) else f"R{frame}"
 
 
 def combination_text(row: Array, names: tuple[str, ...]) -> str:
@@ -301,4 +351,5 @@ def _expressed(
         point=point,
         wrenches=read_only(np.reshape(clean, (-1, 6))),
         twists=read_only(np.reshape(twists, (-1, 6))),
+        frame=frame_words(task.frame),
     )

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 from math import pi
+from textwrap import wrap
 from typing import Self
 
 import numpy as np
@@ -17,13 +18,24 @@ from ..._arrays import Array, as_exact, read_only
 from ...errors import InvalidValueError
 from ...geometry import PRISMATIC
 from ...model import RobotModel
-from ...table_text import boxed, length_text
+from ...table_text import boxed
 from ..singularity_kind import SingularityKind
+from .causes import arm_geometry
 from .classification import names_of
+from .frames import frame_words
 from .rank import OperationalDimension, operational_dimension
 from .search import FoundPoints, SearchSpace, nearest_points, slope_along
-from .task import MaskAxes, SingularTask, generator_of, singular_task, whole_number
+from .task import (
+    MaskAxes,
+    SingularTask,
+    counting_lines,
+    deciding_mask,
+    generator_of,
+    singular_task,
+    whole_number,
+)
 
+_WIDTH = 100
 _ON_SET = 1e-10
 _STATIONARY = 1e-7
 _SAME = 1e-5
@@ -130,6 +142,10 @@ class NearestSingularities:
         Of the whole search.
     length : float
         Characteristic length, metres.
+    mask : ndarray of bool, shape (6,)
+        Components that count.
+    frame : str
+        What the frame is called, such as ``"the tool"``.
 
     Examples
     --------
@@ -153,6 +169,8 @@ class NearestSingularities:
     status: NDArray[np.int8]
     outcome: SearchOutcome
     length: float
+    mask: NDArray[np.bool_]
+    frame: str
 
     @property
     def count(self) -> int:
@@ -203,18 +221,24 @@ class NearestSingularities:
         return NearestStatus(int(self.status[i])).sentence
 
     def __str__(self) -> str:
-        """Table of what was found."""
+        """Table of what was found, and what the kinds mean below it."""
+        lines = [self.outcome.sentence, *counting_lines(self.mask, self.frame)]
         if not self.count:
-            return self.outcome.sentence
-        columns = [
-            ("distance", [f"{d:.4g}" for d in self.distance]),
-            *(
-                (f"q{j + 1}", [length_text(round(float(x), 9)) for x in self.q[:, j]])
-                for j in range(self.q.shape[1])
-            ),
-            ("what", ["; ".join(words) for words in self.words]),
-        ]
-        return f"{self.outcome.sentence}\n{boxed(columns)}"
+            return "\n".join(lines)
+        kinds = [", ".join(kind.value for kind in row) for row in self.kind]
+        joints = [(f"q{j + 1}", [_short(x) for x in self.q[:, j]]) for j in range(self.q.shape[1])]
+        fixed = [("distance", [f"{d:.4g}" for d in self.distance]), ("kind", kinds)]
+        words = list(dict.fromkeys(text for row in self.words for text in row))
+        said = [part for text in words for part in wrap(text, _WIDTH, subsequent_indent="  ")]
+        return "\n".join([*lines, *_tables(fixed, joints), *said])
+
+    def __repr__(self) -> str:
+        nearest = "".join(
+            f"; {kind.value} at {self.distance[i]:.4g}"
+            for kind in SingularityKind
+            if (i := self.of(kind)) is not None
+        )
+        return f"<NearestSingularities {self.outcome.name}: {self.count} found{nearest}>"
 
 
 def nearest_singularity(
@@ -253,7 +277,8 @@ def nearest_singularity(
     length : float, optional
         Characteristic length, metres; default the reach, `characteristic_length`.
     mask : array_like, shape (6,), optional
-        Ones for the components ``vx vy vz wx wy wz`` that count; default all.
+        Ones for the components ``vx vy vz wx wy wz`` that count; default as
+        `classify_singularity`: all, or the position alone for up to three joints.
     mask_axes : {"world", "tool"}
         Axes of the components.
     starts : int
@@ -285,6 +310,7 @@ def nearest_singularity(
     >>> [found.words[i][0].split(":")[0] for i in range(2)], found.distance[:2]
     (['elbow', 'wrist'], array([0.3708, 0.5 ]))
     """
+    mask = deciding_mask(model, frame, mask)
     task = singular_task(model, frame, mask, mask_axes, length)
     home = as_exact(q, (model.n,), "q")
     if not isinstance(limits, (bool, np.bool_)):
@@ -305,13 +331,28 @@ def nearest_singularity(
         upper=model.upper / unit if limits else free,
     )
     first = _starts(task, home, count, bool(limits), generator_of(rng)) / unit
-    if whole.dimension == 0:  # it never moves: nothing to lose
+    if not task.moving.any() or whole.dimension == 0:  # it never moves: nothing to lose
         return _result(space, home, None, [], whole)
     found = _confirmed(space, nearest_points(space, first), bool(limits), most)
     rows = _distinct(space, found, bool(limits), most)
     if rows and np.linalg.norm(found.x[rows[0]] - space.home) < _ALREADY:
         found, rows = _with_crossings(space, first, found, rows, bool(limits), most)
     return _result(space, home, found, rows, whole)
+
+
+def _short(x: float) -> str:
+    return f"{round(float(x), 5) + 0.0:.5g}"
+
+
+def _tables(fixed: list[tuple[str, list[str]]], joints: list[tuple[str, list[str]]]) -> list[str]:
+    """One table, or several one below the other where the joints do not fit abreast."""
+    count = len(joints)
+    while count > 1:
+        tables = [boxed([*fixed, *joints[k : k + count]]) for k in range(0, len(joints), count)]
+        if max(len(line) for table in tables for line in table.splitlines()) <= _WIDTH:
+            return tables
+        count -= 1
+    return [boxed([*fixed, *joints[k : k + 1]]) for k in range(len(joints))] or [boxed(fixed)]
 
 
 def _with_crossings(
@@ -412,8 +453,10 @@ def _result(
     if found is None:
         none: Array = np.zeros((0, n))
         empty = np.zeros(0, dtype=np.int64)
-        found = FoundPoints(none, none[:, 0], none[:, 0], none[:, 0], empty, none, none > 0.0)
-    named = {i: names_of(task, found.x[i] * space.unit, whole, 1e-9) for i in rows}
+        number = np.zeros(0)
+        found = FoundPoints(none, number, number, number, empty, none, none > 0.0)
+    arm = arm_geometry(task) if rows else None
+    named = {i: names_of(task, found.x[i] * space.unit, whole, 1e-9, arm) for i in rows}
     stationary = found.tangential <= _STATIONARY
     known = {name for i in rows if stationary[i] for name in named[i]}
     crossing = np.isinf(found.tangential)
@@ -434,10 +477,10 @@ def _result(
         outcome = SearchOutcome.ALREADY_SINGULAR if there else SearchOutcome.FOUND
     return NearestSingularities(
         home=read_only(home),
-        q=read_only((x * space.unit).reshape(-1, n)),
+        q=read_only((x * space.unit).reshape(len(rows), n)),
         distance=read_only(distance),
-        direction=read_only(direction.reshape(-1, n)),
-        escape=read_only((found.escape[rows] * space.unit).reshape(-1, n)),
+        direction=read_only(direction.reshape(len(rows), n)),
+        escape=read_only((found.escape[rows] * space.unit).reshape(len(rows), n)),
         slope=read_only([slope_along(space, found.x[i], found.escape[i]) for i in rows]),
         codimension=read_only(found.codimension[rows], np.int64),
         kind=tuple(
@@ -449,4 +492,6 @@ def _result(
         status=read_only(status, np.int8),
         outcome=outcome,
         length=task.length,
+        mask=task.mask,
+        frame=frame_words(task.frame),
     )

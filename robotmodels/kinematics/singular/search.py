@@ -119,17 +119,17 @@ def nearest_points(space: SearchSpace, starts: Array) -> FoundPoints:
     >>> (nearest_points(space, home[None]).x - home).round(9) + 0.0
     array([[ 0. ,  0. ,  0. ,  0. , -0.2,  0. ]])
     """
-    x = _to_set(space, starts, 60)
-    good = _at(space, x)[1] < 1e-9
+    x = to_set(space, starts, 60)
+    good = on_set(space, x)[1] < 1e-9
     if good.any():
         x[good] = _polished(space, _descended(space, x[good], 30))
     held = _held(space, x)
-    _, weakest, G = _at(space, x)
+    _, weakest, G = on_set(space, x)
     rest = np.where(held, 0.0, space.home - x)
-    normals, _ = _normals(np.where(held[:, None], 0.0, G))
+    normals, _ = normals_of(np.where(held[:, None], 0.0, G))
     across = np.einsum("ari,ai->ar", normals, rest)
     tangent = rest - np.einsum("ari,ar->ai", normals, across)
-    every, codimension = _normals(G)
+    every, codimension = normals_of(G)
     towards = space.home - x
     escape = np.einsum("ari,ar->ai", every, np.einsum("ari,ai->ar", every, towards))
     size = np.linalg.norm(escape, axis=1)
@@ -174,8 +174,18 @@ def slope_along(space: SearchSpace, x: Array, direction: Array) -> float:
     return float(growth[space.dimension - rank - 1])
 
 
-def _at(space: SearchSpace, x: Array) -> tuple[Array, Array, Array]:
-    """Blocks S (N, e), weakest singular values (N,), and gradients G (N, e, n)."""
+def on_set(space: SearchSpace, x: Array) -> tuple[Array, Array, Array]:
+    """Blocks S (N, e), weakest singular values (N,), and gradients G (N, e, n).
+
+    Examples
+    --------
+    >>> from robotmodels.kinematics.singular.task import singular_task
+    >>> from robotmodels.robots import load
+    >>> free = np.full(6, np.inf)
+    >>> space = SearchSpace(singular_task(load("rx90")), 6, np.ones(6), np.zeros(6), -free, free)
+    >>> on_set(space, np.array([[0.1, 0.2, 0.3, 0.4, 0.0, 0.6]]))[1] < 1e-15
+    array([ True])
+    """
     task, M, q = space.task, space.dimension, x * space.unit
     U, sigma, Vt = np.linalg.svd(task_jacobians(task, q), full_matrices=True)
     U, V = U[:, :, M - 1 :], Vt[:, M - 1 :]
@@ -190,8 +200,14 @@ def _at(space: SearchSpace, x: Array) -> tuple[Array, Array, Array]:
     return S.reshape(N, e), sigma[:, M - 1] / top, G.reshape(N, x.shape[1], e).swapaxes(1, 2)
 
 
-def _normals(G: Array) -> tuple[Array, NDArray[np.int64]]:
-    """Orthonormal rows (N, e, n) spanning those of G, zero beyond their number (N,)."""
+def normals_of(G: Array) -> tuple[Array, NDArray[np.int64]]:
+    """Orthonormal rows (N, e, n) spanning those of G, zero beyond their number (N,).
+
+    Examples
+    --------
+    >>> normals_of(np.array([[[0.0, 2.0, 0.0]]]))[1]
+    array([1])
+    """
     _, size, Vt = np.linalg.svd(G, full_matrices=False)
     counts = size > _WEAK * np.maximum(size[:, :1], 1e-12)
     return Vt * counts[..., None], counts.sum(axis=1)
@@ -207,11 +223,21 @@ def _step(S: Array, G: Array) -> Array:
     return step * np.minimum(1.0, 0.5 / np.maximum(length, 1e-300))
 
 
-def _to_set(space: SearchSpace, x: Array, steps: int) -> Array:
-    """Newton's iteration to the set, inside the limits."""
+def to_set(space: SearchSpace, x: Array, steps: int) -> Array:
+    """Newton's iteration to the set, inside the limits: points (N, n) after some steps.
+
+    Examples
+    --------
+    >>> from robotmodels.kinematics.singular.task import singular_task
+    >>> from robotmodels.robots import load
+    >>> home, free = np.array([0.1, 0.2, 0.3, 0.4, 0.2, 0.6]), np.full(6, np.inf)
+    >>> space = SearchSpace(singular_task(load("rx90")), 6, np.ones(6), home, -free, free)
+    >>> abs(to_set(space, home[None], 60)[0, 4]) < 1e-12
+    np.True_
+    """
     x = np.clip(x, space.lower, space.upper)
     for _ in range(steps):
-        S, weakest, G = _at(space, x)
+        S, weakest, G = on_set(space, x)
         off = weakest > _ON_SET
         if not off.any():
             break
@@ -235,9 +261,9 @@ def _descended(space: SearchSpace, x: Array, steps: int) -> Array:
         length = np.linalg.norm(tangent, axis=1)
         if (length * (pace > 1e-3) < 1e-7).all():
             break
-        there = _to_set(space, x + pace[:, None] * tangent, 12)
+        there = to_set(space, x + pace[:, None] * tangent, 12)
         now, then = (np.linalg.norm(p - space.home, axis=1) for p in (x, there))
-        better = (then < now - 1e-4 * pace * length**2) & (_at(space, there)[1] < 1e-9)
+        better = (then < now - 1e-4 * pace * length**2) & (on_set(space, there)[1] < 1e-9)
         x = np.where(better[:, None], there, x)
         pace = np.where(better, np.minimum(1.0, 2.0 * pace), 0.25 * pace)
     return x
@@ -248,7 +274,7 @@ def _held(space: SearchSpace, x: Array) -> NDArray[np.bool_]:
     tight = 1e-9
     low, high = x <= space.lower + tight, x >= space.upper - tight
     held = low | high
-    G = _at(space, x)[2] if held.any() else np.zeros((len(x), 1, x.shape[1]))
+    G = on_set(space, x)[2] if held.any() else np.zeros((len(x), 1, x.shape[1]))
     for _ in range(x.shape[1]):
         if not held.any():
             break
@@ -267,11 +293,11 @@ def _held(space: SearchSpace, x: Array) -> NDArray[np.bool_]:
 
 def _tangent(space: SearchSpace, x: Array) -> Array:
     """The way home along the set and inside the limits."""
-    G = _at(space, x)[2]
+    G = on_set(space, x)[2]
     held = np.zeros(x.shape, dtype=bool)
     tangent = np.zeros(x.shape)
     for _ in range(x.shape[1] + 1):
-        normals, _ = _normals(np.where(held[:, None], 0.0, G))
+        normals, _ = normals_of(np.where(held[:, None], 0.0, G))
         back = np.where(held, 0.0, space.home - x)
         tangent = back - np.einsum("ari,ar->ai", normals, np.einsum("ari,ai->ar", normals, back))
         leaves = ~held & (
@@ -314,7 +340,7 @@ def _polished(space: SearchSpace, x: Array) -> Array:
 
 def _conditions(space: SearchSpace, x: Array, held: NDArray[np.bool_]) -> Array:
     """What must vanish, (N, n): the way home along the set plus the step to the set."""
-    S, _, G = _at(space, x)
+    S, _, G = on_set(space, x)
     G = np.where(held[:, None], 0.0, G)
     U, size, Vt = np.linalg.svd(G, full_matrices=False)
     counts = size > _WEAK * np.maximum(size[:, :1], 1e-12)

@@ -21,10 +21,12 @@ from ...geometry import PRISMATIC
 from ...model import RobotModel, check_model
 from ..jacobians import Reference, jacobian, jacobian_rate
 from ..lengths import length_of
+from .events import random_postures
 
 MaskAxes = Literal["world", "tool"]
 
 _REFERENCES: dict[MaskAxes, Reference] = {"world": "world_aligned", "tool": "local"}
+_COMPONENTS = ("vx", "vy", "vz", "wx", "wy", "wz")
 _SEED = 20
 
 
@@ -144,6 +146,104 @@ def singular_task(
         row_scale=read_only(scale),
         joint_scale=read_only(np.where(kinds == PRISMATIC, length, 1.0)),
     )
+
+
+def position_decides(model: RobotModel, frame: str | int | None = None) -> bool:
+    """Whether the position of a frame alone is what its joints are for.
+
+    So it is where at most three joints move it, and its position has in general as many freedoms
+    as they are: two links in a plane, or the arm of a robot without its wrist. Their singular
+    positions are then those of the position; the whole twist would hardly ever lose a freedom.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot.
+    frame : str or int, optional
+        Name or number of a frame; default the tool.
+
+    Returns
+    -------
+    bool
+        False for a frame that no joint moves.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> [position_decides(load(name)) for name in ("planar_2r", "planar_3r", "rx90")]
+    [True, False, False]
+    """
+    check_model(model)
+    path = model.twin.frame(frame).path
+    columns = np.isin(model.table.joint_rows + 1, path)
+    count = int(columns.sum())
+    if not 1 <= count <= 3:
+        return False
+    # anywhere, not only inside the limits: the rank in general is the same
+    J = jacobian(model, random_postures(model, 4, seed=3), frame)[:, :3, columns]
+    sigma = np.linalg.svd(J, compute_uv=False)
+    return bool((sigma > 1e-9 * np.maximum(sigma[:, :1], 1e-9)).sum(axis=1).max() == count)
+
+
+def deciding_mask(
+    model: RobotModel, frame: str | int | None, mask: ArrayLike | None
+) -> ArrayLike | None:
+    """The mask that was given, or that of the position where `position_decides`.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot.
+    frame : str or int, optional
+        Name or number of a frame; None is the tool.
+    mask : array_like or None
+        What the caller passed: it wins.
+
+    Returns
+    -------
+    array_like or None
+        None for the whole twist.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> deciding_mask(load("planar_2r"), None, None), deciding_mask(load("rx90"), None, None)
+    ((1, 1, 1, 0, 0, 0), None)
+    """
+    if mask is None and position_decides(model, frame):
+        return (1, 1, 1, 0, 0, 0)
+    return mask
+
+
+def counting_lines(mask: NDArray[np.bool_], frame: str) -> list[str]:
+    """A line about what counts, where it is not the whole twist.
+
+    Parameters
+    ----------
+    mask : ndarray of bool, shape (6,)
+        Components that count.
+    frame : str
+        What the frame is called.
+
+    Returns
+    -------
+    list of str
+        One line, or none.
+
+    Examples
+    --------
+    >>> counting_lines(np.array([True, True, True, False, False, False]), "the tool")
+    ['What counts is the position of the tool (vx, vy, vz)']
+    """
+    if mask.all():
+        return []
+    names = ", ".join(n for n, on in zip(_COMPONENTS, mask, strict=True) if on)
+    what = "the motion"
+    if not mask[3:].any():
+        what = "the position"
+    elif not mask[:3].any():
+        what = "the orientation"
+    return [f"What counts is {what} of {frame} ({names})"]
 
 
 def task_jacobians(task: SingularTask, q: Array) -> Array:

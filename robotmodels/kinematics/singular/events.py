@@ -1,4 +1,8 @@
-"""What happens in an arm where a factor vanishes, seen on configurations that make it vanish."""
+"""What happens in an arm where it is singular: axes aligned, points on axes or in planes.
+
+One list of events names singular positions for the formulas, which look at configurations that
+make a factor vanish, and for the numbers, which look around one configuration.
+"""
 
 from __future__ import annotations
 
@@ -20,14 +24,6 @@ _TOLERANCE = 1e-7
 
 
 @dataclass(frozen=True, slots=True)
-class Event:
-    """Something that happens where a factor vanishes and not elsewhere."""
-
-    kind: SingularityKind | None  # None: the joints decide
-    sentence: str
-
-
-@dataclass(frozen=True, slots=True)
 class _Scene:
     """Axes and points in several configurations."""
 
@@ -35,6 +31,24 @@ class _Scene:
     o: Array  # (samples, joints, 3)
     W: Array | None  # (samples, 3)
     size: float
+
+
+Residual = Callable[[_Scene], Array | None]
+"""What is zero where an event happens, (samples, ...), without units; None where undefined."""
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that happens where a factor vanishes and not elsewhere."""
+
+    kind: SingularityKind | None  # None: the joints decide
+    sentence: str
+    residual: Residual
+
+    def happens(self, scene: _Scene) -> bool:
+        """Whether it does so in all configurations of a scene."""
+        found = self.residual(scene)
+        return found is not None and _none(found, 1.0)
 
 
 class ArmGeometry:
@@ -59,6 +73,7 @@ class ArmGeometry:
         self.turns = [model.table.sigma[k - 1] == REVOLUTE for k in numbers]
         self.q = random_postures(model, 6, seed=7)
         self.whole_arm = len(numbers) >= 6
+        self.size: float | None = None
         self.point, self.meeting = self._point(position_only)
         self.usual = self._scene(self.q)
         places = range(len(numbers))
@@ -67,6 +82,7 @@ class ArmGeometry:
             for a, b in combinations(places, 2)
             if self.turns[a] and self.turns[b] and _none(np.cross(*_pair(self.usual.z, a, b)), 1.0)
         }
+        self.events = [e for e in self._candidates() if not e.happens(self.usual)]
 
     def _point(self, position_only: bool) -> tuple[str, tuple[int, int] | None]:
         """Name of the point that matters, and the axes that meet there (None: the tool point)."""
@@ -91,7 +107,9 @@ class ArmGeometry:
         poses = poses[:, rows]
         z, o = poses[..., :3, 2], poses[..., :3, 3]
         tool = dgm(self.model, q, self.frame)[:, :3, 3]
-        size = max(1e-3, float(np.abs(o - tool[:, None]).max()))
+        # of the arm, not of these configurations: residuals of several are compared
+        size = max(1e-3, float(np.abs(o - tool[:, None]).max())) if self.size is None else self.size
+        self.size = size
         scene = _Scene(z, o, None, size)
         if not with_point:
             return scene
@@ -101,30 +119,25 @@ class ArmGeometry:
     def event(self, q: Array) -> Event | None:
         """What all configurations of q (samples, n) have in common and others have not."""
         scene = self._scene(q)
-        for happens, event in self._candidates():
-            if happens(scene) and not happens(self.usual):
-                return event
-        return None
+        return next((event for event in self.events if event.happens(scene)), None)
 
-    def _candidates(self) -> list[tuple[Callable[[_Scene], bool], Event]]:
+    def residuals(self, event: Event, q: Array) -> Array:
+        """How far configurations (samples, n) are from an event, (samples, r), without units."""
+        found = event.residual(self._scene(q))
+        if found is None:  # the point is nowhere: axes that meet there have become parallel
+            return np.full((len(q), 1), np.inf)
+        return found.reshape(len(q), -1)
+
+    def _candidates(self) -> list[Event]:
         places, names = range(len(self.numbers)), self.numbers
         turning = [k for k in places if self.turns[k]]
-        out: list[tuple[Callable[[_Scene], bool], Event]] = []
+        out: list[Event] = []
 
-        def add(
-            happens: Callable[[_Scene], bool], kind: SingularityKind | None, sentence: str
-        ) -> None:
-            out.append((happens, Event(kind, sentence)))
+        def add(residual: Residual, kind: SingularityKind | None, sentence: str) -> None:
+            out.append(Event(kind, sentence, residual))
 
         stretched = "the arm is stretched or folded"
-        for a, b in sorted(combinations(turning, 2), key=lambda pair: pair[1] - pair[0]):
-            kind = self._kind_of_pair(a, b)
-            words = f": {stretched}" if kind is SingularityKind.ELBOW else ""
-            add(_aligned(a, b), kind, f"axes {names[a]} and {names[b]} are aligned{words}")
-        for k in turning:
-            first = k == 0 and self.whole_arm
-            kind = SingularityKind.SHOULDER if first else SingularityKind.OTHER
-            add(_on_axis(k), kind, f"{self.point} is on axis {names[k]}")
+        # links of one length fold so that axes are aligned too: that is still the elbow
         for a, b in sorted(self.parallel):
             add(
                 _in_plane(a, b), SingularityKind.ELBOW,
@@ -137,6 +150,14 @@ class ArmGeometry:
                     f"the parallel axes {names[a]}, {names[b]} and {names[c]} are in one plane: "
                     f"{stretched}",
                 )  # fmt: skip
+        for a, b in sorted(combinations(turning, 2), key=lambda pair: pair[1] - pair[0]):
+            kind = self._kind_of_pair(a, b)
+            words = f": {stretched}" if kind is SingularityKind.ELBOW else ""
+            add(_aligned(a, b), kind, f"axes {names[a]} and {names[b]} are aligned{words}")
+        for k in turning:
+            first = k == 0 and self.whole_arm
+            kind = SingularityKind.SHOULDER if first else SingularityKind.OTHER
+            add(_on_axis(k), kind, f"{self.point} is on axis {names[k]}")
         if len(turning) > 1 and turning[:2] == [0, 1]:
             add(
                 _beside_first, SingularityKind.SHOULDER,
@@ -207,53 +228,54 @@ def _common(s: _Scene, a: int, b: int) -> Array | None:
     return s.o[:, a] + way[:, None] * za
 
 
-def _aligned(a: int, b: int) -> Callable[[_Scene], bool]:
-    def happens(s: _Scene) -> bool:
+def _aligned(a: int, b: int) -> Residual:
+    def residual(s: _Scene) -> Array:
         za, zb = _pair(s.z, a, b)
-        return _none(np.cross(za, zb), 1.0) and _none(np.cross(s.o[:, b] - s.o[:, a], za), s.size)
+        off = np.cross(s.o[:, b] - s.o[:, a], za) / s.size
+        return np.concatenate([np.cross(za, zb), off], axis=1)
 
-    return happens
-
-
-def _on_axis(k: int) -> Callable[[_Scene], bool]:
-    def happens(s: _Scene) -> bool:
-        return s.W is not None and _none(np.cross(s.W - s.o[:, k], s.z[:, k]), s.size)
-
-    return happens
+    return residual
 
 
-def _in_plane(a: int, b: int) -> Callable[[_Scene], bool]:
-    def happens(s: _Scene) -> bool:
+def _on_axis(k: int) -> Residual:
+    def residual(s: _Scene) -> Array | None:
+        return None if s.W is None else np.cross(s.W - s.o[:, k], s.z[:, k]) / s.size
+
+    return residual
+
+
+def _in_plane(a: int, b: int) -> Residual:
+    def residual(s: _Scene) -> Array | None:
         if s.W is None:
-            return False
+            return None
         normal = np.cross(s.z[:, a], s.o[:, b] - s.o[:, a])
-        return _none(np.einsum("si,si->s", normal, s.W - s.o[:, a]), s.size**2)
+        return np.einsum("si,si->s", normal, s.W - s.o[:, a]) / s.size**2
 
-    return happens
+    return residual
 
 
-def _coplanar(a: int, b: int, c: int) -> Callable[[_Scene], bool]:
-    def happens(s: _Scene) -> bool:
+def _coplanar(a: int, b: int, c: int) -> Residual:
+    def residual(s: _Scene) -> Array:
         normal = np.cross(s.z[:, a], s.o[:, b] - s.o[:, a])
-        return _none(np.einsum("si,si->s", normal, s.o[:, c] - s.o[:, a]), s.size**2)
+        return np.einsum("si,si->s", normal, s.o[:, c] - s.o[:, a]) / s.size**2
 
-    return happens
+    return residual
 
 
-def _beside_first(s: _Scene) -> bool:
+def _beside_first(s: _Scene) -> Array | None:
     if s.W is None:
-        return False
+        return None
     normal = np.cross(s.z[:, 0], s.z[:, 1])
-    return _none(np.einsum("si,si->s", normal, s.W - s.o[:, 0]), s.size)
+    return np.einsum("si,si->s", normal, s.W - s.o[:, 0]) / s.size
 
 
-def _same_direction(a: int, b: int) -> Callable[[_Scene], bool]:
-    return lambda s: _none(np.cross(s.z[:, a], s.z[:, b]), 1.0)
+def _same_direction(a: int, b: int) -> Residual:
+    return lambda s: np.cross(s.z[:, a], s.z[:, b])
 
 
-def _same_plane(a: int, b: int, c: int) -> Callable[[_Scene], bool]:
-    return lambda s: _none(np.linalg.det(s.z[:, [a, b, c]]), 1.0)
+def _same_plane(a: int, b: int, c: int) -> Residual:
+    return lambda s: np.linalg.det(s.z[:, [a, b, c]])
 
 
-def _perpendicular(a: int, b: int) -> Callable[[_Scene], bool]:
-    return lambda s: _none(np.einsum("si,si->s", s.z[:, a], s.z[:, b]), 1.0)
+def _perpendicular(a: int, b: int) -> Residual:
+    return lambda s: np.einsum("si,si->s", s.z[:, a], s.z[:, b])

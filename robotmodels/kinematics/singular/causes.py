@@ -1,0 +1,215 @@
+"""Why an arm is singular at or near a configuration: the events of the singular sets around it.
+
+At one configuration axes may be aligned or parallel by accident. What a singular set means is what
+happens all over it: starts beside the configuration go to the set by Newton's iteration, and what
+happens where they arrive belongs to it. The events are those that name the factors of the formulas.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..._arrays import Array
+from ..singularity_kind import SingularityKind
+from .events import ArmGeometry, Event
+from .search import SearchSpace, normals_of, on_set, to_set
+from .task import SingularTask, task_jacobians
+
+_STARTS = 24
+_BESIDE = 0.03
+_AWAY = 0.5
+_ON_SET = 1e-11
+_STEP = 1e-6
+_FLAT = 1e-4
+_TIGHT, _LOOSE = 1e-7, 1e-5
+_TAKES_PART = 1e-4
+_NOTHING_SPECIAL = "axes and points show nothing special, but the columns become dependent"
+
+
+@dataclass(frozen=True, slots=True)
+class Cause:
+    """A singular set at or near a configuration, and what happens in the arm all over it.
+
+    Parameters
+    ----------
+    events : tuple of (SingularityKind, str)
+        As many as the set makes conditions on the joints, or more where it has several names; a
+        sentence for each.
+    codimension : int
+        How many conditions the set makes.
+    weak : float
+        Singular value over the largest that the distance from the set makes, to the first order;
+        0 on the set.
+    known : bool
+        Whether events make all the conditions: without them the distance is a rough one.
+    """
+
+    events: tuple[tuple[SingularityKind, str], ...]
+    codimension: int
+    weak: float
+    known: bool
+
+
+def arm_geometry(task: SingularTask) -> ArmGeometry:
+    """Axes and points of the arm that a task is about.
+
+    Parameters
+    ----------
+    task : SingularTask
+        The robot, the frame, and what counts.
+
+    Returns
+    -------
+    ArmGeometry
+        With the events that may happen.
+
+    Examples
+    --------
+    >>> from robotmodels.kinematics.singular.task import singular_task
+    >>> from robotmodels.robots import load
+    >>> arm_geometry(singular_task(load("rx90"))).point
+    'the wrist centre'
+    """
+    numbers = [int(row) + 1 for row in task.model.table.joint_rows[task.moving]]
+    return ArmGeometry(task.model, task.frame, numbers, not task.mask[3:].any())
+
+
+def causes_at(task: SingularTask, q: Array, dimension: int, arm: ArmGeometry) -> tuple[Cause, ...]:
+    """Singular sets at or near a configuration, the nearest first.
+
+    Parameters
+    ----------
+    task : SingularTask
+        What is asked about.
+    q : ndarray, shape (n,)
+        Configuration, rad or m.
+    dimension : int
+        M of the task.
+    arm : ArmGeometry
+        Of the task.
+
+    Returns
+    -------
+    tuple of Cause
+        Of each set that was found once; none if there is none around.
+
+    Examples
+    --------
+    >>> from robotmodels.kinematics.singular.task import singular_task
+    >>> from robotmodels.robots import load
+    >>> task, q = singular_task(load("rx90")), np.array([0.1, 0.2, 0.3, 0.4, 0.0, 0.6])
+    >>> causes_at(task, q, 6, arm_geometry(task))[0].events
+    ((<SingularityKind.WRIST: 'wrist'>, 'axes 4 and 6 are aligned'),)
+    """
+    n = len(q)
+    home, free = q / task.joint_scale, np.full(n, np.inf)
+    space = SearchSpace(task, dimension, task.joint_scale, home, -free, free)
+    aside = np.random.default_rng(0).normal(size=(_STARTS, n)) * np.where(task.moving, _BESIDE, 0.0)
+    x = to_set(space, home + aside, 25)
+    away = np.linalg.norm(x - home, axis=1)
+    _, weakest, G = on_set(space, x)
+    keep = (weakest < _ON_SET) & (away < _AWAY)
+    x, G = x[keep][order := np.argsort(away[keep])], G[keep][order]
+    if not len(x):
+        return ()
+    normals, codimension = normals_of(G)
+    off = [np.abs(arm.residuals(event, x * task.joint_scale)).max(axis=1) for event in arm.events]
+    residual = np.stack(off, axis=1) if off else np.zeros((len(x), 0))
+    # where the set is touched twice, its points are known to half of the digits
+    flat = np.linalg.norm(G, axis=(1, 2)) < _FLAT
+    happening = residual <= np.where(flat, _LOOSE, _TIGHT)[:, None]
+    taking = (np.abs(normals) > _TAKES_PART).any(axis=1)
+    signature = np.column_stack([codimension, happening, taking])
+    made: list[tuple[Cause, NDArray[np.bool_]]] = []
+    seen: set[bytes] = set()
+    for i in range(len(x)):
+        if (key := signature[i].tobytes()) in seen:
+            continue
+        seen.add(key)
+        cause = _cause(space, arm, x[i], normals[i, : codimension[i]], happening[i], G[i])
+        made.append((cause, residual[i] <= _LOOSE))
+    return _minimal(arm, made)
+
+
+def _minimal(arm: ArmGeometry, made: list[tuple[Cause, NDArray[np.bool_]]]) -> tuple[Cause, ...]:
+    """Those that are not where others meet, each once, the nearest first."""
+    sentences = [event.sentence for event in arm.events]
+    found: dict[tuple[tuple[SingularityKind, str], ...], Cause] = {}
+    for cause, happening in sorted(made, key=lambda one: _specialty(one[0])):
+        here = {sentences[k] for k in np.flatnonzero(happening)}
+        if cause.events in found:
+            if cause.weak < found[cause.events].weak:
+                found[cause.events] = cause
+        elif not any({text for _, text in other.events} <= here for other in found.values()):
+            found[cause.events] = cause
+    return tuple(sorted(found.values(), key=lambda cause: cause.weak))
+
+
+def _specialty(cause: Cause) -> tuple[int, bool, int, float]:
+    return cause.codimension, not cause.known, -len(cause.events), cause.weak
+
+
+def _cause(
+    space: SearchSpace,
+    arm: ArmGeometry,
+    x: Array,
+    normals: Array,
+    happening: NDArray[np.bool_],
+    G: Array,
+) -> Cause:
+    """What makes the conditions of the set at one of its points, and how far home is from it."""
+    sigma = np.linalg.svd(task_jacobians(space.task, x * space.unit), compute_uv=False)
+    top = float(sigma[0]) or 1.0
+    named: list[tuple[SingularityKind, str]] = []
+    distances: list[float] = []
+    spanned: Array = np.zeros((0, len(x)))
+    for k in np.flatnonzero(happening):
+        event = arm.events[k]
+        D = _gradient(space, arm, event, x)
+        size = float(np.linalg.norm(D, 2))
+        if size < _STEP:
+            continue
+        new = _span(D - D @ spanned.T @ spanned, 1e-3 * size)
+        # a folded elbow may bring the wrist centre to the shoulder as well: both have their name
+        kinds = [kind for kind, _ in named]
+        twice = arm.whole_arm and bool(kinds) and SingularityKind.OTHER not in kinds
+        twice = twice and event.kind not in (None, SingularityKind.OTHER, *kinds)
+        if not twice and (not len(new) or len(spanned) == len(normals)):
+            continue
+        kind = event.kind or arm.kind_of_joints(_joints(space, arm, new))
+        named.append((kind, event.sentence))
+        off = arm.residuals(event, (space.home * space.unit)[None])[0]
+        distances.append(float(np.linalg.norm(off)) / size)
+        spanned = np.vstack([spanned, new])
+    known = len(spanned) == len(normals)
+    if len(spanned) < len(normals):
+        others = _span(normals - normals @ spanned.T @ spanned, 1e-3)
+        named.append((arm.kind_of_joints(_joints(space, arm, others)), _NOTHING_SPECIAL))
+        distances.append(float(np.linalg.norm(others @ (space.home - x))))
+    slope, away = float(np.linalg.norm(G, 2)) / top, float(np.linalg.norm(distances))
+    weak = away**2 if slope < _FLAT else slope * away
+    return Cause(tuple(named), len(normals), weak, known)
+
+
+def _span(rows: Array, least: float) -> Array:
+    """Orthonormal rows."""
+    _, size, Vt = np.linalg.svd(rows, full_matrices=False)
+    return Vt[size > least]
+
+
+def _gradient(space: SearchSpace, arm: ArmGeometry, event: Event, x: Array) -> Array:
+    """Derivatives (r, n) of what is zero where an event happens, per unit of distance."""
+    shifts = _STEP * np.eye(len(x))
+    points = np.concatenate([x + shifts, x - shifts]) * space.unit
+    values = arm.residuals(event, points)
+    return ((values[: len(x)] - values[len(x) :]) / (2.0 * _STEP)).T
+
+
+def _joints(space: SearchSpace, arm: ArmGeometry, directions: Array) -> tuple[int, ...]:
+    """Numbers of the frames whose joints some directions move."""
+    taking = (np.abs(directions) > _TAKES_PART).any(axis=0)
+    rows = space.task.model.table.joint_rows
+    return tuple(int(row) + 1 for row in rows[taking] if int(row) + 1 in arm.numbers)
