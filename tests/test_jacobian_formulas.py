@@ -1,5 +1,6 @@
 """The Jacobian and its singular positions as formulas, against numbers."""
 
+import gc
 import math
 import pickle
 import sys
@@ -547,3 +548,38 @@ def test_a_stroke_without_limits_needs_a_range():
     model = rm.RobotModel.from_table(table)
     with pytest.raises(InvalidValueError, match="no limits"):
         singularity_map(model, (0, 1))
+
+
+def test_explanations_are_kept_as_long_as_the_model():
+    arm = rm.load("rx90")
+    first = explain_singularities(arm)
+    assert explain_singularities(arm) is first
+    assert explain_singularities(arm, frame=6) is not first
+    assert explain_singularities(arm) is first
+    # by identity: another model, though equal, has its own
+    other = arm.with_tool(np.eye(4))
+    assert explain_singularities(other) is not first
+    for frame in (1, 2, 3, 4, 5, 6, "joint_3", "joint_4", "joint_5"):
+        explain_singularities(arm, frame)
+    assert explain_singularities(arm).text == first.text
+    known = sys.modules[explain_singularities.__module__]._KNOWN
+    key = id(arm)
+    assert len(known[key][1]) <= 8
+    del arm
+    gc.collect()
+    assert key not in known
+
+
+def test_maps_refuse_and_print():
+    arm = rm.load("rx90")
+    for joints in (1, None, "joint_1", (1,), {1, 2}):
+        with pytest.raises(InvalidValueError, match="joints: expected two joints"):
+            singularity_map(arm, joints=joints)
+    text = repr(singularity_map(arm, (1, 2), at=[0, 0, 0, 0, 1, 0], samples=(5, 7)))
+    assert "joint_2 and joint_3, 5 by 7: determinant" in text
+    assert len(text) < 160
+    # seven joints: refused without the formulas, which take seconds
+    panda = rm.load("panda")
+    with pytest.raises(InvalidValueError, match="no determinant"):
+        singularity_map(panda, (1, 2))
+    assert id(panda) not in sys.modules[explain_singularities.__module__]._KNOWN

@@ -62,6 +62,17 @@ class SingularityMap:
     label: str
     units: tuple[str, str, str]
 
+    def __repr__(self) -> str:
+        names, units, size = self.names, self.units, self.values.shape
+        unit = "" if units[2] == "1" else f" {units[2]}"
+        text = "no values"
+        if self.values.size:
+            text = f"{self.values.min():.4g} to {self.values.max():.4g}{unit}"
+        return (
+            f"<SingularityMap of {self.model_name} over {names[0]} and {names[1]}, {size[0]} by "
+            f"{size[1]}: {self.label:.60} from {text}>"
+        )
+
 
 def singularity_map(
     model: RobotModel,
@@ -130,6 +141,7 @@ def singularity_map(
     grid[..., columns[0]] = axes[0][:, None]
     grid[..., columns[1]] = axes[1]
     if factor is None:
+        _refuse_redundant(model)
         explanation = explain_singularities(model)
         values = explanation.determinant(grid)
         label, unit = "determinant", explanation.unit
@@ -156,9 +168,23 @@ def singularity_map(
     )
 
 
+def _refuse_redundant(model: RobotModel) -> None:
+    """More joints than six never make a square matrix: no formulas are needed to know."""
+    count = int(np.isin(model.table.joint_rows + 1, model.twin.frame(None).path).sum())
+    if count > 6:
+        raise InvalidValueError(
+            f"{model.name}: there is no determinant ({count} joints move the tool, the matrix is "
+            "not square); pass one of explain_singularities(model).factors as factor."
+        )
+
+
 def _columns(model: RobotModel, joints: Sequence[int | str]) -> list[int]:
     names = [str(model.table.names[row]) for row in model.table.joint_rows]
-    if isinstance(joints, str) or len(joints) != 2:
+    if (
+        isinstance(joints, str)
+        or not isinstance(joints, (Sequence, np.ndarray))
+        or len(joints) != 2
+    ):
         raise InvalidValueError(
             f"joints: expected two joints, columns of q or names, such as (1, 2), got {joints!r}."
         )
