@@ -472,10 +472,10 @@ BOMB = "".join(f'<!ENTITY e{i} "{f"&e{i - 1};" * 10}">' for i in range(1, 30))
 )
 def test_doctypes_are_refused_at_once(doctype):
     text = doctype + GOOD.replace("good", "&e29;" if "e29" in doctype else "&x;")
-    start = time.perf_counter()
+    start = time.process_time()
     with pytest.raises(UrdfError, match=r"has a DOCTYPE: .* Remove the"):
         read(text)
-    assert time.perf_counter() - start < 0.1
+    assert time.process_time() - start < 0.1
 
 
 @pytest.mark.parametrize(
@@ -679,9 +679,9 @@ def test_a_chain_of_a_thousand_links_is_read_without_recursion(kind):
         *(joint(f"J{j}", f"L{j}", f"L{j + 1}", kind if j else "revolute", origin=origin)
           for j in range(f)),
     )  # fmt: skip
-    start = time.perf_counter()
+    start = time.process_time()
     model = read(text)
-    assert time.perf_counter() - start < 3.0
+    assert time.process_time() - start < 3.0
     assert model.n == (f if kind == "revolute" else 1)
     # in a batch: the scratch data of Pinocchio's single calls grow with the cube of n
     T = rm.dgm(model, np.zeros((1, model.n)))
