@@ -7,6 +7,7 @@ from identities.random_robots import random_pose
 from robotmodels.errors import InvalidValueError
 from robotmodels.trajectories import (
     MotionLimits,
+    SplineEnds,
     Synchronisation,
     TimeLaw,
     blended_lines,
@@ -317,3 +318,40 @@ def test_points_of_no_arc_are_refused(rng):
             T0[:3, 3], T1[:3, 3] = p, p + R @ [1.0, 0.0, 0.0]
             with pytest.raises(InvalidValueError, match="straight_line"):
                 circular_arc(T0, p + R @ [0.4, height, 0.0], T1, duration=1.0)
+
+
+# --- closing, and the end of the time ------------------------------------------------------------
+
+
+@pytest.mark.parametrize("size", [1e-9, 1e-3, 1.0, 1e3])
+def test_periodic_splines_close_beside_their_own_size(rng, size):
+    points = size * rng.normal(size=(5, 2))
+    times = np.arange(6.0)
+    reach = np.ptp(points, axis=0)
+    nearly = np.vstack((points, points[:1] + 0.5e-9 * reach))
+    loop = cubic_spline(nearly, times, ends=SplineEnds.PERIODIC)
+    assert np.abs(loop.q(0.0) - loop.q(5.0)).max() < 1e-14 * size
+    wide = nearly.copy()
+    wide[-1, 1] += 2e-9 * reach[1]
+    with pytest.raises(InvalidValueError, match=r"joint 2 ends .* beside its start"):
+        cubic_spline(wide, times, ends=SplineEnds.PERIODIC)
+    # a joint that stays has rounding alone
+    points[:, 1] = np.pi * size
+    ring = np.vstack((points, points[:1]))
+    ring[-1, 1] = np.nextafter(ring[-1, 1], np.inf)
+    cubic_spline(ring, times, ends=SplineEnds.PERIODIC)
+
+
+def test_a_rounding_after_the_end_is_the_end(rng):
+    for T in (1e-3, 1.0, 0.3, 1e3):
+        move = cubic_spline(rng.normal(size=(3, 2)), [0.0, 0.4 * T, T], v0=1.0, v1=2.0)
+        for t, end in ((np.nextafter(T, np.inf), T), (T + 2.0 * np.spacing(T), T), (-1e-20, 0.0)):
+            for part in (move.q, move.v, move.a, move.jerk):
+                assert np.array_equal(part(t), part(end))
+                assert np.array_equal(part([t, 0.2 * T]), part([end, 0.2 * T]))
+        for t in (T * (1.0 + 1e-14), -1e-14 * T):
+            with pytest.raises(InvalidValueError, match="does not rest"):
+                move.q(t)
+    many = np.cumsum(np.full(3, 0.1))  # 0.30000000000000004
+    short = cubic_spline([0.0, 1.0], [0.0, 0.3], v1=2.0)
+    assert short.v(many)[-1] == pytest.approx(2.0, rel=1e-12)

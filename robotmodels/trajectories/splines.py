@@ -86,8 +86,14 @@ def cubic_spline(
         raise InvalidValueError("v0, v1: only a clamped spline takes velocities at its ends.")
     q = knots.points
     if ends is SplineEnds.PERIODIC:
-        if np.abs(q[0] - q[-1]).max(initial=0.0) > 1e-9:
-            raise InvalidValueError("points: a periodic spline ends where it began.")
+        gap = np.abs(q[0] - q[-1])
+        open_ = gap > 1e-9 * np.ptp(q[:-1], axis=0) + 4.0 * np.finfo(float).eps * np.abs(q[0])
+        if open_.any():
+            j = int(open_.argmax())
+            raise InvalidValueError(
+                f"points: a periodic spline ends where it began; joint {j + 1} ends {gap[j]:.3g} "
+                "beside its start. Give the first point again as the last."
+            )
         q = q.copy()
         q[-1] = q[0]
     condition: Any = {

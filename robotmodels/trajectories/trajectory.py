@@ -348,10 +348,10 @@ class Trajectory:
         before = after = None
         if not self.repeats and t.size:
             end = np.asarray(duration)[..., None]
-            before, after = flat < 0.0, flat > end
-            if not (before.any() or after.any()):
-                before = after = None
-            else:
+            if (flat < 0.0).any() or (flat > end).any():
+                # a few roundings beside an end, where sums of steps arrive, are the end
+                near = 4.0 * np.spacing(end)
+                before, after = flat < -near, flat > end + near
                 if not self.holds:
                     self._refuse_outside(flat, before, after, duration)
                 flat = np.clip(flat, 0.0, end)
