@@ -53,8 +53,9 @@ def explain_singularities(
     For up to three joints the position of the frame, if it has as many freedoms as they are (here
     the tool matters; `classify_singularity`, `nearest_singularity` and `singularity_flags` take it
     by default as well); else the rows that are not zero, if they are as many as the joints (four
-    of a SCARA arm); else all square minors. For more joints than rows all square minors: the matrix loses rank where every
-    minor has a factor that vanishes, and ``conditions`` are the smallest sets of such factors.
+    of a SCARA arm); else all square minors. For more joints than rows all square minors: the
+    matrix loses rank where every minor has a factor that vanishes, and ``conditions`` are the
+    smallest sets of such factors.
 
     Parameters
     ----------
