@@ -137,3 +137,47 @@ def test_without_the_solver(monkeypatch, rng):
     base = base_parameters(model)
     with pytest.raises(MissingExtraError, match=r"robotmodels\[cones\]"):
         standard_parameters(base, base.values(model))
+
+
+def test_the_nearest_of_no_robot_stays_near_the_prior(rng):
+    """What no torque shows is the prior's also where the base parameters are not met."""
+    model = rm.load("rx90")
+    base = base_parameters(model)
+    values = base.values(model) * (1 + 0.05 * rng.normal(size=len(base)))
+    found = standard_parameters(base, values)
+    again = standard_parameters(base, base.values(found.of(model)))
+    assert found.inertia.mass[0] == pytest.approx(30.0, rel=1e-3)  # M1 has no effect
+    assert found.distance <= again.distance * 1.01 + 1e-6
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 100.0])
+def test_the_size_of_the_robot_does_not_matter(size):
+    table = rm.load("rx90").table
+    scaled = rm.DHTable(
+        antecedent=table.antecedent, sigma=table.sigma, alpha=table.alpha, theta=table.theta,
+        d=size * table.d, r=size * table.r,
+    )  # fmt: skip
+    model = rm.RobotModel.from_table(scaled)
+    drive = rm.DriveParameters(Ia=[0.1 * size**2] * 6, Fv=[size**2] * 6, Fc=[10 * size] * 6)
+    model = model.with_inertia(uniform_bodies(model, 60.0)).with_drive(drive)
+    base = base_parameters(model)
+    found = standard_parameters(base, base.values(model), prior=uniform_bodies(model, 90.0))
+    assert found.status is PhysicalStatus.EXACT
+    assert found.distance == pytest.approx(1.345171366871, rel=1e-6)
+    # a friction below zero is no friction
+    values = base.values(model)
+    values[base.names.index("Fc3")] = -1e-3 * size
+    found = standard_parameters(base, values, prior=uniform_bodies(model, 90.0))
+    assert found.status is PhysicalStatus.NEAREST
+    for part in (found.drive.Ia, found.drive.Fv, found.drive.Fc):
+        assert (part >= 0.0).all()
+
+
+def test_terms_of_coupled_motors_come_back(rng):
+    model = rm.load("tx40").with_inertia(random_bodies(rng, 6))
+    base = base_parameters(model)
+    values = base.values(model)
+    values[-3:] *= 1.5  # Iam6, Fvm6, Fcm6
+    found = standard_parameters(base, values, prior=uniform_bodies(model, 30.0))
+    assert found.status is PhysicalStatus.EXACT
+    np.testing.assert_allclose(base.values(found.of(model)), values, atol=1e-9)

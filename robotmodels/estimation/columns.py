@@ -16,7 +16,7 @@ from ..errors import InvalidValueError, ShapeError
 
 DEPENDENT = 1e-8
 """Sine of the angle to the span of the columns before, below which a column depends on them."""
-EMPTY = 1e-10
+EMPTY = 1e-8
 """Length relative to the longest column, below which a column is without effect."""
 
 

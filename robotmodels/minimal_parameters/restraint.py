@@ -17,7 +17,7 @@ from .._arrays import Array
 from ..geometry import FIXED, REVOLUTE
 from ..model import RobotModel
 
-PARALLEL = 1e-9
+PARALLEL = 1e-8
 """Sine of an angle, cosine of one, or length in metres below which two axes are one direction,
 perpendicular, or through one point."""
 

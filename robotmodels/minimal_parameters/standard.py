@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Rebuilt, as_exact, read_only
-from ..drive import DriveParameters
-from ..errors import InvalidValueError, MissingExtraError
+from .._arrays import Array, Rebuilt, as_core, as_exact, read_only
+from ..drive import DriveParameters, Transmission
+from ..errors import InvalidValueError, ShapeError
 from ..inertia import InertialParameters
 from ..model import RobotModel
 from ..regressors import parameter_vector
-from .prior import check_definite, pseudo_inertias
+from .cone import ConeOutcome, ConeProblem
+from .prior import check_definite
 from .result import BaseParameters
 
 MARGIN = 1e-3
 """Smallest eigenvalue of a link's pseudo-inertia, relative to the prior's."""
+_KEPT = 1e-9
+"""Deviation relative to the largest base parameter that counts as none."""
 
 
 class PhysicalStatus(Enum):
@@ -46,6 +48,8 @@ class StandardParameters(Rebuilt):
         Of f real bodies, unless the status says otherwise.
     drive : DriveParameters
         Of n joints; those of the model where drives were not among the base parameters.
+    transmission : Transmission or None
+        The model's, with the inertia and friction of coupled motors that were found.
     status : PhysicalStatus
         Whether the base parameters were kept.
     deviation : ndarray, shape (b,)
@@ -62,6 +66,7 @@ class StandardParameters(Rebuilt):
 
     inertia: InertialParameters
     drive: DriveParameters
+    transmission: Transmission | None
     status: PhysicalStatus
     deviation: Array
     distance: float
@@ -101,7 +106,8 @@ class StandardParameters(Rebuilt):
         """
         if self.status is PhysicalStatus.NOT_CONVERGED:
             raise InvalidValueError(self.status.value)
-        return model.with_inertia(self.inertia).with_drive(self.drive)
+        whole = model.with_inertia(self.inertia).with_drive(self.drive)
+        return whole.with_transmission(self.transmission)
 
 
 def standard_parameters(
@@ -177,30 +183,53 @@ def standard_parameters(
     if drives.n != model.n:
         raise InvalidValueError(f"drive_prior: expected {model.n} joints, got {drives.n}.")
     P0 = check_definite(bodies, "prior")
-    problem = _Cone(base, b, _prior_vector(base, bodies, drives), P0, margin)
-    x, solved = problem.nearest_to_prior()
-    status = PhysicalStatus.EXACT
-    if not solved:
-        W = _relative(b) if weights is None else as_exact(weights, np.shape(weights), "weights")
-        if W.ndim != 2 or W.shape[1] != len(base):
-            raise InvalidValueError(f"weights: expected shape (k, {len(base)}), got {W.shape}.")
-        x, solved = problem.nearest_base(W)
-        status = PhysicalStatus.NEAREST if solved else PhysicalStatus.NOT_CONVERGED
-    return _result(base, b, x, drives, status, problem)
+    W = _relative(base, b) if weights is None else as_core(weights, (len(base),), "weights")
+    if W.ndim != 2:
+        raise ShapeError(f"weights: expected shape (k, {len(base)}), got {W.shape}.")
+    problem = ConeProblem(base, _prior_vector(base, bodies, drives), P0, margin)
+    x, outcome = problem.nearest_to_prior(b)
+    if outcome is ConeOutcome.SOLVED:
+        found = _result(base, b, x, drives, PhysicalStatus.EXACT, problem)
+        if _is_kept(found.deviation, b):
+            return found
+    x, solved = problem.nearest_base(W, b)
+    status = PhysicalStatus.NEAREST
+    if solved is not ConeOutcome.SOLVED:
+        status = PhysicalStatus.NOT_CONVERGED
+    found = _result(base, b, x, drives, status, problem)
+    if status is PhysicalStatus.NEAREST and _is_kept(found.deviation, b):
+        return replace(found, status=PhysicalStatus.EXACT)
+    if outcome is ConeOutcome.FAILED:
+        # whether real bodies have these base parameters was not told
+        return replace(found, status=PhysicalStatus.NOT_CONVERGED)
+    return found
 
 
 def _result(
     base: BaseParameters, b: Array, x: Array, drives: DriveParameters, status: PhysicalStatus,
-    problem: _Cone,
+    problem: ConeProblem,
 ) -> StandardParameters:  # fmt: skip
+    """The robot of the variables, and what it has of the base parameters."""
     f, n = base.model.f, base.model.n
+    transmission = base.model.transmission
     if base.drive:
         Ia, Fv, Fc, offset = x[10 * f : 10 * f + 4 * n].reshape(4, n)
         drives = DriveParameters(Ia=Ia, Fv=Fv, Fc=Fc, offset=offset)
-    return StandardParameters(
-        InertialParameters(x[: 10 * f].reshape(f, 10)), drives, status,
-        base.matrix @ x - b, problem.distance(x),
-    )  # fmt: skip
+        if transmission is not None and transmission.coupled_motors:
+            motors = np.array(transmission.coupled_motors) - 1
+            terms = np.zeros((3, n))
+            terms[:, motors] = x[10 * f + 4 * n :].reshape(3, len(motors))
+            transmission = Transmission(transmission.matrix, transmission.offset, *terms)
+    inertia = InertialParameters(x[: 10 * f].reshape(f, 10))
+    robot = base.model.with_inertia(inertia).with_drive(drives).with_transmission(transmission)
+    deviation = base.values(robot) - b
+    return StandardParameters(inertia, drives, transmission, status, deviation, problem.distance(x))
+
+
+def _is_kept(deviation: Array, b: Array) -> bool:
+    return float(np.abs(deviation).max(initial=0.0)) <= _KEPT * max(
+        1e-300, float(np.abs(b).max(initial=0.0))
+    )
 
 
 def _prior_vector(
@@ -209,116 +238,11 @@ def _prior_vector(
     return parameter_vector(base.model.with_inertia(bodies).with_drive(drives), base.drive)
 
 
-def _relative(b: Array) -> Array:
-    size = np.abs(b).max(initial=0.0) or 1.0
-    return np.diag(1.0 / np.maximum(np.abs(b), 1e-3 * size))
-
-
-_PLACES = tuple((i, k) for k in range(4) for i in range(k + 1))
-"""Upper triangle of a 4x4 matrix, column by column, as the solver stacks it."""
-
-
-class _Cone:
-    """The convex problem: variables x are the standard parameters, in units of the prior."""
-
-    def __init__(
-        self, base: BaseParameters, b: Array, prior: Array, P0: Array, margin: float
-    ) -> None:
-        f, n = base.model.f, base.model.n
-        self.base, self.b, self.prior, self.margin = base, b, prior, margin
-        p = len(prior)
-        # whitened pseudo-inertia of link j: the identity at the prior
-        basis = pseudo_inertias(InertialParameters(np.eye(10)))
-        self.maps = np.zeros((f, 16, 10))
-        for j in range(f):
-            L = np.linalg.inv(np.linalg.cholesky(P0[j]))
-            self.maps[j] = np.stack([(L @ B @ L.T).ravel() for B in basis], axis=1)
-        # of the drives, changes count relative to the prior's own size
-        rest = prior[10 * f :]
-        size = np.maximum(np.abs(rest), 1e-2 * np.abs(rest).max(initial=0.0))
-        self.sizes = np.where(size > 0, size, 1.0)
-        metric = np.zeros((p, p))
-        for j in range(f):
-            part = slice(10 * j, 10 * j + 10)
-            metric[part, part] = self.maps[j].T @ self.maps[j]
-        metric[range(10 * f, p), range(10 * f, p)] = 1.0 / self.sizes**2
-        self.metric = metric
-        # rotor inertias and frictions; offsets, and what couples motors, may have either sign
-        self.f, self.positive = f, range(10 * f, min(10 * f + 3 * n, p))
-
-    def distance(self, x: Array) -> float:
-        change = x - self.prior
-        return float(np.sqrt(max(change @ self.metric @ change, 0.0)))
-
-    def nearest_to_prior(self) -> tuple[Array, bool]:
-        """Minimum of the distance on the base parameters."""
-        M = self.base.matrix
-        x, solved = self._solve(self.metric, -self.metric @ self.prior, M, self.b)
-        if not solved:
-            return x, False
-        # the solver's last digits
-        scale = np.diag(1.0 / np.sqrt(np.diag(self.metric)))
-        return x + scale @ np.linalg.pinv(M @ scale) @ (self.b - M @ x), True
-
-    def nearest_base(self, W: Array) -> tuple[Array, bool]:
-        """Minimum of ``|W (M x - b)|^2``, and among those, nearly, of the distance."""
-        A = W @ self.base.matrix
-        hessian = A.T @ A
-        small = 1e-8 * np.trace(hessian) / np.trace(self.metric)
-        H = hessian + small * self.metric
-        g = -A.T @ (W @ self.b) - small * self.metric @ self.prior
-        return self._solve(H, g, np.zeros((0, len(g))), np.zeros(0))
-
-    def _solve(self, H: Array, g: Array, E: Array, e: Array) -> tuple[Array, bool]:
-        clarabel = _clarabel()
-        from scipy import sparse
-
-        p = len(g)
-        unit = 1.0 / np.sqrt(np.diag(self.metric))
-        rows, right, cones = [], [], []
-        if len(e):
-            scale = 1.0 / np.abs(E * unit).max(axis=1)
-            rows.append(E * scale[:, None])
-            right.append(e * scale)
-            cones.append(clarabel.ZeroConeT(len(e)))
-        if len(self.positive):
-            bound = np.zeros((len(self.positive), p))
-            bound[range(len(self.positive)), self.positive] = -1.0
-            rows.append(bound)
-            right.append(np.zeros(len(self.positive)))
-            cones.append(clarabel.NonnegativeConeT(len(self.positive)))
-        for j in range(self.f):
-            block = np.zeros((10, p))
-            floor = np.zeros(10)
-            for k, (i, m) in enumerate(_PLACES):
-                weight = 1.0 if i == m else np.sqrt(2.0)
-                block[k, 10 * j : 10 * j + 10] = -weight * self.maps[j][4 * i + m]
-                floor[k] = -self.margin * (i == m)
-            rows.append(block)
-            right.append(floor)
-            cones.append(clarabel.PSDTriangleConeT(4))
-        A = np.concatenate(rows) * unit
-        settings = clarabel.DefaultSettings()
-        settings.verbose = False
-        settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-11
-        settings.max_iter = 500
-        scaled = H * unit * unit[:, None]
-        size = max(float(np.abs(scaled).max()), 1e-300)
-        solver = clarabel.DefaultSolver(
-            sparse.csc_matrix(np.triu(scaled / size)), g * unit / size, sparse.csc_matrix(A),
-            np.concatenate(right), cones, settings,
-        )  # fmt: skip
-        solution = solver.solve()
-        done = str(solution.status) in ("Solved", "AlmostSolved")
-        return unit * np.array(solution.x), done
-
-
-def _clarabel() -> Any:
-    try:
-        import clarabel
-    except ImportError:
-        raise MissingExtraError(
-            "Physically consistent parameters need Clarabel, a solver for cones: "
-            "pip install 'robotmodels[cones]'."
-        ) from None
-    return clarabel
+def _relative(base: BaseParameters, b: Array) -> Array:
+    """Deviations count relative to the values, which are compared with others of their kind."""
+    kinds = np.array([name.rstrip("0123456789")[:1] for name in base.names])
+    sizes = np.abs(b)
+    for kind in set(kinds.tolist()):
+        own = kinds == kind
+        sizes[own] = np.maximum(sizes[own], 1e-3 * sizes[own].max())
+    return np.diag(1.0 / np.where(sizes > 0, sizes, 1.0))
