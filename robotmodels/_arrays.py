@@ -259,15 +259,24 @@ def read_only(array: ArrayLike, dtype: type = np.float64) -> NDArray[Any]:
 
 
 class Rebuilt:
-    """Base of frozen dataclasses that are rebuilt when they are copied or unpickled.
+    """Base of frozen dataclasses whose arrays stay read-only when they are copied or unpickled.
 
-    NumPy forgets that an array is read-only when it is pickled; the constructor makes it so again.
+    NumPy forgets that an array is read-only when it is pickled.
     """
 
     __slots__ = ()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), tuple(getattr(self, f.name) for f in fields(self) if f.init)  # type: ignore[arg-type]
+        values = tuple(getattr(self, f.name) for f in fields(self) if f.init)  # type: ignore[arg-type]
+        return _rebuilt, (type(self), values)
+
+
+def _rebuilt(kind: type, values: tuple[Any, ...]) -> Any:
+    for value in values:
+        for array in value if isinstance(value, tuple) else (value,):
+            if isinstance(array, np.ndarray):
+                array.flags.writeable = False
+    return kind(*values)
 
 
 def same_value(a: object, b: object) -> bool:

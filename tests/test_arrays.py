@@ -177,6 +177,15 @@ def test_values_are_read_only_after_a_copy_too():
         rm.static_wrench(model, [0.1] * 6, [0.0] * 6),
         rm.ikm(model, [0.1] * 6, [0.0] * 6),
         rm.base_parameters(model),
+        rm.classify_singularity(model, [0.1, 0.5, 0.4, 0.3, 0.0, 0.2]),
+        rm.nearest_singularity(model, [0.1, 0.5, 0.4, 0.3, 0.1, 0.2]),
+        rm.velocity_ellipsoid(model, [0.1] * 6),
+        rm.manipulability(model, [0.1] * 6),
+        rm.jacobian_factors(model, [0.1] * 6),
+        rm.operational_dimension(model),
+        kin.jacobian_rank(model, [0.1] * 6),
+        kin.singularity_flags(model, [[0.1] * 6]),
+        kin.singularity_map(model, (1, 2), samples=(5, 5)),
     )
     for value in values:
         for again in (pickle.loads(pickle.dumps(value)), copy.deepcopy(value)):

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, as_core, as_exact, as_vector, batch_shape, read_only
+from .._arrays import Array, Rebuilt, as_core, as_exact, as_vector, batch_shape, read_only
 from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel, check_model
 from .ellipsoid import in_range
@@ -24,7 +24,7 @@ _ON = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Manipulability:
+class Manipulability(Rebuilt):
     """How well joints move m components of the twist. Read-only.
 
     Parameters

@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, as_core, batch_shape, read_only
+from .._arrays import Array, Rebuilt, as_core, batch_shape, read_only
 from ..errors import InvalidValueError, ShapeError
 
 # sine of an angle that is rounding: a direction so near an axis or a plane lies on it
@@ -46,7 +46,7 @@ class EllipsoidQuantity(Enum):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Ellipsoid:
+class Ellipsoid(Rebuilt):
     """Velocities or forces that joints of one size give: ``sum_i (u_i . x / r_i)^2 <= 1``.
 
     Read-only; leading axes are those of the configurations.

@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import se3
-from .._arrays import Array, as_vector, read_only
+from .._arrays import Array, Rebuilt, as_vector, read_only
 from ..geometry import PRISMATIC
 from ..model import FrameOfInterest, RobotModel, check_model
 from .poses import link_poses
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class JacobianFactors:
+class JacobianFactors(Rebuilt):
     """The three matrices of the book: ``J = rotation transport reduced``.
 
     The first two are invertible whatever the configuration, so that rank, singular positions and

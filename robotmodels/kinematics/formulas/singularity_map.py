@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..._arrays import Array, as_exact, as_vector, read_only
+from ..._arrays import Array, Rebuilt, as_exact, as_vector, read_only
 from ...errors import InvalidValueError, ShapeError, nearest_names
 from ...geometry import PRISMATIC
 from ...model import RobotModel, check_model
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SingularityMap:
+class SingularityMap(Rebuilt):
     """Values of a singular factor or of the determinant over two joints; drawn by ``viz``.
 
     The robot is singular where the value is zero.

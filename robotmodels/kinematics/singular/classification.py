@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..._arrays import Array, as_exact, as_floats, read_only
+from ..._arrays import Array, Rebuilt, as_exact, as_floats, read_only
 from ...model import RobotModel
 from ...table_text import length_text
 from ..poses import dgm
@@ -40,7 +40,7 @@ _TWICE = 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SingularityReport:
+class SingularityReport(Rebuilt):
     """One configuration: what it has lost, what it has gained. Read-only; `print` it.
 
     Parameters

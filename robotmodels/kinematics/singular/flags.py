@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..._arrays import Array, as_vector, read_only
+from ..._arrays import Array, Rebuilt, as_vector, read_only
 from ...model import RobotModel
 from .frames import frame_words
 from .rank import TOLERANCE, operational_dimension, task_rank
@@ -45,7 +45,7 @@ class SingularityStatus(IntEnum):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SingularityFlags:
+class SingularityFlags(Rebuilt):
     """Statuses of the configurations of one call. Read-only.
 
     Parameters

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..._arrays import Array, read_only
+from ..._arrays import Array, Rebuilt, read_only
 from ...errors import FrameNotFoundError, InvalidValueError
 from ..poses import dgm, link_poses
 from .bases import normalised, sparse_basis
@@ -25,7 +25,7 @@ _WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LostDirections:
+class LostDirections(Rebuilt):
     """Combinations of velocities that cannot be produced, in chosen axes at a chosen point.
 
     Parameters

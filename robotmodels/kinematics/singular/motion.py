@@ -13,7 +13,7 @@ from typing import Self
 
 import numpy as np
 
-from ..._arrays import Array, read_only
+from ..._arrays import Array, Rebuilt, read_only
 from ..poses import dgm
 from .bases import normalised, sparse_basis
 from .task import SingularTask, task_derivatives, task_jacobians
@@ -54,7 +54,7 @@ class SelfMotionKind(IntEnum):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SelfMotion:
+class SelfMotion(Rebuilt):
     """One joint motion that leaves the tool still, to first order. Read-only.
 
     Parameters

@@ -14,7 +14,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..._arrays import Array, as_exact, read_only
+from ..._arrays import Array, Rebuilt, as_exact, read_only
 from ...errors import InvalidValueError
 from ...geometry import PRISMATIC
 from ...model import RobotModel
@@ -103,7 +103,7 @@ class SearchOutcome(IntEnum):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class NearestSingularities:
+class NearestSingularities(Rebuilt):
     """Singular configurations by their distance from a given one. Read-only; `print` it.
 
     S rows, the nearest first; none twice, also not by whole turns of a joint unless limits were

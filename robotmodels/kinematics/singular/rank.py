@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..._arrays import Array, as_floats, as_vector, read_only
+from ..._arrays import Array, Rebuilt, as_floats, as_vector, read_only
 from ...model import RobotModel
 from ..jacobians import jacobian
 from ..lengths import spread_configurations
@@ -34,7 +34,7 @@ _NAMES = ("vx", "vy", "vz", "wx", "wy", "wz")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class JacobianRank:
+class JacobianRank(Rebuilt):
     """Ranks of the Jacobians of one call, with what they were decided by. Read-only.
 
     Parameters
@@ -66,7 +66,7 @@ class JacobianRank:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class OperationalDimension:
+class OperationalDimension(Rebuilt):
     """How many independent motions a frame of a robot has. Read-only.
 
     Parameters
