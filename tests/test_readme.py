@@ -27,6 +27,12 @@ def test_python_examples(tmp_path, monkeypatch, capsys):
     )
     np.testing.assert_allclose(names["motion"].q(names["motion"].duration), names["q"])
     assert names["path"].complete
+    np.testing.assert_allclose(
+        names["base"].reduce(names["W"]) @ names["base"].values(names["rx90"]),
+        rm.idm(names["rx90"], names["q"], 0.5 * names["q"], names["q"]),
+    )
+    assert len(names["base"]) == 58
+    assert names["fall"].relative_drift < 1e-8
     assert (tmp_path / "ur5.html").stat().st_size > 500_000
     assert (tmp_path / "arm.urdf").is_file()
     printed = capsys.readouterr().out
