@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields
 from typing import Any, ClassVar
 
@@ -14,7 +15,7 @@ from .protocols import breakaway_torques
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)
-class JointFriction:
+class JointFriction(ABC):
     """Parameters of shape (n,) that the fields name; a subclass adds `basis`."""
 
     kinds: ClassVar[tuple[str, ...]] = ()
@@ -43,6 +44,7 @@ class JointFriction:
         """Torques between which a joint at rest sticks, shape (2, n): lower, upper."""
         return breakaway_torques(self)
 
+    @abstractmethod
     def basis(self, v: ArrayLike) -> Array:
         """Torque per unit of each parameter of its joint.
 
@@ -56,7 +58,6 @@ class JointFriction:
         ndarray, shape (..., k, n)
             In the order of ``kinds``.
         """
-        raise NotImplementedError
 
     def torque(self, v: ArrayLike) -> Array:
         """Torque that the joints need to overcome friction; dry friction is zero at rest.

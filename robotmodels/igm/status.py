@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from enum import IntEnum
-from typing import Self
+from .._outcomes import Outcome
 
 
-class IGMStatus(IntEnum):
+class IGMStatus(Outcome):
     """Outcome of an inverse geometric model for one pose; fits int8.
 
     ``REACHED`` and ``REACHED_FAMILY`` come with solutions, the others say why there is none.
@@ -24,8 +23,6 @@ class IGMStatus(IntEnum):
     <IGMStatus.REACHED: 0>
     """
 
-    sentence: str
-
     REACHED = 0, "The pose is reached."
     REACHED_FAMILY = 1, "The pose is reached by an infinite family of postures."
     OUTSIDE_LIMITS = 2, "The pose is reached only outside the joint limits."
@@ -35,10 +32,3 @@ class IGMStatus(IntEnum):
         5, "The position is reached, but the orientation is not available there.",
     )  # fmt: skip
     NOT_CONVERGED = 6, "No posture was found that meets the pose."
-
-    def __new__(cls, value: int, sentence: str = "") -> Self:
-        """Attach the sentence to the number."""
-        status = int.__new__(cls, value)
-        status._value_ = value
-        status.sentence = sentence
-        return status

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntEnum
-from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, Rebuilt, as_exact, as_vector, batch_shape, read_only
+from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from ..geometry import PRISMATIC
 from ..model import RobotModel, check_model
@@ -20,7 +19,7 @@ from .statics import weight_torque
 _EPS = float(np.finfo(np.float64).eps)
 
 
-class StaticStatus(IntEnum):
+class StaticStatus(Outcome):
     """What joint torques say about the wrench they hold; fits int8.
 
     Attributes
@@ -34,8 +33,6 @@ class StaticStatus(IntEnum):
     'No wrench balances the torques: the residual would move joints while the tool rests.'
     """
 
-    sentence: str
-
     DETERMINED = 0, "One wrench balances the torques."
     UNDETERMINED = (
         1, "Many wrenches balance the torques, as the structure carries some alone; the smallest.",
@@ -47,13 +44,6 @@ class StaticStatus(IntEnum):
         3, "No wrench balances the residual, which would move joints while the tool rests; many "
         "balance the other torques, as the structure carries some alone; the smallest.",
     )  # fmt: skip
-
-    def __new__(cls, value: int, sentence: str = "") -> Self:
-        """Attach the sentence to the number."""
-        status = int.__new__(cls, value)
-        status._value_ = value
-        status.sentence = sentence
-        return status
 
 
 @dataclass(frozen=True, slots=True, eq=False)

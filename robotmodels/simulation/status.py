@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import Enum, IntEnum
-from typing import Self
+from enum import Enum
+
+from .._outcomes import Outcome
 
 
-class SimulationStatus(IntEnum):
+class SimulationStatus(Outcome):
     """Why a simulation ended; fits int8. What was reached comes with every status.
 
     Attributes
@@ -21,8 +22,6 @@ class SimulationStatus(IntEnum):
     'The motion was followed to its end.'
     """
 
-    sentence: str
-
     FINISHED = 0, "The motion was followed to its end."
     LIMIT_REACHED = 1, "A joint reached one of its limits, where the motion was to be stopped."
     NOT_CONVERGED = 2, "The allowed evaluations of the model were used up before the end."
@@ -32,13 +31,6 @@ class SimulationStatus(IntEnum):
     )
     SINGULAR = 4, "The mass matrix became singular: there is no one acceleration to go on with."
     CHATTERING = 5, "Joints stick and slip again at the same instant without end."
-
-    def __new__(cls, value: int, sentence: str = "") -> Self:
-        """Attach the sentence to the number."""
-        status = int.__new__(cls, value)
-        status._value_ = value
-        status.sentence = sentence
-        return status
 
 
 class Integrator(Enum):
@@ -60,7 +52,7 @@ class Integrator(Enum):
     BDF = "BDF"
 
 
-class SimulationEventKind(IntEnum):
+class SimulationEventKind(Outcome):
     """What happened at an instant of a simulation.
 
     Attributes
@@ -74,19 +66,10 @@ class SimulationEventKind(IntEnum):
     'comes to rest and sticks'
     """
 
-    sentence: str
-
     STUCK = 0, "comes to rest and sticks"
     BROKE_AWAY = 1, "breaks away"
     REVERSED = 2, "reverses without sticking"
     LIMIT = 3, "reaches a limit"
-
-    def __new__(cls, value: int, sentence: str = "") -> Self:
-        """Attach the sentence to the number."""
-        kind = int.__new__(cls, value)
-        kind._value_ = value
-        kind.sentence = sentence
-        return kind
 
 
 @dataclass(frozen=True, slots=True)

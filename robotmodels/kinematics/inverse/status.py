@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from enum import IntEnum
-from typing import Self
+from ..._outcomes import Outcome
 
 
-class IKMStatus(IntEnum):
+class IKMStatus(Outcome):
     """Outcome of an inverse kinematic model for one row; fits int8.
 
     Joint velocities come with every status; what they miss is in the ``error`` of the result.
@@ -24,8 +23,6 @@ class IKMStatus(IntEnum):
     <IKMStatus.LIMITED: 4>
     """
 
-    sentence: str
-
     MET = 0, "The motion is met."
     IN_PART = 1, "The motion is met in part: its weak directions are kept slow near a singularity."
     SINGULAR = 2, "The motion has a part that cannot be produced at this singular position."
@@ -33,10 +30,3 @@ class IKMStatus(IntEnum):
         3, "The motion has a part that cannot be produced: too few degrees of freedom.",
     )  # fmt: skip
     LIMITED = 4, "The motion is kept within the limits of the joints, which cannot follow it."
-
-    def __new__(cls, value: int, sentence: str = "") -> Self:
-        """Attach the sentence to the number."""
-        status = int.__new__(cls, value)
-        status._value_ = value
-        status.sentence = sentence
-        return status

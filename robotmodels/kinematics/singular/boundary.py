@@ -7,13 +7,12 @@ self-motion may turn the lost direction until the old one is free.
 
 from __future__ import annotations
 
-from enum import IntEnum
 from math import tau
-from typing import Self
 
 import numpy as np
 
 from ..._arrays import Array
+from ..._outcomes import Outcome
 from .motion import SelfMotion, SelfMotionKind, moved_on, second_order_forms
 from .task import SingularTask, task_jacobians
 
@@ -21,7 +20,7 @@ _ZERO_FORM = 1e-6
 _STEP = 0.15
 
 
-class WorkspaceSide(IntEnum):
+class WorkspaceSide(Outcome):
     """Where a singular pose lies in what the robot reaches near that configuration.
 
     Attributes
@@ -35,19 +34,10 @@ class WorkspaceSide(IntEnum):
     'INTERIOR'
     """
 
-    sentence: str
-
     REGULAR = 0, "No direction is lost."
     INTERIOR = 1, "Inside the workspace: the lost direction is open after a self-motion or a turn."
     BOUNDARY = 2, "On a boundary: along the lost direction the tool can move to one side only."
     UNDECIDED = 3, "The second order and the self-motions do not tell boundary from interior."
-
-    def __new__(cls, value: int, sentence: str = "") -> Self:
-        """Attach the sentence to the number."""
-        side = int.__new__(cls, value)
-        side._value_ = value
-        side.sentence = sentence
-        return side
 
 
 def workspace_side(

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntEnum
-from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..._arrays import Array, Rebuilt, as_vector, read_only
+from ..._outcomes import Outcome
 from ...model import RobotModel
 from .frames import frame_words
 from .rank import TOLERANCE, operational_dimension, task_rank
 from .task import MaskAxes, above_zero, counting_lines, deciding_mask, singular_task
 
 
-class SingularityStatus(IntEnum):
+class SingularityStatus(Outcome):
     """What a configuration is; fits int8.
 
     Attributes
@@ -30,18 +29,9 @@ class SingularityStatus(IntEnum):
     'Singular: the robot has lost freedoms.'
     """
 
-    sentence: str
-
     REGULAR = 0, "Regular: all freedoms of the robot are there."
     NEAR_SINGULAR = 1, "Near a singular configuration: one freedom is weak."
     SINGULAR = 2, "Singular: the robot has lost freedoms."
-
-    def __new__(cls, value: int, sentence: str = "") -> Self:
-        """Attach the sentence to the number."""
-        status = int.__new__(cls, value)
-        status._value_ = value
-        status.sentence = sentence
-        return status
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,12 +8,11 @@ is only if the second order allows it: ``J a + (dJ/dt) v = 0`` must have a solut
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntEnum
-from typing import Self
 
 import numpy as np
 
 from ..._arrays import Array, Rebuilt, read_only
+from ..._outcomes import Outcome
 from ..poses import dgm
 from .bases import normalised, sparse_basis
 from .task import SingularTask, task_derivatives, task_jacobians
@@ -23,7 +22,7 @@ _SHORT = 0.01
 _MET = 1e-11
 
 
-class SelfMotionKind(IntEnum):
+class SelfMotionKind(Outcome):
     """How far a self-motion goes.
 
     Attributes
@@ -37,20 +36,11 @@ class SelfMotionKind(IntEnum):
     'The joints can only begin to move: at the second order the tool leaves its place.'
     """
 
-    sentence: str
-
     FINITE = 0, "The joints can move on while the tool stays."
     INFINITESIMAL = (
         1, "The joints can only begin to move: at the second order the tool leaves its place.",
     )  # fmt: skip
     UNDECIDED = 2, "The second order allows it, but no such motion was found along it."
-
-    def __new__(cls, value: int, sentence: str = "") -> Self:
-        """Attach the sentence to the number."""
-        kind = int.__new__(cls, value)
-        kind._value_ = value
-        kind.sentence = sentence
-        return kind
 
 
 @dataclass(frozen=True, slots=True, eq=False)

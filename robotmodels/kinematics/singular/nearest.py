@@ -6,15 +6,14 @@ Seed book section 1.3.2.3: the solution near singular positions needs to know wh
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from enum import IntEnum
 from math import pi
 from textwrap import wrap
-from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..._arrays import Array, Rebuilt, as_exact, read_only
+from ..._outcomes import Outcome
 from ...errors import InvalidValueError
 from ...geometry import PRISMATIC
 from ...model import RobotModel
@@ -43,7 +42,7 @@ _BESIDE = 8
 _ALREADY, _ASIDE, _FLAT = 1e-9, 1e-4, 3e-6
 
 
-class NearestStatus(IntEnum):
+class NearestStatus(Outcome):
     """What one found configuration is; fits int8.
 
     Attributes
@@ -57,8 +56,6 @@ class NearestStatus(IntEnum):
     'Singular, and none of the same kind in its neighbourhood is nearer.'
     """
 
-    sentence: str
-
     NEAREST = 0, "Singular, and none of the same kind in its neighbourhood is nearer."
     AT_LIMIT = 1, "Singular, and none that respects the joint limits is nearer there."
     NOT_STATIONARY = 2, "Singular, but a nearer one in its neighbourhood is not excluded."
@@ -66,15 +63,8 @@ class NearestStatus(IntEnum):
         3, "Singular in another way than the given configuration, and the nearest to within 1e-4.",
     )  # fmt: skip
 
-    def __new__(cls, value: int, sentence: str = "") -> Self:
-        """Attach the sentence to the number."""
-        status = int.__new__(cls, value)
-        status._value_ = value
-        status.sentence = sentence
-        return status
 
-
-class SearchOutcome(IntEnum):
+class SearchOutcome(Outcome):
     """What a search came to.
 
     Attributes
@@ -88,18 +78,9 @@ class SearchOutcome(IntEnum):
     'NONE_FOUND'
     """
 
-    sentence: str
-
     FOUND = 0, "Singular configurations were found."
     ALREADY_SINGULAR = 1, "The given configuration is singular itself."
     NONE_FOUND = 2, "No singular configuration was found from any start."
-
-    def __new__(cls, value: int, sentence: str = "") -> Self:
-        """Attach the sentence to the number."""
-        outcome = int.__new__(cls, value)
-        outcome._value_ = value
-        outcome.sentence = sentence
-        return outcome
 
 
 @dataclass(frozen=True, slots=True, eq=False)
