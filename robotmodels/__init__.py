@@ -43,8 +43,6 @@ from .regressors import (
     torque_regressor_chunks,
 )
 from .robots import load, robots
-from .symbolic_dgm import DirectModelExplanation, explain_dgm
-from .symoro import read_par
 from .urdf import NamedFrame
 
 if TYPE_CHECKING:
@@ -84,6 +82,8 @@ if TYPE_CHECKING:
         uniform_bodies,
     )
     from .simulation import Simulation, simulate, torque_parts
+    from .symbolic_dgm import DirectModelExplanation, explain_dgm
+    from .symoro import read_par
 
 __version__ = "0.1.0"
 
@@ -225,6 +225,8 @@ _ROOMS = {
         "simulate",
         "torque_parts",
     ),
+    ".symbolic_dgm": ("DirectModelExplanation", "explain_dgm"),
+    ".symoro": ("read_par",),
 }
 _ROOM_OF = {name: room for room, names in _ROOMS.items() for name in names}
 

@@ -20,8 +20,11 @@ def python(code):
 
 
 def test_import_takes_less_than_0_6_s():
-    # of the processor: tests may run beside each other
-    code = "from time import process_time as t; a = t(); import robotmodels; print(t() - a)"
+    # the clock counts what runs beside the test, the processor's time the threads of libraries
+    code = (
+        "from time import perf_counter as t, process_time as p; a, b = t(), p(); "
+        "import robotmodels; print(min(t() - a, p() - b))"
+    )
     python(code)  # warm-up: byte code is written and files are read into memory
     assert min(float(python(code)) for _ in range(5)) < 0.6
 
