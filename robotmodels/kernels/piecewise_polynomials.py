@@ -57,7 +57,7 @@ def piecewise_derivatives(
     count = orders.shape[0]
     last = np.empty(groups, np.int64)
     piece = np.empty(groups, np.int64)
-    begin, end, length, x = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+    begin, end, inverse, x = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     here = np.empty((count, powers, n))  # coefficients of the derivatives on the present pieces
     for m in range(M):
         for g in range(groups):
@@ -85,7 +85,7 @@ def piecewise_derivatives(
                     begin[j], end[j] = breaks[m, g, k], breaks[m, g, k + 1]
                     if h <= 0.0:  # a motion without duration stays at its start
                         h, end[j] = 1.0, np.inf
-                    length[j] = h
+                    inverse[j] = 1.0 / h
                     for p in range(count):
                         for i in range(orders[p], powers):
                             c = coefficients[m, k, i, j]
@@ -93,9 +93,13 @@ def piecewise_derivatives(
                             for r in range(orders[p]):
                                 c = c * (i - r) / h
                             here[p, i, j] = c
-            for j in range(n):
-                part = (now - begin[j]) / length[j]
+            # joints that share their times share this as well
+            for j in range(1 if groups == 1 else n):
+                part = (now - begin[j]) * inverse[j]
                 x[j] = 1.0 if now >= end[j] else min(max(part, 0.0), 1.0)
+            if groups == 1:
+                for j in range(1, n):
+                    x[j] = x[0]
             for p in range(count):
                 if orders[p] >= powers:
                     for j in range(n):
