@@ -1,0 +1,214 @@
+"""Poses of a robot whose parameters are off, and their derivatives by every parameter.
+
+Each row of the table is seven elementary motions (seed book eq. [1.3], with gamma and b for
+branches and Hayati's beta)::
+
+    Rot(z, gamma) Trans(z, b) Rot(y, beta) Rot(x, alpha) Trans(x, d) Rot(z, theta) Trans(z, r)
+
+A change of one of them is a screw along its axis: the column of the generalised differential
+model (section 1.4.3) is ``[axis x (p - origin); axis]`` for a rotation and ``[axis; 0]`` for a
+translation, p the measured point. A parameter acts on its element through a factor that depends
+on the configuration: 1 for a geometric parameter, the reading of the joint for a gain.
+"""
+
+from math import cos, sin
+
+import numpy as np
+
+from ._compile import INTS, MATRIX, NOTHING, OUT3, VECTOR, Floats, Ints, compiled
+from ._vectors import (
+    Matrix,
+    Vector,
+    add,
+    cross,
+    product,
+    put_vector,
+    scale,
+    subtract,
+    times,
+    vector,
+    whole_matrix,
+    whole_vector,
+)
+from .poses import put_pose
+
+__all__ = ["erroneous_poses"]
+
+_ELEMENTS = 7
+
+
+@compiled()
+def _turned_x(R: Matrix, angle: float) -> Matrix:
+    """R Rot(x, angle)."""
+    c = cos(angle)
+    s = sin(angle)
+    return (
+        R[0], R[1] * c + R[2] * s, R[2] * c - R[1] * s,
+        R[3], R[4] * c + R[5] * s, R[5] * c - R[4] * s,
+        R[6], R[7] * c + R[8] * s, R[8] * c - R[7] * s,
+    )  # fmt: skip
+
+
+@compiled()
+def _turned_y(R: Matrix, angle: float) -> Matrix:
+    """R Rot(y, angle)."""
+    c = cos(angle)
+    s = sin(angle)
+    return (
+        R[0] * c - R[2] * s, R[1], R[2] * c + R[0] * s,
+        R[3] * c - R[5] * s, R[4], R[5] * c + R[3] * s,
+        R[6] * c - R[8] * s, R[7], R[8] * c + R[6] * s,
+    )  # fmt: skip
+
+
+@compiled()
+def _turned_z(R: Matrix, angle: float) -> Matrix:
+    """R Rot(z, angle)."""
+    c = cos(angle)
+    s = sin(angle)
+    return (
+        R[0] * c + R[1] * s, R[1] * c - R[0] * s, R[2],
+        R[3] * c + R[4] * s, R[4] * c - R[3] * s, R[5],
+        R[6] * c + R[7] * s, R[7] * c - R[6] * s, R[8],
+    )  # fmt: skip
+
+
+@compiled()
+def _x_axis(R: Matrix) -> Vector:
+    return (R[0], R[3], R[6])
+
+
+@compiled()
+def _y_axis(R: Matrix) -> Vector:
+    return (R[1], R[4], R[7])
+
+
+@compiled()
+def _z_axis(R: Matrix) -> Vector:
+    return (R[2], R[5], R[8])
+
+
+@compiled()
+def _screws_of_row(
+    element: Floats, R: Matrix, p: Vector, axes: Floats, origins: Floats, first: int
+) -> tuple[Matrix, Vector]:
+    """Pass one row: its frame in the world, and the axis and origin of its seven motions."""
+    put_vector(axes, first, _z_axis(R))  # gamma
+    put_vector(origins, first, p)
+    R = _turned_z(R, element[0])
+    put_vector(axes, first + 1, _z_axis(R))  # b
+    p = add(p, scale(element[1], _z_axis(R)))
+    put_vector(axes, first + 2, _y_axis(R))  # beta
+    put_vector(origins, first + 2, p)
+    R = _turned_y(R, element[2])
+    put_vector(axes, first + 3, _x_axis(R))  # alpha
+    put_vector(origins, first + 3, p)
+    R = _turned_x(R, element[3])
+    put_vector(axes, first + 4, _x_axis(R))  # d
+    p = add(p, scale(element[4], _x_axis(R)))
+    put_vector(axes, first + 5, _z_axis(R))  # theta
+    put_vector(origins, first + 5, p)
+    R = _turned_z(R, element[5])
+    put_vector(axes, first + 6, _z_axis(R))  # r
+    return R, add(p, scale(element[6], _z_axis(R)))
+
+
+@compiled(
+    NOTHING(
+        MATRIX, MATRIX, INTS, INTS, INTS, MATRIX, VECTOR, MATRIX, VECTOR,
+        VECTOR, INTS, INTS, MATRIX, OUT3, OUT3,
+    )
+)  # fmt: skip
+def erroneous_poses(
+    q: Floats,
+    nominal: Floats,
+    sigma: Ints,
+    joint: Ints,
+    path: Ints,
+    before_rotation: Floats,
+    before_position: Floats,
+    after_rotation: Floats,
+    after_position: Floats,
+    deviation: Floats,
+    row: Ints,
+    element: Ints,
+    factor: Floats,
+    out_pose: Floats,
+    out_psi: Floats,
+) -> None:
+    """Poses of one end of a robot and the generalised differential model.
+
+    Parameters
+    ----------
+    q : (N, n)
+        Joint positions as they are read [rad or m].
+    nominal : (R, 7)
+        gamma, b, beta, alpha, d, theta, r of every row [rad, m].
+    sigma, joint : (R,) int64
+        0 revolute, 1 prismatic, 2 fixed; column of the joint in q, -1 if fixed.
+    path : (k,) int64
+        Rows from the world to the end, in order.
+    before_rotation, before_position, after_rotation, after_position
+        Constant poses in front of the first row and behind the last, (3, 3) and (3,) [m].
+    deviation : (P,)
+        Values of the parameters: what is added to their elements, times the factor.
+    row, element : (P,) int64
+        Which row and which of the seven elements a parameter acts on.
+    factor : (N, P)
+        What the deviation is multiplied by at each configuration.
+    out_pose : (N, 4, 4)
+        Written: poses in the world.
+    out_psi : (N, 6, P), or (N, 6, 0) if not wanted
+        Written: [v; w] of the end per unit of each parameter, world axes, at the end's origin.
+    """
+    k = path.shape[0]
+    count = deviation.shape[0]
+    place = np.full(nominal.shape[0], -1)
+    for m in range(k):
+        place[path[m]] = m
+    elements = np.empty((k, _ELEMENTS))
+    axes = np.empty((k * _ELEMENTS, 3))
+    origins = np.empty((k * _ELEMENTS, 3))
+    start = whole_matrix(before_rotation)
+    start_position = whole_vector(before_position)
+    last = whole_matrix(after_rotation)
+    last_position = whole_vector(after_position)
+    for i in range(q.shape[0]):
+        for m in range(k):
+            j = path[m]
+            elements[m] = nominal[j]
+            if sigma[j] == 0:
+                elements[m, 5] += q[i, joint[j]]
+            elif sigma[j] == 1:
+                elements[m, 6] += q[i, joint[j]]
+        for c in range(count):
+            m = place[row[c]]
+            if m >= 0:
+                elements[m, element[c]] += factor[i, c] * deviation[c]
+        R = start
+        p = start_position
+        for m in range(k):
+            R, p = _screws_of_row(elements[m], R, p, axes, origins, m * _ELEMENTS)
+        p = add(p, times(R, last_position))
+        R = product(R, last)
+        put_pose(out_pose[i], R, p)
+        if out_psi.shape[2] == 0:
+            continue
+        for c in range(count):
+            m = place[row[c]]
+            f = factor[i, c]
+            if m < 0 or f == 0.0:
+                for s in range(6):
+                    out_psi[i, s, c] = 0.0
+                continue
+            e = element[c]
+            axis = vector(axes, m * _ELEMENTS + e)
+            if e == 1 or e == 4 or e == 6:
+                v = axis
+                w = (0.0, 0.0, 0.0)
+            else:
+                v = cross(axis, subtract(p, vector(origins, m * _ELEMENTS + e)))
+                w = axis
+            for s in range(3):
+                out_psi[i, s, c] = f * v[s]
+                out_psi[i, 3 + s, c] = f * w[s]
