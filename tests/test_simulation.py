@@ -208,6 +208,55 @@ def test_torques_that_change_while_all_joints_stick_are_seen():
     assert step.v[-1, 0] == pytest.approx(2.0 * (1.0 - 0.333), abs=1e-9)
 
 
+@pytest.mark.parametrize("excess", [1e-3, 1e-4, 1e-6, 1e-8])
+def test_parts_break_away_at_the_crossing_however_little_the_torque_exceeds(excess):
+    """Torques that pass the breakaway torque for a short while, between looks of a step."""
+    for w in (0.7, 1.3, 2.9):
+        sim = simulate(slider(Fc=[3.0]), [0.0], [0.0],
+                       lambda t, q, v, w=w: [3.0 * (1.0 + excess) * np.sin(w * t)],
+                       t=[0.0, 2.5 / w])  # fmt: skip
+        assert [e.kind for e in sim.events] == [KINDS.BROKE_AWAY, KINDS.STUCK]
+        crossing = np.arcsin(1.0 / (1.0 + excess)) / w
+        # what the rounding of a part in 1e13 of the torque takes, at the slope it crosses with
+        late = 2e-13 / (w * np.sqrt(2.0 * excess))
+        assert sim.events[0].t == pytest.approx(crossing, abs=late + 1e-14)
+
+
+@pytest.mark.parametrize("slope", [0.07, 4.1, 300.0])
+def test_a_ramp_breaks_away_at_its_crossing(slope):
+    for start in (0.0, 3.0):  # the second begins at the breakaway torque
+        sim = simulate(slider(Fc=[3.0]), [0.0], [0.0],
+                       lambda t, q, v, start=start: [start + slope * t],
+                       t=np.linspace(0.0, 4.0 / slope, 5))  # fmt: skip
+        crossing = (3.0 - start) / slope
+        assert [e.kind for e in sim.events] == [KINDS.BROKE_AWAY]
+        assert sim.events[0].t == pytest.approx(crossing, rel=1e-12, abs=1e-13 * 3.0 / slope)
+        after = np.maximum(sim.t - crossing, 0.0)
+        assert np.allclose(sim.v[:, 0], slope * after**2 / 4.0, rtol=1e-9, atol=1e-14)
+
+
+def test_a_part_that_hardly_turns_back_sticks():
+    """A velocity that would be negative for less than the time between two looks."""
+    low, c = 1e-7, 0.05
+
+    def control(t, q, v):  # v = c (t - 1)^2 - low against 1 N of friction, 2 kg
+        return [1.0 + 4.0 * c * (t - 1.0)]
+
+    sim = simulate(slider(Fc=[1.0]), [0.0], [c - low], control, [0.0, 2.0])
+    assert [e.kind for e in sim.events] == [KINDS.STUCK, KINDS.BROKE_AWAY]
+    assert sim.events[0].t == pytest.approx(1.0 - np.sqrt(low / c), abs=1e-9)
+    assert sim.events[1].t == pytest.approx(1.0, abs=1e-11)
+    assert sim.v[-1, 0] == pytest.approx(c, abs=1e-11)  # from rest at 1 s
+
+
+def test_a_limit_that_is_hardly_passed_stops():
+    beyond, brake = 1e-8, 3.0
+    speed = np.sqrt(2.0 * (0.5 + beyond) * brake / 2.0)
+    sim = simulate(slider(), [0.0], [speed], [-brake], [0.0, 2.0], stop_at_limits=True)
+    assert sim.status is SimulationStatus.LIMIT_REACHED
+    assert sim.t[-1] == pytest.approx(speed * 2.0 / brake - np.sqrt(4.0 * beyond / brake), abs=1e-9)
+
+
 def test_what_is_at_rest_at_the_start_sticks_or_not():
     held = simulate(pendulum(Fc=[8.0]), [0.0], [0.0], t=1.0)  # 2 kg at 0.4 m: 7.848 N m
     assert held.sticking.all()

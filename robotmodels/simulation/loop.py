@@ -10,13 +10,14 @@ import numpy as np
 
 from .._arrays import Array
 from ..errors import RobotModelsError
+from .crossings import beyond, first_below
 from .dry_friction import DryFriction, Mode
 from .forces import Forces
 from .inputs import before
 from .status import Integrator, SimulationEvent, SimulationEventKind, SimulationStatus
 
 _LOOKS = 8  # instants of a step at which it is looked for events
-_SLACK = 1e-9  # of the breakaway torque: beyond it, so that a part does not stick again at once
+_SLACK = 1e-9  # of the breakaway torque: torques that are beyond it by less do not count
 _ROUNDING = 1e-13
 _SAME_INSTANT = 64 * float(np.finfo(np.float64).eps)
 
@@ -229,46 +230,46 @@ class _Walk:
         Q, V = Y[:n], Y[n : 2 * n]
         found: _Found | None = None
 
-        def earlier(time: float) -> bool:
-            return found is None or time < found.t
+        def keep(time: float, part: int = -1, limit: int = -1) -> None:
+            nonlocal found
+            if found is None or time < found.t:
+                found = _Found(time, part, limit)
 
         slip = np.flatnonzero(mode.signs) if self.dry.count else np.empty(0, np.int64)
-        if slip.size:
-            D = self.dry.rates[slip] * mode.signs[slip, None]
-            S = D @ V
-            gone = -_ROUNDING * (1.0 + np.abs(D) @ np.abs(V)) > S
-            for i in np.flatnonzero(gone.any(axis=1)):
-                k = int(np.argmax(gone[i]))
-                time = _root(lambda s, row=D[i]: float(row @ dense(s)[n : 2 * n]), ts, k)
-                if earlier(time):
-                    found = _Found(time, part=int(slip[i]))
+        D = self.dry.rates[slip] * mode.signs[slip, None]
+        for i, row in zip(slip, D, strict=True):
+
+            def speed(s: float, row: Array = row) -> float:
+                return float(row @ dense(s)[n : 2 * n])
+
+            least = -_ROUNDING * (1.0 + float((np.abs(row) @ np.abs(V)).max()))
+            below = first_below(speed, ts, row @ V, least, 0.0)
+            if below is not None:
+                keep(below[0], part=int(i))
         if self.limits is not None:
             lower, upper = self.limits
             for side, limit in ((1.0, upper), (-1.0, lower)):
-                room = side * (limit[:, None] - Q)
-                gone = room < -_ROUNDING * (1.0 + np.abs(Q))
-                for j in np.flatnonzero(gone.any(axis=1)):
-                    k = int(np.argmax(gone[j]))
-                    time = _root(
-                        lambda s, j=j, x=limit[j], c=side: float(c * (x - dense(s)[j])), ts, k
-                    )
-                    if earlier(time):
-                        found = _Found(time, limit=int(j))
+                for j in np.flatnonzero(np.isfinite(limit)).tolist():
+
+                    def room(s: float, j: int = j, sign: float = side, x: Array = limit) -> float:
+                        return float(sign * (x[j] - dense(s)[j]))
+
+                    least = -_ROUNDING * (1.0 + float(np.abs(Q[j]).max()))
+                    below = first_below(room, ts, side * (limit[j] - Q[j]), least, 0.0)
+                    if below is not None:
+                        keep(below[0], limit=int(j))
         if mode.sticks:
 
             def margin(s: float) -> float:
-                y = dense(s)
-                return self._margin(s, y) + _SLACK
+                return self._margin(s, dense(s))
 
-            for k in range(1, len(ts)):
-                if found is not None and ts[k - 1] >= found.t:
-                    break
-                if margin(float(ts[k])) < 0.0:
-                    # past it, so that a jump of the torques is seen as well
-                    time = _beyond(margin, _root(margin, ts, k), float(ts[k]))
-                    if earlier(time):
-                        found = _Found(time)
-                    break
+            # no look at torques after the first event: they would be those of another mode
+            seen = ts if found is None else ts[: max(int(np.searchsorted(ts, found.t)) + 1, 2)]
+            values = np.array([margin(float(s)) for s in seen])
+            below = first_below(margin, seen, values, -_SLACK, -_ROUNDING)
+            if below is not None:
+                # past it, so that a jump of the torques is seen as well
+                keep(beyond(margin, *below, -_ROUNDING))
         return found
 
     def _margin(self, t: float, y: Array) -> float:
@@ -341,34 +342,3 @@ class _Walk:
             event = SimulationEvent(kind, t, int(self.dry.joint[i]), bool(self.dry.motor[i]))
             self.path.events.append(event)
         self.forces.set_mode(mode)
-
-
-def _root(g: Callable[[float], float], ts: Array, k: int) -> float:
-    """Where a function becomes negative that does so between looks k - 1 and k."""
-    from scipy.optimize import brentq
-
-    left, right = float(ts[max(k - 1, 0)]), float(ts[k])
-    width = right - left
-    if g(left) <= 0.0:  # it begins at zero, as after an event: it may rise before it falls
-        for _ in range(40):
-            width *= 0.5
-            if g(left + width) > 0.0:
-                break
-        else:
-            return left
-        low, high = left + width, left + 2.0 * width
-    else:
-        low, high = left, right
-    if g(high) >= 0.0:
-        return high
-    found: Any = brentq(g, low, high, xtol=1e-15 * max(1.0, abs(right)))
-    return float(found)
-
-
-def _beyond(g: Callable[[float], float], t: float, end: float) -> float:
-    """The first representable instants after a root at which the function is negative."""
-    step = float(np.spacing(max(abs(t), abs(end))))
-    while t < end and g(t) >= 0.0:
-        t = min(t + step, end)
-        step *= 2.0
-    return t
