@@ -185,6 +185,13 @@ class Transmission:
         for name, value in given.items():
             array = np.zeros(n) if value is None else as_exact(value, (n,), name)
             object.__setattr__(self, name, read_only(array))
+        terms = any(getattr(self, name).any() for name in ("Iam", "Fvm", "Fcm"))
+        if terms and not self.is_invertible:
+            raise InertiaError(
+                f"matrix: it has rank {self.rank} of {n}, so that joints do not tell how fast the "
+                "motors turn: inertia and friction of coupled motors (Iam, Fvm, Fcm) need a matrix "
+                "that can be inverted."
+            )
         single = sorted(set(range(1, self.n + 1)) - set(self.coupled_motors))
         for m in single:
             if self.Iam[m - 1] or self.Fvm[m - 1] or self.Fcm[m - 1]:
@@ -200,9 +207,27 @@ class Transmission:
         return self.matrix.shape[0]
 
     @property
+    def rank(self) -> int:
+        """Number of independent encoder variables."""
+        return _rank(self.matrix)
+
+    @property
     def is_invertible(self) -> bool:
         """Whether every set of joint variables has encoder variables (no joint mimics others)."""
-        return bool(np.linalg.matrix_rank(self.matrix) == self.n)
+        return self.rank == self.n
+
+    @property
+    def is_mimicry(self) -> bool:
+        """Whether the matrix is singular as that of mimic joints: independent columns, and zeros.
+
+        The encoder variables with columns of zeros are not there; the others are free.
+        """
+        return 0 < self.rank < self.n and self.rank == self.free.shape[1]
+
+    @property
+    def free(self) -> Array:
+        """Columns of ``K`` that are not zero, shape (n, m): ``v = free v_c``."""
+        return self.matrix[:, self.matrix.any(axis=0)]
 
     @property
     def weights(self) -> Array:
@@ -317,6 +342,12 @@ class Transmission:
 
     def __hash__(self) -> int:
         return value_hash(self.matrix, self.offset, self.Iam, self.Fvm, self.Fcm)
+
+
+def _rank(K: Array) -> int:
+    """Rank of a matrix whose columns may be in any units."""
+    size = np.abs(K).max(axis=0, initial=0.0)
+    return int(np.linalg.matrix_rank(K[:, size > 0.0] / size[size > 0.0])) if size.any() else 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

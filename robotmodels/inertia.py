@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import se3
 from ._arrays import Array, as_core, as_floats, read_only, same_value, value_hash
-from .errors import InertiaError, ShapeError
+from .errors import InertiaError, RobotModelsWarning, ShapeError
 from .geometry import DHTable
 
 PARAMETERS = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
@@ -24,12 +24,17 @@ PARAMETERS = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
 _ROUNDING = 1e-12
 
 
+class InertiaWarning(RobotModelsWarning):
+    """A link has inertial parameters that no body has."""
+
+
 @dataclass(frozen=True, slots=True, init=False, eq=False)
 class InertialParameters:
     """Standard inertial parameters of every frame.
 
     Any real values are legal: base parameters have first moments with zero mass, identified ones
-    may not be physical. `is_physical` and `consistency` say whether a real body could have them.
+    may not be physical. `is_physical` and `consistency` say whether a real body could have them;
+    ``print`` shows them as a table, and under it what is wrong with which link.
 
     Parameters
     ----------
@@ -242,6 +247,22 @@ class InertialParameters:
         """
         return ConsistencyReport(tuple(_finding(j, row) for j, row in enumerate(self.values)))
 
+    def __str__(self) -> str:
+        report = self.consistency()
+        rows = [("link", *PARAMETERS, "physical")]
+        rows += [
+            (str(link.link), *(f"{x:.4g}" for x in row + 0.0), "yes" if link.is_physical else "no")
+            for row, link in zip(self.values, report.links, strict=True)
+        ]
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        lines = [
+            "  ".join(word.rjust(width) for word, width in zip(row, widths, strict=True))
+            for row in rows
+        ]
+        lines.insert(1, "-" * len(lines[0]))
+        lines += [str(link) for link in report.links if not link.is_physical]
+        return "\n".join(lines)
+
     def moved(self, T: ArrayLike) -> Self:
         """The same bodies described in other frames.
 
@@ -350,6 +371,13 @@ class ConsistencyReport:
     def is_physical(self) -> bool:
         """Whether every link is physical."""
         return all(link.is_physical for link in self.links)
+
+    @property
+    def not_physical(self) -> str:
+        """What is wrong with which link, in one sentence; empty if nothing is."""
+        return "; ".join(
+            f"link {link.link}: {', '.join(link.problems)}" for link in self.links if link.problems
+        )
 
     def __str__(self) -> str:
         return "\n".join(map(str, self.links))

@@ -104,6 +104,20 @@ def test_mimic_joints_are_singular_and_say_so():
         gripper.to_encoder([0.3, -0.2])
 
 
+def test_ranks_do_not_depend_on_units():
+    """Joints in metres and gears of thousands: columns of any size are independent."""
+    for size in (1e-20, 1e20):
+        gears = rm.Transmission([[size, 0.0], [-size, 1.0]])
+        assert gears.is_invertible
+        assert not gears.is_mimicry
+        assert gears.coupled_motors == (2,)
+    fingers = rm.Transmission([[1e-20, 0, 0], [1e-20, 0, 0], [0, 0, 1.0]])
+    assert (fingers.rank, fingers.is_mimicry) == (2, True)
+    np.testing.assert_array_equal(fingers.free, [[1e-20, 0], [1e-20, 0], [0, 1]])
+    for matrix in (np.ones((3, 3)), np.zeros((3, 3))):
+        assert not rm.Transmission(matrix).is_mimicry
+
+
 @pytest.mark.parametrize(
     "make",
     [lambda rng: random_drive(rng, 4), lambda rng: random_transmission(rng, 4)],
@@ -146,6 +160,7 @@ def test_mistakes_in_drives(fields, error, words):
         ({"matrix": np.eye(2), "offset": [0.0]}, ShapeError, "offset: expected shape"),
         ({"matrix": np.eye(2), "offset": np.zeros((3, 2))}, ShapeError, "offset: expected shape"),
         ({"matrix": np.eye(2), "Iam": [0.1, 0]}, InertiaError, "Motor 1 turns one joint only"),
+        ({"matrix": np.ones((2, 2)), "Fvm": [0.1, 0]}, InertiaError, "rank 1 of 2"),
         ({"matrix": [[1, 0], [-1, 1]], "Fcm": [0.1, 0]}, InertiaError, r"the motors \[2\]"),
     ],
 )

@@ -5,7 +5,13 @@ import pytest
 from identities.random_robots import random_model, random_state
 
 import robotmodels as rm
-from robotmodels.errors import InvalidValueError, ShapeError, SingularMassMatrixError
+from robotmodels.errors import (
+    InertiaError,
+    InvalidValueError,
+    ShapeError,
+    SingularMassMatrixError,
+)
+from robotmodels.inertia import InertiaWarning
 
 # name: function of the model and its vectors, lengths of these, shape of the result
 FUNCTIONS = {
@@ -31,7 +37,10 @@ def case(request):
 
 @pytest.fixture(scope="module", params=["physical", "any"])
 def model(request):
-    """A tree that Pinocchio orders otherwise; with "any" inertia it cannot hold it at all."""
+    """A tree that Pinocchio orders otherwise; with "any" inertia it cannot hold it at all.
+
+    Such links have a direct model if the rotors are heavy enough.
+    """
     model = random_model(
         np.random.default_rng(3), f=7, tree=True, fixed=True, inertia=request.param, drive=True,
         transmission=True,
@@ -39,6 +48,11 @@ def model(request):
     assert model.n >= 3
     assert not model.twin.in_table_order
     assert model.twin.serves_dynamics == (request.param == "physical")
+    if request.param == "any":
+        model = model.with_drive(rm.DriveParameters(Ia=np.full(model.n, 300.0), Fc=model.drive.Fc))
+        values = model.inertia.values.copy()
+        values[:, 9] = np.abs(values[:, 9])  # negative masses are warned of, see below
+        model = model.with_inertia(rm.InertialParameters(values))
     return model
 
 
@@ -228,6 +242,137 @@ def test_a_configuration_alone_may_be_singular():
         rm.ddm(arm, q[130], np.zeros(3), np.ones(3))
     a = rm.ddm(arm, q[0], np.zeros(3), np.ones(3))
     close(rm.idm(arm, q[0], np.zeros(3), a), np.ones(3), 1e-11)
+
+
+def rx90_with(link, **values):
+    model = rm.load("rx90").with_drive(None)
+    rows = model.inertia.values.copy()
+    for name, value in values.items():
+        rows[link - 1, rm.inertia.PARAMETERS.index(name)] = value
+    return model.with_inertia(rm.InertialParameters(rows))
+
+
+@pytest.mark.parametrize("batch", [(), (3,)])
+@pytest.mark.parametrize(
+    ("model", "words"),
+    [
+        (rx90_with(3, M=-50.0), "2 of its 6 .*link 3: negative mass -50 kg"),
+        (rx90_with(3, ZZ=-2.0, XX=-1.0), "link 3: a principal moment is -2.04 kg"),
+        (
+            rm.load("rx90").with_drive(rm.DriveParameters(Ia=[0, 0, 0, 0, 0, -3])),
+            "negative: -3 of joint 6",
+        ),
+        (
+            rm.load("planar_2r")
+            .with_drive(rm.DriveParameters(Ia=[1.0, 1.0]))
+            .with_transmission(rm.Transmission([[1, 0], [-1, 1]], Iam=[0, 40.0])),
+            r"must fit the Ia.*\[0.0, 40.0\]",
+        ),
+    ],
+    ids=["mass", "moments", "rotor", "coupled rotor"],
+)
+def test_a_mass_matrix_of_no_robot_names_the_links(model, words, batch):
+    x = np.full((*batch, model.n), 0.3)
+    with pytest.raises(InertiaError, match=words) as caught:
+        rm.ddm(model, x, x, x)
+    assert ("first in sample 0 of 3" in str(caught.value)) == bool(batch)
+    assert "not positive definite" in str(caught.value)
+
+
+def test_a_negative_mass_that_does_no_harm_yet_is_warned_of():
+    model = rx90_with(6, M=-0.01).with_drive(rm.DriveParameters(Ia=np.ones(6)))
+    zero = np.zeros(6)
+    for q in (zero, [zero, zero]):
+        with pytest.warns(InertiaWarning, match=r"link 6 \(.*\) -0.01 kg"):
+            rm.ddm(model, q, zero, zero)
+
+
+def test_joints_that_move_no_inertia_are_named():
+    model = rm.load("rx90").with_drive(None)
+    rows = model.inertia.values.copy()
+    rows[4:] = 0.0
+    model = model.with_inertia(rm.InertialParameters(rows))
+    x = np.full(6, 0.4)
+    for q in (x, [x, x]):
+        with pytest.raises(SingularMassMatrixError, match=r"rank 4 of 6, .*of joints 5, 6 moves"):
+            rm.ddm(model, q, x, x)
+
+
+# --- joints that mimic others ----------------------------------------------------------------
+
+
+def mimicking(seed, matrix, **options):
+    """A random robot, some of whose joints follow others."""
+    rng = np.random.default_rng(seed)
+    n = len(matrix)
+    model = random_model(rng, f=n, tree=True, drive=True, **options)
+    return model.with_transmission(rm.Transmission(matrix, rng.normal(size=n)))
+
+
+MIMICS = {
+    "finger": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, -1, 0]],
+    "two masters": [[0.5, 0.2, 0, 0], [0, 2.0, 0, 0], [3, 0.1, 0, 0], [0, 0, 0, 0.01]],
+    "chain": [[0, 0, 0, 2.0], [0, 0, 0, -1.0], [0, 0, 0, 0.0], [0, 0, 0, 1.0]],
+}
+
+
+@pytest.mark.parametrize("batch", [(), (1,), (2, 3), (0,)], ids=str)
+@pytest.mark.parametrize("matrix", MIMICS.values(), ids=MIMICS)
+@pytest.mark.parametrize("drive", [True, False])
+def test_joints_that_mimic_others_follow(matrix, drive, batch):
+    """Inverse of direct on the constraint: K^T tau comes back, and the accelerations follow."""
+    model = mimicking(4, matrix)
+    K = model.transmission
+    rng = np.random.default_rng(0)
+    q_c, v_c, a_c, tau = rng.normal(size=(4, *batch, 4))
+    w = rng.normal(size=(*batch, 6))
+    q, v = K.to_joint(q_c), v_c @ K.matrix.T
+    a = rm.ddm(model, q, v, tau, w, drive)
+    back = rm.idm(model, q, v, a, w, drive)
+    close(K.to_motor_torque(back), K.to_motor_torque(tau), 1e-10)
+    close(a @ (np.eye(4) - K.matrix @ np.linalg.pinv(K.matrix)).T, np.zeros_like(a), 1e-10)
+    motion = a_c @ K.matrix.T
+    close(rm.ddm(model, q, v, rm.idm(model, q, v, motion, w, drive), w, drive), motion, 1e-9)
+    for index in np.ndindex(*batch):
+        close(a[index], rm.ddm(model, q[index], v[index], tau[index], w[index], drive), 1e-10)
+
+
+def test_a_gripper_read_from_a_urdf_moves_as_one():
+    """Two fingers of 0.1 kg on slides: 1 N on the first moves both, by a = 1 / (2 * 0.1)."""
+    finger = (
+        '<link name="f{0}"><inertial><mass value="0.1"/><inertia ixx="1e-4" iyy="1e-4" izz="1e-4"'
+        ' ixy="0" ixz="0" iyz="0"/></inertial></link><joint name="j{0}" type="prismatic"><parent '
+        'link="hand"/><child link="f{0}"/><axis xyz="1 0 0"/><limit lower="-1" upper="1" '
+        'effort="1" velocity="1"/>{1}</joint>'
+    )
+    text = (
+        '<robot name="gripper"><link name="hand"/>'
+        + finger.format(1, "")
+        + finger.format(2, '<mimic joint="j1" multiplier="-1" offset="0.02"/>')
+        + "</robot>"
+    )
+    gripper = rm.RobotModel.from_urdf(text, mimic=True)
+    q = gripper.transmission.to_joint([0.01, 0.0])
+    close(rm.ddm(gripper, q, [0.1, -0.1], [1.0, 0.0]), [5.0, -5.0])
+    close(rm.ddm(gripper, [q, q], [0.1, -0.1], [0.0, -1.0]), [[5.0, -5.0]] * 2)
+    free = rm.RobotModel.from_urdf(text)
+    close(rm.ddm(free, q, [0.1, -0.1], [1.0, 0.0]), [10.0, 0.0])
+    with pytest.raises(InvalidValueError, match=r"^q: .*mimic.*to_joint"):
+        rm.ddm(gripper, [0.01, 0.3], [0.1, -0.1], [1.0, 0.0])
+    with pytest.raises(InvalidValueError, match=r"^v: .*joint 2 is off"):
+        rm.ddm(gripper, [q, q], [[0.0, 0.0], [0.0, 0.1]], [1.0, 0.0])
+    massless = gripper.with_inertia(None)
+    with pytest.raises(SingularMassMatrixError, match="rank 0 of 1, .*joints 1, 2 moves no"):
+        rm.ddm(massless, q, [0.1, -0.1], [1.0, 0.0])
+
+
+@pytest.mark.parametrize("matrix", [np.ones((2, 2)), np.zeros((2, 2)), [[1, 2], [0.5, 1]]], ids=str)
+def test_a_singular_coupling_is_named(matrix):
+    model = rm.load("planar_2r").with_transmission(rm.Transmission(matrix))
+    rank = np.linalg.matrix_rank(matrix)
+    for q in (np.zeros(2), np.zeros((3, 2))):
+        with pytest.raises(InvalidValueError, match=f"^transmission: .*rank {rank} of 2.*None"):
+            rm.ddm(model, q, q, q)
 
 
 @pytest.mark.parametrize("mass", [1e-12, 1e12])

@@ -175,6 +175,27 @@ def test_the_report_has_a_line_for_each_link():
     assert finding.triangle_gap == pytest.approx(0.1)
 
 
+def test_parameters_print_as_a_table_that_says_what_no_body_has():
+    rows = np.vstack(
+        [body((0.1, 0.1, 0.1)).values, [[1, 0, 0, 0.1, 0, 0.1, 0, 0, 0, -2.5]], np.zeros((1, 10)),
+         body((0.1, 0.1, 0.3)).values]
+    )  # fmt: skip
+    lines = str(rm.InertialParameters(rows)).splitlines()
+    assert lines[0].split() == ["link", *rm.inertia.PARAMETERS, "physical"]
+    assert lines[2].split() == ["1", *"0.1 0 0 0.1 0 0.1 0 0 0 2 yes".split()]
+    assert [line.split()[-1] for line in lines[2:6]] == ["yes", "no", "no", "no"]
+    assert len({len(line) for line in lines[:6]}) == 1
+    assert lines[6].startswith("link 2: not physical: negative mass -2.5 kg")
+    assert lines[7:] == [
+        "link 3: not physical: no mass",
+        "link 4: not physical: triangle inequality fails by 0.1 kg m^2",
+    ]
+    report = rm.InertialParameters(rows).consistency()
+    assert report.not_physical.startswith("link 2: negative mass -2.5 kg")
+    assert report.not_physical.count("link") == 3
+    assert str(rm.InertialParameters.zeros(0)).startswith("link")
+
+
 # --- being a value, and mistakes -----------------------------------------------------------------
 
 

@@ -7,13 +7,18 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_vector, batch_rows, batch_shape
-from ..errors import SingularMassMatrixError
 from ..friction import Friction, check_friction
 from ..model import RobotModel, check_model
+from .definite import (
+    is_definite,
+    no_answer,
+    sample_error,
+    unit_diagonal,
+    warn_of_negative_mass,
+)
 from .mass import mass_matrix
+from .mimicry import check_follows, following_accelerations, free_motion
 from .wrench import wrench_torque
-
-_SINGULAR = 1e-14
 
 
 def ddm(
@@ -27,7 +32,10 @@ def ddm(
 ) -> Array:
     """Direct dynamic model: joint accelerations under given torques, the inverse of `idm`.
 
-    Also called forward dynamics.
+    Also called forward dynamics. Where joints mimic others (a transmission ``q = K q_c + q_0``
+    with a singular K), the joints follow: with G the columns of K that are not zero, ``a = G a_c``
+    and ``G^T M G a_c = G^T (tau - C v - g - ...)``. What counts of the torques is then ``K^T tau``
+    (`Transmission.to_motor_torque`), which is that of ``idm(model, q, v, a)``.
 
     Parameters
     ----------
@@ -51,13 +59,21 @@ def ddm(
     Raises
     ------
     SingularMassMatrixError
-        The mass matrix cannot be inverted: a joint moves no inertia.
+        The mass matrix cannot be inverted: joints that move no inertia, which are named.
+    InertiaError
+        The mass matrix is not positive definite; the links that no body is are named.
     ShapeError, InvalidValueError
-        Arguments of the wrong length, or with NaN or infinity.
+        Arguments of the wrong length, or with NaN or infinity; a singular transmission that is
+        not one of mimic joints; mimic joints that do not follow in ``q`` or ``v``.
+
+    Warns
+    -----
+    InertiaWarning
+        A link has a negative mass, though the mass matrix is positive definite.
 
     References
     ----------
-    Seed book section 1.5 (introduction) and 1.5.1.
+    Seed book section 1.5 (introduction), 1.5.1 and, for the coupling, 1.2.1.
 
     Examples
     --------
@@ -82,17 +98,20 @@ def ddm(
         tau = tau - drives.torque(v, None)
     if wrench is not None:
         tau = tau - wrench_torque(model, q, wrench)
+    free = None if model.transmission is None else free_motion(model.transmission)
+    if free is not None:
+        check_follows(model, free, q, v)
+        out = following_accelerations(model, free, q, v, tau, drive)
+        warn_of_negative_mass(model)
+        return out
     twin = model.twin
     if n and q.ndim == v.ndim == tau.ndim == 1 and twin.serves_dynamics:
         to_pin = twin.to_pin
         h = twin.from_pin(pin.nonLinearEffects(twin.model, twin.data(), to_pin(q), to_pin(v)))
         M = mass_matrix(model, q, drive)
-        # as the kernel does: coordinates of unit diagonal, so that units and sizes do not matter
-        size = np.abs(np.diag(M))
-        size = np.sqrt(np.where(size > 0.0, size, np.abs(M).max(axis=1)))
-        scaled = M / (size[:, None] * size) if size.all() else np.zeros_like(M)
-        if _is_singular(scaled):
-            raise _singular(model, "")
+        scaled, size = unit_diagonal(M)  # as the kernel does
+        if not is_definite(scaled):
+            raise no_answer(model, M, drive)
         return np.asarray(np.linalg.solve(scaled, (tau - h) / size) / size, np.float64)
     from ..kernels.direct_dynamics import joint_accelerations
 
@@ -100,27 +119,8 @@ def ddm(
     out = np.empty(rows[0].shape)
     rotor = np.zeros((n, n)) if drives is None else np.ascontiguousarray(drives.rotor)
     pi, gravity = model.inertia.values, model.gravity
-    singular = joint_accelerations(*rows, *model.chain, pi, gravity, rotor, out)
-    if singular >= 0:
-        raise _singular(model, f" (first in sample {singular} of {rows[0].shape[0]})")
+    found = joint_accelerations(*rows, *model.chain, pi, gravity, rotor, out)
+    if found != -1:
+        raise sample_error(model, rows[0], drive, found if found >= 0 else -2 - found, bool(batch))
+    warn_of_negative_mass(model)
     return out.reshape(*batch, n)
-
-
-def _is_singular(M: Array) -> bool:
-    """Whether a symmetric matrix of unit diagonal is singular to rounding."""
-    try:
-        pivots = np.linalg.cholesky(M).diagonal()
-        return bool((pivots * pivots).min() <= 4 * len(M) * np.finfo(np.float64).eps)
-    except np.linalg.LinAlgError:
-        # not positive definite: parameters that are not physical, or values out of range
-        if not np.isfinite(M).all():
-            return True
-        return bool(np.linalg.cond(M) > 1 / _SINGULAR)
-
-
-def _singular(model: RobotModel, where: str) -> SingularMassMatrixError:
-    return SingularMassMatrixError(
-        f"the mass matrix of {model.name!r} is singular{where}: some joint (or combination of "
-        "joints) moves no inertia. Give inertial parameters with model.with_inertia(...), or "
-        "rotor inertias Ia with model.with_drive(...)."
-    )

@@ -1,8 +1,8 @@
 """Joint accelerations from torques: M a = tau - h(q, v).
 
 M. Walker and D. Orin 1982: h by Newton-Euler without acceleration, M by composite bodies. The
-system is solved by elimination with row pivoting, because M need not be positive definite for
-parameters that are not physical.
+system is solved by Cholesky; M need not be positive definite for parameters that are not
+physical: it is then solved by elimination with row pivoting, and the sample is told.
 """
 
 from math import sqrt
@@ -16,14 +16,65 @@ from .newton_euler import joint_torques
 __all__ = ["joint_accelerations"]
 
 BLOCK = 64
+POSITIVE, INDEFINITE, SINGULAR = 0, 1, 2  # what a symmetric matrix is
 EPSILON = float(np.finfo(np.float64).eps)
 
 
 @compiled()
-def solve_in_place(A: Floats, b: Floats, i: int, sizes: Floats) -> bool:
-    """Solve ``A[i] x = b[i]`` into b[i], spoiling A[i]; False if A[i] is singular to rounding.
+def solve_definite(A: Floats, b: Floats, i: int, diagonal: Floats) -> int:
+    """Solve ``A[i] x = b[i]`` into b[i] by Cholesky: POSITIVE; else leave both, and say why not.
 
-    ``sizes`` (n,) is scratch.
+    Spoils the lower half of A[i], which is symmetric and of unit diagonal; ``diagonal`` (n,) keeps
+    the latter. SINGULAR to rounding or INDEFINITE: what is left after a pivot of zero must then be
+    zero too in a matrix that has no negative eigenvalue.
+    """
+    n = A.shape[1]
+    least = 4.0 * n * EPSILON
+    for k in range(n):
+        diagonal[k] = A[i, k, k]
+    kind = POSITIVE
+    for k in range(n):
+        pivot = A[i, k, k]
+        for column in range(k):
+            pivot -= A[i, k, column] * A[i, k, column]
+        for row in range(k + 1, n):
+            rest = A[i, k, row]
+            for column in range(k):
+                rest -= A[i, row, column] * A[i, k, column]
+            A[i, row, k] = rest
+        if not pivot > least:
+            kind = INDEFINITE if pivot < -least else SINGULAR
+            for row in range(k + 1, n):
+                if A[i, row, k] * A[i, row, k] > 4.0 * least:
+                    kind = INDEFINITE
+            break
+        A[i, k, k] = sqrt(pivot)
+        for row in range(k + 1, n):
+            A[i, row, k] /= A[i, k, k]
+    if kind != POSITIVE:
+        for row in range(n):
+            A[i, row, row] = diagonal[row]
+            for column in range(row):
+                A[i, row, column] = A[i, column, row]
+        return kind
+    for row in range(n):
+        rest = b[i, row]
+        for column in range(row):
+            rest -= A[i, row, column] * b[i, column]
+        b[i, row] = rest / A[i, row, row]
+    for row in range(n - 1, -1, -1):
+        rest = b[i, row]
+        for column in range(row + 1, n):
+            rest -= A[i, column, row] * b[i, column]
+        b[i, row] = rest / A[i, row, row]
+    return POSITIVE
+
+
+@compiled()
+def solve_in_place(A: Floats, b: Floats, i: int, sizes: Floats, diagonal: Floats) -> int:
+    """Solve ``A[i] x = b[i]`` into b[i], spoiling A[i], which is POSITIVE or INDEFINITE.
+
+    Not if it is SINGULAR to rounding. ``sizes`` and ``diagonal`` (n,) are scratch.
     """
     n = A.shape[1]
     # Coordinates of unit diagonal (of the row's size where that is zero), so that the units and
@@ -34,12 +85,26 @@ def solve_in_place(A: Floats, b: Floats, i: int, sizes: Floats) -> bool:
             for column in range(n):
                 sizes[row] = max(sizes[row], abs(A[i, row, column]))
         if not sizes[row] > 0.0:
-            return False
+            return SINGULAR
         sizes[row] = sqrt(sizes[row])
     for row in range(n):
         for column in range(n):
             A[i, row, column] /= sizes[row] * sizes[column]
         b[i, row] /= sizes[row]
+    kind = solve_definite(A, b, i, diagonal)
+    if kind == SINGULAR:
+        return SINGULAR
+    if kind == INDEFINITE and not eliminate(A, b, i):
+        return SINGULAR
+    for row in range(n):
+        b[i, row] /= sizes[row]
+    return kind
+
+
+@compiled()
+def eliminate(A: Floats, b: Floats, i: int) -> bool:
+    """Solve ``A[i] x = b[i]`` into b[i] by pivoting rows; False if A[i] is singular to rounding."""
+    n = A.shape[1]
     for row in range(n):
         scale = 0.0
         for column in range(n):
@@ -72,8 +137,6 @@ def solve_in_place(A: Floats, b: Floats, i: int, sizes: Floats) -> bool:
         for column in range(row + 1, n):
             rest -= A[i, row, column] * b[i, column]
         b[i, row] = rest / A[i, row, row]
-    for row in range(n):
-        b[i, row] /= sizes[row]
     return True
 
 
@@ -114,7 +177,9 @@ def joint_accelerations(
     Returns
     -------
     int
-        -1, or the index of the first sample whose matrix is singular to rounding.
+        -1 if all matrices are positive definite; the index of the first sample whose matrix is
+        singular to rounding; if there is none, -2 less the index of the first whose matrix has
+        negative eigenvalues.
     """
     samples, n = q.shape
     block = min(samples, BLOCK)
@@ -122,7 +187,9 @@ def joint_accelerations(
     M = np.empty((block, n, n))
     still = np.zeros((block, n))
     sizes = np.empty(n)
+    diagonal = np.empty(n)
     singular = -1
+    indefinite = -1
     for start in range(0, samples, BLOCK):
         stop = min(start + BLOCK, samples)
         size = stop - start
@@ -158,9 +225,13 @@ def joint_accelerations(
                 h[i, row] = tau[start + i, row] - h[i, row]
                 for column in range(n):
                     M[i, row, column] += rotor[row, column]
-            solved = solve_in_place(M, h, i, sizes)
-            if not solved and singular < 0:
+            kind = solve_in_place(M, h, i, sizes, diagonal)
+            if kind == SINGULAR and singular < 0:
                 singular = start + i
+            if kind == INDEFINITE and indefinite < 0:
+                indefinite = start + i
             for row in range(n):
-                out[start + i, row] = h[i, row] if solved else np.nan
+                out[start + i, row] = np.nan if kind == SINGULAR else h[i, row]
+    if singular < 0 and indefinite >= 0:
+        return -2 - indefinite
     return singular
