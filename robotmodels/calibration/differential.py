@@ -75,7 +75,7 @@ def differential_model(
     >>> from robotmodels.robots import load
     >>> found = differential_model(candidate_parameters(load("rx90")), np.zeros((5, 6)))
     >>> found.T.shape, found.psi.shape
-    ((5, 4, 4), (5, 6, 33))
+    ((5, 4, 4), (5, 6, 34))
     """
     from ..kernels.erroneous_poses import erroneous_poses
 

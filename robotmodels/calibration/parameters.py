@@ -316,7 +316,7 @@ def candidate_parameters(
     --------
     >>> from robotmodels.robots import load
     >>> candidate_parameters(load("rx90"), base=False, tool=False).names[6:10]
-    ('alpha2', 'd2', 'r2', 'alpha3')
+    ('r1', 'alpha2', 'd2', 'r2')
     """
     skeleton = skeleton_of(model, frames)
     on_path = sorted({int(r) for frame in skeleton.frames for r in skeleton.path(frame)})

@@ -1,4 +1,4 @@
-"""The book's six parameters of a pose: how a robot stands in the world, and a tool on its flange."""
+"""The six parameters of a pose: how a robot stands in the world, and a tool on its flange."""
 
 from __future__ import annotations
 

@@ -1,0 +1,279 @@
+"""Which parameters measurements can tell: by the column rule of the base parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from .._arrays import Array, Rebuilt
+from ..errors import InvalidValueError
+from ..estimation import ColumnBasis, column_basis
+from ..table_text import boxed
+from .elements import ErrorLaw
+from .measurements import Measurement
+from .parameters import GeometricParameters
+from .problem import Problem, guessed_fixtures, linearised, problem_of, satisfying
+
+DEPENDENT = 1e-7
+"""Sine of the angle to the columns before, below which a parameter acts like a combination."""
+_EMPTY = 1e-9
+
+
+class Reason(Enum):
+    """Why a parameter is not estimated; the value is the sentence.
+
+    Examples
+    --------
+    >>> Reason.GAUGE.value
+    'where the robot stands is not measured: it stays as it is'
+    """
+
+    NO_EFFECT = "it does not change what is measured"
+    REGROUPED = "it acts like a combination of others, which take its part"
+    GAUGE = "where the robot stands is not measured: it stays as it is"
+    KNOWN = "it is known and fixed"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class IdentifiableParameters(Rebuilt):
+    """The parameters that measurements tell, and why the others are not among them.
+
+    Parameters
+    ----------
+    candidates : GeometricParameters
+        All that were looked at.
+    kept : GeometricParameters
+        Those that can be estimated.
+    reasons : mapping of str to Reason
+        For every other candidate.
+    regrouping : mapping of str to mapping of str to float
+        ``{kept: {candidate: coefficient}}``: what the estimate of a kept parameter stands for.
+    basis : ColumnBasis
+        Of the fixtures and candidates, in this order.
+    fixtures : int
+        How many columns of the basis are fixtures.
+    condition : float
+        Condition number of the kept columns and fixtures, columns scaled to length 1.
+    rows : int
+        Number of residual rows that were looked at.
+
+    References
+    ----------
+    Seed book section 1.4.4.2; W. Khalil, M. Gautier, Ch. Enguehard, "Identifiable parameters and
+    optimum configurations for robots calibration", Robotica 9, 1991.
+    """
+
+    candidates: GeometricParameters
+    kept: GeometricParameters
+    reasons: dict[str, Reason]
+    regrouping: dict[str, dict[str, float]]
+    basis: ColumnBasis
+    fixtures: int
+    condition: float
+    rows: int
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters that can be estimated."""
+        return self.kept.names
+
+    @property
+    def count(self) -> int:
+        """How many can be estimated."""
+        return len(self.kept)
+
+    @property
+    def gap(self) -> tuple[float, float]:
+        """Smallest distance of a kept column, largest of a dependent one: sines of angles."""
+        return self.basis.gap
+
+    def of_reason(self, reason: Reason) -> tuple[str, ...]:
+        """Parameters that are left out for a reason.
+
+        Parameters
+        ----------
+        reason : Reason
+            Which.
+
+        Returns
+        -------
+        tuple of str
+            Names.
+        """
+        return tuple(name for name, why in self.reasons.items() if why is reason)
+
+    def __str__(self) -> str:
+        stands_for = [_sum_text(self.regrouping.get(name, {name: 1.0})) for name in self.names]
+        lines = [f"{self.count} identifiable parameters of {len(self.candidates)}:"]
+        lines.append(boxed([("parameter", list(self.names)), ("stands for", stands_for)]))
+        for reason in Reason:
+            names = self.of_reason(reason)
+            if names:
+                lines.append(f"{', '.join(names)}: {reason.value}.")
+        low, high = self.gap
+        lines.append(
+            f"Smallest angle kept {low:.1e}, largest left out {high:.1e} (sines); condition "
+            f"{self.condition:.3g}."
+        )
+        return "\n".join(lines)
+
+
+def _sum_text(terms: dict[str, float]) -> str:
+    text = ""
+    for name, c in terms.items():
+        size = "" if abs(abs(c) - 1.0) < 1e-9 else f"{abs(c):.4g} "
+        sign = ("-" if c < 0 else "") if not text else (" - " if c < 0 else " + ")
+        text += f"{sign}{size}{name}"
+    return text
+
+
+def identifiable_on(
+    candidates: GeometricParameters,
+    measurements: Iterable[Measurement],
+    known_lengths: Iterable[str] = (),
+    deviation: Array | None = None,
+    fixtures: Array | None = None,
+    dependent: float = DEPENDENT,
+) -> IdentifiableParameters:
+    """Parameters that given measurements tell.
+
+    Parameters
+    ----------
+    candidates : GeometricParameters
+        In the order of preference.
+    measurements : iterable of Measurement
+        What is measured, at the configurations at hand.
+    known_lengths : iterable of str
+        Parameters that are known: they stay as they are and give the scale.
+    deviation, fixtures : ndarray, optional
+        Where to look; default the nominal robot.
+    dependent : float
+        Sine of the angle to the columns before, below which a column depends on them.
+
+    Returns
+    -------
+    IdentifiableParameters
+        Kept and left out.
+
+    Raises
+    ------
+    InvalidValueError
+        No length is known; a name that is no parameter.
+
+    References
+    ----------
+    Seed book section 1.4.4.2.
+
+    Examples
+    --------
+    >>> from robotmodels.calibration import Position, candidate_parameters
+    >>> from robotmodels.robots import load
+    >>> q = np.random.default_rng(0).uniform(-2, 2, (20, 6))
+    >>> found = identifiable_on(candidate_parameters(load("rx90")), [Position(q, np.zeros((20, 3)))])
+    >>> found.count
+    27
+    """
+    problem = problem_of(candidates, measurements)
+    known = tuple(known_lengths)
+    at = set(candidates.index(known, "known_lengths").tolist())
+    check_scale(problem, known)
+    reasons: dict[str, Reason] = {}
+    xi = np.zeros(len(candidates)) if deviation is None else deviation
+    values = guessed_fixtures(problem, xi) if fixtures is None else fixtures
+    there = satisfying(problem, xi, values)
+    W = _all_rows(there, xi, values)
+    for k, entry in enumerate(candidates.entries):
+        if k in at:
+            reasons[entry.name] = Reason.KNOWN
+        elif entry.row == 0 and not problem.sees_base:
+            reasons[entry.name] = Reason.GAUGE
+    free = np.array([k for k, name in enumerate(candidates.names) if name not in reasons], int)
+    F = problem.F
+    columns = np.concatenate([np.arange(F), F + free]).astype(int)
+    basis = _angle_basis(W[:, columns], dependent)
+    kept = [k - F for k in basis.kept if k >= F]
+    for k in basis.empty:
+        if k >= F:
+            reasons[candidates.names[free[k - F]]] = Reason.NO_EFFECT
+    for k in basis.dependent:
+        if k >= F:
+            reasons[candidates.names[free[k - F]]] = Reason.REGROUPED
+    regrouping: dict[str, dict[str, float]] = {}
+    for position, k in enumerate(basis.kept):
+        if k >= F:
+            row = basis.coefficients[position, F:]
+            regrouping[candidates.names[free[k - F]]] = {
+                candidates.names[free[c]]: float(row[c]) for c in np.flatnonzero(row)
+            }
+    chosen = W[:, columns][:, basis.kept]
+    unit = chosen / np.linalg.norm(chosen, axis=0)
+    singular = np.linalg.svd(unit, compute_uv=False) if len(basis.kept) else np.ones(1)
+    return IdentifiableParameters(
+        candidates=candidates,
+        kept=candidates.subset([candidates.names[free[k]] for k in kept]),
+        reasons=reasons,
+        regrouping=regrouping,
+        basis=basis,
+        fixtures=F,
+        condition=float(singular[0] / singular[-1]),
+        rows=len(W),
+    )
+
+
+def check_scale(problem: Problem, known: tuple[str, ...]) -> None:
+    """Refuse measurements that are homogeneous in length, if no length is known.
+
+    Parameters
+    ----------
+    problem : Problem
+        The calibration.
+    known : tuple of str
+        Names of parameters that are known.
+
+    Raises
+    ------
+    InvalidValueError
+        Nothing gives the scale.
+    """
+    if problem.knows_length:
+        return
+    p = problem.parameters
+    lengths = {
+        entry.name: value
+        for entry, value in zip(p.entries, p.nominal, strict=True)
+        if entry.law is ErrorLaw.CONSTANT and entry.element.is_length and abs(value) > 1e-6
+        and entry.row > 0
+    }  # fmt: skip
+    if any(name in lengths for name in known):
+        return
+    raise InvalidValueError(
+        "These measurements know no length: a robot shrunk to nothing would satisfy them. Measure "
+        "a distance (KnownDistance, Distance), or name a parameter whose length is known: "
+        f"known_lengths=({next(iter(lengths), 'd3')!r},). Lengths that are not zero here: "
+        f"{', '.join(lengths) or 'none'}."
+    )
+
+
+def _angle_basis(W: Array, dependent: float) -> ColumnBasis:
+    """Columns are compared by angles: a metre and a radian have no common length."""
+    length = np.linalg.norm(W, axis=0)
+    longest = length.max(initial=0.0) or 1.0
+    return column_basis(
+        W, scale=1.0 / np.where(length > _EMPTY * longest, length, longest), nothing=dependent
+    )
+
+
+def _all_rows(problem: Problem, xi: Array, fixtures: Array) -> Array:
+    """Derivatives by fixtures and parameters, shape (M, F + P), rows without weights."""
+    F, P = problem.F, problem.P
+    parts = []
+    for m, part in zip(problem.measurements, linearised(problem, xi, fixtures), strict=True):
+        block = np.zeros((part.residual.size, F + P))
+        block[:, problem.columns(m)] = part.by_fixtures.reshape(len(block), -1)
+        if part.by_parameters.shape[-1]:
+            block[:, F:] = part.by_parameters.reshape(-1, P)
+        parts.append(block)
+    return np.concatenate(parts)

@@ -1,0 +1,156 @@
+"""A pose of the end, or its orientation alone, measured from outside."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ... import se3
+from ..._arrays import Array, read_only
+from ...errors import InvalidValueError, ShapeError
+from ..skeleton import Frame
+from .measurement import (
+    Evaluation,
+    Linearised,
+    Measurement,
+    View,
+    as_noise,
+    as_readings,
+    part_of_noise,
+)
+from .rotation_vectors import inverse_left_jacobians, rotation_errors
+
+_AXES = ("x", "y", "z", "rx", "ry", "rz")
+_UNITS = ("m", "m", "m", "rad", "rad", "rad")
+
+
+@dataclass(frozen=True, slots=True, init=False, eq=False)
+class Pose(Measurement):
+    """Measured poses of the end, all six rows or some of them.
+
+    Where the measuring device stands is the base Z of the robot (the world is the device's
+    frame), and the target on the arm is the tool E: both are parameters of the robot.
+
+    Parameters
+    ----------
+    q : array_like, shape (N, n)
+        Readings of the joints, rad or m.
+    T : array_like, shape (N, 4, 4)
+        Measured poses, metres.
+    rows : six of 0 or 1
+        Which of x, y, z, rx, ry, rz (world axes) are measured; ``[0, 0, 0, 1, 1, 1]`` is
+        orientation only.
+    sigma : array_like, shape (), (k,) or (N, k), optional
+        Standard deviations, m and rad; default: estimated from the data.
+    covariance : array_like, shape (k, k) or (N, k, k), optional
+        Instead of sigma.
+    frame : str, int or None
+        The end; None is the tool.
+    name : str
+        In reports.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError, NotARotationError
+        Shapes that do not fit, NaN, poses that are none, no row asked.
+
+    References
+    ----------
+    Seed book section 1.4.4.
+
+    Examples
+    --------
+    >>> Pose(np.zeros((2, 6)), np.tile(np.eye(4), (2, 1, 1))).axes
+    ('x', 'y', 'z', 'rx', 'ry', 'rz')
+    """
+
+    q: Array
+    T: Array
+    rows: tuple[bool, ...]
+    sigma: Array | None
+    covariance: Array | None
+    frame: Frame
+    name: str
+
+    def __init__(
+        self,
+        q: ArrayLike,
+        T: Any,
+        rows: Sequence[int | bool] = (1, 1, 1, 1, 1, 1),
+        sigma: ArrayLike | None = None,
+        covariance: ArrayLike | None = None,
+        frame: Frame = None,
+        name: str = "pose",
+    ) -> None:
+        set_ = object.__setattr__
+        set_(self, "q", as_readings(q))
+        poses = se3.as_pose(T, "T")
+        if poses.shape != (len(self.q), 4, 4):
+            raise ShapeError(
+                f"T: expected a pose for each row of q, shape ({len(self.q)}, 4, 4), got "
+                f"{poses.shape}."
+            )
+        set_(self, "T", read_only(poses))
+        asked = tuple(bool(r) for r in rows)
+        if len(asked) != 6 or not any(asked):
+            raise InvalidValueError(f"rows: expected six numbers 0 or 1, not all 0, got {rows!r}.")
+        set_(self, "rows", asked)
+        noise = as_noise(sigma, covariance, len(self.q), sum(asked))
+        set_(self, "sigma", noise[0])
+        set_(self, "covariance", noise[1])
+        set_(self, "frame", frame)
+        set_(self, "name", name)
+
+    @property
+    def blocks(self) -> int:
+        """Number of measured poses."""
+        return len(self.q)
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Labels of the rows that are measured."""
+        return tuple(a for a, asked in zip(_AXES, self.rows, strict=True) if asked)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Units of the rows that are measured."""
+        return tuple(u for u, asked in zip(_UNITS, self.rows, strict=True) if asked)
+
+    @property
+    def views(self) -> tuple[View, ...]:
+        """The end at every configuration."""
+        return (View(self.frame, self.q),)
+
+    @property
+    def knows_length(self) -> bool:
+        """Positions are lengths; orientation alone is not."""
+        return any(self.rows[:3])
+
+    @property
+    def sees_base(self) -> bool:
+        """The pose is measured in the world."""
+        return True
+
+    def linearise(self, evaluations: Sequence[Evaluation], fixtures: Array) -> Linearised:
+        """Position difference and rotation vector, world axes."""
+        T, psi = evaluations[0]
+        u = rotation_errors(T[:, :3, :3], self.T[:, :3, :3])
+        residual = np.hstack([T[:, :3, 3] - self.T[:, :3, 3], u])
+        J = psi.copy()
+        J[:, 3:] = inverse_left_jacobians(u) @ psi[:, 3:]
+        asked = np.flatnonzero(self.rows)
+        return Linearised(residual[:, asked], J[:, asked], np.zeros((self.blocks, len(asked), 0)))
+
+    def with_configurations(self, configurations: Sequence[Array]) -> Self:
+        """The same poses at other readings."""
+        (q,) = configurations
+        return replace(self, q=q)
+
+    def subset(self, blocks: NDArray[np.int64]) -> Self:
+        """Some of the poses."""
+        sigma, covariance = part_of_noise(self, blocks)
+        return replace(self, q=self.q[blocks], T=self.T[blocks], sigma=sigma, covariance=covariance)

@@ -1,0 +1,94 @@
+"""Rotation vectors of small rotations, and how they change."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..._arrays import Array
+
+
+def rotation_errors(R: Array, R_measured: Array) -> Array:
+    """Rotation vectors that turn measured rotations into predicted ones, world axes.
+
+    Parameters
+    ----------
+    R, R_measured : ndarray, shape (N, 3, 3)
+        Predicted and measured.
+
+    Returns
+    -------
+    ndarray, shape (N, 3)
+        ``log(R R_measured^T)``, rad.
+    """
+    from scipy.spatial.transform import Rotation
+
+    if not len(R):
+        return np.zeros((0, 3))
+    return Rotation.from_matrix(R @ R_measured.swapaxes(-1, -2)).as_rotvec()
+
+
+def inverse_left_jacobians(u: Array) -> Array:
+    """Derivative of a rotation vector by a turn in front: ``d u = J^-1 w``.
+
+    Parameters
+    ----------
+    u : ndarray, shape (N, 3)
+        Rotation vectors, rad, shorter than a turn.
+
+    Returns
+    -------
+    ndarray, shape (N, 3, 3)
+        Inverse left Jacobians of SO(3).
+
+    References
+    ----------
+    T. D. Barfoot, State Estimation for Robotics, Cambridge 2017, eq. (7.76).
+    """
+    angle = np.linalg.norm(u, axis=-1)[:, None, None]
+    K = skew_of(u)
+    half = 0.5 * angle
+    small = angle < 1e-4
+    safe = np.where(small, 1.0, half)
+    # (1 - h cot h) / (2 h)^2, whose series begins 1/12
+    c = np.where(small, 1.0 / 12.0 + angle**2 / 720.0, (1.0 - safe / np.tan(safe)) / (4 * safe**2))
+    return np.eye(3) - 0.5 * K + c * (K @ K)
+
+
+def left_jacobians(u: Array) -> Array:
+    """Turn in front that a change of a rotation vector makes: ``w = J d u``.
+
+    Parameters
+    ----------
+    u : ndarray, shape (N, 3)
+        Rotation vectors, rad.
+
+    Returns
+    -------
+    ndarray, shape (N, 3, 3)
+        Left Jacobians of SO(3).
+    """
+    angle = np.linalg.norm(u, axis=-1)[:, None, None]
+    K = skew_of(u)
+    small = angle < 1e-4
+    safe = np.where(small, 1.0, angle)
+    a = np.where(small, 0.5 - angle**2 / 24.0, (1.0 - np.cos(safe)) / safe**2)
+    b = np.where(small, 1.0 / 6.0 - angle**2 / 120.0, (safe - np.sin(safe)) / safe**3)
+    return np.eye(3) + a * K + b * (K @ K)
+
+
+def skew_of(u: Array) -> Array:
+    """Matrices of the vector product.
+
+    Parameters
+    ----------
+    u : ndarray, shape (..., 3)
+        Vectors.
+
+    Returns
+    -------
+    ndarray, shape (..., 3, 3)
+        ``skew_of(u) @ x`` is ``cross(u, x)``.
+    """
+    K = np.zeros((*u.shape, 3))
+    K[..., 0, 1], K[..., 0, 2], K[..., 1, 2] = -u[..., 2], u[..., 1], -u[..., 0]
+    return K - K.swapaxes(-1, -2)

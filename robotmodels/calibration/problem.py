@@ -1,0 +1,335 @@
+"""All measurements of a calibration together: one vector of unknowns, one stack of rows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import Array, Rebuilt
+from ..errors import InvalidValueError, ShapeError
+from .differential import differential_model
+from .measurements import Evaluation, Fixture, Linearised, Measurement
+from .measurements.measurement import whitened
+from .parameters import GeometricParameters
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Problem(Rebuilt):
+    """Parameters, measurements and their fixtures. The unknowns are [parameters, fixtures].
+
+    Parameters
+    ----------
+    parameters : GeometricParameters
+        P parameters of the robot.
+    measurements : tuple of Measurement
+        What was measured.
+    fixtures : tuple of Fixture
+        F unknowns of the measurements, each name once.
+    factors : tuple
+        For each measurement and view, ``parameters.factors(q)``.
+
+    Examples
+    --------
+    >>> from robotmodels.calibration import Position, candidate_parameters
+    >>> from robotmodels.robots import load
+    >>> measured = Position(np.zeros((4, 6)), np.zeros((4, 3)))
+    >>> problem_of(candidate_parameters(load("rx90")), [measured]).rows
+    12
+    """
+
+    parameters: GeometricParameters
+    measurements: tuple[Measurement, ...]
+    fixtures: tuple[Fixture, ...]
+    factors: tuple[tuple[Array, ...], ...]
+
+    @property
+    def P(self) -> int:
+        """Number of parameters."""
+        return len(self.parameters)
+
+    @property
+    def F(self) -> int:
+        """Number of fixtures."""
+        return len(self.fixtures)
+
+    @property
+    def rows(self) -> int:
+        """Number of residuals."""
+        return sum(m.blocks * len(m.axes) for m in self.measurements)
+
+    @property
+    def block(self) -> NDArray[np.int64]:
+        """Number of the block of each row, counted through all measurements, shape (M,)."""
+        parts, first = [], 0
+        for m in self.measurements:
+            parts.append(np.repeat(np.arange(first, first + m.blocks), len(m.axes)))
+            first += m.blocks
+        return np.concatenate(parts)
+
+    @property
+    def blocks(self) -> int:
+        """Number of blocks of all measurements."""
+        return sum(m.blocks for m in self.measurements)
+
+    @property
+    def knows_length(self) -> bool:
+        """Whether some measurement knows a length."""
+        return any(m.knows_length for m in self.measurements)
+
+    @property
+    def sees_base(self) -> bool:
+        """Whether some measurement sees where the robot stands."""
+        return any(m.sees_base for m in self.measurements)
+
+    def columns(self, measurement: Measurement) -> NDArray[np.int64]:
+        """Where the fixtures of a measurement are among all, shape (its F,)."""
+        number = {fixture.name: k for k, fixture in enumerate(self.fixtures)}
+        return np.array([number[fixture.name] for fixture in measurement.fixtures], dtype=np.int64)
+
+    def with_parameters(self, parameters: GeometricParameters) -> Self:
+        """The same measurements for other parameters."""
+        return replace(self, parameters=parameters, factors=_factors(parameters, self.measurements))
+
+
+def problem_of(parameters: GeometricParameters, measurements: Iterable[Measurement]) -> Problem:
+    """Put measurements together.
+
+    Parameters
+    ----------
+    parameters : GeometricParameters
+        Of the robot; made for every end that is measured.
+    measurements : iterable of Measurement
+        One or more.
+
+    Returns
+    -------
+    Problem
+        Of the measurements as they are.
+
+    Raises
+    ------
+    InvalidValueError, ShapeError
+        No measurement, something else; readings of another robot; a fixture with two units.
+
+    Examples
+    --------
+    >>> from robotmodels.calibration import PointContact, candidate_parameters
+    >>> from robotmodels.robots import load
+    >>> touched = PointContact(np.zeros((4, 6)), ["a", "a", "b", "b"])
+    >>> problem_of(candidate_parameters(load("rx90")), [touched]).F
+    6
+    """
+    if isinstance(measurements, Measurement):
+        measurements = (measurements,)
+    measurements = tuple(measurements)
+    if not measurements:
+        raise InvalidValueError("measurements: expected one or more, got none.")
+    fixtures: dict[str, Fixture] = {}
+    n = parameters.model.n
+    for k, m in enumerate(measurements):
+        if not isinstance(m, Measurement):
+            raise InvalidValueError(
+                f"measurements[{k}]: expected Pose, Position, PointContact or another kind of "
+                f"measurement, got {type(m).__name__}."
+            )
+        for view in m.views:
+            if view.q.shape[1] != n:
+                raise ShapeError(
+                    f"measurements[{k}] ({m.name}): expected readings of {n} joints, shape "
+                    f"(N, {n}), got {view.q.shape}."
+                )
+        for fixture in m.fixtures:
+            if fixtures.setdefault(fixture.name, fixture).unit != fixture.unit:
+                raise InvalidValueError(
+                    f"fixture {fixture.name!r} is in m for one measurement and rad for another."
+                )
+    return Problem(
+        parameters, measurements, tuple(fixtures.values()), _factors(parameters, measurements)
+    )
+
+
+def _factors(
+    parameters: GeometricParameters, measurements: tuple[Measurement, ...]
+) -> tuple[tuple[Array, ...], ...]:
+    return tuple(tuple(parameters.factors(view.q) for view in m.views) for m in measurements)
+
+
+def measured_frames(measurements: Iterable[Measurement]) -> tuple[str | int | None, ...]:
+    """Ends that measurements see, each once.
+
+    Parameters
+    ----------
+    measurements : iterable of Measurement
+        Of one robot.
+
+    Returns
+    -------
+    tuple
+        Frames; the tool (None) if they see none.
+    """
+    return tuple(dict.fromkeys(view.frame for m in measurements for view in m.views)) or (None,)
+
+
+def evaluations(problem: Problem, xi: Array) -> list[list[Evaluation]]:
+    """Poses and Psi of every view of every measurement.
+
+    Parameters
+    ----------
+    problem : Problem
+        The calibration.
+    xi : ndarray, shape (P,)
+        Deviations.
+
+    Returns
+    -------
+    list of list of Evaluation
+        For each measurement, for each view.
+    """
+    return [
+        [
+            Evaluation(*differential_model(problem.parameters, view.q, xi, view.frame, factor))
+            for view, factor in zip(m.views, factors, strict=True)
+        ]
+        for m, factors in zip(problem.measurements, problem.factors, strict=True)
+    ]
+
+
+def guessed_fixtures(problem: Problem, xi: Array) -> Array:
+    """First values of all fixtures.
+
+    Parameters
+    ----------
+    problem : Problem
+        The calibration.
+    xi : ndarray, shape (P,)
+        Deviations of the robot.
+
+    Returns
+    -------
+    ndarray, shape (F,)
+        m or rad.
+
+    Raises
+    ------
+    InvalidValueError
+        A fixture that no measurement of poses says anything about.
+    """
+    values = np.full(problem.F, np.nan)
+    for m, seen in zip(problem.measurements, evaluations(problem, xi), strict=True):
+        guess = m.guess(seen)
+        if guess is not None:
+            at = problem.columns(m)
+            new = np.isnan(values[at])
+            values[at[new]] = guess[new]
+    if np.isnan(values).any():
+        names = [f.name for f, v in zip(problem.fixtures, values, strict=True) if np.isnan(v)]
+        raise InvalidValueError(
+            f"No measurement says where {', '.join(names)} is: name a point that is touched "
+            "(PointContact), as its name and label with a colon between."
+        )
+    return values
+
+
+def linearised(problem: Problem, xi: Array, fixtures: Array) -> list[Linearised]:
+    """Residuals and derivatives of each measurement.
+
+    Parameters
+    ----------
+    problem : Problem
+        The calibration.
+    xi : ndarray, shape (P,)
+        Deviations.
+    fixtures : ndarray, shape (F,)
+        Fixtures.
+
+    Returns
+    -------
+    list of Linearised
+        One for each measurement; ``by_fixtures`` has the measurement's own columns.
+    """
+    return [
+        m.linearise(seen, fixtures[problem.columns(m)])
+        for m, seen in zip(problem.measurements, evaluations(problem, xi), strict=True)
+    ]
+
+
+def stacked(problem: Problem, x: Array, scales: tuple[Array, ...]) -> tuple[Array, Array]:
+    """Whitened rows of all measurements.
+
+    Parameters
+    ----------
+    problem : Problem
+        The calibration.
+    x : ndarray, shape (P + F,)
+        Deviations, then fixtures.
+    scales : tuple of ndarray, shapes (k,)
+        Standard deviations for each measurement that states none.
+
+    Returns
+    -------
+    residual : ndarray, shape (M,)
+        In standard deviations.
+    jacobian : ndarray, shape (M, P + F)
+        Derivatives.
+    """
+    P = problem.P
+    residual = np.empty(problem.rows)
+    jacobian = np.zeros((problem.rows, P + problem.F))
+    first = 0
+    for m, part, scale in zip(
+        problem.measurements, linearised(problem, x[:P], x[P:]), scales, strict=True
+    ):
+        rows = slice(first, first + part.residual.size)
+        first = rows.stop
+        residual[rows] = whitened(m, part.residual, scale).ravel()
+        if part.by_parameters.shape[-1]:
+            jacobian[rows, :P] = whitened(m, part.by_parameters, scale).reshape(-1, P)
+        at = problem.columns(m)
+        if len(at):
+            jacobian[rows, P + at] = whitened(m, part.by_fixtures, scale).reshape(-1, len(at))
+    return residual, jacobian
+
+
+def satisfying(problem: Problem, xi: Array, fixtures: Array) -> Problem:
+    """The same problem at nearby readings at which a robot satisfies its constraints exactly.
+
+    Ranks must be judged there: with the readings of another robot the constraints are violated a
+    little, and a column that no data can tell from others seems to be independent. Each block
+    moves its own readings by the shortest step (in the norm of the joints).
+
+    Parameters
+    ----------
+    problem : Problem
+        The calibration.
+    xi : ndarray, shape (P,)
+        Deviations of the robot that shall satisfy them.
+    fixtures : ndarray, shape (F,)
+        Fixtures.
+
+    Returns
+    -------
+    Problem
+        With other readings; blocks that cannot be satisfied are left out.
+
+    References
+    ----------
+    Seed book section 1.4.5.
+    """
+    from .satisfied import satisfied_measurement
+
+    moved = []
+    for m in problem.measurements:
+        if not m.is_constraint:
+            moved.append(m)
+            continue
+        new = satisfied_measurement(problem.parameters, m, xi, fixtures[problem.columns(m)])
+        if new is not None:
+            moved.append(new)
+    measurements = tuple(moved)
+    return replace(
+        problem, measurements=measurements, factors=_factors(problem.parameters, measurements)
+    )
