@@ -134,6 +134,11 @@ class Measurement(Rebuilt, ABC):
     def sees_base(self) -> bool:
         """Whether the place of the robot in the world matters."""
 
+    @property
+    def groups(self) -> NDArray[np.int64]:
+        """Number of the group of each block, shape (B,): blocks that share their own fixtures."""
+        return np.zeros(self.blocks, dtype=np.int64)
+
     def guess(self, evaluations: Sequence[Evaluation]) -> Array | None:
         """First values of the fixtures from the poses of the nominal robot, shape (F,).
 

@@ -166,6 +166,12 @@ class PointContact(Measurement):
         """Only through points that are known in the world."""
         return bool(self.known)
 
+    @property
+    def groups(self) -> NDArray[np.int64]:
+        """Number of the point of each touch."""
+        number = {label: k for k, label in enumerate(self.points)}
+        return np.array([number[label] for label in self.point], dtype=np.int64)
+
     def guess(self, evaluations: Sequence[Evaluation]) -> Array | None:
         """Mean position of the touches of each point."""
         p = evaluations[0].T[:, :3, 3]
