@@ -18,6 +18,7 @@ from robotmodels.errors import (
     InvalidValueError,
     ShapeError,
 )
+from robotmodels.inertia import InertiaWarning
 from robotmodels.minimal_parameters import base_parameters, uniform_bodies
 
 
@@ -130,9 +131,41 @@ def test_what_is_taken_off_leaves_nothing_behind():
     np.testing.assert_allclose(
         left, with_payload(bare, 0.1, [0.5, 0.1, 0.0]).inertia.values, atol=1e-15
     )
-    assert not without_payload(planar(), 5.0, [0, 0, 0]).inertia.is_physical[1]
     same = with_payload(bare, 0.0, [1.0, 0.0, 0.0])
     np.testing.assert_array_equal(same.inertia.values, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("payload", "words"),
+    [
+        ((5.0, [0, 0, 0]), "link 2 .*'robot'.*negative mass -3 kg"),
+        ((2.0, [0.3, 0, 0]), "first moments without mass"),
+        ((1.0, [0.4, 0, 0]), "principal moment"),
+        ((1.0, [0.1, 0, 0], 0.2 * np.eye(3)), "principal moment"),
+        ((1.0, [0.1, 0.0, 0], 0.2 * np.eye(3), 1), "link 1 "),
+    ],
+)
+def test_a_body_that_was_not_there_is_reported(payload, words):
+    """The link is warned of by name; the numbers are those of the subtraction."""
+    with pytest.warns(InertiaWarning, match=words) as caught:
+        left = without_payload(planar(), *payload)
+    assert caught[0].filename == __file__
+    assert not left.inertia.is_physical.all()
+    # a link that was no body before is not the payload's fault
+    identified = planar().with_inertia(rm.InertialParameters(-np.ones((2, 10))))
+    without_payload(identified, *payload)
+
+
+@pytest.mark.parametrize("mass", [1e-9, 1.0, 1e6])
+def test_rounding_is_no_body_that_was_not_there(mass):
+    """Point masses are on the border of what bodies have: taking one off gives no warning."""
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        com = rng.normal(size=3)
+        left = without_payload(with_payload(planar(), mass, com), mass, com)
+        np.testing.assert_allclose(
+            left.inertia.values, planar().inertia.values, atol=1e-14 * max(1.0, mass)
+        )
 
 
 @pytest.mark.parametrize(

@@ -100,6 +100,48 @@ def test_a_joint_sticks_between_its_breakaway_torques():
     np.testing.assert_array_equal(both.breakaway, [[-2.0, -2.0], [4.0, 6.0]])
 
 
+@pytest.mark.parametrize("first", MODELS)
+@pytest.mark.parametrize("second", MODELS)
+def test_models_add_up(first, second):
+    a, b = MODELS[first](), MODELS[second]()
+    v = np.array([[0.3, -0.2], [0.0, 4.0]])
+    both = a + b
+    assert isinstance(both, FrictionSum)
+    assert not any(isinstance(part, FrictionSum) for part in both.parts)
+    np.testing.assert_allclose(both.torque(v), a.torque(v) + b.torque(v), rtol=1e-14)
+    assert both.kinds == (*a.kinds, *b.kinds)
+    np.testing.assert_array_equal(both.parameters, np.vstack([a.parameters, b.parameters]))
+    np.testing.assert_allclose((both + a).torque(v), both.torque(v) + a.torque(v), rtol=1e-14)
+    robot = arm()
+    if len(set(both.kinds)) == len(both.kinds):
+        W = torque_regressor(robot, v, v, v, drive=False, friction=both)
+        extra = W[..., -2 * len(both.kinds) :] @ both.parameters.ravel()
+        np.testing.assert_allclose(extra, both.torque(v), rtol=1e-13)
+    else:
+        repeated = next(kind for k, kind in enumerate(both.kinds) if kind in both.kinds[:k])
+        with pytest.raises(InvalidValueError, match=f"{repeated} columns already"):
+            torque_regressor(robot, v, v, v, drive=False, friction=both)
+
+
+def test_only_models_of_the_same_joints_add_up():
+    class Quadratic:
+        n = 2
+
+        def torque(self, v):
+            return np.asarray(v) * np.abs(v)
+
+    viscous = ViscousFriction(TWO)
+    for both in (viscous + Quadratic(), Quadratic() + viscous):
+        np.testing.assert_allclose(both.torque([2.0, 3.0]), [2.0 + 4.0, 6.0 + 9.0])
+    with pytest.raises(ShapeError, match="2 joints, got 1"):
+        viscous + CoulombFriction([1.0])
+    for other in (3.0, None, CoulombFriction):
+        with pytest.raises(TypeError, match="unsupported operand"):
+            viscous + other
+        with pytest.raises(TypeError, match="unsupported operand"):
+            other + (viscous + viscous)
+
+
 def test_symmetric_parameters_are_coulomb_and_viscous():
     v = np.random.default_rng(0).normal(size=(5, 2))
     symmetric = AsymmetricFriction([1, 2], [3, 4], [1, 2], [3, 4])
@@ -118,6 +160,17 @@ def test_symmetric_parameters_are_coulomb_and_viscous():
         (lambda: AsymmetricFriction([1], [1, 2], [1], [1]), ShapeError, "Fcp"),
         (lambda: StribeckFriction([1], [1], [1], [0.0]), InvalidValueError, "vs"),
         (lambda: StribeckFriction([1], [1], [1], [1.0], [-1]), InvalidValueError, "exponent"),
+        (
+            lambda: StribeckFriction([1, -2], [1, 1], [1, 1], [1, 1]),
+            InvalidValueError,
+            r"^Fv: .*joint 2 .*\(-2\)",
+        ),
+        (lambda: StribeckFriction([1], [-1], [1], [1.0]), InvalidValueError, "^Fc: .*joint 1"),
+        (
+            lambda: StribeckFriction([1, 1], [1, 3], [2, 2.5], [1, 1]),
+            InvalidValueError,
+            r"^Fs: .*joint 2 \(2.5\) is less than .*\(3\)",
+        ),
         (lambda: FrictionSum(()), InvalidValueError, "at least one"),
         (lambda: FrictionSum((ViscousFriction([1]), "x")), InvalidValueError, "parts"),
         (

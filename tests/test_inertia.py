@@ -182,7 +182,7 @@ def test_parameters_print_as_a_table_that_says_what_no_body_has():
     )  # fmt: skip
     lines = str(rm.InertialParameters(rows)).splitlines()
     assert lines[0].split() == ["link", *rm.inertia.PARAMETERS, "physical"]
-    assert lines[2].split() == ["1", *"0.1 0 0 0.1 0 0.1 0 0 0 2 yes".split()]
+    assert lines[2].split() == ["1", "0.1", "0", "0", "0.1", "0", "0.1", "0", "0", "0", "2", "yes"]
     assert [line.split()[-1] for line in lines[2:6]] == ["yes", "no", "no", "no"]
     assert len({len(line) for line in lines[:6]}) == 1
     assert lines[6].startswith("link 2: not physical: negative mass -2.5 kg")

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_exact, as_floats
 from ..errors import InertiaError, InvalidValueError, ShapeError
-from ..inertia import InertialParameters
+from ..inertia import InertialParameters, InertiaWarning
 from ..model import RobotModel, check_model
 
 
@@ -91,13 +93,17 @@ def without_payload(
     Returns
     -------
     RobotModel
-        A new model. Its link is not physical if the body was not part of it
-        (`InertialParameters.is_physical`).
+        A new model.
 
     Raises
     ------
     InertiaError, InvalidValueError, FrameNotFoundError, ShapeError
         As `with_payload`.
+
+    Warns
+    -----
+    InertiaWarning
+        What remains is no body, though the link was one: the payload was not part of it.
 
     References
     ----------
@@ -140,8 +146,38 @@ def _with_body(
     if sign < 0.0:
         rounding = 4.0 * np.finfo(np.float64).eps * (np.abs(old) + np.abs(row))
         new[np.abs(new) <= rounding] = 0.0
+        _report_what_remains(model, place.parent, old, new, float(rounding.max()))
     values[place.parent - 1] = new
     return model.with_inertia(InertialParameters(values))
+
+
+def _report_what_remains(
+    model: RobotModel, link: int, old: Array, new: Array, rounding: float
+) -> None:
+    """Warn the caller of `without_payload` if a body less leaves no body."""
+    least = -16.0 * rounding
+    if _least_density(new) >= least or _least_density(old) < least:
+        return
+    found = InertialParameters(new[None]).consistency().links[0]
+    why = "; ".join(found.problems) or "the pseudo-inertia has a negative eigenvalue"
+    warnings.warn(
+        f"link {link} ({model.table.names[link - 1]}) of {model.name!r} is not physical without "
+        f"this payload: {why}. Was the payload part of the link, with this mass, centre of mass "
+        "and frame?",
+        InertiaWarning,
+        stacklevel=4,
+    )
+
+
+def _least_density(row: Array) -> float:
+    """Smallest eigenvalue of the pseudo-inertia of ten parameters; not negative for a body."""
+    XX, XY, XZ, YY, YZ, ZZ = row[:6]
+    tensor = np.array([[XX, XY, XZ], [XY, YY, YZ], [XZ, YZ, ZZ]])
+    pseudo = np.empty((4, 4))
+    pseudo[:3, :3] = 0.5 * np.trace(tensor) * np.eye(3) - tensor
+    pseudo[:3, 3] = pseudo[3, :3] = row[6:9]
+    pseudo[3, 3] = row[9]
+    return float(np.linalg.eigvalsh(pseudo)[0])
 
 
 def _body(mass: float, com: ArrayLike, inertia: ArrayLike | None) -> Array:

@@ -14,7 +14,7 @@ from .protocols import Friction, LinearFriction, breakaway_torques, check_fricti
 
 @dataclass(frozen=True, slots=True)
 class FrictionSum:
-    """Several friction models that act together.
+    """Several friction models that act together; ``a + b`` of two friction models is one.
 
     Parameters
     ----------
@@ -32,6 +32,8 @@ class FrictionSum:
     >>> both = FrictionSum((ViscousFriction([1.0]), CoulombFriction([2.0])))
     >>> both.torque([3.0]), both.kinds
     (array([5.]), ('Fv', 'Fc'))
+    >>> ViscousFriction([1.0]) + CoulombFriction([2.0]) == both
+    True
     """
 
     parts: tuple[Friction, ...]
@@ -71,6 +73,44 @@ class FrictionSum:
         """Torque that the joints need to overcome friction, shape (..., n)."""
         return np.sum([part.torque(v) for part in self.parts], axis=0)
 
+    def __add__(self, other: object) -> FrictionSum:
+        return together(self, other)
+
+    def __radd__(self, other: object) -> FrictionSum:
+        return together(other, self)
+
     @property
     def _linear(self) -> tuple[LinearFriction, ...]:
         return tuple(check_linear(part) for part in self.parts)
+
+
+def together(first: object, second: object) -> FrictionSum:
+    """What ``first + second`` is; sums are taken apart.
+
+    Parameters
+    ----------
+    first, second : object
+        Friction models of the same joints.
+
+    Returns
+    -------
+    FrictionSum
+        Of all parts, in order; NotImplemented if either is no friction model.
+
+    Raises
+    ------
+    ShapeError
+        Friction of other numbers of joints.
+
+    Examples
+    --------
+    >>> from robotmodels.friction import CoulombFriction, ViscousFriction
+    >>> together(ViscousFriction([1.0]), CoulombFriction([2.0])).n
+    1
+    """
+    parts: list[Friction] = []
+    for each in (first, second):
+        if isinstance(each, type) or not isinstance(each, Friction):
+            return NotImplemented
+        parts += each.parts if isinstance(each, FrictionSum) else (each,)
+    return FrictionSum(tuple(parts))

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_floats, read_only, same_value, value_hash
 from ..errors import ShapeError
+from .combined import FrictionSum, together
 from .protocols import breakaway_torques
 
 
@@ -78,6 +79,12 @@ class JointFriction(ABC):
             Wrong length; NaN or infinity.
         """
         return (self.basis(v) * self.parameters).sum(axis=-2)
+
+    def __add__(self, other: object) -> FrictionSum:
+        return together(self, other)
+
+    def __radd__(self, other: object) -> FrictionSum:
+        return together(other, self)
 
     def __reduce__(self) -> tuple[Any, ...]:  # rebuilt, so that a copy is read-only as well
         return type(self), tuple(getattr(self, f.name) for f in fields(self))

@@ -23,7 +23,7 @@ class StribeckFriction(JointFriction):
     Parameters
     ----------
     Fv, Fc, Fs : array_like, shape (n,)
-        Viscous, Coulomb and static friction.
+        Viscous, Coulomb and static friction, ``Fv >= 0`` and ``Fs >= Fc >= 0``.
     vs : array_like, shape (n,)
         Stribeck velocity, positive, rad/s or m/s.
     exponent : array_like, shape (n,), optional
@@ -32,7 +32,8 @@ class StribeckFriction(JointFriction):
     Raises
     ------
     ShapeError, InvalidValueError
-        Lengths that differ; NaN or infinity; a velocity or exponent that is not positive.
+        Lengths that differ; NaN or infinity; a velocity or exponent that is not positive; friction
+        that drives its joint, or is less at rest than in motion.
 
     References
     ----------
@@ -68,6 +69,22 @@ class StribeckFriction(JointFriction):
             values = getattr(self, name)
             if (values <= 0.0).any():
                 raise InvalidValueError(f"{name}: expected positive numbers, got {values.min()}.")
+        advice = (
+            "Identified values that are noise about zero are set to zero; ViscousFriction and "
+            "CoulombFriction take any numbers."
+        )
+        for name in ("Fv", "Fc"):
+            for j in np.flatnonzero(getattr(self, name) < 0.0)[:1]:
+                raise InvalidValueError(
+                    f"{name}: friction of joint {j + 1} is negative ({getattr(self, name)[j]:g}), "
+                    f"so that it would drive the joint. {advice}"
+                )
+        for j in np.flatnonzero(self.Fs < self.Fc)[:1]:
+            raise InvalidValueError(
+                f"Fs: static friction of joint {j + 1} ({self.Fs[j]:g}) is less than its Coulomb "
+                f"friction Fc ({self.Fc[j]:g}), where Stribeck's curve falls from Fs to Fc. "
+                f"Exchange them if they are in the wrong order. {advice}"
+            )
 
     def basis(self, v: ArrayLike) -> Array:
         """Torque per unit of each parameter, see `LinearFriction`."""

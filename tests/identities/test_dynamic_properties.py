@@ -143,10 +143,11 @@ def test_friction_adds_its_torque_to_both_models(model, seed, kind):
     n = model.n
     model = model.with_drive(random_drive(rng, n))
     q, v, a = random_state(model, rng, 3)
+    Fv, Fc, fall, vs = rng.uniform(0.1, 3, (4, n))
     friction = (
         AsymmetricFriction(*rng.uniform(0.1, 3, (4, n)))
         if kind
-        else StribeckFriction(*rng.uniform(0.1, 3, (4, n)))
+        else StribeckFriction(Fv, Fc, Fc + fall, vs)
     )
     for drive in (True, False):
         plain = idm(model, q, v, a, drive=drive)

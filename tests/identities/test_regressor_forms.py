@@ -38,7 +38,8 @@ def close(actual, expected, tolerance=1e-12):
 def random_friction(rng, n):
     if rng.random() < 0.5:
         return AsymmetricFriction(*rng.uniform(0.1, 3.0, (4, n)))
-    return StribeckFriction(*rng.uniform(0.1, 3.0, (4, n)), exponent=rng.uniform(0.7, 2.5, n))
+    Fv, Fc, fall, vs = rng.uniform(0.1, 3.0, (4, n))
+    return StribeckFriction(Fv, Fc, Fc + fall, vs, exponent=rng.uniform(0.7, 2.5, n))
 
 
 def friction_beside(rng, model, drive):
