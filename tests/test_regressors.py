@@ -1,10 +1,12 @@
 """The border of the regressors: columns and their names, batches, chunks, errors."""
 
+import pickle
 import tracemalloc
 
 import numpy as np
 import pytest
 from identities.random_robots import random_model, random_state
+from scipy import signal
 
 import robotmodels as rm
 from robotmodels.errors import InvalidValueError, ShapeError
@@ -23,6 +25,7 @@ from robotmodels.regressors import (
     power_regressor,
     power_regressor_chunks,
 )
+from robotmodels.regressors.low_pass import FilterRun
 
 FUNCTIONS = {
     "torque": (rm.torque_regressor, 3),
@@ -381,8 +384,6 @@ def test_filters_answer_as_their_transfer_functions(order):
     """A harmonic through a Butterworth filter, after the transient, and its derivative."""
     from scipy.signal import butter, freqs
 
-    from robotmodels.regressors.low_pass import FilterRun
-
     b, a = butter(order, 40.0, analog=True)
     omega, dt = 25.0, 2e-4
     t = np.arange(0.0, 1.5, dt)
@@ -405,8 +406,6 @@ def test_filters_answer_as_their_transfer_functions(order):
 
 
 def test_a_ramp_and_its_derivative_are_exact():
-    from robotmodels.regressors.low_pass import FilterRun
-
     low_pass, dt = LowPass.first_order(3.0), 0.1
     t = np.arange(20) * dt
     ramp = 5.0 + 2.0 * t
@@ -452,8 +451,96 @@ def test_mistakes_in_filtered_regressors(model):
             function(model, 0.1, q, v[:2], FILTER)
 
 
-def test_discrete_filters_are_refused():
-    from scipy.signal import dlti
+# --- discrete filters --------------------------------------------------------------------------
 
-    with pytest.raises(InvalidValueError, match="continuous"):
-        LowPass.from_scipy(dlti([1.0], [1.0, 0.5], dt=0.1))
+RATE = 200.0
+
+
+def discrete_filters():
+    """Of every form SciPy has: the object or arrays, and what it does as (b, a)."""
+    b, a = signal.butter(4, 8.0, fs=RATE)
+    third = signal.butter(3, 20.0, fs=RATE)
+    eighth = signal.cheby1(8, 0.5, 15.0, fs=RATE, output="sos")
+    average = np.ones(4) / 4
+    return {
+        "ba": ((b, a), 1 / RATE, (b, a)),
+        "dlti": (signal.dlti(b, a, dt=1 / RATE), None, (b, a)),
+        "zpk": (signal.butter(4, 8.0, fs=RATE, output="zpk"), 1 / RATE, (b, a)),
+        "dlti of zpk": (signal.dlti(*signal.tf2zpk(*third), dt=1 / RATE), None, third),
+        "space": (signal.dlti(*third, dt=1 / RATE).to_ss(), None, third),
+        "sections": (eighth, 1 / RATE, signal.sos2tf(eighth)),
+        "odd sections": (signal.tf2sos(*third), 1 / RATE, third),
+        "moving average": ((average, [1.0, 0, 0, 0]), 1 / RATE, (average, [1.0])),
+        "wide": (signal.butter(1, 0.45 * RATE, fs=RATE), 1 / RATE,
+                 signal.butter(1, 0.45 * RATE, fs=RATE)),
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("form", discrete_filters())
+def test_a_discrete_filter_is_scipys(form):
+    system, dt, (b, a) = discrete_filters()[form]
+    low_pass = LowPass.from_scipy(system, dt)
+    assert low_pass.period == 1 / RATE
+    u = np.random.default_rng(0).normal(size=(400, 2))
+    u[0] = 0.0
+    expected = signal.lfilter(b, a, u, axis=0)
+    np.testing.assert_allclose(low_pass.filter(u, 1 / RATE), expected, atol=1e-9)
+    assert pickle.loads(pickle.dumps(low_pass)).period == low_pass.period
+    # the derivative: the trapezoidal rule, 2 / dt (z - 1) / (z + 1), on the way
+    omega = 2 * np.pi * 3.0
+    t = np.arange(3000) / RATE
+    slope = np.empty((t.size, 1))
+    FilterRun(low_pass, 1 / RATE).derivatives(np.sin(omega * t)[:, None], slope)
+    z = np.exp(1j * omega / RATE)
+    H = np.polyval(b, z) / np.polyval(np.r_[a, np.zeros(len(b) - len(a))], z)
+    wave = (H * 2 * RATE * (z - 1) / (z + 1) * np.exp(1j * omega * t)).imag
+    np.testing.assert_allclose(slope[2000:, 0], wave[2000:], atol=1e-6)
+
+
+def test_the_discrete_filtered_regressor_gives_the_filtered_torques(model):
+    """Along a smooth motion sampled at 1 kHz: the torques through the same filter."""
+    rng = np.random.default_rng(1)
+    dt, n = 1e-3, model.n
+    low_pass = LowPass.from_scipy(signal.butter(4, 12.0, fs=1 / dt, output="sos"), dt=dt)
+    t = np.arange(2500)[:, None] * dt
+    rate, size = rng.uniform(1.0, 6.0, n), rng.uniform(0.2, 0.6, n)
+    q = size * np.sin(rate * t)
+    v, a = size * rate * np.cos(rate * t), -size * rate**2 * np.sin(rate * t)
+    tau = rm.idm(model.with_drive(None), q, v, a)
+    W = filtered_regressor(model, dt, q, v, low_pass, drive=False)
+    expected = low_pass.filter(tau, dt)
+    found = W @ rm.parameter_vector(model, drive=False)
+    scale = np.abs(tau).max()
+    np.testing.assert_allclose(found, expected, atol=2e-5 * scale)
+    base = base_parameters(model, drive=False)
+    pieces = filtered_regressor_chunks(
+        model, dt, q, v, low_pass, drive=False, columns=base, size=300
+    )
+    for rows, part in pieces:
+        np.testing.assert_allclose(part @ base.values(model), expected[rows], atol=2e-5 * scale)
+    with pytest.raises(InvalidValueError, match=r"^dt: .*period 0.001 s.*0.002 s"):
+        filtered_regressor(model, 2 * dt, q, v, low_pass)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: (signal.dlti([1.0], [1.0, 0.5], dt=0.1), None), "half the sampling rate"),
+        (
+            lambda: (signal.ellip(3, 1, 20, 0.2, output="sos")[:, :6] * 1.0, None),
+            "dt: second-order",
+        ),
+        (lambda: (signal.cheby2(4, 30, 0.3, output="sos"), 0.1), "half the sampling rate"),
+        (lambda: (signal.dlti([1.0, 1.0], [1.0, 0.5]), None), "no sampling period"),
+        (lambda: (signal.dlti([1.0, 1.0], [1.0, 0.5], dt=0.1), 0.2), "own period is 0.1"),
+        (lambda: (signal.lti([1.0], [1.0, 0.5]), 0.1), "continuous"),
+        (lambda: (([1.0, 1.0], [1.0, -1.5]), 0.1), "stable"),
+        (lambda: (([1.0, 1.0], [1.0, 0.5]), -0.1), "dt: "),
+        (lambda: (np.ones((2, 5)), 0.1), r"\(k, 6\)"),
+        (lambda: ("butter", 0.1), "SciPy"),
+    ],
+)
+def test_mistakes_in_discrete_filters(make, words):
+    system, dt = make()
+    with pytest.raises(InvalidValueError, match=words):
+        LowPass.from_scipy(system, dt)

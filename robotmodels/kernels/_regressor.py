@@ -5,8 +5,15 @@ columns are linear in it, so the unit motion of a joint gives that joint's row, 
 velocity gives the power.
 """
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ._compile import Floats, Ints, compiled
 from ._vectors import Matrix, Vector, cross, dot, transpose_times
+
+Bools = NDArray[np.bool_]
+
+INERTIA, MOMENTS, MASS = 1, 2, 4  # bits: which of XX to ZZ, MX MY MZ, and M is wanted
 
 Ten = tuple[float, float, float, float, float, float, float, float, float, float]
 
@@ -34,6 +41,41 @@ def wrench_columns(t: Vector, z: Vector, w: Vector, dw: Vector, U: Matrix, u: Ve
         pull[2] + turn[2],
         dot(t, u),
     )
+
+
+@compiled()
+def wanted_wrench_columns(
+    t: Vector, z: Vector, w: Vector, dw: Vector, U: Matrix, u: Vector, wanted: int
+) -> Ten:
+    """Those of `wrench_columns` that the bits of ``wanted`` ask for, zero in the place of others."""
+    if wanted & INERTIA:
+        if wanted & (MOMENTS | MASS):
+            return wrench_columns(t, z, w, dw, U, u)
+        nothing = (0.0, 0.0, 0.0)
+        return wrench_columns(nothing, z, w, dw, U, nothing)
+    a, b, c = 0.0, 0.0, 0.0
+    if wanted & MOMENTS:
+        pull = transpose_times(U, t)
+        turn = cross(u, z)
+        a, b, c = pull[0] + turn[0], pull[1] + turn[1], pull[2] + turn[2]
+    return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, a, b, c, dot(t, u))
+
+
+@compiled()
+def wanted_of_links(place: Ints, antecedent: Ints, wanted: Ints, needed: Bools) -> None:
+    """What is wanted of each link, and whether it or a link outboard of it matters at all.
+
+    ``place (10 f,)`` as in the kernels; ``wanted (f,)`` bits and ``needed (f,)`` are written.
+    """
+    for k in range(antecedent.shape[0] - 1, -1, -1):
+        bits = 0
+        for c in range(10):
+            if place[10 * k + c] >= 0:
+                bits |= INERTIA if c < 6 else (MOMENTS if c < 9 else MASS)
+        wanted[k] = bits
+        needed[k] |= bits != 0
+        if needed[k] and antecedent[k] > 0:
+            needed[antecedent[k] - 1] = True
 
 
 @compiled()

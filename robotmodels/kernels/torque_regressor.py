@@ -9,7 +9,7 @@ import numpy as np
 
 from ._compile import CHAIN, INTS, MATRIX, NOTHING, OUT3, VECTOR, Floats, Ints, compiled
 from ._motion import coordinate, link_acceleration, link_transform, rotation_acceleration
-from ._regressor import put_columns, wrench_columns
+from ._regressor import put_columns, wanted_of_links, wanted_wrench_columns
 from ._vectors import (
     add,
     cross,
@@ -72,14 +72,16 @@ def torque_regressors(
     g = transpose_times(whole_matrix(base_rotation), whole_vector(gravity))
     put_vector(u, 0, (-g[0], -g[1], -g[2]))
     nothing = (0.0, 0.0, 0.0)
-    used = np.zeros(f, dtype=np.bool_)
-    for x in range(10 * f):
-        used[x // 10] |= place[x] >= 0
+    wanted = np.zeros(f, dtype=np.int64)
+    needed = np.zeros(f, dtype=np.bool_)
+    wanted_of_links(place, antecedent, wanted, needed)
     for i in range(q.shape[0]):
         for row in range(out.shape[1]):
             for column in range(out.shape[2]):
                 out[i, row, column] = 0.0
         for k in range(f):
+            if not needed[k]:
+                continue
             b = antecedent[k]
             c = joint[k]
             Rj, Pj = link_transform(
@@ -106,7 +108,8 @@ def torque_regressors(
             put_vector(dw, k + 1, dwj)
             put_matrix(U, k + 1, Uj)
             put_vector(u, k + 1, uj)
-            if not used[k]:
+            bits = wanted[k]
+            if bits == 0:
                 continue
             inner = k + 1
             while inner > 0:
@@ -115,9 +118,9 @@ def torque_regressors(
                 if sigma[inner - 1] == 0:
                     # Unit motion of the link about the joint's axis
                     t = cross(z, transpose_times(Rk, subtract(pk, vector(p, inner))))
-                    columns = wrench_columns(t, z, wj, dwj, Uj, uj)
+                    columns = wanted_wrench_columns(t, z, wj, dwj, Uj, uj, bits)
                     put_columns(out, i, row, place, k, columns)
                 elif sigma[inner - 1] == 1:
-                    columns = wrench_columns(z, nothing, wj, dwj, Uj, uj)
+                    columns = wanted_wrench_columns(z, nothing, wj, dwj, Uj, uj, bits)
                     put_columns(out, i, row, place, k, columns)
                 inner = antecedent[inner - 1]

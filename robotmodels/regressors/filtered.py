@@ -34,18 +34,18 @@ def filtered_regressor(
     The momentum form filtered: ``F(tau) = (F(dP/dt) - F(S)) @ parameters``, where the filter gives
     ``F(dP/dt)`` from P without differentiating it. Filter the measured torques alike, with
     ``low_pass.filter(tau, dt)``; both start from rest, so that they belong together from the first
-    sample.
+    sample. The derivative of a discrete filter is that of the trapezoidal rule.
 
     Parameters
     ----------
     model : RobotModel
         The robot, f frames and n joints.
     dt : float
-        Sampling period, seconds.
+        Sampling period, seconds; that of the filter if it is a discrete one.
     q, v : array_like, shape (N, n)
         Joint variables (rad or m) and velocities, regularly sampled.
     low_pass : LowPass
-        ``LowPass.first_order(cutoff)`` or ``LowPass.from_scipy(...)``.
+        ``LowPass.first_order(cutoff)`` or ``LowPass.from_scipy(...)``, continuous or discrete.
     drive : bool
         Whether the columns of the drive parameters are included.
     columns, friction
