@@ -13,10 +13,11 @@ import robotmodels as rm
 from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.minimal_parameters import BaseMethod, base_parameters
 from robotmodels.minimal_parameters.formulas import constants_of
+from robotmodels.minimal_parameters.numeric import natural_sizes, torque_factors
 from robotmodels.regressors import parameter_names, parameter_vector, torque_regressor
 
 GRAVITIES = ((0.0, 0.0, -9.81), (0.0, -9.81, 0.0), (-9.81, 0.0, 0.0), (0.0, 0.0, 0.0))
-CATALOGUE = [name for name in rm.robots() if not name.startswith("erd:")]
+CATALOGUE = rm.robots()
 
 
 def any_robot(rng):
@@ -54,36 +55,54 @@ def right_angled_robot(rng):
     return rm.RobotModel.from_table(table, gravity=GRAVITIES[rng.integers(4)])
 
 
-def equal(one, other):
+def equal(one, other, tolerance=1e-10):
+    """The same parameters, and the same torques of each standard parameter."""
     assert one.names == other.names
-    size = max(1.0, abs(other.matrix).max(initial=0.0))
-    assert np.allclose(one.matrix, other.matrix, rtol=0, atol=1e-9 * size)
     assert one.no_effect == other.no_effect
+    model = one.model
+    sizes, _ = natural_sizes(model, one.drive, one.friction)
+    W = np.vstack(torque_factors(model, one.drive, friction=one.friction)) * sizes
+    longest = np.sqrt((W * W).sum(axis=0)).max(initial=1e-300)
+    apart = (one.matrix - other.matrix) * sizes / sizes[one.kept][:, None]
+    assert np.sqrt(((W[:, one.kept] @ apart) ** 2).sum(axis=0)).max() <= tolerance * longest
+    # and the same numbers where the parameter acts
+    acting = np.sqrt((W[:, one.kept] ** 2).sum(axis=0)) > 1e-2 * longest
+    assert abs(apart[acting]).max(initial=0.0) <= 1e-5
 
 
 def keeps_torque(base, model, rng, drive):
     q, v, a = rng.uniform(-2, 2, (3, 20, model.n))
     W = torque_regressor(model, q, v, a, drive=drive)
-    pi = parameter_vector(model, drive)
-    torque = W @ pi
-    size = max(1.0, abs(W).max() * abs(pi).max())
-    assert np.allclose(base.reduce(W) @ base.values(model), torque, rtol=0, atol=1e-10 * size)
+    torque = W @ parameter_vector(model, drive)
+    largest = max(1e-300, abs(torque).max())
+    assert abs(base.reduce(W) @ base.values(model) - torque).max() <= 1e-10 * largest
 
 
-@pytest.mark.parametrize("drive", [True, False])
-@pytest.mark.parametrize("name", CATALOGUE)
-def test_rules_and_numbers_agree_on_the_catalogue(name, drive, rng):
-    model = rm.load(name)
+def filled(model, rng):
+    """Real bodies and drives on every joint."""
     model = model.with_inertia(random_bodies(rng, model.f))
     if model.transmission is None:
         model = model.with_drive(random_drive(rng, model.n))
-    rules = base_parameters(model, drive=drive)
-    numbers = base_parameters(model, "numeric", drive=drive)
-    equal(rules, numbers)
-    kept, dependent = numbers.gap
-    assert kept > 0.1
-    assert dependent < 1e-13
-    keeps_torque(rules, model, rng, drive)
+    return model
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_rules_and_numbers_agree_on_the_catalogue(name, rng):
+    model = filled(rm.load(name), rng)
+    # the great trees once; their links are the same with and without drives
+    for drive in (True, False) if model.f < 40 else (True,):
+        rules = base_parameters(model, drive=drive)
+        numbers = base_parameters(model, "numeric", drive=drive)
+        equal(rules, numbers)
+        kept, dependent = numbers.gap
+        assert dependent < 2e-11
+        if not numbers.notes:
+            assert kept > 0.01
+            assert dependent < 1e-13
+        for base in (rules, numbers):
+            keeps_torque(base, model, rng, drive)
+            smallest = abs(base.matrix[base.matrix != 0]).min()
+            assert smallest > (1e-13 if base.notes else 1e-6)
 
 
 @pytest.mark.parametrize("build", [any_robot, right_angled_robot])
@@ -305,8 +324,7 @@ def test_result_is_a_value():
 
 def test_values_belong_to_the_structure():
     base = base_parameters(rm.load("rx90"))
-    assert base.values(rm.load("puma560")).shape == (58,)
-    with pytest.raises(InvalidValueError, match="other standard parameters"):
+    with pytest.raises(InvalidValueError, match="frames or kinds of joints"):
         base.values(rm.load("planar_2r"))
     with pytest.raises(ShapeError, match="a column for each"):
         base.reduce(np.ones((4, 60)))

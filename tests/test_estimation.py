@@ -11,8 +11,9 @@ def test_random_ranks(rng):
     for _ in range(50):
         p, r = int(rng.integers(1, 12)), int(rng.integers(1, 12))
         W = rng.normal(size=(40, min(r, p))) @ rng.normal(size=(min(r, p), p))
-        W *= 10.0 ** rng.uniform(-4, 4, size=p)
-        basis = column_basis(W, empty=1e-14)
+        sizes = 10.0 ** rng.uniform(-4, 4, size=p)
+        W *= sizes
+        basis = column_basis(W, scale=1.0 / sizes)
         assert basis.rank == min(r, p)
         again = W[:, basis.kept] @ basis.coefficients
         assert np.allclose(again, W, rtol=0, atol=1e-8 * abs(W).max(axis=0))
@@ -44,6 +45,42 @@ def test_gap_and_empty_columns(rng):
     assert dependent < 1e-14
 
 
+def test_the_gap_tells_of_what_is_nearly_empty(rng):
+    W = rng.normal(size=(30, 6))
+    W[:, 5] *= 1e-7  # independent of all, but it hardly acts
+    W[:, 3] = W[:, 0] + 1e-6 * W[:, 3]  # acts, but nearly depends
+    basis = column_basis(W)
+    assert basis.kept.tolist() == [0, 1, 2, 3, 4, 5]
+    assert basis.distance[3] == pytest.approx(1e-6, rel=0.5)
+    assert basis.gap[0] == basis.distance[5] < 2e-7
+    # compared with others of its kind it is as long as any
+    assert column_basis(W, kinds=[0, 0, 0, 0, 0, 1]).distance[5] > 0.5
+    W[:, 5] *= 1e-8  # what is not kept is told as well
+    assert 1e-16 < column_basis(W, kinds=[0] * 6).gap[1] < 2e-15
+
+
+def test_what_hardly_acts_takes_nothing_over(rng):
+    W = rng.normal(size=(40, 3))
+    W[:, 0] = 1e-7 * W[:, 2]  # first in the order, and the same as the last
+    basis = column_basis(W)
+    assert basis.kept.tolist() == [1, 2]
+    assert basis.coefficients[:, 0].tolist() == pytest.approx([0.0, 1e-7], abs=1e-20)
+    assert basis.coefficients[0, 0] == 0.0
+    # between equals the order decides
+    W[:, 0] = 0.1 * W[:, 2]
+    assert column_basis(W).kept.tolist() == [0, 1]
+
+
+def test_coefficients_are_zero_where_there_are_none(rng):
+    kept = rng.normal(size=(50, 5))
+    kept[:, 4] = kept[:, 0] + 1e-6 * kept[:, 4]  # magnifies rounding to 1e-10
+    C = np.array([[1.0, 0.0], [0.0, 2.0], [0.0, 0.0], [3.0, 0.0], [0.0, 0.0]])
+    basis = column_basis(np.hstack((kept, kept @ C)))
+    assert basis.kept.tolist() == [0, 1, 2, 3, 4]
+    assert ((basis.coefficients[:, 5:] != 0) == (C != 0)).all()
+    assert np.allclose(basis.coefficients[:, 5:], C, atol=1e-14)
+
+
 def test_nothing_and_less():
     assert column_basis(np.zeros((3, 2))).rank == 0
     assert column_basis(np.zeros((0, 2))).empty.tolist() == [0, 1]
@@ -60,6 +97,8 @@ def test_mistakes_are_named():
         column_basis(np.eye(2), order=[0, 0])
     with pytest.raises(InvalidValueError, match="scale"):
         column_basis(np.eye(2), scale=[1.0, 0.0])
+    with pytest.raises(InvalidValueError, match="kinds"):
+        column_basis(np.eye(2), kinds=[0.5, 1.0])
     with pytest.raises(InvalidValueError):
         column_basis([[np.nan, 1.0]])
 

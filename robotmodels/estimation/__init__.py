@@ -1,6 +1,6 @@
 """Estimation: numerics of linear models that know no robot."""
 
 from .columns import ColumnBasis, column_basis
-from .triangles import triangular_factor
+from .triangles import factors_by_kind, triangular_factor
 
-__all__ = ["ColumnBasis", "column_basis", "triangular_factor"]
+__all__ = ["ColumnBasis", "column_basis", "factors_by_kind", "triangular_factor"]

@@ -1,7 +1,9 @@
 """Independent columns of a matrix: which are kept, and how the others follow from them.
 
 Columns are taken in an order of preference, and a column is kept if it is not a combination of
-those kept before it. So a dependent column is always regrouped into columns that come earlier.
+those kept before it. So a dependent column is regrouped into columns that come earlier. Columns that
+hardly act wait until those that do have been looked at: what is regrouped into a column that hardly
+acts has a coefficient as large as the column is small, and rounding with it.
 """
 
 from __future__ import annotations
@@ -14,10 +16,11 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import Array, Rebuilt, as_floats, read_only
 from ..errors import InvalidValueError, ShapeError
 
-DEPENDENT = 1e-8
-"""Sine of the angle to the span of the columns before, below which a column depends on them."""
-EMPTY = 1e-8
-"""Length relative to the longest column, below which a column is without effect."""
+NOTHING = 1e-11
+"""Length relative to the longest column, below which a column, or what is left of it, is nothing."""
+_LEVELS = (1e-4, 1e-8)
+"""Lengths of what is left of a column, relative to the longest, below which it waits."""
+_ROUNDING = 1e-14
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,13 +32,14 @@ class ColumnBasis(Rebuilt):
     kept : ndarray of int, shape (b,)
         Numbers of the independent columns, in the order of the matrix.
     empty : ndarray of int, shape (e,)
-        Numbers of the columns without effect (zero).
+        Numbers of the columns without effect.
     coefficients : ndarray, shape (b, p)
         ``W = W[:, kept] @ coefficients``: the parameters of the kept columns that give the same
         product as all parameters are ``coefficients @ parameters``.
     distance : ndarray, shape (p,)
-        Sine of the angle between each column and the span of those kept before it; 0 for columns
-        without effect.
+        Length of what is left of each column without its projection on those kept before it,
+        relative to the longest column of its kind: small for a column that nearly depends on
+        others and for one that is nearly empty.
 
     Examples
     --------
@@ -75,22 +79,31 @@ class ColumnBasis(Rebuilt):
 
     @property
     def gap(self) -> tuple[float, float]:
-        """Smallest distance of a kept column and largest of a dependent one (1, 0 without any)."""
-        kept, others = self.distance[self.kept], self.distance[self.dependent]
-        return float(kept.min(initial=1.0)), float(others.max(initial=0.0))
+        """Smallest distance of a kept column and largest of one that is not (1, 0 without any)."""
+        others = np.ones(len(self.distance), dtype=bool)
+        others[self.kept] = False
+        return (
+            float(self.distance[self.kept].min(initial=1.0)),
+            float(self.distance[others].max(initial=0.0)),
+        )
 
 
 def column_basis(
     W: ArrayLike,
     order: ArrayLike | None = None,
     scale: ArrayLike | None = None,
-    dependent: float = DEPENDENT,
-    empty: float = EMPTY,
+    nothing: float = NOTHING,
+    kinds: ArrayLike | None = None,
+    longest: float | None = None,
 ) -> ColumnBasis:
     """Choose independent columns in an order of preference.
 
-    The decision is free of scale: columns are compared by angles, and the lengths that tell a
-    column without effect are taken in the units that ``scale`` gives.
+    A column is kept if what is left of it, without its projection on the columns kept before, is
+    longer than ``nothing``. Lengths are in the units that ``scale`` gives, relative to the longest
+    column: whatever is not kept changes no product by more than that part of the largest.
+
+    Columns of which less than 1e-4 (then 1e-8) is left are looked at after the others, whatever
+    their place in the order, so that coefficients stay below 1e4 and rounding does.
 
     Parameters
     ----------
@@ -101,15 +114,18 @@ def column_basis(
     scale : array_like, shape (p,), optional
         Natural size of the parameter of each column, so that ``W * scale`` has comparable columns;
         default 1.
-    dependent : float
-        Sine of the angle to the columns kept before, below which a column depends on them.
-    empty : float
-        Length of ``W * scale`` relative to its longest column, below which one is without effect.
+    nothing : float
+        Length relative to the longest column, below which what is left of a column is nothing, and
+        coefficients are.
+    kinds : array_like of int, shape (p,), optional
+        Columns of one number are compared with each other in `ColumnBasis.gap`; default all.
+    longest : float, optional
+        What lengths are relative to; default that of the longest column of ``W * scale``.
 
     Returns
     -------
     ColumnBasis
-        Kept columns and combinations; coefficients below rounding are zero.
+        Kept columns and combinations; coefficients that nothing depends on are exactly zero.
 
     Raises
     ------
@@ -132,36 +148,76 @@ def column_basis(
     p = W.shape[1]
     order = np.arange(p) if order is None else _permutation(order, p)
     scale = np.ones(p) if scale is None else _positive(scale, p)
-    length = np.sqrt((W * W).sum(axis=0))
-    in_units = length * scale
-    seen = in_units > empty * in_units.max(initial=0.0)
-    unit: Array = np.divide(W, length, out=np.zeros(W.shape), where=seen)
-    if unit.shape[0] > p:
-        unit = np.asarray(np.linalg.qr(unit, mode="r"))
-    Q = np.empty((min(unit.shape), unit.shape[0]))
+    alike = np.zeros(p, dtype=np.int64) if kinds is None else _kinds(kinds, p)
+    length = np.sqrt((W * W).sum(axis=0)) * scale
+    longest = float(length.max(initial=0.0) if longest is None else longest) or 1.0
+    U = W * (scale / longest)
+    if U.shape[0] > p:
+        U = np.asarray(np.linalg.qr(U, mode="r"))
+    length = length / longest
+    kept, parts, left = _kept_columns(U, order[length[order] > nothing], nothing)
+    left[length <= nothing] = length[length <= nothing]
+    combinations = _combinations(parts, kept, left, nothing)
+    rows = np.argsort(kept)
+    kept = kept[rows]
+    coefficients = combinations[rows] * scale[kept][:, None] / scale
+    most = np.array([length[alike == kind].max() for kind in range(alike.max(initial=-1) + 1)])
+    distance = left / np.where(most > nothing, most, 1.0)[alike]
+    return ColumnBasis(kept, np.flatnonzero(length <= nothing), coefficients, distance)
+
+
+def _kept_columns(
+    U: Array, order: NDArray[np.int64], nothing: float
+) -> tuple[NDArray[np.int64], Array, Array]:
+    """Orthogonalised columns: which are kept, all columns in the basis, what is left of them."""
+    p = U.shape[1]
+    Q = np.empty((min(U.shape), U.shape[0]))
     parts = np.zeros((len(Q), p))
-    distance = np.zeros(p)
+    left = np.zeros(p)
     kept: list[int] = []
-    for k in order[seen[order]]:
-        basis, rest = Q[: len(kept)], unit[:, k]
-        for _ in range(2):  # once more for the digits that the first projection has cancelled
-            part = basis @ rest
-            rest = rest - part @ basis
-            parts[: len(kept), k] += part
-        distance[k] = np.sqrt(rest @ rest)
-        if distance[k] > dependent and len(kept) < len(Q):
-            Q[len(kept)] = rest / distance[k]
-            parts[len(kept), k] = distance[k]
-            kept.append(int(k))
-    b = len(kept)
-    combinations = np.linalg.solve(parts[:b, kept], parts[:b]) if b else np.zeros((0, p))
-    # unit columns have coefficients near 1; what is below this is rounding, magnified as it may be
-    combinations[abs(combinations) < 1e-3 * dependent] = 0.0
-    combinations[:, kept] = np.eye(b)
-    rows = np.argsort(kept) if b else []
-    kept_sorted = np.array(kept, dtype=np.int64)[rows] if b else np.empty(0, dtype=np.int64)
-    coefficients = combinations[rows] * length / length[kept_sorted][:, None]
-    return ColumnBasis(kept_sorted, np.flatnonzero(~seen), coefficients, distance)
+    rest = U.T.copy()
+    for level in (*(x for x in _LEVELS if x > nothing), nothing):
+        waiting: list[int] = []
+        for k in order.tolist():
+            basis = Q[: len(kept)]
+            for _ in range(2):  # once more for the digits that the first projection has cancelled
+                part = basis @ rest[k]
+                rest[k] -= part @ basis
+                parts[: len(kept), k] += part
+            left[k] = np.sqrt(rest[k] @ rest[k])
+            if left[k] > level and len(kept) < len(Q):
+                Q[len(kept)] = rest[k] / left[k]
+                parts[len(kept), k] = left[k]
+                kept.append(k)
+            elif left[k] > _ROUNDING:
+                waiting.append(k)
+        order = np.array(waiting, dtype=np.int64)
+    return np.array(kept, dtype=np.int64), parts[: len(kept)], left
+
+
+def _combinations(
+    parts: Array, kept: NDArray[np.int64], left: Array, nothing: float
+) -> Array:
+    """All columns as combinations of the kept ones, without coefficients that are rounding."""
+    b, p = parts.shape
+    if not b:
+        return np.zeros((0, p))
+    triangle = parts[:, kept]
+    whole = np.linalg.solve(triangle, parts)
+    found = whole.copy()
+    # rounding of a column is magnified in the coefficient of a kept one of which little is left
+    slight = _ROUNDING / left[kept]
+    found[np.abs(found) <= np.minimum(slight, nothing)[:, None]] = 0.0
+    fewer = np.abs(found) <= np.maximum(slight, nothing)[:, None]
+    for k in np.flatnonzero((fewer & (found != 0.0)).any(axis=0)):
+        # the others make up for what is left out, if they can
+        terms = np.flatnonzero(~fewer[:, k])
+        again = np.linalg.lstsq(triangle[:, terms], parts[:, k], rcond=None)[0]
+        if np.linalg.norm(parts[:, k] - triangle[:, terms] @ again) <= nothing:
+            found[:, k] = 0.0
+            found[terms, k] = again
+    found[:, kept] = np.eye(b)
+    return found
 
 
 def _permutation(order: ArrayLike, p: int) -> NDArray[np.int64]:
@@ -178,3 +234,10 @@ def _positive(scale: ArrayLike, p: int) -> Array:
     if values.shape != (p,) or not (values > 0).all():
         raise InvalidValueError(f"scale: expected {p} positive numbers, got {scale!r:.80}.")
     return values
+
+
+def _kinds(kinds: ArrayLike, p: int) -> NDArray[np.int64]:
+    values = np.asarray(kinds)
+    if values.shape != (p,) or values.dtype.kind not in "iu" or (values < 0).any():
+        raise InvalidValueError(f"kinds: expected {p} numbers from 0, got {kinds!r:.80}.")
+    return values.astype(np.int64)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,27 +11,65 @@ from .._arrays import Array, as_core, as_vector, batch_rows
 from .._choices import chosen
 from ..drive import Transmission
 from ..errors import InvalidValueError, ShapeError
-from ..estimation.columns import DEPENDENT
+from ..estimation import column_basis
+from ..estimation.columns import NOTHING
+from ..friction import Friction, check_friction, check_linear
 from ..model import RobotModel, check_model
+from .alignment import near_alignments
 from .numeric import base_by_numbers
 from .result import BaseMethod, BaseParameters
 from .symbolic import base_by_rules
+
+
+@runtime_checkable
+class SampledMotion(Protocol):
+    """Positions, velocities and accelerations at some times; samples of a trajectory have them."""
+
+    @property
+    def q(self) -> ArrayLike:
+        """Joint variables, shape (..., N, n)."""
+        ...
+
+    @property
+    def v(self) -> ArrayLike:
+        """Velocities."""
+        ...
+
+    @property
+    def a(self) -> ArrayLike:
+        """Accelerations."""
+        ...
+
+
+@runtime_checkable
+class TimedMotion(Protocol):
+    """A motion that can be sampled; a trajectory can."""
+
+    def resample(self, samples: int | None = None, period: float | None = None) -> Any:
+        """The motion at equal steps of time."""
+        ...
+
+
+Motion = tuple[ArrayLike, ArrayLike, ArrayLike] | SampledMotion | TimedMotion
+_SAMPLES = 1000
 
 
 def base_parameters(
     model: RobotModel,
     method: Literal["symbolic", "numeric"] | BaseMethod = "symbolic",
     drive: bool = True,
-    motion: tuple[ArrayLike, ArrayLike, ArrayLike] | None = None,
+    motion: Motion | None = None,
     constraint: ArrayLike | Transmission | None = None,
-    tolerance: float = DEPENDENT,
+    tolerance: float = NOTHING,
+    friction: Friction | None = None,
 ) -> BaseParameters:
     """Base inertial parameters: the fewest that give the same torques.
 
     Also called minimal, barycentric or identifiable parameters. Both methods keep Khalil's choice:
     the parameters of the frames nearest to the base before those behind them, link parameters
-    before ``Ia`` before ``Fv``, ``Fc`` and ``offset``; what depends on others is regrouped into
-    those that come before it.
+    before ``Ia`` before ``Fv``, ``Fc`` and ``offset`` before those of a friction model; what depends
+    on others is regrouped into those that come before it. Only a parameter that hardly acts (less
+    than 1e-4 of the largest) gives way to a later one that does.
 
     Parameters
     ----------
@@ -41,15 +79,23 @@ def base_parameters(
         By Khalil's rules, with formulas, or from the columns of the torque regressor.
     drive : bool
         Whether the drive parameters are among the standard ones.
-    motion : tuple of array_like, shapes (N, n), optional
+    motion : tuple of array_like, shapes (N, n), Samples or Trajectory, optional
         Joint variables (rad or m), velocities and accelerations that the regressor is taken on, of
-        the numeric method; default random ones. What logged motion does not show is not kept.
+        the numeric method; default random ones. A trajectory is taken at 1000 times. What logged
+        motion does not show is not kept.
     constraint : array_like, shape (n, u), or Transmission, optional
         Joints that are bound to each other, ``v = constraint u`` (mimic joints, a transmission):
         the torques are those of the u free variables. Of the numeric method.
     tolerance : float
-        Sine of the angle to the columns kept before, below which a column depends on them. Of the
-        numeric method; `BaseParameters.gap` says how far from it the columns are.
+        What counts as nothing, by both methods: the part of the largest torque that a parameter
+        may have without being kept, the sine of an angle between axes that are taken as parallel,
+        and a coefficient (of parameters in their natural units). The default keeps every torque to
+        1e-10. A file whose right angles are written "1.5708" has torques that differ from those of
+        right angles by 4e-6: take 1e-4 for the table that is meant. `BaseParameters.notes` says
+        which axes are nearly aligned.
+    friction : Friction, optional
+        A friction model that is linear in its parameters (`robotmodels.friction`), whose columns
+        come after those of the drives.
 
     Returns
     -------
@@ -59,7 +105,8 @@ def base_parameters(
     Raises
     ------
     InvalidValueError
-        Another method; motion, a constraint or a tolerance for the symbolic one; NaN; an empty log.
+        Another method; motion or a constraint for the symbolic one; NaN; an empty log; friction
+        that is not linear.
     ShapeError
         Arrays of the wrong shape.
 
@@ -77,27 +124,39 @@ def base_parameters(
     (36, {'ZZ4': 1.0, 'YY5': 1.0})
     """
     check_model(model)
-    if chosen(BaseMethod, method, "method") is BaseMethod.SYMBOLIC:
+    way = chosen(BaseMethod, method, "method")
+    if not 0.0 < tolerance < 1.0:
+        raise InvalidValueError(f"tolerance: expected a number between 0 and 1, got {tolerance}.")
+    if friction is not None:
+        check_linear(check_friction(friction, model.n))
+    notes = (*near_alignments(model, tolerance), *_transmission_notes(model, constraint))
+    if way is BaseMethod.SYMBOLIC:
         given = {"motion": motion, "constraint": constraint}
-        if any(value is not None for value in given.values()) or tolerance != DEPENDENT:
-            names = [name for name, value in given.items() if value is not None] or ["tolerance"]
+        names = [name for name, value in given.items() if value is not None]
+        if names:
             raise InvalidValueError(
                 f"{names[0]}: the symbolic method knows the table alone; use method='numeric'."
             )
-        return base_by_rules(model, bool(drive))
-    if not 0.0 < tolerance < 1.0:
-        raise InvalidValueError(f"tolerance: expected a sine between 0 and 1, got {tolerance}.")
+        return base_by_rules(model, bool(drive), tolerance, friction, notes)
     samples = None if motion is None else _samples(model, motion)
-    bound = None if constraint is None else _bound(model, constraint)
-    return base_by_numbers(model, bool(drive), samples, bound, tolerance)
+    bound = None
+    if constraint is not None:
+        bound, columns = _bound(model, constraint)
+        notes = (*notes, *_constraint_notes(bound, columns))
+    return base_by_numbers(model, bool(drive), samples, bound, tolerance, friction, notes)
 
 
-def _samples(
-    model: RobotModel, motion: tuple[ArrayLike, ArrayLike, ArrayLike]
-) -> tuple[Array, Array, Array]:
+def _samples(model: RobotModel, motion: Motion) -> tuple[Array, Array, Array]:
+    if not isinstance(motion, (tuple, list)) and isinstance(motion, TimedMotion):
+        motion = motion.resample(_SAMPLES)
+    if not isinstance(motion, (tuple, list)) and isinstance(motion, SampledMotion):
+        motion = (motion.q, motion.v, motion.a)
     if not isinstance(motion, (tuple, list)) or len(motion) != 3:
-        raise InvalidValueError("motion: expected three arrays (q, v, a), each of shape (N, n).")
-    names = ("q", "v", "a")
+        raise InvalidValueError(
+            "motion: expected three arrays (q, v, a), each of shape (N, n), or a trajectory, got "
+            f"{type(motion).__name__}."
+        )
+    names = ("motion q", "motion v", "motion a")
     arrays = tuple(as_vector(x, model.n, s) for x, s in zip(motion, names, strict=True))
     _, rows = batch_rows(arrays, names)
     if rows[0].shape[0] == 0:
@@ -107,7 +166,39 @@ def _samples(
     return rows[0], rows[1], rows[2]
 
 
-def _bound(model: RobotModel, constraint: ArrayLike | Transmission) -> Array:
+def _constraint_notes(G: Array, columns: int) -> tuple[str, ...]:
+    """That joints are constrained; G has independent columns, of so many that were given."""
+    n, rank = G.shape
+    if rank == n:
+        return ()
+    free = "one free variable" if rank == 1 else f"{rank} free variables"
+    said = (
+        f"Joint variables are constrained: rank {rank} of {n}, so that the torques are those of "
+        f"{free}."
+    )
+    if rank < columns:
+        said += (
+            f" The {columns} columns of the constraint depend on each other; if no joint is meant "
+            "to follow others, the matrix is wrong."
+        )
+    return (said,)
+
+
+def _transmission_notes(
+    model: RobotModel, constraint: ArrayLike | Transmission | None
+) -> tuple[str, ...]:
+    if model.transmission is None or model.transmission.is_invertible or constraint is not None:
+        return ()
+    rank = model.transmission.rank
+    return (
+        f"The transmission of {model.name} is singular, rank {rank} of {model.n}: its joint "
+        "variables are constrained, which these parameters of independent joints leave out; with "
+        "constraint=model.transmission they are those of the free variables.",
+    )
+
+
+def _bound(model: RobotModel, constraint: ArrayLike | Transmission) -> tuple[Array, int]:
+    """Independent columns of a constraint, and how many it has that are not zero."""
     matrix = constraint.matrix if isinstance(constraint, Transmission) else constraint
     G = as_core(matrix, (), "constraint")
     if G.ndim != 2 or G.shape[0] != model.n or G.shape[1] == 0:
@@ -116,4 +207,10 @@ def _bound(model: RobotModel, constraint: ArrayLike | Transmission) -> Array:
         )
     if not np.any(G):
         raise InvalidValueError("constraint: all zero, so nothing moves.")
-    return G
+    kept = column_basis(G, scale=_inverse_lengths(G)).kept
+    return np.ascontiguousarray(G[:, kept]), int(G.any(axis=0).sum())
+
+
+def _inverse_lengths(G: Array) -> Array:
+    lengths = np.linalg.norm(G, axis=0)
+    return 1.0 / np.where(lengths > 0.0, lengths, 1.0)

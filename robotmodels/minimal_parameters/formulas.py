@@ -9,6 +9,8 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
+from math import pi
 from typing import Any
 
 import numpy as np
@@ -17,13 +19,15 @@ from numpy.typing import NDArray
 from .._arrays import Array
 from ..geometry import PRISMATIC, REVOLUTE
 from ..model import RobotModel
-from ..regressors import parameter_names
-from ..symbolic_dgm._angles import ROUNDING, exact_turns
-from .restraint import Turning, restraints
-from .rules import RowConstants, loads_of, regrouped
+from ..symbolic_dgm._angles import exact_turns
+from .restraint import EXACT, Turning, reach, restraints
+from .rules import RowConstants, loads_of, regrouped, rows_of_numbers
 
 _LONGEST = 40
 """Operations in a coefficient beyond which its number tells more."""
+
+_SHOWN = 1e-6
+"""Relative difference of a coefficient from its rule that the printed digits do not show."""
 
 _GREEK = {"G": r"\gamma", "B": r"\beta", "A": r"\alpha", "TH": r"\theta"}
 
@@ -119,7 +123,12 @@ def numeric_formulas(
 
 
 def symbolic_formulas(
-    model: RobotModel, drive: bool, kept: NDArray[np.int64], matrix: Array
+    model: RobotModel,
+    drive: bool,
+    kept: NDArray[np.int64],
+    matrix: Array,
+    names: Sequence[str],
+    tolerance: float = EXACT,
 ) -> tuple[Formula, ...]:
     """Formulas whose coefficients are made of the symbols of the table.
 
@@ -133,12 +142,16 @@ def symbolic_formulas(
         Numbers of the kept ones.
     matrix : ndarray, shape (b, p)
         The same combinations in numbers: they say which terms there are.
+    names : sequence of str, length p
+        Standard parameters.
+    tolerance : float
+        Sine of an angle that counts as none.
 
     Returns
     -------
     tuple of Formula
-        One per kept parameter. Coefficients of coupled motors, which no rule gives, are numbers,
-        and so are formulas longer than a line or two (oblique axes one behind the other).
+        One per kept parameter. Coefficients that no rule gives are numbers (coupled motors, axes
+        that are only nearly parallel), and so are formulas longer than a line or two (oblique axes one behind the other).
 
     Examples
     --------
@@ -150,17 +163,19 @@ def symbolic_formulas(
     """
     import sympy
 
-    rows, directions, _ = _rows_of_symbols(model)
-    found = regrouped(model, rows, directions, drive)
-    names = parameter_names(model, drive)
+    rows, directions, _ = _rows_of_symbols(model, tolerance)
+    found = regrouped(model, rows, directions, drive, tolerance)
+    ruled = regrouped(model, *rows_of_numbers(model, tolerance), drive, tolerance)
     printed: dict[Any, tuple[str, str]] = {}
     out = []
     for number, row in zip(kept, matrix, strict=True):
-        symbols = found.get(int(number), {})
+        symbols, rule = found.get(int(number), {}), ruled.get(int(number), {})
         groups: dict[tuple[float, str, str], list[int]] = {}
         for k in np.flatnonzero(row):
             value = float(row[k])
-            formula = sympy.sympify(symbols.get(int(k), float(f"{value:.6g}")))
+            formula = sympy.sympify(symbols.get(int(k), 0))
+            if formula == 0 or abs(rule.get(int(k), 0) - value) > _SHOWN * abs(value):
+                formula = sympy.sympify(float(f"{value:.6g}"))
             if sympy.count_ops(formula) > _LONGEST:
                 formula = sympy.Float(f"{value:.6g}", 6)
             if formula not in printed:
@@ -195,13 +210,15 @@ class Constant:
     unit: str
 
 
-def constants_of(model: RobotModel) -> tuple[Constant, ...]:
+def constants_of(model: RobotModel, tolerance: float = EXACT) -> tuple[Constant, ...]:
     """The symbols of a robot's formulas.
 
     Parameters
     ----------
     model : RobotModel
         The robot.
+    tolerance : float
+        Angle that counts as none.
 
     Returns
     -------
@@ -214,21 +231,21 @@ def constants_of(model: RobotModel) -> tuple[Constant, ...]:
     >>> constants_of(load("rx90"))[0]
     Constant(text='D3', latex='D_{3}', value=0.45, unit='m')
     """
-    return tuple(_rows_of_symbols(model)[2])
+    return tuple(_rows_of_symbols(model, tolerance)[2])
 
 
 def _rows_of_symbols(
-    model: RobotModel,
+    model: RobotModel, tolerance: float
 ) -> tuple[list[RowConstants], list[Array], list[Constant]]:
     """What `regrouped` takes, as formulas; motion of the joint itself is left out."""
     import sympy
 
-    table, found = model.table, restraints(model)
-    symbols = _Symbols()
+    table, found = model.table, restraints(model, tolerance)
+    symbols = _Symbols(tolerance, tolerance * reach(model))
     rows: list[RowConstants] = []
     directions: list[Array] = []
     weight = float(np.linalg.norm(model.gravity))
-    for j, load in enumerate(loads_of(model), start=1):
+    for j, load in enumerate(loads_of(model, tolerance), start=1):
         own, sigma = found[j], table.sigma[j - 1]
         T = symbols.turned(2, table.gamma, "G", j) @ symbols.shifted(2, table.b, "BL", j)
         T = T @ symbols.turned(1, table.beta, "B", j) @ symbols.turned(0, table.alpha, "A", j)
@@ -238,7 +255,7 @@ def _rows_of_symbols(
         if sigma != PRISMATIC:
             T = T @ symbols.shifted(2, table.r, "RL", j)
         pull: Any = load
-        if sigma == PRISMATIC and load and abs(abs(load) - weight) <= 1e-12 * weight:
+        if sigma == PRISMATIC and load and abs(abs(load) - weight) <= tolerance * weight:
             pull = symbols.gravity(weight) * (1 if load > 0 else -1)
         rows.append(RowConstants(T[:3, :3], T[:3, 3], pull))
         if sigma == REVOLUTE or own.turning is not Turning.ONE_DIRECTION:
@@ -252,7 +269,8 @@ def _rows_of_symbols(
 class _Symbols:
     """Elementary motions as matrices of symbols; values that are exact stay numbers."""
 
-    def __init__(self) -> None:
+    def __init__(self, angle: float, length: float) -> None:
+        self.angle, self.length = angle, length
         self.constants: list[Constant] = []
 
     def turned(self, axis: int, column: Array, letter: str, j: int) -> Array:
@@ -260,7 +278,7 @@ class _Symbols:
 
         value = float(column[j - 1])
         T = np.array(sympy.eye(4), dtype=object)
-        turns = exact_turns(value)
+        turns = _turns(value, self.angle)
         if turns is None:
             angle: Any = self._symbol(letter, _GREEK[letter], j, value, "rad")
         else:
@@ -275,7 +293,7 @@ class _Symbols:
 
         T = np.array(sympy.eye(4), dtype=object)
         value = float(column[j - 1])
-        if abs(value) > ROUNDING:
+        if abs(value) > self.length:
             T[axis, 3] = self._symbol(letter, letter, j, value, "m")
         return T
 
@@ -292,6 +310,12 @@ class _Symbols:
         symbol = sympy.Symbol(f"{letter}{j}")
         self.constants.append(Constant(str(symbol), f"{latex}_{{{j}}}", value, unit))
         return symbol
+
+
+def _turns(angle: float, tolerance: float) -> Fraction | None:
+    """An angle as a fraction of pi if it is one to rounding, or a right one to the tolerance."""
+    quarter = round(angle / (pi / 2))
+    return exact_turns(quarter * pi / 2 if abs(angle - quarter * pi / 2) <= tolerance else angle)
 
 
 def _formula(

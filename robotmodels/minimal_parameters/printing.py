@@ -105,7 +105,7 @@ def _used(base: BaseParameters) -> Sequence[Constant]:
         for term in formula.terms
         for word in re.findall(r"[A-Z]+\d*", term.text)
     }
-    return [constant for constant in constants_of(base.model) if constant.text in words]
+    return [constant for constant in constants_of(base.model, base.tolerance) if constant.text in words]
 
 
 def _sum_text(formula: Formula) -> str:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import Enum
+from math import sqrt
 
 import numpy as np
 
@@ -17,9 +18,9 @@ from .._arrays import Array
 from ..geometry import FIXED, REVOLUTE
 from ..model import RobotModel
 
-PARALLEL = 1e-8
-"""Sine of an angle, cosine of one, or length in metres below which two axes are one direction,
-perpendicular, or through one point."""
+EXACT = 1e-11
+"""Sine of an angle, cosine of one, or length relative to the robot's, below which two axes are one
+direction, perpendicular, or through one point."""
 
 
 class Turning(Enum):
@@ -59,25 +60,27 @@ class Restraint:
     slides: tuple[Array, ...]
     centre: Array | None
 
-    def slides_along(self, direction: Array) -> bool:
+    def slides_along(self, direction: Array, tolerance: float) -> bool:
         """Whether a prismatic joint before it moves it along a direction, in part or wholly."""
-        return any(abs(slide @ direction) > PARALLEL for slide in self.slides)
+        return any(abs(slide @ direction) > tolerance for slide in self.slides)
 
-    def slides_across(self, direction: Array) -> bool:
+    def slides_across(self, direction: Array, tolerance: float) -> bool:
         """Whether a prismatic joint before it moves it in another direction."""
-        return any(not parallel(slide, direction) for slide in self.slides)
+        return any(not parallel(slide, direction, tolerance) for slide in self.slides)
 
 
 _STANDING = Restraint(Turning.NONE, np.zeros(3), (), np.zeros(3))
 
 
-def parallel(a: Array, b: Array) -> bool:
+def parallel(a: Array, b: Array, tolerance: float = EXACT) -> bool:
     """Whether two unit vectors have one direction, either way round.
 
     Parameters
     ----------
     a, b : ndarray, shape (3,)
         Unit vectors.
+    tolerance : float
+        Sine of an angle that counts as none.
 
     Returns
     -------
@@ -89,16 +92,18 @@ def parallel(a: Array, b: Array) -> bool:
     >>> parallel(np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, -1.0]))
     True
     """
-    return float(np.linalg.norm(np.cross(a, b))) <= PARALLEL
+    return _length_of_cross(a, b) <= tolerance
 
 
-def restraints(model: RobotModel) -> tuple[Restraint, ...]:
+def restraints(model: RobotModel, tolerance: float = EXACT) -> tuple[Restraint, ...]:
     """The restraint of every link, R_0 first.
 
     Parameters
     ----------
     model : RobotModel
         The robot, f frames.
+    tolerance : float
+        Sine of an angle, and length relative to that of the robot, that count as none.
 
     Returns
     -------
@@ -112,11 +117,12 @@ def restraints(model: RobotModel) -> tuple[Restraint, ...]:
     'ONE_DIRECTION'
     """
     chain = model.chain
+    within = _Tolerance(tolerance, tolerance * reach(model))
     found = [_STANDING]
     for k in range(model.f):
         before = found[int(chain.antecedent[k])]
         R, P = chain.rotation[k], chain.position[k]
-        after = _with_joint(before, int(chain.sigma[k]), R[:, 2], P)
+        after = _with_joint(before, int(chain.sigma[k]), R[:, 2], P, within)
         found.append(
             Restraint(
                 after.turning,
@@ -128,40 +134,77 @@ def restraints(model: RobotModel) -> tuple[Restraint, ...]:
     return tuple(found)
 
 
-def _with_joint(before: Restraint, sigma: int, z: Array, P: Array) -> Restraint:
+@dataclass(frozen=True, slots=True)
+class _Tolerance:
+    """What counts as nothing: of angles, and of lengths in metres."""
+
+    angle: float
+    length: float
+
+
+def reach(model: RobotModel) -> float:
+    """Reach of the table, metres; 1 where all lengths are zero.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot.
+
+    Returns
+    -------
+    float
+        Sum of the distances between one origin and the next.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> reach(load("rx90"))
+    0.9
+    """
+    table = model.table
+    lengths = float(np.sqrt(table.d**2 + table.r**2 + table.b**2).sum())
+    return lengths if lengths > 0 else 1.0
+
+
+def _with_joint(
+    before: Restraint, sigma: int, z: Array, P: Array, within: _Tolerance
+) -> Restraint:
     """The restraint behind a joint with axis z through P, still in the axes of the antecedent."""
     if sigma == FIXED:
         return before
+    along = before.turning is Turning.ONE_DIRECTION and parallel(
+        z, before.direction, within.angle
+    )
     if sigma != REVOLUTE:
         slides = (*before.slides, z) if before.turning is not Turning.FREE else ()
-        return replace(before, slides=slides, centre=_after_sliding(before, z))
+        # a slide along the only axis moves a point of it along it, and no other in the plane
+        keeps = before.turning is Turning.NONE or along
+        return replace(before, slides=slides, centre=before.centre if keeps else None)
     if before.turning is Turning.NONE:
         return Restraint(Turning.ONE_DIRECTION, z, before.slides, P)
-    centre = _common_point(before, z, P)
-    if before.turning is Turning.ONE_DIRECTION and parallel(z, before.direction):
+    centre = _common_point(before, z, P, within)
+    if along:
         return replace(before, centre=centre)
     return Restraint(Turning.FREE, np.zeros(3), (), None if before.slides else centre)
 
 
-def _after_sliding(before: Restraint, z: Array) -> Array | None:
-    """A slide along the only axis moves a point of the axis along it, and no other in the plane."""
-    if before.turning is Turning.NONE:
-        return before.centre
-    keeps = before.turning is Turning.ONE_DIRECTION and parallel(z, before.direction)
-    return before.centre if keeps else None
-
-
-def _common_point(before: Restraint, z: Array, P: Array) -> Array | None:
+def _common_point(before: Restraint, z: Array, P: Array, within: _Tolerance) -> Array | None:
     """A point on the axis (z, P) and on the axes before it; any point of a common axis."""
     if before.centre is None:
         return None
     way = before.centre - P
     if before.turning is Turning.FREE:
-        return before.centre if float(np.linalg.norm(np.cross(z, way))) <= PARALLEL else None
+        return before.centre if _length_of_cross(z, way) <= within.length else None
     e = before.direction
-    if parallel(z, e):
-        return P if float(np.linalg.norm(np.cross(z, way))) <= PARALLEL else None
+    if parallel(z, e, within.angle):
+        return P if _length_of_cross(z, way) <= within.length else None
     # both axes pass through P + s z = centre + t e
     s, t = np.linalg.lstsq(np.stack((z, -e), axis=1), way, rcond=None)[0]
     point = P + s * z
-    return point if float(np.linalg.norm(point - before.centre - t * e)) <= PARALLEL else None
+    return point if float(np.linalg.norm(point - before.centre - t * e)) <= within.length else None
+
+
+def _length_of_cross(a: Array, b: Array) -> float:
+    x, y, z = a.tolist()
+    u, v, w = b.tolist()
+    return sqrt((y * w - z * v) ** 2 + (z * u - x * w) ** 2 + (x * v - y * u) ** 2)

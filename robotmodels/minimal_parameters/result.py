@@ -13,9 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, as_floats, read_only
 from ..errors import InvalidValueError, ShapeError
+from ..estimation.columns import NOTHING
+from ..friction import Friction
 from ..latex_text import markdown
 from ..model import RobotModel, check_model
 from ..regressors import parameter_names, parameter_vector
+from .belonging import differences
 from .formulas import Formula, numeric_formulas, symbolic_formulas
 from .printing import table_latex, table_text
 
@@ -52,13 +55,27 @@ class BaseParameters:
     method : BaseMethod
         How they were found.
     gap : (float, float), optional
-        Of the numeric method: sine of the smallest angle of a kept column to those kept before it,
-        and of the largest of a dependent one. Far apart, the rank is beyond doubt.
+        Of the numeric method: the least that a kept column has beyond those kept before it, and the
+        most that one has which is not kept; as part of the longest column of its kind (inertias,
+        first moments, masses, rotors, ...). So a column that nearly depends on others is told as
+        well as one that is nearly empty. Far apart, the rank is beyond doubt.
+    friction : Friction, optional
+        A linear friction model whose parameters come after those of the drives.
+    tolerance : float
+        Part of the largest torque that counts as nothing.
+    notes : tuple of str
+        What is to be known of the result, in sentences: axes that are aligned only nearly, joints
+        that are constrained.
 
     Raises
     ------
     ShapeError
         Fields that do not fit each other.
+
+    Notes
+    -----
+    Two results are compared in the torque, ``reduce(W) @ matrix``, and not by their matrices: where
+    a kept column hardly acts, its row of the matrix may be moved by much and no torque shows it.
 
     Examples
     --------
@@ -77,6 +94,9 @@ class BaseParameters:
     matrix: Array
     method: BaseMethod
     gap: tuple[float, float] | None = None
+    friction: Friction | None = None
+    tolerance: float = NOTHING
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "kept", read_only(self.kept, np.int64))
@@ -91,7 +111,7 @@ class BaseParameters:
     @cached_property
     def parameter_names(self) -> tuple[str, ...]:
         """The p standard parameters."""
-        return parameter_names(self.model, self.drive)
+        return parameter_names(self.model, self.drive, self.friction)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -190,7 +210,7 @@ class BaseParameters:
         Raises
         ------
         InvalidValueError
-            A model with other standard parameters.
+            A robot with other base parameters: another structure, geometry, gravity or coupling.
 
         Examples
         --------
@@ -200,13 +220,58 @@ class BaseParameters:
         >>> base_parameters(arm).values(arm).shape
         (11,)
         """
+        self.check(model)
+        return self.matrix @ parameter_vector(model, self.drive, self.friction)
+
+    def belongs_to(self, model: RobotModel) -> bool:
+        """Whether a robot has these base parameters, with values of its own.
+
+        Parameters
+        ----------
+        model : RobotModel
+            A robot; its inertial and drive parameters, zeros of the joints, tool and names do not
+            matter.
+
+        Returns
+        -------
+        bool
+            Same frames and constants of the table, same gravity in the base, same coupled motors.
+
+        Examples
+        --------
+        >>> from robotmodels.robots import load
+        >>> from robotmodels.minimal_parameters import base_parameters
+        >>> base_parameters(load("rx90")).belongs_to(load("puma560"))
+        False
+        """
         check_model(model)
-        if parameter_names(model, self.drive) != self.parameter_names:
+        return not differences(self.model, model, self.drive)
+
+    def check(self, model: RobotModel) -> None:
+        """Refuse a robot that has other base parameters.
+
+        Parameters
+        ----------
+        model : RobotModel
+            A robot.
+
+        Raises
+        ------
+        InvalidValueError
+            It does not have these base parameters, see `belongs_to`.
+
+        Examples
+        --------
+        >>> from robotmodels.robots import load
+        >>> from robotmodels.minimal_parameters import base_parameters
+        >>> base_parameters(load("rx90")).check(load("rx90"))
+        """
+        check_model(model)
+        if found := differences(self.model, model, self.drive):
             raise InvalidValueError(
-                f"model: {model.name!r} has other standard parameters than {self.model.name!r}, "
-                "whose base parameters these are; ask for those of the model itself."
+                f"model: these are base parameters of {self.model.name!r}, and {model.name!r} has "
+                f"others: {'; '.join(found)}. Ask for those of the model itself."
             )
-        return self.matrix @ parameter_vector(model, self.drive)
 
     @cached_property
     def formulas(self) -> tuple[Formula, ...]:
@@ -215,7 +280,9 @@ class BaseParameters:
         Of the symbolic method with the coefficients in symbols of the table, else in numbers.
         """
         if self.method is BaseMethod.SYMBOLIC:
-            return symbolic_formulas(self.model, self.drive, self.kept, self.matrix)
+            return symbolic_formulas(
+                self.model, self.drive, self.kept, self.matrix, self.parameter_names, self.tolerance
+            )
         return self.numbers
 
     @cached_property
@@ -246,4 +313,7 @@ class BaseParameters:
         )
 
     def __reduce__(self) -> tuple[object, ...]:  # rebuilt, so that its arrays are read-only again
-        return type(self), (self.model, self.drive, self.kept, self.matrix, self.method, self.gap)
+        return type(self), (
+            self.model, self.drive, self.kept, self.matrix, self.method, self.gap, self.friction,
+            self.tolerance, self.notes,
+        )  # fmt: skip

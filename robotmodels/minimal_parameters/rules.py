@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 from .._arrays import Array
 from ..geometry import FIXED, REVOLUTE
 from ..model import RobotModel
-from .restraint import PARALLEL, Restraint, Turning, parallel, restraints
+from .restraint import EXACT, Restraint, Turning, parallel, restraints
 
 Combination = dict[int, Any]
 """Coefficients of standard parameters by their number; numbers or formulas."""
@@ -112,7 +112,11 @@ class _Regrouping:
 
 
 def regrouped(
-    model: RobotModel, rows: Sequence[RowConstants], directions: Sequence[Array], drive: bool
+    model: RobotModel,
+    rows: Sequence[RowConstants],
+    directions: Sequence[Array],
+    drive: bool,
+    tolerance: float = EXACT,
 ) -> dict[int, Combination]:
     """Apply the rules to all joints, from the last to the first.
 
@@ -126,6 +130,8 @@ def regrouped(
         The direction of `Restraint` of each frame 1..f, as numbers or formulas.
     drive : bool
         Whether ``Ia``, ``Fv``, ``Fc`` and ``offset`` are among the parameters.
+    tolerance : float
+        Sine of an angle, and length relative to that of the robot, that count as none.
 
     Returns
     -------
@@ -147,12 +153,12 @@ def regrouped(
     """
     f, n = model.f, model.n
     work = _Regrouping(model, 10 * f + (4 * n if drive else 0))
-    found = restraints(model)
+    found = restraints(model, tolerance)
     gravity = np.asarray(model.gravity) @ model.chain.base_rotation
     weight = float(np.linalg.norm(gravity))
     down = gravity / weight if weight > 0 else np.zeros(3)
-    vertical = _directions_along(model, found, down)
-    loads = loads_of(model)
+    vertical = _directions_along(model, found, down, tolerance)
+    loads = loads_of(model, tolerance)
     for j in range(f, 0, -1):
         joint = int(model.chain.joint[j - 1])
         sigma = int(model.chain.sigma[j - 1])
@@ -160,25 +166,29 @@ def regrouped(
         row, e = rows[j - 1], directions[j - 1]
         unloaded = weight == 0.0 or vertical[j]
         if drive and sigma != FIXED:
-            _regroup_drive(work, model, j, joint, before, row, loads[j - 1] != 0.0)
+            _regroup_drive(work, model, j, joint, before, row, loads[j - 1] != 0.0, tolerance)
         if sigma == FIXED:
             _regroup_body(work, j, row)
         elif own.turning is Turning.NONE:
             _drop(work, j, range(_M))
         elif sigma == REVOLUTE:
-            _regroup_revolute(work, j, own, row, unloaded, weight == 0.0)
+            _regroup_revolute(work, j, own, row, unloaded, weight == 0.0, tolerance)
         else:
-            _regroup_prismatic(work, j, own, row, e)
+            _regroup_prismatic(work, j, own, row, e, tolerance)
     return work.stays
 
 
-def rows_of_numbers(model: RobotModel) -> tuple[list[RowConstants], list[Array]]:
+def rows_of_numbers(
+    model: RobotModel, tolerance: float = EXACT
+) -> tuple[list[RowConstants], list[Array]]:
     """What `regrouped` takes, as numbers of the table.
 
     Parameters
     ----------
     model : RobotModel
         The robot, f frames.
+    tolerance : float
+        As for `regrouped`.
 
     Returns
     -------
@@ -197,18 +207,22 @@ def rows_of_numbers(model: RobotModel) -> tuple[list[RowConstants], list[Array]]
     chain = model.chain
     rows = [
         RowConstants(R, P, load)
-        for R, P, load in zip(chain.rotation, chain.position, loads_of(model), strict=True)
+        for R, P, load in zip(
+            chain.rotation, chain.position, loads_of(model, tolerance), strict=True
+        )
     ]
-    return rows, [restraint.direction for restraint in restraints(model)[1:]]
+    return rows, [restraint.direction for restraint in restraints(model, tolerance)[1:]]
 
 
-def loads_of(model: RobotModel) -> list[float]:
+def loads_of(model: RobotModel, tolerance: float = EXACT) -> list[float]:
     """Gravity along the axis of each frame with every joint at zero; none is exactly 0.
 
     Parameters
     ----------
     model : RobotModel
         The robot, f frames.
+    tolerance : float
+        As for `regrouped`.
 
     Returns
     -------
@@ -222,20 +236,21 @@ def loads_of(model: RobotModel) -> list[float]:
     9.81
     """
     gravity = np.asarray(model.gravity) @ model.chain.base_rotation
-    slight = PARALLEL * max(1.0, float(np.linalg.norm(gravity)))
+    slight = tolerance * max(1.0, float(np.linalg.norm(gravity)))
     loads = [float(gravity @ _in_base(model, j)[:, 2]) for j in range(1, model.f + 1)]
     return [0.0 if abs(load) <= slight else load for load in loads]
 
 
 def _regroup_revolute(
-    work: _Regrouping, j: int, own: Restraint, row: RowConstants, unloaded: bool, weightless: bool
-) -> None:
+    work: _Regrouping, j: int, own: Restraint, row: RowConstants, unloaded: bool, weightless: bool,
+    tolerance: float,
+) -> None:  # fmt: skip
     first, a = 10 * (j - 1), work.antecedent[j - 1]
     z, P = row.rotation[:, 2], row.position
     work.add_mass(a, P, work.take(first + _M))
     if own.turning is Turning.ONE_DIRECTION:
         _drop(work, j, (*range(_ZZ), _MZ))
-        across = own.slides_across(own.direction)
+        across = own.slides_across(own.direction, tolerance)
         if own.centre is not None and unloaded and not across:
             _drop(work, j, (_MX, _MY))
         return
@@ -250,7 +265,7 @@ def _regroup_revolute(
 
 
 def _regroup_prismatic(
-    work: _Regrouping, j: int, own: Restraint, row: RowConstants, e: Array
+    work: _Regrouping, j: int, own: Restraint, row: RowConstants, e: Array, tolerance: float
 ) -> None:
     first, a, R = 10 * (j - 1), work.antecedent[j - 1], row.rotation
     for place in range(6):
@@ -258,12 +273,12 @@ def _regroup_prismatic(
         work.add_tensor(a, tensor, work.take(first + place))
     if own.turning is not Turning.ONE_DIRECTION:
         return
-    last = max(i for i in range(3) if abs(own.direction[i]) > PARALLEL)
+    last = max(i for i in range(3) if abs(own.direction[i]) > tolerance)
     along = work.take(first + _MX + last)
     for i in range(last):
-        if abs(own.direction[i]) > PARALLEL:
+        if abs(own.direction[i]) > tolerance:
             work.add(first + _MX + i, -e[i] / e[last], along)
-    if parallel(own.direction, np.array([0.0, 0.0, 1.0])):
+    if parallel(own.direction, np.array([0.0, 0.0, 1.0]), tolerance):
         for i in range(2):
             work.add_moment(a, R[:, i], row.position, work.take(first + _MX + i))
 
@@ -279,20 +294,20 @@ def _regroup_body(work: _Regrouping, j: int, row: RowConstants) -> None:
 
 def _regroup_drive(
     work: _Regrouping, model: RobotModel, j: int, joint: int, before: Restraint, row: RowConstants,
-    loaded: bool,
+    loaded: bool, tolerance: float,
 ) -> None:  # fmt: skip
     first, Ia = 10 * (j - 1), 10 * model.f + joint
     z = model.chain.rotation[j - 1][:, 2]
     if model.chain.sigma[j - 1] == REVOLUTE:
         is_first = before.turning is Turning.NONE
-        crosses = before.turning is Turning.ONE_DIRECTION and abs(z @ before.direction) <= PARALLEL
+        crosses = before.turning is Turning.ONE_DIRECTION and abs(z @ before.direction) <= tolerance
         if is_first or crosses:
             work.add(first + _ZZ, 1, work.take(Ia))
         return
     still = before.turning is Turning.NONE or (
-        before.turning is Turning.ONE_DIRECTION and parallel(z, before.direction)
+        before.turning is Turning.ONE_DIRECTION and parallel(z, before.direction, tolerance)
     )
-    if not still or before.slides_along(z):
+    if not still or before.slides_along(z, tolerance):
         return
     # M_j less the same mass in frame a acts on joint j alone: as Ia_j and, loaded, as a constant
     if loaded:
@@ -305,11 +320,13 @@ def _regroup_drive(
     work.add_mass(a, row.position, {k: -factor * c for k, c in moved.items()})
 
 
-def _directions_along(model: RobotModel, found: tuple[Restraint, ...], down: Array) -> list[bool]:
+def _directions_along(
+    model: RobotModel, found: tuple[Restraint, ...], down: Array, tolerance: float
+) -> list[bool]:
     """Of each frame, whether it turns about one direction and gravity acts along it."""
     return [
         restraint.turning is Turning.ONE_DIRECTION
-        and parallel(_in_base(model, j) @ restraint.direction, down)
+        and parallel(_in_base(model, j) @ restraint.direction, down, tolerance)
         for j, restraint in enumerate(found)
     ]
 

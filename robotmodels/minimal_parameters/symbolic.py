@@ -2,19 +2,39 @@
 
 from __future__ import annotations
 
+from math import sqrt
+
 import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
+from ..estimation import ColumnBasis, column_basis
+from ..estimation.columns import NOTHING
+from ..friction import Friction, check_linear
+from ..geometry import PRISMATIC
 from ..model import RobotModel
 from ..regressors import parameter_names
-from .numeric import base_columns
+from .numeric import base_columns, natural_sizes, torque_factors
+from .restraint import reach
 from .result import BaseMethod, BaseParameters
 from .rules import regrouped, rows_of_numbers
 
+_FINEST, _COARSEST = 1e-13, 1e-2
+"""Between these, sines and lengths relative to the robot's are neither nothing nor clear."""
 
-def base_by_rules(model: RobotModel, drive: bool) -> BaseParameters:
+
+def base_by_rules(
+    model: RobotModel,
+    drive: bool,
+    tolerance: float = NOTHING,
+    friction: Friction | None = None,
+    notes: tuple[str, ...] = (),
+) -> BaseParameters:
     """Base parameters by the rules of `robotmodels.minimal_parameters.rules`.
+
+    Rules know axes that are parallel and axes that are not. Where that depends on what counts as
+    nothing (angles of a table that was written with few digits), they hold if the torques say so;
+    otherwise the combinations are those of the torques.
 
     Parameters
     ----------
@@ -23,6 +43,12 @@ def base_by_rules(model: RobotModel, drive: bool) -> BaseParameters:
     drive : bool
         Whether drive parameters are among the standard ones. Those of coupled motors follow no
         rule: they are looked at in numbers.
+    tolerance : float
+        Part of the largest torque, and sine of an angle, that count as nothing.
+    friction : Friction, optional
+        A linear friction model; its columns are compared with those of the same joint's drive.
+    notes : tuple of str
+        Sentences for the result.
 
     Returns
     -------
@@ -39,7 +65,23 @@ def base_by_rules(model: RobotModel, drive: bool) -> BaseParameters:
     >>> len(base_by_rules(load("rx90"), drive=True))
     58
     """
-    found = regrouped(model, *rows_of_numbers(model), drive)
+    kept, matrix = _by_rules(model, drive, tolerance, friction, _FINEST)
+    if not _is_clear(model, drive, tolerance, kept):
+        ruled, ruled_matrix = _by_rules(model, drive, tolerance, friction, tolerance)
+        basis = base_columns(model, drive, tolerance=tolerance, friction=friction)
+        kept, matrix = basis.kept, np.asarray(basis.coefficients)
+        if _holds(model, drive, tolerance, friction, basis, ruled, ruled_matrix):
+            kept, matrix = ruled, ruled_matrix
+    return BaseParameters(
+        model, drive, kept, matrix, BaseMethod.SYMBOLIC, None, friction, tolerance, notes
+    )
+
+
+def _by_rules(
+    model: RobotModel, drive: bool, tolerance: float, friction: Friction | None, exact: float
+) -> tuple[NDArray[np.int64], Array]:
+    """Kept parameters and their combinations, with angles up to ``exact`` taken as none."""
+    found = regrouped(model, *rows_of_numbers(model, exact), drive, exact)
     p = len(parameter_names(model, drive))
     ruled = 10 * model.f + (4 * model.n if drive else 0)
     kept = np.array(sorted(found), dtype=np.int64)
@@ -47,19 +89,103 @@ def base_by_rules(model: RobotModel, drive: bool) -> BaseParameters:
     for row, number in zip(matrix, kept, strict=True):
         for k, coefficient in found[int(number)].items():
             row[k] = coefficient
+    sizes, _ = natural_sizes(model, drive)
+    matrix[abs(matrix * sizes) <= tolerance * sizes[kept][:, None]] = 0.0
     if p > ruled:
-        kept, matrix = _with_couplings(model, kept, matrix, ruled)
-    return BaseParameters(model, drive, kept, matrix, BaseMethod.SYMBOLIC)
+        kept, matrix = _with_couplings(model, kept, matrix, ruled, tolerance)
+    if friction is not None:
+        kept, matrix = _with_friction(model, drive, friction, kept, matrix, tolerance)
+    return kept, matrix
+
+
+def _is_clear(
+    model: RobotModel, drive: bool, tolerance: float, kept: NDArray[np.int64]
+) -> bool:
+    """Whether the same parameters are kept wherever a sine or a length begins to count."""
+    if tolerance > NOTHING:
+        return False
+    table = model.table
+    lengths = np.abs(np.concatenate((table.d, table.r, table.b))) / reach(model)
+    if ((lengths > _FINEST) & (lengths < _COARSEST)).any():
+        return False
+    coarse = regrouped(model, *rows_of_numbers(model, _COARSEST), drive, _COARSEST)
+    ruled = 10 * model.f + (4 * model.n if drive else 0)
+    return sorted(coarse) == kept[kept < ruled].tolist()
+
+
+def _holds(
+    model: RobotModel, drive: bool, tolerance: float, friction: Friction | None,
+    basis: ColumnBasis, kept: NDArray[np.int64], matrix: Array,
+) -> bool:  # fmt: skip
+    """Whether the combinations of the rules give the torques, from what the torques show."""
+    if not np.array_equal(kept, basis.kept):
+        return False
+    if (matrix.any(axis=0) != basis.coefficients.any(axis=0)).any():
+        return False
+    W = np.vstack(torque_factors(model, drive, friction=friction))
+    W = W * natural_sizes(model, drive, friction)[0]
+    sizes = natural_sizes(model, drive, friction)[0]
+    missed = W - W[:, kept] @ (matrix * sizes / sizes[kept][:, None])
+    longest = np.sqrt((W * W).sum(axis=0)).max(initial=0.0)
+    return bool(np.sqrt((missed * missed).sum(axis=0)).max(initial=0.0) <= tolerance * longest)
 
 
 def _with_couplings(
-    model: RobotModel, kept: NDArray[np.int64], matrix: Array, ruled: int
+    model: RobotModel, kept: NDArray[np.int64], matrix: Array, ruled: int, tolerance: float
 ) -> tuple[NDArray[np.int64], Array]:
     """Add the columns of coupled motors: kept, or combinations of the others."""
-    basis = base_columns(model, drive=True)
+    basis = base_columns(model, drive=True, tolerance=tolerance)
     own = basis.kept[basis.kept >= ruled]
     numbers = np.concatenate((kept, own))
     whole = np.vstack((matrix, np.zeros((len(own), matrix.shape[1]))))
-    rows = np.searchsorted(basis.kept, numbers)
-    whole[:, ruled:] = basis.coefficients[rows][:, ruled:]
+    if np.array_equal(numbers, basis.kept):
+        whole[:, ruled:] = basis.coefficients[:, ruled:]
     return numbers, whole
+
+
+def _with_friction(
+    model: RobotModel, drive: bool, friction: Friction, kept: NDArray[np.int64], matrix: Array,
+    tolerance: float,
+) -> tuple[NDArray[np.int64], Array]:  # fmt: skip
+    """Add the columns of a friction model: functions of one velocity, as Fv, Fc and offset are."""
+    linear = check_linear(friction)
+    n, p, added = model.n, matrix.shape[1], len(linear.kinds)
+    v = _velocities(model)
+    columns = [linear.basis(v)[:, k] for k in range(added)]
+    numbers = [p + n * k for k in range(added)]
+    if drive:
+        columns = [v, np.sign(v), np.ones_like(v), *columns]
+        numbers = [10 * model.f + n * k for k in (1, 2, 3)] + numbers
+    sizes = natural_sizes(model, drive, friction)[0]
+    whole = np.hstack((matrix, np.zeros((len(matrix), n * added))))
+    rows: list[tuple[int, Array]] = []
+    for i in range(n):
+        own = np.array(numbers) + i
+        basis = column_basis(
+            np.stack([c[:, i] for c in columns], axis=1), None, sizes[own], tolerance
+        )
+        new = {int(own[k]): np.zeros(p + n * added) for k in basis.kept if own[k] >= p}
+        for k, column in enumerate(own):
+            if column < p:
+                continue
+            for j, coefficient in zip(own[basis.kept], basis.coefficients[:, k], strict=True):
+                if j < p:  # Fv, Fc or offset, which may stand in another parameter
+                    whole[:, column] += coefficient * matrix[:, j]
+                else:
+                    new[int(j)][column] = coefficient
+        rows += new.items()
+    rows.sort(key=lambda row: row[0])
+    kept = np.concatenate((kept, np.array([number for number, _ in rows], dtype=np.int64)))
+    return kept, np.vstack((whole, *[row for _, row in rows]))
+
+
+def _velocities(model: RobotModel, samples: int = 300) -> Array:
+    """Velocities of both signs, over all decades in which friction may change."""
+    rng = np.random.default_rng(0)
+    size = reach(model)
+    slides = model.table.sigma[model.table.joint_rows] == PRISMATIC
+    most = 2.0 * sqrt(9.81 / size) * np.where(slides, size, 1.0)
+    signs = rng.choice([-1.0, 1.0], size=(samples, model.n))
+    v = most * signs * rng.uniform(size=(samples, model.n))
+    v[::2] *= 10.0 ** (-6.0 * rng.uniform(size=v[::2].shape))
+    return v
