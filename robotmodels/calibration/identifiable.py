@@ -134,9 +134,11 @@ def identifiable_on(
     candidates: GeometricParameters,
     measurements: Iterable[Measurement],
     known_lengths: Iterable[str] = (),
+    known: Iterable[str] = (),
     deviation: Array | None = None,
     fixtures: Array | None = None,
     dependent: float = DEPENDENT,
+    scale_is_known: bool = False,
 ) -> IdentifiableParameters:
     """Parameters that given measurements tell.
 
@@ -148,10 +150,14 @@ def identifiable_on(
         What is measured, at the configurations at hand.
     known_lengths : iterable of str
         Parameters that are known: they stay as they are and give the scale.
+    known : iterable of str
+        Other parameters that stay as they are.
     deviation, fixtures : ndarray, optional
         Where to look; default the nominal robot.
     dependent : float
         Sine of the angle to the columns before, below which a column depends on them.
+    scale_is_known : bool
+        Whether the candidates cannot change the scale of the robot (base and tool alone).
 
     Returns
     -------
@@ -172,14 +178,19 @@ def identifiable_on(
     >>> from robotmodels.calibration import Position, candidate_parameters
     >>> from robotmodels.robots import load
     >>> q = np.random.default_rng(0).uniform(-2, 2, (20, 6))
-    >>> found = identifiable_on(candidate_parameters(load("rx90")), [Position(q, np.zeros((20, 3)))])
+    >>> there = Position(q, np.zeros((20, 3)))
+    >>> found = identifiable_on(candidate_parameters(load("rx90")), [there])
     >>> found.count
     27
     """
     problem = problem_of(candidates, measurements)
-    known = tuple(known_lengths)
-    at = set(candidates.index(known, "known_lengths").tolist())
-    check_scale(problem, known)
+    known_lengths, known = tuple(known_lengths), tuple(known)
+    at = {
+        *candidates.index(known_lengths, "known_lengths").tolist(),
+        *candidates.index(known, "known").tolist(),
+    }
+    if not scale_is_known:
+        check_scale(problem, known_lengths)
     reasons: dict[str, Reason] = {}
     xi = np.zeros(len(candidates)) if deviation is None else deviation
     values = guessed_fixtures(problem, xi) if fixtures is None else fixtures
@@ -221,6 +232,28 @@ def identifiable_on(
         condition=float(singular[0] / singular[-1]),
         rows=len(W),
     )
+
+
+def all_deviations(
+    candidates: GeometricParameters, kept: GeometricParameters, deviation: Array
+) -> Array:
+    """Deviations of all candidates, zero for those that were not estimated.
+
+    Parameters
+    ----------
+    candidates, kept : GeometricParameters
+        All, and those that were estimated.
+    deviation : ndarray, shape (number kept,)
+        Their values.
+
+    Returns
+    -------
+    ndarray, shape (number of candidates,)
+        In the order of the candidates.
+    """
+    values = np.zeros(len(candidates))
+    values[candidates.index(kept.names)] = deviation
+    return values
 
 
 def check_scale(problem: Problem, known: tuple[str, ...]) -> None:
