@@ -8,7 +8,7 @@ from enum import Enum
 
 import numpy as np
 
-from .._arrays import Array, Rebuilt
+from .._arrays import Array, Rebuilt, read_only
 from ..errors import InvalidValueError
 from ..estimation import ColumnBasis, column_basis
 from ..table_text import boxed
@@ -59,6 +59,11 @@ class IdentifiableParameters(Rebuilt):
         Condition number of the kept columns and fixtures, columns scaled to length 1.
     rows : int
         Number of residual rows that were looked at.
+    factor : ndarray, shape (count, count)
+        Triangular factor of the kept columns without their projection on the fixtures: its
+        singular values are those of the identification matrix of the kept parameters.
+    configurations : int
+        Number of blocks of rows (measurements) that were looked at.
 
     References
     ----------
@@ -74,6 +79,11 @@ class IdentifiableParameters(Rebuilt):
     fixtures: int
     condition: float
     rows: int
+    factor: Array
+    configurations: int
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "factor", read_only(self.factor))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -105,14 +115,52 @@ class IdentifiableParameters(Rebuilt):
         """
         return tuple(name for name, why in self.reasons.items() if why is reason)
 
+    @property
+    def regrouped_into(self) -> dict[str, dict[str, float]]:
+        """For every parameter seen only in combination, the kept ones that take its part.
+
+        ``{regrouped: {kept: coefficient}}``: a deviation of 1 of the parameter moves what is
+        measured as these deviations of the kept ones do (and of the fixtures, not listed).
+        """
+        return {
+            name: {kept: terms[name] for kept, terms in self.regrouping.items() if name in terms}
+            for name in self.of_reason(Reason.REGROUPED)
+        }
+
+    @property
+    def matrix(self) -> Array:
+        """C, shape (count, P): what is estimated is ``C xi`` for deviations xi of all candidates.
+
+        Columns of parameters without effect, of the gauge and of what is known are zero.
+        """
+        number = {name: k for k, name in enumerate(self.candidates.names)}
+        C = np.zeros((self.count, len(self.candidates)))
+        for row, name in enumerate(self.names):
+            for other, c in self.regrouping[name].items():
+                C[row, number[other]] = c
+        return C
+
     def __str__(self) -> str:
-        stands_for = [_sum_text(self.regrouping.get(name, {name: 1.0})) for name in self.names]
-        lines = [f"{self.count} identifiable parameters of {len(self.candidates)}:"]
-        lines.append(boxed([("parameter", list(self.names)), ("stands for", stands_for)]))
-        for reason in Reason:
+        lines = [f"{self.count} identifiable parameters of {len(self.candidates)}"]
+        if self.count:
+            stands_for = [_sum_text(self.regrouping[name]) for name in self.names]
+            lines[0] += ":"
+            lines.append(boxed([("parameter", list(self.names)), ("stands for", stands_for)]))
+        for heading, reason in (
+            ("Not identifiable", Reason.NO_EFFECT), ("Only in combination", Reason.REGROUPED),
+            ("Gauge", Reason.GAUGE), ("Known", Reason.KNOWN),
+        ):  # fmt: skip
             names = self.of_reason(reason)
-            if names:
-                lines.append(f"{', '.join(names)}: {reason.value}.")
+            if not names:
+                continue
+            lines.append(f"{heading} ({reason.value}):")
+            if reason is Reason.REGROUPED:
+                lines += [
+                    f"  {name} acts like {_sum_text(terms) or 'the unknown fixtures'}"
+                    for name, terms in self.regrouped_into.items()
+                ]
+            else:
+                lines.append(f"  {', '.join(names)}")
         low, high = self.gap
         lines.append(
             f"Smallest angle kept {low:.1e}, largest left out {high:.1e} (sines); condition "
@@ -181,7 +229,7 @@ def identifiable_on(
     >>> there = Position(q, np.zeros((20, 3)))
     >>> found = identifiable_on(candidate_parameters(load("rx90")), [there])
     >>> found.count
-    27
+    21
     """
     problem = problem_of(candidates, measurements)
     known_lengths, known = tuple(known_lengths), tuple(known)
@@ -231,7 +279,14 @@ def identifiable_on(
         fixtures=F,
         condition=float(singular[0] / singular[-1]),
         rows=len(W),
+        factor=_without_fixtures(chosen, len(basis.kept) - len(kept)),
+        configurations=there.blocks,
     )
+
+
+def _without_fixtures(W: Array, fixtures: int) -> Array:
+    """Triangular factor of the columns behind the first ones, those projected out."""
+    return np.asarray(np.linalg.qr(W, mode="r"))[fixtures:, fixtures:]
 
 
 def all_deviations(
