@@ -237,7 +237,8 @@ class Transmission:
         """
         if not self.is_invertible:
             return np.zeros((self.n, self.n))
-        W = np.linalg.inv(self.matrix)
+        # the units of the motors do not matter: relative to the motors' own joints they go away
+        W = np.linalg.inv(self.matrix / np.abs(self.matrix).max(axis=0))
         W[np.abs(W) < 1e-12 * np.abs(W).max()] = 0.0
         own = np.diag(W).copy()
         own[own == 0.0] = 1.0
@@ -412,6 +413,15 @@ class DriveMatrices:
                     self.rows, v.tolist(), a.tolist(), strict=True
                 )
             ])  # fmt: skip
+        if self.rows and a is not None and v.ndim == a.ndim == 2 and v.shape == a.shape:
+            # many samples of them: one pass through the arrays instead of seven
+            from .kernels.drive_torques import drive_torques
+
+            Ia, Fv, Fc, offset = np.array(self.rows).T.copy()
+            out = np.empty(v.shape)
+            v, a = np.ascontiguousarray(v), np.ascontiguousarray(a)
+            drive_torques(v, a, Ia, Fv, Fc, offset, out)
+            return out
         tau = np.sign(v)
         tau *= self.coulomb
         tau += v.dot(self.viscous)

@@ -83,6 +83,25 @@ def test_drive_matrices_state_the_formula_of_the_docstring(seed):
     assert np.allclose(matrices.viscous, matrices.viscous.T)
 
 
+@pytest.mark.parametrize("batch", [(), (1,), (7,), (0,), (2, 3)], ids=str)
+def test_drives_of_many_samples_are_those_of_one(batch):
+    """The one pass through many samples, and standing joints, which have no dry friction."""
+    drive = random_drive(np.random.default_rng(0), 3)
+    matrices = drive_matrices(drive, None)
+    v, a = np.random.default_rng(1).normal(size=(2, *batch, 3))
+    v[..., 1] = 0.0
+    wanted = drive.Ia * a + drive.Fv * v + drive.Fc * np.sign(v) + drive.offset
+    found = matrices.torque(v, a)
+    assert found.shape == wanted.shape
+    np.testing.assert_allclose(found, wanted, rtol=1e-14, atol=1e-14)
+    turned = matrices.torque(np.asfortranarray(v), np.repeat(a, 2, axis=-1)[..., ::2])
+    np.testing.assert_array_equal(turned, found)
+    if batch:
+        np.testing.assert_allclose(matrices.torque(v, a[0] if len(a) else np.zeros(3)),
+            drive.Ia * (a[0] if len(a) else 0.0) + drive.Fv * v + drive.Fc * np.sign(v)
+            + drive.offset, rtol=1e-13, atol=1e-13)  # fmt: skip
+
+
 def test_drives_default_to_nothing():
     drive = rm.DriveParameters(Fc=[1.0, 2.0])
     assert drive.n == 2

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import Array, as_exact, as_vector, batch_rows, batch_shape
 from ..drive import DriveParameters, Transmission
 from ..errors import InvalidValueError
-from ..friction import Friction, check_friction
+from ..friction import Friction, check_friction, check_linear
 from ..inertia import InertialParameters
 from ..model import RobotModel, check_model
 from .wrench import wrench_torque
@@ -32,6 +32,15 @@ class Base(Protocol):
     @property
     def kept(self) -> NDArray[np.int64]:
         """Numbers of the kept ones among the standard parameters."""
+        ...
+
+    @property
+    def friction(self) -> Friction | None:
+        """The friction model whose parameters are among them, after those of the drives."""
+        ...
+
+    def check(self, model: RobotModel) -> None:
+        """Refuse a robot that they do not belong to."""
         ...
 
 
@@ -61,7 +70,8 @@ def base_model(model: RobotModel, base: Base, values: ArrayLike) -> RobotModel:
     Raises
     ------
     InvalidValueError
-        Base parameters of a robot of another structure; NaN or infinity.
+        Base parameters of another robot (structure, geometry, gravity, couplings), or with those
+        of a friction model, which a robot has no place for; NaN or infinity.
     ShapeError
         Not one value for each base parameter.
 
@@ -78,32 +88,37 @@ def base_model(model: RobotModel, base: Base, values: ArrayLike) -> RobotModel:
     >>> base_model(arm, base, base.values(arm)).inertia.mass
     array([0., 0., 0., 0., 0., 0.])
     """
-    check_model(model)
-    b = as_exact(values, (len(base.kept),), "values")
-    other = base.model
-    if (
-        not np.array_equal(model.table.sigma, other.table.sigma)
-        or not np.array_equal(model.table.antecedent, other.table.antecedent)
-        or _coupled(model) != _coupled(other)
-    ):
+    robot, friction = _split(model, base, values)
+    if friction is not None:
         raise InvalidValueError(
-            f"base: these are base parameters of {other.name!r}, whose frames or coupled motors "
-            f"are not those of {model.name!r}; ask for those of the model itself."
+            f"base: parameters of {type(base.friction).__name__} are among them, which a robot has "
+            "no place for; idm_from_base takes them, or ask for base parameters without friction."
         )
+    return robot
+
+
+def _split(model: RobotModel, base: Base, values: ArrayLike) -> tuple[RobotModel, Array | None]:
+    """The robot of base parameters, and the parameters (k, n) of a friction model among them."""
+    check_model(model)
+    base.check(model)
+    b = as_exact(values, (len(base.kept),), "values")
     f, n = model.f, model.n
     coupled = np.array(_coupled(model), dtype=np.int64) - 1
-    full = np.zeros(10 * f + (4 * n + 3 * coupled.size if base.drive else 0))
+    count = 10 * f + (4 * n + 3 * coupled.size if base.drive else 0)
+    kinds = 0 if base.friction is None else len(check_linear(base.friction).kinds)
+    full = np.zeros(count + kinds * n)
     full[base.kept] = b
+    extra = full[count:].reshape(kinds, n) if kinds else None
     bodies = model.with_inertia(InertialParameters(full[: 10 * f].reshape(f, 10)))
     if not base.drive:
-        return bodies
+        return bodies, extra
     drives = full[10 * f : 10 * f + 4 * n].reshape(4, n)
     bodies = bodies.with_drive(DriveParameters(*drives))
     if coupled.size and (K := model.transmission) is not None:
         terms = np.zeros((3, n))
-        terms[:, coupled] = full[10 * f + 4 * n :].reshape(3, coupled.size)
+        terms[:, coupled] = full[10 * f + 4 * n : count].reshape(3, coupled.size)
         bodies = bodies.with_transmission(Transmission(K.matrix, K.offset, *terms))
-    return bodies
+    return bodies, extra
 
 
 def idm_from_base(
@@ -133,7 +148,8 @@ def idm_from_base(
     wrench : array_like, shape (..., 6), optional
         What the tool exerts on the environment, see `idm`.
     friction : Friction, optional
-        A friction model that acts besides the drives, see `idm`.
+        A friction model that acts besides the drives, see `idm`, and besides one whose parameters
+        are among the base ones.
 
     Returns
     -------
@@ -162,7 +178,7 @@ def idm_from_base(
     >>> bool(np.allclose(tau, idm(arm, *motion), rtol=1e-12))
     True
     """
-    robot = base_model(model, base, values)
+    robot, extra = _split(model, base, values)
     n = model.n
     q, v, a = as_vector(q, n, "q"), as_vector(v, n, "v"), as_vector(a, n, "a")
     if wrench is not None:
@@ -183,6 +199,8 @@ def idm_from_base(
         tau = tau + wrench_torque(model, q, wrench)
     if friction is not None:
         tau = tau + friction.torque(v)
+    if extra is not None and base.friction is not None:
+        tau = tau + (check_linear(base.friction).basis(v) * extra).sum(axis=-2)
     return tau
 
 
