@@ -18,6 +18,7 @@ from robotmodels.errors import (
     InvalidValueError,
     ShapeError,
 )
+from robotmodels.friction import AsymmetricFriction
 from robotmodels.inertia import InertiaWarning
 from robotmodels.minimal_parameters import base_parameters, uniform_bodies
 
@@ -233,3 +234,30 @@ def test_base_parameters_of_another_robot_are_refused():
         base_model(other, base, base.values(arm))
     with pytest.raises(ShapeError, match=r"^v: "):
         idm_from_base(arm, base, base.values(arm), q, [0.0], q)
+    # the same joints, but other lengths or another gravity: the numbers would be wrong
+    for another in (planar(l1=0.6), arm.with_gravity([0, 0, -9.81])):
+        for call in (
+            lambda robot: base_model(robot, base, base.values(arm)),
+            lambda robot: idm_from_base(robot, base, base.values(arm), q, q, q),
+        ):
+            with pytest.raises(InvalidValueError, match="base parameters of"):
+                call(another)
+
+
+@pytest.mark.parametrize("drive", [True, False])
+def test_base_parameters_with_a_friction_model(drive):
+    model = random_model(np.random.default_rng(8), f=4, drive=True)
+    n = model.n
+    rng = np.random.default_rng(1)
+    friction = AsymmetricFriction(*rng.uniform(0.5, 2.0, (4, n)))
+    if drive:
+        model = model.with_drive(rm.DriveParameters(Ia=model.drive.Ia))
+    q, v, a = random_state(model, rng, 20)
+    base = base_parameters(model, "numeric", drive=drive, friction=friction)
+    values = base.values(model)
+    tau = rm.idm(model, q, v, a, friction=friction)
+    np.testing.assert_allclose(
+        idm_from_base(model, base, values, q, v, a), tau, rtol=0, atol=1e-10 * np.abs(tau).max()
+    )
+    with pytest.raises(InvalidValueError, match="AsymmetricFriction"):
+        base_model(model, base, values)

@@ -313,6 +313,38 @@ def test_columns_that_are_not_there_are_named(case, model, columns, error, words
         function(model, *states(model, count), columns=columns)
 
 
+def test_base_parameters_choose_columns_of_their_own_robot_alone(model):
+    """Another length, and other columns are dependent: the names alone do not tell."""
+    q, v, a = states(model, 3, 2)
+    base = base_parameters(model)
+    longer = model.with_table(model.table.replace(d=model.table.d + 0.1))
+    calls = (
+        lambda m: rm.torque_regressor(m, q, v, a, columns=base),
+        lambda m: rm.torque_regressor_chunks(m, q, v, a, columns=base),
+        lambda m: power_regressor(m, q, v, a, columns=base),
+        lambda m: momentum_regressor(m, q, v, columns=base),
+        lambda m: filtered_regressor(m, 0.01, q, v, FILTER, columns=base),
+        lambda m: rm.parameter_names(m, columns=base),
+    )
+    for call in calls:
+        call(model.with_inertia(None).with_tool(None))
+        with pytest.raises(InvalidValueError, match="base parameters of"):
+            call(longer)
+
+
+def test_columns_of_some_links_are_those_of_all(model):
+    """Links that no wanted column needs are not walked; what is left is the same to the bit."""
+    q, v, a = states(model, 3, 3)
+    W = rm.torque_regressor(model, q, v, a)
+    names = rm.parameter_names(model)
+    rng = np.random.default_rng(0)
+    choices = [[k] for k in range(10 * model.f)]
+    choices += [rng.permutation(len(names))[: rng.integers(1, 12)].tolist() for _ in range(40)]
+    for columns in choices:
+        some = rm.torque_regressor(model, q, v, a, columns=columns)
+        np.testing.assert_array_equal(some, W[..., columns])
+
+
 def test_no_column_at_all(model):
     q, v, a = states(model, 3, 2)
     assert rm.torque_regressor(model, q, v, a, columns=[]).shape == (2, model.n, 0)

@@ -36,6 +36,10 @@ class KeptColumns(Protocol):
         """Their numbers."""
         ...
 
+    def check(self, model: RobotModel) -> None:
+        """Refuse a robot that they do not belong to."""
+        ...
+
 
 Columns = Sequence[int] | Sequence[str] | NDArray[np.int64] | NDArray[np.bool_] | KeptColumns
 
@@ -100,7 +104,7 @@ def energy_blocks(model: RobotModel, drive: bool) -> Blocks:
     return {kind: blocks[kind] for kind in (LINKS, "Ia", "Iam") if kind in blocks}
 
 
-def chosen_columns(blocks: Blocks, columns: Columns | None) -> ChosenColumns:
+def chosen_columns(blocks: Blocks, columns: Columns | None, model: RobotModel) -> ChosenColumns:
     """Find the columns that are asked for.
 
     Parameters
@@ -109,6 +113,8 @@ def chosen_columns(blocks: Blocks, columns: Columns | None) -> ChosenColumns:
         All columns.
     columns : indices, names, mask, BaseParameters or None
         None takes all.
+    model : RobotModel
+        The robot whose columns they are.
 
     Returns
     -------
@@ -118,7 +124,7 @@ def chosen_columns(blocks: Blocks, columns: Columns | None) -> ChosenColumns:
     Raises
     ------
     InvalidValueError
-        A column that is not there, or is asked for twice.
+        A column that is not there, or is asked for twice; base parameters of another robot.
     ShapeError
         A mask of another length.
     """
@@ -126,6 +132,8 @@ def chosen_columns(blocks: Blocks, columns: Columns | None) -> ChosenColumns:
     if columns is None:
         chosen = np.arange(len(every))
     else:
+        if isinstance(columns, KeptColumns):
+            columns.check(model)
         chosen = np.array(_numbers(every, columns), dtype=np.int64).reshape(-1)
         if np.unique(chosen).size != chosen.size:
             raise InvalidValueError("columns: a column is asked for twice; give each once.")

@@ -66,7 +66,7 @@ def energy_regressor(
     check_model(model)
     arrays = as_vector(q, model.n, "q"), as_vector(v, model.n, "v")
     batch, rows = batch_rows(arrays, ("q", "v"))
-    chosen = chosen_columns(energy_blocks(model, drive), columns)
+    chosen = chosen_columns(energy_blocks(model, drive), columns, model)
     out = np.empty((rows[0].shape[0], chosen.count))
     fill_energies(model, chosen, rows, out)
     return out.reshape(*batch, chosen.count)
@@ -123,7 +123,7 @@ def energy_regressor_chunks(
     check_size(size)
     arrays = as_vector(q, model.n, "q"), as_vector(v, model.n, "v")
     _, rows = batch_rows(arrays, ("q", "v"))
-    chosen = chosen_columns(energy_blocks(model, drive), columns)
+    chosen = chosen_columns(energy_blocks(model, drive), columns, model)
     return stream(partial(fill_energies, model, chosen), rows, size, (chosen.count,))
 
 

@@ -77,7 +77,7 @@ def energy_difference_regressor(
     """
     check_model(model)
     t, q, v, at = _samples(model, t, q, v, knots)
-    chosen = chosen_columns(standard_blocks(model, drive, friction), columns)
+    chosen = chosen_columns(standard_blocks(model, drive, friction), columns, model)
     out = np.empty((max(at.size - 1, 0), chosen.count))
     if out.shape[0]:
         _fill(model, chosen, friction_of(model, friction), t, q, v, at, out)
@@ -139,7 +139,7 @@ def energy_difference_regressor_chunks(
     check_model(model)
     check_size(size)
     t, q, v, at = _samples(model, t, q, v, knots)
-    chosen = chosen_columns(standard_blocks(model, drive, friction), columns)
+    chosen = chosen_columns(standard_blocks(model, drive, friction), columns, model)
     return _stream(model, chosen, friction_of(model, friction), t, q, v, at, size)
 
 

@@ -77,7 +77,7 @@ def filtered_regressor(
     """
     check_model(model)
     q, v, dt = _samples(model, q, v, dt, low_pass)
-    chosen = chosen_columns(standard_blocks(model, drive, friction), columns)
+    chosen = chosen_columns(standard_blocks(model, drive, friction), columns, model)
     W = np.empty((q.shape[0], model.n, chosen.count))
     linear = friction_of(model, friction)
     for piece, part in _stream(model, chosen, linear, dt, q, v, low_pass, _PIECE):
@@ -142,7 +142,7 @@ def filtered_regressor_chunks(
     check_model(model)
     check_size(size)
     q, v, dt = _samples(model, q, v, dt, low_pass)
-    chosen = chosen_columns(standard_blocks(model, drive, friction), columns)
+    chosen = chosen_columns(standard_blocks(model, drive, friction), columns, model)
     return _stream(model, chosen, friction_of(model, friction), dt, q, v, low_pass, size)
 
 

@@ -87,7 +87,7 @@ def momentum_regressor(
     check_model(model)
     n = model.n
     batch, rows = batch_rows((as_vector(q, n, "q"), as_vector(v, n, "v")), ("q", "v"))
-    chosen = chosen_columns(standard_blocks(model, drive, friction), columns)
+    chosen = chosen_columns(standard_blocks(model, drive, friction), columns, model)
     P, S = np.empty((2, rows[0].shape[0], n, chosen.count))
     fill_momenta(model, chosen, friction_of(model, friction), rows, P, S)
     shape = (*batch, n, chosen.count)
@@ -146,7 +146,7 @@ def momentum_regressor_chunks(
     check_size(size)
     n = model.n
     _, rows = batch_rows((as_vector(q, n, "q"), as_vector(v, n, "v")), ("q", "v"))
-    chosen = chosen_columns(standard_blocks(model, drive, friction), columns)
+    chosen = chosen_columns(standard_blocks(model, drive, friction), columns, model)
     return _stream(model, chosen, friction_of(model, friction), rows, size)
 
 

@@ -63,7 +63,7 @@ def parameter_names(
     ('ZZ1', 'offset1', 14)
     """
     check_model(model)
-    return chosen_columns(standard_blocks(model, drive, friction), columns).names
+    return chosen_columns(standard_blocks(model, drive, friction), columns, model).names
 
 
 def energy_parameter_names(
@@ -102,7 +102,7 @@ def energy_parameter_names(
     ('M1', 'Ia1')
     """
     check_model(model)
-    return chosen_columns(energy_blocks(model, drive), columns).names
+    return chosen_columns(energy_blocks(model, drive), columns, model).names
 
 
 def parameter_vector(

@@ -68,7 +68,7 @@ def power_regressor(
     n = model.n
     arrays = as_vector(q, n, "q"), as_vector(v, n, "v"), as_vector(a, n, "a")
     batch, rows = batch_rows(arrays, ("q", "v", "a"))
-    chosen = chosen_columns(standard_blocks(model, drive, friction), columns)
+    chosen = chosen_columns(standard_blocks(model, drive, friction), columns, model)
     out = np.empty((rows[0].shape[0], chosen.count))
     _fill(model, chosen, friction_of(model, friction), rows, out)
     return out.reshape(*batch, chosen.count)
@@ -128,7 +128,7 @@ def power_regressor_chunks(
     n = model.n
     arrays = as_vector(q, n, "q"), as_vector(v, n, "v"), as_vector(a, n, "a")
     _, rows = batch_rows(arrays, ("q", "v", "a"))
-    chosen = chosen_columns(standard_blocks(model, drive, friction), columns)
+    chosen = chosen_columns(standard_blocks(model, drive, friction), columns, model)
     fill = partial(_fill, model, chosen, friction_of(model, friction))
     return stream(fill, rows, size, (chosen.count,))
 

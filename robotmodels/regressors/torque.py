@@ -76,7 +76,7 @@ def torque_regressor(
     n = model.n
     arrays = as_vector(q, n, "q"), as_vector(v, n, "v"), as_vector(a, n, "a")
     batch, rows = batch_rows(arrays, ("q", "v", "a"))
-    chosen = chosen_columns(standard_blocks(model, drive, friction), columns)
+    chosen = chosen_columns(standard_blocks(model, drive, friction), columns, model)
     W = np.empty((rows[0].shape[0], n, chosen.count))
     fill_torques(model, chosen, friction_of(model, friction), rows, W)
     return W.reshape(*batch, n, chosen.count)
@@ -138,7 +138,7 @@ def torque_regressor_chunks(
     n = model.n
     arrays = as_vector(q, n, "q"), as_vector(v, n, "v"), as_vector(a, n, "a")
     _, rows = batch_rows(arrays, ("q", "v", "a"))
-    chosen = chosen_columns(standard_blocks(model, drive, friction), columns)
+    chosen = chosen_columns(standard_blocks(model, drive, friction), columns, model)
     fill = partial(fill_torques, model, chosen, friction_of(model, friction))
     return stream(fill, rows, size, (n, chosen.count))
 
