@@ -21,6 +21,8 @@ from .._arrays import Array
 EFFICIENCY = 0.95
 """Variance of least squares relative to that of the robust estimate, on Gaussian residuals."""
 
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(80)
+
 
 class Loss(Enum):
     """How much a measurement of a given length counts. Members act on lengths divided by scale.
@@ -152,6 +154,29 @@ def median_length(rows: NDArray[np.int64]) -> Array:
     return _by_rows(lambda k: _quantile(k, 0.5), rows)
 
 
+def length_quantile(rows: NDArray[np.int64], probability: float) -> Array:
+    """Length that chi with k degrees of freedom stays under with this probability.
+
+    Parameters
+    ----------
+    rows : ndarray of int, shape (B,)
+        Rows of each measurement.
+    probability : float
+        Below 1.
+
+    Returns
+    -------
+    ndarray, shape (B,)
+        Lengths.
+
+    Examples
+    --------
+    >>> length_quantile(np.array([1, 6]), 0.95).round(4)
+    array([1.96  , 3.5485])
+    """
+    return _by_rows(lambda k: _quantile(k, probability), rows)
+
+
 def robust_scale(length: Array, rows: NDArray[np.int64], freedom: float) -> float:
     """Standard deviation of rows from the median of the lengths of their measurements.
 
@@ -188,18 +213,6 @@ def _by_rows(value: Callable[[int], float], rows: NDArray[np.int64]) -> Array:
     return np.array([value(int(k)) for k in sizes], dtype=np.float64)[where]
 
 
-@lru_cache(maxsize=64)
-def _chi(k: int) -> tuple[Array, Array]:
-    """Nodes over all lengths that chi with k degrees of freedom takes, and their probabilities."""
-    centre = math.sqrt(k)
-    nodes, weights = np.polynomial.legendre.leggauss(24)
-    # cells, as the losses have kinks where the constant is
-    edges = np.linspace(max(0.0, centre - 9.0), centre + 9.0, 97)
-    half = np.diff(edges)[:, None] / 2
-    u = (edges[:-1, None] + half * (1 + nodes)).ravel()
-    return u, _density(k, u) * (half * weights).ravel()
-
-
 def _density(k: int, u: Array) -> Array:
     constant = (k / 2 - 1) * math.log(2) + math.lgamma(k / 2)
     return np.asarray(u ** (k - 1) * np.exp(-u * u / 2 - constant))
@@ -207,12 +220,17 @@ def _density(k: int, u: Array) -> Array:
 
 def _moments(loss: Loss, k: int, c: float) -> tuple[float, float]:
     """Mean curvature and mean square of the influence, per row."""
-    u, probability = _chi(k)
-    _, weight, slope = loss_terms(loss, u, np.full_like(u, c))
-    return (
-        float(probability @ (slope + (k - 1) * weight)) / k,
-        float(probability @ (weight * u) ** 2) / k,
-    )
+    centre = math.sqrt(k)
+    low, high = max(0.0, centre - 9.0), centre + 9.0
+    kink = min(max(c, low), high)  # pieces, as the losses have kinks where the constant is
+    curvature = square = 0.0
+    for start, end in ((low, kink), (kink, high)):
+        u = start + (end - start) / 2 * (1 + _NODES)
+        share = _WEIGHTS * (end - start) / 2 * _density(k, u)
+        _, weight, slope = loss_terms(loss, u, np.full_like(u, c))
+        curvature += float(share @ (slope + (k - 1) * weight)) / k
+        square += float(share @ (weight * u) ** 2) / k
+    return curvature, square
 
 
 @lru_cache(maxsize=256)
@@ -232,11 +250,10 @@ def _constant(loss: Loss, k: int) -> float:
 @lru_cache(maxsize=256)
 def _quantile(k: int, probability: float) -> float:
     low, high = 0.0, math.sqrt(k) + 9.0
-    nodes, weights = np.polynomial.legendre.leggauss(96)
     start = max(0.0, math.sqrt(k) - 9.0)
     for _ in range(60):
         middle = (low + high) / 2
         half = max(middle - start, 0.0) / 2
-        below = float((weights * half) @ _density(k, start + half * (1 + nodes)))
+        below = float((_WEIGHTS * half) @ _density(k, start + half * (1 + _NODES)))
         low, high = (middle, high) if below < probability else (low, middle)
     return (low + high) / 2

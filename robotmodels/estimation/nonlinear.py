@@ -7,24 +7,29 @@ normal equations, and damping, truncation and statistics cost nothing more.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_exact, as_floats
+from .._arrays import Array
 from .._choices import chosen
-from ..errors import InvalidValueError, ShapeError
-from .losses import Loss, loss_terms, median_length, robust_scale, tuning
+from ..errors import InvalidValueError
+from ._problem import Linearise, Point, Problem, Weighing, checked_problem
+from ._spread import covariance, determined
+from ._step import Linear, linear_problem
+from .losses import Loss, length_quantile, robust_scale
 from .nonlinear_fit import FitStatus, NonlinearFit
 from .prior import Prior
-from .spread import spread
-
-Linearise = Callable[[Array], tuple[Array, Array]]
 
 _SINGULAR = 1e-13
 """Relative singular value under which a direction has no effect but rounding."""
+_UNSEEN = 1e-13
+"""Relative decrease that the sum no longer shows: steps are then judged by their lengths."""
+_LEAST_SCALE = 1e-9
+"""Scale of residuals relative to the longest: most measurements fit to rounding."""
+_FALSE_OUTLIERS = 0.05
+"""Outliers expected to be listed in a whole fit of Gaussian residuals."""
 
 
 def fit_nonlinear(
@@ -97,13 +102,178 @@ def fit_nonlinear(
     >>> fit.x.round(9), fit.status.sentence
     (array([2., 3.]), 'The fit has converged: further steps are rounding.')
     """
-    problem = _Problem.checked(linearise, x0, sigma, block, prior)
     loss = chosen(Loss, loss, "loss")
-    threshold = _SINGULAR if truncation is None else _share(truncation)
-    budget = _Budget(_count(iterations), _nonnegative(damping, "damping"))
-    tolerance = _nonnegative(tolerance, "tolerance")
-    point = problem.at(as_exact(x0, (problem.parameters,), "x0"))
-    if loss is not Loss.SQUARES:
-        point = _robust_start(problem, point, threshold, budget, sigma_known)
-    point, status = _minimised(problem, point, loss, threshold, budget, tolerance)
-    raise NotImplementedError
+    tolerance = _between(tolerance, 0.0, 1.0, "tolerance")
+    threshold = _SINGULAR if truncation is None else _between(truncation, 0.0, 1.0, "truncation")
+    if isinstance(iterations, bool) or int(iterations) != iterations or iterations < 1:
+        raise InvalidValueError(f"iterations: expected a number from 1, got {iterations!r}.")
+    problem, point = checked_problem(linearise, x0, sigma, block, prior)
+    start = point.x
+    work = _Work(int(iterations), threshold, _between(damping, 0.0, np.inf, "damping"))
+    if loss is Loss.SQUARES:
+        weighing = Weighing.of(loss, problem.rows, 1.0)
+        point, linear, status = _minimum(problem, weighing, point, work, tolerance)
+    else:
+        weighing, point, linear, status = _robust(
+            problem, loss, point, work, tolerance, sigma_known
+        )
+    if linear.rank < problem.P and truncation is None:
+        status = FitStatus.SINGULAR
+    freedom = determined(problem, linear)
+    whole, scale = covariance(
+        problem, weighing, point, linear, freedom, sigma_known, truncation is not None
+    )
+    back = problem.in_order_of_caller
+    return NonlinearFit(
+        x=point.x,
+        status=status,
+        covariance=whole,
+        scale=scale,
+        freedom=freedom,
+        residuals=back(point.r) * problem.sigma,
+        jacobian=back(point.J) * problem.sigma[:, None],
+        sigma=problem.sigma,
+        block=problem.labels[problem.block],
+        weights=weighing.terms(point.length)[1][problem.block],
+        outliers=_outliers(problem, point, freedom),
+        loss=loss,
+        sigma_known=sigma_known,
+        prior=problem.prior,
+        singular_values=linear.s,
+        dropped=linear.V[linear.rank :] / linear.columns,
+        x0=start,
+        steps=np.array(work.steps, dtype=np.float64).reshape(-1, 5),
+    )
+
+
+@dataclass(slots=True)
+class _Work:
+    """Steps that are left and taken, and the damping that the next one starts with."""
+
+    left: int
+    threshold: float
+    damping: float
+    steps: list[tuple[float, float, float, float, float]] = field(default_factory=list)
+
+
+def _minimum(
+    problem: Problem,
+    weighing: Weighing,
+    point: Point,
+    work: _Work,
+    tolerance: float,
+    most: int | None = None,
+) -> tuple[Point, Linear, FitStatus]:
+    """Steps until they are rounding; the loss and its scale do not change."""
+    total = weighing.total(problem, point)
+    rank: int | None = None
+    last = np.inf
+    taken = 0
+    while True:
+        linear = linear_problem(problem, weighing, point, work.threshold, rank)
+        if taken >= 5:  # a direction at the threshold must not come and go for ever
+            rank = linear.rank
+        full, gain, length = linear.step(0.0)
+        size = float(np.linalg.norm(linear.columns * point.x))
+        relative = length / size if size > 0 else np.inf
+        unseen = gain <= _UNSEEN * total
+        if length == 0.0 or (unseen and length >= last):
+            return point, linear, FitStatus.CONVERGED
+        if work.left <= 0:
+            return point, linear, FitStatus.ITERATION_LIMIT
+        if most is not None and taken >= most:
+            return point, linear, FitStatus.CONVERGED
+        if unseen or relative <= tolerance:
+            after = problem.at(point.x + full)
+            if after is None:
+                return point, linear, FitStatus.STALLED
+            new = weighing.total(problem, after)
+            work.steps.append((total, gain, total - new, 0.0, relative))
+            if relative <= tolerance:
+                if new <= total:
+                    point = after
+                return point, linear, FitStatus.CONVERGED
+            point, total, last = after, new, length
+        else:
+            found = _damped(problem, weighing, point, linear, work, total, size)
+            if found is None:
+                # in exact numbers some damping always lowers the sum: what is left is rounding,
+                # or the Jacobian is not the derivative
+                small = gain <= max(1e-10 * total, 1e-18 * len(point.r))
+                return point, linear, FitStatus.CONVERGED if small else FitStatus.STALLED
+            point, total = found
+            last = np.inf
+        work.left -= 1
+        taken += 1
+
+
+def _damped(
+    problem: Problem,
+    weighing: Weighing,
+    point: Point,
+    linear: Linear,
+    work: _Work,
+    total: float,
+    size: float,
+) -> tuple[Point, float] | None:
+    """Take the step with the least damping that lowers the sum; None if there is none."""
+    damping = work.damping
+    while damping < 1e16:
+        step, gain, length = linear.step(damping)
+        after = problem.at(point.x + step)
+        new = np.inf if after is None else weighing.total(problem, after)
+        if after is not None and total - new > 1e-4 * gain:
+            relative = length / size if size > 0 else np.inf
+            work.steps.append((total, gain, total - new, damping, relative))
+            good = total - new > 0.5 * gain
+            work.damping = (damping / 10 if damping > 1e-8 else 0.0) if good else damping
+            return after, new
+        damping = max(10 * damping, 1e-6)
+    return None
+
+
+def _robust(
+    problem: Problem, loss: Loss, point: Point, work: _Work, tolerance: float, sigma_known: bool
+) -> tuple[Weighing, Point, Linear, FitStatus]:
+    """Huber from the start, as its sum has one minimum where rows are linear; then the loss."""
+    scale = _scale(problem, point, 0.0, sigma_known)
+    for _ in range(20):
+        huber = Weighing.of(Loss.HUBER, problem.rows, scale)
+        point, linear, _status = _minimum(problem, huber, point, work, 1e-3, most=3)
+        before, scale = scale, _scale(problem, point, determined(problem, linear), sigma_known)
+        if abs(scale - before) <= 0.01 * before:
+            break
+    for _ in range(4):
+        # the scale and the estimate belong to each other; what they owe is soon small
+        weighing = Weighing.of(loss, problem.rows, scale)
+        point, linear, _status = _minimum(problem, weighing, point, work, 1e-6)
+        before, scale = scale, _scale(problem, point, determined(problem, linear), sigma_known)
+        if abs(scale - before) <= 1e-6 * before:
+            break
+    weighing = Weighing.of(loss, problem.rows, scale)
+    return weighing, *_minimum(problem, weighing, point, work, tolerance)
+
+
+def _scale(problem: Problem, point: Point, freedom: float, sigma_known: bool) -> float:
+    if sigma_known:
+        return 1.0
+    longest = float(point.length.max(initial=0.0))
+    found = robust_scale(point.length, problem.rows, freedom)
+    return max(found, _LEAST_SCALE * longest) or 1.0
+
+
+def _outliers(problem: Problem, point: Point, freedom: float) -> Array:
+    """Numbers of the measurements that noise of the scale of the others does not explain."""
+    u = point.length / _scale(problem, point, freedom, False)
+    excess = u / length_quantile(problem.rows, 1 - _FALSE_OUTLIERS / max(len(u), 1))
+    worst = np.argsort(-excess, kind="stable")
+    return problem.labels[worst[excess[worst] > 1]]
+
+
+def _between(value: float, low: float, high: float, name: str) -> float:
+    number = float(value)
+    if not low <= number < high:
+        raise InvalidValueError(
+            f"{name}: expected a number from {low} below {high}, got {value!r}."
+        )
+    return number

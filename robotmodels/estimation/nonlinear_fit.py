@@ -1,4 +1,4 @@
-"""What a nonlinear fit gives: the estimate, its covariance, and what is needed to check it again."""
+"""What a nonlinear fit gives: the estimate, its covariance, and all to check it again."""
 
 from __future__ import annotations
 
