@@ -172,5 +172,6 @@ def _samples(samples: Any, k: int) -> tuple[int, ...]:
     except TypeError:
         counts = ()
     if len(counts) != k or min(counts) < 2:
-        raise InvalidValueError(f"samples: expected {k} numbers from 2, got {samples!r:.60}.")
+        many = "a whole number" if k == 1 else f"{k} whole numbers"
+        raise InvalidValueError(f"samples: expected {many} from 2, got {samples!r:.60}.")
     return counts

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import isfinite, nextafter
@@ -94,11 +95,21 @@ class Checked:
 
     def __call__(self, t: float, q: Array, v: Array) -> Array:
         """The law's answer."""
-        value = np.asarray(self.law(t, q.copy(), v.copy()))
-        if value.shape != (self.size,):
+        try:
+            answer = self.law(t, q.copy(), v.copy())
+        except Exception as error:
+            error.add_note(f"Raised by {self.name}(t, q, v) at t = {t:.9g} s.")
+            raise
+        try:
+            value = np.asarray(answer)
+        except ValueError:  # rows of several lengths
+            value = None
+        if value is None or value.shape != (self.size,):
+            came = "None" if answer is None else f"{answer!r:.60}"
+            if value is not None and answer is not None:
+                came = f"shape {value.shape}: {came}"
             raise ShapeError(
-                f"{self.name}: expected an answer of shape ({self.size},), got {value.shape} at "
-                f"t = {t:.9g} s."
+                f"{self.name}: expected {_call(self.name, self.size)}, got {came} at t = {t:.9g} s."
             )
         if value.dtype != np.float64 or not isfinite(sum(value.tolist())):
             return as_floats(value, f"{self.name} at t = {t:.9g} s")
@@ -129,7 +140,7 @@ def as_law(law: Law | ArrayLike | None, size: int, t: Array | None, name: str) -
     Raises
     ------
     ShapeError, InvalidValueError
-        An array of another shape, with NaN or infinity.
+        An array of another shape, with NaN or infinity; a function of other arguments.
 
     Examples
     --------
@@ -139,6 +150,7 @@ def as_law(law: Law | ArrayLike | None, size: int, t: Array | None, name: str) -
     if law is None:
         return None, _NO_KNOTS
     if callable(law):
+        _check_signature(law, size, name)
         return Checked(law, size, name), _NO_KNOTS
     values = as_floats(law, name)
     if values.shape == (size,):
@@ -146,17 +158,36 @@ def as_law(law: Law | ArrayLike | None, size: int, t: Array | None, name: str) -
     if values.ndim == 2 and t is None:
         raise ShapeError(
             f"{name}: rows of values belong to the times t, but t is a duration; give the times, "
-            f"or {name} as a function of (t, q, v)."
+            f"or a function {_call(name, size)}."
         )
     if t is None or values.shape != (len(t), size):
         rows = "" if t is None else f", or ({len(t)}, {size}) for the times t"
         raise ShapeError(
-            f"{name}: expected a function of (t, q, v), or an array of shape ({size},){rows}; got "
-            f"shape {values.shape}."
+            f"{name}: expected a function {_call(name, size)}, or an array of shape "
+            f"({size},){rows}; got shape {values.shape}."
         )
     if len(t) == 1:
         return Constant(values[0].copy()), _NO_KNOTS
     return Table(t, values.copy()), t[1:-1]
+
+
+def _call(name: str, size: int) -> str:
+    return f"{name}(t, q, v) -> ({size},)"
+
+
+def _check_signature(law: Any, size: int, name: str) -> None:
+    try:
+        signature = inspect.signature(law)
+    except (TypeError, ValueError):  # some compiled functions do not tell
+        return
+    try:
+        signature.bind(0.0, _NO_KNOTS, _NO_KNOTS)
+    except TypeError:
+        what = getattr(law, "__name__", type(law).__name__)
+        raise InvalidValueError(
+            f"{name}: expected a function {_call(name, size)} of time (s), positions and "
+            f"velocities, got {what}{signature}, which does not take these three arguments."
+        ) from None
 
 
 def as_times(t: ArrayLike) -> tuple[float, float, Array | None]:

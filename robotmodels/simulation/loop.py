@@ -162,7 +162,9 @@ class _Walk:
                 forces.derivative, t, y, bound, rtol=options.rtol, atol=options.atol,
                 max_step=options.max_step, first_step=first,
             )  # fmt: skip
-            while solver.status == "running":
+            if not np.isfinite(solver.h_abs):  # nothing finite to begin with: no step would end
+                self._fail()
+            while solver.status == "running" and not self.path.status:
                 if forces.evaluations >= options.max_evaluations:
                     self.path.status = SimulationStatus.NOT_CONVERGED
                     break

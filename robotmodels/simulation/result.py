@@ -12,6 +12,9 @@ from .._arrays import Array
 from ..model import RobotModel
 from .status import SimulationEvent, SimulationStatus
 
+_RESTS = 1e-6  # of the potential energy: an arm that moves less of it is taken to be at rest
+_LEAST = 1e-9  # J: drifts are measured against no less
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Simulation:
@@ -116,7 +119,11 @@ class Simulation:
 
     @property
     def energy_turnover(self) -> float:
-        """Largest amount of energy that was moved: the scale of the relative drift, J."""
+        """Largest amount of energy that was moved, J.
+
+        The largest of the kinetic energy, the change of the potential energy and the works of
+        control, friction and tool, at any sample.
+        """
         parts = (
             np.abs(self.kinetic), np.abs(self.potential - self.potential[0]),
             np.abs(self.control_work), np.abs(self.friction_work), np.abs(self.wrench_work),
@@ -125,9 +132,16 @@ class Simulation:
 
     @property
     def relative_drift(self) -> float:
-        """Largest drift over the largest amount of energy moved; 0 where nothing moved."""
-        scale = self.energy_turnover
-        return float(np.abs(self.drift).max()) / scale if scale > 0.0 else 0.0
+        """Largest drift, relative to the energy that was moved.
+
+        Its scale is `energy_turnover`, but at least a millionth of the largest potential energy
+        (where the arm hardly moves, the drift is a rounding error of that energy) and at least
+        1e-9 J (a thousand times the default absolute tolerance of a step). An arm that stays at
+        rest has so a relative drift of zero, or next to it, and not the ratio of two rounding
+        errors.
+        """
+        floor = max(_RESTS * float(np.abs(self.potential).max()), _LEAST)
+        return float(np.abs(self.drift).max()) / max(self.energy_turnover, floor)
 
     @property
     def drift_rate(self) -> float:
@@ -139,8 +153,8 @@ class Simulation:
 
     def __str__(self) -> str:
         lines = [
-            f"{self.model.name}: {self.duration:.6g} s in {self.steps} steps, "
-            f"{self.evaluations} evaluations of the model",
+            f"{self.model.name}: {self.duration:.6g} s in {_counted(self.steps, 'step')}, "
+            f"{_counted(self.evaluations, 'evaluation')} of the model",
             self.reason,
             f"energy drift {self.drift[-1]:.2g} J, {self.drift_rate:.2g} W, "
             f"{self.relative_drift:.2g} of the energy moved",
@@ -148,5 +162,9 @@ class Simulation:
         shown = self.events[:10]
         lines += [str(event) for event in shown]
         if len(self.events) > len(shown):
-            lines.append(f"and {len(self.events) - len(shown)} events more")
+            lines.append(f"and {_counted(len(self.events) - len(shown), 'more event')}")
         return "\n".join(lines)
+
+
+def _counted(number: int, what: str) -> str:
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"

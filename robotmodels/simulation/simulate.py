@@ -105,11 +105,11 @@ def simulate(
     SingularMassMatrixError
         A joint moves no inertia at the start.
     InertiaError
-        The mass matrix is not positive definite at the start, and there is dry friction: what
-        sticks is then not defined.
+        The mass matrix is not positive definite at the start; the links that no body is are named.
     ShapeError, InvalidValueError
         Arguments or answers of ``control`` and ``wrench`` of the wrong shape, with NaN or infinity;
-        a start outside the limits; dry friction that is negative.
+        laws that do not take (t, q, v); a start outside the limits, or so fast that its energy is
+        no finite number; dry friction that is negative; joints that mimic others.
 
     References
     ----------
@@ -142,7 +142,7 @@ def simulate(
     )
     cuts = _cuts(start, end, as_floats(breaks, "breaks"), np.r_[knots, tool_knots])
     limits = _limits(model, q) if stop_at_limits else None
-    ddm(model, q, v, np.zeros(n), drive=drive)  # names a joint without inertia
+    _check_start(model, q, v, drive)
     dry = dry_friction(model, drive, friction)
     if width is None:
         check_dissipates(dry)
@@ -193,6 +193,25 @@ def _limits(model: RobotModel, q: Array) -> tuple[Array, Array]:
             f"{upper[j]:.6g}]; start inside, or leave stop_at_limits out."
         )
     return lower, upper
+
+
+def _check_start(model: RobotModel, q: Array, v: Array, drive: bool) -> None:
+    """Refuse what has no one finite acceleration to begin with."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        # names joints without inertia, links of no body and singular couplings
+        a = ddm(model, q, v, np.zeros(model.n), drive=drive)
+        finite = np.isfinite(a).all() and np.isfinite(kinetic_energy(model, q, v, drive))
+    if model.transmission is not None and not model.transmission.is_invertible:
+        raise InvalidValueError(
+            f"model: {model.name!r} has joints that mimic others, which simulate does not follow: "
+            "its joints would come apart. Integrate ddm, which keeps them together, or simulate "
+            "independent joints with model.with_transmission(None)."
+        )
+    if not finite:
+        raise InvalidValueError(
+            f"v0: the accelerations or the energy of velocities up to {np.abs(v).max():.3g} are no "
+            "finite numbers; start slower."
+        )
 
 
 def _width(smoothing: ArrayLike | None, n: int) -> Array | None:
