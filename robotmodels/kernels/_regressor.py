@@ -47,7 +47,7 @@ def wrench_columns(t: Vector, z: Vector, w: Vector, dw: Vector, U: Matrix, u: Ve
 def wanted_wrench_columns(
     t: Vector, z: Vector, w: Vector, dw: Vector, U: Matrix, u: Vector, wanted: int
 ) -> Ten:
-    """Those of `wrench_columns` that the bits of ``wanted`` ask for, zero in the place of others."""
+    """Those of `wrench_columns` that the bits of ``wanted`` ask for, and zero in others' place."""
     if wanted & INERTIA:
         if wanted & (MOMENTS | MASS):
             return wrench_columns(t, z, w, dw, U, u)

@@ -3,6 +3,11 @@
 Seed book section 1.5.3 (W. Khalil and J.-F. Kleinfinger 1987): most parameters of a base set are
 zero, above all the masses, and so is much of a table. A link is told by bits what of it counts,
 and what its outboard links need; work for nothing is left out.
+
+Counted on an RX-90 (36 base parameters without drives): 461 multiplications and 352 additions, 717
+and 600 for the whole recursion. Of the 461, 302 are by zeros and ones of the table and of the
+axes: formulas written out for this one robot would have 159 and 112. They would save less time
+than that, for a third of what is left is the sines and cosines.
 """
 
 from math import cos, sin
