@@ -281,7 +281,9 @@ def _turned_inside(parameters: GeometricParameters, q: Array) -> Array:
     model = parameters.model
     turning = model.table.sigma[model.table.joint_rows] == REVOLUTE
     both = np.isfinite(model.lower) & np.isfinite(model.upper)
-    middle = np.where(both, 0.5 * (np.where(both, model.lower, 0) + np.where(both, model.upper, 0)), 0.0)
+    middle = np.where(
+        both, 0.5 * (np.where(both, model.lower, 0) + np.where(both, model.upper, 0)), 0.0
+    )
     turned = middle + np.remainder(q - middle + np.pi, 2.0 * np.pi) - np.pi
     return read_only(np.where(turning, turned, q))
 

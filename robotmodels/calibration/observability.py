@@ -152,9 +152,7 @@ def observability(
         psi = psi.factor
     W = as_floats(psi, "psi")
     if W.ndim not in (2, 3) or not W.size:
-        raise ShapeError(
-            f"psi: expected shape (M, L) or (m, k, L), none of them 0, got {W.shape}."
-        )
+        raise ShapeError(f"psi: expected shape (M, L) or (m, k, L), none of them 0, got {W.shape}.")
     m = len(W) if configurations is None else configurations
     if isinstance(m, bool) or int(m) != m or m < 1:
         raise InvalidValueError(f"configurations: expected a whole number from 1, got {m!r}.")
