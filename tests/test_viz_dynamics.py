@@ -174,6 +174,7 @@ def test_lines_over_one_joint():
     assert inertia.get_yscale() == "log"
     assert gravity.get_lines()[0].get_xdata()[-1] == pytest.approx(180.0)
     assert coupling.get_xlabel() == "joint_3 (deg)"
+    assert coupling.get_ylabel() == "coupling\n(no unit)"
     pair = lines(coupling)["joint_2 and joint_3"].get_ydata()[3]
     assert pair == pytest.approx(M[1, 2] / np.sqrt(M[1, 1] * M[2, 2]))
     shown = lines(coupling)
@@ -201,6 +202,8 @@ def test_maps_over_two_joints():
     assert np.allclose(values[0], grid.gravity[..., 1].T)
     assert np.allclose(values[1], grid.mass[..., 1, 1].T)
     assert np.allclose(values[2], grid.coupling[..., 1, 2].T)
+    assert [axes.get_ylabel() for axes in figure.axes if not axes.get_title()] == [
+        "(N m)", "(kg m²)", "no unit"]  # fmt: skip
     assert found[0].get_xlabel() == "joint_2 (rad)"
     assert found[0].get_ylabel() == "joint_3 (rad)"
     low, high = found[0].collections[0].get_clim()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+import textwrap
 import time
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from ..robots import load
 from .info import pose_text
 from .postures import as_text
 
+_TERMINAL = 80  # columns
 _SAMPLES = 1000
 _BATCH = 100_000
 _INVERSE_BATCH = 10_000
@@ -125,12 +127,28 @@ def table_poses(model: RobotModel, q: Array) -> Array:
 
 def _show_base(model: RobotModel) -> None:
     rules, numbers = base_parameters(model), base_parameters(model, "numeric")
-    print(rules)
+    print(_narrow(rules.text))
     kept, dependent = numbers.gap or (0.0, 0.0)
     same = "the same parameters" if rules.names == numbers.names else "other parameters"
     print(
-        f"By the columns of the regressor: {same}; angles of kept columns at least {kept:.2f}, of "
-        f"dependent ones at most {dependent:.0e}."
+        f"By the columns of the regressor: {same};\n  angles of kept columns at least {kept:.2f}, "
+        f"of dependent ones at most {dependent:.0e}."
+    )
+
+
+def _narrow(text: str) -> str:
+    """A printed table whose long lines are wrapped anew for a narrow terminal."""
+    lines: list[str] = []
+    for line in text.splitlines():
+        # a list that goes on: no formula begins so far to the right without its equals sign
+        goes_on = line.startswith(" " * 8) and not line.lstrip().startswith("=")
+        if goes_on and lines:
+            lines[-1] += " " + line.strip()
+        else:
+            lines.append(line)
+    return "\n".join(
+        textwrap.fill(line, _TERMINAL, subsequent_indent=" " * 4, break_on_hyphens=False)
+        for line in lines
     )
 
 

@@ -92,7 +92,7 @@ def plot_inertia_map(
     >>> from robotmodels.simulation import dynamics_map
     >>> figure = plot_inertia_map(dynamics_map(load("rx90"), 2))
     >>> [" ".join(axes.get_ylabel().split()) for axes in figure.axes]
-    ['gravity torque (N m)', 'inertia (kg m²)', 'coupling (1)']
+    ['gravity torque (N m)', 'inertia (kg m²)', 'coupling (no unit)']
     """
     if not isinstance(grid, DynamicsMap):
         raise InvalidValueError(
@@ -128,7 +128,7 @@ def _lines(
         inertia.set_yscale("log")
     gravity.set_ylabel(f"gravity torque\n({_mixed(model, 'N m', 'N')})")
     inertia.set_ylabel(f"inertia\n({_mixed(model, 'kg m²', 'kg')})")
-    coupling.set_ylabel("coupling\n(1)")
+    coupling.set_ylabel("coupling\n(no unit)")
     pairs = list(combinations(range(n), 2))
     strength = {p: _strength(grid.coupling[:, p[0], p[1]]) for p in pairs}
     # the strongest, in the order of the joints
@@ -172,7 +172,7 @@ def _maps(
          _rounded(grid.gravity[..., joint], grid.gravity), True),
         (f"inertia\nof {names[joint]}", "kg" if prismatic[joint] else "kg m²",
          grid.mass[..., joint, joint], False),
-        (f"coupling\n{names[i]}, {names[j]}", "1",
+        (f"coupling\n{names[i]}, {names[j]}", "no unit",
          _rounded(grid.coupling[..., i, j], np.ones(1)), True),
     )  # fmt: skip
     (x_factor, x_unit), (y_factor, y_unit) = (_axis(grid, k, degrees) for k in (0, 1))
@@ -214,7 +214,7 @@ def _map(
     bar.ax.set_facecolor("white")
     bar.outline.set(edgecolor=PALE, linewidth=0.6)
     bar.ax.yaxis.get_offset_text().set(size=SMALL_SIZE, color=INK)
-    bar.set_label(f"({unit})", size=LABEL_SIZE, color=INK)
+    bar.set_label(unit if unit == "no unit" else f"({unit})", size=LABEL_SIZE, color=INK)
 
 
 def _rounded(values: Array, among: Array) -> Array:
