@@ -11,9 +11,11 @@ from identities.random_robots import random_bodies, random_drive, random_pose, r
 
 import robotmodels as rm
 from robotmodels.errors import InvalidValueError, ShapeError
+from robotmodels.friction import AsymmetricFriction, StribeckFriction
 from robotmodels.minimal_parameters import BaseMethod, base_parameters
 from robotmodels.minimal_parameters.formulas import constants_of
-from robotmodels.minimal_parameters.numeric import natural_sizes, torque_factors
+from robotmodels.minimal_parameters.numeric import natural_sizes
+from robotmodels.minimal_parameters.restraint import reach
 from robotmodels.regressors import parameter_names, parameter_vector, torque_regressor
 
 GRAVITIES = ((0.0, 0.0, -9.81), (0.0, -9.81, 0.0), (-9.81, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -61,13 +63,22 @@ def equal(one, other, tolerance=1e-10):
     assert one.no_effect == other.no_effect
     model = one.model
     sizes, _ = natural_sizes(model, one.drive, one.friction)
-    W = np.vstack(torque_factors(model, one.drive, friction=one.friction)) * sizes
-    longest = np.sqrt((W * W).sum(axis=0)).max(initial=1e-300)
+    size = reach(model)
+    slides = np.where(model.table.sigma[model.table.joint_rows] == 1, size, 1.0)
+    q, v, a = np.random.default_rng(5).uniform(-1, 1, (3, 12, model.n)) * slides
+    rate = np.sqrt(9.81 / size)
+    motion = np.pi * q, rate * v, rate**2 * a
+    W = torque_regressor(model, *motion, drive=one.drive, friction=one.friction)
+    W = (W * slides[:, None]).reshape(-1, len(sizes)) * sizes
+    length = np.sqrt((W * W).sum(axis=0))
+    longest = length.max(initial=1e-300)
     apart = (one.matrix - other.matrix) * sizes / sizes[one.kept][:, None]
-    assert np.sqrt(((W[:, one.kept] @ apart) ** 2).sum(axis=0)).max() <= tolerance * longest
+    columns = apart.any(axis=0)
+    shown = np.sqrt(((W[:, one.kept] @ apart[:, columns]) ** 2).sum(axis=0))
+    assert shown.max(initial=0.0) <= tolerance * longest
     # and the same numbers where the parameter acts
-    acting = np.sqrt((W[:, one.kept] ** 2).sum(axis=0)) > 1e-2 * longest
-    assert abs(apart[acting]).max(initial=0.0) <= 1e-5
+    acting = length[one.kept] > 1e-2 * longest
+    assert abs(apart[acting]).max(initial=0.0) <= 100 * tolerance
 
 
 def keeps_torque(base, model, rng, drive):
@@ -179,6 +190,11 @@ def test_rx90_prints_as_the_book():
     assert "XX3R = XX3 + YY4 - YY3 + 2*RL4*MZ4 + RL4^2*(M4 + M5 + M6)" in base.text
     assert "D3 = 0.45 m, RL4 = 0.45 m" in base.text
     assert r"ZZ_{1R} &= ZZ_{1} + \mathrm{Ia}_{1}" in base.latex
+    assert "-  D" not in base.latex
+    assert "Alone, as they are: XY2, YZ2" in base.text
+    assert "Units: XX to ZZ kg m^2, MX to MZ kg m, M kg; Ia kg m^2, Fv N m s/rad" in base.text
+    assert base._repr_markdown_().startswith("**rx90: 58 base parameters")
+    assert max(map(len, base.text.splitlines())) <= 100
 
 
 def test_ten_frames_and_more_have_their_numbers():
@@ -295,6 +311,95 @@ def test_joints_bound_to_each_other(rng):
     assert same.names == base_parameters(model).names
 
 
+@pytest.mark.parametrize("name", ["rx90", "cobra_s600", "gantry", "stanford_arm", "erd:so101"])
+def test_friction_models_are_columns_of_both_methods(name, rng):
+    model = filled(rm.load(name), rng)
+    n = model.n
+
+    def positive():
+        return rng.uniform(0.5, 2.0, n)
+
+    asymmetric = AsymmetricFriction(positive(), positive(), positive(), positive())
+    stribeck = StribeckFriction(positive(), positive(), 2 + positive(), np.full(n, 1e-3))
+    q, v, a = rng.uniform(-2, 2, (3, 40, n))
+    v[::2] *= 1e-3
+    for friction, drive, more in (
+        (asymmetric, True, 1),
+        (asymmetric, False, 4),
+        (stribeck, False, 3),
+    ):
+        rules = base_parameters(model, drive=drive, friction=friction)
+        numbers = base_parameters(model, "numeric", drive=drive, friction=friction)
+        equal(rules, numbers)
+        # of four asymmetric columns three are Fv, Fc and offset again
+        assert len(rules) == len(base_parameters(model, drive=drive)) + more * n
+        W = torque_regressor(model, q, v, a, drive=drive, friction=friction)
+        torque = rm.idm(model, q, v, a, drive=drive, friction=friction)
+        for base in (rules, numbers):
+            found = base.reduce(W) @ base.values(model)
+            assert abs(found - torque).max() <= 1e-10 * abs(torque).max()
+    assert "Fs1" in rules.names
+    assert pickle.loads(pickle.dumps(rules)).names == rules.names
+    with pytest.raises(InvalidValueError, match="Fv columns already"):
+        base_parameters(model, friction=stribeck)
+    with pytest.raises(InvalidValueError, match="expected a friction model"):
+        base_parameters(model, friction=3.0)
+
+
+def test_a_trajectory_is_a_motion():
+    from robotmodels.trajectories import quintic
+
+    model = rm.load("rx90")
+    rest = quintic(np.zeros(6), [0.4, -0.7, 0.5, 1.1, -0.6, 0.9], duration=1.0)
+    by_path = base_parameters(model, "numeric", motion=rest)
+    samples = rest.resample(1000)
+    assert base_parameters(model, "numeric", motion=samples).names == by_path.names
+    by_arrays = base_parameters(model, "numeric", motion=(samples.q, samples.v, samples.a))
+    assert by_arrays.names == by_path.names
+    assert len(by_path) < len(base_parameters(model))  # all joints move as one
+
+
+def test_logs_with_nothing_or_with_nan_are_named():
+    model = rm.load("planar_2r")
+    log = np.ones((5, 2))
+    bad = log.copy()
+    bad[3, 1] = np.nan
+    with pytest.raises(
+        InvalidValueError, match=r"motion v: expected finite.*nan at index \[3, 1\]"
+    ):
+        base_parameters(model, "numeric", motion=(log, bad, log))
+
+
+@pytest.mark.parametrize("name", ["erd:so101", "erd:xarm7", "erd:baxter_left_arm"])
+def test_a_tolerance_takes_few_digits_for_what_is_meant(name):
+    model = rm.load(name)
+    exact = base_parameters(model, drive=False)
+    meant = [base_parameters(model, way, drive=False, tolerance=1e-4) for way in BaseMethod]
+    equal(*meant, tolerance=1e-4)
+    assert len(meant[0]) <= len(exact)
+    for base in meant:
+        assert "Taken as exact: ax" in base.text
+        assert abs(base.matrix[base.matrix != 0]).min() > 1e-6
+        assert "e-1" not in base.text.split("Regrouped")[1].split("Rank")[0]
+    assert not base_parameters(rm.load("rx90")).notes
+
+
+def test_constraints_are_told():
+    model = rm.load("planar_3r")
+    mimic = rm.Transmission([[1.0, 0, 0], [0, 1.0, 0], [0, -1.0, 0]])
+    base = base_parameters(model, "numeric", constraint=mimic)
+    assert "constrained: rank 2 of 3" in base.text
+    assert "wrong" not in base.text
+    assert base.names == base_parameters(model, "numeric", constraint=mimic.matrix[:, :2]).names
+    mistake = base_parameters(rm.load("rx90"), "numeric", constraint=np.ones((6, 6)))
+    assert "rank 1 of 6, so that the torques are those of one free variable." in mistake.text
+    assert "6 columns of the constraint depend on each other" in mistake.notes[0]
+    assert len(mistake) < 40
+    assert not base_parameters(model, "numeric", constraint=np.eye(3)).notes
+    own = base_parameters(model.with_transmission(mimic))
+    assert "is singular, rank 2 of 3" in own.text
+
+
 # --- the result ----------------------------------------------------------------------------------
 
 
@@ -322,12 +427,26 @@ def test_result_is_a_value():
     assert repr(base) == "<BaseParameters of 'cobra_s600': 22 of 56, 27 without effect, symbolic>"
 
 
-def test_values_belong_to_the_structure():
-    base = base_parameters(rm.load("rx90"))
+def test_values_belong_to_the_robot(rng):
+    arm = rm.load("rx90")
+    base = base_parameters(arm)
+    with pytest.raises(InvalidValueError, match=r"'puma560' has others: axis 3 has another place"):
+        base.values(rm.load("puma560"))
     with pytest.raises(InvalidValueError, match="frames or kinds of joints"):
         base.values(rm.load("planar_2r"))
+    with pytest.raises(InvalidValueError, match="gravity in the base is"):
+        base.values(arm.with_gravity([0.0, 0.0, 0.0]))
     with pytest.raises(ShapeError, match="a column for each"):
         base.reduce(np.ones((4, 60)))
+    # bodies, drives and tool are values of its own, and no other robot
+    for other in (filled(arm, rng), arm.with_tool(random_pose(rng))):
+        assert base.belongs_to(other)
+        base.check(other)
+    assert not base.belongs_to(rm.load("ur5"))
+    wrist = rm.load("tx40")
+    assert base_parameters(wrist, drive=False).belongs_to(wrist.with_transmission(None))
+    with pytest.raises(InvalidValueError, match="other motors are coupled"):
+        base_parameters(wrist).check(wrist.with_transmission(None))
 
 
 def test_mistakes_are_named():

@@ -8,6 +8,7 @@ from identities.random_robots import random_bodies, random_drive
 
 import robotmodels as rm
 from robotmodels.errors import InertiaError, InvalidValueError, MissingExtraError, ShapeError
+from robotmodels.friction import StribeckFriction
 from robotmodels.minimal_parameters import (
     PhysicalStatus,
     base_parameters,
@@ -119,7 +120,7 @@ def test_mistakes_are_named(rng):
     model = robot("planar_2r", rng)
     base = base_parameters(model)
     values = base.values(model)
-    with pytest.raises(InertiaError, match="prior: link 1 is no body"):
+    with pytest.raises(InertiaError, match=r"prior: link 1 \(joint_1\) is no body"):
         standard_parameters(base, values, prior=rm.InertialParameters.zeros(2))
     with pytest.raises(ShapeError, match="values"):
         standard_parameters(base, values[:-1])
@@ -129,6 +130,52 @@ def test_mistakes_are_named(rng):
         standard_parameters(base, values, prior=rm.InertialParameters.zeros(3))
     with pytest.raises(InvalidValueError, match="drive_prior"):
         standard_parameters(base, values, drive_prior=rm.DriveParameters.zeros(3))
+
+
+def test_what_is_wrong_with_a_prior_is_named(rng):
+    model = robot("planar_2r", rng)
+    base = base_parameters(model)
+    for k, value, said in (
+        (9, -2.0, "link 2 .joint_2. .*its mass is negative, -2 kg"),
+        (9, 0.0, "its mass is zero"),
+        (5, 90.0, "exceeds the sum of the others"),
+        (5, -90.0, "is negative"),
+    ):
+        values = uniform_bodies(model, 10.0).values.copy()
+        values[1, k] = value
+        with pytest.raises(InertiaError, match=said):
+            standard_parameters(base, base.values(model), prior=rm.InertialParameters(values))
+    thin = [[1e-30, 0, 0, 1.0, 0, 1.0, 0, 0, 0, 1.0]] * 2
+    with pytest.raises(InertiaError, match=r"flat, thin or a point.*So are 1 more"):
+        standard_parameters(base, base.values(model), prior=rm.InertialParameters(thin))
+
+
+def test_it_prints_as_a_table(rng):
+    model = robot("planar_2r", rng)
+    base = base_parameters(model)
+    found = standard_parameters(base, base.values(model), prior=uniform_bodies(model, 10.0))
+    text = str(found)
+    assert text.startswith(PhysicalStatus.EXACT.value)
+    assert "link 2: real body" in text
+    rows = [line.strip("│").split("│") for line in text.splitlines() if line.startswith("│")]
+    assert [row[1].strip() for row in rows[1:]] == list(base.parameter_names)
+    cells = {row[1].strip(): [float(x) for x in row[2:]] for row in rows[1:]}
+    prior, value, difference = cells["M2"]
+    assert value == pytest.approx(found.inertia.mass[1], rel=1e-5)
+    assert difference == pytest.approx(value - prior, rel=1e-2)
+    assert "e-3" not in text  # the solver's last digits are nothing to read
+    assert "EXACT" in repr(found)
+
+
+def test_friction_models_come_back(rng):
+    model = robot("planar_2r", rng)
+    friction = StribeckFriction([1.0, 2.0], [3.0, 4.0], [5.0, 6.0], [0.01, 0.01])
+    base = base_parameters(model, drive=False, friction=friction)
+    values = base.values(model)
+    values[base.names.index("Fs2")] = 7.0
+    found = standard_parameters(base, values, prior=uniform_bodies(model, 10.0))
+    assert found.status is PhysicalStatus.EXACT
+    np.testing.assert_allclose(found.friction, [[1, 2], [3, 4], [5, 7]], rtol=1e-6)
 
 
 def test_without_the_solver(monkeypatch, rng):

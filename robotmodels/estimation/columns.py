@@ -1,9 +1,9 @@
 """Independent columns of a matrix: which are kept, and how the others follow from them.
 
 Columns are taken in an order of preference, and a column is kept if it is not a combination of
-those kept before it. So a dependent column is regrouped into columns that come earlier. Columns that
-hardly act wait until those that do have been looked at: what is regrouped into a column that hardly
-acts has a coefficient as large as the column is small, and rounding with it.
+those kept before it. So a dependent column is regrouped into columns that come earlier. Columns
+that hardly act wait until those that do have been looked at: what is regrouped into a column that
+hardly acts has a coefficient as large as the column is small, and rounding with it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from .._arrays import Array, Rebuilt, as_floats, read_only
 from ..errors import InvalidValueError, ShapeError
 
 NOTHING = 1e-11
-"""Length relative to the longest column, below which a column, or what is left of it, is nothing."""
+"""Length relative to the longest column, below which a column or what is left of it is nothing."""
 _LEVELS = (1e-4, 1e-8)
 """Lengths of what is left of a column, relative to the longest, below which it waits."""
 _ROUNDING = 1e-14
@@ -161,7 +161,8 @@ def column_basis(
     rows = np.argsort(kept)
     kept = kept[rows]
     coefficients = combinations[rows] * scale[kept][:, None] / scale
-    most = np.array([length[alike == kind].max() for kind in range(alike.max(initial=-1) + 1)])
+    most = np.zeros(alike.max(initial=-1) + 1)
+    np.maximum.at(most, alike, length)
     distance = left / np.where(most > nothing, most, 1.0)[alike]
     return ColumnBasis(kept, np.flatnonzero(length <= nothing), coefficients, distance)
 
@@ -195,16 +196,14 @@ def _kept_columns(
     return np.array(kept, dtype=np.int64), parts[: len(kept)], left
 
 
-def _combinations(
-    parts: Array, kept: NDArray[np.int64], left: Array, nothing: float
-) -> Array:
+def _combinations(parts: Array, kept: NDArray[np.int64], left: Array, nothing: float) -> Array:
     """All columns as combinations of the kept ones, without coefficients that are rounding."""
     b, p = parts.shape
     if not b:
         return np.zeros((0, p))
     triangle = parts[:, kept]
-    whole = np.linalg.solve(triangle, parts)
-    found = whole.copy()
+    whole = np.asarray(np.linalg.solve(triangle, parts), np.float64)
+    found: Array = whole.copy()
     # rounding of a column is magnified in the coefficient of a kept one of which little is left
     slight = _ROUNDING / left[kept]
     found[np.abs(found) <= np.minimum(slight, nothing)[:, None]] = 0.0

@@ -16,8 +16,8 @@ _SAME = 1e-9
 def differences(model: RobotModel, other: RobotModel, drive: bool) -> tuple[str, ...]:
     """What gives two robots other base parameters; inertial and drive parameters do not matter.
 
-    Neither do the zeros of the joints (theta of a revolute joint, r of a prismatic one), the tool,
-    names, and a base that is turned about gravity's direction together with it.
+    Neither do the zeros of the joints (theta of a revolute joint, r of a prismatic one), the place
+    of the base, the tool and names.
 
     Parameters
     ----------
@@ -53,9 +53,7 @@ def differences(model: RobotModel, other: RobotModel, drive: bool) -> tuple[str,
             moved = moved - (moved @ R[:, 2]) * R[:, 2]
         if np.abs(turned).max() > _SAME:
             found.append(f"axis {j} has another direction in frame {before}")
-        elif before == 0 and sigma == REVOLUTE and _moves_alone(a.sigma, a.antecedent, k):
-            continue  # where the first joint of a base that stands still is does not matter
-        elif np.abs(moved).max() > near:
+        elif before and np.abs(moved).max() > near:  # the base stands wherever it is
             found.append(f"axis {j} has another place in frame {before}")
     down, below = (np.asarray(m.gravity) @ m.chain.base_rotation for m in (model, other))
     if np.abs(down - below).max() > _SAME * max(1.0, float(np.abs(down).max())):
@@ -63,10 +61,6 @@ def differences(model: RobotModel, other: RobotModel, drive: bool) -> tuple[str,
     if drive:
         found += _coupling_differences(model, other)
     return tuple(found)
-
-
-def _moves_alone(sigma: Array, antecedent: Array, k: int) -> bool:
-    return bool(sigma[k] == REVOLUTE and antecedent[k] == 0)
 
 
 def _coupling_differences(model: RobotModel, other: RobotModel) -> list[str]:

@@ -132,5 +132,6 @@ def _longest(W: Array) -> float:
 
 def _longest_of(length: Array, kinds: NDArray[np.int64], nothing: float) -> Array:
     """Of each kind, its longest column; the longest of all where a kind has no effect."""
-    most = np.array([length[kinds == kind].max(initial=0.0) for kind in range(kinds.max() + 1)])
+    most = np.zeros(kinds.max(initial=-1) + 1)
+    np.maximum.at(most, kinds, length)
     return np.where(most > nothing, most, length.max(initial=0.0) or 1.0)

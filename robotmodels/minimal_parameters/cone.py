@@ -72,7 +72,7 @@ class ConeProblem:
         self.metric[rest, rest] = 1.0 / _sizes(prior[10 * f :], n) ** 2
         self.unit = 1.0 / np.sqrt(np.diag(self.metric))
         # rotor inertias and frictions; offsets, and what couples motors, may have either sign
-        self.positive = np.arange(10 * f, min(10 * f + 3 * n, p))
+        self.positive = np.arange(10 * f, 10 * f + (3 * n if base.drive else 0))
 
     def distance(self, x: Array) -> float:
         """Distance of standard parameters from the prior."""

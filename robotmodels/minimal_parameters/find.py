@@ -67,9 +67,9 @@ def base_parameters(
 
     Also called minimal, barycentric or identifiable parameters. Both methods keep Khalil's choice:
     the parameters of the frames nearest to the base before those behind them, link parameters
-    before ``Ia`` before ``Fv``, ``Fc`` and ``offset`` before those of a friction model; what depends
-    on others is regrouped into those that come before it. Only a parameter that hardly acts (less
-    than 1e-4 of the largest) gives way to a later one that does.
+    before ``Ia`` before ``Fv``, ``Fc`` and ``offset`` before those of a friction model; what
+    depends on others is regrouped into those that come before it. Only a parameter that hardly acts
+    (less than 1e-4 of the largest) gives way to a later one that does.
 
     Parameters
     ----------

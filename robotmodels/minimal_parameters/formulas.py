@@ -114,10 +114,8 @@ def numeric_formulas(
         groups: dict[tuple[float, str, str], list[int]] = {}
         for k in np.flatnonzero(row):
             value = float(row[k])
-            shown = f"{abs(value):.6g}"
-            text = "" if shown == "1" else shown
-            sign = "-" if value < 0 else ""
-            groups.setdefault((float(sign + shown), sign + text, sign + text), []).append(int(k))
+            shown, text = _number_text(value)
+            groups.setdefault((shown, text, text), []).append(int(k))
         out.append(_formula(names, int(number), groups))
     return tuple(out)
 
@@ -151,7 +149,8 @@ def symbolic_formulas(
     -------
     tuple of Formula
         One per kept parameter. Coefficients that no rule gives are numbers (coupled motors, axes
-        that are only nearly parallel), and so are formulas longer than a line or two (oblique axes one behind the other).
+        that are only nearly parallel), and so are formulas longer than a line or two (oblique axes
+        one behind the other).
 
     Examples
     --------
@@ -174,13 +173,17 @@ def symbolic_formulas(
         for k in np.flatnonzero(row):
             value = float(row[k])
             formula = sympy.sympify(symbols.get(int(k), 0))
-            if formula == 0 or abs(rule.get(int(k), 0) - value) > _SHOWN * abs(value):
-                formula = sympy.sympify(float(f"{value:.6g}"))
-            if sympy.count_ops(formula) > _LONGEST:
-                formula = sympy.Float(f"{value:.6g}", 6)
+            off = abs(rule.get(int(k), 0) - value) > _SHOWN * abs(value)
+            if formula == 0 or off or sympy.count_ops(formula) > _LONGEST:
+                shown, text = _number_text(value)
+                groups.setdefault((shown, text, text), []).append(int(k))
+                continue
             if formula not in printed:
                 printed[formula] = _printed(formula)
-            groups.setdefault((round(value, 12), *printed[formula]), []).append(int(k))
+            text, latex = printed[formula]
+            # terms of one symbol are one, also where rounding of the table sets them apart
+            same = next((key for key in groups if key[1:] == (text, latex)), None)
+            groups.setdefault(same or (value, text, latex), []).append(int(k))
         out.append(_formula(names, int(number), groups))
     return tuple(out)
 
@@ -310,6 +313,12 @@ class _Symbols:
         symbol = sympy.Symbol(f"{letter}{j}")
         self.constants.append(Constant(str(symbol), f"{latex}_{{{j}}}", value, unit))
         return symbol
+
+
+def _number_text(value: float) -> tuple[float, str]:
+    """A coefficient to six digits, and its text: empty for 1."""
+    shown, sign = f"{abs(value):.6g}", "-" if value < 0 else ""
+    return float(sign + shown), sign + ("" if shown == "1" else shown)
 
 
 def _turns(angle: float, tolerance: float) -> Fraction | None:

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
-from ..estimation import ColumnBasis, column_basis, factors_by_kind
+from ..estimation import ColumnBasis, column_basis
 from ..estimation.columns import NOTHING
+from ..estimation.triangles import factors_by_kind
 from ..friction import Friction, check_linear
 from ..geometry import PRISMATIC
 from ..model import RobotModel
@@ -152,8 +153,7 @@ def _random_motion(
     # joints may turn all round and slide by the robot's size
     spread = np.diag(units) if constraint is None else np.eye(u) * units.max(initial=0.0)
     q, v, a = (
-        scale * rng.uniform(-1.0, 1.0, (N, u)) @ spread @ G.T
-        for scale in (np.pi, rate, rate**2)
+        scale * rng.uniform(-1.0, 1.0, (N, u)) @ spread @ G.T for scale in (np.pi, rate, rate**2)
     )
     if slow:
         # half of the samples over all decades: friction may be another near zero velocity

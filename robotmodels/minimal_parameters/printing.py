@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import re
+import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from ..geometry import PRISMATIC
+from ..latex_text import escaped, powers
 from .formulas import Constant, Formula, constants_of
 
 if TYPE_CHECKING:
     from .result import BaseParameters
+
+_WIDTH = 100
 
 
 def table_text(base: BaseParameters) -> str:
@@ -23,37 +28,71 @@ def table_text(base: BaseParameters) -> str:
     Returns
     -------
     str
-        Lines: a heading, one formula per parameter (those that stand for themselves together at the
-        end), then the constants, then the parameters without effect.
+        Lines: a heading and what is to be known, one formula per regrouped parameter, the constants
+        in them, the parameters that stand for themselves, those without effect, units and rank.
 
     Examples
     --------
     >>> from robotmodels.robots import load
     >>> from robotmodels.minimal_parameters import base_parameters
-    >>> print(table_text(base_parameters(load("lab_rrt"), drive=False)).splitlines()[1])
+    >>> print(table_text(base_parameters(load("lab_rrt"), drive=False)).splitlines()[2])
       ZZ1R = ZZ1 + YY2 + ZZ3
     """
-    lines = [
-        f"{base.model.name}: {len(base)} base parameters of {len(base.parameter_names)} "
-        f"standard ones ({base.method.value})"
+    lines = [_heading(base), *(_wrapped("", note) for note in base.notes)]
+    regrouped = [
+        pair for pair in zip(base.formulas, base.numbers, strict=True) if pair[0].is_regrouped
     ]
-    for formula, numbers in zip(base.formulas, base.numbers, strict=True):
-        if formula.is_regrouped:
-            lines.append(f"  {formula.name}R = {_sum_text(formula)}")
-            if formula != numbers and any(c.isalpha() for t in formula.terms for c in t.text):
-                lines.append(f"  {' ' * len(formula.name)}  = {_sum_text(numbers)}")
-    own = [formula.name for formula in base.formulas if not formula.is_regrouped]
-    if own:
-        lines.append(f"  as they are: {', '.join(own)}")
+    if regrouped:
+        lines.append(
+            "Regrouped (R: in place of the sum, of which no motion shows the terms apart):"
+        )
+    width = max((len(formula.name) for formula, _ in regrouped), default=0) + 1
+    for formula, numbers in regrouped:
+        lines.append(f"  {formula.name + 'R':<{width}} = {_sum_text(formula)}")
+        if formula != numbers and any(c.isalpha() for t in formula.terms for c in t.text):
+            lines.append(f"  {'':<{width}} = {_sum_text(numbers)}")
     if used := _used(base):
-        lines.append("  " + ", ".join(f"{c.text} = {c.value:.6g} {c.unit}" for c in used))
+        said = ", ".join(f"{c.text} = {c.value:.6g} {c.unit}" for c in used)
+        lines.append(_wrapped("  with ", said))
+    if base.alone:
+        lines.append(_wrapped("Alone, as they are: ", ", ".join(base.alone)))
     if base.no_effect:
-        lines.append(f"without effect: {', '.join(base.no_effect)}")
+        lines.append(_wrapped("Without effect: ", ", ".join(base.no_effect)))
+    lines.append(_wrapped("Units: ", _units(base)))
     if base.gap is not None:
         lines.append(
-            f"rank {len(base)}: kept columns {base.gap[0]:.1e}, dependent {base.gap[1]:.1e}"
+            f"Rank {len(base)}: of the longest column of its kind, the least kept one has "
+            f"{base.gap[0]:.1e} of its own, any other at most {base.gap[1]:.1e}."
         )
     return "\n".join(lines)
+
+
+def _heading(base: BaseParameters) -> str:
+    return (
+        f"{base.model.name}: {len(base)} base parameters of {len(base.parameter_names)} "
+        f"standard ones ({base.method.value})"
+    )
+
+
+def _units(base: BaseParameters) -> str:
+    """Units of the kinds that there are."""
+    slides = base.model.table.sigma[base.model.table.joint_rows] == PRISMATIC
+    said = ["XX to ZZ kg m^2, MX to MZ kg m, M kg"]
+    if not base.drive:
+        return said[0]
+    if not slides.all():
+        said.append("Ia kg m^2, Fv N m s/rad, Fc and offset N m")
+    if slides.any():
+        said.append("of prismatic joints Ia kg, Fv N s/m, Fc and offset N")
+    return "; ".join(said)
+
+
+def _wrapped(label: str, words: str) -> str:
+    indent = " " * min(len(label), 10) if label else "  "
+    return textwrap.fill(
+        label + words, _WIDTH, subsequent_indent=indent, break_long_words=False,
+        break_on_hyphens=False,
+    )  # fmt: skip
 
 
 def table_latex(base: BaseParameters) -> str:
@@ -73,23 +112,25 @@ def table_latex(base: BaseParameters) -> str:
     --------
     >>> from robotmodels.robots import load
     >>> from robotmodels.minimal_parameters import base_parameters
-    >>> print(base_parameters(load("planar_2r"), drive=False).latex.splitlines()[1])
+    >>> print(base_parameters(load("planar_2r"), drive=False).latex.splitlines()[3])
     ZZ_{1R} &= ZZ_{1} + D_{2}^{2} \, M_{2}
     """
     regrouped = [formula for formula in base.formulas if formula.is_regrouped]
-    own = [formula.name for formula in base.formulas if not formula.is_regrouped]
-    out = []
+    out = [rf"\textbf{{{escaped(_heading(base))}}}", *(escaped(note) for note in base.notes)]
     if regrouped:
         body = " \\\\\n".join(
             f"{_symbol(formula.name, 'R')} &= {_sum_latex(formula)}" for formula in regrouped
         )
         out.append(f"\\begin{{align*}}\n{body}\n\\end{{align*}}")
-    if own:
-        out.append("As they are: " + ", ".join(f"${_symbol(name)}$" for name in own))
     if used := _used(base):
-        out.append(", ".join(rf"${c.latex} = {c.value:.6g}\,\mathrm{{{c.unit}}}$" for c in used))
+        said = (rf"${c.latex} = {_number(c.value)}\,\mathrm{{{c.unit}}}$" for c in used)
+        out.append("with " + ", ".join(said))
+    if base.alone:
+        out.append("Alone, as they are: " + ", ".join(f"${_symbol(name)}$" for name in base.alone))
     if base.no_effect:
         out.append("Without effect: " + ", ".join(f"${_symbol(n)}$" for n in base.no_effect))
+    units = re.sub(r"\^(\d)", r"$^\1$", _units(base))
+    out.append(f"Units: {units}")
     return "\n\n".join(out)
 
 
@@ -105,7 +146,9 @@ def _used(base: BaseParameters) -> Sequence[Constant]:
         for term in formula.terms
         for word in re.findall(r"[A-Z]+\d*", term.text)
     }
-    return [constant for constant in constants_of(base.model, base.tolerance) if constant.text in words]
+    return [
+        constant for constant in constants_of(base.model, base.tolerance) if constant.text in words
+    ]
 
 
 def _sum_text(formula: Formula) -> str:
@@ -122,7 +165,7 @@ def _sum_text(formula: Formula) -> str:
 def _sum_latex(formula: Formula) -> str:
     out = ""
     for term in formula.terms:
-        sign, factor = _sign(term.latex)
+        sign, factor = _sign(powers(term.latex))
         names = " + ".join(_symbol(name) for name in term.parameters)
         if (factor or sign) and len(term.parameters) > 1:
             names = rf"\left({names}\right)"
@@ -130,8 +173,12 @@ def _sum_latex(formula: Formula) -> str:
     return out
 
 
+def _number(value: float) -> str:
+    return powers(f"{value:.6g}")
+
+
 def _sign(text: str) -> tuple[str, str]:
-    return ("-", text[1:]) if text.startswith("-") else ("", text)
+    return ("-", text[1:].lstrip()) if text.startswith("-") else ("", text)
 
 
 def _joined(before: str, sign: str) -> str:

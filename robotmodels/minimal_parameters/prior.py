@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from .._arrays import Array
@@ -98,7 +100,7 @@ def pseudo_inertias(bodies: InertialParameters) -> Array:
     return P
 
 
-def check_definite(bodies: InertialParameters, name: str) -> Array:
+def check_definite(bodies: InertialParameters, name: str, frames: Sequence[str] = ()) -> Array:
     """Pseudo-inertias of bodies that must all have mass and extent.
 
     Parameters
@@ -107,6 +109,8 @@ def check_definite(bodies: InertialParameters, name: str) -> Array:
         Of f frames.
     name : str
         Used in error messages.
+    frames : sequence of str, optional
+        Names of the frames, used in error messages.
 
     Returns
     -------
@@ -124,16 +128,39 @@ def check_definite(bodies: InertialParameters, name: str) -> Array:
     (1, 4, 4)
     """
     P = pseudo_inertias(bodies)
-    least, most = np.linalg.eigvalsh(P)[:, 0], np.linalg.eigvalsh(P)[:, -1]
-    bad = least <= 1e-12 * np.maximum(most, 1e-300)
-    if bad.any():
-        j = int(np.flatnonzero(bad)[0])
+    values = np.linalg.eigvalsh(P)
+    bad = np.flatnonzero(values[:, 0] <= 1e-12 * np.maximum(values[:, -1], 1e-300))
+    if bad.size:
+        j = int(bad[0])
+        link = f"link {j + 1}" + (f" ({frames[j]})" if len(frames) > j else "")
+        more = f" So are {bad.size - 1} more." if bad.size > 1 else ""
         raise InertiaError(
-            f"{name}: link {j + 1} is no body with mass and extent in three directions (smallest "
-            f"eigenvalue of its pseudo-inertia {least[j]:.3g}); give a CAD model of every link, or "
+            f"{name}: {link} is no body with mass and extent in three directions: "
+            f"{_wrong(bodies, j)}.{more} Give a CAD model of every link, or "
             "uniform_bodies(model, mass)."
         )
     return P
+
+
+def _wrong(bodies: InertialParameters, j: int) -> str:
+    """What is wrong with a link, in words."""
+    mass = float(bodies.mass[j])
+    if mass < 0:
+        return f"its mass is negative, {mass:.4g} kg"
+    if mass == 0:
+        return "its mass is zero"
+    S = skew(bodies.first_moments[j] / mass)
+    moments = np.linalg.eigvalsh(bodies.tensors[j] + mass * S @ S)
+    shown = ", ".join(f"{x:.4g}" for x in moments)
+    slight = 1e-12 * float(np.abs(moments).max())
+    if moments[0] < -slight:
+        return f"a moment of inertia about its centre of mass is negative ({shown} kg m^2)"
+    if moments[0] + moments[1] < moments[2] - slight:
+        return (
+            "the largest moment of inertia about its centre of mass exceeds the sum of the others "
+            f"({shown} kg m^2)"
+        )
+    return f"it is flat, thin or a point (moments about its centre of mass {shown} kg m^2)"
 
 
 def _solid(ends: list[Array], radius: float) -> Array:

@@ -166,15 +166,11 @@ def reach(model: RobotModel) -> float:
     return lengths if lengths > 0 else 1.0
 
 
-def _with_joint(
-    before: Restraint, sigma: int, z: Array, P: Array, within: _Tolerance
-) -> Restraint:
+def _with_joint(before: Restraint, sigma: int, z: Array, P: Array, within: _Tolerance) -> Restraint:
     """The restraint behind a joint with axis z through P, still in the axes of the antecedent."""
     if sigma == FIXED:
         return before
-    along = before.turning is Turning.ONE_DIRECTION and parallel(
-        z, before.direction, within.angle
-    )
+    along = before.turning is Turning.ONE_DIRECTION and parallel(z, before.direction, within.angle)
     if sigma != REVOLUTE:
         slides = (*before.slides, z) if before.turning is not Turning.FREE else ()
         # a slide along the only axis moves a point of it along it, and no other in the plane

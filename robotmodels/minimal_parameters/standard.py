@@ -17,6 +17,7 @@ from ..regressors import parameter_vector
 from .cone import ConeOutcome, ConeProblem
 from .prior import check_definite
 from .result import BaseParameters
+from .standard_table import standard_text
 
 MARGIN = 1e-3
 """Smallest eigenvalue of a link's pseudo-inertia, relative to the prior's."""
@@ -38,7 +39,7 @@ class PhysicalStatus(Enum):
     NOT_CONVERGED = "The solver did not converge; the parameters are not to be used."
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class StandardParameters(Rebuilt):
     """A full set of standard parameters with given base parameters. Read-only.
 
@@ -57,6 +58,12 @@ class StandardParameters(Rebuilt):
     distance : float
         Distance from the prior: root of the summed squares of the relative changes of the
         pseudo-inertias, ``|P0^-1/2 (P - P0) P0^-1/2|``, and of the drives.
+    names : tuple of str
+        The p standard parameters.
+    prior, values : ndarray, shape (p,)
+        Of each, what it was near to and what was found; prints as a table.
+    friction : ndarray, shape (k, n), or None
+        Parameters of the friction model, where the base parameters have one.
 
     Examples
     --------
@@ -70,9 +77,24 @@ class StandardParameters(Rebuilt):
     status: PhysicalStatus
     deviation: Array
     distance: float
+    names: tuple[str, ...]
+    prior: Array
+    values: Array
+    friction: Array | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "deviation", read_only(self.deviation))
+        for name in ("deviation", "prior", "values", "friction"):
+            if (value := getattr(self, name)) is not None:
+                object.__setattr__(self, name, read_only(value))
+
+    def __str__(self) -> str:
+        return standard_text(self)
+
+    def __repr__(self) -> str:
+        return (
+            f"<StandardParameters: {self.inertia.f} links, {len(self.names)} parameters, "
+            f"{self.status.name}, distance {self.distance:.3g}>"
+        )
 
     def of(self, model: RobotModel) -> RobotModel:
         """The model with these parameters, ready for `robotmodels.to_urdf`.
@@ -149,7 +171,7 @@ def standard_parameters(
     Raises
     ------
     InertiaError
-        A prior that is not physical.
+        A prior that is not physical: which link, and what is wrong with it.
     ShapeError, InvalidValueError
         Values or weights of the wrong shape, NaN, or a margin that is not in (0, 1).
     MissingExtraError
@@ -182,7 +204,7 @@ def standard_parameters(
     drives = model.drive if drive_prior is None else drive_prior
     if drives.n != model.n:
         raise InvalidValueError(f"drive_prior: expected {model.n} joints, got {drives.n}.")
-    P0 = check_definite(bodies, "prior")
+    P0 = check_definite(bodies, "prior", model.table.names)
     W = _relative(base, b) if weights is None else as_core(weights, (len(base),), "weights")
     if W.ndim != 2:
         raise ShapeError(f"weights: expected shape (k, {len(base)}), got {W.shape}.")
@@ -212,18 +234,23 @@ def _result(
     """The robot of the variables, and what it has of the base parameters."""
     f, n = base.model.f, base.model.n
     transmission = base.model.transmission
+    end = 10 * f
     if base.drive:
-        Ia, Fv, Fc, offset = x[10 * f : 10 * f + 4 * n].reshape(4, n)
+        end += 4 * n
+        Ia, Fv, Fc, offset = x[10 * f : end].reshape(4, n)
         drives = DriveParameters(Ia=Ia, Fv=Fv, Fc=Fc, offset=offset)
         if transmission is not None and transmission.coupled_motors:
             motors = np.array(transmission.coupled_motors) - 1
             terms = np.zeros((3, n))
-            terms[:, motors] = x[10 * f + 4 * n :].reshape(3, len(motors))
+            terms[:, motors] = x[end : end + 3 * len(motors)].reshape(3, len(motors))
+            end += 3 * len(motors)
             transmission = Transmission(transmission.matrix, transmission.offset, *terms)
+    friction = None if base.friction is None else x[end:].reshape(-1, n)
     inertia = InertialParameters(x[: 10 * f].reshape(f, 10))
-    robot = base.model.with_inertia(inertia).with_drive(drives).with_transmission(transmission)
-    deviation = base.values(robot) - b
-    return StandardParameters(inertia, drives, transmission, status, deviation, problem.distance(x))
+    return StandardParameters(
+        inertia, drives, transmission, status, base.matrix @ x - b, problem.distance(x),
+        base.parameter_names, problem.prior, x, friction,
+    )  # fmt: skip
 
 
 def _is_kept(deviation: Array, b: Array) -> bool:
@@ -235,7 +262,8 @@ def _is_kept(deviation: Array, b: Array) -> bool:
 def _prior_vector(
     base: BaseParameters, bodies: InertialParameters, drives: DriveParameters
 ) -> Array:
-    return parameter_vector(base.model.with_inertia(bodies).with_drive(drives), base.drive)
+    robot = base.model.with_inertia(bodies).with_drive(drives)
+    return parameter_vector(robot, base.drive, base.friction)
 
 
 def _relative(base: BaseParameters, b: Array) -> Array:

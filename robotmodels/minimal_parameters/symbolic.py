@@ -98,9 +98,7 @@ def _by_rules(
     return kept, matrix
 
 
-def _is_clear(
-    model: RobotModel, drive: bool, tolerance: float, kept: NDArray[np.int64]
-) -> bool:
+def _is_clear(model: RobotModel, drive: bool, tolerance: float, kept: NDArray[np.int64]) -> bool:
     """Whether the same parameters are kept wherever a sine or a length begins to count."""
     if tolerance > NOTHING:
         return False
