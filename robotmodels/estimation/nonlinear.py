@@ -10,9 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array
 from .._choices import chosen
 from ..errors import InvalidValueError
 from ._problem import Linearise, Point, Problem, Weighing, checked_problem
@@ -246,7 +245,7 @@ def _robust(
     for _ in range(4):
         # the scale and the estimate belong to each other; what they owe is soon small
         weighing = Weighing.of(loss, problem.rows, scale)
-        point, linear, _status = _minimum(problem, weighing, point, work, 1e-6)
+        point, linear, _status = _minimum(problem, weighing, point, work, tolerance)
         before, scale = scale, _scale(problem, point, determined(problem, linear), sigma_known)
         if abs(scale - before) <= 1e-6 * before:
             break
@@ -262,8 +261,10 @@ def _scale(problem: Problem, point: Point, freedom: float, sigma_known: bool) ->
     return max(found, _LEAST_SCALE * longest) or 1.0
 
 
-def _outliers(problem: Problem, point: Point, freedom: float) -> Array:
+def _outliers(problem: Problem, point: Point, freedom: float) -> NDArray[np.int64]:
     """Numbers of the measurements that noise of the scale of the others does not explain."""
+    if point.length.max(initial=0.0) <= 1e-13 * np.abs(point.J).max(initial=0.0):
+        return problem.labels[:0]  # rounding of the model is not Gaussian, and no news
     u = point.length / _scale(problem, point, freedom, False)
     excess = u / length_quantile(problem.rows, 1 - _FALSE_OUTLIERS / max(len(u), 1))
     worst = np.argsort(-excess, kind="stable")
