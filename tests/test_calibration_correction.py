@@ -14,8 +14,10 @@ from robotmodels.calibration.calibrated import (
     calibrated_pose,
     calibrated_urdf,
 )
+from robotmodels.calibration.corrected import CorrectionStatus, corrected_igm
 from robotmodels.calibration.elements import Element, ErrorLaw
 from robotmodels.calibration.joint_errors import encoder_transmission, joint_errors_of
+from robotmodels.calibration.offsets import joint_offsets, pose_offsets
 from robotmodels.calibration.parameters import GeometricParameter, GeometricParameters
 from robotmodels.errors import InvalidValueError, ShapeError, UrdfWarning
 
@@ -218,3 +220,247 @@ def test_a_calibrated_robot_is_a_value(rng):
     assert not copy.joint_errors.gain.flags.writeable
     with pytest.raises(InvalidValueError, match="measured ends"):
         robot.with_tool_at("elsewhere")
+
+
+# --- the inverse model of the calibrated robot --------------------------------------------------
+
+
+def readings_of(model, rng, N):
+    low = np.where(np.isfinite(model.lower), np.maximum(model.lower, -3.0), -2.0)
+    high = np.where(np.isfinite(model.upper), np.minimum(model.upper, 3.0), 2.0)
+    return rng.uniform(low, high, size=(N, model.n))
+
+
+def missed(robot, q, T, mask=None):
+    """Largest element that is missing of the poses, for whole poses; of positions with a mask."""
+    P = calibrated_pose(robot, q)
+    return np.abs(P - T).max() if mask is None else np.abs(P[..., :3, 3] - T[..., :3, 3]).max()
+
+
+CASES = {
+    "rx90": {}, "erd:ur10": {}, "puma560": {}, "stanford_arm": {}, "panda": {}, "gantry": {},
+    "cobra_s600": {"mask": [1, 1, 1, 0, 0, 1]},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("laws", [{}, {"gains": True, "eccentricity": True}])
+@pytest.mark.parametrize("name", CASES)
+def test_every_posture_of_the_calibrated_robot(name, laws):
+    rng = np.random.default_rng(3)
+    model, asked = rm.load(name), CASES[name]
+    parameters = candidate_parameters(model, **laws)
+    robot = calibrated_model(parameters, deviations(parameters, rng))
+    q = readings_of(model, rng, 10 if name == "cobra_s600" else 60)
+    T = calibrated_pose(robot, q)
+    found = corrected_igm(robot, T, q_ref=q, **asked)
+    assert (found.residual[found.valid] < 1e-12).all()
+    # an independent forward pass, from the readings
+    there = found.valid.nonzero()
+    assert missed(robot, found.q[there], T[there[0]], asked.get("mask")) < 3e-12
+    turns = model.table.sigma[model.table.joint_rows] == 0
+    way = np.abs(found.nearest(q) - q)
+    way[:, turns] = np.minimum(way[:, turns], 2 * np.pi - way[:, turns])
+    assert way.max() < 1e-7
+    # as many as the calibrated table's own inverse model finds; each is told of
+    own = rm.igm(robot.model, T, q_ref=robot.joint_errors.actual(q), **asked)
+    assert (found.count >= own.count).mean() > 0.98
+    assert (found.correction == CorrectionStatus.ARRIVED).any(axis=-1).mean() > 0.9
+    arrived = found.correction == CorrectionStatus.ARRIVED
+    assert (found.row[arrived] >= 0).all()
+    if not laws:
+        for i in range(len(q)):
+            theirs = own.q[i][own.valid[i]]
+            mine = found.q[i][found.valid[i]]
+            gap = np.abs(theirs[:, None] - mine[None])
+            gap[..., turns] = np.minimum(gap[..., turns], 2 * np.pi - gap[..., turns])
+            # the same postures, save at double roots, which two methods place differently
+            assert (gap.max(axis=-1).min(axis=1) < 1e-5).mean() > 0.85
+
+
+def test_compliance_counts_in_the_inverse_model(rng):
+    model = rm.load("panda")
+    parameters = candidate_parameters(model, compliance=True, gains=True)
+    robot = calibrated_model(parameters, deviations(parameters, rng))
+    q = readings_of(model, rng, 20)
+    T = calibrated_pose(robot, q)
+    found = corrected_igm(robot, T, q_ref=q)
+    assert np.abs(found.nearest(q) - q).max() < 1e-7
+    assert missed(robot, found.nearest(q), T) < 1e-11
+
+
+def test_a_locked_joint_reads_what_it_is_locked_at(rng):
+    model = rm.load("panda")
+    parameters = candidate_parameters(model, gains=True, couplings=[(7, 2)])
+    robot = calibrated_model(parameters, deviations(parameters, rng))
+    q = readings_of(model, rng, 10)
+    q[:, 6] = 0.4
+    T = calibrated_pose(robot, q)
+    found = corrected_igm(robot, T, q_ref=q, lock={6: 0.4})
+    assert np.abs(found.q[found.valid][:, 6] - 0.4).max() < 1e-12
+    assert np.abs(found.nearest(q) - q).max() < 1e-7
+
+
+def test_limits_are_those_of_the_readings(rng):
+    model = rm.load("puma560")
+    parameters = candidate_parameters(model, gains=True)
+    robot = calibrated_model(parameters, deviations(parameters, rng, 5e-3))
+    q = rng.uniform(model.lower, model.upper, size=(100, 6))
+    T = calibrated_pose(robot, q)
+    found = corrected_igm(robot, T, q_ref=q, limits=True)
+    rows = found.q[found.valid]
+    assert ((rows >= model.lower) & (rows <= model.upper)).all()
+    assert np.abs(found.nearest(q) - q).max() < 1e-7
+    assert (found.correction == CorrectionStatus.OUTSIDE_LIMITS).any()
+
+
+def test_a_tip_on_a_tree(rng):
+    model = random_model(rng, f=9, tree=True, prismatic=False, fixed=True, tip="any")
+    model = with_frames(model, rng)
+    parameters = candidate_parameters(model, (None, "camera"), gains=True)
+    robot = calibrated_model(parameters, deviations(parameters, rng)).with_tool_at("camera")
+    q = rng.uniform(-1.5, 1.5, size=(5, model.n))
+    T = differential_model(parameters, q, robot.deviation, "camera").T
+    found = corrected_igm(robot, T, q_ref=q)
+    assert found.valid.any(axis=-1).all()
+    assert missed(robot, found.q[:, 0], T) < 1e-11 * robot_size(robot.model, q[0])
+
+
+@pytest.mark.parametrize("name", ["rx90", "erd:ur10", "puma560"])
+def test_at_and_beyond_the_edge_of_reach(name, rng):
+    """Targets pulled out of the calibrated robot's reach: solutions are true ones or none."""
+    model = rm.load(name)
+    parameters = candidate_parameters(model, gains=True)
+    robot = calibrated_model(parameters, deviations(parameters, rng))
+    straight = {"rx90": [0.2, 0.3, np.pi / 2, 0.4, 0.5, 0.6],
+                "erd:ur10": [0.2, -0.7, 0.0, 0.4, 0.5, 0.6],
+                "puma560": [0.2, 0.3, np.pi / 2, 0.4, 0.5, 0.6]}[name]  # fmt: skip
+    centre = robot.model.base[:3, 3]
+    T = np.repeat(calibrated_pose(robot, straight)[None], 9, axis=0)
+    pull = np.array([-1e-2, -1e-3, -1e-4, 0.0, 1e-4, 1e-3, 1e-2, 0.1, 1.0])
+    away = T[0, :3, 3] - centre
+    T[:, :3, 3] += pull[:, None] * away / np.linalg.norm(away)
+    found = corrected_igm(robot, T)
+    at = found.valid.nonzero()
+    assert missed(robot, found.q[at], T[at[0]]) < 3e-12
+    assert found.count[0] >= 2
+    assert found.count[-1] == 0
+    assert found.status[-1] == rm.IGMStatus.TOO_FAR
+    reached = np.isin(found.status, (rm.IGMStatus.REACHED, rm.IGMStatus.REACHED_FAMILY))
+    np.testing.assert_array_equal(reached, found.count > 0)
+    # the posture it was made from is found at the edge itself
+    assert found.count[3] >= 1
+    gone = np.isin(found.correction, (CorrectionStatus.VANISHED, CorrectionStatus.MERGED))
+    assert (gone.any(axis=-1) | (found.count >= found.row.max(axis=-1) + 1)).all()
+    assert found.reason(8).startswith("The position is out of reach")
+
+
+@pytest.mark.parametrize("name", ["rx90", "puma560"])
+def test_singular_wrists(name, rng):
+    model = rm.load(name)
+    parameters = candidate_parameters(model, gains=True)
+    robot = calibrated_model(parameters, deviations(parameters, rng))
+    q = readings_of(model, rng, 12)
+    q[:, 4] = np.repeat([0.0, 1e-4, -1e-3], 4)
+    T = calibrated_pose(robot, q)
+    found = corrected_igm(robot, T, q_ref=q)
+    assert found.valid.any(axis=-1).all()
+    at = found.valid.nonzero()
+    assert missed(robot, found.q[at], T[at[0]]) < 3e-12
+    nominal = corrected_igm(robot, rm.dgm(robot.structured, q), q_ref=q)
+    at = nominal.valid.nonzero()
+    assert missed(robot, nominal.q[at], rm.dgm(robot.structured, q)[at[0]]) < 3e-12
+    told = nominal.correction[np.isfinite(nominal.nominal).all(axis=-1)]
+    assert (told != CorrectionStatus.NO_POSTURE).all()
+
+
+def test_a_batch_is_its_poses_one_by_one(rng):
+    model = rm.load("puma560")
+    parameters = candidate_parameters(model, gains=True)
+    robot = calibrated_model(parameters, deviations(parameters, rng))
+    q = readings_of(model, rng, 6).reshape(2, 3, 6)
+    T = calibrated_pose(robot, q)
+    together = corrected_igm(robot, T)
+    for i in np.ndindex(2, 3):
+        alone = corrected_igm(robot, T[i])
+        assert alone.count == together.count[i]
+        np.testing.assert_allclose(
+            alone.q, together.q[i][together.valid[i]], rtol=0, atol=1e-10
+        )  # fmt: skip
+    empty = corrected_igm(robot, np.empty((0, 4, 4)))
+    assert empty.q.shape[0] == empty.status.size == 0
+    with pytest.raises(InvalidValueError, match="CalibratedRobot"):
+        corrected_igm(model, T)
+
+
+def test_without_the_second_look_nothing_false_is_said(rng):
+    model = rm.load("rx90")
+    parameters = candidate_parameters(model)
+    robot = calibrated_model(parameters, deviations(parameters, rng))
+    T = calibrated_pose(robot, readings_of(model, rng, 100))
+    quick, whole = corrected_igm(robot, T, complete=False), corrected_igm(robot, T)
+    assert (quick.count <= whole.count).all()
+    assert quick.count.mean() > 7.0
+    assert (quick.residual[quick.valid] < 1e-12).all()
+
+
+# --- controllers that keep their model ----------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["rx90", "erd:ur10", "puma560", "gantry"])
+def test_false_targets_lead_to_the_true_ones(name, rng):
+    model = rm.load(name)
+    parameters = candidate_parameters(model, gains=True, eccentricity=True)
+    robot = calibrated_model(parameters, deviations(parameters, rng))
+    q = readings_of(model, rng, 30)
+    q[:, 4] = np.where(np.abs(q[:, 4]) < 0.2, 0.5, q[:, 4])
+    T = calibrated_pose(robot, q)
+    false = pose_offsets(robot, T, q_ref=q).nearest(q)
+    commanded = rm.igm(model, false, q_ref=q).nearest(q)
+    assert missed(robot, commanded, T) < 1e-11
+    # and without them it misses by what is off
+    assert missed(robot, rm.igm(model, T, q_ref=q).nearest(q), T) > 1e-4
+
+
+def test_offsets_alone_are_cancelled(rng):
+    model = random_model(rng, f=6)
+    full = candidate_parameters(model, base=False, tool=False)
+    own = [f"{'r' if s == 1 else 'theta'}{j + 1}" for j, s in enumerate(model.table.sigma)]
+    parameters = full.subset(own)
+    xi = 1e-2 * rng.normal(size=6)
+    robot = calibrated_model(parameters, xi)
+    found = joint_offsets(robot, rng.uniform(-2.0, 2.0, size=(30, 6)))
+    assert found.worst[0] < 1e-11
+    assert found.rank == np.linalg.matrix_rank(np.eye(6))
+    np.testing.assert_allclose(found.offset, -xi, rtol=0, atol=1e-10)
+
+
+def test_constant_offsets_are_the_best_in_least_squares(rng):
+    model = rm.load("rx90")
+    parameters = candidate_parameters(model, gains=True)
+    robot = calibrated_model(parameters, deviations(parameters, rng))
+    q = readings_of(model, rng, 40)
+    found = joint_offsets(robot, q, mask=[1, 1, 1, 0, 0, 0])
+    assert found.position[1] < found.position[0]
+    wanted = rm.dgm(model, q)[:, :3, 3]
+
+    def cost(offset):
+        return ((calibrated_pose(robot, q + offset)[:, :3, 3] - wanted) ** 2).sum()
+
+    least = cost(found.offset)
+    np.testing.assert_allclose(least, (found.after[:, :3] ** 2).sum(), rtol=1e-9)
+    for step in 1e-5 * np.vstack([np.eye(6), -np.eye(6)]):
+        assert cost(found.offset + step) >= least * (1 - 1e-9)
+    # whole poses, whose rotations weigh: the gradient vanishes as well
+    both = joint_offsets(robot, q, length=0.5)
+
+    def whole(offset):
+        P, W = calibrated_pose(robot, q + offset), rm.dgm(model, q)
+        turn = W[:, :3, :3] @ P[:, :3, :3].swapaxes(-1, -2)
+        angle = np.arccos(np.clip((np.trace(turn, axis1=1, axis2=2) - 1) / 2, -1, 1))
+        return ((P[:, :3, 3] - W[:, :3, 3]) ** 2).sum() + 0.25 * (angle**2).sum()
+
+    best = whole(both.offset)
+    for step in 1e-4 * np.vstack([np.eye(6), -np.eye(6)]):
+        assert whole(both.offset + step) >= best * (1 - 1e-6)
+    with pytest.raises(InvalidValueError, match="none"):
+        joint_offsets(robot, np.empty((0, 6)))

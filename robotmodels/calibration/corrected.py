@@ -27,9 +27,9 @@ from .calibrated import CalibratedRobot
 MERGE = 1e-6
 """Postures closer than this are one [rad, m], as in `igm`."""
 
-STEPS = 30
+STEPS = 15
 SAMPLES = 32  # configurations at which calibrated and nominal poses are compared
-BESIDE = 10.0  # deviations up to which a singular value may hide more postures
+BESIDE = 3.0  # deviations up to which a singular value may hide more postures
 ROUNDS = 12  # of bringing the readings of held joints to their values
 CALIBRATED_ONLY = "of the calibrated robot only"
 
@@ -241,13 +241,13 @@ def corrected_igm(
     held = (starts.free_joints & redundant) | home.locked
     first = home.bring(targets, nominal, starts.valid, held, nominal)
 
-    doubtful = _doubtful(robot, starts, first, redundant) if complete else ~first.met.any(axis=1)
     more = _Postures.none(len(targets), n)
-    status = np.full(len(targets), int(IGMStatus.NOT_CONVERGED), np.int8)
+    lost = starts.valid.any(axis=1)
+    status = np.where(lost, int(IGMStatus.NOT_CONVERGED), starts.status).astype(np.int8)
     closest = np.full((len(targets), n), np.nan)
     missing = np.full((len(targets), 6), np.nan)
-    chosen = np.flatnonzero(doubtful)
-    if chosen.size and (complete or not first.met.all()):
+    chosen = np.flatnonzero(_doubtful(robot, starts, first, redundant) & complete)
+    if chosen.size:
         there = robot.joint_errors.actual(references[chosen])
         own = igm(
             model, targets[chosen], None if q_ref is None else there,

@@ -31,7 +31,9 @@ _FIELDS = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointErrors(Rebuilt):
-    """How far the joints are from their readings::
+    """How far the joints are from their readings.
+
+    ::
 
         q = q_read + G q_read + A sin(q_read) + B cos(q_read) + A2 sin(2 q_read)
             + B2 cos(2 q_read) - C g(q_read)
