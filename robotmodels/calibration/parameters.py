@@ -68,8 +68,8 @@ class GeometricParameters(Rebuilt):
     """Parameters of a robot, in the order in which they are preferred.
 
     Where two of them act alike the earlier is kept and the later regrouped into it: first the
-    variables of the joints, then the rest of the table, the ends, the base, and last what depends
-    on the configuration.
+    ends and the base, which are the least known and may be far off, then the variables of the
+    joints, the rest of the table, and last what depends on the configuration.
 
     Parameters
     ----------
@@ -85,8 +85,8 @@ class GeometricParameters(Rebuilt):
     Examples
     --------
     >>> from robotmodels.robots import load
-    >>> candidate_parameters(load("rx90")).names[:4]
-    ('theta1', 'theta2', 'theta3', 'theta4')
+    >>> candidate_parameters(load("rx90")).names[11:15]
+    ('theta0', 'theta1', 'theta2', 'theta3')
     """
 
     skeleton: Skeleton
@@ -323,17 +323,14 @@ def candidate_parameters(
     table_rows = [r for r in on_path if 1 <= r <= model.f]
     moving = [r for r in table_rows if skeleton.sigma[r] != FIXED]
     own = {REVOLUTE: Element.THETA, PRISMATIC: Element.R}
-    entries = [GeometricParameter(r, own[int(skeleton.sigma[r])], source=r) for r in moving]
-    rest: list[tuple[int, Element]] = []
+    # lengths first: three of them place a point whatever the angles, also near the last axis
+    six = [Element.B, Element.D, Element.R, Element.GAMMA, Element.ALPHA, Element.THETA]
+    places = [(r, e) for r in on_path if r > model.f for e in six] if tool else []
+    places += [(0, e) for e in six] if base else []
+    rest = [(r, own[int(skeleton.sigma[r])]) for r in moving]
     for row in table_rows:
         rest += [(row, element) for element in _elements_of(skeleton, row, on_path)]
-    six = [e for e in Element if e is not Element.BETA]
-    if tool:
-        rest += [(r, e) for r in on_path if r > model.f for e in six]
-    if base:
-        rest += [(0, e) for e in six]
-    known = {(e.row, e.element) for e in entries}
-    entries += [GeometricParameter(r, e, source=r) for r, e in rest if (r, e) not in known]
+    entries = [GeometricParameter(r, e, source=r) for r, e in dict.fromkeys([*places, *rest])]
     laws: list[ErrorLaw] = []
     if eccentricity:
         laws += [ErrorLaw.SINE, ErrorLaw.COSINE, ErrorLaw.SINE_2, ErrorLaw.COSINE_2]

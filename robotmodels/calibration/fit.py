@@ -1,0 +1,201 @@
+"""Geometric calibration of a robot from measurements."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+
+import numpy as np
+
+from .._choices import chosen
+from ..estimation import Loss
+from ..model import RobotModel, check_model
+from .errors_seen import block_errors
+from .folds import (
+    Refit,
+    errors_of_others,
+    errors_of_splits,
+    split_aside,
+    splits,
+    suited_fixtures,
+)
+from .identifiable import all_deviations, identifiable_on
+from .measurements import Measurement
+from .notes import check_enough, notes_after, notes_before
+from .parameters import GeometricParameters, candidate_parameters
+from .placing import placed_robot
+from .prior import ParameterPrior, settled_prior
+from .problem import measured_frames, problem_of
+from .result import CalibrationResult
+from .solve import solve
+
+Progress = Callable[[int, int, str], None]
+"""Called with the number of fits done, of all, and what is being done."""
+
+_SEED = 1
+
+
+def fit(
+    model: RobotModel,
+    measurements: Measurement | Iterable[Measurement],
+    *,
+    parameters: GeometricParameters | Iterable[str] | None = None,
+    known: Iterable[str] = (),
+    known_lengths: Iterable[str] = (),
+    base: bool = True,
+    tool: bool = True,
+    gains: bool = False,
+    couplings: Iterable[tuple[int, int]] = (),
+    compliance: bool = False,
+    eccentricity: bool = False,
+    loss: Loss | str = Loss.SQUARES,
+    prior: ParameterPrior | None = None,
+    truncation: float | None = None,
+    folds: int = 5,
+    held_out: float | Measurement | Sequence[Measurement] = 0.2,
+    rng: np.random.Generator | int | None = None,
+    progress: Progress | None = None,
+) -> CalibrationResult:
+    """Estimate the geometric parameters of a robot, also called kinematic calibration.
+
+    Parameters that the measurements cannot tell stay as they are or are regrouped into others;
+    the result says which. All measurements take part in the estimate; the errors on data kept
+    aside come from further fits without them.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The nominal robot; its base and tool are where the fit begins (if they are far off, the
+        measured positions say where it stands).
+    measurements : Measurement or iterable of Measurement
+        One or more, of any kinds.
+    parameters : GeometricParameters or iterable of str, optional
+        Candidates, or their names; default all of `candidate_parameters`.
+    known, known_lengths : iterable of str
+        Parameters that are known and stay as they are. Measurements without a length (contacts)
+        need one of ``known_lengths``.
+    base, tool, gains, couplings, compliance, eccentricity
+        As `candidate_parameters`.
+    loss : Loss or str
+        ``"squares"``, or against outliers ``"huber"``, ``"cauchy"``, ``"tukey"``.
+    prior : ParameterPrior, optional
+        How large the deviations are thought to be: the estimate is then the maximum a posteriori.
+    truncation : float, optional
+        Directions whose singular value relative to the largest is smaller are left out.
+    folds : int
+        Number of folds of the cross-validation; 0 for none.
+    held_out : float, or Measurement or sequence of them
+        Share of the blocks that one more fit is tested on (0 for none), or measurements for that,
+        which never take part.
+    rng : numpy.random.Generator or int, optional
+        For the folds; default the same each time.
+    progress : callable, optional
+        ``progress(done, of, doing)`` after each fit.
+
+    Returns
+    -------
+    CalibrationResult
+        Values with deviations, errors before and after, the calibrated robot.
+
+    Raises
+    ------
+    InvalidValueError, ShapeError
+        Measurements of another robot, no known length where one is needed, too few measurements,
+        units that cannot be right; with what to measure or to change.
+
+    References
+    ----------
+    Seed book section 1.4.
+
+    Examples
+    --------
+    >>> import robotmodels as rm
+    >>> arm = rm.load("rx90")
+    >>> real = arm.with_tool(rm.se3.translation(0.001, 0.0, 0.1))
+    >>> q = np.random.default_rng(0).uniform(-1.5, 1.5, (40, 6))
+    >>> found = fit(arm, Pose(q, rm.dgm(real, q)), folds=0)
+    >>> round(float(found.deviation[found.names.index("r7")]), 6)
+    0.1
+    """
+    check_model(model)
+    measured = (measurements,) if isinstance(measurements, Measurement) else tuple(measurements)
+    aside = _measurements_aside(held_out)
+    loss = chosen(Loss, loss, "loss")
+    chance = np.random.default_rng(_SEED if rng is None else rng)
+    frames = measured_frames((*measured, *aside))
+
+    def candidates_of(robot: RobotModel) -> GeometricParameters:
+        found = candidate_parameters(
+            robot, frames, base=base, tool=tool, gains=gains, couplings=couplings,
+            compliance=compliance, eccentricity=eccentricity,
+        )  # fmt: skip
+        return found if parameters is None else found.subset(parameters)
+
+    known, known_lengths = tuple(known), tuple(known_lengths)
+    placed = None
+    if isinstance(parameters, GeometricParameters):
+        candidates = parameters
+        notes = notes_before(problem_of(candidates, measured))
+    else:
+        candidates = candidates_of(model)
+        notes = notes_before(problem_of(candidates, measured))
+        fixed = {*known, *known_lengths, *(() if prior is None else prior.named)}
+        placed = placed_robot(candidates, measured, fixed)
+        if placed is not None:
+            candidates = candidates_of(placed.model)
+    share = held_out if isinstance(held_out, float | int) else 0.0
+    step = _Steps(progress, 1 + folds + bool(share))
+    identifiable = identifiable_on(candidates, measured, known_lengths, known)
+    problem = problem_of(identifiable.kept, measured)
+    check_enough(problem)
+    gaussian = None if prior is None else settled_prior(prior, problem, loss, chance)
+    solution = solve(problem, loss=loss, prior=gaussian, truncation=truncation)
+    step("all measurements")
+    again = identifiable_on(
+        candidates, measured, known_lengths, known,
+        deviation=all_deviations(candidates, identifiable.kept, solution.deviation),
+        fixtures=solution.fixtures,
+    )  # fmt: skip
+    as_given = problem_of(candidates_of(model), measured) if placed is not None else problem
+    nothing = np.zeros(as_given.P)
+    before = block_errors(as_given, nothing, suited_fixtures(as_given, nothing, {}))
+    refit = Refit(solution, gaussian, truncation)
+    validation = None
+    if folds and problem.blocks >= 2 * folds:
+        parts = splits(measured, folds, chance)
+        validation = errors_of_splits(refit, parts, before, lambda: step("cross-validation"))
+    kept_aside = None
+    if aside:
+        kept_aside = errors_of_others(refit, aside)
+    elif share and (part := split_aside(measured, share, chance)) is not None:
+        doing = "measurements kept aside"
+        kept_aside = errors_of_splits(refit, [part], before, lambda: step(doing))
+    return CalibrationResult(
+        nominal=model, known=(*known_lengths, *known), identifiable=identifiable, again=again,
+        solution=solution, before=before,
+        placed=None if placed is None else placed.errors,
+        after=block_errors(problem, solution.deviation, solution.fixtures),
+        cross_validation=validation, held_out=kept_aside,
+        notes=(*notes, *notes_after(solution, identifiable, again)),
+    )  # fmt: skip
+
+
+class _Steps:
+    """Counts fits for a progress callback."""
+
+    def __init__(self, progress: Progress | None, total: int) -> None:
+        self._progress, self._total, self._done = progress, total, 0
+
+    def __call__(self, doing: str) -> None:
+        self._done += 1
+        if self._progress is not None:
+            self._progress(self._done, self._total, doing)
+
+
+def _measurements_aside(
+    held_out: float | Measurement | Sequence[Measurement],
+) -> tuple[Measurement, ...]:
+    if isinstance(held_out, Measurement):
+        return (held_out,)
+    if isinstance(held_out, float | int):
+        return ()
+    return tuple(held_out)

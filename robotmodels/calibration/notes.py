@@ -1,0 +1,185 @@
+"""What is strange about measurements, in sentences: what to repair, and what to measure next."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._arrays import Array
+from ..errors import InvalidValueError
+from ..estimation import FitStatus
+from ..geometry import REVOLUTE
+from ..kinematics.lengths import characteristic_length
+from .identifiable import IdentifiableParameters
+from .measurements import Pose, Position
+from .problem import Problem, measured_frames
+from .solve import Solution
+
+_TURNS = 30.0
+"""Reading of a revolute joint beyond which degrees are more likely, rad."""
+_HARDLY = 0.02
+"""Standard deviation of a joint's readings below which it hardly moves, rad or m."""
+_FAR = 50.0
+"""Residual in stated standard deviations that units explain better than noise."""
+_ILL = 1e4
+
+
+def notes_before(problem: Problem) -> tuple[str, ...]:
+    """Look at measurements before they are fitted.
+
+    Parameters
+    ----------
+    problem : Problem
+        Parameters and measurements.
+
+    Returns
+    -------
+    tuple of str
+        Sentences; empty if nothing is strange.
+
+    Raises
+    ------
+    InvalidValueError
+        Readings in degrees, positions in millimetres.
+    """
+    model = problem.parameters.model
+    revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
+    notes = []
+    length = characteristic_length(model)
+    for k, m in enumerate(problem.measurements):
+        where = f"measurements[{k}] ({m.name})"
+        for view in m.views:
+            largest = float(np.abs(view.q[:, revolute]).max(initial=0.0))
+            if largest > _TURNS:
+                raise InvalidValueError(
+                    f"{where}: a revolute joint reads {largest:.4g} rad; these look like degrees. "
+                    "Pass radians: np.deg2rad(q)."
+                )
+        if isinstance(m, Pose | Position):
+            p = m.T[:, :3, 3] if isinstance(m, Pose) else m.p
+            spread = float(np.linalg.norm(np.ptp(p, axis=0)))
+            if spread > 50.0 * length:
+                raise InvalidValueError(
+                    f"{where}: positions are spread over {spread:.4g} m, but the robot reaches "
+                    f"{length:.3g} m; these look like millimetres. Pass metres: 1e-3 * p."
+                )
+        twice = _duplicates(problem, k)
+        if twice:
+            notes.append(
+                f"{where}: {twice} of {m.blocks} rows repeat another row exactly; they add no "
+                "information, but make the standard deviations too small. Leave them out."
+            )
+    for j, reading in enumerate(_all_readings(problem).T):
+        row = model.table.joint_rows[j] + 1
+        seen = any(
+            row in problem.parameters.skeleton.path(f)
+            for f in measured_frames(problem.measurements)
+        )
+        if seen and len(reading) and float(np.std(reading)) < _HARDLY:
+            unit = "rad" if revolute[j] else "m"
+            notes.append(
+                f"Joint {j + 1} ({model.table.joint_names[j]}) moves by {np.ptp(reading):.2g} "
+                f"{unit} only: what it carries is hardly told from what carries it. Measure with "
+                "that joint spread over its range."
+            )
+    return tuple(notes)
+
+
+def check_enough(problem: Problem) -> None:
+    """Refuse fewer rows than unknowns.
+
+    Parameters
+    ----------
+    problem : Problem
+        Parameters that are to be estimated, and measurements.
+
+    Raises
+    ------
+    InvalidValueError
+        How many more measurements are needed.
+    """
+    unknowns = problem.P + problem.F
+    if not problem.P:
+        raise InvalidValueError(
+            "These measurements tell none of the parameters. See identifiable_parameters, and "
+            "measure with all joints spread over their ranges."
+        )
+    if problem.rows > unknowns:
+        return
+    rows = max(len(m.axes) for m in problem.measurements)
+    missing = -(-(unknowns + 1 - problem.rows) // rows)
+    raise InvalidValueError(
+        f"{problem.rows} rows cannot tell {problem.P} parameters and {problem.F} unknown "
+        f"coordinates of fixtures: measure at least {missing} more configurations (better three "
+        "times as many rows as unknowns), or name fewer parameters."
+    )
+
+
+def notes_after(
+    solution: Solution, before: IdentifiableParameters, again: IdentifiableParameters
+) -> tuple[str, ...]:
+    """Look at a solution.
+
+    Parameters
+    ----------
+    solution : Solution
+        Of the fit.
+    before, again : IdentifiableParameters
+        As judged at the nominal robot, and at the solution.
+
+    Returns
+    -------
+    tuple of str
+        Sentences.
+    """
+    fit, problem = solution.fit, solution.problem
+    notes = []
+    if fit.status is not FitStatus.CONVERGED:
+        notes.append(fit.status.sentence)
+    lost = [name for name in before.names if name not in again.names]
+    gained = [name for name in again.names if name not in before.names]
+    if lost or gained:
+        notes.append(
+            "At the solution the identifiable parameters differ from those at the nominal robot"
+            + (f"; no longer: {', '.join(lost)}" if lost else "")
+            + (f"; also: {', '.join(gained)}" if gained else "")
+            + ". Estimates of these are doubtful."
+        )
+    if again.condition > _ILL:
+        notes.append(
+            f"The condition number is {again.condition:.2g}: some parameters are told from each "
+            "other by little more than noise. Choose configurations with select_configurations, "
+            "name fewer parameters, or give a prior."
+        )
+    if fit.sigma_known and fit.scale > _FAR:
+        notes.append(
+            f"Residuals are {fit.scale:.3g} times the stated standard deviations: look for a slip "
+            "of units (mm for m, degrees for rad), a wrong frame, or readings that do not belong "
+            "to their measurements."
+        )
+    if len(fit.outliers):
+        numbers = ", ".join(str(int(b)) for b in fit.outliers[:10])
+        more = " and others" if len(fit.outliers) > 10 else ""
+        notes.append(
+            f"{len(fit.outliers)} of {problem.blocks} measurements are longer than noise explains "
+            f"(blocks {numbers}{more})."
+        )
+    return tuple(notes)
+
+
+def _duplicates(problem: Problem, k: int) -> int:
+    """Blocks whose readings and residuals repeat those of another one."""
+    m = problem.measurements[k]
+    if not m.views:
+        return 0
+    rows = [view.q for view in m.views]
+    if isinstance(m, Pose):
+        rows.append(m.T.reshape(m.blocks, -1))
+    elif isinstance(m, Position):
+        rows.append(m.p)
+    rows.append(m.groups[:, None].astype(np.float64))
+    return m.blocks - len(np.unique(np.hstack(rows), axis=0))
+
+
+def _all_readings(problem: Problem) -> Array:
+    views = [view.q for m in problem.measurements for view in m.views]
+    return np.concatenate(views) if views else np.zeros((0, problem.parameters.model.n))

@@ -1,0 +1,85 @@
+"""The nominal robot where it stands best, with the tool that suits it best: where a fit begins."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from typing import NamedTuple
+
+from ..model import RobotModel
+from .calibrated import calibrated_model
+from .errors_seen import BlockErrors, block_errors
+from .identifiable import identifiable_on
+from .measurements import Measurement
+from .parameters import GeometricParameters, candidate_parameters
+from .problem import problem_of
+from .registration import registered
+from .solve import first_scales, solve
+
+_ROUGH = 1e-6
+
+
+class PlacedRobot(NamedTuple):
+    """A robot with fitted base and tool.
+
+    Attributes
+    ----------
+    model : RobotModel
+        The nominal table, base and tool as fitted.
+    errors : BlockErrors
+        What is left: what the table is to blame for.
+    """
+
+    model: RobotModel
+    errors: BlockErrors
+
+
+def placed_robot(
+    candidates: GeometricParameters, measured: Sequence[Measurement], fixed: Collection[str]
+) -> PlacedRobot | None:
+    """Fit base and tool alone.
+
+    A base or tool that is far off hides what the measurements can tell: the turn of the last joint
+    has no effect on a point that is thought to lie on its axis.
+
+    Parameters
+    ----------
+    candidates : GeometricParameters
+        Of which those of base and ends are fitted.
+    measured : sequence of Measurement
+        To fit.
+    fixed : collection of str
+        Parameters that stay as they are.
+
+    Returns
+    -------
+    PlacedRobot or None
+        None if neither may be off.
+
+    References
+    ----------
+    Seed book section 1.4.4.3.
+    """
+    model = candidates.model
+
+    def of_place(parameters: GeometricParameters) -> list[str]:
+        f = model.f
+        names = [e.name for e in parameters.entries if e.row == 0 or e.row > f]
+        return [name for name in names if name not in fixed and name in candidates.names]
+
+    names = of_place(candidates)
+    if not names:
+        return None
+    rows = {candidates.entries[k].row for k in candidates.index(names)}
+    if not fixed:
+        model = registered(model, measured, base=0 in rows, tool=any(rows - {0}))
+    frames = candidates.skeleton.frames
+    for _ in range(2):  # once more, as a tool off the last axis tells more than one on it
+        few = candidate_parameters(model, frames).subset(names)
+        found = identifiable_on(few, measured, scale_is_known=True)
+        if not len(found.kept):
+            return None
+        problem = problem_of(found.kept, measured)
+        solution = solve(problem, scales=first_scales(problem), tolerance=_ROUGH)
+        model = calibrated_model(solution.problem.parameters, solution.deviation).model
+    errors = block_errors(solution.problem, solution.deviation, solution.fixtures)
+    return PlacedRobot(model, errors)

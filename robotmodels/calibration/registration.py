@@ -1,0 +1,101 @@
+"""A first place of the robot in the world, where nobody knows it: by the measured positions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .. import se3
+from .._arrays import Array
+from ..kinematics import dgm
+from ..kinematics.lengths import characteristic_length
+from ..model import RobotModel
+from .measurements import Measurement, Pose, Position
+
+_NEAR = 0.2
+"""Largest mean residual, in lengths of the robot, that a fit is started from as it is."""
+
+
+def registered(
+    model: RobotModel, measurements: Sequence[Measurement], base: bool, tool: bool
+) -> RobotModel:
+    """The robot with a base and tool that bring measured and computed poses near each other.
+
+    Where the given base and tool already do, the model is returned as it is. Else the base follows
+    from the positions (the rotation that fits them best), and the tool from the poses. Only kinds
+    that measure all three coordinates are used.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The nominal robot.
+    measurements : sequence of Measurement
+        Of any kinds.
+    base, tool : bool
+        Whether each may be changed.
+
+    Returns
+    -------
+    RobotModel
+        A start for the fit.
+
+    References
+    ----------
+    W. Kabsch, "A solution for the best rotation to relate two sets of vectors", Acta
+    Crystallographica A32, 1976.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> arm = load("rx90")
+    >>> q = np.random.default_rng(0).uniform(-1, 1, (10, 6))
+    >>> there = dgm(arm.with_base(se3.translation(3.0, 0, 0) @ se3.rotation("z", 2.0)), q)
+    >>> start = registered(arm, [Pose(q, there)], base=True, tool=True)
+    >>> float(abs(dgm(start, q) - there).max()) < 1e-9
+    True
+    """
+    usable = [m for m in measurements if isinstance(m, Pose | Position) and all(m.rows[:3])]
+    usable = [m for m in usable if m.frame is None]
+    if not usable or not (base or tool):
+        return model
+    length = characteristic_length(model)
+    measured = np.concatenate([_positions(m) for m in usable])
+    computed = np.concatenate([dgm(model, m.q)[:, :3, 3] for m in usable])
+    poses = [m for m in usable if isinstance(m, Pose) and all(m.rows)]
+    turned = [
+        np.trace(dgm(model, m.q)[:, :3, :3].swapaxes(1, 2) @ m.T[:, :3, :3], axis1=1, axis2=2)
+        for m in poses
+    ]
+    near = np.mean(np.linalg.norm(measured - computed, axis=1)) < _NEAR * length
+    if near and all(np.mean(trace) > 1.0 + 2.0 * np.cos(0.5) for trace in turned):
+        return model
+    start = model
+    if base:
+        world = _best_motion(computed, measured)
+        start = model.with_base(world @ model.base)
+    if tool and poses:
+        found = np.concatenate([se3.inverse(dgm(start, m.q)) @ m.T for m in poses])
+        offset = np.eye(4)
+        offset[:3, :3] = _nearest_rotation(found[:, :3, :3].mean(axis=0))
+        offset[:3, 3] = found[:, :3, 3].mean(axis=0)
+        start = start.with_tool(start.tool @ offset)
+    return start
+
+
+def _positions(m: Pose | Position) -> Array:
+    return m.T[:, :3, 3] if isinstance(m, Pose) else m.p
+
+
+def _best_motion(points: Array, targets: Array) -> Array:
+    """Pose that moves points onto targets with the least sum of squares."""
+    a, b = points.mean(axis=0), targets.mean(axis=0)
+    T = np.eye(4)
+    T[:3, :3] = _nearest_rotation((targets - b).T @ (points - a))
+    T[:3, 3] = b - T[:3, :3] @ a
+    return T
+
+
+def _nearest_rotation(M: Array) -> Array:
+    U, _, Vt = np.linalg.svd(M)
+    return U @ np.diag([1.0, 1.0, float(np.sign(np.linalg.det(U @ Vt)))]) @ Vt

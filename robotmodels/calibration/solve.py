@@ -1,0 +1,171 @@
+"""One fit of given parameters to given measurements, deviations of the noise estimated along."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .._arrays import Array, Rebuilt, read_only
+from ..estimation import Loss, NonlinearFit, Prior, fit_nonlinear
+from ..estimation.losses import robust_scale
+from ..kinematics.lengths import characteristic_length
+from .measurements import Measurement
+from .problem import Problem, guessed_fixtures, stacked
+
+_FIRST_LENGTH = 1e-3
+"""Standard deviation of lengths before it has been estimated, m."""
+_ROUNDS = 20
+_SETTLED = 1e-3
+_ROUGH = 1e-6
+"""Tolerance of the steps while the noise is still being estimated."""
+_EXACT = 1e-9
+"""Factor on the noise below which residuals are rounding: the data are exact."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Solution(Rebuilt):
+    """Fitted parameters and fixtures.
+
+    Parameters
+    ----------
+    problem : Problem
+        What was fitted.
+    fit : NonlinearFit
+        Of the vector [parameters, fixtures], rows in standard deviations.
+    scales : tuple of ndarray, shapes (k,)
+        Standard deviations of the rows of each measurement (m, rad): estimated where it states
+        none.
+    """
+
+    problem: Problem
+    fit: NonlinearFit
+    scales: tuple[Array, ...]
+
+    @property
+    def deviation(self) -> Array:
+        """Values of the parameters, shape (P,)."""
+        return self.fit.x[: self.problem.P]
+
+    @property
+    def fixtures(self) -> Array:
+        """Values of the fixtures, shape (F,)."""
+        return self.fit.x[self.problem.P :]
+
+
+def first_scales(problem: Problem) -> tuple[Array, ...]:
+    """Standard deviations to begin with: a millimetre, and the angle that it is at arm's length.
+
+    Parameters
+    ----------
+    problem : Problem
+        The calibration.
+
+    Returns
+    -------
+    tuple of ndarray
+        For each measurement, by the units of its rows.
+    """
+    angle = _FIRST_LENGTH / characteristic_length(problem.parameters.model)
+    return tuple(
+        read_only([_FIRST_LENGTH if unit == "m" else angle for unit in m.units])
+        for m in problem.measurements
+    )
+
+
+def solve(
+    problem: Problem,
+    start: Array | None = None,
+    *,
+    scales: tuple[Array, ...] | None = None,
+    loss: Loss = Loss.SQUARES,
+    prior: Prior | None = None,
+    truncation: float | None = None,
+    tolerance: float = 1e-12,
+) -> Solution:
+    """Iterated least squares; noise that is not stated is estimated for each kind and unit.
+
+    Parameters
+    ----------
+    problem : Problem
+        Parameters and measurements.
+    start : ndarray, shape (P + F,), optional
+        Where to start; default the nominal robot and guessed fixtures.
+    scales : tuple of ndarray, optional
+        Standard deviations that are kept as they are; default: estimated.
+    loss, prior, truncation, tolerance
+        As `fit_nonlinear`.
+
+    Returns
+    -------
+    Solution
+        Parameters, fixtures, noise.
+
+    References
+    ----------
+    Seed book section 1.4.4.3.
+    """
+    if start is None:
+        xi = np.zeros(problem.P)
+        start = np.concatenate([xi, guessed_fixtures(problem, xi)])
+    known = all(_states_noise(m) for m in problem.measurements)
+    estimated = scales is None and not known
+    current = first_scales(problem) if scales is None else scales
+    block = problem.block
+    is_settled = not estimated
+    for _ in range(_ROUNDS):
+        fit = fit_nonlinear(
+            lambda x, s=current: stacked(problem, x, s), start, block=block, loss=loss,
+            prior=prior, truncation=truncation, sigma_known=known or scales is not None,
+            tolerance=tolerance if is_settled else max(tolerance, _ROUGH),
+        )  # fmt: skip
+        if is_settled:
+            break
+        previous, current = current, _estimated_scales(problem, fit, current)
+        start = fit.x
+        # the ratios of the scales weight the rows; a common factor changes nothing
+        ratios = np.concatenate([
+            new / old for new, old in zip(current, previous, strict=True)
+        ])  # fmt: skip
+        is_settled = float(np.ptp(ratios)) < _SETTLED * float(ratios.max())
+    return Solution(problem, fit, current)
+
+
+def _states_noise(m: Measurement) -> bool:
+    return m.sigma is not None or m.covariance is not None
+
+
+def _estimated_scales(
+    problem: Problem, fit: NonlinearFit, scales: tuple[Array, ...]
+) -> tuple[Array, ...]:
+    """Noise of each measurement and unit from its residuals, freedom shared by leverage."""
+    weights = np.sqrt(fit.weights)
+    J = fit.jacobian * weights[:, None]
+    length = np.linalg.norm(J, axis=0)
+    Q, _ = np.linalg.qr(J / np.where(length > 0.0, length, 1.0))
+    leverage = (Q * Q).sum(axis=1)
+    new, first = [], 0
+    for m, scale in zip(problem.measurements, scales, strict=True):
+        k = len(m.axes)
+        rows = slice(first, first + m.blocks * k)
+        first = rows.stop
+        if _states_noise(m):
+            new.append(scale)
+            continue
+        residual = fit.residuals[rows].reshape(-1, k)
+        share = leverage[rows].reshape(-1, k)
+        values = scale.copy()
+        for unit in set(m.units):
+            of_unit = np.array([u == unit for u in m.units])
+            fitted = float(share[:, of_unit].sum())
+            if fit.loss is Loss.SQUARES:
+                freedom = of_unit.sum() * m.blocks - fitted
+                square = float((residual[:, of_unit] ** 2).sum())
+                factor = np.sqrt(square / freedom) if freedom > 0.5 else 1.0
+            else:
+                count = np.full(m.blocks, of_unit.sum())
+                factor = robust_scale(np.linalg.norm(residual[:, of_unit], axis=1), count, fitted)
+            if factor > _EXACT:
+                values[of_unit] = scale[of_unit] * factor
+        new.append(read_only(values))
+    return tuple(new)
