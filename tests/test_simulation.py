@@ -37,6 +37,8 @@ from robotmodels.simulation import (
     simulate,
     torque_parts,
 )
+from robotmodels.simulation.dry_friction import DryFriction
+from robotmodels.simulation.forces import Forces
 
 G = 9.81
 KINDS = SimulationEventKind
@@ -539,6 +541,11 @@ def test_ends_before_the_end_say_why():
     lost = simulate(ghost, [0.0, np.pi / 2], [0.0, -1.0], t=10.0)
     assert lost.status in (SimulationStatus.SINGULAR, SimulationStatus.STEP_TOO_SMALL)
     assert lost.t[-1] < 10.0
+    # and nothing is followed past it
+    assert np.linalg.eigvalsh(mass_matrix(ghost, lost.q)).min() > 0.0
+    forces = Forces(ghost, None, None, True, None, DryFriction.none(2), None)
+    assert np.isnan(forces.at(0.0, np.array([0.0, crossing[0]]), np.zeros(2))[0]).all()
+    assert forces.met_singular
 
 
 def test_progress_is_told(caplog):

@@ -150,7 +150,7 @@ class Forces:
         Returns
         -------
         a : ndarray, shape (n,)
-            Accelerations; NaN where the mass matrix is singular.
+            Accelerations; NaN where the mass matrix is not positive definite.
         tau, friction, tool : ndarray, shape (n,)
             Torques of the control, of friction, and for the wrench.
         reaction : ndarray, shape (n,)
@@ -160,11 +160,13 @@ class Forces:
         n, mode = self.n, self.mode
         load, tau, friction, tool = self.load(t, q, v)
         if not mode.sticks:
-            singular = self._accelerations(
+            found = self._accelerations(
                 q.reshape(1, n), v.reshape(1, n), load.reshape(1, n), *self._links, self.rotor,
                 self._a,
             )  # fmt: skip
-            self.met_singular |= singular >= 0
+            if found != -1:  # singular, or past a singularity: it was definite at the start
+                self.met_singular = True
+                self._a[0] = np.nan
             return self._a[0].copy(), tau, friction, tool, self._still[0]
         M, h = self.bodies(q, v)
         rest = load - h
@@ -172,7 +174,9 @@ class Forces:
         a = np.zeros(n)
         if N.shape[1]:
             try:
-                a = N @ np.linalg.solve(N.T @ M @ N, N.T @ rest)
+                inertia = N.T @ M @ N
+                np.linalg.cholesky(inertia)  # refuses what is singular or past a singularity
+                a = N @ np.linalg.solve(inertia, N.T @ rest)
             except np.linalg.LinAlgError:
                 self.met_singular = True
                 return np.full(n, np.nan), tau, friction, tool, self._still[0]

@@ -48,11 +48,11 @@ def simulate(
 ) -> Simulation:
     """Motion of a robot under torques: the direct dynamic model integrated over time.
 
-    The integrator takes steps as large as the tolerances allow. Dry friction (Fc of the drives,
-    Fcm of coupled motors, jumps at rest of a friction model) is exact: a part that comes to rest
-    is held as long as the torque on it stays within its breakaway torques, and each change is an
-    event at which the integration starts anew. Energies and works are integrated along, so that
-    the drift of their balance tells the error of the integration.
+    The integrator takes steps as large as the tolerances allow. Dry friction (Fc of the drives, Fcm
+    of coupled motors, jumps at rest of a friction model) is exact: a part that comes to rest is
+    held as long as the torque on it stays within its breakaway torques (by 1e-9 of them), and each
+    change is an event at which the integration starts anew. Energies and works are integrated
+    along, so that the drift of their balance tells the error of the integration.
 
     Parameters
     ----------
