@@ -109,12 +109,13 @@ def fit(
     Examples
     --------
     >>> import robotmodels as rm
+    >>> import robotmodels.calibration
     >>> arm = rm.load("rx90")
     >>> real = arm.with_tool(rm.se3.translation(0.001, 0.0, 0.1))
     >>> q = np.random.default_rng(0).uniform(-1.5, 1.5, (40, 6))
-    >>> found = fit(arm, Pose(q, rm.dgm(real, q)), folds=0)
-    >>> round(float(found.deviation[found.names.index("r7")]), 6)
-    0.1
+    >>> found = fit(arm, rm.calibration.Pose(q, rm.dgm(real, q)), folds=0)
+    >>> found.model.tool[:3, 3].round(6)
+    array([0.001, 0.   , 0.1  ])
     """
     check_model(model)
     measured = (measurements,) if isinstance(measurements, Measurement) else tuple(measurements)
@@ -122,26 +123,29 @@ def fit(
     loss = chosen(Loss, loss, "loss")
     chance = np.random.default_rng(_SEED if rng is None else rng)
     frames = measured_frames((*measured, *aside))
+    given = parameters if isinstance(parameters, GeometricParameters) else None
+    names = None if parameters is None or given is not None else tuple(parameters)
 
     def candidates_of(robot: RobotModel) -> GeometricParameters:
         found = candidate_parameters(
             robot, frames, base=base, tool=tool, gains=gains, couplings=couplings,
             compliance=compliance, eccentricity=eccentricity,
         )  # fmt: skip
-        return found if parameters is None else found.subset(parameters)
+        return found if names is None else found.subset(names)
 
     known, known_lengths = tuple(known), tuple(known_lengths)
+    candidates = candidates_of(model) if given is None else given
+    as_given = problem_of(candidates, measured)
+    notes = notes_before(as_given)
+    nothing = np.zeros(as_given.P)
+    errors_given = block_errors(as_given, nothing, suited_fixtures(as_given, nothing, {}))
     placed = None
-    if isinstance(parameters, GeometricParameters):
-        candidates = parameters
-        notes = notes_before(problem_of(candidates, measured))
-    else:
-        candidates = candidates_of(model)
-        notes = notes_before(problem_of(candidates, measured))
+    if given is None:
         fixed = {*known, *known_lengths, *(() if prior is None else prior.named)}
         placed = placed_robot(candidates, measured, fixed)
         if placed is not None:
             candidates = candidates_of(placed.model)
+    before = errors_given if placed is None else placed.errors
     share = held_out if isinstance(held_out, float | int) else 0.0
     step = _Steps(progress, 1 + folds + bool(share))
     identifiable = identifiable_on(candidates, measured, known_lengths, known)
@@ -155,9 +159,6 @@ def fit(
         deviation=all_deviations(candidates, identifiable.kept, solution.deviation),
         fixtures=solution.fixtures,
     )  # fmt: skip
-    as_given = problem_of(candidates_of(model), measured) if placed is not None else problem
-    nothing = np.zeros(as_given.P)
-    before = block_errors(as_given, nothing, suited_fixtures(as_given, nothing, {}))
     refit = Refit(solution, gaussian, truncation)
     validation = None
     if folds and problem.blocks >= 2 * folds:
@@ -171,8 +172,7 @@ def fit(
         kept_aside = errors_of_splits(refit, [part], before, lambda: step(doing))
     return CalibrationResult(
         nominal=model, known=(*known_lengths, *known), identifiable=identifiable, again=again,
-        solution=solution, before=before,
-        placed=None if placed is None else placed.errors,
+        solution=solution, given=errors_given, before=before,
         after=block_errors(problem, solution.deviation, solution.fixtures),
         cross_validation=validation, held_out=kept_aside,
         notes=(*notes, *notes_after(solution, identifiable, again)),

@@ -47,7 +47,8 @@ class AsideErrors(Rebuilt):
     blocks : ndarray of int, shape (B,)
         Which blocks.
     before, after : BlockErrors
-        Of the nominal and of the calibrated robot, each with the fixtures that suit it best.
+        Of the nominal robot (base and tool fitted where they may be off) and of one calibrated
+        without these blocks, each with the fixtures that suit it best.
     folds : int
         Number of fits.
     """

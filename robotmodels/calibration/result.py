@@ -31,10 +31,10 @@ class CalibrationResult(Rebuilt):
         What the measurements tell, judged at the nominal robot and at the solution.
     solution : Solution
         The fit: parameters, fixtures, covariance, weights, noise.
-    before, after : BlockErrors
-        Of all measurements: the nominal robot (with the fixtures that suit it) and the calibrated.
-    placed : BlockErrors or None
-        The nominal robot with base and tool alone fitted: what better placing would reach.
+    given, before, after : BlockErrors
+        Of all measurements: the robot as it was given, with base and tool alone fitted (where they
+        may be off: what is left is what the table is to blame for), and the calibrated one; each
+        with the fixtures that suit it.
     cross_validation, held_out : AsideErrors or None
         Errors on data that did not take part.
     notes : tuple of str
@@ -50,8 +50,8 @@ class CalibrationResult(Rebuilt):
     identifiable: IdentifiableParameters
     again: IdentifiableParameters
     solution: Solution
+    given: BlockErrors
     before: BlockErrors
-    placed: BlockErrors | None
     after: BlockErrors
     cross_validation: AsideErrors | None
     held_out: AsideErrors | None
