@@ -46,6 +46,7 @@ def fit(
     gains: bool = False,
     couplings: Iterable[tuple[int, int]] = (),
     compliance: bool = False,
+    bending: bool = False,
     eccentricity: bool = False,
     loss: Loss | str = Loss.SQUARES,
     prior: ParameterPrior | None = None,
@@ -73,7 +74,7 @@ def fit(
     known, known_lengths : iterable of str
         Parameters that are known and stay as they are. Measurements without a length (contacts)
         need one of ``known_lengths``.
-    base, tool, gains, couplings, compliance, eccentricity
+    base, tool, gains, couplings, compliance, bending, eccentricity
         As `candidate_parameters`.
     loss : Loss or str
         ``"squares"``, or against outliers ``"huber"``, ``"cauchy"``, ``"tukey"``.
@@ -129,7 +130,7 @@ def fit(
     def candidates_of(robot: RobotModel) -> GeometricParameters:
         found = candidate_parameters(
             robot, frames, base=base, tool=tool, gains=gains, couplings=couplings,
-            compliance=compliance, eccentricity=eccentricity,
+            compliance=compliance, bending=bending, eccentricity=eccentricity,
         )  # fmt: skip
         return found if names is None else found.subset(names)
 

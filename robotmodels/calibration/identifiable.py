@@ -247,7 +247,7 @@ def identifiable_on(
     for k, entry in enumerate(candidates.entries):
         if k in at:
             reasons[entry.name] = Reason.KNOWN
-        elif entry.row == 0 and not problem.sees_base:
+        elif entry.row == 0 and entry.law is ErrorLaw.CONSTANT and not problem.sees_base:
             reasons[entry.name] = Reason.GAUGE
     free = np.array([k for k, name in enumerate(candidates.names) if name not in reasons], int)
     F = problem.F

@@ -14,6 +14,7 @@ from ..errors import InvalidValueError, nearest_names
 from ..geometry import FIXED, PRISMATIC, REVOLUTE
 from ..model import RobotModel
 from .elements import Element, ErrorLaw
+from .loads import gravity_loads
 from .skeleton import Frame, Skeleton, skeleton_of
 
 NEARLY_PARALLEL = 0.05
@@ -53,6 +54,8 @@ class GeometricParameter:
         """``alpha3``, ``gain5``, ``gain6_5``: element or law, row, and the row of the source."""
         if self.law is ErrorLaw.CONSTANT:
             return f"{self.element.word}{self.row}"
+        if self.law is ErrorLaw.COMPLIANCE and self.element not in (Element.THETA, Element.R):
+            return f"{self.law.value}_{self.element.word}{self.row}"
         other = "" if self.source == self.row else f"_{self.source}"
         return f"{self.law.value}{self.row}{other}"
 
@@ -232,18 +235,13 @@ class GeometricParameters(Rebuilt):
         model = self.model
         q = np.atleast_2d(as_vector(q, model.n, "q"))
         factor = np.ones((len(q), len(self)))
-        torque: Array | None = None
+        loaded = [k for k, e in enumerate(self.entries) if e.law is ErrorLaw.COMPLIANCE]
+        if loaded:
+            elements = [(self.entries[k].row, self.entries[k].element) for k in loaded]
+            factor[:, loaded] = gravity_loads(self.skeleton, q, elements)
         for k, entry in enumerate(self.entries):
-            if entry.law is ErrorLaw.CONSTANT:
-                continue
-            joint = int(self.skeleton.joint[entry.source])
-            reading = q[:, joint]
-            if entry.law is ErrorLaw.COMPLIANCE:
-                if torque is None:
-                    torque = np.atleast_2d(_gravity_torque(model, q))
-                factor[:, k] = -torque[:, joint]
-            else:
-                factor[:, k] = _LAWS[entry.law](reading)
+            if entry.law in _LAWS:
+                factor[:, k] = _LAWS[entry.law](q[:, self.skeleton.joint[entry.source]])
         return factor
 
 
@@ -256,12 +254,6 @@ _LAWS = {
 }
 
 
-def _gravity_torque(model: RobotModel, q: Array) -> Array:
-    from ..dynamics import gravity_torque
-
-    return gravity_torque(model, q)
-
-
 def candidate_parameters(
     model: RobotModel,
     frames: Sequence[Frame] = (None,),
@@ -271,6 +263,7 @@ def candidate_parameters(
     gains: bool = False,
     couplings: Iterable[tuple[int, int]] = (),
     compliance: bool = False,
+    bending: bool = False,
     eccentricity: bool = False,
 ) -> GeometricParameters:
     """All parameters that a calibration of this robot may look at, by the book's rules.
@@ -294,6 +287,9 @@ def candidate_parameters(
         Pairs (j, i) of frames: the reading of joint i moves joint j.
     compliance : bool
         Whether joints give way in proportion to their gravity torque.
+    bending : bool
+        Whether links bend about alpha and beta, and the mount tilts, in proportion to the moment
+        of gravity there.
     eccentricity : bool
         Whether readings have errors in the sine and cosine of the joint and of twice its value.
 
@@ -315,8 +311,8 @@ def candidate_parameters(
     Examples
     --------
     >>> from robotmodels.robots import load
-    >>> candidate_parameters(load("rx90"), base=False, tool=False).names[6:10]
-    ('r1', 'alpha2', 'd2', 'r2')
+    >>> candidate_parameters(load("rx90"), base=False, tool=False).names[5:9]
+    ('theta6', 'r1', 'alpha2', 'd2')
     """
     skeleton = skeleton_of(model, frames)
     on_path = sorted({int(r) for frame in skeleton.frames for r in skeleton.path(frame)})
@@ -336,12 +332,12 @@ def candidate_parameters(
         laws += [ErrorLaw.SINE, ErrorLaw.COSINE, ErrorLaw.SINE_2, ErrorLaw.COSINE_2]
     if gains:
         laws.append(ErrorLaw.GAIN)
+    if (compliance or bending) and not model.inertia.values.any():
+        raise InvalidValueError(
+            "compliance: the robot gives way under gravity, but this one has no masses. "
+            "Give it inertial parameters (with_inertia), or leave compliance and bending out."
+        )
     if compliance:
-        if not model.inertia.values.any():
-            raise InvalidValueError(
-                "compliance: the joints give way under gravity, but this robot has no masses. "
-                "Give it inertial parameters (with_inertia), or leave compliance out."
-            )
         laws.append(ErrorLaw.COMPLIANCE)
     for law in laws:
         for r in moving:
@@ -349,6 +345,10 @@ def candidate_parameters(
             if kind == PRISMATIC and law not in (ErrorLaw.GAIN, ErrorLaw.COMPLIANCE):
                 continue  # a linear scale has no turn to be off its axis
             entries.append(GeometricParameter(r, own[kind], law, r))
+    if bending:
+        bent = [(r, e) for r in moving for e in (Element.ALPHA, Element.BETA)]
+        bent += [(0, e) for e in (Element.GAMMA, Element.ALPHA, Element.THETA)]
+        entries += [GeometricParameter(r, e, ErrorLaw.COMPLIANCE, r) for r, e in bent]
     for j, i in couplings:
         if j not in moving or i not in moving or i == j:
             raise InvalidValueError(

@@ -71,7 +71,8 @@ def placed_robot(
         return None
     rows = {candidates.entries[k].row for k in candidates.index(names)}
     if not fixed:
-        model = registered(model, measured, base=0 in rows, tool=any(rows - {0}))
+        start = registered(model, measured, base=0 in rows, tool=any(rows - {0}))
+        model = with_gravity_kept(start, model)
     frames = candidates.skeleton.frames
     for _ in range(2):  # once more, as a tool off the last axis tells more than one on it
         few = candidate_parameters(model, frames).subset(names)
@@ -80,6 +81,26 @@ def placed_robot(
             return None
         problem = problem_of(found.kept, measured)
         solution = solve(problem, scales=first_scales(problem), tolerance=_ROUGH)
-        model = calibrated_model(solution.problem.parameters, solution.deviation).model
+        placed = calibrated_model(solution.problem.parameters, solution.deviation).model
+        model = with_gravity_kept(placed, model)
     errors = block_errors(solution.problem, solution.deviation, solution.fixtures)
     return PlacedRobot(model, errors)
+
+
+def with_gravity_kept(placed: RobotModel, model: RobotModel) -> RobotModel:
+    """A robot put elsewhere, on the same floor: gravity keeps its direction in R_0.
+
+    What a base is fitted to is a measuring device, whose axes need not be plumb.
+
+    Parameters
+    ----------
+    placed, model : RobotModel
+        With the new base, and with the base that the gravity belongs to.
+
+    Returns
+    -------
+    RobotModel
+        ``placed`` with its gravity turned.
+    """
+    turned = placed.base[:3, :3] @ model.base[:3, :3].T @ model.gravity
+    return placed.with_gravity(turned)
