@@ -21,6 +21,8 @@ NOTHING = 1e-11
 _LEVELS = (1e-4, 1e-8)
 """Lengths of what is left of a column, relative to the longest, below which it waits."""
 _ROUNDING = 1e-14
+_TALL = 4
+"""Rows a column beyond which a triangular factor is worth its while."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -152,7 +154,7 @@ def column_basis(
     length = np.sqrt((W * W).sum(axis=0)) * scale
     longest = float(length.max(initial=0.0) if longest is None else longest) or 1.0
     U = W * (scale / longest)
-    if U.shape[0] > p:
+    if U.shape[0] > _TALL * p:
         U = np.asarray(np.linalg.qr(U, mode="r"))
     length = length / longest
     kept, parts, left = _kept_columns(U, order[length[order] > nothing], nothing)
@@ -182,8 +184,10 @@ def _kept_columns(
         for k in order.tolist():
             basis = Q[: len(kept)]
             for _ in range(2):  # once more for the digits that the first projection has cancelled
-                part = basis @ rest[k]
-                rest[k] -= part @ basis
+                # these products are too small to be shared between threads of BLAS, which would
+                # wait for each other longer than they work
+                part = np.einsum("ij,j->i", basis, rest[k])
+                rest[k] -= np.einsum("i,ij->j", part, basis)
                 parts[: len(kept), k] += part
             left[k] = np.sqrt(rest[k] @ rest[k])
             if left[k] > level and len(kept) < len(Q):
@@ -202,7 +206,10 @@ def _combinations(parts: Array, kept: NDArray[np.int64], left: Array, nothing: f
     if not b:
         return np.zeros((0, p))
     triangle = parts[:, kept]
-    whole = np.asarray(np.linalg.solve(triangle, parts), np.float64)
+    whole = np.empty((b, p))
+    for i in range(b - 1, -1, -1):
+        known = np.einsum("j,jk->k", triangle[i, i + 1 :], whole[i + 1 :])
+        whole[i] = (parts[i] - known) / triangle[i, i]
     found: Array = whole.copy()
     # rounding of a column is magnified in the coefficient of a kept one of which little is left
     slight = _ROUNDING / left[kept]
