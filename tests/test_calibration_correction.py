@@ -331,13 +331,17 @@ def test_at_and_beyond_the_edge_of_reach(name, rng):
     model = rm.load(name)
     parameters = candidate_parameters(model, gains=True)
     robot = calibrated_model(parameters, deviations(parameters, rng))
-    straight = {"rx90": [0.2, 0.3, np.pi / 2, 0.4, 0.5, 0.6],
-                "erd:ur10": [0.2, -0.7, 0.0, 0.4, 0.5, 0.6],
-                "puma560": [0.2, 0.3, np.pi / 2, 0.4, 0.5, 0.6]}[name]  # fmt: skip
-    centre = robot.model.base[:3, 3]
-    T = np.repeat(calibrated_pose(robot, straight)[None], 9, axis=0)
+    # the elbow that takes the wrist farthest from the shoulder
+    elbow = np.linspace(-np.pi, np.pi, 200001)
+    postures = np.tile([0.2, 0.3, 0.0, 0.4, 0.5, 0.6], (len(elbow), 1))
+    postures[:, 2] = elbow
+    wrist = 5 if name != "erd:ur10" else 4
+    shoulder = rm.dgm(robot.model, postures[0], 2)[:3, 3]
+    arm = rm.dgm(robot.model, robot.joint_errors.actual(postures), wrist)[:, :3, 3] - shoulder
+    straight = np.linalg.norm(arm, axis=1).argmax()
+    away = arm[straight]
+    T = np.repeat(calibrated_pose(robot, postures[straight])[None], 9, axis=0)
     pull = np.array([-1e-2, -1e-3, -1e-4, 0.0, 1e-4, 1e-3, 1e-2, 0.1, 1.0])
-    away = T[0, :3, 3] - centre
     T[:, :3, 3] += pull[:, None] * away / np.linalg.norm(away)
     found = corrected_igm(robot, T)
     at = found.valid.nonzero()
@@ -418,11 +422,14 @@ def test_false_targets_lead_to_the_true_ones(name, rng):
     commanded = rm.igm(model, false, q_ref=q).nearest(q)
     assert missed(robot, commanded, T) < 1e-11
     # and without them it misses by what is off
-    assert missed(robot, rm.igm(model, T, q_ref=q).nearest(q), T) > 1e-4
+    naive = rm.igm(model, T, q_ref=q).nearest(q)
+    reached = np.isfinite(naive).all(axis=-1)
+    assert reached.sum() > 20
+    assert missed(robot, naive[reached], T[reached]) > 1e-4
 
 
 def test_offsets_alone_are_cancelled(rng):
-    model = random_model(rng, f=6)
+    model = rm.load("rx90")
     full = candidate_parameters(model, base=False, tool=False)
     own = [f"{'r' if s == 1 else 'theta'}{j + 1}" for j, s in enumerate(model.table.sigma)]
     parameters = full.subset(own)
@@ -430,7 +437,7 @@ def test_offsets_alone_are_cancelled(rng):
     robot = calibrated_model(parameters, xi)
     found = joint_offsets(robot, rng.uniform(-2.0, 2.0, size=(30, 6)))
     assert found.worst[0] < 1e-11
-    assert found.rank == np.linalg.matrix_rank(np.eye(6))
+    assert found.rank == 6
     np.testing.assert_allclose(found.offset, -xi, rtol=0, atol=1e-10)
 
 

@@ -188,8 +188,9 @@ def corrected_igm(
     Notes
     -----
     A redundant arm keeps the choice the nominal model makes: the same joints read what they read
-    in ``q_ref``. Without joint errors and where `igm` of the calibrated table serves, both give
-    the same postures; what is added here are the readings, their limits and locks, the speed of
+    in ``q_ref``. Postures at the choice of the calibrated table's own inverse model are added;
+    ``free_joints`` tells. Without joint errors and where `igm` of the calibrated table serves,
+    both give the same postures; what is added here are the readings, their limits and locks, the speed of
     ordinary poses, and the outcome of each nominal posture.
 
     References
@@ -246,24 +247,18 @@ def corrected_igm(
     status = np.where(lost, int(IGMStatus.NOT_CONVERGED), starts.status).astype(np.int8)
     closest = np.full((len(targets), n), np.nan)
     missing = np.full((len(targets), 6), np.nan)
-    chosen = np.flatnonzero(_doubtful(robot, starts, first, redundant) & complete)
+    doubt = _doubtful(robot, starts, first, redundant)
+    chosen = np.flatnonzero(doubt & complete)
     if chosen.size:
         there = robot.joint_errors.actual(references[chosen])
         own = igm(
             model, targets[chosen], None if q_ref is None else there,
             lock=dict(locks) or None, **asking,
         )  # fmt: skip
-        keep = own.valid.copy()
-        if redundant:
-            # another choice of what is free would be another set of postures
-            choice = starts.free_joints[chosen]
-            some = choice[:, 0] if choice.shape[1] else np.zeros((chosen.size, n), np.bool_)
-            alike = (own.free_joints == some[:, None]).all(axis=-1)
-            keep &= alike | ~first.met[chosen].any(axis=1)[:, None]
         own_held = (own.free_joints & redundant) | home.locked
         # what is free was put where the reference is, not where it reads
         apart = (references[chosen] - there)[:, None] * (own_held & ~home.locked)
-        found = home.bring(targets[chosen], own.q, keep, own_held, own.q + apart)
+        found = home.bring(targets[chosen], own.q, own.valid, own_held, own.q + apart)
         more = found.spread(chosen, len(targets), own)
         status[chosen] = own.status
         if own.closest is not None and own.missing is not None:
@@ -407,11 +402,12 @@ def _doubtful(
     doubt |= (there & starts.double).any(axis=1)
     if not redundant:
         doubt |= (there[..., None] & starts.free_joints).any(axis=(1, 2))
-        plan = known_arm(robot.structured)
-        if plan.plan is None or starts.method != plan.method:
-            doubt[:] = True
-        else:
-            doubt |= there.sum(axis=1) < plan.most
+    plan = known_arm(robot.structured)
+    if plan.plan is None or starts.method != plan.method:
+        # nothing says how many postures there can be
+        doubt[:] = True
+    else:
+        doubt |= there.sum(axis=1) < plan.most
     return doubt | _twice(first, robot).any(axis=1)
 
 
@@ -479,7 +475,9 @@ def _put_together(
     reading, inside = _turned(home, every.q, reading, references[:, None], given, limits, lower,
                               upper)  # fmt: skip
     chosen = kept & readable & (inside | (not limits))
-    into = np.where(merged, same.argmax(axis=-1), np.arange(same.shape[1]))
+    into = np.broadcast_to(np.arange(same.shape[1]), merged.shape)
+    if same.size:
+        into = np.where(merged, same.argmax(axis=-1), into)
     # a double root, or what is free, is known of either of two that are one
     for name in ("double", "free", "family"):
         values = getattr(every, name)
