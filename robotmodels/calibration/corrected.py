@@ -190,7 +190,8 @@ def corrected_igm(
     A redundant arm keeps the choice the nominal model makes: the same joints read what they read
     in ``q_ref``. Postures at the choice of the calibrated table's own inverse model are added;
     ``free_joints`` tells. Without joint errors and where `igm` of the calibrated table serves,
-    both give the same postures; what is added here are the readings, their limits and locks, the speed of
+    both give the same postures; what is added here are the readings, their limits and locks, the
+    speed of
     ordinary poses, and the outcome of each nominal posture.
 
     References
