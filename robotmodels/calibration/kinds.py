@@ -7,7 +7,6 @@ or plane.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import replace
 from enum import Enum
 from typing import Any, NamedTuple
@@ -15,7 +14,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import se3
 from .._arrays import Array, read_only
 from .._choices import chosen
 from ..errors import InvalidValueError
@@ -189,19 +187,16 @@ def drawn_groups(
     moving = parameters if deviation is not None else replace(parameters, entries=())
     xi = np.zeros(len(moving)) if deviation is None else deviation
     T = differential_model(moving, first, xi, frame).T
-    target, key = _target(kind, T, starts, label, frame, rng, moving, xi)
+    target, group_of = _target(kind, T, starts, label, frame, rng, moving, xi)
     met = satisfied_measurement(moving, target, xi, np.zeros(0))
     found: dict[int, list[Array]] = {g: [first[g]] for g in range(groups)}
     if met is not None:
         q = _turned_inside(parameters, met.views[0].q)
         inside = ((q >= model.lower - 1e-9) & (q <= model.upper + 1e-9)).all(axis=1)
-        for row, g in zip(q, key(met), strict=True):
-            if limits and not inside[0]:
-                inside = inside[1:]
-                continue
-            inside = inside[1:]
+        for row, g, allowed in zip(q, group_of(met), inside, strict=True):
             members = found[g]
-            if len(members) < postures and all(_differ(row, other) for other in members):
+            new = len(members) < postures and all(_differ(row, other) for other in members)
+            if new and (allowed or not limits):
                 members.append(row)
     kept = [np.array(members) for members in found.values() if len(members) > 1]
     n = model.n
@@ -263,17 +258,23 @@ def _target(
 ) -> tuple[Measurement, Any]:  # fmt: skip
     """What the starts shall be moved to, and a function that says which group each row is of."""
     p = T[:, :3, 3]
+    places = p[label]
+    if kind is Kind.PLANE_CONTACT:
+        # every start goes to the foot of its perpendicular on the plane of its group
+        normal = rng.normal(size=p.shape)
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        starting = differential_model(moving, starts, xi, frame).T[:, :3, 3]
+        height = ((starting - places) * normal[label]).sum(axis=1)
+        places = starting - height[:, None] * normal[label]
+    number = {place.tobytes(): int(g) for place, g in zip(places, label, strict=True)}
 
-    def by_place(found: Iterable[Array]) -> list[int]:
-        number = {place.tobytes(): g for g, place in enumerate(p)}
+    def group_of(met: Any) -> list[int]:
+        found = met.T[:, :3, 3] if kind is Kind.FRAME_CONTACT else met.p
         return [number[np.ascontiguousarray(place).tobytes()] for place in found]
 
-    if kind is Kind.POINT_CONTACT:
-        return m.Position(starts, p[label], frame=frame), lambda met: by_place(met.p)
-    return (
-        m.Pose(starts, T[label], frame=frame),
-        lambda met: by_place(met.T[:, :3, 3]),
-    )
+    if kind is Kind.FRAME_CONTACT:
+        return m.Pose(starts, T[label], frame=frame), group_of
+    return m.Position(starts, places, frame=frame), group_of
 
 
 def _turned_inside(parameters: GeometricParameters, q: Array) -> Array:

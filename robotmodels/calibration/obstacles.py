@@ -70,6 +70,7 @@ class Sphere(Obstacle):
         object.__setattr__(self, "radius", size)
 
     def distance(self, start: Array, end: Array) -> Array:
+        """As `Obstacle.distance`."""
         along = end - start
         length = (along**2).sum(axis=-1)
         t = ((self.center - start) * along).sum(axis=-1) / np.where(length > 0.0, length, 1.0)
@@ -111,6 +112,7 @@ class HalfSpace(Obstacle):
         object.__setattr__(self, "offset", float(as_exact(offset, (), "offset")))
 
     def distance(self, start: Array, end: Array) -> Array:
+        """As `Obstacle.distance`."""
         return np.minimum(start @ self.normal, end @ self.normal) - self.offset
 
 
@@ -145,6 +147,7 @@ class Box(Obstacle):
         object.__setattr__(self, "upper", read_only(high))
 
     def distance(self, start: Array, end: Array) -> Array:
+        """As `Obstacle.distance`."""
         along = end - start
         moving = np.where(along != 0.0, along, 1.0)
         # the squared distance is a parabola between the places where a face is crossed
@@ -152,7 +155,7 @@ class Box(Obstacle):
             np.where(along != 0.0, (face - start) / moving, 0.0)
             for face in (self.lower, self.upper)
         ]
-        ends = np.zeros((*along.shape[:-1], 2)) + [0.0, 1.0]
+        ends = np.broadcast_to([0.0, 1.0], (*along.shape[:-1], 2))
         t = np.sort(np.concatenate([*(np.clip(c, 0.0, 1.0) for c in crossed), ends], -1), -1)
         outside = self._outside(start[..., None, :] + t[..., None] * along[..., None, :])
         slope = (outside * along[..., None, :]).sum(axis=-1)

@@ -154,8 +154,9 @@ def select_configurations(
         pool, numbers, notes = _given(looked_at, kind, candidates, space)
     if len(pool) < count:
         raise InvalidValueError(
-            f"count: {count} were asked for, but only {len(pool)} candidates are within the limits, "
-            f"clear of obstacles and meet. {' '.join(notes)} Draw more (drawn), or ask for fewer."
+            f"count: {count} were asked for, but only {len(pool)} candidates are within the "
+            f"limits, clear of obstacles and meet. {' '.join(notes)} Draw more (drawn), or ask "
+            "for fewer."
         )
     kept = _identifiable(looked_at, kind, pool, known_lengths, frame, rng)
     rows = group_rows(kept, kind, pool, sigma, frame)

@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_exact
 from ..errors import InvalidValueError
 from ..model import RobotModel, check_model
-from .identifiable import IdentifiableParameters, check_scale, identifiable_on
+from .identifiable import IdentifiableParameters, identifiable_on
 from .kinds import Kind, as_kind, drawn_groups, measurement_of
 from .measurements import Measurement
 from .parameters import GeometricParameters, candidate_parameters
-from .problem import measured_frames, problem_of
+from .problem import measured_frames
 from .skeleton import Frame
 
 _SEED = 14
