@@ -77,8 +77,7 @@ def _influence(
     problem: Problem, weighing: Weighing, point: Point, left: float
 ) -> tuple[float, Array]:
     """Mean square of the influence, and mean curvature of the measurements of each size."""
-    rho, weight, slope = weighing.terms(point.length)
-    del rho
+    _, weight, slope = weighing.terms(point.length)
     rows = problem.rows
     expected = expected_slope(weighing.loss, rows)
     bend = slope + (rows - 1) * weight
@@ -94,7 +93,6 @@ def _influence(
 
 def _sandwich(problem: Problem, point: Point, linear: Linear, noise: float, beta: Array) -> Array:
     """Covariance from the unweighted rows: outliers are measurements too, where they were taken."""
-    P, rank = problem.P, linear.rank
     data = triangle(point.J)
     bent = data
     if np.ptp(beta) > 0:
@@ -104,9 +102,8 @@ def _sandwich(problem: Problem, point: Point, linear: Linear, noise: float, beta
     _, information = problem.prior.rows(point.x)
     both = np.vstack((bent, np.diag(information))) if information.any() else bent
     _, s, V = np.linalg.svd(both / linear.columns, full_matrices=False)
-    rank = min(rank, int((s > 1e-13 * s[0]).sum()))
+    rank = min(linear.rank, int((s > 1e-13 * s[0]).sum()))
     back = (V[:rank] / s[:rank, None]).T / linear.columns[:, None]
     one, two = data @ back, information[:, None] * back
     middle = noise * (one.T @ one) + two.T @ two
-    assert back.shape == (P, rank)
     return back @ middle @ back.T

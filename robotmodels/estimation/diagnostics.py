@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._arrays import Array, Rebuilt, as_exact, read_only
 from ..errors import InvalidValueError
 from ._problem import Linearise
+from ._step import triangle
 from .leverage import Leverage, leverage
 from .nonlinear_fit import NonlinearFit
 
@@ -141,8 +143,8 @@ def fit_diagnostics(fit: NonlinearFit) -> FitDiagnostics:
     correlation[~np.isfinite(correlation)] = np.nan
     A = fit.jacobian * (np.sqrt(fit.weights) / fit.sigma)[:, None]
     _, information = fit.prior.rows(fit.x)
-    s = np.linalg.svd(np.vstack((A, np.diag(information))), compute_uv=False)
-    s = np.concatenate((s, np.zeros(len(fit.x) - len(s))))
+    s = np.linalg.svd(np.vstack((triangle(A), np.diag(information))), compute_uv=False)
+    s = np.append(np.asarray(s, dtype=np.float64), np.zeros(len(fit.x) - len(s)))
     return FitDiagnostics(
         variance=fit.scale**2,
         deviations=deviations,
@@ -279,7 +281,7 @@ def _chi_squared(fit: NonlinearFit) -> ResidualTest:
     return ResidualTest(statistic, p, text)
 
 
-def _usual(fit: NonlinearFit) -> Array:
+def _usual(fit: NonlinearFit) -> NDArray[np.bool_]:
     """Rows of the measurements that are not listed as outliers."""
     return ~np.isin(fit.block, fit.outliers)
 
@@ -330,7 +332,7 @@ def _independence(fit: NonlinearFit) -> ResidualTest:
     return ResidualTest(correlation, p, text)
 
 
-def _within(size: Array) -> Array:
+def _within(size: NDArray[np.int64]) -> NDArray[np.int64]:
     """0, 1, ... for each of several runs."""
     ends = np.cumsum(size)
     return np.arange(int(ends[-1]) if len(ends) else 0) - np.repeat(ends - size, size)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, Rebuilt, as_floats, read_only
 from .._choices import chosen
@@ -133,7 +133,7 @@ def select_strength(
         x = whole.x
         used = np.flatnonzero(~aside)
 
-        def rest(x: Array, used: Array = used) -> tuple[Array, Array]:
+        def rest(x: Array, used: NDArray[np.int64] = used) -> tuple[Array, Array]:
             r, J = linearise(x)
             return np.asarray(r)[used], np.asarray(J)[used]
 
@@ -155,7 +155,7 @@ def select_strength(
     return StrengthSelection(grid, errors)
 
 
-def _masks(folds: ArrayLike, block: Array) -> Array:
+def _masks(folds: ArrayLike, block: NDArray[np.int64]) -> NDArray[np.bool_]:
     masks = np.asarray(folds)
     if masks.dtype != np.bool_ or masks.ndim != 2 or masks.shape[1] != len(block):
         raise ShapeError(

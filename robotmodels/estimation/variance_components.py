@@ -120,7 +120,8 @@ def variance_components(
     factors = np.ones(len(labels))
     stated = np.broadcast_to(np.asarray(sigma, dtype=np.float64), numbers.shape)
     x = x0
-    for done in range(iterations + 1):
+    done = 0
+    while True:
         fit = fit_nonlinear(
             linearise, x, sigma=stated * factors[place], block=block, loss=loss, prior=prior
         )
@@ -130,18 +131,19 @@ def variance_components(
                 f"{len(numbers)}."
             )
         x = fit.x
-        used = np.bincount(place, (orthonormal_rows(fit) ** 2).sum(axis=1), len(labels))
-        left = np.bincount(place, minlength=len(labels)) - used
+        share = (orthonormal_rows(fit) ** 2).sum(axis=1)
+        used = np.asarray(np.bincount(place, share, len(labels)), dtype=np.float64)
+        left = np.bincount(place, minlength=len(labels)).astype(np.float64) - used
         found = _factors(fit, place, used, left, loss)
         free = (left > 1e-6) & (found > 0)
         found[~free] = 1 / factors[~free]
         quiet = bool((np.abs(found - 1) <= tolerance).all())
         if progress is not None:
             progress(1.0 if quiet else min(1.0, (done + 1) / iterations))
-        if quiet or done == iterations:
-            break
+        if quiet or done >= iterations:
+            return VarianceComponents(labels, factors, left, labels[~free], quiet, fit)
         factors = factors * found
-    return VarianceComponents(labels, factors, left, labels[~free], quiet, fit)
+        done += 1
 
 
 def _factors(
