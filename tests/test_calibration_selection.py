@@ -236,10 +236,16 @@ def test_a_segment_through_a_box_touches_it():
 def test_clearance_sees_links_and_tool_and_forgives_the_foundation():
     arm = RX90.with_tool(rm.se3.translation(0, 0, 0.3))
     floor = HalfSpace([0, 0, 1], 0.0)
-    up = np.array([0.0, np.pi / 2, np.pi / 2, 0.0, 0.0, 0.0])
+    up = np.array([0.0, np.pi / 2, 0.0, 0.0, 0.0, 0.0])
     tip = rm.dgm(arm, up)[:3, 3]
-    far = clearance(arm, up, [Sphere(tip + np.array([0, 0, 0.5]), 0.1)])
-    assert far == pytest.approx(0.4, abs=1e-9)
+    corners = np.vstack([arm.base[:3, 3], rm.link_poses(arm, up)[:, :3, 3], tip])
+    for center in np.random.default_rng(0).uniform(-2, 2, (10, 3)):
+        t = np.linspace(0, 1, 2001)[:, None, None]
+        rods = corners[:-1] + t * np.diff(corners, axis=0)
+        least = np.linalg.norm(rods - center, axis=-1).min()
+        found = clearance(arm, up, [Sphere(center, 0.1)], 0.05)
+        assert found == pytest.approx(least - 0.15, abs=1e-3)
+    assert clearance(arm, up, [floor], 0.05) > 0.0  # it stands there, but its other links do not
     assert clearance(arm, up, [Sphere(tip, 0.01)], 0.1) < 0.0
     assert clearance(arm, up, [Sphere(rm.link_poses(arm, up)[3, :3, 3], 0.01)]) < 0.0
     assert clearance(arm, up, []) == np.inf

@@ -192,7 +192,8 @@ def drawn_groups(
     found: dict[int, list[Array]] = {g: [first[g]] for g in range(groups)}
     if met is not None:
         q = _turned_inside(parameters, met.views[0].q)
-        inside = ((q >= model.lower - 1e-9) & (q <= model.upper + 1e-9)).all(axis=1)
+        within = (q >= model.lower - 1e-9) & (q <= model.upper + 1e-9)
+        inside = np.asarray(within.all(axis=1))
         for row, g, allowed in zip(q, group_of(met), inside, strict=True):
             members = found[g]
             new = len(members) < postures and all(_differ(row, other) for other in members)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._arrays import Array
 from ..geometry import PRISMATIC
@@ -24,7 +25,7 @@ def moved_configurations(
     rows: Array,
     criterion: Criterion,
     rows_of: Callable[[Array], Array],
-    inside: Callable[[Array], Array],
+    inside: Callable[[Array], NDArray[np.bool_]],
     model: RobotModel,
     progress: Progress | None = None,
 ) -> Array:

@@ -199,13 +199,14 @@ class _Space:
     radius: float
 
     def within_limits(self, q: Array) -> NDArray[np.bool_]:
-        return ((q >= self.model.lower - 1e-9) & (q <= self.model.upper + 1e-9)).all(axis=(1, 2))
+        within = (q >= self.model.lower - 1e-9) & (q <= self.model.upper + 1e-9)
+        return np.asarray(within.all(axis=(1, 2)))
 
     def clear(self, q: Array) -> NDArray[np.bool_]:
         if not self.obstacles:
             return np.ones(len(q), dtype=bool)
         far = clearance(self.model, q, self.obstacles, self.radius, self.frame)
-        return (far > 0.0).all(axis=1)
+        return np.asarray((far > 0.0).all(axis=1))
 
     def inside(self, q: Array) -> NDArray[np.bool_]:
         """Groups, shape (G, m, n), that are within limits and clear."""
