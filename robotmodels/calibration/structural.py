@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_exact
 from ..errors import InvalidValueError
 from ..model import RobotModel, check_model
+from .elements import Compliance
 from .identifiable import IdentifiableParameters, identifiable_on
 from .kinds import Kind, as_kind, drawn_groups, measurement_of
 from .measurements import Measurement
@@ -37,7 +38,7 @@ def identifiable_parameters(
     tool: bool = True,
     gains: bool = False,
     couplings: Iterable[tuple[int, int]] = (),
-    compliance: bool = False,
+    compliance: Compliance | str = Compliance.NONE,
     eccentricity: bool = False,
     rng: np.random.Generator | None = None,
 ) -> IdentifiableParameters:
