@@ -1,0 +1,299 @@
+"""Columns of numbers and labels in text files, with every cell that is none named by its line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from .._arrays import Array, read_only
+from ..errors import InvalidValueError, nearest_names
+
+Column = int | str
+"""A column: its number, from 0, or its name in the header."""
+
+_COMMENT = "#"
+
+
+@dataclass(frozen=True, slots=True)
+class CsvTable:
+    """A text file of columns; cells are read when a column is asked for.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    names : tuple of str
+        Of the columns; empty if the file has no header.
+    delimiter : str or None
+        Between cells; None for blanks.
+    width : int
+        Number of columns.
+    first : int
+        Number of the first line of data, from 0.
+    """
+
+    path: Path
+    names: tuple[str, ...]
+    delimiter: str | None
+    width: int
+    first: int
+
+    def find(self, names: Sequence[str]) -> tuple[int, ...] | None:
+        """Numbers of columns by their names, capitals aside; None if one is missing.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Of the header.
+
+        Returns
+        -------
+        tuple of int, or None
+            Numbers from 0.
+        """
+        lower = [name.lower() for name in self.names]
+        wanted = [name.lower() for name in names]
+        if any(lower.count(name) != 1 for name in wanted):
+            return None
+        return tuple(lower.index(name) for name in wanted)
+
+    def number(self, column: Column, what: str) -> int:
+        """Number of a column.
+
+        Parameters
+        ----------
+        column : int or str
+            Its number, from 0, or its name.
+        what : str
+            The argument, for the error message.
+
+        Returns
+        -------
+        int
+            From 0.
+
+        Raises
+        ------
+        InvalidValueError
+            There is no such column, or several.
+        """
+        if isinstance(column, str):
+            found = self.find([column])
+            if found is not None:
+                return found[0]
+            if not self.names:
+                raise InvalidValueError(
+                    f"{what}: {self.path} has no header, so that {column!r} says nothing; give "
+                    f"numbers of columns, from 0 to {self.width - 1}."
+                )
+            if [name.lower() for name in self.names].count(column.lower()) > 1:
+                raise InvalidValueError(
+                    f"{what}: {self.path} has several columns {column!r}; give their numbers, "
+                    "from 0."
+                )
+            near = ", ".join(nearest_names(column, self.names)) or "none"
+            raise InvalidValueError(
+                f"{what}: {self.path} has no column {column!r}; near it: {near}. Its columns: "
+                f"{', '.join(self.names)}."
+            )
+        if not -self.width <= column < self.width:
+            raise InvalidValueError(
+                f"{what}: {self.path} has columns 0 to {self.width - 1}, got {column}."
+            )
+        return column % self.width
+
+    def numbers(self, columns: Sequence[int]) -> Array:
+        """Columns of numbers.
+
+        Parameters
+        ----------
+        columns : sequence of int
+            Which.
+
+        Returns
+        -------
+        ndarray, shape (N, number of columns)
+            As they are in the file.
+
+        Raises
+        ------
+        InvalidValueError
+            A cell that is empty or no finite number; a line of another length; no data. With the
+            number of the line.
+        """
+        try:
+            values = np.loadtxt(
+                self.path, delimiter=self.delimiter, skiprows=self.first, usecols=list(columns),
+                comments=_COMMENT, ndmin=2, encoding="utf-8-sig",
+            )  # fmt: skip
+        except ValueError:
+            values = np.full((1, len(columns)), np.nan)
+        if not np.isfinite(values).all():
+            self._raise_bad_cell(columns)
+        return values
+
+    def labels(self, column: int) -> tuple[str, ...]:
+        """A column of labels.
+
+        Parameters
+        ----------
+        column : int
+            Which.
+
+        Returns
+        -------
+        tuple of str, length N
+            Without blanks around them.
+
+        Raises
+        ------
+        InvalidValueError
+            A cell that is empty.
+        """
+        found = []
+        for line, cells in self._rows():
+            if len(cells) <= column or not cells[column]:
+                raise InvalidValueError(
+                    f"{self.path}, line {line}: {self._called(column)} is empty; a label is needed."
+                )
+            found.append(cells[column])
+        return tuple(found)
+
+    def _called(self, column: int) -> str:
+        name = f" ({self.names[column]})" if column < len(self.names) else ""
+        return f"column {column}{name}"
+
+    def _rows(self) -> list[tuple[int, list[str]]]:
+        """Number of the line, from 1, and cells of every line of data."""
+        lines = self.path.read_text(encoding="utf-8-sig").splitlines()
+        rows = []
+        for number, line in enumerate(lines[self.first :], self.first + 1):
+            text = line.split(_COMMENT, 1)[0].strip("\r\n")
+            if text.strip():
+                rows.append((number, cells_of(text, self.delimiter)))
+        return rows
+
+    def _raise_bad_cell(self, columns: Sequence[int]) -> None:
+        for line, cells in self._rows():
+            for column in columns:
+                where = f"{self.path}, line {line}"
+                if column >= len(cells):
+                    raise InvalidValueError(
+                        f"{where}: expected {self.width} columns as in the first line, got "
+                        f"{len(cells)}."
+                    )
+                cell = cells[column]
+                if not cell:
+                    raise InvalidValueError(
+                        f"{where}: {self._called(column)} is empty. Fill it in, or delete the line."
+                    )
+                try:
+                    finite = np.isfinite(float(cell))
+                except ValueError:
+                    comma = "," in cell and self.delimiter != ","
+                    raise InvalidValueError(
+                        f"{where}: {self._called(column)} is {cell!r}, not a number."
+                        + (" Write a point for the decimal comma." if comma else "")
+                    ) from None
+                if not finite:
+                    raise InvalidValueError(
+                        f"{where}: {self._called(column)} is {cell!r}. A row that was not measured "
+                        "is left out: delete the line."
+                    )
+        raise InvalidValueError(
+            f"{self.path}: no line of numbers. Give a file with a row for each measurement."
+        )
+
+
+def cells_of(line: str, delimiter: str | None) -> list[str]:
+    """Cells of a line without blanks and quotation marks around them.
+
+    Parameters
+    ----------
+    line : str
+        The line.
+    delimiter : str or None
+        Between cells; None for blanks.
+
+    Returns
+    -------
+    list of str
+        Cells.
+
+    Examples
+    --------
+    >>> cells_of(' 1; "a" ;', ";")
+    ['1', 'a', '']
+    """
+    return [cell.strip().strip("\"'") for cell in line.split(delimiter)]
+
+
+def open_table(path: str | Path, delimiter: str | None = None) -> CsvTable:
+    """Look at the first line of a file: if most of its cells are no numbers it is a header.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file; lines that begin with ``#`` are comments.
+    delimiter : str, optional
+        Between cells; default the first of ``;``, tab and ``,`` in the first line, else blanks.
+
+    Returns
+    -------
+    CsvTable
+        Its columns can be read.
+
+    Raises
+    ------
+    InvalidValueError
+        An empty file, or one that is no text.
+    OSError
+        The file cannot be opened.
+    """
+    path = Path(path)
+    try:
+        with path.open(encoding="utf-8-sig") as file:
+            for first, line in enumerate(file):  # noqa: B007
+                if line.split(_COMMENT, 1)[0].strip():
+                    break
+            else:
+                raise InvalidValueError(f"{path}: the file is empty.")
+    except UnicodeDecodeError:
+        raise InvalidValueError(f"{path}: expected a text file of columns (CSV).") from None
+    text = line.split(_COMMENT, 1)[0].strip("\r\n")
+    if delimiter is None:
+        delimiter = next((mark for mark in (";", "\t", ",") if mark in text), None)
+    cells = cells_of(text, delimiter)
+    # labels of a file without a header are words too, but most of its cells are numbers
+    header = 2 * sum(not _is_number(cell) for cell in cells) > len(cells)
+    return CsvTable(path, tuple(cells) if header else (), delimiter, len(cells), first + header)
+
+
+def stacked_columns(tables: Sequence[CsvTable], columns: Sequence[Sequence[int]]) -> Array:
+    """Columns of several files below each other.
+
+    Parameters
+    ----------
+    tables : sequence of CsvTable
+        The files.
+    columns : sequence of sequences of int
+        For each file.
+
+    Returns
+    -------
+    ndarray, shape (N, number of columns)
+        Read-only.
+    """
+    parts = [table.numbers(c) for table, c in zip(tables, columns, strict=True)]
+    return read_only(np.concatenate(parts))
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell or "0")  # an empty cell is a gap in the data, not a name
+    except ValueError:
+        return False
+    return True

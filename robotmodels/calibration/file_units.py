@@ -1,0 +1,83 @@
+"""Units of files: a reader converts what its arguments say, never what the numbers look like."""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import Any, TypeVar
+
+import numpy as np
+
+from ..errors import InvalidValueError
+
+
+class LengthUnit(Enum):
+    """Unit of the lengths in a file; the value is its symbol.
+
+    Examples
+    --------
+    >>> LengthUnit("mm").factor
+    0.001
+    """
+
+    METRE = "m"
+    MILLIMETRE = "mm"
+
+    @property
+    def factor(self) -> float:
+        """Metres in one of it."""
+        return 1e-3 if self is LengthUnit.MILLIMETRE else 1.0
+
+
+class AngleUnit(Enum):
+    """Unit of the angles in a file; the value is its symbol.
+
+    Examples
+    --------
+    >>> round(AngleUnit("deg").factor, 6)
+    0.017453
+    """
+
+    RADIAN = "rad"
+    DEGREE = "deg"
+
+    @property
+    def factor(self) -> float:
+        """Radians in one of it."""
+        return float(np.pi / 180.0) if self is AngleUnit.DEGREE else 1.0
+
+
+U = TypeVar("U", LengthUnit, AngleUnit)
+
+
+def as_file_unit(kind: type[U], value: Any, name: str) -> U:
+    """A unit given as a member or by its symbol.
+
+    Parameters
+    ----------
+    kind : type
+        `LengthUnit` or `AngleUnit`.
+    value : member or str
+        What the caller passed.
+    name : str
+        Used in the error message.
+
+    Returns
+    -------
+    member
+        Of ``kind``.
+
+    Raises
+    ------
+    InvalidValueError
+        Something else.
+
+    Examples
+    --------
+    >>> as_file_unit(LengthUnit, "mm", "lengths")
+    <LengthUnit.MILLIMETRE: 'mm'>
+    """
+    try:
+        return kind(value)
+    except ValueError:
+        symbols = " or ".join(repr(member.value) for member in kind)
+        raise InvalidValueError(f"{name}: expected {symbols}, got {value!r:.60}.") from None
