@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..._arrays import Array, Rebuilt, as_core, as_exact, as_floats, read_only
+from ... import se3
+from ..._arrays import Array, Rebuilt, as_core, as_floats, read_only
 from ...errors import InvalidValueError, ShapeError
 from ..skeleton import Frame
 
@@ -133,6 +134,15 @@ class Measurement(Rebuilt, ABC):
     @abstractmethod
     def sees_base(self) -> bool:
         """Whether the place of the robot in the world matters."""
+
+    @property
+    def dilation_centres(self) -> tuple[Array, Array]:
+        """``A c = b``, shapes (m, 3) and (m,): where what is known in the world lets c be.
+
+        A contact is still satisfied when robot and base are dilated from a place c, as long as
+        the points, lines and planes that are known contain c.
+        """
+        return np.zeros((0, 3)), np.zeros(0)
 
     @property
     def groups(self) -> NDArray[np.int64]:
@@ -287,11 +297,122 @@ def whitened(measurement: Measurement, rows: Array, scale: Array) -> Array:
     if measurement.covariance is not None:
         factor = np.linalg.cholesky(measurement.covariance)
         columns = rows if rows.ndim == 3 else rows[..., None]
-        return np.linalg.solve(factor, columns).reshape(rows.shape)
+        return np.linalg.solve(factor, columns).astype(np.float64).reshape(rows.shape)
     sigma = scale if measurement.sigma is None else measurement.sigma
     return rows / sigma[extra]
 
 
-def exact_frame(value: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
-    """A read-only array of exactly this shape, as `as_exact`."""
-    return read_only(as_exact(value, shape, name))
+def as_rows(rows: Sequence[int | bool], count: int) -> tuple[bool, ...]:
+    """Which rows of a block are measured, at the border of a kind of measurement.
+
+    Parameters
+    ----------
+    rows : sequence of 0 or 1
+        One for each.
+    count : int
+        How many there are.
+
+    Returns
+    -------
+    tuple of bool
+        At least one is True.
+
+    Raises
+    ------
+    InvalidValueError
+        Another number of them, something else than 0 and 1, none asked.
+    """
+    asked = tuple(rows)
+    if len(asked) != count or any(r not in (0, 1) for r in asked) or not any(asked):
+        raise InvalidValueError(
+            f"rows: expected {count} numbers 0 or 1, not all 0, got {rows!r:.80}."
+        )
+    return tuple(bool(r) for r in asked)
+
+
+def as_measured_poses(T: Any, blocks: int) -> Array:
+    """Measured poses at the border of a kind of measurement.
+
+    Parameters
+    ----------
+    T : array_like, shape (B, 4, 4)
+        Metres.
+    blocks : int
+        Number of blocks B.
+
+    Returns
+    -------
+    ndarray, shape (B, 4, 4)
+        Read-only.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError, NotARotationError
+        Another number of them, NaN, no poses.
+    """
+    poses = se3.as_pose(T, "T")
+    if poses.shape != (blocks, 4, 4):
+        raise ShapeError(
+            f"T: expected a pose for each row of q, shape ({blocks}, 4, 4), got {poses.shape}."
+        )
+    return read_only(poses)
+
+
+def as_values(values: ArrayLike, blocks: int, name: str) -> Array:
+    """A measured number for each block, at the border of a kind of measurement.
+
+    Parameters
+    ----------
+    values : array_like, shape (B,) or ()
+        One number holds for all.
+    blocks : int
+        Number of blocks B.
+    name : str
+        Used in error messages.
+
+    Returns
+    -------
+    ndarray, shape (B,)
+        Read-only.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Another number of them, NaN.
+    """
+    numbers = as_floats(values, name)
+    if numbers.shape not in ((), (blocks,)):
+        raise ShapeError(
+            f"{name}: expected a number for each row of q, shape ({blocks},), got {numbers.shape}."
+        )
+    return read_only(np.broadcast_to(numbers, (blocks,)))
+
+
+def same_number_of_readings(q: Array, q_other: ArrayLike) -> Array:
+    """Readings at the other of two configurations, as many as at the first.
+
+    Parameters
+    ----------
+    q : ndarray, shape (N, n)
+        At the first.
+    q_other : array_like, shape (N, n)
+        At the other, rad or m.
+
+    Returns
+    -------
+    ndarray, shape (N, n)
+        Read-only.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Another shape, NaN.
+    """
+    other = as_readings(q_other, "q_other")
+    if other.shape != q.shape:
+        raise ShapeError(f"q_other: expected the shape of q, {q.shape}, got {other.shape}.")
+    return other
+
+
+POSE_AXES = ("x", "y", "z", "rx", "ry", "rz")
+POSE_UNITS = ("m", "m", "m", "rad", "rad", "rad")

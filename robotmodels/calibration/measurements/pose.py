@@ -9,23 +9,23 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ... import se3
-from ..._arrays import Array, read_only
-from ...errors import InvalidValueError, ShapeError
+from ..._arrays import Array, as_core
+from ...errors import ShapeError
 from ..skeleton import Frame
 from .measurement import (
+    POSE_AXES,
+    POSE_UNITS,
     Evaluation,
     Linearised,
     Measurement,
     View,
+    as_measured_poses,
     as_noise,
     as_readings,
+    as_rows,
     part_of_noise,
 )
 from .rotation_vectors import inverse_left_jacobians, rotation_errors
-
-_AXES = ("x", "y", "z", "rx", "ry", "rz")
-_UNITS = ("m", "m", "m", "rad", "rad", "rad")
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)
@@ -33,7 +33,9 @@ class Pose(Measurement):
     """Measured poses of the end, all six rows or some of them.
 
     Where the measuring device stands is the base Z of the robot (the world is the device's
-    frame), and the target on the arm is the tool E: both are parameters of the robot.
+    frame), and the target on the arm is the tool E: both are parameters of the robot. So a camera
+    that stands beside the robot and sees a board on its arm is this kind, with the camera's frame
+    as world; one that the robot carries is `CameraPose`.
 
     Parameters
     ----------
@@ -88,22 +90,57 @@ class Pose(Measurement):
     ) -> None:
         set_ = object.__setattr__
         set_(self, "q", as_readings(q))
-        poses = se3.as_pose(T, "T")
-        if poses.shape != (len(self.q), 4, 4):
-            raise ShapeError(
-                f"T: expected a pose for each row of q, shape ({len(self.q)}, 4, 4), got "
-                f"{poses.shape}."
-            )
-        set_(self, "T", read_only(poses))
-        asked = tuple(bool(r) for r in rows)
-        if len(asked) != 6 or not any(asked):
-            raise InvalidValueError(f"rows: expected six numbers 0 or 1, not all 0, got {rows!r}.")
+        set_(self, "T", as_measured_poses(T, len(self.q)))
+        asked = as_rows(rows, 6)
         set_(self, "rows", asked)
         noise = as_noise(sigma, covariance, len(self.q), sum(asked))
         set_(self, "sigma", noise[0])
         set_(self, "covariance", noise[1])
         set_(self, "frame", frame)
         set_(self, "name", name)
+
+    @classmethod
+    def of_orientations(
+        cls,
+        q: ArrayLike,
+        R: ArrayLike,
+        sigma: ArrayLike | None = None,
+        covariance: ArrayLike | None = None,
+        frame: Frame = None,
+        name: str = "orientation",
+    ) -> Self:
+        """Measured orientations alone: an inclinometer with compass, a gyroscope, a level.
+
+        Parameters
+        ----------
+        q : array_like, shape (N, n)
+            Readings of the joints, rad or m.
+        R : array_like, shape (N, 3, 3)
+            Measured rotations from the end's axes to the world's.
+        sigma, covariance, frame, name
+            As for the class; rows of a block are rx, ry, rz.
+
+        Returns
+        -------
+        Pose
+            With ``rows=[0, 0, 0, 1, 1, 1]``.
+
+        Raises
+        ------
+        ShapeError, InvalidValueError, NotARotationError
+            Shapes that do not fit, NaN, no rotations.
+
+        Examples
+        --------
+        >>> Pose.of_orientations(np.zeros((2, 6)), np.tile(np.eye(3), (2, 1, 1))).axes
+        ('rx', 'ry', 'rz')
+        """
+        rotations = as_core(R, (3, 3), "R")
+        if rotations.ndim != 3:
+            raise ShapeError(f"R: expected shape (N, 3, 3), got {rotations.shape}.")
+        T = np.tile(np.eye(4), (len(rotations), 1, 1))
+        T[:, :3, :3] = rotations
+        return cls(q, T, (0, 0, 0, 1, 1, 1), sigma, covariance, frame, name)
 
     @property
     def blocks(self) -> int:
@@ -113,12 +150,12 @@ class Pose(Measurement):
     @property
     def axes(self) -> tuple[str, ...]:
         """Labels of the rows that are measured."""
-        return tuple(a for a, asked in zip(_AXES, self.rows, strict=True) if asked)
+        return tuple(a for a, asked in zip(POSE_AXES, self.rows, strict=True) if asked)
 
     @property
     def units(self) -> tuple[str, ...]:
         """Units of the rows that are measured."""
-        return tuple(u for u, asked in zip(_UNITS, self.rows, strict=True) if asked)
+        return tuple(u for u, asked in zip(POSE_UNITS, self.rows, strict=True) if asked)
 
     @property
     def views(self) -> tuple[View, ...]:

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..._arrays import Array, as_exact, read_only
-from ...errors import InvalidValueError
 from ..skeleton import Frame
 from .measurement import (
     Evaluation,
@@ -19,6 +18,7 @@ from .measurement import (
     View,
     as_noise,
     as_readings,
+    as_rows,
     part_of_noise,
 )
 
@@ -85,11 +85,7 @@ class Position(Measurement):
         set_ = object.__setattr__
         set_(self, "q", as_readings(q))
         set_(self, "p", read_only(as_exact(p, (len(self.q), 3), "p")))
-        asked = tuple(bool(r) for r in rows)
-        if len(asked) != 3 or not any(asked):
-            raise InvalidValueError(
-                f"rows: expected three numbers 0 or 1, not all 0, got {rows!r}."
-            )
+        asked = as_rows(rows, 3)
         set_(self, "rows", asked)
         noise = as_noise(sigma, covariance, len(self.q), sum(asked))
         set_(self, "sigma", noise[0])

@@ -92,3 +92,83 @@ def skew_of(u: Array) -> Array:
     K = np.zeros((*u.shape, 3))
     K[..., 0, 1], K[..., 0, 2], K[..., 1, 2] = -u[..., 2], u[..., 1], -u[..., 0]
     return K - K.swapaxes(-1, -2)
+
+
+def rotations_of(u: Array) -> Array:
+    """Rotation matrices of rotation vectors.
+
+    Parameters
+    ----------
+    u : ndarray, shape (N, 3)
+        Rotation vectors, rad.
+
+    Returns
+    -------
+    ndarray, shape (N, 3, 3)
+        ``exp(u)``.
+    """
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_rotvec(u).as_matrix() if len(u) else np.zeros((0, 3, 3))
+
+
+def mean_rotation(R: Array) -> Array:
+    """The rotation next to the mean of rotation matrices.
+
+    Parameters
+    ----------
+    R : ndarray, shape (N, 3, 3)
+        One or more.
+
+    Returns
+    -------
+    ndarray, shape (3, 3)
+        Of all rotations that with the smallest sum of squared differences.
+    """
+    U, _, Vt = np.linalg.svd(R.sum(axis=0))
+    U[:, 2] *= np.sign(np.linalg.det(U @ Vt))
+    return U @ Vt
+
+
+def tilt_of(direction: Array) -> Array:
+    """Rotation vector without part along z that turns z to a direction.
+
+    Parameters
+    ----------
+    direction : ndarray, shape (3,)
+        Of length 1, not opposite to z.
+
+    Returns
+    -------
+    ndarray, shape (2,)
+        Its x and y, rad.
+    """
+    x, y, z = direction
+    sine = float(np.hypot(x, y))
+    angle = np.arctan2(sine, z)
+    return np.array([-y, x]) * (angle / sine if sine > 0.0 else 1.0)
+
+
+def tilted_axes(tilt: Array) -> tuple[Array, Array]:
+    """Axes turned by rotation vectors without part along z, and how they change.
+
+    A line or plane has no sense of direction: of its two unit vectors one is not below the plane
+    xy, and is described by two numbers without any singularity near it.
+
+    Parameters
+    ----------
+    tilt : ndarray, shape (N, 2)
+        x and y of the rotation vectors, rad, shorter than a turn.
+
+    Returns
+    -------
+    R : ndarray, shape (N, 3, 3)
+        The axes are its columns.
+    derivative : ndarray, shape (N, 3, 3, 2)
+        ``derivative[:, :, k]`` is that of column k.
+    """
+    u = np.column_stack([tilt, np.zeros(len(tilt))])
+    R = rotations_of(u)
+    w = left_jacobians(u)[:, :, :2]
+    turned = -skew_of(R.swapaxes(-1, -2)) @ w[:, None]
+    return R, turned.swapaxes(1, 2)
