@@ -57,7 +57,7 @@ def read_measurements(
     frame: Frame = None,
     name: str | None = None,
 ) -> Measurement:
-    """Read measurements of one kind from one or more text files (CSV), a row each.
+    r"""Read measurements of one kind from one or more text files (CSV), a row each.
 
     Lines that begin with ``#`` are comments. A first line of words is a header; the columns are
     then found by the names below, or by those given. Without a header they are given by number,
@@ -126,7 +126,7 @@ def read_measurements(
     --------
     >>> from tempfile import TemporaryDirectory
     >>> from robotmodels.robots import load
-    >>> text = "joint_1,joint_2,x,y,z\\n0,90,200,300,0\\n45,30,250,400,0\\n"
+    >>> text = "joint_1,joint_2,x,y,z\n0,90,200,300,0\n45,30,250,400,0\n"
     >>> with TemporaryDirectory() as folder:
     ...     file = Path(folder) / "tracker.csv"
     ...     _ = file.write_text(text)
@@ -164,7 +164,7 @@ def read_measurements(
     if kind is Kind.POSITION:
         p = length.factor * values
         _check_lengths(p, q, model, length, files[0], frame)
-        return Position(q, p, **more, **({} if rows is None else {"rows": rows}))
+        return Position(q, p, (1, 1, 1) if rows is None else rows, **more)
     if kind in (Kind.POSE, Kind.ORIENTATION):
         T = _poses(kind, written, values, length, angle, files[0])
         if kind is Kind.POSE:

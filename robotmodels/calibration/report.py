@@ -10,6 +10,7 @@ from .. import se3
 from .._arrays import Array
 from ..estimation import confidence_intervals, fit_diagnostics
 from ..geometry import PRISMATIC
+from ..kinematics import operational_coordinates
 from ..model import RobotModel
 from .errors_seen import BlockErrors
 from .folds import suited_fixtures
@@ -228,11 +229,12 @@ def _parameters(result: CalibrationResult) -> ReportSection:
     ]
     entries = result.parameters.entries
     order = sorted(range(len(entries)), key=lambda k: (entries[k].row, entries[k].element))
+    start, std = result.parameters.nominal, result.standard_deviation
     for unit in dict.fromkeys(("m", "rad", *result.units)):
         rows = [
             (
-                result.names[k], in_unit(result.parameters.nominal[k], unit), in_unit(result.deviation[k], unit),
-                in_unit(result.values[k], unit), in_unit(result.standard_deviation[k], unit),
+                result.names[k], in_unit(start[k], unit), in_unit(result.deviation[k], unit),
+                in_unit(result.values[k], unit), in_unit(std[k], unit),
                 _percent(result.relative_deviation[k]), in_unit(interval[k, 0], unit),
                 in_unit(interval[k, 1], unit),
             )
@@ -269,18 +271,15 @@ def _places(result: CalibrationResult) -> ReportSection:
         moved = ("", "")
         if found is not None:
             between = se3.inverse(given) @ found
-            turn = float(np.arccos(np.clip(0.5 * (np.trace(between[:3, :3]) - 1.0), -1.0, 1.0)))
-            moved = (millimetres(float(np.linalg.norm(between[:3, 3]))), degrees(turn))
-        rpy = _rpy(T)
-        rows.append((name, *(millimetres(v) for v in T[:3, 3]), *(degrees(v) for v in rpy), *moved))
+            turn = float(np.linalg.norm(operational_coordinates(between, "angle_axis")[3:]))
+            distance = float(np.linalg.norm(between[:3, 3]))
+            moved = (f"{1e3 * distance:.3f}", f"{np.rad2deg(turn):.3f}")
+        rpy = np.rad2deg(operational_coordinates(T, "rpy_urdf")[3:])
+        rows.append(
+            (name, *(f"{1e3 * v:.3f}" for v in T[:3, 3]), *(f"{v:.3f}" for v in rpy), *moved)
+        )
     headings = ("", "x mm", "y", "z", "roll deg", "pitch", "yaw", "moved mm", "turned deg")
     return ReportSection("Base and tool", (table_of(headings, rows),))
-
-
-def _rpy(T: Array) -> Array:
-    from ..kinematics import operational_coordinates
-
-    return operational_coordinates(T, "rpy_urdf")[3:]
 
 
 def _left_out(result: CalibrationResult) -> ReportSection:
@@ -295,7 +294,8 @@ def _left_out(result: CalibrationResult) -> ReportSection:
     into = found.regrouped_into
     if into:
         body.append(
-            f"Seen only in combination ({Reason.REGROUPED.value}): a deviation of 1 (m, rad) acts like"
+            f"Seen only in combination ({Reason.REGROUPED.value}): a deviation of 1 (m, rad) "
+            "acts like"
         )
         body.append(table_of(("parameter", "acts like"), _lines_of_sums(into)))
     low, high = found.gap
@@ -313,8 +313,8 @@ def _lines_of_sums(into: dict[str, dict[str, float]]) -> list[tuple[str, ...]]:
     for name, terms in into.items():
         words = [f"{c:+.3g} {other}" for other, c in terms.items() if abs(c) > 1e-9]
         text = "   ".join(words) or "the unknown fixtures"
-        for k, line in enumerate(wrap(text, 78)):
-            rows.append((name if k == 0 else "", line.ljust(len(line))))  # noqa: PERF401
+        first, *others = wrap(text, 78)
+        rows += [(name, first), *(("", line) for line in others)]
     width = max(len(line) for _, line in rows)
     return [(name, line.ljust(width)) for name, line in rows]
 
@@ -419,7 +419,7 @@ def _outliers(result: CalibrationResult) -> ReportSection | None:
         lengths = ("-", "-")
         if seen[block]:
             lengths = (
-                millimetres(result.after.position[at]), degrees(result.after.angle[at]),
+                millimetres(float(result.after.position[at])), degrees(float(result.after.angle[at])),
             )  # fmt: skip
         rows.append((str(int(block)), m.name, str(int(inside[block]) + 1), *lengths,
                      f"{weight:.2g}"))  # fmt: skip

@@ -73,9 +73,9 @@ class ReportSection(NamedTuple):
 
     Examples
     --------
-    >>> print(ReportSection("Notes", ("None.",)).text())
-    Notes
-    -----
+    >>> print(ReportSection("Outliers", ("None.",)).text())
+    Outliers
+    --------
     None.
     """
 

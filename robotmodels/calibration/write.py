@@ -1,0 +1,213 @@
+"""A calibration as a file for other programs: JSON or YAML with units, or a URDF of the robot."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .._arrays import Array
+from ..errors import InvalidValueError, MissingExtraError
+from ..estimation import confidence_intervals
+from .calibrated import calibrated_urdf
+from .errors_seen import BlockErrors
+
+if TYPE_CHECKING:
+    from .result import CalibrationResult
+
+_FORMAT = 1
+"""Raised when the meaning of an entry changes."""
+_YAML = (".yaml", ".yml")
+
+
+def write_result(result: CalibrationResult, path: str | Path) -> None:
+    """Write a calibration; the suffix of the file says how.
+
+    ``.json`` and ``.yaml`` hold the same (SI units, stated beside each parameter; what is not
+    finite is null). YAML is written by PyYAML, which the package's own dependencies bring (meshcat
+    needs pyngrok, which needs it). To keep everything and go on with it in Python, pickle the
+    result: files hold what other programs need.
+
+    Parameters
+    ----------
+    result : CalibrationResult
+        Of `fit`.
+    path : str or Path
+        A file named ``.json``, ``.yaml``, ``.yml`` or ``.urdf``.
+
+    Raises
+    ------
+    InvalidValueError
+        Another suffix.
+    MissingExtraError
+        PyYAML is not there.
+    UrdfError
+        As `to_urdf`.
+    OSError
+        The file cannot be written.
+
+    Warns
+    -----
+    UrdfWarning
+        What a URDF has no place for.
+
+    References
+    ----------
+    Seed book section 1.4.6.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> import robotmodels as rm
+    >>> import robotmodels.calibration as calibration
+    >>> arm = rm.load("rx90")
+    >>> q = np.random.default_rng(0).uniform(-1.5, 1.5, (40, 6))
+    >>> result = calibration.fit(arm, calibration.Pose(q, rm.dgm(arm, q)), folds=0, held_out=0.0)
+    >>> with TemporaryDirectory() as folder:
+    ...     write_result(result, Path(folder) / "rx90.json")
+    ...     json.loads((Path(folder) / "rx90.json").read_text())["status"]["name"]
+    'CONVERGED'
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix == ".urdf":
+        text = calibrated_urdf(result.robot)
+    elif suffix == ".json":
+        text = json.dumps(result_data(result), indent=2, ensure_ascii=False) + "\n"
+    elif suffix in _YAML:
+        try:
+            import yaml
+        except ImportError:
+            raise MissingExtraError(
+                "YAML files need PyYAML; run: pip install pyyaml (or write a .json file)."
+            ) from None
+        text = yaml.safe_dump(result_data(result), sort_keys=False, allow_unicode=True)
+    else:
+        raise InvalidValueError(
+            f"path: expected a file named .json, .yaml, .yml or .urdf, got {path.name!r}."
+        )
+    path.write_text(text, encoding="utf-8")
+
+
+def result_data(result: CalibrationResult) -> dict[str, Any]:
+    """A calibration as plain lists, numbers and words, as `write_result` writes it.
+
+    Parameters
+    ----------
+    result : CalibrationResult
+        Of `fit`.
+
+    Returns
+    -------
+    dict
+        SI units; None for what is not finite.
+
+    References
+    ----------
+    Seed book section 1.4.6.
+
+    Examples
+    --------
+    >>> import robotmodels as rm
+    >>> import robotmodels.calibration as calibration
+    >>> arm = rm.load("rx90")
+    >>> q = np.random.default_rng(0).uniform(-1.5, 1.5, (40, 6))
+    >>> result = calibration.fit(arm, calibration.Pose(q, rm.dgm(arm, q)), folds=0, held_out=0.0)
+    >>> result_data(result)["parameters"][0]["unit"]
+    'm'
+    """
+    fit, problem = result.solution.fit, result.solution.problem
+    interval = confidence_intervals(fit)
+    start = result.parameters.nominal
+    fixture_std = fit.deviations[problem.P :]
+    return {
+        "format": _FORMAT,
+        "robot": result.nominal.name,
+        "status": {"name": result.status.name, "sentence": result.status.sentence},
+        "measurements": [
+            {
+                "name": m.name, "kind": type(m).__name__, "blocks": m.blocks,
+                "rows": list(m.axes), "units": list(m.units),
+                "noise": _numbers(scale) if m.sigma is None and m.covariance is None else None,
+            }
+            for m, scale in zip(problem.measurements, result.solution.scales, strict=True)
+        ],
+        "parameters": [
+            {
+                "name": name, "unit": unit, "start": _number(start[k]),
+                "deviation": _number(result.deviation[k]), "value": _number(result.values[k]),
+                "std": _number(result.standard_deviation[k]), "interval_95": _numbers(interval[k]),
+            }
+            for k, (name, unit) in enumerate(zip(result.names, result.units, strict=True))
+        ],
+        "covariance": [_numbers(row) for row in result.covariance],
+        "fixtures": [
+            {
+                "name": fixture.name, "unit": fixture.unit,
+                "value": _number(result.fixtures[fixture.name]), "std": _number(fixture_std[k]),
+            }
+            for k, fixture in enumerate(problem.fixtures)
+        ],
+        "known": list(result.known),
+        "left_out": {name: why.name for name, why in result.identifiable.reasons.items()},
+        "regrouping": {
+            name: {other: float(c) for other, c in terms.items()}
+            for name, terms in result.identifiable.regrouping.items()
+        },
+        "condition": _number(result.again.condition),
+        "errors": {
+            "given": _errors(result.given),
+            "before": _errors(result.before),
+            "after": _errors(result.after),
+            "folds": _aside(result.cross_validation),
+            "held_out": _aside(result.held_out),
+        },
+        "outliers": [int(block) for block in fit.outliers],
+        "base": [_numbers(row) for row in result.model.base],
+        "tool": [_numbers(row) for row in result.model.tool],
+        "ends": [
+            {"frame": end.frame, "parent": int(end.parent), "pose": [_numbers(r) for r in end.pose]}
+            for end in result.robot.ends
+        ],
+        "table": _table(result),
+        "notes": [*result.notes, *result.robot.notes],
+    }  # fmt: skip
+
+
+def _table(result: CalibrationResult) -> list[dict[str, Any]]:
+    table = result.model.table
+    columns = ("gamma", "b", "beta", "alpha", "d", "theta", "r")
+    return [
+        {
+            "name": str(table.names[j]), "antecedent": int(table.antecedent[j]),
+            "sigma": int(table.sigma[j]),
+            **{word: _number(getattr(table, word)[j]) for word in columns},
+        }
+        for j in range(table.f)
+    ]  # fmt: skip
+
+
+def _errors(errors: BlockErrors) -> dict[str, Any]:
+    return {
+        unit: None if not (s := errors.summary(unit)).blocks else
+        {"rms": s.rms, "mean": s.mean, "max": s.largest, "blocks": s.blocks}
+        for unit in ("m", "rad")
+    }  # fmt: skip
+
+
+def _aside(errors: Any) -> dict[str, Any] | None:
+    if errors is None:
+        return None
+    return {
+        "fits": errors.folds, "before": _errors(errors.before), "after": _errors(errors.after)
+    }  # fmt: skip
+
+
+def _number(value: Any) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _numbers(values: Array) -> list[float | None]:
+    return [_number(value) for value in values]
