@@ -2,16 +2,42 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from ..._arrays import Array
+from ... import se3
+from ..._arrays import Array, read_only
 from .labelled import Labelled
 from .measurement import Evaluation, Fixture
 from .rotation_vectors import left_jacobians, mean_rotation, rotations_of
 
 POSITION = (0, 1, 2)
-ORIENTATION = (3, 4, 5)
+SIX = (0, 1, 2, 3, 4, 5)
 _NAMES = ("x", "y", "z", "rx", "ry", "rz")
+
+
+def as_known_pose(value: Any, name: str) -> Array:
+    """A known pose at the border of a kind of measurement.
+
+    Parameters
+    ----------
+    value : pose, shape (4, 4)
+        Metres.
+    name : str
+        Used in error messages.
+
+    Returns
+    -------
+    ndarray, shape (4, 4)
+        Read-only.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError, NotARotationError
+        Another shape, NaN, no pose.
+    """
+    return read_only(se3.as_single_pose(value, name))
 
 
 def pose_fixtures(kind: Labelled, asked: tuple[int, ...]) -> tuple[Fixture, ...]:

@@ -1,0 +1,221 @@
+"""The end touches planes: a probe on a table, on the faces of a block."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..._arrays import Array, as_exact, read_only
+from ...errors import InvalidValueError
+from ..skeleton import Frame
+from .dilations import have_common_place
+from .labelled import Labelled, Labels, as_known, as_labels
+from .measurement import (
+    Evaluation,
+    Fixture,
+    Linearised,
+    View,
+    as_noise,
+    as_readings,
+    part_of_noise,
+)
+from .rotation_vectors import tilt_of, tilted_axes
+
+_UNIT = 1e-6
+
+
+@dataclass(frozen=True, slots=True, init=False, eq=False)
+class PlaneContact(Labelled):
+    """Touches of planes by the end's origin.
+
+    A plane is ``normal . p = offset``. Unknown planes are estimated along: the normal as the turn
+    of the world's z about x and y, rad, and the offset, m. How flat they are is part of sigma.
+
+    The end of a ball touches a plane beside the centre of the ball: an unknown offset takes the
+    radius with it as long as the plane is touched from one side; to a known one it is added.
+
+    One plane alone tells little: it sees the end along one direction, and nothing that moves the
+    touched positions within that plane or turns it as a whole. Planes in three directions that are
+    not nearly parallel, each touched in many postures, see as much as touched points do;
+    `identifiable_parameters` says what is left out.
+
+    Parameters
+    ----------
+    q : array_like, shape (N, n)
+        Readings of the joints at each touch, rad or m.
+    plane : array_like of int or str, shape (N,), optional
+        Which plane each touch is of; default: all of the same.
+    known : mapping of label to array_like, shape (4,), optional
+        Planes that are known in the world: the normal (of length 1) and the offset in metres.
+    sigma : array_like, shape (), (1,) or (N, 1), optional
+        Standard deviations, m; default: estimated from the data.
+    covariance : array_like, shape (1, 1) or (N, 1, 1), optional
+        Instead of sigma.
+    frame : str, int or None
+        The end; None is the tool.
+    name : str
+        In reports, and in front of the labels: the same name and label in two measurements is the
+        same plane.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Shapes that do not fit, NaN, a normal that is not of length 1, a known plane that nobody
+        touches.
+
+    References
+    ----------
+    Seed book section 1.4.5.
+
+    Examples
+    --------
+    >>> [fixture.name for fixture in PlaneContact(np.zeros((5, 6)), name="table").fixtures]
+    ['table:0.rx', 'table:0.ry', 'table:0.offset']
+    """
+
+    q: Array
+    plane: tuple[str, ...]
+    known: Mapping[str, Array]
+    sigma: Array | None
+    covariance: Array | None
+    frame: Frame
+    name: str
+
+    def __init__(
+        self,
+        q: ArrayLike,
+        plane: Labels | None = None,
+        known: Mapping[int | str, ArrayLike] | None = None,
+        sigma: ArrayLike | None = None,
+        covariance: ArrayLike | None = None,
+        frame: Frame = None,
+        name: str = "plane",
+    ) -> None:
+        set_ = object.__setattr__
+        set_(self, "q", as_readings(q))
+        labels = as_labels(plane, len(self.q), "plane")
+        set_(self, "plane", labels)
+        set_(self, "known", as_known(known, labels, "plane", _as_plane))
+        noise = as_noise(sigma, covariance, len(self.q), 1)
+        set_(self, "sigma", noise[0])
+        set_(self, "covariance", noise[1])
+        set_(self, "frame", frame)
+        set_(self, "name", name)
+
+    @property
+    def label(self) -> tuple[str, ...]:
+        """Plane of each touch."""
+        return self.plane
+
+    @property
+    def blocks(self) -> int:
+        """Number of touches."""
+        return len(self.q)
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Along the normal."""
+        return ("normal",)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Metres."""
+        return ("m",)
+
+    @property
+    def views(self) -> tuple[View, ...]:
+        """The end at every touch."""
+        return (View(self.frame, self.q),)
+
+    @property
+    def fixtures(self) -> tuple[Fixture, ...]:
+        """Two turns and the offset of each unknown plane."""
+        return tuple(
+            Fixture(f"{self.name}:{label}.{what}", unit)
+            for label in self.unknown
+            for what, unit in (("rx", "rad"), ("ry", "rad"), ("offset", "m"))
+        )
+
+    @property
+    def is_constraint(self) -> bool:
+        """It is."""
+        return True
+
+    @property
+    def dilation_centres(self) -> tuple[Array, Array]:
+        """The known planes."""
+        planes = np.array(list(self.known.values())).reshape(-1, 4)
+        return planes[:, :3], planes[:, 3]
+
+    @property
+    def knows_length(self) -> bool:
+        """Known planes without a common point are a known length: parallel ones, or four."""
+        return not have_common_place(*self.dilation_centres)
+
+    @property
+    def sees_base(self) -> bool:
+        """Only through planes that are known in the world."""
+        return bool(self.known)
+
+    def guess(self, evaluations: Sequence[Evaluation]) -> Array | None:
+        """Mean plane of the touches of each: normal where they spread least."""
+        p = evaluations[0].T[:, :3, 3]
+        group = self.unknown_groups
+        found = np.zeros((len(self.unknown), 3))
+        for g in range(len(found)):
+            mine = p[group == g]
+            mean = mine.mean(axis=0)
+            normal = np.linalg.svd(mine - mean, full_matrices=True)[2][-1]
+            # of its two normals the one that is not below the horizon: see tilted_axes
+            normal = normal if normal[2] >= 0.0 else -normal
+            found[g] = *tilt_of(normal), normal @ mean
+        return found.ravel()
+
+    def linearise(self, evaluations: Sequence[Evaluation], fixtures: Array) -> Linearised:
+        """Distance of the end from the plane."""
+        T, psi = evaluations[0]
+        values = fixtures.reshape(-1, 3)
+        R, by_tilt = tilted_axes(values[:, :2])
+        planes = {label: (R[g, :, 2], values[g, 2]) for g, label in enumerate(self.unknown)}
+        planes |= {label: (plane[:3], plane[3]) for label, plane in self.known.items()}
+        normal = np.array([planes[label][0] for label in self.plane])
+        offset = np.array([planes[label][1] for label in self.plane])
+        p = T[:, :3, 3]
+        by_fixtures = np.zeros((len(T), 1, len(fixtures)))
+        group = self.unknown_groups
+        for g in range(len(values)):
+            mine = group == g
+            by_fixtures[mine, 0, 3 * g : 3 * g + 2] = p[mine] @ by_tilt[g, :, 2]
+            by_fixtures[mine, 0, 3 * g + 2] = -1.0
+        return Linearised(
+            ((normal * p).sum(axis=1) - offset)[:, None], normal[:, None] @ psi[:, :3], by_fixtures
+        )
+
+    def with_configurations(self, configurations: Sequence[Array]) -> Self:
+        """The same touches at other readings."""
+        (q,) = configurations
+        return replace(self, q=q)
+
+    def subset(self, blocks: NDArray[np.int64]) -> Self:
+        """Some of the touches."""
+        sigma, covariance = part_of_noise(self, blocks)
+        plane = tuple(self.plane[b] for b in blocks)
+        return replace(
+            self, q=self.q[blocks], plane=plane, known=self.known_of(plane), sigma=sigma,
+            covariance=covariance,
+        )  # fmt: skip
+
+
+def _as_plane(value: Any, name: str) -> Array:
+    plane = as_exact(value, (4,), name)
+    length = float(np.linalg.norm(plane[:3]))
+    if abs(length - 1.0) > _UNIT:
+        raise InvalidValueError(
+            f"{name}: expected a normal of length 1 and an offset in metres, got a normal of "
+            f"length {length:.6g}. Divide all four numbers by it."
+        )
+    return read_only(np.append(plane[:3] / length, plane[3]))
