@@ -29,7 +29,7 @@ TARGET = rm.se3.translation(0.1, 0.05, 0.15)
 """Of what is measured, in the tool's frame: at the wrist centre positions would say nothing of the
 wrist."""
 KINDS = (Kind.POSE, Kind.POSITION, Kind.ORIENTATION, Kind.POINT_CONTACT)
-CONTACTS = (Kind.ORIENTATION, Kind.FRAME_CONTACT, Kind.POINT_CONTACT, Kind.PLANE_CONTACT)
+CONTACTS = (Kind.ORIENTATION, Kind.POINT_CONTACT)
 MARKS = {
     None: "●", Reason.REGROUPED: "r", Reason.NO_EFFECT: "0", Reason.GAUGE: "g", Reason.KNOWN: "k",
 }  # fmt: skip
@@ -37,7 +37,7 @@ LEGEND = """\
 ● estimated; r regrouped: acts like a combination of others; 0 not identifiable: it does not change
 what is measured; g gauge: the place of the robot is not seen; k known: gives the scale where no
 length is measured. The target is 0.1, 0.05, 0.15 m beside the tool's frame. Contacts have several
-points, poses or planes, all unknown, each met in several postures on the nominal robot."""
+points, all unknown, each touched in several postures of the nominal robot."""
 
 
 def rank_elsewhere(found: IdentifiableParameters, kind: Kind, seed: int) -> tuple[int, float]:
