@@ -52,7 +52,7 @@ def differential_model(
         Values of the parameters, added to the nominal ones; default zero.
     frame : str, int or None
         The end; one of those the parameters were made for.
-    factors : ndarray, shape (N, P), optional
+    factors : ndarray, shape (N, A), optional
         ``parameters.factors(q)`` where it is known already.
 
     Returns
@@ -94,6 +94,6 @@ def differential_model(
         np.ascontiguousarray(skeleton.before[:3, 3]),
         np.ascontiguousarray(skeleton.after[end, :3, :3]),
         np.ascontiguousarray(skeleton.after[end, :3, 3]),
-        np.ascontiguousarray(xi), parameters.rows, parameters.elements, factor, T, psi,
+        np.ascontiguousarray(xi), *parameters.actions, factor, T, psi,
     )  # fmt: skip
     return DifferentialModel(T.reshape(*q.shape[:-1], 4, 4), psi.reshape(*q.shape[:-1], 6, P))

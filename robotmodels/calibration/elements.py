@@ -66,3 +66,19 @@ class ErrorLaw(Enum):
     COSINE = "cosine"
     SINE_2 = "sine_2_"
     COSINE_2 = "cosine_2_"
+
+
+class Compliance(Enum):
+    """What gives way under gravity, in proportion to its moment there.
+
+    Examples
+    --------
+    >>> Compliance.ISOTROPIC.value
+    'joints and mount, the same about all axes'
+    """
+
+    NONE = "nothing"
+    JOINTS = "joints about their axes"
+    LINKS = "joints, links about alpha and beta, and the mount, each for itself"
+    ISOTROPIC = "joints and mount, the same about all axes"
+    UNIFORM = "one for all joints and one for the mount, the same about all axes"

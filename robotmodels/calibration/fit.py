@@ -9,6 +9,7 @@ import numpy as np
 from .._choices import chosen
 from ..estimation import Loss
 from ..model import RobotModel, check_model
+from .elements import Compliance
 from .errors_seen import block_errors
 from .folds import (
     Refit,
@@ -23,7 +24,7 @@ from .measurements import Measurement
 from .notes import check_enough, notes_after, notes_before
 from .parameters import GeometricParameters, candidate_parameters
 from .placing import placed_robot
-from .prior import ParameterPrior, settled_prior
+from .prior import ParameterPrior, estimated_with, settled_prior
 from .problem import measured_frames, problem_of
 from .result import CalibrationResult
 from .solve import solve
@@ -45,8 +46,7 @@ def fit(
     tool: bool = True,
     gains: bool = False,
     couplings: Iterable[tuple[int, int]] = (),
-    compliance: bool = False,
-    bending: bool = False,
+    compliance: Compliance | str = Compliance.NONE,
     eccentricity: bool = False,
     loss: Loss | str = Loss.SQUARES,
     prior: ParameterPrior | None = None,
@@ -74,7 +74,7 @@ def fit(
     known, known_lengths : iterable of str
         Parameters that are known and stay as they are. Measurements without a length (contacts)
         need one of ``known_lengths``.
-    base, tool, gains, couplings, compliance, bending, eccentricity
+    base, tool, gains, couplings, compliance, eccentricity
         As `candidate_parameters`.
     loss : Loss or str
         ``"squares"``, or against outliers ``"huber"``, ``"cauchy"``, ``"tukey"``.
@@ -130,7 +130,7 @@ def fit(
     def candidates_of(robot: RobotModel) -> GeometricParameters:
         found = candidate_parameters(
             robot, frames, base=base, tool=tool, gains=gains, couplings=couplings,
-            compliance=compliance, bending=bending, eccentricity=eccentricity,
+            compliance=compliance, eccentricity=eccentricity,
         )  # fmt: skip
         return found if names is None else found.subset(names)
 
@@ -150,14 +150,15 @@ def fit(
     share = held_out if isinstance(held_out, float | int) else 0.0
     step = _Steps(progress, 1 + folds + bool(share))
     identifiable = identifiable_on(candidates, measured, known_lengths, known)
-    problem = problem_of(identifiable.kept, measured)
-    check_enough(problem)
+    check_enough(problem_of(identifiable.kept, measured))
+    estimated = identifiable.kept if prior is None else estimated_with(prior, identifiable)
+    problem = problem_of(estimated, measured)
     gaussian = None if prior is None else settled_prior(prior, problem, loss, chance)
     solution = solve(problem, loss=loss, prior=gaussian, truncation=truncation)
     step("all measurements")
     again = identifiable_on(
         candidates, measured, known_lengths, known,
-        deviation=all_deviations(candidates, identifiable.kept, solution.deviation),
+        deviation=all_deviations(candidates, estimated, solution.deviation),
         fixtures=solution.fixtures,
     )  # fmt: skip
     refit = Refit(solution, gaussian, truncation)

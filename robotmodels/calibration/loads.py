@@ -13,7 +13,9 @@ from .six_parameters import pose_of_elements
 from .skeleton import Skeleton
 
 
-def gravity_loads(skeleton: Skeleton, q: Array, elements: Sequence[tuple[int, Element]]) -> Array:
+def gravity_loads(
+    skeleton: Skeleton, q: Array, elements: Sequence[tuple[int, Element, int]]
+) -> Array:
     """Forces of gravity along elements: moments about rotations, forces along translations.
 
     For the element of a joint it is minus its gravity torque. For others it is what bends a link
@@ -25,8 +27,8 @@ def gravity_loads(skeleton: Skeleton, q: Array, elements: Sequence[tuple[int, El
         The extended table; masses are those of its model.
     q : ndarray, shape (N, n)
         Joint variables, rad or m.
-    elements : sequence of (int, Element)
-        Rows and elements, K of them.
+    elements : sequence of (int, Element, int)
+        K of them: row, element, and the row whose bodies, with all behind it, are the load.
 
     Returns
     -------
@@ -43,7 +45,7 @@ def gravity_loads(skeleton: Skeleton, q: Array, elements: Sequence[tuple[int, El
     >>> from robotmodels.robots import load
     >>> arm, q = load("erd:ur10"), np.full((1, 6), 0.3)
     >>> from robotmodels.calibration import skeleton_of
-    >>> load_of_2 = gravity_loads(skeleton_of(arm), q, [(2, Element.THETA)])
+    >>> load_of_2 = gravity_loads(skeleton_of(arm), q, [(2, Element.THETA, 2)])
     >>> bool(np.isclose(load_of_2[0, 0], -gravity_torque(arm, q)[0, 1]))
     True
     """
@@ -54,9 +56,9 @@ def gravity_loads(skeleton: Skeleton, q: Array, elements: Sequence[tuple[int, El
     moment = moment[..., 0] + mass[:, None] * T[..., :3, 3]
     carried = _carried(skeleton)
     loads = np.empty((len(q), len(elements)))
-    for k, (row, element) in enumerate(elements):
+    for k, (row, element, carrier) in enumerate(elements):
         axis, origin = _axis(skeleton, T, row, element)
-        bodies = carried[row]
+        bodies = carried[carrier]
         total = mass[bodies].sum()
         if element.is_length:
             moved = total * axis

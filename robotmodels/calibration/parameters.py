@@ -10,20 +10,25 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, Rebuilt, as_vector, read_only
+from .._choices import chosen
 from ..errors import InvalidValueError, nearest_names
 from ..geometry import FIXED, PRISMATIC, REVOLUTE
 from ..model import RobotModel
-from .elements import Element, ErrorLaw
+from .elements import Compliance, Element, ErrorLaw
 from .loads import gravity_loads
 from .skeleton import Frame, Skeleton, skeleton_of
 
 NEARLY_PARALLEL = 0.05
 """Sine of the angle between consecutive axes below which r_j gives way to beta_j (Hayati)."""
+_TURNS = (Element.GAMMA, Element.BETA, Element.ALPHA)
+"""Turns about the axes z, y, x of the frame that a row stands on."""
 
 
 @dataclass(frozen=True, slots=True)
 class GeometricParameter:
-    """One parameter: the deviation of one element of one row, times its law.
+    """One parameter: the deviation of an element of a row, times its law.
+
+    A compliance that is the same about several axes acts on further elements as well.
 
     Parameters
     ----------
@@ -34,7 +39,9 @@ class GeometricParameter:
     law : ErrorLaw
         How it depends on the configuration.
     source : int
-        Row of the joint that the law reads; the row's own for constant errors.
+        Row of the joint that the law reads, or whose load bends; the row's own for constant errors.
+    also : tuple of (int, Element, int)
+        Further rows and elements that it acts on alike, each with the row of its source.
 
     Examples
     --------
@@ -48,13 +55,28 @@ class GeometricParameter:
     element: Element
     law: ErrorLaw = ErrorLaw.CONSTANT
     source: int = -1
+    also: tuple[tuple[int, Element, int], ...] = ()
+
+    @property
+    def actions(self) -> tuple[tuple[int, Element, int], ...]:
+        """All rows and elements that it acts on, and rows of the sources."""
+        return ((self.row, self.element, self.source), *self.also)
+
+    @property
+    def moves_own_joint(self) -> bool:
+        """Whether it adds to the variable of a joint alone."""
+        own = self.element in (Element.THETA, Element.R)
+        return own and not self.also and self.law is not ErrorLaw.CONSTANT
 
     @property
     def name(self) -> str:
         """``alpha3``, ``gain5``, ``gain6_5``: element or law, row, and the row of the source."""
         if self.law is ErrorLaw.CONSTANT:
             return f"{self.element.word}{self.row}"
-        if self.law is ErrorLaw.COMPLIANCE and self.element not in (Element.THETA, Element.R):
+        sources = {source for _, _, source in self.actions}
+        if self.also:
+            return f"{self.law.value}{self.source if len(sources) == 1 else '_joints'}"
+        if self.law is ErrorLaw.COMPLIANCE and not self.moves_own_joint:
             return f"{self.law.value}_{self.element.word}{self.row}"
         other = "" if self.source == self.row else f"_{self.source}"
         return f"{self.law.value}{self.row}{other}"
@@ -114,9 +136,15 @@ class GeometricParameters(Rebuilt):
         return np.array([entry.row for entry in self.entries], dtype=np.int64)
 
     @property
-    def elements(self) -> NDArray[np.int64]:
-        """Number of the element of each parameter, shape (P,)."""
-        return np.array([int(entry.element) for entry in self.entries], dtype=np.int64)
+    def actions(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+        """Parameter, row and element of each action, shapes (A,): a parameter has one or more."""
+        found = [
+            (k, row, int(element))
+            for k, entry in enumerate(self.entries)
+            for row, element, _ in entry.actions
+        ]
+        columns = np.array(found, dtype=np.int64).reshape(-1, 3).T
+        return tuple(np.ascontiguousarray(column) for column in columns)  # type: ignore[return-value]
 
     @property
     def nominal(self) -> Array:
@@ -229,19 +257,21 @@ class GeometricParameters(Rebuilt):
 
         Returns
         -------
-        ndarray, shape (N, P)
-            1 for constant errors; else by `ErrorLaw`.
+        ndarray, shape (N, A)
+            For each of `actions`: 1 for constant errors; else by `ErrorLaw`.
         """
-        model = self.model
-        q = np.atleast_2d(as_vector(q, model.n, "q"))
-        factor = np.ones((len(q), len(self)))
-        loaded = [k for k, e in enumerate(self.entries) if e.law is ErrorLaw.COMPLIANCE]
+        q = np.atleast_2d(as_vector(q, self.model.n, "q"))
+        owner, rows, elements = self.actions
+        factor = np.ones((len(q), len(owner)))
+        laws = [self.entries[k].law for k in owner]
+        sources = [source for entry in self.entries for _, _, source in entry.actions]
+        loaded = [c for c, law in enumerate(laws) if law is ErrorLaw.COMPLIANCE]
         if loaded:
-            elements = [(self.entries[k].row, self.entries[k].element) for k in loaded]
-            factor[:, loaded] = gravity_loads(self.skeleton, q, elements)
-        for k, entry in enumerate(self.entries):
-            if entry.law in _LAWS:
-                factor[:, k] = _LAWS[entry.law](q[:, self.skeleton.joint[entry.source]])
+            bent = [(int(rows[c]), Element(int(elements[c])), sources[c]) for c in loaded]
+            factor[:, loaded] = gravity_loads(self.skeleton, q, bent)
+        for c, law in enumerate(laws):
+            if law in _LAWS:
+                factor[:, c] = _LAWS[law](q[:, self.skeleton.joint[sources[c]]])
         return factor
 
 
@@ -262,8 +292,7 @@ def candidate_parameters(
     tool: bool = True,
     gains: bool = False,
     couplings: Iterable[tuple[int, int]] = (),
-    compliance: bool = False,
-    bending: bool = False,
+    compliance: Compliance | str = Compliance.NONE,
     eccentricity: bool = False,
 ) -> GeometricParameters:
     """All parameters that a calibration of this robot may look at, by the book's rules.
@@ -285,11 +314,8 @@ def candidate_parameters(
         Whether ``q = K q_c + q_0`` has errors in the diagonal of K.
     couplings : iterable of (int, int)
         Pairs (j, i) of frames: the reading of joint i moves joint j.
-    compliance : bool
-        Whether joints give way in proportion to their gravity torque.
-    bending : bool
-        Whether links bend about alpha and beta, and the mount tilts, in proportion to the moment
-        of gravity there.
+    compliance : Compliance or str
+        What gives way under gravity: ``"none"``, ``"joints"``, ``"links"`` or ``"isotropic"``.
     eccentricity : bool
         Whether readings have errors in the sine and cosine of the joint and of twice its value.
 
@@ -332,12 +358,13 @@ def candidate_parameters(
         laws += [ErrorLaw.SINE, ErrorLaw.COSINE, ErrorLaw.SINE_2, ErrorLaw.COSINE_2]
     if gains:
         laws.append(ErrorLaw.GAIN)
-    if (compliance or bending) and not model.inertia.values.any():
+    compliance = chosen(Compliance, compliance, "compliance")
+    if compliance is not Compliance.NONE and not model.inertia.values.any():
         raise InvalidValueError(
             "compliance: the robot gives way under gravity, but this one has no masses. "
-            "Give it inertial parameters (with_inertia), or leave compliance and bending out."
+            "Give it inertial parameters (with_inertia), or leave compliance out."
         )
-    if compliance:
+    if compliance in (Compliance.JOINTS, Compliance.LINKS):
         laws.append(ErrorLaw.COMPLIANCE)
     for law in laws:
         for r in moving:
@@ -345,10 +372,22 @@ def candidate_parameters(
             if kind == PRISMATIC and law not in (ErrorLaw.GAIN, ErrorLaw.COMPLIANCE):
                 continue  # a linear scale has no turn to be off its axis
             entries.append(GeometricParameter(r, own[kind], law, r))
-    if bending:
-        bent = [(r, e) for r in moving for e in (Element.ALPHA, Element.BETA)]
-        bent += [(0, e) for e in (Element.GAMMA, Element.ALPHA, Element.THETA)]
-        entries += [GeometricParameter(r, e, ErrorLaw.COMPLIANCE, r) for r, e in bent]
+    if compliance is Compliance.LINKS:
+        bent = [(0, e, 0) for e in _TURNS]
+        bent += [
+            (s, e, r) for r in moving for s in _successors(skeleton, on_path, r) for e in _TURNS[1:]
+        ]
+        entries += [GeometricParameter(s, e, ErrorLaw.COMPLIANCE, r) for s, e, r in bent]
+    if compliance in (Compliance.ISOTROPIC, Compliance.UNIFORM):
+        at_mount = [(0, e, 0) for e in _TURNS]
+        at_joints = [
+            [(s, e, r) for s in _successors(skeleton, on_path, r) for e in _TURNS] for r in moving
+        ]
+        if compliance is Compliance.UNIFORM:
+            at_joints = [[action for actions in at_joints for action in actions]]
+        for (row, element, source), *also in [at_mount, *at_joints]:
+            law = ErrorLaw.COMPLIANCE
+            entries.append(GeometricParameter(row, element, law, source, tuple(also)))
     for j, i in couplings:
         if j not in moving or i not in moving or i == j:
             raise InvalidValueError(
@@ -357,6 +396,10 @@ def candidate_parameters(
             )
         entries.append(GeometricParameter(j, own[int(skeleton.sigma[j])], ErrorLaw.GAIN, i))
     return GeometricParameters(skeleton, tuple(entries))
+
+
+def _successors(skeleton: Skeleton, on_path: list[int], row: int) -> list[int]:
+    return [s for s in on_path if skeleton.antecedent[s] == row]
 
 
 def _elements_of(skeleton: Skeleton, row: int, on_path: list[int]) -> list[Element]:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from ..model import RobotModel
 from .calibrated import calibrated_model
+from .elements import ErrorLaw
 from .errors_seen import BlockErrors, block_errors
 from .identifiable import identifiable_on
 from .measurements import Measurement
@@ -63,7 +64,10 @@ def placed_robot(
 
     def of_place(parameters: GeometricParameters) -> list[str]:
         f = model.f
-        names = [e.name for e in parameters.entries if e.row == 0 or e.row > f]
+        names = [
+            e.name for e in parameters.entries
+            if e.law is ErrorLaw.CONSTANT and (e.row == 0 or e.row > f)
+        ]  # fmt: skip
         return [name for name in names if name not in fixed and name in candidates.names]
 
     names = of_place(candidates)

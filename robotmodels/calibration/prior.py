@@ -9,8 +9,10 @@ import numpy as np
 
 from .._arrays import Rebuilt, as_reals
 from ..errors import InvalidValueError
-from ..estimation import Loss, Prior
+from ..estimation import Loss, Prior, k_folds, select_strength
 from .elements import ErrorLaw
+from .identifiable import IdentifiableParameters, Reason
+from .parameters import GeometricParameter, GeometricParameters
 from .problem import Problem, guessed_fixtures, stacked
 from .solve import solve
 
@@ -26,12 +28,17 @@ class ParameterPrior(Rebuilt):
     length, angle : float
         Standard deviation of constant deviations of lengths (m) and angles (rad) of the table;
         infinite where nothing is known. Base and tools have no prior, unless they are named.
-    law : float
-        Of the parameters that depend on the configuration, in their own units.
+    gain, compliance, eccentricity : float
+        Of gains and couplings (1, or the ratio of the units), of compliances (rad or m per N m or
+        N), and of errors in sine and cosine (rad).
     named : mapping of str to float
         Standard deviations of single parameters, before the others.
     strength : float or None
         Factor on the information; None chooses it by cross-validation.
+    truncated : bool
+        Whether parameters that the measurements cannot tell from others stay as they are. By
+        default the error is shared among all that may have caused it, as the prior allows: a
+        column that takes the part of another has no reason to be as small.
 
     Raises
     ------
@@ -50,18 +57,54 @@ class ParameterPrior(Rebuilt):
 
     length: float = 1e-3
     angle: float = 5e-3
-    law: float = np.inf
+    gain: float = np.inf
+    compliance: float = np.inf
+    eccentricity: float = np.inf
     named: Mapping[str, float] = field(default_factory=dict)
     strength: float | None = 1.0
+    truncated: bool = False
 
     def __post_init__(self) -> None:
-        sizes = {"length": self.length, "angle": self.angle, "law": self.law, **self.named}
+        sizes = {
+            "length": self.length, "angle": self.angle, "gain": self.gain,
+            "compliance": self.compliance, "eccentricity": self.eccentricity, **self.named,
+        }  # fmt: skip
         for name, value in sizes.items():
             if not float(as_reals(value, name)) > 0.0:
                 raise InvalidValueError(
                     f"{name}: expected a positive standard deviation, or infinity for none, got "
                     f"{value!r}. Name what is known exactly in known=(...)."
                 )
+
+
+def estimated_with(prior: ParameterPrior, found: IdentifiableParameters) -> GeometricParameters:
+    """Parameters to estimate with a prior.
+
+    Parameters
+    ----------
+    prior : ParameterPrior
+        What is thought.
+    found : IdentifiableParameters
+        What the measurements tell.
+
+    Returns
+    -------
+    GeometricParameters
+        Those that are identifiable; and, unless truncated, those that act like combinations of
+        them and have a finite prior.
+    """
+    if prior.truncated:
+        return found.kept
+    f = found.candidates.model.f
+    return found.candidates.subset(
+        entry.name
+        for entry in found.candidates.entries
+        if entry.name in found.names
+        or (
+            found.reasons.get(entry.name) is Reason.REGROUPED
+            and np.isfinite(prior.named.get(entry.name, _size(prior, entry, f)))
+        )
+    )
 
 
 def settled_prior(
@@ -85,31 +128,34 @@ def settled_prior(
     Prior
         Of the vector [parameters, fixtures].
 
-    Raises
-    ------
-    InvalidValueError
-        A name that is no parameter of the problem.
     """
     entries = problem.parameters.entries
-    at = dict(
-        zip(prior.named, problem.parameters.index(prior.named, "prior").tolist(), strict=True)
-    )
-    size = np.array([
-        np.inf if e.row == 0 or e.row > problem.parameters.model.f
-        else prior.law if e.law is not ErrorLaw.CONSTANT
-        else prior.length if e.element.is_length else prior.angle
-        for e in entries
-    ])  # fmt: skip
-    for name, k in at.items():
-        size[k] = prior.named[name]
+    size = np.array([_size(prior, entry, problem.parameters.model.f) for entry in entries])
+    for k, entry in enumerate(entries):
+        size[k] = prior.named.get(entry.name, size[k])
     whole = np.concatenate([size, np.full(problem.F, np.inf)])
     mean = np.zeros(len(whole))
     if prior.strength is not None:
         return Prior(mean, whole, prior.strength)
-    scales = solve(problem, loss=loss).scales
+    whole_prior = Prior(mean, whole)
+    scales = solve(problem, loss=loss, prior=whole_prior).scales
     start = np.concatenate([mean[: problem.P], guessed_fixtures(problem, mean[: problem.P])])
-    strength = prior_strength(
-        lambda x: stacked(problem, x, scales), start, Prior(mean, whole), block=problem.block,
-        loss=loss, folds=_FOLDS, rng=rng,
+    block = problem.block
+    tried = select_strength(
+        lambda x: stacked(problem, x, scales), start, whole_prior, k_folds(block, _FOLDS, rng),
+        strengths=_STRENGTHS, block=block, loss=loss,
     )  # fmt: skip
-    return Prior(mean, whole, strength)
+    return whole_prior.with_strength(tried.strength)
+
+
+_STRENGTHS = np.logspace(-3.0, 3.0, 13)
+
+
+def _size(prior: ParameterPrior, entry: GeometricParameter, f: int) -> float:
+    if entry.law is ErrorLaw.CONSTANT:
+        if entry.row == 0 or entry.row > f:
+            return np.inf
+        return prior.length if entry.element.is_length else prior.angle
+    if entry.law is ErrorLaw.GAIN:
+        return prior.gain
+    return prior.compliance if entry.law is ErrorLaw.COMPLIANCE else prior.eccentricity

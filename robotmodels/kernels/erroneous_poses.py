@@ -116,7 +116,7 @@ def _screws_of_row(
 @compiled(
     NOTHING(
         MATRIX, MATRIX, INTS, INTS, INTS, MATRIX, VECTOR, MATRIX, VECTOR,
-        VECTOR, INTS, INTS, MATRIX, OUT3, OUT3,
+        VECTOR, INTS, INTS, INTS, MATRIX, OUT3, OUT3,
     )
 )  # fmt: skip
 def erroneous_poses(
@@ -130,6 +130,7 @@ def erroneous_poses(
     after_rotation: Floats,
     after_position: Floats,
     deviation: Floats,
+    owner: Ints,
     row: Ints,
     element: Ints,
     factor: Floats,
@@ -152,9 +153,9 @@ def erroneous_poses(
         Constant poses in front of the first row and behind the last, (3, 3) and (3,) [m].
     deviation : (P,)
         Values of the parameters: what is added to their elements, times the factor.
-    row, element : (P,) int64
-        Which row and which of the seven elements a parameter acts on.
-    factor : (N, P)
+    owner, row, element : (A,) int64
+        Each of A actions: number of the parameter, the row and which of its seven elements.
+    factor : (N, A)
         What the deviation is multiplied by at each configuration.
     out_pose : (N, 4, 4)
         Written: poses in the world.
@@ -162,7 +163,7 @@ def erroneous_poses(
         Written: [v; w] of the end per unit of each parameter, world axes, at the end's origin.
     """
     k = path.shape[0]
-    count = deviation.shape[0]
+    count = owner.shape[0]
     place = np.full(nominal.shape[0], -1)
     for m in range(k):
         place[path[m]] = m
@@ -184,7 +185,7 @@ def erroneous_poses(
         for c in range(count):
             m = place[row[c]]
             if m >= 0:
-                elements[m, element[c]] += factor[i, c] * deviation[c]
+                elements[m, element[c]] += factor[i, c] * deviation[owner[c]]
         R = start
         p = start_position
         for m in range(k):
@@ -194,12 +195,13 @@ def erroneous_poses(
         put_pose(out_pose[i], R, p)
         if out_psi.shape[2] == 0:
             continue
+        for s in range(6):
+            for c in range(out_psi.shape[2]):
+                out_psi[i, s, c] = 0.0
         for c in range(count):
             m = place[row[c]]
             f = factor[i, c]
             if m < 0 or f == 0.0:
-                for s in range(6):
-                    out_psi[i, s, c] = 0.0
                 continue
             e = element[c]
             axis = vector(axes, m * _ELEMENTS + e)
@@ -210,5 +212,5 @@ def erroneous_poses(
                 v = cross(axis, subtract(p, vector(origins, m * _ELEMENTS + e)))
                 w = axis
             for s in range(3):
-                out_psi[i, s, c] = f * v[s]
-                out_psi[i, 3 + s, c] = f * w[s]
+                out_psi[i, s, owner[c]] += f * v[s]
+                out_psi[i, 3 + s, owner[c]] += f * w[s]
