@@ -159,7 +159,8 @@ class AxisPosition(Measurement):
         turns = np.zeros(0 if self.axis_is_known else 2)
         if self.zero is not None:
             return turns
-        return np.append(turns, np.mean(evaluations[0].T[:, :3, 3] @ self.axis - self.value))
+        zero = float(np.mean(evaluations[0].T[:, :3, 3] @ self.axis - self.value))
+        return np.array([*turns, zero])
 
     def linearise(self, evaluations: Sequence[Evaluation], fixtures: Array) -> Linearised:
         """Coordinate along the axis less the reading."""
