@@ -28,8 +28,8 @@ ROBOTS = {
 TARGET = rm.se3.translation(0.1, 0.05, 0.15)
 """Of what is measured, in the tool's frame: at the wrist centre positions would say nothing of the
 wrist."""
-KINDS = (Kind.POSE, Kind.POSITION, Kind.ORIENTATION, Kind.POINT_CONTACT)
-CONTACTS = (Kind.ORIENTATION, Kind.POINT_CONTACT)
+KINDS = tuple(Kind)
+CONTACTS = (Kind.ORIENTATION, Kind.FRAME_CONTACT, Kind.POINT_CONTACT, Kind.PLANE_CONTACT)
 MARKS = {
     None: "●", Reason.REGROUPED: "r", Reason.NO_EFFECT: "0", Reason.GAUGE: "g", Reason.KNOWN: "k",
 }  # fmt: skip
@@ -37,7 +37,7 @@ LEGEND = """\
 ● estimated; r regrouped: acts like a combination of others; 0 not identifiable: it does not change
 what is measured; g gauge: the place of the robot is not seen; k known: gives the scale where no
 length is measured. The target is 0.1, 0.05, 0.15 m beside the tool's frame. Contacts have several
-points, all unknown, each touched in several postures of the nominal robot."""
+points, poses or planes, all unknown, each met in several postures on the nominal robot."""
 
 
 def rank_elsewhere(found: IdentifiableParameters, kind: Kind, seed: int) -> tuple[int, float]:
@@ -46,7 +46,7 @@ def rank_elsewhere(found: IdentifiableParameters, kind: Kind, seed: int) -> tupl
     fixed = {*found.of_reason(Reason.KNOWN), *found.of_reason(Reason.GAUGE)}
     p = p.without(fixed) if fixed else p
     m = kind.postures
-    drawn = drawn_groups(p, kind, 40 if m > 1 else 150, m, rng, limits=False)
+    drawn = drawn_groups(p, kind, 60 if m > 1 else 150, m, rng, limits=False)
     full = np.bincount(drawn.label)[drawn.label] == m
     q = drawn.q[full].reshape(-1, m, drawn.q.shape[1])
     W = group_rows(p, kind, q)

@@ -211,7 +211,7 @@ def test_orientation_alone_tells_no_length():
 # --- scale -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("kind", [Kind.POINT_CONTACT])
+@pytest.mark.parametrize("kind", [Kind.POINT_CONTACT, Kind.FRAME_CONTACT, Kind.PLANE_CONTACT])
 def test_contacts_without_a_known_length_are_refused_with_names(kind):
     with pytest.raises(InvalidValueError, match=r"know no length.*known_lengths=\('\w+',\).*d3"):
         identifiable_parameters(rm.load("kr6_r900"), kind)

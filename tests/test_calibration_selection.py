@@ -458,3 +458,19 @@ def test_drawn_measurements_have_no_residual():
             problem, np.zeros(len(parameters)), (np.ones(len(problem.measurements[0].axes)),)
         )
         assert np.abs(r[0]).max() < 1e-14
+
+
+@pytest.mark.parametrize("kind", [Kind.FRAME_CONTACT, Kind.PLANE_CONTACT])
+def test_frames_and_planes_are_met_exactly_within_the_limits(kind):
+    found = select_configurations(
+        RX90, kind, 8, drawn=40, known_lengths=["d3"], starts=1, rng=np.random.default_rng(0)
+    )
+    assert found.groups.shape == (8, kind.postures, 6)
+    T = rm.dgm(RX90, found.groups)
+    if kind is Kind.FRAME_CONTACT:
+        assert np.abs(np.diff(T, axis=1)).max() < 1e-10
+    else:
+        p = T[..., :3, 3] - T[..., :3, 3].mean(axis=1, keepdims=True)
+        assert np.linalg.svd(p, compute_uv=False)[:, 2].max() < 1e-10
+    assert (found.q >= RX90.lower - 1e-9).all()
+    assert (found.q <= RX90.upper + 1e-9).all()

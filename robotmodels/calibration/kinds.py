@@ -44,7 +44,9 @@ class Kind(Enum):
     POSE = "poses of the end, from outside"
     POSITION = "positions of the end, from outside"
     ORIENTATION = "orientations of the end, from outside"
+    FRAME_CONTACT = "the same pose reached in several postures"
     POINT_CONTACT = "the same point touched in several postures"
+    PLANE_CONTACT = "the same plane touched in several postures"
 
     @property
     def postures(self) -> int:
@@ -54,10 +56,10 @@ class Kind(Enum):
     @property
     def is_contact(self) -> bool:
         """Whether the postures of a group must meet."""
-        return self is Kind.POINT_CONTACT
+        return self in (Kind.FRAME_CONTACT, Kind.POINT_CONTACT, Kind.PLANE_CONTACT)
 
 
-_POSTURES = {Kind.POINT_CONTACT: 4}
+_POSTURES = {Kind.FRAME_CONTACT: 2, Kind.POINT_CONTACT: 4, Kind.PLANE_CONTACT: 6}
 
 
 def as_kind(value: Any, name: str = "kind") -> Kind:
@@ -180,17 +182,14 @@ def drawn_groups(
     moving = parameters if deviation is not None else replace(parameters, entries=())
     xi = np.zeros(len(moving)) if deviation is None else deviation
     T = differential_model(moving, first, xi, frame).T
-    places = T[label, :3, 3]
-    number = {place.tobytes(): int(g) for place, g in zip(places, label, strict=True)}
-    target = m.Position(starts, places, frame=frame)
+    target, group_of = _target(kind, T, starts, label, frame, rng, moving, xi)
     met = satisfied_measurement(moving, target, xi, np.zeros(0))
     found: dict[int, list[Array]] = {g: [first[g]] for g in range(groups)}
-    if isinstance(met, m.Position):
+    if met is not None:
         q = _turned_inside(parameters, met.views[0].q)
         within = (q >= model.lower - 1e-9) & (q <= model.upper + 1e-9)
         inside = np.asarray(within.all(axis=1))
-        group_of = [number[np.ascontiguousarray(place).tobytes()] for place in met.p]
-        for row, g, allowed in zip(q, group_of, inside, strict=True):
+        for row, g, allowed in zip(q, group_of(met), inside, strict=True):
             members = found[g]
             new = len(members) < postures and all(_differ(row, other) for other in members)
             if new and (allowed or not limits):
@@ -246,6 +245,35 @@ def measurement_of(
             return m.Position(q, T[:, :3, 3], **more)
         case Kind.POINT_CONTACT:
             return m.PointContact(q, label, **more)
+        case Kind.FRAME_CONTACT:
+            return m.FrameContact(q, label, **more)
+        case Kind.PLANE_CONTACT:
+            return m.PlaneContact(q, label, **more)
+
+
+def _target(
+    kind: Kind, T: Array, starts: Array, label: NDArray[np.int64], frame: Frame,
+    rng: np.random.Generator, moving: GeometricParameters, xi: Array,
+) -> tuple[Measurement, Any]:  # fmt: skip
+    """What the starts shall be moved to, and a function that says which group each row is of."""
+    p = T[:, :3, 3]
+    places = p[label]
+    if kind is Kind.PLANE_CONTACT:
+        # every start goes to the foot of its perpendicular on the plane of its group
+        normal = rng.normal(size=p.shape)
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        starting = differential_model(moving, starts, xi, frame).T[:, :3, 3]
+        height = ((starting - places) * normal[label]).sum(axis=1)
+        places = starting - height[:, None] * normal[label]
+    number = {place.tobytes(): int(g) for place, g in zip(places, label, strict=True)}
+
+    def group_of(met: Any) -> list[int]:
+        found = met.T[:, :3, 3] if kind is Kind.FRAME_CONTACT else met.p
+        return [number[np.ascontiguousarray(place).tobytes()] for place in found]
+
+    if kind is Kind.FRAME_CONTACT:
+        return m.Pose(starts, T[label], frame=frame), group_of
+    return m.Position(starts, places, frame=frame), group_of
 
 
 def _turned_inside(parameters: GeometricParameters, q: Array) -> Array:

@@ -22,7 +22,7 @@ from .skeleton import Frame
 _SEED = 14
 _CONTACTS = 14
 """Contacts that are drawn for structural identifiability, and postures of each."""
-_POSTURES = {Kind.POINT_CONTACT: 8}
+_POSTURES = {Kind.FRAME_CONTACT: 6, Kind.POINT_CONTACT: 8, Kind.PLANE_CONTACT: 14}
 
 
 def identifiable_parameters(
