@@ -124,8 +124,11 @@ def fit(
     loss = chosen(Loss, loss, "loss")
     chance = np.random.default_rng(_SEED if rng is None else rng)
     frames = measured_frames((*measured, *aside))
-    given = parameters if isinstance(parameters, GeometricParameters) else None
-    names = None if parameters is None or given is not None else tuple(parameters)
+    given = names = None
+    if isinstance(parameters, GeometricParameters):
+        given = parameters
+    elif parameters is not None:
+        names = tuple(parameters)
 
     def candidates_of(robot: RobotModel) -> GeometricParameters:
         found = candidate_parameters(
