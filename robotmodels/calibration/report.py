@@ -418,9 +418,8 @@ def _outliers(result: CalibrationResult) -> ReportSection | None:
         weight = float(fit.weights[fit.block == block].mean())
         lengths = ("-", "-")
         if seen[block]:
-            lengths = (
-                millimetres(float(result.after.position[at])), degrees(float(result.after.angle[at])),
-            )  # fmt: skip
+            p, angle = float(result.after.position[at]), float(result.after.angle[at])
+            lengths = (millimetres(p), degrees(angle))
         rows.append((str(int(block)), m.name, str(int(inside[block]) + 1), *lengths,
                      f"{weight:.2g}"))  # fmt: skip
     more = (

@@ -5,8 +5,13 @@ imported when the first one is drawn.
 """
 
 from .animate import animate
+from .calibration_report import html_report
 from .camera import Camera
 from .motion import Motion
+from .plot_calibration_in_space import plot_calibration_in_space
+from .plot_calibration_normality import plot_calibration_normality
+from .plot_calibration_parameters import plot_calibration_correlations, plot_calibration_parameters
+from .plot_calibration_residuals import plot_calibration_residuals
 from .plot_dynamics_energy import plot_energy
 from .plot_dynamics_maps import plot_inertia_map
 from .plot_dynamics_torques import plot_torque_parts
@@ -28,6 +33,12 @@ __all__ = [
     "Scene",
     "Unit",
     "animate",
+    "html_report",
+    "plot_calibration_correlations",
+    "plot_calibration_in_space",
+    "plot_calibration_normality",
+    "plot_calibration_parameters",
+    "plot_calibration_residuals",
     "plot_ellipsoids",
     "plot_energy",
     "plot_inertia_map",

@@ -1,0 +1,196 @@
+"""What a calibration found, parameter by parameter, with intervals."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import Array
+from ..calibration.result import CalibrationResult
+from ..errors import InvalidValueError
+from ..estimation import confidence_intervals
+from .figures import INK, PAGE, PALE, SMALL_SIZE, legend_above, line_style, new_figure, panels
+from .plot_calibration_residuals import as_result
+from .plot_units import Unit
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_STYLES = (("table", line_style(0).color, "o"), ("base and ends", line_style(1).color, "s"))
+_FAR = 20.0
+_LENGTHS = {"m": Unit.MILLIMETRE, "rad": Unit.DEGREE}
+_TITLES = {"m": "lengths", "rad": "angles", "1": "gains"}
+
+
+def plot_calibration_parameters(
+    result: CalibrationResult,
+    level: float = 0.95,
+    *,
+    title: str | None = None,
+    size: ArrayLike | None = None,
+) -> Figure:
+    """Deviations with their intervals; lengths, angles and other units in panels of their own.
+
+    Deviations of base and ends count from where the fit placed them.
+
+    Parameters
+    ----------
+    result : CalibrationResult
+        Of `calibration.fit`.
+    level : float
+        Probability of the intervals.
+    title : str, optional
+        Over the figure.
+    size : array_like, shape (2,), optional
+        Width and height, inches.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        A panel for each unit; parameters from the base to the ends, downwards.
+
+    Raises
+    ------
+    InvalidValueError
+        Not a result; a level that is no probability.
+    MissingExtraError
+        Matplotlib is not installed.
+
+    References
+    ----------
+    Seed book section 1.4.4.
+
+    Examples
+    --------
+    >>> import robotmodels as rm
+    >>> import robotmodels.calibration as calibration
+    >>> arm = rm.load("rx90")
+    >>> q = np.random.default_rng(0).uniform(-1.5, 1.5, (40, 6))
+    >>> result = calibration.fit(arm, calibration.Pose(q, rm.dgm(arm, q)), folds=0, held_out=0.0)
+    >>> [axes.get_xlabel() for axes in plot_calibration_parameters(result).axes]
+    ['deviation (mm)', 'deviation (deg)']
+    """
+    found = as_result(result)
+    interval = confidence_intervals(found.solution.fit, level)[: len(found.names)]
+    entries, f = found.parameters.entries, found.nominal.f
+    order = sorted(range(len(entries)), key=lambda k: (entries[k].row, entries[k].element))
+    units = sorted(dict.fromkeys(found.units), key=lambda u: ("m", "rad", "1", u).index(u))
+    of_unit = {unit: [k for k in order if found.units[k] == unit] for unit in units}
+    most = max(len(some) for some in of_unit.values())
+    figure = new_figure(PAGE, 0.85 + 0.155 * max(most, 8), size)
+    grid = panels(figure, 1, len(units))
+    for axes, (unit, some) in zip(grid[0], of_unit.items(), strict=True):
+        shown = _LENGTHS.get(unit)
+        factor, symbol = (1.0, unit) if shown is None else (shown.factor, shown.value)
+        axes.axvline(0.0, color=PALE, linewidth=0.9, zorder=1.2)
+        y = np.arange(len(some))
+        place = np.array([entries[k].row == 0 or entries[k].row > f for k in some])
+        for at, (name, color, marker) in enumerate(_STYLES):
+            own = place == bool(at)
+            if not own.any():
+                continue
+            k = np.array(some)[own]
+            ends = factor * np.abs(interval[k].T - found.deviation[k])
+            axes.errorbar(
+                factor * found.deviation[k], y[own], xerr=np.nan_to_num(ends, posinf=0.0),
+                fmt=marker, color=color, markersize=3.2, elinewidth=1.1, capsize=1.8, label=name,
+            )  # fmt: skip
+        sizes = factor * np.abs(interval[some]).max(axis=1)
+        _spread(axes, sizes[np.isfinite(sizes)], len(units))
+        axes.set_yticks(y, [found.names[k] for k in some], size=SMALL_SIZE, color=INK)
+        axes.set_ylim(len(some) - 0.4, -0.6)
+        axes.margins(x=0.06)
+        axes.grid(False, axis="y")
+        axes.set_xlabel(f"deviation ({symbol})")
+        axes.set_title(_TITLES.get(unit, unit), size=SMALL_SIZE + 1.0, color=INK)
+    handles = {}
+    for axes in grid[0]:
+        containers, labels = axes.get_legend_handles_labels()
+        handles |= dict(zip(labels, containers, strict=True))
+    percent = f"{100.0 * level:g} %"
+    legend_above(figure, list(handles.values()), title or f"deviations and {percent} intervals")
+    return figure
+
+
+def _spread(axes: Any, sizes: Array, panels: int) -> None:
+    """A scale that is linear around zero and of powers beyond, if few are far larger than most."""
+    most, usual = float(sizes.max(initial=0.0)), float(np.median(sizes)) if sizes.size else 0.0
+    if not usual or most < _FAR * usual:
+        axes.locator_params(axis="x", nbins=5 if panels > 2 else 7)
+        return
+    from matplotlib.ticker import FixedLocator, NullLocator
+
+    first = float(np.ceil(np.log10(usual)))
+    axes.set_xscale("symlog", linthresh=10.0**first, linscale=1.5)
+    powers = 10.0 ** np.arange(first, np.ceil(np.log10(most)) + 1.0)
+    powers = powers[:: -(-len(powers) // (2 if panels > 2 else 3))]
+    axes.xaxis.set_major_locator(FixedLocator([*-powers[::-1], 0.0, *powers]))
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.set_xlim(-1.3 * most, 1.3 * most)
+
+
+def plot_calibration_correlations(
+    result: CalibrationResult, *, title: str | None = None, size: ArrayLike | None = None
+) -> Figure:
+    """Correlations of the estimates: pairs that the measurements hardly tell apart are dark.
+
+    Parameters
+    ----------
+    result : CalibrationResult
+        Of `calibration.fit`.
+    title : str, optional
+        Over the figure.
+    size : array_like, shape (2,), optional
+        Width and height, inches.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        A square for each pair.
+
+    Raises
+    ------
+    InvalidValueError
+        Not a result.
+    MissingExtraError
+        Matplotlib is not installed.
+
+    References
+    ----------
+    Seed book section 1.4.4.
+
+    Examples
+    --------
+    >>> import robotmodels as rm
+    >>> import robotmodels.calibration as calibration
+    >>> arm = rm.load("rx90")
+    >>> q = np.random.default_rng(0).uniform(-1.5, 1.5, (40, 6))
+    >>> result = calibration.fit(arm, calibration.Pose(q, rm.dgm(arm, q)), folds=0, held_out=0.0)
+    >>> plot_calibration_correlations(result).axes[1].get_ylabel()
+    'correlation'
+    """
+    found = as_result(result)
+    if not found.names:
+        raise InvalidValueError("result: no parameters were estimated.")
+    entries = found.parameters.entries
+    order = sorted(range(len(entries)), key=lambda k: (entries[k].row, entries[k].element))
+    C = found.correlation[np.ix_(order, order)]
+    names = [found.names[k] for k in order]
+    side = float(np.clip(1.3 + 0.155 * len(names), 3.5, PAGE))
+    figure = new_figure(side + 0.6, side, size)
+    axes = panels(figure, 1)[0, 0]
+    picture = axes.imshow(C, cmap="PuOr", vmin=-1.0, vmax=1.0, interpolation="nearest")
+    every = int(np.ceil(len(names) * (SMALL_SIZE * 1.15 / 72.0) / (side - 1.1)))
+    ticks = np.arange(0, len(names), every)
+    axes.set_xticks(ticks, [names[k] for k in ticks], rotation=90, size=SMALL_SIZE, color=INK)
+    axes.set_yticks(ticks, [names[k] for k in ticks], size=SMALL_SIZE, color=INK)
+    axes.grid(False)
+    bar = figure.colorbar(picture, ax=axes, fraction=0.045, pad=0.02)
+    bar.set_label("correlation", size=SMALL_SIZE + 1.0, color=INK)
+    bar.ax.tick_params(labelsize=SMALL_SIZE, labelcolor=INK, color=PALE, length=2.5)
+    bar.outline.set(edgecolor=PALE, linewidth=0.6)  # type: ignore[operator]
+    if title is not None:
+        figure.suptitle(title, size=SMALL_SIZE + 2.0, color=INK)
+    return figure
