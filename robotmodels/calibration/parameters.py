@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Self
 
 import numpy as np
@@ -116,11 +116,20 @@ class GeometricParameters(Rebuilt):
 
     skeleton: Skeleton
     entries: tuple[GeometricParameter, ...]
+    names: tuple[str, ...] = field(init=False)
+    """Names, shape (P,)."""
+    actions: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]] = field(init=False)
+    """Parameter, row and element of each action, shapes (A,): a parameter has one or more."""
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names, shape (P,)."""
-        return tuple(entry.name for entry in self.entries)
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "names", tuple(entry.name for entry in self.entries))
+        found = [
+            (k, row, int(element))
+            for k, entry in enumerate(self.entries)
+            for row, element, _ in entry.actions
+        ]
+        columns = np.array(found, dtype=np.int64).reshape(-1, 3).T
+        object.__setattr__(self, "actions", tuple(read_only(c, np.int64) for c in columns))
 
     @property
     def model(self) -> RobotModel:
@@ -134,17 +143,6 @@ class GeometricParameters(Rebuilt):
     def rows(self) -> NDArray[np.int64]:
         """Row of each parameter, shape (P,)."""
         return np.array([entry.row for entry in self.entries], dtype=np.int64)
-
-    @property
-    def actions(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-        """Parameter, row and element of each action, shapes (A,): a parameter has one or more."""
-        found = [
-            (k, row, int(element))
-            for k, entry in enumerate(self.entries)
-            for row, element, _ in entry.actions
-        ]
-        columns = np.array(found, dtype=np.int64).reshape(-1, 3).T
-        return tuple(np.ascontiguousarray(column) for column in columns)  # type: ignore[return-value]
 
     @property
     def nominal(self) -> Array:

@@ -87,6 +87,8 @@ def placed_robot(
         solution = solve(problem, scales=first_scales(problem), tolerance=_ROUGH)
         placed = calibrated_model(solution.problem.parameters, solution.deviation).model
         model = with_gravity_kept(placed, model)
+        if len(found.kept) == len(names):
+            break
     errors = block_errors(solution.problem, solution.deviation, solution.fixtures)
     return PlacedRobot(model, errors)
 

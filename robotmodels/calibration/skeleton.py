@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -170,12 +171,8 @@ def skeleton_of(model: RobotModel, frames: Sequence[Frame] = (None,)) -> Skeleto
         raise InvalidValueError(f"frames: expected one or more ends, each once, got {frames}.")
     table = model.table
     base = base_parameters_of(model.base)
-    ends = [model.twin.frame(frame) for frame in frames]
-    tools = []
-    for end in ends:
-        pose = np.eye(4)
-        pose[:3, :3], pose[:3, 3] = end.rotation, end.position
-        tools.append(tool_parameters_of(pose))
+    ends = [_end(model, frame) for frame in frames]
+    tools = [tool_parameters_of(end.pose) for end in ends]
     columns = (
         table.gamma, table.b, table.beta, table.alpha, table.d, table.theta, table.r,
     )  # fmt: skip
@@ -190,3 +187,17 @@ def skeleton_of(model: RobotModel, frames: Sequence[Frame] = (None,)) -> Skeleto
         before=base.turn,
         after=np.array([t.turn for t in tools]),
     )
+
+
+class _End(NamedTuple):
+    parent: int
+    pose: Array
+
+
+def _end(model: RobotModel, frame: Frame) -> _End:
+    if frame is None:
+        return _End(model.tip, model.tool)  # without Pinocchio, which takes longer than a small fit
+    end = model.twin.frame(frame)
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = end.rotation, end.position
+    return _End(end.parent, pose)

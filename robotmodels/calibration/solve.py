@@ -9,7 +9,7 @@ import numpy as np
 from .._arrays import Array, Rebuilt, read_only
 from ..estimation import Loss, NonlinearFit, Prior, fit_nonlinear
 from ..estimation.losses import robust_scale
-from ..kinematics.lengths import characteristic_length
+from .elements import Element
 from .measurements import Measurement
 from .problem import Problem, guessed_fixtures, stacked
 
@@ -54,7 +54,7 @@ class Solution(Rebuilt):
 
 
 def first_scales(problem: Problem) -> tuple[Array, ...]:
-    """Standard deviations to begin with: a millimetre, and the angle that it is at arm's length.
+    """Standard deviations to begin with: a millimetre, and its angle at the robot stretched out.
 
     Parameters
     ----------
@@ -66,7 +66,8 @@ def first_scales(problem: Problem) -> tuple[Array, ...]:
     tuple of ndarray
         For each measurement, by the units of its rows.
     """
-    angle = _FIRST_LENGTH / characteristic_length(problem.parameters.model)
+    lengths = problem.parameters.skeleton.nominal[:, [Element.B, Element.D, Element.R]]
+    angle = _FIRST_LENGTH / (float(np.abs(lengths[1:]).sum()) or 1.0)
     return tuple(
         read_only([_FIRST_LENGTH if unit == "m" else angle for unit in m.units])
         for m in problem.measurements
