@@ -17,11 +17,10 @@ from ..kinematics import OrientationKind, pose_from_coordinates
 from ..kinematics.coordinates.kinds import orientation_kind
 from ..kinematics.lengths import characteristic_length
 from ..model import RobotModel, check_model
-from . import measurements
 from .csv_table import Column, CsvTable, open_table, stacked_columns
+from .file_kinds import CONTACTS, FileKind, as_file_kind
 from .file_units import AngleUnit, LengthUnit, as_file_unit
-from .kinds import Kind, as_kind
-from .measurements import Measurement, Pose, Position
+from .measurements import Distance, Measurement, Pose, Position, RelativePose
 from .skeleton import Frame
 
 _POSITION_NAMES = ("x", "y", "z")
@@ -31,10 +30,6 @@ _DIGITS = 1e-3
 _TURNS = 30.0
 _TURN = 2.0 * np.pi
 _SPREAD = 50.0
-_CONTACTS = {
-    Kind.POINT_CONTACT: "PointContact", Kind.FRAME_CONTACT: "FrameContact",
-    Kind.PLANE_CONTACT: "PlaneContact",
-}  # fmt: skip
 
 
 def read_measurements(
@@ -68,9 +63,9 @@ def read_measurements(
     path : str, Path or iterable of them
         A file, several, or a folder, whose files that fit ``pattern`` are read in the order of
         their names. The rows of several files follow each other.
-    kind : Kind, str or class
+    kind : FileKind, str or class
         ``"position"``, ``"pose"``, ``"orientation"``, ``"distance"``, ``"point_contact"``,
-        ``"frame_contact"``, ``"plane_contact"``.
+        ``"frame_contact"``, ``"plane_contact"``, ``"relative_pose"``.
     model : RobotModel
         The robot: names, number and types of its joints.
     joints : sequence of str or int, length n, optional
@@ -81,16 +76,18 @@ def read_measurements(
         the orientation's coordinates (for quaternions also qw, qx, qy, qz); ``distance`` for
         distances. Contacts have none.
     label : str or int, optional
-        Contacts: column that says which point, pose or plane each row touches. Default: the names
-        of the files without their suffix where there are several; else all the same.
+        Contacts: column that says which point, pose or plane each row touches; distances from a
+        pivot: which pivot. Default: the names of the files without their suffix where there are
+        several; else all the same.
     other_joints : sequence of str or int, length n, optional
-        Distances: columns of the readings at the other position.
+        Columns of the readings at the other end of a distance (without them it is from a pivot),
+        or of a relative pose.
     lengths : ``"m"`` or ``"mm"``
         Unit of positions, distances and the readings of prismatic joints in the file.
     angles, joint_angles : ``"rad"`` or ``"deg"``
         Unit of the angles in the file; of the readings of revolute joints, if another.
     orientation : OrientationKind or str, optional
-        How orientations are written; needed for poses. ``"rpy_urdf"`` is Rot(z) Rot(y) Rot(x)
+        How orientations are written; needed where some are. ``"rpy_urdf"`` is Rot(z) Rot(y) Rot(x)
         listed x, y, z; ``"rpy"`` the same listed z, y, x; ``"quaternion"``; ``"angle_axis"``.
     rows : sequence of 0 or 1, optional
         As `Position` and `Pose`: which coordinates count. All columns are read.
@@ -134,7 +131,8 @@ def read_measurements(
     array([0.2, 0.3, 0. ])
     """
     check_model(model)
-    kind = as_kind(kind)
+    kind = as_file_kind(kind)
+    _check_arguments(kind, label, other_joints, rows)
     length = as_file_unit(LengthUnit, lengths, "lengths")
     angle = as_file_unit(AngleUnit, angles, "angles")
     turn = angle if joint_angles is None else as_file_unit(AngleUnit, joint_angles, "joint_angles")
@@ -157,40 +155,42 @@ def read_measurements(
     called = name or (folder.resolve().name if folder is not None else None)
     if called is not None:
         more["name"] = called
-    if kind not in _CONTACTS and label is not None:
-        raise InvalidValueError(f"label: {kind.name.lower()} has no labels; leave it out.")
-    if other_joints is not None and kind is not Kind.DISTANCE:
-        raise InvalidValueError("other_joints: only distances are between two positions.")
-    if kind is Kind.POSITION:
+    if kind is FileKind.POSITION:
         p = length.factor * values
         _check_lengths(p, q, model, length, files[0], frame)
         return Position(q, p, (1, 1, 1) if rows is None else rows, **more)
-    if kind in (Kind.POSE, Kind.ORIENTATION):
+    if written is not None and kind.has_orientation:
         T = _poses(kind, written, values, length, angle, files[0])
-        if kind is Kind.POSE:
-            _check_lengths(T[:, :3, 3], q, model, length, files[0], frame)
-        only = (0, 0, 0, 1, 1, 1) if kind is Kind.ORIENTATION else (1,) * 6
-        more.setdefault("name", kind.name.lower())
-        return Pose(q, T, only if rows is None else rows, **more)
-    if rows is not None:
-        raise InvalidValueError("rows: only positions and poses have rows to choose.")
-    if kind in _CONTACTS:
-        contact = _built(_CONTACTS[kind])
-        return contact(q, _labels(tables, label, q), **more)
-    if kind is Kind.DISTANCE:
-        distance = _built("Distance")
-        return distance(q, readings(other_joints, "other_joints"), values[:, 0] * length.factor,
-                        **more)  # fmt: skip
-    raise InvalidValueError(
-        f"kind: {kind.name.lower()} has no form of file; build the measurement from arrays."
-    )
+        if kind is FileKind.RELATIVE_POSE:
+            other = readings(other_joints, "other_joints")
+            return RelativePose(q, other, T, (1,) * 6 if rows is None else rows, **more)
+        if kind is FileKind.ORIENTATION:
+            more.setdefault("name", "orientation")
+            return Pose(q, T, (0, 0, 0, 1, 1, 1) if rows is None else rows, **more)
+        _check_lengths(T[:, :3, 3], q, model, length, files[0], frame)
+        return Pose(q, T, (1,) * 6 if rows is None else rows, **more)
+    if kind is FileKind.DISTANCE:
+        measured = length.factor * values[:, 0]
+        if other_joints is not None:
+            return Distance(q, measured, readings(other_joints, "other_joints"), **more)
+        return Distance(q, measured, pivot=_labels(tables, label, q), **more)
+    return CONTACTS[kind](q, _labels(tables, label, q), **more)
 
 
-def _built(name: str) -> Any:
-    found = getattr(measurements, name, None)
-    if found is None:
-        raise InvalidValueError(f"kind: {name} is not part of this release.")
-    return found
+def _check_arguments(
+    kind: FileKind, label: Column | None, other_joints: Sequence[Column] | None,
+    rows: Sequence[int] | None,
+) -> None:  # fmt: skip
+    """Refuse arguments that say nothing about a kind."""
+    word = kind.name.lower()
+    if label is not None and (
+        not (kind.is_contact or kind is FileKind.DISTANCE) or other_joints is not None
+    ):
+        raise InvalidValueError(f"label: {word} has no labels here; leave it out.")
+    if other_joints is not None and kind not in (FileKind.DISTANCE, FileKind.RELATIVE_POSE):
+        raise InvalidValueError(f"other_joints: {word} has one end; leave them out.")
+    if rows is not None and not (kind.has_orientation or kind is FileKind.POSITION):
+        raise InvalidValueError(f"rows: {word} has no rows to choose; leave them out.")
 
 
 def _files(
@@ -214,21 +214,17 @@ def _files(
 
 
 def _needed(
-    kind: Kind, written: OrientationKind | None, columns: Sequence[Column] | None
+    kind: FileKind, written: OrientationKind | None, columns: Sequence[Column] | None
 ) -> tuple[tuple[str, ...], ...]:
     """Names of the measured columns, in one or more spellings; none for contacts."""
-    if kind in _CONTACTS:
+    if kind.is_contact:
         if columns is not None:
             raise InvalidValueError("columns: a contact measures nothing; see label.")
         return ()
-    if kind is Kind.POSITION:
+    if kind is FileKind.POSITION:
         return (_POSITION_NAMES,)
-    if kind is Kind.DISTANCE:
+    if kind is FileKind.DISTANCE:
         return (("distance",), ("length",))
-    if kind not in (Kind.POSE, Kind.ORIENTATION):
-        raise InvalidValueError(
-            f"kind: {kind.name.lower()} has no form of file; build the measurement from arrays."
-        )
     if written is None:
         raise InvalidValueError(
             "orientation: say how orientations are written: 'rpy_urdf' (turns about x, y, z in "
@@ -238,7 +234,7 @@ def _needed(
     own = [written.labels[3:]]
     if written is OrientationKind.QUATERNION:
         own.append(_QUATERNION_NAMES)
-    return tuple((*_POSITION_NAMES, *o) if kind is Kind.POSE else tuple(o) for o in own)
+    return tuple(tuple(o) if kind is FileKind.ORIENTATION else (*_POSITION_NAMES, *o) for o in own)
 
 
 def _joint_columns(
@@ -254,7 +250,7 @@ def _joint_columns(
     names = model.table.joint_names
     advice = f"Give them as {what}=[...], a name or number (from 0) for each of the {n} joints."
     if what == "other_joints":
-        raise InvalidValueError(f"other_joints: a distance has two ends. {advice}")
+        raise InvalidValueError(f"other_joints: two ends need two readings. {advice}")
     if table.names:
         numbered = [f"q{j + 1}" for j in range(n)]
         found = table.find(names)
@@ -310,12 +306,12 @@ def _labels(tables: Sequence[CsvTable], label: Column | None, q: Array) -> tuple
 
 
 def _poses(
-    kind: Kind, written: OrientationKind | None, values: Array, length: LengthUnit,
-    angle: AngleUnit, file: Path,
+    kind: FileKind, written: OrientationKind, values: Array, length: LengthUnit, angle: AngleUnit,
+    file: Path,
 ) -> Array:  # fmt: skip
-    assert written is not None  # _needed has asked for it
-    p = length.factor * values[:, :3] if kind is Kind.POSE else np.zeros((len(values), 3))
-    o = values[:, 3:] if kind is Kind.POSE else values
+    turned_only = kind is FileKind.ORIENTATION
+    p = np.zeros((len(values), 3)) if turned_only else length.factor * values[:, :3]
+    o = values if turned_only else values[:, 3:]
     if written is OrientationKind.QUATERNION:
         size = np.linalg.norm(o, axis=1)
         wrong = np.flatnonzero(abs(size - 1.0) > _DIGITS)
