@@ -39,8 +39,8 @@ def side_by_side(
     model_a, model_b : RobotModel
         The robots.
     base_b : pose, shape (4, 4), optional
-        Place of the second in the world in which the first one's base is given, metres; default
-        its own base.
+        Z of the second, the place of its R_0 in the world of the first, metres; default its own.
+        A robot read from a URDF that is moved by T stands at ``T @ model_b.base``.
     names : tuple of two str
         What stands before the names, instead of ``a`` and ``b``.
 

@@ -9,6 +9,7 @@ from .known_distance import KnownDistance
 from .labelled import Labelled
 from .laser_line import LaserLine
 from .linked_frames import LinkedFrames
+from .lonely import LonelyLabel, lonely_labels
 from .measurement import Evaluation, Fixture, Linearised, Measurement, View
 from .plane_contact import PlaneContact
 from .point_contact import PointContact
@@ -28,6 +29,7 @@ __all__ = [
     "LaserLine",
     "Linearised",
     "LinkedFrames",
+    "LonelyLabel",
     "Measurement",
     "PlaneContact",
     "PointContact",
@@ -36,4 +38,5 @@ __all__ = [
     "RelativePose",
     "View",
     "length_is_known",
+    "lonely_labels",
 ]

@@ -23,7 +23,7 @@ from .measurement import (
     as_values,
     part_of_noise,
 )
-from .rotation_vectors import rotations_of, tilt_of, tilted_axes
+from .rotation_vectors import rotations_of, tilt_of, tilted_axes, unit_vector
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)
@@ -96,10 +96,9 @@ class AxisPosition(Measurement):
         set_(self, "q", as_readings(q))
         set_(self, "value", as_values(value, len(self.q), "value"))
         direction = as_exact(axis, (3,), "axis")
-        length = float(np.linalg.norm(direction))
-        if length == 0.0:
+        if not direction.any():
             raise InvalidValueError("axis: expected a direction, got zeros.")
-        set_(self, "axis", read_only(direction / length))
+        set_(self, "axis", read_only(unit_vector(direction)))
         set_(self, "zero", None if zero is None else float(as_exact(zero, (), "zero")))
         set_(self, "axis_is_known", bool(axis_is_known))
         noise = as_noise(sigma, covariance, len(self.q), 1)

@@ -23,7 +23,7 @@ from .measurement import (
     as_readings,
     part_of_noise,
 )
-from .rotation_vectors import tilt_of, tilted_axes
+from .rotation_vectors import tilt_of, tilted_axes, unit_vector
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)
@@ -199,10 +199,9 @@ class LaserLine(Labelled):
 
 def _as_line(value: Any, name: str) -> Array:
     line = as_exact(value, (2, 3), name)
-    length = float(np.linalg.norm(line[1]))
-    if length == 0.0:
+    if not line[1].any():
         raise InvalidValueError(f"{name}: expected a direction in the second row, got zeros.")
-    return read_only(np.array([line[0], line[1] / length]))
+    return read_only(np.array([line[0], unit_vector(line[1])]))
 
 
 def _four(line: Array) -> Array:

@@ -23,7 +23,7 @@ from .measurement import (
     as_readings,
     part_of_noise,
 )
-from .rotation_vectors import tilt_of, tilted_axes
+from .rotation_vectors import tilt_of, tilted_axes, unit_vector
 
 _UNIT = 1e-6
 
@@ -38,10 +38,10 @@ class PlaneContact(Labelled):
     The end of a ball touches a plane beside the centre of the ball: an unknown offset takes the
     radius with it as long as the plane is touched from one side; to a known one it is added.
 
-    One plane alone tells little: it sees the end along one direction, and nothing that moves the
-    touched positions within that plane or turns it as a whole. Planes in three directions that are
-    not nearly parallel, each touched in many postures, see as much as touched points do;
-    `identifiable_parameters` says what is left out.
+    One inclined plane touched in many postures tells as much as touched points do. A single plane
+    at right angles to the axis of the first joint (a table under an upright robot) does not see
+    that joint turn, nor what moves the whole arm along the plane; `identifiable_parameters` says
+    what is left out. Lay it aslant, or touch a second plane that is not parallel to it.
 
     Parameters
     ----------
@@ -218,4 +218,4 @@ def _as_plane(value: Any, name: str) -> Array:
             f"{name}: expected a normal of length 1 and an offset in metres, got a normal of "
             f"length {length:.6g}. Divide all four numbers by it."
         )
-    return read_only(np.append(plane[:3] / length, plane[3]))
+    return read_only(np.append(unit_vector(plane[:3]), plane[3]))

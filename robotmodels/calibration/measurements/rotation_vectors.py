@@ -172,3 +172,20 @@ def tilted_axes(tilt: Array) -> tuple[Array, Array]:
     w = left_jacobians(u)[:, :, :2]
     turned = -skew_of(R.swapaxes(-1, -2)) @ w[:, None]
     return R, turned.swapaxes(1, 2)
+
+
+def unit_vector(direction: Array) -> Array:
+    """A direction at length 1; one that has it already stays as it is to the last digit.
+
+    Parameters
+    ----------
+    direction : ndarray, shape (3,)
+        Not zero.
+
+    Returns
+    -------
+    ndarray, shape (3,)
+        Of length 1.
+    """
+    length = float(np.linalg.norm(direction))
+    return direction if abs(length - 1.0) < 1e-15 else direction / length
