@@ -13,6 +13,7 @@ from ..model import RobotModel
 
 NUMBER_OPTIONS = (
     "--q", "--q-ref", "--xyz", "--rpy", "--matrix", "--mask", "--tolerance", "--arm-angle",
+    "--sigma", "--prior",
 )  # fmt: skip
 """Options that take lists of numbers."""
 

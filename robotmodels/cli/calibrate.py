@@ -1,0 +1,306 @@
+"""``robotmodels calibrate``: geometric parameters of a robot from files of measurements."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .._arrays import Array
+from ..errors import InvalidValueError, UrdfWarning
+from ..model import RobotModel
+from .numbers import numbers
+from .source import robot_of
+
+if TYPE_CHECKING:
+    from ..calibration import CalibrationResult, Measurement
+
+_KINDS = (
+    "position", "pose", "orientation", "distance", "relative-pose", "point-contact",
+    "frame-contact", "plane-contact",
+)  # fmt: skip
+_LOSSES = ("squares", "huber", "cauchy", "tukey")
+_COMPLIANCES = ("none", "joints", "links", "isotropic", "uniform")
+_EXAMPLES = """\
+examples:
+  robotmodels calibrate --robot ur10e.urdf --measurements tracker.csv --kind position \\
+      --lengths mm --angles deg --out report/
+  robotmodels calibrate --robot rx90 --measurements camera.csv --kind pose \\
+      --orientation quaternion --loss huber --json
+  robotmodels calibrate --robot panda.urdf --measurements hole_0.csv hole_1.csv \\
+      --kind point-contact --known-distance hole_0 hole_1 0.05 --out report/
+
+Into the folder of --out go report.txt, report.html (text and figures, one offline file),
+result.json and calibrated.urdf. Without --out the report is printed.
+
+exit status: 0 the fit has converged, 1 it has not, 2 an argument is wrong"""
+
+
+def add_command(commands: Any) -> None:
+    """Add the command to the parser.
+
+    Parameters
+    ----------
+    commands : argparse subparsers
+        Where to add it.
+
+    Examples
+    --------
+    >>> add_command(argparse.ArgumentParser().add_subparsers())
+    """
+    parser = commands.add_parser(
+        "calibrate",
+        help="geometric parameters of a robot from measurements",
+        description="Geometric calibration: estimate the parameters that measurements tell, with "
+        "their deviations,\nthe errors before and after, and on measurements kept aside.",
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "--robot", required=True,
+        help="a name of the catalogue (rx90, erd:ur5), a .urdf or a SYMORO .par file",
+    )  # fmt: skip
+    parser.add_argument("--base-link", help="URDF only: link whose frame is the world")
+    parser.add_argument("--tip-link", help="URDF only: link whose frame is the tool")
+    parser.add_argument("--package-dir", action="append", default=[], metavar="FOLDER",
+                        help="URDF only: folder that holds packages; may be repeated")  # fmt: skip
+    _add_files(parser.add_argument_group("the measurements"))
+    _add_fit(parser.add_argument_group("the fit"))
+    parser.add_argument("--out", type=Path, metavar="FOLDER", help="where the files go")
+    parser.add_argument("--json", action="store_true", help="print the result as JSON")
+    parser.set_defaults(run=run)
+
+
+def _add_files(files: Any) -> None:
+    files.add_argument("--measurements", required=True, nargs="+", metavar="FILE",
+                       help="CSV files, or one folder")  # fmt: skip
+    files.add_argument("--kind", required=True, choices=_KINDS, help="what was measured")
+    files.add_argument("--pattern", default="*.csv",
+                       help="of the files in a folder (default: %(default)s)")  # fmt: skip
+    files.add_argument("--lengths", choices=("m", "mm"), default="m",
+                       help="unit of lengths in the files (default: %(default)s)")  # fmt: skip
+    files.add_argument("--angles", choices=("rad", "deg"), default="rad",
+                       help="unit of angles in the files (default: %(default)s)")  # fmt: skip
+    files.add_argument("--joint-angles", choices=("rad", "deg"),
+                       help="unit of the readings of joints, if another")  # fmt: skip
+    files.add_argument(
+        "--orientation", metavar="KIND",
+        help="how orientations are written: rpy_urdf, rpy, quaternion (scalar first), angle_axis, "
+        "euler, ...",
+    )  # fmt: skip
+    for option, what in (
+        ("--joints", "columns of the readings of the joints, by name or number from 0"),
+        ("--other-joints", "columns of the readings at the other end of a distance"),
+        ("--columns", "columns of what was measured (x y z, then the orientation)"),
+    ):
+        files.add_argument(option, nargs="+", metavar="COLUMN", help=what)
+    files.add_argument("--label", metavar="COLUMN",
+                       help="column that says which point or plane is touched; default: the names "
+                       "of the files")  # fmt: skip
+    files.add_argument("--delimiter", help="between cells; default ; tab or , as found")
+    files.add_argument("--frame", help="measured end: a frame of the robot (default: the tool)")
+    files.add_argument("--sigma", metavar="NUMBERS",
+                       help="standard deviations of a measurement in m and rad: one, or one for "
+                       "each coordinate; default: estimated")  # fmt: skip
+    files.add_argument(
+        "--known-distance", nargs=3, action="append", default=[], metavar=("A", "B", "LENGTH"),
+        help="point contacts: distance of two touched points, in the unit of --lengths; may be "
+        "repeated",
+    )  # fmt: skip
+
+
+def _add_fit(fitted: Any) -> None:
+    fitted.add_argument("--parameters", nargs="+", metavar="NAME",
+                        help="candidates, such as theta2 d3 (default: all)")  # fmt: skip
+    fitted.add_argument("--known", nargs="+", default=[], metavar="NAME",
+                        help="parameters that stay as they are")  # fmt: skip
+    fitted.add_argument("--known-lengths", nargs="+", default=[], metavar="NAME",
+                        help="the same, for lengths that give the scale")  # fmt: skip
+    fitted.add_argument("--fixed-base", action="store_true", help="the robot stands as given")
+    fitted.add_argument("--fixed-tool", action="store_true", help="the tool is as given")
+    fitted.add_argument("--gains", action="store_true", help="errors of gain of the encoders")
+    fitted.add_argument("--eccentricity", action="store_true", help="encoders off their axes")
+    fitted.add_argument("--compliance", choices=_COMPLIANCES, default="none",
+                        help="what gives way under gravity (default: %(default)s)")  # fmt: skip
+    fitted.add_argument(
+        "--loss", choices=_LOSSES, default="squares",
+        help="all but the first against outliers (default: %(default)s)",
+    )  # fmt: skip
+    fitted.add_argument("--prior", metavar="NUMBERS",
+                        help="standard deviations of the table's lengths (m) and angles (rad) that "
+                        "are expected, such as 1e-3 5e-3")  # fmt: skip
+    fitted.add_argument(
+        "--folds", type=int, default=5,
+        help="of the cross-validation, 0 for none (default: %(default)s)",
+    )  # fmt: skip
+    fitted.add_argument("--held-out", type=float, default=0.2, metavar="SHARE",
+                        help="share of the measurements that one more fit is tested on, 0 for none "
+                        "(default: %(default)s)")  # fmt: skip
+    fitted.add_argument("--test", nargs="+", metavar="FILE",
+                        help="files of measurements that only test the result")  # fmt: skip
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Read, fit, and print or write.
+
+    Parameters
+    ----------
+    arguments : Namespace
+        Parsed arguments.
+
+    Returns
+    -------
+    int
+        0 if the fit has converged, else 1.
+
+    Raises
+    ------
+    RobotModelsError
+        A robot, files or options that make no sense.
+
+    Examples
+    --------
+    >>> parser = argparse.ArgumentParser()
+    >>> add_command(parser.add_subparsers())
+    >>> words = ["calibrate", "--robot", "rx90", "--measurements", "a.csv", "--kind", "position"]
+    >>> parser.parse_args(words).folds
+    5
+    """
+    from ..calibration import KnownDistance, ParameterPrior, fit
+
+    model = robot_of(arguments)
+    measured = read(arguments, model, arguments.measurements)
+    known = [
+        KnownDistance(
+            f"{measured.name}:{a}", f"{measured.name}:{b}",
+            float(numbers(length, 1, "--known-distance")[0])
+            * (1e-3 if arguments.lengths == "mm" else 1.0),
+        )
+        for a, b, length in arguments.known_distance
+    ]  # fmt: skip
+    prior = None
+    if arguments.prior is not None:
+        length, angle = numbers(arguments.prior, 2, "--prior")
+        prior = ParameterPrior(length=float(length), angle=float(angle))
+    aside = arguments.held_out
+    if arguments.test is not None:
+        aside = read(arguments, model, arguments.test, name="test")
+    result = fit(
+        model, [measured, *known], parameters=arguments.parameters, known=arguments.known,
+        known_lengths=arguments.known_lengths, base=not arguments.fixed_base,
+        tool=not arguments.fixed_tool, gains=arguments.gains,
+        eccentricity=arguments.eccentricity, compliance=arguments.compliance,
+        loss=arguments.loss, prior=prior, folds=arguments.folds, held_out=aside,
+        progress=_progress if sys.stderr.isatty() else None,
+    )  # fmt: skip
+    if arguments.out is not None:
+        write(result, arguments.out, quiet=arguments.json)
+    if arguments.json:
+        from ..calibration.write import result_data
+
+        print(json.dumps(result_data(result), indent=2, ensure_ascii=False))
+    elif arguments.out is None:
+        print(result.report(), end="")
+    return 0 if result.solution.fit.converged else 1
+
+
+def read(
+    arguments: argparse.Namespace, model: RobotModel, files: list[str], name: str | None = None
+) -> Measurement:
+    """The measurements of some files.
+
+    Parameters
+    ----------
+    arguments : Namespace
+        Parsed arguments.
+    model : RobotModel
+        The robot.
+    files : list of str
+        Files, or one folder.
+    name : str, optional
+        Of the measurement.
+
+    Returns
+    -------
+    Measurement
+        Metres and radians.
+
+    Raises
+    ------
+    RobotModelsError
+        As `read_measurements`.
+    """
+    from ..calibration.read import read_measurements
+
+    return read_measurements(
+        files[0] if len(files) == 1 else files, arguments.kind, model,
+        joints=_columns(arguments.joints), columns=_columns(arguments.columns),
+        other_joints=_columns(arguments.other_joints),
+        label=None if arguments.label is None else _column(arguments.label),
+        lengths=arguments.lengths, angles=arguments.angles, joint_angles=arguments.joint_angles,
+        orientation=arguments.orientation, pattern=arguments.pattern,
+        delimiter=arguments.delimiter, sigma=_sigma(arguments.sigma), frame=arguments.frame,
+        name=name,
+    )  # fmt: skip
+
+
+def write(result: CalibrationResult, folder: Path, quiet: bool = False) -> None:
+    """Write the files of a report into a folder and say which.
+
+    Parameters
+    ----------
+    result : CalibrationResult
+        Of the fit.
+    folder : Path
+        Made if it is not there.
+    quiet : bool
+        Whether nothing is printed but warnings.
+
+    Raises
+    ------
+    RobotModelsError, OSError
+        A file that cannot be made.
+    """
+    from ..calibration.write import write_result
+    from ..viz import html_report
+
+    folder.mkdir(parents=True, exist_ok=True)
+    report = result.report()
+    (folder / "report.txt").write_text(report, encoding="utf-8")
+    write_result(result, folder / "result.json")
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", UrdfWarning)
+        write_result(result, folder / "calibrated.urdf")
+    for warning in caught:
+        print(f"robotmodels: calibrated.urdf: {warning.message}", file=sys.stderr)
+    html_report(result, folder / "report.html")
+    if not quiet:
+        print(report.split("What was measured", 1)[0].rstrip())
+        for name in ("report.txt", "report.html", "result.json", "calibrated.urdf"):
+            print(f"wrote {folder / name}")
+
+
+def _column(word: str) -> int | str:
+    """A column by number where the word is one, else by name."""
+    return int(word) if word.lstrip("-").isdecimal() else word
+
+
+def _columns(words: list[str] | None) -> list[int | str] | None:
+    return None if words is None else [_column(word) for word in words]
+
+
+def _sigma(text: str | None) -> float | Array | None:
+    if text is None:
+        return None
+    values = numbers(text, range(1, 7), "--sigma")
+    if (values <= 0.0).any():
+        raise InvalidValueError(f"--sigma: expected positive numbers in m and rad, got {text!r}.")
+    return float(values[0]) if len(values) == 1 else values
+
+
+def _progress(done: int, of: int, doing: str) -> None:
+    end = "\n" if done == of else ""
+    print(f"\r{done} of {of} fits: {doing:<28}", end=end, file=sys.stderr, flush=True)
