@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Rebuilt, as_exact, read_only
+from .._arrays import Array, Rebuilt, as_exact, as_vector, read_only
 from ..errors import InvalidValueError, UrdfWarning
 from ..kinematics import dgm
 from ..model import RobotModel, to_urdf
+from .bending import Bending, bending_of
 from .elements import Element, ErrorLaw
 from .joint_errors import JointErrors, joint_errors_of
 from .parameters import GeometricParameters
@@ -30,17 +31,20 @@ class CalibratedEnd(NamedTuple):
     parent : int
         Number of the table's frame it is fixed to; 0 is R_0.
     pose : ndarray, shape (4, 4)
-        In that frame, metres.
+        In that frame with nothing bent, metres.
+    row : int
+        Its row of the extended table.
 
     Examples
     --------
-    >>> CalibratedEnd(None, 6, np.eye(4)).parent
+    >>> CalibratedEnd(None, 6, np.eye(4), 7).parent
     6
     """
 
     frame: Frame
     parent: int
     pose: Array
+    row: int
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
@@ -48,7 +52,8 @@ class CalibratedRobot(Rebuilt):
     """A robot with its deviations applied.
 
     Constant deviations are in ``model``, whose variables are where the joints are;
-    ``joint_errors`` lead there from what the joints read. Limits and named configurations are
+    ``joint_errors`` lead there from what the joints read. What gravity bends elsewhere is in
+    ``bending``: no model with constant elements has it. Limits and named configurations are
     those of the readings. Bodies keep their place in their own frames: inertial parameters are
     those of the nominal robot, and so is the transmission.
 
@@ -64,7 +69,9 @@ class CalibratedRobot(Rebuilt):
         The nominal table at the calibrated base and tool: it keeps the structure that gives a
         closed form, and errs only by the deviations of the table.
     joint_errors : JointErrors
-        Gains, couplings, eccentricity and compliance.
+        Gains, couplings, eccentricity and compliance of the joints about their own axes.
+    bending : Bending
+        Compliance of the links and of the mount.
     ends : tuple of CalibratedEnd
         Where the measured ends are.
 
@@ -87,6 +94,7 @@ class CalibratedRobot(Rebuilt):
     model: RobotModel
     structured: RobotModel
     joint_errors: JointErrors
+    bending: Bending
     ends: tuple[CalibratedEnd, ...]
 
     def __post_init__(self) -> None:
@@ -107,9 +115,16 @@ class CalibratedRobot(Rebuilt):
             notes.append("Eccentricity of the encoders is in joint_errors, not in model.")
         if errors.compliance.any():
             notes.append("Compliance of the joints is in joint_errors, not in model.")
+        if not self.bending.is_zero:
+            bent = self.bending.bent_rows
+            what = ["tilt of the mount"] if self.bending.tilts_mount else []
+            what += [f"bending before {', '.join(bent)}"] if bent else []
+            notes.append(
+                f"What gives way under gravity ({' and '.join(what)}) is in bending, not in model."
+            )
         elsewhere = [
-            self.parameters.skeleton.row_name(1 + self.nominal.f + k)
-            for k, end in enumerate(self.ends)
+            self.parameters.skeleton.row_name(end.row)
+            for end in self.ends
             if end.frame not in (None, self.model.twin.names.tool)
             and not _is_named(self.model, end.frame)
         ]
@@ -126,14 +141,20 @@ class CalibratedRobot(Rebuilt):
         Parameters
         ----------
         frame : str, int or None
-            Any frame of the model; None is the tool.
+            Any frame of the model; None, or its name, is the tool.
 
         Returns
         -------
         CalibratedEnd or None
             None for a frame that was not a measured end.
         """
-        return next((end for end in self.ends if _same(end.frame, frame)), None)
+        tool = self.model.twin.names.tool
+        also = {None: tool, tool: None}.get(frame, frame)  # type: ignore[arg-type]
+        for wanted in (frame, also):
+            for end in self.ends:
+                if _same(end.frame, wanted):
+                    return end
+        return None
 
     def with_tool_at(self, frame: Frame) -> Self:
         """The same robot whose tool is another measured end, so that inverse models serve it.
@@ -160,7 +181,7 @@ class CalibratedRobot(Rebuilt):
                 f"frame: expected one of the measured ends that joints move, {known}, got "
                 f"{frame!r}."
             )
-        tool = CalibratedEnd(None, end.parent, end.pose)
+        tool = end._replace(frame=None)
         others = tuple(e for e in self.ends if e.frame is not None)
         return replace(
             self,
@@ -223,7 +244,7 @@ def calibrated_model(parameters: GeometricParameters, deviation: ArrayLike) -> C
         else:
             pose = np.eye(4)
             pose[:3, :3], pose[:3, 3] = found.rotation, found.position
-        ends.append(CalibratedEnd(frame, found.parent, read_only(pose)))
+        ends.append(CalibratedEnd(frame, found.parent, read_only(pose), 1 + f + k))
     columns = {e.word: elements[1 : 1 + f, e] for e in Element}
     by_name = [end for end in ends if end.frame in (None, nominal.twin.names.tool)]
     tool = min(by_name, key=lambda end: end.frame is not None).pose if by_name else nominal.tool
@@ -245,6 +266,7 @@ def calibrated_model(parameters: GeometricParameters, deviation: ArrayLike) -> C
         model=model,
         structured=nominal.with_base(base).with_tool(tool),
         joint_errors=joint_errors_of(parameters, xi),
+        bending=bending_of(parameters, elements, xi),
         ends=tuple(ends),
     )
 
@@ -279,11 +301,54 @@ def calibrated_pose(robot: CalibratedRobot, q_read: ArrayLike, frame: Frame = No
     --------
     See `calibrated_model`.
     """
-    q = robot.joint_errors.actual(q_read)
+    readings = as_vector(q_read, robot.model.n, "q_read")
+    q = robot.joint_errors.actual(readings)
+    if not robot.bending.is_zero:
+        n, (path, after) = robot.model.n, tip_of(robot, frame)
+        T = robot.bending.poses(readings.reshape(-1, n), q.reshape(-1, n), path, after)
+        return T.reshape(*q.shape[:-1], 4, 4)
     end = robot.end(frame)
     if end is None:
         return dgm(robot.model, q, frame)
     return dgm(robot.model, q, end.parent) @ end.pose
+
+
+def tip_of(robot: CalibratedRobot, frame: Frame = None) -> tuple[NDArray[np.int64], Array]:
+    """Where a frame hangs in the extended table.
+
+    Parameters
+    ----------
+    robot : CalibratedRobot
+        The robot.
+    frame : str, int or None
+        A measured end or any frame of the model; None is the tool.
+
+    Returns
+    -------
+    path : ndarray of int, shape (k,)
+        Rows from the world: to the end, or to the frame of the table that carries the frame.
+    after : ndarray, shape (4, 4)
+        Constant pose behind the last of them, metres.
+
+    Raises
+    ------
+    FrameNotFoundError
+        An unknown frame.
+
+    Examples
+    --------
+    >>> from robotmodels.calibration import candidate_parameters
+    >>> from robotmodels.robots import load
+    >>> parameters = candidate_parameters(load("rx90"))
+    >>> tip_of(calibrated_model(parameters, np.zeros(len(parameters))), 2)[0]
+    array([0, 1, 2])
+    """
+    skeleton, end = robot.parameters.skeleton, robot.end(frame)
+    if end is not None:
+        return robot.bending.path_to(end.row), skeleton.after[end.row - 1 - robot.model.f]
+    found, pose = robot.model.twin.frame(frame), np.eye(4)
+    pose[:3, :3], pose[:3, 3] = found.rotation, found.position
+    return robot.bending.path_to(found.parent), pose
 
 
 def calibrated_urdf(robot: CalibratedRobot) -> str:

@@ -11,6 +11,7 @@ from .._arrays import Array, Rebuilt, as_exact, as_vector, read_only
 from ..drive import Transmission
 from ..errors import InvalidValueError
 from ..model import RobotModel
+from .bending import bends
 from .elements import Element, ErrorLaw
 from .parameters import GeometricParameters
 
@@ -159,7 +160,7 @@ class JointErrors(Rebuilt):
                 "gain: 1 + G is singular, so that some joints do not move with any reading; a "
                 "gain error is small beside 1."
             )
-        inverse = np.linalg.inv(K)
+        inverse = np.asarray(np.linalg.inv(K), np.float64)
         q = rows @ inverse.T
         if not self.is_affine:
             q = self._settled(q, rows, inverse)
@@ -281,7 +282,8 @@ def joint_errors_of(parameters: GeometricParameters, deviation: ArrayLike) -> Jo
     Returns
     -------
     JointErrors
-        Gains, eccentricities and compliances.
+        Gains, eccentricities and compliances of joints about their own axes; what bends links or
+        tilts the mount is not among them, see `bending_of`.
 
     Raises
     ------
@@ -300,16 +302,17 @@ def joint_errors_of(parameters: GeometricParameters, deviation: ArrayLike) -> Jo
     skeleton, n = parameters.skeleton, parameters.model.n
     laws = {name: np.zeros((n, n)) for name in _FIELDS.values()}
     for entry, value in zip(parameters.entries, xi, strict=True):
-        if entry.law is ErrorLaw.CONSTANT:
+        if entry.law is ErrorLaw.CONSTANT or bends(parameters, entry):
             continue
-        own = (Element.THETA, Element.R, None)[int(skeleton.sigma[entry.row])]
-        source = int(skeleton.joint[entry.source])
-        if entry.element is not own or source < 0:
-            raise InvalidValueError(
-                f"{entry.name}: a law of the readings acts on the variable of a joint, and reads "
-                f"one; this one acts on {entry.element.word} of {skeleton.row_name(entry.row)}."
-            )
-        laws[_FIELDS[entry.law]][int(skeleton.joint[entry.row]), source] += value
+        for row, element, source_row in entry.actions:
+            own = (Element.THETA, Element.R, None)[int(skeleton.sigma[row])]
+            source = int(skeleton.joint[source_row])
+            if element is not own or source < 0:
+                raise InvalidValueError(
+                    f"{entry.name}: a law of the readings acts on the variable of a joint, and "
+                    f"reads one; this one acts on {element.word} of {skeleton.row_name(row)}."
+                )
+            laws[_FIELDS[entry.law]][int(skeleton.joint[row]), source] += value
     return JointErrors(parameters.model, **laws)
 
 

@@ -12,9 +12,10 @@ from .._arrays import Array, Rebuilt, as_vector, read_only
 from ..errors import InvalidValueError
 from ..igm.asked import above_zero, mask_of
 from ..igm.components import rotation_vectors
-from ..kinematics import dgm, jacobian
+from ..kinematics import dgm
 from .calibrated import CalibratedRobot, calibrated_pose
 from .corrected import CorrectedSolutions, corrected_igm
+from .reading_jacobian import reading_jacobian
 
 STEPS = 50
 DEPENDENT = 1e-9  # singular values beside the largest below which offsets are not told apart
@@ -279,8 +280,7 @@ def _missing(robot: CalibratedRobot, q_read: Array, wanted: Array) -> Array:
 
 def _slope(robot: CalibratedRobot, q_read: Array, error: Array) -> Array:
     """Minus the derivative of `_missing` by the readings, (N, 6, n)."""
-    errors = robot.joint_errors
-    J = jacobian(robot.model, errors.actual(q_read))
+    J = reading_jacobian(robot, q_read)
     phi = error[:, 3:]
     t = np.linalg.norm(phi, axis=1)
     half = 0.5 * np.where(t < 1e-3, 1.0, t)
@@ -290,8 +290,7 @@ def _slope(robot: CalibratedRobot, q_read: Array, error: Array) -> Array:
     K[:, [2, 0, 1], [1, 2, 0]] = phi
     K[:, [1, 2, 0], [2, 0, 1]] = -phi
     turned = np.eye(3) + 0.5 * K + c[:, None, None] * (K @ K)
-    J = np.concatenate([J[:, :3], turned @ J[:, 3:]], axis=1)
-    return J @ errors.slope(q_read)
+    return np.concatenate([J[:, :3], turned @ J[:, 3:]], axis=1)
 
 
 def _rms(rows: Array) -> float:
