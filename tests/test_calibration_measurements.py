@@ -166,6 +166,7 @@ def truth(model, xi, kind, ends, rng):
     at, at_other, others = T(q, e), T(q_other, e), T(q, f)
     board, point, axis = random_pose(rng), rng.normal(size=3), unit(rng)
     far = np.linalg.norm(at[:, :3, 3] - point, axis=1)
+    apart = np.linalg.norm(at[:, :3, 3] - at_other[:, :3, 3], axis=1)
     inverse = np.linalg.inv(at)
     measured = {
         "pose": (Pose(q, at, frame=e), []),
@@ -175,10 +176,7 @@ def truth(model, xi, kind, ends, rng):
         "pivot": (Distance(q, far, frame=e), point),
         "known_pivot": (Distance(q, far, known={0: point}, frame=e), []),
         "dead_path": (Distance(q, far + 0.1, offset=True, frame=e), [*point, 0.1]),
-        "pair": (
-            Distance(q, np.linalg.norm(at[:, :3, 3] - at_other[:, :3, 3], axis=1), q_other, frame=e),
-            [],
-        ),
+        "pair": (Distance(q, apart, q_other, frame=e), []),
         "relative": (RelativePose(q, q_other, inverse @ at_other, frame=e), []),
         "camera": (CameraPose(q, inverse @ board, frame=e), None),
         "known_camera": (CameraPose(q, inverse @ board, known={0: board}, frame=e), []),
@@ -534,7 +532,7 @@ def test_mistakes_are_named():
         PlaneContact(q, [0, 0, 1], {2: [0, 0, 1, 0]})
     with pytest.raises(InvalidValueError, match="expected a mapping of labels"):
         PointContact(q, known=[0.1, 0.2, 0.3])
-    with pytest.raises(InvalidValueError, match="normal of length 2. Divide"):
+    with pytest.raises(InvalidValueError, match=r"normal of length 2\. Divide"):
         PlaneContact(q, known={0: [0, 0, 2, 0.4]})
     with pytest.raises(InvalidValueError, match="expected a direction in the second row"):
         LaserLine(q, known={0: np.zeros((2, 3))})
