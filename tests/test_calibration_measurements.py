@@ -114,9 +114,9 @@ def slope(function, x, k, h=1e-3):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [2, 3])
 def test_derivatives_by_parameters_and_fixtures_are_those_of_finite_differences(kind, seed):
-    model, rng = robot(seed, tip=None if seed == 1 else "any")
+    model, rng = robot(seed, tip="any")
     ends = (None, 0 if seed == 3 else 2)
     m = all_kinds(rng, model.n, ends)[kind]
     problem = problem_with(model, m, ends)
