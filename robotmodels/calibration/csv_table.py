@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -125,13 +126,15 @@ class CsvTable:
             number of the line.
         """
         try:
-            values = np.loadtxt(
-                self.path, delimiter=self.delimiter, skiprows=self.first, usecols=list(columns),
-                comments=_COMMENT, ndmin=2, encoding="utf-8-sig",
-            )  # fmt: skip
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)  # no data: said below
+                values = np.loadtxt(
+                    self.path, delimiter=self.delimiter, skiprows=self.first,
+                    usecols=list(columns), comments=_COMMENT, ndmin=2, encoding="utf-8-sig",
+                )  # fmt: skip
         except ValueError:
-            values = np.full((1, len(columns)), np.nan)
-        if not np.isfinite(values).all():
+            values = np.zeros((0, len(columns)))
+        if not len(values) or not np.isfinite(values).all():
             self._raise_bad_cell(columns)
         return values
 
