@@ -20,7 +20,8 @@ _HARDLY = 0.02
 """Standard deviation of a joint's readings below which it hardly moves, rad or m."""
 _FAR = 50.0
 """Residual in stated standard deviations that units explain better than noise."""
-_ILL = 1e4
+_CONFUSED = 50.0
+"""Standard deviation, in that of the parameter if it were alone, beyond which others hide it."""
 
 
 def notes_before(problem: Problem) -> tuple[str, ...]:
@@ -144,11 +145,13 @@ def notes_after(
             + (f"; also: {', '.join(gained)}" if gained else "")
             + ". Estimates of these are doubtful."
         )
-    if again.condition > _ILL:
+    hidden = _hidden(solution)
+    if hidden:
         notes.append(
-            f"The condition number is {again.condition:.2g}: some parameters are told from each "
-            "other by little more than noise. Choose configurations with select_configurations, "
-            "name fewer parameters, or give a prior."
+            f"{', '.join(hidden)}: told from each other by little more than noise (their standard "
+            f"deviations are over {_CONFUSED:g} times what they were if the others were known). "
+            "Choose configurations with select_configurations, leave one of them out (known=...), "
+            "or give a prior."
         )
     if fit.sigma_known and fit.scale > _FAR:
         notes.append(
@@ -164,6 +167,21 @@ def notes_after(
             f"(blocks {numbers}{more})."
         )
     return tuple(notes)
+
+
+def _hidden(solution: Solution) -> list[str]:
+    """Parameters whose estimates hang on those of others."""
+    fit, problem = solution.fit, solution.problem
+    if not np.isfinite(fit.covariance).all():
+        return []
+    alone = np.linalg.norm(fit.jacobian * np.sqrt(fit.weights)[:, None], axis=0)
+    scale = 1.0 if fit.sigma_known else fit.scale
+    inflation = fit.deviations * alone / max(scale, 1e-300)
+    return [
+        name
+        for name, factor in zip(problem.parameters.names, inflation, strict=False)
+        if factor > _CONFUSED
+    ]
 
 
 def _duplicates(problem: Problem, k: int) -> int:
