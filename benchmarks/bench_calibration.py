@@ -1,0 +1,321 @@
+"""Geometric calibration beside FIGAROH and pybotics, and on real data that were kept aside.
+
+    OPENBLAS_NUM_THREADS=1 python benchmarks/bench_calibration.py [--rounds 7] [--out ...]
+        [--figaroh-python PATH] [--pybotics-python PATH] [--quick]
+
+Times: a UR10 with errors of 1 mm and 2 mrad in all placements, base and tool off, noise of 0.1 mm
+and 0.1 mrad; FIGAROH is given the same rows. Figures are medians of the processor's time, with
+the clock's beside it. Peers run in environments of their own (`pip install figaroh`, and
+`pip install pybotics`, which wants numpy < 2), by the Python that the options name; without it
+their entries are left out and that is said. Real data: see `calibration_data.py`; both tools keep
+the same rows aside. `--quick` measures the smallest and the largest set once and one way of each
+real data set.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import subprocess
+import tempfile
+import time
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from calibration_data import (
+    CAMERA_WAYS,
+    PANDA_WAYS,
+    camera_errors,
+    camera_splits,
+    panda,
+    panda_errors,
+)
+
+import robotmodels as rm
+from robotmodels.calibration import CalibrationResult, Pose, fit
+from robotmodels.datasets import ur10_camera
+
+SIZES = (30, 100, 200, 500)
+GOALS = {30: 0.03, 100: 0.06, 200: 0.12, 500: 0.25}
+NOISE = 1e-4  # m and rad
+OURS = "robotmodels"
+DEFAULT = "robotmodels, with 5 folds and a share aside"
+Row = dict[str, Any]
+
+
+def rolled(T: np.ndarray) -> list[float]:
+    """Position, roll, pitch and yaw, as FIGAROH reads them."""
+    return [*T[:3, 3].tolist(), *rm.se3.to_rpy(T[:3, :3])]
+
+
+def simulated(count: int) -> tuple[rm.RobotModel, np.ndarray, np.ndarray]:
+    """Nominal UR10, readings and noisy poses of one that is off in every placement."""
+    rng = np.random.default_rng(1)
+    model = ur10_camera().model
+    n = model.n
+    at = np.concatenate([[model.base], rm.link_transforms(model.table, np.zeros(n))])
+    at[1], at[0] = at[0] @ at[1], np.eye(4)
+
+    def off(length: float, angle: float) -> np.ndarray:
+        return rm.se3.from_rpy(angle * rng.normal(size=3), length * rng.normal(size=3))
+
+    links = [at[j] @ off(1e-3, 2e-3) for j in range(1, n + 1)]
+    Z = off(0.05, 0.05)
+    E = model.tool @ rm.se3.from_rpy([0.2, -0.1, 0.3], [0.05, -0.03, 0.12])
+    q = rng.uniform(-2.5, 2.5, (count, n))
+    poses = []
+    for row in q:
+        T = Z
+        for link, angle in zip(links, row, strict=True):
+            T = T @ link @ rm.se3.rotation("z", angle)
+        T = T @ E
+        T[:3, 3] += NOISE * rng.normal(size=3)
+        T[:3, :3] = T[:3, :3] @ rm.se3.from_rpy(NOISE * rng.normal(size=3))[:3, :3]
+        poses.append(T)
+    return model, q, np.array(poses)
+
+
+def timed(run: Any, rounds: int) -> tuple[float, float, CalibrationResult]:
+    """Medians of processor and clock, s, and the last answer."""
+    found = run()
+    spent = []
+    for _ in range(rounds):
+        clock, processor = time.perf_counter(), time.process_time()
+        found = run()
+        spent.append((time.process_time() - processor, time.perf_counter() - clock))
+    processor, clock = np.median(spent, axis=0).tolist()
+    return processor, clock, found
+
+
+def speed_rows(sizes: tuple[int, ...], rounds: int, figaroh: str, pybotics: str) -> list[Row]:
+    """Full calibration on simulated poses."""
+    rows: list[Row] = []
+    tasks = []
+    for count in sizes:
+        model, q, T = simulated(count)
+        floor = NOISE * np.sqrt(3.0 * (1.0 - 30.0 / (6.0 * count)))
+        told = [rolled(x) + y.tolist() for x, y in zip(T, q, strict=True)]
+        tasks.append({
+            "name": f"{count}", "rows": told, "level": "full_params", "method": "structural",
+            "repeats": min(rounds, 3),
+        })  # fmt: skip
+        for name, options in ((OURS, {"folds": 0, "held_out": 0}), (DEFAULT, {})):
+            processor, clock, found = timed(
+                lambda o=options, m=model, x=q, y=T: fit(m, Pose(x, y), **o), rounds
+            )
+            errors = found.after.summary("m"), found.after.summary("rad")
+            rows.append({
+                "work": count, "name": name, "processor": processor, "clock": clock,
+                "parameters": [len(found.names)], "position": errors[0].rms,
+                "angle": errors[1].rms, "floor": floor,
+                "goal": GOALS[count] if name == OURS else None,
+            })  # fmt: skip
+        print(count, [f"{r['name']} {r['processor']:.4f} s" for r in rows[-2:]], flush=True)
+    others = {
+        "FIGAROH": peer(figaroh, "calibration_figaroh.py", tasks),
+        "pybotics, distances of positions": peer(
+            pybotics, "calibration_pybotics.py", [str(count) for count in sizes]
+        ),
+    }
+    for name, answers in others.items():
+        rows += [{**said, "work": int(said["name"]), "name": name} for said in answers]
+    first = {r["work"]: r["processor"] for r in rows if r["name"] == OURS}
+    for r in rows:
+        r["ratio"] = r["processor"] / first[r["work"]]
+    return sorted(rows, key=lambda r: r["work"])
+
+
+def peer(python: str, script: str, tasks: list[Any]) -> list[dict[str, Any]]:
+    """What a peer says to some tasks, in an environment of its own."""
+    if not python:
+        return []
+    path = Path(__file__).parent / script
+    with tempfile.TemporaryDirectory() as folder:
+        arguments = tasks
+        if tasks and isinstance(tasks[0], dict):
+            job = Path(folder) / "job.json"
+            job.write_text(json.dumps({"urdf": ur10_camera().urdf, "tasks": tasks}))
+            arguments = [str(job)]
+        done = subprocess.run(
+            [python, "-W", "ignore", str(path), *arguments], capture_output=True, text=True,
+            check=False, timeout=3600,
+        )  # fmt: skip
+    if done.returncode:
+        print(f"{script} ended with an error: {done.stderr.splitlines()[-1:]}")
+        return []
+    said = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
+    for entry in said:
+        if "skipped" in entry:
+            print(f"{entry['skipped']}: its entries are left out.")
+            return []
+        print(script, {k: v for k, v in entry.items() if k != "parameters"}, flush=True)
+    return said
+
+
+def camera_rows(ways: tuple[str, ...], figaroh: str) -> list[Row]:
+    """Errors on rows of the UR10's camera that were kept aside."""
+    q, T = ur10_camera().measured
+    splits = camera_splits(len(q))
+    rows: list[Row] = []
+    for way in ways:
+        row: Row = {"name": f"robotmodels: {way}"}
+        for scheme, parts in {"in sample": [], **splits}.items():
+            position, angle, counts = camera_errors(way, parts)
+            row[scheme] = (position, angle)
+            row["parameters"] = sorted(set(counts) | set(row.get("parameters", ())))
+        rows.append(row)
+        print(row, flush=True)
+    told = [rolled(x) + y.tolist() for x, y in zip(T, q, strict=True)]
+    for level, method in (("full_params", "structural"), ("full_params", "map"),
+                          ("joint_offset", "structural")) if len(ways) > 1 else ():  # fmt: skip
+        base = {"rows": told, "level": level, "method": method}
+        tasks: list[Any] = [{"name": "in sample", **base, "repeats": 1}]
+        tasks += [
+            {"name": scheme, **base, "parts": [part.tolist() for part in parts]}
+            for scheme, parts in splits.items()
+        ]
+        said = peer(figaroh, "calibration_figaroh.py", tasks)
+        if said:
+            row = {"name": f"FIGAROH: {level}, {method}"}
+            row |= {entry["name"]: (entry["position"], entry["angle"]) for entry in said}
+            row["parameters"] = sorted({k for entry in said for k in entry["parameters"]})
+            rows.append(row)
+    return rows
+
+
+def panda_rows(ways: tuple[str, ...], robots: tuple[str, ...]) -> list[Row]:
+    """Errors at places of the double socket that were kept aside."""
+    rows: list[Row] = []
+    for robot in robots:
+        places = sorted(panda(robot)[0].places)
+        jobs = [([p for p in places if p != out], [out]) for out in places]
+        if robot == "panda_1":
+            jobs.insert(0, (["front"], [p for p in places if p != "front"]))
+        for way in ways:
+            for train, test in jobs:
+                before, after, elsewhere = panda_errors(robot, way, train, test)
+                rows.append({
+                    "robot": robot, "way": way, "train": train, "before": before,
+                    "after": after, "elsewhere": elsewhere,
+                })  # fmt: skip
+            print(robot, way, [r["elsewhere"] for r in rows[-len(jobs) :]], flush=True)
+    return rows
+
+
+def machine(figaroh: str, pybotics: str) -> dict[str, str]:
+    """What the figures were measured on."""
+    found = {"robotmodels": rm.__version__}
+    for package in ("numpy", "numba", "scipy"):
+        found[package] = version(package)
+    for package, python in (("figaroh", figaroh), ("pybotics", pybotics)):
+        code = f"from importlib.metadata import version; print(version({package!r}))"
+        try:
+            done = subprocess.run([python, "-c", code], capture_output=True, text=True, check=True)
+            found[package] = done.stdout.strip()
+        except (OSError, subprocess.CalledProcessError, PackageNotFoundError):
+            found[package] = "left out: no Python with it was named"
+    cpu, info = platform.processor() or platform.machine(), Path("/proc/cpuinfo")
+    if info.exists():
+        names = [line for line in info.read_text().splitlines() if line.startswith("model name")]
+        cpu = names[0].partition(":")[2].strip() if names else cpu
+    return {
+        "cpu": cpu, "system": platform.system(), "python": platform.python_version(), **found,
+        "OPENBLAS_NUM_THREADS": os.environ.get("OPENBLAS_NUM_THREADS", "not set"),
+        "load": f"{os.getloadavg()[0]:.1f} on {os.cpu_count()} cores when the run began",
+    }  # fmt: skip
+
+
+def report(about: dict[str, str], speed: list[Row], camera: list[Row], sockets: list[Row]) -> str:
+    """The results as Markdown."""
+    lines = ["# Geometric calibration: measured side by side", ""]
+    lines += [f"- {key}: {value}" for key, value in about.items()]
+    lines += [
+        "", "## UR10, simulated poses", "",
+        "Processor's time and clock in s, medians; `x`: ratio to the plain fit of ours. Position "
+        "and angle: root mean square of the fitted rows; floor: what noise alone leaves of the "
+        "position with 30 parameters.", "",
+        "| poses | contestant | s | clock | x | parameters | position, mm | floor | angle, mrad | "
+        "goal, s | met |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
+    ]  # fmt: skip
+    for r in speed:
+        goal = r.get("goal")
+        met = "" if goal is None else ("yes" if r["processor"] <= goal else "no")
+        kept = f"{r['parameters'][0]}" + (f" of rank {r['rank']}" if "rank" in r else "")
+        floor = f"{1e3 * r['floor']:.4f}" if "floor" in r else ""
+        angle = f"{1e3 * r['angle']:.4f}" if "angle" in r else ""
+        lines.append(
+            f"| {r['work']} | {r['name']} | {r['processor']:.4f} | {r['clock']:.4f} | "
+            f"{r['ratio']:.1f} | {kept} | {1e3 * r['position']:.4f} | {floor} | {angle} | "
+            f"{'' if goal is None else goal} | {met} |"
+        )
+    schemes = ["in sample", "5 folds, 0", "5 folds, 1", "5 folds, 2", "leave one out"]
+    lines += [
+        "", "## UR10 with a camera, 23 real poses", "",
+        "Root mean square of position, mm / angle, degrees; all but the first column of rows that "
+        "were kept aside, the same ones for both tools.", "",
+        "| fit | parameters | " + " | ".join(schemes) + " |", "|---" * 7 + "|",
+    ]  # fmt: skip
+    for r in camera:
+        told = [f"{1e3 * r[s][0]:.3f} / {np.degrees(r[s][1]):.3f}" for s in schemes]
+        kept = " to ".join(f"{k}" for k in sorted({r["parameters"][0], r["parameters"][-1]}))
+        lines.append(f"| {r['name']} | {kept} | " + " | ".join(told) + " |")
+    lines += [
+        "", "## Panda in the double socket", "",
+        "Mean distance of the ball from its socket, mm: with the nominal arm and after calibration "
+        "where it was trained (base and tool fitted in both), and at places kept aside, whose "
+        "sockets alone are fitted, without their distance.", "",
+        "| robot | fit | trained on | before | after | kept aside |", "|---" * 6 + "|",
+    ]  # fmt: skip
+    for r in sockets:
+        aside = ", ".join(f"{place} {1e3 * e:.3f}" for place, e in r["elsewhere"].items())
+        few = r["train"] if len(r["train"]) < 3 else [f"the other {len(r['train'])}"]
+        lines.append(
+            f"| {r['robot']} | {r['way']} | {', '.join(few)} | {1e3 * r['before']:.2f} | "
+            f"{1e3 * r['after']:.3f} | {aside} |"
+        )
+    for robot in dict.fromkeys(r["robot"] for r in sockets):
+        lines += ["", f"Mean of the places of {robot}, each left out in turn:", ""]
+        for way in dict.fromkeys(r["way"] for r in sockets):
+            each = [
+                next(iter(r["elsewhere"].values()))
+                for r in sockets
+                if (r["robot"], r["way"]) == (robot, way) and len(r["elsewhere"]) == 1
+            ]
+            lines.append(f"- {way}: {1e3 * np.mean(each):.3f} mm")
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    """Measure, print and keep the results."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
+    parser.add_argument("--rounds", type=int, default=7)
+    parser.add_argument("--figaroh-python", default="")
+    parser.add_argument("--pybotics-python", default="")
+    parser.add_argument("--quick", action="store_true")
+    given = parser.parse_args()
+    figaroh, pybotics = given.figaroh_python, given.pybotics_python
+    for name, python in (("FIGAROH", figaroh), ("pybotics", pybotics)):
+        if not python:
+            print(f"No Python with {name} was named: its entries are left out.")
+    about = machine(figaroh, pybotics)
+    few = slice(0, 1) if given.quick else slice(None)
+    sizes = (SIZES[0], SIZES[-1]) if given.quick else SIZES
+    speed = speed_rows(sizes, 1 if given.quick else given.rounds, figaroh, pybotics)
+    camera = camera_rows(tuple(CAMERA_WAYS)[few], figaroh)
+    sockets = panda_rows(tuple(PANDA_WAYS)[few], ("panda_1", "panda_2")[few])
+    text = report(about, speed, camera, sockets)
+    print(text)
+    given.out.mkdir(parents=True, exist_ok=True)
+    (given.out / "calibration.md").write_text(text, encoding="utf-8")
+    kept = {"machine": about, "speed": speed, "camera": camera, "double_socket": sockets}
+    (given.out / "calibration.json").write_text(json.dumps(kept, indent=2) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
