@@ -293,7 +293,7 @@ def test_short_lines_decimal_commas_empty_files_and_files_of_bytes(tmp_path):
     with pytest.raises(InvalidValueError, match="line 14: expected 9 columns as in the first"):
         read_measurements(file, "position", RX90)
     file.write_text(";".join(NAMES) + "\n" + ";".join(["0,5"] * 6) + "\n")
-    with pytest.raises(InvalidValueError, match="is '0,5', not a number. Write a point"):
+    with pytest.raises(InvalidValueError, match=r"is '0,5', not a number\. Write a point"):
         read_measurements(file, "point_contact", RX90)
     file.write_text("# nothing\n\n")
     with pytest.raises(InvalidValueError, match="the file is empty"):
@@ -369,5 +369,5 @@ def test_the_urdf_is_the_calibrated_robot(result, tmp_path):
     again = RobotModel.from_urdf(tmp_path / "a.urdf")
     q = np.random.default_rng(5).uniform(-2.0, 2.0, (20, 6))
     np.testing.assert_allclose(dgm(again, q), calibrated_pose(result.robot, q), atol=1e-11)
-    with pytest.raises(InvalidValueError, match="expected a file named .json"):
+    with pytest.raises(InvalidValueError, match=r"expected a file named \.json"):
         write_result(result, tmp_path / "a.txt")

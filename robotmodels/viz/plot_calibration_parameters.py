@@ -181,7 +181,9 @@ def plot_calibration_correlations(
     side = float(np.clip(1.3 + 0.155 * len(names), 3.5, PAGE))
     figure = new_figure(side + 0.6, side, size)
     axes = panels(figure, 1)[0, 0]
-    picture = axes.imshow(C, cmap="PuOr", vmin=-1.0, vmax=1.0, interpolation="nearest")
+    picture = axes.imshow(
+        C, cmap="PuOr", vmin=-1.0, vmax=1.0, interpolation="nearest", aspect="auto"
+    )
     every = int(np.ceil(len(names) * (SMALL_SIZE * 1.15 / 72.0) / (side - 1.1)))
     ticks = np.arange(0, len(names), every)
     axes.set_xticks(ticks, [names[k] for k in ticks], rotation=90, size=SMALL_SIZE, color=INK)
