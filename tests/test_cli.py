@@ -306,3 +306,98 @@ def test_demo_draws_the_eight_postures(run, tmp_path):
     lost = [float(number) for number in re.findall(r"its postures to (\S+) rad", out)]
     assert len(lost) == 2
     assert max(lost) < 1e-6
+
+
+# --- calibrate ------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def tracker(tmp_path):
+    """Positions of an RX-90 with a tool, in mm and degrees, and the robot that they are of."""
+    rng = np.random.default_rng(0)
+    real = rm.load("rx90").with_tool(se3.translation(0.05, 0.03, 0.1))
+    q = rng.uniform(-1.8, 1.8, (40, 6))
+    p = rm.dgm(real, q)[:, :3, 3] + 1e-4 * rng.normal(size=(40, 3))
+    file = tmp_path / "tracker.csv"
+    header = ",".join([*real.table.joint_names, "x", "y", "z"])
+    np.savetxt(file, np.hstack([np.degrees(q), 1e3 * p]), delimiter=",", header=header, comments="")
+    return file, real
+
+
+def test_calibrate_writes_a_report_and_a_robot(run, tracker, tmp_path):
+    file, real = tracker
+    words = ["calibrate", "--robot", "rx90", "--measurements", file, "--kind", "position",
+             "--lengths", "mm", "--angles", "deg", "--parameters", "b7", "d7", "r7"]  # fmt: skip
+    folder = tmp_path / "new" / "report"
+    code, out, _ = run(*words, "--out", folder)
+    assert code == 0
+    assert "The fit has converged" in out
+    names = {"report.txt", "report.html", "result.json", "calibrated.urdf"}
+    assert {path.name for path in folder.iterdir()} == names
+    assert {path.name for path in tmp_path.iterdir()} == {"tracker.csv", "new"}
+    robot = rm.RobotModel.from_urdf(folder / "calibrated.urdf")
+    q = np.array([0.3, 1.0, -1.8, 0.4, 0.8, -0.2])
+    missed = rm.dgm(robot, q)[:3, 3] - rm.dgm(real, q)[:3, 3]
+    assert np.linalg.norm(missed) < 2e-4
+    data = json.loads((folder / "result.json").read_text())
+    code, out, err = run(*words, "--json")
+    assert (code, err) == (0, "")
+    assert json.loads(out) == data
+    code, out, _ = run(*words)
+    assert (code, out) == (0, (folder / "report.txt").read_text())
+
+
+def test_calibrate_takes_known_distances_and_files_that_only_test(run, tmp_path):
+    arm = rm.load("rx90")
+    real = arm.with_tool(se3.translation(0.05, 0.03, 0.1))
+    rng = np.random.default_rng(1)
+    balls = {"a": [0.5, 0.1, 0.4], "b": [0.6, 0.1, 0.4], "c": [0.3, -0.4, 0.5]}
+    for name, place in balls.items():
+        turns = [se3.from_rpy(rng.uniform(-1.0, 1.0, 3), place) for _ in range(25)]
+        found = rm.igm(real, np.array(turns))
+        q = found.q[found.valid][::3]
+        np.savetxt(tmp_path / f"{name}.csv", q, delimiter=",")
+    files = [tmp_path / "a.csv", tmp_path / "b.csv"]
+    words = ["calibrate", "--robot", "rx90", "--kind", "point-contact", "--measurements", *files,
+             "--parameters", "b7", "d7", "r7", "--folds", 0]  # fmt: skip
+    code, _, err = run(*words)
+    assert code == 2
+    assert "know no length" in err
+    code, _, err = run(*words, "--known-distance", "a", "b", "zero")
+    assert code == 2
+    assert "--known-distance: expected 1 finite number" in err
+    words += ["--known-distance", "a", "b", 0.1, "--test", tmp_path / "c.csv", "--json"]
+    code, out, _ = run(*words)
+    data = json.loads(out)
+    assert code == 0
+    np.testing.assert_allclose(np.array(data["tool"])[:3, 3], [0.05, 0.03, 0.1], atol=1e-6)
+    assert data["errors"]["held_out"]["after"]["m"]["rms"] < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--lengths", "mm"], "look like degrees. Say angles='deg'"),
+        (["--angles", "deg"], "look like millimetres. Say lengths='mm'"),
+        (["--angles", "deg", "--lengths", "mm", "--columns", "x", "y", "w"], "no column 'w'"),
+        (["--angles", "deg", "--lengths", "mm", "--parameters", "d9"], "'d9' is not a parameter"),
+        (["--angles", "deg", "--lengths", "mm", "--sigma", "-1"], "--sigma: expected positive"),
+        (["--angles", "deg", "--lengths", "mm", "--prior", "1"], "--prior: expected 2"),
+        (["--robot", "rx91"], "rx90"),
+        (["--measurements", "missing.csv"], "missing.csv"),
+    ],
+)
+def test_wrong_arguments_of_calibrate(run, tracker, words, message):
+    file, _ = tracker
+    code, out, err = run("calibrate", "--robot", "rx90", "--measurements", file, "--kind",
+                         "position", *words)  # fmt: skip
+    assert (code, out) == (2, "")
+    assert err.startswith("robotmodels: ")
+    assert message in err
+    assert err.count("\n") == 1
+
+
+def test_help_of_calibrate_shows_examples(run):
+    code, out, _ = run("calibrate", "--help")
+    assert code == 0
+    assert out.count("robotmodels calibrate --robot") >= 3
