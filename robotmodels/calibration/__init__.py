@@ -14,9 +14,24 @@ from .errors_seen import BlockErrors, ErrorSummary
 from .fit import fit
 from .folds import AsideErrors
 from .identifiable import IdentifiableParameters, Reason, identifiable_on
+from .joined import side_by_side
 from .joint_errors import JointErrors, encoder_transmission, joint_errors_of
 from .kinds import Kind
-from .measurements import KnownDistance, Measurement, PointContact, Pose, Position
+from .measurements import (
+    AxisPosition,
+    CameraPose,
+    Distance,
+    FrameContact,
+    KnownDistance,
+    LaserLine,
+    LinkedFrames,
+    Measurement,
+    PlaneContact,
+    PointContact,
+    Pose,
+    Position,
+    RelativePose,
+)
 from .observability import Criterion, Observability, observability
 from .obstacles import Box, HalfSpace, Sphere, clearance
 from .parameters import GeometricParameter, GeometricParameters, candidate_parameters
@@ -32,17 +47,21 @@ from .structural import identifiable_parameters
 
 __all__ = [
     "AsideErrors",
+    "AxisPosition",
     "BlockErrors",
     "Box",
     "CalibratedEnd",
     "CalibratedRobot",
     "CalibrationResult",
+    "CameraPose",
     "Compliance",
     "Criterion",
     "DifferentialModel",
+    "Distance",
     "Element",
     "ErrorLaw",
     "ErrorSummary",
+    "FrameContact",
     "GeometricParameter",
     "GeometricParameters",
     "HalfSpace",
@@ -51,14 +70,18 @@ __all__ = [
     "JointErrors",
     "Kind",
     "KnownDistance",
+    "LaserLine",
+    "LinkedFrames",
     "Measurement",
     "Observability",
     "ParameterPrior",
+    "PlaneContact",
     "PointContact",
     "Pose",
     "Position",
     "Problem",
     "Reason",
+    "RelativePose",
     "SelectedConfigurations",
     "SixParameters",
     "Skeleton",
@@ -81,6 +104,7 @@ __all__ = [
     "pose_of_elements",
     "problem_of",
     "select_configurations",
+    "side_by_side",
     "skeleton_of",
     "tool_parameters_of",
 ]

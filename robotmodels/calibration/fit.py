@@ -25,7 +25,7 @@ from .notes import check_enough, notes_after, notes_before
 from .parameters import GeometricParameters, candidate_parameters
 from .placing import placed_robot
 from .prior import ParameterPrior, estimated_with, settled_prior
-from .problem import measured_frames, problem_of
+from .problem import as_measurements, measured_frames, problem_of
 from .result import CalibrationResult
 from .solve import solve
 
@@ -119,7 +119,7 @@ def fit(
     array([0.001, 0.   , 0.1  ])
     """
     check_model(model)
-    measured = (measurements,) if isinstance(measurements, Measurement) else tuple(measurements)
+    measured = as_measurements(measurements)
     aside = _measurements_aside(held_out)
     loss = chosen(Loss, loss, "loss")
     chance = np.random.default_rng(_SEED if rng is None else rng)

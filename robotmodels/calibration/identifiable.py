@@ -13,7 +13,7 @@ from ..errors import InvalidValueError
 from ..estimation import ColumnBasis, column_basis
 from ..table_text import boxed
 from .elements import ErrorLaw
-from .measurements import Measurement
+from .measurements import Measurement, length_is_known
 from .parameters import GeometricParameters
 from .problem import Problem, guessed_fixtures, linearised, problem_of, satisfying
 
@@ -326,15 +326,24 @@ def check_scale(problem: Problem, known: tuple[str, ...]) -> None:
     InvalidValueError
         Nothing gives the scale.
     """
-    if problem.knows_length:
-        return
+    if all(unit == "rad" for m in problem.measurements for unit in m.units):
+        return  # orientations do not see lengths at all
     p = problem.parameters
-    lengths = {
-        entry.name: value
+    base_is_known = not any(
+        e.row == 0 and e.law is ErrorLaw.CONSTANT and e.name not in known for e in p.entries
+    )
+    origin = p.model.base[:3, 3] if base_is_known else None
+    if length_is_known(problem.measurements, origin):
+        return
+    free = [
+        (entry, value)
         for entry, value in zip(p.entries, p.nominal, strict=True)
-        if entry.law is ErrorLaw.CONSTANT and entry.element.is_length and abs(value) > 1e-6
-        and entry.row > 0
-    }  # fmt: skip
+        if entry.law is ErrorLaw.CONSTANT and entry.element.is_length and entry.row > 0
+    ]
+    if not any(entry.row <= p.model.f for entry, _ in free):
+        return  # where no length of the table may be off, all are known
+    free.sort(key=lambda pair: pair[0].row > p.model.f)
+    lengths = [entry.name for entry, value in free if abs(value) > 1e-6]
     if any(name in lengths for name in known):
         return
     raise InvalidValueError(

@@ -10,7 +10,7 @@ from ..estimation import FitStatus
 from ..geometry import REVOLUTE
 from ..kinematics.lengths import characteristic_length
 from .identifiable import IdentifiableParameters
-from .measurements import Pose, Position
+from .measurements import Pose, Position, lonely_labels
 from .problem import Problem, measured_frames
 from .solve import Solution
 
@@ -69,6 +69,7 @@ def notes_before(problem: Problem) -> tuple[str, ...]:
                 f"{where}: {twice} of {m.blocks} rows repeat another row exactly; they add no "
                 "information, but make the standard deviations too small. Leave them out."
             )
+    notes += [str(lonely) for lonely in lonely_labels(problem.measurements)]
     for j, reading in enumerate(_all_readings(problem).T):
         row = model.table.joint_rows[j] + 1
         seen = any(

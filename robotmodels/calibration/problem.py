@@ -76,11 +76,6 @@ class Problem(Rebuilt):
         return sum(m.blocks for m in self.measurements)
 
     @property
-    def knows_length(self) -> bool:
-        """Whether some measurement knows a length."""
-        return any(m.knows_length for m in self.measurements)
-
-    @property
     def sees_base(self) -> bool:
         """Whether some measurement sees where the robot stands."""
         return any(m.sees_base for m in self.measurements)
@@ -95,7 +90,9 @@ class Problem(Rebuilt):
         return replace(self, parameters=parameters, factors=_factors(parameters, self.measurements))
 
 
-def problem_of(parameters: GeometricParameters, measurements: Iterable[Measurement]) -> Problem:
+def problem_of(
+    parameters: GeometricParameters, measurements: Measurement | Iterable[Measurement]
+) -> Problem:
     """Put measurements together.
 
     Parameters
@@ -123,19 +120,10 @@ def problem_of(parameters: GeometricParameters, measurements: Iterable[Measureme
     >>> problem_of(candidate_parameters(load("rx90")), [touched]).F
     6
     """
-    if isinstance(measurements, Measurement):
-        measurements = (measurements,)
-    measurements = tuple(measurements)
-    if not measurements:
-        raise InvalidValueError("measurements: expected one or more, got none.")
+    measurements = as_measurements(measurements)
     fixtures: dict[str, Fixture] = {}
     n = parameters.model.n
     for k, m in enumerate(measurements):
-        if not isinstance(m, Measurement):
-            raise InvalidValueError(
-                f"measurements[{k}]: expected Pose, Position, PointContact or another kind of "
-                f"measurement, got {type(m).__name__}."
-            )
         for view in m.views:
             if view.q.shape[1] != n:
                 raise ShapeError(
@@ -150,6 +138,40 @@ def problem_of(parameters: GeometricParameters, measurements: Iterable[Measureme
     return Problem(
         parameters, measurements, tuple(fixtures.values()), _factors(parameters, measurements)
     )
+
+
+def as_measurements(
+    measurements: Measurement | Iterable[Measurement],
+) -> tuple[Measurement, ...]:
+    """Measurements at the border: one or several.
+
+    Parameters
+    ----------
+    measurements : Measurement or iterable of Measurement
+        What a caller passed.
+
+    Returns
+    -------
+    tuple of Measurement
+        One or more.
+
+    Raises
+    ------
+    InvalidValueError
+        None at all, or something else.
+    """
+    if isinstance(measurements, Measurement):
+        return (measurements,)
+    found = tuple(measurements)
+    if not found:
+        raise InvalidValueError("measurements: expected one or more, got none.")
+    for k, m in enumerate(found):
+        if not isinstance(m, Measurement):
+            raise InvalidValueError(
+                f"measurements[{k}]: expected Pose, Position, PointContact or another kind of "
+                f"measurement, got {type(m).__name__}."
+            )
+    return found
 
 
 def _factors(

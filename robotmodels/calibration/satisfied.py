@@ -62,6 +62,10 @@ def satisfied_measurement(
     values = np.concatenate([xi, none])
     q = [view.q.copy() for view in measurement.views]
     count = len(motions)
+    # ends that are seen at the same readings (two arms of a tree) move together
+    views = measurement.views
+    first = [next(i for i, v in enumerate(views) if v.q is view.q) for view in views]
+    own = sorted(set(first))
     P = len(parameters)
     satisfied = np.zeros(measurement.blocks, dtype=bool)
     for _ in range(_STEPS):
@@ -81,11 +85,16 @@ def satisfied_measurement(
         satisfied = np.abs(residual).max(axis=1) < _SATISFIED
         if satisfied.all():
             break
-        J = np.concatenate([part.by_parameters for part in parts], axis=-1)
+        together = [
+            sum((p.by_parameters for p, f in zip(parts, first, strict=True) if f == g), 0.0)
+            for g in own
+        ]
+        J = np.concatenate(together, axis=-1)
         step = -(np.linalg.pinv(J, rcond=1e-6) @ residual[..., None])[..., 0]
         step *= np.minimum(1.0, _FURTHEST / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
-        for k in range(len(q)):
-            q[k] = q[k] + step[:, k * count : (k + 1) * count]
+        for k, f in enumerate(first):
+            at = own.index(f) * count
+            q[k] = q[k] + step[:, at : at + count]
     kept = np.flatnonzero(satisfied | (np.abs(residual).max(axis=1) < 1e-10))
     if not len(kept):
         return None
