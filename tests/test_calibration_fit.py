@@ -679,6 +679,8 @@ def test_an_unknown_name_is_told_with_its_neighbours(scene):
         fit(scene.nominal, Pose(scene.q, scene.T), parameters=["theta9"])
     with pytest.raises(InvalidValueError, match="known"):
         fit(scene.nominal, Pose(scene.q, scene.T), known=["alpha77"])
+    with pytest.raises(InvalidValueError, match="alpha77"):
+        fit(scene.nominal, Pose(scene.q, scene.T), prior=ParameterPrior(named={"alpha77": 1.0}))
 
 
 def test_a_prior_pulls_to_the_nominal_robot_where_data_say_little():
@@ -804,8 +806,25 @@ def test_readings_of_another_robot_are_refused(scene):
         fit(scene.nominal, Position(np.zeros((4, 7)), np.zeros((4, 3))))
     with pytest.raises(InvalidValueError, match="expected one or more"):
         fit(scene.nominal, [])
+
+
+def test_what_is_no_measurement_is_refused(scene):
+    measured = Pose(scene.q, scene.T)
     with pytest.raises(InvalidValueError, match="Pose, Position"):
         fit(scene.nominal, [scene.T])
+    with pytest.raises(InvalidValueError, match="held_out"):
+        fit(scene.nominal, measured, held_out=scene.T)
+    with pytest.raises(InvalidValueError, match="held_out"):
+        fit(scene.nominal, measured, held_out=1.5)
+    with pytest.raises(InvalidValueError, match="folds"):
+        fit(scene.nominal, measured, folds=1)
+
+
+def test_readings_that_do_not_belong_to_their_measurements_are_named(scene):
+    # no noise is stated, so that only its size tells
+    mixed = scene.q[np.random.default_rng(0).permutation(60)]
+    result = fit(scene.nominal, Pose(mixed, scene.T), **ALONE)
+    assert any("belong" in note for note in result.notes)
 
 
 def test_results_pickle(contacts):
