@@ -11,6 +11,8 @@ from .changed import IdentifiabilityChange, identifiability_change
 from .differential import DifferentialModel, differential_model
 from .elements import Compliance, Element, ErrorLaw
 from .errors_seen import BlockErrors, ErrorSummary
+from .file_kinds import FileKind
+from .file_units import AngleUnit, LengthUnit
 from .fit import fit
 from .folds import AsideErrors
 from .identifiable import IdentifiableParameters, Reason, identifiable_on
@@ -37,6 +39,9 @@ from .obstacles import Box, HalfSpace, Sphere, clearance
 from .parameters import GeometricParameter, GeometricParameters, candidate_parameters
 from .prior import ParameterPrior
 from .problem import Problem, problem_of
+from .read import read_measurements
+from .report import report_text
+from .residuals import measured_residuals
 from .result import CalibrationResult
 from .select import select_configurations
 from .selected import SelectedConfigurations
@@ -44,8 +49,10 @@ from .six_parameters import SixParameters, base_parameters_of, pose_of_elements,
 from .skeleton import Skeleton, skeleton_of
 from .solve import Solution
 from .structural import identifiable_parameters
+from .write import result_data, write_result
 
 __all__ = [
+    "AngleUnit",
     "AsideErrors",
     "AxisPosition",
     "BlockErrors",
@@ -61,6 +68,7 @@ __all__ = [
     "Element",
     "ErrorLaw",
     "ErrorSummary",
+    "FileKind",
     "FrameContact",
     "GeometricParameter",
     "GeometricParameters",
@@ -71,6 +79,7 @@ __all__ = [
     "Kind",
     "KnownDistance",
     "LaserLine",
+    "LengthUnit",
     "LinkedFrames",
     "Measurement",
     "Observability",
@@ -100,11 +109,16 @@ __all__ = [
     "identifiable_on",
     "identifiable_parameters",
     "joint_errors_of",
+    "measured_residuals",
     "observability",
     "pose_of_elements",
     "problem_of",
+    "read_measurements",
+    "report_text",
+    "result_data",
     "select_configurations",
     "side_by_side",
     "skeleton_of",
     "tool_parameters_of",
+    "write_result",
 ]

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from .._choices import chosen
+from ..errors import InvalidValueError
 from ..estimation import Loss
 from ..model import RobotModel, check_model
 from .elements import Compliance
@@ -33,6 +34,8 @@ Progress = Callable[[int, int, str], None]
 """Called with the number of fits done, of all, and what is being done."""
 
 _SEED = 1
+_TOLD_APART = 1e-4
+"""Sine of the angle between columns below which noise hides a parameter behind others."""
 
 
 def fit(
@@ -121,6 +124,8 @@ def fit(
     check_model(model)
     measured = as_measurements(measurements)
     aside = _measurements_aside(held_out)
+    if folds and folds < 2:
+        raise InvalidValueError(f"folds: expected 2 or more, or 0 for none, got {folds}.")
     loss = chosen(Loss, loss, "loss")
     chance = np.random.default_rng(_SEED if rng is None else rng)
     frames = measured_frames((*measured, *aside))
@@ -139,6 +144,8 @@ def fit(
 
     known, known_lengths = tuple(known), tuple(known_lengths)
     candidates = candidates_of(model) if given is None else given
+    if prior is not None:
+        candidates.index(prior.named, "prior")
     as_given = problem_of(candidates, measured)
     notes = notes_before(as_given)
     nothing = np.zeros(as_given.P)
@@ -152,7 +159,9 @@ def fit(
     before = errors_given if placed is None else placed.errors
     share = held_out if isinstance(held_out, float | int) else 0.0
     step = _Steps(progress, 1 + folds + bool(share))
-    identifiable = identifiable_on(candidates, measured, known_lengths, known)
+    identifiable = identifiable_on(
+        candidates, measured, known_lengths, known, dependent=_TOLD_APART
+    )
     check_enough(problem_of(identifiable.kept, measured))
     estimated = identifiable.kept if prior is None else estimated_with(prior, identifiable)
     problem = problem_of(estimated, measured)
@@ -162,7 +171,7 @@ def fit(
     again = identifiable_on(
         candidates, measured, known_lengths, known,
         deviation=all_deviations(candidates, estimated, solution.deviation),
-        fixtures=solution.fixtures,
+        fixtures=solution.fixtures, dependent=_TOLD_APART,
     )  # fmt: skip
     refit = Refit(solution, gaussian, truncation)
     validation = None
@@ -199,8 +208,10 @@ class _Steps:
 def _measurements_aside(
     held_out: float | Measurement | Sequence[Measurement],
 ) -> tuple[Measurement, ...]:
-    if isinstance(held_out, Measurement):
-        return (held_out,)
     if isinstance(held_out, float | int):
+        if not 0.0 <= held_out < 1.0:
+            raise InvalidValueError(
+                f"held_out: expected a share from 0 to under 1, or measurements, got {held_out}."
+            )
         return ()
-    return tuple(held_out)
+    return as_measurements(held_out, "held_out")

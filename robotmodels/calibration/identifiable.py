@@ -243,6 +243,12 @@ def identifiable_on(
     xi = np.zeros(len(candidates)) if deviation is None else deviation
     values = guessed_fixtures(problem, xi) if fixtures is None else fixtures
     there = satisfying(problem, xi, values)
+    if not any(m.views for m in there.measurements):
+        raise InvalidValueError(
+            f"{', '.join(m.name for m in problem.measurements)}: no readings near the given ones "
+            "satisfy these constraints, so the robot is far from what touched. Check the labels, "
+            "the order of the joints and the tool (a first value of its length helps)."
+        )
     W = _all_rows(there, xi, values)
     for k, entry in enumerate(candidates.entries):
         if k in at:

@@ -9,6 +9,7 @@ from ..errors import InvalidValueError
 from ..estimation import FitStatus
 from ..geometry import REVOLUTE
 from ..kinematics.lengths import characteristic_length
+from .elements import Element
 from .identifiable import IdentifiableParameters
 from .measurements import Pose, Position, lonely_labels
 from .problem import Problem, measured_frames
@@ -20,6 +21,9 @@ _HARDLY = 0.02
 """Standard deviation of a joint's readings below which it hardly moves, rad or m."""
 _FAR = 50.0
 """Residual in stated standard deviations that units explain better than noise."""
+_UNLIKELY = 0.02
+"""Noise that is estimated, relative to the robot or in rad, that no measurement of a robot has."""
+_LENGTHS = [Element.B, Element.D, Element.R]
 _CONFUSED = 50.0
 """Standard deviation, in that of the parameter if it were alone, beyond which others hide it."""
 
@@ -160,6 +164,19 @@ def notes_after(
             "of units (mm for m, degrees for rad), a wrong frame, or readings that do not belong "
             "to their measurements."
         )
+    length = np.abs(problem.parameters.skeleton.nominal[1:, _LENGTHS]).sum()
+    for m, scale in zip(problem.measurements, solution.scales, strict=True):
+        if m.sigma is None and m.covariance is None and not fit.sigma_known:
+            size = max(
+                (s / (length if unit == "m" else 1.0))
+                for s, unit in zip(scale, m.units, strict=True)
+            )
+            if size > _UNLIKELY:
+                notes.append(
+                    f"{m.name}: what is left is {100.0 * size:.2g} % of the robot's size (or of a "
+                    "radian). Look for readings that do not belong to their measurements, joints "
+                    "in another order, a wrong frame or units."
+                )
     if len(fit.outliers):
         numbers = ", ".join(str(int(b)) for b in fit.outliers[:10])
         more = " and others" if len(fit.outliers) > 10 else ""

@@ -141,7 +141,7 @@ def problem_of(
 
 
 def as_measurements(
-    measurements: Measurement | Iterable[Measurement],
+    measurements: Measurement | Iterable[Measurement], name: str = "measurements"
 ) -> tuple[Measurement, ...]:
     """Measurements at the border: one or several.
 
@@ -149,6 +149,8 @@ def as_measurements(
     ----------
     measurements : Measurement or iterable of Measurement
         What a caller passed.
+    name : str
+        Used in error messages.
 
     Returns
     -------
@@ -164,11 +166,11 @@ def as_measurements(
         return (measurements,)
     found = tuple(measurements)
     if not found:
-        raise InvalidValueError("measurements: expected one or more, got none.")
+        raise InvalidValueError(f"{name}: expected one or more, got none.")
     for k, m in enumerate(found):
         if not isinstance(m, Measurement):
             raise InvalidValueError(
-                f"measurements[{k}]: expected Pose, Position, PointContact or another kind of "
+                f"{name}[{k}]: expected Pose, Position, PointContact or another kind of "
                 f"measurement, got {type(m).__name__}."
             )
     return found

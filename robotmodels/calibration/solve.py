@@ -15,12 +15,12 @@ from .problem import Problem, guessed_fixtures, stacked
 
 _FIRST_LENGTH = 1e-3
 """Standard deviation of lengths before it has been estimated, m."""
-_ROUNDS = 20
+_ROUNDS = 10
 _SETTLED = 1e-3
 _ROUGH = 1e-6
 """Tolerance of the steps while the noise is still being estimated."""
 _EXACT = 1e-9
-"""Factor on the noise below which residuals are rounding: the data are exact."""
+"""Smallest standard deviation that is estimated, m or rad: below, the data are exact."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -166,7 +166,6 @@ def _estimated_scales(
             else:
                 count = np.full(m.blocks, of_unit.sum())
                 factor = robust_scale(np.linalg.norm(residual[:, of_unit], axis=1), count, fitted)
-            if factor > _EXACT:
-                values[of_unit] = scale[of_unit] * factor
+            values[of_unit] = np.maximum(scale[of_unit] * factor, _EXACT)
         new.append(read_only(values))
     return tuple(new)
