@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from math import pi
 from typing import Any
 
@@ -11,127 +10,25 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import se3
-from .._arrays import Array, Rebuilt, as_vector, batch_rows, read_only
-from .._outcomes import Outcome
+from .._arrays import Array, as_vector, batch_rows
 from ..errors import InvalidValueError
-from ..geometry import PRISMATIC, REVOLUTE
+from ..geometry import PRISMATIC
 from ..igm import igm
 from ..igm.asked import above_zero, locks_of, mask_of
 from ..igm.known import known_arm
-from ..igm.solutions import IGMSolutions, posture_distance
+from ..igm.solutions import IGMSolutions
 from ..igm.status import IGMStatus
 from ..kinematics import dgm
 from ..model import RobotModel
-from .calibrated import CalibratedRobot
+from .calibrated import CalibratedRobot, tip_of
+from .corrected_rows import put_together, same_as
+from .corrected_solutions import CorrectedSolutions, CorrectionStatus
+from .homing import Flags, Home, Postures
 
-MERGE = 1e-6
-"""Postures closer than this are one [rad, m], as in `igm`."""
+__all__ = ["CorrectedSolutions", "CorrectionStatus", "corrected_igm"]
 
-STEPS = 15
 SAMPLES = 32  # configurations at which calibrated and nominal poses are compared
 BESIDE = 3.0  # deviations up to which a singular value may hide more postures
-ROUNDS = 12  # of bringing the readings of held joints to their values
-CALIBRATED_ONLY = "of the calibrated robot only"
-
-
-class CorrectionStatus(Outcome):
-    """What became of a posture of the nominal robot; fits int8.
-
-    Attributes
-    ----------
-    sentence : str
-        What a person reads.
-
-    Examples
-    --------
-    >>> CorrectionStatus.MERGED.sentence
-    'It arrives where another nominal posture arrived already.'
-    """
-
-    ARRIVED = 0, "It was brought to a posture of the calibrated robot."
-    MERGED = 1, "It arrives where another nominal posture arrived already."
-    VANISHED = 2, "Newton steps from it do not meet the pose: the calibrated robot has lost it."
-    OUTSIDE_LIMITS = 3, "It was brought to a posture outside the joint limits."
-    NO_READING = 4, "It was brought to a posture that no readings of the joints lead to."
-    NO_POSTURE = 5, "The nominal robot has no more postures for the pose."
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class CorrectedSolutions(Rebuilt):
-    """Postures that bring a calibrated robot to the poses of one call.
-
-    Parameters
-    ----------
-    solutions : IGMSolutions
-        ``q (..., S, n)`` are what the joints must read; ``residual`` is that of the calibrated
-        robot at these readings.
-    actual : ndarray, shape (..., S, n)
-        Variables of the calibrated table there, rad or m; NaN where there is no solution.
-    nominal : ndarray, shape (..., C, n)
-        Postures of the nominal robot from which they were found, rad or m; NaN where there are
-        none.
-    correction : ndarray of int8, shape (..., C)
-        Codes of `CorrectionStatus`, one for each nominal posture.
-    row : ndarray of int, shape (..., C)
-        Which of the S rows a nominal posture became; -1 if none.
-
-    References
-    ----------
-    Seed book section 1.4.6.
-
-    Examples
-    --------
-    See `corrected_igm`.
-    """
-
-    solutions: IGMSolutions
-    actual: Array
-    nominal: Array
-    correction: NDArray[np.int8]
-    row: NDArray[np.int64]
-
-    def __post_init__(self) -> None:
-        for name, kind in (("actual", np.float64), ("nominal", np.float64),
-                           ("correction", np.int8), ("row", np.int64)):  # fmt: skip
-            object.__setattr__(self, name, read_only(getattr(self, name), kind))
-
-    @property
-    def q(self) -> Array:
-        """Readings, shape (..., S, n), rad or m; NaN where there is no solution."""
-        return self.solutions.q
-
-    @property
-    def valid(self) -> NDArray[np.bool_]:
-        """Whether a row is a solution, shape (..., S)."""
-        return self.solutions.valid
-
-    @property
-    def residual(self) -> Array:
-        """The larger of what is missing in metres and in radians, shape (..., S)."""
-        return self.solutions.residual
-
-    @property
-    def within_limits(self) -> NDArray[np.bool_]:
-        """Whether the readings of a solution are inside the limits, shape (..., S)."""
-        return self.solutions.within_limits
-
-    @property
-    def status(self) -> NDArray[np.int8]:
-        """Codes of `IGMStatus`, one for each pose."""
-        return self.solutions.status
-
-    @property
-    def count(self) -> NDArray[np.int64]:
-        """Number of solutions of each pose."""
-        return self.solutions.count
-
-    def reason(self, i: int | tuple[int, ...] = ()) -> str:
-        """What became of one pose, in a sentence; see `IGMSolutions.reason`."""
-        return self.solutions.reason(i)
-
-    def nearest(self, q: ArrayLike) -> Array:
-        """Readings of the solution nearest to a posture; see `IGMSolutions.nearest`."""
-        return self.solutions.nearest(q)
 
 
 def corrected_igm(
@@ -226,7 +123,7 @@ def corrected_igm(
     flat = poses.reshape(*poses.shape[:-2], 16)
     batch, (rows, references) = batch_rows((flat, reference), ("T", "q_ref"))
     targets = np.ascontiguousarray(rows.reshape(-1, 4, 4))
-    home = _Home(robot, asked, mask_axes == "tool", [column for column, _ in locks], tolerance)
+    home = Home(robot, asked, mask_axes == "tool", [column for column, _ in locks], tolerance)
     shift = _own_offsets(robot)
     asking: dict[str, Any] = {
         "mask": None if asked.all() else asked, "mask_axes": mask_axes,
@@ -243,7 +140,7 @@ def corrected_igm(
     held = (starts.free_joints & redundant) | home.locked
     first = home.bring(targets, nominal, starts.valid, held, nominal)
 
-    more = _Postures.none(len(targets), n)
+    more = Postures.none(len(targets), n)
     lost = starts.valid.any(axis=1)
     status = np.where(lost, int(IGMStatus.NOT_CONVERGED), starts.status).astype(np.int8)
     closest = np.full((len(targets), n), np.nan)
@@ -251,9 +148,10 @@ def corrected_igm(
     doubt = _doubtful(robot, starts, first, redundant)
     chosen = np.flatnonzero(doubt & complete)
     if chosen.size:
+        aims = home.aimed(targets[chosen], first, chosen)
         there = robot.joint_errors.actual(references[chosen])
         own = igm(
-            model, targets[chosen], None if q_ref is None else there,
+            model, aims, None if q_ref is None else there,
             lock=dict(locks) or None, **asking,
         )  # fmt: skip
         own_held = (own.free_joints & redundant) | home.locked
@@ -264,152 +162,29 @@ def corrected_igm(
         status[chosen] = own.status
         if own.closest is not None and own.missing is not None:
             closest[chosen], missing[chosen] = own.closest, own.missing
-    return _put_together(
+    return put_together(
         robot, batch, starts, first, more, nominal, targets, references, q_ref is not None,
         bool(limits), home, status, closest, missing,
     )  # fmt: skip
 
 
-# --- Newton steps -------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Postures:
-    """Candidates of N poses: where they arrived, their readings, what is left."""
-
-    q: Array
-    reading: Array
-    met: NDArray[np.bool_]
-    residual: Array
-    least: Array
-    double: NDArray[np.bool_]
-    free: NDArray[np.bool_]
-    family: NDArray[np.bool_]
-
-    @staticmethod
-    def none(N: int, n: int) -> _Postures:
-        rows, flags = np.empty((N, 0, n)), np.zeros((N, 0), np.bool_)
-        loose = np.zeros((N, 0, n), np.bool_)
-        return _Postures(rows, rows, flags, rows[..., 0], rows[..., 0], flags, loose, loose)
-
-    def spread(self, chosen: NDArray[np.int64], N: int, own: IGMSolutions) -> _Postures:
-        """The same among N poses, with what `igm` says of them."""
-
-        def put(values: NDArray[Any]) -> NDArray[Any]:
-            all_rows = np.zeros((N, *values.shape[1:]), values.dtype)
-            all_rows[chosen] = values
-            return all_rows
-
-        return _Postures(
-            put(self.q), put(self.reading), put(self.met), put(self.residual), put(self.least),
-            put(own.double), put(own.free_joints), put(own.family_joints),
-        )  # fmt: skip
-
-
-class _Home:
-    """Newton's method for one robot and task."""
-
-    def __init__(
-        self,
-        robot: CalibratedRobot,
-        mask: NDArray[np.bool_],
-        in_tool_axes: bool,
-        locked: list[int],
-        tolerance: float,
-    ) -> None:
-        model = robot.model
-        tool = model.twin.frame(None)
-        joints = model.chain.joint[tool.path - 1]
-        on_path = np.zeros(model.n, np.bool_)
-        on_path[joints[joints >= 0]] = True
-        links = np.linalg.norm(model.chain.position[tool.path[1:] - 1], axis=-1).sum()
-        self.length = float(links + np.linalg.norm(tool.position)) or 1.0
-        self.turns = model.table.sigma[model.table.joint_rows] == REVOLUTE
-        self.unit = np.where(on_path, np.where(self.turns, 1.0, self.length), 0.0)
-        self.locked = np.zeros(model.n, np.bool_)
-        self.locked[locked] = True
-        self.errors = robot.joint_errors
-        self.mask, self.in_tool_axes, self.tolerance = mask, in_tool_axes, tolerance
-        self.is_redundant = int((on_path & ~self.locked).sum()) > int(mask.sum())
-        self._arm = (*model.chain, *tool.kernel_arguments)
-
-    def bring(
-        self,
-        targets: Array,
-        starts: Array,
-        there: NDArray[np.bool_],
-        held: NDArray[np.bool_],
-        wanted: Array,
-    ) -> _Postures:
-        """Candidates (N, C, n) brought home; held joints read what is wanted."""
-        q = np.array(starts, np.float64, order="C")
-        there, held = np.ascontiguousarray(there), np.ascontiguousarray(held)
-        q[~there] = 0.0
-        wanted = np.where(there[..., None], wanted, 0.0)
-        residual, least = self._steps(targets, q, there, held, STEPS)
-        reading = q.copy()
-        if not self.errors.is_zero and q.size:
-            rows = np.ones(there.shape, np.bool_)
-            for _ in range(ROUNDS):
-                q[..., self.turns] = _wrapped(q[..., self.turns])
-                reading = self.errors.reading(q)
-                off = np.where(held & there[..., None], wanted - reading, 0.0)
-                off[..., self.turns] = _wrapped(off[..., self.turns])
-                rows = (np.abs(off) > 1e-15 * (1.0 + np.abs(wanted))).any(axis=-1)
-                rows &= np.isfinite(reading).all(axis=-1)
-                if not rows.any():
-                    break
-                q[rows] += off[rows]
-                some, value = self._steps(targets, q, rows, held, STEPS)
-                residual[rows], least[rows] = some[rows], value[rows]
-            known = there & np.isfinite(reading).all(axis=-1)
-            # what the readings lead to is what counts
-            actual = q.copy()
-            actual[known] = self.errors.actual(reading[known])
-            residual[known] = self._steps(targets, actual, known, held, 0)[0][known]
-            off = np.where(held, wanted - reading, 0.0)
-            off[..., self.turns] = _wrapped(off[..., self.turns])
-            astray = ~(np.abs(np.where(known[..., None], off, 0.0)) <= 1e-12).all(axis=-1)
-            residual[astray] = np.inf
-        else:
-            q[..., self.turns] = _wrapped(q[..., self.turns])
-            reading = q.copy()
-        flags = np.zeros(there.shape, np.bool_)
-        loose = np.zeros(held.shape, np.bool_)
-        return _Postures(q, reading, there & (residual <= self.tolerance), residual, least, flags,
-                         loose, loose)  # fmt: skip
-
-    def _steps(
-        self, targets: Array, q: Array, there: NDArray[np.bool_], held: NDArray[np.bool_], most: int
-    ) -> tuple[Array, Array]:
-        from ..igm._homing import brought_home
-
-        residual, least = np.empty(there.shape), np.empty(there.shape)
-        brought_home(
-            targets, q, there, held, *self._arm, self.mask.astype(np.int64),
-            int(self.in_tool_axes), self.unit, self.length, most, residual, least,
-        )  # fmt: skip
-        return residual, least
-
-
 def _doubtful(
-    robot: CalibratedRobot, starts: IGMSolutions, first: _Postures, redundant: bool
+    robot: CalibratedRobot, starts: IGMSolutions, first: Postures, redundant: bool
 ) -> NDArray[np.bool_]:
     """Poses where the nominal postures may not be all, or not lead to all."""
     there = starts.valid
-    doubt = ~there.any(axis=1)
-    doubt |= (there & ~(first.met & np.isfinite(first.reading).all(axis=-1))).any(axis=1)
-    doubt |= (there & (first.least < BESIDE * _deviation(robot))).any(axis=1)
-    doubt |= (there & starts.double).any(axis=1)
+    lost = there & ~(first.met & first.readable)
+    doubted = lost | (there & ((first.least < BESIDE * _deviation(robot)) | starts.double))
     if not redundant:
-        doubt |= (there[..., None] & starts.free_joints).any(axis=(1, 2))
+        doubted |= there & starts.free_joints.any(axis=-1)
+    doubt: Flags = np.asarray(doubted.any(axis=1) | ~there.any(axis=1), np.bool_)
     plan = known_arm(robot.structured)
     if plan.plan is None or starts.method != plan.method:
         # nothing says how many postures there can be
         doubt[:] = True
     else:
         doubt |= there.sum(axis=1) < plan.most
-    return doubt | _twice(first, robot).any(axis=1)
+    return doubt | np.asarray(same_as(first, robot).any(axis=(1, 2)), np.bool_)
 
 
 def _deviation(robot: CalibratedRobot) -> float:
@@ -419,174 +194,11 @@ def _deviation(robot: CalibratedRobot) -> float:
     span = rng.uniform(-pi, pi, size=(SAMPLES, model.n))
     a = dgm(robot.structured, span + _own_offsets(robot))
     b = dgm(model, span)
+    if not robot.bending.is_zero:
+        b = robot.bending.poses(span, span, *tip_of(robot))
     size = max(float(np.abs(b[:, :3, 3]).max()), 1e-9)
     turn = np.abs(a[:, :3, :3] - b[:, :3, :3]).max()
     return float(max(turn, np.abs(a[:, :3, 3] - b[:, :3, 3]).max() / size))
-
-
-def _twice(postures: _Postures, robot: CalibratedRobot) -> NDArray[np.bool_]:
-    """Candidates that are where an earlier one is, (N, C)."""
-    return _same_as(postures, robot).any(axis=-1)
-
-
-def _same_as(postures: _Postures, robot: CalibratedRobot) -> NDArray[np.bool_]:
-    """Element (N, c, k): whether candidate c arrived where the earlier k did."""
-    turns = robot.model.table.sigma[robot.model.table.joint_rows] == REVOLUTE
-    way = np.abs(postures.q[:, :, None] - postures.q[:, None])
-    way[..., turns] = np.minimum(way[..., turns], 2.0 * pi - way[..., turns])
-    near = (way < MERGE).all(axis=-1)
-    C = near.shape[1]
-    earlier = np.tri(C, k=-1, dtype=np.bool_)
-    return near & earlier & postures.met[:, :, None] & postures.met[:, None]
-
-
-# --- the result ---------------------------------------------------------------------------------
-
-
-def _put_together(
-    robot: CalibratedRobot,
-    batch: tuple[int, ...],
-    starts: IGMSolutions,
-    first: _Postures,
-    more: _Postures,
-    nominal: Array,
-    targets: Array,
-    references: Array,
-    given: bool,
-    limits: bool,
-    home: _Home,
-    status: NDArray[np.int8],
-    closest: Array,
-    missing: Array,
-) -> CorrectedSolutions:
-    model, n, N = robot.model, robot.model.n, len(targets)
-    C = first.q.shape[1]
-    every = _Postures(*(
-        np.concatenate([getattr(first, name), getattr(more, name)], axis=1)
-        for name in _Postures.__dataclass_fields__
-    ))  # fmt: skip
-    every.free[:, :C] |= starts.free_joints & home.is_redundant
-    every.family[:, :C] |= starts.family_joints & home.is_redundant
-    same = _same_as(every, robot)
-    merged = same.any(axis=-1)
-    kept = every.met & ~merged
-    readable = np.isfinite(every.reading).all(axis=-1)
-    reading = np.where(readable[..., None], every.reading, 0.0)
-    lower, upper = model.lower, model.upper
-    reading, inside = _turned(home, every.q, reading, references[:, None], given, limits, lower,
-                              upper)  # fmt: skip
-    chosen = kept & readable & (inside | (not limits))
-    into = np.broadcast_to(np.arange(same.shape[1]), merged.shape)
-    if same.size:
-        into = np.where(merged, same.argmax(axis=-1), into)
-    # a double root, or what is free, is known of either of two that are one
-    for name in ("double", "free", "family"):
-        values = getattr(every, name)
-        for c in range(C, into.shape[1]):
-            at = np.flatnonzero(merged[:, c])
-            values[at, into[at, c]] |= values[at, c]
-
-    correction = np.full((N, C), int(CorrectionStatus.NO_POSTURE), np.int8)
-    for code, where in (
-        (CorrectionStatus.VANISHED, starts.valid),
-        (CorrectionStatus.ARRIVED, first.met),
-        (CorrectionStatus.NO_READING, first.met & ~readable[:, :C]),
-        (CorrectionStatus.OUTSIDE_LIMITS, (first.met & ~inside[:, :C]) if limits else False),
-        (CorrectionStatus.MERGED, merged[:, :C]),
-    ):
-        correction[where & starts.valid] = int(code)
-
-    distance = posture_distance(reading, references[:, None], home.turns & (not limits))
-    key = distance if given else np.broadcast_to(np.arange(float(into.shape[1])), distance.shape)
-    order = np.argsort(np.where(chosen, key, np.inf), axis=1, kind="stable")
-    S = int(chosen.sum(axis=1).max(initial=0))
-    rank = np.argsort(order, axis=1)
-    row = np.where(np.take_along_axis(chosen, into, 1), np.take_along_axis(rank, into, 1), -1)
-
-    def packed(values: NDArray[Any], empty: Any) -> NDArray[Any]:
-        at = order[:, :S].reshape(N, S, *(1,) * (values.ndim - 2))
-        rows = np.take_along_axis(values, at, axis=1)
-        absent = ~np.take_along_axis(chosen, order[:, :S], axis=1)
-        rows[absent] = empty
-        return rows.reshape(*batch, *rows.shape[1:])
-
-    codes = np.full(into.shape, len(starts.labels), np.int16)
-    codes[:, :C] = starts.code
-    found = chosen.any(axis=1)
-    loose = (every.free & chosen[..., None]).any(axis=(1, 2)) | (found & home.is_redundant)
-    beyond = (kept & readable).any(axis=1) & ~found
-    # the calibrated table alone may meet a pose less closely than was asked
-    wrong = np.isin(status, (IGMStatus.REACHED, IGMStatus.REACHED_FAMILY)) & ~found
-    status = np.where(wrong, IGMStatus.NOT_CONVERGED, status)
-    status = np.where(beyond, IGMStatus.OUTSIDE_LIMITS, status)
-    status = np.where(found, np.where(loose, IGMStatus.REACHED_FAMILY, IGMStatus.REACHED), status)
-    solutions = IGMSolutions(
-        q=packed(reading, np.nan),
-        valid=packed(chosen, False),
-        residual=packed(every.residual, np.nan),
-        within_limits=packed(inside & chosen, False),
-        code=packed(codes, -1),
-        labels=(*starts.labels, CALIBRATED_ONLY),
-        status=status.astype(np.int8).reshape(batch),
-        double=packed(every.double, False),
-        free_joints=packed(every.free, False),
-        family_joints=packed(every.family, False),
-        method=f"{starts.method}; brought to the calibrated table by Newton steps",
-        periodic=home.turns & (not limits),
-        mask=home.mask,
-        closest=np.where(found[:, None], np.nan, closest).reshape(*batch, n),
-        missing=np.where(found[:, None], np.nan, missing).reshape(*batch, 6),
-    )
-    return CorrectedSolutions(
-        solutions,
-        packed(home.errors.actual(reading), np.nan),
-        nominal.reshape(*batch, C, n),
-        correction.reshape(*batch, C),
-        row[:, :C].reshape(*batch, C),
-    )
-
-
-def _turned(
-    home: _Home,
-    q: Array,
-    reading: Array,
-    references: Array,
-    given: bool,
-    limits: bool,
-    lower: Array,
-    upper: Array,
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Readings with whole turns of the joints added, and whether they are inside the limits.
-
-    Nearest to the reference (else to mid-range) inside the limits, or in (-pi, pi].
-    """
-    turns, errors = home.turns, home.errors
-    if limits:
-        low, high = lower, upper
-        both = np.isfinite(low) & np.isfinite(high)
-        with np.errstate(invalid="ignore"):
-            middle = np.where(both, 0.5 * (low + high), 0.0)
-        aim = references if given else np.broadcast_to(middle, references.shape)
-    else:
-        low, high = np.full(len(turns), -pi), np.full(len(turns), pi)
-        aim = np.zeros_like(references)
-    count = np.zeros(q.shape)
-    turned = reading
-    for _ in range(4):
-        # the turn nearest to the aim; inside the limits if one is
-        step = np.round((aim - turned) / (2.0 * pi))
-        with np.errstate(invalid="ignore"):
-            least = np.ceil((low - turned) / (2.0 * pi) - 1e-15)
-            most = np.floor((high - turned) / (2.0 * pi) + 1e-15)
-        step = np.where(least <= most, np.clip(step, least, most), 0.0) * turns
-        if not step.any():
-            break
-        count += step
-        turned = reading + 2.0 * pi * count
-        if not errors.is_zero:
-            known = errors.reading(q + 2.0 * pi * count)
-            turned = np.where(np.isfinite(known), known, turned)
-    return turned, ((turned >= lower) & (turned <= upper)).all(axis=-1)
 
 
 def _own_offsets(robot: CalibratedRobot) -> Array:
@@ -598,9 +210,3 @@ def _own_offsets(robot: CalibratedRobot) -> Array:
         return column[table.joint_rows]
 
     return own(robot.model) - own(robot.structured)
-
-
-def _wrapped(angle: Array) -> Array:
-    """Angles into (-pi, pi]."""
-    inside = np.abs(angle) <= pi
-    return np.where(inside & (angle > -pi), angle, pi - np.mod(pi - angle, 2.0 * pi))

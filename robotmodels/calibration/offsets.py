@@ -11,11 +11,10 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, Rebuilt, as_vector, read_only
 from ..errors import InvalidValueError
 from ..igm.asked import above_zero, mask_of
-from ..igm.components import rotation_vectors
 from ..kinematics import dgm
 from .calibrated import CalibratedRobot, calibrated_pose
 from .corrected import CorrectedSolutions, corrected_igm
-from .reading_jacobian import reading_jacobian
+from .reading_jacobian import missing_of_pose, missing_slope, reading_jacobian
 
 STEPS = 50
 DEPENDENT = 1e-9  # singular values beside the largest below which offsets are not told apart
@@ -192,7 +191,8 @@ def joint_offsets(
     before = error = _missing(robot, commanded, wanted)
     cost, rank = float(np.sum((weight * error) ** 2)), 0
     for _ in range(STEPS):
-        W = weight[:, None] * _slope(robot, commanded + offset, error) * unit
+        J = reading_jacobian(robot, commanded + offset)
+        W = weight[:, None] * missing_slope(J, error[:, 3:]) * unit
         solved = np.linalg.lstsq(W.reshape(-1, n), (weight * error).ravel(), rcond=DEPENDENT)
         rank = int(solved[2])
         step = solved[0] * unit
@@ -273,24 +273,7 @@ def pose_offsets(
 
 def _missing(robot: CalibratedRobot, q_read: Array, wanted: Array) -> Array:
     """What the real tool misses, (N, 6), world axes."""
-    T = calibrated_pose(robot, q_read)
-    turn = wanted[:, :3, :3] @ T[:, :3, :3].swapaxes(-1, -2)
-    return np.concatenate([wanted[:, :3, 3] - T[:, :3, 3], rotation_vectors(turn)], axis=1)
-
-
-def _slope(robot: CalibratedRobot, q_read: Array, error: Array) -> Array:
-    """Minus the derivative of `_missing` by the readings, (N, 6, n)."""
-    J = reading_jacobian(robot, q_read)
-    phi = error[:, 3:]
-    t = np.linalg.norm(phi, axis=1)
-    half = 0.5 * np.where(t < 1e-3, 1.0, t)
-    c = np.where(t < 1e-3, 1.0 / 12.0 + t * t / 720.0,
-                 (1.0 - half / np.tan(half)) / (4.0 * half * half))  # fmt: skip
-    K = np.zeros((len(phi), 3, 3))
-    K[:, [2, 0, 1], [1, 2, 0]] = phi
-    K[:, [1, 2, 0], [2, 0, 1]] = -phi
-    turned = np.eye(3) + 0.5 * K + c[:, None, None] * (K @ K)
-    return np.concatenate([J[:, :3], turned @ J[:, 3:]], axis=1)
+    return missing_of_pose(calibrated_pose(robot, q_read), wanted)
 
 
 def _rms(rows: Array) -> float:

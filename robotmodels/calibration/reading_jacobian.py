@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_vector
+from ..igm.components import rotation_vectors
 from ..kinematics import jacobian
 from .calibrated import CalibratedRobot, tip_of
 
@@ -55,3 +56,56 @@ def reading_jacobian(robot: CalibratedRobot, q_read: ArrayLike) -> Array:
         by_joint, by_load = robot.bending.jacobians(rows, q, *tip_of(robot))
         J = by_joint @ errors.slope(rows) + by_load
     return J.reshape(*readings.shape[:-1], 6, n)
+
+
+def missing_of_pose(T: Array, wanted: Array) -> Array:
+    """What poses miss of the wanted ones.
+
+    Parameters
+    ----------
+    T, wanted : ndarray, shape (N, 4, 4)
+        World poses, metres.
+
+    Returns
+    -------
+    ndarray, shape (N, 6)
+        Translation (m) and ``log(R_wanted R^T)`` (rad), world axes.
+
+    Examples
+    --------
+    >>> missing_of_pose(np.eye(4)[None], np.eye(4)[None])
+    array([[0., 0., 0., 0., 0., 0.]])
+    """
+    turn = wanted[:, :3, :3] @ T[:, :3, :3].swapaxes(-1, -2)
+    return np.concatenate([wanted[:, :3, 3] - T[:, :3, 3], rotation_vectors(turn)], axis=1)
+
+
+def missing_slope(J: Array, phi: Array) -> Array:
+    """Minus the derivative of `missing_of_pose` where the rotation ``phi`` is missing.
+
+    Parameters
+    ----------
+    J : ndarray, shape (N, 6, n)
+        Jacobian, world axes.
+    phi : ndarray, shape (N, 3)
+        Missing rotation, rad.
+
+    Returns
+    -------
+    ndarray, shape (N, 6, n)
+        J with its angular rows turned and stretched as the rotation vector is.
+
+    Examples
+    --------
+    >>> bool((missing_slope(np.eye(6)[None], np.zeros((1, 3))) == np.eye(6)).all())
+    True
+    """
+    t = np.linalg.norm(phi, axis=1)
+    half = 0.5 * np.where(t < 1e-3, 1.0, t)
+    c = np.where(t < 1e-3, 1.0 / 12.0 + t * t / 720.0,
+                 (1.0 - half / np.tan(half)) / (4.0 * half * half))  # fmt: skip
+    K = np.zeros((len(phi), 3, 3))
+    K[:, [2, 0, 1], [1, 2, 0]] = phi
+    K[:, [1, 2, 0], [2, 0, 1]] = -phi
+    turned = np.eye(3) + 0.5 * K + c[:, None, None] * (K @ K)
+    return np.concatenate([J[:, :3], turned @ J[:, 3:]], axis=1)

@@ -30,14 +30,14 @@ from ..kernels._compile import (
 )
 from ..kernels._vectors import whole_matrix, whole_vector
 from ..kernels.svd import orthogonal_rows
-from ._descent import IDENTITY, Arm, Goal, error_jacobian, forward, missing
+from ._descent import Arm, Goal, error_jacobian, forward, missing
 
 __all__ = ["brought_home"]
 
 FLAGS = types.Array(types.boolean, 2, "C", readonly=True)
 JOINT_FLAGS = types.Array(types.boolean, 3, "C", readonly=True)
 
-FLOOR = 1e-15
+FLOOR = 5e-15  # error of a forward pass over an arm of metres
 LONGEST = 0.5  # step of a joint [rad, or the length of the arm]
 NEAR = 1e-7  # error below which a step is taken although it does not help at once
 ROUNDED = 1e-14  # error below which one that does not help is rounding
@@ -264,12 +264,13 @@ def homed(
 
 @compiled(
     NOTHING(
-        STACK, OUT3, FLAGS, JOINT_FLAGS, *CHAIN, INTS, MATRIX, VECTOR, INTS, INT, VECTOR,
+        STACK, STACK, OUT3, FLAGS, JOINT_FLAGS, *CHAIN, INTS, MATRIX, VECTOR, INTS, VECTOR,
         types.float64, INT, OUT2, OUT2,
     )
 )  # fmt: skip
 def brought_home(
     targets: Floats,
+    axes: Floats,
     q: Floats,
     there: NDArray[np.bool_],
     held: NDArray[np.bool_],
@@ -284,7 +285,6 @@ def brought_home(
     tool_rotation: Floats,
     tool_position: Floats,
     mask: Ints,
-    tool_axes: int,
     unit: Floats,
     length: float,
     steps: int,
@@ -297,6 +297,8 @@ def brought_home(
     ----------
     targets : (N, 4, 4)
         World poses of the tool [m].
+    axes : (N, 3, 3)
+        Axes of the components of the error, as columns.
     q : (N, C, n)
         Postures [rad or m], overwritten by where they arrived.
     there : (N, C) bool
@@ -309,8 +311,6 @@ def brought_home(
         As for `tip_poses`.
     mask : (6,) int64
         1 for each component of the error that is asked for.
-    tool_axes : int
-        1: components in the axes of the tool at its target, 0: in world axes.
     unit : (n,)
         What a joint's step is measured in: 1 rad, or ``length`` [m]; 0 for joints off the path.
     length : float
@@ -321,7 +321,7 @@ def brought_home(
         Written: the larger of what is missing in metres and in radians; infinite where not there.
     least : (N, C)
         Written: least singular value of the Jacobian without units, of all joints of the path;
-        up to sqrt(6) times less if it is square.
+        up to sqrt(6) times less if it is square. Zero without steps.
     """
     n = q.shape[2]
     rows = path.shape[0]
@@ -346,7 +346,7 @@ def brought_home(
             target[0, 0], target[0, 1], target[0, 2], target[1, 0], target[1, 1], target[1, 2],
             target[2, 0], target[2, 1], target[2, 2],
         )  # fmt: skip
-        goal = (R, (target[0, 3], target[1, 3], target[2, 3]), R if tool_axes else IDENTITY)
+        goal = (R, (target[0, 3], target[1, 3], target[2, 3]), whole_matrix(axes[s]))
         for c in range(q.shape[1]):
             residual[s, c] = np.inf
             least[s, c] = 0.0
@@ -356,6 +356,8 @@ def brought_home(
                 q[s, c], held[s, c], goal, arm, mask, asked, unit, length, steps, x, trial, best,
                 work,
             )  # fmt: skip
+            if steps == 0:
+                continue
             # at the last look, a step of rounding away from where it arrived
             m = gathered(mask, free, unit, length, work)
             if m == asked:
