@@ -6,14 +6,109 @@ Seed book sections 1.2.1 (q = K_c q_c + q_0), 1.5.1.4 (friction), 1.5.1.5 (rotor
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, fields
-from typing import Any, Self
+from enum import Enum
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ._arrays import Array, as_exact, as_floats, as_vector, read_only, same_value, value_hash
+from ._choices import chosen
 from .errors import InertiaError, InvalidValueError, ShapeError
+
+
+class DriveKind(Enum):
+    """One kind of drive parameters; those of coupled motors belong to the kind that they couple.
+
+    Examples
+    --------
+    >>> DriveKind.IA.value, DriveKind.IA.coupling
+    ('Ia', 'Iam')
+    """
+
+    IA = "Ia"
+    FV = "Fv"
+    FC = "Fc"
+    OFFSET = "offset"
+
+    @property
+    def coupling(self) -> str | None:
+        """Name of what couples motors in this kind; an offset couples nothing."""
+        return None if self is DriveKind.OFFSET else f"{self.value}m"
+
+
+DriveWord = Literal["Ia", "Fv", "Fc", "offset"]
+Drives = bool | DriveKind | DriveWord | Iterable[DriveKind | DriveWord]
+"""All drive parameters, none, or those of some kinds."""
+
+
+def drive_kinds(drive: Drives) -> tuple[DriveKind, ...]:
+    """Which kinds of drive parameters are meant.
+
+    Parameters
+    ----------
+    drive : bool, DriveKind, str, or collection of these
+        All kinds, none, or some, as members or in words: ``("Ia", "Fv", "Fc")``.
+
+    Returns
+    -------
+    tuple of DriveKind
+        In the order of the regressors' columns, each once.
+
+    Raises
+    ------
+    InvalidValueError
+        Something else.
+
+    Examples
+    --------
+    >>> [kind.value for kind in drive_kinds(("Fc", "Ia"))]
+    ['Ia', 'Fc']
+    """
+    if isinstance(drive, (bool, np.bool_)):
+        return tuple(DriveKind) if drive else ()
+    if isinstance(drive, (DriveKind, str)):
+        drive = (drive,)
+    if not isinstance(drive, Iterable):
+        raise InvalidValueError(
+            "drive: expected True, False, or kinds of drive parameters such as ('Ia', 'Fv'), got "
+            f"{drive!r:.60}."
+        )
+    asked = {chosen(DriveKind, kind, "drive") for kind in drive}
+    return tuple(kind for kind in DriveKind if kind in asked)
+
+
+def check_all_or_none(drive: object) -> bool:
+    """Refuse kinds of drives where all or none act: torques are those of the model's drives.
+
+    Parameters
+    ----------
+    drive : bool
+        What the caller passed.
+
+    Returns
+    -------
+    bool
+        The same.
+
+    Raises
+    ------
+    InvalidValueError
+        Something else.
+
+    Examples
+    --------
+    >>> check_all_or_none(True)
+    True
+    """
+    if isinstance(drive, (bool, np.bool_)):
+        return bool(drive)
+    raise InvalidValueError(
+        f"drive: expected True or False here, got {drive!r:.60}; kinds of drive parameters are for "
+        "regressors and base parameters, and model.with_drive(...) takes single terms away."
+    )
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)
@@ -130,6 +225,9 @@ class Transmission:
     The diagonal parts (k = j) belong to ``Ia`` and ``Fv`` of `DriveParameters`, as in the
     published TX40 identifications.
 
+    Where the motors are given by the joints, ``q_motor = R q``, ``K`` is the inverse of ``R``:
+    `from_motor`.
+
     Parameters
     ----------
     matrix : array_like, shape (n, n)
@@ -200,6 +298,63 @@ class Transmission:
                     "DriveParameters (Ia, Fv, Fc); coupling terms are for the motors "
                     f"{list(self.coupled_motors)}."
                 )
+
+    @classmethod
+    def from_motor(
+        cls,
+        matrix: ArrayLike,
+        offset: ArrayLike | None = None,
+        Iam: ArrayLike | None = None,
+        Fvm: ArrayLike | None = None,
+        Fcm: ArrayLike | None = None,
+    ) -> Self:
+        """The transmission of motors that turn as ``q_c = R q + r_0``.
+
+        Joint torques are then ``tau = R^T tau_c``.
+
+        Parameters
+        ----------
+        matrix : array_like, shape (n, n)
+            ``R``: turns of each motor (row) per turn of each joint (column).
+        offset : array_like, shape (n,), optional
+            ``r_0``, the motors' variables where the joints are at zero; default zero.
+        Iam, Fvm, Fcm : array_like, shape (n,), optional
+            As for the class.
+
+        Returns
+        -------
+        Transmission
+            With ``K = R^-1`` and ``q_0 = -K r_0``.
+
+        Raises
+        ------
+        InvalidValueError
+            ``R`` has no inverse.
+        ShapeError, InertiaError
+            As the class.
+
+        References
+        ----------
+        Seed book section 1.2.1; the wrist of the TX40 turns motor 6 by joints 5 and 6.
+
+        Examples
+        --------
+        >>> wrist = Transmission.from_motor([[45.0, 0.0], [32.0, 32.0]], Iam=[0.0, 0.01])
+        >>> wrist.to_encoder([1.0, 0.0]), wrist.to_motor_torque([45.0, 32.0])
+        (array([45., 32.]), array([0., 1.]))
+        """
+        R = as_floats(matrix, "matrix")
+        if R.ndim != 2 or R.shape[0] != R.shape[1]:
+            raise ShapeError(f"matrix: expected a square (n, n) matrix, got {R.shape}.")
+        n = R.shape[0]
+        if _rank(R.T) < n:  # a row for each motor, each in units of its own
+            raise InvalidValueError(
+                f"matrix: R has rank {_rank(R.T)} of {n}, so that motors do not tell the joints; "
+                "check its rows, or give K of q = K q_c to Transmission itself."
+            )
+        K = np.linalg.inv(R)
+        zero = None if offset is None else -K @ as_exact(offset, (n,), "offset")
+        return cls(K, zero, Iam, Fvm, Fcm)
 
     @property
     def n(self) -> int:

@@ -10,10 +10,13 @@ import sympy
 from identities.random_robots import random_bodies, random_drive, random_pose, random_table
 
 import robotmodels as rm
+from robotmodels.drive import DriveKind
 from robotmodels.errors import InvalidValueError, ShapeError
+from robotmodels.estimation import column_basis
 from robotmodels.friction import AsymmetricFriction, StribeckFriction
 from robotmodels.minimal_parameters import BaseMethod, base_parameters
 from robotmodels.minimal_parameters.formulas import constants_of
+from robotmodels.minimal_parameters.gap import miss, with_clear_gap
 from robotmodels.minimal_parameters.numeric import natural_sizes
 from robotmodels.minimal_parameters.restraint import reach
 from robotmodels.regressors import parameter_names, parameter_vector, torque_regressor
@@ -62,7 +65,7 @@ def equal(one, other, tolerance=1e-10):
     assert one.names == other.names
     assert one.no_effect == other.no_effect
     model = one.model
-    sizes, _ = natural_sizes(model, one.drive, one.friction)
+    sizes = natural_sizes(model, one.drive, one.friction)
     size = reach(model)
     slides = np.where(model.table.sigma[model.table.joint_rows] == 1, size, 1.0)
     q, v, a = np.random.default_rng(5).uniform(-1, 1, (3, 12, model.n)) * slides
@@ -146,6 +149,83 @@ def test_the_rank_does_not_depend_on_the_size_of_the_robot(size):
         )  # fmt: skip
         model = rm.RobotModel.from_table(scaled, base=rm.load(name).base)
         assert base_parameters(model, "numeric").names == base_parameters(rm.load(name)).names
+
+
+@pytest.mark.parametrize("length", [1e-3, 1e-4, 1e-5, 1e-6, 1e-9, 1e-12, 6e-17])
+def test_tiny_lengths_are_no_unit_of_the_rank(length):
+    """Lengths of rounding, or far below those that joints slide through, decide nothing."""
+    rng, h = np.random.default_rng(2), np.pi / 2
+    for rows in (
+        [{"sigma": 0}, {"sigma": 0, "alpha": h, "d": length}, {"sigma": 1, "alpha": h}],
+        [{"sigma": 1, "r": length}, {"sigma": 1, "alpha": h}, {"sigma": 1, "alpha": h}],
+        [{"sigma": 1, "r": length}, {"sigma": 0, "alpha": h}],
+        [{"sigma": 0}, {"sigma": 1, "alpha": h, "d": length}],
+        [{"sigma": 1}, {"sigma": 0, "alpha": h, "d": length}, {"sigma": 1, "alpha": -h}],
+        [{"sigma": 0, "r": length}, {"sigma": 0, "alpha": h}, {"sigma": 0, "alpha": -h}],
+    ):
+        model = filled(rm.RobotModel.from_table(table_of(*rows)), rng)
+        friction = AsymmetricFriction(*rng.uniform(0.5, 2.0, (4, model.n)))
+        for more in (None, friction):
+            rules = base_parameters(model, friction=more)
+            numbers = base_parameters(model, "numeric", friction=more)
+            equal(rules, numbers)
+            if length < 1e-9 and more is None:
+                nothing = [{k: x for k, x in row.items() if k not in "dr"} for row in rows]
+                exact = base_parameters(rm.RobotModel.from_table(table_of(*nothing)))
+                assert numbers.names == exact.names
+        keeps_torque(base_parameters(model, "numeric"), model, rng, True)
+        keeps_torque(base_parameters(model), model, rng, True)
+
+
+def slightly_off(rng):
+    """Right angles and no lengths but for some that are tiny, from rounding to a hundredth."""
+    model = right_angled_robot(rng)
+    table, f = model.table, model.f
+    off = 10.0 ** rng.uniform(-13.0, -2.0)
+
+    def moved(column):
+        return column + off * rng.normal(size=f) * (rng.random(f) < 0.4)
+
+    table = table.replace(
+        alpha=moved(table.alpha), beta=moved(table.beta), d=moved(table.d), r=moved(table.r)
+    )
+    return model.with_table(table)
+
+
+def test_methods_agree_on_what_is_nearly_aligned():
+    rng = np.random.default_rng(11)
+    for _ in range(120):
+        model = filled(slightly_off(rng), rng)
+        rules, numbers = base_parameters(model), base_parameters(model, "numeric")
+        assert rules.names == numbers.names
+        for base in (rules, numbers):
+            W = torque_regressor(model, *rng.uniform(-2, 2, (3, 20, model.n)))
+            torque = W @ parameter_vector(model)
+            missed = abs(base.reduce(W) @ base.values(model) - torque).max(initial=0.0)
+            assert missed <= 3e-10 * max(1e-300, abs(torque).max(initial=0.0))
+            assert not any("NOT TO BE USED" in note for note in base.notes)
+
+
+@pytest.mark.parametrize("gravity", [1e-13, 1e-12, 1e-11, 1e-10, 1e-6, 1e-3])
+def test_hardly_any_gravity(gravity):
+    for name in ("rx90", "gantry", "cobra_s600"):
+        model = rm.load(name).with_gravity([0.0, 0.0, -gravity])
+        assert base_parameters(model).names == base_parameters(model, "numeric").names
+
+
+def test_torques_that_are_not_kept_are_told():
+    base = base_parameters(rm.load("rx90"), "numeric")
+    assert base.missed < 1e-14
+    assert not base.notes
+    assert "NOT TO BE USED: these base parameters miss 2.0e-01" in miss(0.2, 1e-11)[0]
+
+
+def test_a_robot_without_joints():
+    model = rm.RobotModel.from_table(table_of({"sigma": 2, "d": 0.2}))
+    for method in ("symbolic", "numeric"):
+        base = base_parameters(model, method)
+        assert len(base) == 0
+        assert base.no_effect == parameter_names(model)
 
 
 # --- what others print ---------------------------------------------------------------------------
@@ -269,6 +349,58 @@ def test_ur10_with_friction_and_rotors():
     assert len([n for n in base.names if not n.startswith("offset")]) == 52
 
 
+def test_counts_of_the_literature():
+    """Rotors alone for the RX-90, rotors and friction for the UR10, by words and by members."""
+    rx90 = rm.load("rx90")
+    for method in ("symbolic", "numeric"):
+        rotors = base_parameters(rx90, method, drive=("Ia",))
+        assert len(rotors) == 40
+        assert len(rotors.no_effect) == 11
+        assert rotors.text.startswith("rx90: 40 base parameters of 66 standard ones")
+        assert "Ia kg m^2" in rotors.text
+        assert "Fv" not in rotors.text
+        ur10 = base_parameters(rm.load("erd:ur10"), method, drive=("Ia", "Fv", DriveKind.FC))
+        assert len(ur10) == 52
+    assert rotors.drive == (DriveKind.IA,)
+
+
+@pytest.mark.parametrize(
+    "kinds", [("Ia",), ("offset",), ("Fv", "offset"), ("Ia", "offset"), ("Ia", "Fv", "Fc"), ()]
+)
+def test_methods_agree_on_any_kinds(kinds, rng):
+    robots = [rm.load(name) for name in ("gantry", "cobra_s600", "tx40", "stanford_arm")]
+    robots += [right_angled_robot(rng) for _ in range(8)]
+    for model in robots:
+        model = filled(model, rng)
+        rules = base_parameters(model, drive=kinds)
+        equal(rules, base_parameters(model, "numeric", drive=kinds))
+        keeps_torque(rules, model, rng, kinds)
+        assert pickle.loads(pickle.dumps(rules)).drive == rules.drive
+        # and by recursion, with the model's own terms of the kinds that are left out
+        q, v, a = rng.uniform(-1, 1, (3, 5, model.n))
+        torque = rm.idm_from_base(model, rules, rules.values(model), q, v, a)
+        expected = rm.idm(model, q, v, a)
+        assert abs(torque - expected).max() <= 1e-11 * max(1.0, abs(expected).max())
+
+
+def test_stribeck_friction_with_rotors(rng):
+    """Kinds that the friction model does not have stay; only those that clash are left out."""
+    model = filled(rm.load("rx90"), rng)
+    p = rng.uniform(0.5, 2.0, (3, 6))
+    stribeck = StribeckFriction(p[0], p[1], p[1] + p[2], np.full(6, 0.05))
+    found = [
+        base_parameters(model, way, drive=("Ia", "offset"), friction=stribeck) for way in BaseMethod
+    ]
+    equal(*found)
+    assert len(found[0]) == 40 + 6 + 18
+    bare = model.with_drive(rm.DriveParameters(Ia=model.drive.Ia, offset=model.drive.offset))
+    q, v, a = rng.uniform(-1, 1, (3, 50, 6))
+    for base in found:
+        W = torque_regressor(bare, q, v, a, drive=base.drive, friction=stribeck, columns=base)
+        torque = rm.idm(bare, q, v, a, friction=stribeck)
+        assert np.allclose(W @ base.values(bare), torque, atol=1e-10 * abs(torque).max())
+
+
 def test_coupled_motors_of_the_tx40():
     model = rm.load("tx40")
     base = base_parameters(model)
@@ -295,6 +427,56 @@ def test_motion_that_shows_less_keeps_less(rng):
     W = torque_regressor(model, q * still, v * still, a * still)
     again = part.reduce(W) @ part.matrix
     assert np.allclose(again, W, atol=1e-8 * abs(W).max())
+
+
+def small_log(rng, amplitude, samples=400):
+    """Motion about one posture of the RX-90."""
+    q, v, a = amplitude * rng.normal(size=(3, samples, 6))
+    return q + rng.normal(size=6), v, a
+
+
+def test_a_log_without_a_clear_gap_says_so():
+    """From small motions some parameters fade away; the line goes to a gap, or is said to be in none."""
+    model, rng = rm.load("rx90"), np.random.default_rng(0)
+    moved = doubted = 0
+    for amplitude in 10.0 ** np.linspace(-5.0, -3.0, 9):
+        base = base_parameters(model, "numeric", motion=small_log(rng, amplitude))
+        kept, other = base.gap
+        assert kept > other  # what is reported is what decided
+        if kept < 100 * other:
+            doubted += 1
+            (note,) = (n for n in base.notes if n.startswith("No clear gap"))
+            assert f"kept with {kept:.1e}" in note
+            assert f"left out with {other:.1e}" in note
+            assert "tolerance (here 1e-11)" in note
+            assert "richer motion" in note
+            doubtful = note.split("In doubt: ")[1].split(". A richer")[0].split(" and ")[0]
+            assert {*doubtful.split(", ")} <= {*base.parameter_names}
+            assert note[:40] in base.text
+        else:
+            assert not any(n.startswith("No clear gap") for n in base.notes)
+            moved += kept < 1e-11 or other > 1e-11
+            assert 3e-13 < kept
+            assert other < 3e-10
+        if len(base) < 58:
+            assert any(f"shows {len(base)} of the 58 base parameters" in n for n in base.notes)
+    assert doubted
+    assert moved
+    still = np.full((20, 6), 0.3), np.zeros((20, 6)), np.zeros((20, 6))
+    base = base_parameters(model, "numeric", motion=still)
+    assert "This motion shows 6 of the 58 base parameters; not kept: ZZ1," in base.notes[0]
+
+
+def test_a_gap_that_is_there_is_taken():
+    for lengths, kept in (
+        ((1.0, 2e-9, 2e-11, 9e-12, 5e-13, 1e-16), 5),  # the gap below, within a factor of 30
+        ((1.0, 1e-6, 2e-11, 9e-12, 6e-13, 1e-13), 2),  # the gap above
+        ((1.0, 1e-8, 2e-11, 1e-16, 1e-17, 0.0), 3),  # in a gap already
+        ((1.0, 1e-8, 2e-10, 2e-11, 5e-12, 1e-13), 4),  # none: stays at the tolerance
+    ):
+        W = np.diag(lengths)
+        basis = with_clear_gap(W, np.ones(6), 1e-11, column_basis(W))
+        assert len(basis.kept) == kept
 
 
 def test_joints_bound_to_each_other(rng):
@@ -340,7 +522,7 @@ def test_friction_models_are_columns_of_both_methods(name, rng):
             assert abs(found - torque).max() <= 1e-10 * abs(torque).max()
     assert "Fs1" in rules.names
     assert pickle.loads(pickle.dumps(rules)).names == rules.names
-    with pytest.raises(InvalidValueError, match="Fv columns already"):
+    with pytest.raises(InvalidValueError, match=r"Fv columns already.*drive=\('Ia', 'offset'\)"):
         base_parameters(model, friction=stribeck)
     with pytest.raises(InvalidValueError, match="expected a friction model"):
         base_parameters(model, friction=3.0)
@@ -382,6 +564,58 @@ def test_a_tolerance_takes_few_digits_for_what_is_meant(name):
         assert abs(base.matrix[base.matrix != 0]).min() > 1e-6
         assert "e-1" not in base.text.split("Regrouped")[1].split("Rank")[0]
     assert not base_parameters(rm.load("rx90")).notes
+
+
+def test_notes_tell_the_tolerance_to_use():
+    model = rm.load("erd:bravo7_no_ee")
+    exact = base_parameters(model)
+    assert "tolerance=1e-08 takes them as exact" in exact.notes[0]
+    meant = base_parameters(model, tolerance=1e-8)
+    assert len(meant) == 58 < len(exact)
+    assert "Taken as exact" in meant.text
+    # what a great tolerance leaves out has an effect, and is not said to have none
+    assert meant.neglected == ("MX1", "MY1", "MZ2")
+    assert "Neglected, less than 1e-08 of the largest torque: MX1, MY1, MZ2" in meant.text
+    assert r"MX_{1}" in meant.latex.split("Neglected")[1]
+    assert not {*meant.neglected} & {*meant.no_effect, *meant.alone, *meant.in_combination}
+    assert base_parameters(model, "numeric", tolerance=1e-8).neglected == meant.neglected
+    assert not base_parameters(rm.load("rx90"), tolerance=1e-4).neglected
+    for base in (exact, meant):
+        assert max(map(len, base.text.splitlines())) <= 100
+
+
+def test_long_formulas_are_numbers():
+    """Oblique axes one behind the other: lines of the table stay lines."""
+    rows = [{"sigma": 0, "alpha": 0.3 * j, "d": 0.1 * j, "r": 0.2} for j in range(1, 7)]
+    base = base_parameters(rm.RobotModel.from_table(rm.DHTable.from_rows(rows)))
+    for text in (base.text, base_parameters(base.model, "numeric").text):
+        assert max(map(len, text.splitlines())) <= 100
+    assert "RL2" in base.text  # short ones keep their symbols
+    longest = max(sum(len(t.text) for t in formula.terms) for formula in base.formulas)
+    assert longest > 180
+    formulas = base.text.split("Regrouped")[1].split("  with ")[0]
+    assert all(len(line) <= 180 for line in formulas.split("R  "))
+
+
+def test_values_have_names_and_units(rng):
+    model = filled(rm.load("cobra_s600"), rng)
+    base = base_parameters(model)
+    table = base.value_table(model)
+    assert list(table) == list(base.names)
+    assert list(table.values()) == base.values(model).tolist()
+    assert table["ZZ1R"] == table["ZZ1"]
+    rows = [line.strip("│").split("│") for line in str(table).splitlines() if line[0] == "│"]
+    cells = {row[0].strip(): (row[1].strip(), row[2].strip()) for row in rows[1:]}
+    assert cells["ZZ1R"] == (f"{table['ZZ1']:.6g}", "kg m^2")
+    assert [cells[k][1] for k in ("Fv1", "Fv3", "Fc1", "Fc3")] == ["N m s/rad", "N s/m", "N m", "N"]
+    assert cells["M3R"][1] == "kg"
+    again = base.value_table(base.values(model))
+    assert dict(again) == dict(table)
+    assert not pickle.loads(pickle.dumps(again)).numbers.flags.writeable
+    with pytest.raises(ShapeError, match="values"):
+        base.value_table([1.0, 2.0])
+    with pytest.raises(KeyError, match=r"No base parameter 'ZZZ1'.* mean ZZ1"):
+        table["ZZZ1"]
 
 
 def test_constraints_are_told():
@@ -459,8 +693,13 @@ def test_mistakes_are_named():
         base_parameters(model, "numeric", motion=(np.zeros((0, 2)),) * 3)
     with pytest.raises(InvalidValueError, match="three arrays"):
         base_parameters(model, "numeric", motion=np.zeros((5, 2)))
-    with pytest.raises(InvalidValueError, match="tolerance"):
-        base_parameters(model, "numeric", tolerance=0.0)
+    for tolerance in (0.0, 0.9, "a", [1e-9]):
+        with pytest.raises(InvalidValueError, match="tolerance"):
+            base_parameters(model, "numeric", tolerance=tolerance)
+    with pytest.raises(
+        InvalidValueError, match="drive: expected one of 'ia', 'fv', 'fc', 'offset'"
+    ):
+        base_parameters(model, drive=("rotor",))
     with pytest.raises(ShapeError, match=r"constraint: expected shape \(2, u\)"):
         base_parameters(model, "numeric", constraint=np.eye(3))
     with pytest.raises(InvalidValueError, match="nothing moves"):

@@ -188,6 +188,22 @@ def test_mistakes_in_transmissions(fields, error, words):
         rm.Transmission(**fields)
 
 
+def test_motors_given_by_joints():
+    """``q_motor = R q``: the TX40's motor 6 is turned by joints 5 and 6."""
+    R, turn = np.diag([45.0, 32.0]), [0.3, -0.2]
+    R[1, 0] = 32.0
+    wrist = rm.Transmission.from_motor(R, turn, Iam=[0.0, 0.1])
+    q, tau = np.array([0.7, -0.4]), np.array([2.0, 3.0])
+    np.testing.assert_allclose(wrist.to_encoder(q), R @ q + turn, rtol=1e-13)
+    np.testing.assert_allclose(R.T @ wrist.to_motor_torque(tau), tau, rtol=1e-13)
+    assert wrist.coupled_motors == (2,)
+    np.testing.assert_allclose(wrist.weights, [[1, 0], [1, 1]], atol=1e-14)
+    with pytest.raises(InvalidValueError, match="R has rank 1 of 2"):
+        rm.Transmission.from_motor([[1.0, 1.0], [1e6, 1e6]])
+    with pytest.raises(ShapeError, match="square"):
+        rm.Transmission.from_motor([[1.0, 1.0]])
+
+
 @pytest.mark.parametrize("method", ["to_joint", "to_encoder", "to_motor_torque"])
 def test_mistakes_in_vectors_through_the_gears(method):
     with pytest.raises(ShapeError, match=r"expected shape \(\.\.\., 6\), got \(5,\)"):

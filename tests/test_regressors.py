@@ -9,6 +9,7 @@ from identities.random_robots import random_model, random_state
 from scipy import signal
 
 import robotmodels as rm
+from robotmodels.drive import DriveKind
 from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.minimal_parameters import base_parameters
 from robotmodels.regressors import (
@@ -176,9 +177,34 @@ def test_energy_of_a_coupled_wrist():
 # --- long logs -------------------------------------------------------------------------------
 
 
-def test_chunks_of_nothing_and_of_one(model):
+def test_a_log_without_samples_is_named(model):
+    """What consumes a log refuses an empty one; what maps rows returns none."""
     q, v, a = states(model, 3, 0)
-    assert list(rm.torque_regressor_chunks(model, q, v, a)) == []
+    t, names = np.zeros(0), "the log is empty; expected at least"
+    for function, rows in (
+        (rm.torque_regressor_chunks, (q, v, a)),
+        (power_regressor_chunks, (q, v, a)),
+        (energy_regressor_chunks, (q, v)),
+        (momentum_regressor_chunks, (q, v)),
+    ):
+        with pytest.raises(InvalidValueError, match=rf"^q, v.*: {names} one sample"):
+            function(model, *rows)
+    for function in (filtered_regressor, filtered_regressor_chunks):
+        with pytest.raises(InvalidValueError, match=rf"^q, v: {names} one sample"):
+            function(model, 0.1, q, v, FILTER)
+    for function in (energy_difference_regressor, energy_difference_regressor_chunks):
+        with pytest.raises(InvalidValueError, match=rf"^t: {names} 2 samples"):
+            function(model, t, q, v)
+    with pytest.raises(InvalidValueError, match=rf"^t: {names} 2 samples"):
+        joint_work(t, v, v)
+    p = rm.parameter_vector(model).size
+    assert rm.torque_regressor(model, q, v, a).shape == (0, model.n, p)
+    assert power_regressor(model, q, v, a).shape == (0, p)
+    assert rm.energy_regressor(model, q, v).shape == (0, len(energy_parameter_names(model)))
+    assert momentum_regressor(model, q, v).momentum.shape == (0, model.n, p)
+
+
+def test_a_chunk_of_one(model):
     q, v, a = states(model, 3)
     ((rows, W),) = rm.torque_regressor_chunks(model, q, v, a)
     assert (rows.start, rows.stop) == (0, 1)
@@ -212,7 +238,7 @@ FILTER = LowPass.first_order(30.0)
 def chunked(model, q, v, a, size):
     """Of every form: all at once, and the pieces."""
     t = np.cumsum(np.full(len(q), 0.01))
-    knots = np.arange(0, len(q), 3)
+    knots = np.unique(np.append(np.arange(0, len(q), 3), len(q) - 1))
     momentum = momentum_regressor(model, q, v)
     momenta = [(rows, P.copy(), S.copy())
                for rows, (P, S) in momentum_regressor_chunks(model, q, v, size=size)]  # fmt: skip
@@ -250,7 +276,7 @@ def chunked(model, q, v, a, size):
     }
 
 
-@pytest.mark.parametrize("N", [0, 1, 7, 300])
+@pytest.mark.parametrize("N", [2, 7, 300])
 @pytest.mark.parametrize("size", [1, 4, 1000])
 def test_pieces_of_every_form_are_the_whole(model, N, size):
     for form, (whole, chunks) in chunked(model, *states(model, 3, N), size).items():
@@ -352,6 +378,78 @@ def test_no_column_at_all(model):
     assert filtered_regressor(model, 0.1, q, v, FILTER, columns=[]).shape == (2, model.n, 0)
 
 
+@pytest.mark.parametrize("name", ["random", "tx40"])
+def test_kinds_of_drives_have_columns_of_their_own(model, name):
+    """Any collection of kinds gives the columns that it names, of every form."""
+    model = rm.load("tx40") if name == "tx40" else model
+    q, v, a = states(model, 3, 4)
+    t = np.arange(4.0)
+    every = rm.parameter_names(model)
+    forms = (
+        lambda d: rm.torque_regressor(model, q, v, a, drive=d),
+        lambda d: power_regressor(model, q, v, a, drive=d),
+        lambda d: momentum_regressor(model, q, v, drive=d).momentum,
+        lambda d: momentum_regressor(model, q, v, drive=d).force,
+        lambda d: energy_difference_regressor(model, t, q, v, drive=d),
+        lambda d: filtered_regressor(model, 0.1, q, v, FILTER, drive=d),
+    )
+    for kinds in ((), ("Ia",), ("Fc", "Ia"), (DriveKind.FV, "offset"), ("Ia", "Fv", "Fc")):
+        names = rm.parameter_names(model, drive=kinds)
+        words = {k.value if isinstance(k, DriveKind) else k for k in kinds}
+        words |= {f"{word}m" for word in words} - {"offsetm"}
+        at = [every.index(name) for name in names]
+        assert at == [
+            k for k, name in enumerate(every)
+            if k < 10 * model.f or name.rstrip("0123456789") in words
+        ]  # fmt: skip
+        for form in forms:
+            np.testing.assert_array_equal(form(kinds), form(True)[..., at])
+        np.testing.assert_array_equal(
+            rm.parameter_vector(model, kinds), rm.parameter_vector(model)[at]
+        )
+        h = rm.energy_regressor(model, q, v, drive=kinds)
+        assert h.shape[-1] == len(energy_parameter_names(model, kinds))
+        assert (h.shape[-1] > 10 * model.f) == ("Ia" in words)
+    assert rm.parameter_names(model, drive="Ia") == rm.parameter_names(model, drive=DriveKind.IA)
+    with pytest.raises(InvalidValueError, match=r"drive: expected one of 'ia', .* got 'Iam'"):
+        rm.parameter_names(model, drive=("Iam",))
+    with pytest.raises(InvalidValueError, match="drive: expected True, False, or kinds"):
+        rm.torque_regressor(model, q, v, a, drive=None)
+    for function in (rm.idm, rm.ddm):
+        with pytest.raises(InvalidValueError, match="drive: expected True or False here"):
+            function(model, q, v, a, drive=("Ia",))
+    for function in (rm.mass_matrix, lambda m, q, drive: rm.kinetic_energy(m, q, v, drive)):
+        with pytest.raises(InvalidValueError, match="drive: expected True or False here"):
+            function(model, q, drive=("Ia",))
+
+
+def test_energy_of_base_parameters_with_rotors(model):
+    q, v, _ = states(model, 3, 2)
+    base = base_parameters(model, drive="Ia")
+    h = rm.energy_regressor(model, q, v, columns=base)
+    assert h.shape == (2, len(base))
+    np.testing.assert_array_equal(h, base.reduce(rm.energy_regressor(model, q, v)))
+    energy = rm.kinetic_energy(model, q, v) + rm.potential_energy(model, q)
+    change = (h[0] - h[1]) @ base.values(model)
+    np.testing.assert_allclose(change, energy[0] - energy[1], rtol=1e-9)
+    whole = base_parameters(model)
+    with pytest.raises(InvalidValueError, match=r"have no column here: Fv.*drive=\('Ia',\)"):
+        rm.energy_regressor(model, q, v, columns=whole)
+    with pytest.raises(ShapeError, match=r"An energy has no columns of Fv, Fc, offset.*'Ia'"):
+        whole.reduce(rm.energy_regressor(model, q, v))
+
+
+def test_printed_names_are_taken(model):
+    q, v, a = states(model, 3, 2)
+    base = base_parameters(model)
+    name = next(n for n in base.names if len(base.regrouping[n]) > 1)
+    assert base.regrouping[f"{name}R"] is base.regrouping[name]
+    column = rm.torque_regressor(model, q, v, a, columns=[name])
+    np.testing.assert_array_equal(rm.torque_regressor(model, q, v, a, columns=[f"{name}R"]), column)
+    with pytest.raises(KeyError, match="No base parameter 'Q1'"):
+        base.regrouping["Q1"]
+
+
 def test_friction_is_no_energy(model):
     q, v, _ = states(model, 3)
     with pytest.raises(InvalidValueError, match=r"'Fv.*no"):
@@ -399,13 +497,17 @@ def test_mistakes_in_times(model, change, error, words):
 def test_hardly_any_samples(model):
     q, v, _ = states(model, 3, 3)
     p = rm.parameter_vector(model).size
-    for count in (0, 1):
-        rows = energy_difference_regressor(model, np.arange(count), q[:count], v[:count])
-        assert rows.shape == (0, p)
-        assert joint_work(np.arange(count), v[:count], v[:count]).shape == (0,)
-    assert energy_difference_regressor(model, np.arange(3), q, v, knots=[]).shape == (0, p)
-    assert energy_difference_regressor(model, np.arange(3), q, v, knots=[1]).shape == (0, p)
-    assert filtered_regressor(model, 0.1, q[:0], v[:0], FILTER).shape == (0, model.n, p)
+    for function in (energy_difference_regressor, energy_difference_regressor_chunks):
+        with pytest.raises(InvalidValueError, match="the log has 1 sample; expected at least 2"):
+            function(model, [0.0], q[:1], v[:1])
+        for knots in ([], [1]):
+            with pytest.raises(InvalidValueError, match=rf"knots: .* got {len(knots)}\."):
+                function(model, np.arange(3), q, v, knots=knots)
+    with pytest.raises(InvalidValueError, match="the log has 1 sample"):
+        joint_work([0.0], v[:1], v[:1])
+    assert energy_difference_regressor(model, np.arange(3), q, v, knots=[0, 2]).shape == (1, p)
+    one = filtered_regressor(model, 0.1, q[:1], v[:1], FILTER)
+    assert not one.any()  # the filter starts from rest
 
 
 # --- filters ---------------------------------------------------------------------------------
@@ -453,6 +555,7 @@ def test_a_ramp_and_its_derivative_are_exact():
     ("make", "error", "words"),
     [
         (lambda: LowPass.first_order(0.0), InvalidValueError, "cutoff"),
+        (lambda: LowPass(10.0), InvalidValueError, r"LowPass.first_order\(cutoff\)"),
         (lambda: LowPass.first_order([1.0]), InvalidValueError, "cutoff"),
         (lambda: LowPass([[1.0]], [1.0], [1.0]), InvalidValueError, "stable"),
         (lambda: LowPass([1.0], [1.0], [1.0]), ShapeError, "A:"),

@@ -502,6 +502,9 @@ def test_a_limit_stops_the_motion():
     assert outward.t[-1] == pytest.approx(0.0, abs=1e-9)
     with pytest.raises(InvalidValueError, match=r"joint 1 starts at 0\.6, outside its limits"):
         simulate(slider(), [0.6], [0.0], t=1.0, stop_at_limits=True)
+    endless = slider().with_table(slider().table.replace(lower=None, upper=None))
+    with pytest.raises(InvalidValueError, match="stop_at_limits: no joint of .* finite limit"):
+        simulate(endless, [0.6], [0.0], t=1.0, stop_at_limits=True)
 
 
 def test_ends_before_the_end_say_why():
@@ -684,6 +687,8 @@ def test_parts_of_the_torque_make_the_whole(seed):
     assert np.array_equal(parts.gravity, gravity_torque(model, q))
     twice = torque_parts(model, q, 2 * v, a)
     assert np.allclose(twice.coriolis, 4 * parts.coriolis)
+    with pytest.raises(InvalidValueError, match="q, v, a: the motion is empty"):
+        torque_parts(model, q[:0], v[:0], a[:0])
     bare = torque_parts(model, q, v, a, drive=False)
     assert not bare.friction.any()
     assert not bare.wrench.any()

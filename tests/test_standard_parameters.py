@@ -83,6 +83,35 @@ def test_the_prior_itself_is_kept(rng):
     assert np.allclose(found.inertia.values, model.inertia.values, atol=1e-7)
 
 
+def test_a_prior_that_is_the_robot_is_returned_as_it_is(rng):
+    for name in ("rx90", "cobra_s600", "tx40"):
+        model = rm.load(name)
+        model = model.with_inertia(random_bodies(rng, model.f))
+        for kinds in (True, ("Ia", "Fc"), ()):
+            base = base_parameters(model, drive=kinds)
+            found = standard_parameters(base, base.values(model))
+            assert found.status is PhysicalStatus.EXACT
+            assert found.distance == 0.0
+            assert found.inertia == model.inertia
+            assert found.drive == model.drive
+            assert found.transmission == model.transmission
+
+
+@pytest.mark.parametrize("scale", [1e-2, 1e3, 1e6, 1e9])
+def test_a_prior_of_another_order_of_magnitude(scale, rng):
+    """Real bodies a million times heavier than the prior are found, not said to be none."""
+    model = robot("rx90", rng).with_inertia(uniform_bodies(rm.load("rx90"), 30.0))
+    base = base_parameters(model)
+    drives = (scale * getattr(model.drive, k) for k in ("Ia", "Fv", "Fc", "offset"))
+    heavy = model.with_inertia(rm.InertialParameters(scale * model.inertia.values))
+    heavy = heavy.with_drive(rm.DriveParameters(*drives))
+    values = base.values(heavy)
+    found = standard_parameters(base, values)
+    assert found.status is PhysicalStatus.EXACT
+    assert abs(found.deviation).max() <= 1e-12 * abs(values).max()
+    assert found.inertia.is_physical.all()
+
+
 def test_base_parameters_of_no_robot(rng):
     model = robot("planar_2r", rng)
     base = base_parameters(model)
@@ -145,6 +174,10 @@ def test_what_is_wrong_with_a_prior_is_named(rng):
         values[1, k] = value
         with pytest.raises(InertiaError, match=said):
             standard_parameters(base, base.values(model), prior=rm.InertialParameters(values))
+    wrist = rm.load("tx40")  # the catalogue has no inertia of its link 6
+    whole = base_parameters(wrist)
+    with pytest.raises(InertiaError, match=r"link 6 .*Pass prior=uniform_bodies\(model, mass="):
+        standard_parameters(whole, whole.values(wrist))
     thin = [[1e-30, 0, 0, 1.0, 0, 1.0, 0, 0, 0, 1.0]] * 2
     with pytest.raises(InertiaError, match=r"flat, thin or a point.*So are 1 more"):
         standard_parameters(base, base.values(model), prior=rm.InertialParameters(thin))
@@ -183,7 +216,7 @@ def test_without_the_solver(monkeypatch, rng):
     model = robot("planar_2r", rng)
     base = base_parameters(model)
     with pytest.raises(MissingExtraError, match=r"robotmodels\[cones\]"):
-        standard_parameters(base, base.values(model))
+        standard_parameters(base, base.values(model), prior=uniform_bodies(model, 5.0))
 
 
 def test_the_nearest_of_no_robot_stays_near_the_prior(rng):
@@ -218,6 +251,46 @@ def test_the_size_of_the_robot_does_not_matter(size):
     assert found.status is PhysicalStatus.NEAREST
     for part in (found.drive.Ia, found.drive.Fv, found.drive.Fc):
         assert (part >= 0.0).all()
+
+
+def coupled_trunk(rng):
+    """Three joints, two motors of which are coupled, one after the other."""
+    K = rm.Transmission.from_motor([[1.0, 0, 0], [0.5, 1.0, 0], [0, 2.0, 1.0]])
+    rows = [{"sigma": 0, "alpha": np.pi / 2 * (j > 0), "d": 0.3 * j} for j in range(3)]
+    model = rm.RobotModel.from_table(rm.DHTable.from_rows(rows), transmission=K)
+    drive = rm.DriveParameters(*rng.uniform(0.5, 1.0, (4, 3)))
+    return model.with_inertia(random_bodies(rng, 3)).with_drive(drive)
+
+
+@pytest.mark.parametrize("name", ["tx40", "three"])
+def test_coupled_motors_store_and_take_energy(name, rng):
+    """Rotors and friction of coupled motors that no motors can have are not EXACT."""
+    model = coupled_trunk(rng) if name == "three" else rm.load("tx40")
+    model = model.with_inertia(uniform_bodies(model, 30.0))
+    base = base_parameters(model)
+    names, own = list(base.names), base.values(model)
+    last = model.transmission.coupled_motors[-1]
+    for kind in ("Ia", "Fv", "Fc"):
+        values = own.copy()
+        for name in names:
+            if name in (f"{kind}{last - 1}", f"{kind}{last}"):
+                values[names.index(name)] = 0.0
+        values[names.index(f"{kind}m{last}")] = 0.01 * (-1.0 if kind == "Fc" else 1.0)
+        found = standard_parameters(base, values)
+        assert found.status is PhysicalStatus.NEAREST
+        drives = found.of(model).drive_matrices
+        for matrix in (drives.rotor, drives.viscous):
+            assert np.linalg.eigvalsh(matrix)[0] >= -1e-12 * abs(matrix).max()
+        v = rng.normal(size=(200, model.n))
+        still = found.drive.offset
+        taken = ((drives.torque(v, None) - still) * v).sum(axis=1)
+        assert taken.min() >= -1e-12 * abs(taken).max()
+        A = rm.mass_matrix(found.of(model), rng.uniform(-2, 2, (20, model.n)))
+        assert np.linalg.eigvalsh(A).min() > 0.0
+    # and those that motors can have are
+    values = own.copy()
+    values[names.index(f"Iam{last}")] = 1e-3
+    assert standard_parameters(base, values).status is PhysicalStatus.EXACT
 
 
 def test_terms_of_coupled_motors_come_back(rng):

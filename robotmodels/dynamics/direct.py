@@ -7,6 +7,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_vector, batch_rows, batch_shape
+from ..drive import check_all_or_none
 from ..friction import Friction, check_friction
 from ..model import RobotModel, check_model
 from .definite import (
@@ -85,6 +86,7 @@ def ddm(
     array([2.])
     """
     check_model(model)
+    check_all_or_none(drive)
     n = model.n
     q, v, tau = as_vector(q, n, "q"), as_vector(v, n, "v"), as_vector(tau, n, "tau")
     batch_shape((q, v, tau), ("q", "v", "tau"))

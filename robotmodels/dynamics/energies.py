@@ -7,6 +7,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_vector, batch_rows
+from ..drive import check_all_or_none
 from ..model import RobotModel, check_model
 
 
@@ -46,6 +47,7 @@ def kinetic_energy(model: RobotModel, q: ArrayLike, v: ArrayLike, drive: bool = 
     1.0
     """
     check_model(model)
+    check_all_or_none(drive)
     q, v = as_vector(q, model.n, "q"), as_vector(v, model.n, "v")
     twin = model.twin
     if q.ndim == v.ndim == 1 and twin.serves_dynamics:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, as_exact, as_vector, batch_rows, batch_shape
-from ..drive import DriveParameters, Transmission
+from ..drive import DriveKind, DriveParameters, Drives, Transmission, drive_kinds
 from ..errors import InvalidValueError
 from ..friction import Friction, check_friction, check_linear
 from ..inertia import InertialParameters
@@ -25,8 +25,8 @@ class Base(Protocol):
         ...
 
     @property
-    def drive(self) -> bool:
-        """Whether drive parameters are among them."""
+    def drive(self) -> Drives:
+        """Which drive parameters are among them."""
         ...
 
     @property
@@ -65,7 +65,8 @@ def base_model(model: RobotModel, base: Base, values: ArrayLike) -> RobotModel:
     Returns
     -------
     RobotModel
-        A new model. Drive parameters are those of the model if there are none among the base ones.
+        A new model. Drive parameters of the kinds that are not among the base ones are those of the
+        model.
 
     Raises
     ------
@@ -104,20 +105,28 @@ def _split(model: RobotModel, base: Base, values: ArrayLike) -> tuple[RobotModel
     b = as_exact(values, (len(base.kept),), "values")
     f, n = model.f, model.n
     coupled = np.array(_coupled(model), dtype=np.int64) - 1
-    count = 10 * f + (4 * n + 3 * coupled.size if base.drive else 0)
+    asked = drive_kinds(base.drive)
+    joined = [kind.coupling for kind in asked if kind.coupling is not None]
+    own = 10 * f + n * len(asked)
+    count = own + coupled.size * len(joined)
     kinds = 0 if base.friction is None else len(check_linear(base.friction).kinds)
     full = np.zeros(count + kinds * n)
     full[base.kept] = b
     extra = full[count:].reshape(kinds, n) if kinds else None
     bodies = model.with_inertia(InertialParameters(full[: 10 * f].reshape(f, 10)))
-    if not base.drive:
+    if not asked:
         return bodies, extra
-    drives = full[10 * f : 10 * f + 4 * n].reshape(4, n)
-    bodies = bodies.with_drive(DriveParameters(*drives))
-    if coupled.size and (K := model.transmission) is not None:
-        terms = np.zeros((3, n))
-        terms[:, coupled] = full[10 * f + 4 * n : count].reshape(3, coupled.size)
-        bodies = bodies.with_transmission(Transmission(K.matrix, K.offset, *terms))
+    drives = dict(
+        zip((kind.value for kind in asked), full[10 * f : own].reshape(-1, n), strict=True)
+    )
+    rest = {kind.value: getattr(model.drive, kind.value) for kind in DriveKind}
+    bodies = bodies.with_drive(DriveParameters(**{**rest, **drives}))
+    if coupled.size and joined and (K := model.transmission) is not None:
+        terms = {"Iam": K.Iam, "Fvm": K.Fvm, "Fcm": K.Fcm}
+        for name, values_of in zip(joined, full[own:count].reshape(len(joined), -1), strict=True):
+            terms[name] = np.zeros(n)
+            terms[name][coupled] = values_of
+        bodies = bodies.with_transmission(Transmission(K.matrix, K.offset, **terms))
     return bodies, extra
 
 
@@ -142,7 +151,8 @@ def idm_from_base(
     base : BaseParameters
         Which b parameters are kept.
     values : array_like, shape (b,)
-        Their values. If there are no drive parameters among them, those of the model act.
+        Their values. Of the kinds of drive parameters that are not among them, those of the model
+        act.
     q, v, a : array_like, shape (..., n)
         Joint variables (rad or m), velocities and accelerations; the leading axes broadcast.
     wrench : array_like, shape (..., 6), optional

@@ -6,6 +6,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_vector, batch_shape
+from ..drive import check_all_or_none
 from ..friction import Friction, check_friction
 from ..model import RobotModel, check_model
 from .rigid import rigid_torques
@@ -26,6 +27,10 @@ def idm(
     Also called inverse dynamics, ``rnea``, ``rne``.
 
     ``tau = M(q) a + C(q, v) v + g(q) + J^T wrench + Ia a + Fv v + Fc sign(v) + offset + friction``
+
+    It is linear in the inertial parameters and takes any of them, base parameters as well as a mass
+    that came out negative; whether links are real bodies, `InertialParameters.is_physical` tells,
+    and `ddm` and `simulate` name those that are not. An empty batch gives an empty result.
 
     Parameters
     ----------
@@ -68,6 +73,7 @@ def idm(
     array([1.962])
     """
     check_model(model)
+    check_all_or_none(drive)
     n = model.n
     q, v, a = as_vector(q, n, "q"), as_vector(v, n, "v"), as_vector(a, n, "a")
     if wrench is not None:

@@ -9,6 +9,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, as_vector, batch_rows
+from ..drive import check_all_or_none
 from ..model import RobotModel, check_model
 
 
@@ -47,6 +48,7 @@ def mass_matrix(model: RobotModel, q: ArrayLike, drive: bool = True) -> Array:
     array([[0.02]])
     """
     check_model(model)
+    check_all_or_none(drive)
     q = as_vector(q, model.n, "q")
     twin = model.twin
     if q.ndim == 1 and twin.serves_dynamics:

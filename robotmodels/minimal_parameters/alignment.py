@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import ceil, log10
+
 import numpy as np
 
 from .._arrays import Array
@@ -9,6 +11,7 @@ from ..geometry import FIXED
 from ..model import RobotModel
 
 _ROUNDING, _NEAR = 1e-13, 1e-4
+_GREATEST = 1e-2  # of a tolerance
 _LONGEST_LIST = 4
 
 
@@ -46,9 +49,11 @@ def near_alignments(model: RobotModel, tolerance: float) -> tuple[str, ...]:
     if taken:
         out.append(f"Taken as exact: {_listed(taken)}.")
     if apart:
+        greatest = max(off for off, _ in apart)
+        enough = min(10.0 ** (ceil(log10(greatest)) + 1), _GREATEST)
         out.append(
             f"Not exact: {_listed(apart)}. What they show beyond {tolerance:.0e} of the largest "
-            "torque is kept; a greater tolerance takes them as exact."
+            f"torque is kept; tolerance={enough:.0e} takes them as exact."
         )
     return tuple(out)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .._arrays import Array
+from ..drive import Drives, drive_kinds
 from ..geometry import PRISMATIC, REVOLUTE
 from ..model import RobotModel
 from .restraint import reach
@@ -13,7 +14,7 @@ _SAME = 1e-9
 """Difference of constants, relative to 1 (directions) or to the robot's size, that is rounding."""
 
 
-def differences(model: RobotModel, other: RobotModel, drive: bool) -> tuple[str, ...]:
+def differences(model: RobotModel, other: RobotModel, drive: Drives) -> tuple[str, ...]:
     """What gives two robots other base parameters; inertial and drive parameters do not matter.
 
     Neither do the zeros of the joints (theta of a revolute joint, r of a prismatic one), the place
@@ -23,8 +24,8 @@ def differences(model: RobotModel, other: RobotModel, drive: bool) -> tuple[str,
     ----------
     model, other : RobotModel
         Two robots.
-    drive : bool
-        Whether the drives are among the parameters.
+    drive : bool or collection of DriveKind
+        Which drives are among the parameters.
 
     Returns
     -------
@@ -58,7 +59,7 @@ def differences(model: RobotModel, other: RobotModel, drive: bool) -> tuple[str,
     down, below = (np.asarray(m.gravity) @ m.chain.base_rotation for m in (model, other))
     if np.abs(down - below).max() > _SAME * max(1.0, float(np.abs(down).max())):
         found.append(f"gravity in the base is {_shown(below)} instead of {_shown(down)} m/s^2")
-    if drive:
+    if any(kind.coupling is not None for kind in drive_kinds(drive)):
         found += _coupling_differences(model, other)
     return tuple(found)
 

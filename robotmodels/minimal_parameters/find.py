@@ -7,9 +7,9 @@ from typing import Any, Literal, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_core, as_vector, batch_rows
+from .._arrays import Array, as_core, as_floats, as_vector, batch_rows
 from .._choices import chosen
-from ..drive import Transmission
+from ..drive import Drives, Transmission, drive_kinds
 from ..errors import InvalidValueError, ShapeError
 from ..estimation import column_basis
 from ..estimation.columns import NOTHING
@@ -52,12 +52,13 @@ class TimedMotion(Protocol):
 
 Motion = tuple[ArrayLike, ArrayLike, ArrayLike] | SampledMotion | TimedMotion
 _SAMPLES = 1000
+_LARGEST = 1e-2
 
 
 def base_parameters(
     model: RobotModel,
     method: Literal["symbolic", "numeric"] | BaseMethod = "symbolic",
-    drive: bool = True,
+    drive: Drives = True,
     motion: Motion | None = None,
     constraint: ArrayLike | Transmission | None = None,
     tolerance: float = NOTHING,
@@ -77,22 +78,26 @@ def base_parameters(
         The robot, f frames and n joints; serial or tree, any base and gravity.
     method : {"symbolic", "numeric"}
         By Khalil's rules, with formulas, or from the columns of the torque regressor.
-    drive : bool
-        Whether the drive parameters are among the standard ones.
+    drive : bool or collection of DriveKind or str
+        Which drive parameters are among the standard ones: all, none, or kinds such as ``"Ia"`` or
+        ``("Ia", "Fv", "Fc")``. What couples motors goes with its kind.
     motion : tuple of array_like, shapes (N, n), Samples or Trajectory, optional
         Joint variables (rad or m), velocities and accelerations that the regressor is taken on, of
         the numeric method; default random ones. A trajectory is taken at 1000 times. What logged
-        motion does not show is not kept.
+        motion does not show is not kept, and `BaseParameters.notes` says so.
     constraint : array_like, shape (n, u), or Transmission, optional
         Joints that are bound to each other, ``v = constraint u`` (mimic joints, a transmission):
         the torques are those of the u free variables. Of the numeric method.
     tolerance : float
         What counts as nothing, by both methods: the part of the largest torque that a parameter
         may have without being kept, the sine of an angle between axes that are taken as parallel,
-        and a coefficient (of parameters in their natural units). The default keeps every torque to
-        1e-10. A file whose right angles are written "1.5708" has torques that differ from those of
-        right angles by 4e-6: take 1e-4 for the table that is meant. `BaseParameters.notes` says
-        which axes are nearly aligned.
+        and a coefficient (of parameters in their natural units); at most 0.01. The default keeps
+        the torques of each parameter to 1e-11 of the largest: whole torques to 1e-12 where axes are
+        aligned or clearly are not, and to about 3e-10 where they are off by some 1e-10 rad. On
+        logged motion the line goes to the widest gap within a factor of 30. A file
+        whose right angles are written "1.5708" has torques that differ from those of right angles
+        by 4e-6: take 1e-4 for the table that is meant. `BaseParameters.notes` says which axes are
+        nearly aligned, and which value takes them as exact.
     friction : Friction, optional
         A friction model that is linear in its parameters (`robotmodels.friction`), whose columns
         come after those of the drives.
@@ -106,7 +111,7 @@ def base_parameters(
     ------
     InvalidValueError
         Another method; motion or a constraint for the symbolic one; NaN; an empty log; friction
-        that is not linear.
+        that is not linear or repeats columns of the drives; a tolerance above 0.01.
     ShapeError
         Arrays of the wrong shape.
 
@@ -125,8 +130,8 @@ def base_parameters(
     """
     check_model(model)
     way = chosen(BaseMethod, method, "method")
-    if not 0.0 < tolerance < 1.0:
-        raise InvalidValueError(f"tolerance: expected a number between 0 and 1, got {tolerance}.")
+    kinds = drive_kinds(drive)
+    tolerance = _part(tolerance)
     if friction is not None:
         check_linear(check_friction(friction, model.n))
     notes = (*near_alignments(model, tolerance), *_transmission_notes(model, constraint))
@@ -137,13 +142,24 @@ def base_parameters(
             raise InvalidValueError(
                 f"{names[0]}: the symbolic method knows the table alone; use method='numeric'."
             )
-        return base_by_rules(model, bool(drive), tolerance, friction, notes)
+        return base_by_rules(model, kinds, tolerance, friction, notes)
     samples = None if motion is None else _samples(model, motion)
     bound = None
     if constraint is not None:
         bound, columns = _bound(model, constraint)
         notes = (*notes, *_constraint_notes(bound, columns))
-    return base_by_numbers(model, bool(drive), samples, bound, tolerance, friction, notes)
+    return base_by_numbers(model, kinds, samples, bound, tolerance, friction, notes)
+
+
+def _part(tolerance: Any) -> float:
+    """A tolerance: more than a part in a hundred of the torque is no nothing."""
+    value = as_floats(tolerance, "tolerance")
+    if value.ndim != 0 or not 0.0 < value <= _LARGEST:
+        raise InvalidValueError(
+            f"tolerance: expected a number above 0 and up to {_LARGEST:g}, the part of the largest "
+            f"torque that counts as nothing, got {tolerance!r:.60}."
+        )
+    return float(value)
 
 
 def _samples(model: RobotModel, motion: Motion) -> tuple[Array, Array, Array]:

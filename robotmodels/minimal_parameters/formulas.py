@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
+from ..drive import Drives
 from ..geometry import PRISMATIC, REVOLUTE
 from ..model import RobotModel
 from ..symbolic_dgm._angles import exact_turns
@@ -122,7 +123,7 @@ def numeric_formulas(
 
 def symbolic_formulas(
     model: RobotModel,
-    drive: bool,
+    drive: Drives,
     kept: NDArray[np.int64],
     matrix: Array,
     names: Sequence[str],
@@ -134,8 +135,8 @@ def symbolic_formulas(
     ----------
     model : RobotModel
         The robot.
-    drive : bool
-        Whether drive parameters are among the standard ones.
+    drive : bool or collection of DriveKind
+        Which drive parameters are among the standard ones.
     kept : ndarray of int, shape (b,)
         Numbers of the kept ones.
     matrix : ndarray, shape (b, p)

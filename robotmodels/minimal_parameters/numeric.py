@@ -5,19 +5,21 @@ from __future__ import annotations
 from math import ceil, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .._arrays import Array
+from ..drive import DriveKind, Drives, drive_kinds
 from ..estimation import ColumnBasis, column_basis
 from ..estimation.columns import NOTHING
 from ..estimation.triangles import factors_by_kind
 from ..friction import Friction, check_linear
 from ..geometry import PRISMATIC
 from ..model import RobotModel
-from ..regressors import parameter_names, torque_regressor_chunks
+from ..regressors import parameter_names, torque_regressor, torque_regressor_chunks
 from .branches import columns_by_branches
+from .gap import FoundColumns, doubts, miss, unseen, with_clear_gap
 from .restraint import reach
 from .result import BaseMethod, BaseParameters
+from .rules import EARTH
 
 _ROWS_A_COLUMN = 3
 _PIECE = 1024
@@ -25,11 +27,13 @@ _MANY = 250
 """Columns beyond which a tree is taken path by path."""
 _SLOWEST = 6.0
 """Decades of velocities that friction is looked at on."""
+_FRESH = 40
+"""Samples on which the torques are compared at last."""
 
 
 def base_by_numbers(
     model: RobotModel,
-    drive: bool,
+    drive: Drives,
     samples: tuple[Array, Array, Array] | None = None,
     constraint: Array | None = None,
     tolerance: float = NOTHING,
@@ -42,8 +46,8 @@ def base_by_numbers(
     ----------
     model : RobotModel
         The robot, n joints.
-    drive : bool
-        Whether drive parameters are among the standard ones.
+    drive : bool or collection of DriveKind
+        Which drive parameters are among the standard ones.
     samples : tuple of ndarray, shapes (N, n), optional
         Joint variables, velocities and accelerations; default random ones.
     constraint : ndarray, shape (n, u), optional
@@ -72,21 +76,28 @@ def base_by_numbers(
     >>> len(base), base.gap[0] > 0.01, base.gap[1] < 1e-12
     (58, True, True)
     """
-    basis = base_columns(model, drive, samples, constraint, tolerance, friction)
+    kinds = drive_kinds(drive)
+    found = base_columns(model, kinds, samples, constraint, tolerance, friction)
+    basis, names = found.basis, parameter_names(model, kinds, friction)
+    notes = (*notes, *doubts(names, basis, tolerance, samples is not None))
+    if samples is not None:
+        whole = base_columns(model, kinds, None, constraint, tolerance, friction).basis.kept
+        notes = (*notes, *unseen(names, basis.kept, whole))
+    missed = missed_torque(model, kinds, friction, constraint, samples, basis)
     return BaseParameters(
-        model, drive, basis.kept, basis.coefficients, BaseMethod.NUMERIC, basis.gap, friction,
-        tolerance, notes,
+        model, kinds, basis.kept, basis.coefficients, BaseMethod.NUMERIC, basis.gap, friction,
+        tolerance, (*notes, *miss(missed, tolerance)), found.neglected, missed,
     )  # fmt: skip
 
 
 def base_columns(
     model: RobotModel,
-    drive: bool,
+    drive: Drives,
     samples: tuple[Array, Array, Array] | None = None,
     constraint: Array | None = None,
     tolerance: float = NOTHING,
     friction: Friction | None = None,
-) -> ColumnBasis:
+) -> FoundColumns:
     """Independent columns of the torque regressor; arguments as `base_by_numbers`.
 
     The link parameters of the first frames are preferred, then Ia, Fv, Fc, offset and those of
@@ -96,22 +107,32 @@ def base_columns(
     Examples
     --------
     >>> from robotmodels.robots import load
-    >>> base_columns(load("planar_2r"), drive=False).kept
+    >>> base_columns(load("planar_2r"), drive=False).basis.kept
     array([ 5, 15, 16, 17])
     """
-    factors = torque_factors(model, drive, samples, constraint, friction)
-    scale, kinds = natural_sizes(model, drive, friction)
+    kinds = drive_kinds(drive)
+    factors = torque_factors(model, kinds, samples, constraint, friction)
+    scale = natural_sizes(model, kinds, friction)
     coupled = model.transmission is not None and model.transmission.coupled_motors
+    W = np.vstack([np.zeros((0, len(scale))), *factors])
+    basis = None
     if len(scale) > _MANY and constraint is None and not coupled:
-        found = columns_by_branches(model, factors, scale, kinds, tolerance)
-        if found is not None:
-            return found
-    return column_basis(np.vstack(factors), None, scale, tolerance, kinds)
+        alike = np.zeros(len(scale), dtype=np.int64)
+        basis = columns_by_branches(model, factors, scale, alike, tolerance)
+    if basis is None:
+        basis = column_basis(W, None, scale, tolerance)
+    if samples is not None:
+        basis = with_clear_gap(W, scale, tolerance, basis)
+    length = np.sqrt((W * W).sum(axis=0)) * scale
+    shows = length > NOTHING * length.max(initial=0.0)
+    names = parameter_names(model, kinds, friction)
+    neglected = np.flatnonzero(shows & ~basis.coefficients.any(axis=0))
+    return FoundColumns(basis, tuple(names[k] for k in neglected))
 
 
 def torque_factors(
     model: RobotModel,
-    drive: bool,
+    drive: Drives,
     samples: tuple[Array, Array, Array] | None = None,
     constraint: Array | None = None,
     friction: Friction | None = None,
@@ -148,7 +169,7 @@ def _random_motion(
     rng = np.random.default_rng(0)
     G = np.eye(model.n) if constraint is None else constraint
     u = G.shape[1]
-    rate = sqrt(9.81 / size)
+    rate = sqrt(EARTH / size)
     N = ceil(_ROWS_A_COLUMN * p / max(u, 1))
     # joints may turn all round and slide by the robot's size
     spread = np.diag(units) if constraint is None else np.eye(u) * units.max(initial=0.0)
@@ -161,48 +182,97 @@ def _random_motion(
     return q, v, a
 
 
-def natural_sizes(
-    model: RobotModel, drive: bool, friction: Friction | None = None
-) -> tuple[Array, NDArray[np.int64]]:
-    """Parameters of a robot of this size and unit mass, and which are of one kind.
+def natural_sizes(model: RobotModel, drive: Drives, friction: Friction | None = None) -> Array:
+    """Parameters of a robot of this size and unit mass, with torques as its weight gives them.
 
     Parameters
     ----------
     model : RobotModel
         The robot.
-    drive : bool
-        Whether drive parameters are among the standard ones.
+    drive : bool or collection of DriveKind
+        Which drive parameters are among the standard ones.
     friction : Friction, optional
         A linear friction model.
 
     Returns
     -------
-    sizes : ndarray, shape (p,)
+    ndarray, shape (p,)
         In the units of the rows of `torque_factors`.
-    kinds : ndarray of int, shape (p,)
-        Inertias, first moments, masses, then the kinds of the drives and of friction.
 
     Examples
     --------
     >>> from robotmodels.robots import load
-    >>> natural_sizes(load("planar_2r"), drive=False)[1][:10]
-    array([0, 0, 0, 0, 0, 0, 1, 1, 1, 2])
+    >>> natural_sizes(load("rx90"), drive=False)[[0, 6, 9]].round(2)
+    array([0.81, 0.9 , 1.  ])
     """
-    size, n = reach(model), model.n
+    size = reach(model)
     link = [size**2] * 6 + [size] * 3 + [1.0]
     slides = model.table.sigma[model.table.joint_rows] == PRISMATIC
+    unit = np.where(slides, size, 1.0)
     rotor = np.where(slides, 1.0, size**2)
-    rate = sqrt(9.81 / size)
-    drives = [rotor, rotor * rate, rotor * rate**2, rotor * rate**2] if drive else []
-    rest = len(parameter_names(model, drive)) - 10 * model.f - n * len(drives)
-    added = 0 if friction is None else len(check_linear(friction).kinds)
-    sizes = np.concatenate((
-        np.tile(link, model.f), *drives, np.full(rest, size**2), *[rotor * rate**2] * added
-    ))  # fmt: skip
-    kinds = np.concatenate((
-        np.tile([0] * 6 + [1] * 3 + [2], model.f),
-        np.repeat(np.arange(3, 3 + len(drives)), n),
-        np.full(rest, 7),
-        np.repeat(np.arange(8, 8 + added), n),
-    ))  # fmt: skip
-    return sizes, kinds.astype(np.int64)
+    rate = sqrt(EARTH / size)
+    torque = rotor * unit * rate**2
+    of_kind = {
+        DriveKind.IA: (rotor, size**2), DriveKind.FV: (rotor * rate, size**2 * rate),
+        DriveKind.FC: (torque, size**2 * rate**2), DriveKind.OFFSET: (torque, 0.0),
+    }  # fmt: skip
+    kinds = drive_kinds(drive)
+    motors = () if model.transmission is None else model.transmission.coupled_motors
+    joined = [np.full(len(motors), of_kind[k][1]) for k in kinds if k.coupling is not None]
+    extra: list[Array] = []
+    if friction is not None:
+        linear = check_linear(friction)
+        speeds = unit * rate * 10.0 ** -np.arange(0.0, _SLOWEST + 1.0)[:, None]
+        basis = np.abs(linear.basis(np.concatenate((speeds, -speeds))))
+        extra = list(torque / np.maximum(1.0, basis.max(axis=0)))
+    own = [of_kind[kind][0] for kind in kinds]
+    return np.concatenate((np.tile(link, model.f), *own, *joined, *extra))
+
+
+def missed_torque(
+    model: RobotModel, drive: tuple[DriveKind, ...], friction: Friction | None,
+    constraint: Array | None, samples: tuple[Array, Array, Array] | None, basis: ColumnBasis,
+) -> float:  # fmt: skip
+    """Part of the torques of some parameters that their base parameters miss.
+
+    Looked at on a motion that has not been used and does not know the size that the robot was
+    taken to have; on a log, at some of its own samples.
+
+    Parameters
+    ----------
+    model, drive, friction, constraint, samples
+        As for `base_by_numbers`.
+    basis : ColumnBasis
+        What was found.
+
+    Returns
+    -------
+    float
+        Largest missed torque relative to the largest torque; 0 where there is none.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> arm = load("planar_2r")
+    >>> missed_torque(arm, (), None, None, None, base_columns(arm, False).basis) < 1e-13
+    True
+    """
+    rng = np.random.default_rng(1)
+    if samples is None:
+        G = np.eye(model.n) if constraint is None else constraint
+        u = (
+            rng.uniform(-1.0, 1.0, (3, _FRESH, G.shape[1]))
+            * np.array([np.pi, 2.0, 2.0])[:, None, None]
+        )
+        samples = u[0] @ G.T, u[1] @ G.T, u[2] @ G.T
+    else:
+        some = np.unique(np.linspace(0, len(samples[0]) - 1, _FRESH).astype(np.int64))
+        samples = samples[0][some], samples[1][some], samples[2][some]
+    W = torque_regressor(model, *samples, drive=drive, friction=friction)
+    if constraint is not None:
+        W = np.einsum("iu,kip->kup", constraint, W)
+    pi = rng.normal(size=W.shape[-1])
+    torque = W @ pi
+    missed = W[..., basis.kept] @ (basis.coefficients @ pi) - torque
+    largest = float(np.abs(torque).max(initial=0.0))
+    return float(np.abs(missed).max(initial=0.0)) / largest if largest > 0.0 else 0.0

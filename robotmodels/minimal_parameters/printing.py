@@ -7,6 +7,7 @@ import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from ..drive import drive_kinds
 from ..geometry import PRISMATIC
 from ..latex_text import escaped, powers
 from .formulas import Constant, Formula, constants_of
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
     from .result import BaseParameters
 
 _WIDTH = 100
+_LONGEST = 180
+"""Letters of a formula, beyond which its numbers are easier to read."""
 
 
 def table_text(base: BaseParameters) -> str:
@@ -39,18 +42,16 @@ def table_text(base: BaseParameters) -> str:
       ZZ1R = ZZ1 + YY2 + ZZ3
     """
     lines = [_heading(base), *(_wrapped("", note) for note in base.notes)]
-    regrouped = [
-        pair for pair in zip(base.formulas, base.numbers, strict=True) if pair[0].is_regrouped
-    ]
+    regrouped = _shown(base)
     if regrouped:
         lines.append(
             "Regrouped (R: in place of the sum, of which no motion shows the terms apart):"
         )
     width = max((len(formula.name) for formula, _ in regrouped), default=0) + 1
     for formula, numbers in regrouped:
-        lines.append(f"  {formula.name + 'R':<{width}} = {_sum_text(formula)}")
+        lines.append(_equation(f"  {formula.name + 'R':<{width}} = ", formula))
         if formula != numbers and any(c.isalpha() for t in formula.terms for c in t.text):
-            lines.append(f"  {'':<{width}} = {_sum_text(numbers)}")
+            lines.append(_equation(f"  {'':<{width}} = ", numbers))
     if used := _used(base):
         said = ", ".join(f"{c.text} = {c.value:.6g} {c.unit}" for c in used)
         lines.append(_wrapped("  with ", said))
@@ -58,12 +59,15 @@ def table_text(base: BaseParameters) -> str:
         lines.append(_wrapped("Alone, as they are: ", ", ".join(base.alone)))
     if base.no_effect:
         lines.append(_wrapped("Without effect: ", ", ".join(base.no_effect)))
+    if base.neglected:
+        lines.append(_wrapped(f"{_neglected(base)}: ", ", ".join(base.neglected)))
     lines.append(_wrapped("Units: ", _units(base)))
     if base.gap is not None:
-        lines.append(
-            f"Rank {len(base)}: of the longest column of its kind, the least kept one has "
-            f"{base.gap[0]:.1e} of its own, any other at most {base.gap[1]:.1e}."
+        said = (
+            f"of the longest column, the least kept one has {base.gap[0]:.1e} beyond the others, "
+            f"what is not kept at most {base.gap[1]:.1e}."
         )
+        lines.append(_wrapped(f"Rank {len(base)}: ", said))
     return "\n".join(lines)
 
 
@@ -74,16 +78,46 @@ def _heading(base: BaseParameters) -> str:
     )
 
 
+def _neglected(base: BaseParameters) -> str:
+    return f"Neglected, less than {base.tolerance:.0e} of the largest torque"
+
+
+def _shown(base: BaseParameters) -> list[tuple[Formula, Formula]]:
+    """What is regrouped, and the same in numbers; numbers alone where symbols fill lines."""
+    pairs = zip(base.formulas, base.numbers, strict=True)
+    return [
+        (numbers if len(_sum_text(formula)) > _LONGEST else formula, numbers)
+        for formula, numbers in pairs
+        if formula.is_regrouped
+    ]
+
+
+def _equation(label: str, formula: Formula) -> str:
+    """A line, or several that are broken between terms."""
+    line = label + _sum_text(formula)
+    if len(line) <= _WIDTH:
+        return line
+    # brackets of a factor are not broken, unless they alone are longer than the line
+    return textwrap.fill(
+        line, _WIDTH, subsequent_indent=" " * (len(label) + 2), break_long_words=False,
+        break_on_hyphens=False, drop_whitespace=True,
+    )  # fmt: skip
+
+
 def _units(base: BaseParameters) -> str:
     """Units of the kinds that there are."""
     slides = base.model.table.sigma[base.model.table.joint_rows] == PRISMATIC
     said = ["XX to ZZ kg m^2, MX to MZ kg m, M kg"]
-    if not base.drive:
-        return said[0]
-    if not slides.all():
-        said.append("Ia kg m^2, Fv N m s/rad, Fc and offset N m")
-    if slides.any():
-        said.append("of prismatic joints Ia kg, Fv N s/m, Fc and offset N")
+    kinds = {kind.value for kind in drive_kinds(base.drive)}
+    forces = [kind for kind in ("Fc", "offset") if kind in kinds]
+    for joints, mark, units in (
+        (~slides, "", ("kg m^2", "N m s/rad", "N m")),
+        (slides, "of prismatic joints ", ("kg", "N s/m", "N")),
+    ):
+        parts = [f"Ia {units[0]}"] * ("Ia" in kinds) + [f"Fv {units[1]}"] * ("Fv" in kinds)
+        parts += [f"{' and '.join(forces)} {units[2]}"] * bool(forces)
+        if joints.any() and parts:
+            said.append(mark + ", ".join(parts))
     return "; ".join(said)
 
 
@@ -115,7 +149,7 @@ def table_latex(base: BaseParameters) -> str:
     >>> print(base_parameters(load("planar_2r"), drive=False).latex.splitlines()[3])
     ZZ_{1R} &= ZZ_{1} + D_{2}^{2} \, M_{2}
     """
-    regrouped = [formula for formula in base.formulas if formula.is_regrouped]
+    regrouped = [formula for formula, _ in _shown(base)]
     out = [rf"\textbf{{{escaped(_heading(base))}}}", *(escaped(note) for note in base.notes)]
     if regrouped:
         body = " \\\\\n".join(
@@ -129,6 +163,9 @@ def table_latex(base: BaseParameters) -> str:
         out.append("Alone, as they are: " + ", ".join(f"${_symbol(name)}$" for name in base.alone))
     if base.no_effect:
         out.append("Without effect: " + ", ".join(f"${_symbol(n)}$" for n in base.no_effect))
+    if base.neglected:
+        names = ", ".join(f"${_symbol(name)}$" for name in base.neglected)
+        out.append(f"{_neglected(base)}: {names}")
     units = re.sub(r"\^(\d)", r"$^\1$", _units(base))
     out.append(f"Units: {units}")
     return "\n\n".join(out)
@@ -142,7 +179,7 @@ def _used(base: BaseParameters) -> Sequence[Constant]:
         return ()
     words = {
         word
-        for formula in base.formulas
+        for formula, _ in _shown(base)
         for term in formula.terms
         for word in re.findall(r"[A-Z]+\d*", term.text)
     }

@@ -136,8 +136,8 @@ def check_definite(bodies: InertialParameters, name: str, frames: Sequence[str] 
         more = f" So are {bad.size - 1} more." if bad.size > 1 else ""
         raise InertiaError(
             f"{name}: {link} is no body with mass and extent in three directions: "
-            f"{_wrong(bodies, j)}.{more} Give a CAD model of every link, or "
-            "uniform_bodies(model, mass)."
+            f"{_wrong(bodies, j)}.{more} Pass "
+            f"{name}=uniform_bodies(model, mass=...), or a CAD model of every link."
         )
     return P
 

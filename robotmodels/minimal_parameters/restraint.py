@@ -23,6 +23,10 @@ EXACT = 1e-11
 direction, perpendicular, or through one point."""
 
 
+_LEAST = 1e-4
+"""Metres: the least reach of a robot."""
+
+
 class Turning(Enum):
     """Which rotations a link can have."""
 
@@ -143,7 +147,10 @@ class _Tolerance:
 
 
 def reach(model: RobotModel) -> float:
-    """Reach of the table, metres; 1 where all lengths are zero.
+    """Reach of the table, metres; 1 where its lengths come to nothing.
+
+    Lengths that together are less than 0.1 mm are rounding, or offsets of a robot that only slides
+    or turns: no unit to measure it with.
 
     Parameters
     ----------
@@ -163,7 +170,7 @@ def reach(model: RobotModel) -> float:
     """
     table = model.table
     lengths = float(np.sqrt(table.d**2 + table.r**2 + table.b**2).sum())
-    return lengths if lengths > 0 else 1.0
+    return lengths if lengths > _LEAST else 1.0
 
 
 def _with_joint(before: Restraint, sigma: int, z: Array, P: Array, within: _Tolerance) -> Restraint:

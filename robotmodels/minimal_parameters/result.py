@@ -11,16 +11,18 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, as_floats, read_only
+from .._arrays import Array, as_exact, as_floats, read_only
+from ..drive import Drives, drive_kinds
 from ..errors import InvalidValueError, ShapeError
 from ..estimation.columns import NOTHING
 from ..friction import Friction
 from ..latex_text import markdown
 from ..model import RobotModel, check_model
-from ..regressors import parameter_names, parameter_vector
+from ..regressors import energy_parameter_names, parameter_names, parameter_vector
 from .belonging import differences
 from .formulas import Formula, numeric_formulas, symbolic_formulas
 from .printing import table_latex, table_text
+from .values_table import BaseValues, KeptNames, base_values
 
 
 class BaseMethod(Enum):
@@ -46,8 +48,9 @@ class BaseParameters:
     ----------
     model : RobotModel
         The robot.
-    drive : bool
-        Whether its drive parameters are among the p standard parameters.
+    drive : bool or collection of DriveKind or str
+        Which kinds of its drive parameters are among the p standard parameters; kept as a tuple of
+        `DriveKind`, empty where there are none.
     kept : ndarray of int, shape (b,)
         Which of them are kept, by number.
     matrix : ndarray, shape (b, p)
@@ -56,16 +59,22 @@ class BaseParameters:
         How they were found.
     gap : (float, float), optional
         Of the numeric method: the least that a kept column has beyond those kept before it, and the
-        most that one has which is not kept; as part of the longest column of its kind (inertias,
-        first moments, masses, rotors, ...). So a column that nearly depends on others is told as
-        well as one that is nearly empty. Far apart, the rank is beyond doubt.
+        most that one has which is not kept, as parts of the longest column of all (parameters in
+        natural units, those of a robot of this size and unit mass). It is what decides: what is
+        below the tolerance is not kept. Far apart, the rank is beyond doubt; where they are not,
+        `notes` says which parameters are in doubt.
     friction : Friction, optional
         A linear friction model whose parameters come after those of the drives.
     tolerance : float
         Part of the largest torque that counts as nothing.
     notes : tuple of str
         What is to be known of the result, in sentences: axes that are aligned only nearly, joints
-        that are constrained.
+        that are constrained, a rank that is in doubt, a motion that shows little.
+    neglected : tuple of str
+        Parameters that torques show, but with less than the tolerance.
+    missed : float, optional
+        Largest torque that they miss on a motion that was not used to find them, as part of the
+        largest; of logged motion on its own samples. None where rules alone gave them.
 
     Raises
     ------
@@ -89,7 +98,7 @@ class BaseParameters:
     """
 
     model: RobotModel
-    drive: bool
+    drive: Drives
     kept: NDArray[np.int64]
     matrix: Array
     method: BaseMethod
@@ -97,8 +106,11 @@ class BaseParameters:
     friction: Friction | None = None
     tolerance: float = NOTHING
     notes: tuple[str, ...] = ()
+    neglected: tuple[str, ...] = ()
+    missed: float | None = None
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "drive", drive_kinds(self.drive))
         object.__setattr__(self, "kept", read_only(self.kept, np.int64))
         object.__setattr__(self, "matrix", read_only(self.matrix))
         shape = (len(self.kept), len(self.parameter_names))
@@ -121,7 +133,9 @@ class BaseParameters:
     @cached_property
     def no_effect(self) -> tuple[str, ...]:
         """Standard parameters that no torque shows."""
-        return tuple(np.array(self.parameter_names)[~self.matrix.any(axis=0)].tolist())
+        shown = {*self.neglected}
+        names = np.array(self.parameter_names)[~self.matrix.any(axis=0)].tolist()
+        return tuple(name for name in names if name not in shown)
 
     @cached_property
     def alone(self) -> tuple[str, ...]:
@@ -132,19 +146,21 @@ class BaseParameters:
     @cached_property
     def in_combination(self) -> tuple[str, ...]:
         """Standard parameters that are determined only together with others."""
-        apart = {*self.no_effect, *self.alone}
+        apart = {*self.no_effect, *self.neglected, *self.alone}
         return tuple(name for name in self.parameter_names if name not in apart)
 
     @cached_property
     def regrouping(self) -> Mapping[str, Mapping[str, float]]:
-        """Of each kept parameter, the coefficients of all that it stands for, itself included."""
+        """Of each kept parameter, the coefficients of all that it stands for, itself included.
+
+        By its standard name, ``ZZ1``, or as it is printed, ``ZZ1R``.
+        """
         names = self.parameter_names
-        return MappingProxyType(
-            {
-                name: MappingProxyType({names[k]: float(row[k]) for k in np.flatnonzero(row)})
-                for name, row in zip(self.names, self.matrix, strict=True)
-            }
+        found = KeptNames(
+            (name, MappingProxyType({names[k]: float(row[k]) for k in np.flatnonzero(row)}))
+            for name, row in zip(self.names, self.matrix, strict=True)
         )
+        return MappingProxyType(found)
 
     @cached_property
     def null_space(self) -> Array:
@@ -189,10 +205,26 @@ class BaseParameters:
         p = len(self.parameter_names)
         if W.ndim < 1 or W.shape[-1] != p:
             raise ShapeError(
-                f"W: expected shape (..., {p}), a column for each standard parameter (with or "
-                f"without drives as these base parameters), got {W.shape}."
+                f"W: expected shape (..., {p}), a column for each standard parameter (with the "
+                f"same drives and friction as these base parameters), got {W.shape}."
+                + self._energy_hint(W.shape[-1] if W.ndim else 0)
             )
         return np.ascontiguousarray(W[..., self.kept])
+
+    def _energy_hint(self, columns: int) -> str:
+        """What is missing where a regressor has the columns of an energy."""
+        energy = energy_parameter_names(self.model, self.drive)
+        if columns not in (len(energy), len(energy_parameter_names(self.model))):
+            return ""
+        kinds = dict.fromkeys(
+            name.rstrip("0123456789") for name in self.parameter_names if name not in energy
+        )
+        if not kinds:
+            return ""
+        return (
+            f" An energy has no columns of {', '.join(kinds)}: reduce it by base parameters without"
+            " them, base_parameters(model, drive=('Ia',))."
+        )
 
     def values(self, model: RobotModel) -> Array:
         """Base parameters of a model's own standard parameters.
@@ -222,6 +254,39 @@ class BaseParameters:
         """
         self.check(model)
         return self.matrix @ parameter_vector(model, self.drive, self.friction)
+
+    def value_table(self, values: RobotModel | ArrayLike) -> BaseValues:
+        """Names, values and units side by side.
+
+        Parameters
+        ----------
+        values : RobotModel or array_like, shape (b,)
+            A robot of the same structure, or values such as identified ones.
+
+        Returns
+        -------
+        BaseValues
+            A mapping of names to values that prints as a table.
+
+        Raises
+        ------
+        InvalidValueError, ShapeError
+            A robot with other base parameters; another number of values; NaN.
+
+        Examples
+        --------
+        >>> from robotmodels.robots import load
+        >>> from robotmodels.minimal_parameters import base_parameters
+        >>> arm = load("planar_2r")
+        >>> table = base_parameters(arm, drive=False).value_table([4.0, 1.0, 0.5, 0.0])
+        >>> table["ZZ1"], table["ZZ1R"]
+        (4.0, 4.0)
+        """
+        if isinstance(values, RobotModel):
+            numbers = self.values(values)
+        else:
+            numbers = as_exact(values, (len(self),), "values")
+        return base_values(self, numbers)
 
     def belongs_to(self, model: RobotModel) -> bool:
         """Whether a robot has these base parameters, with values of its own.
@@ -315,5 +380,5 @@ class BaseParameters:
     def __reduce__(self) -> tuple[object, ...]:  # rebuilt, so that its arrays are read-only again
         return type(self), (
             self.model, self.drive, self.kept, self.matrix, self.method, self.gap, self.friction,
-            self.tolerance, self.notes,
+            self.tolerance, self.notes, self.neglected, self.missed,
         )  # fmt: skip

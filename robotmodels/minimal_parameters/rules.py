@@ -22,7 +22,7 @@ product:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,9 +30,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
+from ..drive import DriveKind, Drives, drive_kinds
 from ..geometry import FIXED, REVOLUTE
 from ..model import RobotModel
 from .restraint import EXACT, Restraint, Turning, parallel, restraints
+
+EARTH = 9.81
+"""Gravity that motion and torques are compared with, m/s^2."""
 
 Combination = dict[int, Any]
 """Coefficients of standard parameters by their number; numbers or formulas."""
@@ -115,7 +119,7 @@ def regrouped(
     model: RobotModel,
     rows: Sequence[RowConstants],
     directions: Sequence[Array],
-    drive: bool,
+    drive: Drives,
     tolerance: float = EXACT,
 ) -> dict[int, Combination]:
     """Apply the rules to all joints, from the last to the first.
@@ -128,8 +132,8 @@ def regrouped(
         The numbers, or the formulas, that the coefficients are made of, row by row.
     directions : sequence of ndarray, shapes (3,)
         The direction of `Restraint` of each frame 1..f, as numbers or formulas.
-    drive : bool
-        Whether ``Ia``, ``Fv``, ``Fc`` and ``offset`` are among the parameters.
+    drive : bool or collection of DriveKind
+        Which of ``Ia``, ``Fv``, ``Fc`` and ``offset`` are among the parameters.
     tolerance : float
         Sine of an angle, and length relative to that of the robot, that count as none.
 
@@ -152,10 +156,12 @@ def regrouped(
     4
     """
     f, n = model.f, model.n
-    work = _Regrouping(model, 10 * f + (4 * n if drive else 0))
+    kinds = drive_kinds(drive)
+    starts = {kind: 10 * f + n * i for i, kind in enumerate(kinds)}
+    work = _Regrouping(model, 10 * f + n * len(kinds))
     found = restraints(model, tolerance)
     gravity = np.asarray(model.gravity) @ model.chain.base_rotation
-    weight = float(np.linalg.norm(gravity))
+    weight = weight_of(model, tolerance)
     down = gravity / weight if weight > 0 else np.zeros(3)
     vertical = _directions_along(model, found, down, tolerance)
     loads = loads_of(model, tolerance)
@@ -165,8 +171,9 @@ def regrouped(
         before, own = found[work.antecedent[j - 1]], found[j]
         row, e = rows[j - 1], directions[j - 1]
         unloaded = weight == 0.0 or vertical[j]
-        if drive and sigma != FIXED:
-            _regroup_drive(work, model, j, joint, before, row, loads[j - 1] != 0.0, tolerance)
+        if sigma != FIXED:
+            drives = {kind: start + joint for kind, start in starts.items()}
+            _regroup_drive(work, model, j, drives, before, row, loads[j - 1] != 0.0, tolerance)
         if sigma == FIXED:
             _regroup_body(work, j, row)
         elif own.turning is Turning.NONE:
@@ -214,6 +221,31 @@ def rows_of_numbers(
     return rows, [restraint.direction for restraint in restraints(model, tolerance)[1:]]
 
 
+def weight_of(model: RobotModel, tolerance: float = EXACT) -> float:
+    """Magnitude of gravity, exactly 0 where it is none.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot.
+    tolerance : float
+        Part of the earth's gravity that counts as none.
+
+    Returns
+    -------
+    float
+        m/s^2.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> weight_of(load("rx90"))
+    9.81
+    """
+    weight = float(np.linalg.norm(model.gravity))
+    return weight if weight > tolerance * EARTH else 0.0
+
+
 def loads_of(model: RobotModel, tolerance: float = EXACT) -> list[float]:
     """Gravity along the axis of each frame with every joint at zero; none is exactly 0.
 
@@ -235,8 +267,11 @@ def loads_of(model: RobotModel, tolerance: float = EXACT) -> list[float]:
     >>> loads_of(load("cobra_s600"))[2]
     9.81
     """
+    weight = weight_of(model, tolerance)
+    if weight == 0.0:
+        return [0.0] * model.f
     gravity = np.asarray(model.gravity) @ model.chain.base_rotation
-    slight = tolerance * max(1.0, float(np.linalg.norm(gravity)))
+    slight = tolerance * weight
     loads = [float(gravity @ _in_base(model, j)[:, 2]) for j in range(1, model.f + 1)]
     return [0.0 if abs(load) <= slight else load for load in loads]
 
@@ -293,10 +328,12 @@ def _regroup_body(work: _Regrouping, j: int, row: RowConstants) -> None:
 
 
 def _regroup_drive(
-    work: _Regrouping, model: RobotModel, j: int, joint: int, before: Restraint, row: RowConstants,
-    loaded: bool, tolerance: float,
+    work: _Regrouping, model: RobotModel, j: int, drives: Mapping[DriveKind, int],
+    before: Restraint, row: RowConstants, loaded: bool, tolerance: float,
 ) -> None:  # fmt: skip
-    first, Ia = 10 * (j - 1), 10 * model.f + joint
+    first, Ia, offset = 10 * (j - 1), drives.get(DriveKind.IA), drives.get(DriveKind.OFFSET)
+    if Ia is None:
+        return
     z = model.chain.rotation[j - 1][:, 2]
     if model.chain.sigma[j - 1] == REVOLUTE:
         is_first = before.turning is Turning.NONE
@@ -311,7 +348,9 @@ def _regroup_drive(
         return
     # M_j less the same mass in frame a acts on joint j alone: as Ia_j and, loaded, as a constant
     if loaded:
-        moved, factor = work.take(10 * model.f + 3 * model.n + joint), -1 / row.load
+        if offset is None:
+            return
+        moved, factor = work.take(offset), -1 / row.load
         work.add(Ia, -factor, moved)
     else:
         moved, factor = work.take(Ia), 1

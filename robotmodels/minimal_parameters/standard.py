@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, Rebuilt, as_core, as_exact, read_only
-from ..drive import DriveParameters, Transmission
+from ..drive import DriveKind, DriveParameters, Transmission, drive_kinds
 from ..errors import InvalidValueError, ShapeError
 from ..inertia import InertialParameters
 from ..model import RobotModel
@@ -23,6 +23,8 @@ MARGIN = 1e-3
 """Smallest eigenvalue of a link's pseudo-inertia, relative to the prior's."""
 _KEPT = 1e-9
 """Deviation relative to the largest base parameter that counts as none."""
+_SAME = 1e-14
+"""The same, of a prior that has the base parameters already."""
 
 
 class PhysicalStatus(Enum):
@@ -35,7 +37,10 @@ class PhysicalStatus(Enum):
     """
 
     EXACT = "The robot has exactly these base parameters."
-    NEAREST = "No real bodies have these base parameters; the robot has the nearest that some have."
+    NEAREST = (
+        "No real bodies and drives, with the margin asked for, have these base parameters; the "
+        "robot has the nearest that some have."
+    )
     NOT_CONVERGED = "The solver did not converge; the parameters are not to be used."
 
 
@@ -144,8 +149,10 @@ def standard_parameters(
 
     What no torque shows is taken from the prior, never from zeros: the result is the robot nearest
     to it among all with positive definite pseudo-inertias, and rotor inertias and frictions that
-    are not negative. If no such robot has the given base parameters, the nearest base parameters
-    that one has are taken, and the status and the deviation say so.
+    are not negative, those of coupled motors together: the matrices of ``Ia`` with ``Iam`` and of
+    ``Fv`` with ``Fvm`` are positive semidefinite. A prior that has the base parameters and is such
+    a robot is returned as it is. If no such robot has the given base parameters, the nearest base
+    parameters that one has are taken, and the status and the deviation say so.
 
     Parameters
     ----------
@@ -209,6 +216,8 @@ def standard_parameters(
     if W.ndim != 2:
         raise ShapeError(f"weights: expected shape (k, {len(base)}), got {W.shape}.")
     problem = ConeProblem(base, _prior_vector(base, bodies, drives), P0, margin)
+    if _is_same(base.matrix @ problem.prior - b, b) and problem.is_met(problem.prior):
+        return _result(base, b, problem.prior, drives, PhysicalStatus.EXACT, problem)
     x, outcome = problem.nearest_to_prior(b)
     if outcome is ConeOutcome.SOLVED:
         found = _result(base, b, x, drives, PhysicalStatus.EXACT, problem)
@@ -234,23 +243,33 @@ def _result(
     """The robot of the variables, and what it has of the base parameters."""
     f, n = base.model.f, base.model.n
     transmission = base.model.transmission
-    end = 10 * f
-    if base.drive:
-        end += 4 * n
-        Ia, Fv, Fc, offset = x[10 * f : end].reshape(4, n)
-        drives = DriveParameters(Ia=Ia, Fv=Fv, Fc=Fc, offset=offset)
-        if transmission is not None and transmission.coupled_motors:
-            motors = np.array(transmission.coupled_motors) - 1
-            terms = np.zeros((3, n))
-            terms[:, motors] = x[end : end + 3 * len(motors)].reshape(3, len(motors))
-            end += 3 * len(motors)
-            transmission = Transmission(transmission.matrix, transmission.offset, *terms)
+    kinds = drive_kinds(base.drive)
+    end = 10 * f + n * len(kinds)
+    found = dict(zip((k.value for k in kinds), x[10 * f : end].reshape(-1, n), strict=True))
+    rest = {kind.value: getattr(drives, kind.value) for kind in DriveKind}
+    drives = DriveParameters(**{**rest, **found})
+    if transmission is not None and transmission.coupled_motors:
+        motors = np.array(transmission.coupled_motors) - 1
+        terms = {
+            k.coupling: getattr(transmission, k.coupling).copy() for k in DriveKind if k.coupling
+        }
+        for kind in kinds:
+            if kind.coupling is not None:
+                terms[kind.coupling][motors] = x[end : end + len(motors)]
+                end += len(motors)
+        transmission = Transmission(transmission.matrix, transmission.offset, **terms)
     friction = None if base.friction is None else x[end:].reshape(-1, n)
     inertia = InertialParameters(x[: 10 * f].reshape(f, 10))
     return StandardParameters(
         inertia, drives, transmission, status, base.matrix @ x - b, problem.distance(x),
         base.parameter_names, problem.prior, x, friction,
     )  # fmt: skip
+
+
+def _is_same(deviation: Array, b: Array) -> bool:
+    return bool(
+        (np.abs(deviation) <= _SAME * np.maximum(np.abs(b), np.abs(b).max(initial=0.0))).all()
+    )
 
 
 def _is_kept(deviation: Array, b: Array) -> bool:

@@ -8,16 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
+from ..drive import DriveKind, Drives, drive_kinds
 from ..estimation import ColumnBasis, column_basis
 from ..estimation.columns import NOTHING
 from ..friction import Friction, check_linear
 from ..geometry import PRISMATIC
 from ..model import RobotModel
 from ..regressors import parameter_names
-from .numeric import base_columns, natural_sizes, torque_factors
+from .gap import doubts, miss
+from .numeric import base_columns, missed_torque, natural_sizes, torque_factors
 from .restraint import reach
 from .result import BaseMethod, BaseParameters
-from .rules import regrouped, rows_of_numbers
+from .rules import EARTH, regrouped, rows_of_numbers
 
 _FINEST, _COARSEST = 1e-13, 1e-2
 """Between these, sines and lengths relative to the robot's are neither nothing nor clear."""
@@ -25,7 +27,7 @@ _FINEST, _COARSEST = 1e-13, 1e-2
 
 def base_by_rules(
     model: RobotModel,
-    drive: bool,
+    drive: Drives,
     tolerance: float = NOTHING,
     friction: Friction | None = None,
     notes: tuple[str, ...] = (),
@@ -40,8 +42,8 @@ def base_by_rules(
     ----------
     model : RobotModel
         The robot.
-    drive : bool
-        Whether drive parameters are among the standard ones. Those of coupled motors follow no
+    drive : bool or collection of DriveKind
+        Which drive parameters are among the standard ones. Those of coupled motors follow no
         rule: they are looked at in numbers.
     tolerance : float
         Part of the largest torque, and sine of an angle, that count as nothing.
@@ -65,54 +67,70 @@ def base_by_rules(
     >>> len(base_by_rules(load("rx90"), drive=True))
     58
     """
-    kept, matrix = _by_rules(model, drive, tolerance, friction, _FINEST)
-    if not _is_clear(model, drive, tolerance, kept):
-        ruled, ruled_matrix = _by_rules(model, drive, tolerance, friction, tolerance)
-        basis = base_columns(model, drive, tolerance=tolerance, friction=friction)
-        kept, matrix = basis.kept, np.asarray(basis.coefficients)
-        if _holds(model, drive, tolerance, friction, basis, ruled, ruled_matrix):
-            kept, matrix = ruled, ruled_matrix
+    kinds = drive_kinds(drive)
+    kept, matrix = _by_rules(model, kinds, tolerance, friction, _FINEST)
+    if _is_clear(model, kinds, tolerance, kept):
+        return BaseParameters(
+            model, kinds, kept, matrix, BaseMethod.SYMBOLIC, None, friction, tolerance, notes
+        )
+    ruled, ruled_matrix = _by_rules(model, kinds, tolerance, friction, tolerance)
+    found = base_columns(model, kinds, tolerance=tolerance, friction=friction)
+    basis, names = found.basis, parameter_names(model, kinds, friction)
+    kept, matrix = basis.kept, np.asarray(basis.coefficients)
+    if _holds(model, kinds, tolerance, friction, basis, ruled, ruled_matrix):
+        kept, matrix = ruled, ruled_matrix
+    missed = missed_torque(model, kinds, friction, None, None, basis)
+    notes = (*notes, *doubts(names, basis, tolerance, False), *miss(missed, tolerance))
     return BaseParameters(
-        model, drive, kept, matrix, BaseMethod.SYMBOLIC, None, friction, tolerance, notes
-    )
+        model, kinds, kept, matrix, BaseMethod.SYMBOLIC, None, friction, tolerance, notes,
+        found.neglected, missed,
+    )  # fmt: skip
 
 
 def _by_rules(
-    model: RobotModel, drive: bool, tolerance: float, friction: Friction | None, exact: float
+    model: RobotModel,
+    drive: tuple[DriveKind, ...],
+    tolerance: float,
+    friction: Friction | None,
+    exact: float,
 ) -> tuple[NDArray[np.int64], Array]:
     """Kept parameters and their combinations, with angles up to ``exact`` taken as none."""
     found = regrouped(model, *rows_of_numbers(model, exact), drive, exact)
     p = len(parameter_names(model, drive))
-    ruled = 10 * model.f + (4 * model.n if drive else 0)
+    ruled = 10 * model.f + model.n * len(drive)
     kept = np.array(sorted(found), dtype=np.int64)
     matrix = np.zeros((len(kept), p))
     for row, number in zip(matrix, kept, strict=True):
         for k, coefficient in found[int(number)].items():
             row[k] = coefficient
-    sizes, _ = natural_sizes(model, drive)
+    sizes = natural_sizes(model, drive)
     matrix[abs(matrix * sizes) <= tolerance * sizes[kept][:, None]] = 0.0
     if p > ruled:
-        kept, matrix = _with_couplings(model, kept, matrix, ruled, tolerance)
+        kept, matrix = _with_couplings(model, drive, kept, matrix, ruled, tolerance)
     if friction is not None:
         kept, matrix = _with_friction(model, drive, friction, kept, matrix, tolerance)
     return kept, matrix
 
 
-def _is_clear(model: RobotModel, drive: bool, tolerance: float, kept: NDArray[np.int64]) -> bool:
+def _is_clear(
+    model: RobotModel, drive: tuple[DriveKind, ...], tolerance: float, kept: NDArray[np.int64]
+) -> bool:
     """Whether the same parameters are kept wherever a sine or a length begins to count."""
     if tolerance > NOTHING:
         return False
     table = model.table
     lengths = np.abs(np.concatenate((table.d, table.r, table.b))) / reach(model)
-    if ((lengths > _FINEST) & (lengths < _COARSEST)).any():
+    weight = np.linalg.norm(model.gravity) / EARTH
+    sizes = np.append(lengths, weight)
+    if ((sizes > _FINEST) & (sizes < _COARSEST)).any():
         return False
     coarse = regrouped(model, *rows_of_numbers(model, _COARSEST), drive, _COARSEST)
-    ruled = 10 * model.f + (4 * model.n if drive else 0)
+    ruled = 10 * model.f + model.n * len(drive)
     return sorted(coarse) == kept[kept < ruled].tolist()
 
 
 def _holds(
-    model: RobotModel, drive: bool, tolerance: float, friction: Friction | None,
+    model: RobotModel, drive: tuple[DriveKind, ...], tolerance: float, friction: Friction | None,
     basis: ColumnBasis, kept: NDArray[np.int64], matrix: Array,
 ) -> bool:  # fmt: skip
     """Whether the combinations of the rules give the torques, from what the torques show."""
@@ -121,18 +139,19 @@ def _holds(
     if (matrix.any(axis=0) != basis.coefficients.any(axis=0)).any():
         return False
     W = np.vstack(torque_factors(model, drive, friction=friction))
-    W = W * natural_sizes(model, drive, friction)[0]
-    sizes = natural_sizes(model, drive, friction)[0]
+    sizes = natural_sizes(model, drive, friction)
+    W = W * sizes
     missed = W - W[:, kept] @ (matrix * sizes / sizes[kept][:, None])
     longest = np.sqrt((W * W).sum(axis=0)).max(initial=0.0)
     return bool(np.sqrt((missed * missed).sum(axis=0)).max(initial=0.0) <= tolerance * longest)
 
 
 def _with_couplings(
-    model: RobotModel, kept: NDArray[np.int64], matrix: Array, ruled: int, tolerance: float
-) -> tuple[NDArray[np.int64], Array]:
+    model: RobotModel, drive: tuple[DriveKind, ...], kept: NDArray[np.int64], matrix: Array,
+    ruled: int, tolerance: float,
+) -> tuple[NDArray[np.int64], Array]:  # fmt: skip
     """Add the columns of coupled motors: kept, or combinations of the others."""
-    basis = base_columns(model, drive=True, tolerance=tolerance)
+    basis = base_columns(model, drive, tolerance=tolerance).basis
     own = basis.kept[basis.kept >= ruled]
     numbers = np.concatenate((kept, own))
     whole = np.vstack((matrix, np.zeros((len(own), matrix.shape[1]))))
@@ -142,8 +161,8 @@ def _with_couplings(
 
 
 def _with_friction(
-    model: RobotModel, drive: bool, friction: Friction, kept: NDArray[np.int64], matrix: Array,
-    tolerance: float,
+    model: RobotModel, drive: tuple[DriveKind, ...], friction: Friction,
+    kept: NDArray[np.int64], matrix: Array, tolerance: float,
 ) -> tuple[NDArray[np.int64], Array]:  # fmt: skip
     """Add the columns of a friction model: functions of one velocity, as Fv, Fc and offset are."""
     linear = check_linear(friction)
@@ -151,10 +170,11 @@ def _with_friction(
     v = _velocities(model)
     columns = [linear.basis(v)[:, k] for k in range(added)]
     numbers = [p + n * k for k in range(added)]
-    if drive:
-        columns = [v, np.sign(v), np.ones_like(v), *columns]
-        numbers = [10 * model.f + n * k for k in (1, 2, 3)] + numbers
-    sizes = natural_sizes(model, drive, friction)[0]
+    plain = {DriveKind.FV: v, DriveKind.FC: np.sign(v), DriveKind.OFFSET: np.ones_like(v)}
+    own = [(kind, 10 * model.f + n * k) for k, kind in enumerate(drive) if kind in plain]
+    columns = [*(plain[kind] for kind, _ in own), *columns]
+    numbers = [*(start for _, start in own), *numbers]
+    sizes = natural_sizes(model, drive, friction)
     whole = np.hstack((matrix, np.zeros((len(matrix), n * added))))
     rows: list[tuple[int, Array]] = []
     for i in range(n):
@@ -182,7 +202,7 @@ def _velocities(model: RobotModel, samples: int = 300) -> Array:
     rng = np.random.default_rng(0)
     size = reach(model)
     slides = model.table.sigma[model.table.joint_rows] == PRISMATIC
-    most = 2.0 * sqrt(9.81 / size) * np.where(slides, size, 1.0)
+    most = 2.0 * sqrt(EARTH / size) * np.where(slides, size, 1.0)
     signs = rng.choice([-1.0, 1.0], size=(samples, model.n))
     v = most * signs * rng.uniform(size=(samples, model.n))
     v[::2] *= 10.0 ** (-6.0 * rng.uniform(size=v[::2].shape))

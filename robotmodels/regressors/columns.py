@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..drive import Drives, drive_kinds
 from ..errors import InvalidValueError, ShapeError, nearest_names
 from ..friction import Friction, LinearFriction, check_friction, check_linear
 from ..inertia import PARAMETERS
 from ..model import RobotModel
 
-DRIVE_KINDS = ("Ia", "Fv", "Fc", "offset")
-COUPLED_KINDS = ("Iam", "Fvm", "Fcm")
 LINKS = "links"
 
 Blocks = Mapping[str, tuple[str, ...]]
@@ -64,6 +63,10 @@ class ChosenColumns:
         """Number of columns."""
         return len(self.names)
 
+    def column(self, kind: str, number: int) -> int:
+        """Column of one parameter of a kind, -1 if it is not chosen."""
+        return int(self.places[kind][number]) if kind in self.places else -1
+
     def has(self, *kinds: str) -> bool:
         """Whether any column of these kinds is chosen."""
         return any((self.places[kind] >= 0).any() for kind in kinds if kind in self.places)
@@ -79,26 +82,30 @@ def friction_of(model: RobotModel, friction: Friction | None) -> LinearFriction 
     return None if friction is None else check_linear(check_friction(friction, model.n))
 
 
-def standard_blocks(model: RobotModel, drive: bool, friction: Friction | None) -> Blocks:
+def standard_blocks(model: RobotModel, drive: Drives, friction: Friction | None) -> Blocks:
     """Columns of the torque and of what is derived from it."""
+    kinds = drive_kinds(drive)
     frames = [int(row) + 1 for row in model.table.joint_rows]
     motors = [frames[m - 1] for m in coupled_motors(model)]
     blocks: dict[str, tuple[str, ...]] = {LINKS: _link_names(model)}
-    if drive:
-        blocks |= {kind: tuple(f"{kind}{j}" for j in frames) for kind in DRIVE_KINDS}
-        blocks |= {kind: tuple(f"{kind}{j}" for j in motors) for kind in COUPLED_KINDS}
+    blocks |= {kind.value: tuple(f"{kind.value}{j}" for j in frames) for kind in kinds}
+    if motors:
+        coupled = (kind.coupling for kind in kinds if kind.coupling is not None)
+        blocks |= {name: tuple(f"{name}{j}" for j in motors) for name in coupled}
     if (linear := friction_of(model, friction)) is not None:
         for kind in linear.kinds:
             if kind in blocks:
+                rest = tuple(k.value for k in kinds if k.value not in linear.kinds)
                 raise InvalidValueError(
                     f"friction: there are {kind} columns already, of the drives or of another part "
-                    "of the friction model; leave the model out that repeats them."
+                    "of the friction model; leave out what repeats them, of the drives with "
+                    f"drive={rest}."
                 )
             blocks[kind] = tuple(f"{kind}{j}" for j in frames)
     return blocks
 
 
-def energy_blocks(model: RobotModel, drive: bool) -> Blocks:
+def energy_blocks(model: RobotModel, drive: Drives) -> Blocks:
     """Columns of the energy: friction and offsets have none."""
     blocks = standard_blocks(model, drive, None)
     return {kind: blocks[kind] for kind in (LINKS, "Ia", "Iam") if kind in blocks}
@@ -146,6 +153,15 @@ def chosen_columns(blocks: Blocks, columns: Columns | None, model: RobotModel) -
 
 def _numbers(every: tuple[str, ...], columns: Columns) -> list[int]:
     if isinstance(columns, KeptColumns):
+        missing = [name for name in columns.names if name not in every]
+        if missing:
+            few = ", ".join(missing[:6]) + (", ..." if len(missing) > 6 else "")
+            raise InvalidValueError(
+                f"columns: of these base parameters, {len(missing)} have no column here: {few}. "
+                "Friction and offsets have none in an energy, for which base parameters with "
+                "drive=('Ia',) or without drives are made; elsewhere ask for the same drives and "
+                "friction as they have."
+            )
         return [_number(every, name) for name in columns.names]
     if isinstance(columns, str) or not isinstance(columns, (Sequence, np.ndarray)):
         raise InvalidValueError(
@@ -159,16 +175,23 @@ def _numbers(every: tuple[str, ...], columns: Columns) -> list[int]:
     return [_number(every, column) for column in columns]
 
 
+def plain_name(name: str, known: Container[str]) -> str:
+    """The standard name of a parameter that is given as it is printed, ``ZZ1R`` for ``ZZ1``."""
+    return name[:-1] if name not in known and name[-1:] == "R" and name[:-1] in known else name
+
+
 def _number(every: tuple[str, ...], column: object) -> int:
     if isinstance(column, str):
-        if column not in every:
+        name = plain_name(column, every)
+        if name not in every:
             near = nearest_names(column, every)
             raise InvalidValueError(
                 f"columns: there is no column {column!r} here"
                 + (f"; the nearest are {', '.join(near)}." if near else ".")
-                + " Friction and offsets have none in an energy, drives none with drive=False."
+                + " Friction and offsets have none in an energy, and drives those of the kinds"
+                " that drive= asks for."
             )
-        return every.index(column)
+        return every.index(name)
     if isinstance(column, (bool, np.bool_)) or not isinstance(column, (int, np.integer)):
         raise InvalidValueError(f"columns: expected numbers or names, got {column!r:.80}.")
     if not 0 <= column < len(every):

@@ -99,7 +99,7 @@ def add_torques(
             W[:, joints, columns] = sign * values[:, joints]
     if chosen.has("Iam", "Fvm", "Fcm"):
         for kind, motor, torques in coupled_terms(model, v, rotor):
-            if (column := chosen.places[kind][motor]) >= 0:
+            if (column := chosen.column(kind, motor)) >= 0:
                 W[:, :, column] = sign * torques
 
 
@@ -118,7 +118,7 @@ def add_powers(
             rows[:, columns] = values[:, joints] * v[:, joints]
     if chosen.has("Iam", "Fvm", "Fcm"):
         for kind, motor, torques in coupled_terms(model, v, rotor):
-            if (column := chosen.places[kind][motor]) >= 0:
+            if (column := chosen.column(kind, motor)) >= 0:
                 rows[:, column] = (torques * v).sum(axis=1)
 
 

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_vector, batch_rows
+from ..drive import Drives
 from ..model import RobotModel, check_model
-from .chunks import check_size, stream
+from .chunks import check_log, check_size, stream
 from .columns import LINKS, ChosenColumns, Columns, chosen_columns, energy_blocks
 from .drives import add_rotor_energies
 
@@ -19,7 +20,7 @@ def energy_regressor(
     model: RobotModel,
     q: ArrayLike,
     v: ArrayLike,
-    drive: bool = True,
+    drive: Drives = True,
     columns: Columns | None = None,
 ) -> Array:
     """Row of the total energy: kinetic plus potential energy is the row times the parameters.
@@ -30,11 +31,13 @@ def energy_regressor(
         The robot, f frames and n joints.
     q, v : array_like, shape (..., n)
         Joint variables (rad or m) and velocities; the leading axes broadcast.
-    drive : bool
+        An empty batch gives an empty result.
+    drive : bool or collection of DriveKind or str
         Whether the columns of the rotor inertias, ``v^2 / 2`` (and those of coupled motors), are
-        included. Friction is no energy.
+        included: True, or kinds with ``"Ia"`` among them. Friction is no energy.
     columns : indices, names, mask or BaseParameters, optional
-        A choice of the columns. Base parameters give the energy but for a constant.
+        A choice of the columns. Base parameters without friction and offsets, such as
+        ``base_parameters(model, drive=("Ia",))``, give the energy but for a constant.
 
     Returns
     -------
@@ -76,7 +79,7 @@ def energy_regressor_chunks(
     model: RobotModel,
     q: ArrayLike,
     v: ArrayLike,
-    drive: bool = True,
+    drive: Drives = True,
     size: int = 1024,
     columns: Columns | None = None,
 ) -> Iterator[tuple[slice, Array]]:
@@ -88,8 +91,8 @@ def energy_regressor_chunks(
         The robot, n joints.
     q, v : array_like, shape (N, n)
         Joint variables (rad or m) and velocities.
-    drive : bool
-        Whether the columns of the rotor inertias are included.
+    drive : bool or collection of DriveKind or str
+        Whether the columns of the rotor inertias are included, as for `energy_regressor`.
     size : int
         Samples in a piece.
     columns
@@ -105,7 +108,7 @@ def energy_regressor_chunks(
     Raises
     ------
     ShapeError, InvalidValueError
-        As `energy_regressor`, or ``size`` below 1.
+        As `energy_regressor`, ``size`` below 1, or a log without samples.
 
     References
     ----------
@@ -123,6 +126,7 @@ def energy_regressor_chunks(
     check_size(size)
     arrays = as_vector(q, model.n, "q"), as_vector(v, model.n, "v")
     _, rows = batch_rows(arrays, ("q", "v"))
+    check_log(rows[0].shape[0])
     chosen = chosen_columns(energy_blocks(model, drive), columns, model)
     return stream(partial(fill_energies, model, chosen), rows, size, (chosen.count,))
 

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, as_exact, as_floats, as_vector
+from ..drive import Drives
 from ..errors import InvalidValueError, ShapeError
 from ..friction import Friction, LinearFriction
 from ..model import RobotModel, check_model
-from .chunks import check_size, pieces
+from .chunks import check_log, check_size, pieces
 from .columns import ChosenColumns, Columns, chosen_columns, friction_of, standard_blocks
 from .drives import couplings
 from .energy import fill_energies
@@ -24,7 +25,7 @@ def energy_difference_regressor(
     t: ArrayLike,
     q: ArrayLike,
     v: ArrayLike,
-    drive: bool = True,
+    drive: Drives = True,
     columns: Columns | None = None,
     friction: Friction | None = None,
     knots: ArrayLike | None = None,
@@ -44,8 +45,9 @@ def energy_difference_regressor(
         Times, ascending, seconds; need not be regular.
     q, v : array_like, shape (N, n)
         Joint variables (rad or m) and velocities at these times.
-    drive : bool
-        Whether the columns of the drive parameters are included.
+    drive : bool or collection of DriveKind or str
+        Which drive parameters have columns: all, none, or kinds such as ``("Ia", "Fv", "Fc")``;
+        what couples motors goes with its kind.
     columns, friction
         As for `torque_regressor`.
     knots : array_like of int, shape (k,), optional
@@ -60,7 +62,7 @@ def energy_difference_regressor(
     Raises
     ------
     ShapeError, InvalidValueError
-        As `torque_regressor`; times or knots that do not ascend.
+        As `torque_regressor`; times or knots that do not ascend, or fewer than two of them.
 
     References
     ----------
@@ -78,9 +80,8 @@ def energy_difference_regressor(
     check_model(model)
     t, q, v, at = _samples(model, t, q, v, knots)
     chosen = chosen_columns(standard_blocks(model, drive, friction), columns, model)
-    out = np.empty((max(at.size - 1, 0), chosen.count))
-    if out.shape[0]:
-        _fill(model, chosen, friction_of(model, friction), t, q, v, at, out)
+    out = np.empty((at.size - 1, chosen.count))
+    _fill(model, chosen, friction_of(model, friction), t, q, v, at, out)
     return out
 
 
@@ -89,7 +90,7 @@ def energy_difference_regressor_chunks(
     t: ArrayLike,
     q: ArrayLike,
     v: ArrayLike,
-    drive: bool = True,
+    drive: Drives = True,
     size: int = 1024,
     columns: Columns | None = None,
     friction: Friction | None = None,
@@ -105,8 +106,9 @@ def energy_difference_regressor_chunks(
         Times, ascending, seconds.
     q, v : array_like, shape (N, n)
         Joint variables (rad or m) and velocities.
-    drive : bool
-        Whether the columns of the drive parameters are included.
+    drive : bool or collection of DriveKind or str
+        Which drive parameters have columns: all, none, or kinds such as ``("Ia", "Fv", "Fc")``;
+        what couples motors goes with its kind.
     size : int
         Rows in a piece.
     columns, friction, knots
@@ -165,7 +167,8 @@ def joint_work(t: ArrayLike, v: ArrayLike, tau: ArrayLike, knots: ArrayLike | No
     Raises
     ------
     ShapeError, InvalidValueError
-        Arrays that do not fit each other, NaN, times or knots that do not ascend.
+        Arrays that do not fit each other, NaN, times or knots that do not ascend, or fewer than
+        two of them.
 
     References
     ----------
@@ -202,6 +205,7 @@ def _times(t: ArrayLike) -> Array:
     times = as_floats(t, "t")
     if times.ndim != 1:
         raise ShapeError(f"t: expected times of shape (N,), got {times.shape}.")
+    check_log(times.size, "t", least=2)
     steps = np.diff(times)
     if (steps <= 0.0).any():
         k = int(np.argmax(steps <= 0.0)) + 1
@@ -217,8 +221,12 @@ def _knots(knots: ArrayLike | None, N: int) -> NDArray[np.int64]:
     at = np.asarray(knots)
     if at.ndim != 1 or (at.size and at.dtype.kind not in "iu"):
         raise InvalidValueError(f"knots: expected numbers of samples, got {knots!r:.80}.")
+    if at.size < 2:
+        raise InvalidValueError(
+            f"knots: expected at least two samples, which a row lies between, got {at.size}."
+        )
     at = at.astype(np.int64)
-    if at.size and (at[0] < 0 or at[-1] >= N or (np.diff(at) <= 0).any()):
+    if at[0] < 0 or at[-1] >= N or (np.diff(at) <= 0).any():
         raise InvalidValueError(
             f"knots: expected ascending numbers of samples from 0 to {N - 1}, got {knots!r:.80}."
         )
@@ -235,8 +243,8 @@ def _stream(
     at: NDArray[np.int64],
     size: int,
 ) -> Iterator[tuple[slice, Array]]:
-    count = max(at.size - 1, 0)
-    out = np.empty((min(size, max(count, 1)), chosen.count))
+    count = at.size - 1
+    out = np.empty((min(size, count), chosen.count))
     for piece in pieces(count, out.shape[0]):
         part = out[: piece.stop - piece.start]
         _fill(model, chosen, friction, t, q, v, at[piece.start : piece.stop + 1], part)
@@ -329,6 +337,4 @@ def _friction_works(h: Array, v: Array, friction: LinearFriction) -> Array:
 
 def _summed(values: Array, at: NDArray[np.int64]) -> Array:
     """Sums over the stretches between knots of what each step between samples has."""
-    if at.size < 2:
-        return np.empty((0, values.shape[1]))
     return np.add.reduceat(values[: at[-1]], at[:-1], axis=0)

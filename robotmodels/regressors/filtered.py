@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_vector
+from ..drive import Drives
 from ..errors import InvalidValueError, ShapeError
 from ..friction import Friction, LinearFriction
 from ..model import RobotModel, check_model
-from .chunks import check_size, pieces
+from .chunks import check_log, check_size, pieces
 from .columns import ChosenColumns, Columns, chosen_columns, friction_of, standard_blocks
 from .low_pass import FilterRun, LowPass, check_period
 from .momentum import fill_momenta
@@ -25,7 +26,7 @@ def filtered_regressor(
     q: ArrayLike,
     v: ArrayLike,
     low_pass: LowPass,
-    drive: bool = True,
+    drive: Drives = True,
     columns: Columns | None = None,
     friction: Friction | None = None,
 ) -> Array:
@@ -46,8 +47,9 @@ def filtered_regressor(
         Joint variables (rad or m) and velocities, regularly sampled.
     low_pass : LowPass
         ``LowPass.first_order(cutoff)`` or ``LowPass.from_scipy(...)``, continuous or discrete.
-    drive : bool
-        Whether the columns of the drive parameters are included.
+    drive : bool or collection of DriveKind or str
+        Which drive parameters have columns: all, none, or kinds such as ``("Ia", "Fv", "Fc")``;
+        what couples motors goes with its kind.
     columns, friction
         As for `torque_regressor`.
 
@@ -59,7 +61,8 @@ def filtered_regressor(
     Raises
     ------
     ShapeError, InvalidValueError
-        As `torque_regressor`; a period that is not positive; something that is no filter.
+        As `torque_regressor`; a period that is not positive; something that is no filter; a log
+        without samples.
 
     References
     ----------
@@ -91,7 +94,7 @@ def filtered_regressor_chunks(
     q: ArrayLike,
     v: ArrayLike,
     low_pass: LowPass,
-    drive: bool = True,
+    drive: Drives = True,
     size: int = _PIECE,
     columns: Columns | None = None,
     friction: Friction | None = None,
@@ -108,8 +111,9 @@ def filtered_regressor_chunks(
         Joint variables (rad or m) and velocities, regularly sampled.
     low_pass : LowPass
         The filter.
-    drive : bool
-        Whether the columns of the drive parameters are included.
+    drive : bool or collection of DriveKind or str
+        Which drive parameters have columns: all, none, or kinds such as ``("Ia", "Fv", "Fc")``;
+        what couples motors goes with its kind.
     size : int
         Samples in a piece.
     columns, friction
@@ -159,6 +163,7 @@ def _samples(
         raise ShapeError(
             f"q, v: expected samples of shape (N, {model.n}) both, got {q.shape} and {v.shape}."
         )
+    check_log(q.shape[0])
     return np.ascontiguousarray(q), np.ascontiguousarray(v), check_period(dt)
 
 
@@ -173,7 +178,7 @@ def _stream(
     size: int,
 ) -> Iterator[tuple[slice, Array]]:
     N, n = q.shape
-    P, S, W, F = np.empty((4, min(size, max(N, 1)), n, chosen.count))
+    P, S, W, F = np.empty((4, min(size, N), n, chosen.count))
     momentum, force = FilterRun(low_pass, dt), FilterRun(low_pass, dt)
     for piece in pieces(N, P.shape[0]):
         k = piece.stop - piece.start

@@ -55,8 +55,17 @@ class LowPass:
     period: float | None
 
     def __init__(
-        self, A: ArrayLike, B: ArrayLike, C: ArrayLike, period: float | None = None
+        self,
+        A: ArrayLike,
+        B: ArrayLike | None = None,
+        C: ArrayLike | None = None,
+        period: float | None = None,
     ) -> None:
+        if B is None or C is None:
+            raise InvalidValueError(
+                "LowPass: expected the matrices A, B and C; for a cut-off frequency in rad/s take "
+                "LowPass.first_order(cutoff), for filters of SciPy LowPass.from_scipy(...)."
+            )
         matrix = as_floats(A, "A")
         if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not matrix.size:
             raise ShapeError(f"A: expected a square matrix (m, m), got {matrix.shape}.")

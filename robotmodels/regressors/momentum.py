@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_vector, batch_rows
+from ..drive import Drives
 from ..friction import Friction, LinearFriction
 from ..model import RobotModel, check_model
-from .chunks import check_size, pieces
+from .chunks import check_log, check_size, pieces
 from .columns import LINKS, ChosenColumns, Columns, chosen_columns, friction_of, standard_blocks
 from .drives import add_rotor_momenta, add_torques
 
@@ -35,7 +36,7 @@ def momentum_regressor(
     model: RobotModel,
     q: ArrayLike,
     v: ArrayLike,
-    drive: bool = True,
+    drive: Drives = True,
     columns: Columns | None = None,
     friction: Friction | None = None,
 ) -> MomentumRegressors:
@@ -51,8 +52,10 @@ def momentum_regressor(
         The robot, f frames and n joints.
     q, v : array_like, shape (..., n)
         Joint variables (rad or m) and velocities; the leading axes broadcast.
-    drive : bool
-        Whether the columns of the drive parameters are included.
+        An empty batch gives an empty result.
+    drive : bool or collection of DriveKind or str
+        Which drive parameters have columns: all, none, or kinds such as ``("Ia", "Fv", "Fc")``;
+        what couples motors goes with its kind.
     columns, friction
         As for `torque_regressor`.
 
@@ -98,7 +101,7 @@ def momentum_regressor_chunks(
     model: RobotModel,
     q: ArrayLike,
     v: ArrayLike,
-    drive: bool = True,
+    drive: Drives = True,
     size: int = 128,
     columns: Columns | None = None,
     friction: Friction | None = None,
@@ -111,8 +114,9 @@ def momentum_regressor_chunks(
         The robot, n joints.
     q, v : array_like, shape (N, n)
         Joint variables (rad or m) and velocities.
-    drive : bool
-        Whether the columns of the drive parameters are included.
+    drive : bool or collection of DriveKind or str
+        Which drive parameters have columns: all, none, or kinds such as ``("Ia", "Fv", "Fc")``;
+        what couples motors goes with its kind.
     size : int
         Samples in a piece.
     columns, friction
@@ -128,7 +132,7 @@ def momentum_regressor_chunks(
     Raises
     ------
     ShapeError, InvalidValueError
-        As `momentum_regressor`, or ``size`` below 1.
+        As `momentum_regressor`, ``size`` below 1, or a log without samples.
 
     References
     ----------
@@ -146,6 +150,7 @@ def momentum_regressor_chunks(
     check_size(size)
     n = model.n
     _, rows = batch_rows((as_vector(q, n, "q"), as_vector(v, n, "v")), ("q", "v"))
+    check_log(rows[0].shape[0])
     chosen = chosen_columns(standard_blocks(model, drive, friction), columns, model)
     return _stream(model, chosen, friction_of(model, friction), rows, size)
 
@@ -174,7 +179,7 @@ def _stream(
     size: int,
 ) -> Iterator[tuple[slice, MomentumRegressors]]:
     N = rows[0].shape[0]
-    P, S = np.empty((2, min(size, max(N, 1)), model.n, chosen.count))
+    P, S = np.empty((2, min(size, N), model.n, chosen.count))
     for piece in pieces(N, P.shape[0]):
         k = piece.stop - piece.start
         fill_momenta(model, chosen, friction, [array[piece] for array in rows], P[:k], S[:k])

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from .._arrays import Array
+from ..drive import Drives, drive_kinds
 from ..friction import Friction
 from ..model import RobotModel, check_model
 from .columns import (
-    COUPLED_KINDS,
-    DRIVE_KINDS,
     Columns,
     chosen_columns,
     coupled_motors,
@@ -21,7 +20,7 @@ from .columns import (
 
 def parameter_names(
     model: RobotModel,
-    drive: bool = True,
+    drive: Drives = True,
     friction: Friction | None = None,
     columns: Columns | None = None,
 ) -> tuple[str, ...]:
@@ -31,8 +30,9 @@ def parameter_names(
     ----------
     model : RobotModel
         The robot, f frames and n joints.
-    drive : bool
-        Whether the drive parameters are included.
+    drive : bool or collection of DriveKind or str
+        Which drive parameters are included: all, none, or kinds such as ``("Ia", "Fv", "Fc")``;
+        what couples motors goes with its kind.
     friction : Friction, optional
         A friction model that is linear in its parameters, see `robotmodels.friction`.
     columns : indices, names or BaseParameters, optional
@@ -67,7 +67,7 @@ def parameter_names(
 
 
 def energy_parameter_names(
-    model: RobotModel, drive: bool = True, columns: Columns | None = None
+    model: RobotModel, drive: Drives = True, columns: Columns | None = None
 ) -> tuple[str, ...]:
     """Names of the parameters that store energy, in the order of `energy_regressor`.
 
@@ -75,8 +75,8 @@ def energy_parameter_names(
     ----------
     model : RobotModel
         The robot, f frames and n joints.
-    drive : bool
-        Whether the rotors are included.
+    drive : bool or collection of DriveKind or str
+        Whether the rotors are included, as for `energy_regressor`.
     columns : indices, names or BaseParameters, optional
         A choice of them.
 
@@ -106,7 +106,7 @@ def energy_parameter_names(
 
 
 def parameter_vector(
-    model: RobotModel, drive: bool = True, friction: Friction | None = None
+    model: RobotModel, drive: Drives = True, friction: Friction | None = None
 ) -> Array:
     """The model's own standard parameters, in the order of `parameter_names`.
 
@@ -114,8 +114,9 @@ def parameter_vector(
     ----------
     model : RobotModel
         The robot.
-    drive : bool
-        Whether the drive parameters are included.
+    drive : bool or collection of DriveKind or str
+        Which drive parameters are included: all, none, or kinds such as ``("Ia", "Fv", "Fc")``;
+        what couples motors goes with its kind.
     friction : Friction, optional
         A friction model that is linear in its parameters.
 
@@ -141,11 +142,12 @@ def parameter_vector(
     """
     check_model(model)
     values = [model.inertia.values.ravel()]
-    if drive:
-        values += [getattr(model.drive, p) for p in DRIVE_KINDS]
-        if model.transmission is not None:
-            motors = np.array(coupled_motors(model), dtype=np.int64) - 1
-            values += [getattr(model.transmission, p)[motors] for p in COUPLED_KINDS]
+    kinds = drive_kinds(drive)
+    values += [getattr(model.drive, kind.value) for kind in kinds]
+    if model.transmission is not None:
+        motors = np.array(coupled_motors(model), dtype=np.int64) - 1
+        terms = (kind.coupling for kind in kinds if kind.coupling is not None)
+        values += [getattr(model.transmission, term)[motors] for term in terms]
     if (linear := friction_of(model, friction)) is not None:
         values.append(linear.parameters.ravel())
     return np.concatenate(values)

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_vector, batch_rows
+from ..drive import Drives
 from ..friction import Friction, LinearFriction
 from ..model import RobotModel, check_model
-from .chunks import check_size, stream
+from .chunks import check_log, check_size, stream
 from .columns import LINKS, ChosenColumns, Columns, chosen_columns, friction_of, standard_blocks
 from .drives import add_torques
 
@@ -21,7 +22,7 @@ def torque_regressor(
     q: ArrayLike,
     v: ArrayLike,
     a: ArrayLike,
-    drive: bool = True,
+    drive: Drives = True,
     columns: Columns | None = None,
     friction: Friction | None = None,
 ) -> Array:
@@ -35,8 +36,10 @@ def torque_regressor(
         The robot, f frames and n joints; its own inertia is not used.
     q, v, a : array_like, shape (..., n)
         Joint variables (rad or m), velocities and accelerations; the leading axes broadcast.
-    drive : bool
-        Whether the columns of the drive parameters are included.
+        An empty batch gives an empty result.
+    drive : bool or collection of DriveKind or str
+        Which drive parameters have columns: all, none, or kinds such as ``("Ia", "Fv", "Fc")``;
+        what couples motors goes with its kind.
     columns : indices, names, mask or BaseParameters, optional
         A choice of the columns, which alone are computed; default all. Base parameters choose the
         columns that they keep.
@@ -87,7 +90,7 @@ def torque_regressor_chunks(
     q: ArrayLike,
     v: ArrayLike,
     a: ArrayLike,
-    drive: bool = True,
+    drive: Drives = True,
     size: int = 256,
     columns: Columns | None = None,
     friction: Friction | None = None,
@@ -102,8 +105,9 @@ def torque_regressor_chunks(
         The robot, n joints.
     q, v, a : array_like, shape (N, n)
         Joint variables (rad or m), velocities and accelerations.
-    drive : bool
-        Whether the columns of the drive parameters are included.
+    drive : bool or collection of DriveKind or str
+        Which drive parameters have columns: all, none, or kinds such as ``("Ia", "Fv", "Fc")``;
+        what couples motors goes with its kind.
     size : int
         Samples in a piece.
     columns, friction
@@ -119,7 +123,7 @@ def torque_regressor_chunks(
     Raises
     ------
     ShapeError, InvalidValueError
-        As `torque_regressor`, or ``size`` below 1.
+        As `torque_regressor`, ``size`` below 1, or a log without samples.
 
     References
     ----------
@@ -138,6 +142,7 @@ def torque_regressor_chunks(
     n = model.n
     arrays = as_vector(q, n, "q"), as_vector(v, n, "v"), as_vector(a, n, "a")
     _, rows = batch_rows(arrays, ("q", "v", "a"))
+    check_log(rows[0].shape[0], "q, v, a")
     chosen = chosen_columns(standard_blocks(model, drive, friction), columns, model)
     fill = partial(fill_torques, model, chosen, friction_of(model, friction))
     return stream(fill, rows, size, (n, chosen.count))

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_floats
+from ..drive import check_all_or_none
 from ..dynamics import ddm, kinetic_energy, mass_matrix, potential_energy
 from ..errors import InertiaError, InvalidValueError, ShapeError
 from ..friction import Friction, check_friction
@@ -78,8 +79,8 @@ def simulate(
         of ``sign(v)``. Joints then creep where they should stick, and narrow widths are stiff
         (take ``method="Radau"``).
     stop_at_limits : bool
-        Whether the simulation ends where a joint reaches a limit of its table. Otherwise limits
-        are not looked at.
+        Whether the simulation ends where a joint reaches a limit of its table; joints with infinite
+        limits go on. Otherwise limits are not looked at.
     breaks : array_like, shape (K,)
         Times at which ``control`` or ``wrench`` jump, such as the instants of a sampled controller:
         the integration starts anew there. A law's value at a break belongs to the time after it;
@@ -108,7 +109,8 @@ def simulate(
         The mass matrix is not positive definite at the start; the links that no body is are named.
     ShapeError, InvalidValueError
         Arguments or answers of ``control`` and ``wrench`` of the wrong shape, with NaN or infinity;
-        laws that do not take (t, q, v); a start outside the limits, or so fast that its energy is
+        laws that do not take (t, q, v); a start outside the limits, or limits asked for that no
+        joint has; a start so fast that its energy is
         no finite number; dry friction that is negative; joints that mimic others.
 
     References
@@ -124,6 +126,7 @@ def simulate(
     ((5, 6), 'The motion was followed to its end.', True)
     """
     check_model(model)
+    check_all_or_none(drive)
     n = model.n
     q, v = as_state(q0, n, "q0"), as_state(v0, n, "v0")
     start, end, times = as_times(t)
@@ -185,6 +188,11 @@ def _cuts(start: float, end: float, breaks: Array, knots: Array) -> list[tuple[f
 
 def _limits(model: RobotModel, q: Array) -> tuple[Array, Array]:
     lower, upper = model.lower, model.upper
+    if not (np.isfinite(lower) | np.isfinite(upper)).any():
+        raise InvalidValueError(
+            f"stop_at_limits: no joint of {model.name!r} has a finite limit, so that nothing would "
+            "stop; give the table lower= and upper=, or leave stop_at_limits out."
+        )
     out = np.flatnonzero((q < lower) | (q > upper))
     if out.size:
         j = int(out[0])

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_vector, batch_shape, read_only
+from ..drive import check_all_or_none
 from ..dynamics import gravity_torque, idm
 from ..errors import InvalidValueError
 from ..friction import Friction, check_friction
@@ -76,7 +77,9 @@ def torque_parts(
     model : RobotModel
         The robot, n joints.
     q, v, a : array_like, shape (..., n)
-        Joint variables (rad or m), velocities and accelerations; the leading axes broadcast.
+        Joint variables (rad or m), velocities and accelerations; the leading axes broadcast. At
+        least one sample: unlike `idm`, which maps an empty batch to an empty one, this tells about
+        a motion.
     wrench : array_like, shape (..., 6), optional
         What the tool exerts on the environment, see `idm`.
     drive : bool
@@ -92,7 +95,7 @@ def torque_parts(
     Raises
     ------
     ShapeError, InvalidValueError
-        Arguments of the wrong length, or with NaN or infinity.
+        Arguments of the wrong length, or with NaN or infinity; a motion without samples.
 
     References
     ----------
@@ -106,6 +109,7 @@ def torque_parts(
     True
     """
     check_model(model)
+    check_all_or_none(drive)
     n = model.n
     q, v, a = as_vector(q, n, "q"), as_vector(v, n, "v"), as_vector(a, n, "a")
     arrays, names = [q, v, a], ["q", "v", "a"]
@@ -113,6 +117,8 @@ def torque_parts(
         arrays.append(as_vector(wrench, 6, "wrench"))
         names.append("wrench")
     batch = batch_shape(tuple(arrays), tuple(names))
+    if 0 in batch:
+        raise InvalidValueError("q, v, a: the motion is empty; expected at least one sample.")
     q, v, a = (np.broadcast_to(x, (*batch, n)) for x in (q, v, a))
     still = np.zeros((*batch, n))
     gravity = gravity_torque(model, q)

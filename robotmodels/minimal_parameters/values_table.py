@@ -1,0 +1,138 @@
+"""Base parameters by name: lookups that take printed names as well, and a table of values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from .._arrays import Array, Rebuilt, read_only
+from ..errors import nearest_names
+from ..geometry import PRISMATIC
+from ..regressors.columns import plain_name
+from ..table_text import boxed
+
+if TYPE_CHECKING:
+    from .result import BaseParameters
+
+_LINK_UNITS = {"M": "kg", "MX": "kg m", "MY": "kg m", "MZ": "kg m"}
+_TURNING = {"Ia": "kg m^2", "Fv": "N m s/rad"}
+_SLIDING = {"Ia": "kg", "Fv": "N s/m"}
+
+
+class KeptNames(dict[str, Any]):
+    """A dictionary by standard names that takes printed ones, ``ZZ1R`` for ``ZZ1``.
+
+    Examples
+    --------
+    >>> KeptNames({"ZZ1": 2.0})["ZZ1R"]
+    2.0
+    """
+
+    def __missing__(self, name: object) -> Any:
+        if isinstance(name, str) and (plain := plain_name(name, self)) in self:
+            return self[plain]
+        near = nearest_names(str(name), tuple(self))
+        hint = f" Did you mean {', '.join(near)}?" if near else ""
+        raise KeyError(
+            f"No base parameter {name!r}.{hint} What is regrouped or without effect has none."
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class BaseValues(Rebuilt, Mapping[str, float]):
+    """Values of base parameters by name; prints as a table. Read-only.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Standard names of the b kept parameters.
+    printed : tuple of str
+        The same with an R where others are regrouped into them.
+    numbers : ndarray, shape (b,)
+        Values.
+    units : tuple of str
+        Units.
+
+    Examples
+    --------
+    >>> found = BaseValues(("ZZ1",), ("ZZ1R",), [2.0], ("kg m^2",))
+    >>> found["ZZ1"], len(found)
+    (2.0, 1)
+    """
+
+    names: tuple[str, ...]
+    printed: tuple[str, ...]
+    numbers: Any
+    units: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "numbers", read_only(self.numbers))
+
+    def __getitem__(self, name: str) -> float:
+        return KeptNames(zip(self.names, self.numbers.tolist(), strict=True))[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def __str__(self) -> str:
+        return boxed([
+            ("parameter", list(self.printed)),
+            ("value", [f"{x:.6g}" for x in self.numbers.tolist()]),
+            ("unit", list(self.units)),
+        ])  # fmt: skip
+
+    def __repr__(self) -> str:
+        return f"<BaseValues: {len(self)} base parameters>"
+
+
+def base_values(base: BaseParameters, values: Array) -> BaseValues:
+    """Base parameters with their values and units.
+
+    Parameters
+    ----------
+    base : BaseParameters
+        b of them.
+    values : ndarray, shape (b,)
+        Their values.
+
+    Returns
+    -------
+    BaseValues
+        In the order of ``base.names``.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> from robotmodels.minimal_parameters import base_parameters
+    >>> print(base_values(base_parameters(load("planar_2r"), drive=False), [4.0, 1.0, 0.5, 0.0]))
+    ┌───────────┬───────┬────────┐
+    │ parameter │ value │   unit │
+    ├───────────┼───────┼────────┤
+    │      ZZ1R │     4 │ kg m^2 │
+    │       ZZ2 │     1 │ kg m^2 │
+    │       MX2 │   0.5 │   kg m │
+    │       MY2 │     0 │   kg m │
+    └───────────┴───────┴────────┘
+    """
+    several = (base.matrix != 0.0).sum(axis=1) > 1
+    printed = (f"{n}R" if more else n for n, more in zip(base.names, several, strict=True))
+    units = tuple(_unit(base, name) for name in base.names)
+    return BaseValues(base.names, tuple(printed), values, units)
+
+
+def _unit(base: BaseParameters, name: str) -> str:
+    kind = name.rstrip("0123456789")
+    frame = int(name[len(kind) :])
+    if kind in _LINK_UNITS:
+        return _LINK_UNITS[kind]
+    if kind.isupper():
+        return "kg m^2"
+    slides = int(base.model.table.sigma[frame - 1]) == PRISMATIC
+    plain = kind[:2]  # Iam, Fvm and frictions by direction are of the same unit
+    if plain in _TURNING:
+        return (_SLIDING if slides else _TURNING)[plain]
+    return "N" if slides else "N m"
