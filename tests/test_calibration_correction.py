@@ -19,6 +19,7 @@ from robotmodels.calibration.elements import Compliance, Element, ErrorLaw
 from robotmodels.calibration.joint_errors import encoder_transmission, joint_errors_of
 from robotmodels.calibration.offsets import joint_offsets, pose_offsets
 from robotmodels.calibration.parameters import GeometricParameter, GeometricParameters
+from robotmodels.calibration.reading_jacobian import missing_of_pose, reading_jacobian
 from robotmodels.errors import InvalidValueError, ShapeError, UrdfWarning
 
 
@@ -475,3 +476,85 @@ def test_constant_offsets_are_the_best_in_least_squares(rng):
         assert whole(both.offset + step) >= best * (1 - 1e-6)
     with pytest.raises(InvalidValueError, match="none"):
         joint_offsets(robot, np.empty((0, 6)))
+
+
+# --- links that bend and a mount that tilts -----------------------------------------------------
+
+
+def bent(model, mode, rng, **laws):
+    """A robot that gives way by about 1 mrad in each element, and is off by 1 mm and 1 mrad."""
+    parameters = candidate_parameters(model, compliance=mode, **laws)
+    return calibrated_model(parameters, deviations(parameters, rng))
+
+
+@pytest.mark.parametrize("mode", [Compliance.LINKS, Compliance.ISOTROPIC, Compliance.UNIFORM])
+@pytest.mark.parametrize("name", ["erd:ur10", "panda"])
+def test_bending_counts_in_the_inverse_model(name, mode, rng):
+    model = rm.load(name)
+    robot = bent(model, mode, rng, gains=True)
+    assert not robot.bending.is_zero
+    q = readings_of(model, rng, 12)
+    T = calibrated_pose(robot, q)
+    # it is more than rounding, and an inverse model without it would miss by that
+    rigid = rm.dgm(robot.model, robot.joint_errors.actual(q))
+    assert np.abs(rigid - T)[:, :3, 3].max() > 1e-5
+    found = corrected_igm(robot, T, q_ref=q)
+    assert (found.residual[found.valid] < 1e-12).all()
+    at = found.valid.nonzero()
+    assert missed(robot, found.q[at], T[at[0]]) < 3e-12
+    way = np.abs(found.nearest(q) - q)
+    assert np.minimum(way, 2 * np.pi - way).max() < 1e-7
+    false = pose_offsets(robot, T, q_ref=q)
+    np.testing.assert_array_equal(false.solutions.q, found.q)
+    np.testing.assert_allclose(
+        false.command[found.valid], rm.dgm(model, found.q[found.valid]), rtol=0, atol=1e-15
+    )
+
+
+@pytest.mark.parametrize("axes", ["world", "tool"])
+def test_parts_of_poses_are_met_by_robots_that_bend(axes, rng):
+    mask = [1, 1, 1, 0, 1, 1]
+    model = rm.load("erd:ur10")
+    robot = bent(model, Compliance.UNIFORM, rng)
+    q = readings_of(model, rng, 2)
+    q[:, 5] = 0.4
+    T = calibrated_pose(robot, q)
+    found = corrected_igm(robot, T, q_ref=q, mask=mask, mask_axes=axes, lock={5: 0.4})
+    assert found.valid.any(axis=-1).all()
+    i, s = found.valid.nonzero()
+    P = calibrated_pose(robot, found.q[i, s])
+    np.testing.assert_allclose(P[:, :3, 3], T[i, :3, 3], rtol=0, atol=3e-12)
+    # the rotation that is left is about the one axis that is not asked for
+    turn = missing_of_pose(P, T[i])[:, 3:]
+    if axes == "tool":
+        turn = np.einsum("nij,ni->nj", T[i, :3, :3], turn)
+    assert np.abs(turn[:, 1:]).max() < 3e-12
+
+
+def test_the_slope_of_a_robot_that_bends(rng):
+    model = random_model(rng, f=6, tip="any")
+    robot = bent(model, Compliance.LINKS, rng, gains=True, eccentricity=True)
+    q = rng.uniform(-2.0, 2.0, size=(4, model.n))
+    J = reading_jacobian(robot, q)
+    h = 1e-5
+    for j in range(model.n):
+        step = h * np.eye(model.n)[j]
+        high, low = calibrated_pose(robot, q + step), calibrated_pose(robot, q - step)
+        moved = missing_of_pose(low, high) / (2 * h)
+        np.testing.assert_allclose(J[..., j], moved, rtol=0, atol=1e-7 * robot_size(model, q[0]))
+
+
+def test_constant_offsets_of_a_robot_that_bends(rng):
+    model = rm.load("erd:ur10")
+    robot = bent(model, Compliance.LINKS, rng)
+    q = readings_of(model, rng, 20)
+    found = joint_offsets(robot, q, mask=[1, 1, 1, 0, 0, 0])
+    wanted = rm.dgm(model, q)[:, :3, 3]
+
+    def cost(offset):
+        return ((calibrated_pose(robot, q + offset)[:, :3, 3] - wanted) ** 2).sum()
+
+    least = cost(found.offset)
+    assert least < cost(np.zeros(6))
+    for step in 1e-5 * np.vstack([np.eye(6), -np.eye(6)]):
+        assert cost(found.offset + step) >= least * (1 - 1e-9)
