@@ -23,7 +23,7 @@ from .folds import (
 from .identifiable import all_deviations, identifiable_on
 from .measurements import Measurement
 from .notes import check_enough, notes_after, notes_before
-from .parameters import GeometricParameters, candidate_parameters
+from .parameters import GeometricParameters, as_names, candidate_parameters
 from .placing import placed_robot
 from .prior import ParameterPrior, estimated_with, settled_prior
 from .problem import as_measurements, measured_frames, problem_of
@@ -133,7 +133,7 @@ def fit(
     if isinstance(parameters, GeometricParameters):
         given = parameters
     elif parameters is not None:
-        names = tuple(parameters)
+        names = as_names(parameters)
 
     def candidates_of(robot: RobotModel) -> GeometricParameters:
         found = candidate_parameters(
@@ -142,7 +142,7 @@ def fit(
         )  # fmt: skip
         return found if names is None else found.subset(names)
 
-    known, known_lengths = tuple(known), tuple(known_lengths)
+    known, known_lengths = as_names(known), as_names(known_lengths)
     candidates = candidates_of(model) if given is None else given
     if prior is not None:
         candidates.index(prior.named, "prior")
@@ -168,9 +168,10 @@ def fit(
     gaussian = None if prior is None else settled_prior(prior, problem, loss, chance)
     solution = solve(problem, loss=loss, prior=gaussian, truncation=truncation)
     step("all measurements")
+    preferred = candidates.preferring(estimated.names)
     again = identifiable_on(
-        candidates, measured, known_lengths, known,
-        deviation=all_deviations(candidates, estimated, solution.deviation),
+        preferred, measured, known_lengths, known,
+        deviation=all_deviations(preferred, estimated, solution.deviation),
         fixtures=solution.fixtures, dependent=_TOLD_APART,
     )  # fmt: skip
     refit = Refit(solution, gaussian, truncation)

@@ -160,7 +160,7 @@ def _split(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Refit(Rebuilt):
-    """How to fit again without some measurements: from the solution, noise as it was found.
+    """How to fit again without some measurements: from the solution.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ def errors_of_splits(
         start = [known[fixture.name] for fixture in problem.fixtures]
         solution = solve(
             problem, np.concatenate([refit.solution.deviation, start]),
-            scales=refit.solution.scales, loss=refit.solution.fit.loss, prior=refit.prior,
+            from_scales=refit.solution.scales, loss=refit.solution.fit.loss, prior=refit.prior,
             truncation=refit.truncation, tolerance=_ROUGH,
         )  # fmt: skip
         fixtures = fixtures_by_name(solution)

@@ -14,7 +14,7 @@ from ..estimation import ColumnBasis, column_basis
 from ..table_text import boxed
 from .elements import ErrorLaw
 from .measurements import Measurement, length_is_known
-from .parameters import GeometricParameters
+from .parameters import GeometricParameters, as_names
 from .problem import Problem, guessed_fixtures, linearised, problem_of, satisfying
 
 DEPENDENT = 1e-7
@@ -232,7 +232,7 @@ def identifiable_on(
     21
     """
     problem = problem_of(candidates, measurements)
-    known_lengths, known = tuple(known_lengths), tuple(known)
+    known_lengths, known = as_names(known_lengths), as_names(known)
     at = {
         *candidates.index(known_lengths, "known_lengths").tolist(),
         *candidates.index(known, "known").tolist(),

@@ -195,10 +195,11 @@ def _hidden(solution: Solution) -> list[str]:
     alone = np.linalg.norm(fit.jacobian * np.sqrt(fit.weights)[:, None], axis=0)
     scale = 1.0 if fit.sigma_known else fit.scale
     inflation = fit.deviations * alone / max(scale, 1e-300)
+    has_prior = np.isfinite(fit.prior.deviation)  # it says what the data do not
     return [
         name
-        for name, factor in zip(problem.parameters.names, inflation, strict=False)
-        if factor > _CONFUSED
+        for k, name in enumerate(problem.parameters.names)
+        if inflation[k] > _CONFUSED and not has_prior[k]
     ]
 
 

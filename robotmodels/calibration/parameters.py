@@ -178,10 +178,8 @@ class GeometricParameters(Rebuilt):
             An unknown name; the message gives the nearest ones.
         """
         known = {name: k for k, name in enumerate(self.names)}
-        if isinstance(names, str):
-            names = (names,)
         found = []
-        for name in names:
+        for name in as_names(names):
             if name not in known:
                 near = ", ".join(nearest_names(str(name), known)) or ", ".join(self.names)
                 raise InvalidValueError(
@@ -215,6 +213,34 @@ class GeometricParameters(Rebuilt):
         ('theta2', 'd3')
         """
         return replace(self, entries=tuple(self.entries[k] for k in sorted(self.index(names))))
+
+    def preferring(self, names: Iterable[str]) -> Self:
+        """The same parameters, some of them before the others.
+
+        Parameters
+        ----------
+        names : iterable of str
+            Which are preferred, in this order.
+
+        Returns
+        -------
+        GeometricParameters
+            In another order.
+
+        Raises
+        ------
+        InvalidValueError
+            An unknown name.
+
+        Examples
+        --------
+        >>> from robotmodels.robots import load
+        >>> candidate_parameters(load("rx90")).preferring(["d3"]).names[0]
+        'd3'
+        """
+        first = [self.entries[k] for k in self.index(names)]
+        rest = [entry for entry in self.entries if entry not in first]
+        return replace(self, entries=(*first, *rest))
 
     def without(self, names: Iterable[str]) -> Self:
         """All but some of the parameters.
@@ -280,6 +306,27 @@ _LAWS = {
     ErrorLaw.SINE_2: lambda x: np.sin(2.0 * x),
     ErrorLaw.COSINE_2: lambda x: np.cos(2.0 * x),
 }
+
+
+def as_names(names: str | Iterable[str]) -> tuple[str, ...]:
+    """Names at the border: one or several.
+
+    Parameters
+    ----------
+    names : str or iterable of str
+        What a caller passed; a text is one name.
+
+    Returns
+    -------
+    tuple of str
+        Names.
+
+    Examples
+    --------
+    >>> as_names("r4")
+    ('r4',)
+    """
+    return (names,) if isinstance(names, str) else tuple(names)
 
 
 def candidate_parameters(

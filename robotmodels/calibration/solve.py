@@ -17,6 +17,7 @@ _FIRST_LENGTH = 1e-3
 """Standard deviation of lengths before it has been estimated, m."""
 _ROUNDS = 10
 _SETTLED = 1e-3
+_NOTHING = 1e-13
 _ROUGH = 1e-6
 """Tolerance of the steps while the noise is still being estimated."""
 _EXACT = 1e-9
@@ -79,6 +80,7 @@ def solve(
     start: Array | None = None,
     *,
     scales: tuple[Array, ...] | None = None,
+    from_scales: tuple[Array, ...] | None = None,
     loss: Loss = Loss.SQUARES,
     prior: Prior | None = None,
     truncation: float | None = None,
@@ -94,6 +96,8 @@ def solve(
         Where to start; default the nominal robot and guessed fixtures.
     scales : tuple of ndarray, optional
         Standard deviations that are kept as they are; default: estimated.
+    from_scales : tuple of ndarray, optional
+        Where their estimation starts.
     loss, prior, truncation, tolerance
         As `fit_nonlinear`.
 
@@ -111,7 +115,7 @@ def solve(
         start = np.concatenate([xi, guessed_fixtures(problem, xi)])
     known = all(_states_noise(m) for m in problem.measurements)
     estimated = scales is None and not known
-    current = first_scales(problem) if scales is None else scales
+    current = scales or from_scales or first_scales(problem)
     block = problem.block
     is_settled = not estimated
     for _ in range(_ROUNDS):
@@ -124,11 +128,13 @@ def solve(
             break
         previous, current = current, _estimated_scales(problem, fit, current)
         start = fit.x
-        # the ratios of the scales weight the rows; a common factor changes nothing
-        ratios = np.concatenate([
-            new / old for new, old in zip(current, previous, strict=True)
-        ])  # fmt: skip
-        is_settled = float(np.ptp(ratios)) < _SETTLED * float(ratios.max())
+        # the ratios of the scales weight the rows; a common factor changes nothing, unless there
+        # is a prior to be weighed against
+        ratios = np.concatenate([new / old for new, old in zip(current, previous, strict=True)])
+        changed = np.ptp(ratios) if prior is None else np.abs(ratios - 1.0).max()
+        is_settled = float(changed) < _SETTLED * float(ratios.max())
+        if min(float(scale.min()) for scale in current) <= _EXACT:
+            tolerance = max(tolerance, _ROUGH)  # exact data: steps are rounding long before
     return Solution(problem, fit, current)
 
 
@@ -140,11 +146,7 @@ def _estimated_scales(
     problem: Problem, fit: NonlinearFit, scales: tuple[Array, ...]
 ) -> tuple[Array, ...]:
     """Noise of each measurement and unit from its residuals, freedom shared by leverage."""
-    weights = np.sqrt(fit.weights)
-    J = fit.jacobian * weights[:, None]
-    length = np.linalg.norm(J, axis=0)
-    Q, _ = np.linalg.qr(J / np.where(length > 0.0, length, 1.0))
-    leverage = (Q * Q).sum(axis=1)
+    leverage = _leverage(fit)
     new, first = [], 0
     for m, scale in zip(problem.measurements, scales, strict=True):
         k = len(m.axes)
@@ -169,3 +171,15 @@ def _estimated_scales(
             values[of_unit] = np.maximum(scale[of_unit] * factor, _EXACT)
         new.append(read_only(values))
     return tuple(new)
+
+
+def _leverage(fit: NonlinearFit) -> Array:
+    """Share of a degree of freedom that each row has taken, shape (M,)."""
+    J = fit.jacobian * np.sqrt(fit.weights)[:, None]
+    information = np.sqrt(fit.prior.strength) / fit.prior.deviation
+    length = np.sqrt((J * J).sum(axis=0) + information**2)
+    length[length == 0.0] = 1.0
+    J = J / length
+    values, vectors = np.linalg.eigh(J.T @ J + np.diag((information / length) ** 2))
+    told = values > _NOTHING * values[-1]
+    return ((J @ (vectors[:, told] / np.sqrt(values[told]))) ** 2).sum(axis=1)
