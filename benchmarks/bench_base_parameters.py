@@ -437,8 +437,8 @@ def report(
         "",
         f"Medians of {rounds} rounds (FIGAROH too) of the processor's time, and of the clock's; "
         "`x`: ratio to the first line of each work. Goals are of the processor's time.",
-        "`rank`: base parameters of links, rotors and friction, without offsets. `gap`: smallest "
-        "sine of a kept column to those before it / largest of a dependent one.",
+        "`rank`: base parameters of links, rotors and friction, without offsets. `gap`: least "
+        "that a kept column has beyond those before it / most of one left out, of the longest.",
     ]
     for title, rows in parts.items():
         if not rows:

@@ -503,7 +503,7 @@ def test_a_limit_stops_the_motion():
     with pytest.raises(InvalidValueError, match=r"joint 1 starts at 0\.6, outside its limits"):
         simulate(slider(), [0.6], [0.0], t=1.0, stop_at_limits=True)
     endless = slider().with_table(slider().table.replace(lower=None, upper=None))
-    with pytest.raises(InvalidValueError, match="stop_at_limits: no joint of .* finite limit"):
+    with pytest.raises(InvalidValueError, match=r"stop_at_limits: no joint of .* finite limit"):
         simulate(endless, [0.6], [0.0], t=1.0, stop_at_limits=True)
 
 

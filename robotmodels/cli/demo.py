@@ -126,13 +126,15 @@ def table_poses(model: RobotModel, q: Array) -> Array:
 
 
 def _show_base(model: RobotModel) -> None:
-    rules, numbers = base_parameters(model), base_parameters(model, "numeric")
+    # links and rotors, as in the book's table; friction is each joint's own
+    rules = base_parameters(model, drive=("Ia",))
+    numbers = base_parameters(model, "numeric", drive=("Ia",))
     print(_narrow(rules.text))
     kept, dependent = numbers.gap or (0.0, 0.0)
     same = "the same parameters" if rules.names == numbers.names else "other parameters"
     print(
-        f"By the columns of the regressor: {same};\n  angles of kept columns at least {kept:.2f}, "
-        f"of dependent ones at most {dependent:.0e}."
+        f"By the columns of the regressor: {same};\n  of kept columns at least {kept:.2f} is their "
+        f"own, of the others at most {dependent:.0e}."
     )
 
 
