@@ -1,5 +1,6 @@
 """Geometric calibration: from measurements, or from the robot touching things (section 1.4)."""
 
+from .bending import Bending
 from .calibrated import (
     CalibratedEnd,
     CalibratedRobot,
@@ -8,6 +9,8 @@ from .calibrated import (
     calibrated_urdf,
 )
 from .changed import IdentifiabilityChange, identifiability_change
+from .corrected import corrected_igm
+from .corrected_solutions import CorrectedSolutions, CorrectionStatus
 from .differential import DifferentialModel, differential_model
 from .elements import Compliance, Element, ErrorLaw
 from .errors_seen import BlockErrors, ErrorSummary
@@ -36,10 +39,12 @@ from .measurements import (
 )
 from .observability import Criterion, Observability, observability
 from .obstacles import Box, HalfSpace, Sphere, clearance
+from .offsets import JointOffsets, PoseOffsets, joint_offsets, pose_offsets
 from .parameters import GeometricParameter, GeometricParameters, candidate_parameters
 from .prior import ParameterPrior
 from .problem import Problem, problem_of
 from .read import read_measurements
+from .reading_jacobian import reading_jacobian
 from .report import report_text
 from .residuals import measured_residuals
 from .result import CalibrationResult
@@ -55,6 +60,7 @@ __all__ = [
     "AngleUnit",
     "AsideErrors",
     "AxisPosition",
+    "Bending",
     "BlockErrors",
     "Box",
     "CalibratedEnd",
@@ -62,6 +68,8 @@ __all__ = [
     "CalibrationResult",
     "CameraPose",
     "Compliance",
+    "CorrectedSolutions",
+    "CorrectionStatus",
     "Criterion",
     "DifferentialModel",
     "Distance",
@@ -76,6 +84,7 @@ __all__ = [
     "IdentifiabilityChange",
     "IdentifiableParameters",
     "JointErrors",
+    "JointOffsets",
     "Kind",
     "KnownDistance",
     "LaserLine",
@@ -87,6 +96,7 @@ __all__ = [
     "PlaneContact",
     "PointContact",
     "Pose",
+    "PoseOffsets",
     "Position",
     "Problem",
     "Reason",
@@ -102,6 +112,7 @@ __all__ = [
     "calibrated_urdf",
     "candidate_parameters",
     "clearance",
+    "corrected_igm",
     "differential_model",
     "encoder_transmission",
     "fit",
@@ -109,11 +120,14 @@ __all__ = [
     "identifiable_on",
     "identifiable_parameters",
     "joint_errors_of",
+    "joint_offsets",
     "measured_residuals",
     "observability",
     "pose_of_elements",
+    "pose_offsets",
     "problem_of",
     "read_measurements",
+    "reading_jacobian",
     "report_text",
     "result_data",
     "select_configurations",
