@@ -340,8 +340,8 @@ class Transmission:
         Examples
         --------
         >>> wrist = Transmission.from_motor([[45.0, 0.0], [32.0, 32.0]], Iam=[0.0, 0.01])
-        >>> wrist.to_encoder([1.0, 0.0]), wrist.to_motor_torque([45.0, 32.0])
-        (array([45., 32.]), array([0., 1.]))
+        >>> wrist.to_encoder([1.0, 0.0]), wrist.to_motor_torque([77.0, 32.0])
+        (array([45., 32.]), array([1., 1.]))
         """
         R = as_floats(matrix, "matrix")
         if R.ndim != 2 or R.shape[0] != R.shape[1]:

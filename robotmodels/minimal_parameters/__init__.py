@@ -7,10 +7,12 @@ from .find import base_parameters
 from .prior import uniform_bodies
 from .result import BaseMethod, BaseParameters
 from .standard import PhysicalStatus, StandardParameters, standard_parameters
+from .values_table import BaseValues
 
 __all__ = [
     "BaseMethod",
     "BaseParameters",
+    "BaseValues",
     "PhysicalStatus",
     "StandardParameters",
     "base_parameters",

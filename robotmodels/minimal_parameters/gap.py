@@ -59,10 +59,10 @@ def with_clear_gap(W: Array, scale: Array, tolerance: float, basis: ColumnBasis)
 
     Examples
     --------
-    >>> W = np.diag([1.0, 3e-11, 8e-12, 1e-16])
+    >>> W = np.diag([1.0, 1e-9, 3e-11, 8e-12, 1e-16])
     >>> at_tolerance = column_basis(W, nothing=1e-11)
-    >>> len(at_tolerance.kept), len(with_clear_gap(W, np.ones(4), 1e-11, at_tolerance).kept)
-    (2, 3)
+    >>> len(at_tolerance.kept), len(with_clear_gap(W, np.ones(5), 1e-11, at_tolerance).kept)
+    (3, 4)
     """
     if ratio(basis) >= CLEAR:
         return basis
