@@ -88,7 +88,7 @@ def without_payload(
     model : RobotModel
         The robot.
     mass, com, inertia, frame
-        As for `with_payload`.
+        As for `with_payload`: kg, shapes (3,) in m and (3, 3) in kg m^2, and the frame.
 
     Returns
     -------
