@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -165,7 +166,8 @@ def fit(
     check_enough(problem_of(identifiable.kept, measured))
     estimated = identifiable.kept if prior is None else estimated_with(prior, identifiable)
     problem = problem_of(estimated, measured)
-    gaussian = None if prior is None else settled_prior(prior, problem, loss, chance)
+    prior_of = None if prior is None else partial(settled_prior, prior, loss=loss, rng=chance)
+    gaussian = None if prior_of is None else prior_of(problem)
     solution = solve(problem, loss=loss, prior=gaussian, truncation=truncation)
     step("all measurements")
     preferred = candidates.preferring(estimated.names)
@@ -174,7 +176,7 @@ def fit(
         deviation=all_deviations(preferred, estimated, solution.deviation),
         fixtures=solution.fixtures, dependent=_TOLD_APART,
     )  # fmt: skip
-    refit = Refit(solution, gaussian, truncation)
+    refit = Refit(solution, prior_of, truncation)
     validation = None
     if folds and problem.blocks >= 2 * folds:
         parts = splits(measured, folds, chance)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from .._arrays import Array, Rebuilt
 from ..errors import InvalidValueError
 from ..estimation import Prior, fit_nonlinear
+from .dealing import dealt_blocks
 from .errors_seen import BlockErrors, block_errors
 from .measurements import Measurement
 from .parameters import GeometricParameters
@@ -85,18 +86,7 @@ def splits(
     """
     if folds < 2:
         raise InvalidValueError(f"folds: expected 2 or more (0 for none), got {folds}.")
-    dealt: list[NDArray[np.int64]] = []
-    turn = 0
-    for m in measurements:
-        fold = np.full(m.blocks, -1, dtype=np.int64)
-        if m.views:
-            for group in np.unique(m.groups):
-                members = np.flatnonzero(m.groups == group)
-                if len(members) < 2:
-                    continue
-                fold[rng.permutation(members)] = (turn + np.arange(len(members))) % folds
-                turn += len(members)
-        dealt.append(fold)
+    dealt = dealt_blocks(measurements, folds, rng)
     parts = [_split(measurements, dealt, k) for k in range(folds)]
     return [part for part in parts if part.aside]
 
@@ -129,15 +119,8 @@ def split_aside(
         raise InvalidValueError(
             f"held_out: expected a share between 0 and 1, or measurements, got {share!r}."
         )
-    dealt = []
-    for m in measurements:
-        fold = np.full(m.blocks, -1, dtype=np.int64)
-        if m.views:
-            for group in np.unique(m.groups):
-                members = rng.permutation(np.flatnonzero(m.groups == group))
-                count = min(round(share * len(members)), len(members) - 1)
-                fold[members[:count]] = 0
-        dealt.append(fold)
+    folds = max(round(1.0 / share), 2)
+    dealt = dealt_blocks(measurements, folds, rng)
     part = _split(measurements, dealt, 0)
     return part if part.aside else None
 
@@ -166,14 +149,14 @@ class Refit(Rebuilt):
     ----------
     solution : Solution
         Of all measurements.
-    prior : Prior or None
-        The same prior.
+    prior : callable or None
+        The prior for a problem, from its own measurements alone.
     truncation : float or None
         The same truncation.
     """
 
     solution: Solution
-    prior: Prior | None
+    prior: Callable[[Problem], Prior] | None
     truncation: float | None
 
 
@@ -206,7 +189,8 @@ def errors_of_splits(
         start = [known[fixture.name] for fixture in problem.fixtures]
         solution = solve(
             problem, np.concatenate([refit.solution.deviation, start]),
-            from_scales=refit.solution.scales, loss=refit.solution.fit.loss, prior=refit.prior,
+            from_scales=refit.solution.scales, loss=refit.solution.fit.loss,
+            prior=None if refit.prior is None else refit.prior(problem),
             truncation=refit.truncation, tolerance=_ROUGH,
         )  # fmt: skip
         fixtures = fixtures_by_name(solution)

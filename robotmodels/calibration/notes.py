@@ -9,7 +9,7 @@ from ..errors import InvalidValueError
 from ..estimation import FitStatus
 from ..geometry import REVOLUTE
 from ..kinematics.lengths import characteristic_length
-from .elements import Element
+from .elements import Element, ErrorLaw
 from .identifiable import IdentifiableParameters
 from .measurements import Pose, Position, lonely_labels
 from .problem import Problem, measured_frames
@@ -24,6 +24,9 @@ _FAR = 50.0
 _UNLIKELY = 0.02
 """Noise that is estimated, relative to the robot or in rad, that no measurement of a robot has."""
 _LENGTHS = [Element.B, Element.D, Element.R]
+_OTHER_LENGTH, _OTHER_ANGLE = 0.1, 0.35
+"""Deviations beyond which it is another robot, in sizes of the robot and rad."""
+_FEW = 0.5
 _CONFUSED = 50.0
 """Standard deviation, in that of the parameter if it were alone, beyond which others hide it."""
 
@@ -73,6 +76,7 @@ def notes_before(problem: Problem) -> tuple[str, ...]:
                 f"{where}: {twice} of {m.blocks} rows repeat another row exactly; they add no "
                 "information, but make the standard deviations too small. Leave them out."
             )
+    notes += _same_names(problem)
     notes += [str(lonely) for lonely in lonely_labels(problem.measurements)]
     for j, reading in enumerate(_all_readings(problem).T):
         row = model.table.joint_rows[j] + 1
@@ -158,11 +162,24 @@ def notes_after(
             "Choose configurations with select_configurations, leave one of them out (known=...), "
             "or give a prior."
         )
-    if fit.sigma_known and fit.scale > _FAR:
+    first = 0
+    for m in problem.measurements:
+        rows = slice(first, first + m.blocks * len(m.axes))
+        first = rows.stop
+        size = float(np.sqrt(np.mean(fit.residuals[rows] ** 2)))
+        if (m.sigma is not None or m.covariance is not None) and size > _FAR:
+            notes.append(
+                f"{m.name}: residuals are {size:.3g} times the stated standard deviations. Look "
+                "for a slip of units (mm for m, degrees for rad), a wrong frame, or readings that "
+                "do not belong to their measurements."
+            )
+    notes += _unlikely_deviations(solution)
+    spare, unknowns = problem.rows - problem.P - problem.F, problem.P + problem.F
+    if spare < _FEW * unknowns:
         notes.append(
-            f"Residuals are {fit.scale:.3g} times the stated standard deviations: look for a slip "
-            "of units (mm for m, degrees for rad), a wrong frame, or readings that do not belong "
-            "to their measurements."
+            f"{spare} rows more than the {unknowns} unknowns: too few to know the noise well, so "
+            "standard deviations are uncertain and intervals too short. Measure more "
+            "configurations."
         )
     length = np.abs(problem.parameters.skeleton.nominal[1:, _LENGTHS]).sum()
     for m, scale in zip(problem.measurements, solution.scales, strict=True):
@@ -187,6 +204,26 @@ def notes_after(
     return tuple(notes)
 
 
+def _unlikely_deviations(solution: Solution) -> list[str]:
+    """Parameters of the table that would be another robot's."""
+    parameters = solution.problem.parameters
+    f = parameters.model.f
+    size = np.abs(parameters.skeleton.nominal[1:, _LENGTHS]).sum()
+    far = [
+        f"{entry.name} by {value:.3g} {entry.unit}"
+        for entry, value in zip(parameters.entries, solution.deviation, strict=True)
+        if entry.law is ErrorLaw.CONSTANT and 0 < entry.row <= f
+        and abs(value) > (_OTHER_LENGTH * size if entry.element.is_length else _OTHER_ANGLE)
+    ]  # fmt: skip
+    if not far:
+        return []
+    return [
+        f"{', '.join(far)}: deviations that no robot has. Look for a slip of units (mm for m, "
+        "degrees for rad), joints in another order or with another sign or zero, rotations the "
+        "other way round; or these parameters are not told by the data."
+    ]
+
+
 def _hidden(solution: Solution) -> list[str]:
     """Parameters whose estimates hang on those of others."""
     fit, problem = solution.fit, solution.problem
@@ -200,6 +237,23 @@ def _hidden(solution: Solution) -> list[str]:
         name
         for k, name in enumerate(problem.parameters.names)
         if inflation[k] > _CONFUSED and not has_prior[k]
+    ]
+
+
+def _same_names(problem: Problem) -> list[str]:
+    """Kinds that share fixtures because they share a name, which may be meant or not."""
+    seen: dict[str, set[str]] = {}
+    shared = []
+    for m in problem.measurements:
+        names = {fixture.name for fixture in m.fixtures}
+        if m.views and names & seen.get(m.name, set()):
+            shared.append(m.name)
+        if m.views:
+            seen.setdefault(m.name, set()).update(names)
+    return [
+        f"More than one measurement is called {name!r}: equal labels are taken as the same point, "
+        "plane or pose. Give them names of their own (name=...) if they are not."
+        for name in dict.fromkeys(shared)
     ]
 
 

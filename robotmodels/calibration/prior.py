@@ -9,7 +9,8 @@ import numpy as np
 
 from .._arrays import Rebuilt, as_reals
 from ..errors import InvalidValueError
-from ..estimation import Loss, Prior, k_folds, select_strength
+from ..estimation import Loss, Prior, select_strength
+from .dealing import dealt_blocks
 from .elements import ErrorLaw
 from .identifiable import IdentifiableParameters, Reason
 from .parameters import GeometricParameter, GeometricParameters
@@ -128,6 +129,10 @@ def settled_prior(
     Prior
         Of the vector [parameters, fixtures].
 
+    Raises
+    ------
+    InvalidValueError
+        Too few measurements to keep some of them aside.
     """
     entries = problem.parameters.entries
     size = np.array([_size(prior, entry, problem.parameters.model.f) for entry in entries])
@@ -138,11 +143,18 @@ def settled_prior(
     if prior.strength is not None:
         return Prior(mean, whole, prior.strength)
     whole_prior = Prior(mean, whole)
+    if problem.blocks < 2 * _FOLDS:
+        raise InvalidValueError(
+            f"strength: choosing it needs {2 * _FOLDS} measurements or more, got "
+            f"{problem.blocks}; give the strength."
+        )
     scales = solve(problem, loss=loss, prior=whole_prior).scales
     start = np.concatenate([mean[: problem.P], guessed_fixtures(problem, mean[: problem.P])])
     block = problem.block
+    dealt = np.concatenate(dealt_blocks(problem.measurements, _FOLDS, rng))[block]
+    masks = np.array([dealt == k for k in range(_FOLDS) if (dealt == k).any()])
     tried = select_strength(
-        lambda x: stacked(problem, x, scales), start, whole_prior, k_folds(block, _FOLDS, rng),
+        lambda x: stacked(problem, x, scales), start, whole_prior, masks,
         strengths=_STRENGTHS, block=block, loss=loss,
     )  # fmt: skip
     return whole_prior.with_strength(tried.strength)
