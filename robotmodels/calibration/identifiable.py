@@ -13,9 +13,10 @@ from ..errors import InvalidValueError
 from ..estimation import ColumnBasis, column_basis
 from ..table_text import boxed
 from .elements import ErrorLaw
-from .measurements import Measurement, length_is_known
+from .measurements import Measurement
 from .parameters import GeometricParameters, as_names
 from .problem import Problem, guessed_fixtures, linearised, problem_of, satisfying
+from .scale import check_scale, needs_a_length
 
 DEPENDENT = 1e-7
 """Sine of the angle to the columns before, below which a parameter acts like a combination."""
@@ -237,8 +238,6 @@ def identifiable_on(
         *candidates.index(known_lengths, "known_lengths").tolist(),
         *candidates.index(known, "known").tolist(),
     }
-    if not scale_is_known:
-        check_scale(problem, known_lengths)
     reasons: dict[str, Reason] = {}
     xi = np.zeros(len(candidates)) if deviation is None else deviation
     values = guessed_fixtures(problem, xi) if fixtures is None else fixtures
@@ -250,6 +249,13 @@ def identifiable_on(
             "the order of the joints and the tool (a first value of its length helps)."
         )
     W = _all_rows(there, xi, values)
+    if not scale_is_known and needs_a_length(problem, (*known, *known_lengths)):
+        fixed = [*known, *known_lengths]
+        if not problem.sees_base:
+            fixed += [
+                e.name for e in candidates.entries if e.row == 0 and e.law is ErrorLaw.CONSTANT
+            ]
+        check_scale(there, W, fixed, known_lengths)
     for k, entry in enumerate(candidates.entries):
         if k in at:
             reasons[entry.name] = Reason.KNOWN
@@ -315,49 +321,6 @@ def all_deviations(
     values = np.zeros(len(candidates))
     values[candidates.index(kept.names)] = deviation
     return values
-
-
-def check_scale(problem: Problem, known: tuple[str, ...]) -> None:
-    """Refuse measurements that are homogeneous in length, if no length is known.
-
-    Parameters
-    ----------
-    problem : Problem
-        The calibration.
-    known : tuple of str
-        Names of parameters that are known.
-
-    Raises
-    ------
-    InvalidValueError
-        Nothing gives the scale.
-    """
-    if all(unit == "rad" for m in problem.measurements for unit in m.units):
-        return  # orientations do not see lengths at all
-    p = problem.parameters
-    base_is_known = not any(
-        e.row == 0 and e.law is ErrorLaw.CONSTANT and e.name not in known for e in p.entries
-    )
-    origin = p.model.base[:3, 3] if base_is_known else None
-    if length_is_known(problem.measurements, origin):
-        return
-    free = [
-        (entry, value)
-        for entry, value in zip(p.entries, p.nominal, strict=True)
-        if entry.law is ErrorLaw.CONSTANT and entry.element.is_length and entry.row > 0
-    ]
-    if not any(entry.row <= p.model.f for entry, _ in free):
-        return  # where no length of the table may be off, all are known
-    free.sort(key=lambda pair: pair[0].row > p.model.f)
-    lengths = [entry.name for entry, value in free if abs(value) > 1e-6]
-    if any(name in lengths for name in known):
-        return
-    raise InvalidValueError(
-        "These measurements know no length: a robot shrunk to nothing would satisfy them. Measure "
-        "a distance (KnownDistance, Distance), or name a parameter whose length is known: "
-        f"known_lengths=({next(iter(lengths), 'd3')!r},). Lengths that are not zero here: "
-        f"{', '.join(lengths) or 'none'}."
-    )
 
 
 def _angle_basis(W: Array, dependent: float) -> ColumnBasis:
