@@ -311,6 +311,9 @@ def test_mistakes_are_named():
     one = serial(np.random.default_rng(0), 1, 0, False)
     with pytest.raises(InvalidValueError, match="two postures"):
         identifiable_parameters(one, Kind.POINT_CONTACT, known_lengths=["r1"])
+    wrist = rm.RobotModel.from_table(
+        rm.DHTable.from_rows([{"sigma": 0}, {"sigma": 0, "alpha": 1.5}, {"sigma": 0, "alpha": -1.5}])
+    )
     with pytest.raises(InvalidValueError, match="would do here: none"):
-        identifiable_parameters(rm.load("gantry"), Kind.POINT_CONTACT, known_lengths=["r1"])
+        identifiable_parameters(wrist, Kind.POINT_CONTACT)
     assert as_kind("point-contact") is as_kind(PointContact) is Kind.POINT_CONTACT

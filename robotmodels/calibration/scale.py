@@ -8,6 +8,7 @@ import numpy as np
 
 from .._arrays import Array
 from ..errors import InvalidValueError
+from ..geometry import PRISMATIC
 from ..kinematics.lengths import spread_configurations
 from .differential import differential_model
 from .elements import ErrorLaw
@@ -101,7 +102,9 @@ def check_scale(problem: Problem, W: Array, fixed: Sequence[str], named: Sequenc
         shrunk = shapes @ np.linalg.lstsq(shapes, distances, rcond=_NULL)[0]
         return bool(np.linalg.norm(shrunk - distances) <= _MOVES * np.linalg.norm(distances))
 
-    if named and not is_open(fixed):
+    # readings of prismatic joints are lengths, and may be enough
+    slides = bool((p.skeleton.sigma == PRISMATIC).any())
+    if (named or slides) and not is_open(fixed):
         return
     rest = [name for name in fixed if name not in named]
     serve = [name for name in lengths if not is_open([*rest, name])]
