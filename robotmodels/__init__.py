@@ -11,7 +11,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 from . import errors, friction, kinematics, regressors
-from .drive import DriveParameters, Transmission
+from .drive import DriveKind, DriveParameters, Transmission
 from .dynamics import (
     base_model,
     christoffel_blocks,
@@ -28,7 +28,7 @@ from .dynamics import (
 )
 from .geometry import DHTable, link_transforms
 from .igm import IGMSolutions, IGMStatus, igm, igm_numeric
-from .inertia import InertialParameters
+from .inertia import InertialParameters, InertiaWarning
 from .kinematics import dgm, dkm, dkm_second_order, jacobian, jacobian_rate, link_poses
 from .model import RobotModel, to_urdf, write_urdf
 from .regressors import (
@@ -76,6 +76,7 @@ if TYPE_CHECKING:
     )
     from .minimal_parameters import (
         BaseParameters,
+        BaseValues,
         StandardParameters,
         base_parameters,
         standard_parameters,
@@ -89,15 +90,18 @@ __version__ = "0.1.0"
 
 __all__ = [
     "BaseParameters",
+    "BaseValues",
     "DHTable",
     "DampedInverse",
     "DirectModelExplanation",
+    "DriveKind",
     "DriveParameters",
     "FilteredInverse",
     "IGMSolutions",
     "IGMStatus",
     "IKMSolution",
     "IKMStatus",
+    "InertiaWarning",
     "InertialParameters",
     "InverseModelExplanation",
     "JacobianExplanation",
@@ -187,6 +191,7 @@ def __dir__() -> list[str]:
 _ROOMS = {
     ".minimal_parameters": (
         "BaseParameters",
+        "BaseValues",
         "StandardParameters",
         "base_parameters",
         "standard_parameters",
