@@ -312,7 +312,7 @@ def test_mistakes_are_named():
     with pytest.raises(InvalidValueError, match="two postures"):
         identifiable_parameters(one, Kind.POINT_CONTACT, known_lengths=["r1"])
     wrist = rm.RobotModel.from_table(
-        rm.DHTable.from_rows([{"sigma": 0}, {"sigma": 0, "alpha": 1.5}, {"sigma": 0, "alpha": -1.5}])
+        rm.DHTable.from_rows([{"sigma": 0}, {"sigma": 0, "alpha": 1}, {"sigma": 0, "alpha": -1}])
     )
     with pytest.raises(InvalidValueError, match="would do here: none"):
         identifiable_parameters(wrist, Kind.POINT_CONTACT)

@@ -35,6 +35,8 @@ def test_python_examples(tmp_path, monkeypatch, capsys):
     assert names["fall"].relative_drift < 1e-8
     assert (tmp_path / "ur5.html").stat().st_size > 500_000
     assert (tmp_path / "arm.urdf").is_file()
+    assert names["result"].after.summary("m").mean < 0.22e-3
+    assert names["result"].before.summary("m").mean > 8e-3
     printed = capsys.readouterr().out
     assert "rx90" in printed
     assert "elbow: C3 = 0" in printed
