@@ -2,6 +2,10 @@
 
 import os
 
+# tests run beside each other: threads of the linear algebra would wait for one another, which
+# takes longer than the small matrices here. Read when NumPy is first imported.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import numpy as np
 import pytest
 from hypothesis import settings
