@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import robotmodels as rm
+from robotmodels import calibration
 from robotmodels.datasets import panda_double_socket, ur10_camera
 from robotmodels.errors import InvalidValueError
 
@@ -51,6 +52,47 @@ def test_the_ball_is_the_tool_of_the_panda():
     model = panda_double_socket().model
     q = np.linspace(-0.5, 0.5, 7)
     assert np.array_equal(rm.dgm(model, q), rm.dgm(model, q, frame="ball_link"))
+
+
+@pytest.mark.parametrize("robot", ["panda_1", "panda_2"])
+def test_masses_of_the_panda_are_those_of_the_catalogue(robot):
+    model = panda_double_socket(robot).model
+    catalogue = rm.load("panda").inertia
+    assert np.array_equal(model.inertia.values[:6], catalogue.values[:6])
+    assert model.inertia.is_physical.all()
+    bare = model.with_inertia(catalogue)
+    carrying = rm.with_payload(
+        bare, 0.73, [-0.01, 0.0, 0.03], inertia=np.diag((0.001, 0.0025, 0.0017)),
+        frame="panda_hand",
+    )  # fmt: skip
+    np.testing.assert_allclose(model.inertia.values, carrying.inertia.values, atol=1e-15)
+
+
+def test_panda_hangs_as_the_one_of_example_robot_data():
+    # whose frame 7 is turned by 45 degrees, and which has fingers
+    model, heavy = panda_double_socket().model, rm.load("erd:panda")
+    q = np.array([0.3, -0.7, 0.4, -2.0, 0.6, 1.2, 0.9])
+    values = heavy.inertia.values.copy()
+    values[7:] = 0.0
+    full = rm.gravity_torque(heavy.with_inertia(rm.InertialParameters(values)), [*q, 0.0, 0.0])
+    np.testing.assert_allclose(rm.gravity_torque(model, q), full[:7], rtol=1e-9, atol=1e-9)
+
+
+def test_compliance_of_the_panda_can_be_asked():
+    data = panda_double_socket()
+    q = np.concatenate(data.places["front"])
+    label = np.repeat([0, 1], [len(x) for x in data.places["front"]])
+    measured = [
+        calibration.PointContact(q, label, name="front"),
+        calibration.KnownDistance("front:0", "front:1", data.distance),
+    ]
+    prior = calibration.ParameterPrior(length=3e-4, angle=6e-3, compliance=6e-5)
+    some = {"prior": prior, "folds": 0, "held_out": 0.0}
+    stiff = calibration.fit(data.model, measured, **some)
+    soft = calibration.fit(data.model, measured, compliance="isotropic", **some)
+    assert any(name.startswith("compliance") for name in soft.names)
+    assert not any(name.startswith("compliance") for name in stiff.names)
+    assert soft.after.summary("m").rms < stiff.after.summary("m").rms
 
 
 def test_an_unknown_panda_is_named():

@@ -12,6 +12,7 @@ from .._arrays import Array, Rebuilt, as_exact, read_only
 from ..errors import InvalidValueError, nearest_names
 from ..model import RobotModel
 from ._files import folder, numbers
+from .panda_masses import panda_masses
 
 _ROBOTS = ("panda_1", "panda_2")
 _DISTANCE = 0.05
@@ -64,8 +65,13 @@ class DoubleSocket(Rebuilt):
 
     @property
     def model(self) -> RobotModel:
-        """The nominal robot, its tool the centre of the ball."""
-        return RobotModel.from_urdf(self.urdf, tip_link="ball_link")
+        """The nominal robot with masses, its tool the centre of the ball.
+
+        The URDF has no masses: those of `panda_masses` are added, so that compliance under
+        gravity can be asked of it. They move nothing else. Ball and its holder have no mass here.
+        """
+        bare = RobotModel.from_urdf(self.urdf, tip_link="ball_link")
+        return bare.with_inertia(panda_masses())
 
     @property
     def blocks(self) -> int:
@@ -80,6 +86,9 @@ def panda_double_socket(robot: str = "panda_1") -> DoubleSocket:
     hand is turned about it, and only the joints are read. No device measures anything. Poses that
     the controller believed in (``*_pose.csv`` of the source) are not shipped: they follow from
     the readings.
+
+    The `model` has the published masses of the Panda's links and of its hand, which the URDF
+    leaves out, so that ``calibration.fit(data.model, ..., compliance="isotropic")`` can be asked.
 
     What looks like two arms may be one on two days: what is identified of them agrees within its
     deviations. At the place ``high`` of panda_2 the socket was moved in between.
@@ -112,6 +121,8 @@ def panda_double_socket(robot: str = "panda_1") -> DoubleSocket:
     {'back-high': (30, 30), 'front': (30, 32), 'right': (30, 30)}
     >>> data.model.n, data.distance, data.licence
     (7, 0.05, 'MIT')
+    >>> round(float(data.model.inertia.mass.sum()), 2)
+    16.79
     """
     if robot not in _ROBOTS:
         near = ", ".join(nearest_names(str(robot), _ROBOTS)) or ", ".join(_ROBOTS)
