@@ -13,9 +13,11 @@ from robotmodels.calibration import (
     PointContact,
     Pose,
     Position,
+    Reason,
     candidate_parameters,
     differential_model,
     fit,
+    joint_offsets,
 )
 from robotmodels.calibration.calibrated import calibrated_pose
 from robotmodels.calibration.measurements import (
@@ -723,7 +725,7 @@ def test_truncation_leaves_out_what_is_hardly_seen():
     full = fit(s.nominal, Position(q, T[:, :3, 3]), **ALONE)
     cut = fit(s.nominal, Position(q, T[:, :3, 3]), truncation=1e-3, **ALONE)
     assert cut.solution.fit.rank < full.solution.fit.rank
-    assert np.abs(cut.deviation).max() < 0.1 * np.abs(full.deviation).max()
+    assert np.abs(cut.deviation).max() < 0.5 * np.abs(full.deviation).max()
 
 
 # --- mistakes -------------------------------------------------------------------------------------
@@ -845,3 +847,46 @@ def test_progress_is_told(scene):
     fit(scene.nominal, Pose(scene.q, scene.T), folds=3, progress=lambda *x: said.append(x))
     assert [done for done, _, _ in said] == [1, 2, 3, 4, 5]
     assert {total for _, total, _ in said} == {5}
+
+
+def test_what_noise_hides_stays_as_it_is():
+    """The wrist of an arm whose target is its centre: a tool moved by noise tells nothing of it."""
+    arm = rm.load("rx90")
+    q = np.random.default_rng(1).uniform(-2, 2, (60, 6))
+    seen = rm.dgm(arm, q)[:, :3, 3] + 5e-5 * np.random.default_rng(2).normal(size=(60, 3))
+    result = fit(arm, Position(q, seen), **ALONE)
+    hidden = result.identifiable.of_reason(Reason.NOISE)
+    assert {"theta4", "theta5", "alpha5", "alpha6"} <= set(hidden)
+    turned = rm.dgm(result.model, q)[:, :3, :3].swapaxes(1, 2) @ rm.dgm(arm, q)[:, :3, :3]
+    assert np.trace(turned, axis1=1, axis2=2).min() > 1 + 2 * np.cos(1e-3)
+
+
+def test_no_gain_on_data_kept_aside_is_told():
+    arm = rm.load("rx90")
+    rng = np.random.default_rng(3)
+    q = rng.uniform(-2, 2, (14, 6))
+    T = rm.dgm(arm, q)
+    T[:, :3, 3] += 2e-3 * rng.normal(size=(14, 3))  # noise alone
+    result = fit(arm, Pose(q, T))
+    assert any("does not lower the position error" in note for note in result.notes)
+
+
+def test_joint_offsets_of_a_result_count_what_was_measured():
+    arm = rm.load("rx90")
+    candidates = candidate_parameters(arm)
+    xi = 1e-3 * np.random.default_rng(5).normal(size=len(candidates))
+    q = np.random.default_rng(6).uniform(-2, 2, (60, 6))
+    seen = differential_model(candidates, q, xi).T[:, :3, 3]
+    result = fit(arm, Position(q, seen), **ALONE)
+    assert result.measured_mask == (1, 1, 1, 0, 0, 0)
+    found = joint_offsets(result, q)
+    assert np.array_equal(
+        found.offset, joint_offsets(result.robot, q, mask=[1, 1, 1, 0, 0, 0]).offset
+    )
+
+
+def test_a_result_prints_one_line(scene):
+    result = fit(scene.nominal, Pose(scene.q, scene.T), **ALONE)
+    assert "\n" not in repr(result)
+    assert len(repr(result)) < 300
+    assert len(repr(result.parameters)) < 500

@@ -21,7 +21,7 @@ from .folds import AsideErrors
 from .identifiable import IdentifiableParameters, Reason, identifiable_on
 from .joined import side_by_side
 from .joint_errors import JointErrors, encoder_transmission, joint_errors_of
-from .kinds import Kind
+from .kinds import Kind, drawn_groups
 from .measurements import (
     AxisPosition,
     CameraPose,
@@ -114,6 +114,7 @@ __all__ = [
     "clearance",
     "corrected_igm",
     "differential_model",
+    "drawn_groups",
     "encoder_transmission",
     "fit",
     "identifiability_change",

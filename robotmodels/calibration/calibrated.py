@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -269,6 +269,42 @@ def calibrated_model(parameters: GeometricParameters, deviation: ArrayLike) -> C
         bending=bending_of(parameters, elements, xi),
         ends=tuple(ends),
     )
+
+
+def as_calibrated(robot: Any) -> CalibratedRobot:
+    """A calibrated robot at the border: itself, or that of the result of a fit.
+
+    Parameters
+    ----------
+    robot : CalibratedRobot or CalibrationResult
+        What a caller passed.
+
+    Returns
+    -------
+    CalibratedRobot
+        The robot.
+
+    Raises
+    ------
+    InvalidValueError
+        Something else.
+
+    Examples
+    --------
+    >>> as_calibrated(3)
+    Traceback (most recent call last):
+    ...
+    robotmodels.errors.InvalidValueError: robot: expected a CalibratedRobot or a CalibrationResult,
+    got int; make one with fit(...) or calibrated_model(parameters, deviation).
+    """
+    found = getattr(robot, "robot", robot)
+    if not isinstance(found, CalibratedRobot):
+        raise InvalidValueError(
+            "robot: expected a CalibratedRobot or a CalibrationResult, got "
+            f"{type(robot).__name__}; make one with fit(...) or calibrated_model(parameters, "
+            "deviation)."
+        )
+    return found
 
 
 def calibrated_pose(robot: CalibratedRobot, q_read: ArrayLike, frame: Frame = None) -> Array:

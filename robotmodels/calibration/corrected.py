@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from .. import se3
 from .._arrays import Array, as_vector, batch_rows
-from ..errors import InvalidValueError
 from ..geometry import PRISMATIC
 from ..igm import igm
 from ..igm.asked import above_zero, locks_of, mask_of
@@ -20,7 +19,7 @@ from ..igm.solutions import IGMSolutions
 from ..igm.status import IGMStatus
 from ..kinematics import dgm
 from ..model import RobotModel
-from .calibrated import CalibratedRobot, tip_of
+from .calibrated import CalibratedRobot, as_calibrated, tip_of
 from .corrected_rows import put_together, same_as
 from .corrected_solutions import CorrectedSolutions, CorrectionStatus
 from .homing import Flags, Home, Postures
@@ -110,11 +109,7 @@ def corrected_igm(
     >>> found.nearest(q).round(9)
     array([0.1, 0.2, 1.3, 0.4, 0.5, 0.6])
     """
-    if not isinstance(robot, CalibratedRobot):
-        raise InvalidValueError(
-            f"robot: expected a CalibratedRobot, got {type(robot).__name__}; make one with "
-            "calibrated_model(parameters, deviation)."
-        )
+    robot = as_calibrated(robot)
     model, n = robot.model, robot.model.n
     tolerance = above_zero(tolerance, "tolerance")
     asked, locks = mask_of(mask), locks_of(model, lock)

@@ -23,18 +23,21 @@ from .folds import (
 )
 from .identifiable import all_deviations, identifiable_on
 from .measurements import Measurement
-from .notes import check_enough, notes_after, notes_before
+from .notes import check_enough, notes_after, notes_before, notes_of_gain
 from .parameters import GeometricParameters, as_names, candidate_parameters
 from .placing import placed_robot
 from .prior import ParameterPrior, estimated_with, settled_prior
-from .problem import as_measurements, measured_frames, problem_of
+from .problem import as_measurements, guessed_fixtures, measured_frames, problem_of
 from .result import CalibrationResult
 from .solve import solve
+from .untold import untold_by, without_untold
 
 Progress = Callable[[int, int, str], None]
 """Called with the number of fits done, of all, and what is being done."""
 
 _SEED = 1
+_TRIES = 4
+"""Fits until noise hides no parameter any more."""
 _TOLD_APART = 1e-4
 """Sine of the angle between columns below which noise hides a parameter behind others."""
 
@@ -164,11 +167,18 @@ def fit(
         candidates, measured, known_lengths, known, dependent=_TOLD_APART
     )
     check_enough(problem_of(identifiable.kept, measured))
-    estimated = identifiable.kept if prior is None else estimated_with(prior, identifiable)
-    problem = problem_of(estimated, measured)
     prior_of = None if prior is None else partial(settled_prior, prior, loss=loss, rng=chance)
-    gaussian = None if prior_of is None else prior_of(problem)
-    solution = solve(problem, loss=loss, prior=gaussian, truncation=truncation)
+    for _ in range(_TRIES):
+        estimated = identifiable.kept if prior is None else estimated_with(prior, identifiable)
+        problem = problem_of(estimated, measured)
+        gaussian = None if prior_of is None else prior_of(problem)
+        zero = np.zeros(problem.P)
+        start = np.concatenate([zero, guessed_fixtures(problem, zero)])
+        solution = solve(problem, start, loss=loss, prior=gaussian, truncation=truncation)
+        untold = [] if gaussian is not None or truncation else untold_by(solution, start)
+        if not untold:
+            break
+        identifiable = without_untold(identifiable, untold)
     step("all measurements")
     preferred = candidates.preferring(estimated.names)
     again = identifiable_on(
@@ -178,7 +188,10 @@ def fit(
     )  # fmt: skip
     refit = Refit(solution, prior_of, truncation)
     validation = None
-    if folds and problem.blocks >= 2 * folds:
+    blocks = sum(m.blocks for m in measured if m.views)
+    if folds and blocks < 2 * folds:
+        notes = (*notes, f"{blocks} measurements are too few for {folds} folds: none were made.")
+    elif folds:
         parts = splits(measured, folds, chance)
         validation = errors_of_splits(refit, parts, before, lambda: step("cross-validation"))
     kept_aside = None
@@ -192,7 +205,11 @@ def fit(
         solution=solution, given=errors_given, before=before,
         after=block_errors(problem, solution.deviation, solution.fixtures),
         cross_validation=validation, held_out=kept_aside,
-        notes=(*notes, *notes_after(solution, identifiable, again)),
+        notes=(
+            *notes_of_gain(before, validation, kept_aside),
+            *notes,
+            *notes_after(solution, identifiable, again),
+        ),
     )  # fmt: skip
 
 

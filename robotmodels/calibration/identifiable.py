@@ -36,6 +36,7 @@ class Reason(Enum):
     REGROUPED = "it acts like a combination of others, which take its part"
     GAUGE = "where the robot stands is not measured: it stays as it is"
     KNOWN = "it is known and fixed"
+    NOISE = "what it does is smaller than the noise: it stays as it is"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,12 +8,15 @@ from .._arrays import Array
 from ..errors import InvalidValueError
 from ..estimation import FitStatus
 from ..geometry import REVOLUTE
+from ..kinematics import dgm
 from ..kinematics.lengths import characteristic_length
-from .elements import Element, ErrorLaw
+from .elements import ErrorLaw
+from .errors_seen import BlockErrors
+from .folds import AsideErrors
 from .identifiable import IdentifiableParameters
-from .measurements import Pose, Position, lonely_labels
+from .measurements import Distance, Pose, Position, lonely_labels
 from .problem import Problem, measured_frames
-from .solve import Solution
+from .solve import Solution, size_of_robot
 
 _TURNS = 30.0
 """Reading of a revolute joint beyond which degrees are more likely, rad."""
@@ -23,9 +26,9 @@ _FAR = 50.0
 """Residual in stated standard deviations that units explain better than noise."""
 _UNLIKELY = 0.02
 """Noise that is estimated, relative to the robot or in rad, that no measurement of a robot has."""
-_LENGTHS = [Element.B, Element.D, Element.R]
 _OTHER_LENGTH, _OTHER_ANGLE = 0.1, 0.35
 """Deviations beyond which it is another robot, in sizes of the robot and rad."""
+_NO_GAIN = 0.98
 _FEW = 0.5
 _CONFUSED = 50.0
 """Standard deviation, in that of the parameter if it were alone, beyond which others hide it."""
@@ -65,11 +68,23 @@ def notes_before(problem: Problem) -> tuple[str, ...]:
         if isinstance(m, Pose | Position):
             p = m.T[:, :3, 3] if isinstance(m, Pose) else m.p
             spread = float(np.linalg.norm(np.ptp(p, axis=0)))
+            said = float(np.linalg.norm(np.ptp(dgm(model, m.q, m.frame)[..., :3, 3], axis=0)))
+            if 0.0 < spread < said / 200.0:
+                raise InvalidValueError(
+                    f"{where}: positions are spread over {spread:.3g} m, but those of the robot "
+                    f"over {said:.3g} m; these look like kilometres, or the same position all the "
+                    "time. Pass metres."
+                )
             if spread > 50.0 * length:
                 raise InvalidValueError(
                     f"{where}: positions are spread over {spread:.4g} m, but the robot reaches "
                     f"{length:.3g} m; these look like millimetres. Pass metres: 1e-3 * p."
                 )
+        if isinstance(m, Distance) and float(np.median(m.length)) > 50.0 * length:
+            raise InvalidValueError(
+                f"{where}: lengths are about {float(np.median(m.length)):.4g} m, but the robot "
+                f"reaches {length:.3g} m; these look like millimetres. Pass metres: 1e-3 * length."
+            )
         twice = _duplicates(problem, k)
         if twice:
             notes.append(
@@ -155,12 +170,13 @@ def notes_after(
             + ". Estimates of these are doubtful."
         )
     hidden = _hidden(solution)
+    no_prior = not np.isfinite(fit.prior.deviation).any()
     if hidden:
         notes.append(
             f"{', '.join(hidden)}: told from each other by little more than noise (their standard "
             f"deviations are over {_CONFUSED:g} times what they were if the others were known). "
             "Choose configurations with select_configurations, leave one of them out (known=...), "
-            "or give a prior."
+            f"or give a prior{'' if no_prior else ' of its own (named=...)'}."
         )
     first = 0
     for m in problem.measurements:
@@ -173,6 +189,16 @@ def notes_after(
                 "for a slip of units (mm for m, degrees for rad), a wrong frame, or readings that "
                 "do not belong to their measurements."
             )
+        elif (
+            m.views
+            and (m.sigma is not None or m.covariance is not None)
+            and 0.0 < size < 1.0 / _FAR
+        ):
+            notes.append(
+                f"{m.name}: residuals are {1.0 / size:.3g} times smaller than the stated standard "
+                "deviations. Look for a slip of units in sigma; the deviations of the parameters "
+                "hang on it."
+            )
     notes += _unlikely_deviations(solution)
     spare, unknowns = problem.rows - problem.P - problem.F, problem.P + problem.F
     if spare < _FEW * unknowns:
@@ -181,7 +207,7 @@ def notes_after(
             "standard deviations are uncertain and intervals too short. Measure more "
             "configurations."
         )
-    length = np.abs(problem.parameters.skeleton.nominal[1:, _LENGTHS]).sum()
+    length = size_of_robot(problem)
     for m, scale in zip(problem.measurements, solution.scales, strict=True):
         if m.sigma is None and m.covariance is None and not fit.sigma_known:
             size = max(
@@ -195,12 +221,44 @@ def notes_after(
                     "in another order, a wrong frame or units."
                 )
     if len(fit.outliers):
-        numbers = ", ".join(str(int(b)) for b in fit.outliers[:10])
+        numbers = ", ".join(str(int(b) + 1) for b in fit.outliers[:10])
         more = " and others" if len(fit.outliers) > 10 else ""
         notes.append(
             f"{len(fit.outliers)} of {problem.blocks} measurements are longer than noise explains "
-            f"(blocks {numbers}{more})."
+            f"(numbers {numbers}{more}, counted from 1)."
         )
+    return tuple(notes)
+
+
+def notes_of_gain(
+    before: BlockErrors, validation: AsideErrors | None, held_out: AsideErrors | None
+) -> tuple[str, ...]:
+    """Say whether the robot errs less where it was not measured, which is what counts.
+
+    Parameters
+    ----------
+    before : BlockErrors
+        Of the nominal robot.
+    validation, held_out : AsideErrors or None
+        Errors on data kept aside.
+
+    Returns
+    -------
+    tuple of str
+        A sentence for each unit that gained nothing.
+    """
+    notes = []
+    for aside, what in ((validation, "cross-validation"), (held_out, "data kept aside")):
+        if aside is None:
+            continue
+        for unit, word in (("m", "position"), ("rad", "angle")):
+            after, was = aside.after.summary(unit), aside.before.summary(unit)
+            if after.blocks and before.summary(unit).blocks and after.rms > _NO_GAIN * was.rms:
+                notes.append(
+                    f"Calibration does not lower the {word} error in {what}: {was.rms:.4g} to "
+                    f"{after.rms:.4g} {unit} (rms). The noise or the number of measurements does "
+                    "not carry this many parameters: fewer parameters, a prior, or more data."
+                )
     return tuple(notes)
 
 
@@ -208,7 +266,7 @@ def _unlikely_deviations(solution: Solution) -> list[str]:
     """Parameters of the table that would be another robot's."""
     parameters = solution.problem.parameters
     f = parameters.model.f
-    size = np.abs(parameters.skeleton.nominal[1:, _LENGTHS]).sum()
+    size = size_of_robot(solution.problem)
     far = [
         f"{entry.name} by {value:.3g} {entry.unit}"
         for entry, value in zip(parameters.entries, solution.deviation, strict=True)

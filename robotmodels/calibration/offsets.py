@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,12 +13,15 @@ from .._arrays import Array, Rebuilt, as_vector, read_only
 from ..errors import InvalidValueError
 from ..igm.asked import above_zero, mask_of
 from ..kinematics import dgm
-from .calibrated import CalibratedRobot, calibrated_pose
+from .calibrated import CalibratedRobot, as_calibrated, calibrated_pose
 from .corrected import CorrectedSolutions, corrected_igm
 from .reading_jacobian import missing_of_pose, missing_slope, reading_jacobian
 
 STEPS = 50
 DEPENDENT = 1e-9  # singular values beside the largest below which offsets are not told apart
+
+if TYPE_CHECKING:
+    from .result import CalibrationResult
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,7 +131,7 @@ class PoseOffsets(Rebuilt):
 
 
 def joint_offsets(
-    robot: CalibratedRobot,
+    robot: CalibratedRobot | CalibrationResult,
     q: ArrayLike,
     mask: ArrayLike | None = None,
     length: float | None = None,
@@ -136,12 +140,13 @@ def joint_offsets(
 
     Parameters
     ----------
-    robot : CalibratedRobot
+    robot : CalibratedRobot or CalibrationResult
         The robot, n joints.
     q : array_like, shape (N, n)
         What the controller would command, rad or m: the nominal model is to hold there.
     mask : array_like, shape (6,), optional
-        Components ``x y z rx ry rz`` (world axes) that count; default all.
+        Components ``x y z rx ry rz`` (world axes) that count; default all, and positions alone for
+        a result of positions alone: orientations that nobody measured must not weigh.
     length : float, optional
         Metres that weigh as much as a radian; default the mean distance of the tool from the
         base.
@@ -174,6 +179,9 @@ def joint_offsets(
     >>> found.offset.round(9) + 0.0
     array([ 0.  ,  0.  , -0.01,  0.  ,  0.  ,  0.  ])
     """
+    if mask is None:
+        mask = getattr(robot, "measured_mask", None)
+    robot = as_calibrated(robot)
     n = robot.model.n
     commanded = np.atleast_2d(as_vector(q, n, "q")).reshape(-1, n)
     asked = mask_of(mask)
@@ -213,7 +221,7 @@ def joint_offsets(
 
 
 def pose_offsets(
-    robot: CalibratedRobot,
+    robot: CalibratedRobot | CalibrationResult,
     T: ArrayLike,
     q_ref: ArrayLike | None = None,
     mask: ArrayLike | None = None,
@@ -265,6 +273,7 @@ def pose_offsets(
     >>> bool(np.abs(there - T).max() < 1e-12)
     True
     """
+    robot = as_calibrated(robot)
     found = corrected_igm(robot, T, q_ref, mask, mask_axes, limits, lock)
     command = np.full((*found.valid.shape, 4, 4), np.nan)
     command[found.valid] = dgm(robot.nominal, found.q[found.valid])

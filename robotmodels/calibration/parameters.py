@@ -139,6 +139,10 @@ class GeometricParameters(Rebuilt):
     def __len__(self) -> int:
         return len(self.entries)
 
+    def __repr__(self) -> str:
+        """Names alone: the extended table holds the whole robot."""
+        return f"<GeometricParameters of {self.model.name}: {', '.join(self.names)}>"
+
     @property
     def rows(self) -> NDArray[np.int64]:
         """Row of each parameter, shape (P,)."""

@@ -127,6 +127,25 @@ class CalibrationResult(Rebuilt):
         """The calibrated model: table with beta, base, tool, transmission."""
         return self.robot.model
 
+    @property
+    def measured_mask(self) -> tuple[int, ...]:
+        """Components x y z rx ry rz that the measurements have seen."""
+        units = {unit for m in self.solution.problem.measurements for unit in m.units}
+        return (int("m" in units),) * 3 + (int("rad" in units),) * 3
+
+    def __repr__(self) -> str:
+        """The headline of the report: a result holds too much to be listed."""
+        errors = [
+            f"rms {word} error {self.before.summary(unit).rms:.4g} -> "
+            f"{self.after.summary(unit).rms:.4g} {unit}"
+            for unit, word in (("m", "position"), ("rad", "angle"))
+            if self.after.summary(unit).blocks
+        ]
+        return (
+            f"<CalibrationResult of {self.nominal.name}: {len(self.names)} parameters, "
+            f"{self.status.name.lower()}, {', '.join(errors)}; .report() tells all>"
+        )
+
     def report(self) -> str:
         """All of it as text."""
         from .report import report_text

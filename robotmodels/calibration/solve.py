@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .._arrays import Array, Rebuilt, read_only
-from ..estimation import Loss, NonlinearFit, Prior, fit_nonlinear
+from ..estimation import FitStatus, Loss, NonlinearFit, Prior, fit_nonlinear
 from ..estimation.losses import robust_scale
 from .elements import Element
 from .measurements import Measurement
@@ -67,8 +67,7 @@ def first_scales(problem: Problem) -> tuple[Array, ...]:
     tuple of ndarray
         For each measurement, by the units of its rows.
     """
-    lengths = problem.parameters.skeleton.nominal[:, [Element.B, Element.D, Element.R]]
-    angle = _FIRST_LENGTH / (float(np.abs(lengths[1:]).sum()) or 1.0)
+    angle = _FIRST_LENGTH / size_of_robot(problem)
     return tuple(
         read_only([_FIRST_LENGTH if unit == "m" else angle for unit in m.units])
         for m in problem.measurements
@@ -135,6 +134,9 @@ def solve(
         is_settled = float(changed) < _SETTLED * float(ratios.max())
         if min(float(scale.min()) for scale in current) <= _EXACT:
             tolerance = max(tolerance, _ROUGH)  # exact data: steps are rounding long before
+    if fit.status is FitStatus.STALLED and min(float(s.min()) for s in current) <= _EXACT:
+        # what is left is rounding, which no step lowers
+        fit = replace(fit, status=FitStatus.CONVERGED)
     return Solution(problem, fit, current)
 
 
@@ -183,3 +185,21 @@ def _leverage(fit: NonlinearFit) -> Array:
     values, vectors = np.linalg.eigh(J.T @ J + np.diag((information / length) ** 2))
     told = values > _NOTHING * values[-1]
     return ((J @ (vectors[:, told] / np.sqrt(values[told]))) ** 2).sum(axis=1)
+
+
+def size_of_robot(problem: Problem) -> float:
+    """A length that deviations are compared with: the robot stretched out.
+
+    Parameters
+    ----------
+    problem : Problem
+        The calibration.
+
+    Returns
+    -------
+    float
+        Metres; 1 for a robot without lengths.
+    """
+    lengths = problem.parameters.skeleton.nominal[1:, [Element.B, Element.D, Element.R]]
+    size = float(np.abs(lengths).sum())
+    return size if size > _FIRST_LENGTH else 1.0
