@@ -5,15 +5,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, as_exact
 from ..calibration.residuals import MeasuredResiduals, measured_residuals
 from ..calibration.result import CalibrationResult
 from ..errors import InvalidValueError
 from .figures import ALERT, INK, LABEL_SIZE, PAGE, new_figure
+from .plot_calibration_cells import Cell, far_apart, fill_cells
 from .plot_calibration_residuals import AFTER, BEFORE, as_result
-from .plot_pose_path import _across, _box, _style, _taken
+from .plot_pose_path import _across, _box, _style
 from .plot_units import Unit
 
 if TYPE_CHECKING:
@@ -23,6 +24,13 @@ _NEAR = 0.3
 """Extent from which the axes are in metres."""
 _LONGEST = 0.16
 """Length of the longest arrow beside the longest edge of the box."""
+_TALLEST, _TALLEST_OF_MANY = 0.56 * PAGE, 2.6
+"""Height of a row of panels, inches, of one and of several."""
+_FAR, _SPOT = 0.2, 0.03
+"""Distances of places and of spots where arrows start, beside the longest edge of the box."""
+_ROUND = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)
+_MOST_PLACES, _FEWEST = 12, 4
+"""Of panels one below the other; points in each."""
 
 
 def plot_calibration_in_space(
@@ -36,20 +44,23 @@ def plot_calibration_in_space(
     """Errors of position as arrows where the end was, before (left) and after (right).
 
     Arrows go from where the robot says that its end is towards where it was measured or touched;
-    they are magnified as it stands over each side. Crosses are outliers, without arrows.
+    they are magnified as it stands over each panel. Crosses are outliers, without arrows. Places
+    that are small and far from each other, such as sockets around the robot, have a row of panels
+    each, with limits and a magnification of their own.
 
     Parameters
     ----------
     result : CalibrationResult
         Of `calibration.fit`.
     magnification : float, optional
-        Of the arrows on both sides; default for each side so that they can be seen.
+        Of the arrows in all panels; default for each panel so that they can be seen.
     view : array_like, shape (2,), optional
-        Azimuth and elevation of the eye, rad.
+        Azimuth and elevation of the eye, rad; default for each place across its longest
+        horizontal direction.
     title : str, optional
         Over the figure.
     size : array_like, shape (2,), optional
-        Width and height, inches.
+        Width and height, inches; default as wide as a page and as high as its panels need.
 
     Returns
     -------
@@ -89,44 +100,96 @@ def plot_calibration_in_space(
     p = np.concatenate([part.p for part in parts])
     outlier = np.concatenate([part.outlier for part in parts])
     usual = ~outlier if not outlier.all() else outlier
-    sides = [np.concatenate([-_position(part, x) for part in parts])[usual] for x in range(2)]
-    outside, p = p[~usual], p[usual]
-    angles = _across(p) if view is None else as_exact(view, (2,), "view")
-    figure = new_figure(PAGE, 0.56 * PAGE, size)
+    sides = [np.concatenate([-_position(part, x) for part in parts]) for x in range(2)]
+    names = np.repeat([part.measurement.name for part in parts], [len(part.p) for part in parts])
+    place = _places(p, usual)
+    titles = _titles(names, place)
+    figure = new_figure(PAGE, _TALLEST, size)
     figure.set_layout_engine("none")
+    cells = []
+    for row, place_title in enumerate(titles):
+        here, gone = usual & (place == row), ~usual & (place == row)
+        angles = _across(p[here]) if view is None else as_exact(view, (2,), "view")
+        for column, style in enumerate((BEFORE, AFTER)):
+            axes: Any = figure.add_subplot(len(titles), 2, 2 * row + column + 1, projection="3d")
+            error = sides[column][here]
+            edges, scale = _arrows(
+                axes, p[here], error, p[gone], magnification, style.color, angles
+            )
+            rms = float(np.sqrt(np.mean(np.sum(error**2, axis=1))))
+            side = ("before" if place_title else "before (base and tool fitted)", "after")[column]
+            heading = f"{place_title}{side}: rms {1e3 * rms:.3g} mm, arrows x {scale:g}"
+            axes.set_title(heading, size=LABEL_SIZE, color=INK)
+            cells.append(Cell(axes, edges, heading, row, column))
+    if title is None and len(titles) > 1:
+        title = "before: base and tool fitted"
+    tallest = _TALLEST if len(titles) == 1 else _TALLEST_OF_MANY
+    fill_cells(figure, cells, tallest if size is None else None, 0.3 if title is not None else 0.02)
+    if title is not None:
+        at = 1.0 - 0.06 / figure.get_figheight()
+        figure.suptitle(title, size=LABEL_SIZE + 1.0, color=INK, y=at, va="top")
+    return figure
+
+
+def _arrows(
+    axes: Any, p: Array, error: Array, outside: Array, magnification: float | None, color: Any,
+    view: Array,
+) -> tuple[Array, float]:  # fmt: skip
+    """Draw the errors of one place; edges of the box, and the magnification."""
     extent = float(np.ptp(p, axis=0).max()) or float(np.abs(p).max()) or 1.0
     unit = Unit.METRE if extent > _NEAR else Unit.MILLIMETRE
     k = unit.factor
-    both: list[tuple[Any, Array]] = []
-    names = ("before (base and tool fitted)", "after")
-    for side, (error, style, name) in enumerate(zip(sides, (BEFORE, AFTER), names, strict=True)):
-        length = np.linalg.norm(error, axis=1)
-        most = float(length.max())
-        scale = magnification or (_round(_LONGEST * extent / most) if most > 1e-12 else 1.0)
-        axes: Any = figure.add_subplot(1, 2, side + 1, projection="3d")
-        axes.quiver(
-            *(k * p).T, *(k * scale * error).T, color=style.color, linewidth=1.0,
-            arrow_length_ratio=0.3,
-        )  # fmt: skip
-        dot = 5.0 if len(p) <= 100 else 2.0
-        axes.scatter(*(k * p).T, s=dot, color=INK, alpha=0.5, depthshade=False, linewidth=0.0)
-        axes.scatter(
-            *(k * outside).T, s=22.0, color=ALERT, marker="x", depthshade=False, linewidth=1.0
-        )
-        edges = _box(axes, k * np.concatenate([p, p + scale * error, outside]))
-        _style(axes, unit, angles, edges)
-        for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
-            axis.labelpad = 2.5
-        rms = float(np.sqrt(np.mean(length**2)))
-        axes.set_title(
-            f"{name}: rms {1e3 * rms:.3g} mm, arrows x {scale:g}", size=LABEL_SIZE, color=INK
-        )
-        both.append((axes, edges))
-    if title is not None:
-        figure.suptitle(title, size=LABEL_SIZE + 1.0, color=INK)
-    for side, (axes, edges) in enumerate(both):
-        _fill_side(figure, axes, edges, side, 0.84 if title is not None else 0.9)
-    return figure
+    most = float(np.linalg.norm(error, axis=1).max())
+    scale = magnification or (_round(_longest(p, extent) / most) if most > 1e-12 else 1.0)
+    axes.quiver(
+        *(k * p).T, *(k * scale * error).T, color=color, linewidth=1.0, arrow_length_ratio=0.3
+    )
+    dot = 5.0 if len(p) <= 100 else 2.0
+    axes.scatter(*(k * p).T, s=dot, color=INK, alpha=0.5, depthshade=False, linewidth=0.0)
+    axes.scatter(*(k * outside).T, s=22.0, color=ALERT, marker="x", depthshade=False, linewidth=1.0)
+    edges = _box(axes, k * np.concatenate([p, p + scale * error, outside]))
+    _style(axes, unit, view, edges)
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.labelpad = 2.5
+    return edges, scale
+
+
+def _places(p: Array, usual: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Number of the place of each point; all the same unless places are small and far apart."""
+    one = np.zeros(len(p), dtype=np.int64)
+    group = far_apart(p[usual], _FAR)
+    count = int(group.max()) + 1
+    own = [p[usual][group == g] for g in range(count)]
+    if not 1 < count <= _MOST_PLACES or min(len(x) for x in own) < _FEWEST:
+        return one
+    sizes = [float(np.ptp(x, axis=0).max()) for x in own]
+    extent = float(np.ptp(p[usual], axis=0).max())
+    if max(sizes) > _FAR / 3.0 * extent or max(sizes) < _SPOT * extent:
+        return one
+    centres = np.array([x.mean(axis=0) for x in own])
+    return np.argmin(np.linalg.norm(p[:, None] - centres, axis=2), axis=1)
+
+
+def _titles(names: NDArray[np.str_], place: NDArray[np.int64]) -> list[str]:
+    """What stands before the heading of each place: the name of what was measured there alone."""
+    count = int(place.max()) + 1
+    if count == 1:
+        return [""]
+    own = [tuple(np.unique(names[place == row])) for row in range(count)]
+    alone = all(len(some) == 1 for some in own) and len(set(own)) == count
+    words = [some[0] if alone else f"place {row + 1}" for row, some in enumerate(own)]
+    return [f"{word if len(word) <= 14 else word[:13] + '.'}, " for word in words]
+
+
+def _longest(p: Array, extent: float) -> float:
+    """Length of the longest arrow: longer where all arrows start in a few spots."""
+    spot = far_apart(p, _SPOT)
+    count = int(spot.max()) + 1
+    if not 1 < count <= _MOST_PLACES or len(p) < _FEWEST * count:
+        return _LONGEST * extent
+    centres = np.array([p[spot == g].mean(axis=0) for g in range(count)])
+    apart = np.linalg.norm(centres[:, None] - centres, axis=2)[np.triu_indices(count, 1)]
+    return max(_LONGEST * extent, 0.45 * float(apart.min()))
 
 
 def _has_position(part: MeasuredResiduals) -> bool:
@@ -140,31 +203,6 @@ def _position(part: MeasuredResiduals, side: int) -> Array:
 
 
 def _round(value: float) -> float:
-    """The next smaller of 1, 2, 5 times a power of ten; 1 at least, for arrows as they are."""
+    """The next smaller round number; 1 at least, for arrows as they are."""
     power = 10.0 ** np.floor(np.log10(value))
-    return float(max(1.0, power * max(k for k in (1.0, 2.0, 5.0) if k * power <= value * 1.0001)))
-
-
-def _fill_side(figure: Figure, axes: Any, edges: Array, side: int, top: float) -> None:
-    """Place the box so that it fills its half of the figure below the headings."""
-    width, height = figure.bbox.size
-    pad = 0.012 * width
-    room = np.array((0.5 * width, top * height)) - 2.0 * pad
-    middle = np.array(((0.25 + 0.5 * side) * width, 0.5 * top * height))
-    zoom, shift = 1.0, np.zeros(2)
-    for _ in range(6):
-        axes.set_position((0.5 * side + shift[0] / width, shift[1] / height, 0.5, top))
-        axes.set_box_aspect(edges, zoom=zoom)
-        figure.draw_without_rendering()
-        low, high = _taken(axes)
-        fit, off = float((room / (high - low)).min()), middle - 0.5 * (low + high)
-        if 0.98 < fit < 1.02 and np.abs(off).max() < pad:
-            break
-        zoom, shift = zoom * fit, shift + fit * off
-    # the heading stays over its half wherever the box went
-    axes.title.set_visible(False)
-    figure.text(
-        0.25 + 0.5 * side, top + 0.02, axes.get_title(), size=LABEL_SIZE, color=INK, ha="center"
-    )
-    for artist in axes.get_children():
-        artist.set_clip_on(False)
+    return float(max(1.0, power * max(k for k in _ROUND if k * power <= value * 1.0001)))

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array
+from .._arrays import Array, as_exact, as_reals
+from ..calibration.parameters import GeometricParameters
 from ..calibration.result import CalibrationResult
-from ..errors import InvalidValueError
+from ..calibration.skeleton import skeleton_of
+from ..errors import InvalidValueError, ShapeError
 from ..estimation import confidence_intervals
 from .figures import INK, PAGE, PALE, SMALL_SIZE, legend_above, line_style, new_figure, panels
 from .plot_calibration_residuals import as_result
@@ -20,14 +23,24 @@ if TYPE_CHECKING:
 
 _STYLES = (("table", line_style(0).color, "o"), ("base and ends", line_style(1).color, "s"))
 _FAR = 20.0
-_LENGTHS = {"m": Unit.MILLIMETRE, "rad": Unit.DEGREE}
-_TITLES = {"m": "lengths", "rad": "angles", "1": "gains"}
+SHOWN = {
+    "m": (Unit.MILLIMETRE.factor, Unit.MILLIMETRE.value),
+    "rad": (Unit.DEGREE.factor, Unit.DEGREE.value),
+    "rad/N m": (1e6, "µrad/(N m)"),
+    "m/N m": (1e6, "µm/(N m)"),
+}
+"""Factors and symbols of the units in which deviations are drawn; gains as they are."""
+TITLES = {
+    "m": "lengths", "rad": "angles", "1": "gains", "rad/N m": "compliance",
+    "m/N m": "compliance of lengths",
+}  # fmt: skip
 
 
 def plot_calibration_parameters(
     result: CalibrationResult,
     level: float = 0.95,
     *,
+    truth: ArrayLike | Mapping[str, float] | None = None,
     title: str | None = None,
     size: ArrayLike | None = None,
 ) -> Figure:
@@ -41,6 +54,11 @@ def plot_calibration_parameters(
         Of `calibration.fit`.
     level : float
         Probability of the intervals.
+    truth : array_like, shape (P,), or mapping of str to float, optional
+        Known deviations, such as those of a simulation: drawn as crosses. Of the P parameters of
+        the result in their order, NaN where unknown; or by names of candidates (m, rad, ...). Of
+        these the regrouped ones are added to the parameters that stand for them, to first order,
+        and those that are not named count as zero. They count from the robot as it was given.
     title : str, optional
         Over the figure.
     size : array_like, shape (2,), optional
@@ -54,7 +72,10 @@ def plot_calibration_parameters(
     Raises
     ------
     InvalidValueError
-        Not a result; a level that is no probability.
+        Not a result; a level that is no probability; true deviations of parameters that are no
+        candidates.
+    ShapeError
+        Not one true deviation for each parameter.
     MissingExtraError
         Matplotlib is not installed.
 
@@ -73,6 +94,7 @@ def plot_calibration_parameters(
     ['deviation (mm)', 'deviation (deg)']
     """
     found = as_result(result)
+    known = None if truth is None else _known(truth, found)
     interval = confidence_intervals(found.solution.fit, level)[: len(found.names)]
     entries, f = found.parameters.entries, found.nominal.f
     order = sorted(range(len(entries)), key=lambda k: (entries[k].row, entries[k].element))
@@ -82,8 +104,7 @@ def plot_calibration_parameters(
     figure = new_figure(PAGE, 0.85 + 0.155 * max(most, 8), size)
     grid = panels(figure, 1, len(units))
     for axes, (unit, some) in zip(grid[0], of_unit.items(), strict=True):
-        shown = _LENGTHS.get(unit)
-        factor, symbol = (1.0, unit) if shown is None else (shown.factor, shown.value)
+        factor, symbol = SHOWN.get(unit, (1.0, unit))
         axes.axvline(0.0, color=PALE, linewidth=0.9, zorder=1.2)
         y = np.arange(len(some))
         place = np.array([entries[k].row == 0 or entries[k].row > f for k in some])
@@ -98,20 +119,59 @@ def plot_calibration_parameters(
                 fmt=marker, color=color, markersize=3.2, elinewidth=1.1, capsize=1.8, label=name,
             )  # fmt: skip
         sizes = factor * np.abs(interval[some]).max(axis=1)
+        if known is not None and not np.isnan(known[some]).all():
+            axes.plot(
+                factor * known[some], y, linestyle="", marker="x", markersize=4.5, color=INK,
+                markeredgewidth=0.9, zorder=3.0, label="truth",
+            )  # fmt: skip
+            sizes = np.fmax(sizes, factor * np.abs(known[some]))
         _spread(axes, sizes[np.isfinite(sizes)], len(units))
         axes.set_yticks(y, [found.names[k] for k in some], size=SMALL_SIZE, color=INK)
         axes.set_ylim(len(some) - 0.4, -0.6)
         axes.margins(x=0.06)
         axes.grid(False, axis="y")
         axes.set_xlabel(f"deviation ({symbol})")
-        axes.set_title(_TITLES.get(unit, unit), size=SMALL_SIZE + 1.0, color=INK)
+        axes.set_title(TITLES.get(unit, unit), size=SMALL_SIZE + 1.0, color=INK)
     handles = {}
     for axes in grid[0]:
         containers, labels = axes.get_legend_handles_labels()
         handles |= dict(zip(labels, containers, strict=True))
+    if "truth" in handles:  # last
+        handles["truth"] = handles.pop("truth")
     percent = f"{100.0 * level:g} %"
     legend_above(figure, list(handles.values()), title or f"deviations and {percent} intervals")
     return figure
+
+
+def _known(truth: ArrayLike | Mapping[str, float], found: CalibrationResult) -> Array:
+    """True deviations from where the fit started, as the result's; NaN where they are unknown."""
+    P = len(found.names)
+    skeleton = skeleton_of(found.nominal, found.parameters.skeleton.frames)
+    given = GeometricParameters(skeleton, found.parameters.entries)
+    moved = found.parameters.nominal - given.nominal
+    if not isinstance(truth, Mapping):
+        values = as_reals(truth, "truth")
+        if values.shape != (P,):
+            raise ShapeError(
+                f"truth: expected one deviation for each of the {P} parameters of the result, got "
+                f"shape {values.shape}; or a mapping of names of candidates."
+            )
+        return values - moved
+    candidates = found.identifiable.candidates.names
+    known = {str(name): float(as_exact(x, (), f"truth {name}")) for name, x in truth.items()}
+    unknown = [name for name in known if name not in candidates]
+    if unknown:
+        raise InvalidValueError(
+            f"truth: expected names of candidates of the result, got {', '.join(unknown[:5])}; "
+            f"candidates are {', '.join(candidates)}."
+        )
+    values = np.full(P, np.nan)
+    for k, name in enumerate(found.names):
+        terms = found.identifiable.regrouping.get(name, {}) | {name: 1.0}
+        named = [c * known[other] for other, c in terms.items() if other in known]
+        if named:
+            values[k] = sum(named)
+    return values - moved
 
 
 def _spread(axes: Any, sizes: Array, panels: int) -> None:

@@ -32,6 +32,8 @@ BEFORE, AFTER = line_style(1), line_style(0)
 """Colours of the robot before and after its calibration."""
 
 _FEW = 60
+_RING, _OVER_RINGS = 6.0, 5.0
+"""Diameter of a ring, and distance of a text from axes that keeps it off rings there, points."""
 
 
 def as_result(result: Any) -> CalibrationResult:
@@ -161,12 +163,16 @@ def plot_calibration_residuals(
             if outlier.any():
                 axes.plot(
                     x[outlier], np.clip(y[outlier], -most, most), linestyle="", marker="o",
-                    markersize=6.0, markerfacecolor="none", markeredgecolor=ALERT,
+                    markersize=_RING, markerfacecolor="none", markeredgecolor=ALERT,
                     markeredgewidth=0.9, clip_on=False, label="outlier (at the edge: beyond it)",
                 )  # fmt: skip
             rms = float(np.sqrt(np.mean(usual**2)))
             axes.set_title(
-                f"rms {rms:.3g} {shown.value}", size=SMALL_SIZE, color=INK, loc="right", pad=2.0
+                f"rms {rms:.3g} {shown.value}",
+                size=SMALL_SIZE,
+                color=INK,
+                loc="right",
+                pad=_OVER_RINGS if outlier.any() else 2.0,
             )
         grid[row, 0].set_ylabel(f"{axis} ({shown.value})")
     for axes in grid[-1]:
