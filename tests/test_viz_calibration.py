@@ -9,9 +9,21 @@ from matplotlib.text import Text
 from scipy.spatial.transform import Rotation
 
 from robotmodels import se3
-from robotmodels.calibration import KnownDistance, PointContact, Pose, Position, fit
+from robotmodels.calibration import (
+    KnownDistance,
+    ParameterPrior,
+    PointContact,
+    Pose,
+    Position,
+    calibrated_model,
+    calibrated_pose,
+    candidate_parameters,
+    fit,
+    select_configurations,
+)
 from robotmodels.calibration.residuals import measured_residuals
-from robotmodels.errors import InvalidValueError
+from robotmodels.datasets import panda_double_socket
+from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.estimation import confidence_intervals
 from robotmodels.kinematics import dgm
 from robotmodels.robots import load
@@ -21,7 +33,9 @@ from robotmodels.viz import (
     plot_calibration_normality,
     plot_calibration_parameters,
     plot_calibration_residuals,
+    plot_selection,
 )
+from robotmodels.viz.plot_pose_path import _taken
 
 RX90 = load("rx90").with_tool(se3.translation(0.05, 0.03, 0.1))
 PLOTS = (
@@ -169,3 +183,170 @@ def test_what_cannot_be_drawn_is_named(results):
         plot_calibration_in_space(results["few"], magnification=0.0)
     with pytest.raises(InvalidValueError, match="level"):
         plot_calibration_parameters(results["few"], 1.5)
+
+
+@pytest.fixture(scope="module")
+def sockets():
+    data = panda_double_socket()
+    measured = []
+    for place, both in data.places.items():
+        hole = np.repeat([0, 1], [len(q) for q in both])
+        measured += [
+            PointContact(np.concatenate(both), hole, name=place),
+            KnownDistance(f"{place}:0", f"{place}:1", data.distance),
+        ]
+    prior = ParameterPrior(length=3e-4, angle=6e-3, compliance=6e-5)
+    return fit(data.model, measured, compliance="isotropic", prior=prior, folds=0, held_out=0.0)
+
+
+def longest_arrow(axes):
+    (arrows,) = [c for c in axes.collections if hasattr(c, "_segments3d")]
+    shafts = np.array([segment for segment in arrows._segments3d if len(segment) == 2])
+    return np.linalg.norm(shafts[:, 1] - shafts[:, 0], axis=1).max()
+
+
+@pytest.mark.parametrize("size", [None, (7.1, 7.0)])
+def test_far_places_have_panels_of_their_own(sockets, size):
+    figure = plot_calibration_in_space(sockets, size=size)
+    parts = [part for part in measured_residuals(sockets) if part.measurement.views]
+    assert len(figure.axes) == 6
+    for row, part in enumerate(parts):
+        for side, errors in enumerate((part.before, part.after)):
+            axes = figure.axes[2 * row + side]
+            rms = 1e3 * np.sqrt(np.mean(np.sum(errors[~part.outlier] ** 2, axis=1)))
+            name = "after" if side else "before"
+            assert axes.get_title().startswith(f"{part.measurement.name}, {name}: rms {rms:.3g} mm")
+            limits = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
+            assert np.ptp(limits, axis=1).max() < 150.0  # mm; the places are 1 m apart
+            assert longest_arrow(axes) > 0.1 * np.ptp(limits, axis=1).max()
+
+
+@pytest.mark.parametrize("size", [None, (7.1, 3.0), (5.0, 6.0)])
+@pytest.mark.parametrize("name", ["few", "mixed"])
+@pytest.mark.parametrize("title", [None, "A robot"])
+def test_boxes_with_their_texts_stay_in_their_halves(results, name, size, title):
+    figure = plot_calibration_in_space(results[name], size=size, title=title)
+    FigureCanvasAgg(figure)
+    figure.draw_without_rendering()
+    assert len(figure.axes) == 2
+    top = min(t.get_window_extent().y0 for t in figure.texts if "arrows" in t.get_text())
+    for side, axes in enumerate(figure.axes):
+        low, high = _taken(axes)
+        width = figure.bbox.width
+        assert low[0] >= 0.5 * side * width - 2.0
+        assert high[0] <= 0.5 * (side + 1) * width + 2.0
+        assert low[1] >= -2.0
+        assert high[1] <= top + 2.0
+        assert not axes.patch.get_visible()  # it would hide its neighbour's names
+
+
+def test_flat_scenes_are_low():
+    rng = np.random.default_rng(5)
+    q = rng.uniform(-2.0, 2.0, (40000, 6))
+    p = dgm(RX90, q)[:, :3, 3]
+    q = q[np.abs(p[:, 2] - 0.2) < 0.005][:60]
+    T = dgm(RX90, q)
+    T[:, :3, 3] += 1e-4 * rng.normal(size=(len(q), 3))
+    flat = fit(RX90, Position(q, T[:, :3, 3]), folds=0, held_out=0.0)
+    assert plot_calibration_in_space(flat).get_figheight() < 3.0
+
+
+def test_compliance_is_shown_in_whole_numbers(sockets):
+    figure = plot_calibration_parameters(sockets)
+    axes = figure.axes[2]
+    assert axes.get_xlabel() == "deviation (µrad/(N m))"
+    figure.draw_without_rendering()
+    assert axes.xaxis.get_offset_text().get_text() == ""
+    names = [text.get_text() for text in axes.get_yticklabels()]
+    values = {}
+    for bars in axes.containers:
+        values |= dict(zip(bars[0].get_ydata(), bars[0].get_xdata(), strict=True))
+    for k, name in enumerate(names):
+        found = sockets.deviation[sockets.names.index(name)]
+        assert values[k] == pytest.approx(1e6 * found)
+
+
+def crosses(figure):
+    """Drawn truth by name, m or rad."""
+    shown = {}
+    for axes in figure.axes:
+        factor = 1e3 if "mm" in axes.get_xlabel() else 180.0 / np.pi
+        names = [text.get_text() for text in axes.get_yticklabels()]
+        for line in axes.get_lines():
+            if line.get_label() == "truth":
+                x, y = line.get_data()
+                shown |= {names[int(j)]: v / factor for j, v in zip(y, x, strict=True)}
+    return shown
+
+
+def test_known_truth_is_drawn_where_the_fit_finds_it():
+    # exact data: estimates are the truth, regrouped and counted from where the fit put the base
+    rng = np.random.default_rng(2)
+    p = candidate_parameters(RX90)
+    xi = 1e-5 * rng.normal(size=len(p))
+    q = rng.uniform(-2.0, 2.0, (60, 6))
+    T = calibrated_pose(calibrated_model(p, xi), q)
+    result = fit(RX90, Position(q, T[:, :3, 3]), folds=0, held_out=0.0)
+    truth = dict(zip(p.names, xi, strict=True))
+    assert any(len(terms) > 1 for terms in result.identifiable.regrouping.values())
+    figure = plot_calibration_parameters(result, truth=truth)
+    shown = crosses(figure)
+    assert set(shown) == set(result.names)
+    for name, deviation in zip(result.names, result.deviation, strict=True):
+        assert shown[name] == pytest.approx(deviation, abs=2e-9)
+    assert figure.legends[0].get_texts()[-1].get_text() == "truth"
+    some = crosses(plot_calibration_parameters(result, truth={"d3": truth["d3"]}))
+    assert {name for name, value in some.items() if np.isfinite(value)} >= {"d3"}
+    assert np.isnan(some["r4"])
+
+
+def test_truth_in_the_order_of_the_parameters(results):
+    result = results["few"]
+    given = np.full(len(result.names), np.nan)
+    at = result.names.index("theta3")
+    given[at] = 1e-3
+    shown = crosses(plot_calibration_parameters(result, truth=given))
+    assert shown["theta3"] == pytest.approx(1e-3)
+    with pytest.raises(ShapeError, match="truth: expected one deviation"):
+        plot_calibration_parameters(result, truth=given[1:])
+    with pytest.raises(InvalidValueError, match="truth: expected names of candidates.*theta33"):
+        plot_calibration_parameters(result, truth={"theta33": 0.0})
+
+
+def test_rings_at_the_edge_leave_the_root_mean_squares_free(results):
+    figure = plot_calibration_residuals(results["many"])
+    FigureCanvasAgg(figure)
+    figure.draw_without_rendering()
+    for axes in figure.axes:
+        text = axes._right_title.get_window_extent()
+        half = 0.5 * (6.0 + 0.9) * figure.dpi / 72.0
+        assert text.y0 >= axes.bbox.y1 + half - 1.0
+
+
+def test_selection_shows_its_numbers():
+    selected = select_configurations(
+        RX90, "position", 30, drawn=100, starts=1, rng=np.random.default_rng(1)
+    )
+    figure = plot_selection(selected, 0.05)
+    line = figure.axes[0].get_lines()[0]
+    np.testing.assert_array_equal(line.get_xdata(), selected.counts)
+    np.testing.assert_array_equal(line.get_ydata(), selected.values)
+    for axes, unit, factor in zip(figure.axes[1:], ("m", "rad"), (1e3, 180.0 / np.pi), strict=True):
+        own = [u == unit for u in selected.parameters.units]
+        drawn = {line.get_label(): line.get_ydata() for line in axes.get_lines()}
+        values = factor * selected.deviations[:, own]
+        np.testing.assert_allclose(drawn["median"], np.median(values, axis=1))
+        np.testing.assert_allclose(drawn["largest"], values.max(axis=1))
+        assert axes.get_yscale() == "log"
+    enough = selected.enough(0.05)
+    assert enough is not None
+    for axes in figure.axes:
+        assert axes.get_lines()[-1].get_xdata()[0] == enough
+    assert figure.legends[0].get_title().get_text() == selected.enough_sentence(0.05)
+    assert [text.get_text() for text in figure.legends[0].get_texts()][-1] == f"enough: {enough}"
+    never = plot_selection(selected, 1e-6)
+    assert len(never.legends[0].get_texts()) == 3
+    with pytest.raises(InvalidValueError, match="expected SelectedConfigurations"):
+        plot_selection(selected.q)
+    with pytest.raises(InvalidValueError, match="gain"):
+        plot_selection(selected, 2.0)

@@ -21,7 +21,7 @@ from .folds import (
     splits,
     suited_fixtures,
 )
-from .identifiable import all_deviations, identifiable_on
+from .identifiable import Reason, all_deviations, identifiable_on
 from .measurements import Measurement
 from .notes import check_enough, notes_after, notes_before, notes_of_gain
 from .parameters import GeometricParameters, as_names, candidate_parameters
@@ -182,7 +182,7 @@ def fit(
     step("all measurements")
     preferred = candidates.preferring(estimated.names)
     again = identifiable_on(
-        preferred, measured, known_lengths, known,
+        preferred, measured, known_lengths, (*known, *identifiable.of_reason(Reason.NOISE)),
         deviation=all_deviations(preferred, estimated, solution.deviation),
         fixtures=solution.fixtures, dependent=_TOLD_APART,
     )  # fmt: skip

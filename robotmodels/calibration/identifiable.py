@@ -151,6 +151,7 @@ class IdentifiableParameters(Rebuilt):
         for heading, reason in (
             ("Not identifiable", Reason.NO_EFFECT), ("Only in combination", Reason.REGROUPED),
             ("Gauge", Reason.GAUGE), ("Known", Reason.KNOWN),
+            ("Smaller than the noise", Reason.NOISE),
         ):  # fmt: skip
             names = self.of_reason(reason)
             if not names:

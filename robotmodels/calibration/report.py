@@ -174,7 +174,8 @@ def _errors(result: CalibrationResult) -> ReportSection:
     )  # fmt: skip
     sentences = [
         "Lengths of the residuals of each measurement. With base and tool fitted, the table is to "
-        "blame for what is left. Folds and held out: measurements that the fit had not seen.",
+        "blame for what is left. Folds and held out: measurements that the calibration had not seen "
+        "(before it: base and tool fitted to all of them).",
     ]
     if aside is None and result.held_out is None:
         sentences.append(
@@ -287,7 +288,7 @@ def _left_out(result: CalibrationResult) -> ReportSection:
     body: list[str | ReportTable] = [
         f"{found.count} of {len(found.candidates)} parameters are told by these measurements."
     ]
-    for reason in (Reason.KNOWN, Reason.GAUGE, Reason.NO_EFFECT):
+    for reason in (Reason.KNOWN, Reason.GAUGE, Reason.NO_EFFECT, Reason.NOISE):
         names = found.of_reason(reason)
         if names:
             body.append(f"{', '.join(names)}: {reason.value}.")

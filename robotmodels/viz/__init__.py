@@ -21,6 +21,7 @@ from .plot_joint_motion import plot_joint_motion
 from .plot_joint_path import plot_joint_path
 from .plot_pose_path import plot_pose_path
 from .plot_profiles import plot_profiles
+from .plot_selection import plot_selection
 from .plot_singularities import plot_singularities
 from .plot_trajectory import plot_trajectory
 from .plot_units import Unit
@@ -47,6 +48,7 @@ __all__ = [
     "plot_joint_path",
     "plot_pose_path",
     "plot_profiles",
+    "plot_selection",
     "plot_singularities",
     "plot_torque_parts",
     "plot_trajectory",
