@@ -221,9 +221,10 @@ def test_far_places_have_panels_of_their_own(sockets, size):
             assert longest_arrow(axes) > 0.1 * np.ptp(limits, axis=1).max()
 
 
-@pytest.mark.parametrize("size", [None, (7.1, 3.0), (5.0, 6.0)])
-@pytest.mark.parametrize("name", ["few", "mixed"])
-@pytest.mark.parametrize("title", [None, "A robot"])
+@pytest.mark.parametrize(
+    ("name", "size", "title"),
+    [("few", None, None), ("mixed", (7.1, 3.0), "A robot"), ("few", (5.0, 6.0), None)],
+)
 def test_boxes_with_their_texts_stay_in_their_halves(results, name, size, title):
     figure = plot_calibration_in_space(results[name], size=size, title=title)
     FigureCanvasAgg(figure)
@@ -309,7 +310,7 @@ def test_truth_in_the_order_of_the_parameters(results):
     assert shown["theta3"] == pytest.approx(1e-3)
     with pytest.raises(ShapeError, match="truth: expected one deviation"):
         plot_calibration_parameters(result, truth=given[1:])
-    with pytest.raises(InvalidValueError, match="truth: expected names of candidates.*theta33"):
+    with pytest.raises(InvalidValueError, match=r"truth: expected names of candidates.*theta33"):
         plot_calibration_parameters(result, truth={"theta33": 0.0})
 
 
