@@ -359,7 +359,7 @@ def test_calibrate_takes_known_distances_and_files_that_only_test(run, tmp_path)
         np.savetxt(tmp_path / f"{name}.csv", q, delimiter=",")
     files = [tmp_path / "a.csv", tmp_path / "b.csv"]
     words = ["calibrate", "--robot", "rx90", "--kind", "point-contact", "--measurements", *files,
-             "--parameters", "b7", "d7", "r7", "--folds", 0]  # fmt: skip
+             "--parameters", "b7", "d7", "r7", "d3", "r4", "--folds", 0]  # fmt: skip
     code, _, err = run(*words)
     assert code == 2
     assert "know no length" in err

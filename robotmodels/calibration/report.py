@@ -174,8 +174,8 @@ def _errors(result: CalibrationResult) -> ReportSection:
     )  # fmt: skip
     sentences = [
         "Lengths of the residuals of each measurement. With base and tool fitted, the table is to "
-        "blame for what is left. Folds and held out: measurements that the calibration had not seen "
-        "(before it: base and tool fitted to all of them).",
+        "blame for what is left. Folds and held out: measurements that the calibration had not "
+        "seen (before it: base and tool fitted to all of them).",
     ]
     if aside is None and result.held_out is None:
         sentences.append(
