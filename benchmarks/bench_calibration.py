@@ -293,6 +293,9 @@ def report(about: dict[str, str], speed: list[Row], camera: list[Row], sockets: 
     return "\n".join(lines) + "\n"
 
 
+PARTS = ["speed", "double_socket", "camera"]
+
+
 def main() -> None:
     """Measure, print and keep the results."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -301,6 +304,10 @@ def main() -> None:
     parser.add_argument("--figaroh-python", default="")
     parser.add_argument("--pybotics-python", default="")
     parser.add_argument("--quick", action="store_true")
+    parser.add_argument(
+        "--parts", nargs="+", choices=PARTS, default=PARTS,
+        help="what to measure; the rest stays as it was kept",
+    )  # fmt: skip
     given = parser.parse_args()
     figaroh, pybotics = given.figaroh_python, given.pybotics_python
     for name, python in (("FIGAROH", figaroh), ("pybotics", pybotics)):
@@ -326,13 +333,22 @@ def main() -> None:
             json.dumps(kept, indent=2) + "\n", encoding="utf-8"
         )
 
-    speed += speed_rows(sizes, 1 if quick else given.rounds, figaroh, pybotics)
-    keep()
-    for robot in robots:
-        sockets += panda_rows(tuple(PANDA_WAYS), (robot,))
+    old = json.loads((given.out / "calibration.json").read_text()) if given.parts != PARTS else {}
+    for rows, part in ((speed, "speed"), (camera, "camera"), (sockets, "double_socket")):
+        if part not in given.parts:
+            rows += old[part]
+    if given.parts != PARTS:
+        about["parts"] = f"measured now: {', '.join(given.parts)}; the rest earlier"
+    if "speed" in given.parts:
+        speed += speed_rows(sizes, 1 if quick else given.rounds, figaroh, pybotics)
         keep()
-    camera += camera_rows(tuple(ways), figaroh)
-    keep()
+    if "double_socket" in given.parts:
+        for robot in robots:
+            sockets += panda_rows(tuple(PANDA_WAYS), (robot,))
+            keep()
+    if "camera" in given.parts:
+        camera += camera_rows(tuple(ways), figaroh)
+        keep()
     print(report(about, speed, camera, sockets))
 
 
