@@ -116,7 +116,8 @@ def plot_calibration_in_space(
             edges, scale = _arrows(
                 axes, p[here], error, p[gone], magnification, style.color, angles
             )
-            rms = float(np.sqrt(np.mean(np.sum(error**2, axis=1))))
+            every = sides[column][place == row]  # outliers count, as in the report
+            rms = float(np.sqrt(np.mean(np.sum(every**2, axis=1))))
             side = ("before" if place_title else "before (base and tool fitted)", "after")[column]
             heading = f"{place_title}{side}: rms {1e3 * rms:.3g} mm, arrows x {scale:g}"
             axes.set_title(heading, size=LABEL_SIZE, color=INK)

@@ -166,7 +166,7 @@ def plot_calibration_residuals(
                     markersize=_RING, markerfacecolor="none", markeredgecolor=ALERT,
                     markeredgewidth=0.9, clip_on=False, label="outlier (at the edge: beyond it)",
                 )  # fmt: skip
-            rms = float(np.sqrt(np.mean(usual**2)))
+            rms = float(np.sqrt(np.mean(y**2)))  # outliers count, as in the report
             axes.set_title(
                 f"rms {rms:.3g} {shown.value}",
                 size=SMALL_SIZE,
