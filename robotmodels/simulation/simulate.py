@@ -188,7 +188,7 @@ def _cuts(start: float, end: float, breaks: Array, knots: Array) -> list[tuple[f
 
 def _limits(model: RobotModel, q: Array) -> tuple[Array, Array]:
     lower, upper = model.lower, model.upper
-    if not (np.isfinite(lower) | np.isfinite(upper)).any():
+    if lower.size and not (np.isfinite(lower) | np.isfinite(upper)).any():
         raise InvalidValueError(
             f"stop_at_limits: no joint of {model.name!r} has a finite limit, so that nothing would "
             "stop; give the table lower= and upper=, or leave stop_at_limits out."
