@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,10 +83,6 @@ class Problem(Rebuilt):
         """Where the fixtures of a measurement are among all, shape (its F,)."""
         number = {fixture.name: k for k, fixture in enumerate(self.fixtures)}
         return np.array([number[fixture.name] for fixture in measurement.fixtures], dtype=np.int64)
-
-    def with_parameters(self, parameters: GeometricParameters) -> Self:
-        """The same measurements for other parameters."""
-        return replace(self, parameters=parameters, factors=_factors(parameters, self.measurements))
 
 
 def problem_of(
