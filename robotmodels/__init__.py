@@ -46,7 +46,7 @@ from .robots import load, robots
 from .urdf import NamedFrame
 
 if TYPE_CHECKING:
-    from . import calibration, datasets, simulation, trajectories, viz
+    from . import calibration, datasets, identification, simulation, trajectories, viz
     from .igm.paul import InverseModelExplanation, explain_igm
     from .kinematics import (
         DampedInverse,
@@ -136,6 +136,7 @@ __all__ = [
     "force_ellipsoid",
     "friction",
     "gravity_torque",
+    "identification",
     "idm",
     "idm_from_base",
     "igm",
@@ -240,7 +241,7 @@ _ROOM_OF = {name: room for room, names in _ROOMS.items() for name in names}
 
 def __getattr__(name: str) -> Any:
     """Import rooms, pictures and derivations when they are first asked for."""
-    if name in ("calibration", "datasets", "simulation", "trajectories", "viz"):
+    if name in ("calibration", "datasets", "identification", "simulation", "trajectories", "viz"):
         return importlib.import_module(f".{name}", __name__)
     if name in _ROOM_OF:
         return getattr(importlib.import_module(_ROOM_OF[name], __name__), name)
