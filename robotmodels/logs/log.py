@@ -13,7 +13,6 @@ from .._arrays import Array, as_floats
 from ..errors import InvalidValueError, ShapeError
 
 
-
 @dataclass(frozen=True, slots=True)
 class RefusedRows:
     """Rows of a source that are not in the log, and why.
