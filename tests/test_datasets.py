@@ -1,5 +1,7 @@
 """The data sets that the package ships: complete, licensed, small, read-only, and what they say."""
 
+import hashlib
+import lzma
 import pickle
 from importlib.resources import files
 
@@ -8,10 +10,26 @@ import pytest
 
 import robotmodels as rm
 from robotmodels import calibration
-from robotmodels.datasets import panda_double_socket, ur10_camera
+from robotmodels.datasets import load_tx40, panda_double_socket, ur10_camera
 from robotmodels.errors import InvalidValueError
 
 LIMIT = 1_500_000
+POSITION_SUMS = [
+    219493.748722345,
+    1676192.3150742827,
+    -2677940.9767097957,
+    2395494.736123584,
+    523756.04227606254,
+    -1104534.8181496228,
+]
+TORQUE_SUMS = [
+    1476.7921263303622,
+    -27080.066948092983,
+    83.06179579912973,
+    185.26527387799896,
+    163.48264339729593,
+    -554.9814843220033,
+]
 
 
 def every_file(folder):
@@ -142,12 +160,119 @@ def test_data_pickle_and_stay_read_only(data):
     [
         ("panda_double_socket", "Copyright (c) 2024 platonics"),
         ("ur10_camera", "Apache License"),
+        ("tx40_log", "Copyright [2021-2025] Thanh Nguyen"),
     ],
 )
 def test_licence_and_provenance_are_beside_the_data(name, words):
     folder = files("robotmodels.datasets") / name
     assert words in (folder / "LICENSE").read_text(encoding="utf-8")
     assert "commit" in (folder / "PROVENANCE.md").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def tx40():
+    return load_tx40()
+
+
+@pytest.mark.parametrize(
+    ("name", "sha256"),
+    [
+        ("pos_read_data.csv", "5cc1cecc1024ef0e331d0caba06f689456ab789ec3f1e904599c0a8be5c27bc8"),
+        ("curr_data.csv", "f4592f4ba4db42f5d7625688986be25b575ca34d0504b27979ca6b0276bd3af9"),
+        ("TX40_bp_5.csv", "00dc377866e792e7dad787eaa719def4cc428aa0735c00216526a60f8df0dec6"),
+        ("TX40_ep_5.csv", "fe09197df7390990643a0f6e8742e787acd2c4071becd68b3e82d320a6cc9572"),
+    ],
+)
+def test_files_of_the_tx40_are_those_of_their_source(tx40, name, sha256):
+    folder = files("robotmodels.datasets") / "tx40_log"
+    packed = folder / f"{name}.xz"
+    data = lzma.decompress(packed.read_bytes()) if packed.is_file() else None
+    data = (folder / name).read_bytes() if data is None else data
+    assert hashlib.sha256(data).hexdigest() == sha256
+    said = {source.name: source.sha256 for source in tx40.log.sources}
+    assert said.get(name, sha256) == sha256
+
+
+def test_numbers_of_the_tx40_are_those_of_its_text(tx40):
+    folder = files("robotmodels.datasets") / "tx40_log"
+    for name, values in (
+        ("pos_read_data.csv.xz", tx40.motor_positions),
+        ("curr_data.csv.xz", tx40.motor_torques),
+    ):
+        lines = lzma.decompress((folder / name).read_bytes()).decode().splitlines()
+        assert len(lines) == 45001
+        for row in (0, 1, 12345, 44999):
+            assert [float(cell) for cell in lines[row + 1].split(",")] == values[row].tolist()
+        assert not values.flags.writeable
+    # frozen: sums of the columns of the source's files
+    np.testing.assert_allclose(tx40.motor_positions.sum(axis=0), POSITION_SUMS, rtol=1e-13)
+    np.testing.assert_allclose(tx40.motor_torques.sum(axis=0), TORQUE_SUMS, rtol=1e-13)
+
+
+def test_the_tx40_moves_within_its_limits_and_does_the_work_of_its_motors(tx40):
+    log, model = tx40.log, tx40.model
+    assert log.dt == 2e-4
+    assert log.names == model.table.joint_names
+    assert ((model.lower < log.q) & (log.q < model.upper)).all()
+    assert (np.abs(log.tau) < model.table.effort[model.table.joint_rows]).mean() > 0.99
+    work = (log.tau[:-1] * np.diff(log.q, axis=0)).sum()
+    motors = (tx40.motor_torques[:-1] * np.diff(tx40.motor_positions, axis=0)).sum()
+    assert work == pytest.approx(motors, rel=1e-12)
+    np.testing.assert_allclose(log.tau[:, 4:], tx40.motor_torques[:, 4:] @ [[45, 0], [32, 32]])
+    np.testing.assert_allclose(log.q[:, 3], tx40.motor_positions[:, 3] / -48)
+
+
+def test_published_parameters_of_the_tx40_are_grouped_as_those_of_the_model(tx40):
+    base = rm.base_parameters(tx40.model)
+    ours = {name.removesuffix("R") for name in base.names}
+    assert ours - {p.name for p in tx40.published} == {"Ia6"}
+    assert {p.name for p in tx40.published} < ours
+    assert {p.name for p in tx40.essential} < {p.name for p in tx40.published}
+    assert len(tx40.published) == 60
+    by_name = {p.name: p for p in tx40.published}
+    assert by_name["Fcm6"].expression == "fsm6"
+    assert by_name["offset3"].wls_deviation == pytest.approx(0.3476 * 0.5902)
+    assert by_name["Fv1"].ols == 8.107054
+    assert by_name["Fv1"].ols_deviation == pytest.approx(0.041346, rel=1e-4)
+
+
+def test_the_tx40_gives_its_published_parameters_again(tx40):
+    # which it does not with a zero, a sign, a ratio or a coupling that is wrong
+    from scipy.signal import butter, filtfilt
+
+    log = tx40.log
+    q = filtfilt(*butter(4, 50 * 2 * log.dt), log.q, axis=0)
+    v = np.gradient(q, log.dt, axis=0)
+    a = np.gradient(v, log.dt, axis=0)
+    base = rm.base_parameters(tx40.model)
+    W = rm.torque_regressor(tx40.model, q[::5], v[::5], a[::5], columns=base)
+    slow = butter(4, 40 * 2 * 5 * log.dt)
+    rows = slice(100, -100, 10)
+    W = filtfilt(*slow, W, axis=0)[rows]
+    tau = filtfilt(*slow, filtfilt(*butter(4, 200 * 2 * log.dt), log.tau, axis=0)[::5], axis=0)
+    moving = np.abs(v[::5][rows]) > 0.1
+    moving[:, 4:] &= np.abs(v[::5][rows][:, 4:].sum(axis=1, keepdims=True)) > 0.12
+    A, y = W[moving], tau[rows][moving]
+    x = np.linalg.lstsq(A, y, rcond=None)[0]
+    rest = y - A @ x
+    assert np.linalg.norm(rest) < 0.06 * np.linalg.norm(y)
+    joint = np.nonzero(moving)[1]
+    weights = np.array([1.0 / rest[joint == j].std() for j in range(6)])[joint]
+    x = np.linalg.lstsq(A * weights[:, None], y * weights, rcond=None)[0]
+    found = dict(zip((name.removesuffix("R") for name in base.names), x.tolist(), strict=True))
+    seen = [p for p in tx40.published if p.wls_percent < 3.0]
+    assert len(seen) == 16
+    for p in seen:
+        assert found[p.name] == pytest.approx(p.wls, abs=3.0 * p.wls_deviation), p.name
+
+
+def test_the_tx40_pickles(tx40):
+    again = pickle.loads(pickle.dumps(tx40))
+    assert np.array_equal(again.log.tau, tx40.log.tau)
+    assert not again.motor_torques.flags.writeable
+    assert again.published == tx40.published
+    assert again.training == slice(0, 24750)
+    assert again.held_out == slice(29250, 45000)
 
 
 def test_no_file_is_large():

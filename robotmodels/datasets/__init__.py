@@ -2,11 +2,15 @@
 
 from .camera import CameraCalibration, CameraPoses, ur10_camera
 from .double_socket import DoubleSocket, panda_double_socket
+from .tx40 import PublishedParameter, Tx40Log, load_tx40
 
 __all__ = [
     "CameraCalibration",
     "CameraPoses",
     "DoubleSocket",
+    "PublishedParameter",
+    "Tx40Log",
+    "load_tx40",
     "panda_double_socket",
     "ur10_camera",
 ]
