@@ -8,7 +8,6 @@ import pytest
 from robotmodels import se3
 from robotmodels.calibration import KnownDistance, PointContact, Pose, Position, fit
 from robotmodels.calibration.calibrated import calibrated_pose
-from robotmodels.calibration.csv_table import open_table
 from robotmodels.calibration.measurements import (
     Distance,
     FrameContact,
@@ -17,6 +16,7 @@ from robotmodels.calibration.measurements import (
 )
 from robotmodels.calibration.read import read_measurements
 from robotmodels.calibration.write import result_data, write_result
+from robotmodels.csv_table import open_table
 from robotmodels.errors import InvalidValueError, NotARotationError
 from robotmodels.geometry import DHTable
 from robotmodels.kinematics import dgm, operational_coordinates

@@ -1,5 +1,6 @@
 """Geometric calibration: from measurements, or from the robot touching things (section 1.4)."""
 
+from ..file_units import AngleUnit, LengthUnit
 from .bending import Bending
 from .calibrated import (
     CalibratedEnd,
@@ -15,7 +16,6 @@ from .differential import DifferentialModel, differential_model
 from .elements import Compliance, Element, ErrorLaw
 from .errors_seen import BlockErrors, ErrorSummary
 from .file_kinds import FileKind
-from .file_units import AngleUnit, LengthUnit
 from .fit import fit
 from .folds import AsideErrors
 from .identifiable import IdentifiableParameters, Reason, identifiable_on

@@ -11,15 +11,15 @@ from numpy.typing import ArrayLike
 
 from .. import se3
 from .._arrays import Array
+from ..csv_table import Column, CsvTable, open_table, stacked_columns
 from ..errors import InvalidValueError
+from ..file_units import AngleUnit, LengthUnit, as_file_unit
 from ..geometry import REVOLUTE
 from ..kinematics import OrientationKind, pose_from_coordinates
 from ..kinematics.coordinates.kinds import orientation_kind
 from ..kinematics.lengths import characteristic_length
 from ..model import RobotModel, check_model
-from .csv_table import Column, CsvTable, open_table, stacked_columns
 from .file_kinds import CONTACTS, FileKind, as_file_kind
-from .file_units import AngleUnit, LengthUnit, as_file_unit
 from .measurements import Distance, Measurement, Pose, Position, RelativePose
 from .skeleton import Frame
 

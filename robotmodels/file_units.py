@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..errors import InvalidValueError
+from .errors import InvalidValueError
 
 
 class LengthUnit(Enum):
@@ -46,7 +46,27 @@ class AngleUnit(Enum):
         return float(np.pi / 180.0) if self is AngleUnit.DEGREE else 1.0
 
 
-U = TypeVar("U", LengthUnit, AngleUnit)
+class TimeUnit(Enum):
+    """Unit of the times in a file; the value is its symbol.
+
+    Examples
+    --------
+    >>> TimeUnit("ms").factor
+    0.001
+    """
+
+    SECOND = "s"
+    MILLISECOND = "ms"
+    MICROSECOND = "us"
+    NANOSECOND = "ns"
+
+    @property
+    def factor(self) -> float:
+        """Seconds in one of it."""
+        return {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}[self.value]
+
+
+U = TypeVar("U", LengthUnit, AngleUnit, TimeUnit)
 
 
 def as_file_unit(kind: type[U], value: Any, name: str) -> U:
@@ -55,7 +75,7 @@ def as_file_unit(kind: type[U], value: Any, name: str) -> U:
     Parameters
     ----------
     kind : type
-        `LengthUnit` or `AngleUnit`.
+        `LengthUnit`, `AngleUnit` or `TimeUnit`.
     value : member or str
         What the caller passed.
     name : str

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from .._arrays import Array, read_only
-from ..errors import InvalidValueError, nearest_names
+from ._arrays import Array, read_only
+from .errors import InvalidValueError, nearest_names
 
 Column = int | str
 """A column: its number, from 0, or its name in the header."""
@@ -126,17 +127,65 @@ class CsvTable:
             number of the line.
         """
         try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", UserWarning)  # no data: said below
-                values = np.loadtxt(
-                    self.path, delimiter=self.delimiter, skiprows=self.first,
-                    usecols=list(columns), comments=_COMMENT, ndmin=2, encoding="utf-8-sig",
-                )  # fmt: skip
+            values = self._loaded(columns)
         except ValueError:
             values = np.zeros((0, len(columns)))
         if not len(values) or not np.isfinite(values).all():
             self._raise_bad_cell(columns)
         return values
+
+    def _loaded(self, columns: Sequence[int]) -> Array:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # no data: said by the callers
+            return np.loadtxt(
+                self.path, delimiter=self.delimiter, skiprows=self.first, quotechar='"',
+                usecols=list(columns), comments=_COMMENT, ndmin=2, encoding="utf-8-sig",
+            )  # fmt: skip
+
+    def numbers_with_gaps(self, columns: Sequence[int]) -> Array:
+        """Columns of numbers, NaN where a cell is empty, infinite or not a number by its own word.
+
+        Parameters
+        ----------
+        columns : sequence of int
+            Which.
+
+        Returns
+        -------
+        ndarray, shape (N, number of columns)
+            As they are in the file; rows without any number in them too.
+
+        Raises
+        ------
+        InvalidValueError
+            A cell of words; a line of another length; no data. With the number of the line.
+        """
+        try:
+            values = self._loaded(columns)
+        except ValueError:
+            values = self._cell_by_cell(columns)
+        if not len(values):
+            self._raise_bad_cell(columns)
+        values[~np.isfinite(values)] = np.nan
+        return values
+
+    def _cell_by_cell(self, columns: Sequence[int]) -> Array:
+        rows = []
+        for line, cells in self._rows():
+            if len(cells) != self.width:
+                raise InvalidValueError(
+                    f"{self.path}, line {line}: expected {self.width} columns as in the first "
+                    f"line, got {len(cells)}. Delete the line if it was cut off."
+                )
+            row = []
+            for column in columns:
+                cell = cells[column]
+                try:
+                    row.append(float(cell or "nan"))
+                except ValueError:
+                    raise self._no_number(line, column, cell) from None
+            rows.append(row)
+        return np.array(rows, dtype=np.float64).reshape(len(rows), len(columns))
 
     def labels(self, column: int) -> tuple[str, ...]:
         """A column of labels.
@@ -196,11 +245,7 @@ class CsvTable:
                 try:
                     finite = np.isfinite(float(cell))
                 except ValueError:
-                    comma = "," in cell and self.delimiter != ","
-                    raise InvalidValueError(
-                        f"{where}: {self._called(column)} is {cell!r}, not a number."
-                        + (" Write a point for the decimal comma." if comma else "")
-                    ) from None
+                    raise self._no_number(line, column, cell) from None
                 if not finite:
                     raise InvalidValueError(
                         f"{where}: {self._called(column)} is {cell!r}. A row that was not measured "
@@ -208,6 +253,13 @@ class CsvTable:
                     )
         raise InvalidValueError(
             f"{self.path}: no line of numbers. Give a file with a row for each measurement."
+        )
+
+    def _no_number(self, line: int, column: int, cell: str) -> InvalidValueError:
+        comma = "," in cell and self.delimiter != ","
+        return InvalidValueError(
+            f"{self.path}, line {line}: {self._called(column)} is {cell!r:.60}, not a number."
+            + (" Write a point for the decimal comma." if comma else "")
         )
 
 
@@ -231,7 +283,12 @@ def cells_of(line: str, delimiter: str | None) -> list[str]:
     >>> cells_of(' 1; "a" ;', ";")
     ['1', 'a', '']
     """
-    return [cell.strip().strip("\"'") for cell in line.split(delimiter)]
+    if delimiter is not None and '"' in line and line.count('"') % 2 == 0:
+        # a cell in quotation marks may have the delimiter in it; blanks may stand before them
+        cells = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
+    else:
+        cells = line.split(delimiter)
+    return [cell.strip().strip("\"'") for cell in cells]
 
 
 def open_table(path: str | Path, delimiter: str | None = None) -> CsvTable:
