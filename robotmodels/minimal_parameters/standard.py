@@ -9,14 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, Rebuilt, as_core, as_exact, read_only
-from ..drive import DriveKind, DriveParameters, Transmission, drive_kinds
+from ..drive import DriveParameters, Transmission
 from ..errors import InvalidValueError, ShapeError
 from ..inertia import InertialParameters
 from ..model import RobotModel
-from ..regressors import parameter_vector
-from .cone import ConeOutcome, ConeProblem
+from .cone import ConeProblem
+from .conic import ConeOutcome
 from .prior import check_definite
 from .result import BaseParameters
+from .robot_parts import robot_parts, standard_vector
 from .standard_table import standard_text
 
 MARGIN = 1e-3
@@ -215,7 +216,7 @@ def standard_parameters(
     W = _relative(base, b) if weights is None else as_core(weights, (len(base),), "weights")
     if W.ndim != 2:
         raise ShapeError(f"weights: expected shape (k, {len(base)}), got {W.shape}.")
-    problem = ConeProblem(base, _prior_vector(base, bodies, drives), P0, margin)
+    problem = ConeProblem(base, standard_vector(base, bodies, drives), P0, margin)
     if _is_same(base.matrix @ problem.prior - b, b) and problem.is_met(problem.prior):
         return _result(base, b, problem.prior, drives, PhysicalStatus.EXACT, problem)
     x, outcome = problem.nearest_to_prior(b)
@@ -241,28 +242,10 @@ def _result(
     problem: ConeProblem,
 ) -> StandardParameters:  # fmt: skip
     """The robot of the variables, and what it has of the base parameters."""
-    f, n = base.model.f, base.model.n
-    transmission = base.model.transmission
-    kinds = drive_kinds(base.drive)
-    end = 10 * f + n * len(kinds)
-    found = dict(zip((k.value for k in kinds), x[10 * f : end].reshape(-1, n), strict=True))
-    rest = {kind.value: getattr(drives, kind.value) for kind in DriveKind}
-    drives = DriveParameters(**{**rest, **found})
-    if transmission is not None and transmission.coupled_motors:
-        motors = np.array(transmission.coupled_motors) - 1
-        terms = {
-            k.coupling: getattr(transmission, k.coupling).copy() for k in DriveKind if k.coupling
-        }
-        for kind in kinds:
-            if kind.coupling is not None:
-                terms[kind.coupling][motors] = x[end : end + len(motors)]
-                end += len(motors)
-        transmission = Transmission(transmission.matrix, transmission.offset, **terms)
-    friction = None if base.friction is None else x[end:].reshape(-1, n)
-    inertia = InertialParameters(x[: 10 * f].reshape(f, 10))
+    parts = robot_parts(base, x, drives)
     return StandardParameters(
-        inertia, drives, transmission, status, base.matrix @ x - b, problem.distance(x),
-        base.parameter_names, problem.prior, x, friction,
+        parts.inertia, parts.drive, parts.transmission, status, base.matrix @ x - b,
+        problem.distance(x), base.parameter_names, problem.prior, x, parts.friction,
     )  # fmt: skip
 
 
@@ -276,13 +259,6 @@ def _is_kept(deviation: Array, b: Array) -> bool:
     return float(np.abs(deviation).max(initial=0.0)) <= _KEPT * max(
         1e-300, float(np.abs(b).max(initial=0.0))
     )
-
-
-def _prior_vector(
-    base: BaseParameters, bodies: InertialParameters, drives: DriveParameters
-) -> Array:
-    robot = base.model.with_inertia(bodies).with_drive(drives)
-    return parameter_vector(robot, base.drive, base.friction)
 
 
 def _relative(base: BaseParameters, b: Array) -> Array:

@@ -1,0 +1,321 @@
+"""Convex problems with quadratic objectives on cones, and how to check what the solver says."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum, auto
+from typing import Any
+
+import numpy as np
+
+from .._arrays import Array
+from ..errors import MissingExtraError
+
+_ROOT = float(np.sqrt(2.0))
+
+
+class ConeOutcome(Enum):
+    """What the solver says.
+
+    Examples
+    --------
+    >>> ConeOutcome.SOLVED.name
+    'SOLVED'
+    """
+
+    SOLVED = auto()
+    INFEASIBLE = auto()
+    FAILED = auto()
+
+
+class Cone(Enum):
+    """Where the slack of a constraint lies.
+
+    Examples
+    --------
+    >>> Cone.ZERO.name
+    'ZERO'
+    """
+
+    ZERO = auto()
+    NONNEGATIVE = auto()
+    SECOND_ORDER = auto()
+    """The first entry is at least the length of the others."""
+    SEMIDEFINITE = auto()
+    """The upper triangle, column by column; off the diagonal times the root of 2."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Constraint:
+    """``right - rows @ x`` lies in a cone.
+
+    Parameters
+    ----------
+    cone : Cone
+        Which.
+    rows : ndarray, shape (k, p)
+        In units that make the slack of order one.
+    right : ndarray, shape (k,)
+        The same units.
+    sentences : tuple of str
+        What is said where there is no slack left: one for each row of the cones ``ZERO`` and
+        ``NONNEGATIVE``, a single one for the others.
+    """
+
+    cone: Cone
+    rows: Array
+    right: Array
+    sentences: tuple[str, ...]
+
+    def slack(self, x: Array) -> Array:
+        """Room that is left, one for each sentence; negative where x is outside."""
+        s = self.right - self.rows @ x
+        if self.cone is Cone.ZERO:
+            return -np.abs(s)
+        if self.cone is Cone.NONNEGATIVE:
+            return s
+        if self.cone is Cone.SECOND_ORDER:
+            return np.array([float(s[0] - np.linalg.norm(s[1:]))])
+        return np.asarray(np.linalg.eigvalsh(matrix_of(s))[:1], dtype=np.float64)
+
+    def weight(self, z: Array) -> Array:
+        """Size of multipliers, one for each sentence."""
+        if self.cone in (Cone.ZERO, Cone.NONNEGATIVE):
+            return np.abs(z)
+        return np.array([float(np.linalg.norm(z))])
+
+    def dual(self, z: Array) -> Array:
+        """The nearest multipliers that the cone allows."""
+        if self.cone is Cone.ZERO:
+            return z
+        if self.cone is Cone.NONNEGATIVE:
+            return np.maximum(z, 0.0)
+        if self.cone is Cone.SEMIDEFINITE:
+            values, vectors = np.linalg.eigh(matrix_of(z))
+            return triangle_of((vectors * np.maximum(values, 0.0)) @ vectors.T)
+        length = float(np.linalg.norm(z[1:]))
+        if length <= z[0]:
+            return z
+        half = 0.5 * max(z[0] + length, 0.0)
+        return np.concatenate(([half], half * z[1:] / length))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ConeSolution:
+    """What a solver of cones returns.
+
+    Parameters
+    ----------
+    x : ndarray, shape (p,)
+        Variables; to be used only where the outcome is ``SOLVED``.
+    multipliers : tuple of ndarray, shapes (k,)
+        Of each constraint; where the outcome is ``INFEASIBLE``, those that prove it.
+    outcome : ConeOutcome
+        What the solver says.
+    """
+
+    x: Array
+    multipliers: tuple[Array, ...]
+    outcome: ConeOutcome
+
+
+def matrix_of(stacked: Array) -> Array:
+    """Symmetric matrix of its stacked upper triangle.
+
+    Parameters
+    ----------
+    stacked : ndarray, shape (k (k + 1) / 2,)
+        Column by column, off the diagonal times the root of 2.
+
+    Returns
+    -------
+    ndarray, shape (k, k)
+        The matrix.
+
+    Examples
+    --------
+    >>> matrix_of(np.array([1.0, 0.0, 2.0]))
+    array([[1., 0.],
+           [0., 2.]])
+    """
+    k = round((np.sqrt(8.0 * len(stacked) + 1.0) - 1.0) / 2.0)
+    columns, rows = np.tril_indices(k)
+    S = np.zeros((k, k))
+    S[rows, columns] = np.where(rows == columns, stacked, stacked / _ROOT)
+    S[columns, rows] = S[rows, columns]
+    return S
+
+
+def triangle_of(S: Array) -> Array:
+    """Stacked upper triangle of symmetric matrices, the inverse of `matrix_of`.
+
+    Parameters
+    ----------
+    S : ndarray, shape (..., k, k)
+        Matrices.
+
+    Returns
+    -------
+    ndarray, shape (..., k (k + 1) / 2)
+        Column by column, off the diagonal times the root of 2.
+
+    Examples
+    --------
+    >>> triangle_of(np.eye(2))
+    array([1., 0., 1.])
+    """
+    columns, rows = np.tril_indices(S.shape[-1])
+    return S[..., rows, columns] * np.where(rows == columns, 1.0, _ROOT)
+
+
+def solve_cones(
+    H: Array, g: Array, constraints: Sequence[Constraint], unit: Array, size: float = 1.0,
+    fit: tuple[Array, Array] | None = None,
+) -> ConeSolution:  # fmt: skip
+    """Least of ``x H x / 2 + g x + |F x - t|^2 / 2`` within constraints.
+
+    The sum of squares has variables of its own, so that F is not squared and keeps its digits.
+
+    Parameters
+    ----------
+    H : ndarray, shape (p, p)
+        Positive semidefinite.
+    g : ndarray, shape (p,)
+        Linear term.
+    constraints : sequence of Constraint
+        All of them hold.
+    unit : ndarray, shape (p,)
+        Natural sizes of the variables.
+    size : float
+        How many units the variables are expected to have; the solver's numbers are of order one.
+    fit : (ndarray, ndarray), optional
+        F of shape (k, p), and t of shape (k,).
+
+    Returns
+    -------
+    ConeSolution
+        Variables and multipliers of the problem as it is posed here.
+
+    Raises
+    ------
+    MissingExtraError
+        The solver is not installed.
+
+    Examples
+    --------
+    >>> floor = Constraint(Cone.NONNEGATIVE, -np.eye(1), np.array([-2.0]), ("x is at least 2",))
+    >>> found = solve_cones(np.eye(1), np.zeros(1), [floor], np.ones(1))
+    >>> float(found.x[0].round(6)), float(found.multipliers[0][0].round(6))
+    (2.0, 2.0)
+    """
+    clarabel = _clarabel()
+    from scipy import sparse
+
+    p = len(g)
+    F, t = (np.zeros((0, p)), np.zeros(0)) if fit is None else fit
+    k = len(t)
+    of_cone = {
+        Cone.ZERO: clarabel.ZeroConeT,
+        Cone.NONNEGATIVE: clarabel.NonnegativeConeT,
+        Cone.SECOND_ORDER: clarabel.SecondOrderConeT,
+    }
+    used = [one for one in constraints if len(one.right)]
+    rows = [np.hstack((one.rows * unit, np.zeros((len(one.right), k)))) for one in used]
+    right = [one.right / size for one in used]
+    cones = [
+        clarabel.PSDTriangleConeT(len(matrix_of(one.right)))
+        if one.cone is Cone.SEMIDEFINITE
+        else of_cone[one.cone](len(one.right))
+        for one in used
+    ]
+    if k:
+        scale = 1.0 / np.maximum(1.0, np.abs(F * unit * size).max(axis=1))
+        rows.append(np.hstack((F * unit * size, -np.eye(k))) * scale[:, None])
+        right.append(t * scale)
+        cones.append(clarabel.ZeroConeT(k))
+    scaled = H * unit * unit[:, None] * size**2
+    largest = max(float(np.abs(scaled).max(initial=0.0)), 1.0 if k else 1e-300)
+    P = np.zeros((p + k, p + k))
+    P[:p, :p] = np.triu(scaled) / largest
+    P[p:, p:] = np.eye(k) / largest
+    linear = np.concatenate((g * unit * size / largest, np.zeros(k)))
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-11
+    settings.max_iter = 500
+    solution = clarabel.DefaultSolver(
+        sparse.csc_matrix(P), linear, sparse.csc_matrix(np.concatenate(rows)),
+        np.concatenate(right), cones, settings,
+    ).solve()  # fmt: skip
+    x = size * unit * np.array(solution.x)[:p]
+    z = np.array(solution.z) * (largest / size)
+    ends = np.cumsum([len(one.right) for one in used])
+    parts = iter(np.split(z, ends)[: len(used)] if used else [])
+    multipliers = tuple(next(parts) if len(one.right) else np.zeros(0) for one in constraints)
+    return ConeSolution(x, multipliers, _outcome(str(solution.status)))
+
+
+def lower_bound(
+    value: float, gradient: Array, x: Array, constraints: Sequence[Constraint],
+    multipliers: Sequence[Array], reach: Array,
+) -> float:  # fmt: skip
+    """What a convex objective is at least within constraints, proved by multipliers.
+
+    Any multipliers that the cones allow prove a bound, those of the optimum the best: nothing of
+    the solver is trusted. With slacks s and what is left of the stationarity,
+    ``r = gradient + sum rows^T z``, every x' that meets the constraints has
+    ``f(x') >= f(x) - z s - r (x - x')``.
+
+    Parameters
+    ----------
+    value : float
+        The objective at x.
+    gradient : ndarray, shape (p,)
+        Its derivative at x.
+    x : ndarray, shape (p,)
+        Any point, best the optimum.
+    constraints : sequence of Constraint
+        All that hold.
+    multipliers : sequence of ndarray
+        Of each constraint; brought into the cone first.
+    reach : ndarray, shape (p,)
+        How far from x the bound is asked for, variable by variable.
+
+    Returns
+    -------
+    float
+        The bound.
+
+    Examples
+    --------
+    >>> floor = Constraint(Cone.NONNEGATIVE, -np.eye(1), np.array([-2.0]), ("x is at least 2",))
+    >>> x = np.array([2.0])
+    >>> lower_bound(2.0, x, x, [floor], [np.array([2.0])], np.ones(1))
+    2.0
+    """
+    left, paid = gradient.copy(), 0.0
+    for one, z in zip(constraints, multipliers, strict=True):
+        allowed = one.dual(z)
+        left += one.rows.T @ allowed
+        paid += float(allowed @ (one.right - one.rows @ x))
+    return value - paid - float(np.abs(left) @ reach)
+
+
+def _outcome(word: str) -> ConeOutcome:
+    if word in ("Solved", "AlmostSolved"):
+        return ConeOutcome.SOLVED
+    if word in ("PrimalInfeasible", "AlmostPrimalInfeasible"):
+        return ConeOutcome.INFEASIBLE
+    return ConeOutcome.FAILED
+
+
+def _clarabel() -> Any:
+    try:
+        import clarabel
+    except ImportError:
+        raise MissingExtraError(
+            "Physically consistent parameters need Clarabel, a solver for cones: "
+            "pip install 'robotmodels[cones]'."
+        ) from None
+    return clarabel
