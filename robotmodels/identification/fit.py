@@ -1,0 +1,178 @@
+"""From a log to the dynamic parameters of a robot."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Executor
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._choices import chosen
+from ..drive import Drives
+from ..errors import InvalidValueError
+from ..estimation import column_basis
+from ..friction import Friction
+from ..logs import Log
+from ..minimal_parameters import BaseParameters, base_parameters
+from ..model import RobotModel, check_model
+from .correlated import correlated_covariance
+from .equations import EquationForm, Equations, equations
+from .estimate import Estimate, Method
+from .least_squares import ordinary, reweighted, solved, weighted, weights_of
+from .processing import Processing, choose_processing
+from .reduction import Reduction, reduce_equations
+from .result import IdentificationResult
+from .validation import validate
+
+_NOTHING = 1e-7
+"""Length of a column relative to the longest, below which the log does not show it."""
+
+
+def fit(
+    model: RobotModel,
+    log: Log,
+    method: Method | str = Method.WLS,
+    *,
+    drive: Drives = True,
+    friction: Friction | None = None,
+    form: EquationForm | str = EquationForm.TORQUE,
+    base: BaseParameters | None = None,
+    processing: Processing | None = None,
+    cutoff: float | None = None,
+    decimation: int | None = None,
+    dead_band: ArrayLike | None = None,
+    edges: float | None = None,
+    test: Log | None = None,
+    executor: Executor | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> IdentificationResult:
+    """Identify the base parameters, frictions and rotor inertias of a robot from a log.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot; its own inertia is not used by least squares.
+    log : Log
+        Positions and torques of its joints, of `read_log`.
+    method : Method or str
+        How the equations are solved, such as "ols", "wls" or "iv".
+    drive : bool or collection of DriveKind or str
+        Which drive parameters are identified.
+    friction : Friction, optional
+        A friction model besides them, linear in its parameters.
+    form : EquationForm or str
+        What the equations balance.
+    base : BaseParameters, optional
+        Instead of ``drive`` and ``friction``.
+    processing : Processing, optional
+        All choices of the signal processing; instead of them single ones:
+    cutoff, decimation, dead_band, edges
+        As for `choose_processing`; default what the log suggests.
+    test : Log, optional
+        Kept aside: the predicted torques are compared with it.
+    executor : concurrent.futures.Executor, optional
+        Who computes the pieces of the log; the result does not depend on it.
+    progress : callable, optional
+        Called with the fraction done.
+
+    Returns
+    -------
+    IdentificationResult
+        Parameters, deviations, errors.
+
+    Raises
+    ------
+    InvalidValueError, ShapeError
+        A log of other joints, or of too few samples; choices that make no sense.
+
+    References
+    ----------
+    Seed book section 1.6; M. Gautier and W. Khalil, "On the identification of the inertial
+    parameters of robots", IEEE CDC 1988.
+    """
+    check_model(model)
+    way = chosen(Method, method, "method")
+    balance = chosen(EquationForm, form, "form")
+    if base is None:
+        base = base_parameters(model, drive=drive, friction=friction)
+    else:
+        base.check(model)
+    if processing is None:
+        processing = choose_processing(log, cutoff, decimation, dead_band, edges)
+    elif any(x is not None for x in (cutoff, decimation, dead_band, edges)):
+        raise InvalidValueError(
+            "processing: it holds every choice; leave out cutoff, decimation, dead_band and edges, "
+            "or leave out processing."
+        )
+    system = equations(base, log, processing, balance)
+    whole = reduce_equations(system, executor, progress)
+    system, reduction, gap, unseen = _seen(system, whole)
+    estimate = _estimate(way, system, reduction)
+    R, _, _ = reduction.stacked()
+    values = estimate.values
+    weights = weights_of(estimate.sigma, reduction)
+    if way is Method.OLS:
+        weights = np.ones(len(weights))
+    _, inverse, _ = solved(reduction, weights)
+    spread = correlated_covariance(system, values, weights, inverse)
+    return IdentificationResult(
+        system=system,
+        reduction=reduction,
+        estimate=replace(estimate, covariance=spread.covariance),
+        white=estimate.deviations,
+        lags=spread.lags,
+        gap=gap,
+        unseen=unseen,
+        not_essential=(),
+        condition=float(np.linalg.cond(R)),
+        condition_scaled=float(np.linalg.cond(R / np.linalg.norm(R, axis=0))),
+        fitted=validate(system.base, system.names, values, log, processing),
+        held_out=None
+        if test is None
+        else validate(system.base, system.names, values, test, processing),
+        notes=(*log.notes, *processing.notes, *estimate.notes, *_notes(unseen)),
+    )
+
+
+def _estimate(way: Method, system: Equations, reduction: Reduction) -> Estimate:
+    if way is Method.OLS:
+        return ordinary(reduction)
+    if way is Method.WLS:
+        return weighted(reduction)
+    if way is Method.IRLS:
+        return reweighted(reduction)
+    raise InvalidValueError(f"method: {way.name.lower()!r} is not built.")
+
+
+def _seen(
+    system: Equations, whole: Reduction
+) -> tuple[Equations, Reduction, tuple[float, float], tuple[str, ...]]:
+    """Equations in the parameters that the log tells from each other."""
+    R, _, _ = whole.stacked()
+    found = column_basis(R, nothing=_NOTHING)
+    if found.rank == len(whole.names):
+        return system, whole, found.gap, ()
+    base = system.base
+    kept = found.kept
+    # what depends on others in this log is regrouped into them
+    seen = BaseParameters(
+        base.model, base.drive, base.kept[kept], found.coefficients @ base.matrix, base.method,
+        found.gap, friction=base.friction,
+    )  # fmt: skip
+    factors = tuple(F[:, [*kept.tolist(), F.shape[1] - 1]] for F in whole.factors)
+    names = tuple(whole.names[k] for k in kept)
+    unseen = tuple(name for name in whole.names if name not in names)
+    reduction = Reduction(names, factors, whole.counts, whole.left_out)
+    return replace(system, base=seen, names=names), reduction, found.gap, unseen
+
+
+def _notes(unseen: tuple[str, ...]) -> tuple[str, ...]:
+    if not unseen:
+        return ()
+    return (
+        f"The log does not tell {', '.join(unseen)} from other parameters: their joints do not "
+        "move enough. They are regrouped (see base.regrouping) or without effect; use an exciting "
+        "trajectory to find them.",
+    )

@@ -1,0 +1,194 @@
+"""Ordinary, weighted and iteratively re-weighted least squares on reduced equations."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._arrays import Array
+from ..errors import InvalidValueError
+from .estimate import Estimate, EstimateStatus, Method
+from .reduction import Reduction
+
+_ITERATIONS = 50
+_STILL = 1e-10
+
+
+def ordinary(reduction: Reduction) -> Estimate:
+    """Ordinary least squares: all equations count alike.
+
+    Parameters
+    ----------
+    reduction : Reduction
+        Of the equations; its columns are independent.
+
+    Returns
+    -------
+    Estimate
+        Its covariance holds if the noise of all joints is alike and white.
+
+    Raises
+    ------
+    InvalidValueError
+        Fewer equations than parameters.
+
+    References
+    ----------
+    Seed book section 1.6.2.1.
+    """
+    check_count(reduction)
+    values, inverse, rest = solved(reduction, None)
+    left = reduction.rows - len(values)
+    return Estimate(
+        Method.OLS, reduction.names, values, rest / left * inverse,
+        deviations_of(reduction, values),
+    )  # fmt: skip
+
+
+def weighted(reduction: Reduction) -> Estimate:
+    """Weighted least squares: the equations of each joint by the deviation of its residuals.
+
+    Parameters
+    ----------
+    reduction : Reduction
+        Of the equations.
+
+    Returns
+    -------
+    Estimate
+        Weights are of the residuals of ordinary least squares.
+
+    Raises
+    ------
+    InvalidValueError
+        Fewer equations than parameters.
+
+    References
+    ----------
+    Seed book section 1.6.2.1; M. Gautier and P. Poignet, "Extended Kalman filtering and weighted
+    least squares dynamic identification of robot", Control Engineering Practice 9, 2001.
+    """
+    return _with_weights(reduction, Method.WLS, 1)
+
+
+def reweighted(reduction: Reduction) -> Estimate:
+    """Weighted least squares whose weights are those of its own residuals, by iteration.
+
+    Parameters
+    ----------
+    reduction : Reduction
+        Of the equations.
+
+    Returns
+    -------
+    Estimate
+        The maximum of the likelihood, if the noise of each joint is white and normal.
+
+    Raises
+    ------
+    InvalidValueError
+        Fewer equations than parameters.
+
+    References
+    ----------
+    A. Janot, M. Gautier, A. Jubien and P.-O. Vandanjon, "Comparison between the CLOE method and the
+    DIDIM method for robots identification", IEEE T-CST 22(5), 2014, section II.
+    """
+    return _with_weights(reduction, Method.IRLS, _ITERATIONS)
+
+
+def _with_weights(reduction: Reduction, method: Method, most: int) -> Estimate:
+    check_count(reduction)
+    values, inverse, rest = solved(reduction, None)
+    status = EstimateStatus.SOLVED if most == 1 else EstimateStatus.NOT_CONVERGED
+    iterations = 0
+    for iterations in range(1, most + 1):
+        before = values
+        w = weights_of(deviations_of(reduction, values), reduction)
+        values, inverse, rest = solved(reduction, w)
+        moved = np.abs(values - before)
+        if (moved <= _STILL * np.sqrt(np.diag(inverse)) + 1e-15 * np.abs(values)).all():
+            status = EstimateStatus.SOLVED
+            break
+    scale = rest / (reduction.rows - len(values))
+    return Estimate(
+        method, reduction.names, values, scale * inverse, deviations_of(reduction, values), status,
+        iterations,
+    )  # fmt: skip
+
+
+def solved(reduction: Reduction, weights: Array | None) -> tuple[Array, Array, float]:
+    """Parameters, the inverse of the information matrix, and the sum of squares that is left.
+
+    Parameters
+    ----------
+    reduction : Reduction
+        Of the equations.
+    weights : ndarray, shape (m,), or None
+        Of each kind.
+
+    Returns
+    -------
+    values : ndarray, shape (b,)
+        Parameters.
+    inverse : ndarray, shape (b, b)
+        ``(R^T R)^-1``.
+    rest : float
+        Sum of squared weighted residuals.
+    """
+    from scipy.linalg import solve_triangular
+
+    R, y, rest = reduction.stacked(weights)
+    # columns of like lengths: units of parameters differ by decades
+    size = np.linalg.norm(R, axis=0)
+    inverse = solve_triangular(R / size, np.eye(len(R))) / size[:, None]
+    return inverse @ y, inverse @ inverse.T, rest
+
+
+def deviations_of(reduction: Reduction, values: Array) -> Array:
+    """Deviation of the residuals of each kind; parameters are taken off in equal shares of rows.
+
+    Parameters
+    ----------
+    reduction : Reduction
+        Of the equations.
+    values : ndarray, shape (b,)
+        Parameters.
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        N m or N; 0 for a kind without equations.
+    """
+    left = 1.0 - len(values) / reduction.rows
+    return np.sqrt(reduction.sums(values) / np.maximum(reduction.counts * left, 1e-300))
+
+
+def weights_of(sigma: Array, reduction: Reduction) -> Array:
+    """Weights of deviations; residuals that are rounding count alike.
+
+    Parameters
+    ----------
+    sigma : ndarray, shape (m,)
+        Deviations.
+    reduction : Reduction
+        Of the equations.
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        ``1 / sigma``.
+    """
+    size = np.array([np.linalg.norm(R[:, -1]) for R in reduction.factors])
+    size = size / np.sqrt(np.maximum(reduction.counts, 1))
+    least = 1e-12 * max(float(size.max(initial=0.0)), 1e-300)
+    return 1.0 / np.maximum(sigma, least)
+
+
+def check_count(reduction: Reduction) -> None:
+    """Refuse fewer equations than parameters."""
+    b = len(reduction.names)
+    if reduction.rows <= b:
+        raise InvalidValueError(
+            f"log: {reduction.rows} equations for {b} parameters are too few; give a longer log, a "
+            "smaller decimation= or dead_band=, or fewer parameters."
+        )

@@ -1,0 +1,110 @@
+"""How well parameters predict the torques of a log."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .._arrays import Array, Rebuilt, read_only
+from ..logs import Log
+from ..minimal_parameters import BaseParameters
+from .equations import Equations
+from .prediction import predicted_torque
+from .processing import Processing
+from .signals import piece_signals, pieces
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Validation(Rebuilt):
+    """Errors of predicted torques, by joint. Read-only.
+
+    Parameters
+    ----------
+    rmse : ndarray, shape (n,)
+        Root mean square of measured less predicted torque at the rate of the log, N m or N.
+    relative : ndarray, shape (n,)
+        Its part of the root mean square of the measured torque.
+    bias : ndarray, shape (n,)
+        Mean of measured less predicted torque, N m or N.
+    filtered_rmse : ndarray, shape (n,)
+        Root mean square of the residuals of the equations, in which both sides are filtered and
+        dead bands left out; NaN for a joint without equations.
+    filtered_relative : ndarray, shape (n,)
+        Its part of the filtered torque.
+    correlation : ndarray, shape (n,)
+        Of successive residuals of the equations.
+    samples : int
+        Of the log, edges left out.
+    """
+
+    rmse: Array
+    relative: Array
+    bias: Array
+    filtered_rmse: Array
+    filtered_relative: Array
+    correlation: Array
+    samples: int
+
+    def __post_init__(self) -> None:
+        names = ("rmse", "relative", "bias", "filtered_rmse", "filtered_relative", "correlation")
+        for name in names:
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+
+def validate(
+    base: BaseParameters, names: tuple[str, ...], values: Array, log: Log, processing: Processing
+) -> Validation:
+    """Compare predicted torques with those of a log, which may be another one.
+
+    Parameters
+    ----------
+    base : BaseParameters
+        Of the robot.
+    names : tuple of str
+        The b parameters that were identified.
+    values : ndarray, shape (b,)
+        Their values.
+    log : Log
+        The log.
+    processing : Processing
+        How positions become velocities and accelerations.
+
+    Returns
+    -------
+    Validation
+        Errors by joint.
+
+    References
+    ----------
+    Seed book section 1.6.5.
+    """
+    system = Equations(base, names, log, processing)
+    n = log.n
+    squares, sums, whole = np.zeros(n), np.zeros(n), np.zeros(n)
+    samples = 0
+    kept, filtered, taken = np.zeros(n), np.zeros(n), np.zeros(n)
+    products = np.zeros(n)
+    last = np.zeros((0, n))
+    for piece in pieces(log, processing):
+        found = piece_signals(log, processing, piece, 0)
+        e = found.tau - predicted_torque(
+            base, names, values, found.q, found.v, found.a, processing.dead_band
+        )
+        squares += (e * e).sum(axis=0)
+        sums += e.sum(axis=0)
+        whole += (found.tau**2).sum(axis=0)
+        samples += len(e)
+        block = system.block(piece)
+        r = np.where(block.use, block.y - block.W @ values, 0.0)
+        kept += (r * r).sum(axis=0)
+        filtered += np.where(block.use, block.y**2, 0.0).sum(axis=0)
+        taken += block.use.sum(axis=0)
+        chain = np.vstack((last, r))
+        products += (chain[1:] * chain[:-1]).sum(axis=0)
+        last = r[-1:]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return Validation(
+            np.sqrt(squares / samples), np.sqrt(squares / whole), sums / samples,
+            np.sqrt(kept / taken), np.sqrt(kept / filtered), products / kept, samples,
+        )  # fmt: skip
