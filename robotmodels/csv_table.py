@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -186,6 +186,33 @@ class CsvTable:
                     raise self._no_number(line, column, cell) from None
             rows.append(row)
         return np.array(rows, dtype=np.float64).reshape(len(rows), len(columns))
+
+    def cells(self, column: int) -> Iterator[tuple[int, str]]:
+        """Cells of a column as text, each with the number of its line, from 1.
+
+        Parameters
+        ----------
+        column : int
+            Which.
+
+        Yields
+        ------
+        line : int
+            From 1.
+        cell : str
+            Empty where the line is too short.
+        """
+        for line, cells in self._rows():
+            yield line, cells[column] if column < len(cells) else ""
+
+    def first_row(self) -> tuple[int, list[str]]:
+        """Number of the first line of data, from 1, and its cells; none if there is no data."""
+        with self.path.open(encoding="utf-8-sig") as file:
+            for number, line in enumerate(file, 1):
+                text = line.split(_COMMENT, 1)[0].strip("\r\n")
+                if number > self.first and text.strip():
+                    return number, cells_of(text, self.delimiter)
+        return self.first + 1, []
 
     def labels(self, column: int) -> tuple[str, ...]:
         """A column of labels.

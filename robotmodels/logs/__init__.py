@@ -3,10 +3,17 @@
 Seed book sections 1.6.2.4 and 1.6.2.5.
 """
 
+from .joining import join_logs, with_delay
 from .log import Log, LogSource, RefusedRows
+from .read import read_log
+from .table import LogFormat
 
 __all__ = [
     "Log",
+    "LogFormat",
     "LogSource",
     "RefusedRows",
+    "join_logs",
+    "read_log",
+    "with_delay",
 ]

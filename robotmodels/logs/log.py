@@ -163,7 +163,7 @@ class Log:
     @property
     def t(self) -> Array:
         """Time of each sample, seconds, recordings one after the other, shape (N,)."""
-        return self.dt * np.arange(len(self))
+        return np.asarray(self.dt * np.arange(len(self)), np.float64)
 
     def recordings(self) -> Iterator[slice]:
         """Rows of each recording, whose samples are joined in time."""
@@ -200,7 +200,7 @@ class Log:
                 f"rows: none from {start} to {stop}; the log has {len(self)} rows."
             )
         inner = self.starts[(self.starts > first) & (self.starts < last)] - first
-        part = {
+        part: dict[str, Any] = {
             name: None if (array := getattr(self, name)) is None else array[first:last]
             for name in ("q", "tau", "v", "a", "q_ref", "v_ref")
         }

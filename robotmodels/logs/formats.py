@@ -1,0 +1,250 @@
+"""Files of each format opened as columns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .._arrays import Array
+from ..csv_table import CsvTable, open_table
+from ..errors import InvalidValueError, MissingExtraError
+from .table import LogFormat, LogTable
+
+
+def open_log_table(path: Path, kind: LogFormat | None, delimiter: str | None = None) -> LogTable:
+    """Open a file as columns.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    kind : LogFormat or None
+        None: as its suffix says.
+    delimiter : str, optional
+        Of text files; default as `open_table` finds it.
+
+    Returns
+    -------
+    LogTable
+        Columns, read when they are asked for.
+
+    Raises
+    ------
+    InvalidValueError
+        The file is not of this format, or its arrays are of different lengths.
+    MissingExtraError
+        Parquet without pyarrow.
+    OSError
+        The file cannot be opened.
+    """
+    kind = LogFormat.of(path) if kind is None else kind
+    if delimiter is not None and kind is not LogFormat.CSV:
+        raise InvalidValueError(f"delimiter: {path} is no text file; leave it out.")
+    if kind is LogFormat.CSV:
+        return _text(open_table(path, delimiter))
+    if kind is LogFormat.NPZ:
+        return _arrays(path, _npz(path))
+    if kind is LogFormat.MAT:
+        return _arrays(path, _mat(path))
+    return _arrays(path, _parquet(path))
+
+
+def _text(table: CsvTable) -> LogTable:
+    def words(column: int) -> str:
+        _, cells = table.first_row()
+        return cells[column] if column < len(cells) else ""
+
+    lists = _lists(table)
+    if lists is not None:
+        return _arrays(table.path, lists)
+    return LogTable(
+        table.path, table.names, table.width, {}, table.numbers_with_gaps, words
+    )  # fmt: skip
+
+
+def _lists(table: CsvTable) -> dict[str, Any] | None:
+    """Columns of a table some of whose cells are lists, "[0.1, 0.2]"; None if there are none."""
+    _, first = table.first_row()
+    listed = [i for i, cell in enumerate(first) if cell[:1] in "[(" and cell[:1]]
+    if not listed or not table.names:
+        return None
+    found: dict[str, Any] = {}
+    for i, name in enumerate(table.names):
+        if i in listed:
+            found[name] = _list_column(table, i)
+        elif _reads_as_number(first[i]):
+            found[name] = table.numbers_with_gaps([i])[:, 0]
+        else:
+            found[name] = table.labels(i)[0]
+    return found
+
+
+def _list_column(table: CsvTable, column: int) -> Any:
+    rows: list[list[str]] = []
+    for line, cell in table.cells(column):
+        parts = [part.strip().strip("'\"") for part in cell.strip("[]() ").split(",")]
+        parts = [part for part in parts if part]
+        if rows and len(parts) != len(rows[0]):
+            raise InvalidValueError(
+                f"{table.path}, line {line}: {table.names[column]} has {len(parts)} entries; "
+                f"expected {len(rows[0])} as in the first line."
+            )
+        rows.append(parts)
+    try:
+        return np.array(rows, dtype=np.float64)
+    except ValueError:
+        return ", ".join(rows[0])  # names, which are the same in every row
+
+
+def _reads_as_number(cell: str) -> bool:
+    try:
+        float(cell or "nan")
+    except ValueError:
+        return False
+    return True
+
+
+def _npz(path: Path) -> dict[str, Any]:
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            if isinstance(stored, np.ndarray):
+                raise InvalidValueError(f"{path}: one array (NPY); expected named arrays (NPZ).")
+            return {name: stored[name] for name in stored.files}
+    except (ValueError, EOFError) as error:
+        if isinstance(error, InvalidValueError):
+            raise
+        raise InvalidValueError(
+            f"{path}: it cannot be read as NPZ without objects in it ({error}); write it with "
+            "numpy.savez(file, q=..., tau=...)."
+        ) from None
+    except OSError:
+        if not path.is_file():
+            raise
+        raise InvalidValueError(f"{path}: this is no NPZ file.") from None
+
+
+def _mat(path: Path) -> dict[str, Any]:
+    from scipy.io import loadmat
+    from scipy.io.matlab import MatReadError
+
+    with path.open("rb") as file:
+        head = file.read(128)
+    if head.startswith(b"MATLAB 7.3") or head[1:4] == b"HDF":
+        raise InvalidValueError(
+            f"{path}: this is a MAT file of version 7.3 (HDF5), which is not read here; in MATLAB "
+            "save it with save(file, '-v7'), or write CSV or Parquet."
+        )
+    try:
+        stored = loadmat(path)
+    except (ValueError, MatReadError, TypeError, NotImplementedError) as error:
+        raise InvalidValueError(f"{path}: this is no MAT file that can be read: {error}.") from None
+    found: dict[str, Any] = {}
+    for name, value in stored.items():
+        if not name.startswith("__"):
+            _flatten(name, value, found)
+    return found
+
+
+def _flatten(name: str, value: Any, found: dict[str, Any]) -> None:
+    """Fields of structures under names with points: log.q."""
+    if value.dtype.names is None:
+        found[name] = value
+    elif value.size == 1:
+        for field in value.dtype.names:
+            _flatten(f"{name}.{field}", np.asarray(value.reshape(-1)[0][field]), found)
+
+
+def _parquet(path: Path) -> dict[str, Any]:
+    try:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+    except ImportError:
+        raise MissingExtraError(
+            "Parquet files need pyarrow: pip install 'robotmodels[logs]'."
+        ) from None
+    try:
+        stored = pq.read_table(path)
+    except pa.ArrowInvalid as error:
+        raise InvalidValueError(f"{path}: this is no Parquet file: {error}.") from None
+    found: dict[str, Any] = {}
+    for name, column in zip(stored.column_names, stored.columns, strict=True):
+        kind = column.type
+        if pa.types.is_timestamp(kind):
+            nanoseconds = column.cast(pa.timestamp("ns", kind.tz)).cast(pa.int64())
+            found[name] = nanoseconds.to_numpy()
+        elif pa.types.is_list(kind) or pa.types.is_fixed_size_list(kind):
+            found[name] = _parquet_lists(path, name, column)
+        elif pa.types.is_integer(kind) or pa.types.is_floating(kind):
+            found[name] = column.to_numpy()
+        elif len(column):
+            found[name] = str(column[0].as_py())
+    return found
+
+
+def _parquet_lists(path: Path, name: str, column: Any) -> Any:
+    rows = column.to_pylist()
+    width = max((len(row) for row in rows if row is not None), default=0)
+    if any(isinstance(cell, str) for row in rows[:1] for cell in row or ()):
+        return ", ".join(rows[0])
+    values = np.full((len(rows), width), np.nan)
+    for i, row in enumerate(rows):
+        if row is None:
+            continue
+        if len(row) != width:
+            raise InvalidValueError(
+                f"{path}: {name} has {len(row)} entries in row {i}, and {width} in others."
+            )
+        values[i] = [np.nan if cell is None else cell for cell in row]
+    return values
+
+
+def _arrays(path: Path, stored: dict[str, Any]) -> LogTable:
+    """Columns of arrays with names: those with as many rows as most numbers have."""
+    matrices: dict[str, Array] = {}
+    texts: dict[str, str] = {}
+    for name, value in stored.items():
+        array = np.asarray(value)
+        if array.dtype.kind in "USO":
+            texts[name] = ", ".join(str(word).strip() for word in array.reshape(-1))
+        elif array.dtype.kind in "fiub" and array.ndim <= 2 and array.size > 1:
+            whole = array.astype(np.float64)
+            flat = whole.ndim == 1 or 1 in whole.shape
+            matrices[name] = whole.reshape(-1, 1) if flat else whole
+    if not matrices:
+        raise InvalidValueError(f"{path}: no array of numbers in it; it has {list(stored)!r:.200}.")
+    N = max(len(value) for value in matrices.values())
+    for name, value in matrices.items():
+        if value.shape[0] < value.shape[1] and value.shape[1] == N:
+            raise InvalidValueError(
+                f"{path}: {name} has shape {value.shape}, a row for each joint; write it with a "
+                "row for each sample (transposed)."
+            )
+    matrices = {name: value for name, value in matrices.items() if len(value) == N}
+    names: list[str] = []
+    groups: dict[str, tuple[int, ...]] = {}
+    for name, value in matrices.items():
+        k = value.shape[1]
+        own = tuple(range(len(names), len(names) + k))
+        names += [name] if k == 1 else [f"{name}[{i}]" for i in range(k)]
+        if k > 1:
+            groups[name] = own
+    blocks = np.concatenate(list(matrices.values()), axis=1)
+    names += list(texts)
+    own_texts = list(texts.values())
+
+    def read(columns: Sequence[int]) -> Array:
+        for column in columns:
+            if column >= blocks.shape[1]:
+                raise InvalidValueError(f"{path}: {names[column]} is text, not numbers.")
+        values = blocks[:, list(columns)]
+        values[~np.isfinite(values)] = np.nan
+        return values
+
+    def words(column: int) -> str:
+        k = column - blocks.shape[1]
+        return own_texts[k] if k >= 0 else repr(float(blocks[0, column]))
+
+    return LogTable(path, tuple(names), len(names), groups, read, words)

@@ -1,0 +1,232 @@
+"""The time base of a log: gaps, jumps back, repeated stamps and jitter, all of them said."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import Array
+from ..errors import InvalidValueError
+from .log import RefusedRows
+
+_REGULAR = 0.01
+"""Stamps this close to a regular grid, in periods, are the grid: rounding, not sampling."""
+_REPEATED = 0.1
+"""Share of repeated stamps above which the stamps are too coarse to tell anything."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RegularRows:
+    """Samples on a regular grid.
+
+    Parameters
+    ----------
+    dt : float
+        Its period, s.
+    values : ndarray, shape (N, m)
+        Samples.
+    starts : ndarray of int
+        First rows of recordings.
+    refused : tuple of RefusedRows
+        What was left out.
+    notes : tuple of str
+        What was done.
+    """
+
+    dt: float
+    values: Array
+    starts: NDArray[np.int64]
+    refused: tuple[RefusedRows, ...]
+    notes: tuple[str, ...]
+
+
+def regular_rows(
+    t: Array | None,
+    values: Array,
+    source: str,
+    dt: float | None = None,
+    largest_gap: float = 1.5,
+    largest_jitter: float = 0.5,
+) -> RegularRows:
+    """Bring samples to a regular grid, recording by recording.
+
+    A row that lacks a number is refused and ends a recording, since nothing may be filtered over
+    it. A stamp that repeats the one before is refused. Time that goes back, or on by more than
+    ``largest_gap`` periods, starts a recording. Stamps that are off the grid by less than a
+    hundredth of a period are taken as regular; others are brought to it by cubic splines.
+
+    Parameters
+    ----------
+    t : ndarray, shape (N,), or None
+        Seconds; NaN where it was not recorded. None: rows are a period apart.
+    values : ndarray, shape (N, m)
+        NaN where nothing was measured.
+    source : str
+        Name of the file, for what is said.
+    dt : float, optional
+        Period of the grid, s; needed without ``t``, else default the mean of the stamps'
+        differences.
+    largest_gap : float
+        In periods of the file.
+    largest_jitter : float
+        How much of a period the differences of stamps may be off before that is an error.
+
+    Returns
+    -------
+    RegularRows
+        With notes in words.
+
+    Raises
+    ------
+    InvalidValueError
+        Nothing is left, jitter is too large, stamps are too coarse, ``t`` and ``dt`` both missing.
+    """
+    refused: list[RefusedRows] = []
+    notes: list[str] = []
+    N = len(values)
+    good = np.isfinite(values).all(axis=1)
+    if t is not None:
+        good &= np.isfinite(t)
+    bad = np.flatnonzero(~good)
+    if len(bad):
+        refused.append(
+            RefusedRows(source, tuple(bad.tolist()), "a number is missing or not finite")
+        )
+    if len(bad) == N:
+        raise InvalidValueError(
+            f"{source}: every one of its {N} rows lacks a number; see whether the right columns "
+            "were given, and whether they were recorded at the same times."
+        )
+    kept = np.flatnonzero(good)
+    broken = np.diff(kept) > 1
+    if len(bad):
+        notes.append(
+            f"{source}: {len(bad)} of {N} rows lack a number and were left out (the first is row "
+            f"{bad[0]}); the log is split there."
+        )
+    if t is None:
+        if dt is None:
+            raise InvalidValueError(
+                f"{source}: no column of times was given or found; say dt=, the sampling period in "
+                "seconds, or time=, the column."
+            )
+        period = dt
+    else:
+        kept, broken = _without_repeated(t, kept, broken, source, refused, notes)
+        period, broken = _split(t, kept, broken, source, largest_gap, notes)
+    edges = np.flatnonzero(broken) + 1
+    pieces, alone = [], []
+    for piece in np.split(kept, edges):
+        (pieces if len(piece) > 1 or len(kept) == 1 else alone).append(piece)
+    if alone:
+        rows = tuple(int(piece[0]) for piece in alone)
+        refused.append(RefusedRows(source, rows, "no neighbour in time"))
+        notes.append(f"{source}: {len(rows)} rows have no neighbour in time and were left out.")
+    if not pieces:
+        raise InvalidValueError(
+            f"{source}: no two rows follow each other in time without a gap; nothing is left."
+        )
+    blocks = [values[piece] for piece in pieces]
+    if t is not None:
+        stamps = [t[piece] for piece in pieces]
+        grid = period if dt is None else dt
+        blocks = _on_grid(stamps, blocks, period, grid, source, largest_jitter, notes)
+        period = grid
+    starts = np.concatenate([[0], np.cumsum([len(block) for block in blocks])[:-1]])
+    return RegularRows(
+        float(period), np.concatenate(blocks), starts.astype(np.int64), tuple(refused),
+        tuple(notes),
+    )  # fmt: skip
+
+
+def _without_repeated(
+    t: Array, kept: NDArray[np.int64], broken: NDArray[np.bool_], source: str,
+    refused: list[RefusedRows], notes: list[str],
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:  # fmt: skip
+    again = np.zeros(len(kept), bool)
+    again[1:] = np.diff(t[kept]) == 0.0
+    count = int(again.sum())
+    if not count:
+        return kept, broken
+    if count > _REPEATED * len(kept):
+        raise InvalidValueError(
+            f"{source}: {count} of {len(kept)} stamps repeat the one before: they are coarser than "
+            "the sampling. Say dt=, the sampling period, and time=False to leave them aside."
+        )
+    rows = kept[again]
+    refused.append(RefusedRows(source, tuple(rows.tolist()), "its time is that of the row before"))
+    notes.append(
+        f"{source}: {count} rows repeat the time of the row before and were left out (the first "
+        f"is row {rows[0]}, at {t[rows[0]]:.9g} s)."
+    )
+    # what was broken before a row that is left out stays broken before the next one
+    piece = np.concatenate([[0], np.cumsum(broken)])[~again]
+    return kept[~again], np.diff(piece) > 0
+
+
+def _split(
+    t: Array, kept: NDArray[np.int64], broken: NDArray[np.bool_], source: str, largest_gap: float,
+    notes: list[str],
+) -> tuple[float, NDArray[np.bool_]]:  # fmt: skip
+    """Mean period within recordings, and where new ones start."""
+    steps = np.diff(t[kept])
+    back = steps < 0.0
+    inside = steps[~broken & ~back]
+    if not len(inside):
+        raise InvalidValueError(
+            f"{source}: no two rows follow each other in time; see whether time names the right "
+            "column."
+        )
+    median = float(np.median(inside))
+    gap = (steps > largest_gap * median) & ~broken
+    for words, where in (("goes back", back & ~broken), ("has a gap", gap)):
+        found = np.flatnonzero(where)
+        if len(found):
+            first = found[0]
+            notes.append(
+                f"{source}: time {words} {len(found)} times (first before row {kept[first + 1]}, "
+                f"from {t[kept[first]]:.9g} to {t[kept[first + 1]]:.9g} s); the log is split there."
+            )
+    broken = broken | back | gap
+    return float(steps[~broken].mean()) if (~broken).any() else median, broken
+
+
+def _on_grid(
+    stamps: list[Array], blocks: list[Array], period: float, grid: float, source: str,
+    largest_jitter: float, notes: list[str],
+) -> list[Array]:  # fmt: skip
+    off, jitter = 0.0, 0.0
+    for times in stamps:
+        if len(times) > 1:
+            k = np.arange(len(times))
+            deviation = times - times[0] - period * k
+            off = max(off, float(np.ptp(deviation)) / period)
+            jitter = max(jitter, float(np.abs(np.diff(times) - period).max()) / period)
+    told = f"{source}: stamps are up to {jitter:.2g} periods from regular"
+    if jitter > largest_jitter:
+        raise InvalidValueError(
+            f"{told}, more than the {largest_jitter:g} that may be interpolated over; say "
+            "largest_jitter= if that is meant, or largest_gap= to split the log there."
+        )
+    if off <= _REGULAR and abs(grid - period) * max(map(len, stamps)) <= _REGULAR * period:
+        if jitter > 1e-6:
+            notes.append(f"{told}; taken as regular at {period:.9g} s.")
+        return blocks
+    from scipy.interpolate import CubicSpline
+
+    asked = "" if grid == period else f", asked for at {grid:g} s (the file has {period:.9g} s)"
+    notes.append(
+        f"{told} and up to {off:.2g} from the grid: brought to it by cubic splines{asked}."
+    )
+    found = []
+    for times, block in zip(stamps, blocks, strict=True):
+        if len(times) == 1:
+            found.append(block)
+            continue
+        # one more where rounding alone leaves the last sample out
+        count = int(np.floor((times[-1] - times[0]) / grid + 1e-6)) + 1
+        wanted = np.minimum(times[0] + grid * np.arange(count), times[-1])
+        found.append(CubicSpline(times, block)(wanted))
+    return found

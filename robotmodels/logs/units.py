@@ -1,0 +1,146 @@
+"""From what a file has to SI on the joint side."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import Array, as_exact, as_floats
+from ..drive import Transmission
+from ..errors import InvalidValueError, ShapeError
+from ..file_units import AngleUnit, LengthUnit
+from ..geometry import PRISMATIC
+from ..model import RobotModel
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointSide:
+    """Factors of positions and torques, from the file's columns to the joints.
+
+    ``q = Q^T raw + q_0`` and ``tau = T^T raw`` for rows of samples.
+
+    Parameters
+    ----------
+    positions, torques : ndarray, shape (n, n)
+        ``Q`` and ``T``.
+    offset : ndarray, shape (n,)
+        ``q_0``.
+    """
+
+    positions: Array
+    torques: Array
+    offset: Array
+
+    def q(self, raw: Array) -> Array:
+        """Positions of the joints, shape (N, n)."""
+        return raw @ self.positions + self.offset
+
+    def rate(self, raw: Array) -> Array:
+        """Their derivatives."""
+        return raw @ self.positions
+
+    def tau(self, raw: Array) -> Array:
+        """Torques of the joints, shape (N, n)."""
+        return raw @ self.torques
+
+
+def joint_side(
+    n: int,
+    *,
+    angles: AngleUnit,
+    lengths: LengthUnit,
+    signs: ArrayLike | None,
+    gears: ArrayLike | None,
+    transmission: Transmission | None,
+    drive_gains: ArrayLike | None,
+    offsets: ArrayLike | None,
+    model: RobotModel | None,
+) -> JointSide:
+    """Factors for what the arguments of `read_log` say.
+
+    Parameters
+    ----------
+    n : int
+        Number of joints.
+    angles, lengths, signs, gears, transmission, drive_gains, offsets, model
+        As for `read_log`.
+
+    Returns
+    -------
+    JointSide
+        With the signs first, then units and drive gains, gears or transmission, and offsets.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Arguments of other lengths or that contradict each other.
+    """
+    unit = np.full(n, angles.factor)
+    if gears is not None and transmission is not None:
+        raise InvalidValueError(
+            "gears, transmission: give one of them; a transmission has the gear ratios in it."
+        )
+    if gears is None and transmission is None and model is not None:
+        prismatic = model.table.sigma[model.table.joint_rows] == PRISMATIC
+        unit[prismatic] = lengths.factor
+    turn = _each(signs, n, "signs", 1.0)
+    if (np.abs(turn) != 1.0).any():
+        raise InvalidValueError(f"signs: expected 1 or -1 for each of the {n} joints, got {signs}.")
+    gain = turn * _each(drive_gains, n, "drive_gains", 1.0)
+    ratio = _each(gears, n, "gears", 1.0)
+    for name, value in (("drive_gains", gain), ("gears", ratio)):
+        if not value.all():
+            raise InvalidValueError(f"{name}: expected numbers other than zero.")
+    K, zero = np.diag(1.0 / ratio), np.zeros(n)
+    if transmission is not None:
+        if transmission.n != n:
+            raise ShapeError(
+                f"transmission: it has {transmission.n} joints, the log has {n} columns of "
+                "positions."
+            )
+        if not transmission.is_invertible:
+            raise InvalidValueError(
+                "transmission: joints mimic others, so that torques of motors do not tell those "
+                "of the joints; take the model of the free joints."
+            )
+        K, zero = transmission.matrix, transmission.offset
+    return JointSide(
+        (turn * unit)[:, None] * K.T,
+        gain[:, None] * np.linalg.inv(K),
+        zero + _each(offsets, n, "offsets", 0.0),
+    )
+
+
+def _each(value: ArrayLike | None, n: int, name: str, default: float) -> Array:
+    if value is None:
+        return np.full(n, default)
+    array = as_floats(value, name)
+    return np.full(n, float(array)) if array.ndim == 0 else as_exact(array, (n,), name)
+
+
+def check_headers(said: Sequence[AngleUnit | None], given: AngleUnit, source: str) -> None:
+    """Refuse an argument that contradicts the header.
+
+    Parameters
+    ----------
+    said : sequence of AngleUnit or None
+        By the header's columns.
+    given : AngleUnit
+        By the argument.
+    source : str
+        Name of the file.
+
+    Raises
+    ------
+    InvalidValueError
+        They differ.
+    """
+    for unit in said:
+        if unit is not None and unit is not given:
+            raise InvalidValueError(
+                f"{source}: the header says {unit.value!r}, the argument angles={given.value!r}; "
+                f"say angles={unit.value!r}, or name the right columns."
+            )
