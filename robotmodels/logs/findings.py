@@ -1,0 +1,81 @@
+"""What a check of a log found, in words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+
+class Severity(Enum):
+    """How bad a finding is; the value says what follows.
+
+    Examples
+    --------
+    >>> Severity.USELESS.value
+    'a fit would mean nothing'
+    """
+
+    NOTE = "worth knowing"
+    DOUBTFUL = "results may be wrong"
+    USELESS = "a fit would mean nothing"
+
+
+class FindingKind(Enum):
+    """What may be wrong with a log; the value says it in words.
+
+    Examples
+    --------
+    >>> FindingKind.STUCK.value
+    'values repeat for a long time'
+    """
+
+    WRONG_JOINT_COUNT = "its joints are not as many as the model's"
+    POSITIONS_IN_DEGREES = "positions look like degrees"
+    MOTOR_SIDE_POSITIONS = "positions look like those of motors"
+    OUTSIDE_LIMITS = "positions are outside the limits"
+    TOO_FAST = "velocities are above the limits"
+    TORQUE_ABOVE_LIMITS = "torques are above the limits"
+    TORQUE_BELOW_USE = "torques are too small to be torques of the joints"
+    CONSTANT_POSITION = "a joint does not move"
+    CONSTANT_TORQUE = "a torque is constant"
+    NOTHING_MOVES = "nothing moves"
+    SATURATED = "torques stay at their extreme values"
+    QUANTISED = "positions have coarse steps"
+    STUCK = "values repeat for a long time"
+    JUMP = "positions jump"
+    TOO_SHORT = "it is short for what is to be found"
+    SLOWER_THAN_LOG = "a joint does not come back in the time of the log"
+    NOT_EXCITING = "its motion does not show all parameters"
+    SWAPPED_JOINTS = "joints look swapped"
+    WRONG_SIGN = "a sign looks wrong"
+    OUT_OF_STEP = "positions and torques are out of step"
+
+
+@dataclass(frozen=True, slots=True)
+class LogFinding:
+    """One thing that is wrong or strange.
+
+    Parameters
+    ----------
+    kind : FindingKind
+        What.
+    severity : Severity
+        How bad.
+    joints : tuple of str
+        Where; empty if it is of the whole log.
+    sentence : str
+        With numbers, and what to do.
+
+    Examples
+    --------
+    >>> print(LogFinding(FindingKind.STUCK, Severity.NOTE, ("2",), "Joint 2: ..."))
+    Joint 2: ...
+    """
+
+    kind: FindingKind
+    severity: Severity
+    joints: tuple[str, ...]
+    sentence: str
+
+    def __str__(self) -> str:
+        return self.sentence
