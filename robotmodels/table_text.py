@@ -1,9 +1,10 @@
-"""Text of tables: boxes, angles as fractions of pi, lengths, joint variables."""
+"""Text of tables and of the sections of reports; angles as fractions of pi, lengths, variables."""
 
 from __future__ import annotations
 
 from fractions import Fraction
 from math import pi
+from typing import NamedTuple
 
 _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 SMALLEST = 1e-9
@@ -121,3 +122,91 @@ def variable_text(symbol: str, number: int, offset: str, negative: bool) -> str:
     """
     name = symbol + str(number).translate(_SUBSCRIPTS)
     return name if offset == "0" else f"{name} {'-' if negative else '+'} {offset}"
+
+
+class ReportTable(NamedTuple):
+    """Columns of text under headings.
+
+    Attributes
+    ----------
+    columns : tuple of (str, tuple of str)
+        Heading and cells of each.
+
+    Examples
+    --------
+    >>> print(ReportTable((("n", ("1",)),)).text())
+    ┌───┐
+    │ n │
+    ├───┤
+    │ 1 │
+    └───┘
+    """
+
+    columns: tuple[tuple[str, tuple[str, ...]], ...]
+
+    @property
+    def rows(self) -> int:
+        """Number of rows without the headings."""
+        return len(self.columns[0][1]) if self.columns else 0
+
+    def text(self) -> str:
+        """In a box."""
+        return boxed([(head, list(cells)) for head, cells in self.columns])
+
+
+def table_of(headings: tuple[str, ...], rows: list[tuple[str, ...]]) -> ReportTable:
+    """A table from its rows.
+
+    Parameters
+    ----------
+    headings : tuple of str
+        One for each column.
+    rows : list of tuple of str
+        Cells.
+
+    Returns
+    -------
+    ReportTable
+        The same by columns.
+
+    Examples
+    --------
+    >>> table_of(("a", "b"), [("1", "2")]).rows
+    1
+    """
+    cells = tuple(zip(*rows, strict=True)) if rows else ((),) * len(headings)
+    return ReportTable(tuple(zip(headings, cells, strict=True)))
+
+
+class ReportSection(NamedTuple):
+    """A heading with sentences and tables in the order in which they are read.
+
+    Attributes
+    ----------
+    title : str
+        The heading.
+    body : tuple of str or ReportTable
+        Paragraphs and tables.
+
+    Examples
+    --------
+    >>> print(ReportSection("Outliers", ("None.",)).text())
+    Outliers
+    --------
+    None.
+    """
+
+    title: str
+    body: tuple[str | ReportTable, ...]
+
+    def text(self, width: int = 100) -> str:
+        """Lines of at most a number of columns (tables are as wide as they are)."""
+        from textwrap import fill
+
+        parts = [
+            part.text()
+            if isinstance(part, ReportTable)
+            else fill(part, width, subsequent_indent="  " if part.startswith("* ") else "")
+            for part in self.body
+        ]
+        return "\n".join([self.title, "-" * len(self.title), *parts])

@@ -13,11 +13,12 @@ from robotmodels.calibration.differential import differential_model
 from robotmodels.calibration.parameters import candidate_parameters
 from robotmodels.calibration.problem import linearised
 from robotmodels.calibration.report import report_sections, report_text, strong_correlations
-from robotmodels.calibration.report_parts import ReportTable, degrees, in_unit, millimetres
+from robotmodels.calibration.report_parts import degrees, in_unit, millimetres
 from robotmodels.calibration.residuals import measured_residuals
 from robotmodels.errors import InvalidValueError
 from robotmodels.kinematics import dgm
 from robotmodels.robots import load
+from robotmodels.table_text import ReportTable
 from robotmodels.viz import html_report
 
 UR10 = load("erd:ur10")

@@ -12,19 +12,12 @@ from ..estimation import confidence_intervals, fit_diagnostics
 from ..geometry import PRISMATIC
 from ..kinematics import operational_coordinates
 from ..model import RobotModel
+from ..table_text import ReportSection, ReportTable, table_of
 from .errors_seen import BlockErrors
 from .folds import suited_fixtures
 from .identifiable import Reason
 from .problem import stacked
-from .report_parts import (
-    ReportSection,
-    ReportTable,
-    degrees,
-    in_unit,
-    millimetres,
-    printed_unit,
-    table_of,
-)
+from .report_parts import degrees, in_unit, millimetres, printed_unit
 
 if TYPE_CHECKING:
     from .result import CalibrationResult
