@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from .. import __version__
 from ..errors import RobotModelsError
-from . import calibrate, demo, igm, info, listing, view
+from . import calibrate, demo, excite, igm, info, listing, view
 from .numbers import joined
 
 
@@ -24,8 +24,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 if it worked, 1 if a pose is not reached or a fit has not converged, 2 if an argument was
-        wrong.
+        0 if it worked, 1 if a pose is not reached, a fit has not converged or no motion keeps its
+        limits, 2 if an argument was wrong.
 
     Examples
     --------
@@ -39,7 +39,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "table or their URDF.",
     )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for module in (demo, listing, info, igm, calibrate, view):
+    for module in (demo, listing, info, igm, calibrate, excite, view):
         module.add_command(commands)
     parser.add_argument("--version", action="version", version=__version__)
     arguments = parser.parse_args(joined(sys.argv[1:] if argv is None else argv))

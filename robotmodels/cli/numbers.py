@@ -13,7 +13,7 @@ from ..model import RobotModel
 
 NUMBER_OPTIONS = (
     "--q", "--q-ref", "--xyz", "--rpy", "--matrix", "--mask", "--tolerance", "--arm-angle",
-    "--sigma", "--prior",
+    "--sigma", "--prior", "--velocity", "--acceleration", "--torque-limits", "--box", "--keep-out",
 )  # fmt: skip
 """Options that take lists of numbers."""
 

@@ -16,6 +16,7 @@ from .plot_dynamics_energy import plot_energy
 from .plot_dynamics_maps import plot_inertia_map
 from .plot_dynamics_torques import plot_torque_parts
 from .plot_ellipsoids import plot_ellipsoids
+from .plot_excitation import plot_excitation
 from .plot_inverse_velocities import plot_inverse_velocities
 from .plot_joint_motion import plot_joint_motion
 from .plot_joint_path import plot_joint_path
@@ -42,6 +43,7 @@ __all__ = [
     "plot_calibration_residuals",
     "plot_ellipsoids",
     "plot_energy",
+    "plot_excitation",
     "plot_inertia_map",
     "plot_inverse_velocities",
     "plot_joint_motion",

@@ -89,7 +89,8 @@ class MotionBasis:
         if not self.rest:
             return np.eye(2 * H + 1)
         k = np.arange(1.0, H + 1.0)
-        return block_diag(np.ones((1, 1)), null_space(np.ones((1, H))), null_space(k[None]))
+        parts = np.ones((1, 1)), null_space(np.ones((1, H))), null_space(k[None])
+        return np.asarray(block_diag(*parts), dtype=np.float64)
 
     @cached_property
     def _splines(self) -> Trajectory:

@@ -1,0 +1,247 @@
+"""``robotmodels excite``: a motion that shows the base parameters of a robot."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import InvalidValueError
+from .numbers import numbers
+from .source import robot_of
+
+if TYPE_CHECKING:
+    from ..identification.excitation import ExcitingTrajectory, WorkspaceBox
+    from ..trajectories import MotionLimits
+
+_EXAMPLES = """\
+examples:
+  robotmodels excite --robot rx90 --duration 10 --harmonics 5 --criterion condition --out motion/
+  robotmodels excite --robot ur10e --acceleration 4 --box -inf -inf 0.1 inf inf inf \\
+      --seed 1 --out motion/
+  robotmodels excite --robot panda.urdf --kind spline --points 12 --drive Ia Fv Fc offset --json
+
+Into the folder of --out go trajectory.csv (or .npz, .yaml: --format), trajectory.json (the
+coefficients and all numbers), trajectory.png (if Matplotlib is installed) and summary.txt. Without
+--out the summary is printed.
+
+exit status: 0 a motion within all limits was found, 1 none was found, 2 an argument is wrong"""
+
+
+def add_command(commands: Any) -> None:
+    """Add the command to the parser.
+
+    Parameters
+    ----------
+    commands : argparse subparsers
+        Where to add it.
+
+    Examples
+    --------
+    >>> add_command(argparse.ArgumentParser().add_subparsers())
+    """
+    parser = commands.add_parser(
+        "excite",
+        help="a motion for the dynamic identification of a robot",
+        description="Exciting trajectory: a periodic motion within the limits of a robot on which "
+        "its base parameters\nare seen best, with analytic gradients from several starts.",
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "--robot", required=True,
+        help="a name of the catalogue (rx90, erd:ur5), a .urdf or a SYMORO .par file",
+    )  # fmt: skip
+    parser.add_argument("--base-link", help="URDF only: link whose frame is the world")
+    parser.add_argument("--tip-link", help="URDF only: link whose frame is the tool")
+    parser.add_argument("--package-dir", action="append", default=[], metavar="FOLDER",
+                        help="URDF only: folder that holds packages; may be repeated")  # fmt: skip
+    _add_motion(parser.add_argument_group("the motion"))
+    _add_limits(parser.add_argument_group("the limits"))
+    _add_search(parser.add_argument_group("the search"))
+    files = parser.add_argument_group("the files")
+    files.add_argument("--out", type=Path, metavar="FOLDER", help="where the files go")
+    files.add_argument("--rate", type=float, default=1000.0,
+                       help="samples per second in the file (default: %(default)s)")  # fmt: skip
+    files.add_argument("--format", choices=("csv", "npz", "yaml"), default="csv",
+                       help="of the samples; yaml: ROS JointTrajectory "
+                       "(default: %(default)s)")  # fmt: skip
+    files.add_argument("--degrees", action="store_true",
+                       help="write revolute joints in degrees")  # fmt: skip
+    files.add_argument("--json", action="store_true", help="print the result as JSON")
+    parser.set_defaults(run=run)
+
+
+def _add_motion(motion: Any) -> None:
+    motion.add_argument("--duration", type=float, default=10.0,
+                        help="of one period, s (default: %(default)s)")  # fmt: skip
+    motion.add_argument("--kind", choices=("fourier", "spline"), default="fourier",
+                        help="finite Fourier series or quintic spline "
+                        "(default: %(default)s)")  # fmt: skip
+    motion.add_argument("--harmonics", type=int, default=5,
+                        help="of the series (default: %(default)s)")  # fmt: skip
+    motion.add_argument("--points", type=int,
+                        help="of the spline (default: twice the harmonics)")  # fmt: skip
+    motion.add_argument("--drive", nargs="*", default=["Ia", "Fv", "Fc"],
+                        choices=("Ia", "Fv", "Fc", "offset"), metavar="KIND",
+                        help="drive parameters to be identified: Ia Fv Fc offset, or none "
+                        "(default: Ia Fv Fc)")  # fmt: skip
+
+
+def _add_limits(limits: Any) -> None:
+    for name, unit in (("velocity", "rad/s or m/s"), ("acceleration", "rad/s^2 or m/s^2")):
+        limits.add_argument(f"--{name}", metavar="NUMBERS",
+                            help=f"greatest {name}, {unit}: one, or one for each "
+                            "joint")  # fmt: skip
+    limits.add_argument("--torque-limits", metavar="NUMBERS",
+                        help="greatest torques, N m or N: one, or one for each joint "
+                        "(default: those of the robot)")  # fmt: skip
+    for name, what in (("--box", "stays in"), ("--keep-out", "keeps out of")):
+        limits.add_argument(name, action="append", default=[], metavar="NUMBERS",
+                            help=f"box that the tool {what}: lower x y z, upper x y z, m; inf "
+                            "for no face; may be repeated")  # fmt: skip
+
+
+def _add_search(search: Any) -> None:
+    search.add_argument("--criterion", choices=("condition", "log-det"), default="condition",
+                        help="what is made small (default: %(default)s)")  # fmt: skip
+    search.add_argument("--sigma", metavar="NUMBERS",
+                        help="standard deviations of the torques, N m or N: one, or one for each "
+                        "joint")  # fmt: skip
+    search.add_argument("--starts", type=int, default=8,
+                        help="motions that are improved (default: %(default)s)")  # fmt: skip
+    search.add_argument("--random", type=int, default=100, metavar="COUNT",
+                        help="random motions, of which the best are improved "
+                        "(default: %(default)s)")  # fmt: skip
+    search.add_argument("--iterations", type=int, default=200,
+                        help="most of each stage of a start (default: %(default)s)")  # fmt: skip
+    search.add_argument("--seed", type=int, default=0,
+                        help="of chance (default: %(default)s)")  # fmt: skip
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Search, and print or write.
+
+    Parameters
+    ----------
+    arguments : Namespace
+        Parsed arguments.
+
+    Returns
+    -------
+    int
+        0 if a motion within all limits was found, else 1.
+
+    Raises
+    ------
+    RobotModelsError
+        A robot or options that make no sense.
+
+    Examples
+    --------
+    >>> parser = argparse.ArgumentParser()
+    >>> add_command(parser.add_subparsers())
+    >>> parser.parse_args(["excite", "--robot", "rx90"]).harmonics
+    5
+    """
+    from ..identification.excitation import ExcitationStatus, exciting_trajectory
+    from ..identification.excitation.files import excitation_data
+
+    model = robot_of(arguments)
+    n = model.n
+    if arguments.seed < 0:
+        raise InvalidValueError(f"--seed: expected a number from 0, got {arguments.seed}.")
+    if arguments.degrees and arguments.format == "yaml":
+        raise InvalidValueError("--degrees: ROS reads radians; leave it out with --format yaml.")
+    if not 0.0 < arguments.rate < np.inf:
+        raise InvalidValueError(f"--rate: expected a positive number, got {arguments.rate:g}.")
+    found = exciting_trajectory(
+        model, duration=arguments.duration, harmonics=arguments.harmonics,
+        points=arguments.points, kind=arguments.kind, criterion=arguments.criterion,
+        drive=tuple(arguments.drive) or False, limits=_limits(arguments, model),
+        torque_limits=_each(arguments.torque_limits, n, "--torque-limits"),
+        sigma=_each(arguments.sigma, n, "--sigma"), boxes=_boxes(arguments),
+        starts=arguments.starts, baseline=arguments.random, iterations=arguments.iterations,
+        rng=arguments.seed, progress=_progress if sys.stderr.isatty() else False,
+    )  # fmt: skip
+    if arguments.out is not None:
+        _write(found, arguments)
+    if arguments.json:
+        print(json.dumps(excitation_data(found), indent=2, ensure_ascii=False))
+    elif arguments.out is None:
+        print(found)
+    return int(found.status is ExcitationStatus.INFEASIBLE)
+
+
+def _write(found: ExcitingTrajectory, arguments: argparse.Namespace) -> None:
+    """Write the files and say which."""
+    from ..errors import MissingExtraError
+    from ..identification.excitation import write_coefficients, write_trajectory
+    from ..viz import plot_excitation
+
+    folder = arguments.out
+    folder.mkdir(parents=True, exist_ok=True)
+    samples = f"trajectory.{arguments.format}"
+    names = [samples, "trajectory.json", "trajectory.png", "summary.txt"]
+    write_trajectory(found, folder / samples, arguments.rate, degrees=arguments.degrees)
+    write_coefficients(found, folder / "trajectory.json")
+    (folder / "summary.txt").write_text(f"{found}\n", encoding="utf-8")
+    try:
+        plot_excitation(found).savefig(folder / "trajectory.png")
+    except MissingExtraError as error:
+        names.remove("trajectory.png")
+        print(f"robotmodels: no trajectory.png: {error}", file=sys.stderr)
+    if not arguments.json:
+        print(found)
+        for name in names:
+            print(f"wrote {folder / name}")
+
+
+def _limits(arguments: argparse.Namespace, model: Any) -> MotionLimits | None:
+    """Limits of the table with those of the options in their place."""
+    from dataclasses import replace
+
+    from ..trajectories import MotionLimits
+
+    limits = MotionLimits.of_model(model)
+    for name in ("velocity", "acceleration"):
+        given = _each(getattr(arguments, name), model.n, f"--{name}")
+        if given is not None:
+            limits = replace(limits, **{name: given, f"{name}_lower": -given})
+    return limits
+
+
+def _each(text: str | None, n: int, option: str) -> Any:
+    """One number for all joints, or one for each."""
+    if text is None:
+        return None
+    values = numbers(text, sorted({1, n}), option)
+    if not (values > 0.0).all():
+        raise InvalidValueError(f"{option}: expected positive numbers, got {text!r}.")
+    return np.full(n, values)
+
+
+def _boxes(arguments: argparse.Namespace) -> list[WorkspaceBox]:
+    from ..identification.excitation import WorkspaceBox
+
+    boxes = []
+    for given, inside in ((arguments.box, True), (arguments.keep_out, False)):
+        for text in given:
+            try:
+                corners = [float(word) for word in text.replace(",", " ").split()]
+            except ValueError:
+                corners = []
+            if len(corners) != 6:
+                option = "--box" if inside else "--keep-out"
+                raise InvalidValueError(f"{option}: expected six numbers in m, got {text!r}.")
+            boxes.append(WorkspaceBox(corners[:3], corners[3:], inside=inside))
+    return boxes
+
+
+def _progress(done: int, of: int) -> None:
+    end = "\n" if done == of else ""
+    print(f"\r{done} of {of} stages", end=end, file=sys.stderr, flush=True)
