@@ -59,7 +59,7 @@ def plot_excitation(
     -------
     matplotlib.figure.Figure
         Panels of position, velocity, acceleration and torque over one period, joints of different
-        units in columns of their own, limits dashed; at the right the criterion over the
+        units in columns of their own, limits dashed; below them the criterion over the
         iterations of every start, and that of random motions beside those of the starts, before
         and after.
 
@@ -97,16 +97,16 @@ def plot_excitation(
     labels, kinds = joint_names(None, n, model), joint_units(None, n, model)
     columns = list(dict.fromkeys(kinds))
     rows = 3 + heavy
-    figure = new_figure(PAGE, 0.9 + 1.15 * rows + 0.02 * n, size)
-    # apart from each other, as the panels of the search have titles and labels of their own
-    whole = figure.add_gridspec(1, 2, width_ratios=[1.6 * len(columns), 1.0])
-    grid, search = whole[0].subgridspec(rows, len(columns)), whole[1].subgridspec(2, 1)
+    figure = new_figure(PAGE, 2.9 + 1.1 * rows + 0.02 * n, size)
+    grid = figure.add_gridspec(rows + 1, 2, height_ratios=[1.0] * rows + [1.6])
+    # joints are revolute or prismatic: one column over the page, or two
+    places = [slice(None)] if len(columns) == 1 else [slice(0, 1), slice(1, 2)]
     handles: list[Any] = []
     for column, unit in enumerate(columns):
         joints = [j for j in range(n) if kinds[j] is unit]
         above: Any = None
         for row in range(rows):
-            axes = styled(figure.add_subplot(grid[row, column], sharex=above))
+            axes = styled(figure.add_subplot(grid[row, places[column]], sharex=above))
             above = above or axes
             axes.tick_params(labelbottom=row == rows - 1)
             if row < 3:
@@ -120,8 +120,8 @@ def plot_excitation(
             else:
                 _draw_torques(axes, motion.t, torque, joints, found, labels)
         figure.axes[-1].set_xlabel("time (s)")
-    _draw_search(styled(figure.add_subplot(search[0])), found)
-    _draw_baseline(styled(figure.add_subplot(search[1])), found)
+    _draw_search(styled(figure.add_subplot(grid[-1, 0])), found)
+    _draw_baseline(styled(figure.add_subplot(grid[-1, 1])), found)
     figure.align_ylabels()
     handles.sort(key=lambda line: labels.index(str(line.get_label())))
     text = (
