@@ -258,14 +258,14 @@ def solve_cones(
 
 def lower_bound(
     value: float, gradient: Array, x: Array, constraints: Sequence[Constraint],
-    multipliers: Sequence[Array], reach: Array,
+    multipliers: Sequence[Array], curvature: Array,
 ) -> float:  # fmt: skip
     """What a convex objective is at least within constraints, proved by multipliers.
 
     Any multipliers that the cones allow prove a bound, those of the optimum the best: nothing of
-    the solver is trusted. With slacks s and what is left of the stationarity,
+    the solver is trusted. With slacks s, curvature C and what is left of the stationarity,
     ``r = gradient + sum rows^T z``, every x' that meets the constraints has
-    ``f(x') >= f(x) - z s - r (x - x')``.
+    ``f(x') >= f(x) - z s + r (x' - x) + |x' - x|_C^2 / 2 >= f(x) - z s - r C^-1 r / 2``.
 
     Parameters
     ----------
@@ -279,8 +279,8 @@ def lower_bound(
         All that hold.
     multipliers : sequence of ndarray
         Of each constraint; brought into the cone first.
-    reach : ndarray, shape (p,)
-        How far from x the bound is asked for, variable by variable.
+    curvature : ndarray, shape (p, p)
+        Positive definite, no more than the second derivative of the objective anywhere.
 
     Returns
     -------
@@ -291,7 +291,7 @@ def lower_bound(
     --------
     >>> floor = Constraint(Cone.NONNEGATIVE, -np.eye(1), np.array([-2.0]), ("x is at least 2",))
     >>> x = np.array([2.0])
-    >>> lower_bound(2.0, x, x, [floor], [np.array([2.0])], np.ones(1))
+    >>> lower_bound(2.0, x, x, [floor], [np.array([2.0])], np.eye(1))
     2.0
     """
     left, paid = gradient.copy(), 0.0
@@ -299,7 +299,9 @@ def lower_bound(
         allowed = one.dual(z)
         left += one.rows.T @ allowed
         paid += float(allowed @ (one.right - one.rows @ x))
-    return value - paid - float(np.abs(left) @ reach)
+    unit = 1.0 / np.sqrt(np.diag(curvature))
+    scaled = np.linalg.solve(curvature * unit * unit[:, None], left * unit)
+    return value - paid - 0.5 * float((left * unit) @ scaled)
 
 
 def _outcome(word: str) -> ConeOutcome:
