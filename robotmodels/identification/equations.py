@@ -29,6 +29,18 @@ class EquationForm(Enum):
     """
 
     TORQUE = "torques of the joints"
+    """The inverse dynamic model: one equation for each joint; needs accelerations."""
+    FILTERED = "rates of the momenta of the joints"
+    """The momentum form through a low-pass: one for each joint, without accelerations."""
+    POWER = "power of all joints together"
+    """One equation at each time; needs accelerations."""
+    ENERGY = "energy of the robot between instants"
+    """One equation for each stretch of time, without accelerations."""
+
+    @property
+    def by_joint(self) -> bool:
+        """Whether each joint has equations of its own."""
+        return self in (EquationForm.TORQUE, EquationForm.FILTERED)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,15 +50,15 @@ class Block:
     Parameters
     ----------
     t : ndarray, shape (k,)
-        Times in the log, seconds.
+        Times in the log, seconds; of a stretch its middle.
     W : ndarray, shape (k, m, b)
         Regressor.
     y : ndarray, shape (k, m)
-        Measured side, N m or N.
+        Measured side: N m or N; W of a power, J of an energy.
     use : ndarray of bool, shape (k, m)
         Which equations take part: not those in a dead band.
     v : ndarray, shape (k, n)
-        Velocities, rad/s or m/s, filtered alike.
+        Velocities, rad/s or m/s, filtered alike; of a stretch their mean.
     """
 
     t: Array
@@ -94,7 +106,7 @@ class Equations:
     @property
     def kinds(self) -> int:
         """Equations at one time: the joints, or one for the whole robot."""
-        return self.model.n
+        return self.model.n if self.form.by_joint else 1
 
     def with_names(self, names: tuple[str, ...]) -> Self:
         """The same equations in fewer parameters."""
@@ -115,10 +127,20 @@ class Equations:
         Returns
         -------
         Block
-            With k = (rows of the piece) / decimation, rounded up.
+            With k = (rows of the piece) / decimation, rounded up; forms that need samples on
+            either side have a few less at the ends of a recording.
         """
+        from .energy_block import energy_block
+        from .filtered_block import filtered_block
+        from .power_block import power_block
         from .torque_block import torque_block
 
+        if self.form is EquationForm.FILTERED:
+            return filtered_block(self, piece)
+        if self.form is EquationForm.POWER:
+            return power_block(self, piece)
+        if self.form is EquationForm.ENERGY:
+            return energy_block(self, piece)
         return torque_block(self, piece)
 
     def blocks(self) -> Iterator[Block]:

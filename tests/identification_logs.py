@@ -1,0 +1,50 @@
+"""Logs of random robots without noise, whose velocities and accelerations are exact."""
+
+import numpy as np
+from identities.random_robots import random_model
+
+import robotmodels as rm
+from robotmodels.identification import Log
+
+
+def swinging(model, rng, samples=4000, dt=2e-3, harmonics=5, period=4.0, size=1.0):
+    """Positions, velocities and accelerations that are sums of sines, of order one."""
+    t = dt * np.arange(samples)
+    prismatic = model.table.sigma[model.table.joint_rows] == 1
+    w = 2.0 * np.pi * np.arange(1, harmonics + 1) / period
+    a, b = rng.normal(size=(2, harmonics, model.n)) / w[:, None]
+    a, b = (size * x * np.where(prismatic, 0.3, 1.0) for x in (a, b))
+    c, s = np.cos(np.outer(t, w)), np.sin(np.outer(t, w))
+    q = rng.uniform(-1.0, 1.0, size=model.n) + s @ a - c @ b
+    v = (c * w) @ a + (s * w) @ b
+    return q, v, -(s * w**2) @ a + (c * w**2) @ b
+
+
+def clean_log(model, rng, noise=0.0, **options):
+    """A log whose torques are those of the model, with white noise if it is asked for."""
+    dt = options.setdefault("dt", 2e-3)
+    q, v, a = swinging(model, rng, **options)
+    tau = rm.idm(model, q, v, a)
+    return Log(dt, q, tau + noise * rng.normal(size=tau.shape), v, a)
+
+
+def odd_robots():
+    """Serial, prismatic, branched and coupled arms with turned bases, tools and zero lengths."""
+
+    def robot(seed, f, **options):
+        return random_model(np.random.default_rng(seed), f, drive=True, **options)
+
+    bodies = random_model(np.random.default_rng(7), 3, prismatic=False, drive=True)
+    return {
+        "serial": robot(5, 4, prismatic=False),
+        "prismatic": robot(7, 4),
+        "tree": robot(16, 5, tree=True),
+        "fixed frame": robot(9, 5, fixed=True),
+        "coupled wrist": robot(12, 4, prismatic=False, transmission=True),
+        "zero lengths": rm.RobotModel.from_table(
+            rm.DHTable(antecedent=[0, 1, 2], sigma=[0, 0, 0], alpha=[0.0, np.pi / 2, -np.pi / 2]),
+            inertia=bodies.inertia,
+            drive=bodies.drive,
+        ),
+        "rx90": rm.load("rx90"),
+    }
