@@ -152,6 +152,10 @@ def exciting_trajectory(
     )
     aim = chosen(ExcitationCriterion, criterion, "criterion")
     base = _checked_base(model, base, drive)
+    if not len(base):
+        raise InvalidValueError(
+            f"{model.name} has no base parameters: nothing of it is to be excited."
+        )
     bounds, notes = excitation_limits(model, limits)
     torques, torque_notes = excitation_torques(model, torque_limits)
     count, pool = _whole(starts, "starts"), _whole(baseline, "baseline")

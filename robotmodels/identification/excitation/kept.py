@@ -8,6 +8,8 @@ import numpy as np
 
 from ..._arrays import Array, Rebuilt, read_only
 from ...dynamics import idm
+from ...model import RobotModel
+from ...regressors.drives import couplings
 from ...trajectories import LimitsReport, Trajectory
 from .boxes import clearances
 from .problem import ExcitationProblem
@@ -20,8 +22,10 @@ class ExcitationLimits(Rebuilt):
     """What a motion asks of the robot, beside what is allowed.
 
     Positions, velocities and accelerations are exact extremes of the motion. Torques and
-    clearances are looked at on a grid; an eighth of the second difference, by which a smooth curve
-    may pass its neighbouring samples, is added to each torque and taken from each clearance.
+    clearances are looked at on a grid, with an allowance for what lies between its samples: an
+    eighth of the second difference for a torque, which is smooth but for the jumps of dry friction
+    (both sides of these are looked at besides), and a half of it for a clearance, which has kinks
+    where another face of a box becomes the nearest.
 
     Parameters
     ----------
@@ -101,21 +105,38 @@ def limits_kept(problem: ExcitationProblem, trajectory: Trajectory) -> Excitatio
     times = np.linspace(0.0, problem.basis.duration, _DENSE * len(problem.t) + 1)
     q, v, a = trajectory.motion.derivatives(times, (0, 1, 2))
     torque = np.abs(idm(model, q, v, a))
-    more = _between(torque)
+    more = _between(torque, 0.125)
+    peaks = (torque + more).max(axis=0)
+    beside = _beside_jumps(model, times, v)
+    if beside.size:
+        q_, v_, a_ = trajectory.motion.derivatives(beside, (0, 1, 2))
+        peaks = np.maximum(peaks, np.abs(idm(model, q_, v_, a_)).max(axis=0))
     clearance, most = np.empty(len(problem.boxes)), 0.0
     for k, box in enumerate(problem.boxes):
         free = clearances(model, box, q)
-        less = _between(free)
+        less = _between(free, 0.5)
         clearance[k], most = (free - less).min(), max(most, float(less.max()))
     return ExcitationLimits(
-        trajectory.check(problem.limits), problem.torque_limits, (torque + more).max(axis=0),
+        trajectory.check(problem.limits), problem.torque_limits, peaks,
         clearance, float(times[1]), np.array([more.max(initial=0.0), most]),
     )  # fmt: skip
 
 
-def _between(y: Array) -> Array:
-    """By how much a smooth curve may pass its samples (N, m) on the way to the next ones."""
+def _between(y: Array, part: float) -> Array:
+    """A part of the second differences of samples (N, m)."""
     bend = np.zeros(y.shape)
-    bend[1:-1] = np.abs(np.diff(y, 2, axis=0)) / 8.0
+    bend[1:-1] = part * np.abs(np.diff(y, 2, axis=0))
     bend[0], bend[-1] = bend[1], bend[-2]
     return bend
+
+
+def _beside_jumps(model: RobotModel, times: Array, v: Array) -> Array:
+    """Times just before and after a joint or a coupled motor turns round."""
+    turning = np.hstack((v, *((v @ row)[:, None] for row, _ in couplings(model))))
+    before, which = np.nonzero(turning[:-1] * turning[1:] < 0.0)
+    one, two = turning[before, which], turning[before + 1, which]
+    step = times[1] - times[0]
+    at = times[before] + step * one / (one - two)
+    # a straight line finds the zero to a part of the step; look at both sides of that part
+    near = 0.02 * step
+    return np.clip(np.concatenate((at - near, at + near)), times[0], times[-1])
