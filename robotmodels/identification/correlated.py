@@ -10,8 +10,8 @@ import numpy as np
 from .._arrays import Array, Rebuilt, read_only
 from .equations import Block, Equations
 
-_MOST = 200
-"""Lags at most."""
+_STRONGEST = 0.97
+"""Correlation of successive residuals beyond which whitening would divide by next to nothing."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,9 +42,9 @@ def correlated_covariance(
 ) -> CorrelatedCovariance:
     """Covariance of weighted least squares without the assumption that residuals are white.
 
-    The scores of each instant, of all joints together, are summed with those of the instants
-    around it (Bartlett's window), so that correlation in time, between joints, and variances that
-    change count.
+    The scores of each instant, of all joints together, are whitened by the correlation of
+    successive residuals, summed with those of the instants around it (Bartlett's window), and
+    coloured again, so that correlation in time, between joints, and variances that change count.
 
     Parameters
     ----------
@@ -57,8 +57,7 @@ def correlated_covariance(
     inverse : ndarray, shape (b, b)
         Inverse of the information ``sum W^T diag(weights^2) W``.
     lags : int, optional
-        Instants on either side; default by Andrews' rule from the correlation of successive
-        residuals.
+        Instants on either side; default the fifth root of the number of instants.
 
     Returns
     -------
@@ -68,8 +67,9 @@ def correlated_covariance(
     References
     ----------
     W. Newey and K. West, "A simple, positive semi-definite, heteroskedasticity and autocorrelation
-    consistent covariance matrix", Econometrica 55(3), 1987; D. Andrews, "Heteroskedasticity and
-    autocorrelation consistent covariance matrix estimation", Econometrica 59(3), 1991, (6.2).
+    consistent covariance matrix", Econometrica 55(3), 1987; D. Andrews and C. Monahan, "An improved
+    heteroskedasticity and autocorrelation consistent covariance matrix estimator", Econometrica
+    60(4), 1992 (whitening).
     """
     b, m = len(values), len(weights)
     products, squares, count, rows = np.zeros(m), np.zeros(m), 0, 0
@@ -82,20 +82,21 @@ def correlated_covariance(
         count += len(e)
         rows += int(block.use.sum())
     correlation = products / np.where(squares > 0.0, squares, 1.0)
+    shares = squares * weights**2
+    rho = float(shares @ correlation / shares.sum()) if shares.any() else 0.0
+    rho = min(max(rho, -_STRONGEST), _STRONGEST)
     if lags is None:
-        shares = squares * weights**2
-        rho = float(shares @ correlation / shares.sum()) if shares.any() else 0.0
-        rho = min(abs(rho), 0.97)
-        alpha = 4.0 * rho**2 / (1.0 - rho**2) ** 2
-        lags = int(np.ceil(1.1447 * (alpha * count) ** (1.0 / 3.0)))
-    lags = max(0, min(lags, _MOST, count - 1))
+        lags = int(count**0.2)
+    lags = max(0, min(lags, count - 2))
     window = 1.0 - np.arange(1, lags + 1) / (lags + 1.0)
     total = np.zeros((b, b))
-    before = np.zeros((0, b))
+    last, before = np.zeros((0, b)), np.zeros((0, b))
     for block, e in _residuals(system, values):
-        scores = np.einsum("kjb,kj->kb", block.W, e * weights**2)
-        total += scores.T @ scores
-        chain = np.vstack((before, scores))
+        scores = np.vstack((last, np.einsum("kjb,kj->kb", block.W, e * weights**2)))
+        last = scores[-1:]
+        white = scores[1:] - rho * scores[:-1]
+        total += white.T @ white
+        chain = np.vstack((before, white))
         k = len(before)
         for lag, share in enumerate(window, start=1):
             first = max(k - lag, 0)
@@ -104,7 +105,8 @@ def correlated_covariance(
                 part = chain[first : first + len(ahead)].T @ ahead
                 total += share * (part + part.T)
         before = chain[max(len(chain) - lags, 0) :] if lags else before
-    factor = rows / max(rows - b, 1)
+    # one instant less, and the parameters that were taken from the residuals
+    factor = count / max(count - 1, 1) * rows / max(rows - b, 1) / (1.0 - rho) ** 2
     return CorrelatedCovariance(factor * inverse @ total @ inverse, lags, correlation)
 
 

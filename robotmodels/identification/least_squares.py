@@ -100,8 +100,9 @@ def _with_weights(reduction: Reduction, method: Method, most: int) -> Estimate:
     check_count(reduction)
     values, inverse, rest = solved(reduction, None)
     status = EstimateStatus.SOLVED if most == 1 else EstimateStatus.NOT_CONVERGED
-    iterations = 0
-    for iterations in range(1, most + 1):
+    done = 0
+    while done < most:
+        done += 1
         before = values
         w = weights_of(deviations_of(reduction, values), reduction)
         values, inverse, rest = solved(reduction, w)
@@ -112,7 +113,7 @@ def _with_weights(reduction: Reduction, method: Method, most: int) -> Estimate:
     scale = rest / (reduction.rows - len(values))
     return Estimate(
         method, reduction.names, values, scale * inverse, deviations_of(reduction, values), status,
-        iterations,
+        done,
     )  # fmt: skip
 
 

@@ -26,6 +26,8 @@ _NOISY = 4.0
 """Dead band relative to the deviation of the velocities' noise."""
 _ABOVE = 10.0
 """Density relative to that of the noise below which a spectrum is noise."""
+_EDGE = 3.0
+"""Periods of the cutoff after which the filter's transient is gone from what a fit could see."""
 _LONGEST = 16.0
 """Seconds of the windows that spectra are averaged over."""
 
@@ -106,9 +108,9 @@ def choose_processing(
 
     The motion has the frequency below which the velocities have 99.9 % of their power (that of
     noise taken off). Positions are cut off at ten times that, so that they are not distorted;
-    regressor and torque at two and a half times that, by the decimation; what lies within a hundredth
-    of a joint's greatest velocity, or four deviations of the noise of its velocity, is its dead
-    band.
+    regressor and torque at two and a half times that, by the decimation; what lies within a
+    hundredth of a joint's greatest velocity, or four deviations of the noise of its velocity, is
+    its dead band.
 
     Parameters
     ----------
@@ -121,7 +123,7 @@ def choose_processing(
     dead_band : array_like, scalar or shape (n,), optional
         rad/s or m/s; 0 leaves nothing out.
     edges : float, optional
-        Seconds cut at both ends of each recording; default one period of the cutoff.
+        Seconds cut at both ends of each recording; default three periods of the cutoff.
     order, accuracy : int
         Of the filter's passes and of the central differences.
     filtered : bool
@@ -154,8 +156,8 @@ def choose_processing(
     motion, noise, fastest = _motion(log)
     nyquist = 0.5 / log.dt
     notes = [
-        f"The velocities have {100 * _POWER:g} % of their power below {motion:.3g} Hz; noise of the "
-        f"positions {_listed(noise)} (deviation)."
+        f"The velocities have {100 * _POWER:g} % of their power below {motion:.3g} Hz; noise of "
+        f"the positions {_listed(noise)} (deviation)."
     ]
     if not filtered:
         if cutoff is not None:
@@ -227,9 +229,9 @@ def _edges(
         seconds = float(as_floats(asked, "edges"))
         if not seconds >= 0.0:
             raise InvalidValueError(f"edges: expected seconds from 0, got {asked!r}.")
-        cut = int(round(seconds / log.dt))
+        cut = round(seconds / log.dt)
     else:
-        cut = 0 if band is None else int(np.ceil(1.0 / (band * log.dt)))
+        cut = 0 if band is None else int(np.ceil(_EDGE / (band * log.dt)))
     if 2 * cut >= longest:
         raise InvalidValueError(
             f"edges: {cut} samples are cut at both ends, but the longest recording has {longest}; "

@@ -9,12 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
-from ..regressors import torque_regressor_chunks
+from ..regressors import torque_regressor, torque_regressor_chunks
 from .filters import decimation_window
 from .signals import Piece, Signals, piece_signals
 
 if TYPE_CHECKING:
     from .equations import Block, Equations
+
+_CHUNK = 1024
+"""Samples whose regressor is made at a time."""
+_LEAST = 0.5
+"""Part of a window's weights that must be outside the dead band."""
 
 
 def torque_block(system: Equations, piece: Piece) -> Block:
@@ -55,32 +60,57 @@ def signals_block(system: Equations, piece: Piece, found: Signals) -> Block:
     """
     from .equations import Block
 
-    b, n = len(system.names), system.model.n
     step = system.processing.decimation
-    width = n * b + 2 * n
-
-    def rows() -> Iterator[Array]:
-        chunks = torque_regressor_chunks(
-            system.model, found.q, found.v, found.a, system.base.drive,
-            columns=system.names, friction=system.base.friction,
-        )  # fmt: skip
-        buffer = np.empty((0, width))
-        for part, W in chunks:
-            k = len(W)
-            if len(buffer) < k:
-                buffer = np.empty((k, width))
-            out = buffer[:k]
-            out[:, : n * b] = W.reshape(k, -1)
-            out[:, n * b : n * b + n] = found.tau[part]
-            out[:, n * b + n :] = found.v[part]
-            yield out
-
     first = piece.start - max(piece.start - system.processing.reach, piece.low)
-    kept = decimated(rows(), step, first, -(-(piece.stop - piece.start) // step), width)
-    W = kept[:, : n * b].reshape(-1, n, b)
-    v = kept[:, n * b + n :]
-    t = found.t[first : first + piece.stop - piece.start : step]
-    return Block(t, W, kept[:, n * b : n * b + n], moving(system, v), v)
+    kept = slice(first, first + piece.stop - piece.start, step)
+    count = -(-(piece.stop - piece.start) // step)
+    options = {"columns": system.names, "friction": system.base.friction}
+    sliding = moving(system, found.v)
+    if step == 1:
+        q, v, a = found.q[kept], found.v[kept], found.a[kept]
+        W = torque_regressor(system.model, q, v, a, system.base.drive, **options)
+        return Block(found.t[kept], W, found.tau[kept], sliding[kept], v)
+    chunks = torque_regressor_chunks(
+        system.model, found.q, found.v, found.a, system.base.drive, _CHUNK, **options
+    )
+    thinned = _Thinned(count, (system.model.n, len(system.names)), step, first)
+    for part, W in chunks:
+        thinned.add(W, sliding[part])
+    torques = _Thinned(count, (system.model.n, 1), step, first)
+    torques.add(np.ascontiguousarray(found.tau[:, :, None]), sliding)
+    use = thinned.weights > _LEAST
+    v = decimated(iter((found.v,)), step, first, count, found.v.shape[1])
+    return Block(found.t[kept], thinned.means(use), torques.means(use)[:, :, 0], use, v)
+
+
+class _Thinned:
+    """Rows on their way through the low-pass, each kind with the samples that it may use.
+
+    Whatever weights they are added with, equations stay equations. So a joint's samples in its dead
+    band are left out of the sums, on both sides alike, and the others count more.
+    """
+
+    def __init__(self, count: int, core: tuple[int, int], step: int, centre: int) -> None:
+        self.sums, self.weights = np.zeros((count, *core)), np.zeros((count, core[0]))
+        self.step, self.centre, self.first = step, centre, 0
+        self.taps = decimation_window(step)
+
+    def add(self, rows: Array, use: NDArray[np.bool_]) -> None:
+        """Add rows ``(k, m, c)`` that follow those before; ``use (k, m)``."""
+        from ..kernels.decimation import add_rows
+
+        seen = rows.any(axis=0)
+        # columns of links and drives before the joint are zero
+        start = np.where(seen.any(axis=1), seen.argmax(axis=1), rows.shape[2]).astype(np.int64)
+        add_rows(
+            rows, use.astype(np.int64).reshape(-1), start, self.taps, self.step, self.first,
+            self.centre, self.sums, self.weights,
+        )  # fmt: skip
+        self.first += len(rows)
+
+    def means(self, use: NDArray[np.bool_]) -> Array:
+        """Weighted means ``(count, m, c)``, zero where too few samples take part."""
+        return np.where(use, 1.0 / np.where(use, self.weights, 1.0), 0.0)[:, :, None] * self.sums
 
 
 def decimated(rows: Iterator[Array], step: int, centre: int, count: int, width: int) -> Array:
@@ -107,20 +137,14 @@ def decimated(rows: Iterator[Array], step: int, centre: int, count: int, width: 
     ndarray, shape (count, width)
         The rows kept.
     """
-    from ..kernels.decimation import add_rows
-
-    taps = decimation_window(step)
-    sums, weights = np.zeros((count, width)), np.zeros(count)
-    first = 0
+    thinned = _Thinned(count, (1, width), step, centre)
     for chunk in rows:
-        add_rows(chunk, taps, step, first, centre, sums, weights)
-        first += len(chunk)
-    sums /= weights[:, None]
-    return sums
+        thinned.add(np.ascontiguousarray(chunk)[:, None], np.ones((len(chunk), 1), dtype=bool))
+    return thinned.means(np.ones((count, 1), dtype=bool))[:, 0]
 
 
 def moving(system: Equations, v: Array) -> NDArray[np.bool_]:
-    """Where the direction of dry friction is known: the joint and coupled motors turn.
+    """Where the direction of dry friction is known: the joint and its coupled motors turn.
 
     Parameters
     ----------
@@ -132,7 +156,14 @@ def moving(system: Equations, v: Array) -> NDArray[np.bool_]:
     Returns
     -------
     ndarray of bool, shape (k, n)
-        Which equations take part.
+        Which samples tell something.
     """
     band = system.processing.dead_band
-    return ~(np.abs(v) < band)
+    found = ~(np.abs(v) < band)
+    transmission = system.model.transmission
+    if transmission is not None:
+        for m in transmission.coupled_motors:
+            w = transmission.weights[m - 1]
+            turns = ~(np.abs(v @ w) < band[m - 1])
+            found[:, w != 0.0] &= turns[:, None]
+    return found
