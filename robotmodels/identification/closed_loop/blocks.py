@@ -1,0 +1,162 @@
+"""Equations whose blocks are given, so that what is built for measured ones serves them too."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..._arrays import Array
+from ...estimation.merging import merged_tree
+from ..correlated import CorrelatedCovariance, correlated_covariance
+from ..equations import Block, Equations
+from ..reduction import Reduction, block_reduction, merge
+from ..signals import Piece
+from ..torque_block import signals_block
+from .loop import ClosedLoop
+from .simulated import simulated_signals, simulated_use
+
+_KEPT = 64_000_000
+"""Bytes of measured blocks that are kept from one iteration to the next."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GivenEquations(Equations):
+    """Equations of a robot with blocks of their own.
+
+    Parameters
+    ----------
+    source : callable
+        Makes the blocks, in order.
+    """
+
+    source: Callable[[], Iterator[Block]] = lambda: iter(())
+
+    def blocks(self) -> Iterator[Block]:
+        """The blocks that are given."""
+        return self.source()
+
+
+def given(system: Equations, source: Callable[[], Iterator[Block]]) -> GivenEquations:
+    """Equations of a system with other blocks.
+
+    Parameters
+    ----------
+    system : Equations
+        Robot, log and choices.
+    source : callable
+        Makes the blocks.
+
+    Returns
+    -------
+    GivenEquations
+        With the system's names.
+    """
+    return GivenEquations(
+        system.base, system.names, system.log, system.processing, system.form, source
+    )
+
+
+def simulated_blocks(
+    system: Equations, loop: ClosedLoop, values: Array
+) -> Iterator[tuple[Piece, Block]]:
+    """Regressor of the simulated robot's motion beside the torque that was measured.
+
+    Parameters
+    ----------
+    system : Equations
+        Robot, log and choices.
+    loop : ClosedLoop
+        How it is simulated.
+    values : ndarray, shape (b,)
+        Its parameters.
+
+    Yields
+    ------
+    piece : Piece
+        In order.
+    block : Block
+        Both sides through the same decimation, at the times of the measured equations; ``use`` and
+        ``v`` are those of the simulated motion.
+
+    Raises
+    ------
+    RanAway
+        The robot does not follow.
+    """
+    for piece, found in simulated_signals(system, loop, values):
+        first = max(piece.start - system.processing.reach, piece.low)
+        tau = np.array(system.log.tau[first : first + len(found)])
+        block = signals_block(system, piece, replace(found, tau=tau))
+        yield piece, replace(block, use=simulated_use(system, loop, block.v))
+
+
+def measured_blocks(system: Equations) -> Callable[[Piece], Block]:
+    """The measured equations of a piece, kept if all of them together are small.
+
+    Parameters
+    ----------
+    system : Equations
+        The equations.
+
+    Returns
+    -------
+    callable
+        From `Piece` to `Block`.
+    """
+    n, b = system.model.n, len(system.names)
+    size = 8 * n * (b + 1) * (len(system.log) // system.processing.decimation + 1)
+    if size > _KEPT:
+        return system.block
+    kept = {(piece.start, piece.stop): system.block(piece) for piece in system.pieces()}
+    return lambda piece: kept[piece.start, piece.stop]
+
+
+def reduced(system: Equations, blocks: Iterator[Block]) -> Reduction:
+    """Reduction of blocks, in the fixed tree of `reduce_equations`.
+
+    Parameters
+    ----------
+    system : Equations
+        Whose names they have.
+    blocks : iterator of Block
+        In order.
+
+    Returns
+    -------
+    Reduction
+        Of all.
+    """
+    found = merged_tree((block_reduction(system.names, block) for block in blocks), merge)
+    if found is None:
+        raise ValueError("blocks: none.")
+    return found
+
+
+def sandwich(
+    system: GivenEquations, values: Array, weights: Array, inverse: Array, lags: int | None
+) -> CorrelatedCovariance:
+    """Covariance that holds for correlated residuals, where the inverse need not be symmetric.
+
+    Parameters
+    ----------
+    system : GivenEquations
+        Blocks whose W are instruments (or the regressor) and ``y - W @ values`` residuals.
+    values : ndarray, shape (b,)
+        Parameters.
+    weights : ndarray, shape (m,)
+        Of each kind.
+    inverse : ndarray, shape (b, b)
+        ``d values / d scores``.
+    lags : int or None
+        As for `correlated_covariance`.
+
+    Returns
+    -------
+    CorrelatedCovariance
+        Of the parameters.
+    """
+    scores = correlated_covariance(system, values, weights, np.eye(len(values)), lags)
+    covariance = inverse @ scores.covariance @ inverse.T
+    return replace(scores, covariance=0.5 * (covariance + covariance.T))

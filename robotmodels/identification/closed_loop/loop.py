@@ -1,0 +1,241 @@
+"""The closed loop that is simulated: controller, width of dry friction at rest, what ends it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..._arrays import Array, Rebuilt, as_exact, as_floats, read_only
+from ...drive import DriveParameters, Transmission, drive_kinds
+from ...dynamics import base_model
+from ...errors import InvalidValueError, ShapeError
+from ...model import RobotModel
+from ..equations import EquationForm, Equations
+from .controller import Controller, inverse_masses, tuned_controller
+
+_FASTER = 10.0
+"""Bandwidth of a controller that is not known, in frequencies of the motion."""
+_NEAR = 0.5
+"""rad or m: errors of position below which no robot has run away."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ClosedLoop(Rebuilt):
+    """How a controlled robot is simulated. Read-only.
+
+    Parameters
+    ----------
+    controller : Controller
+        What moves the robot.
+    width : ndarray, shape (n,)
+        Velocities around rest, rad/s or m/s, over which dry friction rises linearly; beyond it is
+        that of the equations.
+    astray : ndarray, shape (n,)
+        Distances from the references, rad or m, beyond which the robot has run away.
+    hold, substeps : int
+        Steps of integration over which a torque is held; steps of a sample of the log.
+    referenced : bool
+        Whether references are those of the log; otherwise its filtered positions are followed.
+    notes : tuple of str
+        What to know.
+    """
+
+    controller: Controller
+    width: Array
+    astray: Array
+    hold: int
+    substeps: int
+    referenced: bool
+    notes: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        for name in ("width", "astray"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+
+def closed_loop(
+    system: Equations,
+    values: ArrayLike,
+    controller: Controller | None = None,
+    *,
+    bandwidth: float | None = None,
+    width: ArrayLike | None = None,
+    substeps: int = 1,
+) -> ClosedLoop | None:
+    """The closed loop of a log: its own controller, or one that is tuned to follow closely.
+
+    Parameters
+    ----------
+    system : Equations
+        Robot, log and choices.
+    values : array_like, shape (b,)
+        Parameters to begin with; a controller that is tuned and the width depend on them.
+    controller : Controller, optional
+        That of the robot; default proportional and derivative gains for ``bandwidth`` with the
+        torques of ``values`` fed forward.
+    bandwidth : float, optional
+        Hz, of a controller that is tuned; default ten times the frequency of the motion.
+    width : array_like, scalar or shape (n,), optional
+        rad/s or m/s; default the dead band, and no less than a step of integration can follow.
+    substeps : int
+        Steps of integration for a sample of the log.
+
+    Returns
+    -------
+    ClosedLoop or None
+        None where the mass matrix of the values is not positive definite.
+
+    Raises
+    ------
+    InvalidValueError, ShapeError
+        A controller of another robot, or whose period is no multiple or part of that of the log;
+        parameters of a friction model; equations that are not those of torques.
+
+    References
+    ----------
+    A. Janot, P.-O. Vandanjon and M. Gautier, "A generic instrumental variable approach for
+    industrial robot identification", IEEE T-CST 22(1), 2014, section III.
+    """
+    log, n = system.log, system.model.n
+    if system.form is not EquationForm.TORQUE:
+        raise InvalidValueError(
+            f"form: closed loops are simulated for {EquationForm.TORQUE.value}, got "
+            f"{system.form.value}."
+        )
+    if system.base.friction is not None:
+        raise InvalidValueError(
+            f"friction: the simulated robot has the friction of its drives (Fv, Fc, offset), not "
+            f"{type(system.base.friction).__name__}; take least squares for it."
+        )
+    if system.model.transmission is not None and not system.model.transmission.is_invertible:
+        raise InvalidValueError(
+            "model: joints that mimic others are not simulated with a controller; take least "
+            "squares for this robot."
+        )
+    robot = robot_of(system, values)
+    if inverse_masses(robot, log.q) is None:
+        return None
+    notes: list[str] = []
+    if controller is None:
+        asked = _FASTER * system.processing.motion if bandwidth is None else bandwidth
+        controller = tuned_controller(robot, log.q, asked, period=log.dt)
+        found = float((controller.kp / controller.kd).max() / np.pi)
+        notes.append(
+            f"The controller is not known: the simulated one has a bandwidth of {found:.3g} Hz and "
+            "feeds the torques of the first values forward."
+        )
+    elif bandwidth is not None:
+        raise InvalidValueError("bandwidth: it is for a controller that is not given.")
+    if controller.n != n:
+        raise ShapeError(f"controller: expected {n} joints, got {controller.n}.")
+    referenced = log.q_ref is not None
+    if not referenced:
+        notes.append(
+            "The log has no references: the simulated robot follows the filtered measured "
+            "positions, so that what noise the filter leaves is in its references."
+        )
+    substeps, hold = steps_of(controller, log.dt, substeps)
+    if width is None:
+        rest = least_width(robot, log.q, log.dt / substeps)
+        chosen = np.where(rest > 0.0, np.maximum(system.processing.dead_band, rest), 0.0)
+    else:
+        chosen = as_floats(width, "width")
+        if chosen.shape not in ((), (n,)) or (chosen < 0.0).any():
+            raise ShapeError(f"width: expected one velocity or shape ({n},), none negative.")
+    targets = log.q if log.q_ref is None else log.q_ref
+    reach = np.maximum(np.ptp(targets, axis=0), _NEAR)
+    return ClosedLoop(
+        controller, np.broadcast_to(chosen, (n,)), reach, hold, substeps, referenced, tuple(notes)
+    )
+
+
+def robot_of(system: Equations, values: ArrayLike) -> RobotModel:
+    """The robot whose equations hold: base parameters on its links and drives, nothing else.
+
+    Parameters
+    ----------
+    system : Equations
+        Robot and parameters.
+    values : array_like, shape (b,)
+        Of ``system.names``.
+
+    Returns
+    -------
+    RobotModel
+        As `base_model`, without the drive parameters that the equations leave out.
+    """
+    base, model = system.base, system.model
+    found = dict(zip(system.names, as_exact(values, (len(system.names),), "values"), strict=True))
+    whole = np.array([found.get(name, 0.0) for name in base.names])
+    robot = base_model(model, base, whole)
+    kinds = drive_kinds(base.drive)
+    own = {kind.value: getattr(robot.drive, kind.value) for kind in kinds}
+    robot = robot.with_drive(DriveParameters(**{"Ia": np.zeros(model.n), **own}))
+    if (K := robot.transmission) is not None:
+        names = [kind.coupling for kind in kinds if kind.coupling is not None]
+        terms = {name: getattr(K, name) for name in names}
+        robot = robot.with_transmission(Transmission(K.matrix, K.offset, **terms))
+    return robot
+
+
+def steps_of(controller: Controller, dt: float, substeps: int) -> tuple[int, int]:
+    """Steps of integration of a sample, and of a period of the controller.
+
+    Parameters
+    ----------
+    controller : Controller
+        With its period.
+    dt : float
+        Period of the log, seconds.
+    substeps : int
+        Steps of a sample at least.
+
+    Returns
+    -------
+    substeps, hold : int
+        Such that the controller acts at steps.
+    """
+    if not isinstance(substeps, (int, np.integer)) or substeps < 1:
+        raise InvalidValueError(f"substeps: expected a whole number from 1, got {substeps!r}.")
+    period = dt if controller.period is None else controller.period
+    samples, parts = period / dt, dt / period
+    if abs(samples - round(samples)) <= 1e-6 * samples:
+        return int(substeps), int(substeps) * round(samples)
+    if abs(parts - round(parts)) <= 1e-6 * parts:
+        whole = -(-int(substeps) // round(parts)) * round(parts)
+        return whole, whole // round(parts)
+    raise InvalidValueError(
+        f"period: expected a multiple or a whole part of that of the log ({dt:g} s), got "
+        f"{period:g} s."
+    )
+
+
+def least_width(robot: RobotModel, q: Array, step: float) -> Array:
+    """Width below which a joint that comes to rest would be thrown across it in one step.
+
+    Parameters
+    ----------
+    robot : RobotModel
+        With its drives.
+    q : ndarray, shape (N, n)
+        Postures.
+    step : float
+        Of the integration, seconds.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        rad/s or m/s; 0 for joints without dry friction, or without a definite mass matrix.
+    """
+    drives, inverse = robot.drive_matrices, inverse_masses(robot, q)
+    if drives is None or inverse is None:
+        return np.zeros(robot.n)
+    give = np.diagonal(inverse, axis1=1, axis2=2).max(axis=0)
+    rate = np.abs(drives.coulomb) * give
+    if robot.transmission is not None:
+        for k, m in enumerate(robot.transmission.coupled_motors):
+            w = drives.coupling[k]
+            rate[m - 1] += abs(drives.coupled_coulomb[k]) * float((inverse @ w @ w).max())
+    return step * rate

@@ -1,0 +1,128 @@
+"""What a controller is asked to follow, and what is fed forward."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..._arrays import Array
+from ...logs import Log
+from ...model import RobotModel
+from ..filters import central_differences
+from ..processing import Processing
+from ..signals import Piece, piece_signals
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class References:
+    """Rows of what is followed, and the one after them.
+
+    Parameters
+    ----------
+    q, v : ndarray, shape (N + 1, n)
+        Positions (rad or m) and velocities.
+    feed : ndarray, shape (N + 1, n)
+        Torques that are fed forward, N m or N.
+    """
+
+    q: Array
+    v: Array
+    feed: Array
+
+
+def references(
+    log: Log,
+    processing: Processing,
+    piece: Piece,
+    first: int,
+    last: int,
+    feed_forward: RobotModel | None,
+    width: Array,
+) -> References:
+    """References of some rows of a recording.
+
+    Parameters
+    ----------
+    log : Log
+        The log; without references its filtered positions are taken.
+    processing : Processing
+        The choices.
+    piece : Piece
+        One of the recording.
+    first, last : int
+        Rows, the last one left out; the row after it is added, or that before it again where the
+        recording ends.
+    feed_forward : RobotModel or None
+        Whose torques are fed forward.
+    width : ndarray, shape (n,)
+        Over which its dry friction rises.
+
+    Returns
+    -------
+    References
+        Of ``last - first + 1`` rows.
+    """
+    if log.q_ref is None:
+        stop = min(last + 1, piece.high)
+        rows = Piece(first, stop, piece.low, piece.high, piece.begin, piece.end)
+        found = piece_signals(log, processing, rows, 0)
+        q, v, a = found.q, found.v, found.a
+    else:
+        stop = min(last + 1, piece.end)
+        margin = 2 * processing.accuracy
+        low, high = max(first - margin, piece.begin), min(stop + margin, piece.end)
+        inner = slice(first - low, stop - low)
+        q_ref = np.array(log.q_ref[low:high])
+        if log.v_ref is not None:
+            v_ref = np.array(log.v_ref[low:high])
+        else:
+            v_ref = _differences(q_ref, log.dt, processing.accuracy)
+        a_ref = _differences(v_ref, log.dt, processing.accuracy)
+        q, v, a = q_ref[inner], v_ref[inner], a_ref[inner]
+    if stop == last:
+        q, v, a = (np.vstack((x, x[-1:])) for x in (q, v, a))
+    q, v, a = (np.ascontiguousarray(x) for x in (q, v, a))
+    return References(q, v, _fed(feed_forward, q, v, a, width))
+
+
+def _differences(x: Array, dt: float, accuracy: int) -> Array:
+    return central_differences(x, dt, accuracy) if len(x) > 1 else np.zeros(x.shape)
+
+
+def _fed(robot: RobotModel | None, q: Array, v: Array, a: Array, width: Array) -> Array:
+    """Torques of a robot, which may be one of base parameters; it may come to rest."""
+    if robot is None:
+        return np.zeros(q.shape)
+    from ...kernels.newton_euler import joint_torques
+
+    tau = np.empty(q.shape)
+    joint_torques(q, v, a, *robot.chain, robot.inertia.values, robot.gravity, tau)
+    drives = robot.drive_matrices
+    if drives is None:
+        return tau
+    tau += a @ drives.rotor + v @ drives.viscous + drives.offset
+    tau += drives.coulomb * direction(v, width)
+    if robot.transmission is not None and drives.coupling.size:
+        motors = np.array(robot.transmission.coupled_motors) - 1
+        turns = direction(v @ drives.coupling.T, width[motors])
+        tau += (turns * drives.coupled_coulomb) @ drives.coupling
+    return tau
+
+
+def direction(v: Array, width: Array) -> Array:
+    """Direction of dry friction: linear over the width on either side of rest, then the sign.
+
+    Parameters
+    ----------
+    v : ndarray, shape (N, n)
+        Velocities.
+    width : ndarray, shape (n,)
+        rad/s or m/s.
+
+    Returns
+    -------
+    ndarray, shape (N, n)
+        From -1 to 1.
+    """
+    return np.where(np.abs(v) > width, np.sign(v), v / np.where(width > 0.0, width, 1.0))

@@ -1,0 +1,247 @@
+"""Signals of a simulated closed loop, piece by piece."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..._arrays import Array, as_exact
+from ...errors import InvalidValueError
+from ...logs import Log
+from ...model import RobotModel, check_model
+from ..equations import Equations
+from ..processing import Processing
+from ..signals import Piece, Signals
+from .controller import Controller
+from .loop import ClosedLoop, least_width, robot_of, steps_of
+from .references import references
+
+
+class RanAway(Exception):
+    """A simulated robot left its references, or its mass matrix was not positive definite."""
+
+
+@dataclass(slots=True, eq=False)
+class MovingRobot:
+    """A controlled robot on its way through a recording.
+
+    Parameters
+    ----------
+    robot : RobotModel
+        Its links and drives, which may be those of base parameters.
+    loop : ClosedLoop
+        How it is simulated.
+    dt : float
+        Period of the samples, seconds.
+    state : ndarray, shape (5, n)
+        As the kernel has it; nothing before the first step.
+    """
+
+    robot: RobotModel
+    loop: ClosedLoop
+    dt: float
+    state: Array | None = None
+
+    def advance(self, q_ref: Array, v_ref: Array, feed: Array) -> tuple[Array, Array, Array, Array]:
+        """Follow references by N samples.
+
+        Parameters
+        ----------
+        q_ref, v_ref, feed : ndarray, shape (N + 1, n)
+            References, and torques fed forward.
+
+        Returns
+        -------
+        q, v, a, tau : ndarray, shape (N, n)
+            What it did.
+
+        Raises
+        ------
+        RanAway
+            It did not follow.
+        """
+        from ...kernels.closed_loop import follow_references
+
+        robot, loop, n = self.robot, self.loop, self.robot.n
+        own = loop.controller
+        if self.state is None:
+            self.state = np.zeros((5, n))
+            self.state[0], self.state[1] = q_ref[0], v_ref[0]
+        rotor, viscous = np.zeros((n, n)), np.zeros((n, n))
+        drives, coupling = np.zeros((3, n)), np.zeros((0, n))
+        coupled = np.zeros(0)
+        if (found := robot.drive_matrices) is not None:
+            rotor, viscous = found.rotor, found.viscous
+            drives[:] = found.coulomb, found.offset, loop.width
+            coupling = found.coupling
+            if robot.transmission is not None and coupling.size:
+                motors = np.array(robot.transmission.coupled_motors) - 1
+                coupled = np.concatenate((found.coupled_coulomb, loop.width[motors]))
+        out = np.empty((4, len(q_ref) - 1, n))
+        failed = follow_references(
+            q_ref, v_ref, feed, np.stack((own.kp, own.kd, own.ki, own.limit)), loop.astray,
+            loop.hold, loop.substeps, self.dt, *robot.chain, robot.inertia.values, robot.gravity,
+            np.ascontiguousarray(rotor), np.ascontiguousarray(viscous), drives,
+            np.ascontiguousarray(coupling), coupled, self.state, *out,
+        )  # fmt: skip
+        if failed >= 0:
+            raise RanAway
+        return out[0], out[1], out[2], out[3]
+
+
+def simulated_signals(
+    system: Equations, loop: ClosedLoop, values: Array
+) -> Iterator[tuple[Piece, Signals]]:
+    """Signals of the simulated robot for each piece of the log and the windows at its ends.
+
+    Parameters
+    ----------
+    system : Equations
+        Robot, log and choices.
+    loop : ClosedLoop
+        How it is simulated.
+    values : ndarray, shape (b,)
+        Its parameters.
+
+    Yields
+    ------
+    piece : Piece
+        In order.
+    found : Signals
+        Exact positions, velocities, accelerations and torques of the simulation; they are not
+        filtered, since there is no noise in them.
+
+    Raises
+    ------
+    RanAway
+        The robot does not follow.
+    """
+    log, choices = system.log, system.processing
+    robot = robot_of(system, values)
+    runner = MovingRobot(robot, loop, log.dt)
+    begin, done, held = -1, 0, 0
+    kept = np.zeros((4, 0, log.n))
+    for piece in system.pieces():
+        if piece.begin != begin:
+            begin = piece.begin
+            runner = MovingRobot(robot, loop, log.dt)
+            done = held = piece.begin if loop.referenced else piece.low
+            kept = kept[:, :0]
+        last = min(piece.stop + choices.reach, piece.high)
+        if last > done:
+            asked = references(
+                log, choices, piece, done, last, loop.controller.feed_forward, loop.width
+            )
+            rows = runner.advance(asked.q, asked.v, asked.feed)
+            kept = np.concatenate((kept, np.stack(rows)), axis=1)
+            done = last
+        first = max(piece.start - choices.reach, piece.low)
+        kept, held = kept[:, first - held :], first
+        found = kept[:, : last - first].copy()
+        yield piece, Signals(log.dt * np.arange(first, last), *found)
+
+
+def simulated_use(system: Equations, loop: ClosedLoop, v: Array) -> NDArray[np.bool_]:
+    """Where dry friction of the simulated robot is that of the equations.
+
+    Parameters
+    ----------
+    system : Equations
+        Robot and choices.
+    loop : ClosedLoop
+        With the width of dry friction at rest.
+    v : ndarray, shape (k, n)
+        Velocities.
+
+    Returns
+    -------
+    ndarray of bool, shape (k, n)
+        Not where the joint, or a motor that it shares with others, is near rest.
+    """
+    band = np.maximum(system.processing.dead_band, loop.width)
+    use = ~(np.abs(v) < band)
+    K = system.model.transmission
+    if K is not None:
+        for m in K.coupled_motors:
+            if f"Fcm{int(system.model.table.joint_rows[m - 1]) + 1}" in system.names:
+                w = K.weights[m - 1]
+                use &= ~((np.abs(v @ w) < band[m - 1])[:, None] & (w != 0.0))
+    return use
+
+
+def simulated_log(
+    model: RobotModel,
+    controller: Controller,
+    q_ref: ArrayLike,
+    v_ref: ArrayLike,
+    dt: float,
+    *,
+    width: ArrayLike | None = None,
+    substeps: int = 1,
+) -> Log:
+    """Log of a simulated robot that follows references under its controller, without noise.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot, its drives included.
+    controller : Controller
+        What moves it.
+    q_ref, v_ref : array_like, shape (N, n)
+        References at the samples, rad or m; it starts on them.
+    dt : float
+        Sampling period, seconds.
+    width : array_like, scalar or shape (n,), optional
+        Velocities around rest over which dry friction rises linearly; default what a step of the
+        integration can follow.
+    substeps : int
+        Runge-Kutta steps of a sample.
+
+    Returns
+    -------
+    Log
+        Positions, exact velocities and accelerations, torques, references.
+
+    Raises
+    ------
+    InvalidValueError
+        The robot ran away from its references, or its mass matrix is not positive definite.
+    ShapeError
+        References that do not fit the robot.
+
+    References
+    ----------
+    Seed book section 1.5; M. Gautier, A. Janot and P.-O. Vandanjon, IEEE T-CST 21(2), 2013.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> arm = load("rx90")
+    >>> rest = np.zeros((100, 6))
+    >>> log = simulated_log(arm, Controller(np.full(6, 500.0), 50.0), rest, rest, 0.001)
+    >>> len(log), log.v is not None
+    (100, True)
+    """
+    check_model(model)
+    n = model.n
+    targets = as_exact(q_ref, (len(np.atleast_1d(q_ref)), n), "q_ref")  # type: ignore[arg-type]
+    speeds = as_exact(v_ref, targets.shape, "v_ref")
+    given = Log(dt, targets, np.zeros(targets.shape), q_ref=targets, v_ref=speeds)
+    parts, hold = steps_of(controller, given.dt, substeps)
+    band = least_width(model, targets, given.dt / parts) if width is None else width
+    wide = np.broadcast_to(np.asarray(band, np.float64), (n,))
+    loop = ClosedLoop(controller, wide, np.full(n, np.inf), hold, parts, True, ())
+    choices = Processing(given.dt, None, 4, 4, 1, np.zeros(n), 0, 0.0, ())
+    N = len(targets)
+    asked = references(given, choices, Piece(0, N, 0, N, 0, N), 0, N, controller.feed_forward, wide)
+    try:
+        q, v, a, tau = MovingRobot(model, loop, given.dt).advance(asked.q, asked.v, asked.feed)
+    except RanAway:
+        raise InvalidValueError(
+            "controller: the robot runs away, or its mass matrix is not positive definite; give "
+            "lower gains, more substeps, or a robot whose joints all move inertia."
+        ) from None
+    return Log(given.dt, q, tau, v, a, targets, speeds)

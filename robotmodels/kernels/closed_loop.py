@@ -1,0 +1,325 @@
+"""A sampled controller and the robot that it moves, by Runge-Kutta steps of fixed length.
+
+The direct model of one state: bias torques by Newton-Euler without acceleration, the mass matrix by
+composite bodies of the same transforms, Cholesky (M. Walker and D. Orin 1982). Nothing divides by
+a mass, so links may be those of base parameters; only the mass matrix has to be positive definite.
+"""
+
+from math import isfinite
+
+import numpy as np
+
+from ._compile import CHAIN, INT, MATRIX, OUT2, VECTOR, Floats, Ints, compiled
+from ._inertia import inertia_of, inertia_times, join_antecedent
+from ._motion import coordinate, link_acceleration, link_transform, rotation_acceleration
+from ._vectors import (
+    add,
+    cross,
+    matrix,
+    put_matrix,
+    put_vector,
+    scale,
+    times,
+    transpose_times,
+    vector,
+    whole_matrix,
+    whole_vector,
+)
+from .direct_dynamics import POSITIVE, solve_in_place
+
+__all__ = ["follow_references"]
+
+
+@compiled()
+def direction(v: float, width: float) -> float:
+    """Direction of dry friction: linear over the width on either side of rest, then its sign."""
+    if v > width:
+        return 1.0
+    if v < -width:
+        return -1.0
+    if width == 0.0:
+        return 0.0
+    return v / width
+
+
+@compiled()
+def bias_and_mass(
+    q: Floats,
+    v: Floats,
+    antecedent: Ints,
+    sigma: Ints,
+    joint: Ints,
+    rotation: Floats,
+    position: Floats,
+    pi: Floats,
+    R: Floats,
+    U: Floats,
+    links: Floats,
+    composite: Floats,
+    h: Floats,
+    M: Floats,
+) -> None:
+    """Torques h (1, n) of the state q, v (1, n) without acceleration, and its M (1, n, n).
+
+    Scratch: R, U (f + 1, 3, 3), links (6, f + 1, 3), composite (f, 10). Row 0 of links[3] holds
+    the acceleration of the base, the other rows 0 of U and links are zero.
+    """
+    f = antecedent.shape[0]
+    n = h.shape[1]
+    P = links[0]
+    w = links[1]
+    dw = links[2]
+    u = links[3]
+    force = links[4]
+    moment = links[5]
+    for k in range(f):
+        b = antecedent[k]
+        c = joint[k]
+        Rj, Pj = link_transform(
+            sigma[k], coordinate(q, 0, c), matrix(rotation, k), vector(position, k)
+        )
+        wj, dwj, uj = link_acceleration(
+            sigma[k],
+            Rj,
+            Pj,
+            coordinate(v, 0, c),
+            0.0,
+            vector(w, b),
+            vector(dw, b),
+            matrix(U, b),
+            vector(u, b),
+        )
+        Uj = rotation_acceleration(wj, dwj)
+        J, MS, mass = inertia_of(pi, k)
+        F = add(scale(mass, uj), times(Uj, MS))
+        N = add(add(inertia_times(J, dwj), cross(wj, inertia_times(J, wj))), cross(MS, uj))
+        put_matrix(R, k + 1, Rj)
+        put_vector(P, k + 1, Pj)
+        put_vector(w, k + 1, wj)
+        put_vector(dw, k + 1, dwj)
+        put_matrix(U, k + 1, Uj)
+        put_vector(u, k + 1, uj)
+        put_vector(force, k + 1, F)
+        put_vector(moment, k + 1, N)
+        for x in range(10):
+            composite[k, x] = pi[k, x]
+    for row in range(n):
+        for column in range(n):
+            M[0, row, column] = 0.0
+    for j in range(f, 0, -1):
+        F = vector(force, j)
+        N = vector(moment, j)
+        Rj = matrix(R, j)
+        Pj = vector(P, j)
+        J, MS, mass = inertia_of(composite, j - 1)
+        b = antecedent[j - 1]
+        if b > 0:
+            Fb = times(Rj, F)
+            Nb = add(times(Rj, N), cross(Pj, Fb))
+            put_vector(force, b, add(vector(force, b), Fb))
+            put_vector(moment, b, add(vector(moment, b), Nb))
+            join_antecedent(composite, b - 1, Rj, Pj, J, MS, mass)
+        if sigma[j - 1] == 2:
+            continue
+        column = joint[j - 1]
+        if sigma[j - 1] == 0:
+            h[0, column] = N[2]
+            F = (-MS[1], MS[0], 0.0)
+            N = (J[2], J[4], J[5])
+        else:
+            h[0, column] = F[2]
+            F = (0.0, 0.0, mass)
+            N = (MS[1], -MS[0], 0.0)
+        inner = j
+        while inner > 0:
+            if sigma[inner - 1] != 2:
+                entry = N[2] if sigma[inner - 1] == 0 else F[2]
+                M[0, joint[inner - 1], column] = entry
+                M[0, column, joint[inner - 1]] = entry
+            Rj = matrix(R, inner)
+            F = times(Rj, F)
+            N = add(times(Rj, N), cross(vector(P, inner), F))
+            inner = antecedent[inner - 1]
+
+
+@compiled()
+def drive_torque(
+    v: Floats,
+    viscous: Floats,
+    coulomb: Floats,
+    offset: Floats,
+    coupling: Floats,
+    coupled: Floats,
+    width: Floats,
+    coupled_width: Floats,
+    out: Floats,
+) -> None:
+    """Torques that friction and offsets of the drives take up at the velocities v (1, n)."""
+    n = v.shape[1]
+    for j in range(n):
+        tau = offset[j] + coulomb[j] * direction(v[0, j], width[j])
+        for k in range(n):
+            tau += viscous[j, k] * v[0, k]
+        out[0, j] = tau
+    for m in range(coupling.shape[0]):
+        speed = 0.0
+        for k in range(n):
+            speed += coupling[m, k] * v[0, k]
+        tau = coupled[m] * direction(speed, coupled_width[m])
+        for j in range(n):
+            out[0, j] += coupling[m, j] * tau
+
+
+@compiled(
+    INT(
+        MATRIX, MATRIX, MATRIX, MATRIX, VECTOR, INT, INT, MATRIX.dtype, *CHAIN, MATRIX, VECTOR,
+        MATRIX, MATRIX, MATRIX, MATRIX, VECTOR, OUT2, OUT2, OUT2, OUT2, OUT2,
+    )
+)  # fmt: skip
+def follow_references(
+    q_ref: Floats,
+    v_ref: Floats,
+    feed: Floats,
+    gains: Floats,
+    astray: Floats,
+    hold: int,
+    substeps: int,
+    dt: float,
+    antecedent: Ints,
+    sigma: Ints,
+    joint: Ints,
+    rotation: Floats,
+    position: Floats,
+    base_rotation: Floats,
+    base_position: Floats,
+    pi: Floats,
+    gravity: Floats,
+    rotor: Floats,
+    viscous: Floats,
+    drives: Floats,
+    coupling: Floats,
+    coupled: Floats,
+    state: Floats,
+    q: Floats,
+    v: Floats,
+    a: Floats,
+    tau: Floats,
+) -> int:
+    """Follow references from a state on, and write what a log has of it.
+
+    Parameters
+    ----------
+    q_ref, v_ref, feed : (N + 1, n)
+        References and fed-forward torques at the samples and at the one after the last, linear in
+        between.
+    gains : (4, n)
+        Of position, velocity and integral, and the largest torque.
+    astray : (n,)
+        Distances from the references beyond which the robot has run away.
+    hold, substeps : int
+        Steps of integration for which a torque is held; steps of a sample.
+    dt : float
+        Period of the samples [s].
+    antecedent, ..., base_position
+        The `Chain`.
+    pi, gravity : (f, 10), (3,)
+        Of the links, any real values; of the world.
+    rotor, viscous : (n, n)
+        Of the drives.
+    drives : (3, n)
+        Coulomb friction, offset, and width of the ramp of dry friction around rest.
+    coupling : (k, n)
+        Turns of the coupled motors for those of the joints.
+    coupled : (2,) or (2 k,)
+        Their Coulomb frictions, then their widths.
+    state : (5, n)
+        Read and written: q, v, integral of the error, held torque; state[4, 0] counts the steps.
+    q, v, a, tau : (N, n)
+        Written.
+
+    Returns
+    -------
+    int
+        -1, or the sample after which the robot ran away or had no positive definite mass matrix.
+    """
+    N, n = q.shape
+    f = antecedent.shape[0]
+    motors = coupling.shape[0]
+    step = dt / substeps
+    R = np.empty((f + 1, 3, 3))
+    U = np.zeros((f + 1, 3, 3))
+    links = np.zeros((6, f + 1, 3))
+    composite = np.empty((f, 10))
+    M = np.empty((1, n, n))
+    sizes = np.empty(n)
+    diagonal = np.empty(n)
+    x = np.empty((1, n))
+    y = np.empty((1, n))
+    h = np.empty((1, n))
+    taken = np.empty((1, n))
+    slopes = np.empty((2, 4, n))
+    g = transpose_times(whole_matrix(base_rotation), whole_vector(gravity))
+    put_vector(links[3], 0, (-g[0], -g[1], -g[2]))
+    ticks = int(state[4, 0])
+    for i in range(N):
+        for part in range(substeps):
+            if ticks % hold == 0:
+                share = part / substeps
+                for j in range(n):
+                    e = q_ref[i, j] + share * (q_ref[i + 1, j] - q_ref[i, j]) - state[0, j]
+                    de = v_ref[i, j] + share * (v_ref[i + 1, j] - v_ref[i, j]) - state[1, j]
+                    ahead = feed[i, j] + share * (feed[i + 1, j] - feed[i, j])
+                    asked = gains[0, j] * e + gains[1, j] * de + gains[2, j] * state[2, j] + ahead
+                    most = gains[3, j]
+                    state[3, j] = min(max(asked, -most), most)
+                    if abs(asked) <= most:  # no wind-up
+                        state[2, j] += hold * step * e
+            ticks += 1
+            for stage in range(4):
+                ahead = 0.0 if stage == 0 else (step if stage == 3 else 0.5 * step)
+                before = max(stage - 1, 0)
+                for j in range(n):
+                    x[0, j] = state[0, j]
+                    y[0, j] = state[1, j]
+                    if stage > 0:
+                        x[0, j] += ahead * slopes[0, before, j]
+                        y[0, j] += ahead * slopes[1, before, j]
+                bias_and_mass(
+                    x, y, antecedent, sigma, joint, rotation, position, pi, R, U, links,
+                    composite, h, M,
+                )  # fmt: skip
+                drive_torque(
+                    y, viscous, drives[0], drives[1], coupling, coupled[:motors], drives[2],
+                    coupled[motors:], taken,
+                )  # fmt: skip
+                for row in range(n):
+                    h[0, row] = state[3, row] - h[0, row] - taken[0, row]
+                    for column in range(n):
+                        M[0, row, column] += rotor[row, column]
+                if solve_in_place(M, h, 0, sizes, diagonal) != POSITIVE:
+                    return i
+                for j in range(n):
+                    slopes[0, stage, j] = y[0, j]
+                    slopes[1, stage, j] = h[0, j]
+                if stage == 0 and part == 0:
+                    for j in range(n):
+                        q[i, j] = state[0, j]
+                        v[i, j] = state[1, j]
+                        a[i, j] = h[0, j]
+                        tau[i, j] = state[3, j]
+            for j in range(n):
+                for s in range(2):
+                    state[s, j] += (
+                        step
+                        / 6.0
+                        * (
+                            slopes[s, 0, j]
+                            + 2.0 * (slopes[s, 1, j] + slopes[s, 2, j])
+                            + slopes[s, 3, j]
+                        )
+                    )
+        for j in range(n):
+            if not isfinite(state[1, j]) or not abs(state[0, j] - q_ref[i + 1, j]) < astray[j]:
+                return i
+    state[4, 0] = ticks
+    return -1
