@@ -340,14 +340,14 @@ def _torque_limits(log: Log, model: RobotModel, found: list[LogFinding]) -> None
             if usual > 2.0 * effort[j]:
                 _add(
                     found, FindingKind.TORQUE_ABOVE_LIMITS, Severity.USELESS, log, j,
-                    f"its torques are up to {largest:.4g}, its limit is {effort[j]:.4g}; see units, "
-                    "drive gains and gear ratios.",
+                    f"its torques are up to {largest:.4g}, its limit is {effort[j]:.4g}; see "
+                    "units, drive gains and gear ratios.",
                 )  # fmt: skip
             elif usual > 1.1 * effort[j]:
                 _add(
                     found, FindingKind.TORQUE_ABOVE_LIMITS, Severity.DOUBTFUL, log, j,
-                    f"one in a hundred of its torques is above {usual:.4g}, its limit is "
-                    f"{effort[j]:.4g}; see drive gains and gear ratios, or the limit of the model.",
+                    f"one in a hundred of its torques is above {usual:.4g}, its limit "
+                    f"is {effort[j]:.4g}; see drive gains and gear ratios, or the limit of the model.",
                 )  # fmt: skip
             elif 0.0 < largest < _TINY * effort[j]:
                 _add(
@@ -374,7 +374,7 @@ def _samples(log: Log, model: RobotModel, found: list[LogFinding]) -> None:
         found.append(
             LogFinding(
                 FindingKind.TOO_SHORT, Severity.USELESS if few else Severity.DOUBTFUL, (),
-                f"The log has {len(log)} samples of {log.n} joints, {equations} equations for up to "
-                f"{count} parameters; record a longer motion.",
+                f"The log has {len(log)} samples of {log.n} joints, {equations} equations for up "
+                f"to {count} parameters; record a longer motion.",
             )
         )  # fmt: skip
