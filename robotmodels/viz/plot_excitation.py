@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+_MOST = 14.0  # logarithm of the largest condition number that is drawn
+
 
 def plot_excitation(
     found: ExcitingTrajectory,
@@ -155,7 +157,8 @@ def _draw_search(axes: Axes, found: ExcitingTrajectory) -> None:
     best = _best(found)
     ratio = found.criterion is ExcitationCriterion.CONDITION
     for k, start in enumerate(found.starts):
-        values = np.exp(start.history) if ratio else start.history
+        # penalties of limits that cannot be kept go beyond all numbers
+        values = np.exp(np.minimum(start.history, _MOST)) if ratio else start.history
         front = k == best
         color = line_style(0).color if front else PALE
         axes.plot(np.arange(1, len(values) + 1), values, color=color, label="_start",

@@ -1,0 +1,192 @@
+"""Files of exciting trajectories, and the command that makes them."""
+
+import json
+
+import numpy as np
+import pytest
+import yaml
+
+import robotmodels as rm
+from robotmodels.cli import main
+from robotmodels.errors import InvalidValueError, ShapeError
+from robotmodels.identification.excitation import (
+    exciting_trajectory,
+    read_coefficients,
+    write_coefficients,
+    write_trajectory,
+)
+from robotmodels.trajectories import fourier, quintic
+
+QUICK = {"harmonics": 3, "starts": 1, "baseline": 2, "iterations": 5, "rng": 0}
+
+
+@pytest.fixture(scope="module")
+def found():
+    return exciting_trajectory(rm.load("stanford_arm"), **QUICK)
+
+
+@pytest.mark.parametrize("degrees", [False, True])
+def test_csv_holds_samples_and_their_units(found, tmp_path, degrees):
+    path = tmp_path / "a.csv"
+    write_trajectory(found, path, rate=50.0, degrees=degrees)
+    header = path.read_text(encoding="utf-8").splitlines()[0].split(",")
+    angle = "deg" if degrees else "rad"
+    assert header[:4] == ["t (s)", f"q joint_1 ({angle})", f"q joint_2 ({angle})", "q joint_3 (m)"]
+    assert header[9] == "v joint_3 (m/s)"
+    assert header[18] == f"a joint_6 ({angle}/s^2)"
+    rows = np.loadtxt(path, delimiter=",", skiprows=1)
+    assert rows.shape == (501, 19)
+    assert np.allclose(rows[:, 0], np.arange(501) / 50.0)
+    factor = np.where(np.arange(6) == 2, 1.0, 180.0 / np.pi if degrees else 1.0)
+    for k, one in enumerate((found.trajectory.q, found.trajectory.v, found.trajectory.a)):
+        expected = one(rows[:, 0]) * factor
+        assert np.allclose(rows[:, 1 + 6 * k : 7 + 6 * k], expected, rtol=1e-10, atol=1e-10)
+
+
+def test_npz_and_ros(found, tmp_path):
+    write_trajectory(found, tmp_path / "a.npz", rate=30.0)
+    with np.load(tmp_path / "a.npz") as data:
+        assert np.array_equal(data["q"], found.trajectory.q(data["t"]))
+        assert data["units"].tolist() == ["rad", "rad", "m", "rad", "rad", "rad"]
+        assert len(data["t"]) == 301
+    write_trajectory(found, tmp_path / "a.yaml", rate=30.0)
+    message = yaml.safe_load((tmp_path / "a.yaml").read_text(encoding="utf-8"))
+    assert message["joint_names"] == list(found.model.table.joint_names)
+    assert len(message["points"]) == 301
+    point = message["points"][100]
+    assert point["time_from_start"] == {"sec": 3, "nanosec": 333333333}
+    assert np.allclose(point["accelerations"], found.trajectory.a(100 / 30.0), atol=1e-10)
+    assert set(point) == {"positions", "velocities", "accelerations", "time_from_start"}
+    with pytest.raises(InvalidValueError, match="radians"):
+        write_trajectory(found, tmp_path / "a.yaml", degrees=True)
+
+
+def test_any_trajectory_can_be_written(tmp_path):
+    move = quintic([0.0, 1.0], [1.0, 2.0], duration=0.35)
+    write_trajectory(move, tmp_path / "a.csv", rate=10.0, names=["x", "y"], turns=[True, False])
+    rows = np.loadtxt(tmp_path / "a.csv", delimiter=",", skiprows=1)
+    assert rows[:, 0].tolist() == [0.0, 0.1, 0.2, 0.3]
+    write_trajectory(fourier([1.0, -1.0], [0.0, 0.0], 0.0, 2.0), tmp_path / "b.npz", rate=10.0)
+
+
+@pytest.mark.parametrize("kind", ["fourier", "spline"])
+def test_coefficients_make_the_same_motion_bit_by_bit(kind, tmp_path):
+    one = exciting_trajectory(rm.load("planar_2r"), kind=kind, **QUICK)
+    write_coefficients(one, tmp_path / "a.json")
+    again = read_coefficients(tmp_path / "a.json")
+    t = np.linspace(0.0, 10.0, 77)
+    assert np.array_equal(again.q(t), one.trajectory.q(t))
+    assert np.array_equal(again.a(t), one.trajectory.a(t))
+    data = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))
+    assert data["condition"] == one.condition
+    assert data["limits"]["torque"] == [None, None]
+    assert data["robot"] == "planar_2r"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("no json", "expected a file of"),
+        ("[]", "expected a file of"),
+        ('{"format": "other"}', "expected a file of"),
+        ('{"format": "robotmodels exciting trajectory 1", "motion": {}}', "cannot be read"),
+        (
+            '{"format": "robotmodels exciting trajectory 1", "motion": {"kind": "fourier", '
+            '"duration": 1.0, "order": 3, "rest": true, "coefficients": [[1.0]]}}',
+            "expected 5 rows",
+        ),
+    ],
+)
+def test_other_files_are_refused(text, message, tmp_path):
+    (tmp_path / "a.json").write_text(text, encoding="utf-8")
+    with pytest.raises((InvalidValueError, ShapeError), match=message):
+        read_coefficients(tmp_path / "a.json")
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "error"),
+    [
+        ("a.txt", {}, InvalidValueError),
+        ("a.csv", {"rate": 0.0}, InvalidValueError),
+        ("a.csv", {"names": ["x"]}, ShapeError),
+    ],
+)
+def test_wrong_arguments_of_writing(found, name, options, error, tmp_path):
+    with pytest.raises(error):
+        write_trajectory(found, tmp_path / name, **options)
+
+
+# --- the command ----------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def run(capsys):
+    def run(*words):
+        try:
+            code = main([str(word) for word in words])
+        except SystemExit as stop:
+            code = stop.code
+        out, err = capsys.readouterr()
+        return code, out, err
+
+    return run
+
+
+FEW = ["--starts", 1, "--random", 2, "--iterations", 5, "--harmonics", 3, "--seed", 4]
+
+
+def test_excite_writes_what_a_controller_needs(run, tmp_path):
+    folder = tmp_path / "motion"
+    code, out, err = run(
+        "excite", "--robot", "rx90", "--duration", 8, "--criterion", "log-det", "--acceleration",
+        "3", "3", "4", "5", "5", "6", "--velocity", 1.5, "--box", "-inf", "-inf", "-1e1", "inf",
+        "inf", "inf", "--keep-out", "2,2,-1,3,3,1", "--rate", 100, "--out", folder, *FEW,
+    )  # fmt: skip
+    assert (code, err) == (0, "")
+    names = {"trajectory.csv", "trajectory.json", "trajectory.png", "summary.txt"}
+    assert {path.name for path in folder.iterdir()} == names
+    assert all(f"wrote {folder / name}" in out for name in names)
+    rows = np.loadtxt(folder / "trajectory.csv", delimiter=",", skiprows=1)
+    assert rows.shape == (801, 19)
+    assert (np.abs(rows[:, 13:]).max(axis=0) <= [3, 3, 4, 5, 5, 6]).all()
+    assert np.abs(rows[:, 7:13]).max() <= 1.5
+    again = read_coefficients(folder / "trajectory.json")
+    assert np.allclose(again.q(rows[:, 0]), rows[:, 1:7], atol=1e-10)
+    assert "every limit is kept" in (folder / "summary.txt").read_text(encoding="utf-8")
+
+
+def test_excite_prints_json_and_tells_when_limits_cannot_be_kept(run):
+    code, out, err = run("excite", "--robot", "planar_2r", "--kind", "spline", "--points", 6,
+                         "--drive", "--json", *FEW)  # fmt: skip
+    data = json.loads(out)
+    assert (code, err) == (0, "")
+    assert data["base_parameters"] == ["ZZ1", "ZZ2", "MX2", "MY2"]
+    assert data["motion"]["order"] == 6
+    code, out, _ = run("excite", "--robot", "ur10e", "--torque-limits", 0.1, *FEW)
+    assert code == 1
+    assert "No motion was found that keeps every limit." in out
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--velocity", "1", "2"], "--velocity"),
+        (["--acceleration", "-1"], "positive"),
+        (["--box", "0", "0", "1"], "six numbers"),
+        (["--rate", "0"], "--rate"),
+        (["--seed", "-1"], "--seed"),
+        (["--degrees", "--format", "yaml"], "radians"),
+        (["--duration", "0"], "duration"),
+        (["--points", "4"], "harmonics"),
+    ],
+)
+def test_wrong_arguments_of_excite(run, words, message):
+    code, _, err = run("excite", "--robot", "rx90", *FEW, *words)
+    assert code == 2
+    assert message in err
+
+
+def test_help_of_excite_shows_examples(run):
+    code, out, _ = run("excite", "--help")
+    assert code == 0
+    assert "robotmodels excite --robot rx90" in out
