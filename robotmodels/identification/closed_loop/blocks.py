@@ -82,7 +82,7 @@ def simulated_blocks(
 
     Raises
     ------
-    RanAway
+    RanAwayError
         The robot does not follow.
     """
     for piece, found in simulated_signals(system, loop, values):

@@ -62,7 +62,7 @@ def instrumental(
     iterations: int = 20,
     lags: int | None = None,
 ) -> SimulatedEstimate:
-    """Instrumental variables (IDIM-IV): consistent where noise of the positions is in the regressor.
+    """Instrumental variables (IDIM-IV): consistent although noise is in the regressor.
 
     The controlled robot is simulated with the last parameters; the regressor Z of its motion, which
     the noise of the sensors does not reach, is the instrument: ``Z^T S (y - W b) = 0``.
@@ -100,16 +100,14 @@ def instrumental(
     industrial robot identification", IEEE T-CST 22(1), 2014, section III.
     """
     check_count(reduction)
-    first = _start(reduction, start)
+    first = first_values(reduction, start)
     if loop is None:
         loop = closed_loop(system, first, controller)
     if loop is None:
         return ran_away(Method.IV, system, first, loop)
     way = loop
     measured = measured_blocks(system)
-    # columns of like lengths: units of parameters differ by decades
-    size = np.maximum(np.linalg.norm(np.vstack([R[:, :-1] for R in reduction.factors]), axis=0),
-                      1e-300)  # fmt: skip
+    size = torque_sizes(reduction)
 
     def pairs(values: Array) -> Iterator[tuple[Array, Block]]:
         for piece, block in simulated_blocks(system, way, values):
@@ -119,8 +117,7 @@ def instrumental(
     def advance(values: Array) -> InstrumentStep:
         return _step(reduction, values, pairs(values), size)
 
-    torque = np.sqrt(sum(float(R[:, -1] @ R[:, -1]) for R in reduction.factors))
-    ended = iterated(first, advance, torque / size, iterations)
+    ended = iterated(first, advance, size, iterations)
     last = ended.last
     if last is None:
         return ran_away(Method.IV, system, first, loop)
@@ -158,7 +155,7 @@ def _step(
         e = block.y - block.W @ values
         for j in range(m):
             use = block.use[:, j]
-            z, w, r = Z[use, j] / size, block.W[use, j] / size, e[use, j]
+            z, w, r = Z[use, j] * size, block.W[use, j] * size, e[use, j]
             ZW[j] += z.T @ w
             ZZ[j] += z.T @ z
             WW[j] += w.T @ w
@@ -187,8 +184,8 @@ def _step(
     half = solve_triangular(low, A, lower=True)
     canonical = np.linalg.svd(solve_triangular(high, half.T, lower=True), compute_uv=False)
     return InstrumentStep(
-        values + move / size, np.sqrt(np.maximum(np.diag(spread), 0.0)) / size,
-        inverse / size[:, None] / size, sigma, weights, float(np.linalg.cond(scaled)),
+        values + move * size, np.sqrt(np.maximum(np.diag(spread), 0.0)) * size,
+        inverse * size[:, None] * size, sigma, weights, float(np.linalg.cond(scaled)),
         float(min(canonical[-1], 1.0)),
     )  # fmt: skip
 
@@ -198,10 +195,43 @@ def _lifted(X: Array) -> Array:
     return X + np.diag(1e-13 * np.diag(X))
 
 
-def _start(reduction: Reduction, start: ArrayLike | None) -> Array:
+def first_values(reduction: Reduction, start: ArrayLike | None) -> Array:
+    """Parameters to begin with: those given, or weighted least squares.
+
+    Parameters
+    ----------
+    reduction : Reduction
+        Of the measured equations.
+    start : array_like, shape (b,), or None
+        What was asked.
+
+    Returns
+    -------
+    ndarray, shape (b,)
+        Values.
+    """
     if start is None:
         return weighted(reduction).values
     return as_exact(start, (len(reduction.names),), "start")
+
+
+def torque_sizes(reduction: Reduction) -> Array:
+    """Value of each parameter whose torque alone would be as large as that measured.
+
+    Parameters
+    ----------
+    reduction : Reduction
+        Of the measured equations.
+
+    Returns
+    -------
+    ndarray, shape (b,)
+        Units of parameters differ by decades; this makes them alike.
+    """
+    whole = np.vstack(reduction.factors)
+    length = np.linalg.norm(whole[:, :-1], axis=0)
+    torque = max(float(np.linalg.norm(whole[:, -1])), 1e-300)
+    return torque / np.where(length > 0.0, length, 1.0)
 
 
 def ran_away(

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..._arrays import Array
 from ..estimate import EstimateStatus
-from .simulated import RanAway
+from .simulated import RanAwayError
 
 STILL = 1e-3
 """Parts of its deviation by which a parameter may still move."""
@@ -75,7 +75,7 @@ def iterated(
     start : ndarray, shape (b,)
         Parameters to begin with.
     advance : callable
-        The `Step` of a simulation with given parameters; raises `RanAway`.
+        The `Step` of a simulation with given parameters; raises `RanAwayError`.
     size : ndarray, shape (b,)
         Value of each parameter whose torque alone would be as large as that measured.
     most : int
@@ -91,7 +91,7 @@ def iterated(
     values = start
     try:
         step = advance(values)
-    except RanAway:
+    except RanAwayError:
         return Iterated(start, None, EstimateStatus.UNSTABLE, 0)
     for count in range(1, most + 1):
         move = step.values - values
@@ -105,7 +105,7 @@ def iterated(
         for _ in range(_HALVINGS):
             try:
                 tried = advance(values + share * move)
-            except RanAway:
+            except RanAwayError:
                 away = True
             else:
                 if tried.cost <= step.cost + slack:

@@ -15,7 +15,7 @@ from ..signals import Piece, piece_signals
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class References:
+class Targets:
     """Rows of what is followed, and the one after them.
 
     Parameters
@@ -39,7 +39,7 @@ def references(
     last: int,
     feed_forward: RobotModel | None,
     width: Array,
-) -> References:
+) -> Targets:
     """References of some rows of a recording.
 
     Parameters
@@ -60,7 +60,7 @@ def references(
 
     Returns
     -------
-    References
+    Targets
         Of ``last - first + 1`` rows.
     """
     if log.q_ref is None:
@@ -83,7 +83,7 @@ def references(
     if stop == last:
         q, v, a = (np.vstack((x, x[-1:])) for x in (q, v, a))
     q, v, a = (np.ascontiguousarray(x) for x in (q, v, a))
-    return References(q, v, _fed(feed_forward, q, v, a, width))
+    return Targets(q, v, _fed(feed_forward, q, v, a, width))
 
 
 def _differences(x: Array, dt: float, accuracy: int) -> Array:

@@ -20,7 +20,7 @@ from .loop import ClosedLoop, least_width, robot_of, steps_of
 from .references import references
 
 
-class RanAway(Exception):
+class RanAwayError(Exception):
     """A simulated robot left its references, or its mass matrix was not positive definite."""
 
 
@@ -60,7 +60,7 @@ class MovingRobot:
 
         Raises
         ------
-        RanAway
+        RanAwayError
             It did not follow.
         """
         from ...kernels.closed_loop import follow_references
@@ -88,7 +88,7 @@ class MovingRobot:
             np.ascontiguousarray(coupling), coupled, self.state, *out,
         )  # fmt: skip
         if failed >= 0:
-            raise RanAway
+            raise RanAwayError
         return out[0], out[1], out[2], out[3]
 
 
@@ -116,7 +116,7 @@ def simulated_signals(
 
     Raises
     ------
-    RanAway
+    RanAwayError
         The robot does not follow.
     """
     log, choices = system.log, system.processing
@@ -139,8 +139,11 @@ def simulated_signals(
             kept = np.concatenate((kept, np.stack(rows)), axis=1)
             done = last
         first = max(piece.start - choices.reach, piece.low)
-        kept, held = kept[:, first - held :], first
+        kept = kept[:, first - held :]
         found = kept[:, : last - first].copy()
+        # the next window looks back no farther than this: many robots may be on their way at once
+        held = max(first, min(piece.stop - choices.reach, done))
+        kept = kept[:, held - first :].copy()
         yield piece, Signals(log.dt * np.arange(first, last), *found)
 
 
@@ -239,7 +242,7 @@ def simulated_log(
     asked = references(given, choices, Piece(0, N, 0, N, 0, N), 0, N, controller.feed_forward, wide)
     try:
         q, v, a, tau = MovingRobot(model, loop, given.dt).advance(asked.q, asked.v, asked.feed)
-    except RanAway:
+    except RanAwayError:
         raise InvalidValueError(
             "controller: the robot runs away, or its mass matrix is not positive definite; give "
             "lower gains, more substeps, or a robot whose joints all move inertia."

@@ -1,0 +1,166 @@
+"""Direct and inverse dynamic identification models: measured torque, simulated motion."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..._arrays import Array
+from ..equations import Block, Equations
+from ..estimate import EstimateStatus, Method
+from ..least_squares import check_count, deviations_of, solved, weights_of
+from ..reduction import Reduction
+from .blocks import given, reduced, sandwich, simulated_blocks
+from .controller import Controller
+from .estimate import SimulatedEstimate
+from .instrumental import first_values, ran_away, torque_sizes
+from .iteration import iterated
+from .loop import ClosedLoop, closed_loop
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DidimStep:
+    """Weighted least squares on the regressor of one simulation.
+
+    Parameters
+    ----------
+    values, deviations : ndarray, shape (b,)
+        Parameters, and their deviations if residuals were white.
+    inverse : ndarray, shape (b, b)
+        Of the information.
+    sigma, weights : ndarray, shape (n,)
+        Deviations of the residuals, and the weights.
+    condition : float
+        Of the regressor, with columns of length one.
+    cost : float
+        0: a fixed point is looked for.
+    """
+
+    values: Array
+    deviations: Array
+    inverse: Array
+    sigma: Array
+    weights: Array
+    condition: float
+    cost: float = 0.0
+
+
+def didim(
+    system: Equations,
+    reduction: Reduction,
+    controller: Controller | None = None,
+    start: ArrayLike | None = None,
+    *,
+    loop: ClosedLoop | None = None,
+    iterations: int = 20,
+    lags: int | None = None,
+) -> SimulatedEstimate:
+    """Direct and inverse dynamic identification models (DIDIM): torques alone are measured.
+
+    The controlled robot is simulated with the last parameters; weighted least squares then explain
+    the measured torque by the regressor of the simulated motion. Where the log has references, the
+    measured positions take no part but for the parameters to begin with.
+
+    Parameters
+    ----------
+    system : Equations
+        Robot, log and choices.
+    reduction : Reduction
+        Of these equations; for the start and the sizes of the parameters.
+    controller : Controller, optional
+        That of the robot; default one that is tuned to follow closely.
+    start : array_like, shape (b,), optional
+        Parameters to begin with; default weighted least squares.
+    loop : ClosedLoop, optional
+        How the robot is simulated, instead of ``controller``.
+    iterations : int
+        Simulations at most.
+    lags : int, optional
+        As for `correlated_covariance`.
+
+    Returns
+    -------
+    SimulatedEstimate
+        Parameters with a covariance that holds for correlated residuals.
+
+    Raises
+    ------
+    InvalidValueError, ShapeError
+        Fewer equations than parameters; a controller that does not fit; a friction model.
+
+    References
+    ----------
+    M. Gautier, A. Janot and P.-O. Vandanjon, "A new closed-loop output error method for parameter
+    identification of robot dynamics", IEEE T-CST 21(2), 2013, section III.
+    """
+    check_count(reduction)
+    first = first_values(reduction, start)
+    if loop is None:
+        loop = closed_loop(system, first, controller)
+    if loop is None:
+        return ran_away(Method.DIDIM, system, first, loop)
+    way = loop
+
+    def blocks(values: Array) -> Iterator[Block]:
+        return (block for _, block in simulated_blocks(system, way, values))
+
+    def advance(values: Array) -> DidimStep:
+        return weighted_step(reduced(system, blocks(values)), values)
+
+    ended = iterated(first, advance, torque_sizes(reduction), iterations)
+    last = ended.last
+    if last is None:
+        return ran_away(Method.DIDIM, system, first, loop)
+    equations = given(system, lambda: blocks(ended.values))
+    spread = sandwich(equations, ended.values, last.weights, last.inverse, lags)
+    notes = loop.notes
+    if ended.status is not EstimateStatus.SOLVED:
+        notes = (*notes, ended.status.sentence)
+    return SimulatedEstimate(
+        Method.DIDIM, system.names, ended.values, spread.covariance, last.sigma, ended.status,
+        ended.iterations, notes, last.deviations, spread.lags, last.condition, 1.0, loop,
+    )  # fmt: skip
+
+
+def weighted_step(found: Reduction, values: Array) -> DidimStep:
+    """Weighted least squares with weights of the residuals of the values before.
+
+    Parameters
+    ----------
+    found : Reduction
+        Of the equations of a simulation.
+    values : ndarray, shape (b,)
+        Those that were simulated.
+
+    Returns
+    -------
+    DidimStep
+        The parameters that follow.
+    """
+    check_shown(found)
+    weights = weights_of(deviations_of(found, values), found)
+    solution, inverse, rest = solved(found, weights)
+    scale = rest / max(found.rows - len(values), 1)
+    R, _, _ = found.stacked(weights)
+    return DidimStep(
+        solution, np.sqrt(np.maximum(scale * np.diag(inverse), 0.0)), inverse,
+        deviations_of(found, solution), weights,
+        float(np.linalg.cond(R / np.linalg.norm(R, axis=0))),
+    )  # fmt: skip
+
+
+def check_shown(found: Reduction) -> None:
+    """Refuse equations in which a parameter takes no part."""
+    from ...errors import InvalidValueError
+
+    shown = np.any([R[:, :-1].any(axis=0) for R in found.factors], axis=0)
+    if not shown.all():
+        missing = ", ".join(found.names[k] for k in np.flatnonzero(~shown))
+        raise InvalidValueError(
+            f"log: nothing of the simulated motion shows {missing}; its joints do not leave the "
+            "dead band. Give a smaller dead_band=, or drop these parameters."
+        )
+    check_count(found)
