@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from concurrent.futures import Executor
 from dataclasses import dataclass
 
@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array, Rebuilt, read_only
-from ..estimation.merging import merged_factor, merged_tree
+from ..errors import InvalidValueError
+from ..estimation.merging import merged_tree
 from .equations import Block, Equations
+from .piece_tasks import piece_reductions
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,48 +73,60 @@ class Reduction(Rebuilt):
 
         Returns
         -------
-        R : ndarray, shape (r, b)
-            Triangular, r at most b.
-        y : ndarray, shape (r,)
+        R : ndarray, shape (b, b)
+            Triangular.
+        y : ndarray, shape (b,)
             Its right side.
         rest : float
             Sum of squares that no parameters explain: ``|R x - y|^2 + rest`` is the whole.
         """
-        w = np.ones(len(self.factors)) if weights is None else weights
-        whole = merged_tree((w[k] * R for k, R in enumerate(self.factors)), merged_factor)
+        from ..kernels.triangles import fold_rows
+
         b = len(self.names)
-        if whole is None:
-            return np.zeros((0, b)), np.zeros(0), 0.0
-        if len(whole):
-            whole = np.asarray(np.linalg.qr(whole, mode="r"))
-        top = whole[:b]
-        return top[:, :b], top[:, b], float((whole[b:, b] ** 2).sum())
+        whole = np.zeros((b + 1, b + 1))
+        for k, R in enumerate(self.factors):
+            fold_rows(np.ascontiguousarray(R if weights is None else weights[k] * R), whole)
+        return whole[:b, :b], whole[:b, b], float(whole[b, b] ** 2)
 
 
 def reduce_equations(
     system: Equations | Iterable[Equations],
     executor: Executor | None = None,
     progress: Callable[[float], None] | None = None,
+    window: int | None = None,
 ) -> Reduction:
     """Reduce equations to one triangular factor for each kind of rows.
 
-    Pieces of the log are fixed and their factors merged in a fixed tree, so that the result has the
-    same bits for any number of workers.
+    Pieces of the logs are fixed, their factors are merged in a fixed tree, and the order of every
+    sum is fixed, so that the result has the same bits for any number of workers and threads (of
+    processors of one make).
 
     Parameters
     ----------
     system : Equations or iterable of Equations
-        One log, or several of the same robot and parameters; an iterator may read them as it goes.
+        One log, or several of the same robot and parameters; an iterator may open one file at a
+        time, which is let go when its pieces are done.
     executor : concurrent.futures.Executor, optional
-        Who computes the pieces: threads, processes, or a cluster that offers this interface;
-        default this thread.
+        Who computes the pieces: threads, processes, or a cluster that offers this interface (such
+        as ``client.get_executor()`` of Dask); default this thread. A task is given the rows of its
+        piece and of the filters' reach beside it, not the log. After an error no piece that waits
+        is begun, and the executor can be used on.
     progress : callable, optional
-        Called with the fraction done.
+        Called with the fraction done, which never falls. Of an iterator whose length is not known
+        only its end is told.
+    window : int, optional
+        Pieces that are at work or wait at a time, default twice the processors and 2: memory does
+        not grow with the log. Give more for a cluster of more workers.
 
     Returns
     -------
     Reduction
         Its size is the square of the number of parameters, whatever the length of the log.
+
+    Raises
+    ------
+    InvalidValueError
+        No equations; logs of different parameters or kinds of equations; a window below 1.
 
     References
     ----------
@@ -120,32 +134,11 @@ def reduce_equations(
     "Communication-optimal parallel and sequential QR and LU factorizations", SIAM J. Scientific
     Computing 34(1), 2012.
     """
-    systems = [system] if isinstance(system, Equations) else system
-    leaves = _leaves(systems, progress) if executor is None else _submitted(systems, executor)
-    found = merged_tree(leaves, merge)
+    systems = (system,) if isinstance(system, Equations) else system
+    found = merged_tree(piece_reductions(systems, executor, progress, window), merge)
     if found is None:
-        raise ValueError("system: no equations.")
+        raise InvalidValueError("system: expected the equations of at least one log, got none.")
     return found
-
-
-def _leaves(
-    systems: Iterable[Equations], progress: Callable[[float], None] | None
-) -> Iterator[Reduction]:
-    for system in systems:
-        parts = system.pieces()
-        for k, piece in enumerate(parts):
-            yield block_reduction(system.names, system.block(piece))
-            if progress is not None:
-                progress((k + 1) / len(parts))
-
-
-def _submitted(systems: Iterable[Equations], executor: Executor) -> Iterator[Reduction]:
-    for system in systems:
-        yield from executor.map(_piece, *zip(*((system, p) for p in system.pieces()), strict=True))
-
-
-def _piece(system: Equations, piece: object) -> Reduction:
-    return block_reduction(system.names, system.block(piece))  # type: ignore[arg-type]
 
 
 def block_reduction(names: tuple[str, ...], block: Block) -> Reduction:
@@ -163,11 +156,16 @@ def block_reduction(names: tuple[str, ...], block: Block) -> Reduction:
     Reduction
         Of this block alone.
     """
+    from ..kernels.triangles import fold_equations
+
+    W, y = np.ascontiguousarray(block.W), np.ascontiguousarray(block.y)
+    seen = np.any(W, axis=0, keepdims=True)[0]
     factors = []
-    for j in range(block.y.shape[1]):
-        use = block.use[:, j]
-        rows = np.column_stack((block.W[use, j], block.y[use, j]))
-        factors.append(merged_factor(np.zeros((0, rows.shape[1])), rows))
+    for j, used in enumerate(block.use.T):
+        columns, rows = np.flatnonzero(seen[j]), np.flatnonzero(used)
+        R = np.zeros((len(columns) + 1, len(columns) + 1))
+        fold_equations(W, y, j, rows, columns, R)
+        factors.append(_widened(R, np.append(columns, len(names)), len(names) + 1))
     counts = block.use.sum(axis=0)
     return Reduction(names, tuple(factors), counts, len(block) - counts)
 
@@ -184,10 +182,39 @@ def merge(first: Reduction, second: Reduction) -> Reduction:
     -------
     Reduction
         Of all their equations.
+
+    Raises
+    ------
+    InvalidValueError
+        They have different ones.
     """
+    if first.names != second.names or len(first.factors) != len(second.factors):
+        raise InvalidValueError(
+            f"system: expected logs of the same parameters and kinds of equations, got "
+            f"{len(first.names)} parameters of {len(first.factors)} kinds and {len(second.names)} "
+            f"of {len(second.factors)}; make all with the same base parameters and form."
+        )
     return Reduction(
         first.names,
-        tuple(merged_factor(a, b) for a, b in zip(first.factors, second.factors, strict=True)),
+        tuple(_merged(a, b) for a, b in zip(first.factors, second.factors, strict=True)),
         first.counts + second.counts,
         first.left_out + second.left_out,
     )
+
+
+def _merged(first: Array, second: Array) -> Array:
+    """A factor R of both, in the columns that are not zero: ``R^T R = A^T A + B^T B``."""
+    from ..kernels.triangles import fold_rows
+
+    columns = np.flatnonzero(first.any(axis=0) | second.any(axis=0))
+    R = np.zeros((len(columns), len(columns)))
+    for rows in (first, second):
+        fold_rows(np.ascontiguousarray(rows[:, columns]), R)
+    return _widened(R, columns, first.shape[1])
+
+
+def _widened(R: Array, columns: NDArray[np.int64], width: int) -> Array:
+    """Columns at their places among others that are zero."""
+    whole = np.zeros((len(R), width))
+    whole[:, columns] = R
+    return whole

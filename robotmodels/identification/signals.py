@@ -8,12 +8,17 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from .._arrays import Array, Rebuilt, read_only
+from ..errors import InvalidValueError
 from ..logs import Log
 from .filters import central_differences, settling, zero_phase
 from .processing import Processing
 
 PIECE = 16384
 """Samples of a piece; pieces are fixed, so that results do not depend on who computes them."""
+_INSTANTS = 4096
+"""Instants whose equations a piece makes at most, since all of them are held at a time."""
+_BESIDE = 16
+"""Samples beside the decimation's window that some forms of the equations look at."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -117,7 +122,7 @@ def pieces(log: Log, processing: Processing) -> Iterator[Piece]:
         In order; their length is a multiple of the decimation.
     """
     step = processing.decimation
-    size = max(1, PIECE // step) * step
+    size = max(1, min(PIECE // step, _INSTANTS)) * step
     for part in log.recordings():
         low, high = part.start + processing.edges, part.stop - processing.edges
         for start in range(low, high, size):
@@ -143,12 +148,12 @@ def piece_signals(log: Log, processing: Processing, piece: Piece, reach: int) ->
     Signals
         The first row is ``max(piece.start - reach, piece.low)``.
     """
-    first, last = max(piece.start - reach, piece.low), min(piece.stop + reach, piece.high)
-    # the filter forgets what is farther away; differences look a few samples further
-    margin = 2 * processing.accuracy
-    if processing.cutoff is not None:
-        margin += settling(processing.cutoff, log.dt, processing.order)
-    begin, end = max(first - margin, piece.begin), min(last + margin, piece.end)
+    first, last, begin, end = _looked_at(log, processing, piece, reach)
+    if begin < 0 or end > len(log):
+        raise InvalidValueError(
+            f"piece: its rows {first} to {last} are made of rows {begin} to {end}, and the log has "
+            f"rows 0 to {len(log)}; take the pieces of this log, of `pieces`."
+        )
     inner = slice(first - begin, last - begin)
 
     def filtered(x: Array) -> Array:
@@ -161,6 +166,45 @@ def piece_signals(log: Log, processing: Processing, piece: Piece, reach: int) ->
     v = central_differences(q, log.dt, processing.accuracy) if log.v is None else filtered(log.v)
     a = central_differences(v, log.dt, processing.accuracy) if log.a is None else filtered(log.a)
     return Signals(
-        log.dt * np.arange(first, last), q[inner], v[inner], a[inner],
+        log.dt * np.arange(first, last, dtype=np.float64), q[inner], v[inner], a[inner],
         np.array(log.tau[first:last]),
     )  # fmt: skip
+
+
+def piece_alone(log: Log, processing: Processing, piece: Piece) -> tuple[Log, Piece]:
+    """The rows that the equations of a piece are made of, as a log of their own.
+
+    Parameters
+    ----------
+    log : Log
+        The log.
+    processing : Processing
+        The choices.
+    piece : Piece
+        Which rows.
+
+    Returns
+    -------
+    Log
+        Views of positions, velocities, accelerations and torques, without what was said of them.
+    Piece
+        The same piece in it; its recording may begin and end outside.
+    """
+    _, _, begin, end = _looked_at(log, processing, piece, processing.reach + _BESIDE)
+    rows = slice(begin, end)
+    v, a = (None if x is None else x[rows] for x in (log.v, log.a))
+    alone = Log(log.dt, log.q[rows], log.tau[rows], v, a, names=log.names, delay=log.delay)
+    moved = (getattr(piece, field.name) - begin for field in fields(Piece))
+    return alone, Piece(*moved)
+
+
+def _looked_at(
+    log: Log, processing: Processing, piece: Piece, reach: int
+) -> tuple[int, int, int, int]:
+    """First and last row of a piece with so many beside it, and of those that they are made of."""
+    first, last = max(piece.start - reach, piece.low), min(piece.stop + reach, piece.high)
+    # the filter forgets what is farther away; differences look a few samples further
+    margin = 2 * processing.accuracy
+    if processing.cutoff is not None:
+        margin += settling(processing.cutoff, log.dt, processing.order)
+    return first, last, max(first - margin, piece.begin), min(last + margin, piece.end)
