@@ -2,6 +2,7 @@
 
 import pickle
 import sys
+from typing import Any
 
 import numpy as np
 import pytest
@@ -290,6 +291,7 @@ def test_coupled_motors_stay_real(kind, rng):
     model = robot(kind, rng)
     base = base_parameters(model)
     values = base.values(model)
+    assert model.transmission is not None
     motor = model.transmission.coupled_motors[-1]
     for name, value in ((f"Fvm{motor}", 9.0), (f"Fcm{motor}", -9.0), (f"Iam{motor}", 5.0)):
         values[base.names.index(name)] = value
@@ -298,6 +300,7 @@ def test_coupled_motors_stay_real(kind, rng):
     found = fit_consistent(base, R, y, rest=rest, prior=uniform_bodies(model, 3.0 * model.f))
     assert found.status is CONSTRAINED
     drives = found.of(model).drive_matrices
+    assert drives is not None
     for matrix in (drives.rotor, drives.viscous):
         assert np.linalg.eigvalsh(matrix)[0] >= -1e-9 * abs(matrix).max()
     assert any("coupled motors" in said for said in found.active)
@@ -322,6 +325,7 @@ def test_frictions_of_models_take_energy(friction, bad, rng):
     assert found.status is CONSTRAINED
     assert found.values[list(base.parameter_names).index(bad)] == pytest.approx(0.0, abs=1e-4)
     assert f"{bad} is zero." in found.active
+    assert found.friction is not None
     if isinstance(friction, StribeckFriction):
         StribeckFriction(*found.friction, vs=[0.1, 0.1])  # Fs >= Fc >= 0, or it is refused
     elif bad == "Fv2":  # an offset has either sign
@@ -341,6 +345,7 @@ def test_stribeck_falls(rng):
     R, y, rest = factor(W, W @ values)
     found = fit_consistent(base, R, y, rest=rest, prior=uniform_bodies(model, 6.0))
     assert found.status is CONSTRAINED
+    assert found.friction is not None
     assert "Fs2 of Stribeck's curve is its Fc2." in found.active
     assert found.friction[2, 1] == pytest.approx(found.friction[1, 1], abs=1e-4)
 
@@ -417,11 +422,13 @@ def test_mistakes_are_named(rng):
         (InvalidValueError, "no link 3", {"centre_bounds": [CentreBox(3, [0] * 3, [1] * 3)]}),
         (InvalidValueError, "expected CentreBox", {"centre_bounds": [3]}),
     ):
-        given = {"R": R, "y": y, "rest": rest, "prior": prior} | changes
+        given: dict[str, Any] = {"R": R, "y": y, "rest": rest, "prior": prior} | changes
         with pytest.raises(error, match=said):
             fit_consistent(base, given.pop("R"), given.pop("y"), **given)
     with pytest.raises(InvalidValueError, match="low must not be above"):
         CentreBox(1, [1, 0, 0], [0, 1, 1])
+    with pytest.raises(InvalidValueError, match="low must not be above"):
+        CentreBox(1, [np.inf, 0, 0], [np.inf, 1, 1])
     with pytest.raises(ShapeError, match="high"):
         CentreBox(1, [1, 0, 0], [0, 1])
     with pytest.raises(InvalidValueError, match="semi_axes"):

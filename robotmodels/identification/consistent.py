@@ -44,7 +44,7 @@ _TIGHT = 1e-5
 """Room, in natural units, that is none."""
 _KEPT = 1e-9
 """Deviation from the least squares, relative to the largest, that is none."""
-_PROVED = 1e-4
+_PROVED = 2e-4
 """Part of the squares within which the fit is known to be the best, else it is said."""
 _REAL = 5e-9
 """Violation that is rounding, in natural units as many as the robot is away from the prior."""
@@ -152,7 +152,6 @@ def fit_consistent(
         )
     if rows is not None and rows < 1:
         raise InvalidValueError(f"rows: expected the number of residuals, got {rows}.")
-    system = torque_squares(base, R, y, rest)
     bodies = model.inertia if prior is None else prior
     if bodies.f != model.f:
         raise InvalidValueError(f"prior: expected {model.f} links, got {bodies.f}.")
@@ -161,6 +160,7 @@ def fit_consistent(
         raise InvalidValueError(f"drive_prior: expected {model.n} joints, got {drives.n}.")
     P0 = check_definite(bodies, "prior", model.table.names)
     problem = ConeProblem(base, standard_vector(base, bodies, drives), P0, margin)
+    system = torque_squares(base, R, y, rest, problem.unit)
     bounds = (
         *mass_constraints(model.f, problem.unit, mass_bounds, total_mass),
         *centre_constraints(model.f, problem.unit, centre_bounds or ()),

@@ -17,7 +17,7 @@ _ROTATED = 1e-9
 """Deviation from a rotation that is rounding."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, init=False)
 class CentreBox(Rebuilt):
     """The centre of mass of a link lies in a box along the axes of its frame.
 
@@ -43,13 +43,15 @@ class CentreBox(Rebuilt):
     low: Array
     high: Array
 
-    def __post_init__(self) -> None:
-        for name in ("low", "high"):
-            value = as_reals(getattr(self, name), name)
+    def __init__(self, link: int, low: ArrayLike, high: ArrayLike) -> None:
+        object.__setattr__(self, "link", int(link))
+        for name, given in (("low", low), ("high", high)):
+            value = as_reals(given, name)
             if value.shape != (3,):
                 raise ShapeError(f"{name}: expected shape (3,), got {value.shape}.")
             object.__setattr__(self, name, read_only(value))
-        if not (self.low <= self.high).all():
+        finite = (self.low < np.inf).all() and (self.high > -np.inf).all()
+        if not (finite and (self.low <= self.high).all()):
             raise InvalidValueError(
                 f"CentreBox of link {self.link}: low must not be above high, got {self.low} and "
                 f"{self.high}; both in metres, in frame R_{self.link}."
@@ -78,7 +80,7 @@ class CentreBox(Rebuilt):
         return found
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, init=False)
 class CentreEllipsoid(Rebuilt):
     """The centre of mass of a link lies in an ellipsoid.
 
@@ -107,18 +109,24 @@ class CentreEllipsoid(Rebuilt):
     link: int
     centre: Array
     semi_axes: Array
-    rotation: Array | None = None
+    rotation: Array
 
-    def __post_init__(self) -> None:
-        for name in ("centre", "semi_axes"):
-            value = as_exact(getattr(self, name), (3,), name)
-            object.__setattr__(self, name, read_only(value))
+    def __init__(
+        self,
+        link: int,
+        centre: ArrayLike,
+        semi_axes: ArrayLike,
+        rotation: ArrayLike | None = None,
+    ) -> None:
+        object.__setattr__(self, "link", int(link))
+        for name, given in (("centre", centre), ("semi_axes", semi_axes)):
+            object.__setattr__(self, name, read_only(as_exact(given, (3,), name)))
         if (self.semi_axes <= 0.0).any():
             raise InvalidValueError(
                 f"semi_axes: expected positive lengths in metres, got {self.semi_axes}; a "
                 "CentreBox holds a coordinate at a known value."
             )
-        R = np.eye(3) if self.rotation is None else as_exact(self.rotation, (3, 3), "rotation")
+        R = np.eye(3) if rotation is None else as_exact(rotation, (3, 3), "rotation")
         if np.abs(R.T @ R - np.eye(3)).max() > _ROTATED:
             raise InvalidValueError(
                 f"rotation: expected perpendicular unit vectors in its columns, got\n{R}"
@@ -130,7 +138,7 @@ class CentreEllipsoid(Rebuilt):
         first = 10 * (self.link - 1)
         rows = np.zeros((4, len(unit)))
         rows[0, first + 9] = -1.0
-        inward = (np.asarray(self.rotation) / self.semi_axes).T
+        inward = (self.rotation / self.semi_axes).T
         rows[1:, first + 6 : first + 9] = -inward
         rows[1:, first + 9] = inward @ self.centre
         rows /= unit[first + 9]

@@ -11,8 +11,9 @@ from .._arrays import Array, Rebuilt, as_core, as_exact
 from ..errors import InvalidValueError, ShapeError
 from ..minimal_parameters import BaseParameters
 
-_RANK = 1e-14
-"""Singular value, relative to the largest of scaled columns and for each column, that is zero."""
+_RANK = 1e-10
+"""Singular value relative to the largest, of columns in natural units, that is no information: what
+is seen with less is rounding, and left to the prior."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,8 +31,7 @@ class TorqueSquares(Rebuilt):
     level : ndarray, shape (k,)
         What they are there.
     best : ndarray, shape (b,)
-        Least-squares base parameters, the shortest in units of their columns where R does not
-        determine all.
+        Least-squares base parameters, the shortest in natural units where R does not determine all.
     least : float
         Sum of squares that no parameters take away.
     nothing : float
@@ -51,7 +51,9 @@ class TorqueSquares(Rebuilt):
         return float(np.sum((self.fit @ x - self.target) ** 2)) + self.least
 
 
-def torque_squares(base: BaseParameters, R: ArrayLike, y: ArrayLike, rest: float) -> TorqueSquares:
+def torque_squares(
+    base: BaseParameters, R: ArrayLike, y: ArrayLike, rest: float, unit: Array
+) -> TorqueSquares:
     """Squares of the torques' residuals from the triangular factor of an identification.
 
     Parameters
@@ -64,6 +66,8 @@ def torque_squares(base: BaseParameters, R: ArrayLike, y: ArrayLike, rest: float
         Its right side.
     rest : float
         Squares that are not in them.
+    unit : ndarray, shape (p,)
+        Natural sizes of the standard parameters.
 
     Returns
     -------
@@ -80,7 +84,7 @@ def torque_squares(base: BaseParameters, R: ArrayLike, y: ArrayLike, rest: float
     >>> from robotmodels.robots import load
     >>> from robotmodels.minimal_parameters import base_parameters
     >>> base = base_parameters(load("planar_2r"), drive=False)
-    >>> torque_squares(base, np.eye(4), np.ones(4), rest=2.0).least
+    >>> torque_squares(base, np.eye(4), np.ones(4), 2.0, np.ones(20)).least
     2.0
     """
     factor = as_core(R, (len(base),), "R")
@@ -95,21 +99,24 @@ def torque_squares(base: BaseParameters, R: ArrayLike, y: ArrayLike, rest: float
             f"rest: expected a sum of squares, zero or more, got {rest}; "
             "give 0 for rounding below zero."
         )
-    lengths = np.linalg.norm(factor, axis=0)
-    if not lengths.any():
+    if not factor.any():
         raise InvalidValueError(
             "R: every entry is zero, so that no parameter is seen; check the log and its weights."
         )
-    scale = np.where(lengths > 0, lengths, 1.0)
+    scale = 1.0 / np.sqrt(((base.matrix * unit) ** 2).sum(axis=1))
     U, values, V = np.linalg.svd(factor / scale, full_matrices=False)
-    k = int((values > _RANK * len(base) * values[0]).sum())
+    k = int((values > _RANK * values[0]).sum())
     U, values, V = U[:, :k], values[:k], V[:k]
     target = U.T @ right
+    seen = U.T @ factor
+    # turned so that its rows are orthogonal with columns of one length: the solver likes it
+    lengths = np.linalg.norm(seen, axis=0)
+    turn = np.linalg.svd(seen / np.where(lengths > 0, lengths, 1.0))[0].T
     level = target / values
     same = (V * scale) @ base.matrix
     best = (V.T @ level) / scale
     left = float(np.sum((right - U @ target) ** 2))
     nothing = (1e-11**2) * (float(right @ right) + rest)
     return TorqueSquares(
-        values[:, None] * same, target, same, level, best, left + float(rest), nothing
+        turn @ seen @ base.matrix, turn @ target, same, level, best, left + float(rest), nothing
     )
