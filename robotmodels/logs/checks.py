@@ -346,8 +346,9 @@ def _torque_limits(log: Log, model: RobotModel, found: list[LogFinding]) -> None
             elif usual > 1.1 * effort[j]:
                 _add(
                     found, FindingKind.TORQUE_ABOVE_LIMITS, Severity.DOUBTFUL, log, j,
-                    f"one in a hundred of its torques is above {usual:.4g}, its limit "
-                    f"is {effort[j]:.4g}; see drive gains and gear ratios, or the limit of the model.",
+                    f"one in a hundred of its torques is above {usual:.4g}, its "
+                    f"limit is {effort[j]:.4g}; see drive gains and gear ratios, or the "
+                    "limit of the model.",
                 )  # fmt: skip
             elif 0.0 < largest < _TINY * effort[j]:
                 _add(

@@ -130,7 +130,7 @@ def find_quantity(
             )
         ordered = {int(key): i for key, i in found.items()}
         return tuple(ordered[k] for k in numbers)
-    if joints is not None and set(found) <= {name.lower() for name in joints}:
+    if joints is not None and set(found) & {name.lower() for name in joints}:
         missing = [name for name in joints if name.lower() not in found]
         if missing:
             raise InvalidValueError(
@@ -175,9 +175,13 @@ def joints_of(table: LogTable, kind: Quantity, columns: Sequence[int]) -> tuple[
         return tuple(table.words(i) for _, i in sorted(numbered))
     found = [_stem_and_joint(table.names[i], kind, None) for i in columns if i < len(table.names)]
     keys = [where[1] for where in found if where is not None]
-    if len(keys) == len(columns) and not any(key.isdecimal() for key in keys):
-        return tuple(keys)
-    return None
+    if len(keys) < len(columns) or any(key.isdecimal() for key in keys):
+        return None
+    places = [table.names[i].lower().find(key) for i, key in zip(columns, keys, strict=True)]
+    return tuple(
+        table.names[i][place : place + len(key)]  # capitals as they are
+        for i, key, place in zip(columns, keys, places, strict=True)
+    )
 
 
 def find_time(table: LogTable) -> FoundTime | None:

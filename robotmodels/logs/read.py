@@ -287,7 +287,13 @@ def _raw(
     for k, other in enumerate(owners):
         if own is not None and other is not None and other != own and set(other) == set(own):
             values[k] = values[k][:, [other.index(name) for name in own]]
-    if names is not None and own is not None and set(names) <= set(own) and own != names:
+    if names is not None and own is not None and set(names) & set(own) and own != names:
+        missing = [name for name in names if name not in own]
+        if missing:
+            raise InvalidValueError(
+                f"positions: {table.path} has no joint {', '.join(missing)}; it has "
+                f"{', '.join(own)}. Say which in joints=."
+            )
         # the file has the robot's joints in another order or among others, and says so
         place = [own.index(name) for name in names]
         values = [block[:, place] for block in values]
