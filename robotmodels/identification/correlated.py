@@ -10,6 +10,12 @@ import numpy as np
 from .._arrays import Array, Rebuilt, read_only
 from .equations import Block, Equations
 
+_MOST = 60
+"""Lags at most."""
+_QUIET = 5
+"""Lags in a row without correlation, after which there is none."""
+_LEAST = 0.1
+"""Variance with all lags, relative to that without them, below which the lags are not used."""
 _STRONGEST = 0.97
 """Correlation of successive residuals beyond which whitening would divide by next to nothing."""
 
@@ -43,8 +49,9 @@ def correlated_covariance(
     """Covariance of weighted least squares without the assumption that residuals are white.
 
     The scores of each instant, of all joints together, are whitened by the correlation of
-    successive residuals, summed with those of the instants around it (Bartlett's window), and
-    coloured again, so that correlation in time, between joints, and variances that change count.
+    successive residuals, summed with those of as many instants around it as the whitened residuals
+    are correlated over (a window that is flat first, then falls), and coloured again. So
+    correlation in time and between joints and variances that change count.
 
     Parameters
     ----------
@@ -57,7 +64,7 @@ def correlated_covariance(
     inverse : ndarray, shape (b, b)
         Inverse of the information ``sum W^T diag(weights^2) W``.
     lags : int, optional
-        Instants on either side; default the fifth root of the number of instants.
+        Instants on either side; default as many as the residuals say.
 
     Returns
     -------
@@ -67,47 +74,72 @@ def correlated_covariance(
     References
     ----------
     W. Newey and K. West, "A simple, positive semi-definite, heteroskedasticity and autocorrelation
-    consistent covariance matrix", Econometrica 55(3), 1987; D. Andrews and C. Monahan, "An improved
-    heteroskedasticity and autocorrelation consistent covariance matrix estimator", Econometrica
-    60(4), 1992 (whitening).
+    consistent covariance matrix", Econometrica 55(3), 1987 (the sum over lags); D. Andrews and C.
+    Monahan, "An improved heteroskedasticity and autocorrelation consistent covariance matrix
+    estimator", Econometrica 60(4), 1992 (whitening); D. Politis, "Adaptive bandwidth choice",
+    Journal of Nonparametric Statistics 15, 2003 (the window and its length).
     """
     b, m = len(values), len(weights)
-    products, squares, count, rows = np.zeros(m), np.zeros(m), 0, 0
+    products, count, rows = np.zeros((_MOST + 1, m)), 0, 0
     last = np.zeros((0, m))
     for block, e in _residuals(system, values):
         chain = np.vstack((last, e))
-        products += (chain[1:] * chain[:-1]).sum(axis=0)
-        squares += (e * e).sum(axis=0)
-        last = e[-1:]
+        for lag in range(min(_MOST + 1, len(chain))):
+            # pairs whose later one is new
+            first = max(len(last), lag)
+            products[lag] += (chain[first:] * chain[first - lag : len(chain) - lag]).sum(axis=0)
+        last = chain[-_MOST:]
         count += len(e)
         rows += int(block.use.sum())
-    correlation = products / np.where(squares > 0.0, squares, 1.0)
-    shares = squares * weights**2
-    rho = float(shares @ correlation / shares.sum()) if shares.any() else 0.0
-    rho = min(max(rho, -_STRONGEST), _STRONGEST)
-    if lags is None:
-        lags = int(count**0.2)
-    lags = max(0, min(lags, count - 2))
-    window = 1.0 - np.arange(1, lags + 1) / (lags + 1.0)
-    total = np.zeros((b, b))
+    correlation = products / np.where(products[0] > 0.0, products[0], 1.0)
+    pooled = products @ weights**2
+    rho, found = _window(pooled, rows)
+    window = _flat_then_falling(found if lags is None else lags, count)
+    total, straight = np.zeros((b, b)), np.zeros((b, b))
     last, before = np.zeros((0, b)), np.zeros((0, b))
     for block, e in _residuals(system, values):
         scores = np.vstack((last, np.einsum("kjb,kj->kb", block.W, e * weights**2)))
         last = scores[-1:]
         white = scores[1:] - rho * scores[:-1]
-        total += white.T @ white
+        straight += white.T @ white
         chain = np.vstack((before, white))
-        k = len(before)
         for lag, share in enumerate(window, start=1):
-            first = max(k - lag, 0)
-            ahead = chain[first + lag :]
-            if len(ahead):
-                part = chain[first : first + len(ahead)].T @ ahead
+            first = max(len(before), lag)
+            if first < len(chain):
+                part = chain[first - lag : len(chain) - lag].T @ chain[first:]
                 total += share * (part + part.T)
-        before = chain[max(len(chain) - lags, 0) :] if lags else before
+        before = chain[max(len(chain) - len(window), 0) :]
+    total = inverse @ (straight + total) @ inverse
+    straight = inverse @ straight @ inverse
+    # such a window may give less than nothing where lags are few and noisy
+    poor = np.diag(total) < _LEAST * np.diag(straight)
+    if poor.any():
+        total = straight
     # one instant less, and the parameters that were taken from the residuals
     factor = count / max(count - 1, 1) * rows / max(rows - b, 1) / (1.0 - rho) ** 2
-    return CorrelatedCovariance(factor * inverse @ total @ inverse, lags, correlation)
+    return CorrelatedCovariance(factor * total, len(window), correlation[1])
+
+
+def _window(pooled: Array, rows: int) -> tuple[float, int]:
+    """Correlation of successive residuals, and lags over which they are when that is taken off."""
+    if not pooled[0] > 0.0:
+        return 0.0, 0
+    r = pooled / pooled[0]
+    rho = float(np.clip(r[1], -_STRONGEST, _STRONGEST))
+    around = np.concatenate((r[1:2], r[:-2]))  # of lags -1 to K - 2
+    white = (1.0 + rho**2) * r[:-1] - rho * (around + r[1:])
+    white = np.abs(white / white[0])
+    bound = 2.0 * np.sqrt(np.log10(max(rows, 10)) / max(rows, 10))
+    for lag in range(len(white) - _QUIET):
+        if (white[lag + 1 : lag + 1 + _QUIET] < bound).all():
+            return rho, 2 * lag
+    return rho, len(white) - 1
+
+
+def _flat_then_falling(lags: int, count: int) -> Array:
+    """Weights of lags 1 to ``lags``: one for the first half, then falling to zero."""
+    k = np.arange(1, max(0, min(lags, count - 2)) + 1)
+    return np.minimum(1.0, 2.0 * (1.0 - k / (len(k) + 1.0))) if len(k) else np.zeros(0)
 
 
 def _residuals(system: Equations, values: Array) -> Iterator[tuple[Block, Array]]:
