@@ -78,7 +78,8 @@ def report(rows: list[dict], facts: dict[str, str]) -> str:
     lines += [
         "",
         f"Goal for a 6R arm: condition number of the base regressor, not scaled, below {GOAL:g} in "
-        f"at most {GOAL_TIME:g} s, starts included. Columns in SI units, rows of all joints alike, "
+        f"at most {GOAL_TIME:g} s of the processor, starts included (the clock is "
+        "that of a machine with the load that is said). Columns in SI units, rows of all joints alike, "
         "500 samples in a period.",
         "",
         "| robot | case | columns | condition | with scaled columns | log det | every start | "
@@ -87,7 +88,7 @@ def report(rows: list[dict], facts: dict[str, str]) -> str:
     ]
     for row in rows:
         starts = f"{min(row['starts']):.1f} to {max(row['starts']):.1f}"
-        met = row["condition"] < GOAL and row["clock"] <= GOAL_TIME
+        met = row["condition"] < GOAL and row["cpu"] <= GOAL_TIME
         chance = [
             "" if row[key] is None else f"{row[key]:.1f}"
             for key in ("random_median", "random_best")

@@ -409,6 +409,17 @@ def test_what_cannot_be_done_is_a_status_that_names_the_limits():
     assert "limits that are not kept" in str(found)
 
 
+def test_limits_of_jerk_are_kept():
+    limits = MotionLimits(2.0, 6.0, 20.0, lower=-2.0, upper=2.0)
+    found = exciting_trajectory(
+        rm.load("planar_2r"), kind="spline", limits=limits, starts=1, baseline=3, iterations=20,
+        rng=0,
+    )  # fmt: skip
+    assert found.limits.kept
+    t = np.linspace(0.0, 10.0, 4001)
+    assert 10.0 < np.abs(found.trajectory.jerk(t)).max() <= 20.0
+
+
 def test_limits_that_are_missing_are_taken_and_said():
     limits, notes = excitation_limits(rm.load("stanford_arm"))
     assert np.isfinite([limits.lower, limits.upper, limits.velocity, limits.acceleration]).all()

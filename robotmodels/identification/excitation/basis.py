@@ -56,8 +56,8 @@ class MotionBasis:
     Examples
     --------
     >>> basis = MotionBasis(MotionKind.FOURIER, 10.0, 5)
-    >>> basis.count, abs(basis.at(np.zeros(1), 2)).max() < 1e-14
-    (9, np.True_)
+    >>> basis.count, bool(abs(basis.at(np.zeros(1), 2)).max() < 1e-14)
+    (9, True)
     """
 
     kind: MotionKind

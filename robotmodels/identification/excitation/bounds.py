@@ -45,7 +45,7 @@ def excitation_limits(
     --------
     >>> from robotmodels.robots import load
     >>> limits, notes = excitation_limits(load("ur10e"))
-    >>> limits.acceleration.round(2)[0], len(notes)
+    >>> round(float(limits.acceleration[0]), 2), len(notes)
     (8.38, 1)
     """
     own = MotionLimits.of_model(model) if limits is None else limits

@@ -72,7 +72,7 @@ def smooth_condition(W: Array, power: float) -> tuple[float, Array]:
     Examples
     --------
     >>> value, gradient = smooth_condition(np.diag([4.0, 1.0]), 50.0)
-    >>> round(np.exp(value), 6), gradient.diagonal()
+    >>> round(float(np.exp(value)), 6), gradient.diagonal()
     (4.0, array([ 0.25, -1.  ]))
     """
     s, Vt = singular_values(W)
