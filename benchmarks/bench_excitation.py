@@ -78,9 +78,9 @@ def report(rows: list[dict], facts: dict[str, str]) -> str:
     lines += [
         "",
         f"Goal for a 6R arm: condition number of the base regressor, not scaled, below {GOAL:g} in "
-        f"at most {GOAL_TIME:g} s of the processor, starts included (the clock is "
-        "that of a machine with the load that is said). Columns in SI units, rows of all joints alike, "
-        "500 samples in a period.",
+        f"at most {GOAL_TIME:g} s of the processor, starts included; the clock is that of a "
+        "machine with the load that is said. Columns in SI units, rows of all joints alike, 500 "
+        "samples in a period.",
         "",
         "| robot | case | columns | condition | with scaled columns | log det | every start | "
         "random: median | best | motions | cpu, s | clock, s | load | limits kept | goal met |",

@@ -410,14 +410,18 @@ def test_what_cannot_be_done_is_a_status_that_names_the_limits():
 
 
 def test_limits_of_jerk_are_kept():
-    limits = MotionLimits(2.0, 6.0, 20.0, lower=-2.0, upper=2.0)
-    found = exciting_trajectory(
-        rm.load("planar_2r"), kind="spline", limits=limits, starts=1, baseline=3, iterations=20,
-        rng=0,
-    )  # fmt: skip
-    assert found.limits.kept
+    options = {"kind": "spline", "starts": 1, "baseline": 3, "iterations": 20, "rng": 0}
     t = np.linspace(0.0, 10.0, 4001)
-    assert 10.0 < np.abs(found.trajectory.jerk(t)).max() <= 20.0
+    free, bound = (
+        exciting_trajectory(
+            rm.load("planar_2r"), limits=MotionLimits(2.0, 6.0, jerk, lower=-2.0, upper=2.0),
+            **options,
+        )
+        for jerk in (np.inf, 2.0)
+    )  # fmt: skip
+    assert bound.limits.kept
+    assert np.abs(free.trajectory.jerk(t)).max() > 2.5
+    assert 1.0 < np.abs(bound.trajectory.jerk(t)).max() <= 2.0
 
 
 def test_limits_that_are_missing_are_taken_and_said():
