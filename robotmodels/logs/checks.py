@@ -16,6 +16,8 @@ _BEYOND = 0.05
 """Of its range, how far a joint may be outside its limits: sensors and stops are not exact."""
 _OFTEN = 0.01
 _TURNS = 30.0
+_FACTOR = 4.0
+"""Times its limit that a joint must be at to be in another unit, not only off its zero."""
 _SATURATED = 0.02
 _STUCK = 50
 _JUMP = 20.0
@@ -96,14 +98,14 @@ def _constant(log: Log, found: list[LogFinding]) -> NDArray[np.bool_]:
         if not moving[j]:
             _add(
                 found, FindingKind.CONSTANT_POSITION, Severity.DOUBTFUL, log, j,
-                f"it stays at {log.q[0, j]:.4g}; nothing is found of its inertia and friction. See "
-                "whether the right column was read, or take it out of the model.",
+                f"it stays at {log.q[0, j] + 0.0:.4g}; nothing is found of its inertia "
+                "and friction. See whether the right column was read, or take it out of the model.",
             )  # fmt: skip
         if np.ptp(log.tau[:, j]) == 0.0:
             _add(
                 found, FindingKind.CONSTANT_TORQUE, Severity.USELESS, log, j,
-                f"its torque is {log.tau[0, j]:.4g} in every sample, so that nothing can be found "
-                "of it; see whether the right column was read.",
+                f"its torque is {log.tau[0, j] + 0.0:.4g} in every sample, so that nothing can be "
+                "found of it; see whether the right column was read.",
             )  # fmt: skip
     if not moving.any():
         found.append(
@@ -188,24 +190,20 @@ def _stuck(log: Log, moving: NDArray[np.bool_], found: list[LogFinding]) -> None
     ).tolist():  # one sensor alone that stops while its torque goes on
         still = np.diff(log.q[:, j]) == 0.0
         marks = np.diff(np.concatenate([[0], still.astype(np.int8), [0]]))
-        begin, end = np.flatnonzero(marks == 1), np.flatnonzero(marks == -1)
-        if not len(begin):
-            continue
-        k = int(np.argmax(end - begin))
-        length = int(end[k] - begin[k])
+        begin, stop = np.flatnonzero(marks == 1), np.flatnonzero(marks == -1)
         speed = np.abs(np.diff(log.q[:, j]))
-        before = speed[max(0, begin[k] - 3) : begin[k]]
-        after = speed[end[k] : end[k] + 1]
         usual = float(np.quantile(speed, 0.9))
-        if (
-            length >= _STUCK and len(before) and len(after) and usual > 0.0
-            and before.mean() > 0.3 * usual and float(after[0]) > 5.0 * usual
-        ):  # fmt: skip
-            _add(
-                found, FindingKind.STUCK, Severity.DOUBTFUL, log, j,
-                f"its position repeats for {length} samples from row {begin[k]} and then jumps; "
-                "the sensor or the recorder stopped. Leave these rows out.",
-            )  # fmt: skip
+        for start, end in zip(begin.tolist(), stop.tolist(), strict=True):
+            if end - start < _STUCK or start == 0 or end == len(speed):
+                continue
+            before = float(speed[max(0, start - 3) : start].mean())
+            if before > 0.3 * usual and float(speed[end]) > 5.0 * usual > 0.0:
+                _add(
+                    found, FindingKind.STUCK, Severity.DOUBTFUL, log, j,
+                    f"its position repeats for {end - start + 1} samples from row {start} and then "
+                    "jumps; the sensor or the recorder stopped. Leave these rows out.",
+                )  # fmt: skip
+                break
     if len(runs) and runs.max() >= 3 and runs.sum() > _OFTEN * len(log):
         found.append(
             LogFinding(
@@ -300,7 +298,8 @@ def _units(log: Log, model: RobotModel, found: list[LogFinding]) -> None:
         f"{lower[j]:.4g} to {upper[j]:.4g})"
         for j in outside
     )
-    surely = size[outside].max() > _TURNS or (beyond[outside] > 0.2).any()
+    reach = np.where(known, np.maximum(np.abs(lower), np.abs(upper)), np.pi)
+    surely = (size[outside] > _FACTOR * reach[outside]).any()
     if motors and surely:
         kind, advice = FindingKind.MOTOR_SIDE_POSITIONS, (
             "through the model's transmission they would be within: read the log with "
@@ -308,9 +307,10 @@ def _units(log: Log, model: RobotModel, found: list[LogFinding]) -> None:
         )  # fmt: skip
     elif fits and turning.any() and surely:
         kind, advice = FindingKind.POSITIONS_IN_DEGREES, (
-            "as degrees they would be within: read the log with angles='deg'."
+            "as degrees they would be within: read the log with angles='deg', or with gears= or "
+            "transmission= if they are motor angles."
         )  # fmt: skip
-    elif size[outside].max() > _TURNS:
+    elif surely:
         kind, advice = FindingKind.MOTOR_SIDE_POSITIONS, (
             "these may be motor angles: read the log with gears= or transmission=."
         )  # fmt: skip
