@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ._compile import INT, INTS, NOTHING, OUT2, OUT3, STACK, VECTOR, compiled
+
+_ROWS = 4
+"""Rows that are added at a time, or the sums would be fetched and stored for each."""
 
 
 @compiled(NOTHING(STACK, INTS, INTS, VECTOR, INT, INT, INT, OUT3, OUT2))
@@ -30,16 +35,29 @@ def add_rows(rows, use, first_column, taps, step, first, centre, sums, weights):
     """
     half = len(taps) // 2
     k, m, columns = rows.shape
-    for i in range(k):
-        # outputs whose centre is at most `half` rows away
-        place = first + i - centre
+    w = np.empty(_ROWS)
+    for start in range(0, k, _ROWS):
+        count = min(_ROWS, k - start)
+        # outputs whose centre is at most `half` rows away from one of these rows
+        place = first + start - centre
         low = max(0, -((half - place) // step))
-        high = min(len(weights) - 1, (place + half) // step)
+        high = min(len(weights) - 1, (place + count - 1 + half) // step)
         for j in range(m):
-            if use[i * m + j] == 0:
-                continue
             for o in range(low, high + 1):
-                weight = taps[place - o * step + half]
-                weights[o, j] += weight
+                total = 0.0
+                for r in range(_ROWS):
+                    w[r] = 0.0
+                    tap = place + r - o * step + half
+                    if r < count and use[(start + r) * m + j] != 0 and 0 <= tap < len(taps):
+                        w[r] = taps[tap]
+                        total += w[r]
+                if total == 0.0 and w[0] == 0.0 and w[1] == 0.0 and w[2] == 0.0:
+                    continue
+                weights[o, j] += total
+                i0, last = start, k - 1
+                i1, i2, i3 = min(i0 + 1, last), min(i0 + 2, last), min(i0 + 3, last)
+                w0, w1, w2, w3 = w[0], w[1], w[2], w[3]
                 for c in range(first_column[j], columns):
-                    sums[o, j, c] += weight * rows[i, j, c]
+                    sums[o, j, c] += (w0 * rows[i0, j, c] + w1 * rows[i1, j, c]) + (
+                        w2 * rows[i2, j, c] + w3 * rows[i3, j, c]
+                    )
