@@ -77,7 +77,9 @@ def correlated_covariance(
     consistent covariance matrix", Econometrica 55(3), 1987 (the sum over lags); D. Andrews and C.
     Monahan, "An improved heteroskedasticity and autocorrelation consistent covariance matrix
     estimator", Econometrica 60(4), 1992 (whitening); D. Politis, "Adaptive bandwidth choice",
-    Journal of Nonparametric Statistics 15, 2003 (the window and its length).
+    Journal of Nonparametric Statistics 15, 2003 (the window and its length); J. MacKinnon and H.
+    White, "Some heteroskedasticity-consistent covariance matrix estimators with improved finite
+    sample properties", Journal of Econometrics 29, 1985 (the jackknife).
     """
     b, m = len(values), len(weights)
     products, count, rows = np.zeros((_MOST + 1, m)), 0, 0
@@ -115,8 +117,9 @@ def correlated_covariance(
     poor = np.diag(total) < _LEAST * np.diag(straight)
     if poor.any():
         total = straight
-    # one instant less, and the parameters that were taken from the residuals
-    factor = count / max(count - 1, 1) * rows / max(rows - b, 1) / (1.0 - rho) ** 2
+    # one instant less, and residuals that the parameters made smaller, the more so where they have
+    # more to say: as the jackknife does, with the mean leverage
+    factor = count / max(count - 1, 1) * (rows / max(rows - b, 1)) ** 2 / (1.0 - rho) ** 2
     return CorrelatedCovariance(factor * total, len(window), correlation[1])
 
 
