@@ -23,7 +23,7 @@ from ..minimal_parameters import BaseParameters, base_parameters
 from ..model import RobotModel, check_model
 from ..table_text import boxed
 from .correlated import correlated_covariance
-from .drive_gains_total import TotalSolution, current_noise, known_side, total_least_squares
+from .drive_gains_total import TotalSolution, known_side, total_least_squares
 from .equations import Block, Equations, equations
 from .known_payload import LoadedLog
 from .processing import Processing, choose_processing
@@ -34,6 +34,7 @@ from .several_logs import (
     mapped_reduction,
     payload_columns,
     reduced_side,
+    residual_noise,
 )
 
 _NOTHING = 1e-7
@@ -253,7 +254,7 @@ def identify_drive_gains(
     reductions = [reduced_side(system, side, executor) for system in systems]
     names, matrices = _unknowns(base, len(bare), carried)
     whole = mapped_reduction(reductions, matrices, names)
-    noise = current_noise(whole)
+    noise = residual_noise(whole)
     R, _, _ = whole.stacked(1.0 / noise)
     found = column_basis(R, nothing=_NOTHING)
     kept = found.kept

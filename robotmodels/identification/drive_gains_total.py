@@ -8,9 +8,8 @@ import numpy as np
 
 from .._arrays import Array, Rebuilt, read_only
 from .reduction import Reduction
+from .several_logs import column_lengths
 
-_LEAST_NOISE = 1e-8
-"""Deviation of currents relative to their size, below which residuals are rounding."""
 _ITERATIONS = 30
 
 
@@ -42,37 +41,6 @@ class TotalSolution(Rebuilt):
     def __post_init__(self) -> None:
         for name in ("x", "gains", "singular_values", "inverse", "weights"):
             object.__setattr__(self, name, read_only(getattr(self, name)))
-
-
-def current_noise(reduction: Reduction) -> Array:
-    """Deviation of the noise of each motor's current, from its own equations alone.
-
-    The current of a motor is linear in the parameters of the robot divided by its gain, whatever
-    the gain, so that its residuals tell the noise without any gain being known.
-
-    Parameters
-    ----------
-    reduction : Reduction
-        Of all logs, in the exact columns; the measured side are the currents.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        At least 1e-8 of the current's root mean square, so that exact data has weights; 1 for a
-        motor whose current is zero.
-    """
-    found = np.ones(len(reduction.factors))
-    for m, F in enumerate(reduction.factors):
-        size = np.linalg.norm(F[:, -1])
-        count = max(int(reduction.counts[m]), 1)
-        if not size > 0.0:
-            continue
-        U, s, _ = np.linalg.svd(F[:, :-1] / _lengths(F[:, :-1]), full_matrices=False)
-        U = U[:, s > 1e-12 * s.max(initial=0.0)]
-        rest = np.linalg.norm(F[:, -1] - U @ (U.T @ F[:, -1]))
-        left = max(count - U.shape[1], 1)
-        found[m] = max(float(rest) / np.sqrt(left), _LEAST_NOISE * float(size) / np.sqrt(count))
-    return found
 
 
 def homogeneous_factor(reduction: Reduction, weights: Array) -> Array:
@@ -156,7 +124,7 @@ def total_least_squares(reduction: Reduction, noise: Array) -> TotalSolution:
 
 def _information_inverse(R: Array, scale: Array) -> Array:
     """Inverse of ``R^T R`` without what the noise of the currents adds to it."""
-    size = _lengths(R)
+    size = column_lengths(R)
     information = (R / size).T @ (R / size)
     n = len(scale)
     which = np.arange(len(size) - n, len(size))
@@ -191,7 +159,7 @@ def known_side(reduction: Reduction, noise: Array) -> TotalSolution:
     weights = 1.0 / noise
     for _ in range(_ITERATIONS):
         R = homogeneous_factor(reduction, weights)
-        size = _lengths(R[:, keep])
+        size = column_lengths(R[:, keep])
         found = np.linalg.lstsq(R[:, keep] / size, -R[:, c], rcond=1e-13)[0] / size
         gains = np.abs(found[c:])
         if not gains.any():
@@ -207,8 +175,3 @@ def known_side(reduction: Reduction, noise: Array) -> TotalSolution:
         (R[:, keep] / size).T @ (R[:, keep] / size), rcond=1e-14, hermitian=True
     )
     return TotalSolution(found[:c], found[c:], s, inverse / np.outer(size, size), weights)
-
-
-def _lengths(R: Array) -> Array:
-    lengths = np.linalg.norm(R, axis=0)
-    return np.where(lengths > 0.0, lengths, 1.0)

@@ -18,6 +18,9 @@ from .formed_rows import combined, formed_block
 from .reduction import Reduction, block_reduction, merge
 from .signals import Piece
 
+_LEAST_NOISE = 1e-8
+"""Deviation relative to what is measured, below which residuals are rounding."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MappedEquations(Rebuilt):
@@ -174,6 +177,43 @@ def mapped_reduction(
     if found is None:
         raise InvalidValueError("logs: expected at least one log.")
     return found
+
+
+def residual_noise(reduction: Reduction) -> Array:
+    """Deviation of the noise of each kind of equations, from its own equations alone.
+
+    The current of a motor is linear in the parameters of the robot divided by its gain, whatever
+    the gain, so that its residuals tell the noise without any gain being known.
+
+    Parameters
+    ----------
+    reduction : Reduction
+        Of all logs.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        At least 1e-8 of the root mean square of the measured side, so that exact data has weights;
+        1 where that is zero.
+    """
+    found = np.ones(len(reduction.factors))
+    for m, F in enumerate(reduction.factors):
+        size = np.linalg.norm(F[:, -1])
+        count = max(int(reduction.counts[m]), 1)
+        if not size > 0.0:
+            continue
+        U, s, _ = np.linalg.svd(F[:, :-1] / column_lengths(F[:, :-1]), full_matrices=False)
+        U = U[:, s > 1e-12 * s.max(initial=0.0)]
+        rest = np.linalg.norm(F[:, -1] - U @ (U.T @ F[:, -1]))
+        left = max(count - U.shape[1], 1)
+        found[m] = max(float(rest) / np.sqrt(left), _LEAST_NOISE * float(size) / np.sqrt(count))
+    return found
+
+
+def column_lengths(R: Array) -> Array:
+    """Lengths of columns, 1 for those that are zero."""
+    lengths = np.linalg.norm(R, axis=0)
+    return np.where(lengths > 0.0, lengths, 1.0)
 
 
 def payload_columns(base: BaseParameters, frame: str | int | None) -> Array:
