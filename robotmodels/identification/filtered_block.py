@@ -10,6 +10,8 @@ import numpy as np
 from .._arrays import Array
 from ..regressors import momentum_regressor_chunks
 from .signals import Piece, Signals, piece_signals
+from .torque_block import _LEAST as LEAST
+from .torque_block import _Thinned as Thinned
 from .torque_block import decimated, moving
 
 if TYPE_CHECKING:
@@ -52,39 +54,44 @@ def filtered_block(system: Equations, piece: Piece) -> Block:
     # the low-pass, differences around its ends, and the shift by which all pieces begin inside
     around = processing.reach + 2 * SHORT
     found = piece_signals(system.log, processing, piece, around)
-    b, n, step = len(system.names), system.model.n, processing.decimation
+    n, step = system.model.n, processing.decimation
     first = piece.start - max(piece.start - around, piece.low)
     length = max(min(piece.stop + SHORT, piece.high - SHORT) - piece.start - SHORT, 0)
-    width = n * b + 2 * n
-    # rows begin SHORT inside, and so does the first equation
-    kept = decimated(_rows(system, found), step, first, -(-length // step), width)
-    v = kept[:, n * b + n :]
+    count = -(-length // step)
+    # samples begin SHORT inside, and so does the first equation
+    inner = slice(SHORT, max(len(found) - SHORT, SHORT))
+    sliding, tau, v = moving(system, found.v[inner]), found.tau[inner], found.v[inner]
+    regressors = Thinned(count, (n, len(system.names)), step, first)
+    for part, W in _regressors(system, found):
+        regressors.add(W, sliding[part])
+    torques = Thinned(count, (n, 1), step, first)
+    torques.add(np.ascontiguousarray(tau[:, :, None]), sliding)
+    use = regressors.weights > LEAST
     start = first + SHORT
     return Block(
-        found.t[start : start + length : step], kept[:, : n * b].reshape(-1, n, b),
-        kept[:, n * b : n * b + n], moving(system, v), v,
+        found.t[start : start + length : step], regressors.means(use),
+        torques.means(use)[:, :, 0], use, decimated(iter((v,)), step, first, count, n),
     )  # fmt: skip
 
 
-def _rows(system: Equations, found: Signals) -> Iterator[Array]:
-    """Regressor, torque and velocity of the samples that have ``SHORT`` others on either side."""
-    b, n, dt = len(system.names), system.model.n, system.log.dt
-    momenta, others = np.empty((0, n * b)), np.empty((0, n * b + 2 * n))
+def _regressors(system: Equations, found: Signals) -> Iterator[tuple[slice, Array]]:
+    """Regressors of the samples that have ``SHORT`` others on either side."""
+    shape = (0, system.model.n, len(system.names))
+    momenta, forces = np.empty(shape), np.empty(shape)
+    done = 0
     chunks = momentum_regressor_chunks(
         system.model, found.q, found.v, system.base.drive,
         columns=system.names, friction=system.base.friction,
     )  # fmt: skip
-    for part, (P, S) in chunks:
-        k = len(P)
-        momenta = np.vstack((momenta, P.reshape(k, -1)))
-        others = np.vstack((others, np.hstack((-S.reshape(k, -1), found.tau[part], found.v[part]))))
+    for _, (P, S) in chunks:
+        momenta, forces = np.concatenate((momenta, P)), np.concatenate((forces, S))
         inner = len(momenta) - 2 * SHORT
         if inner <= 0:
             continue
-        out = others[SHORT : SHORT + inner]
+        out = -forces[SHORT : SHORT + inner]
         for away, weight in enumerate(_WEIGHTS, start=1):
             ahead, behind = momenta[SHORT + away :][:inner], momenta[SHORT - away :][:inner]
-            out[:, : n * b] += weight / dt * (ahead - behind)
-        yield out
-        # the first SHORT rows have been used up, and are those that `out` ended with
-        momenta, others = momenta[inner:], others[inner:]
+            out += weight / system.log.dt * (ahead - behind)
+        yield slice(done, done + inner), out
+        done += inner
+        momenta, forces = momenta[inner:], forces[inner:]
