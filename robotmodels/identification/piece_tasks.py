@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import pickle
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sized
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor, Future
 from dataclasses import replace
 from functools import lru_cache
@@ -30,6 +30,7 @@ def piece_reductions(
     executor: Executor | None,
     progress: Callable[[float], None] | None,
     window: int | None,
+    logs: int | None,
 ) -> Iterator[Reduction]:
     """Reduction of each piece of each log, in order.
 
@@ -43,6 +44,8 @@ def piece_reductions(
         Called with the fraction done.
     window : int or None
         Pieces at a time, default twice the processors and 2.
+    logs : int or None
+        How many there are, where that is known.
 
     Yields
     ------
@@ -55,10 +58,10 @@ def piece_reductions(
         A window below 1.
     """
     if executor is None:
-        tasks = _tasks(systems, _reduced_here)
+        tasks = _tasks(systems, _reduced_here, logs)
         found = ((function(*given), done) for function, given, done in tasks)
     else:
-        found = in_order(_tasks(systems, _reduced_there), executor, window)
+        found = in_order(_tasks(systems, _reduced_there, logs), executor, window)
     ended = None
     for reduction, ended in found:
         yield reduction
@@ -114,10 +117,11 @@ def in_order(
 
 
 def _tasks(
-    systems: Iterable[Equations], reduced: Callable[[Equations, list[Piece]], Iterator[Task[T]]]
+    systems: Iterable[Equations],
+    reduced: Callable[[Equations, list[Piece]], Iterator[Task[T]]],
+    logs: int | None,
 ) -> Iterator[Task[T]]:
     """A task for each piece, of one log at a time."""
-    logs = len(systems) if isinstance(systems, Sized) else None
     for k, system in enumerate(systems):
         pieces = system.pieces()
         for i, (function, given, _) in enumerate(reduced(system, pieces)):

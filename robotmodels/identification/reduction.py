@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sized
 from concurrent.futures import Executor
 from dataclasses import dataclass
 
@@ -135,7 +135,9 @@ def reduce_equations(
     Computing 34(1), 2012.
     """
     systems = (system,) if isinstance(system, Equations) else system
-    found = merged_tree(piece_reductions(systems, executor, progress, window), merge)
+    logs = len(systems) if isinstance(systems, Sized) else None
+    leaves = piece_reductions(systems, executor, progress, window, logs)
+    found = merged_tree(leaves, merge)
     if found is None:
         raise InvalidValueError("system: expected the equations of at least one log, got none.")
     return found
