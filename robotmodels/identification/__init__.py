@@ -23,6 +23,22 @@ from .consistent_urdf import UrdfParity, urdf_parity
 from .correlated import CorrelatedCovariance, correlated_covariance
 from .equations import Block, EquationForm, Equations, equations
 from .estimate import Estimate, EstimateStatus, Method
+from .excitation import (
+    ExcitationCriterion,
+    ExcitationLimits,
+    ExcitationQuality,
+    ExcitationStart,
+    ExcitationStatus,
+    ExcitingTrajectory,
+    MotionBasis,
+    MotionKind,
+    WorkspaceBox,
+    excitation_limits,
+    exciting_trajectory,
+    read_coefficients,
+    write_coefficients,
+    write_trajectory,
+)
 from .filters import central_differences, decimation_window, zero_phase
 from .fit import fit
 from .joint_checks import check_joints
@@ -47,6 +63,12 @@ __all__ = [
     "Equations",
     "Estimate",
     "EstimateStatus",
+    "ExcitationCriterion",
+    "ExcitationLimits",
+    "ExcitationQuality",
+    "ExcitationStart",
+    "ExcitationStatus",
+    "ExcitingTrajectory",
     "FindingKind",
     "IdentificationResult",
     "Log",
@@ -54,6 +76,8 @@ __all__ = [
     "LogFormat",
     "LogSource",
     "Method",
+    "MotionBasis",
+    "MotionKind",
     "Processing",
     "Reduction",
     "RefusedRows",
@@ -63,6 +87,7 @@ __all__ = [
     "SynchronisationStatus",
     "UrdfParity",
     "Validation",
+    "WorkspaceBox",
     "central_differences",
     "check_joints",
     "check_log",
@@ -70,11 +95,14 @@ __all__ = [
     "correlated_covariance",
     "decimation_window",
     "equations",
+    "excitation_limits",
+    "exciting_trajectory",
     "fit",
     "fit_consistent",
     "join_logs",
     "ordinary",
     "predicted_torque",
+    "read_coefficients",
     "read_log",
     "reduce_equations",
     "reweighted",
@@ -84,5 +112,7 @@ __all__ = [
     "validate",
     "weighted",
     "with_delay",
+    "write_coefficients",
+    "write_trajectory",
     "zero_phase",
 ]

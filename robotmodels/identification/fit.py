@@ -14,12 +14,13 @@ from ..drive import Drives
 from ..errors import InvalidValueError
 from ..estimation import column_basis
 from ..friction import Friction
-from ..logs import Log
+from ..logs import Log, Severity, check_log
 from ..minimal_parameters import BaseParameters, base_parameters
 from ..model import RobotModel, check_model
 from .correlated import correlated_covariance
 from .equations import EquationForm, Equations, equations
 from .estimate import Estimate, Method
+from .joint_checks import check_joints
 from .least_squares import ordinary, reweighted, solved, weighted, weights_of
 from .processing import Processing, choose_processing
 from .reduction import Reduction, reduce_equations
@@ -45,6 +46,7 @@ def fit(
     dead_band: ArrayLike | None = None,
     edges: float | None = None,
     test: Log | None = None,
+    checked: bool = True,
     executor: Executor | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> IdentificationResult:
@@ -72,6 +74,9 @@ def fit(
         As for `choose_processing`; default what the log suggests.
     test : Log, optional
         Kept aside: the predicted torques are compared with it.
+    checked : bool
+        Whether the log is looked at first: units, signs, order of the joints, channels that say
+        nothing, delay. What makes a fit meaningless is an error, what is doubtful a note.
     executor : concurrent.futures.Executor, optional
         Who computes the pieces of the log; the result does not depend on it.
     progress : callable, optional
@@ -85,7 +90,8 @@ def fit(
     Raises
     ------
     InvalidValueError, ShapeError
-        A log of other joints, or of too few samples; choices that make no sense.
+        A log of other joints, or of too few samples; one that cannot be what it is said to be
+        (each finding with what to do); choices that make no sense.
 
     References
     ----------
@@ -99,6 +105,7 @@ def fit(
         base = base_parameters(model, drive=drive, friction=friction)
     else:
         base.check(model)
+    findings = _checked(log, model) if checked else ()
     if processing is None:
         processing = choose_processing(log, cutoff, decimation, dead_band, edges)
     elif any(x is not None for x in (cutoff, decimation, dead_band, edges)):
@@ -132,7 +139,7 @@ def fit(
         held_out=None
         if test is None
         else validate(system.base, system.names, values, test, processing),
-        notes=(*log.notes, *processing.notes, *estimate.notes, *_notes(unseen)),
+        notes=(*log.notes, *findings, *processing.notes, *estimate.notes, *_notes(unseen)),
     )
 
 
@@ -144,6 +151,19 @@ def _estimate(way: Method, system: Equations, reduction: Reduction) -> Estimate:
     if way is Method.IRLS:
         return reweighted(reduction)
     raise InvalidValueError(f"method: {way.name.lower()!r} is not built.")
+
+
+def _checked(log: Log, model: RobotModel) -> tuple[str, ...]:
+    """Sentences on a log that may be used; one that may not is refused with all of them."""
+    found = check_log(log, model)
+    if not any(finding.severity is Severity.USELESS for finding in found):
+        found = (*found, *check_joints(log, model))
+    useless = [str(finding) for finding in found if finding.severity is Severity.USELESS]
+    if useless:
+        raise InvalidValueError(
+            "log: " + " ".join(useless) + " (checked=False takes the log as it is.)"
+        )
+    return tuple(str(finding) for finding in found)
 
 
 def _seen(

@@ -23,6 +23,8 @@ _STUCK = 50
 _JUMP = 20.0
 _PER_PARAMETER = 10
 _TINY = 1e-3
+_WRONG_UNIT = 10.0
+"""Times its limit that a torque must be at to be in another unit or of a motor."""
 _FEW_LEVELS = 100
 
 
@@ -337,7 +339,7 @@ def _torque_limits(log: Log, model: RobotModel, found: list[LogFinding]) -> None
         largest = float(np.abs(log.tau[:, j]).max())
         usual = float(np.quantile(np.abs(log.tau[:, j]), 0.99))
         if np.isfinite(effort[j]) and effort[j] > 0.0:
-            if usual > 2.0 * effort[j]:
+            if usual > _WRONG_UNIT * effort[j]:
                 _add(
                     found, FindingKind.TORQUE_ABOVE_LIMITS, Severity.USELESS, log, j,
                     f"its torques are up to {largest:.4g}, its limit is {effort[j]:.4g}; see "
