@@ -150,8 +150,8 @@ def _prediction(result: IdentificationResult) -> str:
         if lost:
             text += f". {_lost(lost)}"
         return (
-            f"{text.rstrip('.')}. No log was kept aside: how well other motion is predicted is not known; give "
-            "test= (--test)."
+            f"{text.rstrip('.')}. No log was kept aside: how well other motion is predicted is not "
+            "known; give test= (--test)."
         )
     text += (
         f"; from those kept aside by {_span(aside.relative)} "

@@ -7,6 +7,7 @@ imported when the first one is drawn.
 from .animate import animate
 from .calibration_report import html_report
 from .camera import Camera
+from .identification_report import identification_html
 from .motion import Motion
 from .plot_calibration_in_space import plot_calibration_in_space
 from .plot_calibration_normality import plot_calibration_normality
@@ -17,6 +18,14 @@ from .plot_dynamics_maps import plot_inertia_map
 from .plot_dynamics_torques import plot_torque_parts
 from .plot_ellipsoids import plot_ellipsoids
 from .plot_excitation import plot_excitation
+from .plot_identification_parameters import (
+    plot_identification_correlations,
+    plot_identification_deviations,
+    plot_identification_parameters,
+)
+from .plot_identification_processing import plot_processing
+from .plot_identification_residuals import plot_identification_residuals
+from .plot_identification_torques import plot_identification_torques
 from .plot_inverse_velocities import plot_inverse_velocities
 from .plot_joint_motion import plot_joint_motion
 from .plot_joint_path import plot_joint_path
@@ -36,6 +45,7 @@ __all__ = [
     "Unit",
     "animate",
     "html_report",
+    "identification_html",
     "plot_calibration_correlations",
     "plot_calibration_in_space",
     "plot_calibration_normality",
@@ -44,11 +54,17 @@ __all__ = [
     "plot_ellipsoids",
     "plot_energy",
     "plot_excitation",
+    "plot_identification_correlations",
+    "plot_identification_deviations",
+    "plot_identification_parameters",
+    "plot_identification_residuals",
+    "plot_identification_torques",
     "plot_inertia_map",
     "plot_inverse_velocities",
     "plot_joint_motion",
     "plot_joint_path",
     "plot_pose_path",
+    "plot_processing",
     "plot_profiles",
     "plot_selection",
     "plot_singularities",

@@ -16,6 +16,7 @@ from ..errors import InvalidValueError, ShapeError
 from ..estimation import confidence_intervals
 from .figures import INK, PAGE, PALE, SMALL_SIZE, legend_above, line_style, new_figure, panels
 from .plot_calibration_residuals import as_result
+from .plot_correlation import correlation_figure
 from .plot_units import Unit
 
 if TYPE_CHECKING:
@@ -238,21 +239,4 @@ def plot_calibration_correlations(
     order = sorted(range(len(entries)), key=lambda k: (entries[k].row, entries[k].element))
     C = found.correlation[np.ix_(order, order)]
     names = [found.names[k] for k in order]
-    side = float(np.clip(1.3 + 0.155 * len(names), 3.5, PAGE))
-    figure = new_figure(side + 0.6, side, size)
-    axes = panels(figure, 1)[0, 0]
-    picture = axes.imshow(
-        C, cmap="PuOr", vmin=-1.0, vmax=1.0, interpolation="nearest", aspect="auto"
-    )
-    every = int(np.ceil(len(names) * (SMALL_SIZE * 1.15 / 72.0) / (side - 1.1)))
-    ticks = np.arange(0, len(names), every)
-    axes.set_xticks(ticks, [names[k] for k in ticks], rotation=90, size=SMALL_SIZE, color=INK)
-    axes.set_yticks(ticks, [names[k] for k in ticks], size=SMALL_SIZE, color=INK)
-    axes.grid(False)
-    bar = figure.colorbar(picture, ax=axes, fraction=0.045, pad=0.02)
-    bar.set_label("correlation", size=SMALL_SIZE + 1.0, color=INK)
-    bar.ax.tick_params(labelsize=SMALL_SIZE, labelcolor=INK, color=PALE, length=2.5)
-    bar.outline.set(edgecolor=PALE, linewidth=0.6)  # type: ignore[operator]
-    if title is not None:
-        figure.suptitle(title, size=SMALL_SIZE + 2.0, color=INK)
-    return figure
+    return correlation_figure(C, names, title, size)

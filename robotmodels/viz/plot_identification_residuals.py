@@ -1,0 +1,132 @@
+"""Residuals of an identification: over time beside their deviation, and their autocorrelation."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import Array
+from ..identification.diagnostics import residual_diagnostics
+from ..identification.equations import Equations
+from ..identification.report_parameters import kind_names, kind_units
+from ..identification.result import IdentificationResult
+from ..logs import Log
+from .figures import INK, PAGE, PALE, SMALL_SIZE, legend_above, line_style, new_figure, panels
+from .plot_identification_torques import as_identification, check_test
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_MOST = 4000
+"""Residuals that are drawn as points; beyond, only the farthest of a group."""
+_BAND = "0.88"
+
+
+def plot_identification_residuals(
+    result: IdentificationResult,
+    test: Log | None = None,
+    *,
+    title: str | None = None,
+    size: ArrayLike | None = None,
+) -> Figure:
+    """Residuals of the equations with two deviations on both sides, and their autocorrelation.
+
+    Parameters
+    ----------
+    result : IdentificationResult
+        Of `identification.fit`.
+    test : Log, optional
+        Draw the residuals of this log, which was kept aside, instead of those of its own; the
+        deviation is that of the fit.
+    title : str, optional
+        Over the figure.
+    size : array_like, shape (2,), optional
+        Width and height, inches.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        A row for each kind of equations; on the right 95 % of the correlations of white residuals
+        are within the band.
+
+    Raises
+    ------
+    InvalidValueError, ShapeError
+        Not a result; not a log of its joints.
+    MissingExtraError
+        Matplotlib is not installed.
+
+    References
+    ----------
+    Seed book section 1.6.5.
+
+    Examples
+    --------
+    >>> import robotmodels as rm
+    >>> from robotmodels.identification import fit
+    >>> from robotmodels.minimal_parameters import uniform_bodies
+    >>> arm, t = rm.load("planar_2r"), np.arange(0.0, 20.0, 0.01)[:, None]
+    >>> arm, w = arm.with_inertia(uniform_bodies(arm, 5.0)), np.array([1.0, 1.7])
+    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -w * w * np.sin(w * t)
+    >>> result = fit(arm, Log(0.01, q, rm.idm(arm, q, v, a)), decimation=1)
+    >>> plot_identification_residuals(result).axes[0].get_ylabel()
+    'residual (N m)'
+    """
+    found = as_identification(result)
+    check_test(found, test)
+    system = found.system if test is None else replace(found.system, log=test)
+    names, units = kind_names(found), kind_units(found)
+    m = len(names)
+    t, e, far = _residuals(system, found.values, found.estimate.sigma)
+    correlation = residual_diagnostics(system, found.values)
+    lag = np.arange(1, correlation.lags + 1) / found.system.processing.rate
+    figure = new_figure(PAGE, 0.9 + 1.1 * m, size)
+    grid = panels(figure, m, 2, sharex="col", width_ratios=[2.2, 1.0])
+    color = line_style(0).color
+    for j in range(m):
+        left, right = grid[j]
+        sigma = float(found.estimate.sigma[j])
+        left.axhspan(-2.0 * sigma, 2.0 * sigma, color=_BAND, linewidth=0.0, zorder=0.5,
+                     label="two deviations; 95 % of white residuals")  # fmt: skip
+        left.axhline(0.0, color=PALE, linewidth=0.6, zorder=1.2, label="_zero")
+        left.plot(t, e[:, j], linestyle="", marker="o", markersize=1.4, color=color,
+                  markeredgewidth=0.0, label="residual; its autocorrelation")  # fmt: skip
+        left.set_ylabel(f"residual ({units[j]})")
+        left.set_title(f"{names[j]}: {100.0 * far[j]:.2g} % outside", loc="left", size=SMALL_SIZE,
+                       color=INK, pad=2.0)  # fmt: skip
+        bounds, rho = correlation.bounds[j, 1:], correlation.autocorrelation[j, 1:]
+        right.fill_between(lag, -bounds, bounds, color=_BAND, linewidth=0.0, zorder=0.5)
+        right.axhline(0.0, color=PALE, linewidth=0.6, zorder=1.2)
+        right.vlines(lag, 0.0, rho, color=color, linewidth=1.2)
+        right.set_ylim(-1.05, 1.05)
+        if j == 0:
+            right.set_title("autocorrelation", loc="left", size=SMALL_SIZE, color=INK, pad=2.0)
+    grid[-1, 0].set_xlabel("time (s)")
+    grid[-1, 1].set_xlabel("lag (s)")
+    handles = [*grid[0, 0].patches, *grid[0, 0].get_lines()]
+    legend_above(figure, [h for h in handles if not str(h.get_label()).startswith("_")], title)
+    return figure
+
+
+def _residuals(system: Equations, values: Array, sigma: Array) -> tuple[Array, Array, Array]:
+    """Times and residuals, NaN where an equation does not take part, and the part that is far.
+
+    Of many, the farthest of each group.
+    """
+    count = len(system.log) / system.processing.decimation
+    step = max(1, int(np.ceil(count / _MOST)))
+    far, all_of = np.zeros(system.kinds), np.zeros(system.kinds)
+    times, rows = [], []
+    for block in system.blocks():
+        e = np.where(block.use, block.y - block.W @ values, np.nan)
+        far += (np.abs(e) > 2.0 * sigma).sum(axis=0)
+        all_of += block.use.sum(axis=0)
+        for start in range(0, len(e), step):
+            group = np.nan_to_num(np.abs(e[start : start + step]), nan=-1.0)
+            times.append(block.t[start])
+            rows.append(e[start + group.argmax(axis=0), np.arange(e.shape[1])])
+    with np.errstate(invalid="ignore"):
+        return np.array(times), np.array(rows).reshape(-1, system.kinds), far / all_of

@@ -1,0 +1,239 @@
+"""Measured and predicted torques of an identification, on its log and on one kept aside."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import Array
+from ..errors import InvalidValueError, ShapeError
+from ..identification.prediction import predicted_torque
+from ..identification.report_parameters import effort_units
+from ..identification.result import IdentificationResult
+from ..identification.signals import piece_signals, pieces
+from ..logs import Log
+from .figures import (
+    INK,
+    PAGE,
+    PALE,
+    SMALL_SIZE,
+    legend_above,
+    line_style,
+    new_figure,
+    panels,
+)
+from .plot_envelope import envelope
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_POINTS = 1200
+"""Groups of samples over the length of a log."""
+_MEASURED, _PREDICTED, _LEFT = line_style(3).color, line_style(0).color, line_style(1).color
+_REST = "0.88"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DrawnTorques:
+    """Envelopes of a log's torques, NaN between recordings.
+
+    Parameters
+    ----------
+    measured, predicted, left : tuple of ndarray, shapes (k, n)
+        Times and values; left is measured less predicted.
+    slow_t : ndarray, shape (g,)
+        Times of groups of samples.
+    slow : ndarray of bool, shape (g, n)
+        Whether the joint is in its dead band most of the group.
+    """
+
+    measured: tuple[Array, Array]
+    predicted: tuple[Array, Array]
+    left: tuple[Array, Array]
+    slow_t: Array
+    slow: Array
+
+
+def as_identification(result: Any) -> IdentificationResult:
+    """Check what a figure of an identification is asked of.
+
+    Parameters
+    ----------
+    result : IdentificationResult
+        What the caller passed.
+
+    Returns
+    -------
+    IdentificationResult
+        The same.
+
+    Raises
+    ------
+    InvalidValueError
+        Something else.
+    """
+    if not isinstance(result, IdentificationResult):
+        raise InvalidValueError(
+            "result: expected an IdentificationResult of identification.fit, got "
+            f"{type(result).__name__}."
+        )
+    return result
+
+
+def check_test(result: IdentificationResult, test: Any) -> None:
+    """Refuse what is no log of the robot.
+
+    Parameters
+    ----------
+    result : IdentificationResult
+        The identification.
+    test : Log or None
+        What the caller passed.
+
+    Raises
+    ------
+    InvalidValueError, ShapeError
+        No log; one of other joints.
+    """
+    if test is None:
+        return
+    if not isinstance(test, Log):
+        raise InvalidValueError(f"test: expected a Log, got {type(test).__name__}.")
+    if test.n != result.model.n:
+        raise ShapeError(f"test: expected a log of {result.model.n} joints, got {test.n}.")
+
+
+def plot_identification_torques(
+    result: IdentificationResult,
+    test: Log | None = None,
+    *,
+    title: str | None = None,
+    size: ArrayLike | None = None,
+) -> Figure:
+    """Measured and predicted torques over time, and what is left, a row for each joint.
+
+    Samples are drawn as envelopes, so that peaks of long logs stay. Grey stretches are in the dead
+    band, whose equations did not take part.
+
+    Parameters
+    ----------
+    result : IdentificationResult
+        Of `identification.fit`.
+    test : Log, optional
+        Kept aside: drawn in a column of its own, in the same scale.
+    title : str, optional
+        Over the figure.
+    size : array_like, shape (2,), optional
+        Width and height, inches.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The error relative to the measured torque stands over each panel.
+
+    Raises
+    ------
+    InvalidValueError, ShapeError
+        Not a result; not a log of its joints.
+    MissingExtraError
+        Matplotlib is not installed.
+
+    References
+    ----------
+    Seed book section 1.6.5.
+
+    Examples
+    --------
+    >>> import robotmodels as rm
+    >>> from robotmodels.identification import fit
+    >>> from robotmodels.minimal_parameters import uniform_bodies
+    >>> arm, t = rm.load("planar_2r"), np.arange(0.0, 20.0, 0.01)[:, None]
+    >>> arm, w = arm.with_inertia(uniform_bodies(arm, 5.0)), np.array([1.0, 1.7])
+    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -w * w * np.sin(w * t)
+    >>> result = fit(arm, Log(0.01, q, rm.idm(arm, q, v, a)), decimation=1)
+    >>> [axes.get_ylabel() for axes in plot_identification_torques(result).axes]
+    ['torque (N m)', 'torque (N m)']
+    """
+    found = as_identification(result)
+    check_test(found, test)
+    sides = [("fitted", found.system.log, found.fitted)]
+    if test is not None:
+        sides.append(("kept aside", test, found.validate(test)))
+    n, units = found.model.n, effort_units(found.model)
+    figure = new_figure(PAGE, 0.9 + 1.15 * n, size)
+    grid = panels(
+        figure, n, len(sides), sharex="col", sharey="row",
+        width_ratios=[max(log.duration, 0.25 * sides[0][1].duration) for _, log, _ in sides],
+    )  # fmt: skip
+    for column, (word, log, errors) in enumerate(sides):
+        drawn = drawn_torques(found, log)
+        for j, name in enumerate(found.model.table.joint_names):
+            axes = grid[j, column]
+            axes.fill_between(
+                drawn.slow_t, 0.0, 1.0, where=drawn.slow[:, j].astype(bool).tolist(), step="mid",
+                transform=axes.get_xaxis_transform(), color=_REST, linewidth=0.0, zorder=0.5,
+                label="dead band",
+            )  # fmt: skip
+            axes.axhline(0.0, color=PALE, linewidth=0.6, zorder=1.2, label="_zero")
+            for (t, y), color, width, label in (
+                (drawn.measured, _MEASURED, 0.7, "measured"),
+                (drawn.left, _LEFT, 0.6, "measured less predicted"),
+                (drawn.predicted, _PREDICTED, 1.1, "predicted"),
+            ):
+                axes.plot(t[:, j], y[:, j], color=color, linewidth=width, label=label)
+            relative = 100.0 * errors.relative[j]
+            axes.set_title(f"{name}, {word}: {relative:.3g} %", loc="left", size=SMALL_SIZE,
+                           color=INK, pad=2.0)  # fmt: skip
+            if column == 0:
+                kind = "force" if units[j] == "N" else "torque"
+                axes.set_ylabel(f"{kind} ({units[j]})")
+        grid[-1, column].set_xlabel("time (s)")
+    handles = [*grid[0, 0].get_lines(), *grid[0, 0].collections]
+    legend_above(figure, [h for h in handles if not str(h.get_label()).startswith("_")], title)
+    return figure
+
+
+def drawn_torques(result: IdentificationResult, log: Log) -> DrawnTorques:
+    """Torques of a log piece by piece, in as many points as a figure shows.
+
+    Parameters
+    ----------
+    result : IdentificationResult
+        The identification.
+    log : Log
+        Of the robot.
+
+    Returns
+    -------
+    DrawnTorques
+        Envelopes.
+    """
+    chosen = result.system.processing
+    step = max(1, len(log) // _POINTS)
+    parts: list[list[tuple[Array, Array]]] = [[], [], []]
+    slow_t, slow = [], []
+    gap = np.full((1, log.n), np.nan)
+    begin = None
+    for piece in pieces(log, chosen):
+        found = piece_signals(log, chosen, piece, 0)
+        tau = predicted_torque(
+            result.base, result.names, result.values, found.q, found.v, found.a, chosen.dead_band
+        )
+        for part, y in zip(parts, (found.tau, tau, found.tau - tau), strict=True):
+            if begin is not None and piece.begin != begin:
+                part.append((gap, gap))
+            part.append(envelope(found.t, y, step))
+        begin = piece.begin
+        starts = np.arange(0, len(found), step)
+        inside = np.add.reduceat((np.abs(found.v) < chosen.dead_band).astype(float), starts, axis=0)
+        counts = np.diff(np.append(starts, len(found)))
+        slow_t.append(found.t[starts] + 0.5 * (counts - 1) * log.dt)
+        slow.append(inside > 0.5 * counts[:, None])
+    measured, predicted, left = (
+        (np.concatenate([t for t, _ in part]), np.concatenate([y for _, y in part]))
+        for part in parts
+    )
+    return DrawnTorques(measured, predicted, left, np.concatenate(slow_t), np.concatenate(slow))
