@@ -17,8 +17,11 @@ from .blocks import given, reduced, sandwich, simulated_blocks
 from .controller import Controller
 from .estimate import SimulatedEstimate
 from .instrumental import first_values, ran_away, torque_sizes
-from .iteration import iterated
+from .iteration import reweighted
 from .loop import ClosedLoop, closed_loop
+
+_MEMORY = 6
+"""Steps that are mixed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,8 +34,8 @@ class DidimStep:
         Parameters, and their deviations if residuals were white.
     inverse : ndarray, shape (b, b)
         Of the information.
-    sigma, weights : ndarray, shape (n,)
-        Deviations of the residuals, and the weights.
+    sigma, weights, next_weights : ndarray, shape (m,)
+        Deviations of the residuals, the weights, and those that follow from the former.
     condition : float
         Of the regressor, with columns of length one.
     cost : float
@@ -44,6 +47,7 @@ class DidimStep:
     inverse: Array
     sigma: Array
     weights: Array
+    next_weights: Array
     condition: float
     cost: float = 0.0
 
@@ -55,7 +59,7 @@ def didim(
     start: ArrayLike | None = None,
     *,
     loop: ClosedLoop | None = None,
-    iterations: int = 20,
+    iterations: int = 50,
     lags: int | None = None,
 ) -> SimulatedEstimate:
     """Direct and inverse dynamic identification models (DIDIM): torques alone are measured.
@@ -107,10 +111,10 @@ def didim(
     def blocks(values: Array) -> Iterator[Block]:
         return (block for _, block in simulated_blocks(system, way, values))
 
-    def advance(values: Array) -> DidimStep:
-        return weighted_step(reduced(system, blocks(values)), values)
+    def advance(values: Array, weights: Array | None) -> DidimStep:
+        return weighted_step(reduced(system, blocks(values)), values, weights)
 
-    ended = iterated(first, advance, torque_sizes(reduction), iterations)
+    ended = reweighted(first, advance, torque_sizes(reduction), iterations, memory=_MEMORY)
     last = ended.last
     if last is None:
         return ran_away(Method.DIDIM, system, first, loop)
@@ -125,8 +129,8 @@ def didim(
     )  # fmt: skip
 
 
-def weighted_step(found: Reduction, values: Array) -> DidimStep:
-    """Weighted least squares with weights of the residuals of the values before.
+def weighted_step(found: Reduction, values: Array, weights: Array | None) -> DidimStep:
+    """Weighted least squares on the equations of one simulation.
 
     Parameters
     ----------
@@ -134,6 +138,8 @@ def weighted_step(found: Reduction, values: Array) -> DidimStep:
         Of the equations of a simulation.
     values : ndarray, shape (b,)
         Those that were simulated.
+    weights : ndarray, shape (m,), or None
+        Of each kind; None for those of the residuals of the values.
 
     Returns
     -------
@@ -141,14 +147,15 @@ def weighted_step(found: Reduction, values: Array) -> DidimStep:
         The parameters that follow.
     """
     check_shown(found)
-    weights = weights_of(deviations_of(found, values), found)
+    if weights is None:
+        weights = weights_of(deviations_of(found, values), found)
     solution, inverse, rest = solved(found, weights)
     scale = rest / max(found.rows - len(values), 1)
+    sigma = deviations_of(found, solution)
     R, _, _ = found.stacked(weights)
     return DidimStep(
-        solution, np.sqrt(np.maximum(scale * np.diag(inverse), 0.0)), inverse,
-        deviations_of(found, solution), weights,
-        float(np.linalg.cond(R / np.linalg.norm(R, axis=0))),
+        solution, np.sqrt(np.maximum(scale * np.diag(inverse), 0.0)), inverse, sigma, weights,
+        weights_of(sigma, found), float(np.linalg.cond(R / np.linalg.norm(R, axis=0))),
     )  # fmt: skip
 
 

@@ -173,7 +173,7 @@ def _tested(
     b_iv: Array,
     lags: int | None,
 ) -> _Tested:
-    """Augmented regression of weighted equations, from their factors and one pass for the spread."""
+    """Augmented regression of weighted equations: their factors, and one pass for the spread."""
     from scipy.stats import chi2
 
     b = len(b_iv)
@@ -216,22 +216,19 @@ def _tested(
 
 def _factors(both: Callable[[], Iterator[tuple[Array, Block]]], n: int) -> list[Array]:
     """Of each joint, R with ``R^T R = [Z W y]^T [Z W y]``."""
-    leaves = (
-        [
-            merged_factor(
-                np.zeros((0, 2 * Z.shape[2] + 1)),
-                np.column_stack((Z[own.use[:, j], j], own.W[own.use[:, j], j], own.y[own.use[:, j], j])),
-            )
-            for j in range(n)
-        ]
-        for Z, own in both()
-    )  # fmt: skip
+    leaves = ([_factor(Z, own, j) for j in range(n)] for Z, own in both())
     found = merged_tree(
         leaves, lambda a, c: [merged_factor(x, y) for x, y in zip(a, c, strict=True)]
     )
     if found is None:
         raise InvalidValueError("log: no equations; give a longer log or smaller edges=.")
     return found
+
+
+def _factor(Z: Array, own: Block, j: int) -> Array:
+    use = own.use[:, j]
+    rows = np.column_stack((Z[use, j], own.W[use, j], own.y[use, j]))
+    return merged_factor(np.zeros((0, rows.shape[1])), rows)
 
 
 def _kept(

@@ -51,6 +51,11 @@ class InstrumentStep:
     strength: float
     cost: float = 0.0
 
+    @property
+    def next_weights(self) -> Array:
+        """The same: weights follow every step here."""
+        return self.weights
+
 
 def instrumental(
     system: Equations,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import Enum
 from typing import Literal
 
@@ -20,17 +20,20 @@ from ..signals import Piece, piece_signals
 from ..torque_block import decimated
 from .blocks import given, reduced, sandwich
 from .controller import Controller
-from .didim import weighted_step
+from .didim import DidimStep, weighted_step
 from .estimate import SimulatedEstimate
 from .instrumental import first_values, ran_away, torque_sizes
-from .iteration import iterated
+from .iteration import reweighted
 from .loop import ClosedLoop, closed_loop
 from .references import references
 from .simulated import simulated_signals, simulated_use
 
 _DIFFERENCE = 1e-5
 """Part of the torque that a parameter is moved by for its sensitivity."""
+_ROUNDING = 1e-10
+"""Part of the outputs below which an error is rounding."""
 _SLACK = 1e-9
+"""Of an equation, by which the weighted squares of the errors may grow."""
 
 
 class Output(Enum):
@@ -45,33 +48,6 @@ class Output(Enum):
     TORQUE = "torques"
     POSITION = "positions"
     BOTH = "torques and positions"
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class OutputStep:
-    """One step of Gauss and Newton.
-
-    Parameters
-    ----------
-    values, deviations : ndarray, shape (b,)
-        Parameters, and their deviations if errors were white.
-    inverse : ndarray, shape (b, b)
-        Of the information.
-    sigma, weights : ndarray, shape (m,)
-        Deviations of the errors of each output, and the weights.
-    condition : float
-        Of the sensitivities, with columns of length one.
-    cost : float
-        Twice the negative logarithm of the likelihood of the values before, without constants.
-    """
-
-    values: Array
-    deviations: Array
-    inverse: Array
-    sigma: Array
-    weights: Array
-    condition: float
-    cost: float
 
 
 def output_error(
@@ -137,20 +113,15 @@ def output_error(
     way = loop
     size = torque_sizes(reduction)
 
-    def advance(values: Array) -> OutputStep:
+    def advance(values: Array, weights: Array | None) -> DidimStep:
         found = reduced(system, _blocks(system, way, values, size, which))
-        step = weighted_step(found, values)
-        # residuals that are rounding do not count
-        lengths = np.array([float(np.linalg.norm(R[:, -1])) for R in found.factors])
-        errors = np.maximum(found.sums(values), (1e-9 * lengths) ** 2)
-        cost = float(found.counts @ np.log(np.maximum(errors, 1e-300)))
-        return OutputStep(
-            step.values, step.deviations, step.inverse, step.sigma, step.weights, step.condition,
-            cost,
-        )  # fmt: skip
+        step = weighted_step(found, values, weights)
+        # errors that are rounding do not count
+        lengths = np.array([float(R[:, -1] @ R[:, -1]) for R in found.factors])
+        errors = np.maximum(found.sums(values), _ROUNDING**2 * lengths)
+        return replace(step, cost=float(step.weights**2 @ errors))
 
-    slack = _SLACK * reduction.rows
-    ended = iterated(first, advance, size, iterations, slack)
+    ended = reweighted(first, advance, size, iterations, _SLACK * reduction.rows)
     last = ended.last
     if last is None:
         return ran_away(Method.CLOE, system, first, loop)
@@ -160,7 +131,7 @@ def output_error(
     if which is not Output.TORQUE and system.log.q_ref is None:
         notes = (
             *notes,
-            "Positions are compared with a simulation that follows them: give a log with references.",
+            "Positions are compared with a simulation that follows them; give references.",
         )
     if ended.status is not EstimateStatus.SOLVED:
         notes = (*notes, ended.status.sentence)
@@ -200,7 +171,9 @@ def _blocks(
             Output.POSITION: always,
             Output.BOTH: np.hstack((moving, always)),
         }
-        t = log.dt * np.arange(piece.start, piece.stop, system.processing.decimation)
+        t = log.dt * np.arange(
+            piece.start, piece.stop, system.processing.decimation, dtype=np.float64
+        )
         yield Block(t, S, y + S @ values, uses[which], v)
 
 

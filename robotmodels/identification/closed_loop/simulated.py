@@ -144,7 +144,7 @@ def simulated_signals(
         # the next window looks back no farther than this: many robots may be on their way at once
         held = max(first, min(piece.stop - choices.reach, done))
         kept = kept[:, held - first :].copy()
-        yield piece, Signals(log.dt * np.arange(first, last), *found)
+        yield piece, Signals(log.dt * np.arange(first, last, dtype=np.float64), *found)
 
 
 def simulated_use(system: Equations, loop: ClosedLoop, v: Array) -> NDArray[np.bool_]:

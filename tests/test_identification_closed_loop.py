@@ -1,0 +1,358 @@
+"""Methods that simulate the controlled robot recover what they were made of."""
+
+import importlib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from identities.random_robots import random_bodies, random_model
+
+import robotmodels as rm
+from robotmodels.drive import DriveParameters, Transmission
+from robotmodels.errors import InertiaError, InvalidValueError, ShapeError
+from robotmodels.identification import (
+    EstimateStatus,
+    Log,
+    choose_processing,
+    equations,
+    reduce_equations,
+)
+from robotmodels.identification.closed_loop import (
+    Controller,
+    closed_loop,
+    didim,
+    hausman_test,
+    instrumental,
+    output_error,
+    simulated_log,
+    tuned_controller,
+)
+from robotmodels.identification.closed_loop.loop import least_width, robot_of
+from robotmodels.identification.closed_loop.simulated import simulated_signals
+from robotmodels.identification.fit import _seen
+from robotmodels.inertia import InertialParameters
+
+
+def robot(kind):
+    """A robot with drives whose bodies are physical."""
+    rng = np.random.default_rng(7)
+    if kind == "tx40":
+        arm = rm.load("tx40")
+        wrist = arm.transmission
+        # the shipped model has what was published of the motors; friction so that joints move
+        return arm.with_transmission(
+            Transmission(
+                wrist.matrix, wrist.offset, Iam=[0, 0, 0, 0, 0, 0.01], Fvm=[0, 0, 0, 0, 0, 0.7],
+                Fcm=[0, 0, 0, 0, 0, 1.1],
+            )
+        )  # fmt: skip
+    if kind == "rx90":
+        arm = rm.load("rx90")
+    elif kind == "gantry":
+        arm = rm.load("gantry")
+        arm = arm.with_inertia(random_bodies(rng, arm.f))
+    elif kind == "prismatic":
+        arm = random_model(np.random.default_rng(3), f=4, name="prismatic")
+        assert 1 in arm.table.sigma
+    else:
+        arm = random_model(np.random.default_rng(5), f=6, tree=True, fixed=True, name="tree")
+        assert 2 in arm.table.sigma
+        assert len(set(arm.table.antecedent)) < arm.f
+    n = arm.n
+    drive = DriveParameters(
+        Ia=rng.uniform(0.1, 0.3, n), Fv=rng.uniform(0.5, 2.0, n), Fc=rng.uniform(0.5, 2.0, n),
+        offset=rng.uniform(-0.5, 0.5, n),
+    )  # fmt: skip
+    return arm.with_drive(drive)
+
+
+def other(arm, seed=1, spread=0.2):
+    """A robot of the same kind whose bodies and drives are others, physical still."""
+    rng = np.random.default_rng(seed)
+
+    def scaled(x):
+        return x * rng.uniform(1.0 - spread, 1.0 + spread, (len(x),) + (1,) * (x.ndim - 1))
+
+    drive = DriveParameters(**{k: scaled(getattr(arm.drive, k)) for k in ("Ia", "Fv", "Fc")},
+                            offset=scaled(arm.drive.offset))  # fmt: skip
+    out = arm.with_inertia(InertialParameters(scaled(arm.inertia.values))).with_drive(drive)
+    if (K := arm.transmission) is not None:
+        terms = {k: scaled(getattr(K, k)) for k in ("Iam", "Fvm", "Fcm")}
+        out = out.with_transmission(Transmission(K.matrix, K.offset, **terms))
+    return out
+
+
+def motion(n, seconds, dt, rng, size=0.8):
+    """References: sums of sines whose velocities are exact."""
+    t = np.arange(0.0, seconds, dt)[:, None]
+    q, v = np.zeros((len(t), n)), np.zeros((len(t), n))
+    for k in range(1, 5):
+        w = 2.0 * np.pi * k * 0.35
+        c, p = rng.normal(size=n) * size / k, rng.uniform(0, 2 * np.pi, n)
+        q += c * np.sin(w * t + p)
+        v += c * w * np.cos(w * t + p)
+    return q, v
+
+
+def recorded(kind, seconds=3.0, dt=2e-3, seed=0, substeps=1):
+    """A robot, its controller, its log without noise, and how wide its dry friction is at rest."""
+    arm = robot(kind)
+    q_ref, v_ref = motion(arm.n, seconds, dt, np.random.default_rng(seed))
+    # a controller that another robot was the model of: it does not follow too well
+    control = tuned_controller(other(arm, 11), q_ref, 4.0, period=dt, feed_forward=False)
+    width = least_width(arm, q_ref, dt / substeps)
+    log = simulated_log(arm, control, q_ref, v_ref, dt, width=width, substeps=substeps)
+    return arm, control, log, width
+
+
+def problem(arm, log, width=0.0, decimation=1):
+    choices = choose_processing(
+        log, decimation=decimation, dead_band=width, edges=0.0, filtered=False
+    )
+    base = rm.base_parameters(arm, drive=True)
+    system = equations(base, log, choices)
+    system, reduction, _, _ = _seen(system, reduce_equations(system))
+    return system, reduction
+
+
+def values_of(system, arm):
+    found = dict(zip(system.base.names, system.base.values(arm), strict=True))
+    return np.array([found[name] for name in system.names])
+
+
+def off(found, truth, reduction):
+    """Largest error, as a part of the value that would explain the whole torque."""
+    R = np.vstack(reduction.factors)
+    size = np.linalg.norm(R[:, -1]) / np.linalg.norm(R[:, :-1], axis=0)
+    return float((np.abs(found - truth) / np.maximum(size, np.abs(truth))).max())
+
+
+KINDS = ("rx90", "gantry", "prismatic", "tree", "tx40")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_simulated_accelerations_are_those_of_the_direct_model(kind):
+    arm, control, log, width = recorded(kind, 0.3, substeps=2)
+    fast = (np.abs(log.v) > width).all(axis=1)
+    if arm.transmission is not None:
+        fast &= (np.abs(log.v @ arm.transmission.weights.T) > width).all(axis=1)
+    assert fast.sum() > 20
+    a = rm.ddm(arm, log.q[fast], log.v[fast], log.tau[fast])
+    assert np.allclose(log.a[fast], a, rtol=1e-9, atol=1e-9 * np.abs(a).max())
+    asked = control.kp * (log.q_ref - log.q) + control.kd * (log.v_ref - log.v)
+    assert np.allclose(log.tau, asked, rtol=1e-12, atol=1e-12 * np.abs(asked).max())
+
+
+def test_the_motion_is_that_of_simulate_and_steps_converge_with_order_four():
+    arm = robot("rx90")
+    arm = arm.with_drive(replace_drive(arm, Fc=0.0))
+    q_ref, v_ref = motion(6, 0.2, 1e-2, np.random.default_rng(0))
+    control = tuned_controller(arm, q_ref, 4.0, period=1e-2, feed_forward=False)
+    logs = [simulated_log(arm, control, q_ref, v_ref, 1e-2, substeps=s) for s in (1, 2, 16)]
+    t = 1e-2 * np.arange(len(q_ref))
+
+    def law(time, q, v):
+        return logs[2].tau[min(int(time / 1e-2 + 1e-9), len(t) - 1)]
+
+    exact = rm.simulate(arm, q_ref[0], v_ref[0], law, t, breaks=t[1:-1], rtol=1e-11, atol=1e-12)
+    errors = [float(np.abs(log.q - exact.q).max()) for log in logs]
+    assert errors[2] < 1e-9
+    assert errors[0] / errors[1] > 10.0
+
+
+def replace_drive(arm, **terms):
+    own = {k: getattr(arm.drive, k) for k in ("Ia", "Fv", "Fc", "offset")}
+    return DriveParameters(**{**own, **{k: np.full(arm.n, x) for k, x in terms.items()}})
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("method", [instrumental, didim], ids=["iv", "didim"])
+def test_exact_parameters_from_a_log_without_noise(kind, method):
+    arm, control, log, width = recorded(kind)
+    system, reduction = problem(arm, log, width)
+    truth, start = values_of(system, arm), values_of(system, other(arm))
+    assert off(start, truth, reduction) > 1e-3
+    loop = closed_loop(system, start, control, width=width)
+    found = method(system, reduction, start=start, loop=loop)
+    assert found.status is EstimateStatus.SOLVED
+    assert off(found.values, truth, reduction) < 1e-8
+    assert found.strength > 0.9
+
+
+@pytest.mark.parametrize(
+    ("kind", "output"), [("rx90", "torque"), ("prismatic", "both"), ("tree", "torque"), ("tx40", "torque"),
+                     ("prismatic", "position")])  # fmt: skip
+def test_output_error_recovers_exact_parameters(kind, output):
+    arm, control, log, width = recorded(kind, 1.2, 4e-3, substeps=2)
+    system, reduction = problem(arm, log, width)
+    truth, start = values_of(system, arm), values_of(system, other(arm, spread=0.1))
+    loop = closed_loop(system, start, control, width=width, substeps=2)
+    found = output_error(system, reduction, start=start, loop=loop, output=output)
+    assert found.status is EstimateStatus.SOLVED
+    assert off(found.values, truth, reduction) < 1e-8
+    assert len(found.sigma) == arm.n * (2 if output == "both" else 1)
+
+
+def test_pieces_and_recordings_are_simulated_as_one_run_each(monkeypatch):
+    arm, control, log, width = recorded("prismatic", 1.0)
+    twice = Log(
+        log.dt, *(np.vstack((x, x)) for x in (log.q, log.tau, log.v, log.a, log.q_ref, log.v_ref)),
+        starts=(0, len(log)),
+    )  # fmt: skip
+    signals = importlib.import_module("robotmodels.identification.signals")
+    monkeypatch.setattr(signals, "PIECE", 64)
+    system, _ = problem(arm, twice, width, decimation=5)
+    assert len(system.pieces()) > 10
+    truth = values_of(system, arm)
+    loop = closed_loop(system, truth, control, width=width)
+    for piece, found in simulated_signals(system, loop, truth):
+        first = max(piece.start - system.processing.reach, piece.low)
+        rows = slice(first, first + len(found))
+        assert len(found) == min(piece.stop + system.processing.reach, piece.high) - first
+        for name in ("q", "v", "a", "tau"):
+            assert np.allclose(getattr(found, name), getattr(twice, name)[rows], rtol=1e-7,
+                               atol=1e-7 * np.abs(getattr(twice, name)).max())  # fmt: skip
+
+
+def test_a_robot_of_base_parameters_is_the_robot_without_what_the_equations_leave_out():
+    arm = robot("tx40")
+    base = rm.base_parameters(arm, drive=("Ia", "Fv"))
+    q_ref, v_ref = motion(6, 0.2, 1e-3, np.random.default_rng(0))
+    system = equations(base, Log(1e-3, q_ref, v_ref), choose_processing(Log(1e-3, q_ref, v_ref)))
+    twin = robot_of(system, base.values(arm))
+    assert not twin.drive.Fc.any()
+    assert not twin.drive.offset.any()
+    assert twin.transmission.Iam.any()
+    assert not twin.transmission.Fcm.any()
+    a = np.ones((200, 6))
+    tau = rm.idm(twin, q_ref, v_ref, a)
+    W = rm.torque_regressor(arm, q_ref, v_ref, a, drive=("Ia", "Fv"), columns=base.names)
+    assert np.allclose(tau, W @ base.values(arm), rtol=1e-9, atol=1e-9)
+
+
+def test_controllers_hold_limit_and_integrate():
+    arm = robot("gantry")
+    rest = np.zeros((400, 6))
+    goal = rest + 0.2
+    own = tuned_controller(arm, rest, 2.0, period=2e-3, feed_forward=False)
+    start = np.vstack((rest[:1], goal[1:]))
+    slow = replace_controller(own, period=8e-3)
+    log = simulated_log(arm, slow, start, rest, 2e-3)
+    held = log.tau.reshape(-1, 4, 6)
+    assert (held == held[:, :1]).all()
+    assert (np.diff(held[:, 0], axis=0) != 0.0).any()
+    limited = replace_controller(own, limit=0.3 * np.abs(log.tau).max(axis=0))
+    low = simulated_log(arm, limited, start, rest, 2e-3)
+    assert (np.abs(low.tau) <= limited.limit).all()
+    assert (np.abs(low.tau) == limited.limit).any()
+    quick = replace_controller(own, period=1e-3)
+    fine = simulated_log(arm, quick, start, rest, 2e-3)
+    assert np.abs(fine.q - simulated_log(arm, own, start, rest, 2e-3).q).max() > 1e-6
+    # gravity leaves an error that the integral takes away
+    still = np.zeros((6000, 6))
+    plain = simulated_log(arm, own, still, still, 2e-3)
+    integral = replace_controller(own, ki=1.0 * own.kp)
+    settled = simulated_log(arm, integral, still, still, 2e-3)
+    worst = int(np.abs(plain.q[-1]).argmax())
+    assert np.abs(settled.q[-1, worst]) < 0.1 * np.abs(plain.q[-1, worst])
+
+
+def replace_controller(own, **changes):
+    terms = {k: getattr(own, k) for k in ("kp", "kd", "ki", "limit", "feed_forward", "period")}
+    return Controller(**{**terms, **changes})
+
+
+def test_feed_forward_of_the_robot_itself_follows_closely():
+    arm = robot("tx40")
+    q_ref, v_ref = motion(6, 1.0, 1e-3, np.random.default_rng(4))
+    errors = []
+    for ahead in (False, True):
+        control = tuned_controller(arm, q_ref, 5.0, period=1e-3, feed_forward=ahead)
+        log = simulated_log(arm, control, q_ref, v_ref, 1e-3)
+        errors.append(np.abs(log.q - q_ref).max())
+    assert errors[1] < 0.1 * errors[0]
+
+
+def test_a_robot_that_cannot_be_simulated_is_said_to_be_unstable():
+    arm, control, log, width = recorded("prismatic", 1.0)
+    system, reduction = problem(arm, log, width)
+    truth = values_of(system, arm)
+    for method in (instrumental, didim, output_error):
+        found = method(system, reduction, start=-truth)
+        assert found.status is EstimateStatus.UNSTABLE
+        assert np.isfinite(found.values).all()
+        assert np.isinf(found.deviations).all()
+        assert "not positive definite" in found.notes[-1]
+    wild = replace_controller(control, kp=-50.0 * control.kp)
+    found = instrumental(system, reduction, wild, start=truth)
+    assert found.status is EstimateStatus.UNSTABLE
+    assert "runs away" in found.notes[-1]
+    verdict = hausman_test(system, found)
+    assert np.isnan(verdict.p) and not verdict.biased
+    assert "not tested" in verdict.sentence
+
+
+def test_a_log_without_references_is_followed_and_told():
+    arm, _, log, width = recorded("prismatic", 2.0)
+    bare = Log(log.dt, log.q, log.tau, log.v, log.a)
+    system, reduction = problem(arm, bare, width)
+    found = instrumental(system, reduction, start=values_of(system, other(arm)))
+    assert found.status is EstimateStatus.SOLVED
+    # instruments of another controller, and wider friction at rest: consistent all the same
+    assert off(found.values, values_of(system, arm), reduction) < 1e-8
+    told = " ".join(found.notes)
+    assert "no references" in told
+    assert "controller is not known" in told
+
+
+def test_mistakes_are_named():
+    arm, control, log, width = recorded("prismatic", 0.4)
+    system, reduction = problem(arm, log, width)
+    truth = values_of(system, arm)
+    with pytest.raises(ShapeError, match="4 joints, got 2"):
+        closed_loop(system, truth, Controller([1.0, 1.0], 1.0))
+    with pytest.raises(InvalidValueError, match="multiple or a whole part"):
+        closed_loop(system, truth, replace_controller(control, period=0.003))
+    with pytest.raises(InvalidValueError, match="bandwidth"):
+        closed_loop(system, truth, control, bandwidth=3.0)
+    with pytest.raises(InvalidValueError, match="output"):
+        output_error(system, reduction, control, truth, output="speed")
+    with pytest.raises(InertiaError, match="not positive definite"):
+        tuned_controller(robot_of(system, -truth), log.q, 3.0)
+    with pytest.raises(InvalidValueError, match="limit"):
+        Controller([1.0, 1.0], 1.0, limit=0.0)
+    with pytest.raises(ShapeError, match="one length"):
+        Controller([1.0, 1.0], [1.0, 2.0, 3.0])
+    curved = rm.friction.ViscousFriction(np.ones(arm.n))
+    rest = rm.base_parameters(arm, drive=("Ia",), friction=curved)
+    with pytest.raises(InvalidValueError, match="friction of its drives"):
+        closed_loop(equations(rest, log, system.processing), np.ones(len(rest)), control)
+    with pytest.raises(InvalidValueError, match="runs away"):
+        simulated_log(arm, replace_controller(control, kd=1e9), log.q_ref, log.v_ref, log.dt)
+
+
+def test_least_width_is_that_of_one_step():
+    arm = robot("rx90")
+    q = np.zeros((1, 6))
+    M = rm.mass_matrix(arm, q[0])
+    expected = 1e-3 * arm.drive.Fc * np.diag(np.linalg.inv(M))
+    assert np.allclose(least_width(arm, q, 1e-3), expected, rtol=1e-9)
+
+
+def test_results_are_read_only_and_pickle():
+    import pickle
+
+    arm, control, log, width = recorded("prismatic", 1.0)
+    system, reduction = problem(arm, log, width)
+    found = instrumental(system, reduction, control, values_of(system, arm))
+    for one in (found, pickle.loads(pickle.dumps(found))):
+        for array in (
+            one.values,
+            one.white,
+            one.covariance,
+            one.loop.width,
+            one.loop.controller.kp,
+        ):
+            with pytest.raises(ValueError, match="read-only"):
+                array[0] = 1.0
+    assert replace(found, lags=3).lags == 3
