@@ -6,6 +6,7 @@ the parameters, ``.basis(v)`` gives the columns that multiply them, for identifi
 
 from .asymmetric import AsymmetricFriction
 from .combined import FrictionSum
+from .load import LoadFriction
 from .plain import CoulombFriction, TorqueOffset, ViscousFriction
 from .protocols import Friction, LinearFriction, check_friction, check_linear
 from .stribeck import StribeckFriction
@@ -16,6 +17,7 @@ __all__ = [
     "Friction",
     "FrictionSum",
     "LinearFriction",
+    "LoadFriction",
     "StribeckFriction",
     "TorqueOffset",
     "ViscousFriction",
