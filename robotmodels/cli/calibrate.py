@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from .._arrays import Array
 from ..errors import InvalidValueError, UrdfWarning
 from ..model import RobotModel
+from .columns import column, columns
 from .numbers import numbers
 from .source import robot_of
 
@@ -237,9 +238,9 @@ def read(
 
     return read_measurements(
         files[0] if len(files) == 1 else files, arguments.kind, model,
-        joints=_columns(arguments.joints), columns=_columns(arguments.columns),
-        other_joints=_columns(arguments.other_joints),
-        label=None if arguments.label is None else _column(arguments.label),
+        joints=columns(arguments.joints), columns=columns(arguments.columns),
+        other_joints=columns(arguments.other_joints),
+        label=None if arguments.label is None else column(arguments.label),
         lengths=arguments.lengths, angles=arguments.angles, joint_angles=arguments.joint_angles,
         orientation=arguments.orientation, pattern=arguments.pattern,
         delimiter=arguments.delimiter, sigma=_sigma(arguments.sigma), frame=arguments.frame,
@@ -281,15 +282,6 @@ def write(result: CalibrationResult, folder: Path, quiet: bool = False) -> None:
         print(report.split("What was measured", 1)[0].rstrip())
         for name in ("report.txt", "report.html", "result.json", "calibrated.urdf"):
             print(f"wrote {folder / name}")
-
-
-def _column(word: str) -> int | str:
-    """A column by number where the word is one, else by name."""
-    return int(word) if word.lstrip("-").isdecimal() else word
-
-
-def _columns(words: list[str] | None) -> list[int | str] | None:
-    return None if words is None else [_column(word) for word in words]
 
 
 def _sigma(text: str | None) -> float | Array | None:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from .. import __version__
 from ..errors import RobotModelsError
-from . import calibrate, demo, excite, igm, info, listing, view
+from . import calibrate, demo, excite, identify, igm, info, listing, view
 from .numbers import joined
 
 
@@ -39,7 +39,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "table or their URDF.",
     )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for module in (demo, listing, info, igm, calibrate, excite, view):
+    for module in (demo, listing, info, igm, calibrate, excite, identify, view):
         module.add_command(commands)
     parser.add_argument("--version", action="version", version=__version__)
     arguments = parser.parse_args(joined(sys.argv[1:] if argv is None else argv))

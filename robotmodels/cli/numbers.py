@@ -14,6 +14,7 @@ from ..model import RobotModel
 NUMBER_OPTIONS = (
     "--q", "--q-ref", "--xyz", "--rpy", "--matrix", "--mask", "--tolerance", "--arm-angle",
     "--sigma", "--prior", "--velocity", "--acceleration", "--torque-limits", "--box", "--keep-out",
+    "--gears", "--drive-gains", "--signs", "--offsets", "--dead-band",
 )  # fmt: skip
 """Options that take lists of numbers."""
 

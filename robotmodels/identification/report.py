@@ -31,6 +31,7 @@ from .report_parameters import (
 from .validation import Validation
 
 if TYPE_CHECKING:
+    from .consistent_result import ConsistentFit
     from .result import IdentificationResult
 
 _PAIRS = 12
@@ -39,13 +40,15 @@ _MORE = 1.5
 _GOOD_CONDITION = 100.0
 
 
-def report_text(result: IdentificationResult) -> str:
+def report_text(result: IdentificationResult, robot: ConsistentFit | None = None) -> str:
     """All of an identification as text of 100 columns.
 
     Parameters
     ----------
     result : IdentificationResult
         Of `fit`.
+    robot : ConsistentFit, optional
+        Of `consistent_robot`: what it costs is told too.
 
     Returns
     -------
@@ -69,17 +72,21 @@ def report_text(result: IdentificationResult) -> str:
     Dynamic identification of planar_2r
     """
     title = f"Dynamic identification of {result.model.name}"
-    parts = [section.text() for section in report_sections(result)]
+    parts = [section.text() for section in report_sections(result, robot)]
     return "\n\n".join([f"{title}\n{'=' * len(title)}", *parts]) + "\n"
 
 
-def report_sections(result: IdentificationResult) -> tuple[ReportSection, ...]:
+def report_sections(
+    result: IdentificationResult, robot: ConsistentFit | None = None
+) -> tuple[ReportSection, ...]:
     """What the text and the page of a report say.
 
     Parameters
     ----------
     result : IdentificationResult
         Of `fit`.
+    robot : ConsistentFit, optional
+        Of `consistent_robot`.
 
     Returns
     -------
@@ -93,7 +100,7 @@ def report_sections(result: IdentificationResult) -> tuple[ReportSection, ...]:
     found = residual_diagnostics(result.system, result.values)
     parts = (
         _verdict(result, found), _data(result), _processing(result), _errors(result),
-        _parameters(result), _trust(result, found), _notes(result),
+        _parameters(result), _trust(result, found), _real(robot), _notes(result),
     )  # fmt: skip
     return tuple(part for part in parts if part is not None)
 
@@ -421,6 +428,24 @@ def _chance(test: ResidualTest) -> str:
     if np.isnan(test.p):
         return "-"
     return "< 1e-9" if test.p < 1e-9 else f"{test.p:.2g}"
+
+
+def _real(robot: ConsistentFit | None) -> ReportSection | None:
+    if robot is None:
+        return None
+    body: list[str | ReportTable] = [
+        f"{robot.status.sentence} Its residuals are {robot.price:.3g} % more than those of least "
+        f"squares (root of the weighted squares); none has {100.0 * robot.gap:.1g} % less."
+    ]
+    body += [f"* {sentence}" for sentence in robot.active]
+    rows = [
+        (name, number(free), number(real))
+        for name, free, real in zip(
+            robot.names, robot.least_squares, robot.base_values, strict=True
+        )
+    ]
+    body.append(table_of(("base", "least squares", "real robot"), rows))
+    return ReportSection("Robot of real bodies", tuple(body))
 
 
 def _notes(result: IdentificationResult) -> ReportSection | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
+from ..identification.consistent_result import ConsistentFit
 from ..identification.report import report_sections
 from ..identification.result import IdentificationResult
 from ..logs import Log
@@ -24,7 +25,10 @@ from .report_page import write_report
 
 
 def identification_html(
-    result: IdentificationResult, path: str | Path, test: Log | None = None
+    result: IdentificationResult,
+    path: str | Path,
+    test: Log | None = None,
+    robot: ConsistentFit | None = None,
 ) -> None:
     """Write the report on an identification with its figures into one file that needs no network.
 
@@ -36,6 +40,8 @@ def identification_html(
         The HTML file.
     test : Log, optional
         The log that was kept aside, for the figures; the result holds its errors only.
+    robot : ConsistentFit, optional
+        Of `consistent_robot`: what it costs is told too.
 
     Raises
     ------
@@ -105,4 +111,4 @@ def identification_html(
         ),
     ]
     title = f"Dynamic identification of {found.model.name}"
-    write_report(path, title, report_sections(found), figures)
+    write_report(path, title, report_sections(found, robot), figures)

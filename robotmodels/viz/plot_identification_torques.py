@@ -30,7 +30,7 @@ from .plot_envelope import envelope
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_POINTS = 1200
+_POINTS = 700
 """Groups of samples over the length of a log."""
 _MEASURED, _PREDICTED, _LEFT = line_style(3).color, line_style(0).color, line_style(1).color
 _REST = "0.88"
