@@ -16,8 +16,6 @@ _QUIET = 5
 """Lags in a row without correlation, after which there is none."""
 _LEAST = 0.1
 """Variance with all lags, relative to that without them, below which the lags are not used."""
-_STRONGEST = 0.97
-"""Correlation of successive residuals beyond which whitening would divide by next to nothing."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,10 +46,9 @@ def correlated_covariance(
 ) -> CorrelatedCovariance:
     """Covariance of weighted least squares without the assumption that residuals are white.
 
-    The scores of each instant, of all joints together, are whitened by the correlation of
-    successive residuals, summed with those of as many instants around it as the whitened residuals
-    are correlated over (a window that is flat first, then falls), and coloured again. So
-    correlation in time and between joints and variances that change count.
+    The residuals of the joints are taken as stationary: their covariances, between joints and over
+    as many instants as they are correlated, come from the residuals themselves (a window that is
+    flat first, then falls), and the regressor carries them to the parameters.
 
     Parameters
     ----------
@@ -73,70 +70,74 @@ def correlated_covariance(
 
     References
     ----------
-    W. Newey and K. West, "A simple, positive semi-definite, heteroskedasticity and autocorrelation
-    consistent covariance matrix", Econometrica 55(3), 1987 (the sum over lags); D. Andrews and C.
-    Monahan, "An improved heteroskedasticity and autocorrelation consistent covariance matrix
-    estimator", Econometrica 60(4), 1992 (whitening); D. Politis, "Adaptive bandwidth choice",
-    Journal of Nonparametric Statistics 15, 2003 (the window and its length); J. MacKinnon and H.
-    White, "Some heteroskedasticity-consistent covariance matrix estimators with improved finite
-    sample properties", Journal of Econometrics 29, 1985 (the jackknife).
+    D. Cochrane and G. Orcutt, "Application of least squares regression to relationships containing
+    autocorrelated error terms", J. American Statistical Association 44, 1949 (the covariance); D.
+    Politis, "Adaptive bandwidth choice", Journal of Nonparametric Statistics 15, 2003 (the window
+    and its length); J. MacKinnon and H. White, "Some heteroskedasticity-consistent covariance
+    matrix estimators with improved finite sample properties", Journal of Econometrics 29, 1985 (the
+    jackknife).
     """
     b, m = len(values), len(weights)
-    products, count, rows = np.zeros((_MOST + 1, m)), 0, 0
-    last = np.zeros((0, m))
+    products, pairs = np.zeros((2, _MOST + 1, m, m))
+    last, count = np.zeros((2, 0, m)), 0
     for block, e in _residuals(system, values):
-        chain = np.vstack((last, e))
-        for lag in range(min(_MOST + 1, len(chain))):
-            # pairs whose later one is new
-            first = max(len(last), lag)
-            products[lag] += (chain[first:] * chain[first - lag : len(chain) - lag]).sum(axis=0)
-        last = chain[-_MOST:]
+        chain = np.concatenate((last, np.stack((e, block.use))), axis=1)
+        k = last.shape[1]
+        for lag in range(min(_MOST + 1, chain.shape[1])):
+            first = max(k, lag)  # pairs whose later one is new
+            before, now = chain[:, first - lag : chain.shape[1] - lag], chain[:, first:]
+            products[lag] += before[0].T @ now[0]
+            pairs[lag] += before[1].T @ now[1]
+        last = chain[:, -_MOST:]
         count += len(e)
-        rows += int(block.use.sum())
-    correlation = products / np.where(products[0] > 0.0, products[0], 1.0)
-    pooled = products @ weights**2
-    rho, found = _window(pooled, rows)
-    window = _flat_then_falling(found if lags is None else lags, count)
+    own = np.arange(m)
+    size = products[0, own, own]
+    correlation = products[1, own, own] / np.where(size > 0.0, size, 1.0)
+    rows = int(pairs[0, own, own].sum())
+    if lags is None:
+        lags = _correlated(products[:, own, own] @ weights**2, rows)
+    window = _flat_then_falling(lags, count)
+    gamma = products / np.maximum(pairs, 1.0)
     total, straight = np.zeros((b, b)), np.zeros((b, b))
-    last, before = np.zeros((0, b)), np.zeros((0, b))
-    for block, e in _residuals(system, values):
-        scores = np.vstack((last, np.einsum("kjb,kj->kb", block.W, e * weights**2)))
-        last = scores[-1:]
-        white = scores[1:] - rho * scores[:-1]
-        straight += white.T @ white
-        chain = np.vstack((before, white))
+    before = np.zeros((0, m, b))
+    for block in system.blocks():
+        W = block.W * np.where(block.use, weights**2, 0.0)[:, :, None]
+        straight += _carried(W, gamma[0], W)
+        chain = np.concatenate((before, W))
         for lag, share in enumerate(window, start=1):
             first = max(len(before), lag)
             if first < len(chain):
-                part = chain[first - lag : len(chain) - lag].T @ chain[first:]
+                part = _carried(chain[first - lag : len(chain) - lag], gamma[lag], chain[first:])
                 total += share * (part + part.T)
         before = chain[max(len(chain) - len(window), 0) :]
     total = inverse @ (straight + total) @ inverse
     straight = inverse @ straight @ inverse
-    # such a window may give less than nothing where lags are few and noisy
-    poor = np.diag(total) < _LEAST * np.diag(straight)
-    if poor.any():
+    # such a window may give less than nothing where instants are few
+    if (np.diag(total) < _LEAST * np.diag(straight)).any():
         total = straight
-    # one instant less, and residuals that the parameters made smaller, the more so where they have
-    # more to say: as the jackknife does, with the mean leverage
-    factor = count / max(count - 1, 1) * (rows / max(rows - b, 1)) ** 2 / (1.0 - rho) ** 2
-    return CorrelatedCovariance(factor * total, len(window), correlation[1])
+    # residuals that the parameters made smaller, the more so where they have more to say: as the
+    # jackknife does, with the mean leverage
+    factor = (rows / max(rows - b, 1)) ** 2
+    return CorrelatedCovariance(factor * total, len(window), correlation)
 
 
-def _window(pooled: Array, rows: int) -> tuple[float, int]:
-    """Correlation of successive residuals, and lags over which they are when that is taken off."""
+def _carried(before: Array, gamma: Array, now: Array) -> Array:
+    """Sum over instants of ``W_before^T gamma W_now``, shape (b, b)."""
+    b = now.shape[2]
+    mixed = np.matmul(gamma.T, before)
+    return mixed.reshape(-1, b).T @ np.ascontiguousarray(now).reshape(-1, b)
+
+
+def _correlated(pooled: Array, rows: int) -> int:
+    """Lags of the window: twice those over which residuals are correlated."""
     if not pooled[0] > 0.0:
-        return 0.0, 0
-    r = pooled / pooled[0]
-    rho = float(np.clip(r[1], -_STRONGEST, _STRONGEST))
-    around = np.concatenate((r[1:2], r[:-2]))  # of lags -1 to K - 2
-    white = (1.0 + rho**2) * r[:-1] - rho * (around + r[1:])
-    white = np.abs(white / white[0])
+        return 0
+    r = np.abs(pooled / pooled[0])
     bound = 2.0 * np.sqrt(np.log10(max(rows, 10)) / max(rows, 10))
-    for lag in range(len(white) - _QUIET):
-        if (white[lag + 1 : lag + 1 + _QUIET] < bound).all():
-            return rho, 2 * lag
-    return rho, len(white) - 1
+    for lag in range(len(r) - _QUIET):
+        if (r[lag + 1 : lag + 1 + _QUIET] < bound).all():
+            return 2 * lag
+    return len(r) - 1
 
 
 def _flat_then_falling(lags: int, count: int) -> Array:
