@@ -157,6 +157,14 @@ def sandwich(
     CorrelatedCovariance
         Of the parameters.
     """
-    scores = correlated_covariance(system, values, weights, np.eye(len(values)), lags)
-    covariance = inverse @ scores.covariance @ inverse.T
-    return replace(scores, covariance=0.5 * (covariance + covariance.T))
+
+    def turned() -> Iterator[Block]:
+        for block in system.blocks():
+            e = block.y - block.W @ values
+            W = block.W @ inverse.T
+            yield replace(block, W=W, y=W @ values + e)
+
+    spread = correlated_covariance(
+        given(system, turned), values, weights, np.eye(len(values)), lags
+    )
+    return replace(spread, covariance=0.5 * (spread.covariance + spread.covariance.T))
