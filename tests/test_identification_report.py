@@ -1,0 +1,335 @@
+"""What an identification says of itself: residuals, signs, report, files, and the real robot."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import robotmodels as rm
+from robotmodels.errors import InertiaError, InvalidValueError, ShapeError
+from robotmodels.identification import (
+    EquationForm,
+    Log,
+    LogSource,
+    RefusedRows,
+    choose_processing,
+    equations,
+    fit,
+)
+from robotmodels.identification.diagnostics import (
+    not_seen,
+    residual_diagnostics,
+    strong_correlations,
+    understatement,
+    wrong_signs,
+)
+from robotmodels.identification.identified_robot import consistent_robot, prior_bodies
+from robotmodels.identification.report import report_text
+from robotmodels.identification.report_parameters import (
+    intervals,
+    kind_names,
+    kind_units,
+    stands_for,
+)
+from robotmodels.identification.write import log_data, read_estimate, result_data, write_result
+from robotmodels.minimal_parameters import uniform_bodies
+
+DT = 0.005
+
+
+def arm(name="lab_trr", mass=6.0):
+    """A robot with bodies and drives; the first joint of the default slides."""
+    model = rm.load(name)
+    n = model.n
+    drive = rm.DriveParameters(np.full(n, 0.3), np.full(n, 2.0), np.full(n, 1.5), np.zeros(n))
+    return model.with_inertia(uniform_bodies(model, mass)).with_drive(drive)
+
+
+def log_of(model, sigma=0.05, seed=0, seconds=20.0, noise=None, **more):
+    """A motion with exact velocities and accelerations, and noisy torques."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(0.0, seconds, DT)[:, None]
+    w = 2.0 * np.pi * (0.17 + 0.13 * np.arange(model.n))
+    q = v = a = 0.0
+    for k in (1, 2, 3):
+        phase = rng.uniform(0.0, 6.0, model.n)
+        q = q + 0.4 / k * np.sin(k * w * t + phase)
+        v = v + 0.4 * w * np.cos(k * w * t + phase)
+        a = a - 0.4 * k * w**2 * np.sin(k * w * t + phase)
+    tau = rm.idm(model, q, v, a)
+    tau = tau + (sigma * rng.normal(size=tau.shape) if noise is None else noise(rng, tau.shape))
+    return Log(DT, q, tau, v=v, a=a, **more)
+
+
+def raw(log, dead_band=0.0):
+    """No filter and no decimation: residuals are those of the samples."""
+    return choose_processing(log, decimation=1, dead_band=dead_band, filtered=False, edges=0.0)
+
+
+@pytest.fixture(scope="module")
+def found():
+    model = arm()
+    source = LogSource("run.csv", "ab" * 32, 4000)
+    log = log_of(
+        model, names=("lift", "shoulder", "elbow"), sources=[source],
+        refused=[RefusedRows("run.csv", (3, 4, 5, 9), "not a number in column tau1")],
+    )  # fmt: skip
+    return fit(model, log, processing=raw(log), test=log_of(model, seed=1), checked=False)
+
+
+# --- residuals ------------------------------------------------------------------------------------
+
+
+def residuals(system, values):
+    blocks = list(system.blocks())
+    e = np.concatenate([b.y - b.W @ values for b in blocks])
+    return e, np.concatenate([b.use for b in blocks])
+
+
+def test_correlations_and_moments_are_those_of_the_residuals(found):
+    e, _ = residuals(found.system, found.values)
+    seen = residual_diagnostics(found.system, found.values, lags=15)
+    x = e - e.mean(axis=0)
+    N = len(x)
+    for lag in range(16):
+        r = (x[lag:] * x[: N - lag]).sum(axis=0) / (N - lag) / (x * x).mean(axis=0)
+        np.testing.assert_allclose(seen.autocorrelation[:, lag], r, atol=3e-6)
+    s = x / x.std(axis=0)
+    np.testing.assert_allclose(seen.skewness, (s**3).mean(axis=0), atol=1e-10)
+    np.testing.assert_allclose(seen.kurtosis, (s**4).mean(axis=0) - 3.0, atol=1e-10)
+    np.testing.assert_allclose(seen.mean, e.mean(axis=0), atol=1e-12)
+    np.testing.assert_allclose(seen.deviation, e.std(axis=0), rtol=1e-10)
+    rho = (x[1:] * x[:-1]).sum(axis=0) / (x * x).sum(axis=0)
+    one = residual_diagnostics(found.system, found.values, lags=1)
+    Q = N * (N + 2) * rho**2 / (N - 1)  # Ljung and Box over one lag
+    np.testing.assert_allclose([test.statistic for test in one.whiteness], Q, rtol=2e-3, atol=1e-4)
+
+
+def test_gaps_and_recordings_are_no_neighbours():
+    model = arm()
+    log = log_of(model, seconds=10.0)
+    log = Log(DT, log.q, log.tau, v=log.v, a=log.a, starts=[0, 700, 1300])
+    base = rm.base_parameters(model)
+    system = equations(base, log, raw(log, dead_band=0.15))
+    values = 0.9 * base.values(model)  # residuals that last
+    e, use = residuals(system, values)
+    assert 0 < use.sum() < use.size
+    recording = np.searchsorted([700, 1300], np.arange(len(e)), side="right")
+    seen = residual_diagnostics(system, values, lags=5)
+    for j in range(3):
+        mu, gamma = e[use[:, j], j].mean(), e[use[:, j], j].var()
+        for lag in range(1, 6):
+            both = use[lag:, j] & use[:-lag, j] & (recording[lag:] == recording[:-lag])
+            product = ((e[lag:, j] - mu) * (e[:-lag, j] - mu))[both].mean()
+            assert seen.autocorrelation[j, lag] == pytest.approx(product / gamma, abs=1e-9)
+            assert seen.bounds[j, lag] == pytest.approx(1.959964 / np.sqrt(both.sum()))
+
+
+def test_white_normal_residuals_pass_and_others_are_named():
+    model = arm()
+
+    def coloured(rng, shape):
+        e = rng.normal(0.0, 0.05, shape)
+        for k in range(1, len(e)):
+            e[k] += 0.7 * e[k - 1]
+        return e
+
+    def tailed(rng, shape):
+        return rng.laplace(0.0, 0.05, shape)
+
+    for noise, white, normal in (
+        (None, True, True),
+        (coloured, False, True),
+        (tailed, True, False),
+    ):
+        log = log_of(model, noise=noise)
+        base = rm.base_parameters(model)
+        seen = residual_diagnostics(equations(base, log, raw(log)), base.values(model))
+        assert [test.passed for test in seen.whiteness] == [white] * 3
+        assert [test.passed for test in seen.normality] == [normal] * 3
+        if noise is coloured:
+            np.testing.assert_allclose(seen.autocorrelation[:, 1], 0.7, atol=0.05)
+
+
+def test_residuals_that_vanish_and_wrong_arguments(found):
+    model = arm()
+    log = log_of(model, sigma=0.0)
+    base = rm.base_parameters(model)
+    still = Log(DT, np.zeros((200, 3)), np.zeros((200, 3)))
+    seen = residual_diagnostics(equations(base, still, raw(still)), np.zeros(len(base)))
+    assert np.isnan(seen.whiteness[0].p)
+    assert seen.whiteness[0].sentence.startswith("Too few residuals")
+    with pytest.raises(ShapeError, match="one for each of the"):
+        residual_diagnostics(equations(base, log, raw(log)), np.zeros(2))
+    with pytest.raises(InvalidValueError, match="lags"):
+        residual_diagnostics(found.system, found.values, lags=0)
+
+
+# --- parameters -----------------------------------------------------------------------------------
+
+
+def test_a_negative_friction_is_named_with_its_certainty():
+    model = arm()
+    wrong = replace(model.drive, Fv=np.array([2.0, -2.0, 2.0]))
+    log = log_of(model.with_drive(wrong))
+    result = fit(model, log, processing=raw(log), checked=False)
+    joint = int(model.table.joint_rows[1]) + 1
+    signs = {one.name: one for one in wrong_signs(result.base, result.estimate)}
+    assert signs[f"Fv{joint}"].certain
+    assert f"Fv{joint} = -2 is negative" in report_text(result).replace("\n  ", " ")
+    log = log_of(model)
+    good = fit(model, log, processing=raw(log), checked=False)
+    assert not any(one.certain for one in wrong_signs(good.base, good.estimate))
+
+
+def test_lists_of_parameters_agree_with_the_covariance(found):
+    weak = not_seen(found.estimate, 0.01)
+    assert set(weak) == {
+        name
+        for name, ratio in zip(found.names, found.relative_deviations, strict=True)
+        if ratio > 0.01
+    }
+    C = found.estimate.correlation
+    for a, b, c in strong_correlations(found.estimate, 0.5):
+        assert abs(c) > 0.5
+        assert C[found.names.index(a), found.names.index(b)] == c
+    pairs = np.triu(np.abs(C) > 0.5, k=1).sum()
+    assert len(strong_correlations(found.estimate, 0.5)) == pairs > 0
+    np.testing.assert_allclose(understatement(found) * found.white, found.deviations)
+    ends = intervals(found.estimate)
+    np.testing.assert_allclose(ends.mean(axis=1), found.values, atol=1e-12)
+
+
+def test_what_a_parameter_stands_for_fits_and_counts_its_terms():
+    base = rm.base_parameters(rm.load("rx90"))
+    for name, row in zip(base.names, base.matrix, strict=True):
+        text = stands_for(base, name, 29)
+        assert len(text) <= 29
+        assert text.startswith(name)
+        left = int(text.split("... ")[1].split()[0]) if "..." in text else 0
+        shown = text.split(" ...")[0].replace(" - ", " + ").split(" + ")
+        assert len(shown) + left == np.count_nonzero(row)
+
+
+# --- report ---------------------------------------------------------------------------------------
+
+
+def test_the_report_has_all_parameters_units_and_what_was_refused(found):
+    text = report_text(found)
+    assert max(map(len, text.splitlines())) <= 100
+    rows = {}
+    for line in text.split("Parameters\n---")[1].splitlines():
+        cells = [cell.strip() for cell in line.split("│")[1:-1]]
+        if len(cells) == 7:
+            rows[cells[0].removesuffix("R")] = cells
+    for k, name in enumerate(found.names):
+        assert float(rows[name][2]) == pytest.approx(found.values[k], rel=1e-3)
+        assert float(rows[name][3]) == pytest.approx(found.deviations[k], rel=0.06)
+        assert float(rows[name][5]) < found.values[k] < float(rows[name][6])
+    assert "4 rows were refused. run.csv: 4 (rows 3 to 5, 9)" in text
+    assert "abab" * 4 in text
+    assert kind_units(found) == ("N", "N m", "N m")
+    assert "kg │" in text  # rotor inertia of the joint that slides
+    assert "N s/m" in text
+    assert "The parameters carry over" in text
+    alone = replace(found, held_out=None)
+    assert "No log was kept aside" in report_text(alone)
+
+
+def test_a_prediction_worse_than_none_is_said(found):
+    model = found.model
+    log = log_of(model, seed=3)
+    other = Log(DT, log.q, -log.tau, v=log.v, a=log.a)
+    text = report_text(replace(found, held_out=found.validate(other)))
+    assert "farther off than no torque at all" in text
+    assert "carry over to motion" not in text
+
+
+def test_forms_of_the_whole_robot_are_reported_too():
+    model = arm()
+    log = log_of(model)
+    result = fit(model, log, form=EquationForm.POWER, processing=raw(log), checked=False)
+    assert (kind_names(result), kind_units(result)) == (("whole robot",), ("W",))
+    assert "power of all joints together" in report_text(result).replace("\n  ", " ")
+    assert result_data(result)["method"]["form"] == "POWER"
+
+
+# --- files ----------------------------------------------------------------------------------------
+
+
+def test_json_holds_everything_to_the_bit_and_no_nan(found, tmp_path):
+    write_result(found, tmp_path / "result.json")
+
+    def refuse(word):
+        raise AssertionError(word)
+
+    data = json.loads((tmp_path / "result.json").read_text(), parse_constant=refuse)
+    again = read_estimate(tmp_path / "result.json")
+    assert again.names == found.names
+    assert (again.values == found.values).all()
+    assert (again.covariance == found.estimate.covariance).all()
+    assert again.method is found.estimate.method
+    assert again.status is found.estimate.status
+    assert data["processing"]["decimation"] == 1
+    assert data["processing"]["cutoff"] is None
+    assert data["data"]["refused"][0]["rows"] == [3, 4, 5, 9]
+    assert data["data"]["sources"][0]["sha256"] == "ab" * 32
+    assert data["versions"]["numpy"] == np.__version__
+    assert data["errors"]["held_out"]["rmse"] == found.held_out.rmse.tolist()
+
+
+def test_the_hash_is_of_the_numbers_that_were_used():
+    log = log_of(arm())
+    before = log_data(log)["sha256"]
+    same = Log(DT, np.asfortranarray(log.q), log.tau.copy())
+    assert log_data(same)["sha256"] == before
+    tau = log.tau.copy()
+    tau[1234, 1] = np.nextafter(tau[1234, 1], np.inf)
+    assert log_data(Log(DT, log.q, tau))["sha256"] != before
+    assert log_data(log.rows(0, 3999))["sha256"] != before
+
+
+def test_other_files_are_refused(found, tmp_path):
+    with pytest.raises(InvalidValueError, match=r"\.json or \.urdf"):
+        write_result(found, tmp_path / "result.txt")
+    (tmp_path / "other.json").write_text('{"format": 1, "chapter": "calibration"}')
+    with pytest.raises(InvalidValueError, match="expected an identification"):
+        read_estimate(tmp_path / "other.json")
+    (tmp_path / "torn.json").write_text('{"format"')
+    with pytest.raises(InvalidValueError, match="not a result"):
+        read_estimate(tmp_path / "torn.json")
+
+
+@pytest.mark.filterwarnings("ignore::robotmodels.errors.UrdfWarning")
+def test_the_urdf_is_of_real_bodies_and_has_the_torques(found, tmp_path):
+    robot = consistent_robot(found)
+    write_result(found, tmp_path / "robot.urdf", robot)
+    again = rm.RobotModel.from_urdf(tmp_path / "robot.urdf")
+    assert again.inertia.is_physical.all()
+    rng = np.random.default_rng(0)
+    q, v, a = rng.uniform(-0.5, 0.5, (3, 20, 3))
+    whole = robot.of(found.model)
+    np.testing.assert_allclose(
+        rm.idm(again, q, v, a, drive=False), rm.idm(whole, q, v, a, drive=False), atol=1e-8
+    )
+    # and these are those of the robot that moved, to the noise of its log
+    error = rm.idm(whole, q, v, a) - rm.idm(found.model, q, v, a)
+    assert np.abs(error).max() < 0.05
+    text = report_text(found, robot)
+    assert "Robot of real bodies" in text
+    data = result_data(found, robot)["consistent"]
+    assert list(data["base"]) == list(found.names)
+    assert data["price_percent"] == robot.price
+
+
+def test_priors_fill_in_what_a_model_does_not_have():
+    bodies, sentences = prior_bodies(rm.load("tx40"))
+    assert bodies.is_physical.all()
+    assert len(sentences) == 1
+    own = rm.load("tx40").inertia.values
+    assert (bodies.values[:5] == own[:5]).all()
+    assert bodies.values[5, 9] == pytest.approx(own[5, 9])
+    assert prior_bodies(rm.load("rx90")) == (rm.load("rx90").inertia, ())
+    with pytest.raises(InertiaError, match="no masses"):
+        prior_bodies(rm.load("planar_2r"))
