@@ -207,6 +207,20 @@ def compare_methods(
     ----------
     Seed book section 1.6; Q. Leboutet, J. Roux, A. Janot, J. R. Guadarrama-Olvera and G. Cheng,
     "Inertial parameter identification in robotics: a survey", Applied Sciences 11(9), 2021.
+
+    Examples
+    --------
+    >>> from robotmodels.dynamics import idm
+    >>> from robotmodels.identification import Log
+    >>> from robotmodels.robots import load
+    >>> model, t, w = load("rx90"), 0.01 * np.arange(600)[:, None], np.linspace(1.0, 5.0, 6)
+    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
+    >>> log = Log(0.01, q, idm(model, q, v, a), v, a)
+    >>> found = compare_methods(
+    ...     model, log, ("ols", "wls"), ("torque", "filtered"), drive=False, checked=False
+    ... )
+    >>> [row.label for row in found.fits]
+    ['ols', 'wls', 'ols, filtered', 'wls, filtered']
     """
     pairs = list(
         product(

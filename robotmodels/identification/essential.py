@@ -132,6 +132,17 @@ def essential(
     W. Khalil and E. Dombre, "Modeling, Identification and Control of Robots", 2002, section
     12.5; C. Presse and M. Gautier, "Bayesian estimation of inertial parameters of robots", IEEE
     ICRA 1992.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> A = rng.normal(size=(900, 2))
+    >>> y = A @ [2.0, 0.0] + rng.normal(size=900)
+    >>> R = np.linalg.qr(np.column_stack((A, y)), mode="r")
+    >>> reduction = Reduction(("XX1", "XY1"), (R,), np.array([900]), np.array([0]))
+    >>> found = essential(reduction)
+    >>> found.names, found.dropped, bool(found.growth[-1] < 0.01)
+    (('XX1',), ('XY1',), True)
     """
     kind = chosen(EssentialRule, rule, "rule")
     most = float(as_floats(ratio, "ratio"))
@@ -202,6 +213,16 @@ def with_columns(reduction: Reduction, names: tuple[str, ...]) -> Reduction:
     ------
     InvalidValueError
         A name that is not there.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> A = rng.normal(size=(900, 2))
+    >>> y = A @ [2.0, 0.0]
+    >>> R = np.linalg.qr(np.column_stack((A, y)), mode="r")
+    >>> reduction = Reduction(("XX1", "XY1"), (R,), np.array([900]), np.array([0]))
+    >>> with_columns(reduction, ("XY1",)).factors[0].shape
+    (3, 2)
     """
     missing = [name for name in names if name not in reduction.names]
     if missing:

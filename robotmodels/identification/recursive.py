@@ -114,6 +114,22 @@ def recursive(
     ----------
     Seed book section 1.6.4; G. Bierman, "Factorization Methods for Discrete Sequential
     Estimation", Academic Press 1977, chapter V.
+
+    Examples
+    --------
+    >>> from robotmodels.dynamics import idm
+    >>> from robotmodels.identification import Log, choose_processing, equations, reduce_equations
+    >>> from robotmodels.minimal_parameters import base_parameters
+    >>> from robotmodels.robots import load
+    >>> model, t, w = load("rx90"), 0.01 * np.arange(600)[:, None], np.linspace(1.0, 5.0, 6)
+    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
+    >>> log = Log(0.01, q, idm(model, q, v, a), v, a)
+    >>> base = base_parameters(model, drive=False)
+    >>> given = choose_processing(log, filtered=False, decimation=1, edges=0.0, dead_band=0.0)
+    >>> system = equations(base, log, given)
+    >>> found = recursive(system, reduce_equations(system), every=100)
+    >>> len(found.history), bool(np.allclose(found.values, base.values(model)))
+    (6, True)
     """
     factor = float(as_floats(forgetting, "forgetting"))
     if not 0.0 < factor <= 1.0:

@@ -95,6 +95,17 @@ def ridge(
     ----------
     G. Golub, M. Heath and G. Wahba, "Generalized cross-validation as a method for choosing a good
     ridge parameter", Technometrics 21(2), 1979.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> A = rng.normal(size=(900, 2))
+    >>> y = A @ [2.0, -1.0] + rng.normal(size=900)
+    >>> R = np.linalg.qr(np.column_stack((A, y)), mode="r")
+    >>> reduction = Reduction(("XX1", "XY1"), (R,), np.array([900]), np.array([0]))
+    >>> found = ridge(reduction, prior=[0.0, 0.0], deviations=[1.0, 0.001])
+    >>> abs(found.values.round()), round(found.degrees, 1)
+    (array([2., 0.]), 1.0)
     """
     check_count(reduction)
     start = weighted(reduction)
@@ -156,6 +167,21 @@ def segments(system: Equations, count: int = 5) -> tuple[Reduction, ...]:
     ------
     InvalidValueError
         Fewer than two, or more than there are samples.
+
+    Examples
+    --------
+    >>> from robotmodels.dynamics import idm
+    >>> from robotmodels.identification import Log, choose_processing, equations
+    >>> from robotmodels.minimal_parameters import base_parameters
+    >>> from robotmodels.robots import load
+    >>> model, t, w = load("rx90"), 0.01 * np.arange(600)[:, None], np.linspace(1.0, 5.0, 6)
+    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
+    >>> log = Log(0.01, q, idm(model, q, v, a), v, a)
+    >>> base = base_parameters(model, drive=False)
+    >>> given = choose_processing(log, filtered=False, decimation=1, edges=0.0, dead_band=0.0)
+    >>> system = equations(base, log, given)
+    >>> [part.rows for part in segments(system, 3)]
+    [1200, 1200, 1200]
     """
     log = system.log
     if not isinstance(count, (int, np.integer)) or not 2 <= count <= len(log):
@@ -190,6 +216,19 @@ def select_ridge_strength(
     ------
     InvalidValueError, ShapeError
         Fewer than two parts; arrays that do not fit.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> A = rng.normal(size=(900, 2))
+    >>> y = A @ [2.0, -1.0] + rng.normal(size=900)
+    >>> parts = [
+    ...     Reduction(("XX1", "XY1"), (np.column_stack((A, y))[k::3],), np.array([300]), [0])
+    ...     for k in range(3)
+    ... ]
+    >>> right = select_ridge_strength(parts, [2.0, -1.0], [0.1, 0.1]).strength
+    >>> bool(right > select_ridge_strength(parts, [9.0, 9.0], [0.1, 0.1]).strength)
+    True
     """
     if len(parts) < 2:
         raise InvalidValueError(f"parts: expected two or more, got {len(parts)}; see segments.")

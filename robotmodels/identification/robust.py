@@ -143,6 +143,24 @@ def robust(
     P. J. Huber and E. M. Ronchetti, "Robust Statistics", 2nd ed., Wiley 2009, sections 7.6 to 7.8;
     V. Yohai, "High breakdown-point and high efficiency robust estimates for regression", Annals of
     Statistics 15(2), 1987 (the scale that is kept).
+
+    Examples
+    --------
+    >>> from robotmodels.dynamics import idm
+    >>> from robotmodels.identification import Log, choose_processing, equations, reduce_equations
+    >>> from robotmodels.minimal_parameters import base_parameters
+    >>> from robotmodels.robots import load
+    >>> model, t, w = load("rx90"), 0.01 * np.arange(600)[:, None], np.linspace(1.0, 5.0, 6)
+    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
+    >>> tau = idm(model, q, v, a)
+    >>> tau[::20] += 50.0  # one of twenty samples is wrong
+    >>> log = Log(0.01, q, tau, v, a)
+    >>> base = base_parameters(model, drive=False)
+    >>> given = choose_processing(log, filtered=False, decimation=1, edges=0.0, dead_band=0.0)
+    >>> system = equations(base, log, given)
+    >>> found = robust(system, reduce_equations(system), "tukey")
+    >>> found.outliers.counts, bool(np.allclose(found.values, base.values(model)))
+    (array([30, 30, 30, 30, 30, 30]), True)
     """
     kind = chosen(Loss, loss, "loss")
     check_count(reduction)

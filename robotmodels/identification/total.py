@@ -103,6 +103,16 @@ def total(reduction: Reduction, noise: ArrayLike = 0.001) -> TotalEstimate:
     3.5 (mixed problems); W. Fuller, "Measurement Error Models", Wiley 1987, section 2.3
     (covariance); M. Gautier, P.-O. Vandanjon and C. Presse, "Identification of inertial and drive
     gain parameters of robots", IEEE CDC 1994.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> A = rng.normal(size=(900, 2))
+    >>> y = A @ [2.0, -1.0] + 0.02 * rng.normal(size=900)
+    >>> R = np.linalg.qr(np.column_stack((A + 0.4 * rng.normal(size=A.shape), y)), mode="r")
+    >>> reduction = Reduction(("XX1", "XY1"), (R,), np.array([900]), np.array([0]))
+    >>> weighted(reduction).values.round(1), total(reduction, [0.4, 0.4, 0.02]).values.round(1)
+    (array([ 1.7, -0.9]), array([ 2., -1.]))
     """
     check_count(reduction)
     start = weighted(reduction)
