@@ -113,7 +113,7 @@ def test_no_curve_is_said():
 @pytest.mark.parametrize("name", ["planar_2r", "tx40"])
 def test_an_exact_log_gives_the_exact_friction_by_load(name):
     model = robot(name)
-    moved = motion(model.n, 3000)
+    moved = motion(model.n, 2000)
     Fl = np.linspace(0.05, 0.2, model.n)
     more = LoadFriction(Fl).under_load(moved[1], carried(model, moved))
     log = logged(model, moved, more)
@@ -126,9 +126,9 @@ def test_an_exact_log_gives_the_exact_friction_by_load(name):
 
 def test_friction_by_load_in_noise():
     model = robot()
-    moved = motion(2, 3000, size=1.0)
+    moved = motion(2, 2000, size=1.0)
     more = LoadFriction([0.1, 0.0]).under_load(moved[1], carried(model, moved))
-    for seed in range(6):
+    for seed in range(4):
         log = logged(model, moved, more, 0.2, seed)
         found = fit_load_friction(model, log, processing=raw(log, 3))
         assert found.seen.tolist() == [True, False]

@@ -14,8 +14,9 @@ from ..inertia import PARAMETERS
 from ..logs import Log
 from ..minimal_parameters import BaseParameters
 from ..model import RobotModel, check_model
-from .equations import equations
+from .equations import Equations, equations
 from .friction_curves import (
+    Fitted,
     OwnColumns,
     OwnEquations,
     chosen_factors,
@@ -31,6 +32,8 @@ _STILL = 1e-10
 _SMALL = 1e-3
 """Step relative to the deviations."""
 _SURE = 3.0
+_STARTS = (0.0, 0.1)
+_HELD = 3
 
 
 class LoadFrictionStatus(Outcome):
@@ -141,7 +144,44 @@ def fit_load_friction(
     one = np.zeros((n, 1), dtype=np.int64)
     start = OwnEquations(system, _loads(links, np.zeros(b)), 1).reduced()
     sigma = own_noise(start)
-    theta = fitted(chosen_factors(start, b, one), sigma).values
+    plain = fitted(chosen_factors(start, b, one), sigma).values
+    # where a load does not change its sign, there may be a second, worse minimum
+    ways = []
+    for first in _STARTS:
+        theta = np.concatenate((plain[:b], np.full(n, first)))
+        for _ in range(_HELD if first else 0):
+            # the other parameters come to terms with this friction before it may move
+            tangents = _tangents(links, theta[:b], theta[b:])
+            fixed = OwnEquations(system, tangents, 1).reduced()
+            theta[:b] = fitted(chosen_factors(fixed, b, one - 1), sigma).values[:b]
+        ways.append(_descended(system, links, theta, sigma))
+    best = min(ways, key=lambda way: way.likelihood)
+    covariance = own_covariance(best.equations, best.found, best.theta, best.sigma)
+    deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    Fl = best.theta[b:]
+    return LoadFrictionFit(
+        base, best.theta[:b], deviations[:b], Fl, deviations[b:], Fl > _SURE * deviations[b:],
+        np.sqrt(best.found.sums / np.maximum(start.counts, 1)), best.iterations, best.status,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Way:
+    """Where Gauss-Newton ended from one start."""
+
+    theta: Array
+    found: Fitted
+    equations: OwnEquations
+    sigma: Array
+    likelihood: float
+    iterations: int
+    status: LoadFrictionStatus
+
+
+def _descended(system: Equations, links: NDArray[np.bool_], theta: Array, sigma: Array) -> _Way:
+    """Gauss-Newton whose steps are halved until they improve the fit."""
+    n, b = system.model.n, len(system.names)
+    one = np.zeros((n, 1), dtype=np.int64)
     status, iterations, settled = LoadFrictionStatus.NOT_CONVERGED, 0, False
     before, cost, held, size = theta, np.inf, False, np.zeros(len(theta))
     while True:
@@ -172,16 +212,11 @@ def fit_load_friction(
         if iterations == _ITERATIONS:
             break
         before, cost, theta = theta, now, found.values
-    last = theta[b:]
+    local = OwnEquations(system, columns, 1, theta[b:, None], spread=True)
     theta = theta if held else found.values
-    values, Fl = theta[:b], theta[b:]
-    local = OwnEquations(system, columns, 1, last[:, None], spread=True)
-    covariance = own_covariance(local, found, theta, sigma)
-    deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    return LoadFrictionFit(
-        base, values, deviations[:b], Fl, deviations[b:], Fl > _SURE * deviations[b:],
-        np.sqrt(found.sums / np.maximum(reduced.counts, 1)), iterations, status,
-    )  # fmt: skip
+    counts = np.maximum(reduced.counts, 1)
+    likelihood = float(counts @ np.log(np.maximum(found.sums / counts, 1e-300)))
+    return _Way(theta, found, local, sigma, likelihood, iterations, status)
 
 
 def _links(base: BaseParameters) -> NDArray[np.bool_]:

@@ -324,5 +324,6 @@ def _refined(
     return StribeckFit(
         system.base, found.values[:b], deviations[:b], drop, np.where(seen, vs, np.nan), exponent,
         np.where(seen, deviations[b::2], np.nan),
-        np.where(seen, vs * deviations[b + 1 :: 2], np.nan), p_value, seen, np.sqrt(found.sums / np.maximum(reduced.counts, 1)), iterations, status,
+        np.where(seen, vs * deviations[b + 1 :: 2], np.nan), p_value, seen,
+        np.sqrt(found.sums / np.maximum(reduced.counts, 1)), iterations, status,
     )  # fmt: skip
