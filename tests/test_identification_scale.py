@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+import tracemalloc
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import replace
 from functools import cache
@@ -334,3 +335,18 @@ def test_logs_that_do_not_belong_together_are_refused():
         reduce_equations([first, system(name="rx90", decimation=25)])
     with pytest.raises(InvalidValueError, match="got none"):
         reduce_equations([])
+
+
+def test_memory_is_that_of_a_piece_whatever_the_length():
+    base = base_parameters(rm.load("planar_2r"), drive=("Fv", "Fc"))
+    whole = system()
+    peaks = []
+    for repeats in (2, 12):
+        logs = (
+            equations(base, whole.log.rows(0, 40_000), whole.processing) for _ in range(repeats)
+        )
+        tracemalloc.start()
+        reduce_equations(logs)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < 1.02 * peaks[0]

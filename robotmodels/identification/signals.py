@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
+from functools import lru_cache
 
 import numpy as np
 
@@ -19,6 +20,7 @@ _INSTANTS = 4096
 """Instants whose equations a piece makes at most, since all of them are held at a time."""
 _BESIDE = 16
 """Samples beside the decimation's window that some forms of the equations look at."""
+_settling = lru_cache(maxsize=64)(settling)  # asked for each piece of each pass
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -206,5 +208,5 @@ def _looked_at(
     # the filter forgets what is farther away; differences look a few samples further
     margin = 2 * processing.accuracy
     if processing.cutoff is not None:
-        margin += settling(processing.cutoff, log.dt, processing.order)
+        margin += _settling(processing.cutoff, log.dt, processing.order)
     return first, last, max(first - margin, piece.begin), min(last + margin, piece.end)
