@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from identification_logs import clean_log, odd_robots
 
+import robotmodels as rm
 from robotmodels.errors import InvalidValueError
 from robotmodels.identification import (
     choose_processing,
@@ -95,3 +96,25 @@ def test_choices_that_make_no_sense():
         with_columns(reduction, ("XX9",))
     one = with_columns(reduction, ("XX1",))
     assert essential(one).names == ("XX1",)
+
+
+# Essential parameters of the TX40's log as they were published with it (FIGAROH, file of 25
+# essential parameters, ratio of relative deviations), by their standard names.
+# fmt: off
+PUBLISHED = {
+    "ZZ1", "Fv1", "Fc1", "XX2", "XZ2", "ZZ2", "MX2", "Fv2", "Fc2", "XX3", "ZZ3", "MY3", "Ia3",
+    "Fv3", "Fc3", "Ia4", "Fv4", "Fc4", "MY5", "Ia5", "Fv5", "Fc5", "Fv6", "Fvm6", "Fcm6",
+}
+# fmt: on
+
+
+def test_the_published_essential_parameters_of_a_real_robot_are_found():
+    data = rm.datasets.load_tx40()
+    system = equations(base_parameters(data.model), data.log, choose_processing(data.log))
+    reduction = reduce_equations(system)
+    found = essential(reduction, growth=1e9)
+    # the rotor of the last motor is a column of its own here
+    assert set(found.names) == PUBLISHED | {"Ia6", "Iam6"}
+    assert found.ratio[-1] <= 30.0 < found.ratio[-2]
+    assert 0.03 < found.growth[-1] < 0.1
+    assert essential(reduction).names == found.names
