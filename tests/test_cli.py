@@ -12,6 +12,7 @@ import robotmodels as rm
 from robotmodels import se3
 from robotmodels.cli import main
 from robotmodels.cli.numbers import joined, numbers
+from robotmodels.minimal_parameters import uniform_bodies
 
 POINT = ["--mask", "1", "1", "1", "0", "0", "0"]
 
@@ -401,3 +402,121 @@ def test_help_of_calibrate_shows_examples(run):
     code, out, _ = run("calibrate", "--help")
     assert code == 0
     assert out.count("robotmodels calibrate --robot") >= 3
+
+
+# --- identify -------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def motion(tmp_path_factory):
+    """A log of two joints in degrees, torques in a file of their own, and the robot it is of."""
+    rng = np.random.default_rng(0)
+    n, dt = 2, 0.002
+    real = rm.load("planar_2r")
+    real = real.with_inertia(uniform_bodies(real, 6.0)).with_drive(
+        rm.DriveParameters(*(np.full(n, x) for x in (0.4, 3.0, 2.0, 0.5)))
+    )
+    t = np.arange(0.0, 16.0, dt)[:, None]
+    q = v = a = 0.0
+    for k in (1, 2, 3):
+        w, phase = 2.0 * np.pi * k * (0.15 + 0.05 * np.arange(n)), rng.uniform(0.0, 6.0, n)
+        q = q + 0.4 / k * np.sin(w * t + phase)
+        v, a = v + 0.4 / k * w * np.cos(w * t + phase), a - 0.4 / k * w**2 * np.sin(w * t + phase)
+    tau = rm.idm(real, q, v, a) + 0.05 * rng.normal(size=q.shape)
+    folder = tmp_path_factory.mktemp("motion")
+    for name, values in (("q", np.degrees(q)), ("tau", tau)):
+        header = ",".join(f"{name}{j + 1}" for j in range(n))
+        np.savetxt(folder / f"{name}.csv", values, delimiter=",", header=header, comments="")
+    return folder, real
+
+
+def identify(folder):
+    return ["identify", "--robot", "planar_2r", "--log", folder / "q.csv", "--torques-from",
+            folder / "tau.csv", "--dt", "2e-3", "--angles", "deg"]  # fmt: skip
+
+
+def test_identify_writes_a_report_and_a_robot(run, motion, tmp_path):
+    folder, real = motion
+    out_folder = tmp_path / "new" / "report"
+    words = [*identify(folder), "--test-share", "0.25", "--prior", "5"]
+    code, out, err = run(*words, "--workers", "2", "--out", out_folder)
+    assert code == 0
+    assert "The parameters carry over" in out
+    assert "A URDF has no place for" in err
+    names = {"report.txt", "report.html", "result.json", "identified.urdf"}
+    assert {path.name for path in out_folder.iterdir()} == names
+    data = json.loads((out_folder / "result.json").read_text())
+    base = rm.base_parameters(real)
+    expected = dict(zip(base.names, base.values(real), strict=True))
+    for one in data["parameters"]:
+        assert abs(one["value"] - expected[one["name"]]) < 5.0 * one["std"] + 1e-3
+    assert data["data"]["samples"] == 6000
+    assert data["errors"]["held_out"]["samples"] == 2000 - 2 * data["processing"]["edges"]
+    robot = rm.RobotModel.from_urdf(out_folder / "identified.urdf")
+    q, v, a = np.random.default_rng(1).uniform(-0.5, 0.5, (3, 20, 2))
+    missed = rm.idm(robot, q, v, a, drive=False) - rm.idm(real, q, v, a, drive=False)
+    assert np.abs(missed).max() < 0.1
+    # one process gives the same bits, and JSON what the file has
+    code, out, _ = run(*words, "--consistent", "--json")
+    assert code == 0
+    assert json.loads(out) == data
+    code, out, _ = run(*words, "--consistent")
+    assert (code, out) == (0, (out_folder / "report.txt").read_text())
+
+
+def test_identify_takes_choices_and_files_that_only_test(run, motion):
+    folder, _ = motion
+    words = [*identify(folder), "--test", folder / "q.csv", "--test-torques-from",
+             folder / "tau.csv", "--rows", "0", "4000", "--method", "ols", "--cutoff", "30",
+             "--decimation", "10", "--dead-band", "0.05", "--edges", "0.2", "--drive", "Fv", "Fc",
+             "--delay", "0.004", "--json"]  # fmt: skip
+    code, out, _ = run(*words)
+    data = json.loads(out)
+    assert code == 0
+    assert data["method"]["name"] == "OLS"
+    assert data["method"]["drive"] == ["Fv", "Fc"]
+    chosen = data["processing"]
+    assert (chosen["cutoff"], chosen["decimation"], chosen["edges"]) == (30.0, 10, 100)
+    assert chosen["dead_band"] == [0.05] * 2
+    assert data["data"]["delay"] == 0.004
+    assert data["data"]["samples"] == 4000
+    assert data["errors"]["held_out"]["samples"] == 7998 - 200
+
+
+def test_choices_of_identify_are_those_of_the_package():
+    from robotmodels.cli import identify as command
+    from robotmodels.identification import EquationForm, Method
+
+    assert set(command.METHODS) == {method.name.lower() for method in Method}
+    assert set(command.FORMS) == {form.name.lower() for form in EquationForm}
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--test-share", "2"], "expected a part of 1"),
+        (["--test-share", "0.2", "--test-rows", "0", "10"], "give one of them"),
+        (["--test-rows", "0", "10"], "say with --rows"),
+        (["--test-torques-from", "x.csv"], "belongs to --test"),
+        (["--motor-side"], "no transmission"),
+        (["--motor-side", "--gears", "100"], "give one of them"),
+        (["--gears", "1", "2", "3"], "--gears: expected 1 or 2 finite numbers"),
+        (["--workers", "0"], "--workers"),
+        (["--positions", "nothing*"], "nothing"),
+        (["--cutoff", "1e6"], "half the sampling rate"),
+        (["--prior", "rx90"], "has 6 links, the robot 2"),
+        (["--consistent"], "has no masses"),
+        (["--log", "missing.csv"], "missing.csv"),
+    ],
+)
+def test_wrong_arguments_of_identify(run, motion, words, message):
+    code, out, err = run(*identify(motion[0]), *words)
+    assert (code, out) == (2, "")
+    assert message in err
+    assert err.count("\n") == 1
+
+
+def test_help_of_identify_shows_examples(run):
+    code, out, _ = run("identify", "--help")
+    assert code == 0
+    assert out.count("robotmodels identify --robot") >= 3

@@ -141,7 +141,7 @@ def _add_fit(fitted: Any) -> None:
     fitted.add_argument("--cutoff", type=float, metavar="HZ",
                         help="-3 dB of the positions' low-pass; default by the log")  # fmt: skip
     fitted.add_argument("--decimation", type=int, metavar="N",
-                        help="samples for an equation; default by the log, 1 keeps all")  # fmt: skip
+                        help="samples for an equation; default by the log, 1: all")  # fmt: skip
     fitted.add_argument("--dead-band", metavar="NUMBERS",
                         help="velocities (rad/s, m/s) below which a joint's equations are left "
                         "out")  # fmt: skip
@@ -152,10 +152,10 @@ def _add_fit(fitted: Any) -> None:
     fitted.add_argument("--consistent", action="store_true",
                         help="tell what real bodies and drives cost (as --out does)")  # fmt: skip
     fitted.add_argument("--prior", metavar="ROBOT",
-                        help="what decides what the torques do not: a robot, or the mass in kg of "
-                        "one of uniform bodies; default the robot's inertia")  # fmt: skip
+                        help="what decides what the torques do not: a robot, or the mass in "
+                        "kg of one of uniform bodies; default its own inertia")  # fmt: skip
     fitted.add_argument("--workers", type=int, default=1, metavar="N",
-                        help="processes (default: %(default)s); the result is the same")  # fmt: skip
+                        help="processes (default: %(default)s), with the same result")  # fmt: skip
 
 
 def run(arguments: argparse.Namespace) -> int:

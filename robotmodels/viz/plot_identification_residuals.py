@@ -102,6 +102,7 @@ def plot_identification_residuals(
         right.axhline(0.0, color=PALE, linewidth=0.6, zorder=1.2)
         right.vlines(lag, 0.0, rho, color=color, linewidth=1.2)
         right.set_ylim(-1.05, 1.05)
+        right.set_xlim(0.0, 1.03 * float(lag[-1]))
         if j == 0:
             right.set_title("autocorrelation", loc="left", size=SMALL_SIZE, color=INK, pad=2.0)
     grid[-1, 0].set_xlabel("time (s)")
