@@ -180,7 +180,8 @@ def test_exact_parameters_from_a_log_without_noise(kind, method):
 
 
 @pytest.mark.parametrize(
-    ("kind", "output"), [("rx90", "torque"), ("prismatic", "both"), ("tree", "torque"), ("tx40", "torque"),
+    ("kind", "output"), [("rx90", "torque"), ("prismatic", "both"), ("tree", "torque"),
+    ("tx40", "torque"),
                      ("prismatic", "position")])  # fmt: skip
 def test_output_error_recovers_exact_parameters(kind, output):
     arm, control, log, width = recorded(kind, 1.2, 4e-3, substeps=2)

@@ -1,0 +1,98 @@
+"""Noise of the positions: least squares are biased and the test says so; the others are not."""
+
+import numpy as np
+
+import robotmodels as rm
+from robotmodels.drive import DriveParameters
+from robotmodels.identification import (
+    Log,
+    central_differences,
+    choose_processing,
+    equations,
+    ordinary,
+    reduce_equations,
+)
+from robotmodels.identification.closed_loop import (
+    closed_loop,
+    didim,
+    hausman_test,
+    instrumental,
+    simulated_log,
+    tuned_controller,
+)
+from robotmodels.inertia import InertialParameters
+
+DT = 2e-3
+WIDTH = 0.01
+
+
+def arm():
+    bodies = InertialParameters.from_com(
+        [3.0, 2.0], [[0.3, 0.02, 0.0], [0.2, 0.01, 0.0]],
+        [np.diag([0.02, 0.1, 0.1]), np.diag([0.01, 0.05, 0.05])],
+    )  # fmt: skip
+    drive = DriveParameters(Ia=[0.1, 0.05], Fv=[1.0, 0.5], Fc=[0.8, 0.4], offset=[0.1, -0.1])
+    return rm.load("planar_2r").with_inertia(bodies).with_drive(drive)
+
+
+def recorded():
+    """Log without noise, and the controller."""
+    rng = np.random.default_rng(0)
+    t = np.arange(0.0, 3.0, DT)[:, None]
+    q, v = np.zeros((len(t), 2)), np.zeros((len(t), 2))
+    for k in range(1, 6):
+        w = np.pi * k
+        c, p = rng.normal(size=2) * 0.7 / k, rng.uniform(0.0, 6.0, 2)
+        q += c * np.sin(w * t + p)
+        v += c * w * np.cos(w * t + p)
+    control = tuned_controller(arm(), q, 8.0, period=DT, feed_forward=False)
+    return control, simulated_log(arm(), control, q, v, DT, width=WIDTH)
+
+
+def studied(count, position, torque, decimation, methods):
+    """Errors in deviations, by method, and probabilities of the test, of so many noisy logs."""
+    control, exact = recorded()
+    base = rm.base_parameters(arm(), drive=True)
+    truth = base.values(arm())
+    rng = np.random.default_rng(1)
+    errors, chances = [], []
+    for _ in range(count):
+        e = position * rng.normal(size=exact.q.shape)
+        de = central_differences(e, DT)
+        log = Log(
+            DT, exact.q + e, exact.tau + torque * rng.normal(size=e.shape), exact.v + de,
+            exact.a + central_differences(de, DT), exact.q_ref, exact.v_ref,
+        )  # fmt: skip
+        choices = choose_processing(
+            log, decimation=decimation, dead_band=0.05, edges=0.0, filtered=False
+        )
+        system = equations(base, log, choices)
+        reduction = reduce_equations(system)
+        loop = closed_loop(system, 1.1 * truth, control, width=WIDTH)
+        both = [m(system, reduction, start=1.1 * truth, loop=loop, lags=0)
+                for m in methods]  # fmt: skip
+        found = (ordinary(reduction), *both)
+        errors.append([(one.values - truth) / one.deviations for one in found])
+        verdict = hausman_test(system, both[0], lags=0)
+        chances.append(verdict.p)
+    return np.array(errors), np.array(chances)
+
+
+def test_differentiated_noise_biases_least_squares_alone_and_the_test_says_so():
+    count = 8
+    errors, chances = studied(count, 1e-4, 0.5, 1, (instrumental, didim))
+    z = errors.mean(axis=0) * np.sqrt(count)  # of order one where nothing is biased
+    assert np.abs(z[0]).max() > 6.0
+    assert np.abs(z[1:]).max() < 4.0
+    assert (chances < 1e-3).all()
+
+
+def test_without_noise_of_positions_the_test_rejects_as_often_as_asked():
+    count = 30
+    errors, chances = studied(count, 0.0, 0.5, 10, (instrumental,))
+    inside = (np.abs(errors) < 1.96).mean(axis=(0, 2))
+    print(inside, (chances < 0.05).mean(), np.histogram(chances, 5, (0, 1))[0])
+    assert (inside > 0.9).all()
+    # 5 % of 30: 1.5, its deviation 1.2
+    assert (chances < 0.05).mean() <= 0.17
+    assert 0.25 < np.median(chances) < 0.75
