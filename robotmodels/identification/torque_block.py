@@ -99,7 +99,7 @@ class _Thinned:
         """Add rows ``(k, m, c)`` that follow those before; ``use (k, m)``."""
         from ..kernels.decimation import add_rows
 
-        seen = rows.any(axis=0)
+        seen = np.any(rows, axis=0, keepdims=True)[0]
         # columns of links and drives before the joint are zero
         start = np.where(seen.any(axis=1), seen.argmax(axis=1), rows.shape[2]).astype(np.int64)
         add_rows(
