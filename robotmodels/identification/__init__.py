@@ -16,12 +16,38 @@ from ..logs import (
     read_log,
     with_delay,
 )
+from .closed_loop import (
+    ClosedLoop,
+    Controller,
+    HausmanResult,
+    Output,
+    SimulatedEstimate,
+    closed_loop,
+    didim,
+    hausman_test,
+    instrumental,
+    output_error,
+    simulated_log,
+    tuned_controller,
+)
+from .comparison import ComparedFit, MethodComparison, compare_methods
 from .consistent import fit_consistent
 from .consistent_bounds import CentreBound, CentreBox, CentreEllipsoid
 from .consistent_result import ConsistentFit, ConsistentStatus
 from .consistent_urdf import UrdfParity, urdf_parity
 from .correlated import CorrelatedCovariance, correlated_covariance
+from .diagnostics import (
+    ResidualDiagnostics,
+    WrongSign,
+    not_seen,
+    residual_diagnostics,
+    strong_correlations,
+    understatement,
+    wrong_signs,
+)
+from .drive_gains import DriveGains, GainMethod, GainStatus, identify_drive_gains
 from .equations import Block, EquationForm, Equations, equations
+from .essential import Essential, EssentialRule, essential
 from .estimate import Estimate, EstimateStatus, Method
 from .excitation import (
     ExcitationCriterion,
@@ -41,26 +67,46 @@ from .excitation import (
 )
 from .filters import central_differences, decimation_window, zero_phase
 from .fit import fit
+from .friction_comparison import FrictionComparison, FrictionForm, compare_friction
+from .identified_robot import consistent_robot, prior_bodies
 from .joint_checks import check_joints
+from .known_payload import KnownPayload, LoadedLog
 from .least_squares import ordinary, reweighted, weighted
+from .load_friction import LoadFrictionFit, LoadFrictionStatus, fit_load_friction
+from .many_robots import reduce_many
+from .payload import PayloadEstimate, PayloadStatus, identify_payload
 from .prediction import predicted_torque
 from .processing import Processing, choose_processing
+from .recursive import RecursiveEstimate, RecursiveHistory, recursive
 from .reduction import Reduction, reduce_equations
+from .report import report_text
 from .result import IdentificationResult
+from .ridge import RidgeEstimate, ridge, segments, select_ridge_strength
+from .robust import Outliers, RobustEstimate, robust
+from .sequential import SequentialEstimate, SequentialStep, sequential
 from .signals import Signals, signals
+from .stribeck import StribeckFit, StribeckStatus, fit_stribeck
 from .synchronisation import Synchronisation, SynchronisationStatus, synchronisation
+from .total import TotalEstimate, TotalStatus, total
 from .validation import Validation, validate
+from .write import read_estimate, write_result
 
 __all__ = [
     "Block",
     "CentreBound",
     "CentreBox",
     "CentreEllipsoid",
+    "ClosedLoop",
+    "ComparedFit",
     "ConsistentFit",
     "ConsistentStatus",
+    "Controller",
     "CorrelatedCovariance",
+    "DriveGains",
     "EquationForm",
     "Equations",
+    "Essential",
+    "EssentialRule",
     "Estimate",
     "EstimateStatus",
     "ExcitationCriterion",
@@ -70,49 +116,108 @@ __all__ = [
     "ExcitationStatus",
     "ExcitingTrajectory",
     "FindingKind",
+    "FrictionComparison",
+    "FrictionForm",
+    "GainMethod",
+    "GainStatus",
+    "HausmanResult",
     "IdentificationResult",
+    "KnownPayload",
+    "LoadFrictionFit",
+    "LoadFrictionStatus",
+    "LoadedLog",
     "Log",
     "LogFinding",
     "LogFormat",
     "LogSource",
     "Method",
+    "MethodComparison",
     "MotionBasis",
     "MotionKind",
+    "Outliers",
+    "Output",
+    "PayloadEstimate",
+    "PayloadStatus",
     "Processing",
+    "RecursiveEstimate",
+    "RecursiveHistory",
     "Reduction",
     "RefusedRows",
+    "ResidualDiagnostics",
+    "RidgeEstimate",
+    "RobustEstimate",
+    "SequentialEstimate",
+    "SequentialStep",
     "Severity",
     "Signals",
+    "SimulatedEstimate",
+    "StribeckFit",
+    "StribeckStatus",
     "Synchronisation",
     "SynchronisationStatus",
+    "TotalEstimate",
+    "TotalStatus",
     "UrdfParity",
     "Validation",
     "WorkspaceBox",
+    "WrongSign",
     "central_differences",
     "check_joints",
     "check_log",
     "choose_processing",
+    "closed_loop",
+    "compare_friction",
+    "compare_methods",
+    "consistent_robot",
     "correlated_covariance",
     "decimation_window",
+    "didim",
     "equations",
+    "essential",
     "excitation_limits",
     "exciting_trajectory",
     "fit",
     "fit_consistent",
+    "fit_load_friction",
+    "fit_stribeck",
+    "hausman_test",
+    "identify_drive_gains",
+    "identify_payload",
+    "instrumental",
     "join_logs",
+    "not_seen",
     "ordinary",
+    "output_error",
     "predicted_torque",
+    "prior_bodies",
     "read_coefficients",
+    "read_estimate",
     "read_log",
+    "recursive",
     "reduce_equations",
+    "reduce_many",
+    "report_text",
+    "residual_diagnostics",
     "reweighted",
+    "ridge",
+    "robust",
+    "segments",
+    "select_ridge_strength",
+    "sequential",
     "signals",
+    "simulated_log",
+    "strong_correlations",
     "synchronisation",
+    "total",
+    "tuned_controller",
+    "understatement",
     "urdf_parity",
     "validate",
     "weighted",
     "with_delay",
     "write_coefficients",
+    "write_result",
     "write_trajectory",
+    "wrong_signs",
     "zero_phase",
 ]

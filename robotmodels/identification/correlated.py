@@ -104,11 +104,17 @@ def correlated_covariance(
         W = block.W * np.where(block.use, weights**2, 0.0)[:, :, None]
         straight += _carried(W, gamma[0], W)
         chain = np.concatenate((before, W))
+        k = len(before)
+        # what residuals of the instants before carry to each row, all lags together
+        flat = np.ascontiguousarray(chain.transpose(1, 0, 2)).reshape(m, -1)
+        carried = np.zeros((m, len(W) * b))
         for lag, share in enumerate(window, start=1):
-            first = max(len(before), lag)
+            first = max(k, lag)
             if first < len(chain):
-                part = _carried(chain[first - lag : len(chain) - lag], gamma[lag], chain[first:])
-                total += share * (part + part.T)
+                then = flat[:, (first - lag) * b : (len(chain) - lag) * b]
+                carried[:, (first - k) * b :] += (share * gamma[lag].T) @ then
+        part = carried.reshape(-1, b).T @ flat[:, k * b :].reshape(-1, b)
+        total += part + part.T
         before = chain[max(len(chain) - len(window), 0) :]
     total = inverse @ (straight + total) @ inverse
     straight = inverse @ straight @ inverse
@@ -136,7 +142,7 @@ def _correlated(pooled: Array, rows: int) -> int:
     bound = 2.0 * np.sqrt(np.log10(max(rows, 10)) / max(rows, 10))
     for lag in range(len(r) - _QUIET):
         if (r[lag + 1 : lag + 1 + _QUIET] < bound).all():
-            return 2 * lag
+            return min(2 * lag, _MOST)  # no covariances are known beyond
     return len(r) - 1
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,16 +18,26 @@ from ..friction import Friction
 from ..logs import Log, Severity, check_log
 from ..minimal_parameters import BaseParameters, base_parameters
 from ..model import RobotModel, check_model
+from .closed_loop.estimate import SimulatedEstimate
 from .correlated import correlated_covariance
 from .equations import EquationForm, Equations, equations
-from .estimate import Estimate, Method
+from .essential import EssentialRule, with_columns
+from .essential import essential as essential_parameters
+from .estimate import Method
 from .joint_checks import check_joints
-from .least_squares import ordinary, reweighted, solved, weighted, weights_of
+from .least_squares import solved, used_weights
 from .processing import Processing, choose_processing
 from .reduction import Reduction, reduce_equations
 from .result import IdentificationResult
+from .solving import MethodOptions, solve
 from .validation import validate
 
+if TYPE_CHECKING:
+    from ..estimation import Loss
+    from .closed_loop import ClosedLoop, Controller, Output
+
+_LINEAR = (Method.OLS, Method.WLS, Method.IRLS)
+"""Methods whose covariance is formed here, for correlated residuals."""
 _NOTHING = 1e-7
 """Length of a column relative to the longest, below which the log does not show it."""
 
@@ -45,6 +56,17 @@ def fit(
     decimation: int | None = None,
     dead_band: ArrayLike | None = None,
     edges: float | None = None,
+    loss: Loss | str | None = None,
+    prior: RobotModel | ArrayLike | None = None,
+    prior_deviations: ArrayLike | None = None,
+    strength: float | None = None,
+    noise: ArrayLike | None = None,
+    forgetting: float | None = None,
+    controller: Controller | None = None,
+    loop: ClosedLoop | None = None,
+    start: ArrayLike | None = None,
+    output: Output | str | None = None,
+    essential: bool | float | EssentialRule | str = False,
     test: Log | None = None,
     checked: bool = True,
     executor: Executor | None = None,
@@ -72,6 +94,22 @@ def fit(
         All choices of the signal processing; instead of them single ones:
     cutoff, decimation, dead_band, edges
         As for `choose_processing`; default what the log suggests.
+    loss
+        Of method "robust": "huber" (default), "cauchy" or "tukey".
+    prior, prior_deviations, strength
+        Of method "ridge": a robot or values (b,) to draw toward, how far they may be off (b,), and
+        what the squares of the prior are multiplied by (default by cross-validation).
+    noise
+        Of method "tls": deviation of the noise of the columns, see `total`.
+    forgetting
+        Of method "recursive": weight of an instant relative to the next, default 1.
+    controller, loop, start, output
+        Of methods "iv", "didim" and "cloe", which simulate the controlled robot: its controller
+        (default a tuned one), how it is simulated, parameters to begin with, and what "cloe"
+        compares. An option that the method does not take is an error.
+    essential : bool, float, EssentialRule or str
+        Leave out parameters whose relative deviations say that they are not seen: True as is
+        usual (30), a ratio of relative deviations, or a rule: "ratio", "f_test", "aic".
     test : Log, optional
         Kept aside: the predicted torques are compared with it.
     checked : bool
@@ -100,6 +138,10 @@ def fit(
     """
     check_model(model)
     way = chosen(Method, method, "method")
+    options = MethodOptions(
+        loss, prior, prior_deviations, strength, noise, forgetting, controller, loop, start, output
+    )
+    options.check(way)
     balance = chosen(EquationForm, form, "form")
     if base is None:
         base = base_parameters(model, drive=drive, friction=friction)
@@ -116,41 +158,53 @@ def fit(
     system = equations(base, log, processing, balance)
     whole = reduce_equations(system, executor, progress)
     system, reduction, gap, unseen = _seen(system, whole)
-    estimate = _estimate(way, system, reduction)
+    estimate = solve(system, reduction, way, options)
+    dropped: tuple[str, ...] = ()
+    if (rule := _essential_rule(essential)) is not None:
+        found = essential_parameters(reduction, estimate, **rule)
+        dropped = found.dropped
+        if dropped:
+            system = system.with_names(found.names)
+            reduction = with_columns(reduction, found.names)
+            estimate = solve(system, reduction, way, options)
     R, _, _ = reduction.stacked()
+    white, lags = estimate.deviations, 0
+    if isinstance(estimate, SimulatedEstimate):
+        white, lags = estimate.white, estimate.lags
+    elif way in _LINEAR:
+        weights = used_weights(way, reduction)
+        _, inverse, _ = solved(reduction, weights)
+        spread = correlated_covariance(system, estimate.values, weights, inverse)
+        lags = spread.lags
+        estimate = replace(estimate, covariance=spread.covariance)
     values = estimate.values
-    weights = weights_of(estimate.sigma, reduction)
-    if way is Method.OLS:
-        weights = np.ones(len(weights))
-    _, inverse, _ = solved(reduction, weights)
-    spread = correlated_covariance(system, values, weights, inverse)
     return IdentificationResult(
         system=system,
         reduction=reduction,
-        estimate=replace(estimate, covariance=spread.covariance),
-        white=estimate.deviations,
-        lags=spread.lags,
+        estimate=estimate,
+        white=white,
+        lags=lags,
         gap=gap,
         unseen=unseen,
-        not_essential=(),
+        not_essential=dropped,
         condition=float(np.linalg.cond(R)),
         condition_scaled=float(np.linalg.cond(R / np.linalg.norm(R, axis=0))),
         fitted=validate(system.base, system.names, values, log, processing),
         held_out=None
         if test is None
         else validate(system.base, system.names, values, test, processing),
-        notes=(*log.notes, *findings, *processing.notes, *estimate.notes, *_notes(unseen)),
+        notes=(*log.notes, *findings, *processing.notes, *estimate.notes, *_notes(unseen, dropped)),
     )
 
 
-def _estimate(way: Method, system: Equations, reduction: Reduction) -> Estimate:
-    if way is Method.OLS:
-        return ordinary(reduction)
-    if way is Method.WLS:
-        return weighted(reduction)
-    if way is Method.IRLS:
-        return reweighted(reduction)
-    raise InvalidValueError(f"method: {way.name.lower()!r} is not built.")
+def _essential_rule(essential: bool | float | EssentialRule | str) -> dict[str, Any] | None:
+    if essential is False:
+        return None
+    if essential is True:
+        return {}
+    if isinstance(essential, (str, EssentialRule)):
+        return {"rule": essential}
+    return {"ratio": essential}
 
 
 def _checked(log: Log, model: RobotModel) -> tuple[str, ...]:
@@ -188,11 +242,16 @@ def _seen(
     return replace(system, base=seen, names=names), reduction, found.gap, unseen
 
 
-def _notes(unseen: tuple[str, ...]) -> tuple[str, ...]:
-    if not unseen:
-        return ()
-    return (
-        f"The log does not tell {', '.join(unseen)} from other parameters: their joints do not "
-        "move enough. They are regrouped (see base.regrouping) or without effect; use an exciting "
-        "trajectory to find them.",
-    )
+def _notes(unseen: tuple[str, ...], dropped: tuple[str, ...]) -> tuple[str, ...]:
+    notes: list[str] = []
+    if unseen:
+        notes.append(
+            f"The log does not tell {', '.join(unseen)} from other parameters: their joints do not "
+            "move enough. They are regrouped (see base.regrouping) or without effect; use an "
+            "exciting trajectory to find them."
+        )
+    if dropped:
+        notes.append(
+            f"{len(dropped)} parameters are not essential, and taken as zero: {', '.join(dropped)}."
+        )
+    return tuple(notes)

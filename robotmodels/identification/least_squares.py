@@ -185,6 +185,27 @@ def weights_of(sigma: Array, reduction: Reduction) -> Array:
     return 1.0 / np.maximum(sigma, least)
 
 
+def used_weights(method: Method, reduction: Reduction) -> Array:
+    """Weights with which one of these methods has solved the equations.
+
+    Parameters
+    ----------
+    method : Method
+        Ordinary, weighted or iteratively re-weighted least squares.
+    reduction : Reduction
+        Of the equations.
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        One for ordinary least squares.
+    """
+    if method is Method.OLS:
+        return np.ones(len(reduction.factors))
+    before = ordinary(reduction) if method is Method.WLS else reweighted(reduction)
+    return weights_of(before.sigma, reduction)
+
+
 def check_count(reduction: Reduction) -> None:
     """Refuse fewer equations than parameters."""
     b = len(reduction.names)

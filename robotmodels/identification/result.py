@@ -161,6 +161,18 @@ class IdentificationResult(Rebuilt):
         """
         return validate(self.base, self.names, self.values, log, self.system.processing)
 
+    def report(self) -> str:
+        """One page that a person reads: data, choices, parameters, errors, verdict.
+
+        Returns
+        -------
+        str
+            Of at most 100 columns.
+        """
+        from .report import report_text
+
+        return report_text(self)
+
     def whole(self) -> Array:
         """Values of all base parameters, those that are not essential as zero.
 

@@ -1,0 +1,168 @@
+"""Each method with the options that it takes, for equations that are made and reduced."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
+
+from numpy.typing import ArrayLike
+
+from ..errors import InvalidValueError
+from ..model import RobotModel
+from .equations import Equations
+from .estimate import Estimate, Method
+from .least_squares import ordinary, reweighted, weighted
+from .recursive import recursive
+from .reduction import Reduction
+from .ridge import ridge, segments
+from .robust import robust
+from .sequential import sequential
+from .total import total
+
+if TYPE_CHECKING:
+    from ..estimation import Loss
+    from .closed_loop import ClosedLoop, Controller, Output
+
+_SIMULATED = (Method.IV, Method.DIDIM, Method.CLOE)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MethodOptions:
+    """What single methods take beyond the equations; None is each method's own default.
+
+    Parameters
+    ----------
+    loss : Loss or str, optional
+        Of robust least squares: "huber", "cauchy" or "tukey".
+    prior : RobotModel or array_like, shape (b,), optional
+        Values that ridge draws toward: those of a robot, or numbers in the order of the parameters.
+    prior_deviations : array_like, shape (b,), optional
+        How far they may be off.
+    strength : float, optional
+        Of the prior; default 1 with deviations, else by cross-validation over segments of the log.
+    noise : float or array_like, optional
+        Of the columns, of total least squares.
+    forgetting : float, optional
+        Weight of an instant relative to the next, of recursive least squares.
+    controller : Controller, optional
+        Of the robot, for the methods that simulate it.
+    loop : ClosedLoop, optional
+        How it is simulated, instead of a controller.
+    start : array_like, shape (b,), optional
+        Parameters that methods that simulate begin with; default weighted least squares.
+    output : Output or str, optional
+        What closed-loop output error compares: "torque", "position" or "both".
+    """
+
+    loss: Loss | str | None = None
+    prior: RobotModel | ArrayLike | None = None
+    prior_deviations: ArrayLike | None = None
+    strength: float | None = None
+    noise: ArrayLike | None = None
+    forgetting: float | None = None
+    controller: Controller | None = None
+    loop: ClosedLoop | None = None
+    start: ArrayLike | None = None
+    output: Output | str | None = None
+
+    def check(self, method: Method) -> None:
+        """Refuse options that a method does not take: none is ignored."""
+        for field in fields(self):
+            takers = _TAKERS[field.name]
+            if getattr(self, field.name) is not None and method not in takers:
+                words = " or ".join(repr(taker.name.lower()) for taker in takers)
+                raise InvalidValueError(
+                    f"{field.name}: the method {method.name.lower()!r} does not take it; it is "
+                    f"for {words}."
+                )
+
+
+_TAKERS = {
+    "loss": (Method.ROBUST,),
+    "prior": (Method.RIDGE,),
+    "prior_deviations": (Method.RIDGE,),
+    "strength": (Method.RIDGE,),
+    "noise": (Method.TLS,),
+    "forgetting": (Method.RECURSIVE,),
+    "controller": _SIMULATED,
+    "loop": _SIMULATED,
+    "start": _SIMULATED,
+    "output": (Method.CLOE,),
+}
+
+
+def solve(
+    system: Equations, reduction: Reduction, method: Method, options: MethodOptions
+) -> Estimate:
+    """Parameters by one of the methods.
+
+    Parameters
+    ----------
+    system : Equations
+        Robot, log and choices; its columns are independent.
+    reduction : Reduction
+        Of the same equations.
+    method : Method
+        How.
+    options : MethodOptions
+        What it takes.
+
+    Returns
+    -------
+    Estimate
+        Parameters, covariance, status.
+
+    Raises
+    ------
+    InvalidValueError
+        Options of another method; too few equations.
+    """
+    options.check(method)
+    if method is Method.OLS:
+        return ordinary(reduction)
+    if method is Method.WLS:
+        return weighted(reduction)
+    if method is Method.IRLS:
+        return reweighted(reduction)
+    if method is Method.ROBUST:
+        return robust(system, reduction, "huber" if options.loss is None else options.loss)
+    if method is Method.TLS:
+        return total(reduction, 0.001 if options.noise is None else options.noise)
+    if method is Method.SEQUENTIAL:
+        return sequential(system, reduction)
+    if method is Method.RECURSIVE:
+        return recursive(system, reduction, _or(options.forgetting, 1.0))
+    if method is Method.RIDGE:
+        told = options.strength is not None or options.prior_deviations is not None
+        parts = None if told else segments(system)
+        return ridge(
+            reduction, _prior(system, options.prior), options.prior_deviations, options.strength,
+            parts,
+        )  # fmt: skip
+    return _simulated(system, reduction, method, options)
+
+
+def _simulated(
+    system: Equations, reduction: Reduction, method: Method, options: MethodOptions
+) -> Estimate:
+    from .closed_loop import Output, didim, instrumental, output_error
+
+    controller, start, loop = options.controller, options.start, options.loop
+    if method is Method.IV:
+        return instrumental(system, reduction, controller, start, loop=loop)
+    if method is Method.DIDIM:
+        return didim(system, reduction, controller, start, loop=loop)
+    output = Output.TORQUE if options.output is None else options.output
+    return output_error(system, reduction, controller, start, output=output, loop=loop)
+
+
+def _prior(system: Equations, prior: RobotModel | ArrayLike | None) -> ArrayLike | None:
+    """Values of the parameters that are identified, of a robot that is expected."""
+    if not isinstance(prior, RobotModel):
+        return prior
+    values = dict(zip(system.base.names, system.base.values(prior).tolist(), strict=True))
+    return [values[name] for name in system.names]
+
+
+def _or(value: float | None, default: float) -> float:
+    return default if value is None else value
