@@ -322,3 +322,93 @@ def test_several_recordings_are_one_log(tx40):
         G = sum(part.factors[j].T @ part.factors[j] for part in parts)
         assert np.allclose(both.factors[j].T @ both.factors[j], G, rtol=1e-9, atol=1e-9 * G.max())
     assert (both.counts == parts[0].counts + parts[1].counts).all()
+
+
+# --- every method through one door -------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("method", "options"),
+    [
+        ("robust", {"loss": "tukey"}),
+        ("tls", {"noise": 1e-4}),
+        ("ridge", {"strength": 0.0}),
+        ("sequential", {}),
+        ("recursive", {"forgetting": 1.0}),
+    ],
+)
+def test_other_methods_are_exact_as_well(method, options):
+    model = ROBOTS["serial"]
+    log = clean_log(model, np.random.default_rng(3))
+    found = fit(model, log, method, processing=as_it_is(log, 10), **options)
+    truth = found.base.values(model)
+    assert np.abs(found.values - truth).max() / np.abs(truth).max() < 1e-8
+    assert found.estimate.method.name.lower() == method
+    for name, value in options.items():
+        assert getattr(found.options, name) == value
+
+
+def test_no_option_is_ignored(tx40):
+    model, log = tx40.model, tx40.log
+    cases = {
+        "loss": "huber", "prior": model, "strength": 1.0, "noise": 0.1, "forgetting": 0.9,
+        "start": np.zeros(61), "output": "torque",
+    }  # fmt: skip
+    for name, value in cases.items():
+        with pytest.raises(InvalidValueError, match=f"{name}: the method 'wls' does not take it"):
+            fit(model, log, "wls", **{name: value})
+
+
+def test_a_prior_is_a_robot_or_numbers(tx40):
+    model, log = tx40.model, tx40.log.rows(0, 24750)
+    by_robot = fit(model, log, "ridge", prior=model, strength=10.0)
+    numbers = by_robot.base.values(model)
+    by_numbers = fit(model, log, "ridge", prior=numbers, strength=10.0)
+    assert np.array_equal(by_robot.values, by_numbers.values)
+    # it draws: nearer to the prior than least squares, where the log says little
+    free = fit(model, log)
+    far = np.abs(free.values - numbers) / free.deviations
+    near = np.abs(by_robot.values - numbers) / free.deviations
+    assert np.median(near) < np.median(far)
+
+
+def test_essential_parameters_are_those_that_are_seen(tx40, whole):
+    found = fit(tx40.model, tx40.log, essential=True)
+    assert 20 <= len(found.names) <= 32
+    published = {p.name for p in tx40.essential}
+    assert published <= set(found.names)
+    assert set(found.names) | set(found.not_essential) == set(whole.names)
+    assert (found.relative_deviations < 0.5).all()
+    assert found.essential_rule == "ratio 30"
+    # they predict as well
+    assert (found.fitted.filtered_rmse < 1.15 * whole.fitted.filtered_rmse).all()
+    assert len(found.whole()) == 61
+    assert (found.whole() == 0.0).sum() == len(found.not_essential)
+
+
+def test_tx40_with_instruments_says_the_same(tx40, whole):
+    from robotmodels.identification import hausman_test
+
+    found = fit(tx40.model, tx40.log, "iv")
+    off = np.abs(found.values - whole.values) / whole.deviations
+    assert off.max() < 0.5
+    verdict = hausman_test(found.system, found.estimate)
+    assert verdict.p > 0.05
+    assert "nothing speaks against" in verdict.sentence.lower()
+
+
+def test_tx40_of_real_bodies_costs_little(tx40, trained):
+    from robotmodels.identification import consistent_robot, urdf_parity
+
+    robot = consistent_robot(trained)
+    assert 0.0 <= robot.price < 3.0  # per cent of the residual
+    real = trained.validate(tx40.log.rows(tx40.held_out.start, tx40.held_out.stop))
+    from robotmodels.identification import validate
+
+    held_out = validate(
+        trained.base, trained.base.names, robot.base_values,
+        tx40.log.rows(tx40.held_out.start, tx40.held_out.stop), trained.system.processing,
+    )  # fmt: skip
+    assert (held_out.rmse < 1.03 * real.rmse).all(), held_out.rmse / real.rmse
+    parity = urdf_parity(robot.of(tx40.model))
+    assert max(parity.links, parity.drives) < 1e-9

@@ -19,7 +19,7 @@ from .numbers import numbers
 from .source import robot_of
 
 if TYPE_CHECKING:
-    from ..identification import ConsistentFit, IdentificationResult, Log
+    from ..identification import ConsistentFit, Controller, IdentificationResult, Log
     from ..inertia import InertialParameters
 
 METHODS = (
@@ -154,6 +154,24 @@ def _add_fit(fitted: Any) -> None:
     fitted.add_argument("--prior", metavar="ROBOT",
                         help="what decides what the torques do not: a robot, or the mass in "
                         "kg of one of uniform bodies; default its own inertia")  # fmt: skip
+    fitted.add_argument("--essential", nargs="?", const="30", metavar="RATIO",
+                        help="leave out parameters that are not seen: until no relative deviation "
+                        "is more than RATIO (30) times the least; or f_test, aic")  # fmt: skip
+    fitted.add_argument("--loss", choices=("huber", "cauchy", "tukey"),
+                        help="of --method robust (default: huber)")  # fmt: skip
+    fitted.add_argument("--strength", type=float,
+                        help="of --method ridge, toward the robot's own parameters; default by "
+                        "cross-validation")  # fmt: skip
+    fitted.add_argument("--noise", type=float,
+                        help="of --method tls: noise of the columns, relative (default: "
+                        "0.001)")  # fmt: skip
+    fitted.add_argument("--forgetting", type=float,
+                        help="of --method recursive: weight of an instant relative to the "
+                        "next")  # fmt: skip
+    fitted.add_argument("--kp", metavar="NUMBERS",
+                        help="of methods iv, didim, cloe: the controller's gains of position, "
+                        "N m/rad or N/m; with --kd. Default a tuned controller")  # fmt: skip
+    fitted.add_argument("--kd", metavar="NUMBERS", help="its gains of velocity")
     fitted.add_argument("--workers", type=int, default=1, metavar="N",
                         help="processes (default: %(default)s), with the same result")  # fmt: skip
 
@@ -194,7 +212,11 @@ def run(arguments: argparse.Namespace) -> int:
             model, log, arguments.method, form=arguments.form, drive=kinds or False,
             cutoff=arguments.cutoff, decimation=arguments.decimation,
             dead_band=_joint_numbers(arguments.dead_band, model, "--dead-band"),
-            edges=arguments.edges, test=test, checked=not arguments.no_check, executor=executor,
+            edges=arguments.edges, essential=_essential(arguments.essential),
+            loss=arguments.loss, strength=arguments.strength, noise=arguments.noise,
+            forgetting=arguments.forgetting, controller=_controller(arguments, model),
+            prior=model if arguments.method == "ridge" else None, test=test,
+            checked=not arguments.no_check, executor=executor,
             progress=_progress if sys.stderr.isatty() else None,
         )  # fmt: skip
     robot = None
@@ -389,6 +411,26 @@ def _prior(arguments: argparse.Namespace, model: RobotModel) -> InertialParamete
             ) from None
         return bodies
     return uniform_bodies(model, mass)
+
+
+def _essential(text: str | None) -> bool | float | str:
+    if text is None:
+        return False
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def _controller(arguments: argparse.Namespace, model: RobotModel) -> Controller | None:
+    if arguments.kp is None and arguments.kd is None:
+        return None
+    if arguments.kp is None or arguments.kd is None:
+        raise InvalidValueError("--kp, --kd: a controller has both gains; give the other as well.")
+    from ..identification import Controller
+
+    kp, kd = (_joint_numbers(getattr(arguments, name), model, f"--{name}") for name in ("kp", "kd"))
+    return Controller(kp, kd)  # type: ignore[arg-type]  # both were given
 
 
 def _workers(count: int) -> Any:

@@ -150,6 +150,8 @@ def fit(
     findings = _checked(log, model) if checked else ()
     if processing is None:
         processing = choose_processing(log, cutoff, decimation, dead_band, edges)
+        if decimation is None and not balance.by_joint:
+            processing = _denser(processing, model.n)
     elif any(x is not None for x in (cutoff, decimation, dead_band, edges)):
         raise InvalidValueError(
             "processing: it holds every choice; leave out cutoff, decimation, dead_band and edges, "
@@ -193,6 +195,8 @@ def fit(
         held_out=None
         if test is None
         else validate(system.base, system.names, values, test, processing),
+        options=options,
+        essential_rule=_rule_name(essential),
         notes=(*log.notes, *findings, *processing.notes, *estimate.notes, *_notes(unseen, dropped)),
     )
 
@@ -205,6 +209,22 @@ def _essential_rule(essential: bool | float | EssentialRule | str) -> dict[str, 
     if isinstance(essential, (str, EssentialRule)):
         return {"rule": essential}
     return {"ratio": essential}
+
+
+def _rule_name(essential: bool | float | EssentialRule | str) -> str:
+    if essential is False:
+        return ""
+    rule = _essential_rule(essential) or {}
+    word = rule.get("rule", EssentialRule.RATIO)
+    name = word.name if isinstance(word, EssentialRule) else str(word)
+    return f"{name.lower()} {rule.get('ratio', 30.0):g}" if name == "RATIO" else name.lower()
+
+
+def _denser(processing: Processing, n: int) -> Processing:
+    """As many equations for forms with one at a time as for those with one for each joint."""
+    step = max(1, processing.decimation // n)
+    note = f"One equation at a time for all joints: one of {step} samples is kept instead."
+    return replace(processing, decimation=step, notes=(*processing.notes, note))
 
 
 def _checked(log: Log, model: RobotModel) -> tuple[str, ...]:

@@ -9,8 +9,9 @@ from ..errors import InvalidValueError
 from .estimate import Estimate, EstimateStatus, Method
 from .reduction import Reduction
 
-_ITERATIONS = 50
-_STILL = 1e-10
+_ITERATIONS = 100
+_STILL = 1e-8
+"""Part of its deviation that a parameter moves at most in the last iteration."""
 
 
 def ordinary(reduction: Reduction) -> Estimate:
@@ -181,7 +182,7 @@ def weights_of(sigma: Array, reduction: Reduction) -> Array:
     """
     size = np.array([np.linalg.norm(R[:, -1]) for R in reduction.factors])
     size = size / np.sqrt(np.maximum(reduction.counts, 1))
-    least = 1e-12 * max(float(size.max(initial=0.0)), 1e-300)
+    least = max(1e-12 * float(size.max(initial=0.0)), 1e-300)
     return 1.0 / np.maximum(sigma, least)
 
 

@@ -15,6 +15,7 @@ from .equations import Equations
 from .estimate import Estimate
 from .prediction import predicted_torque
 from .reduction import Reduction
+from .solving import MethodOptions
 from .validation import Validation, validate
 
 
@@ -47,6 +48,10 @@ class IdentificationResult(Rebuilt):
         Errors on the log itself.
     held_out : Validation or None
         On the log that was kept aside.
+    options : MethodOptions
+        What the method was given beyond the equations.
+    essential_rule : str
+        By which parameters were left out; empty where all were kept.
     notes : tuple of str
         What is strange, and what to do.
 
@@ -67,6 +72,8 @@ class IdentificationResult(Rebuilt):
     condition_scaled: float
     fitted: Validation
     held_out: Validation | None
+    options: MethodOptions
+    essential_rule: str
     notes: tuple[str, ...]
 
     @property

@@ -5,6 +5,8 @@ from __future__ import annotations
 import hashlib
 import json
 import platform
+from dataclasses import fields, is_dataclass
+from enum import Enum
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +17,7 @@ from .._arrays import Array
 from ..drive import drive_kinds
 from ..errors import InvalidValueError
 from ..logs import Log
-from ..model import to_urdf
+from ..model import RobotModel, to_urdf
 from .diagnostics import (
     not_seen,
     residual_diagnostics,
@@ -30,6 +32,7 @@ from .report_parameters import intervals, kind_names, parameter_units
 if TYPE_CHECKING:
     from .consistent_result import ConsistentFit
     from .result import IdentificationResult
+    from .solving import MethodOptions
 
 _FORMAT = 1
 """Raised when the meaning of an entry changes."""
@@ -190,6 +193,7 @@ def result_data(result: IdentificationResult, robot: ConsistentFit | None = None
         "method": {
             "name": estimate.method.name, "sentence": estimate.method.value,
             "iterations": estimate.iterations, "lags": result.lags, "notes": list(estimate.notes),
+            "options": option_data(result.options), "essential": result.essential_rule,
             "form": result.system.form.name,
             "drive": [kind.value for kind in drive_kinds(base.drive)],
             "friction": None if base.friction is None else repr(base.friction),
@@ -231,6 +235,43 @@ def result_data(result: IdentificationResult, robot: ConsistentFit | None = None
         "versions": _versions(),
         "notes": list(result.notes),
     }  # fmt: skip
+
+
+def option_data(options: MethodOptions) -> dict[str, Any]:
+    """What a method was given beyond the equations, ready for JSON.
+
+    Parameters
+    ----------
+    options : MethodOptions
+        Of the fit.
+
+    Returns
+    -------
+    dict
+        Those that were given, by name: numbers, lists, words; a robot by its name, a controller by
+        its fields.
+
+    Examples
+    --------
+    >>> from robotmodels.identification.solving import MethodOptions
+    >>> option_data(MethodOptions(loss="tukey", strength=2.0))
+    {'loss': 'tukey', 'strength': 2.0}
+    """
+    given = ((f.name, getattr(options, f.name)) for f in fields(options))
+    return {name: _option(value) for name, value in given if value is not None}
+
+
+def _option(value: Any) -> Any:
+    if isinstance(value, RobotModel):
+        return value.name
+    if isinstance(value, Enum):
+        return value.name.lower()
+    if is_dataclass(value):
+        parts = ((f.name, getattr(value, f.name)) for f in fields(value))
+        return {name: _option(part) for name, part in parts if part is not None}
+    if isinstance(value, (str, bool)):
+        return value
+    return np.asarray(value).tolist()
 
 
 def log_data(log: Log) -> dict[str, Any]:
