@@ -93,7 +93,7 @@ def correlated_covariance(
     own = np.arange(m)
     size = products[0, own, own]
     correlation = products[1, own, own] / np.where(size > 0.0, size, 1.0)
-    rows = int(pairs[0, own, own].sum())
+    rows = int(pairs[0, own, own] @ (weights > 0.0))  # a kind without weight says nothing
     if lags is None:
         lags = _correlated(products[:, own, own] @ weights**2, rows)
     window = _flat_then_falling(lags, count)
