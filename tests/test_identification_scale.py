@@ -112,7 +112,8 @@ def test_processes_give_the_same_bits(way):
 @pytest.mark.slow
 @pytest.mark.parametrize("processes", [False, True])
 def test_a_dask_cluster_gives_the_same_bits(processes):
-    distributed = pytest.importorskip("distributed", reason="pip install robotmodels[dask]")
+    import distributed
+
     whole = system()
     here = bits(reduce_equations(whole))
     with (
