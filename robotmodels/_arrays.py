@@ -17,6 +17,8 @@ from .errors import InvalidValueError, ShapeError
 Array = NDArray[np.float64]
 
 _FLOAT64 = np.dtype(np.float64)
+_AT_A_TIME = 2**18
+"""Numbers that are looked at together."""
 
 
 def as_floats(value: ArrayLike, name: str) -> Array:
@@ -335,7 +337,11 @@ def _converted(value: ArrayLike, name: str) -> Array:
 
 
 def _all_finite(array: Array) -> bool:
-    return bool(np.isfinite(array).all())
+    if array.ndim == 0 or array.size <= _AT_A_TIME:
+        return bool(np.isfinite(array).all())
+    # long logs piece by piece: what isfinite tells of all of them would be held at once
+    rows = max(1, _AT_A_TIME * len(array) // array.size)
+    return all(bool(np.isfinite(array[k : k + rows]).all()) for k in range(0, len(array), rows))
 
 
 def _shape_message(name: str, core: tuple[int, ...], shape: tuple[int, ...]) -> str:

@@ -10,14 +10,18 @@ from numpy.typing import NDArray
 from .._arrays import Array
 from ..errors import InvalidValueError
 from ..logs import Log
+from ..logs.stretches import SAMPLES, stretches
 from ..model import RobotModel
-from ..regressors import torque_regressor
+from ..regressors import torque_regressor_chunks
 from .filters import central_differences, zero_phase
 
 _PER_CUTOFF = 2.5
 """Rows in a period of the cutoff frequency: what is filtered holds no more."""
 _MOST = 6000
 _STILL = 0.02
+_STRETCHES = 20
+_PERIODS = 50.0
+"""Of the cutoff frequency in a stretch at least, since its ends are lost."""
 _RANK = 1e-9
 _SMOOTH = ("Ia", "Fv", "offset")
 
@@ -31,7 +35,7 @@ class ThinRows:
     bases : tuple of ndarray, each shape (N_j, r_j)
         Orthonormal bases of what the columns of joint j span.
     regressors : tuple of ndarray, each shape (N_j, p)
-        Their rows.
+        Their rows; none where they are left out.
     places : tuple of ndarray of int, each shape (N_j,)
         Rows of the log.
     velocities : ndarray, shape (rows of the log, n)
@@ -55,7 +59,9 @@ class ThinRows:
     shared: Array
 
 
-def thin_rows(log: Log, model: RobotModel, cutoff: float, margin: int) -> ThinRows:
+def thin_rows(
+    log: Log, model: RobotModel, cutoff: float, margin: int, whole: bool = True
+) -> ThinRows:
     """Filter, differentiate, thin out, and leave out rows near a joint's standstill.
 
     Positions and torques pass the same zero-phase filter, so that what is left of the one fits what
@@ -72,6 +78,8 @@ def thin_rows(log: Log, model: RobotModel, cutoff: float, margin: int) -> ThinRo
         Hz.
     margin : int
         Rows left out at both ends of each recording.
+    whole : bool
+        False leaves the regressors out, for which there are bases.
 
     Returns
     -------
@@ -102,17 +110,18 @@ def thin_rows(log: Log, model: RobotModel, cutoff: float, margin: int) -> ThinRo
             f"{cutoff:g} Hz and the delays that are tried need; give a higher cutoff or try fewer."
         )
     places = np.concatenate(taken)
-    W = torque_regressor(model, q[places], v[places], a[places], drive=_SMOOTH)
-    dry = W.shape[2]
-    W = np.concatenate([W, _dry_friction(log, model, v, cutoff)[places]], axis=2)
+    friction = _dry_friction(log, model, v, cutoff, places)
     moving = _moving(model, v, places, int(np.ceil(0.25 / (cutoff * log.dt))))
-    bases, regressors, own = [], [], []
-    for j in range(log.n):
-        rows = W[moving[:, j], j]
+    regressors = _rows_by_joint(model, (q[places], v[places], a[places]), friction, moving)
+    dry = regressors[0].shape[1] - friction.shape[2]
+    del q, a, friction
+    bases = []
+    for j, rows in enumerate(regressors):
         U, s, _ = np.linalg.svd(rows / _sizes(rows), full_matrices=False)
         bases.append(np.ascontiguousarray(U[:, s > _RANK * s.max(initial=0.0)]))
-        regressors.append(rows)
-        own.append(places[moving[:, j]])
+        if not whole:
+            regressors[j] = np.empty((0, rows.shape[1]))
+    own = [places[moving[:, j]] for j in range(log.n)]
     return ThinRows(
         tuple(bases),
         tuple(regressors),
@@ -125,16 +134,61 @@ def thin_rows(log: Log, model: RobotModel, cutoff: float, margin: int) -> ThinRo
     )
 
 
-def _dry_friction(log: Log, model: RobotModel, v: Array, cutoff: float) -> Array:
+def _rows_by_joint(
+    model: RobotModel,
+    samples: tuple[Array, Array, Array],
+    friction: Array,
+    moving: NDArray[np.bool_],
+) -> list[Array]:
+    """Rows of each joint at which it may be looked at, links and drives, then dry friction."""
+    found: list[Array] = []
+    counts = np.zeros(model.n, dtype=np.int64)
+    for part, W in torque_regressor_chunks(model, *samples, drive=_SMOOTH):
+        if not found:
+            width = W.shape[2] + friction.shape[2]
+            found = [np.empty((int(k), width)) for k in moving.sum(axis=0)]
+        for j, rows in enumerate(found):
+            use = moving[part, j]
+            here = slice(counts[j], counts[j] + int(use.sum()))
+            rows[here, : W.shape[2]] = W[use, j]
+            rows[here, W.shape[2] :] = friction[part][use, j]
+            counts[j] = here.stop
+    return found
+
+
+def looked_at(log: Log, cutoff: float) -> Log:
+    """Of a log of more than 1e5 samples so many, in up to 20 stretches spread evenly over it.
+
+    Parameters
+    ----------
+    log : Log
+        What was recorded.
+    cutoff : float
+        Hz; stretches are much longer than what a filter of this cutoff needs.
+
+    Returns
+    -------
+    Log
+        A short log itself.
+    """
+    length = max(SAMPLES // _STRETCHES, int(_PERIODS / (cutoff * log.dt)))
+    return stretches(log, length, max(SAMPLES, length))
+
+
+def _dry_friction(
+    log: Log, model: RobotModel, v: Array, cutoff: float, places: NDArray[np.int64]
+) -> Array:
     """Columns of Coulomb friction, whose steps pass the filter as those of the torques do."""
-    n = log.n
-    columns = np.zeros((len(v), n, n + len(_shared(model))))
-    columns[:, range(n), range(n)] = np.sign(v)
-    for k, weights in enumerate(_shared(model)):
-        columns[:, :, n + k] = np.sign(v @ weights)[:, None] * weights
+    n, shared = log.n, _shared(model)
+    steps = np.sign(np.concatenate([v, v @ shared.T], axis=1))
     for rows in log.recordings():
         if rows.stop - rows.start > 1:
-            columns[rows] = zero_phase(columns[rows], cutoff, log.dt)
+            steps[rows] = zero_phase(steps[rows], cutoff, log.dt)
+    kept = steps[places]
+    columns = np.zeros((len(places), n, n + len(shared)))
+    columns[:, range(n), range(n)] = kept[:, :n]
+    for k, weights in enumerate(shared):
+        columns[:, :, n + k] = kept[:, n + k, None] * weights
     return columns
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_floats
+from .._arrays import Array, as_floats, read_only
 from ..errors import InvalidValueError, ShapeError
 
 _SETTLED = 1e-13
@@ -55,16 +57,19 @@ def zero_phase(x: ArrayLike, cutoff: float, dt: float, order: int = 4) -> Array:
     >>> round(float(np.abs(y[500:1500]).max()), 3)
     0.707
     """
-    from scipy.signal import sosfiltfilt
+    from ..kernels.biquads import forward_backward
 
     signal = as_floats(x, "x")
     if signal.ndim < 1 or signal.shape[0] < 2:
         raise ShapeError(
             f"x: expected at least two samples along the first axis, got {np.shape(x)}."
         )
-    sos = _sections(cutoff, dt, order)
+    sections = _sections(cutoff, dt, order)
     pad = min(settling(cutoff, dt, order), signal.shape[0] - 1)
-    return np.ascontiguousarray(sosfiltfilt(sos, signal, axis=0, padtype="odd", padlen=pad))
+    channels = np.ascontiguousarray(signal).reshape(len(signal), -1)
+    out = np.empty(channels.shape)
+    forward_backward(sections, channels, pad, out)
+    return out.reshape(signal.shape)
 
 
 def settling(cutoff: float, dt: float, order: int = 4) -> int:
@@ -85,10 +90,10 @@ def settling(cutoff: float, dt: float, order: int = 4) -> int:
     >>> settling(10.0, 0.001) < 2000
     True
     """
-    from scipy.signal import sos2zpk
-
-    _, poles, _ = sos2zpk(_sections(cutoff, dt, order))
-    slowest = float(np.abs(poles).max())
+    sections = _sections(cutoff, dt, order)
+    # poles of a second-order section are a pair, that of a first-order one is alone
+    sizes = np.where(sections[:, 4] != 0.0, np.sqrt(sections[:, 4]), np.abs(sections[:, 3]))
+    slowest = float(sizes.max())
     return int(np.ceil(np.log(_SETTLED) / np.log(slowest))) if slowest > 0.0 else 1
 
 
@@ -181,8 +186,7 @@ def decimation_window(step: int) -> Array:
 
 
 def _sections(cutoff: float, dt: float, order: int) -> Array:
-    from scipy.signal import butter
-
+    """Second-order sections b0, b1, b2, a1, a2 of one pass of a Butterworth low-pass."""
     if not isinstance(order, (int, np.integer)) or order < 1:
         raise InvalidValueError(f"order: expected a whole number from 1, got {order!r}.")
     if not 0.0 < cutoff < 0.5 / dt:
@@ -190,7 +194,21 @@ def _sections(cutoff: float, dt: float, order: int) -> Array:
             f"cutoff: expected a frequency between 0 and half the sampling rate ({0.5 / dt:g} Hz), "
             f"got {cutoff!r}."
         )
+    return _butterworth(float(cutoff), float(dt), int(order))
+
+
+@lru_cache(maxsize=64)  # asked for each piece of each pass
+def _butterworth(cutoff: float, dt: float, order: int) -> Array:
     # where one pass of a wider filter has lost half of the 3 dB; the bilinear design bends
     # frequencies by a tangent
-    wider = np.tan(np.pi * cutoff * dt) / (np.sqrt(2.0) - 1.0) ** (0.5 / order)
-    return butter(order, 2.0 * np.arctan(wider) / np.pi, output="sos")
+    w = np.tan(np.pi * cutoff * dt) / (np.sqrt(2.0) - 1.0) ** (0.5 / order)
+    rows = []
+    if order % 2:
+        rows.append((w / (1.0 + w), w / (1.0 + w), 0.0, (w - 1.0) / (w + 1.0), 0.0))
+    for k in range(order // 2):
+        # a pair of poles on the half circle, s^2 + 2 d w s + w^2, with s = (z - 1) / (z + 1)
+        d = np.sin(np.pi * (2 * k + 1) / (2 * order))
+        size = 1.0 + 2.0 * d * w + w**2
+        b = w**2 / size
+        rows.append((b, 2.0 * b, b, 2.0 * (w**2 - 1.0) / size, (1.0 - 2.0 * d * w + w**2) / size))
+    return read_only(rows)

@@ -25,6 +25,7 @@ from .essential import EssentialRule, with_columns
 from .essential import essential as essential_parameters
 from .estimate import Method
 from .joint_checks import check_joints
+from .kept_equations import kept_equations, plain
 from .least_squares import solved, used_weights
 from .processing import Processing, choose_processing
 from .reduction import Reduction, reduce_equations
@@ -157,7 +158,7 @@ def fit(
             "processing: it holds every choice; leave out cutoff, decimation, dead_band and edges, "
             "or leave out processing."
         )
-    system = equations(base, log, processing, balance)
+    system: Equations = kept_equations(equations(base, log, processing, balance))
     whole = reduce_equations(system, executor, progress)
     system, reduction, gap, unseen = _seen(system, whole)
     estimate = solve(system, reduction, way, options)
@@ -181,7 +182,7 @@ def fit(
         estimate = replace(estimate, covariance=spread.covariance)
     values = estimate.values
     return IdentificationResult(
-        system=system,
+        system=plain(system),
         reduction=reduction,
         estimate=estimate,
         white=white,
@@ -191,7 +192,7 @@ def fit(
         not_essential=dropped,
         condition=float(np.linalg.cond(R)),
         condition_scaled=float(np.linalg.cond(R / np.linalg.norm(R, axis=0))),
-        fitted=validate(system.base, system.names, values, log, processing),
+        fitted=validate(system.base, system.names, values, log, processing, system),
         held_out=None
         if test is None
         else validate(system.base, system.names, values, test, processing),

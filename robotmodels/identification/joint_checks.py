@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 
 from .._arrays import Array
@@ -9,7 +12,7 @@ from ..errors import ShapeError
 from ..logs import FindingKind, Log, LogFinding, Severity
 from ..model import RobotModel, check_model
 from ..regressors import torque_regressor
-from .delay_rows import ThinRows, thin_rows
+from .delay_rows import ThinRows, looked_at, thin_rows
 from .synchronisation import synchronisation
 
 _CUTOFF, _SHARE = 15.0, 0.1
@@ -29,6 +32,9 @@ def check_joints(log: Log, model: RobotModel) -> tuple[LogFinding, ...]:
       significantly, the sign of its torque (or of its position) looks wrong.
     - The regressor's rank on this motion is compared with that on random motion.
     - The delay of the torques is estimated, see `synchronisation`.
+
+    Of a log of more than 1e5 samples so many are looked at, in up to 20 stretches spread evenly
+    over it; what is found then says so.
 
     Parameters
     ----------
@@ -69,14 +75,21 @@ def check_joints(log: Log, model: RobotModel) -> tuple[LogFinding, ...]:
     check_model(model)
     if model.n != log.n:
         raise ShapeError(f"log: {log.n} joints, the model {model.name} has {model.n}.")
-    rows = thin_rows(log, model, min(_CUTOFF, _SHARE / log.dt), 2)
+    cutoff = min(_CUTOFF, _SHARE / log.dt)
+    part = looked_at(log, cutoff)
     found: list[LogFinding] = []
-    swapped = _swapped(log, rows, found)
-    if not swapped:
+    _dynamic(part, model, thin_rows(part, model, cutoff, 2), found)
+    _in_step(part, model, found)
+    if part is not log:
+        said = f" (Judged by {len(part)} of {len(log)} samples.)"
+        found = [replace(finding, sentence=finding.sentence + said) for finding in found]
+    return tuple(found)
+
+
+def _dynamic(log: Log, model: RobotModel, rows: ThinRows, found: list[LogFinding]) -> None:
+    if not _swapped(log, rows, found):
         _signs(log, rows, found)
     _excited(log, model, rows, found)
-    _in_step(log, model, found)
-    return tuple(found)
 
 
 def _swapped(log: Log, rows: ThinRows, found: list[LogFinding]) -> bool:
@@ -166,8 +179,8 @@ def _excited(log: Log, model: RobotModel, rows: ThinRows, found: list[LogFinding
     lower, upper = np.maximum(model.lower, -np.pi), np.minimum(model.upper, np.pi)
     q = rng.uniform(lower, upper, (most, model.n))
     v, a = rng.normal(0.0, 2.0, (2, most, model.n))
-    possible = _rank(torque_regressor(model, q, v, a).reshape(most * model.n, -1))
-    seen = _rank(np.concatenate(rows.regressors))
+    possible = _rank([torque_regressor(model, q, v, a).reshape(most * model.n, -1)])
+    seen = _rank(rows.regressors)
     if seen < possible:
         found.append(
             LogFinding(
@@ -179,11 +192,12 @@ def _excited(log: Log, model: RobotModel, rows: ThinRows, found: list[LogFinding
         )  # fmt: skip
 
 
-def _rank(W: Array) -> int:
-    size = np.sqrt((W**2).sum(axis=0))
-    W = W[:, size > 1e-9 * size.max(initial=0.0)]
-    R = np.linalg.qr(W / np.sqrt((W**2).sum(axis=0)), mode="r")
-    s = np.linalg.svd(R, compute_uv=False)
+def _rank(parts: Sequence[Array]) -> int:
+    factors = [np.asarray(np.linalg.qr(W, mode="r")) for W in parts]
+    R = np.asarray(np.linalg.qr(np.concatenate(factors), mode="r"))
+    size = np.sqrt((R**2).sum(axis=0))  # of the columns of all parts
+    kept = size > 1e-9 * size.max(initial=0.0)
+    s = np.linalg.svd(R[:, kept] / size[kept], compute_uv=False)
     return int((s > _RANK * s.max(initial=0.0)).sum())
 
 

@@ -11,6 +11,7 @@ from .._arrays import Array, Rebuilt, as_floats, read_only
 from ..errors import InvalidValueError, ShapeError
 from ..logs import Log
 from .filters import decimation_window
+from .spectrum import power_density
 
 _POWER = 0.999
 """Part of the power of the velocities below the frequency that the motion is said to have."""
@@ -244,8 +245,6 @@ def _edges(
 
 def _motion(log: Log) -> tuple[float, Array, Array]:
     """Frequency of the motion, deviation of the positions' noise, greatest velocities."""
-    from scipy.signal import welch
-
     part = max(log.recordings(), key=lambda rows: rows.stop - rows.start)
     longest = int(_LONGEST / log.dt) * 4  # a few windows tell the spectrum
     q = np.asarray(log.q[part.start : min(part.stop, part.start + longest)])
@@ -255,7 +254,7 @@ def _motion(log: Log) -> tuple[float, Array, Array]:
         )
     rate = 1.0 / log.dt
     v = np.diff(q, axis=0) * rate
-    f, P = welch(v, rate, nperseg=min(len(v), int(_LONGEST * rate)), detrend="constant", axis=0)
+    f, P = power_density(v, rate, min(len(v), max(2, int(_LONGEST * rate))))
     # what a difference does to positions
     S = P[1:] / (2.0 * rate * np.sin(np.pi * f[1:] / rate))[:, None] ** 2
     high = (f[1:] > 0.25 * rate) & (f[1:] < 0.45 * rate)

@@ -9,7 +9,7 @@ import numpy as np
 from .._arrays import Array, Rebuilt, read_only
 from ..logs import Log
 from ..minimal_parameters import BaseParameters
-from .equations import Equations
+from .equations import EquationForm, Equations
 from .prediction import predicted_torque
 from .processing import Processing
 from .signals import piece_signals, pieces
@@ -53,7 +53,12 @@ class Validation(Rebuilt):
 
 
 def validate(
-    base: BaseParameters, names: tuple[str, ...], values: Array, log: Log, processing: Processing
+    base: BaseParameters,
+    names: tuple[str, ...],
+    values: Array,
+    log: Log,
+    processing: Processing,
+    system: Equations | None = None,
 ) -> Validation:
     """Compare predicted torques with those of a log, which may be another one.
 
@@ -69,6 +74,8 @@ def validate(
         The log.
     processing : Processing
         How positions become velocities and accelerations.
+    system : Equations, optional
+        The equations of these torques, where they have been made; others are not used.
 
     Returns
     -------
@@ -79,7 +86,8 @@ def validate(
     ----------
     Seed book section 1.6.5.
     """
-    system = Equations(base, names, log, processing)
+    if system is None or system.form is not EquationForm.TORQUE or system.names != names:
+        system = Equations(base, names, log, processing)
     n = log.n
     squares, sums, whole = np.zeros(n), np.zeros(n), np.zeros(n)
     samples = 0

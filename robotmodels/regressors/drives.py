@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 
 import numpy as np
 
-from .._arrays import Array
+from .._arrays import Array, read_only
+from ..drive import Transmission
 from ..friction import LinearFriction
 from ..model import RobotModel
 from .columns import ChosenColumns
@@ -16,9 +18,14 @@ def couplings(model: RobotModel) -> list[tuple[Array, Array]]:
     """Of each coupled motor, its turns ``w`` per joint (n,) and ``w w^T`` without diagonal."""
     if model.transmission is None:
         return []
-    weights = model.transmission.weights
-    rows = [weights[m - 1] for m in model.transmission.coupled_motors]
-    return [(w, np.outer(w, w) - np.diag(w**2)) for w in rows]
+    return _couplings(model.transmission)
+
+
+@lru_cache(maxsize=16)  # asked for each chunk of a log
+def _couplings(transmission: Transmission) -> list[tuple[Array, Array]]:
+    weights = transmission.weights
+    rows = [weights[m - 1] for m in transmission.coupled_motors]
+    return [(read_only(w), read_only(np.outer(w, w) - np.diag(w**2))) for w in rows]
 
 
 def joint_terms(

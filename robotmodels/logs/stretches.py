@@ -1,0 +1,56 @@
+"""Stretches of a long log, of which enough can be told."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .log import Log
+
+SAMPLES = 100_000
+"""Of a log that are looked at together."""
+
+
+def stretches(log: Log, length: int, samples: int = SAMPLES) -> Log:
+    """A bounded part of a long log: stretches spread evenly over it.
+
+    Parameters
+    ----------
+    log : Log
+        What was recorded.
+    length : int
+        Samples of a stretch; it is no longer than ``samples``, and shorter at the end of a
+        recording.
+    samples : int
+        Of all stretches together, at most.
+
+    Returns
+    -------
+    Log
+        The log itself if it is not longer; otherwise positions and torques of the
+        stretches, each a recording of its own. Recordings shorter than half a stretch take part
+        only where there is no longer one.
+
+    Examples
+    --------
+    >>> log = Log(0.01, np.zeros((1000, 1)), np.zeros((1000, 1)))
+    >>> part = stretches(log, 50, 200)
+    >>> len(part), [rows.start for rows in part.recordings()]
+    (200, [0, 50, 100, 150])
+    >>> stretches(log, 50) is log
+    True
+    """
+    if len(log) <= samples:
+        return log
+    length = max(1, min(length, samples))
+    every = [
+        slice(start, min(start + length, rows.stop))
+        for rows in log.recordings()
+        for start in range(rows.start, rows.stop, length)
+    ]
+    whole = [rows for rows in every if 2 * (rows.stop - rows.start) >= length] or every
+    count = min(len(whole), max(1, samples // max(r.stop - r.start for r in whole)))
+    places = np.unique(np.linspace(0, len(whole) - 1, count).round().astype(int))
+    taken = [whole[k] for k in places]
+    starts = np.cumsum([0, *(rows.stop - rows.start for rows in taken)])[:-1]
+    q, tau = (np.concatenate([x[rows] for rows in taken]) for x in (log.q, log.tau))
+    return Log(log.dt, q, tau, starts=starts, names=log.names, delay=log.delay)
