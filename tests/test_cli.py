@@ -307,6 +307,47 @@ def test_demo_draws_the_eight_postures(run, tmp_path):
     lost = [float(number) for number in re.findall(r"its postures to (\S+) rad", out)]
     assert len(lost) == 2
     assert max(lost) < 1e-6
+    assert "robotmodels demo --real" in out
+
+
+def test_demo_identifies_the_real_robot(run, tmp_path, monkeypatch):
+    pages = []  # drawing them takes longer than all the rest, and has tests of its own
+    monkeypatch.setattr(rm.viz, "identification_html", lambda *what: pages.append(what))
+    code, out, _ = run("demo", "--real", "--out", tmp_path)
+    assert code == 0
+    (result, page, test, robot) = pages[0]
+    assert (len(result.names), len(test)) == (61, 15750)
+    assert page == tmp_path / "tx40-report.html"
+    assert robot.inertia.is_physical.all()
+    assert re.search(r"  ZZ1 +1\.24\d\d \+- 0\.0\d+ +1\.2421 \+- 0\.0137", out)
+    assert "60 of 60 are within two of our deviations." in out
+    ours, best = (
+        np.array(re.search(f"  {word} +((?: +[0-9.]+)+)", out)[1].split(), float)
+        for word in ("here", "published, best")
+    )
+    assert ours.shape == (6,)
+    assert (ours < best).all()
+    price = float(re.search(r"residuals (\S+) % above least squares", out)[1])
+    assert 0.0 < price < 3.0
+    again = rm.RobotModel.from_urdf(tmp_path / "tx40-identified.urdf")
+    assert again.inertia.is_physical.all()
+    data = json.loads((tmp_path / "tx40-result.json").read_text(encoding="utf-8"))
+    assert len(data["parameters"]) == 61
+    assert "Verdict" in (tmp_path / "tx40-report.txt").read_text(encoding="utf-8")
+
+
+def test_demo_of_the_real_robot_goes_on_without_extras(tmp_path):
+    words = (
+        "import sys; sys.modules['matplotlib'] = sys.modules['clarabel'] = None\n"
+        "from robotmodels.cli import main\n"
+        f"sys.exit(main(['demo', '--real', '--out', {str(tmp_path)!r}]))"
+    )
+    done = subprocess.run([sys.executable, "-c", words], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "No figures: figures need Matplotlib" in done.stdout
+    assert "No robot of real bodies, no URDF" in done.stdout
+    assert "60 of 60" in done.stdout
+    assert {path.name for path in tmp_path.iterdir()} == {"tx40-report.txt", "tx40-result.json"}
 
 
 # --- calibrate ------------------------------------------------------------------------------------

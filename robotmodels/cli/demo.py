@@ -1,4 +1,4 @@
-"""``robotmodels demo``: from a table and from a URDF to every direct model and every posture."""
+"""``robotmodels demo``: two arms with every direct model and every posture; a real log."""
 
 from __future__ import annotations
 
@@ -48,11 +48,16 @@ def add_command(commands: Any) -> None:
         help="two arms from table and URDF to every direct model and every posture",
         description="Take the Staubli RX-90 from its table to URDF and Pinocchio, and the UR5 "
         "from its URDF to its table; print every direct model of both and every posture that "
-        "reaches a pose, and draw them.",
+        "reaches a pose, and draw them. With --real, identify a Staubli TX40 from its log instead.",
     )
     parser.add_argument(
+        "--real", action="store_true",
+        help="identify the dynamic parameters of a real TX40 from the log that is shipped, beside "
+        "published values",
+    )  # fmt: skip
+    parser.add_argument(
         "--out", type=Path, default=Path("robotmodels-demo"), metavar="FOLDER",
-        help="where the URDF and the scenes go (default: %(default)s)",
+        help="where the files go (default: %(default)s)",
     )  # fmt: skip
     parser.set_defaults(run=run)
 
@@ -63,7 +68,7 @@ def run(arguments: argparse.Namespace) -> None:
     Parameters
     ----------
     arguments : Namespace
-        With ``out``, the folder for the files.
+        With ``out``, the folder for the files, and ``real``.
 
     Examples
     --------
@@ -73,6 +78,13 @@ def run(arguments: argparse.Namespace) -> None:
     started = time.perf_counter()
     folder: Path = arguments.out
     folder.mkdir(parents=True, exist_ok=True)
+    if arguments.real:
+        from .demo_identification import identify_tx40
+
+        _say("Staubli TX40: from a log of its motion to a robot that predicts its torques")
+        identify_tx40(folder)
+        print(f"\nDone in {time.perf_counter() - started:.1f} s.")
+        return
     _say("Staubli RX-90: from the table of the seed book (Table 1.1) to URDF to Pinocchio")
     rx90 = load("rx90")
     _show_models(rx90, _RX90_POSTURE, folder)
@@ -95,6 +107,7 @@ def run(arguments: argparse.Namespace) -> None:
     show([rx90, ur5.with_base(beside @ ur5.base)], [_RX90_POSTURE, _UR5_POSTURE]).save(scene)
     print(f"Offline scene of both arms: {scene.resolve()} (open it in a browser)")
     print(f"\nDone in {time.perf_counter() - started:.1f} s.")
+    print("robotmodels demo --real identifies a real TX40 from nine seconds of its motion.")
 
 
 def table_poses(model: RobotModel, q: Array) -> Array:
