@@ -37,9 +37,16 @@ def test_python_examples(tmp_path, monkeypatch, capsys):
     assert (tmp_path / "arm.urdf").is_file()
     assert names["result"].after.summary("m").mean < 0.22e-3
     assert names["result"].before.summary("m").mean > 8e-3
+    tx40 = names["tx40"]
+    assert len(tx40.names) == 61
+    assert abs(tx40.value("ZZ1") - 1.23) < 0.01
+    assert 0.025 < tx40.deviation("ZZ1") < 0.035
+    np.testing.assert_allclose(tx40.held_out.rmse, [4.1, 5.1, 1.5, 0.6, 1.3, 1.3], atol=0.05)
+    assert names["real"].inertia.is_physical.all()
     printed = capsys.readouterr().out
     assert "rx90" in printed
     assert "elbow: C3 = 0" in printed
+    assert "Dynamic identification of tx40" in printed
 
 
 POSE_B = [[-1, 0, 0, 0.4], [0, 1, 0, 0.2], [0, 0, -1, 0.5], [0, 0, 0, 1]]
