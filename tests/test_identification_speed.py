@@ -25,7 +25,8 @@ from robotmodels.identification.equations import Equations
 from robotmodels.identification.filters import settling, zero_phase
 from robotmodels.identification.kept_equations import kept_equations, plain
 from robotmodels.identification.spectrum import power_density
-from robotmodels.logs import Log
+from robotmodels.logs import FindingKind, Log, check_log
+from robotmodels.logs.checks import _Runs
 from robotmodels.logs.stretches import stretches
 from robotmodels.minimal_parameters import base_parameters
 
@@ -54,7 +55,7 @@ def test_zero_phase_is_that_of_scipy(order, band):
     x = np.random.default_rng(0).normal(size=(3000, 2)).cumsum(axis=0)
     wider = np.tan(np.pi * band) / (np.sqrt(2.0) - 1.0) ** (0.5 / order)
     sos = butter(order, 2.0 * np.arctan(wider) / np.pi, output="sos")
-    poles = np.abs(np.concatenate([np.roots(row[3:]) for row in sos]))
+    poles = np.abs(np.concatenate([np.roots(row[3:]) for row in np.asarray(sos)]))
     assert settling(band, 1.0, order) == pytest.approx(
         np.log(1e-13) / np.log(poles.max()), abs=1.0, rel=1e-6
     )
@@ -179,3 +180,25 @@ def test_what_a_long_log_hides_is_found_in_stretches_and_said():
     wrong = Log(DT, whole.q, whole.tau * [-1.0, 1.0])
     (found,) = [f for f in check_joints(wrong, model) if f.joints == ("1",)]
     assert "of 120000 samples" in found.sentence
+
+
+def test_runs_are_found_whatever_the_pieces():
+    rng = np.random.default_rng(3)
+    for _ in range(300):
+        same = rng.random(rng.integers(0, 30)) < rng.random()
+        runs = _Runs(2)
+        for part in np.split(same, sorted(rng.integers(0, len(same) + 1, 3))):
+            runs.add(part)
+        steps = np.diff(np.concatenate([[0], same.astype(int), [0]]))
+        pairs = zip(np.flatnonzero(steps == 1), np.flatnonzero(steps == -1), strict=True)
+        assert runs.ended() == [(a, b) for a, b in pairs if b - a >= 2]
+
+
+def test_what_happens_once_in_a_long_log_is_found():
+    q = np.sin(1e-3 * np.arange(250_000))[:, None] * [1.0, 0.7]
+    q[99_950:100_060, 1] = q[99_950, 1]  # a sensor that stops, over the end of a piece
+    q[230_000, 0] += 0.5
+    log = Log(1e-3, q, np.cos(q) + 1e-3 * np.random.default_rng(0).normal(size=q.shape))
+    found = {f.kind: f for f in check_log(log)}
+    assert "110 samples from row 99950" in found[FindingKind.STUCK].sentence
+    assert "at row 23000" in found[FindingKind.JUMP].sentence

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,12 +22,16 @@ _FACTOR = 4.0
 """Times its limit that a joint must be at to be in another unit, not only off its zero."""
 _SATURATED = 0.02
 _STUCK = 50
+_ROWS = 3
+"""Rows in all channels alike, one after the other, that show a recorder that is too fast."""
 _JUMP = 20.0
 _PER_PARAMETER = 10
 _TINY = 1e-3
 _WRONG_UNIT = 10.0
 """Times its limit that a torque must be at to be in another unit or of a motor."""
 _FEW_LEVELS = 100
+_CHUNK = 100_000
+"""Samples that are looked at together; statistics of a longer channel are of so many of it."""
 
 
 def check_log(log: Log, model: RobotModel | None = None) -> tuple[LogFinding, ...]:
@@ -34,8 +40,10 @@ def check_log(log: Log, model: RobotModel | None = None) -> tuple[LogFinding, ..
     Without a model: joints that do not move and torques that are constant, saturation, coarse
     steps, values that repeat, jumps, recordings that are too short. With one, besides: numbers of
     joints, degrees, motor angles, limits of position, velocity and torque, samples for the number
-    of parameters. Whether joints are swapped, signs are wrong, and the motion shows the parameters
-    is told by `robotmodels.identification.check_joints`, since it takes the dynamic model.
+    of parameters. Of a long log quantiles, steps of sensors and turns are those of about 1e5
+    samples spread evenly over it; everything else is looked at in every sample. Whether joints are
+    swapped, signs are wrong, and the motion shows the parameters is told by
+    `robotmodels.identification.check_joints`, since it takes the dynamic model.
 
     Parameters
     ----------
@@ -92,6 +100,50 @@ def _add(
     found.append(LogFinding(kind, severity, (name,), f"Joint {name}: {words}"))
 
 
+def _spread(x: Array) -> Array:
+    """Samples spread evenly over a long channel, all of a short one."""
+    return x[:: -(-len(x) // _CHUNK)] if len(x) else x
+
+
+def _chunks(N: int) -> Iterator[slice]:
+    for start in range(0, N, _CHUNK):
+        yield slice(start, min(start + _CHUNK, N))
+
+
+def _moves(q: Array) -> Array:
+    """Sizes of the moves from a sample to the next, of a long channel some."""
+    return np.abs(_spread(q[1:]) - _spread(q[:-1]))
+
+
+class _Runs:
+    """Runs of True of a row that is told piece by piece, those that are long enough."""
+
+    def __init__(self, least: int) -> None:
+        self.least, self.begun, self.seen = least, -1, 0
+        self.found: list[tuple[int, int]] = []
+
+    def add(self, same: NDArray[np.bool_]) -> None:
+        """Values that follow those before."""
+        if not len(same):
+            return
+        edges = (np.flatnonzero(same[1:] != same[:-1]) + 1 + self.seen).tolist()
+        if bool(same[0]) == (self.begun < 0):  # it changes between the pieces
+            edges.insert(0, self.seen)
+        self.seen += len(same)
+        if self.begun >= 0:
+            edges.insert(0, self.begun)
+        self.begun = edges.pop() if len(edges) % 2 else -1
+        pairs = zip(edges[::2], edges[1::2], strict=True)
+        self.found += [pair for pair in pairs if pair[1] - pair[0] >= self.least]
+
+    def ended(self) -> list[tuple[int, int]]:
+        """First index of each run, and the one after its last."""
+        if self.begun >= 0 and self.seen - self.begun >= self.least:
+            self.found.append((self.begun, self.seen))
+        self.begun = -1
+        return self.found
+
+
 def _constant(log: Log, found: list[LogFinding]) -> NDArray[np.bool_]:
     """Report channels that do not change; joints that move."""
     span = np.ptp(log.q, axis=0)
@@ -127,11 +179,15 @@ def _saturated(log: Log, found: list[LogFinding]) -> None:
         if not span:
             continue
         for end, word in ((float(tau.max()), "largest"), (float(tau.min()), "smallest")):
-            at = np.abs(tau - end) <= 1e-6 * span
-            share = float(at.mean())
+            count = sum(
+                int((np.abs(tau[rows] - end) <= 1e-6 * span).sum()) for rows in _chunks(len(tau))
+            )
+            share = count / len(tau)
+            if share <= _SATURATED or count < 5:
+                continue
             # a current that is cut stays for several samples, steps of a sensor do so anywhere
             levels = len(np.unique(tau[: min(len(tau), 20000)]))
-            if share > _SATURATED and at.sum() >= 5 and share > 5.0 / levels:
+            if share > 5.0 / levels:
                 _add(
                     found, FindingKind.SATURATED, Severity.DOUBTFUL, log, j,
                     f"{100 * share:.1f} % of its torques are the {word} one ({end:.4g}); the drive "
@@ -141,7 +197,7 @@ def _saturated(log: Log, found: list[LogFinding]) -> None:
 
 def _coarse(log: Log, moving: NDArray[np.bool_], found: list[LogFinding]) -> None:
     for j in np.flatnonzero(moving).tolist():
-        step = resolution(log.q[:, j])
+        step = resolution(_spread(log.q[:, j]))
         span = float(np.ptp(log.q[:, j]))
         if step > 0.0 and span / step < _FEW_LEVELS:
             _add(
@@ -180,40 +236,47 @@ def resolution(values: Array) -> float:
 
 def _stuck(log: Log, moving: NDArray[np.bool_], found: list[LogFinding]) -> None:
     """Report positions and torques that all repeat at once: samples that were not taken."""
-    same = (np.diff(log.q[:, moving], axis=0) == 0.0).all(axis=1)
-    same &= (np.diff(log.tau, axis=0) == 0.0).all(axis=1)
-    if not moving.any() or same.all():
+    if not moving.any():
         return
-    edges = np.diff(np.concatenate([[0], same.astype(np.int8), [0]]))
-    first, last = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
-    runs = last - first
-    for j in np.flatnonzero(
-        moving
-    ).tolist():  # one sensor alone that stops while its torque goes on
-        still = np.diff(log.q[:, j]) == 0.0
-        marks = np.diff(np.concatenate([[0], still.astype(np.int8), [0]]))
-        begin, stop = np.flatnonzero(marks == 1), np.flatnonzero(marks == -1)
-        speed = np.abs(np.diff(log.q[:, j]))
-        usual = float(np.quantile(speed, 0.9))
-        for start, end in zip(begin.tolist(), stop.tolist(), strict=True):
-            if end - start < _STUCK or start == 0 or end == len(speed):
+    whole, repeated = _Runs(_ROWS), 0
+    alone = {j: _Runs(_STUCK) for j in np.flatnonzero(moving).tolist()}
+    for rows in _chunks(len(log) - 1):
+        both = slice(rows.start, rows.stop + 1)
+        still = np.diff(log.q[both], axis=0) == 0.0
+        for j, runs in alone.items():
+            runs.add(still[:, j])
+        same = still[:, moving].all(axis=1) & (np.diff(log.tau[both], axis=0) == 0.0).all(axis=1)
+        whole.add(same)
+        repeated += int(same.sum())
+    if repeated == len(log) - 1:
+        return
+    # one sensor alone that stops while its torque goes on
+    for j, runs in alone.items():
+        long = runs.ended()
+        if not long:
+            continue
+        q = log.q[:, j]
+        usual = float(np.quantile(_moves(q), 0.9))
+        for start, end in long:
+            if start == 0 or end == len(log) - 1:
                 continue
-            before = float(speed[max(0, start - 3) : start].mean())
-            if before > 0.3 * usual and float(speed[end]) > 5.0 * usual > 0.0:
+            before = float(np.abs(np.diff(q[max(0, start - 3) : start + 1])).mean())
+            if before > 0.3 * usual and abs(float(q[end + 1] - q[end])) > 5.0 * usual > 0.0:
                 _add(
                     found, FindingKind.STUCK, Severity.DOUBTFUL, log, j,
                     f"its position repeats for {end - start + 1} samples from row {start} and then "
                     "jumps; the sensor or the recorder stopped. Leave these rows out.",
                 )  # fmt: skip
                 break
-    if len(runs) and runs.max() >= 3 and runs.sum() > _OFTEN * len(log):
+    rows_alike = whole.ended()
+    if rows_alike and repeated > _OFTEN * len(log):
+        first, last = max(rows_alike, key=lambda run: run[1] - run[0])
         found.append(
             LogFinding(
                 FindingKind.STUCK, Severity.DOUBTFUL, (),
-                f"{int(runs.sum())} rows repeat the row before in every channel (up to "
-                f"{int(runs.max())} one after the other, from row {first[np.argmax(runs)]}): the "
-                "recorder is faster than what it records. Read it with the period of the "
-                "controller.",
+                f"{repeated} rows repeat the row before in every channel (up to {last - first} one "
+                f"after the other, from row {first}): the recorder is faster than what it records. "
+                "Read it with the period of the controller.",
             )
         )  # fmt: skip
 
@@ -222,12 +285,15 @@ def _jumps(log: Log, moving: NDArray[np.bool_], found: list[LogFinding]) -> None
     for j in np.flatnonzero(moving).tolist():
         largest, at, usual = 0.0, 0, 0.0
         for rows in log.recordings():
-            steps = np.abs(np.diff(log.q[rows, j]))
-            if len(steps):
-                usual = max(usual, float(np.quantile(steps, 0.99)))
+            q = log.q[rows, j]
+            if len(q) < 2:
+                continue
+            usual = max(usual, float(np.quantile(_moves(q), 0.99)))
+            for part in _chunks(len(q) - 1):
+                steps = np.abs(np.diff(q[part.start : part.stop + 1]))
                 k = int(steps.argmax())
                 if steps[k] > largest:
-                    largest, at = float(steps[k]), rows.start + k + 1
+                    largest, at = float(steps[k]), rows.start + part.start + k + 1
         if usual > 0.0 and largest > _JUMP * usual:
             turn = abs(largest - 2.0 * np.pi) < 0.1
             _add(
@@ -243,7 +309,7 @@ def _slow(log: Log, moving: NDArray[np.bool_], found: list[LogFinding]) -> None:
     """Report joints that go one way only: less than a period of their motion."""
     for j in np.flatnonzero(moving).tolist():
         span = float(np.ptp(log.q[:, j]))
-        way = sum(_reversals(log.q[rows, j], 0.05 * span) for rows in log.recordings())
+        way = sum(_reversals(_spread(log.q[rows, j]), 0.05 * span) for rows in log.recordings())
         if way == 0:
             _add(
                 found, FindingKind.SLOWER_THAN_LOG, Severity.DOUBTFUL, log, j,
@@ -276,28 +342,27 @@ def _units(log: Log, model: RobotModel, found: list[LogFinding]) -> None:
     prismatic = model.table.sigma[model.table.joint_rows] == PRISMATIC
     known = np.isfinite(lower) & np.isfinite(upper) & (upper > lower)
     margin = np.where(known, _BEYOND * (upper - lower), np.inf)
+    least, most = log.q.min(axis=0), log.q.max(axis=0)
     with np.errstate(invalid="ignore"):
-        beyond = ((log.q < lower - margin) | (log.q > upper + margin)).mean(axis=0)
-    beyond[~known] = 0.0
-    size = np.abs(log.q).max(axis=0)
-    outside = [
-        j for j in range(log.n) if beyond[j] > 0.0 or (not prismatic[j] and size[j] > _TURNS)
-    ]
+        beyond = known & ((least < lower - margin) | (most > upper + margin))
+    size = np.maximum(np.abs(least), np.abs(most))
+    outside = [j for j in range(log.n) if beyond[j] or (not prismatic[j] and size[j] > _TURNS)]
     if not outside:
         return
     turning = ~prismatic & known
-    as_degrees = log.q[:, turning] / _DEGREES
-    fits = ((as_degrees >= lower[turning] - margin[turning])
-            & (as_degrees <= upper[turning] + margin[turning])).all()  # fmt: skip
+    fits = ((least / _DEGREES >= lower - margin) & (most / _DEGREES <= upper + margin))[
+        turning
+    ].all()
     ratio = model.transmission
     motors = False
     if ratio is not None and ratio.is_invertible and not np.allclose(ratio.matrix, np.eye(log.n)):
-        q = ratio.to_joint(log.q)
-        motors = bool(((q >= lower - margin) & (q <= upper + margin))[:, known].all())
+        motors = True
+        for rows in _chunks(len(log)):
+            q = ratio.to_joint(log.q[rows])
+            motors &= bool(((q >= lower - margin) & (q <= upper + margin))[:, known].all())
     names = tuple(log.names[j] for j in outside)
     listed = ", ".join(
-        f"{log.names[j]} ({log.q[:, j].min():.4g} to {log.q[:, j].max():.4g}, limits "
-        f"{lower[j]:.4g} to {upper[j]:.4g})"
+        f"{log.names[j]} ({least[j]:.4g} to {most[j]:.4g}, limits {lower[j]:.4g} to {upper[j]:.4g})"
         for j in outside
     )
     reach = np.where(known, np.maximum(np.abs(lower), np.abs(upper)), np.pi)
@@ -336,8 +401,9 @@ def _torque_limits(log: Log, model: RobotModel, found: list[LogFinding]) -> None
     effort = model.table.effort
     velocity = model.table.velocity
     for j in range(log.n):
-        largest = float(np.abs(log.tau[:, j]).max())
-        usual = float(np.quantile(np.abs(log.tau[:, j]), 0.99))
+        tau = log.tau[:, j]
+        largest = max(abs(float(tau.min())), abs(float(tau.max())))
+        usual = float(np.quantile(np.abs(_spread(tau)), 0.99))
         if np.isfinite(effort[j]) and effort[j] > 0.0:
             if usual > _WRONG_UNIT * effort[j]:
                 _add(
@@ -359,7 +425,7 @@ def _torque_limits(log: Log, model: RobotModel, found: list[LogFinding]) -> None
                     "be in kN m or of the motor. See units, drive gains and gear ratios.",
                 )  # fmt: skip
         if np.isfinite(velocity[j]) and velocity[j] > 0.0:
-            parts = [np.abs(np.diff(log.q[rows, j])) / log.dt for rows in log.recordings()]
+            parts = [_moves(log.q[rows, j]) / log.dt for rows in log.recordings()]
             speed = float(np.quantile(np.concatenate(parts), 0.95)) if len(log) > 2 else 0.0
             if speed > 2.0 * velocity[j]:
                 _add(
