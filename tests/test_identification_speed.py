@@ -199,6 +199,6 @@ def test_what_happens_once_in_a_long_log_is_found():
     q[99_950:100_060, 1] = q[99_950, 1]  # a sensor that stops, over the end of a piece
     q[230_000, 0] += 0.5
     log = Log(1e-3, q, np.cos(q) + 1e-3 * np.random.default_rng(0).normal(size=q.shape))
-    found = {f.kind: f for f in check_log(log)}
-    assert "110 samples from row 99950" in found[FindingKind.STUCK].sentence
-    assert "at row 23000" in found[FindingKind.JUMP].sentence
+    found = {(f.kind, f.joints): f.sentence for f in check_log(log)}
+    assert "110 samples from row 99950" in found[FindingKind.STUCK, ("2",)]
+    assert "at row 23000" in found[FindingKind.JUMP, ("1",)]
