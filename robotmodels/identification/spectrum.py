@@ -50,4 +50,4 @@ def power_density(x: Array, rate: float, length: int) -> tuple[Array, Array]:
     P = total / (len(starts) * rate * float(window @ window))
     # one side holds the power of both; zero and half the rate have no other
     P[1 : (length + 1) // 2] *= 2.0
-    return np.arange(length // 2 + 1) * (rate / length), P
+    return np.arange(length // 2 + 1, dtype=np.float64) * (rate / length), P

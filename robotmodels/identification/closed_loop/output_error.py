@@ -23,10 +23,10 @@ from .controller import Controller
 from .didim import DidimStep, weighted_step
 from .estimate import SimulatedEstimate
 from .instrumental import first_values, ran_away, torque_sizes
-from .iteration import reweighted
+from .iteration import ROUNDING, reweighted
 from .loop import ClosedLoop, closed_loop
 from .references import references
-from .simulated import simulated_signals, simulated_use
+from .simulated import asked_of, simulated_signals, simulated_use
 
 _DIFFERENCE = 1e-5
 """Part of the torque that a parameter is moved by for its sensitivity."""
@@ -34,6 +34,12 @@ _ROUNDING = 1e-10
 """Part of the outputs below which an error is rounding."""
 _SLACK = 1e-9
 """Of an equation, by which the weighted squares of the errors may grow."""
+_KEPT = 64_000_000
+"""Bytes of sensitivities that are kept from one step to the next."""
+_BENT = 0.05
+"""Part of a change of the outputs that kept sensitivities may miss."""
+_NEAR = 0.3
+"""Move, in deviations, below which the sensitivities are to be those of the last parameters."""
 
 
 class Output(Enum):
@@ -64,8 +70,9 @@ def output_error(
     """Closed-loop output error (CLOE): the simulated robot does what the measured one did.
 
     Gauss-Newton steps on the differences of measured and simulated outputs, both through the same
-    decimation, weighted by their own deviations; sensitivities are central differences of
-    simulations, 2 b of them a step. Torques are compared where the references keep a joint out of
+    decimation, weighted by their own deviations. Sensitivities are differences of simulations, b
+    of them; they are kept over steps for which they foretell the outputs, and made anew for the
+    last ones. Torques are compared where the references keep a joint out of
     its dead band.
 
     Parameters
@@ -113,19 +120,22 @@ def output_error(
     way = loop
     size = torque_sizes(reduction)
 
+    outputs = _Outputs(system, way, size, which)
+
     def advance(values: Array, weights: Array | None) -> DidimStep:
-        found = reduced(system, _blocks(system, way, values, size, which))
-        step = weighted_step(found, values, weights)
-        # errors that are rounding do not count
-        lengths = np.array([float(R[:, -1] @ R[:, -1]) for R in found.factors])
-        errors = np.maximum(found.sums(values), _ROUNDING**2 * lengths)
-        return replace(step, cost=float(step.weights**2 @ errors))
+        step, bent = outputs.step(values, weights)
+        if outputs.stale(values, step.deviations) and (
+            bent or (np.abs(step.values - values) <= _NEAR * step.deviations).all()
+        ):
+            outputs.kept = None
+            step, _ = outputs.step(values, weights)
+        return step
 
     ended = reweighted(first, advance, size, iterations, _SLACK * reduction.rows)
     last = ended.last
     if last is None:
         return ran_away(Method.CLOE, system, first, loop)
-    equations = given(system, lambda: _blocks(system, way, ended.values, size, which))
+    equations = given(system, lambda: outputs.blocks(ended.values))
     spread = sandwich(equations, ended.values, last.weights, last.inverse, lags)
     notes = loop.notes
     if which is not Output.TORQUE and system.log.q_ref is None:
@@ -141,40 +151,83 @@ def output_error(
     )  # fmt: skip
 
 
-def _blocks(
-    system: Equations, loop: ClosedLoop, values: Array, size: Array, which: Output
-) -> Iterator[Block]:
-    """Outputs linear in the parameters around values: ``y - y_s + S values = S b``."""
-    b = len(values)
-    moves = _DIFFERENCE * size
-    log = system.log
-    centre = simulated_signals(system, loop, values)
-    sides = [
-        [simulated_signals(system, loop, values + side * move) for side in (1.0, -1.0)]
-        for move in np.diag(moves)
-    ]
-    for piece, found in centre:
-        first = max(piece.start - system.processing.reach, piece.low)
-        rows = slice(first, first + len(found))
-        measured = _outputs(which, np.array(log.tau[rows]), np.array(log.q[rows]))
-        y = measured - _outputs(which, found.tau, found.q)
-        S = np.empty((*y.shape, b))
-        for k, runs in enumerate(sides):
-            up, down = (_outputs(which, x.tau, x.q) for _, x in map(next, runs))
-            S[:, :, k] = (up - down) / (2.0 * moves[k])
-        speeds = _reference_speeds(system, loop, piece, first)
-        S, y, v = _thinned(system, piece, S, y, speeds)
-        moving = simulated_use(system, loop, v)
-        always = np.ones(moving.shape, dtype=bool)
-        uses = {
-            Output.TORQUE: moving,
-            Output.POSITION: always,
-            Output.BOTH: np.hstack((moving, always)),
-        }
-        t = log.dt * np.arange(
-            piece.start, piece.stop, system.processing.decimation, dtype=np.float64
-        )
-        yield Block(t, S, y + S @ values, uses[which], v)
+class _Outputs:
+    """Outputs linear in the parameters, whose sensitivities are kept if they are small."""
+
+    def __init__(self, system: Equations, loop: ClosedLoop, size: Array, which: Output) -> None:
+        self.system, self.loop, self.which = system, loop, which
+        self.moves, self.size = _DIFFERENCE * size, size
+        joints = system.model.n * (2 if which is Output.BOTH else 1)
+        rows = len(system.log) // system.processing.decimation + len(system.pieces())
+        self.small = 8 * joints * (len(size) + 1) * rows <= _KEPT
+        self.kept: tuple[Array, list[Array], list[Array]] | None = None
+
+    def blocks(self, values: Array) -> Iterator[Block]:
+        """Outputs around values: ``y - y_s + S values = S b``, with the S that are kept."""
+        system, log, step = self.system, self.system.log, self.system.processing.decimation
+        asked = asked_of(system, self.loop)
+        centre = simulated_signals(system, self.loop, values, asked)
+        kept = None if self.kept is None else iter(self.kept[1])
+        sides = [
+            simulated_signals(system, self.loop, values + move, asked)
+            for move in np.diag(self.moves)[: None if kept is None else 0]
+        ]
+        for piece, found in centre:
+            first = max(piece.start - system.processing.reach, piece.low)
+            rows = slice(first, first + len(found))
+            out = _outputs(self.which, found.tau, found.q)
+            measured = _outputs(self.which, np.array(log.tau[rows]), np.array(log.q[rows]))
+            y = _thinned(system, piece, measured - out)
+            v = _thinned(system, piece, _reference_speeds(system, self.loop, piece, first))
+            if kept is not None:
+                S = next(kept)
+            else:
+                S = np.empty((*y.shape, len(values)))
+                for k, (_, moved) in enumerate(map(next, sides)):
+                    change = _outputs(self.which, moved.tau, moved.q) - out
+                    S[:, :, k] = _thinned(system, piece, change) / self.moves[k]
+            moving = simulated_use(system, self.loop, v)
+            always = np.ones(moving.shape, dtype=bool)
+            uses = {
+                Output.TORQUE: moving,
+                Output.POSITION: always,
+                Output.BOTH: np.hstack((moving, always)),
+            }
+            t = log.dt * np.arange(piece.start, piece.stop, step, dtype=np.float64)
+            yield Block(t, S, y + S @ values, uses[self.which], v)
+
+    def step(self, values: Array, weights: Array | None) -> tuple[DidimStep, bool]:
+        """Step of the simulation with given parameters; whether kept sensitivities miss it."""
+        bent = False
+        blocks: Iterator[Block] = self.blocks(values)
+        if self.small:
+            made = list(blocks)
+            blocks = iter(made)
+            if self.kept is None:
+                self.kept = values, [x.W for x in made], [x.y for x in made]
+            else:
+                # with the same sensitivities both sides agree as far as outputs are linear
+                move, scale = values - self.kept[0], 1.0 if weights is None else weights
+                foretold = (np.where(x.use, x.W @ move, 0.0) * scale for x in made)
+                pairs = zip(made, self.kept[2], strict=True)
+                missed = (np.where(x.use, x.y - y, 0.0) * scale for x, y in pairs)
+                bent = _length(missed) > _BENT * _length(foretold)
+        found = reduced(self.system, blocks)
+        step = weighted_step(found, values, weights)
+        # errors that are rounding do not count
+        lengths = np.array([float(R[:, -1] @ R[:, -1]) for R in found.factors])
+        errors = np.maximum(found.sums(values), _ROUNDING**2 * lengths)
+        return replace(step, cost=float(step.weights**2 @ errors)), bent
+
+    def stale(self, values: Array, deviations: Array) -> bool:
+        """Whether kept sensitivities are those of clearly other parameters."""
+        if self.kept is None:
+            return False
+        return bool((np.abs(values - self.kept[0]) > deviations + ROUNDING * self.size).any())
+
+
+def _length(parts: Iterator[Array]) -> float:
+    return float(np.sqrt(sum(float((part * part).sum()) for part in parts)))
 
 
 def _outputs(which: Output, tau: Array, q: Array) -> Array:
@@ -192,18 +245,9 @@ def _reference_speeds(system: Equations, loop: ClosedLoop, piece: Piece, first: 
     return references(log, choices, piece, first, last, None, loop.width).v[: last - first]
 
 
-def _thinned(
-    system: Equations, piece: Piece, S: Array, y: Array, v: Array
-) -> tuple[Array, Array, Array]:
+def _thinned(system: Equations, piece: Piece, rows: Array) -> Array:
     """The same decimation as that of the measured equations."""
     step = system.processing.decimation
-    k, m, b = S.shape
-    wide = np.concatenate((S.reshape(k, -1), y, v), axis=1)
     centre = piece.start - max(piece.start - system.processing.reach, piece.low)
     count = -(-(piece.stop - piece.start) // step)
-    kept = decimated(iter((wide,)), step, centre, count, wide.shape[1])
-    return (
-        kept[:, : m * b].reshape(-1, m, b),
-        kept[:, m * b : m * b + m],
-        np.ascontiguousarray(kept[:, m * b + m :]),
-    )
+    return decimated(iter((rows,)), step, centre, count, rows.shape[1])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +17,9 @@ from ..processing import Processing
 from ..signals import Piece, Signals
 from .controller import Controller
 from .loop import ClosedLoop, least_width, robot_of, steps_of
-from .references import references
+from .references import Targets, references
+
+Asked = Callable[[Piece, int, int], Targets]
 
 
 class RanAwayError(Exception):
@@ -93,7 +95,7 @@ class MovingRobot:
 
 
 def simulated_signals(
-    system: Equations, loop: ClosedLoop, values: Array
+    system: Equations, loop: ClosedLoop, values: Array, asked: Asked | None = None
 ) -> Iterator[tuple[Piece, Signals]]:
     """Signals of the simulated robot for each piece of the log and the windows at its ends.
 
@@ -105,6 +107,8 @@ def simulated_signals(
         How it is simulated.
     values : ndarray, shape (b,)
         Its parameters.
+    asked : callable, optional
+        Makes the references, as `asked_of` does, for several robots that follow the same.
 
     Yields
     ------
@@ -120,6 +124,7 @@ def simulated_signals(
         The robot does not follow.
     """
     log, choices = system.log, system.processing
+    follow = asked_of(system, loop) if asked is None else asked
     robot = robot_of(system, values)
     runner = MovingRobot(robot, loop, log.dt)
     begin, done, held = -1, 0, 0
@@ -132,10 +137,8 @@ def simulated_signals(
             kept = kept[:, :0]
         last = min(piece.stop + choices.reach, piece.high)
         if last > done:
-            asked = references(
-                log, choices, piece, done, last, loop.controller.feed_forward, loop.width
-            )
-            rows = runner.advance(asked.q, asked.v, asked.feed)
+            targets = follow(piece, done, last)
+            rows = runner.advance(targets.q, targets.v, targets.feed)
             kept = np.concatenate((kept, np.stack(rows)), axis=1)
             done = last
         first = max(piece.start - choices.reach, piece.low)
@@ -145,6 +148,34 @@ def simulated_signals(
         held = max(first, min(piece.stop - choices.reach, done))
         kept = kept[:, held - first :].copy()
         yield piece, Signals(log.dt * np.arange(first, last, dtype=np.float64), *found)
+
+
+def asked_of(system: Equations, loop: ClosedLoop) -> Asked:
+    """References of rows of a piece; the last ones that were made are kept.
+
+    Parameters
+    ----------
+    system : Equations
+        Robot, log and choices.
+    loop : ClosedLoop
+        How it is simulated.
+
+    Returns
+    -------
+    callable
+        Of the piece, and the first row and the one after the last.
+    """
+    last: tuple[tuple[int, int], Targets] | None = None
+
+    def made(piece: Piece, first: int, stop: int) -> Targets:
+        nonlocal last
+        if last is None or last[0] != (first, stop):
+            feed = loop.controller.feed_forward
+            found = references(system.log, system.processing, piece, first, stop, feed, loop.width)
+            last = (first, stop), found
+        return last[1]
+
+    return made
 
 
 def simulated_use(system: Equations, loop: ClosedLoop, v: Array) -> NDArray[np.bool_]:
