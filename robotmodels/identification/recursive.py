@@ -195,7 +195,8 @@ class _State:
         rows *= np.sqrt(age)[:, None, None]
         fade = self.forgetting**k
         whole = np.vstack((np.sqrt(fade) * self.R, rows[use]))
-        self.R = np.asarray(np.linalg.qr(whole, mode="r")) if len(whole) > b + 1 else whole
+        # fewer rows than columns tell no solution yet, and are kept as they are
+        self.R = np.asarray(np.linalg.qr(whole, mode="r")) if len(whole) >= b + 1 else whole
         self.equations = fade * self.equations + float(age @ use.sum(axis=1))
         self.memory = fade * self.memory + float(age.sum())
 
@@ -219,9 +220,6 @@ class _State:
 
         b = self.R.shape[1] - 1
         R = self.R[:b, :b]
-        if not (np.tril(R, -1) == 0.0).all():  # rows that have not been reduced yet
-            self.R = np.asarray(np.linalg.qr(self.R, mode="r"))
-            R = self.R[:b, :b]
         size = np.linalg.norm(R, axis=0)
         return solve_triangular(R / size, np.eye(b)) / size[:, None]
 
