@@ -12,6 +12,8 @@ from .equations import Block, Equations
 
 _MOST = 60
 """Lags at most."""
+_LEFT = 5.0
+"""Equations that a kind must have beyond the parameters it determines."""
 _QUIET = 5
 """Lags in a row without correlation, after which there is none."""
 _LEAST = 0.1
@@ -42,7 +44,12 @@ class CorrelatedCovariance(Rebuilt):
 
 
 def correlated_covariance(
-    system: Equations, values: Array, weights: Array, inverse: Array, lags: int | None = None
+    system: Equations,
+    values: Array,
+    weights: Array,
+    inverse: Array,
+    lags: int | None = None,
+    taken: Array | None = None,
 ) -> CorrelatedCovariance:
     """Covariance of weighted least squares without the assumption that residuals are white.
 
@@ -62,6 +69,10 @@ def correlated_covariance(
         Inverse of the information ``sum W^T diag(weights^2) W``.
     lags : int, optional
         Instants on either side; default as many as the residuals say.
+
+    taken : ndarray, shape (m,), optional
+        Parameters that each kind of equations has determined (sums of leverages); default in equal
+        shares of the equations.
 
     Returns
     -------
@@ -98,6 +109,15 @@ def correlated_covariance(
         lags = _correlated(products[:, own, own] @ weights**2, rows)
     window = _flat_then_falling(lags, count)
     gamma = products / np.maximum(pairs, 1.0)
+    # residuals that the parameters made smaller, the more so where they have more to say: as the
+    # jackknife does, with the mean leverage of each kind
+    counts = pairs[0, own, own]
+    took = counts * (b / max(rows, 1)) if taken is None else taken
+    few = (counts > 0.0) & (counts - took < _LEFT)
+    larger = np.where(few, 1.0, counts / np.maximum(counts - took, 1.0))
+    gamma *= np.outer(larger, larger)
+    pooled = float(size.sum()) / max(rows - b, 1)
+    gamma[0, own, own] = np.where(few, np.maximum(gamma[0, own, own], pooled), gamma[0, own, own])
     total, straight = np.zeros((b, b)), np.zeros((b, b))
     before = np.zeros((0, m, b))
     for block in system.blocks():
@@ -120,11 +140,8 @@ def correlated_covariance(
     straight = inverse @ straight @ inverse
     # such a window may give less than nothing where instants are few
     if (np.diag(total) < _LEAST * np.diag(straight)).any():
-        total = straight
-    # residuals that the parameters made smaller, the more so where they have more to say: as the
-    # jackknife does, with the mean leverage
-    factor = (rows / max(rows - b, 1)) ** 2
-    return CorrelatedCovariance(factor * total, len(window), correlation)
+        total, window = straight, window[:0]
+    return CorrelatedCovariance(total, len(window), correlation)
 
 
 def _carried(before: Array, gamma: Array, now: Array) -> Array:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .._arrays import Array
 from .._choices import chosen
 from ..drive import Drives
 from ..errors import InvalidValueError
@@ -19,14 +20,14 @@ from ..logs import Log, Severity, check_log
 from ..minimal_parameters import BaseParameters, base_parameters
 from ..model import RobotModel, check_model
 from .closed_loop.estimate import SimulatedEstimate
-from .correlated import correlated_covariance
+from .correlated import CorrelatedCovariance, correlated_covariance
 from .equations import EquationForm, Equations, equations
 from .essential import EssentialRule, with_columns
 from .essential import essential as essential_parameters
-from .estimate import Method
+from .estimate import Estimate, Method
 from .joint_checks import check_joints
 from .kept_equations import kept_equations, plain
-from .least_squares import solved, used_weights
+from .least_squares import shares, solved, used_weights
 from .processing import Processing, choose_processing
 from .reduction import Reduction, reduce_equations
 from .result import IdentificationResult
@@ -148,7 +149,9 @@ def fit(
         base = base_parameters(model, drive=drive, friction=friction)
     else:
         base.check(model)
-    findings = _checked(log, model) if checked else ()
+    findings = _checked(log, model, "log") if checked else ()
+    if test is not None:
+        findings = (*findings, *_test_notes(log, test, model, checked))
     if processing is None:
         processing = choose_processing(log, cutoff, decimation, dead_band, edges)
         if decimation is None and not balance.by_joint:
@@ -158,8 +161,10 @@ def fit(
             "processing: it holds every choice; leave out cutoff, decimation, dead_band and edges, "
             "or leave out processing."
         )
+    _refuse_other_period(processing, log)
     system: Equations = kept_equations(equations(base, log, processing, balance))
     whole = reduce_equations(system, executor, progress)
+    _refuse_nothing(whole, processing)
     system, reduction, gap, unseen = _seen(system, whole)
     estimate = solve(system, reduction, way, options)
     dropped: tuple[str, ...] = ()
@@ -174,12 +179,12 @@ def fit(
     white, lags = estimate.deviations, 0
     if isinstance(estimate, SimulatedEstimate):
         white, lags = estimate.white, estimate.lags
-    elif way in _LINEAR:
-        weights = used_weights(way, reduction)
-        _, inverse, _ = solved(reduction, weights)
-        spread = correlated_covariance(system, estimate.values, weights, inverse)
+    else:
+        spread, ratio = _spread(way, system, reduction, estimate)
         lags = spread.lags
-        estimate = replace(estimate, covariance=spread.covariance)
+        linear = way in _LINEAR
+        whole = spread.covariance if linear else estimate.covariance * np.outer(ratio, ratio)
+        estimate = replace(estimate, covariance=whole)
     values = estimate.values
     return IdentificationResult(
         system=plain(system),
@@ -202,6 +207,24 @@ def fit(
     )
 
 
+def _spread(
+    way: Method, system: Equations, reduction: Reduction, estimate: Estimate
+) -> tuple[CorrelatedCovariance, Array]:
+    """Covariance for correlated residuals, and how much larger it makes deviations.
+
+    Methods that are not linear, or not of all equations at once, have a covariance of their own for
+    white residuals; correlation makes it larger as it does that of weighted least squares.
+    """
+    linear = way if way in _LINEAR else Method.WLS
+    weights = used_weights(linear, reduction)
+    values, inverse, rest = solved(reduction, weights)
+    taken = shares(reduction, weights, inverse)
+    at = estimate.values if way in _LINEAR else values
+    spread = correlated_covariance(system, at, weights, inverse, taken=taken)
+    white = rest / (reduction.rows - len(values)) * np.diag(inverse)
+    return spread, np.sqrt(np.diag(spread.covariance) / np.where(white > 0.0, white, 1.0))
+
+
 def _essential_rule(essential: bool | float | EssentialRule | str) -> dict[str, Any] | None:
     if essential is False:
         return None
@@ -221,6 +244,24 @@ def _rule_name(essential: bool | float | EssentialRule | str) -> str:
     return f"{name.lower()} {rule.get('ratio', 30.0):g}" if name == "RATIO" else name.lower()
 
 
+def _refuse_nothing(whole: Reduction, processing: Processing) -> None:
+    if whole.rows:
+        return
+    bands = " ".join(f"{band:.3g}" for band in processing.dead_band)
+    raise InvalidValueError(
+        f"log: no equation is left of it: {int(whole.left_out.sum())} are in the dead bands "
+        f"({bands} rad/s or m/s). Give a smaller dead_band=, or a log in which the joints move."
+    )
+
+
+def _refuse_other_period(processing: Processing, log: Log) -> None:
+    if abs(processing.dt - log.dt) > 1e-6 * log.dt:
+        raise InvalidValueError(
+            f"processing: it was chosen for samples of {processing.dt:g} s, the log has "
+            f"{log.dt:g} s; choose_processing(log) makes one for this log."
+        )
+
+
 def _denser(processing: Processing, n: int) -> Processing:
     """As many equations for forms with one at a time as for those with one for each joint."""
     step = max(1, processing.decimation // n)
@@ -228,7 +269,7 @@ def _denser(processing: Processing, n: int) -> Processing:
     return replace(processing, decimation=step, notes=(*processing.notes, note))
 
 
-def _checked(log: Log, model: RobotModel) -> tuple[str, ...]:
+def _checked(log: Log, model: RobotModel, name: str) -> tuple[str, ...]:
     """Sentences on a log that may be used; one that may not is refused with all of them."""
     found = check_log(log, model)
     if not any(finding.severity is Severity.USELESS for finding in found):
@@ -236,9 +277,35 @@ def _checked(log: Log, model: RobotModel) -> tuple[str, ...]:
     useless = [str(finding) for finding in found if finding.severity is Severity.USELESS]
     if useless:
         raise InvalidValueError(
-            "log: " + " ".join(useless) + " (checked=False takes the log as it is.)"
+            f"{name}: " + " ".join(useless) + " (checked=False takes the log as it is.)"
         )
     return tuple(str(finding) for finding in found)
+
+
+def _test_notes(log: Log, test: Log, model: RobotModel, checked: bool) -> tuple[str, ...]:
+    """What is to be said of the log that is kept aside; it must be like the other, and another."""
+    if test.n != model.n:
+        raise InvalidValueError(f"test: expected a log of {model.n} joints, got {test.n}.")
+    if abs(test.dt - log.dt) > 1e-6 * log.dt:
+        raise InvalidValueError(
+            f"test: expected the sampling period of the log ({log.dt:g} s), since it is processed "
+            f"alike, got {test.dt:g} s; read it with dt={log.dt:g}, or call result.validate."
+        )
+    if np.shares_memory(log.q, test.q):
+        raise InvalidValueError(
+            "test: it has rows of the log that is fitted, so that it would test nothing; give rows "
+            "that are not fitted."
+        )
+    if not checked:
+        return ()
+    # how it moves does not matter, but what it is in does
+    found = check_log(test, model)
+    useless = [str(finding) for finding in found if finding.severity is Severity.USELESS]
+    if useless:
+        raise InvalidValueError(
+            "test: " + " ".join(useless) + " (checked=False takes the log as it is.)"
+        )
+    return tuple(f"Of the log kept aside: {finding}" for finding in found)
 
 
 def _seen(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._arrays import Array
 from ..errors import InvalidValueError
@@ -10,6 +11,8 @@ from .estimate import Estimate, EstimateStatus, Method
 from .reduction import Reduction
 
 _ITERATIONS = 100
+_LEFT = 5.0
+"""Equations that a kind must have beyond the parameters it determines."""
 _STILL = 1e-8
 """Part of its deviation that a parameter moves at most in the last iteration."""
 
@@ -39,9 +42,10 @@ def ordinary(reduction: Reduction) -> Estimate:
     check_count(reduction)
     values, inverse, rest = solved(reduction, None)
     left = reduction.rows - len(values)
+    taken = shares(reduction, None, inverse)
     return Estimate(
         Method.OLS, reduction.names, values, rest / left * inverse,
-        deviations_of(reduction, values),
+        deviations_of(reduction, values, taken), notes=few_notes(reduction, taken),
     )  # fmt: skip
 
 
@@ -100,21 +104,24 @@ def reweighted(reduction: Reduction) -> Estimate:
 def _with_weights(reduction: Reduction, method: Method, most: int) -> Estimate:
     check_count(reduction)
     values, inverse, rest = solved(reduction, None)
+    w: Array | None = None
     status = EstimateStatus.SOLVED if most == 1 else EstimateStatus.NOT_CONVERGED
     done = 0
     while done < most:
         done += 1
         before = values
-        w = weights_of(deviations_of(reduction, values), reduction)
+        taken = shares(reduction, w, inverse)
+        w = weights_of(deviations_of(reduction, values, taken), reduction)
         values, inverse, rest = solved(reduction, w)
         moved = np.abs(values - before)
         if (moved <= _STILL * np.sqrt(np.diag(inverse)) + 1e-15 * np.abs(values)).all():
             status = EstimateStatus.SOLVED
             break
     scale = rest / (reduction.rows - len(values))
+    taken = shares(reduction, w, inverse)
     return Estimate(
-        method, reduction.names, values, scale * inverse, deviations_of(reduction, values), status,
-        done,
+        method, reduction.names, values, scale * inverse, deviations_of(reduction, values, taken),
+        status, done, few_notes(reduction, taken),
     )  # fmt: skip
 
 
@@ -146,8 +153,30 @@ def solved(reduction: Reduction, weights: Array | None) -> tuple[Array, Array, f
     return inverse @ y, inverse @ inverse.T, rest
 
 
-def deviations_of(reduction: Reduction, values: Array) -> Array:
-    """Deviation of the residuals of each kind; parameters are taken off in equal shares of rows.
+def shares(reduction: Reduction, weights: Array | None, inverse: Array) -> Array:
+    """How many of the parameters each kind of equations has determined; they add to all.
+
+    Parameters
+    ----------
+    reduction : Reduction
+        Of the equations.
+    weights : ndarray, shape (m,), or None
+        Of each kind; None for 1.
+    inverse : ndarray, shape (b, b)
+        Of the information matrix with these weights.
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        Sums of the leverages.
+    """
+    w = np.ones(len(reduction.factors)) if weights is None else weights
+    parts = (R[:, :-1] * weight for R, weight in zip(reduction.factors, w, strict=True))
+    return np.array([float(((R @ inverse) * R).sum()) for R in parts])
+
+
+def deviations_of(reduction: Reduction, values: Array, taken: Array | None = None) -> Array:
+    """Deviation of the residuals of each kind.
 
     Parameters
     ----------
@@ -155,14 +184,52 @@ def deviations_of(reduction: Reduction, values: Array) -> Array:
         Of the equations.
     values : ndarray, shape (b,)
         Parameters.
+    taken : ndarray, shape (m,), optional
+        Parameters that each kind has determined, of `shares`; default in equal shares of the rows.
 
     Returns
     -------
     ndarray, shape (m,)
-        N m or N; 0 for a kind without equations.
+        N m or N; that of all kinds together where a kind has hardly more equations than it has
+        determined parameters; 0 for a kind without equations.
     """
-    left = 1.0 - len(values) / reduction.rows
-    return np.sqrt(reduction.sums(values) / np.maximum(reduction.counts * left, 1e-300))
+    sums, counts = reduction.sums(values), reduction.counts
+    if taken is None:
+        return np.sqrt(sums / np.maximum(counts * (1.0 - len(values) / reduction.rows), 1e-300))
+    left = counts - taken
+    few = too_few(reduction, taken)
+    pooled = float(sums.sum()) / max(reduction.rows - len(values), 1)
+    found = np.where(few, np.maximum(pooled, sums / np.maximum(counts, 1)), 0.0)
+    found[~few] = (sums / np.maximum(left, 1e-300))[~few]
+    return np.sqrt(np.where(counts > 0, found, 0.0))
+
+
+def too_few(reduction: Reduction, taken: Array) -> NDArray[np.bool_]:
+    """Which kinds have hardly more equations than parameters that they determine.
+
+    Parameters
+    ----------
+    reduction : Reduction
+        Of the equations.
+    taken : ndarray, shape (m,)
+        Of `shares`.
+
+    Returns
+    -------
+    ndarray of bool, shape (m,)
+        Those whose residuals tell nothing of their noise.
+    """
+    return (reduction.counts > 0) & (reduction.counts - taken < _LEFT)
+
+
+def few_notes(reduction: Reduction, taken: Array) -> tuple[str, ...]:
+    """A sentence for each kind whose residuals tell nothing of its noise."""
+    return tuple(
+        f"Kind {j + 1} of the equations (joint) has {reduction.counts[j]}, and determines "
+        f"{taken[j]:.1f} parameters: its noise is taken as that of all. A longer log, or a smaller "
+        "decimation= or dead_band=, gives it more."
+        for j in np.flatnonzero(too_few(reduction, taken))
+    )
 
 
 def weights_of(sigma: Array, reduction: Reduction) -> Array:
@@ -180,6 +247,8 @@ def weights_of(sigma: Array, reduction: Reduction) -> Array:
     ndarray, shape (m,)
         ``1 / sigma``.
     """
+    if not any(R[:, -1].any() for R in reduction.factors):
+        return np.ones(len(reduction.factors))
     size = np.array([np.linalg.norm(R[:, -1]) for R in reduction.factors])
     size = size / np.sqrt(np.maximum(reduction.counts, 1))
     least = max(1e-12 * float(size.max(initial=0.0)), 1e-300)

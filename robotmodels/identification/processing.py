@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, Rebuilt, as_floats, read_only
 from ..errors import InvalidValueError, ShapeError
 from ..logs import Log
-from .filters import decimation_window
+from .filters import central_differences, decimation_window, zero_phase
 from .spectrum import power_density
 
 _POWER = 0.999
@@ -29,6 +29,14 @@ _ABOVE = 10.0
 """Density relative to that of the noise below which a spectrum is noise."""
 _EDGE = 3.0
 """Periods of the cutoff after which the filter's transient is gone from what a fit could see."""
+_HIGHEST = 0.4
+"""Cutoff of the positions at most, in sampling rates."""
+_BULK, _FAR, _WIDER = 0.95, 8.0, 3.0
+"""Frequencies beyond eight times that of 95 % of the power are noise; the motion ends at thrice."""
+_MOVES = 1e-3
+"""Power of a joint's velocity in a window, relative to the greatest, below which it rests."""
+_WINDOWS = 8
+"""Windows of the log at most that spectra are made of."""
 _LONGEST = 16.0
 """Seconds of the windows that spectra are averaged over."""
 
@@ -154,7 +162,7 @@ def choose_processing(
     (1.1, 11, 148)
     """
     longest = max(part.stop - part.start for part in log.recordings())
-    motion, noise, fastest = _motion(log)
+    motion, noise = _motion(log)
     nyquist = 0.5 / log.dt
     notes = [
         f"The velocities have {100 * _POWER:g} % of their power below {motion:.3g} Hz; noise of "
@@ -166,7 +174,7 @@ def choose_processing(
         notes.append("Positions are not filtered.")
         band = None
     elif cutoff is None:
-        band = min(_POSITIONS * motion, 0.4 / log.dt)
+        band = min(_POSITIONS * motion, _HIGHEST / log.dt)
         notes.append(f"Positions are cut off at {band:.3g} Hz, {band / motion:.3g} times that.")
     else:
         band = float(as_floats(cutoff, "cutoff"))
@@ -179,7 +187,7 @@ def choose_processing(
     step = _step(log, decimation, motion, longest, notes)
     return Processing(
         log.dt, band, order, accuracy, step,
-        _dead_band(log, dead_band, noise, fastest, band, notes),
+        _dead_band(log, dead_band, noise, motion, band, notes),
         _edges(log, edges, band, longest, notes), motion, tuple(notes),
     )  # fmt: skip
 
@@ -203,7 +211,7 @@ def _step(log: Log, asked: int | None, motion: float, longest: int, notes: list[
 
 
 def _dead_band(
-    log: Log, asked: ArrayLike | None, noise: Array, fastest: Array, band: float | None,
+    log: Log, asked: ArrayLike | None, noise: Array, motion: float, band: float | None,
     notes: list[str],
 ) -> Array:  # fmt: skip
     if asked is not None:
@@ -218,6 +226,7 @@ def _dead_band(
     # white noise of density s^2 / (fs / 2) through a low-pass and a derivative
     f = min(band or np.inf, 0.5 / log.dt)
     velocity_noise = noise * 2.0 * np.pi * f * np.sqrt(2.0 * f * log.dt / 3.0)
+    fastest = _fastest(log, min(_POSITIONS * motion, _HIGHEST / log.dt))
     width = np.maximum(_SLOW * fastest, _NOISY * velocity_noise)
     notes.append(f"Dead band of the velocities: {_listed(width)}.")
     return width
@@ -243,39 +252,79 @@ def _edges(
     return cut
 
 
-def _motion(log: Log) -> tuple[float, Array, Array]:
-    """Frequency of the motion, deviation of the positions' noise, greatest velocities."""
-    part = max(log.recordings(), key=lambda rows: rows.stop - rows.start)
-    longest = int(_LONGEST / log.dt) * 4  # a few windows tell the spectrum
-    q = np.asarray(log.q[part.start : min(part.stop, part.start + longest)])
-    if len(q) < 8:
+def _windows(log: Log) -> list[slice]:
+    """A bounded part of the log: windows spread over each recording, at most `_WINDOWS` in all."""
+    length = max(8, int(_LONGEST / log.dt))
+    parts = [part for part in log.recordings() if part.stop - part.start >= 8]
+    if not parts:
+        longest = max(part.stop - part.start for part in log.recordings())
         raise InvalidValueError(
-            f"log: its longest recording has {len(q)} samples, of which no spectrum can be made."
+            f"log: its longest recording has {longest} samples, of which no spectrum can be made."
         )
+    if len(parts) > _WINDOWS:
+        parts = [parts[k] for k in np.linspace(0, len(parts) - 1, _WINDOWS).round().astype(int)]
+    each = max(1, _WINDOWS // len(parts))
+    found = []
+    for part in parts:
+        count = min(each, -(-(part.stop - part.start) // length))
+        last = max(part.start, part.stop - length)
+        starts = np.linspace(part.start, last, count).round().astype(int).tolist()
+        found += [slice(start, min(start + length, part.stop)) for start in starts]
+    return found
+
+
+def _motion(log: Log) -> tuple[float, Array]:
+    """Frequency of the motion, and deviation of the positions' noise."""
     rate = 1.0 / log.dt
-    v = np.diff(q, axis=0) * rate
-    f, P = power_density(v, rate, min(len(v), max(2, int(_LONGEST * rate))))
-    # what a difference does to positions
-    S = P[1:] / (2.0 * rate * np.sin(np.pi * f[1:] / rate))[:, None] ** 2
-    high = (f[1:] > 0.25 * rate) & (f[1:] < 0.45 * rate)
-    floor = np.median(S[high], axis=0) if high.any() else np.zeros(log.n)
-    bands = [_band(f[1:], P[1:, j], S[:, j], floor[j]) for j in range(log.n)]
-    motion = max(max(bands, default=0.0), float(f[1]))
-    fastest = np.percentile(np.abs(v), 99.0, axis=0)
-    return motion, np.sqrt(floor * rate / 2.0), fastest
+    bands, powers, floors = [], [], []
+    for part in _windows(log):
+        v = np.diff(np.asarray(log.q[part]), axis=0) * rate
+        f, P = power_density(v, rate, len(v))
+        f, P = f[1:], P[1:]
+        # what a difference does to positions
+        gain = (2.0 * rate * np.sin(np.pi * f / rate))[:, None] ** 2
+        S = P / gain
+        high = (f > 0.25 * rate) & (f < 0.45 * rate)
+        floor = np.median(S[high], axis=0) if high.any() else np.zeros(log.n)
+        found = [_band(f, P[:, j], S[:, j], gain[:, 0], floor[j]) for j in range(log.n)]
+        bands.append([max(band, float(f[0])) for band, _ in found])
+        powers.append([power for _, power in found])
+        floors.append(floor)
+    power = np.array(powers)
+    # windows in which a joint hardly moves tell nothing of its motion
+    moves = (power > 0.0) & (power > _MOVES * power.max(axis=0))
+    motion = float(np.where(moves, bands, 0.0).max())
+    if not motion > 0.0:
+        motion = float(np.min(bands))
+    return motion, np.sqrt(np.median(floors, axis=0) * rate / 2.0)
 
 
-def _band(f: Array, P: Array, S: Array, floor: float) -> float:
-    """Frequency of the motion of a joint, from spectra of velocity and position."""
-    if not P.any():
-        return 0.0
-    # the motion ends where the spectrum first falls to the noise
-    width = max(3, len(S) // 500)
-    smooth = np.convolve(S, np.full(width, 1.0 / width), "same")
-    below = np.flatnonzero(smooth < _ABOVE * floor)
-    last = int(below[0]) + 1 if below.size else len(f)
-    power = np.cumsum(P[:last])
-    return float(f[int(np.searchsorted(power, _POWER * power[-1]))])
+def _band(f: Array, P: Array, S: Array, gain: Array, floor: float) -> tuple[float, float]:
+    """Frequency of the motion of a joint and its power, from spectra of velocity and position."""
+    # noise is a plain; the motion is where the spectrum stands out from it
+    width = max(3, 2 * (len(S) // 1000) + 1)
+    if len(S) < width:
+        return float(f[0]), float(P.sum())
+    smooth = np.convolve(np.pad(S, width // 2, mode="edge"), np.full(width, 1.0 / width), "valid")
+    left = np.where(smooth >= _ABOVE * floor, np.maximum(P - gain * floor, 0.0), 0.0)
+    power = np.cumsum(left)
+    if not power[-1] > 0.0:
+        return 0.0, 0.0
+    most, bulk = (float(f[int(np.searchsorted(power, x * power[-1]))]) for x in (_POWER, _BULK))
+    # noise that is no plain, of coarse encoders, is far away from where most of the power is
+    return (_WIDER * bulk if most > _FAR * bulk else most), float(power[-1])
+
+
+def _fastest(log: Log, cutoff: float | None) -> Array:
+    """Greatest velocities, noise filtered away, but for one in a hundred samples."""
+    found = np.zeros(log.n)
+    for part in _windows(log):
+        q = np.array(log.q[part])
+        if cutoff is not None and len(q) > 1:
+            q = zero_phase(q, cutoff, log.dt)
+        v = np.abs(central_differences(q, log.dt, 2))
+        found = np.maximum(found, np.percentile(v, 99.0, axis=0))
+    return found
 
 
 def _listed(values: Array) -> str:
