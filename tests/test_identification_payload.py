@@ -133,6 +133,41 @@ def test_deviations_are_true(together):
     assert ((scores.std(axis=0) > 0.65) & (scores.std(axis=0) < 1.45)).all()
 
 
+@pytest.mark.parametrize("locked", [0, 1, 3, 5])
+def test_what_the_reference_did_not_move_is_unknown_and_not_the_loads(locked):
+    """A joint that stood still without the load moves with it: no error goes to the load."""
+    model = robot("rx90")
+    rng = np.random.default_rng(4)
+    q, v, a = (x.copy() for x in motion(6, 800, 1))
+    q[:, locked], v[:, locked], a[:, locked] = 0.3, 0.0, 0.0
+    bare = Log(DT, q, idm(model, q, v, a) + 0.02 * rng.normal(size=q.shape), v, a)
+    full = logged(with_payload(model, MASS, COM, INERTIA), 2, 800, 0.02, rng)
+    reference = fit(model, bare, processing=raw(bare), checked=False)
+    assert reference.unseen
+    found = identify_payload(model, full, reference)
+    np.testing.assert_allclose(found.sigma, 0.02, rtol=0.15)
+    where = [PARAMETERS.index(name) for name in found.identifiable]
+    alone = [found.names.index(name) for name in found.identifiable]
+    score = (found.parameters[where] - TRUE[where]) / found.deviations[alone]
+    assert {"MX", "MY", "MZ", "M"} <= set(found.identifiable)
+    assert (np.abs(score) < 4.5).all()
+    together = identify_payload(model, full, bare, processing=raw(bare))
+    np.testing.assert_allclose(found.values, together.values, rtol=1e-9, atol=1e-12)
+
+
+def test_what_was_not_essential_in_the_reference_is_not_the_loads():
+    model = robot("rx90")
+    rng = np.random.default_rng(5)
+    bare = logged(model, 1, 800, 0.5, rng)
+    full = logged(with_payload(model, MASS, COM, INERTIA), 2, 800, 0.5, rng)
+    reference = fit(model, bare, processing=raw(bare), essential=True)
+    assert reference.not_essential
+    found = identify_payload(model, full, reference)
+    assert found.status is PayloadStatus.COMPLETE
+    assert (np.abs((found.parameters - TRUE) / found.deviations) < 4.5).all()
+    np.testing.assert_allclose(found.sigma, 0.5, rtol=0.1)
+
+
 def test_a_robot_without_load_shows_none():
     model = robot("planar_2r")
     rng = np.random.default_rng(3)

@@ -185,7 +185,9 @@ def identify_payload(
 
     With a log without load, the parameters of the robot and of the load are found together from
     both. With an identified robot, its parameters and their covariance stand for that log: what
-    the torques of the loaded log have beyond them is the load's.
+    the torques of the loaded log have beyond them is the load's. Where its log did not show all
+    base parameters, or some were left out as not essential, its values hold for the motion of that
+    log only: then the log itself is used, with all base parameters, those unseen unknown.
 
     Parameters
     ----------
@@ -232,6 +234,12 @@ def identify_payload(
     if isinstance(reference, IdentificationResult):
         base = reference.base
         base.check(model)
+        if reference.unseen or reference.not_essential:
+            # its values hold for its own motion only: what they leave out may act in the loaded log
+            if reference.unseen:
+                base = base_parameters(model, drive=base.drive, friction=base.friction)
+            processing = reference.system.processing if processing is None else processing
+            reference = reference.system.log
     else:
         base = base_parameters(model, friction=friction)
     problem = payload_problem(base, loaded, reference, frame, own, processing, executor)
