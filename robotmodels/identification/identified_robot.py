@@ -11,7 +11,8 @@ from ..inertia import InertialParameters
 from ..minimal_parameters import uniform_bodies
 from ..minimal_parameters.prior import check_definite
 from ..model import RobotModel
-from .least_squares import weights_of
+from .estimate import Method
+from .least_squares import used_weights, weights_of
 from .reduction import reduce_equations
 
 if TYPE_CHECKING:
@@ -67,7 +68,12 @@ def consistent_robot(
     if result.names != result.base.names:
         # parameters that were left out as not essential act on the torques of a real robot
         reduction = reduce_equations(result.system.with_names(result.base.names))
-    R, y, rest = reduction.stacked(weights_of(result.estimate.sigma, reduction))
+    method = result.estimate.method
+    if method in (Method.WLS, Method.IRLS):
+        weights = used_weights(method, reduction)  # so that without bounds it is the same fit
+    else:
+        weights = weights_of(result.estimate.sigma, reduction)
+    R, y, rest = reduction.stacked(weights)
     return fit_consistent(result.base, R, y, rest=rest, rows=reduction.rows, prior=prior)
 
 

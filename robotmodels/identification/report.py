@@ -35,6 +35,8 @@ if TYPE_CHECKING:
     from .result import IdentificationResult
 
 _PAIRS = 12
+_UNEXPLAINED = 0.3
+"""Part of a joint's filtered torque left over, above which something is wrong."""
 _MORE = 1.5
 """Errors on data kept aside, relative to those on the log, from which they are named."""
 _GOOD_CONDITION = 100.0
@@ -114,6 +116,7 @@ def _verdict(result: IdentificationResult, found: ResidualDiagnostics) -> Report
         + (f", {estimate.iterations} iterations." if estimate.iterations > 1 else "."),
         _prediction(result),
     ]
+    sentences = [*_doubts(result), *sentences]
     weak = not_seen(estimate)
     if weak:
         sentences.append(
@@ -133,6 +136,20 @@ def _verdict(result: IdentificationResult, found: ResidualDiagnostics) -> Report
     sentences.append(_whiteness(result, found))
     sentences += [sign.sentence for sign in wrong_signs(result.base, estimate)]
     return ReportSection("Verdict", tuple(f"* {sentence}" for sentence in sentences))
+
+
+def _doubts(result: IdentificationResult) -> list[str]:
+    """What comes before all else: joints whose torques the model does not explain."""
+    names = result.model.table.joint_names
+    share = result.fitted.filtered_relative
+    bad = [f"{names[j]} ({100.0 * share[j]:.3g} %)" for j in np.flatnonzero(share > _UNEXPLAINED)]
+    if not bad:
+        return []
+    return [
+        f"Doubtful: much of the filtered torque is not explained: {', '.join(bad)}. The order of "
+        "the joints, signs, zeros, units, the sampling period or the model are wrong for them, or "
+        "they hardly move. Parameters of these joints are not to be used before that is known."
+    ]
 
 
 def _capital(text: str) -> str:
@@ -225,10 +242,12 @@ def _whiteness(result: IdentificationResult, found: ResidualDiagnostics) -> str:
         return text
     if not result.lags:
         return f"{text} The deviations hold for white residuals."
+    middle = float(np.median(factor))
+    way = "smaller" if middle >= 1.0 else "larger"
     return (
         f"{text} The deviations here take correlation over {result.lags} equations into account; "
-        f"those for white residuals, which are usually published, are smaller by a factor of "
-        f"{np.median(factor):.2g} (median; largest {factor.max():.2g})."
+        f"those for white residuals, which are usually published, are {way} by a factor of "
+        f"{max(middle, 1.0 / max(middle, 1e-9)):.2g} (median)."
     )
 
 
