@@ -188,6 +188,29 @@ def test_the_regressor_itself_and_other_units_give_the_same(rng):
         assert again.base_values == pytest.approx(found.base_values, rel=1e-4, abs=1e-5)
 
 
+def test_small_and_large_robots_are_the_same_problem(rng):
+    """A robot of the same shape with masses and torques times s; its prior knows no drives."""
+    model = rm.load("rx90")
+    true = model.with_inertia(uniform_bodies(model, 60.0))
+    true = true.with_drive(rm.DriveParameters(Ia=[0] * 6, Fv=[10] * 6, Fc=[5] * 6, offset=[0] * 6))
+    base, R, y, rest, *_ = noisy(true, rng, 0.3, samples=15)
+    base = base_parameters(model)
+    fits = {
+        s: fit_consistent(base, R, s * y, rest=s**2 * rest, prior=uniform_bodies(model, 60.0 * s))
+        for s in (1e-6, 1e-3, 1.0, 1e3, 1e6)
+    }
+    expected = fits[1.0]
+    assert expected.status is CONSTRAINED
+    assert expected.price > 0.1
+    for s, found in fits.items():
+        assert found.status is CONSTRAINED
+        assert found.gap < 2e-4
+        assert found.squares == pytest.approx(s**2 * expected.squares, rel=1e-6)
+        assert found.active == expected.active
+        far = np.abs(found.base_values / s - expected.base_values).max()
+        assert far < 1e-4 * np.abs(expected.base_values).max()
+
+
 def test_what_the_data_does_not_determine_is_the_priors(rng):
     """A log that never moves joint 2: its columns are empty, the prior stands in."""
     model = arm(rng)

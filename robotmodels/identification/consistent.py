@@ -27,7 +27,8 @@ from ..minimal_parameters.robot_parts import robot_parts, standard_vector
 from ..minimal_parameters.standard import MARGIN
 from .consistent_bounds import CentreBound, centre_constraints, mass_constraints
 from .consistent_result import ConsistentFit, ConsistentStatus, largest_violation
-from .consistent_system import TorqueSquares, torque_squares
+from .consistent_system import TorqueSquares, checked_factor, torque_squares
+from .consistent_units import sizes_of_drives
 
 _FIRST = 1e-8
 """Weight of the squared distance from the prior beside the sum of squares, at first, where the
@@ -159,7 +160,9 @@ def fit_consistent(
     if drives.n != model.n:
         raise InvalidValueError(f"drive_prior: expected {model.n} joints, got {drives.n}.")
     P0 = check_definite(bodies, "prior", model.table.names)
-    problem = ConeProblem(base, standard_vector(base, bodies, drives), P0, margin)
+    R, y = checked_factor(base, R, y, rest)
+    near = standard_vector(base, bodies, drives)
+    problem = ConeProblem(base, near, P0, margin, sizes_of_drives(base, near, R, y))
     system = torque_squares(base, R, y, rest, problem.unit)
     bounds = (
         *mass_constraints(model.f, problem.unit, mass_bounds, total_mass),

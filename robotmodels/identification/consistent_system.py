@@ -87,22 +87,7 @@ def torque_squares(
     >>> torque_squares(base, np.eye(4), np.ones(4), 2.0, np.ones(20)).least
     2.0
     """
-    factor = as_core(R, (len(base),), "R")
-    if factor.ndim != 2:
-        raise ShapeError(
-            f"R: expected shape (r, {len(base)}), a column for each base parameter, got "
-            f"{factor.shape}."
-        )
-    right = as_exact(y, (len(factor),), "y")
-    if not (np.isfinite(rest) and rest >= 0.0):
-        raise InvalidValueError(
-            f"rest: expected a sum of squares, zero or more, got {rest}; "
-            "give 0 for rounding below zero."
-        )
-    if not factor.any():
-        raise InvalidValueError(
-            "R: every entry is zero, so that no parameter is seen; check the log and its weights."
-        )
+    factor, right = checked_factor(base, R, y, rest)
     scale = 1.0 / np.sqrt(((base.matrix * unit) ** 2).sum(axis=1))
     U, values, V = np.linalg.svd(factor / scale, full_matrices=False)
     k = int((values > _RANK * values[0]).sum())
@@ -120,3 +105,44 @@ def torque_squares(
     return TorqueSquares(
         turn @ seen @ base.matrix, turn @ target, same, level, best, left + float(rest), nothing
     )
+
+
+def checked_factor(
+    base: BaseParameters, R: ArrayLike, y: ArrayLike, rest: float
+) -> tuple[Array, Array]:
+    """A weighted system that says something, as arrays.
+
+    Parameters
+    ----------
+    base, R, y, rest
+        As for `torque_squares`.
+
+    Returns
+    -------
+    R : ndarray, shape (r, b)
+        Factor.
+    y : ndarray, shape (r,)
+        Right side.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Wrong shapes, NaN, no information at all, or a negative rest.
+    """
+    factor = as_core(R, (len(base),), "R")
+    if factor.ndim != 2:
+        raise ShapeError(
+            f"R: expected shape (r, {len(base)}), a column for each base parameter, got "
+            f"{factor.shape}."
+        )
+    right = as_exact(y, (len(factor),), "y")
+    if not (np.isfinite(rest) and rest >= 0.0):
+        raise InvalidValueError(
+            f"rest: expected a sum of squares, zero or more, got {rest}; "
+            "give 0 for rounding below zero."
+        )
+    if not factor.any():
+        raise InvalidValueError(
+            "R: every entry is zero, so that no parameter is seen; check the log and its weights."
+        )
+    return factor, right

@@ -33,6 +33,8 @@ class ConeProblem:
         Pseudo-inertias of the prior, positive definite.
     margin : float
         Smallest eigenvalue of the pseudo-inertias relative to these.
+    sizes : ndarray, shape (p - 10 f,), optional
+        Natural sizes of the drive and friction parameters; default those of the prior.
 
     Examples
     --------
@@ -40,7 +42,10 @@ class ConeProblem:
     'ConeProblem'
     """
 
-    def __init__(self, base: BaseParameters, prior: Array, P0: Array, margin: float) -> None:
+    def __init__(
+        self, base: BaseParameters, prior: Array, P0: Array, margin: float,
+        sizes: Array | None = None,
+    ) -> None:  # fmt: skip
         f, p = base.model.f, len(prior)
         self.base, self.prior, self.margin, self.f = base, prior, margin, f
         # whitened pseudo-inertia of each link: the identity at the prior
@@ -54,7 +59,8 @@ class ConeProblem:
             part = slice(10 * j, 10 * j + 10)
             self.metric[part, part] = self.maps[j].T @ self.maps[j]
         rest = range(10 * f, p)
-        self.metric[rest, rest] = 1.0 / drive_sizes(base, prior) ** 2
+        sizes = drive_sizes(base, prior) if sizes is None else sizes
+        self.metric[rest, rest] = 1.0 / sizes**2
         self.unit = 1.0 / np.sqrt(np.diag(self.metric))
         self.positive = positive_drives(base)
         self.blocks = coupled_blocks(base)
