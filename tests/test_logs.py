@@ -41,8 +41,22 @@ def test_gaps_and_jumps_back_split():
     assert rows.dt == pytest.approx(DT)
     assert np.array_equal(rows.values, values(t))
     text = " ".join(rows.notes)
-    assert "time goes back 1 times (first before row 70" in text
-    assert "time has a gap 1 times (first before row 40" in text
+    assert "time goes back once (before row 70" in text
+    assert "time has one gap (before row 40" in text
+
+
+def test_several_gaps_are_counted():
+    t = DT * np.arange(100)
+    t[40:] += 0.5
+    t[70:] += 0.5
+    assert "time has 2 gaps (the first before row 40" in regular_rows(t, values(t), "x").notes[0]
+
+
+def test_rows_are_not_left_out_without_a_filter():
+    t = DT * np.arange(300)
+    with pytest.raises(InvalidValueError, match="folds what is fast"):
+        regular_rows(t, values(t), "x", dt=0.02)
+    assert regular_rows(t, values(t), "x", dt=0.012).dt == 0.012
 
 
 def test_gaps_may_be_allowed():
@@ -162,6 +176,24 @@ def test_delays_that_leave_nothing_are_refused():
         with_delay(log, np.nan)
 
 
+def test_slices_are_rows():
+    log = smooth_log(starts=(0, 700))
+    part = log[600:-100]
+    assert np.array_equal(part.q, log.q[600:1900])
+    assert part.starts.tolist() == [0, 100]
+    assert len(log[:]) == len(log)
+    assert len(log[slice(5, 10, 1)]) == 5
+    for rows in (slice(0, 9000), slice(-9000, 10), slice(9000, 9001)):
+        with pytest.raises(InvalidValueError, match="2000 rows"):
+            log[rows]
+    with pytest.raises(InvalidValueError, match="2000 rows"):
+        log.rows(0, 2001)
+    with pytest.raises(InvalidValueError, match="a step of 2"):
+        log[::2]
+    with pytest.raises(InvalidValueError, match="single samples"):
+        log[3]
+
+
 def test_joined_logs_keep_what_all_have():
     a, b = smooth_log(v=np.zeros((2000, 2)), notes=["a"]), smooth_log(N=100)
     log = join_logs([a, b])
@@ -275,3 +307,81 @@ def test_the_worst_is_said_first(tx40):
     severities = [finding.severity for finding in check_log(log, tx40.model)]
     assert severities[0] is Severity.USELESS
     assert severities[-1] is Severity.DOUBTFUL
+
+
+def test_what_is_no_log_is_said(tx40):
+    with pytest.raises(InvalidValueError, match=r"got Tx40Log; give its \.log"):
+        check_log(tx40, tx40.model)
+    with pytest.raises(InvalidValueError, match="got ndarray; make one"):
+        check_log(tx40.log.q)
+
+
+def test_joints_in_another_order_are_named(tx40):
+    order = [0, 2, 1, 3, 4, 5]
+    names = [tx40.log.names[j] for j in order]
+    log = Log(tx40.log.dt, tx40.log.q[:, order], tx40.log.tau[:, order], names=names)
+    finding = kinds(log, tx40.model)[FindingKind.WRONG_JOINT_ORDER]
+    assert finding.severity is Severity.USELESS
+    assert finding.joints == ("joint_3", "joint_2")
+    assert "model= to read_log" in finding.sentence
+    # names that are not the model's say nothing
+    other = Log(tx40.log.dt, tx40.log.q, tx40.log.tau, names="abcdef")
+    assert check_log(other, tx40.model) == ()
+
+
+def test_milliseconds_as_seconds_are_named(tx40):
+    log = Log(1.0, tx40.log.q, tx40.log.tau)
+    finding = kinds(log)[FindingKind.IMPLAUSIBLE_PERIOD]
+    assert finding.severity is Severity.USELESS
+    assert "milliseconds" in finding.sentence
+
+
+def rates(log):
+    v = np.gradient(log.q, log.dt, axis=0)
+    return v, np.gradient(v, log.dt, axis=0)
+
+
+def off(log):
+    return [f for f in check_log(log) if f.kind is FindingKind.RATES_OFF_POSITIONS]
+
+
+def test_rates_of_the_positions_are_not_named(tx40):
+    v, a = rates(tx40.log)
+    rng = np.random.default_rng(0)
+    for q, w in ((tx40.log.q, v), (tx40.log.q + rng.normal(0, 1e-4, v.shape), v),
+                 (tx40.log.q, v + rng.normal(0, 0.1, v.shape))):  # fmt: skip
+        log = Log(tx40.log.dt, q, tx40.log.tau, w, a, starts=(0, 3, 5, 200, 20000))
+        assert off(log) == []
+    still = np.full((500, 1), 0.3) + rng.normal(0, 1e-6, (500, 1))
+    assert off(Log(DT, still, still, rng.normal(0, 1e-3, (500, 1)))) == []
+    assert off(Log(DT, np.ones((2, 1)), np.ones((2, 1)), np.ones((2, 1)), np.ones((2, 1)))) == []
+
+
+@pytest.mark.parametrize("name", ["v", "a"])
+@pytest.mark.parametrize(
+    ("factor", "joints", "words"),
+    [
+        ([180 / np.pi] * 6, 6, "57.3 times what their positions say, that is degrees"),
+        ([1, 1, -1, 1, 1, 1], 1, "of the other sign"),
+        ([1, 48, 1, 1, 1, 1], 1, "may be a gear ratio"),
+        ([1, 1, 1, 1, 1, 1.2], 1, "1.2 times"),
+    ],
+)
+def test_rates_by_a_factor_are_named(tx40, name, factor, joints, words):
+    both = dict(zip("va", rates(tx40.log), strict=True))
+    both[name] = both[name] * factor
+    (finding,) = off(Log(tx40.log.dt, tx40.log.q, tx40.log.tau, **both))
+    assert finding.severity is Severity.USELESS
+    assert len(finding.joints) == joints
+    assert words in finding.sentence
+
+
+def test_rates_of_another_period_and_of_other_joints_are_named(tx40):
+    v, a = rates(tx40.log)
+    found = off(Log(2.0 * tx40.log.dt, tx40.log.q, tx40.log.tau, v, a))
+    assert [len(finding.joints) for finding in found] == [6, 6]
+    assert all("period may be 2 times the true one" in finding.sentence for finding in found)
+    (finding,) = off(Log(tx40.log.dt, tx40.log.q, tx40.log.tau, v[:, [1, 0, 2, 3, 4, 5]]))
+    assert finding.severity is Severity.DOUBTFUL
+    assert finding.joints == ("1", "2")
+    assert "do not follow" in finding.sentence

@@ -369,6 +369,10 @@ def test_files_that_say_nothing_are_refused(tmp_path):
         read_log([])
     with pytest.raises(FileNotFoundError):
         read_log(tmp_path / "absent.csv")
+    with pytest.raises(InvalidValueError, match=r"absent\.csv: there is no such file"):
+        read_log(tmp_path / "absent.csv")
+    with pytest.raises(InvalidValueError, match=r"near it are bare\.csv"):
+        read_log(tmp_path / "bar.csv")
     assert LogFormat.of(odd) is LogFormat.CSV
 
 

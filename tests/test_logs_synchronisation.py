@@ -174,6 +174,19 @@ def test_shifted_torques_are_named(tx40):
     assert "with_delay(log, 0.004" in found[0].sentence
 
 
+def test_delays_that_are_longer_than_tried_are_named(robot):
+    (finding,) = check_joints(simulated(robot, 1000.0, 0.06), robot)
+    assert finding.kind is FindingKind.OUT_OF_STEP
+    assert "ms late, the largest delay that was tried" in finding.sentence
+    assert "within=" in finding.sentence
+
+
+def test_a_data_set_is_no_log(tx40):
+    for check in (check_joints, synchronisation):
+        with pytest.raises(InvalidValueError, match=r"give its \.log"):
+            check(tx40, tx40.model)
+
+
 def test_motion_that_excites_little_is_named(robot):
     log = simulated(robot, 1000.0, noise=False)
     assert check_joints(log, robot) == ()

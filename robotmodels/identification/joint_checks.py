@@ -10,10 +10,11 @@ import numpy as np
 from .._arrays import Array
 from ..errors import ShapeError
 from ..logs import FindingKind, Log, LogFinding, Severity
+from ..logs.log import check_is_log
 from ..model import RobotModel, check_model
 from ..regressors import torque_regressor
 from .delay_rows import ThinRows, looked_at, thin_rows
-from .synchronisation import synchronisation
+from .synchronisation import SynchronisationStatus, synchronisation
 
 _CUTOFF, _SHARE = 15.0, 0.1
 _CLEARLY = 0.5
@@ -72,6 +73,7 @@ def check_joints(log: Log, model: RobotModel) -> tuple[LogFinding, ...]:
     >>> [finding.kind.name for finding in check_joints(Log(0.001, q, -(2.0 * a + v)), one)]
     ['WRONG_SIGN']
     """
+    check_is_log(log)
     check_model(model)
     if model.n != log.n:
         raise ShapeError(f"log: {log.n} joints, the model {model.name} has {model.n}.")
@@ -203,6 +205,16 @@ def _rank(parts: Sequence[Array]) -> int:
 
 def _in_step(log: Log, model: RobotModel, found: list[LogFinding]) -> None:
     estimate = synchronisation(log, model)
+    if estimate.status is SynchronisationStatus.AT_THE_END:
+        found.append(
+            LogFinding(
+                FindingKind.OUT_OF_STEP, Severity.DOUBTFUL, (),
+                f"The torques fit the positions best {1e3 * abs(estimate.delay):.0f} ms "
+                f"{'late' if estimate.delay > 0.0 else 'early'}, the largest delay that was tried: "
+                "either they are further out of step, or of another motion. Try more by "
+                "synchronisation(log, model, within=...), and take it out with with_delay.",
+            )
+        )  # fmt: skip
     if not estimate.status.is_success:
         return
     if estimate.is_out_of_step:

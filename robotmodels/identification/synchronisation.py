@@ -12,6 +12,7 @@ from .._arrays import Array, Rebuilt, as_floats
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from ..logs import Log
+from ..logs.log import check_is_log
 from ..model import RobotModel, check_model
 from .delay_rows import ThinRows, looked_at, thin_rows
 
@@ -148,6 +149,7 @@ def synchronisation(
     >>> abs(found.delay - 0.004) < 1e-4
     True
     """
+    check_is_log(log)
     check_model(model)
     if model.n != log.n:
         raise ShapeError(f"log: {log.n} joints, the model {model.name} has {model.n}.")

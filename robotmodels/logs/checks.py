@@ -11,7 +11,8 @@ from .._arrays import Array
 from ..geometry import PRISMATIC
 from ..model import RobotModel, check_model
 from .findings import FindingKind, LogFinding, Severity
-from .log import Log
+from .log import Log, check_is_log
+from .rates import rates_off
 
 _DEGREES = 180.0 / np.pi
 _BEYOND = 0.05
@@ -30,6 +31,8 @@ _TINY = 1e-3
 _WRONG_UNIT = 10.0
 """Times its limit that a torque must be at to be in another unit or of a motor."""
 _FEW_LEVELS = 100
+_LONGEST_PERIOD = 0.5
+"""Seconds between samples above which nothing is seen of how a robot moves."""
 _CHUNK = 100_000
 """Samples that are looked at together; statistics of a longer channel are of so many of it."""
 
@@ -38,11 +41,12 @@ def check_log(log: Log, model: RobotModel | None = None) -> tuple[LogFinding, ..
     """What is wrong or strange in a log, each with what to do about it.
 
     Without a model: joints that do not move and torques that are constant, saturation, coarse
-    steps, values that repeat, jumps, recordings that are too short. With one, besides: numbers of
-    joints, degrees, motor angles, limits of position, velocity and torque, samples for the number
-    of parameters. Of a long log quantiles, steps of sensors and turns are those of about 1e5
-    samples spread evenly over it; everything else is looked at in every sample. Whether joints are
-    swapped, signs are wrong, and the motion shows the parameters is told by
+    steps, values that repeat, jumps, recordings that are too short, a period that is too long,
+    velocities and accelerations that do not follow from the positions. With one, besides: numbers
+    of joints and their order, degrees, motor angles, limits of position, velocity and torque,
+    samples for the number of parameters. Of a long log quantiles, steps of sensors and turns are
+    those of about 1e5 samples spread evenly over it; everything else is looked at in every sample.
+    Whether joints are swapped, signs are wrong, and the motion shows the parameters is told by
     `robotmodels.identification.check_joints`, since it takes the dynamic model.
 
     Parameters
@@ -57,6 +61,11 @@ def check_log(log: Log, model: RobotModel | None = None) -> tuple[LogFinding, ..
     tuple of LogFinding
         The worst first; empty if nothing was found.
 
+    Raises
+    ------
+    InvalidValueError
+        What was given is no log.
+
     References
     ----------
     Seed book sections 1.6.2.3 to 1.6.2.5.
@@ -70,6 +79,7 @@ def check_log(log: Log, model: RobotModel | None = None) -> tuple[LogFinding, ..
     Joint 1: its torque is 0 in every sample, so that nothing can be found of it; see whether the \
 right column was read.
     """
+    check_is_log(log)
     found: list[LogFinding] = []
     if model is not None:
         check_model(model)
@@ -79,18 +89,48 @@ right column was read.
                 "so that they agree."
             )
             return (LogFinding(FindingKind.WRONG_JOINT_COUNT, Severity.USELESS, (), sentence),)
+        _order(log, model, found)
+    _period(log, found)
     moving = _constant(log, found)
     _saturated(log, found)
     _coarse(log, moving, found)
     _stuck(log, moving, found)
     _jumps(log, moving, found)
     _slow(log, moving, found)
+    found += rates_off(log)
     if model is not None:
         _units(log, model, found)
         _torque_limits(log, model, found)
         _samples(log, model, found)
     order = list(Severity)[::-1]
     return tuple(sorted(found, key=lambda finding: order.index(finding.severity)))
+
+
+def _order(log: Log, model: RobotModel, found: list[LogFinding]) -> None:
+    """Report joints that have the model's names in another order: names are not looked at later."""
+    names = model.table.joint_names
+    if log.names == names or sorted(log.names) != sorted(names):
+        return
+    other = tuple(name for name, own in zip(log.names, names, strict=True) if name != own)
+    found.append(
+        LogFinding(
+            FindingKind.WRONG_JOINT_ORDER, Severity.USELESS, other,
+            f"The joints of the log are {', '.join(log.names)}, those of {model.name} "
+            f"{', '.join(names)}: the same in another order. Columns are taken in their order, not "
+            "by name; give model= to read_log, which puts them in the model's order.",
+        )
+    )  # fmt: skip
+
+
+def _period(log: Log, found: list[LogFinding]) -> None:
+    if log.dt > _LONGEST_PERIOD:
+        found.append(
+            LogFinding(
+                FindingKind.IMPLAUSIBLE_PERIOD, Severity.USELESS, (),
+                f"Its samples are {log.dt:.4g} s apart, in which a robot does more than can be "
+                "seen; the times may be in milliseconds. See times= and dt= of read_log.",
+            )
+        )  # fmt: skip
 
 
 def _add(

@@ -30,10 +30,13 @@ class FindingKind(Enum):
     """
 
     WRONG_JOINT_COUNT = "its joints are not as many as the model's"
+    WRONG_JOINT_ORDER = "its joints are the model's in another order"
+    IMPLAUSIBLE_PERIOD = "its sampling period is that of no recorder of a robot"
     POSITIONS_IN_DEGREES = "positions look like degrees"
     MOTOR_SIDE_POSITIONS = "positions look like those of motors"
     OUTSIDE_LIMITS = "positions are outside the limits"
     TOO_FAST = "velocities are above the limits"
+    RATES_OFF_POSITIONS = "velocities or accelerations do not follow from the positions"
     TORQUE_ABOVE_LIMITS = "torques are above the limits"
     TORQUE_BELOW_USE = "torques are too small to be torques of the joints"
     CONSTANT_POSITION = "a joint does not move"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,10 @@ from .._arrays import Array
 from ..csv_table import CsvTable, open_table
 from ..errors import InvalidValueError, MissingExtraError
 from .table import LogFormat, LogTable
+
+
+class _NoFileError(InvalidValueError, FileNotFoundError):
+    """A file that is not there."""
 
 
 def open_log_table(path: Path, kind: LogFormat | None, delimiter: str | None = None) -> LogTable:
@@ -38,9 +43,13 @@ def open_log_table(path: Path, kind: LogFormat | None, delimiter: str | None = N
     MissingExtraError
         Parquet without pyarrow.
     OSError
-        The file cannot be opened.
+        The file cannot be opened; one that is not there is an InvalidValueError too.
     """
     kind = LogFormat.of(path) if kind is None else kind
+    if not path.exists():
+        near = get_close_matches(path.name, [each.name for each in path.parent.glob("*")])
+        advice = f"near it are {', '.join(near)}" if near else "see its folder and its name"
+        raise _NoFileError(f"{path}: there is no such file; {advice}.")
     if delimiter is not None and kind is not LogFormat.CSV:
         raise InvalidValueError(f"delimiter: {path} is no text file; leave it out.")
     if kind is LogFormat.CSV:

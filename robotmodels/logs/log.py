@@ -177,7 +177,7 @@ class Log:
         Parameters
         ----------
         start, stop : int
-            First row, and the one after the last.
+            First row, and the one after the last; negative ones count from the end.
 
         Returns
         -------
@@ -187,13 +187,19 @@ class Log:
         Raises
         ------
         InvalidValueError
-            No row is in this range.
+            No row is in this range, or it goes beyond the log.
 
         Examples
         --------
         >>> len(Log(0.01, np.zeros((100, 1)), np.zeros((100, 1))).rows(10, 30))
         20
         """
+        beyond = [row for row in (start, stop) if not -len(self) <= row <= len(self)]
+        if beyond:
+            raise InvalidValueError(
+                f"rows: asked for {start} to {stop}, the log has {len(self)} rows (0 to {len(self)}"
+                "); give a range within it."
+            )
         first, last, _ = slice(start, stop).indices(len(self))
         if first >= last:
             raise InvalidValueError(
@@ -209,6 +215,42 @@ class Log:
             sources=self.sources, refused=self.refused, notes=self.notes,
         )  # fmt: skip
 
+    def __getitem__(self, part: slice) -> Log:
+        """Rows ``log[start:stop]``, as `rows` gives them.
+
+        Parameters
+        ----------
+        part : slice
+            Without a step: a thinned log is made by a filter, see ``decimation`` of a fit.
+
+        Returns
+        -------
+        Log
+            Views of the same arrays.
+
+        Raises
+        ------
+        InvalidValueError
+            Not a slice of following rows within the log.
+
+        Examples
+        --------
+        >>> len(Log(0.01, np.zeros((100, 1)), np.zeros((100, 1)))[10:30])
+        20
+        """
+        if not isinstance(part, slice):
+            raise InvalidValueError(
+                f"log[...]: expected rows as log[start:stop], got {part!r:.60}; single samples are "
+                "in its arrays, such as log.q[k]."
+            )
+        if part.step not in (None, 1):
+            raise InvalidValueError(
+                f"log[...]: expected following rows, got a step of {part.step!r:.20}; leaving out "
+                "samples without a filter folds what is fast into what is slow."
+            )
+        start = 0 if part.start is None else part.start
+        return self.rows(start, len(self) if part.stop is None else part.stop)
+
     def __len__(self) -> int:
         return self.q.shape[0]
 
@@ -221,6 +263,26 @@ class Log:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), tuple(getattr(self, field.name) for field in fields(self))
+
+
+def check_is_log(log: object) -> None:
+    """Refuse what is no log.
+
+    Parameters
+    ----------
+    log : object
+        What was given as one.
+
+    Raises
+    ------
+    InvalidValueError
+        It is something else, such as a data set that has a log.
+    """
+    if isinstance(log, Log):
+        return
+    has = isinstance(getattr(log, "log", None), Log)
+    advice = "give its .log" if has else "make one with Log(dt, q, tau) or read_log"
+    raise InvalidValueError(f"log: expected a Log, got {type(log).__name__}; {advice}.")
 
 
 def _rows(value: ArrayLike, name: str) -> Array:

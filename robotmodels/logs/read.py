@@ -86,7 +86,8 @@ def read_log(
     time : column, two columns (seconds, nanoseconds) or False, optional
         Default found by the usual names; False: none, rows are ``dt`` apart.
     dt : float, optional
-        Sampling period, s; needed without times. With times the log is interpolated to it.
+        Sampling period, s; needed without times. With times the log is interpolated to it, and it
+        may be at most 1.5 times the file's: nothing is left out without a filter.
     times : TimeUnit or {"s", "ms", "us", "ns"}, optional
         Default what the header says, seconds if nothing.
     angles : AngleUnit or {"rad", "deg"}
@@ -128,7 +129,10 @@ def read_log(
     ------
     InvalidValueError, ShapeError
         Columns that are missing or that several could be, cells that are no numbers (with line),
-        a time base that cannot be made regular, arguments that contradict each other.
+        a time base that cannot be made regular, units that are not understood, arguments that
+        contradict each other.
+    FileNotFoundError
+        There is no such file; it is an InvalidValueError too.
     MissingExtraError
         Parquet without pyarrow.
 

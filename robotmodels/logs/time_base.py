@@ -13,6 +13,8 @@ from .log import RefusedRows
 
 _REGULAR = 0.01
 """Stamps this close to a regular grid, in periods, are the grid: rounding, not sampling."""
+_COARSER = 1.5
+"""Periods of the file above which a grid leaves out rows."""
 _REPEATED = 0.1
 """Share of repeated stamps above which the stamps are too coarse to tell anything."""
 
@@ -67,7 +69,7 @@ def regular_rows(
         Name of the file, for what is said.
     dt : float, optional
         Period of the grid, s; needed without ``t``, else default the mean of the stamps'
-        differences.
+        differences, and at most 1.5 times that.
     largest_gap : float
         In periods of the file.
     largest_jitter : float
@@ -81,7 +83,8 @@ def regular_rows(
     Raises
     ------
     InvalidValueError
-        Nothing is left, jitter is too large, stamps are too coarse, ``t`` and ``dt`` both missing.
+        Nothing is left, jitter is too large, stamps are too coarse, ``t`` and ``dt`` both missing,
+        a grid that is coarser than the samples.
     """
     refused: list[RefusedRows] = []
     notes: list[str] = []
@@ -181,13 +184,18 @@ def _split(
         )
     median = float(np.median(inside))
     gap = (steps > largest_gap * median) & ~broken
-    for words, where in (("goes back", back & ~broken), ("has a gap", gap)):
+    for once, often, where in (
+        ("goes back once", "goes back {} times", back & ~broken),
+        ("has one gap", "has {} gaps", gap),
+    ):
         found = np.flatnonzero(where)
         if len(found):
             first = found[0]
+            words = once if len(found) == 1 else often.format(len(found))
             notes.append(
-                f"{source}: time {words} {len(found)} times (first before row {kept[first + 1]}, "
-                f"from {t[kept[first]]:.9g} to {t[kept[first + 1]]:.9g} s); the log is split there."
+                f"{source}: time {words} ({'' if len(found) == 1 else 'the first '}before row "
+                f"{kept[first + 1]}, from {t[kept[first]]:.9g} to {t[kept[first + 1]]:.9g} s); the "
+                "log is split there."
             )
     broken = broken | back | gap
     return float(steps[~broken].mean()) if (~broken).any() else median, broken
@@ -204,6 +212,12 @@ def _on_grid(
             deviation = times - times[0] - period * k
             off = max(off, float(np.ptp(deviation)) / period)
             jitter = max(jitter, float(np.abs(np.diff(times) - period).max()) / period)
+    if grid > _COARSER * period:
+        raise InvalidValueError(
+            f"{source}: its rows are {period:.4g} s apart, dt={grid:g} would leave out some "
+            "without a filter, which folds what is fast into what is slow. Leave dt= out; a fit filters "
+            "and then thins out (decimation=)."
+        )
     told = f"{source}: stamps are up to {jitter:.2g} periods from regular"
     if jitter > largest_jitter:
         raise InvalidValueError(
