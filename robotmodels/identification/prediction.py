@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_exact, as_vector, batch_rows
+from ..friction import check_linear
 from ..minimal_parameters import BaseParameters
 from ..regressors import torque_regressor_chunks
 
@@ -70,7 +71,7 @@ def predicted_torque(
     tau = np.empty((rows[0].shape[0], n))
     if tau.size:
         chunks = torque_regressor_chunks(
-            model, *rows, base.drive, columns=names, friction=base.friction
+            model, rows[0], rows[1], rows[2], base.drive, columns=names, friction=base.friction
         )
         for part, W in chunks:
             tau[part] = W @ b
@@ -90,7 +91,8 @@ def _over_dead_band(base: BaseParameters, terms: dict[str, float], v: Array, ban
         return out
     ramp = np.where(inside, v / wide - np.sign(v), 0.0)
     out += ramp * np.array([terms.get(f"Fc{j}", 0.0) for j in frames])
-    if (friction := base.friction) is not None:
+    if base.friction is not None:
+        friction = check_linear(base.friction)
         inner = np.where(inside, v, band)  # anything outside: its share is zero below
         share = (inner / wide + 1.0) / 2.0
         low, high = friction.basis(-wide), friction.basis(wide)

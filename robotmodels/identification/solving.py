@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
+from .._choices import chosen
 from ..errors import InvalidValueError
 from ..model import RobotModel
 from .equations import Equations
@@ -152,7 +153,7 @@ def _simulated(
         return instrumental(system, reduction, controller, start, loop=loop)
     if method is Method.DIDIM:
         return didim(system, reduction, controller, start, loop=loop)
-    output = Output.TORQUE if options.output is None else options.output
+    output = Output.TORQUE if options.output is None else chosen(Output, options.output, "output")
     return output_error(system, reduction, controller, start, output=output, loop=loop)
 
 

@@ -179,12 +179,11 @@ def _inner(N: int, processing: Processing) -> slice:
 
 def _density(x: Array, dt: float) -> tuple[Array, Array]:
     """Frequencies and root of the power spectral density, averaged in bins of equal ratio."""
-    from scipy.signal import welch
+    from scipy.signal import get_window, welch
 
     width = max(8, len(x) // _SEGMENTS)
-    f, P = welch(
-        x, 1.0 / dt, window=("kaiser", _KAISER), nperseg=width, detrend="linear", axis=0
-    )  # fmt: skip
+    window = get_window(("kaiser", _KAISER), width)
+    f, P = welch(x, 1.0 / dt, window=window, detrend="linear", axis=0)
     f, P = f[1:], P[1:]
     edges = np.geomspace(f[0], f[-1] * (1.0 + 1e-9), _BINS + 1)
     place = np.searchsorted(edges, f, side="right")
