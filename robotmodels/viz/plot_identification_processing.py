@@ -183,7 +183,7 @@ def _density(x: Array, dt: float) -> tuple[Array, Array]:
 
     width = max(8, len(x) // _SEGMENTS)
     window = get_window(("kaiser", _KAISER), width)
-    f, P = welch(x, 1.0 / dt, window=window, detrend="linear", axis=0)
+    f, P = welch(x, 1.0 / dt, window=window, detrend="linear", axis=0)  # type: ignore[arg-type]
     f, P = f[1:], P[1:]
     edges = np.geomspace(f[0], f[-1] * (1.0 + 1e-9), _BINS + 1)
     place = np.searchsorted(edges, f, side="right")
