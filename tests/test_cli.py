@@ -547,7 +547,13 @@ def test_choices_of_identify_are_those_of_the_package():
         (["--cutoff", "1e6"], "half the sampling rate"),
         (["--prior", "rx90"], "has 6 links, the robot 2"),
         (["--consistent"], "has no masses"),
-        (["--log", "missing.csv"], "missing.csv"),
+        (["--log", "missing.csv"], "missing.csv: there is no such file"),
+        (["--rows", "0", "5000", "--test-rows", "10", "5000"], "rows that do not overlap"),
+        (["--rows", "0", "-10", "--test-rows", "7000", "8000"], "rows that do not overlap"),
+        (["--rows", "0", "90000"], "--rows: expected a first row"),
+        (["--rows", "0", "10", "--test-rows", "10", "9000"], "within the 8000 rows"),
+        (["--angles", "rad"], "with --gears or --motor-side. (--no-check takes the log as it"),
+        (["--delay", "0.2", "--rows", "0", "8000"], "7900 rows"),
     ],
 )
 def test_wrong_arguments_of_identify(run, motion, words, message):
@@ -555,6 +561,61 @@ def test_wrong_arguments_of_identify(run, motion, words, message):
     assert (code, out) == (2, "")
     assert message in err
     assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("message", "words"),
+    [
+        ("say angles='deg', or", "say --angles deg, or"),
+        ("(checked=False takes the log as it is.)", "(--no-check takes the log as it is.)"),
+        (
+            "say drive_gains= (N m) or drive_gains=1 to",
+            "say --drive-gains (N m) or --drive-gains 1 to",
+        ),
+        ("say dt=, the period, and time=False to", "say --dt, the period, and --time none to"),
+        ("give them as positions=[...], names", "give them as --positions, names"),
+        ("say transmission=model.transmission if", "say --motor-side if"),
+        ("signs= and drive_gains= of read_log.", "--signs and --drive-gains."),
+        ("times='ms', 'us' or 'ns' if", "--times ms, us or ns if"),
+        ("leave them out (velocities=False of read_log)", "leave them out (--velocities none)"),
+        ("largest_gap= to split, b2=3", "largest_gap= to split, b2=3"),
+    ],
+)
+def test_messages_speak_of_options(message, words):
+    from robotmodels.cli import identify as command
+
+    assert command._as_options(message) == words
+
+
+def test_velocities_that_are_wrong_are_left_out(run, motion, tmp_path):
+    folder, _ = motion
+    q = np.loadtxt(folder / "q.csv", delimiter=",", skiprows=1)
+    both = tmp_path / "both.csv"
+    table = np.column_stack([q, 2.0 * np.gradient(q, 0.002, axis=0)])
+    np.savetxt(both, table, delimiter=",", header="q1,q2,dq1,dq2", comments="")
+    words = identify(folder)
+    words[words.index("--log") + 1] = both
+    code, _, err = run(*words)
+    assert code == 2
+    assert "leave them out (--velocities none)" in err
+    values = []
+    for given in ([*words, "--velocities", "none"], identify(folder)):
+        code, out, _ = run(*given, "--json")
+        assert code == 0
+        values.append([one["value"] for one in json.loads(out)["parameters"]])
+    np.testing.assert_allclose(values[0], values[1], rtol=1e-9)
+
+
+def test_delays_that_are_not_found_are_not_taken_out(run, motion, tmp_path):
+    folder, _ = motion
+    tau = np.loadtxt(folder / "tau.csv", delimiter=",", skiprows=1)
+    late = tmp_path / "late.csv"
+    np.savetxt(late, np.roll(tau, 100, axis=0), delimiter=",", header="tau1,tau2", comments="")
+    words = identify(folder)
+    words[words.index("--torques-from") + 1] = late
+    code, out, err = run(*words, "--delay", "auto")
+    assert (code, out) == (2, "")
+    assert "--delay auto: the torques fit best at an end of the delays" in err
 
 
 def test_help_of_identify_shows_examples(run):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
 import sys
 import warnings
 from concurrent.futures import Executor, ProcessPoolExecutor
@@ -12,14 +13,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .._arrays import Array
-from ..errors import InvalidValueError, RobotModelsError, UrdfWarning
+from ..errors import InvalidValueError, RobotModelsError, ShapeError, UrdfWarning
 from ..model import RobotModel
 from .columns import column, columns
 from .numbers import numbers
 from .source import robot_of
 
 if TYPE_CHECKING:
-    from ..identification import ConsistentFit, Controller, IdentificationResult, Log
+    from ..identification import (
+        ConsistentFit,
+        Controller,
+        IdentificationResult,
+        Log,
+        Synchronisation,
+    )
     from ..inertia import InertialParameters
 
 METHODS = (
@@ -29,6 +36,29 @@ METHODS = (
 FORMS = ("torque", "filtered", "power", "energy")
 _KINDS = ("Ia", "Fv", "Fc", "offset")
 _MOST = 64
+_OPTIONS = {
+    "angles": "--angles", "lengths": "--lengths", "times": "--times", "time": "--time",
+    "dt": "--dt", "positions": "--positions", "torques": "--torques",
+    "torques_from": "--torques-from", "velocities": "--velocities",
+    "accelerations": "--accelerations", "position_references": "--references",
+    "signs": "--signs", "gears": "--gears", "drive_gains": "--drive-gains",
+    "offsets": "--offsets", "delimiter": "--delimiter", "cutoff": "--cutoff",
+    "decimation": "--decimation", "dead_band": "--dead-band", "edges": "--edges",
+    "strength": "--strength", "loss": "--loss", "noise": "--noise", "forgetting": "--forgetting",
+    "prior": "--prior",
+}  # fmt: skip
+"""Arguments of the package in messages, and the options that set them."""
+_WHOLE = (
+    ("transmission=model.transmission", "--motor-side"),
+    ("checked=False", "--no-check"),
+    ("time=False", "--time none"),
+    ("transmission=", "--motor-side"),
+    ("times='ms', 'us' or 'ns'", "--times ms, us or ns"),
+    ("velocities=False", "--velocities none"),
+    ("accelerations=False", "--accelerations none"),
+    (" of read_log", ""),
+)
+_ARGUMENT = re.compile(r"(?<![\w-])([a-z_]+)=(?:\[\.\.\.\]|'([^']*)'|([0-9]+(?:\.[0-9]+)?))?")
 _EXAMPLES = """\
 examples:
   robotmodels identify --robot tx40 --log positions.csv --torques-from currents.csv --dt 2e-4 \\
@@ -89,9 +119,9 @@ def _add_files(files: Any) -> None:
     for option, what in (
         ("--positions", "columns of the positions: names, numbers from 0, or a pattern"),
         ("--torques", "columns of the torques or currents"),
-        ("--velocities", "columns of velocities, where they are measured"),
-        ("--accelerations", "columns of accelerations, where they are measured"),
-        ("--references", "columns of the positions that the controller was to follow"),
+        ("--velocities", "columns of velocities, where they are measured, or none"),
+        ("--accelerations", "columns of accelerations, where they are measured, or none"),
+        ("--references", "columns of the positions that the controller was to follow, or none"),
     ):
         files.add_argument(option, nargs="+", metavar="COLUMN", help=what)
     files.add_argument("--time", metavar="COLUMN", help='column of times, or "none"')
@@ -201,6 +231,16 @@ def run(arguments: argparse.Namespace) -> int:
     >>> parser.parse_args(["identify", "--robot", "tx40", "--log", "a.csv"]).method
     'wls'
     """
+    try:
+        return _run(arguments)
+    except (InvalidValueError, ShapeError) as error:
+        words = _as_options(str(error))
+        if words == str(error):
+            raise
+        raise type(error)(words) from error
+
+
+def _run(arguments: argparse.Namespace) -> int:
     from ..identification import EstimateStatus, fit
 
     model = robot_of(arguments)
@@ -271,16 +311,24 @@ def logs(arguments: argparse.Namespace, model: RobotModel) -> tuple[Log, Log | N
         other = _read(arguments, model, arguments.test, arguments.test_torques_from)
     if arguments.delay is not None:
         if arguments.delay == "auto":
-            delay = float(synchronisation(whole, model).delay)
+            delay = _estimated_delay(synchronisation(whole, model))
         else:
             delay = float(numbers(arguments.delay, 1, "--delay")[0])
         whole = with_delay(whole, delay)
         other = None if other is None else with_delay(other, delay)
-    first, last = (0, len(whole)) if arguments.rows is None else arguments.rows
+    first, last = (0, len(whole))
+    if arguments.rows is not None:
+        first, last = _range(arguments.rows, len(whole), "--rows")
     if arguments.test_rows is not None:
         if arguments.rows is None:
             raise InvalidValueError("--test-rows: say with --rows which rows are fitted.")
-        other = whole.rows(*arguments.test_rows)
+        start, stop = _range(arguments.test_rows, len(whole), "--test-rows")
+        if max(first, start) < min(last, stop):
+            raise InvalidValueError(
+                f"--test-rows: rows {start} to {stop} are not kept aside where {first} to {last} "
+                "are fitted; give rows that do not overlap."
+            )
+        other = whole.rows(start, stop)
     elif (share := arguments.test_share) is not None:
         if not 0.0 < share < 1.0:
             raise InvalidValueError(f"--test-share: expected a part of 1, got {share:g}.")
@@ -288,6 +336,49 @@ def logs(arguments: argparse.Namespace, model: RobotModel) -> tuple[Log, Log | N
         other = whole.rows(middle, last)
         last = middle
     return whole.rows(first, last), other
+
+
+def _range(rows: list[int], N: int, option: str) -> tuple[int, int]:
+    """First row and the one after the last, from 0."""
+    start, stop = (row + N if row < 0 else row for row in rows)
+    if not 0 <= start < stop <= N:
+        raise InvalidValueError(
+            f"{option}: expected a first row and the one after the last within the {N} rows of the "
+            f"log, got {rows[0]} {rows[1]}."
+        )
+    return start, stop
+
+
+def _estimated_delay(found: Synchronisation) -> float:
+    """The delay, where there is one that means something."""
+    from ..identification import SynchronisationStatus
+
+    if found.status is SynchronisationStatus.AT_THE_END:
+        raise InvalidValueError(
+            f"--delay auto: the torques fit best at an end of the delays that were tried "
+            f"({1e3 * found.delays[0]:.0f} to {1e3 * found.delays[-1]:.0f} ms); see whether "
+            "positions and torques are of the same motion, and give the delay in seconds."
+        )
+    if not found.status.is_success:
+        raise InvalidValueError(
+            f"--delay auto: {found.status.sentence} Give the delay in seconds, or leave it out."
+        )
+    return float(found.delay)
+
+
+def _as_options(message: str) -> str:
+    """A message of the package in the words of the command line."""
+    for words, option in _WHOLE:
+        message = message.replace(words, option)
+
+    def option_of(match: re.Match[str]) -> str:
+        name, word, number = match.groups()
+        if name not in _OPTIONS:
+            return match.group()
+        value = word or number
+        return _OPTIONS[name] if not value else f"{_OPTIONS[name]} {value}"
+
+    return _ARGUMENT.sub(option_of, message)
 
 
 def _read(
@@ -306,9 +397,9 @@ def _read(
         )
     return read_log(
         files, torques_from=torques, positions=_columns(arguments.positions),
-        torques=_columns(arguments.torques), velocities=_columns(arguments.velocities),
-        accelerations=_columns(arguments.accelerations),
-        position_references=_columns(arguments.references), time=time, dt=arguments.dt,
+        torques=_columns(arguments.torques), velocities=_or_none(arguments.velocities),
+        accelerations=_or_none(arguments.accelerations),
+        position_references=_or_none(arguments.references), time=time, dt=arguments.dt,
         times=arguments.times, angles=arguments.angles, lengths=arguments.lengths,
         signs=_joint_numbers(arguments.signs, model, "--signs"),
         gears=_joint_numbers(arguments.gears, model, "--gears"),
@@ -452,6 +543,10 @@ def _columns(words: list[str] | None) -> list[int | str] | int | str | None:
     found = columns(words)
     # one word may be a pattern, or the name of a matrix
     return found[0] if found is not None and len(found) == 1 else found
+
+
+def _or_none(words: list[str] | None) -> Any:
+    return False if words == ["none"] else _columns(words)
 
 
 def _progress(fraction: float) -> None:
