@@ -301,6 +301,58 @@ def test_a_header_that_contradicts_the_unit_is_refused(tmp_path):
     assert np.allclose(read_log(path, angles="deg").q, np.radians(q))
 
 
+@pytest.mark.parametrize("unit", ["grad", "rev", "mrad", "counts"])
+def test_positions_in_units_that_are_not_read_are_refused(tmp_path, unit):
+    t, q, tau = samples()
+    head = ["t", *(f"q{j} [{unit}]" for j in (1, 2, 3)), *NUMBERED[4:]]
+    with pytest.raises(InvalidValueError, match=f"is in '{unit}', which is not read"):
+        read_log(write(tmp_path / "a.csv", head, t, q, tau))
+    head = [*NUMBERED, *(f"dq{j} (rpm)" for j in (1, 2, 3))]
+    path = write(tmp_path / "b.csv", head, t, q, tau, q)
+    with pytest.raises(InvalidValueError, match="'dq1 \\(rpm\\)' is in 'rpm'"):
+        read_log(path)
+    assert read_log(path, velocities=False).v is None
+
+
+@pytest.mark.parametrize("unit", ["kNm", "mN m", "kN·m", "mN.m", "lbf-ft", "%", "A"])
+def test_torques_in_other_units_need_gains(tmp_path, unit):
+    t, q, tau = samples()
+    head = [*NUMBERED[:4], *(f"tau{j} [{unit}]" for j in (1, 2, 3))]
+    path = write(tmp_path / "a.csv", head, t, q, tau)
+    with pytest.raises(InvalidValueError, match=r"not in N m; say drive_gains="):
+        read_log(path)
+    np.testing.assert_allclose(read_log(path, drive_gains=1e-3).tau, 1e-3 * tau)
+
+
+@pytest.mark.parametrize("unit", ["Nm", "N m", "N·m", "N.m", "N*m", "N-m", "N"])
+def test_torques_in_newton_metres_are_taken_as_they_are(tmp_path, unit):
+    t, q, tau = samples()
+    head = ["t", *(f"q{j} [rad]" for j in (1, 2, 3)), *(f"tau{j} [{unit}]" for j in (1, 2, 3))]
+    log = read_log(write(tmp_path / "a.csv", head, t, q, tau))
+    assert np.array_equal(log.tau, tau)
+    assert not any("no unit that is known" in note for note in log.notes)
+
+
+def test_brackets_that_are_no_units_are_noted(tmp_path):
+    t, q, tau = samples()
+    head = ["t", *(f"q{j} (meas)" for j in (1, 2, 3)), *(f"tau{j} (raw)" for j in (1, 2, 3))]
+    log = read_log(write(tmp_path / "a.csv", head, t, q, tau))
+    assert np.array_equal(log.q, q)
+    odd = [note for note in log.notes if "no unit that is known" in note]
+    assert ["'meas'" in note or "'raw'" in note for note in odd] == [True, True]
+
+
+def test_a_column_is_one_thing(file):
+    for given, words in (
+        ({"positions": "q*", "torques": "q*"}, "torques: q1, q2, q3 of .* at once"),
+        ({"positions": ["t", "q1", "q2"]}, "positions: t of .* positions and time at once"),
+        ({"torques": ["t", "tau1", "tau2"]}, "torques: t of .* torques and time at once"),
+        ({"velocities": "q*"}, "velocities: q1, q2, q3 of .* at once"),
+    ):
+        with pytest.raises(InvalidValueError, match=words):
+            read_log(file, **given)
+
+
 def test_currents_need_gains(tmp_path):
     t, q, tau = samples()
     path = write(tmp_path / "a.csv", [*NUMBERED[:4], "current1", "current2", "current3"], t, q, tau)

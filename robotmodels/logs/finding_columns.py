@@ -56,7 +56,7 @@ class Quantity(Enum):
         }[self.name]  # fmt: skip
 
 
-_UNIT = re.compile(r"\s*[\[(]\s*([a-zA-Z°/ ._*^-]+[0-9]?)\s*[\])]\s*$")
+_UNIT = re.compile(r"\s*[\[(]\s*([a-zA-Z°%·⋅/ ._*^-]+[0-9]?)\s*[\])]\s*$")
 _INDEX = re.compile(r"^(?P<stem>.*?)[ _./-]*[\[(]?(?P<index>\d+)[\])]?$")
 _TIMES = ("time", "t", "timestamp", "stamp", "times", "timestamps", "__time", "elapsed")
 _NANOSECONDS = ("%time", "field.header.stamp")
@@ -226,6 +226,11 @@ def angle_unit_of(name: str) -> AngleUnit | None:
     unit = _without_unit(name)[1].split("/")[0]
     words = {"rad": "rad", "deg": "deg", "°": "deg", "degree": "deg", "degrees": "deg"}
     return AngleUnit(words[unit]) if unit in words else None
+
+
+def unit_of(name: str) -> str:
+    """What stands in brackets at the end of a header, in small letters; empty if nothing does."""
+    return _without_unit(name)[1]
 
 
 def _without_unit(name: str) -> tuple[str, str]:

@@ -155,7 +155,8 @@ def _moments(log: Log, rate: Array, order: int) -> tuple[Array, Array, Array, Ar
                      (x * y).sum(axis=0)]  # fmt: skip
             count += len(x)
     if not count:
-        return (*np.zeros((4, n)), 0)
+        nothing = np.zeros(n)
+        return nothing, nothing, nothing, nothing, 0
     sx, sy, xx, yy, xy = sums / count
     noise = (2.0 if order == 1 else 6.0) * rough / max(1, steps)
     return xx - sx**2, yy - sy**2, xy - sx * sy, noise, count

@@ -22,7 +22,7 @@ from .finding_columns import (
 )
 from .log import RefusedRows
 from .table import LogTable
-from .units import check_headers
+from .units import check_headers, check_position_units, check_torque_units
 
 Choice = Column | Sequence[Column]
 _NEAR = 1.5
@@ -98,6 +98,8 @@ def raw_samples(
     t, t_columns = _time(table, time, unit, notes)
     where = _quantity(table, Quantity.POSITION, positions, names, notes, t_columns, second is None)
     n = len(where)
+    notes += check_position_units(table, where)
+    _refuse_twice(table, "positions", where, "time", t_columns)
     check_headers([angle_unit_of(table.names[i]) for i in where if table.names], angle,
                   str(table.path))  # fmt: skip
     values = [table.read(where)]
@@ -106,11 +108,16 @@ def raw_samples(
     refused: list[RefusedRows] = []
     if second is None:
         taken = _torques(table, torques, names, notes, t_columns, currents, n, True)
+        _refuse_twice(table, "torques", taken, "positions", where)
+        _refuse_twice(table, "torques", taken, "time", t_columns)
+        notes += check_torque_units(table, taken, currents)
         values.append(table.read(taken))
         owners.append(joints_of(table, Quantity.TORQUE, taken))
     else:
         t2, columns = _time(second, time, unit, notes)
         taken = _torques(second, torques, names, notes, columns, currents, n, False)
+        _refuse_twice(second, "torques", taken, "time", columns)
+        notes += check_torque_units(second, taken, currents)
         tau = second.read(taken)
         values.append(_beside(t, t2, len(values[0]), tau, table, second, notes, refused))
         owners.append(joints_of(second, Quantity.TORQUE, taken))
@@ -132,6 +139,9 @@ def raw_samples(
             )
         if given is None:
             notes.append(_told(table, quantity, found))
+        notes += check_position_units(table, found)
+        if quantity in (Quantity.VELOCITY, Quantity.ACCELERATION):
+            _refuse_twice(table, quantity.argument, found, "positions", where)
         check_headers([angle_unit_of(table.names[i]) for i in found if table.names], angle,
                       str(table.path))  # fmt: skip
         values.append(table.read(found))
@@ -169,6 +179,18 @@ def raw_samples(
     return RawSamples(
         t, np.concatenate(values, axis=1), tuple(order), n, own, tuple(refused), tuple(notes)
     )
+
+
+def _refuse_twice(
+    table: LogTable, what: str, columns: Sequence[int], other: str, others: Sequence[int]
+) -> None:
+    """Refuse columns that are said to be two things at once."""
+    both = sorted(set(columns) & set(others))
+    if both:
+        raise InvalidValueError(
+            f"{what}: {table.called(both)} of {table.path} would be {what} and {other} at once; "
+            f"say {what}=[...] and {other}= so that they differ."
+        )
 
 
 def _quantity(

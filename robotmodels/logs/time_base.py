@@ -215,8 +215,8 @@ def _on_grid(
     if grid > _COARSER * period:
         raise InvalidValueError(
             f"{source}: its rows are {period:.4g} s apart, dt={grid:g} would leave out some "
-            "without a filter, which folds what is fast into what is slow. Leave dt= out; a fit filters "
-            "and then thins out (decimation=)."
+            "without a filter, which folds what is fast into what is slow. Leave dt= out; a fit "
+            "filters and then thins out (decimation=)."
         )
     told = f"{source}: stamps are up to {jitter:.2g} periods from regular"
     if jitter > largest_jitter:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -14,6 +15,22 @@ from ..errors import InvalidValueError, ShapeError
 from ..file_units import AngleUnit, LengthUnit
 from ..geometry import PRISMATIC
 from ..model import RobotModel
+from .finding_columns import unit_of
+from .table import LogTable
+
+_ANGLES = ("rad", "deg", "°", "degree", "degrees", "m", "mm")
+_OTHER_ANGLES = (
+    "grad", "gon", "mrad", "urad", "turn", "turns", "rev", "revs", "rpm", "arcmin", "arcsec", "min",
+    "count", "counts", "inc", "incs", "tick", "ticks", "pulse", "pulses", "step", "steps", "cm",
+    "um", "in", "inch", "ft", "km",
+)  # fmt: skip
+_TORQUES = ("nm", "n", "n/m")
+_OTHER_TORQUES = (
+    "mnm", "cnm", "knm", "unm", "kn", "mn", "ncm", "nmm", "kgm", "kgfm", "kgcm", "kgfcm", "lbft",
+    "lbfft", "ftlb", "ftlbf", "lbin", "lbfin", "inlb", "inlbf", "ozin", "ozfin", "a", "ma", "arms",
+    "amp", "amps", "ampere", "v", "mv", "%", "percent", "permille", "permil", "count", "counts",
+)  # fmt: skip
+_JOINING = re.compile(r"[ .*·⋅_-]")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -144,3 +161,85 @@ def check_headers(said: Sequence[AngleUnit | None], given: AngleUnit, source: st
                 f"{source}: the header says {unit.value!r}, the argument angles={given.value!r}; "
                 f"say angles={unit.value!r}, or name the right columns."
             )
+
+
+def check_position_units(table: LogTable, columns: Sequence[int]) -> list[str]:
+    """Refuse positions and their derivatives in units that are not understood.
+
+    Parameters
+    ----------
+    table : LogTable
+        The file.
+    columns : sequence of int
+        Of positions, velocities, accelerations or references.
+
+    Returns
+    -------
+    list of str
+        What stands in brackets in headers and is no unit that is known, to be noted.
+
+    Raises
+    ------
+    InvalidValueError
+        A header says another unit than rad, deg, m, mm.
+    """
+    odd: dict[str, str] = {}
+    for name in _names(table, columns):
+        unit = unit_of(name).split("/")[0].strip()
+        if unit in _OTHER_ANGLES:
+            raise InvalidValueError(
+                f"{table.path}: the column {name!r} is in {unit!r}, which is not read; write it in "
+                "rad or deg (m or mm for prismatic joints), or give gears= where it is a constant "
+                "factor and the brackets are taken out of the header."
+            )
+        if unit and unit not in _ANGLES:
+            odd.setdefault(unit, name)
+    return [_odd(table, unit, name, "angles=") for unit, name in odd.items()]
+
+
+def check_torque_units(table: LogTable, columns: Sequence[int], gains: bool) -> list[str]:
+    """Refuse torques in units other than N m and N, but where drive gains convert them.
+
+    Parameters
+    ----------
+    table : LogTable
+        The file.
+    columns : sequence of int
+        Of the torques.
+    gains : bool
+        Whether drive gains are given.
+
+    Returns
+    -------
+    list of str
+        What stands in brackets in headers and is no unit that is known, to be noted.
+
+    Raises
+    ------
+    InvalidValueError
+        A header says another unit.
+    """
+    if gains:
+        return []
+    odd: dict[str, str] = {}
+    for name in _names(table, columns):
+        unit = _JOINING.sub("", unit_of(name))
+        if unit in _OTHER_TORQUES:
+            raise InvalidValueError(
+                f"{table.path}: the column {name!r} is in {unit_of(name)!r}, not in N m; say "
+                "drive_gains=, the N m (N for prismatic joints) for one unit of it."
+            )
+        if unit and unit not in _TORQUES:
+            odd.setdefault(unit_of(name), name)
+    return [_odd(table, unit, name, "drive_gains=") for unit, name in odd.items()]
+
+
+def _names(table: LogTable, columns: Sequence[int]) -> list[str]:
+    return [table.names[i] for i in columns if table.names]
+
+
+def _odd(table: LogTable, unit: str, name: str, option: str) -> str:
+    return (
+        f"{table.path.name}: {unit!r} in the header {name!r} is no unit that is known and was left "
+        f"aside; see {option} if it is one."
+    )
