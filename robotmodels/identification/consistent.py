@@ -229,7 +229,8 @@ class _Task:
     def constrained(self) -> _Found:
         """The best fit, and of equal ones the nearest."""
         problem, system = self.problem, self.system
-        total = max(system.least, 1e-8 * float(system.target @ system.target), 1e-300)
+        smallest = max(system.least, 1e-8 * float(system.target @ system.target), 1e-300)
+        total = smallest
         weight = self.gamma / total if self.gamma > 0.0 else _FIRST
         size = problem.size(system.best)
         found = self.fitted(total, weight, size)
@@ -237,22 +238,20 @@ class _Task:
             # how great squares, distance and numbers are is known only now
             if not np.isfinite(found.x).all():
                 break
-            reached, far, wide = (
-                system.sum(found.x),
-                problem.distance(found.x),
-                self.size_of(found.x),
-            )
-            more = reached > _FAR * total
+            reached, far = system.sum(found.x), self.reach(found.x)
+            wide = self.size_of(found.x)
+            # a run that failed may have said too much
+            more = reached > _FAR * total or _SIZES * max(reached, smallest) < total
             light = self.gamma > 0.0 or (not more and weight * far**2 <= 4.0 * _SOUGHT)
             if not more and light and max(size, wide) <= _SIZES * min(size, wide):
                 break
             lighter = _FIRST if more else min(weight, _SOUGHT / (1.0 + far**2))
-            total = max(total, reached) if more else total
-            trial = self.gamma / total if self.gamma > 0.0 else lighter
-            again = self.fitted(total, trial, wide)
+            now = max(smallest, reached) if more else total
+            trial = self.gamma / now if self.gamma > 0.0 else lighter
+            again = self.fitted(now, trial, wide)
             if again.outcome is not ConeOutcome.SOLVED and found.outcome is ConeOutcome.SOLVED:
                 break
-            found, weight, size = again, trial, wide
+            found, total, weight, size = again, now, trial, wide
         if not np.isfinite(found.x).all():
             return _Found(problem.prior, ConsistentStatus.FAILED, np.inf, np.inf, 0.0, ())
         x = found.x if self.gamma > 0.0 else self.nearest(found.x)
@@ -265,6 +264,16 @@ class _Task:
         if not self.is_met(signed):
             status = ConsistentStatus.FAILED
         return self.finished(signed, gap, clipped, status)
+
+    def reach(self, x: Array) -> float:
+        """How far from the prior a robot is, or the least squares are, whichever is farther.
+
+        A fit that stayed near the prior only because its numbers were off is not taken for proof.
+        """
+        problem, system = self.problem, self.system
+        missed = system.level - system.same @ problem.prior
+        moved = problem.unit * (np.linalg.pinv(system.same * problem.unit) @ missed)
+        return max(problem.distance(x), problem.distance(problem.prior + moved))
 
     def settled(self, x: Array) -> Array:
         """Known values exact, bounds missed by rounding met, signs turned back."""
@@ -315,7 +324,7 @@ class _Task:
         )  # fmt: skip
 
     def gap(self, x: Array, found: ConeSolution, total: float, weight: float) -> float:
-        """Part of the squares by which a robot within twice the distance could be better."""
+        """Part of the squares by which a robot within twice the reach could be better."""
         problem, system = self.problem, self.system
         sought = found.x
         change, miss = sought - problem.prior, system.fit @ sought - system.target
@@ -329,8 +338,8 @@ class _Task:
         here = (system.sum(x) - system.least) / total
         if self.gamma > 0.0:  # of the sum that was asked for
             here += weight * problem.distance(x) ** 2
-        else:  # of the squares alone, for robots as far as twice this one
-            bound -= 4.0 * weight * problem.distance(x) ** 2
+        else:  # of the squares alone, for robots as far as twice this one or the least squares
+            bound -= 4.0 * weight * self.reach(x) ** 2
         # squares without any constraint are a bound as well
         return max(0.0, here - max(bound, 0.0)) / (here + system.least / total)
 
