@@ -28,7 +28,11 @@ from robotmodels.identification.closed_loop import (
     tuned_controller,
 )
 from robotmodels.identification.closed_loop.loop import least_width, robot_of
-from robotmodels.identification.closed_loop.simulated import simulated_signals
+from robotmodels.identification.closed_loop.simulated import (
+    RanAwayError,
+    simulated_signals,
+    steps_for,
+)
 from robotmodels.identification.fit import _seen
 from robotmodels.inertia import InertialParameters
 
@@ -172,7 +176,7 @@ def test_exact_parameters_from_a_log_without_noise(kind, method):
     system, reduction = problem(arm, log, width)
     truth, start = values_of(system, arm), values_of(system, other(arm))
     assert off(start, truth, reduction) > 1e-3
-    loop = closed_loop(system, start, control, width=width)
+    loop = closed_loop(system, start, control, width=width, substeps=1)
     found = method(system, reduction, start=start, loop=loop)
     assert found.status is EstimateStatus.SOLVED
     assert off(found.values, truth, reduction) < 1e-8
@@ -205,7 +209,7 @@ def test_pieces_and_recordings_are_simulated_as_one_run_each(monkeypatch):
     system, _ = problem(arm, twice, width, decimation=5)
     assert len(system.pieces()) > 10
     truth = values_of(system, arm)
-    loop = closed_loop(system, truth, control, width=width)
+    loop = closed_loop(system, truth, control, width=width, substeps=1)
     for piece, found in simulated_signals(system, loop, truth):
         first = max(piece.start - system.processing.reach, piece.low)
         rows = slice(first, first + len(found))
@@ -289,7 +293,8 @@ def test_a_robot_that_cannot_be_simulated_is_said_to_be_unstable():
     assert found.status is EstimateStatus.UNSTABLE
     assert "runs away" in found.notes[-1]
     verdict = hausman_test(system, found)
-    assert np.isnan(verdict.p) and not verdict.biased
+    assert np.isnan(verdict.p)
+    assert not verdict.biased
     assert "not tested" in verdict.sentence
 
 
@@ -357,3 +362,82 @@ def test_results_are_read_only_and_pickle():
             with pytest.raises(ValueError, match="read-only"):
                 array[0] = 1.0
     assert replace(found, lags=3).lags == 3
+
+
+def stiff_robot(inertia, Fv, Fc):
+    """Two links, the second with so little inertia that its friction stops it at once."""
+    bodies = InertialParameters.from_com(
+        [1.0, 0.01], [[0.3, 0.0, 0.0], [0.0, 0.0, 0.0]], [0.05 * np.eye(3), inertia * np.eye(3)]
+    )
+    drive = DriveParameters(Ia=np.zeros(2), Fv=[2.0, Fv], Fc=[1.0, Fc], offset=np.zeros(2))
+    return rm.load("planar_2r").with_inertia(bodies).with_drive(drive)
+
+
+def moved(arm, seconds, dt, size=0.8):
+    """Log of exact torques on a motion that is followed exactly."""
+    q, v = motion(2, seconds, dt, np.random.default_rng(2), size)
+    a = rm.identification.central_differences(v, dt)
+    tau = rm.idm(arm, q, v, a)
+    return Log(dt, q, tau, v, a, q, v)
+
+
+@pytest.mark.parametrize(
+    ("inertia", "Fv", "Fc", "dt"), [(2e-4, 2.0, 1.0, 1e-3), (0.01, 10.0, 1.0, 5e-3)]
+)
+def test_joints_that_friction_stops_within_a_sample_are_integrated_in_more_steps(
+    inertia, Fv, Fc, dt
+):
+    arm = stiff_robot(inertia, Fv, Fc)
+    log = moved(arm, 4.0, dt)
+    system, reduction = problem(arm, log, 0.02)
+    truth = values_of(system, arm)
+    loop = closed_loop(system, truth)
+    assert dt / loop.substeps * Fv / inertia < 2.0
+    assert (loop.width < 0.2 * np.abs(log.v).max(axis=0)).all()
+    found = instrumental(system, reduction, start=truth)
+    assert found.status is EstimateStatus.SOLVED
+    assert off(found.values, truth, reduction) < 1e-8
+    rough = closed_loop(system, truth, substeps=1)
+    assert rough.substeps == 1
+    assert "joint_2 is stiff" in " ".join(rough.notes)
+
+
+def test_a_joint_too_stiff_for_any_steps_is_named_and_not_simulated():
+    arm = stiff_robot(2e-6, 2.0, 0.0)
+    log = moved(arm, 2.0, 1e-3)
+    system, reduction = problem(arm, log, 0.02)
+    truth = values_of(system, arm)
+    loop = closed_loop(system, truth)
+    assert loop.substeps == 64
+    assert "joint_2 is stiff: its viscous friction" in " ".join(loop.notes)
+    found = instrumental(system, reduction, start=truth)
+    assert found.status is EstimateStatus.UNSTABLE
+    assert "joint_2 is stiff" in " ".join(found.notes)
+    with pytest.raises(InvalidValueError, match="substeps"):
+        simulated_log(arm, loop.controller, log.q_ref, log.v_ref, log.dt)
+
+
+def test_parameters_of_less_inertia_than_the_first_are_simulated_in_more_steps():
+    arm = stiff_robot(2e-3, 2.0, 1.0)
+    log = moved(arm, 2.0, 1e-3)
+    system, _ = problem(arm, log, 0.02)
+    loop = closed_loop(system, values_of(system, arm), width=0.05, substeps=1)
+    light = stiff_robot(2e-4, 2.0, 1.0)
+    finer = steps_for(light, loop, log)
+    assert 1e-3 / finer.substeps * 2.0 / 2e-4 < 2.0
+    assert finer.hold == finer.substeps
+    assert steps_for(arm, loop, log) is loop
+    with pytest.raises(RanAwayError):
+        steps_for(stiff_robot(2e-6, 2.0, 1.0), loop, log)
+
+
+def test_didim_that_wanders_says_so_with_finite_numbers():
+    arm = stiff_robot(2e-4, 2.0, 1.0)
+    log = moved(arm, 4.0, 1e-3)
+    system, reduction = problem(arm, log, 0.02, decimation=20)
+    loop = closed_loop(system, values_of(system, arm), substeps=12)
+    found = didim(system, reduction, start=values_of(system, arm), loop=loop, iterations=4)
+    assert np.isfinite(found.values).all()
+    assert found.condition < 1e10
+    if found.status is not EstimateStatus.SOLVED:
+        assert "instrumental variables" in found.notes[-1]

@@ -19,9 +19,12 @@ from .estimate import SimulatedEstimate
 from .instrumental import first_values, ran_away, torque_sizes
 from .iteration import reweighted
 from .loop import ClosedLoop, closed_loop
+from .simulated import RanAwayError
 
 _MEMORY = 6
 """Steps that are mixed."""
+_SINGULAR = 1e10
+"""Condition from which a simulated motion tells nothing of some parameters."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,7 +115,10 @@ def didim(
         return (block for _, block in simulated_blocks(system, way, values))
 
     def advance(values: Array, weights: Array | None) -> DidimStep:
-        return weighted_step(reduced(system, blocks(values)), values, weights)
+        step = weighted_step(reduced(system, blocks(values)), values, weights)
+        if not step.condition < _SINGULAR:  # so far astray is no motion of this log
+            raise RanAwayError
+        return step
 
     ended = reweighted(first, advance, torque_sizes(reduction), iterations, memory=_MEMORY)
     last = ended.last
@@ -122,7 +128,13 @@ def didim(
     spread = sandwich(equations, ended.values, last.weights, last.inverse, lags)
     notes = loop.notes
     if ended.status is not EstimateStatus.SOLVED:
-        notes = (*notes, ended.status.sentence)
+        notes = (
+            *notes,
+            ended.status.sentence,
+            "A simulated motion that changes more with the parameters than the torques tell (a "
+            "joint of little inertia under friction, for instance) lets this iteration wander: "
+            "take instrumental variables, which use the measured motion too.",
+        )
     return SimulatedEstimate(
         Method.DIDIM, system.names, ended.values, spread.covariance, last.sigma, ended.status,
         ended.iterations, notes, last.deviations, spread.lags, last.condition, 1.0, loop,

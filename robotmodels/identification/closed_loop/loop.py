@@ -13,12 +13,20 @@ from ...dynamics import base_model
 from ...errors import InvalidValueError, ShapeError
 from ...model import RobotModel
 from ..equations import EquationForm, Equations
-from .controller import Controller, inverse_masses, tuned_controller
+from .controller import Controller, tuned_controller
+from .stiffness import least_width as least_width
+from .stiffness import stiffness
 
 _FASTER = 10.0
 """Bandwidth of a controller that is not known, in frequencies of the motion."""
 _NEAR = 0.5
 """rad or m: errors of position below which no robot has run away."""
+_SLOW = 0.05
+"""Part of a joint's fast velocities that its width at rest need not fall below."""
+MOST = 64
+"""Steps of integration of a sample that are chosen at most."""
+_LOOKED = 2000
+"""Samples of the log at which velocities are looked at."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,7 +70,7 @@ def closed_loop(
     *,
     bandwidth: float | None = None,
     width: ArrayLike | None = None,
-    substeps: int = 1,
+    substeps: int | None = None,
 ) -> ClosedLoop | None:
     """The closed loop of a log: its own controller, or one that is tuned to follow closely.
 
@@ -79,8 +87,9 @@ def closed_loop(
         Hz, of a controller that is tuned; default ten times the frequency of the motion.
     width : array_like, scalar or shape (n,), optional
         rad/s or m/s; default the dead band, and no less than a step of integration can follow.
-    substeps : int
-        Steps of integration for a sample of the log.
+    substeps : int, optional
+        Steps of integration for a sample of the log; default as many as viscous friction asks for
+        stability and the width of dry friction for the dead band, 64 at most.
 
     Returns
     -------
@@ -115,8 +124,10 @@ def closed_loop(
             "squares for this robot."
         )
     robot = robot_of(system, values)
-    if inverse_masses(robot, log.q) is None:
+    stiff = stiffness(robot, log.q)
+    if stiff is None:
         return None
+    given = None if width is None else _checked_width(width, n)
     notes: list[str] = []
     if controller is None:
         asked = _FASTER * system.processing.motion if bandwidth is None else bandwidth
@@ -136,19 +147,17 @@ def closed_loop(
             "The log has no references: the simulated robot follows the filtered measured "
             "positions, so that what noise the filter leaves is in its references."
         )
-    substeps, hold = steps_of(controller, log.dt, substeps)
-    if width is None:
-        rest = least_width(robot, log.q, log.dt / substeps)
-        chosen = np.where(rest > 0.0, np.maximum(system.processing.dead_band, rest), 0.0)
-    else:
-        chosen = as_floats(width, "width")
-        if chosen.shape not in ((), (n,)) or (chosen < 0.0).any():
-            raise ShapeError(f"width: expected one velocity or shape ({n},), none negative.")
+    goal = _goal(system) if given is None else given
+    needed = stiff.steps(log.dt, goal)
+    parts, hold = steps_of(controller, log.dt, min(needed, MOST) if substeps is None else substeps)
+    if (parts < needed and substeps is None) or not stiff.stable(log.dt / parts):
+        notes.append(stiff.sentence(log.dt, parts, goal))
+    if given is None:
+        rest = stiff.width(log.dt / parts)
+        given = np.where(rest > 0.0, np.maximum(system.processing.dead_band, rest), 0.0)
     targets = log.q if log.q_ref is None else log.q_ref
     reach = np.maximum(np.ptp(targets, axis=0), _NEAR)
-    return ClosedLoop(
-        controller, np.broadcast_to(chosen, (n,)), reach, hold, substeps, referenced, tuple(notes)
-    )
+    return ClosedLoop(controller, given, reach, hold, parts, referenced, tuple(notes))
 
 
 def robot_of(system: Equations, values: ArrayLike) -> RobotModel:
@@ -212,30 +221,21 @@ def steps_of(controller: Controller, dt: float, substeps: int) -> tuple[int, int
     )
 
 
-def least_width(robot: RobotModel, q: Array, step: float) -> Array:
-    """Width below which a joint that comes to rest would be thrown across it in one step.
+def _checked_width(width: ArrayLike, n: int) -> Array:
+    chosen = as_floats(width, "width")
+    if chosen.shape not in ((), (n,)) or (chosen < 0.0).any():
+        raise ShapeError(f"width: expected one velocity or shape ({n},), none negative.")
+    return np.broadcast_to(chosen, (n,))
 
-    Parameters
-    ----------
-    robot : RobotModel
-        With its drives.
-    q : ndarray, shape (N, n)
-        Postures.
-    step : float
-        Of the integration, seconds.
 
-    Returns
-    -------
-    ndarray, shape (n,)
-        rad/s or m/s; 0 for joints without dry friction, or without a definite mass matrix.
-    """
-    drives, inverse = robot.drive_matrices, inverse_masses(robot, q)
-    if drives is None or inverse is None:
-        return np.zeros(robot.n)
-    give = np.diagonal(inverse, axis1=1, axis2=2).max(axis=0)
-    rate = np.abs(drives.coulomb) * give
-    if robot.transmission is not None:
-        for k, m in enumerate(robot.transmission.coupled_motors):
-            w = drives.coupling[k]
-            rate[m - 1] += abs(drives.coupled_coulomb[k]) * float((inverse @ w @ w).max())
-    return step * rate
+def _goal(system: Equations) -> Array:
+    """Widths of dry friction that lose few equations: the dead band, or a part of the speed."""
+    log, motion = system.log, system.processing.motion
+    stride = max(1, min(int(0.1 / max(motion * log.dt, 1e-9)), len(log) - 1))
+    rows = np.arange(0, len(log) - stride, max(1, len(log) // _LOOKED))
+    if not rows.size:
+        return system.processing.dead_band
+    targets = log.q if log.q_ref is None else log.q_ref
+    speeds = np.abs(targets[rows + stride] - targets[rows]) / (stride * log.dt)
+    # the few that lie across two recordings do not count
+    return np.maximum(system.processing.dead_band, _SLOW * np.percentile(speeds, 95, axis=0))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,8 +16,9 @@ from ..equations import Equations
 from ..processing import Processing
 from ..signals import Piece, Signals
 from .controller import Controller
-from .loop import ClosedLoop, least_width, robot_of, steps_of
+from .loop import MOST, ClosedLoop, robot_of, steps_of
 from .references import Targets, references
+from .stiffness import stiffness
 
 Asked = Callable[[Piece, int, int], Targets]
 
@@ -126,6 +127,7 @@ def simulated_signals(
     log, choices = system.log, system.processing
     follow = asked_of(system, loop) if asked is None else asked
     robot = robot_of(system, values)
+    loop = steps_for(robot, loop, log)
     runner = MovingRobot(robot, loop, log.dt)
     begin, done, held = -1, 0, 0
     kept = np.zeros((4, 0, log.n))
@@ -178,6 +180,39 @@ def asked_of(system: Equations, loop: ClosedLoop) -> Asked:
     return made
 
 
+def steps_for(robot: RobotModel, loop: ClosedLoop, log: Log) -> ClosedLoop:
+    """The loop with as many steps as these parameters ask for: inertia may have become small.
+
+    Parameters
+    ----------
+    robot : RobotModel
+        Whose friction is to be followed.
+    loop : ClosedLoop
+        With the steps of the first parameters.
+    log : Log
+        Postures and period.
+
+    Returns
+    -------
+    ClosedLoop
+        The same, or with a multiple of its steps.
+
+    Raises
+    ------
+    RanAwayError
+        More steps than are made, or a mass matrix that is not positive definite.
+    """
+    found = stiffness(robot, log.q)
+    if found is None:
+        raise RanAwayError
+    if found.stable(log.dt / loop.substeps):
+        return loop
+    times = -(-found.steps(log.dt, np.zeros(robot.n)) // loop.substeps)
+    if loop.substeps * times > MOST:
+        raise RanAwayError
+    return replace(loop, substeps=loop.substeps * times, hold=loop.hold * times)
+
+
 def simulated_use(system: Equations, loop: ClosedLoop, v: Array) -> NDArray[np.bool_]:
     """Where dry friction of the simulated robot is that of the equations.
 
@@ -214,7 +249,7 @@ def simulated_log(
     dt: float,
     *,
     width: ArrayLike | None = None,
-    substeps: int = 1,
+    substeps: int | None = None,
 ) -> Log:
     """Log of a simulated robot that follows references under its controller, without noise.
 
@@ -231,8 +266,8 @@ def simulated_log(
     width : array_like, scalar or shape (n,), optional
         Velocities around rest over which dry friction rises linearly; default what a step of the
         integration can follow.
-    substeps : int
-        Runge-Kutta steps of a sample.
+    substeps : int, optional
+        Runge-Kutta steps of a sample; default 1, or as many as viscous friction asks for.
 
     Returns
     -------
@@ -264,8 +299,18 @@ def simulated_log(
     targets = as_exact(q_ref, (len(np.atleast_1d(q_ref)), n), "q_ref")  # type: ignore[arg-type]
     speeds = as_exact(v_ref, targets.shape, "v_ref")
     given = Log(dt, targets, np.zeros(targets.shape), q_ref=targets, v_ref=speeds)
+    stiff = stiffness(model, targets)
+    if substeps is None:
+        substeps = 1 if stiff is None else stiff.steps(given.dt, np.zeros(n))
+        if substeps > MOST:
+            raise InvalidValueError(
+                f"substeps: expected up to {MOST} to be enough, but viscous friction asks for "
+                f"{substeps} in a sample of {given.dt:g} s; give substeps= of your own, or more "
+                "inertia (of rotors, for instance)."
+            )
     parts, hold = steps_of(controller, given.dt, substeps)
-    band = least_width(model, targets, given.dt / parts) if width is None else width
+    step = given.dt / parts
+    band = (np.zeros(n) if stiff is None else stiff.width(step)) if width is None else width
     wide = np.broadcast_to(np.asarray(band, np.float64), (n,))
     loop = ClosedLoop(controller, wide, np.full(n, np.inf), hold, parts, True, ())
     choices = Processing(given.dt, None, 4, 4, 1, np.zeros(n), 0, 0.0, ())
