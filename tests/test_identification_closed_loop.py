@@ -437,7 +437,9 @@ def test_didim_that_wanders_says_so_with_finite_numbers():
     system, reduction = problem(arm, log, 0.02, decimation=20)
     loop = closed_loop(system, values_of(system, arm), substeps=12)
     found = didim(system, reduction, start=values_of(system, arm), loop=loop, iterations=4)
-    assert np.isfinite(found.values).all()
-    assert found.condition < 1e10
-    if found.status is not EstimateStatus.SOLVED:
-        assert "instrumental variables" in found.notes[-1]
+    assert found.status is EstimateStatus.NOT_CONVERGED
+    assert "instrumental variables" in found.notes[-1]
+    # held torques are not quite those of the log: the inertia of link 2 is lost in that
+    assert off(found.values, values_of(system, arm), reduction) < 0.02
+    assert np.isfinite(found.deviations).all()
+    assert found.condition < 1e3
