@@ -211,6 +211,28 @@ def test_small_and_large_robots_are_the_same_problem(rng):
         assert far < 1e-4 * np.abs(expected.base_values).max()
 
 
+@pytest.mark.parametrize("drives", [1e-12, 1e-6, 1e-3, 1e3, 1e6])
+def test_a_prior_of_other_sizes_is_no_proof_of_a_bad_fit(drives, rng):
+    """Drives of the prior are far from those of the torques: the best is found, or it is said."""
+    model = rm.load("rx90").with_inertia(uniform_bodies(rm.load("rx90"), 60.0))
+    model = model.with_drive(rm.DriveParameters(Ia=[0] * 6, Fv=[9] * 6, Fc=[5] * 6, offset=[0] * 6))
+    base, R, y, rest, *_ = noisy(model, rng, 0.3, samples=150)
+    best = fit_consistent(base, R, y, rest=rest, prior=uniform_bodies(model, 60.0))
+    assert best.status is CONSTRAINED
+    size = drives * np.ones(6)
+    prior = rm.DriveParameters(Ia=size, Fv=size, Fc=size, offset=size)
+    found = fit_consistent(
+        base, R, y, rest=rest, prior=uniform_bodies(model, 60.0), drive_prior=prior
+    )
+    if drives < 1.0:
+        assert found.status is CONSTRAINED
+        assert found.squares == pytest.approx(best.squares, rel=1e-3)
+    assert found.status in (CONSTRAINED, ConsistentStatus.LOOSE)
+    if found.status is CONSTRAINED:
+        assert found.squares <= best.squares * 1.0005
+    assert best.squares >= found.squares * (1.0 - found.gap) * (1.0 - 1e-4)
+
+
 def test_what_the_data_does_not_determine_is_the_priors(rng):
     """A log that never moves joint 2: its columns are empty, the prior stands in."""
     model = arm(rng)

@@ -13,6 +13,9 @@ from ..minimal_parameters.coupled_drives import drive_sizes
 _LEAST = 1e-3
 """Part of the torques below which what a kind of parameters explains does not give it a size."""
 
+_NOTHING = 1e-2
+"""Part of the data's size that a kind of the prior has at least, else it counts as absent."""
+
 
 def sizes_of_drives(base: BaseParameters, prior: Array, R: Array, y: Array) -> Array:
     """Natural sizes of drive and friction parameters: the prior's, else those of the data.
@@ -59,15 +62,14 @@ def sizes_of_drives(base: BaseParameters, prior: Array, R: Array, y: Array) -> A
     of_base = kinds[base.kept]
     for kind in set(kinds[first:].tolist()):
         own = kinds[first:] == kind
-        if prior[first:][own].any():
-            continue
         shown = (of_base == kind) & (lengths > 0.0)
         if shown.any():
             size = np.median(np.abs(values[shown]))
             size = max(float(size), _LEAST * float(np.median(whole[shown])))
         else:  # of no effect, or seen with the bodies: as great as what it is seen with
             size = _beside_bodies(base, first + np.flatnonzero(own), np.abs(values))
-        if size > 0.0:
+        # a prior that is nothing beside the data would make its columns look unseen
+        if size > 0.0 and np.abs(prior[first:][own]).max() < _NOTHING * size:
             sizes[own] = size
     return sizes
 
