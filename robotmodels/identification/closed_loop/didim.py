@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,6 +21,8 @@ from .iteration import reweighted
 from .loop import ClosedLoop, closed_loop
 from .simulated import RanAwayError
 
+_PARTS = 8
+"""Parts of a sample over which torques of a controller that is not known are held."""
 _MEMORY = 6
 """Steps that are mixed."""
 _SINGULAR = 1e10
@@ -107,6 +109,8 @@ def didim(
     first = first_values(reduction, start)
     if loop is None:
         loop = closed_loop(system, first, controller)
+        if loop is not None and controller is None:
+            loop = _quicker(system, first, loop)
     if loop is None:
         return ran_away(Method.DIDIM, system, first, loop)
     way = loop
@@ -139,6 +143,27 @@ def didim(
         Method.DIDIM, system.names, ended.values, spread.covariance, last.sigma, ended.status,
         ended.iterations, notes, last.deviations, spread.lags, last.condition, 1.0, loop,
     )  # fmt: skip
+
+
+def _quicker(system: Equations, values: Array, loop: ClosedLoop) -> ClosedLoop:
+    """The loop of a controller that is not known, with torques held for a part of a sample only.
+
+    A torque that is held lags by half of its period. What nobody knows of the robot's own
+    controller must not make the simulated one late, which would be taken for inertia and friction.
+    """
+    own = loop.controller
+    quick = Controller(
+        own.kp, own.kd, own.ki, own.limit, own.feed_forward, system.log.dt / _PARTS
+    )  # fmt: skip
+    found = closed_loop(system, values, quick)
+    if found is None:
+        return loop
+    note = (
+        f"Its torques are held for one of {_PARTS} parts of a sample. DIDIM explains torques by a "
+        "motion that it simulates: without the robot's own controller and references (q_ref of the "
+        "log) its deviations do not hold what the simulated controller does otherwise."
+    )
+    return replace(found, notes=(*loop.notes, note))
 
 
 def weighted_step(found: Reduction, values: Array, weights: Array | None) -> DidimStep:
