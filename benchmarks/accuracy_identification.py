@@ -57,7 +57,7 @@ from robotmodels.identification.closed_loop import (
     tuned_controller,
 )
 from robotmodels.identification.closed_loop.loop import least_width
-from robotmodels.identification.least_squares import solved, weights_of
+from robotmodels.identification.methods.least_squares import solved, weights_of
 
 DT = 1e-3
 PERIOD = 10.0

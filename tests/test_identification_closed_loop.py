@@ -204,7 +204,7 @@ def test_pieces_and_recordings_are_simulated_as_one_run_each(monkeypatch):
         log.dt, *(np.vstack((x, x)) for x in (log.q, log.tau, log.v, log.a, log.q_ref, log.v_ref)),
         starts=(0, len(log)),
     )  # fmt: skip
-    signals = importlib.import_module("robotmodels.identification.signals")
+    signals = importlib.import_module("robotmodels.identification.preparation.signals")
     monkeypatch.setattr(signals, "PIECE", 64)
     system, _ = problem(arm, twice, width, decimation=5)
     assert len(system.pieces()) > 10

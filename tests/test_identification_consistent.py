@@ -12,10 +12,10 @@ from scipy.optimize import least_squares
 import robotmodels as rm
 from robotmodels.errors import InertiaError, InvalidValueError, MissingExtraError, ShapeError
 from robotmodels.friction import AsymmetricFriction, StribeckFriction, TorqueOffset, ViscousFriction
-from robotmodels.identification.consistent import fit_consistent
-from robotmodels.identification.consistent_bounds import CentreBox, CentreEllipsoid
-from robotmodels.identification.consistent_result import ConsistentStatus
-from robotmodels.identification.consistent_urdf import urdf_parity
+from robotmodels.identification.consistency.bounds import CentreBox, CentreEllipsoid
+from robotmodels.identification.consistency.fit_consistent import fit_consistent
+from robotmodels.identification.consistency.result import ConsistentStatus
+from robotmodels.identification.consistency.urdf_parity import urdf_parity
 from robotmodels.minimal_parameters import base_parameters, uniform_bodies
 from robotmodels.minimal_parameters.prior import pseudo_inertias
 from robotmodels.regressors import parameter_vector

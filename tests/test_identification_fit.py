@@ -136,7 +136,7 @@ def test_covariance_does_not_depend_on_pieces(monkeypatch):
     b = len(system.names)
     values, weights = rng.normal(size=b), np.array([1.0, 2.0, 3.0, 4.0])
     once = correlated_covariance(system, values, weights, np.eye(b))
-    monkeypatch.setattr(sys.modules["robotmodels.identification.signals"], "PIECE", 500)
+    monkeypatch.setattr(sys.modules["robotmodels.identification.preparation.signals"], "PIECE", 500)
     assert len(system.pieces()) > 5
     again = correlated_covariance(system, values, weights, np.eye(b))
     assert again.lags == once.lags

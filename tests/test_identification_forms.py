@@ -70,7 +70,9 @@ def test_pieces_are_the_whole(form, decimation, monkeypatch):
     system = equations(base, log, plain(log, decimation), form)
     whole = collected(system)
     for size in (90, 300):
-        monkeypatch.setattr(sys.modules["robotmodels.identification.signals"], "PIECE", size)
+        monkeypatch.setattr(
+            sys.modules["robotmodels.identification.preparation.signals"], "PIECE", size
+        )
         assert len(system.pieces()) > 4
         parts = collected(system)
         for name, array in whole.items():

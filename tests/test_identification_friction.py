@@ -8,9 +8,12 @@ from robotmodels.dynamics import idm
 from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.friction import AsymmetricFriction, Friction, LoadFriction, StribeckFriction
 from robotmodels.identification import choose_processing
-from robotmodels.identification.friction_comparison import FrictionForm, compare_friction
-from robotmodels.identification.load_friction import LoadFrictionStatus, fit_load_friction
-from robotmodels.identification.stribeck import StribeckStatus, fit_stribeck
+from robotmodels.identification.friction_models.comparison import FrictionForm, compare_friction
+from robotmodels.identification.friction_models.load_friction import (
+    LoadFrictionStatus,
+    fit_load_friction,
+)
+from robotmodels.identification.friction_models.stribeck import StribeckStatus, fit_stribeck
 from robotmodels.inertia import InertialParameters
 from robotmodels.logs import Log
 from robotmodels.minimal_parameters import base_parameters

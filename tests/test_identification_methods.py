@@ -21,13 +21,13 @@ from robotmodels.identification import (
     reduce_equations,
     weighted,
 )
-from robotmodels.identification.lengths import Lengths
-from robotmodels.identification.recursive import recursive
-from robotmodels.identification.reduction import Reduction
-from robotmodels.identification.ridge import ridge, segments, select_ridge_strength
-from robotmodels.identification.robust import robust
-from robotmodels.identification.sequential import sequential
-from robotmodels.identification.total import TotalStatus, total
+from robotmodels.identification.methods.lengths import Lengths
+from robotmodels.identification.methods.recursive import recursive
+from robotmodels.identification.methods.ridge import ridge, segments, select_ridge_strength
+from robotmodels.identification.methods.robust import robust
+from robotmodels.identification.methods.sequential import sequential
+from robotmodels.identification.methods.total import TotalStatus, total
+from robotmodels.identification.scale.reduction import Reduction
 from robotmodels.minimal_parameters import base_parameters
 
 ROBOTS = odd_robots()
@@ -130,7 +130,7 @@ def test_spikes_in_five_per_cent_of_the_torques_do_no_harm(loss):
 def test_a_robust_estimate_does_not_depend_on_what_is_kept(monkeypatch):
     system, reduction, _ = prepared("serial", 0.3, samples=600)
     kept = robust(system, reduction, "cauchy")
-    monkeypatch.setattr("robotmodels.identification.robust._KEPT_BYTES", 0)
+    monkeypatch.setattr("robotmodels.identification.methods.robust._KEPT_BYTES", 0)
     streamed = robust(system, reduction, "cauchy")
     assert (kept.values == streamed.values).all()
     assert kept.iterations == streamed.iterations

@@ -12,8 +12,8 @@ from robotmodels.identification import (
     reduce_equations,
     weighted,
 )
-from robotmodels.identification.essential import EssentialRule, essential, with_columns
-from robotmodels.identification.reduction import Reduction
+from robotmodels.identification.methods.essential import EssentialRule, essential, with_columns
+from robotmodels.identification.scale.reduction import Reduction
 from robotmodels.minimal_parameters import base_parameters
 
 

@@ -9,7 +9,7 @@ from robotmodels.drive import DriveParameters
 from robotmodels.dynamics import idm, with_payload
 from robotmodels.errors import InvalidValueError
 from robotmodels.identification import choose_processing, fit
-from robotmodels.identification.payload import PayloadStatus, identify_payload
+from robotmodels.identification.several_logs.payload import PayloadStatus, identify_payload
 from robotmodels.inertia import PARAMETERS, InertialParameters
 from robotmodels.logs import Log
 from robotmodels.robots import load

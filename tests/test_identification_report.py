@@ -17,22 +17,27 @@ from robotmodels.identification import (
     equations,
     fit,
 )
-from robotmodels.identification.diagnostics import (
+from robotmodels.identification.consistency.identified_robot import consistent_robot, prior_bodies
+from robotmodels.identification.reporting.diagnostics import (
     not_seen,
     residual_diagnostics,
     strong_correlations,
     understatement,
     wrong_signs,
 )
-from robotmodels.identification.identified_robot import consistent_robot, prior_bodies
-from robotmodels.identification.report import report_text
-from robotmodels.identification.report_parameters import (
+from robotmodels.identification.reporting.parameters import (
     intervals,
     kind_names,
     kind_units,
     stands_for,
 )
-from robotmodels.identification.write import log_data, read_estimate, result_data, write_result
+from robotmodels.identification.reporting.text import report_text
+from robotmodels.identification.reporting.write import (
+    log_data,
+    read_estimate,
+    result_data,
+    write_result,
+)
 from robotmodels.minimal_parameters import uniform_bodies
 
 DT = 0.005

@@ -25,9 +25,9 @@ from robotmodels.identification import (
     reduce_equations,
     weighted,
 )
-from robotmodels.identification.many_robots import reduce_many
-from robotmodels.identification.reduction import merge
-from robotmodels.identification.signals import Piece, piece_alone, piece_signals
+from robotmodels.identification.preparation.signals import Piece, piece_alone, piece_signals
+from robotmodels.identification.scale.many_robots import reduce_many
+from robotmodels.identification.scale.reduction import merge
 from robotmodels.logs import Log, RefusedRows
 from robotmodels.minimal_parameters import base_parameters
 
@@ -129,7 +129,7 @@ def test_a_dask_cluster_gives_the_same_bits(processes):
 CODE = """
 import hashlib, numpy as np
 from robotmodels.identification.equations import Block
-from robotmodels.identification.reduction import block_reduction, merge
+from robotmodels.identification.scale.reduction import block_reduction, merge
 rng = np.random.default_rng(0)
 parts = []
 for _ in range(2):
@@ -300,7 +300,7 @@ def test_pieces_give_what_one_pass_gives(cutoff, monkeypatch):
     cut = equations(whole.base, log, chosen)
     in_pieces, blocks = reduce_equations(cut), list(cut.blocks())
     assert len(blocks) > 3
-    module = import_module("robotmodels.identification.signals")
+    module = import_module("robotmodels.identification.preparation.signals")
     monkeypatch.setattr(module, "PIECE", 10**9)
     monkeypatch.setattr(module, "_INSTANTS", 10**9)
     (block,) = cut.blocks()

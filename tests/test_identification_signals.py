@@ -15,8 +15,8 @@ from robotmodels.identification import (
     signals,
     zero_phase,
 )
-from robotmodels.identification.filters import settling
-from robotmodels.identification.signals import piece_signals, pieces
+from robotmodels.identification.preparation.filters import settling
+from robotmodels.identification.preparation.signals import piece_signals, pieces
 from robotmodels.logs import Log
 from robotmodels.minimal_parameters import base_parameters
 

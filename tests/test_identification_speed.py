@@ -22,9 +22,9 @@ from robotmodels.identification import (
     fit,
 )
 from robotmodels.identification.equations import Equations
-from robotmodels.identification.filters import settling, zero_phase
-from robotmodels.identification.kept_equations import kept_equations, plain
-from robotmodels.identification.spectrum import power_density
+from robotmodels.identification.preparation.filters import settling, zero_phase
+from robotmodels.identification.preparation.spectrum import power_density
+from robotmodels.identification.scale.kept_equations import kept_equations, plain
 from robotmodels.logs import FindingKind, Log, check_log
 from robotmodels.logs.checks import _Runs
 from robotmodels.logs.stretches import stretches

@@ -31,7 +31,7 @@ from robotmodels.identification.closed_loop import (
     tuned_controller,
 )
 from robotmodels.identification.closed_loop.loop import least_width
-from robotmodels.identification.least_squares import solved, weights_of
+from robotmodels.identification.methods.least_squares import solved, weights_of
 
 DT, PERIOD = 1e-3, 10.0
 FILTER = {"cutoff": 15.0, "dead_band": 0.1}

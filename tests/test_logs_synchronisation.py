@@ -6,8 +6,11 @@ import pytest
 import robotmodels as rm
 from robotmodels.datasets import load_tx40
 from robotmodels.errors import InvalidValueError, ShapeError
-from robotmodels.identification.joint_checks import check_joints
-from robotmodels.identification.synchronisation import SynchronisationStatus, synchronisation
+from robotmodels.identification.preparation.joint_checks import check_joints
+from robotmodels.identification.preparation.synchronisation import (
+    SynchronisationStatus,
+    synchronisation,
+)
 from robotmodels.logs import FindingKind, Log, Severity, with_delay
 
 

@@ -8,7 +8,7 @@ import pytest
 import robotmodels as rm
 from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.identification import Log, choose_processing, fit
-from robotmodels.identification.report import report_text
+from robotmodels.identification.reporting.text import report_text
 from robotmodels.minimal_parameters import uniform_bodies
 from robotmodels.viz import (
     identification_html,

@@ -51,7 +51,7 @@ def identify_tx40(folder: Path) -> None:
     """
     from ..datasets import load_tx40
     from ..identification import check_joints, check_log, fit, synchronisation
-    from ..identification.report import report_sections
+    from ..identification.reporting.text import report_sections
 
     data = load_tx40()
     model, log = data.model, data.log

@@ -265,11 +265,11 @@ def _run(arguments: argparse.Namespace) -> int:
     if arguments.out is not None:
         write(result, arguments.out, test, robot, quiet=arguments.json)
     if arguments.json:
-        from ..identification.write import result_data
+        from ..identification.reporting.write import result_data
 
         print(json.dumps(result_data(result, robot), indent=2, ensure_ascii=False))
     elif arguments.out is None:
-        from ..identification.report import report_text
+        from ..identification.reporting.text import report_text
 
         print(report_text(result, robot), end="")
     return 0 if result.estimate.status is EstimateStatus.SOLVED else 1
@@ -297,7 +297,7 @@ def logs(arguments: argparse.Namespace, model: RobotModel) -> tuple[Log, Log | N
     RobotModelsError
         As `read_log`; several ways to keep motion aside.
     """
-    from ..identification.synchronisation import synchronisation
+    from ..identification.preparation.synchronisation import synchronisation
     from ..logs import with_delay
 
     ways = (arguments.test, arguments.test_rows, arguments.test_share)
@@ -437,8 +437,8 @@ def write(
     RobotModelsError, OSError
         A file that cannot be made.
     """
-    from ..identification.report import report_text
-    from ..identification.write import write_result
+    from ..identification.reporting.text import report_text
+    from ..identification.reporting.write import write_result
     from ..viz import identification_html
 
     folder.mkdir(parents=True, exist_ok=True)
@@ -464,8 +464,8 @@ def _real(
     result: IdentificationResult, prior: InertialParameters | None, asked: bool
 ) -> ConsistentFit | None:
     """The robot of real bodies; where it was not asked for, what is missing for it is only said."""
-    from ..identification.consistent_result import ConsistentStatus
-    from ..identification.identified_robot import consistent_robot, prior_bodies
+    from ..identification.consistency.identified_robot import consistent_robot, prior_bodies
+    from ..identification.consistency.result import ConsistentStatus
 
     try:
         if prior is None:

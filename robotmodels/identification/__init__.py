@@ -30,24 +30,13 @@ from .closed_loop import (
     tuned_controller,
 )
 from .comparison import ComparedFit, MethodComparison, compare_methods
-from .consistent import fit_consistent
-from .consistent_bounds import CentreBound, CentreBox, CentreEllipsoid
-from .consistent_result import ConsistentFit, ConsistentStatus
-from .consistent_urdf import UrdfParity, urdf_parity
+from .consistency.bounds import CentreBound, CentreBox, CentreEllipsoid
+from .consistency.fit_consistent import fit_consistent
+from .consistency.identified_robot import consistent_robot, prior_bodies
+from .consistency.result import ConsistentFit, ConsistentStatus
+from .consistency.urdf_parity import UrdfParity, urdf_parity
 from .correlated import CorrelatedCovariance, correlated_covariance
-from .diagnostics import (
-    ResidualDiagnostics,
-    WrongSign,
-    not_seen,
-    residual_diagnostics,
-    strong_correlations,
-    understatement,
-    wrong_signs,
-)
-from .drive_gains import DriveGains, GainMethod, GainStatus, identify_drive_gains
 from .equations import Block, EquationForm, Equations, equations
-from .essential import Essential, EssentialRule, essential
-from .estimate import Estimate, EstimateStatus, Method
 from .excitation import (
     ExcitationCriterion,
     ExcitationLimits,
@@ -64,31 +53,42 @@ from .excitation import (
     write_coefficients,
     write_trajectory,
 )
-from .filters import central_differences, decimation_window, zero_phase
 from .fit import fit
-from .friction_comparison import FrictionComparison, FrictionForm, compare_friction
-from .identified_robot import consistent_robot, prior_bodies
-from .joint_checks import check_joints
-from .known_payload import KnownPayload, LoadedLog
-from .least_squares import ordinary, reweighted, weighted
-from .load_friction import LoadFrictionFit, LoadFrictionStatus, fit_load_friction
-from .many_robots import reduce_many
-from .payload import PayloadEstimate, PayloadStatus, identify_payload
+from .friction_models.comparison import FrictionComparison, FrictionForm, compare_friction
+from .friction_models.load_friction import LoadFrictionFit, LoadFrictionStatus, fit_load_friction
+from .friction_models.stribeck import StribeckFit, StribeckStatus, fit_stribeck
+from .methods.essential import Essential, EssentialRule, essential
+from .methods.estimate import Estimate, EstimateStatus, Method
+from .methods.least_squares import ordinary, reweighted, weighted
+from .methods.recursive import RecursiveEstimate, RecursiveHistory, recursive
+from .methods.ridge import RidgeEstimate, ridge, segments, select_ridge_strength
+from .methods.robust import Outliers, RobustEstimate, robust
+from .methods.sequential import SequentialEstimate, SequentialStep, sequential
+from .methods.total import TotalEstimate, TotalStatus, total
 from .prediction import predicted_torque
-from .processing import Processing, choose_processing
-from .recursive import RecursiveEstimate, RecursiveHistory, recursive
-from .reduction import Reduction, reduce_equations
-from .report import report_text
+from .preparation.filters import central_differences, decimation_window, zero_phase
+from .preparation.joint_checks import check_joints
+from .preparation.processing import Processing, choose_processing
+from .preparation.signals import Signals, signals
+from .preparation.synchronisation import Synchronisation, SynchronisationStatus, synchronisation
+from .reporting.diagnostics import (
+    ResidualDiagnostics,
+    WrongSign,
+    not_seen,
+    residual_diagnostics,
+    strong_correlations,
+    understatement,
+    wrong_signs,
+)
+from .reporting.text import report_text
+from .reporting.write import read_estimate, write_result
 from .result import IdentificationResult
-from .ridge import RidgeEstimate, ridge, segments, select_ridge_strength
-from .robust import Outliers, RobustEstimate, robust
-from .sequential import SequentialEstimate, SequentialStep, sequential
-from .signals import Signals, signals
-from .stribeck import StribeckFit, StribeckStatus, fit_stribeck
-from .synchronisation import Synchronisation, SynchronisationStatus, synchronisation
-from .total import TotalEstimate, TotalStatus, total
+from .scale.many_robots import reduce_many
+from .scale.reduction import Reduction, reduce_equations
+from .several_logs.drive_gains import DriveGains, GainMethod, GainStatus, identify_drive_gains
+from .several_logs.known_payload import KnownPayload, LoadedLog
+from .several_logs.payload import PayloadEstimate, PayloadStatus, identify_payload
 from .validation import Validation, validate
-from .write import read_estimate, write_result
 
 __all__ = [
     "Block",

@@ -17,8 +17,8 @@ from ..logs import Log
 from ..model import RobotModel
 from ..table_text import boxed
 from .equations import EquationForm
-from .estimate import Method
 from .fit import fit
+from .methods.estimate import Method
 from .result import IdentificationResult
 
 

@@ -15,8 +15,8 @@ from ..errors import InvalidValueError
 from ..logs import Log
 from ..minimal_parameters import BaseParameters
 from ..model import RobotModel
-from .processing import Processing
-from .signals import Piece, pieces
+from .preparation.processing import Processing
+from .preparation.signals import Piece, pieces
 
 
 class EquationForm(Enum):
@@ -130,10 +130,10 @@ class Equations:
             With k = (rows of the piece) / decimation, rounded up; forms that need samples on
             either side have a few less at the ends of a recording.
         """
-        from .energy_block import energy_block
-        from .filtered_block import filtered_block
-        from .power_block import power_block
-        from .torque_block import torque_block
+        from .forms.energy import energy_block
+        from .forms.filtered import filtered_block
+        from .forms.power import power_block
+        from .forms.torque import torque_block
 
         if self.form is EquationForm.FILTERED:
             return filtered_block(self, piece)

@@ -22,15 +22,15 @@ from ..model import RobotModel, check_model
 from .closed_loop.estimate import SimulatedEstimate
 from .correlated import CorrelatedCovariance, correlated_covariance
 from .equations import EquationForm, Equations, equations
-from .essential import EssentialRule, with_columns
-from .essential import essential as essential_parameters
-from .estimate import Estimate, Method
-from .joint_checks import check_joints
-from .kept_equations import kept_equations, plain
-from .least_squares import shares, solved, used_weights
-from .processing import Processing, choose_processing
-from .reduction import Reduction, reduce_equations
+from .methods.essential import EssentialRule, with_columns
+from .methods.essential import essential as essential_parameters
+from .methods.estimate import Estimate, Method
+from .methods.least_squares import shares, solved, used_weights
+from .preparation.joint_checks import check_joints
+from .preparation.processing import Processing, choose_processing
 from .result import IdentificationResult
+from .scale.kept_equations import kept_equations, plain
+from .scale.reduction import Reduction, reduce_equations
 from .solving import MethodOptions, solve
 from .validation import validate
 

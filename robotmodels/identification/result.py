@@ -12,9 +12,9 @@ from ..logs import Log
 from ..minimal_parameters import BaseParameters
 from ..model import RobotModel
 from .equations import Equations
-from .estimate import Estimate
+from .methods.estimate import Estimate
 from .prediction import predicted_torque
-from .reduction import Reduction
+from .scale.reduction import Reduction
 from .solving import MethodOptions
 from .validation import Validation, validate
 
@@ -176,7 +176,7 @@ class IdentificationResult(Rebuilt):
         str
             Of at most 100 columns.
         """
-        from .report import report_text
+        from .reporting.text import report_text
 
         return report_text(self)
 

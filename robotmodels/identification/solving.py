@@ -11,14 +11,14 @@ from .._choices import chosen
 from ..errors import InvalidValueError
 from ..model import RobotModel
 from .equations import Equations
-from .estimate import Estimate, Method
-from .least_squares import ordinary, reweighted, weighted
-from .recursive import recursive
-from .reduction import Reduction
-from .ridge import ridge, segments
-from .robust import robust
-from .sequential import sequential
-from .total import total
+from .methods.estimate import Estimate, Method
+from .methods.least_squares import ordinary, reweighted, weighted
+from .methods.recursive import recursive
+from .methods.ridge import ridge, segments
+from .methods.robust import robust
+from .methods.sequential import sequential
+from .methods.total import total
+from .scale.reduction import Reduction
 
 if TYPE_CHECKING:
     from ..estimation import Loss

@@ -11,8 +11,8 @@ from ..logs import Log
 from ..minimal_parameters import BaseParameters
 from .equations import EquationForm, Equations
 from .prediction import predicted_torque
-from .processing import Processing
-from .signals import piece_signals, pieces
+from .preparation.processing import Processing
+from .preparation.signals import piece_signals, pieces
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -114,7 +114,7 @@ def with_delay(log: Log, delay: float) -> Log:
 
     See Also
     --------
-    robotmodels.identification.synchronisation : estimates it.
+    robotmodels.identification.preparation.synchronisation : estimates it.
 
     References
     ----------

@@ -5,8 +5,8 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-from ..identification.consistent_result import ConsistentFit
-from ..identification.report import report_sections
+from ..identification.consistency.result import ConsistentFit
+from ..identification.reporting.text import report_sections
 from ..identification.result import IdentificationResult
 from ..logs import Log
 from .plot_identification_parameters import (

@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array
 from ..errors import InvalidValueError, ShapeError
-from ..identification.filters import decimation_window, zero_phase
-from ..identification.processing import Processing
+from ..identification.preparation.filters import decimation_window, zero_phase
+from ..identification.preparation.processing import Processing
 from ..logs import Log
 from ..model import RobotModel
 from .figures import (

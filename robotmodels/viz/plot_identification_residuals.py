@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array
-from ..identification.diagnostics import residual_diagnostics
 from ..identification.equations import Equations
-from ..identification.report_parameters import kind_names, kind_units
+from ..identification.reporting.diagnostics import residual_diagnostics
+from ..identification.reporting.parameters import kind_names, kind_units
 from ..identification.result import IdentificationResult
 from ..logs import Log
 from .figures import INK, PAGE, PALE, SMALL_SIZE, legend_above, line_style, new_figure, panels

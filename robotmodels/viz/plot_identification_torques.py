@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 from .._arrays import Array
 from ..errors import InvalidValueError, ShapeError
 from ..identification.prediction import predicted_torque
-from ..identification.report_parameters import effort_units
+from ..identification.preparation.signals import piece_signals, pieces
+from ..identification.reporting.parameters import effort_units
 from ..identification.result import IdentificationResult
-from ..identification.signals import piece_signals, pieces
 from ..logs import Log
 from .figures import (
     INK,

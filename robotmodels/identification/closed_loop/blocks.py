@@ -11,9 +11,9 @@ from ..._arrays import Array
 from ...estimation.merging import merged_tree
 from ..correlated import CorrelatedCovariance, correlated_covariance
 from ..equations import Block, Equations
-from ..reduction import Reduction, block_reduction, merge
-from ..signals import Piece
-from ..torque_block import signals_block
+from ..forms.torque import signals_block
+from ..preparation.signals import Piece
+from ..scale.reduction import Reduction, block_reduction, merge
 from .loop import ClosedLoop
 from .simulated import simulated_signals, simulated_use
 

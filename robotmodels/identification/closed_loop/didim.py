@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 
 from ..._arrays import Array
 from ..equations import Block, Equations
-from ..estimate import EstimateStatus, Method
-from ..least_squares import check_count, deviations_of, solved, weights_of
-from ..reduction import Reduction
+from ..methods.estimate import EstimateStatus, Method
+from ..methods.least_squares import check_count, deviations_of, solved, weights_of
+from ..scale.reduction import Reduction
 from .blocks import given, reduced, sandwich, simulated_blocks
 from .controller import Controller
 from .estimate import SimulatedEstimate

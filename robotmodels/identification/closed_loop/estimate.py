@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..._arrays import Array, read_only
-from ..estimate import Estimate
+from ..methods.estimate import Estimate
 from .loop import ClosedLoop
 
 

@@ -9,7 +9,7 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 
 from ..._arrays import Array
-from ..estimate import EstimateStatus
+from ..methods.estimate import EstimateStatus
 from .simulated import RanAwayError
 
 STILL = 1e-3

@@ -13,11 +13,11 @@ from numpy.typing import ArrayLike
 from ..._arrays import Array
 from ..._choices import chosen
 from ..equations import Block, Equations
-from ..estimate import EstimateStatus, Method
-from ..least_squares import check_count
-from ..reduction import Reduction
-from ..signals import Piece, piece_signals
-from ..torque_block import decimated
+from ..forms.torque import decimated
+from ..methods.estimate import EstimateStatus, Method
+from ..methods.least_squares import check_count
+from ..preparation.signals import Piece, piece_signals
+from ..scale.reduction import Reduction
 from .blocks import given, reduced, sandwich
 from .controller import Controller
 from .didim import DidimStep, weighted_step

@@ -9,9 +9,9 @@ import numpy as np
 from ..._arrays import Array
 from ...logs import Log
 from ...model import RobotModel
-from ..filters import central_differences
-from ..processing import Processing
-from ..signals import Piece, piece_signals
+from ..preparation.filters import central_differences
+from ..preparation.processing import Processing
+from ..preparation.signals import Piece, piece_signals
 
 
 @dataclass(frozen=True, slots=True, eq=False)

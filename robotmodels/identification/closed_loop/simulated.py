@@ -13,8 +13,8 @@ from ...errors import InvalidValueError
 from ...logs import Log
 from ...model import RobotModel, check_model
 from ..equations import Equations
-from ..processing import Processing
-from ..signals import Piece, Signals
+from ..preparation.processing import Processing
+from ..preparation.signals import Piece, Signals
 from .controller import Controller
 from .loop import MOST, ClosedLoop, robot_of, steps_of
 from .references import Targets, references
@@ -287,10 +287,12 @@ def simulated_log(
 
     Examples
     --------
+    >>> from robotmodels.identification.closed_loop import tuned_controller
     >>> from robotmodels.robots import load
     >>> arm = load("rx90")
     >>> rest = np.zeros((100, 6))
-    >>> log = simulated_log(arm, Controller(np.full(6, 500.0), 50.0), rest, rest, 0.001)
+    >>> controller = tuned_controller(arm, rest[0], bandwidth=8.0, period=0.001)
+    >>> log = simulated_log(arm, controller, rest, rest, 0.001)
     >>> len(log), log.v is not None
     (100, True)
     """

@@ -1,0 +1,94 @@
+"""Torque equations that are changed before they are thinned out: combined, or with more columns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..._arrays import Array
+from ...regressors import torque_regressor_chunks
+from ..equations import Block, EquationForm, Equations
+from ..preparation.signals import Piece, piece_signals
+from .torque import (
+    _LEAST,  # pyright: ignore[reportPrivateUsage]
+    _Thinned,  # pyright: ignore[reportPrivateUsage]
+    decimated,
+    moving,
+)
+
+_CHUNK = 1024
+
+Rows = tuple[Array, Array, NDArray[np.bool_]]
+RowForm = Callable[[Array, Array, Array, NDArray[np.bool_]], Rows]
+"""From W ``(k, n, b)``, torques, velocities ``(k, n)`` and which of them slide, at the rate of the
+log: new W ``(k, m, c)``, measured side ``(k, m)`` and which take part ``(k, m)``."""
+
+
+def formed_block(system: Equations, piece: Piece, form: RowForm) -> Block:
+    """Equations of a piece whose rows are formed at the rate of the log.
+
+    What is not linear in velocities and torques, such as a friction curve, does not pass through a
+    low-pass unchanged; so it is made of the samples and then thinned out with them.
+
+    Parameters
+    ----------
+    system : Equations
+        Robot, parameters, log and choices; of torques.
+    piece : Piece
+        Which rows.
+    form : callable
+        See `RowForm`.
+
+    Returns
+    -------
+    Block
+        As that of `Equations.block`, with the rows of the form.
+    """
+    assert system.form is EquationForm.TORQUE
+    processing = system.processing
+    found = piece_signals(system.log, processing, piece, processing.reach)
+    step = processing.decimation
+    first = piece.start - max(piece.start - processing.reach, piece.low)
+    kept = slice(first, first + piece.stop - piece.start, step)
+    count = -(-(piece.stop - piece.start) // step)
+    sliding = moving(system, found.v)
+    chunks = torque_regressor_chunks(
+        system.model, found.q, found.v, found.a, system.base.drive, _CHUNK,
+        columns=system.names, friction=system.base.friction,
+    )  # fmt: skip
+    thinned: _Thinned | None = None
+    for part, W in chunks:
+        rows, y, use = form(W, found.tau[part], found.v[part], sliding[part])
+        both = np.concatenate((rows, y[:, :, None]), axis=2)
+        if thinned is None:
+            thinned = _Thinned(count, both.shape[1:], step, first)
+        thinned.add(both, use)
+    assert thinned is not None
+    use = thinned.weights > _LEAST
+    means = thinned.means(use)
+    v = decimated(iter((found.v,)), step, first, count, found.v.shape[1])
+    return Block(found.t[kept], np.ascontiguousarray(means[:, :, :-1]), means[:, :, -1], use, v)
+
+
+def combined(side: Array) -> RowForm:
+    """The form of combinations of joints, such as the motors.
+
+    Parameters
+    ----------
+    side : ndarray, shape (m, n)
+        A row for each combination.
+
+    Returns
+    -------
+    RowForm
+        An equation takes part where all joints in it slide.
+    """
+    needed = (side != 0.0).astype(np.int64)
+
+    def form(W: Array, tau: Array, v: Array, use: NDArray[np.bool_]) -> Rows:
+        rest = (~use).astype(np.int64) @ needed.T
+        return np.einsum("mj,kjb->kmb", side, W), tau @ side.T, rest == 0
+
+    return form

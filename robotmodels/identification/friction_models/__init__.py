@@ -1,0 +1,1 @@
+"""Friction beyond viscous and Coulomb: Stribeck's curve, friction by load, what a log supports."""

@@ -1,0 +1,1 @@
+"""Methods that solve the equations, on one data object."""

@@ -1,0 +1,222 @@
+"""Rows of the torque equations of a log, thinned out, to compare torques moved in time with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..._arrays import Array
+from ...errors import InvalidValueError
+from ...logs import Log
+from ...logs.stretches import SAMPLES, stretches
+from ...model import RobotModel
+from ...regressors import torque_regressor_chunks
+from .filters import central_differences, zero_phase
+
+_PER_CUTOFF = 2.5
+"""Rows in a period of the cutoff frequency: what is filtered holds no more."""
+_MOST = 6000
+_STILL = 0.02
+_STRETCHES = 20
+_PERIODS = 50.0
+"""Of the cutoff frequency in a stretch at least, since its ends are lost."""
+_RANK = 1e-9
+_SMOOTH = ("Ia", "Fv", "offset")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ThinRows:
+    """Equations of one joint at a time, from filtered and thinned samples.
+
+    Parameters
+    ----------
+    bases : tuple of ndarray, each shape (N_j, r_j)
+        Orthonormal bases of what the columns of joint j span.
+    regressors : tuple of ndarray, each shape (N_j, p)
+        Their rows; none where they are left out.
+    places : tuple of ndarray of int, each shape (N_j,)
+        Rows of the log.
+    velocities : ndarray, shape (rows of the log, n)
+        Of the filtered positions.
+    tau : ndarray, shape (rows of the log, n)
+        Filtered torques.
+    viscous, dry : int
+        Columns of viscous and Coulomb friction of the first joint, those of the others follow, and
+        after them Coulomb friction of motors that joints share.
+    shared : ndarray, shape (k, n)
+        Weights of the joints in the speeds of these motors.
+    """
+
+    bases: tuple[Array, ...]
+    regressors: tuple[Array, ...]
+    places: tuple[NDArray[np.int64], ...]
+    velocities: Array
+    tau: Array
+    viscous: int
+    dry: int
+    shared: Array
+
+
+def thin_rows(
+    log: Log, model: RobotModel, cutoff: float, margin: int, whole: bool = True
+) -> ThinRows:
+    """Filter, differentiate, thin out, and leave out rows near a joint's standstill.
+
+    Positions and torques pass the same zero-phase filter, so that what is left of the one fits what
+    is left of the other. Near standstill the sign of the velocity, which friction follows, is lost
+    in that: these rows are left out.
+
+    Parameters
+    ----------
+    log : Log
+        What was recorded.
+    model : RobotModel
+        Of its joints.
+    cutoff : float
+        Hz.
+    margin : int
+        Rows left out at both ends of each recording.
+    whole : bool
+        False leaves the regressors out, for which there are bases.
+
+    Returns
+    -------
+    ThinRows
+        Joint by joint.
+
+    Raises
+    ------
+    InvalidValueError
+        No recording is long enough, or a joint has no rows.
+    """
+    step = max(1, int(1.0 / (_PER_CUTOFF * cutoff * log.dt)), len(log) // _MOST)
+    settled = margin + int(np.ceil(1.0 / (cutoff * log.dt)))
+    v, a, q = np.zeros_like(log.q), np.zeros_like(log.q), np.zeros_like(log.q)
+    tau = np.array(log.tau)
+    taken = []
+    for rows in log.recordings():
+        if rows.stop - rows.start <= 2 * settled + step:
+            continue
+        q[rows] = zero_phase(log.q[rows], cutoff, log.dt)
+        v[rows] = central_differences(q[rows], log.dt)
+        a[rows] = central_differences(v[rows], log.dt)
+        tau[rows] = zero_phase(log.tau[rows], cutoff, log.dt)
+        taken.append(np.arange(rows.start + settled, rows.stop - settled, step))
+    if not taken:
+        raise InvalidValueError(
+            f"log: no recording is longer than {2 * settled + step} samples, which the filter at "
+            f"{cutoff:g} Hz and the delays that are tried need; give a higher cutoff or try fewer."
+        )
+    places = np.concatenate(taken)
+    friction = _dry_friction(log, model, v, cutoff, places)
+    moving = _moving(model, v, places, int(np.ceil(0.25 / (cutoff * log.dt))))
+    regressors = _rows_by_joint(model, (q[places], v[places], a[places]), friction, moving)
+    dry = regressors[0].shape[1] - friction.shape[2]
+    del q, a, friction
+    bases = []
+    for j, rows in enumerate(regressors):
+        U, s, _ = np.linalg.svd(rows / _sizes(rows), full_matrices=False)
+        bases.append(np.ascontiguousarray(U[:, s > _RANK * s.max(initial=0.0)]))
+        if not whole:
+            regressors[j] = np.empty((0, rows.shape[1]))
+    own = [places[moving[:, j]] for j in range(log.n)]
+    return ThinRows(
+        tuple(bases),
+        tuple(regressors),
+        tuple(own),
+        v,
+        tau,
+        10 * model.table.f + log.n,
+        dry,
+        _shared(model),
+    )
+
+
+def _rows_by_joint(
+    model: RobotModel,
+    samples: tuple[Array, Array, Array],
+    friction: Array,
+    moving: NDArray[np.bool_],
+) -> list[Array]:
+    """Rows of each joint at which it may be looked at, links and drives, then dry friction."""
+    found: list[Array] = []
+    counts = np.zeros(model.n, dtype=np.int64)
+    for part, W in torque_regressor_chunks(model, *samples, drive=_SMOOTH):
+        if not found:
+            width = W.shape[2] + friction.shape[2]
+            found = [np.empty((int(k), width)) for k in moving.sum(axis=0)]
+        for j, rows in enumerate(found):
+            use = moving[part, j]
+            here = slice(counts[j], counts[j] + int(use.sum()))
+            rows[here, : W.shape[2]] = W[use, j]
+            rows[here, W.shape[2] :] = friction[part][use, j]
+            counts[j] = here.stop
+    return found
+
+
+def looked_at(log: Log, cutoff: float) -> Log:
+    """Of a log of more than 1e5 samples so many, in up to 20 stretches spread evenly over it.
+
+    Parameters
+    ----------
+    log : Log
+        What was recorded.
+    cutoff : float
+        Hz; stretches are much longer than what a filter of this cutoff needs.
+
+    Returns
+    -------
+    Log
+        A short log itself.
+    """
+    length = max(SAMPLES // _STRETCHES, int(_PERIODS / (cutoff * log.dt)))
+    return stretches(log, length, max(SAMPLES, length))
+
+
+def _dry_friction(
+    log: Log, model: RobotModel, v: Array, cutoff: float, places: NDArray[np.int64]
+) -> Array:
+    """Columns of Coulomb friction, whose steps pass the filter as those of the torques do."""
+    n, shared = log.n, _shared(model)
+    steps = np.sign(np.concatenate([v, v @ shared.T], axis=1))
+    for rows in log.recordings():
+        if rows.stop - rows.start > 1:
+            steps[rows] = zero_phase(steps[rows], cutoff, log.dt)
+    kept = steps[places]
+    columns = np.zeros((len(places), n, n + len(shared)))
+    columns[:, range(n), range(n)] = kept[:, :n]
+    for k, weights in enumerate(shared):
+        columns[:, :, n + k] = kept[:, n + k, None] * weights
+    return columns
+
+
+def _shared(model: RobotModel) -> Array:
+    """Weights of the joints in the speeds of motors that they share, shape (k, n)."""
+    if model.transmission is None:
+        return np.zeros((0, model.n))
+    motors = np.array(model.transmission.coupled_motors, dtype=int) - 1
+    return model.transmission.weights[motors]
+
+
+def _sizes(rows: Array) -> Array:
+    size = np.sqrt((rows**2).sum(axis=0))
+    return np.where(size > 0.0, size, 1.0)
+
+
+def _moving(
+    model: RobotModel, v: Array, places: NDArray[np.int64], near: int
+) -> NDArray[np.bool_]:  # fmt: skip
+    """Rows at which joints, and motors that they share, keep the sign of their velocity."""
+    weights = _shared(model)
+    speed = np.concatenate([v, v @ weights.T], axis=1)
+    owner = np.concatenate([np.eye(v.shape[1], dtype=bool), weights != 0.0])
+    least = _STILL * np.abs(speed).max(axis=0)
+    good = np.abs(speed[places]) > least
+    for side in (-near, near):
+        good &= np.sign(speed[np.clip(places + side, 0, len(v) - 1)]) == np.sign(speed[places])
+    still = ~good | (least == 0.0)
+    # a joint that never moves has no friction to be wrong about
+    still[:, np.abs(speed).max(axis=0) < 1e-9] = False
+    return ~(still @ owner)

@@ -1,0 +1,1 @@
+"""Equations reduced in pieces, by one or many workers, with the same bits."""

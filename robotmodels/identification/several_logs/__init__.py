@@ -1,0 +1,1 @@
+"""Logs with and without a load: drive gains and payloads."""
