@@ -291,7 +291,7 @@ def simulated_log(
     >>> from robotmodels.robots import load
     >>> arm = load("rx90")
     >>> rest = np.zeros((100, 6))
-    >>> controller = tuned_controller(arm, rest[0], bandwidth=8.0, period=0.001)
+    >>> controller = tuned_controller(arm, rest[:1], bandwidth=8.0, period=0.001)
     >>> log = simulated_log(arm, controller, rest, rest, 0.001)
     >>> len(log), log.v is not None
     (100, True)
