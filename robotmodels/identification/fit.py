@@ -265,8 +265,13 @@ def _refuse_other_period(processing: Processing, log: Log) -> None:
 def _denser(processing: Processing, n: int) -> Processing:
     """As many equations for forms with one at a time as for those with one for each joint."""
     step = max(1, processing.decimation // n)
-    note = f"One equation at a time for all joints: one of {step} samples is kept instead."
-    return replace(processing, decimation=step, notes=(*processing.notes, note))
+    notes = (
+        f"One equation at a time for all joints: one of {step} samples is kept instead.",
+        "Noise of the velocities is on both sides of such equations, so that parameters are off by "
+        "more than their deviations say where positions are noisy; they tell less than those of "
+        "the torques, and need a prior (method 'ridge') on short logs.",
+    )
+    return replace(processing, decimation=step, notes=(*processing.notes, *notes))
 
 
 def _checked(log: Log, model: RobotModel, name: str) -> tuple[str, ...]:

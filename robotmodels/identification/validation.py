@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._arrays import Array, Rebuilt, read_only
+from ..errors import InvalidValueError
 from ..logs import Log
 from ..minimal_parameters import BaseParameters
 from .equations import EquationForm, Equations
@@ -111,6 +112,11 @@ def validate(
         chain = np.vstack((last, r))
         products += (chain[1:] * chain[:-1]).sum(axis=0)
         last = r[-1:]
+    if not samples:
+        raise InvalidValueError(
+            f"log: none of its recordings is longer than the {2 * processing.edges} samples that "
+            "are cut at both ends; give a longer one, or shorter edges=."
+        )
     with np.errstate(divide="ignore", invalid="ignore"):
         return Validation(
             np.sqrt(squares / samples), np.sqrt(squares / whole), sums / samples,

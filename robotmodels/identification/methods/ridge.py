@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from dataclasses import dataclass, fields
+from functools import reduce
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,8 +13,8 @@ from ..._arrays import Array, as_exact, as_floats, read_only
 from ...errors import InvalidValueError, ShapeError
 from ...estimation.merging import merged_tree
 from ...estimation.strength import StrengthSelection
-from ..equations import Equations
-from ..scale.reduction import Reduction, merge, reduce_equations
+from ..equations import Block, Equations
+from ..scale.reduction import Reduction, block_reduction, merge
 from .detailed import DetailedEstimate
 from .estimate import Estimate, Method
 from .least_squares import check_count, deviations_of, ordinary, weighted, weights_of
@@ -161,12 +161,12 @@ def segments(system: Equations, count: int = 5) -> tuple[Reduction, ...]:
     Returns
     -------
     tuple of Reduction
-        In order; each has its own edges.
+        In order.
 
     Raises
     ------
     InvalidValueError
-        Fewer than two, or more than there are samples.
+        Fewer than two, or more than there are instants with equations.
 
     Examples
     --------
@@ -183,11 +183,20 @@ def segments(system: Equations, count: int = 5) -> tuple[Reduction, ...]:
     >>> [part.rows for part in segments(system, 3)]
     [1200, 1200, 1200]
     """
-    log = system.log
-    if not isinstance(count, (int, np.integer)) or not 2 <= count <= len(log):
-        raise InvalidValueError(f"count: expected from 2 to {len(log)} parts, got {count!r:.40}.")
-    ends = np.linspace(0, len(log), count + 1).astype(int).tolist()
-    return tuple(reduce_equations(replace(system, log=log.rows(a, z))) for a, z in pairwise(ends))
+    total = sum(len(block) for block in system.blocks())
+    if not isinstance(count, (int, np.integer)) or not 2 <= count <= total:
+        raise InvalidValueError(f"count: expected from 2 to {total} parts, got {count!r:.40}.")
+    ends = np.linspace(0, total, count + 1).astype(int)
+    parts: list[list[Reduction]] = [[] for _ in range(count)]
+    first = 0
+    for block in system.blocks():
+        for k in range(count):
+            rows = slice(*np.clip(ends[k : k + 2] - first, 0, len(block)).tolist())
+            if rows.start < rows.stop:
+                part = Block(*(getattr(block, field.name)[rows] for field in fields(Block)))
+                parts[k].append(block_reduction(system.names, part))
+        first += len(block)
+    return tuple(reduce(merge, part) for part in parts)
 
 
 def select_ridge_strength(

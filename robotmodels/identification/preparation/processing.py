@@ -247,6 +247,13 @@ def _edges(
             f"edges: {cut} samples are cut at both ends, but the longest recording has {longest}; "
             "give a shorter edges=, a higher cutoff=, or a longer log."
         )
+    short = [part.stop - part.start for part in log.recordings()]
+    short = [length for length in short if length <= 2 * cut]
+    if short:
+        notes.append(
+            f"{len(short)} of {len(log.starts)} recordings ({sum(short)} samples) are not longer "
+            "than the edges that are cut, and say nothing."
+        )
     if cut:
         notes.append(f"{cut} samples ({cut * log.dt:.3g} s) are cut at both ends.")
     return cut
