@@ -168,6 +168,8 @@ class DriveGains(Rebuilt):
         )  # fmt: skip
 
     def __str__(self) -> str:
+        if self.status is not GainStatus.SOLVED:
+            return self.status.sentence  # numbers that mean nothing are not shown
         rows = zip(self.gains, self.gain_deviations, self.noise, strict=True)
         cells = [(str(m + 1), *(f"{x:.4g}" for x in row)) for m, row in enumerate(rows)]
         heads = ("motor", "gain", "deviation", "noise")
