@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,17 +16,17 @@ from ..drive import Drives
 from ..errors import InvalidValueError
 from ..estimation import column_basis
 from ..friction import Friction
-from ..logs import Log, Severity, check_log
+from ..logs import Log
 from ..minimal_parameters import BaseParameters, base_parameters
 from ..model import RobotModel, check_model
 from .closed_loop.estimate import SimulatedEstimate
 from .correlated import CorrelatedCovariance, correlated_covariance
 from .equations import EquationForm, Equations, equations
-from .methods.essential import EssentialRule, with_columns
+from .methods.essential import Essential, EssentialRule, with_columns
 from .methods.essential import essential as essential_parameters
 from .methods.estimate import Estimate, Method
 from .methods.least_squares import shares, solved, used_weights
-from .preparation.joint_checks import check_joints
+from .preparation.accepted import accepted_log, accepted_test
 from .preparation.processing import Processing, choose_processing
 from .result import IdentificationResult
 from .scale.kept_equations import kept_equations, plain
@@ -149,9 +149,9 @@ def fit(
         base = base_parameters(model, drive=drive, friction=friction)
     else:
         base.check(model)
-    findings = _checked(log, model, "log") if checked else ()
+    findings = accepted_log(log, model, "log") if checked else ()
     if test is not None:
-        findings = (*findings, *_test_notes(log, test, model, checked))
+        findings = (*findings, *accepted_test(log, test, model, checked))
     if processing is None:
         processing = choose_processing(log, cutoff, decimation, dead_band, edges)
         if decimation is None and not balance.by_joint:
@@ -167,14 +167,12 @@ def fit(
     _refuse_nothing(whole, processing)
     system, reduction, gap, unseen = _seen(system, whole)
     estimate = solve(system, reduction, way, options)
-    dropped: tuple[str, ...] = ()
-    if (rule := _essential_rule(essential)) is not None:
-        found = essential_parameters(reduction, estimate, **rule)
-        dropped = found.dropped
-        if dropped:
-            system = system.with_names(found.names)
-            reduction = with_columns(reduction, found.names)
-            estimate = solve(system, reduction, way, options)
+    found = _essential(reduction, estimate, essential)
+    dropped = () if found is None else found.dropped
+    if found is not None and dropped:
+        system = system.with_names(found.names)
+        reduction = with_columns(reduction, found.names)
+        estimate = solve(system, reduction, way, options)
     R, _, _ = reduction.stacked()
     white, lags = estimate.deviations, 0
     if isinstance(estimate, SimulatedEstimate):
@@ -183,8 +181,8 @@ def fit(
         spread, ratio = _spread(way, system, reduction, estimate)
         lags = spread.lags
         linear = way in _LINEAR
-        whole = spread.covariance if linear else estimate.covariance * np.outer(ratio, ratio)
-        estimate = replace(estimate, covariance=whole)
+        own = estimate.covariance * np.outer(ratio, ratio)
+        estimate = replace(estimate, covariance=spread.covariance if linear else own)
     values = estimate.values
     return IdentificationResult(
         system=plain(system),
@@ -202,7 +200,7 @@ def fit(
         if test is None
         else validate(system.base, system.names, values, test, processing),
         options=options,
-        essential_rule=_rule_name(essential),
+        essential_rule=_rule_name(found, essential),
         notes=(*log.notes, *findings, *processing.notes, *estimate.notes, *_notes(unseen, dropped)),
     )
 
@@ -225,23 +223,24 @@ def _spread(
     return spread, np.sqrt(np.diag(spread.covariance) / np.where(white > 0.0, white, 1.0))
 
 
-def _essential_rule(essential: bool | float | EssentialRule | str) -> dict[str, Any] | None:
-    if essential is False:
+def _essential(
+    reduction: Reduction, estimate: Estimate, asked: bool | float | EssentialRule | str
+) -> Essential | None:
+    if asked is False:
         return None
-    if essential is True:
-        return {}
-    if isinstance(essential, (str, EssentialRule)):
-        return {"rule": essential}
-    return {"ratio": essential}
+    if asked is True:
+        return essential_parameters(reduction, estimate)
+    if isinstance(asked, (str, EssentialRule)):
+        return essential_parameters(reduction, estimate, rule=asked)
+    return essential_parameters(reduction, estimate, ratio=asked)
 
 
-def _rule_name(essential: bool | float | EssentialRule | str) -> str:
-    if essential is False:
+def _rule_name(found: Essential | None, asked: bool | float | EssentialRule | str) -> str:
+    if found is None:
         return ""
-    rule = _essential_rule(essential) or {}
-    word = rule.get("rule", EssentialRule.RATIO)
-    name = word.name if isinstance(word, EssentialRule) else str(word)
-    return f"{name.lower()} {rule.get('ratio', 30.0):g}" if name == "RATIO" else name.lower()
+    if isinstance(asked, (bool, str, EssentialRule)):
+        return found.rule.name.lower()
+    return f"{found.rule.name.lower()} {asked:g}"
 
 
 def _refuse_nothing(whole: Reduction, processing: Processing) -> None:
@@ -272,45 +271,6 @@ def _denser(processing: Processing, n: int) -> Processing:
         "the torques, and need a prior (method 'ridge') on short logs.",
     )
     return replace(processing, decimation=step, notes=(*processing.notes, *notes))
-
-
-def _checked(log: Log, model: RobotModel, name: str) -> tuple[str, ...]:
-    """Sentences on a log that may be used; one that may not is refused with all of them."""
-    found = check_log(log, model)
-    if not any(finding.severity is Severity.USELESS for finding in found):
-        found = (*found, *check_joints(log, model))
-    useless = [str(finding) for finding in found if finding.severity is Severity.USELESS]
-    if useless:
-        raise InvalidValueError(
-            f"{name}: " + " ".join(useless) + " (checked=False takes the log as it is.)"
-        )
-    return tuple(str(finding) for finding in found)
-
-
-def _test_notes(log: Log, test: Log, model: RobotModel, checked: bool) -> tuple[str, ...]:
-    """What is to be said of the log that is kept aside; it must be like the other, and another."""
-    if test.n != model.n:
-        raise InvalidValueError(f"test: expected a log of {model.n} joints, got {test.n}.")
-    if abs(test.dt - log.dt) > 1e-6 * log.dt:
-        raise InvalidValueError(
-            f"test: expected the sampling period of the log ({log.dt:g} s), since it is processed "
-            f"alike, got {test.dt:g} s; read it with dt={log.dt:g}, or call result.validate."
-        )
-    if np.shares_memory(log.q, test.q):
-        raise InvalidValueError(
-            "test: it has rows of the log that is fitted, so that it would test nothing; give rows "
-            "that are not fitted."
-        )
-    if not checked:
-        return ()
-    # how it moves does not matter, but what it is in does
-    found = check_log(test, model)
-    useless = [str(finding) for finding in found if finding.severity is Severity.USELESS]
-    if useless:
-        raise InvalidValueError(
-            "test: " + " ".join(useless) + " (checked=False takes the log as it is.)"
-        )
-    return tuple(f"Of the log kept aside: {finding}" for finding in found)
 
 
 def _seen(
