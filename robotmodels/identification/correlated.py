@@ -87,6 +87,34 @@ def correlated_covariance(
     and its length); J. MacKinnon and H. White, "Some heteroskedasticity-consistent covariance
     matrix estimators with improved finite sample properties", Journal of Econometrics 29, 1985 (the
     jackknife).
+
+    Examples
+    --------
+    >>> from robotmodels.identification import (
+    ...     Log,
+    ...     choose_processing,
+    ...     equations,
+    ...     reduce_equations,
+    ...     weighted,
+    ... )
+    >>> from robotmodels.dynamics import idm
+    >>> from robotmodels.minimal_parameters import uniform_bodies
+    >>> from robotmodels.robots import load
+    >>> arm = load("planar_2r").with_gravity((0.0, -9.81, 0.0))
+    >>> arm = arm.with_inertia(uniform_bodies(arm, 5.0))
+    >>> t, w = 0.005 * np.arange(4000)[:, None], np.array([2.0, 3.1])
+    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
+    >>> log = Log(0.005, q, idm(arm, q, v, a) + 2.0 * v)
+    >>> from robotmodels.minimal_parameters import base_parameters
+    >>> base = base_parameters(arm, drive=("Fv",))
+    >>> system = equations(base, log, choose_processing(log))
+    >>> found = weighted(reduce_equations(system))
+    >>> w = 1.0 / found.sigma
+    >>> W = np.concatenate([x.W * w[:, None] * x.use[..., None] for x in system.blocks()])
+    >>> inverse = np.linalg.inv(np.einsum("kji,kjl->il", W, W))
+    >>> spread = correlated_covariance(system, found.values, w, inverse)
+    >>> bool((np.diag(spread.covariance) > 0.0).all())
+    True
     """
     b, m = len(values), len(weights)
     products, pairs = np.zeros((2, _MOST + 1, m, m))

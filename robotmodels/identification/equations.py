@@ -175,6 +175,24 @@ def equations(
     ------
     InvalidValueError
         A log of another number of joints.
+
+    Examples
+    --------
+    >>> from robotmodels.identification import choose_processing
+    >>> from robotmodels.dynamics import idm
+    >>> from robotmodels.minimal_parameters import uniform_bodies
+    >>> from robotmodels.robots import load
+    >>> arm = load("planar_2r").with_gravity((0.0, -9.81, 0.0))
+    >>> arm = arm.with_inertia(uniform_bodies(arm, 5.0))
+    >>> t, w = 0.005 * np.arange(4000)[:, None], np.array([2.0, 3.1])
+    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
+    >>> log = Log(0.005, q, idm(arm, q, v, a) + 2.0 * v)
+    >>> from robotmodels.minimal_parameters import base_parameters
+    >>> base = base_parameters(arm, drive=("Fv",))
+    >>> system = equations(base, log, choose_processing(log))
+    >>> block = next(system.blocks())
+    >>> block.W.shape[1:], block.y.shape[1:] == (2,)
+    ((2, 8), True)
     """
     if log.n != base.model.n:
         raise InvalidValueError(

@@ -137,6 +137,20 @@ def fit(
     ----------
     Seed book section 1.6; M. Gautier and W. Khalil, "On the identification of the inertial
     parameters of robots", IEEE CDC 1988.
+
+    Examples
+    --------
+    >>> from robotmodels.dynamics import idm
+    >>> from robotmodels.minimal_parameters import uniform_bodies
+    >>> from robotmodels.robots import load
+    >>> arm = load("planar_2r").with_gravity((0.0, -9.81, 0.0))
+    >>> arm = arm.with_inertia(uniform_bodies(arm, 5.0))
+    >>> t, w = 0.005 * np.arange(4000)[:, None], np.array([2.0, 3.1])
+    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
+    >>> log = Log(0.005, q, idm(arm, q, v, a) + 2.0 * v)
+    >>> found = fit(arm, log, drive=("Fv", "Fc"))
+    >>> round(found.value("Fv1"), 3), found.deviation("Fv1") < 1e-3
+    (2.0, True)
     """
     check_model(model)
     way = chosen(Method, method, "method")

@@ -86,6 +86,22 @@ def validate(
     References
     ----------
     Seed book section 1.6.5.
+
+    Examples
+    --------
+    >>> from robotmodels.identification import choose_processing, fit
+    >>> from robotmodels.dynamics import idm
+    >>> from robotmodels.minimal_parameters import uniform_bodies
+    >>> from robotmodels.robots import load
+    >>> arm = load("planar_2r").with_gravity((0.0, -9.81, 0.0))
+    >>> arm = arm.with_inertia(uniform_bodies(arm, 5.0))
+    >>> t, w = 0.005 * np.arange(4000)[:, None], np.array([2.0, 3.1])
+    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
+    >>> log = Log(0.005, q, idm(arm, q, v, a) + 2.0 * v)
+    >>> found = fit(arm, log, drive=("Fv",))
+    >>> errors = validate(found.base, found.names, found.values, log, choose_processing(log))
+    >>> bool((errors.relative < 1e-3).all()), errors.samples > 3000
+    (True, True)
     """
     if system is None or system.form is not EquationForm.TORQUE or system.names != names:
         system = Equations(base, names, log, processing)

@@ -104,6 +104,29 @@ def didim(
     ----------
     M. Gautier, A. Janot and P.-O. Vandanjon, "A new closed-loop output error method for parameter
     identification of robot dynamics", IEEE T-CST 21(2), 2013, section III.
+
+    Examples
+    --------
+    >>> from robotmodels.identification import (
+    ...     Log,
+    ...     choose_processing,
+    ...     equations,
+    ...     reduce_equations,
+    ... )
+    >>> from robotmodels.dynamics import idm
+    >>> from robotmodels.minimal_parameters import uniform_bodies
+    >>> from robotmodels.robots import load
+    >>> arm = load("planar_2r").with_gravity((0.0, -9.81, 0.0))
+    >>> arm = arm.with_inertia(uniform_bodies(arm, 5.0))
+    >>> t, w = 0.005 * np.arange(1600)[:, None], np.array([2.0, 3.1])
+    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
+    >>> log = Log(0.005, q, idm(arm, q, v, a) + 2.0 * v)
+    >>> from robotmodels.minimal_parameters import base_parameters
+    >>> base = base_parameters(arm, drive=("Fv",))
+    >>> system = equations(base, log, choose_processing(log))
+    >>> found = didim(system, reduce_equations(system))
+    >>> round(float(found.values[found.names.index("Fv1")]))
+    2
     """
     check_count(reduction)
     first = first_values(reduction, start)

@@ -121,6 +121,30 @@ def hausman_test(
     J. Hausman, "Specification tests in econometrics", Econometrica 46(6), 1978; A. Janot, P.-O.
     Vandanjon and M. Gautier, "A Durbin-Wu-Hausman test for industrial robot identification", IEEE
     ICRA 2014; W. Newey and K. West, Econometrica 55(3), 1987.
+
+    Examples
+    --------
+    >>> from robotmodels.identification import (
+    ...     Log,
+    ...     choose_processing,
+    ...     equations,
+    ...     instrumental,
+    ...     reduce_equations,
+    ... )
+    >>> from robotmodels.dynamics import idm
+    >>> from robotmodels.minimal_parameters import uniform_bodies
+    >>> from robotmodels.robots import load
+    >>> arm = load("planar_2r").with_gravity((0.0, -9.81, 0.0))
+    >>> arm = arm.with_inertia(uniform_bodies(arm, 5.0))
+    >>> t, w = 0.005 * np.arange(4000)[:, None], np.array([2.0, 3.1])
+    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
+    >>> log = Log(0.005, q, idm(arm, q, v, a) + 2.0 * v)
+    >>> from robotmodels.minimal_parameters import base_parameters
+    >>> base = base_parameters(arm, drive=("Fv",))
+    >>> system = equations(base, log, choose_processing(log))
+    >>> found = instrumental(system, reduce_equations(system))
+    >>> bool(hausman_test(system, found).statistic >= 0.0)
+    True
     """
     if not 0.0 < level < 1.0:
         raise InvalidValueError(f"level: expected a number between 0 and 1, got {level!r}.")

@@ -103,6 +103,29 @@ def instrumental(
     ----------
     A. Janot, P.-O. Vandanjon and M. Gautier, "A generic instrumental variable approach for
     industrial robot identification", IEEE T-CST 22(1), 2014, section III.
+
+    Examples
+    --------
+    >>> from robotmodels.identification import (
+    ...     Log,
+    ...     choose_processing,
+    ...     equations,
+    ...     reduce_equations,
+    ... )
+    >>> from robotmodels.dynamics import idm
+    >>> from robotmodels.minimal_parameters import uniform_bodies
+    >>> from robotmodels.robots import load
+    >>> arm = load("planar_2r").with_gravity((0.0, -9.81, 0.0))
+    >>> arm = arm.with_inertia(uniform_bodies(arm, 5.0))
+    >>> t, w = 0.005 * np.arange(4000)[:, None], np.array([2.0, 3.1])
+    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
+    >>> log = Log(0.005, q, idm(arm, q, v, a) + 2.0 * v)
+    >>> from robotmodels.minimal_parameters import base_parameters
+    >>> base = base_parameters(arm, drive=("Fv",))
+    >>> system = equations(base, log, choose_processing(log))
+    >>> found = instrumental(system, reduce_equations(system))
+    >>> found.status.name, round(float(found.values[found.names.index("Fv1")]), 2)
+    ('SOLVED', 2.0)
     """
     check_count(reduction)
     first = first_values(reduction, start)

@@ -109,6 +109,29 @@ def output_error(
     ----------
     A. Janot, M. Gautier, A. Jubien and P.-O. Vandanjon, "Comparison between the CLOE method and the
     DIDIM method for robots identification", IEEE T-CST 22(5), 2014, sections II and III.
+
+    Examples
+    --------
+    >>> from robotmodels.identification import (
+    ...     Log,
+    ...     choose_processing,
+    ...     equations,
+    ...     reduce_equations,
+    ... )
+    >>> from robotmodels.dynamics import idm
+    >>> from robotmodels.minimal_parameters import uniform_bodies
+    >>> from robotmodels.robots import load
+    >>> arm = load("planar_2r").with_gravity((0.0, -9.81, 0.0))
+    >>> arm = arm.with_inertia(uniform_bodies(arm, 5.0))
+    >>> t, w = 0.005 * np.arange(1600)[:, None], np.array([2.0, 3.1])
+    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
+    >>> log = Log(0.005, q, idm(arm, q, v, a) + 2.0 * v)
+    >>> from robotmodels.minimal_parameters import base_parameters
+    >>> base = base_parameters(arm, drive=("Fv",))
+    >>> system = equations(base, log, choose_processing(log))
+    >>> found = output_error(system, reduce_equations(system))
+    >>> round(float(found.values[found.names.index("Fv1")]))
+    2
     """
     which = chosen(Output, output, "output")
     check_count(reduction)

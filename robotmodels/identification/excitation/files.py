@@ -137,6 +137,20 @@ def write_coefficients(found: ExcitingTrajectory, path: str | Path) -> None:
     ------
     OSError
         The file cannot be written.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> from robotmodels.identification.excitation import exciting_trajectory
+    >>> from tempfile import TemporaryDirectory
+    >>> found = exciting_trajectory(
+    ...     load("planar_2r"), harmonics=2, starts=1, baseline=1, iterations=2, rng=0
+    ... )
+    >>> with TemporaryDirectory() as folder:
+    ...     write_coefficients(found, Path(folder) / "motion.json")
+    ...     again = read_coefficients(Path(folder) / "motion.json")
+    >>> bool((again.q(1.0) == found.trajectory.q(1.0)).all())
+    True
     """
     text = json.dumps(excitation_data(found), indent=2, ensure_ascii=False, allow_nan=False)
     Path(path).write_text(text + "\n", encoding="utf-8")
@@ -161,6 +175,20 @@ def read_coefficients(path: str | Path) -> Trajectory:
         Another kind of file.
     OSError
         It cannot be read.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> from robotmodels.identification.excitation import exciting_trajectory
+    >>> from tempfile import TemporaryDirectory
+    >>> found = exciting_trajectory(
+    ...     load("planar_2r"), harmonics=2, starts=1, baseline=1, iterations=2, rng=0
+    ... )
+    >>> with TemporaryDirectory() as folder:
+    ...     write_coefficients(found, Path(folder) / "motion.json")
+    ...     again = read_coefficients(Path(folder) / "motion.json")
+    >>> bool((again.q(1.0) == found.trajectory.q(1.0)).all())
+    True
     """
     try:
         data = json.loads(Path(path).read_text(encoding="utf-8"))

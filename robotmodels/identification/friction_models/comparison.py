@@ -152,6 +152,20 @@ def compare_friction(
     ----------
     G. Schwarz, "Estimating the dimension of a model", Annals of Statistics 6(2), 1978; seed book
     sections 1.5.1.4 and 1.6.5.
+
+    Examples
+    --------
+    >>> from robotmodels.dynamics import idm
+    >>> from robotmodels.minimal_parameters import uniform_bodies
+    >>> from robotmodels.robots import load
+    >>> arm = load("planar_2r").with_gravity((0.0, -9.81, 0.0))
+    >>> arm = arm.with_inertia(uniform_bodies(arm, 5.0))
+    >>> t, w = 0.005 * np.arange(4000)[:, None], np.array([2.0, 3.1])
+    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
+    >>> log = Log(0.005, q, idm(arm, q, v, a) + 2.0 * v)
+    >>> table = str(compare_friction(arm, log))
+    >>> "viscous, Coulomb" in table
+    True
     """
     check_model(model)
     forms = tuple(

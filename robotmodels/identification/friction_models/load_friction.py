@@ -134,6 +134,20 @@ def fit_load_friction(
     ----------
     P. Hamon, M. Gautier and P. Garrec, "Dynamic identification of robots with a dry friction model
     depending on load and velocity", IEEE/RSJ IROS 2010, section III.
+
+    Examples
+    --------
+    >>> from robotmodels.dynamics import idm
+    >>> from robotmodels.minimal_parameters import uniform_bodies
+    >>> from robotmodels.robots import load
+    >>> arm = load("planar_2r").with_gravity((0.0, -9.81, 0.0))
+    >>> arm = arm.with_inertia(uniform_bodies(arm, 5.0))
+    >>> t, w = 0.005 * np.arange(4000)[:, None], np.array([2.0, 3.1])
+    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
+    >>> log = Log(0.005, q, idm(arm, q, v, a) + 2.0 * v + np.sign(v))
+    >>> found = fit_load_friction(arm, log)
+    >>> found.status.name
+    'SOLVED'
     """
     check_model(model)
     base = with_dry_friction(model, base)

@@ -181,6 +181,19 @@ def fit_stribeck(
     Seed book section 1.5.1.4; B. Armstrong-Helouvry, P. Dupont and C. Canudas de Wit, Automatica
     30(7), 1994, section 2; G. Golub and V. Pereyra, "Separable nonlinear least squares: the
     variable projection method and its applications", Inverse Problems 19, 2003.
+
+    Examples
+    --------
+    >>> from robotmodels.dynamics import idm
+    >>> from robotmodels.minimal_parameters import uniform_bodies
+    >>> from robotmodels.robots import load
+    >>> arm = load("planar_2r").with_gravity((0.0, -9.81, 0.0))
+    >>> arm = arm.with_inertia(uniform_bodies(arm, 5.0))
+    >>> t, w = 0.005 * np.arange(4000)[:, None], np.array([2.0, 3.1])
+    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
+    >>> log = Log(0.005, q, idm(arm, q, v, a) + 2.0 * v)
+    >>> fit_stribeck(arm, log).seen.shape
+    (2,)
     """
     check_model(model)
     powers = as_floats(exponents, "exponents").reshape(-1)

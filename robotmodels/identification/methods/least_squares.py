@@ -38,6 +38,29 @@ def ordinary(reduction: Reduction) -> Estimate:
     References
     ----------
     Seed book section 1.6.2.1.
+
+    Examples
+    --------
+    >>> from robotmodels.identification import (
+    ...     Log,
+    ...     choose_processing,
+    ...     equations,
+    ...     reduce_equations,
+    ... )
+    >>> from robotmodels.dynamics import idm
+    >>> from robotmodels.minimal_parameters import uniform_bodies
+    >>> from robotmodels.robots import load
+    >>> arm = load("planar_2r").with_gravity((0.0, -9.81, 0.0))
+    >>> arm = arm.with_inertia(uniform_bodies(arm, 5.0))
+    >>> t, w = 0.005 * np.arange(4000)[:, None], np.array([2.0, 3.1])
+    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
+    >>> log = Log(0.005, q, idm(arm, q, v, a) + 2.0 * v)
+    >>> from robotmodels.minimal_parameters import base_parameters
+    >>> base = base_parameters(arm, drive=("Fv",))
+    >>> system = equations(base, log, choose_processing(log))
+    >>> found = ordinary(reduce_equations(system))
+    >>> round(float(found.values[found.names.index("Fv2")]), 3)
+    2.0
     """
     check_count(reduction)
     values, inverse, rest = solved(reduction, None)
@@ -71,6 +94,29 @@ def weighted(reduction: Reduction) -> Estimate:
     ----------
     Seed book section 1.6.2.1; M. Gautier and P. Poignet, "Extended Kalman filtering and weighted
     least squares dynamic identification of robot", Control Engineering Practice 9, 2001.
+
+    Examples
+    --------
+    >>> from robotmodels.identification import (
+    ...     Log,
+    ...     choose_processing,
+    ...     equations,
+    ...     reduce_equations,
+    ... )
+    >>> from robotmodels.dynamics import idm
+    >>> from robotmodels.minimal_parameters import uniform_bodies
+    >>> from robotmodels.robots import load
+    >>> arm = load("planar_2r").with_gravity((0.0, -9.81, 0.0))
+    >>> arm = arm.with_inertia(uniform_bodies(arm, 5.0))
+    >>> t, w = 0.005 * np.arange(4000)[:, None], np.array([2.0, 3.1])
+    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
+    >>> log = Log(0.005, q, idm(arm, q, v, a) + 2.0 * v)
+    >>> from robotmodels.minimal_parameters import base_parameters
+    >>> base = base_parameters(arm, drive=("Fv",))
+    >>> system = equations(base, log, choose_processing(log))
+    >>> found = weighted(reduce_equations(system))
+    >>> round(float(found.values[found.names.index("Fv2")]), 3)
+    2.0
     """
     return _with_weights(reduction, Method.WLS, 1)
 
@@ -97,6 +143,29 @@ def reweighted(reduction: Reduction) -> Estimate:
     ----------
     A. Janot, M. Gautier, A. Jubien and P.-O. Vandanjon, "Comparison between the CLOE method and the
     DIDIM method for robots identification", IEEE T-CST 22(5), 2014, section II.
+
+    Examples
+    --------
+    >>> from robotmodels.identification import (
+    ...     Log,
+    ...     choose_processing,
+    ...     equations,
+    ...     reduce_equations,
+    ... )
+    >>> from robotmodels.dynamics import idm
+    >>> from robotmodels.minimal_parameters import uniform_bodies
+    >>> from robotmodels.robots import load
+    >>> arm = load("planar_2r").with_gravity((0.0, -9.81, 0.0))
+    >>> arm = arm.with_inertia(uniform_bodies(arm, 5.0))
+    >>> t, w = 0.005 * np.arange(4000)[:, None], np.array([2.0, 3.1])
+    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
+    >>> log = Log(0.005, q, idm(arm, q, v, a) + 2.0 * v)
+    >>> from robotmodels.minimal_parameters import base_parameters
+    >>> base = base_parameters(arm, drive=("Fv",))
+    >>> system = equations(base, log, choose_processing(log))
+    >>> found = reweighted(reduce_equations(system))
+    >>> round(float(found.values[found.names.index("Fv2")]), 3)
+    2.0
     """
     return _with_weights(reduction, Method.IRLS, _ITERATIONS)
 

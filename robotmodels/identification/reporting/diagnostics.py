@@ -411,6 +411,20 @@ def understatement(result: IdentificationResult) -> Array:
     ndarray, shape (b,)
         Deviations that take correlation into account over those that do not; NaN where these
         vanish.
+
+    Examples
+    --------
+    >>> from robotmodels.identification import Log, fit
+    >>> from robotmodels.dynamics import idm
+    >>> from robotmodels.minimal_parameters import uniform_bodies
+    >>> from robotmodels.robots import load
+    >>> arm = load("planar_2r").with_gravity((0.0, -9.81, 0.0))
+    >>> arm = arm.with_inertia(uniform_bodies(arm, 5.0))
+    >>> t, w = 0.005 * np.arange(4000)[:, None], np.array([2.0, 3.1])
+    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
+    >>> log = Log(0.005, q, idm(arm, q, v, a) + 2.0 * v)
+    >>> understatement(fit(arm, log, drive=("Fv",))).shape
+    (8,)
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(result.white > 0.0, result.deviations / result.white, np.nan)

@@ -124,6 +124,25 @@ def read_estimate(path: str | Path) -> Estimate:
         No such file of this or an older version.
     OSError
         It cannot be read.
+
+    Examples
+    --------
+    >>> from robotmodels.identification import fit
+    >>> from robotmodels.dynamics import idm
+    >>> from robotmodels.minimal_parameters import uniform_bodies
+    >>> from robotmodels.robots import load
+    >>> arm = load("planar_2r").with_gravity((0.0, -9.81, 0.0))
+    >>> arm = arm.with_inertia(uniform_bodies(arm, 5.0))
+    >>> t, w = 0.005 * np.arange(4000)[:, None], np.array([2.0, 3.1])
+    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
+    >>> log = Log(0.005, q, idm(arm, q, v, a) + 2.0 * v)
+    >>> from tempfile import TemporaryDirectory
+    >>> found = fit(arm, log, drive=("Fv",))
+    >>> with TemporaryDirectory() as folder:
+    ...     write_result(found, Path(folder) / "arm.json")
+    ...     again = read_estimate(Path(folder) / "arm.json")
+    >>> bool((again.values == found.values).all())
+    True
     """
     path = Path(path)
     try:

@@ -46,6 +46,25 @@ def reduce_many(
     References
     ----------
     Seed book section 1.6.2.1.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from robotmodels.identification import Log, choose_processing, equations
+    >>> from robotmodels.dynamics import idm
+    >>> from robotmodels.minimal_parameters import uniform_bodies
+    >>> from robotmodels.robots import load
+    >>> arm = load("planar_2r").with_gravity((0.0, -9.81, 0.0))
+    >>> arm = arm.with_inertia(uniform_bodies(arm, 5.0))
+    >>> t, w = 0.005 * np.arange(4000)[:, None], np.array([2.0, 3.1])
+    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
+    >>> log = Log(0.005, q, idm(arm, q, v, a) + 2.0 * v)
+    >>> from robotmodels.minimal_parameters import base_parameters
+    >>> base = base_parameters(arm, drive=("Fv",))
+    >>> system = equations(base, log, choose_processing(log))
+    >>> found = reduce_many({"left": system, "right": system})
+    >>> sorted(found), found["left"].rows == found["right"].rows
+    (['left', 'right'], True)
     """
     owners: deque[K] = deque()  # of the pieces that are under way
 

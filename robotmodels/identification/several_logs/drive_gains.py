@@ -231,6 +231,26 @@ def identify_drive_gains(
     robots", ASME J. Dynamic Systems, Measurement and Control 136(5), 2014; M. Gautier,
     P.-O. Vandanjon and C. Presse, "Identification of inertial and drive gain parameters of robots",
     IEEE CDC 1994.
+
+    Examples
+    --------
+    >>> from robotmodels.identification import KnownPayload
+    >>> from robotmodels.dynamics import idm
+    >>> from robotmodels.minimal_parameters import uniform_bodies
+    >>> from robotmodels.robots import load
+    >>> arm = load("planar_2r").with_gravity((0.0, -9.81, 0.0))
+    >>> arm = arm.with_inertia(uniform_bodies(arm, 5.0))
+    >>> t, w = 0.005 * np.arange(4000)[:, None], np.array([2.0, 3.1])
+    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
+    >>> log = Log(0.005, q, idm(arm, q, v, a) + 2.0 * v)
+    >>> from robotmodels.dynamics import with_payload
+    >>> loaded = with_payload(arm, 2.0, [0.1, 0.0, 0.0])
+    >>> gains = np.array([2.0, 4.0])
+    >>> currents = Log(0.005, q, log.tau / gains)
+    >>> more = Log(0.005, q, (idm(loaded, q, v, a) + 2.0 * v) / gains)
+    >>> with_load = LoadedLog(more, KnownPayload(2.0, [0.1, 0.0, 0.0]))
+    >>> identify_drive_gains(arm, currents, with_load).gains.round(3)
+    array([2., 4.])
     """
     check_model(model)
     way = chosen(GainMethod, method, "method")

@@ -229,6 +229,23 @@ def identify_payload(
     industrial manipulators", IEEE ICRA 2007, sections III.A (difference) and III.C (together);
     P. Wensing, S. Kim and J.-J. Slotine, "Linear matrix inequalities for physically consistent
     inertial parameter identification", IEEE RA-L 3(1), 2018 (real bodies).
+
+    Examples
+    --------
+    >>> from robotmodels.dynamics import idm
+    >>> from robotmodels.minimal_parameters import uniform_bodies
+    >>> from robotmodels.robots import load
+    >>> arm = load("planar_2r").with_gravity((0.0, -9.81, 0.0))
+    >>> arm = arm.with_inertia(uniform_bodies(arm, 5.0))
+    >>> t, w = 0.005 * np.arange(4000)[:, None], np.array([2.0, 3.1])
+    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
+    >>> log = Log(0.005, q, idm(arm, q, v, a) + 2.0 * v)
+    >>> from robotmodels.dynamics import with_payload
+    >>> loaded = with_payload(arm, 2.0, [0.1, 0.0, 0.0])
+    >>> more = Log(0.005, q, idm(loaded, q, v, a) + 2.0 * v)
+    >>> found = identify_payload(arm, more, log)
+    >>> found.identifiable, round(float(found.mass), 3)
+    (('ZZ', 'MX', 'MY', 'M'), 2.0)
     """
     check_model(model)
     if isinstance(reference, IdentificationResult):
