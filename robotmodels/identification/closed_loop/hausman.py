@@ -116,6 +116,10 @@ def hausman_test(
     InvalidValueError
         A level that is not between 0 and 1; an estimate of other parameters.
 
+    See Also
+    --------
+    fit : ``result = fit(model, log, "iv")`` has both, ``result.system`` and ``result.estimate``.
+
     References
     ----------
     J. Hausman, "Specification tests in econometrics", Econometrica 46(6), 1978; A. Janot, P.-O.

@@ -124,6 +124,10 @@ def fit_consistent(
     MissingExtraError
         The solver for cones is not installed.
 
+    See Also
+    --------
+    consistent_robot : the same from the result of `fit`, which has the factor and the weights.
+
     References
     ----------
     Seed book section 1.6.3; P. Wensing, S. Kim and J.-J. Slotine, "Linear matrix inequalities for
