@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import InvalidValueError
 from .numbers import numbers
-from .source import robot_of
+from .source import add_source, robot_of
 
 if TYPE_CHECKING:
     from ..identification.excitation import ExcitingTrajectory, WorkspaceBox
@@ -52,14 +52,7 @@ def add_command(commands: Any) -> None:
         epilog=_EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument(
-        "--robot", required=True,
-        help="a name of the catalogue (rx90, erd:ur5), a .urdf or a SYMORO .par file",
-    )  # fmt: skip
-    parser.add_argument("--base-link", help="URDF only: link whose frame is the world")
-    parser.add_argument("--tip-link", help="URDF only: link whose frame is the tool")
-    parser.add_argument("--package-dir", action="append", default=[], metavar="FOLDER",
-                        help="URDF only: folder that holds packages; may be repeated")  # fmt: skip
+    add_source(parser, option=True)
     _add_motion(parser.add_argument_group("the motion"))
     _add_limits(parser.add_argument_group("the limits"))
     _add_search(parser.add_argument_group("the search"))

@@ -17,7 +17,7 @@ from ..errors import InvalidValueError, RobotModelsError, ShapeError, UrdfWarnin
 from ..model import RobotModel
 from .columns import column, columns
 from .numbers import numbers
-from .source import robot_of
+from .source import add_source, robot_of
 
 if TYPE_CHECKING:
     from ..identification import (
@@ -95,14 +95,7 @@ def add_command(commands: Any) -> None:
         epilog=_EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument(
-        "--robot", required=True,
-        help="a name of the catalogue (tx40, erd:ur5), a .urdf or a SYMORO .par file",
-    )  # fmt: skip
-    parser.add_argument("--base-link", help="URDF only: link whose frame is the world")
-    parser.add_argument("--tip-link", help="URDF only: link whose frame is the tool")
-    parser.add_argument("--package-dir", action="append", default=[], metavar="FOLDER",
-                        help="URDF only: folder that holds packages; may be repeated")  # fmt: skip
+    add_source(parser, option=True)
     _add_files(parser.add_argument_group("the logs"))
     _add_test(parser.add_argument_group("motion that is kept aside, one of"))
     _add_fit(parser.add_argument_group("the fit"))

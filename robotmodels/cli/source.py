@@ -11,13 +11,15 @@ from ..robots import load
 from ..symoro import read_par
 
 
-def add_source(parser: argparse.ArgumentParser) -> None:
+def add_source(parser: argparse.ArgumentParser, option: bool = False) -> None:
     """Add the argument that names a robot, and the options for URDF files.
 
     Parameters
     ----------
     parser : ArgumentParser
         Of the command.
+    option : bool
+        Whether the robot is an option, ``--robot``, of a command that takes files as well.
 
     Examples
     --------
@@ -26,9 +28,11 @@ def add_source(parser: argparse.ArgumentParser) -> None:
     >>> parser.parse_args(["rx90"]).robot
     'rx90'
     """
-    parser.add_argument(
-        "robot", help="a name of the catalogue (rx90, erd:ur5), a .urdf or a SYMORO .par file"
-    )
+    text = "a name of the catalogue (rx90, erd:ur5), a .urdf or a SYMORO .par file"
+    if option:
+        parser.add_argument("--robot", required=True, help=text)
+    else:
+        parser.add_argument("robot", help=text)
     parser.add_argument("--base-link", help="URDF only: link whose frame is the world")
     parser.add_argument("--tip-link", help="URDF only: link whose frame is the tool")
     parser.add_argument(

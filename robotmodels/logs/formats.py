@@ -148,6 +148,7 @@ def _mat(path: Path) -> dict[str, Any]:
         )
     try:
         stored = loadmat(path)
+    # the last is what SciPy raises for versions and types of MAT files that it does not know
     except (ValueError, MatReadError, TypeError, NotImplementedError) as error:
         raise InvalidValueError(f"{path}: this is no MAT file that can be read: {error}.") from None
     found: dict[str, Any] = {}
