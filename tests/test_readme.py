@@ -1,52 +1,71 @@
-"""The README's examples run as they are printed, one after the other."""
+"""The README's examples print what it says, one after the other; its words name what exists."""
 
+import doctest
+import importlib
 import re
 from pathlib import Path
 
-import numpy as np
+import pytest
+
+import robotmodels as rm
 
 TEXT = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
-BLOCKS = re.findall(r"^```python\n(.*?)^```$", TEXT, flags=re.MULTILINE | re.DOTALL)
+BLOCKS = re.findall(r"^```pycon\n(.*?)^```$", TEXT, flags=re.MULTILINE | re.DOTALL)
+HOUSE = TEXT.partition("## Where to change what")[2].partition("## Cite")[0]
 
 
-def test_python_examples(tmp_path, monkeypatch, capsys):
+def test_examples_print_what_they_say(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    names = {}
-    for block in BLOCKS:
-        exec(compile(block, "README.md", "exec"), names)
-    rm, found = names["rm"], names["found"]
-    assert found.q.shape == (8, 6)
-    assert "off by 180 deg" in rm.igm(names["trr"], POSE_B).reason()
-    np.testing.assert_allclose(
-        rm.igm(names["trr"], POSE_B, mask=[1, 1, 1, 0, 0, 0]).q, [[0.2, 0, 0]], atol=1e-6
-    )
-    assert rm.igm(names["iiwa"], names["T"], arm_angle=[0.0, 0.5]).q.shape == (2, 8, 7)
-    assert names["fast"].reason() == "The motion is met."
-    np.testing.assert_allclose(
-        rm.dkm(names["rx90"], names["q"], names["fast"].v), [0.1, 0, -0.2, 0, 0, 0.3], atol=1e-12
-    )
-    np.testing.assert_allclose(names["motion"].q(names["motion"].duration), names["q"])
-    assert names["path"].complete
-    np.testing.assert_allclose(
-        names["base"].reduce(names["W"]) @ names["base"].values(names["rx90"]),
-        rm.idm(names["rx90"], names["q"], 0.5 * names["q"], names["q"]),
-    )
-    assert len(names["base"]) == 58
-    assert names["fall"].relative_drift < 1e-8
+    assert len(BLOCKS) == 6
+    names, said = {}, []
+    runner = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE)
+    for number, block in enumerate(BLOCKS, start=1):
+        test = doctest.DocTestParser().get_doctest(
+            block, names, f"example {number}", "README.md", 0
+        )
+        runner.run(test, out=said.append, clear_globs=False)
+        names = test.globs
+    assert runner.summarize(verbose=False).failed == 0, "".join(said)
     assert (tmp_path / "ur5.html").stat().st_size > 500_000
-    assert (tmp_path / "arm.urdf").is_file()
-    assert names["result"].after.summary("m").mean < 0.22e-3
-    assert names["result"].before.summary("m").mean > 8e-3
-    tx40 = names["tx40"]
-    assert len(tx40.names) == 61
-    assert abs(tx40.value("ZZ1") - 1.23) < 0.01
-    assert 0.025 < tx40.deviation("ZZ1") < 0.035
-    np.testing.assert_allclose(tx40.held_out.rmse, [4.1, 5.1, 1.5, 0.6, 1.3, 1.3], atol=0.05)
-    assert names["real"].inertia.is_physical.all()
-    printed = capsys.readouterr().out
-    assert "rx90" in printed
-    assert "elbow: C3 = 0" in printed
-    assert "Dynamic identification of tx40" in printed
+    assert [path.name for path in tmp_path.iterdir()] == ["ur5.html"]
 
 
-POSE_B = [[-1, 0, 0, 0.4], [0, 1, 0, 0.2], [0, 0, -1, 0.5], [0, 0, 0, 1]]
+def of_package(dotted):
+    """Whether a name is found from the door, or in a room that the door opens."""
+    for start in (rm, rm.trajectories, rm.calibration, rm.identification):
+        value = start
+        for part in dotted.split("."):
+            value = getattr(value, part, None)
+        if value is not None:
+            return True
+    return False
+
+
+@pytest.mark.parametrize(
+    ("title", "column"), [("## More", 1), ("## Dictionary", 1)], ids=["more", "dictionary"]
+)
+def test_tables_name_what_exists(title, column):
+    table = TEXT.partition(title + "\n")[2].partition("\n## ")[0]
+    rows = [line.split("|")[1:-1] for line in table.splitlines() if line.startswith("|")][2:]
+    assert len(rows) > 5
+    unknown = []
+    for row in rows:
+        if "robotmodels " in row[column]:
+            continue  # the command line, tested on its own
+        for name in re.findall(r"`([A-Za-z_.0-9]+)(?:\([^`]*\))?`", row[column]):
+            fields = ("base", "tool", "from_urdf", "fit")
+            if name not in fields and not of_package(name):
+                unknown.append(name)
+    assert unknown == []
+
+
+def test_house_names_every_room():
+    paths = [p for p in Path(rm.__file__).parent.iterdir() if not p.name.startswith("_")]
+    rooms = {p.stem for p in paths if p.suffix == ".py" or (p / "__init__.py").exists()}
+    named = set(re.findall(r"`(\w+)`", HOUSE))
+    for room in named & rooms:
+        importlib.import_module(f"robotmodels.{room}")
+    # What the rooms share to read and write text, and two parts of the description.
+    assert rooms - named == {
+        "csv_table", "file_units", "latex_text", "table_text", "khalil_frames", "visual",
+    }  # fmt: skip
