@@ -1,9 +1,12 @@
-"""Check that a wheel holds the package, its type marker and every URDF file, and nothing else."""
+"""Check that a wheel holds the package, its type marker and every URDF file, nothing else, and is small."""
 
 import subprocess
 import sys
 import zipfile
 from pathlib import Path
+
+LARGEST = 3_000_000
+"""Bytes of a wheel."""
 
 
 def main(wheel: Path, checkout: Path) -> None:
@@ -29,7 +32,10 @@ def main(wheel: Path, checkout: Path) -> None:
         sys.exit(f"missing from {wheel.name}: {', '.join(missing)}")
     if extra := sorted(present - expected):
         sys.exit(f"{wheel.name} holds files that are not in the checkout: {', '.join(extra)}")
-    print(f"{wheel.name}: {len(present)} files, {urdfs} of them URDF")
+    size = wheel.stat().st_size
+    if size > LARGEST:
+        sys.exit(f"{wheel.name} has {size} bytes; at most {LARGEST} are wanted")
+    print(f"{wheel.name}: {size / 1e6:.2f} MB, {len(present)} files, {urdfs} of them URDF")
 
 
 main(Path(sys.argv[1]), Path(sys.argv[2]))
