@@ -1,0 +1,16 @@
+"""The geometric description: the Khalil-Kleinfinger table and the transforms it stands for."""
+
+from .joint_kinds import FIXED, PRISMATIC, REVOLUTE
+from .names import NOT_XML
+from .table import DHTable
+from .transforms import constant_factors, link_transforms
+
+__all__ = [
+    "DHTable",
+    "FIXED",
+    "NOT_XML",
+    "PRISMATIC",
+    "REVOLUTE",
+    "constant_factors",
+    "link_transforms",
+]

@@ -1,0 +1,341 @@
+"""The table of geometric parameters of Khalil and Kleinfinger.
+
+Seed book section 1.2.1, eq. [1.2] and [1.3]; W. Khalil and J.-F. Kleinfinger, "A new geometric
+notation for open and closed-loop robots", IEEE ICRA 1986, for trees (gamma, b); S. Hayati,
+"Robot arm geometric link parameter estimation", IEEE CDC 1983, for beta.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .._arrays import Array, as_exact, read_only, same_value, value_hash
+from ..errors import TableError
+from ..table_text import SMALLEST, angle_text, boxed, length_text, variable_text
+from .columns import check_structure, checked_limits, whole_numbers
+from .joint_kinds import FIXED, PRISMATIC
+from .names import checked_names, default_names
+from .rows import columns_of_rows, unknown_name
+from .standard_rows import rows_of_standard
+
+
+@dataclass(frozen=True, slots=True, init=False, eq=False, repr=False)
+class DHTable:
+    """Geometric parameters of a serial or tree structure in Khalil-Kleinfinger form.
+
+    Also called modified or proximal Denavit-Hartenberg parameters. Row ``j`` places frame
+    ``R_j`` in the frame of its antecedent ``a(j)``::
+
+        T(a(j), j) = Rot(z, gamma_j) Trans(z, b_j) Rot(y, beta_j) Rot(x, alpha_j)
+                     Trans(x, d_j) Rot(z, theta_j) Trans(z, r_j)
+
+    The column of the joint's own variable (``theta`` if revolute, ``r`` if prismatic) holds an
+    offset to which ``q_j`` is added, so ``q = 0`` is the table as printed. `from_rows` is the
+    usual way to write one down.
+
+    Parameters
+    ----------
+    antecedent : array_like of int, shape (f,)
+        Number of the frame that row j stands on: 0 is the base, always less than j.
+    sigma : array_like of int, shape (f,)
+        0 revolute, 1 prismatic, 2 fixed frame.
+    mu : array_like of int, shape (f,), optional
+        1 actuated, 0 passive; all 1 by default. Fixed frames are not actuated: always 0.
+    gamma, beta, alpha, theta : array_like, shape (f,), optional
+        Radians, default 0.
+    b, d, r : array_like, shape (f,), optional
+        Metres, default 0.
+    names : sequence of str, length f, optional
+        Names of the frames; default ``joint_1``, ``joint_2``, ... (``frame_j`` for fixed frames).
+    lower, upper : array_like, shape (n,), optional
+        Limits of the joint variables in radians or metres, default minus and plus infinity.
+    velocity, effort : array_like, shape (n,), optional
+        Largest speed (rad/s, m/s) and torque or force (N m, N), default infinity.
+
+    Raises
+    ------
+    TableError
+        Antecedents that do not come before their successors (a loop), unknown joint types,
+        limits the wrong way round, repeated names.
+    ShapeError, InvalidValueError
+        Columns of different lengths; NaN anywhere, infinity in a geometric column.
+
+    References
+    ----------
+    Seed book section 1.2.1, eq. [1.2], [1.3] and Table 1.1.
+
+    Examples
+    --------
+    >>> arm = DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.3])
+    >>> arm.n, arm.names
+    (2, ('joint_1', 'joint_2'))
+    """
+
+    antecedent: NDArray[np.int64]
+    sigma: NDArray[np.int64]
+    mu: NDArray[np.int64]
+    gamma: Array
+    b: Array
+    beta: Array
+    alpha: Array
+    d: Array
+    theta: Array
+    r: Array
+    names: tuple[str, ...]
+    lower: Array
+    upper: Array
+    velocity: Array
+    effort: Array
+
+    def __init__(
+        self,
+        antecedent: ArrayLike,
+        sigma: ArrayLike,
+        mu: ArrayLike | None = None,
+        gamma: ArrayLike | None = None,
+        b: ArrayLike | None = None,
+        beta: ArrayLike | None = None,
+        alpha: ArrayLike | None = None,
+        d: ArrayLike | None = None,
+        theta: ArrayLike | None = None,
+        r: ArrayLike | None = None,
+        names: Sequence[str] | None = None,
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        effort: ArrayLike | None = None,
+    ) -> None:
+        ancestors = whole_numbers(antecedent, "antecedent")
+        f = ancestors.size
+        if not f:
+            raise TableError("a table needs at least one row, got none.")
+        kinds = whole_numbers(sigma, "sigma", f)
+        check_structure(ancestors, kinds)
+        moving = kinds != FIXED
+        n = int(moving.sum())
+        actuated = moving.astype(np.int64) if mu is None else whole_numbers(mu, "mu", f)
+        if not np.isin(actuated, (0, 1)).all():
+            raise TableError(f"mu: expected 1 (actuated) or 0 (passive), got {actuated.tolist()}.")
+        values: dict[str, NDArray[Any]] = {
+            "antecedent": ancestors,
+            "sigma": kinds,
+            "mu": np.where(moving, actuated, 0),
+        }
+        geometric = {
+            "gamma": gamma, "b": b, "beta": beta, "alpha": alpha, "d": d, "theta": theta, "r": r,
+        }  # fmt: skip
+        for column, given in geometric.items():
+            values[column] = np.zeros(f) if given is None else as_exact(given, (f,), column)
+        values |= checked_limits(
+            {"lower": lower, "upper": upper, "velocity": velocity, "effort": effort}, n
+        )
+        labels = default_names(kinds) if names is None else checked_names(names, f)
+        object.__setattr__(self, "names", labels)
+        for key, value in values.items():
+            object.__setattr__(self, key, read_only(value, value.dtype.type))
+
+    @classmethod
+    def from_rows(cls, rows: Iterable[Mapping[str, Any]], degrees: bool = False) -> Self:
+        """Build a table from one mapping per row.
+
+        Parameters
+        ----------
+        rows : iterable of mappings
+            Keys ``sigma, alpha, d, theta, r``; optionally ``antecedent`` (default: the row
+            before), ``mu, gamma, b, beta, name, lower, upper, velocity, effort``. What is missing
+            is 0, a missing limit is infinite.
+        degrees : bool
+            Whether the angles (and the limits and velocities of revolute joints) are in degrees.
+
+        Returns
+        -------
+        DHTable
+            The table, in radians.
+
+        Raises
+        ------
+        TableError
+            An unknown key (the nearest known ones are named), or as the constructor.
+
+        Examples
+        --------
+        >>> t = DHTable.from_rows([{"sigma": 0}, {"sigma": 0, "alpha": 90, "d": 0.1}], degrees=True)
+        >>> round(float(t.alpha[1]), 6)
+        1.570796
+        """
+        return cls(**columns_of_rows(rows, degrees))
+
+    @classmethod
+    def from_standard(
+        cls, rows: Iterable[Mapping[str, Any]], degrees: bool = False
+    ) -> tuple[Self, Array]:
+        """Build a table from classical (standard, distal) Denavit-Hartenberg rows.
+
+        A classical row is ``Rot(z, theta) Trans(z, d) Trans(x, a) Rot(x, alpha)``; its last two
+        factors belong to the next row here, and those of the last row to the tool.
+
+        Parameters
+        ----------
+        rows : iterable of mappings
+            Keys ``theta, d, a, alpha``, optionally ``sigma``, ``offset`` (added to the joint
+            variable), ``name`` and limits. What is missing is 0.
+        degrees : bool
+            Whether angles, offsets of revolute joints and their limits are in degrees.
+
+        Returns
+        -------
+        table : DHTable
+            The equivalent Khalil-Kleinfinger table with the same joint variables.
+        tool : ndarray, shape (4, 4)
+            ``Trans(x, a_n) Rot(x, alpha_n)``, to be given to the model as its tool.
+
+        Raises
+        ------
+        TableError, InvalidValueError
+            As `from_rows`.
+
+        References
+        ----------
+        P. I. Corke, *Robotics, Vision and Control*, section 7.1, for the classical convention.
+
+        Examples
+        --------
+        >>> table, tool = DHTable.from_standard([{"a": 0.4}, {"a": 0.3}])
+        >>> float(table.d[1]), float(tool[0, 3])
+        (0.4, 0.3)
+        """
+        ours, tool = rows_of_standard(rows, degrees)
+        return cls.from_rows(ours, degrees=degrees), tool
+
+    @property
+    def f(self) -> int:
+        """Number of frames (rows)."""
+        return self.antecedent.size
+
+    @property
+    def n(self) -> int:
+        """Number of moving joints."""
+        return self.lower.size
+
+    @property
+    def joint_rows(self) -> NDArray[np.int64]:
+        """Index (from 0) of the row of each moving joint, shape (n,)."""
+        return np.flatnonzero(self.sigma != FIXED)
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the moving joints, length n."""
+        return tuple(self.names[i] for i in self.joint_rows)
+
+    @property
+    def is_serial(self) -> bool:
+        """Whether every row stands on the row before it."""
+        return bool((self.antecedent == np.arange(self.f)).all())
+
+    def path(self, frame: int) -> list[int]:
+        """Numbers of the frames from the base to one frame, that frame included.
+
+        Parameters
+        ----------
+        frame : int
+            Frame number 1..f; 0, the base, has an empty path.
+
+        Returns
+        -------
+        list of int
+            Frame numbers, ascending.
+
+        Examples
+        --------
+        >>> DHTable(antecedent=[0, 1, 1], sigma=[0, 0, 0]).path(3)
+        [1, 3]
+        """
+        path = []
+        while frame > 0:
+            path.append(frame)
+            frame = int(self.antecedent[frame - 1])
+        return path[::-1]
+
+    def replace(self, **columns: ArrayLike | Sequence[str]) -> Self:
+        """The same table with some columns changed.
+
+        Parameters
+        ----------
+        **columns : array_like
+            Fields of the table by name, shapes as in the constructor.
+
+        Returns
+        -------
+        DHTable
+            A new table.
+
+        Raises
+        ------
+        TableError
+            An unknown column, or as the constructor.
+
+        Examples
+        --------
+        >>> DHTable(antecedent=[0], sigma=[0]).replace(r=[0.2]).r
+        array([0.2])
+        """
+        known = [field.name for field in fields(self)]
+        for column in columns:
+            if column not in known:
+                raise TableError(unknown_name("column", column, known))
+        return replace(self, **columns)  # type: ignore[arg-type]
+
+    def __str__(self) -> str:
+        # columns that say nothing are left out, as in the book's tables of serial robots
+        rows = range(self.f)
+        columns = [("j", [str(j + 1) for j in rows])]
+        if not self.is_serial:
+            columns.append(("a(j)", [str(a) for a in self.antecedent]))
+        columns.append(("σj", [str(s) for s in self.sigma]))
+        if (self.mu != (self.sigma != FIXED)).any():
+            columns.append(("μj", [str(m) for m in self.mu]))
+        if _shows(self.gamma) or _shows(self.b):
+            columns.append(("γj", [angle_text(v) for v in self.gamma]))
+            columns.append(("bj", [length_text(v) for v in self.b]))
+        if _shows(self.beta):
+            columns.append(("βj", [angle_text(v) for v in self.beta]))
+        columns.append(("αj", [angle_text(v) for v in self.alpha]))
+        columns.append(("dj", [length_text(v) for v in self.d]))
+        columns.append(("θj", [self._own_text(j, "θ") for j in rows]))
+        columns.append(("rj", [self._own_text(j, "r") for j in rows]))
+        return boxed(columns)
+
+    def _own_text(self, row: int, symbol: str) -> str:
+        """Cell of the theta or r column: a constant, or the variable with its offset."""
+        offset = float(self.theta[row] if symbol == "θ" else self.r[row])
+        text = angle_text if symbol == "θ" else length_text
+        variable = "r" if self.sigma[row] == PRISMATIC else "θ"
+        if self.sigma[row] == FIXED or symbol != variable:
+            return text(offset)
+        return variable_text(symbol, row + 1, text(abs(offset)), offset < 0)
+
+    def __repr__(self) -> str:
+        return f"<DHTable: {self.f} frames, {self.n} joints>\n{self}"
+
+    def __reduce__(self) -> tuple[Any, ...]:  # rebuilt, so that a copy is read-only as well
+        return type(self), tuple(getattr(self, field.name) for field in fields(self))
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, DHTable):
+            return NotImplemented
+        return all(
+            same_value(getattr(self, field.name), getattr(other, field.name))
+            for field in fields(self)
+        )
+
+    def __hash__(self) -> int:
+        return value_hash(*(getattr(self, field.name) for field in fields(self)))
+
+
+def _shows(column: Array) -> bool:
+    return bool((np.abs(column) >= SMALLEST).any())
