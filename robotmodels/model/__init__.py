@@ -1,0 +1,17 @@
+"""The robot model: a value made of parts, with its Pinocchio twin built from its URDF."""
+
+from .argument import check_model
+from .frame_of_interest import FrameOfInterest
+from .robot_model import GRAVITY, RobotModel
+from .twin import PinocchioTwin
+from .write import to_urdf, write_urdf
+
+__all__ = [
+    "FrameOfInterest",
+    "GRAVITY",
+    "PinocchioTwin",
+    "RobotModel",
+    "check_model",
+    "to_urdf",
+    "write_urdf",
+]

@@ -1,0 +1,43 @@
+"""The table multiplied out into the plain arrays that compiled kernels take."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._arrays import Array, read_only
+from ..geometry import DHTable, constant_factors
+from ..kernels import Chain
+
+
+def multiplied_out(table: DHTable, base: Array) -> Chain:
+    """The constant factors of a table, and how its rows stand on each other.
+
+    Parameters
+    ----------
+    table : DHTable
+        f frames, n joints.
+    base : ndarray, shape (4, 4)
+        Pose of R_0 in the world.
+
+    Returns
+    -------
+    Chain
+        Read-only arrays in table order.
+
+    Examples
+    --------
+    >>> multiplied_out(DHTable(antecedent=[0], sigma=[0], r=[0.2]), np.eye(4)).position
+    array([[0. , 0. , 0.2]])
+    """
+    C = constant_factors(table)
+    joint = np.full(table.f, -1, dtype=np.int64)
+    joint[table.joint_rows] = np.arange(table.n)
+    return Chain(
+        antecedent=table.antecedent,
+        sigma=table.sigma,
+        joint=read_only(joint, np.int64),
+        rotation=read_only(C[:, :3, :3]),
+        position=read_only(C[:, :3, 3]),
+        base_rotation=read_only(base[:3, :3]),
+        base_position=read_only(base[:3, 3]),
+    )

@@ -1,0 +1,353 @@
+"""The robot model: a value made of parts, with its Pinocchio twin built from its URDF."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .. import se3
+from .._arrays import Array, as_exact, read_only, same_value, value_hash
+from ..drive import DriveMatrices, DriveParameters, Transmission, drive_matrices
+from ..geometry import DHTable
+from ..inertia import InertialParameters
+from ..kernels import Chain
+from ..urdf import NamedFrame, RobotParts, read_urdf
+from ..visual import Visual
+from .chain import multiplied_out
+from .changed import Changeable
+from .part_checks import check_count, check_name, check_table, check_tip, checked_postures
+from .twin import PinocchioTwin
+
+GRAVITY = (0.0, 0.0, -9.81)
+"""Default gravity: the acceleration vector in the world frame, m/s^2."""
+
+_PARTS = (
+    "name", "table", "inertia", "drive", "base", "tool", "tip", "gravity", "transmission",
+    "configurations", "frames", "visuals", "notes",
+)  # fmt: skip
+_NUMERIC_PARTS = _PARTS[:9]
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False, weakref_slot=True)
+class RobotModel(Changeable):
+    """A robot: geometry, inertia, drives, base, tool and gravity. Immutable, picklable.
+
+    Made by `from_table` or `from_urdf`, changed by the ``with_*`` methods, which return a new
+    model. Every computation is a function that takes the model first: ``dgm(model, q)``.
+
+    Parameters
+    ----------
+    name : str
+        Of the robot.
+    table : DHTable
+        Geometric parameters.
+    inertia : InertialParameters
+        Of the f frames.
+    drive : DriveParameters
+        Of the n joints.
+    base : ndarray, shape (4, 4)
+        ``Z``: pose of R_0 in the world (seed eq. [1.10]).
+    tool : ndarray, shape (4, 4)
+        ``E``: pose of the tool in the tip frame.
+    tip : int
+        Number of the frame that carries the tool.
+    gravity : ndarray, shape (3,)
+        Acceleration of gravity in the world frame, m/s^2.
+    transmission : Transmission or None
+        Between encoders and joints.
+    configurations : mapping of str to ndarray, shape (n,)
+        Named postures; ``"zero"`` is always there.
+    frames : tuple of NamedFrame
+        Frames of interest, such as every link of a source URDF.
+    visuals : tuple of Visual
+        Shapes of a source URDF.
+    notes : tuple of str
+        What a reader merged, locked or left out, in sentences.
+
+    References
+    ----------
+    Seed book sections 1.2 and 1.5.
+
+    Examples
+    --------
+    >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.3]))
+    >>> arm.n, arm.frame_names
+    (2, ('base', 'joint_1', 'joint_2', 'tool'))
+    """
+
+    name: str
+    table: DHTable
+    inertia: InertialParameters
+    drive: DriveParameters
+    base: Array
+    tool: Array
+    tip: int
+    gravity: Array
+    transmission: Transmission | None = None
+    configurations: Mapping[str, Array] = field(default_factory=dict)
+    frames: tuple[NamedFrame, ...] = ()
+    visuals: tuple[Visual, ...] = ()
+    notes: tuple[str, ...] = ()
+    _twin: PinocchioTwin | None = field(default=None, init=False)
+    _chain: Chain | None = field(default=None, init=False)
+    _drives: tuple[DriveMatrices | None] | None = field(default=None, init=False)
+
+    def __post_init__(self) -> None:
+        check_table(self.table)
+        check_name(self.name)
+        f, n = self.table.f, self.table.n
+        check_count(self.inertia, InertialParameters, "inertia", "f", f)
+        check_count(self.drive, DriveParameters, "drive", "n", n)
+        if self.transmission is not None:
+            check_count(self.transmission, Transmission, "transmission", "n", n)
+        check_tip(self.tip, f)
+        set_ = object.__setattr__
+        set_(self, "tip", int(self.tip))
+        set_(self, "base", read_only(se3.as_single_pose(self.base, "base")))
+        set_(self, "tool", read_only(se3.as_single_pose(self.tool, "tool")))
+        set_(self, "gravity", read_only(as_exact(self.gravity, (3,), "gravity")))
+        set_(self, "configurations", checked_postures(self.configurations, n))
+
+    @classmethod
+    def from_table(
+        cls,
+        table: DHTable,
+        inertia: InertialParameters | None = None,
+        drive: DriveParameters | None = None,
+        base: ArrayLike | None = None,
+        tool: ArrayLike | None = None,
+        tip: int | None = None,
+        gravity: ArrayLike = GRAVITY,
+        transmission: Transmission | None = None,
+        name: str = "robot",
+        configurations: Mapping[str, ArrayLike] | None = None,
+    ) -> Self:
+        """Make a model from a table of geometric parameters.
+
+        Parameters
+        ----------
+        table : DHTable
+            f frames, n joints.
+        inertia : InertialParameters, optional
+            Of the f frames; default massless.
+        drive : DriveParameters, optional
+            Of the n joints; default none.
+        base : array_like, shape (4, 4), optional
+            Pose of R_0 in the world, default identity. ``pinocchio.SE3`` is accepted.
+        tool : array_like, shape (4, 4), optional
+            Pose of the tool in the tip frame, default identity.
+        tip : int, optional
+            Number of the frame that carries the tool; default the last.
+        gravity : array_like, shape (3,)
+            Acceleration in the world frame, m/s^2.
+        transmission : Transmission, optional
+            Between encoders and joints.
+        name : str
+            Of the robot.
+        configurations : mapping of str to array_like, shape (n,), optional
+            Named postures; ``"zero"`` is added.
+
+        Returns
+        -------
+        RobotModel
+            The model.
+
+        Raises
+        ------
+        ShapeError, InvalidValueError, NotARotationError, FrameNotFoundError
+            Parts that do not fit each other; a base or tool that is not a pose; a tip that is
+            not a frame.
+
+        Examples
+        --------
+        >>> table = DHTable.from_rows([{"sigma": 0}, {"sigma": 0, "d": 0.3}])
+        >>> RobotModel.from_table(table, tool=se3.translation(0.2, 0, 0), name="planar").n
+        2
+        """
+        check_table(table)
+        return cls(
+            name=name,
+            table=table,
+            inertia=InertialParameters.zeros(table.f) if inertia is None else inertia,
+            drive=DriveParameters.zeros(table.n) if drive is None else drive,
+            base=np.eye(4) if base is None else base,  # type: ignore[arg-type]
+            tool=np.eye(4) if tool is None else tool,  # type: ignore[arg-type]
+            tip=table.f if tip is None else tip,
+            gravity=gravity,  # type: ignore[arg-type]
+            transmission=transmission,
+            configurations=configurations or {},  # type: ignore[arg-type]
+        )
+
+    @classmethod
+    def from_urdf(
+        cls,
+        path_or_text: str | Path,
+        base_link: str | None = None,
+        tip_link: str | None = None,
+        gravity: ArrayLike = GRAVITY,
+        package_dirs: Iterable[str | Path] | str | Path = (),
+        dynamics: bool = False,
+        mimic: bool = False,
+    ) -> Self:
+        """Make a model from a URDF: its Khalil-Kleinfinger table is extracted.
+
+        ``q`` keeps the URDF's sign and zero. Every link below the base is a named frame; the
+        links that were merged by fixed joints are listed in ``notes``. Pose and dynamics are
+        those of the URDF to rounding.
+
+        Parameters
+        ----------
+        path_or_text : str or Path
+            A file, or the text itself.
+        base_link : str, optional
+            Link whose frame is the world; default the root. What is above it is left out.
+        tip_link : str, optional
+            Link whose frame is the tool. Only the joints between base and tip are kept, others
+            are locked at zero. Default: all joints below the base; the tool is the link called
+            ``tool``, else the link carried by the last joint, or what alone is fixed to it.
+        gravity : array_like, shape (3,)
+            Acceleration in the world frame (the axes of the base link), m/s^2.
+        package_dirs : path or iterable of paths
+            Folders that hold the packages of ``package://`` meshes. If given, a missing mesh is
+            an error; otherwise it is one only when the robot is drawn.
+        dynamics : bool
+            Whether ``<dynamics damping friction>`` fill Fv and Fc.
+        mimic : bool
+            Whether mimic joints follow their masters: the coupling is then in ``transmission``.
+
+        Returns
+        -------
+        RobotModel
+            The model.
+
+        Raises
+        ------
+        UrdfError
+            Malformed text, a DOCTYPE, xacro, a loop, a zero axis, a negative mass, an unsupported
+            joint; with the element at fault and what to do.
+        MeshNotFoundError
+            A mesh is not in the given package folders.
+        FrameNotFoundError
+            ``base_link`` or ``tip_link`` is unknown, or the tip is not below the base.
+
+        Examples
+        --------
+        >>> text = '''<robot name="one"><link name="base"/><link name="arm"/>
+        ... <joint name="turn" type="continuous"><parent link="base"/><child link="arm"/>
+        ... <axis xyz="0 0 1"/></joint></robot>'''
+        >>> RobotModel.from_urdf(text).table.names
+        ('turn',)
+        """
+        parts = read_urdf(path_or_text, base_link, tip_link, package_dirs, dynamics, mimic)
+        return cls(
+            name=parts.name, table=parts.table, inertia=parts.inertia, drive=parts.drive,
+            base=parts.base, tool=parts.tool, tip=parts.tip,
+            gravity=gravity,  # type: ignore[arg-type]
+            transmission=parts.transmission, frames=parts.frames, visuals=parts.visuals,
+            notes=parts.notes,
+        )  # fmt: skip
+
+    @property
+    def n(self) -> int:
+        """Number of moving joints."""
+        return self.table.n
+
+    @property
+    def f(self) -> int:
+        """Number of frames of the table."""
+        return self.table.f
+
+    @property
+    def lower(self) -> Array:
+        """Lower limits of the joint variables, shape (n,), rad or m."""
+        return self.table.lower
+
+    @property
+    def upper(self) -> Array:
+        """Upper limits of the joint variables, shape (n,), rad or m."""
+        return self.table.upper
+
+    @property
+    def frame_names(self) -> tuple[str, ...]:
+        """Names that functions accept as ``frame``: base, the table's, named frames, tool."""
+        return self.twin.frame_names()
+
+    @property
+    def merged_links(self) -> tuple[str, ...]:
+        """Links of the source URDF that were merged into the link they are fixed to."""
+        return tuple(frame.name for frame in self.frames if frame.merged)
+
+    @property
+    def twin(self) -> PinocchioTwin:
+        """The Pinocchio side of the model, built at the first use."""
+        if self._twin is None:
+            object.__setattr__(self, "_twin", PinocchioTwin(self.parts, self.gravity))
+        return self._twin  # type: ignore[return-value]
+
+    @property
+    def pin_model(self) -> Any:
+        """The ``pinocchio.Model`` of the table: nq = nv = n, rigid bodies without drives.
+
+        Its joints may be in another order, see `pin_order`; every link of a source URDF is a
+        frame of it. It is shared: copy it before changing it.
+        """
+        return self.twin.model
+
+    @property
+    def pin_order(self) -> NDArray[np.int64]:
+        """Index in Pinocchio's q and v of each joint of the table, shape (n,)."""
+        return self.twin.order
+
+    @property
+    def chain(self) -> Chain:
+        """The table multiplied out into the plain arrays that compiled kernels take."""
+        if self._chain is None:
+            object.__setattr__(self, "_chain", multiplied_out(self.table, self.base))
+        return self._chain  # type: ignore[return-value]
+
+    @property
+    def drive_matrices(self) -> DriveMatrices | None:
+        """Drive and coupling terms of all joints; None if every one of them is zero."""
+        if self._drives is None:
+            drives = drive_matrices(self.drive, self.transmission)
+            idle = self.drive.is_zero and not drives.coupling.size
+            object.__setattr__(self, "_drives", (None if idle else drives,))
+        return self._drives[0]  # type: ignore[index]
+
+    @property
+    def parts(self) -> RobotParts:
+        """What a URDF is written from."""
+        return RobotParts(
+            name=self.name, table=self.table, base=self.base, tool=self.tool, tip=self.tip,
+            inertia=self.inertia, drive=self.drive, transmission=self.transmission,
+            frames=self.frames, visuals=self.visuals, notes=self.notes,
+        )  # fmt: skip
+
+    def __repr__(self) -> str:
+        return f"<RobotModel {self.name!r}: {self.n} joints, {self.f} frames>"
+
+    def __str__(self) -> str:
+        text = f"{self.name}: {self.n} joints, {self.f} frames\n{self.table}"
+        if not self.inertia.values.any():
+            text += (
+                "\nNo inertial parameters are known: links without mass, torques of drives only."
+            )
+        return text
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, RobotModel):
+            return NotImplemented
+        return all(same_value(getattr(self, p), getattr(other, p)) for p in _NUMERIC_PARTS)
+
+    def __hash__(self) -> int:
+        return value_hash(*(getattr(self, p) for p in _NUMERIC_PARTS))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        parts = [getattr(self, p) for p in _PARTS]
+        parts[_PARTS.index("configurations")] = dict(self.configurations)
+        return type(self), tuple(parts)
