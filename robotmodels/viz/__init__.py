@@ -1,4 +1,4 @@
-"""Pictures of robots: `show` and `animate` give a `Scene`, `plot_*` a Matplotlib figure.
+"""Pictures of robots: `show`, `animate` and `jog` give a `Scene`, `plot_*` a Matplotlib figure.
 
 A scene is a meshcat page that needs no network. Figures need the extra ``plots``; Matplotlib is
 imported when the first one is drawn.
@@ -8,6 +8,7 @@ from .animate import animate
 from .calibration_report import html_report
 from .camera import Camera
 from .identification_report import identification_html
+from .jog import jog
 from .motion import Motion
 from .plot_calibration_in_space import plot_calibration_in_space
 from .plot_calibration_normality import plot_calibration_normality
@@ -46,6 +47,7 @@ __all__ = [
     "animate",
     "html_report",
     "identification_html",
+    "jog",
     "plot_calibration_correlations",
     "plot_calibration_in_space",
     "plot_calibration_normality",

@@ -12,8 +12,9 @@ from .._arrays import Array
 FIELD_OF_VIEW = 30.0
 """Vertical angle of the picture in degrees: narrow, so that an arm looks undistorted."""
 
-# Narrower than most windows, so that nothing is cut off at the sides.
-_ASPECT = 1.15
+ASPECT = 1.15
+"""Width over height that the camera is placed for: narrower than most windows."""
+
 _MARGIN = 0.88
 
 
@@ -27,6 +28,8 @@ class Camera:
         What it looks at and turns about, world axes, metres.
     position : ndarray, shape (3,)
         Where it is, world axes, metres.
+    depth : float
+        How far what it sees reaches behind the target, metres.
 
     Examples
     --------
@@ -36,6 +39,7 @@ class Camera:
 
     target: Array
     position: Array
+    depth: float = 0.0
 
     @property
     def distance(self) -> float:
@@ -98,12 +102,12 @@ def framed(points: Array, view: tuple[float, float] | None = None) -> Camera:
     x, y, z = points @ right, points @ up, points @ back
     # |x - x0| <= (distance - z) slope for every point, likewise y: the tightest ones decide
     slope = tan(radians(0.5 * FIELD_OF_VIEW)) * _MARGIN
-    x0, across = _tightest(x, z, slope * _ASPECT)
+    x0, across = _tightest(x, z, slope * ASPECT)
     y0, high = _tightest(y, z, slope)
     middle = 0.5 * (z.min() + z.max())
     target = x0 * right + y0 * up + middle * back
     distance = max(across - middle, high - middle, 0.05)
-    return Camera(target, target + distance * back)
+    return Camera(target, target + distance * back, float(0.5 * (z.max() - z.min())))
 
 
 def _tightest(x: Array, z: Array, slope: float) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""What `show` and `animate` share: reading their arguments and putting a scene together."""
+"""What `show`, `animate` and `jog` share: reading their arguments and putting a scene together."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from .nodes import Node
 from .palette import Legend
 from .robot import DrawnRobot
 from .scene import Scene
+from .sliders import SliderPanel
 from .surroundings import floor_grid, workspace_box
 
 
@@ -182,6 +183,7 @@ def compose(
     height: int,
     motion: Motion | None = None,
     legend: Legend = (),
+    sliders: SliderPanel | None = None,
 ) -> Scene:
     """Put robots and what stands around them into a scene that they fill.
 
@@ -205,6 +207,8 @@ def compose(
         What is played.
     legend : tuple of (str, Color)
         What the colours stand for.
+    sliders : SliderPanel, optional
+        What the reader moves.
 
     Returns
     -------
@@ -224,4 +228,4 @@ def compose(
     if view is not None:
         azimuth, elevation = as_exact(view, (2,), "view").tolist()
         angles = (azimuth, elevation)
-    return Scene(title, tuple(nodes), framed(points, angles), motion, height, legend)
+    return Scene(title, tuple(nodes), framed(points, angles), motion, height, legend, sliders)

@@ -21,10 +21,12 @@ from .. import se3
 from .._arrays import Array
 from ..errors import MissingExtraError
 from ..visual import Box, Color, Cylinder, Sphere
-from .camera import FIELD_OF_VIEW, Camera
+from .camera import ASPECT, FIELD_OF_VIEW, Camera
 from .motion import Motion
 from .nodes import Drawable, Label, Node, Segments, Triangles
 from .palette import Legend
+from .sliders import SliderPanel
+from .sliders_page import SCRIPT, STYLE, panel_html
 
 _SKY = ([0.86, 0.91, 0.97], [1.0, 1.0, 1.0])
 # Lights far away (directional), so that a gantry of ten metres is as bright as a finger.
@@ -55,11 +57,11 @@ body {{ margin: 0; }}
 #legend span {{ display: inline-block; width: 0.9em; height: 0.9em; margin-right: 0.5em;
  vertical-align: -0.1em; border-radius: 2px; }}
 #message {{ display: none; margin: 2em; font-family: sans-serif; }}
-</style>
+{style}</style>
 </head>
 <body>
 <p id="message">This picture needs WebGL, which this browser or its settings do not offer.</p>
-<div id="meshcat-pane"></div>
+{panel}<div id="meshcat-pane"></div>
 {legend}<script>
 {viewer}
 </script>
@@ -91,10 +93,18 @@ body {{ margin: 0; }}
   window.viewer = viewer;
   scene.commands.forEach(function (command) {{ viewer.handle_command(command); }});
   viewer.controls.target.fromArray(scene.target);
+  // in a picture narrower than the camera was placed for, step back until nothing is cut off:
+  // a point at depth z is seen if its distance from the axis is below slope (distance + z)
+  var across = document.getElementById("meshcat-pane").offsetWidth / window.innerHeight;
+  if (across > 0 && across < scene.aspect) {{
+    var eye = viewer.camera.position, target = viewer.controls.target;
+    var wider = scene.aspect / across, distance = eye.distanceTo(target);
+    eye.sub(target).setLength(wider * distance + (wider - 1) * scene.depth).add(target);
+  }}
   viewer.set_3d_pane_size();
 }})();
 </script>
-</body>
+{script}</body>
 </html>
 """
 
@@ -105,6 +115,7 @@ def page(
     camera: Camera,
     motion: Motion | None,
     legend: Legend = (),
+    sliders: SliderPanel | None = None,
 ) -> str:
     """Write a scene as one HTML page.
 
@@ -120,6 +131,8 @@ def page(
         What is played.
     legend : tuple of (str, Color)
         What the colours stand for.
+    sliders : SliderPanel, optional
+        What the reader moves.
 
     Returns
     -------
@@ -140,12 +153,16 @@ def page(
     if motion is not None and motion.tracks:
         commands.append(_set_animation(motion))
     # the viewer has no command for the point that the camera turns about
-    content = {"arrays": store.arrays, "commands": commands, "target": _y_upwards(camera.target)}
+    content = {"arrays": store.arrays, "commands": commands,
+               "target": _y_upwards(camera.target), "aspect": ASPECT,
+               "depth": round(camera.depth, 6)}  # fmt: skip
     scene = json.dumps(content, separators=(",", ":"))
     # a "<" could end the script element or open a comment in it
     return _TEMPLATE.format(
         title=escape(title), viewer=_viewer_script(), scene=scene.replace("<", "\\u003c"),
-        legend=_legend_list(legend),
+        legend=_legend_list(legend), style="" if sliders is None else STYLE,
+        panel="" if sliders is None else panel_html(title, sliders) + "\n",
+        script="" if sliders is None else f"<script>\n{SCRIPT}</script>\n",
     )  # fmt: skip
 
 

@@ -64,6 +64,8 @@ class DrawnRobot:
         The node of each joint's motion, in the (first) posture.
     size : float
         A length that says how large it is, metres.
+    frames : tuple of str
+        The node that moves with each frame R_0, R_1, ... R_f, in the (first) posture.
 
     Examples
     --------
@@ -75,6 +77,7 @@ class DrawnRobot:
     points: Array
     moving: tuple[str, ...]
     size: float
+    frames: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -135,6 +138,7 @@ def draw_robot(
     own_color = colors[0] if len(q) == 1 else None
     nodes += _shapes([p for p in pieces if p.frame == 0], root, own_color, look.opacity)
     moving: list[str] = []
+    hung: list[str] = []
     for k, posture in enumerate(q):
         top = root if len(q) == 1 else f"{root}/posture_{k + 1}"
         if top != root:
@@ -145,9 +149,9 @@ def draw_robot(
             own = [piece for piece in pieces if piece.frame == j]
             nodes += _shapes(own, paths[j], colors[k], look.opacity)
         if k == 0:
-            moving = [paths[row + 1] for row in model.table.joint_rows]
+            moving, hung = [paths[row + 1] for row in model.table.joint_rows], paths
     points = _extent(model, q if seen is None else seen, pieces)
-    return DrawnRobot(tuple(nodes), points, tuple(moving), size)
+    return DrawnRobot(tuple(nodes), points, tuple(moving), size, tuple(hung))
 
 
 def _limited(table: DHTable, q: Array) -> DHTable:

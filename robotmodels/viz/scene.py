@@ -14,11 +14,12 @@ from .motion import Motion
 from .nodes import Node
 from .page import page
 from .palette import Legend
+from .sliders import SliderPanel
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """A picture of robots, made by `show` or `animate`. It holds no process, port or file.
+    """A picture of robots, made by `show`, `animate` or `jog`. It holds no process, port or file.
 
     Parameters
     ----------
@@ -34,6 +35,8 @@ class Scene:
         Pixels in a notebook.
     legend : tuple of (str, Color)
         What the colours stand for, listed in a corner.
+    sliders : SliderPanel or None
+        What the reader moves.
 
     Examples
     --------
@@ -51,6 +54,7 @@ class Scene:
     motion: Motion | None = None
     height: int = 480
     legend: Legend = ()
+    sliders: SliderPanel | None = None
 
     @property
     def paths(self) -> tuple[str, ...]:
@@ -96,7 +100,7 @@ class Scene:
         MissingExtraError
             meshcat is not installed.
         """
-        return page(self.title, self.nodes, self.camera, self.motion, self.legend)
+        return page(self.title, self.nodes, self.camera, self.motion, self.legend, self.sliders)
 
     def save(self, path: str | Path) -> Path:
         """Write the picture as one offline page, with its animation.
@@ -133,4 +137,6 @@ class Scene:
         if self.motion is not None:
             m = self.motion
             played = f", {m.duration:g} s from {m.samples} samples in {m.keyframes} keyframes"
+        if self.sliders is not None:
+            played = f", {self.sliders.independent.size} sliders"
         return f"<Scene {self.title!r}: {shapes} shapes{played}>"
