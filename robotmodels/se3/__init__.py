@@ -1,0 +1,23 @@
+"""Poses as 4x4 matrices: elementary motions, inverse, checks, MATLAB's order, roll-pitch-yaw.
+
+Seed book section 1.1, eq. [1.1]: the columns of a pose are s, n, a (the axes) and P.
+"""
+
+from .checks import ROTATION_TOLERANCE, as_pose, as_single_pose
+from .matlab import poses_from_matlab, poses_to_matlab
+from .motions import inverse, rotation, skew, translation
+from .roll_pitch_yaw import from_rpy, to_rpy
+
+__all__ = [
+    "ROTATION_TOLERANCE",
+    "as_pose",
+    "as_single_pose",
+    "from_rpy",
+    "inverse",
+    "poses_from_matlab",
+    "poses_to_matlab",
+    "rotation",
+    "skew",
+    "to_rpy",
+    "translation",
+]

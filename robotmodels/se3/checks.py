@@ -1,0 +1,106 @@
+"""Whether a matrix is a pose: the border for poses, which rounds off what is nearly a rotation."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .._arrays import Array, as_core
+from ..errors import NotARotationError, ShapeError
+
+ROTATION_TOLERANCE = 1e-6
+"""Largest entry of ``R R^T - 1`` (and of ``det R - 1``) that still counts as a rotation."""
+
+
+def as_pose(T: Any, name: str = "T") -> Array:
+    """Check poses and bring them exactly onto the rotation group.
+
+    Anything with a ``homogeneous`` attribute (``pinocchio.SE3``) is accepted. A rotation that
+    is off by more than rounding, but less than `ROTATION_TOLERANCE`, is replaced by the nearest
+    rotation (polar decomposition); rotations exact to rounding are left untouched.
+
+    Parameters
+    ----------
+    T : array_like, shape (..., 4, 4)
+        Poses, last row 0 0 0 1.
+    name : str
+        Used in error messages.
+
+    Returns
+    -------
+    ndarray, shape (..., 4, 4)
+        Checked poses.
+
+    Raises
+    ------
+    ShapeError
+        Not (..., 4, 4).
+    InvalidValueError
+        NaN or infinity.
+    NotARotationError
+        The last row or the rotation is off by more than the tolerance, or it mirrors.
+
+    Examples
+    --------
+    >>> as_pose([[1, 0, 0, 0.1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]).shape
+    (4, 4)
+    """
+    T = as_core(getattr(T, "homogeneous", T), (4, 4), name)
+    if T.size == 0:
+        return T
+    if np.abs(T[..., 3, :] - (0.0, 0.0, 0.0, 1.0)).max() > ROTATION_TOLERANCE:
+        raise NotARotationError(f"{name}: the last row of a pose must be 0 0 0 1.")
+    R = T[..., :3, :3]
+    off = np.abs(R @ np.swapaxes(R, -1, -2) - np.eye(3)).max(axis=(-1, -2))
+    worst = float(off.max())
+    mirrors = np.linalg.det(R) < 0
+    if worst > ROTATION_TOLERANCE or mirrors.any():
+        fault = off if worst > ROTATION_TOLERANCE else mirrors
+        i = np.unravel_index(int(fault.argmax()), fault.shape) if off.ndim else ()
+        row = f" (row {', '.join(map(str, i))})" if i else ""
+        raise NotARotationError(
+            f"{name}: the 3x3 block is not a rotation{row}: R R^T differs from 1 by "
+            f"{float(off[i]):.2g} and det R = {float(np.linalg.det(R)[i]):.6g}; at most "
+            f"{ROTATION_TOLERANCE:g} is accepted and rounded away. Make it one first, for "
+            "example with scipy.spatial.transform.Rotation.from_matrix(R).as_matrix()."
+        )
+    T = T.copy()
+    T[..., 3, :] = 0.0, 0.0, 0.0, 1.0
+    if worst > 4e-15:
+        U, _, Vt = np.linalg.svd(R)
+        T[..., :3, :3] = np.where((off > 4e-15)[..., None, None], U @ Vt, R)
+    return T
+
+
+def as_single_pose(T: Any, name: str) -> Array:
+    """One checked pose; None is the identity.
+
+    Parameters
+    ----------
+    T : array_like, shape (4, 4), or None
+        The pose.
+    name : str
+        Used in error messages.
+
+    Returns
+    -------
+    ndarray, shape (4, 4)
+        Checked pose.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError, NotARotationError
+        As `as_pose`.
+
+    Examples
+    --------
+    >>> bool((as_single_pose(None, "tool") == np.eye(4)).all())
+    True
+    """
+    if T is None:
+        return np.eye(4)
+    T = as_pose(T, name)
+    if T.ndim != 2:
+        raise ShapeError(f"{name}: expected one pose of shape (4, 4), got {T.shape}.")
+    return T
