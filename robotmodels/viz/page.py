@@ -93,14 +93,23 @@ body {{ margin: 0; }}
   window.viewer = viewer;
   scene.commands.forEach(function (command) {{ viewer.handle_command(command); }});
   viewer.controls.target.fromArray(scene.target);
-  // in a picture narrower than the camera was placed for, step back until nothing is cut off:
-  // a point at depth z is seen if its distance from the axis is below slope (distance + z)
-  var across = document.getElementById("meshcat-pane").offsetWidth / window.innerHeight;
-  if (across > 0 && across < scene.aspect) {{
-    var eye = viewer.camera.position, target = viewer.controls.target;
-    var wider = scene.aspect / across, distance = eye.distanceTo(target);
+  // In a picture narrower than the camera was placed for, step back until nothing is cut off:
+  // a point at depth z is seen if its distance from the axis is below slope (distance + z).
+  var pane = document.getElementById("meshcat-pane"), touched = false;
+  var eye = viewer.camera.position, target = viewer.controls.target;
+  var distance = eye.distanceTo(target);
+  function fit() {{
+    var across = pane.offsetWidth / window.innerHeight;
+    if (touched || !(across > 0)) return;
+    var wider = Math.max(scene.aspect / across, 1);
     eye.sub(target).setLength(wider * distance + (wider - 1) * scene.depth).add(target);
+    viewer.set_dirty();
   }}
+  ["pointerdown", "wheel"].forEach(function (event) {{
+    pane.addEventListener(event, function () {{ touched = true; }}, true);
+  }});
+  window.addEventListener("resize", fit);
+  fit();
   viewer.set_3d_pane_size();
 }})();
 </script>
