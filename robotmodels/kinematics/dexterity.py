@@ -238,7 +238,7 @@ def manipulability(
 
     Examples
     --------
-    A planar arm of two links: l1 l2 |sin q2|.
+    A planar arm of two links: ``l1 l2 |sin q2|``.
 
     >>> from robotmodels.geometry import DHTable
     >>> from robotmodels.se3 import translation

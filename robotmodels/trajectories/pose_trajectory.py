@@ -82,7 +82,7 @@ class PoseTrajectory:
 
         Returns
         -------
-        ndarray, shape (*t.shape, 4, 4)
+        ndarray, shape (t.shape..., 4, 4)
             Poses, m.
 
         Raises
@@ -116,7 +116,7 @@ class PoseTrajectory:
 
         Returns
         -------
-        ndarray, shape (*t.shape, 6)
+        ndarray, shape (t.shape..., 6)
             ``[v; w]`` of the tool's origin, world axes, m/s and rad/s.
         """
         s, v = self.law.q(t), self.law.v(t)
@@ -132,7 +132,7 @@ class PoseTrajectory:
 
         Returns
         -------
-        ndarray, shape (*t.shape, 6)
+        ndarray, shape (t.shape..., 6)
             Derivative of the twist, m/s^2 and rad/s^2.
         """
         s, v, a = self.law.q(t), self.law.v(t), self.law.a(t)

@@ -141,7 +141,7 @@ class Trajectory:
 
         Returns
         -------
-        ndarray, shape (..., *t.shape, n)
+        ndarray, shape (..., t.shape..., n)
             rad or m; without the last axis for a scalar trajectory. Leading axes are those of a
             batch of motions.
 
@@ -170,7 +170,7 @@ class Trajectory:
 
         Returns
         -------
-        ndarray, shape (..., *t.shape, n)
+        ndarray, shape (..., t.shape..., n)
             rad/s or m/s.
         """
         return self._at(t, (1,))[0]
@@ -185,7 +185,7 @@ class Trajectory:
 
         Returns
         -------
-        ndarray, shape (..., *t.shape, n)
+        ndarray, shape (..., t.shape..., n)
             rad/s^2 or m/s^2. Where it jumps, the value after the jump.
         """
         return self._at(t, (2,))[0]
@@ -200,7 +200,7 @@ class Trajectory:
 
         Returns
         -------
-        ndarray, shape (..., *t.shape, n)
+        ndarray, shape (..., t.shape..., n)
             rad/s^3 or m/s^3, without the pulses where the acceleration jumps.
         """
         return self._at(t, (3,))[0]
