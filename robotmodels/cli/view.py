@@ -1,8 +1,14 @@
-"""``robotmodels view``: draw a robot into an offline page."""
+"""``robotmodels view``: open a robot with joint sliders in the browser."""
 
 from __future__ import annotations
 
 import argparse
+import json
+import os
+import re
+import sys
+import tempfile
+import webbrowser
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +16,16 @@ import numpy as np
 
 from .numbers import posture
 from .source import add_source, robot_of
+
+_EXAMPLES = """\
+examples:
+  robotmodels view rx90
+  robotmodels view erd:panda --q default
+  robotmodels view erd:ur5 --q 0 -90 90 0 90 0 --degrees --out ur5.html
+  robotmodels view arm.urdf --package-dir packages --no-open
+
+The page needs neither a network nor this program any more. Its address may hold a posture, in the
+order and the units of the sliders: ur5.html#q=0,-90,90,0,90,0"""
 
 
 def add_command(commands: Any) -> None:
@@ -26,20 +42,32 @@ def add_command(commands: Any) -> None:
     """
     parser = commands.add_parser(
         "view",
-        help="draw a robot into an offline page",
-        description="Draw a robot in one configuration and save the scene as one HTML file that "
-        "any browser opens without a network.",
+        help="open a robot with joint sliders in the browser",
+        description="Draw a robot with a slider for each joint and the pose of its tool, write it "
+        "as one HTML file\nand open it in the browser.",
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     add_source(parser)
-    parser.add_argument("--q", metavar="NUMBERS", help="joint variables in rad and m, or the name "
-                        "of a configuration; default zero")  # fmt: skip
+    parser.add_argument("--q", metavar="NUMBERS", help="where the robot is at first: joint "
+                        "variables in rad and m, or the name of a configuration; default "
+                        "zero")  # fmt: skip
     parser.add_argument("--degrees", action="store_true", help="revolute joints of --q in degrees")
-    parser.add_argument("--out", type=Path, help="file to write; default NAME.html")
+    parser.add_argument("--skeleton", action="store_true",
+                        help="rods and cylinders sized from the table instead of the URDF's "
+                        "shapes")  # fmt: skip
+    parser.add_argument("--frames", action="store_true",
+                        help="the axes and the names of all frames")  # fmt: skip
+    parser.add_argument("--out", type=Path, metavar="FILE",
+                        help="page to write; default a new file in the folder for temporary "
+                        "files")  # fmt: skip
+    parser.add_argument("--no-open", action="store_true", help="only write the page")
+    parser.add_argument("--json", action="store_true", help="print JSON instead of sentences")
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Draw and save.
+    """Draw, save and open.
 
     Parameters
     ----------
@@ -52,13 +80,52 @@ def run(arguments: argparse.Namespace) -> None:
     >>> parser = argparse.ArgumentParser()
     >>> add_command(parser.add_subparsers())
     >>> with tempfile.TemporaryDirectory() as folder:  # doctest: +ELLIPSIS
-    ...     run(parser.parse_args(["view", "rx90", "--out", f"{folder}/arm.html"]))
+    ...     words = ["view", "rx90", "--no-open", "--out", f"{folder}/arm.html"]
+    ...     run(parser.parse_args(words))
     Scene of rx90 at q = [0. 0. 0. 0. 0. 0.] written to ...
     """
-    from ..viz import show
+    from ..viz import jog
+    from ..viz.stand_ins import with_stand_ins
 
     model = robot_of(arguments)
-    q = posture(arguments.q or "zero", model, "--q", arguments.degrees)
-    path = arguments.out or Path(f"{model.name}.html")
-    show(model, q).save(path)
-    print(f"Scene of {model.name} at q = {np.array2string(q, precision=4)} written to {path}")
+    q = None if arguments.q is None else posture(arguments.q, model, "--q", arguments.degrees)
+    model, missing = (model, ()) if arguments.skeleton else with_stand_ins(model)
+    scene = jog(
+        model, q, meshes=not arguments.skeleton, frames=arguments.frames, names=arguments.frames
+    )
+    path = scene.save(arguments.out or _temporary(model.name)).absolute()
+    opened = not arguments.no_open and _open(path)
+    start = scene.sliders.q if scene.sliders is not None else model.configurations["zero"]
+    if arguments.json:
+        print(json.dumps({
+            "robot": model.name, "joints": model.table.joint_names, "q": start.tolist(),
+            "page": str(path), "opened": opened, "missing_meshes": missing,
+        }))  # fmt: skip
+        return
+    text = np.array2string(start, precision=4, suppress_small=True, max_line_width=10_000)
+    print(f"Scene of {model.name} at q = {text} written to {path}")
+    if missing:
+        print(f"Mesh files not found, a skeleton is drawn for them: {', '.join(missing)}. Give "
+              "their folder with --package-dir.")  # fmt: skip
+    if not opened and not arguments.no_open:
+        print("There is no display or no browser here: open the page in one yourself.")
+
+
+def _temporary(name: str) -> Path:
+    """A new empty file."""
+    stem = re.sub(r"[^\w.-]", "_", name)
+    handle, path = tempfile.mkstemp(prefix=f"robotmodels_{stem}_", suffix=".html")
+    os.close(handle)
+    return Path(path)
+
+
+def _open(path: Path) -> bool:
+    """Open a page in a browser with windows, if there is one."""
+    windows = not sys.platform.startswith(("linux", "freebsd")) or any(
+        os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
+    )
+    try:
+        # without a display Python would start a text browser in the terminal
+        return windows and webbrowser.open(path.as_uri())
+    except (webbrowser.Error, OSError):
+        return False

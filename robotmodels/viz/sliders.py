@@ -115,6 +115,11 @@ class SliderPanel:
     postures: tuple[tuple[str, Array], ...]
     targets: tuple[Target, ...]
 
+    @property
+    def q(self) -> Array:
+        """All n joint variables at first, rad or m."""
+        return self.matrix @ self.start + self.offset
+
 
 def slider_panel(
     model: RobotModel, q: Array, moving: Sequence[str], frames: Sequence[str]

@@ -1,0 +1,48 @@
+"""A skeleton in place of mesh files that are not where they were looked for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ..model import RobotModel
+from ..visual import Mesh, Visual, skeleton
+
+
+def with_stand_ins(model: RobotModel) -> tuple[RobotModel, tuple[str, ...]]:
+    """The robot with a skeleton for the links whose mesh files are missing.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot.
+
+    Returns
+    -------
+    model : RobotModel
+        Itself if all meshes are there, otherwise one with other shapes.
+    missing : tuple of str
+        The mesh files that were not found, as the URDF names them.
+
+    Examples
+    --------
+    >>> from robotmodels.geometry import DHTable
+    >>> arm = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))
+    >>> with_stand_ins(arm)[1]
+    ()
+    """
+    lost = [v for v in model.visuals if isinstance(v.shape, Mesh) and not _is_there(v.shape)]
+    if not lost:
+        return model, ()
+    frames = {visual.frame for visual in lost}
+    bones: list[Visual] = [
+        visual
+        for visual in skeleton(model.table, model.tool, model.tip, axes=False)
+        if visual.frame in frames
+    ]
+    kept = [visual for visual in model.visuals if visual not in lost]
+    names = dict.fromkeys(v.shape.filename for v in lost if isinstance(v.shape, Mesh))
+    return replace(model, visuals=(*kept, *bones)), tuple(names)
+
+
+def _is_there(mesh: Mesh) -> bool:
+    return mesh.path is not None and mesh.path.is_file()
