@@ -1,6 +1,6 @@
 """Identifiable geometric parameters of robots under each kind of measurement, as tables.
 
-    python benchmarks/accuracy_calibration.py [--out benchmarks/results]
+    python -m benchmarks.accuracy_calibration [--out benchmarks/results]
 
 For each robot, a row for each parameter and a column for each kind. Structural: random
 configurations within the joint ranges, contacts at configurations that satisfy them exactly. The

@@ -1,6 +1,6 @@
 """Errors and deviations of identified parameters over many noisy logs of a simulated RX-90.
 
-    python benchmarks/accuracy_identification.py [--logs 500] [--processes 2] [--state FOLDER]
+    python -m benchmarks.accuracy_identification [--logs 500] [--processes 2] [--state FOLDER]
 
 Set OPENBLAS_NUM_THREADS=1 when other work runs beside.
 
@@ -482,7 +482,7 @@ def main() -> None:
                 found[case].append(row)
                 print(f"\r{k + 1} of {len(tasks)}", end="", file=sys.stderr)
     print(file=sys.stderr)
-    command = f"python benchmarks/accuracy_identification.py --logs {options.logs}"
+    command = f"python -m benchmarks.accuracy_identification --logs {options.logs}"
     text = text_of(found, command)
     print(text)
     (options.out / "accuracy_identification.md").write_text(text, encoding="utf-8")

@@ -1,6 +1,6 @@
 """Completeness and accuracy of the inverse geometric models, beside EAIK where it serves the arm.
 
-    python benchmarks/accuracy_igm.py [--poses 100000] [--arms 1000] [--out benchmarks/results]
+    python -m benchmarks.accuracy_igm [--poses 100000] [--arms 1000] [--out benchmarks/results]
 
 For each arm, the poses of random postures, 3 of 100 of them singular or nearly so (wrist aligned,
 elbow stretched or folded, shoulder on the axis, all combinations; exactly, or 1e-12 ... 1e-3 rad
@@ -20,9 +20,12 @@ from dataclasses import asdict, dataclass, replace
 from multiprocessing import get_context
 from pathlib import Path
 
-import igm_arms
 import numpy as np
-from igm_checks import (
+from numpy.typing import NDArray
+
+import robotmodels as rm
+from benchmarks import igm_arms
+from benchmarks.igm_checks import (
     CLOSE,
     branch_given_back,
     difference,
@@ -31,11 +34,9 @@ from igm_checks import (
     newton_search,
     residual,
 )
-from igm_peers import eaik, machine
-from igm_postures import Kind, sample, sigma_of, uniform
-from numpy.typing import NDArray
-
-import robotmodels as rm
+from benchmarks.igm_peers import PACKAGES, eaik
+from benchmarks.igm_postures import Kind, sample, sigma_of, uniform
+from benchmarks.machine import machine
 from robotmodels.igm.general import general_postures, prepare_general
 from robotmodels.igm.loop import joint_chain
 
@@ -435,7 +436,7 @@ def main() -> None:
                 print(brief(row), flush=True)
     printed = printed_postures()
     union = random_arms(arguments.arms) if arguments.arms else None
-    about = machine()
+    about = machine(PACKAGES)
     text = report(rows, printed, union, about)
     print(text)
     arguments.out.mkdir(parents=True, exist_ok=True)

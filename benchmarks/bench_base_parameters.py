@@ -1,6 +1,6 @@
 """Base parameters, regressors and inverse dynamics beside Pinocchio and FIGAROH, in one run.
 
-    OPENBLAS_NUM_THREADS=1 python benchmarks/bench_base_parameters.py [--rounds 5] [--out ...]
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.bench_base_parameters [--rounds 5] [--out ...]
 
 Contestants of a row take turns, round after round; figures are medians of the processor's time,
 with the median of the time on the clock beside it. Base parameters: links, rotor inertia and
@@ -17,15 +17,12 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
-import platform
 import subprocess
 import sys
 import time
 import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +30,9 @@ import numpy as np
 import pinocchio as pin
 
 import robotmodels as rm
+from benchmarks.kept import RESULTS, keep
+from benchmarks.machine import head, machine
+from benchmarks.measure import Contestant, in_turns, loop
 from robotmodels import regressors
 from robotmodels.dynamics import idm_from_base
 
@@ -41,17 +41,8 @@ BATCH = 100_000
 FEW = 2_000
 SAMPLES = 10_000
 LONG = (100_000, 1_000_000)
+ROOT = Path(__file__).parents[1]
 Motion = tuple[np.ndarray, np.ndarray, np.ndarray]
-
-
-@dataclass(frozen=True)
-class Contestant:
-    """One way to do the work; `said` tells of its answer what is worth a note."""
-
-    name: str
-    run: Callable[[], object]
-    samples: int = 1
-    said: Callable[[Any], str] = lambda _: ""
 
 
 @dataclass(frozen=True)
@@ -73,16 +64,12 @@ def measured(
     work: str, field: list[Contestant], rounds: int, unit: str, goals: dict[str, tuple[str, float]]
 ) -> list[Row]:
     """Times of contestants taking turns; `goals` has the text and the limit by name."""
-    notes = {c.name: c.said(c.run()) for c in field}  # compile, page in
-    times: dict[str, list[tuple[float, float]]] = {c.name: [] for c in field}
+    found = in_turns(field, rounds)
     factor = {"ms": 1e3, "us": 1e6}[unit]
-    for _ in range(rounds):
-        for c in field:
-            clock, processor = time.perf_counter(), time.process_time()
-            c.run()
-            spent = time.process_time() - processor, time.perf_counter() - clock
-            times[c.name].append((spent[0] / c.samples * factor, spent[1] / c.samples * factor))
-    median = {name: np.median(values, axis=0).tolist() for name, values in times.items()}
+    notes = {name: timing.note for name, timing in found.items()}
+    median = {
+        name: (t.processor.median * factor, t.clock.median * factor) for name, t in found.items()
+    }
     first = median[field[0].name][0]
     rows = []
     for c in field:
@@ -109,49 +96,6 @@ def motion_of(n: int, count: int) -> Motion:
     return arrays
 
 
-class Figaroh:
-    """FIGAROH told the same robot: its regressor and its base parameters, by its defaults."""
-
-    def __init__(self, model: rm.RobotModel) -> None:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            from figaroh.identification import parameter
-            from figaroh.tools import qrdecomposition, regressor
-        self.regressor, self.qr = regressor, qrdecomposition
-        drives = model.drive if model.drive is not None else rm.DriveParameters.zeros(model.n)
-        self.settings = {
-            "has_friction": True, "has_actuator_inertia": True, "has_joint_offset": False,
-            "act_idxv": list(range(model.n)),
-            "fv": drives.Fv.tolist(), "fs": drives.Fc.tolist(), "Ia": drives.Ia.tolist(),
-        }  # fmt: skip
-        self.robot = pin.RobotWrapper(model.pin_model)
-        self.values = parameter.get_standard_parameters(model.pin_model)
-        self.values |= parameter.add_standard_additional_parameters(model.pin_model, self.settings)
-
-    def stack(self, motion: Motion, drive: bool = True) -> np.ndarray:
-        """The regressor of all samples."""
-        config = self.regressor.RegressorConfig(has_friction=drive, has_actuator_inertia=drive)
-        builder = self.regressor.RegressorBuilder(self.robot, config)
-        return builder.build_basic_regressor(*motion, self.settings)
-
-    def base(self, motion: Motion) -> tuple[Any, np.ndarray, list[str]]:
-        """Regressor, columns without effect left out, double QR."""
-        W = self.stack(motion)
-        empty, names = self.regressor.get_index_eliminate(W, self.values)
-        W = self.regressor.build_regressor_reduced(W, empty)
-        found = self.qr.QRDecomposer()
-        found.double_decomposition(np.zeros(len(W)), W, names, self.values)
-        return found, W, names
-
-    def said(self, answer: tuple) -> str:
-        """Rank, and how well the base parameters give the torques of all."""
-        found, W, names = answer
-        theta = np.array([self.values[name] for name in names])
-        tau = W @ theta
-        error = np.abs(W[:, found.base_indices] @ (found.M @ theta) - tau).max() / np.abs(tau).max()
-        return f"rank {len(found.base_indices)}, torques kept to {error:.0e}"
-
-
 def figaroh_present() -> bool:
     """Whether FIGAROH can be imported."""
     try:
@@ -161,6 +105,14 @@ def figaroh_present() -> bool:
     except ImportError:
         return False
     return True
+
+
+def figaroh_of(model: rm.RobotModel) -> Any:
+    """FIGAROH told the same robot."""
+    from benchmarks.figaroh_base import Figaroh
+
+    drive = model.drive if model.drive is not None else rm.DriveParameters.zeros(model.n)
+    return Figaroh(model.pin_model, drive.Ia, drive.Fv, drive.Fc)
 
 
 def rank_of(base: rm.BaseParameters) -> int:
@@ -216,7 +168,7 @@ def base_parameter_rows(peer: bool, rounds: int) -> list[Row]:
             ),
         ]  # fmt: skip
         if peer:
-            figaroh = Figaroh(model)
+            figaroh = figaroh_of(model)
             field.append(
                 Contestant(
                     "FIGAROH, 1e4 samples", lambda f=figaroh, x=motion: f.base(x), said=figaroh.said
@@ -234,16 +186,6 @@ def through(chunks: Iterable[object]) -> None:
     """Go through the pieces of a stream."""
     for _ in chunks:
         pass
-
-
-def loop(call: Callable[..., object], *arrays: np.ndarray) -> Callable[[], None]:
-    """A call for each sample, from Python."""
-
-    def run() -> None:
-        for row in zip(*arrays, strict=True):
-            call(*row)
-
-    return run
 
 
 def regressor_rows(peer: bool, rounds: int) -> list[Row]:
@@ -270,7 +212,7 @@ def regressor_rows(peer: bool, rounds: int) -> list[Row]:
     plain = Contestant("Pinocchio, Python loop", loop(pin_torque, *few), FEW)
     field = [Contestant("robotmodels", torques(drive=False), BATCH), plain]
     if peer:
-        figaroh = Figaroh(model)
+        figaroh = figaroh_of(model)
         field.append(Contestant("FIGAROH", lambda: figaroh.stack(few, drive=False), FEW))
     rows = measured("torque, 6 x 60", field, rounds, "us", goal)
     name = f"torque, base parameters alone, 6 x {len(links)}"
@@ -360,7 +302,7 @@ def standard_rows(rounds: int) -> list[Row]:
 def child(who: str, count: int) -> None:
     """One call in this process: prints its memory, times and answer."""
     model = rm.load("erd:ur10")
-    figaroh = Figaroh(model) if who == "FIGAROH" else None
+    figaroh = figaroh_of(model) if who == "FIGAROH" else None
 
     def answer(motion: Motion) -> Any:
         if figaroh is not None:
@@ -400,41 +342,28 @@ def memory_rows(peer: bool) -> list[dict[str, Any]]:
         asked += [("FIGAROH", count) for count in (SAMPLES, LONG[0])]
     rows = []
     for who, count in asked:
-        command = [sys.executable, "-W", "ignore", __file__, "--child", who, "--count", str(count)]
-        out = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        command = [
+            sys.executable,
+            "-W",
+            "ignore",
+            "-m",
+            "benchmarks.bench_base_parameters",
+            "--child",
+            who,
+            "--count",
+            str(count),
+        ]
+        out = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT).stdout
         rows.append({"name": who, "samples": count, **json.loads(out.splitlines()[-1])})
     return rows
-
-
-def machine() -> dict[str, str]:
-    """What the figures were measured on, and with which versions."""
-    found = {"robotmodels": rm.__version__}
-    for package in ("pin", "numpy", "numba", "scipy", "clarabel", "figaroh"):
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = "not installed"
-    cpu = platform.processor() or platform.machine()
-    info = Path("/proc/cpuinfo")
-    if info.exists():
-        names = [line for line in info.read_text().splitlines() if line.startswith("model name")]
-        cpu = names[0].partition(":")[2].strip() if names else cpu
-    load = f"{os.getloadavg()[0]:.1f} on {os.cpu_count()} cores when the run began"
-    threads = os.environ.get("OPENBLAS_NUM_THREADS", "not set")
-    return {
-        "cpu": cpu, "system": platform.system(), "python": platform.python_version(), **found,
-        "OPENBLAS_NUM_THREADS": threads, "load": load,
-    }  # fmt: skip
 
 
 def report(
     parts: dict[str, list[Row]], memory: list[dict[str, Any]], about: dict[str, str], rounds: int
 ) -> str:
     """The results as Markdown."""
-    lines = ["# Base parameters and regressors: measured side by side", ""]
-    lines += [f"- {key}: {value}" for key, value in about.items()]
-    lines += [
-        "",
+    lines = [
+        *head("Base parameters and regressors: measured side by side", about),
         f"Medians of {rounds} rounds (FIGAROH too) of the processor's time, and of the clock's; "
         "`x`: ratio to the first line of each work. Goals are of the processor's time.",
         "`rank`: base parameters of links, rotors and friction, without offsets. `gap`: least "
@@ -478,7 +407,7 @@ def report(
 def main() -> None:
     """Measure, print and keep the results."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
+    parser.add_argument("--out", type=Path, default=RESULTS)
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--child", help=argparse.SUPPRESS)
     parser.add_argument("--count", type=int, help=argparse.SUPPRESS)
@@ -486,7 +415,7 @@ def main() -> None:
     if arguments.child:
         child(arguments.child, arguments.count)
         return
-    about, rounds = machine(), arguments.rounds
+    about, rounds = machine(["clarabel", "figaroh"]), arguments.rounds
     peer = figaroh_present()
     if not peer:
         print("FIGAROH is not installed: its entries are left out.")
@@ -499,17 +428,13 @@ def main() -> None:
     memory = memory_rows(peer)
     text = report(parts, memory, about, rounds)
     print(text)
-    arguments.out.mkdir(parents=True, exist_ok=True)
-    (arguments.out / "base_parameters.md").write_text(text, encoding="utf-8")
     kept = {
         "machine": about,
         "rounds": rounds,
         "parts": {title: [asdict(row) for row in rows] for title, rows in parts.items()},
         "memory": memory,
     }
-    (arguments.out / "base_parameters.json").write_text(
-        json.dumps(kept, indent=2) + "\n", encoding="utf-8"
-    )
+    keep(arguments.out, "base_parameters", text, kept)
 
 
 if __name__ == "__main__":

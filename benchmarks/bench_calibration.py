@@ -1,6 +1,6 @@
 """Geometric calibration beside FIGAROH and pybotics, and on real data that were kept aside.
 
-    OPENBLAS_NUM_THREADS=1 python benchmarks/bench_calibration.py [--rounds 7] [--out ...]
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.bench_calibration [--rounds 7] [--out ...]
         [--figaroh-python PATH] [--pybotics-python PATH] [--quick]
 
 Times: a UR10 with errors of 1 mm and 2 mrad in all placements, base and tool off, noise of 0.1 mm
@@ -17,17 +17,15 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
-import platform
 import subprocess
 import tempfile
-import time
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from calibration_data import (
+
+import robotmodels as rm
+from benchmarks.calibration_data import (
     CAMERA_WAYS,
     PANDA_WAYS,
     camera_errors,
@@ -35,9 +33,10 @@ from calibration_data import (
     panda,
     panda_errors,
 )
-
-import robotmodels as rm
-from robotmodels.calibration import CalibrationResult, Pose, fit
+from benchmarks.kept import RESULTS, keep
+from benchmarks.machine import head, machine
+from benchmarks.measure import Contestant, in_turns
+from robotmodels.calibration import Pose, fit
 from robotmodels.datasets import ur10_camera
 
 SIZES = (30, 100, 200, 500)
@@ -80,18 +79,6 @@ def simulated(count: int) -> tuple[rm.RobotModel, np.ndarray, np.ndarray]:
     return model, q, np.array(poses)
 
 
-def timed(run: Any, rounds: int) -> tuple[float, float, CalibrationResult]:
-    """Medians of processor and clock, s, and the last answer."""
-    found = run()
-    spent = []
-    for _ in range(rounds):
-        clock, processor = time.perf_counter(), time.process_time()
-        found = run()
-        spent.append((time.process_time() - processor, time.perf_counter() - clock))
-    processor, clock = np.median(spent, axis=0).tolist()
-    return processor, clock, found
-
-
 def speed_rows(sizes: tuple[int, ...], rounds: int, figaroh: str, pybotics: str) -> list[Row]:
     """Full calibration on simulated poses."""
     rows: list[Row] = []
@@ -105,9 +92,12 @@ def speed_rows(sizes: tuple[int, ...], rounds: int, figaroh: str, pybotics: str)
             "repeats": min(rounds, 3),
         })  # fmt: skip
         for name, options in ((OURS, {"folds": 0, "held_out": 0}), (DEFAULT, {})):
-            processor, clock, found = timed(
-                lambda o=options, m=model, x=q, y=T: fit(m, Pose(x, y), **o), rounds
-            )
+            found = fit(model, Pose(q, T), **options)
+            took = in_turns(
+                [Contestant(name, lambda o=options, m=model, x=q, y=T: fit(m, Pose(x, y), **o))],
+                rounds,
+            )[name]
+            processor, clock = took.processor.median, took.clock.median
             errors = found.after.summary("m"), found.after.summary("rad")
             rows.append({
                 "work": count, "name": name, "processor": processor, "clock": clock,
@@ -209,35 +199,11 @@ def panda_rows(ways: tuple[str, ...], robots: tuple[str, ...]) -> list[Row]:
     return rows
 
 
-def machine(figaroh: str, pybotics: str) -> dict[str, str]:
-    """What the figures were measured on."""
-    found = {"robotmodels": rm.__version__}
-    for package in ("numpy", "numba", "scipy"):
-        found[package] = version(package)
-    for package, python in (("figaroh", figaroh), ("pybotics", pybotics)):
-        code = f"from importlib.metadata import version; print(version({package!r}))"
-        try:
-            done = subprocess.run([python, "-c", code], capture_output=True, text=True, check=True)
-            found[package] = done.stdout.strip()
-        except (OSError, subprocess.CalledProcessError, PackageNotFoundError):
-            found[package] = "left out: no Python with it was named"
-    cpu, info = platform.processor() or platform.machine(), Path("/proc/cpuinfo")
-    if info.exists():
-        names = [line for line in info.read_text().splitlines() if line.startswith("model name")]
-        cpu = names[0].partition(":")[2].strip() if names else cpu
-    return {
-        "cpu": cpu, "system": platform.system(), "python": platform.python_version(), **found,
-        "OPENBLAS_NUM_THREADS": os.environ.get("OPENBLAS_NUM_THREADS", "not set"),
-        "load": f"{os.getloadavg()[0]:.1f} on {os.cpu_count()} cores when the run began",
-    }  # fmt: skip
-
-
 def report(about: dict[str, str], speed: list[Row], camera: list[Row], sockets: list[Row]) -> str:
     """The results as Markdown."""
-    lines = ["# Geometric calibration: measured side by side", ""]
-    lines += [f"- {key}: {value}" for key, value in about.items()]
-    lines += [
-        "", "## UR10, simulated poses", "",
+    lines = [
+        *head("Geometric calibration: measured side by side", about),
+        "## UR10, simulated poses", "",
         "Processor's time and clock in s, medians; `x`: ratio to the plain fit of ours. Position "
         "and angle: root mean square of the fitted rows; floor: what noise alone leaves of the "
         "position with 30 parameters.", "",
@@ -299,7 +265,7 @@ PARTS = ["speed", "double_socket", "camera"]
 def main() -> None:
     """Measure, print and keep the results."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
+    parser.add_argument("--out", type=Path, default=RESULTS)
     parser.add_argument("--rounds", type=int, default=7)
     parser.add_argument("--figaroh-python", default="")
     parser.add_argument("--pybotics-python", default="")
@@ -314,7 +280,7 @@ def main() -> None:
         if not python:
             print(f"No Python with {name} was named: its entries are left out.")
     quick = given.quick
-    about = machine(figaroh, pybotics)
+    about = machine(interpreters={"figaroh": figaroh, "pybotics": pybotics})
     if quick:
         about["run"] = "quick: not all that the script measures"
     sizes = (SIZES[0], SIZES[-1]) if quick else SIZES
@@ -323,15 +289,10 @@ def main() -> None:
     speed: list[Row] = []
     camera: list[Row] = []
     sockets: list[Row] = []
-    given.out.mkdir(parents=True, exist_ok=True)
 
-    def keep() -> None:
-        text = report(about, speed, camera, sockets)
-        (given.out / "calibration.md").write_text(text, encoding="utf-8")
+    def keep_all() -> None:
         kept = {"machine": about, "speed": speed, "camera": camera, "double_socket": sockets}
-        (given.out / "calibration.json").write_text(
-            json.dumps(kept, indent=2) + "\n", encoding="utf-8"
-        )
+        keep(given.out, "calibration", report(about, speed, camera, sockets), kept)
 
     old = json.loads((given.out / "calibration.json").read_text()) if given.parts != PARTS else {}
     for rows, part in ((speed, "speed"), (camera, "camera"), (sockets, "double_socket")):
@@ -341,14 +302,14 @@ def main() -> None:
         about["parts"] = f"measured now: {', '.join(given.parts)}; the rest earlier"
     if "speed" in given.parts:
         speed += speed_rows(sizes, 1 if quick else given.rounds, figaroh, pybotics)
-        keep()
+        keep_all()
     if "double_socket" in given.parts:
         for robot in robots:
             sockets += panda_rows(tuple(PANDA_WAYS), (robot,))
-            keep()
+            keep_all()
     if "camera" in given.parts:
         camera += camera_rows(tuple(ways), figaroh)
-        keep()
+        keep_all()
     print(report(about, speed, camera, sockets))
 
 

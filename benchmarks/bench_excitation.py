@@ -1,7 +1,7 @@
 """Exciting trajectories: condition numbers, times, and the random motions that they are beside.
 
-    OPENBLAS_NUM_THREADS=1 python benchmarks/bench_excitation.py [--starts 8] [--random 100]
-        [--robots rx90 tx40 ...] [--out benchmarks/results/excitation]
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.bench_excitation [--starts 8] [--random 100]
+        [--robots rx90 tx40 ...] [--out benchmarks/results]
 
 One call of `exciting_trajectory` for each line, with its defaults but for what the line names:
 10 s, five harmonics or ten points, limits of the robot's table. Times are of the processor for the
@@ -12,17 +12,16 @@ keep the same limits, each joint as far as its own limits let it.
 from __future__ import annotations
 
 import argparse
-import json
 import os
-import platform
 import time
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import robotmodels as rm
+from benchmarks.kept import RESULTS, keep
+from benchmarks.machine import head, machine
 from robotmodels.identification.excitation import exciting_trajectory
 
 GOAL = 100.0  # unscaled condition number of a 6R arm, within GOAL_TIME
@@ -73,10 +72,8 @@ def measured(name: str, what: str, options: dict[str, Any], starts: int, drawn: 
 
 def report(rows: list[dict], facts: dict[str, str]) -> str:
     """The table in Markdown."""
-    lines = ["# Exciting trajectories: measured", ""]
-    lines += [f"- {key}: {value}" for key, value in facts.items()]
-    lines += [
-        "",
+    lines = [
+        *head("Exciting trajectories: measured", facts),
         f"Goal for a 6R arm: condition number of the base regressor, not scaled, below {GOAL:g} in "
         f"at most {GOAL_TIME:g} s of the processor, starts included; the clock is that of a "
         "machine with the load that is said. Columns in SI units, rows of all joints alike, 500 "
@@ -112,20 +109,11 @@ def main() -> None:
     parser.add_argument("--starts", type=int, default=8)
     parser.add_argument("--random", type=int, default=100)
     parser.add_argument("--robots", nargs="+")
-    parser.add_argument("--out", type=Path,
-                        default=Path(__file__).parent / "results" / "excitation")  # fmt: skip
+    parser.add_argument("--out", type=Path, default=RESULTS)
     arguments = parser.parse_args()
-    facts = {
-        "processor": platform.processor() or platform.machine(),
-        "system": platform.system(),
-        "python": platform.python_version(),
-        "robotmodels": rm.__version__,
-        **{name: version(name) for name in ("numpy", "scipy", "numba")},
-        "OPENBLAS_NUM_THREADS": os.environ.get("OPENBLAS_NUM_THREADS", "not set"),
-        "cores": str(os.cpu_count()),
-        "starts": str(arguments.starts),
-        "random motions": str(arguments.random),
-    }
+    facts = machine() | {
+        "starts": str(arguments.starts), "random motions": str(arguments.random),
+    }  # fmt: skip
     # loads the kernels from disk
     exciting_trajectory(rm.load("planar_2r"), starts=1, baseline=1, iterations=2, rng=0)
     rows = []
@@ -134,10 +122,8 @@ def main() -> None:
             continue
         rows.append(measured(name, what, options, arguments.starts, arguments.random))
         print({k: v for k, v in rows[-1].items() if k != "starts"}, flush=True)
-        arguments.out.with_suffix(".json").write_text(
-            json.dumps({"facts": facts, "rows": rows}, indent=1) + "\n", encoding="utf-8"
-        )
-        arguments.out.with_suffix(".md").write_text(report(rows, facts), encoding="utf-8")
+        kept = {"machine": facts, "rows": rows}
+        keep(arguments.out, "excitation", report(rows, facts), kept)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Identification beside FIGAROH on the same logs and columns, and logs that grow.
 
-    OPENBLAS_NUM_THREADS=1 python benchmarks/bench_identification.py [--rounds 5] [--out ...]
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.bench_identification [--rounds 5] [--out ...]
         [--figaroh-python PATH] [--quick]
 
 Both tools are given the same positions, velocities, accelerations and torques (filtered by ours)
@@ -20,20 +20,20 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
-import platform
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import warnings
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import robotmodels as rm
+from benchmarks.kept import RESULTS, keep
+from benchmarks.machine import head, machine
 from robotmodels.identification import choose_processing, fit, signals
 from robotmodels.logs import Log
 
@@ -41,6 +41,7 @@ DT = 1e-3
 NOISE = 1e-5, 0.05  # rad, N m
 PIECE = 100_000
 Row = dict[str, Any]
+MODULE, ROOT = "benchmarks.bench_identification", Path(__file__).parents[1]
 
 
 def robot(name: str) -> rm.RobotModel:
@@ -77,6 +78,44 @@ def memory() -> tuple[float, float]:
     return int(told["VmHWM"]) / 1024.0, int(told["RssFile"]) / 1024.0
 
 
+class AnonymousMemory:
+    """Growth of the memory that is no page of a file while something is done, MB.
+
+    Looked at every few milliseconds by a thread of its own: the system keeps no record of the most.
+    """
+
+    PERIOD = 0.005
+
+    def __init__(self) -> None:
+        self.first = self.most = 0.0
+        self._over = threading.Event()
+        self._watch = threading.Thread(target=self._look)
+
+    @property
+    def grown(self) -> float:
+        """The most, above what there was in the beginning."""
+        return self.most - self.first
+
+    def __enter__(self) -> AnonymousMemory:
+        self.first = self.most = self._now()
+        self._watch.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        self._watch.join()
+
+    def _look(self) -> None:
+        while not self._over.wait(self.PERIOD):
+            self.most = max(self.most, self._now())
+
+    @staticmethod
+    def _now() -> float:
+        status = Path("/proc/self/status").read_text().splitlines()
+        line = next(line for line in status if line.startswith("RssAnon"))
+        return int(line.split()[1]) / 1024.0
+
+
 def child(name: str, way: str, folder: Path, rounds: int) -> None:
     """One contestant of ours, in a process of its own."""
     model = robot(name)
@@ -96,23 +135,26 @@ def child(name: str, way: str, folder: Path, rounds: int) -> None:
     few = slice(0, min(len(q), 20_000))
     identify(Log(dt, q[few], tau[few], *(None if x is None else x[few] for x in (v, a))))
     before, spent, found = memory()[0], [], None
-    for _ in range(rounds):
-        clock, processor = time.perf_counter(), time.process_time()
-        found = identify(Log(dt, q, tau, v, a))
-        spent.append((time.process_time() - processor, time.perf_counter() - clock))
+    with AnonymousMemory() as anonymous:
+        for _ in range(rounds):
+            clock, processor = time.perf_counter(), time.process_time()
+            found = identify(Log(dt, q, tau, v, a))
+            spent.append((time.process_time() - processor, time.perf_counter() - clock))
     assert found is not None
     processor, clock = np.median(spent, axis=0).tolist()
     error = found.fitted.filtered_rmse if way == "same" else found.fitted.rmse
     print(json.dumps({
         "processor": processor, "clock": clock, "rank": len(found.names),
         "rmse": float(np.sqrt(np.mean(error**2))), "memory": memory()[0], "files": memory()[1],
-        "before": before,
+        "before": before, "anonymous": anonymous.grown,
     }))  # fmt: skip
 
 
 def run(command: list[str]) -> Row:
     """What a contestant says."""
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=3600)
+    done = subprocess.run(
+        command, capture_output=True, text=True, check=False, timeout=3600, cwd=ROOT
+    )
     said = [line for line in done.stdout.splitlines() if line.startswith("{")]
     if done.returncode or not said:
         return {"failed": (done.stderr.splitlines() or ["no answer"])[-1][:200]}
@@ -125,7 +167,7 @@ def rows_of(
     """All contestants on one log."""
     out = []
     for way in ways:
-        command = [sys.executable, "-W", "ignore", __file__, "--child", name, way, str(folder)]
+        command = [sys.executable, "-W", "ignore", "-m", MODULE, "--child", name, way, str(folder)]
         out.append({"work": work, "name": NAMES[way], **run([*command, "--rounds", str(rounds)])})
         print(out[-1], flush=True)
     if peer:
@@ -159,32 +201,11 @@ def prepared(folder: Path, name: str, dt: float) -> None:
         (folder / "robot.urdf").write_text(rm.to_urdf(robot(name)), encoding="utf-8")
 
 
-def machine(peer: str) -> dict[str, str]:
-    """What the figures were measured on."""
-    found = {"robotmodels": rm.__version__}
-    found |= {package: version(package) for package in ("numpy", "numba", "scipy")}
-    code = "from importlib.metadata import version; print(version('figaroh'))"
-    done = subprocess.run(
-        [peer or "false", "-c", code], capture_output=True, text=True, check=False
-    )
-    found["figaroh"] = done.stdout.strip() or "left out: no Python with it was named"
-    cpu, info = platform.processor() or platform.machine(), Path("/proc/cpuinfo")
-    if info.exists():
-        names = [line for line in info.read_text().splitlines() if line.startswith("model name")]
-        cpu = names[0].partition(":")[2].strip() if names else cpu
-    return {
-        "cpu": cpu, "system": platform.system(), "python": platform.python_version(), **found,
-        "OPENBLAS_NUM_THREADS": os.environ.get("OPENBLAS_NUM_THREADS", "not set"),
-        "load": f"{os.getloadavg()[0]:.1f} on {os.cpu_count()} cores when the run began",
-    }  # fmt: skip
-
-
 def report(about: dict[str, str], rows: list[Row]) -> str:
     """The results as Markdown."""
-    lines = ["# Identification: measured side by side", ""]
-    lines += [f"- {key}: {value}" for key, value in about.items()]
-    lines += [
-        "", "Processor's time and clock in s; `x`: ratio of the processor's time to the first of "
+    lines = [
+        *head("Identification: measured side by side", about),
+        "Processor's time and clock in s; `x`: ratio of the processor's time to the first of "
         "the same log. Memory in MB: the highest of the process, what it was before the log, and "
         "of the pages of files at the end (libraries and memory maps). RMSE over all joints, N m: "
         "of the rows that were fitted, for `as fit does it` of the raw torques.", "",
@@ -208,7 +229,7 @@ def report(about: dict[str, str], rows: list[Row]) -> str:
 def main() -> None:
     """Measure, print and keep the results."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
+    parser.add_argument("--out", type=Path, default=RESULTS)
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--figaroh-python", default="")
     parser.add_argument("--quick", action="store_true")
@@ -221,16 +242,13 @@ def main() -> None:
     peer = given.figaroh_python
     if not peer:
         print("No Python with FIGAROH was named: its entries are left out.")
-    about = machine(peer)
+    about = machine(interpreters={"figaroh": peer})
     rounds = 1 if given.quick else given.rounds
     about["rounds"] = f"{rounds}, of FIGAROH {min(rounds, 3)}"
     rows: list[Row] = []
-    given.out.mkdir(parents=True, exist_ok=True)
 
-    def keep() -> None:
-        (given.out / "identification.md").write_text(report(about, rows), encoding="utf-8")
-        text = json.dumps({"machine": about, "rows": rows}, indent=2) + "\n"
-        (given.out / "identification.json").write_text(text, encoding="utf-8")
+    def keep_all() -> None:
+        keep(given.out, "identification", report(about, rows), {"machine": about, "rows": rows})
 
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
@@ -240,14 +258,14 @@ def main() -> None:
         prepared(folder, "tx40", data.log.dt)
         work = f"TX40, real, {len(data.log)} x 6"
         rows += rows_of(work, "tx40", folder, rounds, peer, ["same", "fit", "all rows"])
-        keep()
+        keep_all()
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         simulate(folder, "rx90", 100_000)
         prepared(folder, "rx90", DT)
         ways = ["same", "fit", "all rows"]
         rows += rows_of("RX-90, simulated, 1e5 x 6", "rx90", folder, rounds, peer, ways)
-        keep()
+        keep_all()
     for count in (1_000_000,) if given.quick else (1_000_000, 10_000_000):
         with tempfile.TemporaryDirectory() as place:
             folder = Path(place)
@@ -255,7 +273,7 @@ def main() -> None:
             (folder / "dt").write_text(repr(DT))
             work = f"RX-90, simulated, {count:.0e} x 6, a memory map".replace("+0", "")
             rows += rows_of(work, "rx90", folder, 1, "", ["fit"])
-            keep()
+            keep_all()
     print(report(about, rows))
 
 

@@ -1,31 +1,31 @@
 """Speed of the closed-form inverse models beside their peers, in one run.
 
-    python benchmarks/bench_igm.py [--out benchmarks/results] [--rounds 15] [--slow]
+    python -m benchmarks.bench_igm [--out benchmarks/results] [--rounds 15] [--slow]
 
 Contestants of a row take turns, round after round, so that a drifting machine is fair to all of
-them; the figures are medians in microseconds a pose. Every peer is told the same arm (those with
-arms of their own solve poses of these) and has to give back random postures before it enters.
-Peers that are not installed are named and left out (`pip install eaik ssik ik-geo
-ur-analytic-ik roboticstoolbox-python`). `--slow` adds ssik's preparation of a general arm of one's
-own, which takes minutes.
+them; the figures are medians of the processor's time in microseconds a pose. Every peer is told
+the same arm (those with arms of their own solve poses of these) and has to give back random
+postures before it enters. Peers that are not installed are named and left out (`pip install eaik
+ssik ik-geo ur-analytic-ik roboticstoolbox-python`). `--slow` adds ssik's preparation of a general
+arm of one's own, which takes minutes.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
-import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-import igm_arms
-import igm_peers
 import numpy as np
-from igm_peers import Peer, machine, peers_of
 from numpy.typing import NDArray
 
 import robotmodels as rm
+from benchmarks import igm_arms, igm_peers
+from benchmarks.igm_peers import Peer, peers_of
+from benchmarks.kept import RESULTS, keep
+from benchmarks.machine import head, machine
+from benchmarks.measure import Contestant, in_turns, loop
 from robotmodels.igm.by_plan import TOLERANCES
 from robotmodels.igm.known import known_arm
 
@@ -39,16 +39,6 @@ KERNEL = "robotmodels, kernel"
 
 
 @dataclass(frozen=True)
-class Contestant:
-    """One way to do the work of a row; what takes minutes is done ``once``."""
-
-    name: str
-    run: Callable[[], object]
-    poses: int
-    once: bool = False
-
-
-@dataclass(frozen=True)
 class Row:
     """A line of the table: medians in microseconds a pose, and the goals that were set."""
 
@@ -58,20 +48,10 @@ class Row:
     met: bool | None
 
 
-def measure(contestants: list[Contestant], rounds: int) -> dict[str, float]:
-    """Median time of each contestant, taking turns."""
-    times: dict[str, list[float]] = {c.name: [] for c in contestants}
-    for c in contestants:
-        if not c.once:
-            c.run()  # compile, page in
-    for r in range(rounds):
-        for c in contestants:
-            if c.once and r:
-                continue
-            start = time.perf_counter()
-            c.run()
-            times[c.name].append((time.perf_counter() - start) / c.poses * 1e6)
-    return {name: float(np.median(values)) for name, values in times.items()}
+def medians(contestants: list[Contestant], rounds: int) -> dict[str, float]:
+    """Median of the processor's time of each contestant, microseconds."""
+    found = in_turns(contestants, rounds)
+    return {name: 1e6 * timing.processor.median for name, timing in found.items()}
 
 
 def row(work: str, us: dict[str, float], goals: dict[str, float]) -> Row:
@@ -83,16 +63,6 @@ def row(work: str, us: dict[str, float], goals: dict[str, float]) -> Row:
     )
     met = all(us[name] <= goal for name, goal in goals.items()) if goals else None
     return Row(work, us, text, met)
-
-
-def loop(call: Callable[[Array], object], poses: Array) -> Callable[[], None]:
-    """One call a pose."""
-
-    def run() -> None:
-        for T in poses:
-            call(T)
-
-    return run
 
 
 def reachable(model: rm.RobotModel, count: int, seed: int = 0) -> Array:
@@ -151,7 +121,7 @@ def structured_rows(rounds: int) -> list[Row]:
         if alone is not None:
             contestants.append(Contestant(KERNEL, alone, THOUSAND))
         contestants += [single_peer(peer, model.n) for peer in peers]
-        us = measure(contestants, rounds)
+        us = medians(contestants, rounds)
         goals = {OURS: 12.0} | ({KERNEL: 3.0} if alone is not None else {})
         rows.append(row(f"{name}: all postures, one pose", us, goals))
         for poses in (thousand, T):
@@ -161,7 +131,7 @@ def structured_rows(rounds: int) -> list[Row]:
                 for p in peers
                 if p.batch is not None
             ]
-            us = measure(contestants, rounds if len(poses) < BATCH else max(rounds // 3, 3))
+            us = medians(contestants, rounds if len(poses) < BATCH else max(rounds // 3, 3))
             rows.append(row(f"{name}: all postures, batch of {len(poses)}", us, {OURS: 2.5}))
     return rows
 
@@ -182,7 +152,7 @@ def general_rows(rounds: int, slow: bool) -> list[Row]:
             Contestant(OURS, loop(lambda x, m=model: rm.igm(m, x), T[:FEW]), FEW),
         ]
         contestants += [single_peer(peer, model.n) for peer in peers_of(model, name)]
-        us = measure(contestants, max(rounds // 3, 3))
+        us = medians(contestants, max(rounds // 3, 3))
         goals = {f"{OURS}, batch of {THOUSAND}": 450.0}
         rows.append(row(f"{name}: up to 16 postures", us, goals))
     fresh = (igm_arms.random_arm(seed) for seed in range(1000, 2000))
@@ -200,8 +170,8 @@ def general_rows(rounds: int, slow: bool) -> list[Row]:
             arm.prepare()
             arm.solve(igm_peers.model_pose(model), **igm_peers.SSIK)
 
-        contestants.append(Contestant("ssik, own robot", theirs, 1, once=True))
-    us = measure(contestants, max(rounds // 3, 3))
+        contestants.append(Contestant("ssik, own robot", theirs, 1, rounds=1))
+    us = medians(contestants, max(rounds // 3, 3))
     rows.append(row("a new general 6R arm: the first call, preparation included", us, {OURS: 2e6}))
     return rows
 
@@ -237,7 +207,7 @@ def arm_angle_rows(rounds: int) -> list[Row]:
                 FEW * max(round(found / 8), 1),
             )
         )
-    us = measure(contestants, rounds)
+    us = medians(contestants, rounds)
     goals = {f"{OURS}, {THOUSAND} poses x 16 angles": 5.0}
     return [row("iiwa14: eight postures for one arm angle", us, goals)]
 
@@ -250,7 +220,7 @@ def other_rows(rounds: int) -> list[Row]:
         T = reachable(model, THOUSAND)
         contestants = _both(model, T)
         contestants += [single_peer(peer, model.n) for peer in peers_of(model)]
-        us = measure(contestants, max(rounds // 3, 3))
+        us = medians(contestants, max(rounds // 3, 3))
         rows.append(row(f"{name}, calibrated (1 mm, 2 mrad off)", us, {}))
     arms = {
         "xarm5": rm.load("xarm5"),
@@ -263,7 +233,7 @@ def other_rows(rounds: int) -> list[Row]:
         contestants = _both(model, T)
         peers = peers_of(model, name)
         contestants += [single_peer(peer, model.n) for peer in peers]
-        us = measure(contestants, max(rounds // 3, 3))
+        us = medians(contestants, max(rounds // 3, 3))
         rows.append(row(f"{name}: all postures", us, {}))
     return rows
 
@@ -280,10 +250,8 @@ def _both(model: rm.RobotModel, T: Array) -> list[Contestant]:
 
 def report(rows: list[Row], about: dict[str, str], rounds: int) -> str:
     """The results as Markdown, with ratios to ours."""
-    lines = ["# Closed-form inverse models: measured side by side", ""]
-    lines += [f"- {key}: {value}" for key, value in about.items()]
-    lines += [
-        "",
+    lines = [
+        *head("Closed-form inverse models: measured side by side", about),
         f"Medians of {rounds} rounds (fewer for the long rows) in us a pose, one thread; in "
         "brackets the ratio to ours, the first of the row. Poses are those of random postures "
         "over whole turns; EAIK's batches are asked of one thread; ssik is asked for every branch "
@@ -317,7 +285,7 @@ def _short(name: str) -> str:
 def main() -> None:
     """Measure, print and keep the results."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
+    parser.add_argument("--out", type=Path, default=RESULTS)
     parser.add_argument("--rounds", type=int, default=15)
     parser.add_argument(
         "--slow", action="store_true", help="minutes of ssik for a robot of one's own"
@@ -326,16 +294,13 @@ def main() -> None:
     missing = igm_peers.absent()
     if missing:
         print(f"Not installed, so left out: {', '.join(missing)}.")
+    about = machine(igm_peers.PACKAGES)
     rows = structured_rows(arguments.rounds)
     rows += general_rows(arguments.rounds, arguments.slow)
     rows += arm_angle_rows(arguments.rounds) + other_rows(arguments.rounds)
-    about = machine()
     text = report(rows, about, arguments.rounds)
     print(text)
-    arguments.out.mkdir(parents=True, exist_ok=True)
-    (arguments.out / "igm.md").write_text(text, encoding="utf-8")
-    kept = {"machine": about, "rows": [asdict(r) for r in rows]}
-    (arguments.out / "igm.json").write_text(json.dumps(kept, indent=2) + "\n", encoding="utf-8")
+    keep(arguments.out, "igm", text, {"machine": about, "rows": [asdict(r) for r in rows]})
 
 
 if __name__ == "__main__":

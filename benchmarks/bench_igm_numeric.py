@@ -1,32 +1,33 @@
 """The numeric inverse geometric model beside the Robotics Toolbox and Pinocchio, in one run.
 
-    python benchmarks/bench_igm_numeric.py [--out benchmarks/results] [--poses 2000]
+    python -m benchmarks.bench_igm_numeric [--out benchmarks/results] [--poses 2000]
 
 Every contestant gets the poses of the same random postures inside the limits, by its own direct
 model, and is asked for 1e-6 m and 1e-6 rad. What it claims to have reached is checked by its own
 direct model with the true errors: `reached` counts poses that are met, `false` those that are
 claimed and not met. The Robotics Toolbox's tolerance is on a squared cost; it runs with its
 default (1e-6) and with 5e-13, half the square of 1e-6. Contestants take turns, round after round;
-times are medians over the rounds, in microseconds a pose. The toolbox is optional
+times are medians over
+the rounds of the processor's time, in microseconds a pose. The toolbox is optional
 (`pip install roboticstoolbox-python`).
 """
 
 from __future__ import annotations
 
 import argparse
-import json
-import platform
-import time
 import warnings
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 
 import robotmodels as rm
+from benchmarks import measure
+from benchmarks.kept import RESULTS, keep
+from benchmarks.machine import head, machine
+from benchmarks.measure import in_turns
 from robotmodels.igm import igm_numeric
 
 ROUNDS = 5
@@ -158,14 +159,10 @@ def rows(count: int) -> list[Row]:
     for robot in ROBOTS:
         for limits in (False, True):
             field = contestants(robot, limits, count)
-            times: dict[str, list[float]] = {c.name: [] for c in field}
-            answers = {c.name: c.run() for c in field}  # compile, page in
-            for _ in range(ROUNDS):
-                for c in field:
-                    start = time.perf_counter()
-                    c.run()
-                    times[c.name].append((time.perf_counter() - start) / len(c.poses) * 1e6)
-            median = {name: float(np.median(values)) for name, values in times.items()}
+            answers = {c.name: c.run() for c in field}
+            ways = [measure.Contestant(c.name, c.run, len(c.poses)) for c in field]
+            found = in_turns(ways, ROUNDS)
+            median = {name: 1e6 * timing.processor.median for name, timing in found.items()}
             for c in field:
                 q, claims = answers[c.name]
                 true = met(c, q)
@@ -179,22 +176,6 @@ def rows(count: int) -> list[Row]:
     return table
 
 
-def machine() -> dict[str, str]:
-    """What the figures were measured on, and with which versions."""
-    found = {"robotmodels": rm.__version__}
-    for package in ("pin", "numpy", "numba", "roboticstoolbox-python"):
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = "not installed"
-    cpu = platform.processor() or platform.machine()
-    info = Path("/proc/cpuinfo")
-    if info.exists():
-        names = [line for line in info.read_text().splitlines() if line.startswith("model name")]
-        cpu = names[0].partition(":")[2].strip() if names else cpu
-    return {"cpu": cpu, "system": platform.system(), "python": platform.python_version(), **found}
-
-
 def report(table: list[Row], about: dict[str, str], count: int) -> str:
     """The results as Markdown."""
     ours = [row for row in table if row.name == "robotmodels, batch"]
@@ -202,10 +183,8 @@ def report(table: list[Row], about: dict[str, str], count: int) -> str:
         row.microseconds <= GOAL_TIME and row.reached >= GOAL_REACHED and row.false == 0.0
         for row in ours
     )
-    lines = ["# Numeric inverse geometric model: measured side by side", ""]
-    lines += [f"- {key}: {value}" for key, value in about.items()]
-    lines += [
-        "",
+    lines = [
+        *head("Numeric inverse geometric model: measured side by side", about),
         f"{count} poses of random postures inside the limits, asked for to {TOLERANCE:g} m and "
         f"{TOLERANCE:g} rad. Medians of {ROUNDS} rounds in us a pose, one thread; a quarter of "
         "the poses for the slower ones.",
@@ -218,31 +197,27 @@ def report(table: list[Row], about: dict[str, str], count: int) -> str:
         "| robot | limits | solver | us | x | reached | false |",
         "|---|---|---|---|---|---|---|",
     ]
-    for row in table:
-        lines.append(
-            f"| {row.robot} | {'yes' if row.limits else 'no'} | {row.name} | "
-            f"{row.microseconds:.0f} | {row.ratio:.1f} | {row.reached:.2%} | {row.false:.2%} |"
-        )
+    lines += [
+        f"| {row.robot} | {'yes' if row.limits else 'no'} | {row.name} | "
+        f"{row.microseconds:.0f} | {row.ratio:.1f} | {row.reached:.2%} | {row.false:.2%} |"
+        for row in table
+    ]
     return "\n".join(lines) + "\n"
 
 
 def main() -> None:
     """Measure, print and keep the results."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
+    parser.add_argument("--out", type=Path, default=RESULTS)
     parser.add_argument("--poses", type=int, default=2000)
     arguments = parser.parse_args()
     if _toolbox("DH", "Puma560") is None:
         print("The Robotics Toolbox is not installed: its entries are left out.")
-    about, table = machine(), rows(arguments.poses)
+    about, table = machine(["roboticstoolbox-python"]), rows(arguments.poses)
     text = report(table, about, arguments.poses)
     print(text)
-    arguments.out.mkdir(parents=True, exist_ok=True)
-    (arguments.out / "igm_numeric.md").write_text(text, encoding="utf-8")
     kept = {"machine": about, "rows": [asdict(row) for row in table]}
-    (arguments.out / "igm_numeric.json").write_text(
-        json.dumps(kept, indent=2) + "\n", encoding="utf-8"
-    )
+    keep(arguments.out, "igm_numeric", text, kept)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """The inverse kinematic model beside the Robotics Toolbox, Pinocchio and NumPy, in one run.
 
-    OPENBLAS_NUM_THREADS=1 python benchmarks/bench_ikm.py [--out benchmarks/results] [--rows 10000]
+    OPENBLAS_NUM_THREADS=1 python -m benchmarks.bench_ikm [--out benchmarks/results] [--rows 10000]
 
 Every contestant gets the same configurations and random twists of its own model of the robot and
 gives joint velocities. Ours gives its whole result: velocities, status, what is achieved, missing
@@ -14,19 +14,19 @@ medians over the rounds of the processor's time, in microseconds a row. The tool
 from __future__ import annotations
 
 import argparse
-import json
-import platform
-import time
 import warnings
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 
 import robotmodels as rm
+from benchmarks import measure
+from benchmarks.kept import RESULTS, keep
+from benchmarks.machine import head, machine
+from benchmarks.measure import in_turns
 from robotmodels.kinematics.inverse.ikm import ikm
 from robotmodels.kinematics.inverse.joint_task import JointTask
 from robotmodels.kinematics.inverse.methods import DampedInverse, PseudoInverse
@@ -150,14 +150,9 @@ def rows(count: int) -> list[Row]:
     table = []
     for robot in ROBOTS:
         field, twist, regular = contestants(robot, count)
-        answers = {c.name: c.run() for c in field}  # compile, page in
-        times: dict[str, list[float]] = {c.name: [] for c in field}
-        for _ in range(ROUNDS):
-            for c in field:
-                start = time.process_time()
-                c.run()
-                times[c.name].append((time.process_time() - start) / len(c.J) * 1e6)
-        median = {name: float(np.median(values)) for name, values in times.items()}
+        answers = {c.name: c.run() for c in field}
+        found = in_turns([measure.Contestant(c.name, c.run, len(c.J)) for c in field], ROUNDS)
+        median = {name: 1e6 * timing.processor.median for name, timing in found.items()}
         for c in field:
             n = len(c.J)
             sound = regular[:n]
@@ -174,29 +169,11 @@ def rows(count: int) -> list[Row]:
     return table
 
 
-def machine() -> dict[str, str]:
-    """What the figures were measured on, and with which versions."""
-    found = {"robotmodels": rm.__version__}
-    for package in ("pin", "numpy", "numba", "roboticstoolbox-python"):
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = "not installed"
-    cpu = platform.processor() or platform.machine()
-    info = Path("/proc/cpuinfo")
-    if info.exists():
-        names = [line for line in info.read_text().splitlines() if line.startswith("model name")]
-        cpu = names[0].partition(":")[2].strip() if names else cpu
-    return {"cpu": cpu, "system": platform.system(), "python": platform.python_version(), **found}
-
-
 def report(table: list[Row], about: dict[str, str], count: int) -> str:
     """The results as Markdown."""
     ours = next(row for row in table if row.name == "robotmodels, batch")
-    lines = ["# Inverse kinematic model: measured side by side", ""]
-    lines += [f"- {key}: {value}" for key, value in about.items()]
-    lines += [
-        "",
+    lines = [
+        *head("Inverse kinematic model: measured side by side", about),
         f"{count} random configurations inside the limits and random twists; a tenth of them for "
         f"loops. Medians of {ROUNDS} rounds in us of processor time a row, one thread.",
         f"`missed`: |J v - twist|, median and largest where the smallest singular value is above "
@@ -209,29 +186,27 @@ def report(table: list[Row], about: dict[str, str], count: int) -> str:
         "| robot | solver | us | x | missed | most |",
         "|---|---|---|---|---|---|",
     ]
-    for row in table:
-        lines.append(
-            f"| {row.robot} | {row.name} | {row.microseconds:.1f} | {row.ratio:.1f} | "
-            f"{row.missed:.0e} | {row.most_missed:.0e} |"
-        )
+    lines += [
+        f"| {row.robot} | {row.name} | {row.microseconds:.1f} | {row.ratio:.1f} | "
+        f"{row.missed:.0e} | {row.most_missed:.0e} |"
+        for row in table
+    ]
     return "\n".join(lines) + "\n"
 
 
 def main() -> None:
     """Measure, print and keep the results."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
+    parser.add_argument("--out", type=Path, default=RESULTS)
     parser.add_argument("--rows", type=int, default=10000)
     arguments = parser.parse_args()
     if _toolbox("DH", "Puma560") is None:
         print("The Robotics Toolbox is not installed: its entries are left out.")
-    about, table = machine(), rows(arguments.rows)
+    about, table = machine(["roboticstoolbox-python"]), rows(arguments.rows)
     text = report(table, about, arguments.rows)
     print(text)
-    arguments.out.mkdir(parents=True, exist_ok=True)
-    (arguments.out / "ikm.md").write_text(text, encoding="utf-8")
     kept = {"machine": about, "rows": [asdict(row) for row in table]}
-    (arguments.out / "ikm.json").write_text(json.dumps(kept, indent=2) + "\n", encoding="utf-8")
+    keep(arguments.out, "ikm", text, kept)
 
 
 if __name__ == "__main__":

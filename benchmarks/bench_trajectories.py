@@ -1,6 +1,6 @@
 """Speed of the trajectories beside their peers, in one run.
 
-    python benchmarks/bench_trajectories.py [--out benchmarks/results] [--rounds 25]
+    python -m benchmarks.bench_trajectories [--out benchmarks/results] [--rounds 25]
 
 Contestants of a row take turns, round after round, so that a drifting machine is fair to all of
 them; the figures are medians in microseconds a call, with the best round beside ours. Peers that
@@ -12,22 +12,19 @@ from __future__ import annotations
 
 import argparse
 import importlib
-import json
-import os
-import time
 import warnings
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import numpy as np
-from igm_peers import machine as igm_machine
 from numpy.typing import NDArray
 
 import robotmodels as rm
+from benchmarks.kept import RESULTS, keep
+from benchmarks.machine import head, machine
+from benchmarks.measure import Contestant, in_turns
 from robotmodels import trajectories as tr
 
 Array = NDArray[np.float64]
@@ -36,15 +33,6 @@ SAMPLES, POSES, MOTIONS = 10_000, 1000, 1000
 OURS = "robotmodels"
 PEERS = {"roboticstoolbox-python": "roboticstoolbox", "ruckig": "ruckig"}
 EVALUATED_MS, JOINTS_MS = 2.0, 10.0
-
-
-@dataclass(frozen=True)
-class Contestant:
-    """One way to do the work of a row, ``count`` times in a run."""
-
-    name: str
-    run: Callable[[], object]
-    count: int = 1
 
 
 @dataclass(frozen=True)
@@ -72,16 +60,9 @@ def measure(
     work: str, contestants: list[Contestant], rounds: int, goal: float | None = None
 ) -> Row:
     """Time the contestants of a row, taking turns; the goal is ours, in microseconds."""
-    times: dict[str, list[float]] = {c.name: [] for c in contestants}
-    for c in contestants:
-        c.run()  # compile, page in
-    for _ in range(rounds):
-        for c in contestants:
-            start = time.perf_counter()
-            c.run()
-            times[c.name].append((time.perf_counter() - start) / c.count * 1e6)
-    median = {name: float(np.median(values)) for name, values in times.items()}
-    best = {name: min(values) for name, values in times.items()}
+    found = {name: t.processor.times(1e6) for name, t in in_turns(contestants, rounds).items()}
+    median = {name: spread.median for name, spread in found.items()}
+    best = {name: spread.least for name, spread in found.items()}
     print(f"{work}: " + "; ".join(f"{name} {value:.1f}" for name, value in median.items()))
     met = None if goal is None else median[OURS] <= goal
     return Row(work, median, best, "" if goal is None else f"<= {goal:g} us", met)
@@ -307,26 +288,10 @@ def rtb_joints(rtb: Any, q: Array) -> Contestant:
 # --- report --------------------------------------------------------------------------------------
 
 
-def machine() -> dict[str, str]:
-    """What the figures were measured on, how busy it was, and with which versions."""
-    about = {k: v for k, v in igm_machine().items() if k in ("cpu", "system", "python", OURS)}
-    for package in ("numpy", "numba", "scipy", *PEERS):
-        try:
-            about[package] = version(package)
-        except PackageNotFoundError:
-            about[package] = "not installed"
-    if hasattr(os, "getloadavg"):
-        load = os.getloadavg()[0]
-        about["load"] = f"{load:.1f} on {os.cpu_count()} cores when the run began"
-    return about
-
-
 def report(rows: list[Row], about: dict[str, str], rounds: int) -> str:
     """The results as Markdown, with ratios to ours."""
-    lines = ["# Trajectories: measured side by side", ""]
-    lines += [f"- {key}: {value}" for key, value in about.items()]
-    lines += [
-        "",
+    lines = [
+        *head("Trajectories: measured side by side", about),
         f"Medians of {rounds} rounds in us a call, one thread, and our best round; in brackets the "
         f"ratio to our median. Evaluation: six joints, {SAMPLES} times, positions, velocities, "
         "accelerations and jerks. To joints: all postures of every pose, the branch followed, "
@@ -351,10 +316,10 @@ def report(rows: list[Row], about: dict[str, str], rounds: int) -> str:
 def main() -> None:
     """Measure, print and keep the results."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
+    parser.add_argument("--out", type=Path, default=RESULTS)
     parser.add_argument("--rounds", type=int, default=25)
     arguments = parser.parse_args()
-    about = machine()
+    about = machine(PEERS)
     missing = [package for package in PEERS if module(package) is None]
     if missing:
         print(f"Not installed, so left out: {', '.join(missing)}.")
@@ -362,12 +327,8 @@ def main() -> None:
     rows = evaluation_rows(rounds) + planning_rows(rounds) + via_rows(rounds) + space_rows(rounds)
     text = report(rows, about, rounds)
     print(text)
-    arguments.out.mkdir(parents=True, exist_ok=True)
-    (arguments.out / "trajectories.md").write_text(text, encoding="utf-8")
     kept = {"machine": about, "rows": [asdict(r) for r in rows]}
-    (arguments.out / "trajectories.json").write_text(
-        json.dumps(kept, indent=2) + "\n", encoding="utf-8"
-    )
+    keep(arguments.out, "trajectories", text, kept)
 
 
 if __name__ == "__main__":

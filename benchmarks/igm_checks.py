@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from igm_postures import sigma_of, uniform
 from numpy.typing import NDArray
 
 import robotmodels as rm
+from benchmarks.igm_postures import sigma_of, uniform
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -8,12 +8,9 @@ robot's own direct model, or it does not enter.
 from __future__ import annotations
 
 import importlib
-import platform
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -75,28 +72,6 @@ def module(package: str) -> ModuleType | None:
 def absent() -> list[str]:
     """Peers that are not installed."""
     return [package for package in PACKAGES if module(package) is None]
-
-
-def versions() -> dict[str, str]:
-    """Versions of what is measured."""
-    found = {"robotmodels": rm.__version__}
-    for package in ("numpy", "numba", "scipy", *PACKAGES):
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = "not installed"
-    return found
-
-
-def machine() -> dict[str, str]:
-    """What the figures were measured on, and with which versions."""
-    cpu = platform.processor() or platform.machine()
-    info = Path("/proc/cpuinfo")
-    if info.exists():
-        names = [line for line in info.read_text().splitlines() if line.startswith("model name")]
-        cpu = names[0].partition(":")[2].strip() if names else cpu
-    system, python = platform.system(), platform.python_version()
-    return {"cpu": cpu, "system": system, "python": python, **versions()}
 
 
 def frames_at_zero(model: rm.RobotModel) -> Array:

@@ -1,0 +1,124 @@
+"""The README's tables, made from `benchmarks/results`.
+
+    python benchmarks/readme_tables.py [--check] [--readme README.md]
+
+Puts them between the lines ``<!-- tables from benchmarks/results: begin -->`` and
+``<!-- tables from benchmarks/results: end -->``; ``--check`` changes nothing and ends with 1 where
+the README is not what the results give. Needs the standard library alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from math import degrees
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from benchmarks.rounded import figure
+
+BEGIN = "<!-- tables from benchmarks/results: begin -->"
+END = "<!-- tables from benchmarks/results: end -->"
+RESULTS = Path(__file__).parent / "results"
+OURS, RAW = "robotmodels", "Pinocchio"
+PACKAGES = {
+    "pin": "pin", "roboticstoolbox-python": "RTB", "figaroh": "FIGAROH", "eaik": "EAIK",
+    "ssik": "ssik", "ik-geo": "ik-geo", "pybotics": "pybotics", "ruckig": "ruckig",
+}  # fmt: skip
+Row = dict[str, Any]
+
+
+def tables(results: Path = RESULTS) -> str:
+    """Everything that stands between the two lines."""
+    peers = json.loads((results / "peers.json").read_text(encoding="utf-8"))
+    parts = [speed(peers), accuracy(results)]
+    return "\n\n".join("\n".join(part) for part in parts if part)
+
+
+def speed(peers: dict[str, Any]) -> list[str]:
+    """A line for each work."""
+    facts = peers["machine"]
+    told = [f"{PACKAGES[k]} {v}" for k, v in facts.items() if k in PACKAGES and v[0].isdigit()]
+    lines = [
+        f"Medians of the processor's time, {facts['cpu']}, one thread, Python {facts['python']}, "
+        f"{', '.join(told)}. The last column: the fastest of the others to ours. Spreads, goals "
+        "and every way of each tool: `benchmarks/results/peers.md`; to measure them again: "
+        "`python -m benchmarks`.",
+        "",
+        "| work | robotmodels | Pinocchio, raw calls from Python | peers | others / ours |",
+        "|---|---|---|---|---|",
+    ]
+    for r in peers["rows"]:
+        entries = r["entries"]
+        unit = r["unit"]
+        ours = "; ".join(told_time(e, unit) for e in entries if e["tool"] == OURS)
+        raw = "; ".join(told_time(e, unit) for e in entries if e["tool"] == RAW)
+        others = [e for e in entries if e["tool"] not in (OURS, RAW)]
+        by_tool = [f"{e['tool']} {told_time(e, unit)}" for e in others]
+        ratios = [e["ratio"] for e in entries if e["tool"] != OURS and e["whole"]]
+        ratio = f"{figure(min(ratios))}" if ratios else ""
+        lines.append(f"| {r['work']} | {ours} | {raw} | {'; '.join(by_tool)} | {ratio} |")
+    return lines
+
+
+def accuracy(results: Path) -> list[str]:
+    """What is found, beside those who find it too."""
+    igm = json.loads((results / "accuracy_igm.json").read_text(encoding="utf-8"))["rows"]
+    camera = json.loads((results / "calibration.json").read_text(encoding="utf-8"))["camera"]
+    both = [r["arm"] for r in igm if r["solver"] != OURS]
+    peer = next((r["solver"] for r in igm if r["solver"] != OURS), "")
+    lines = ["| accuracy | robotmodels | peers |", "|---|---|---|"]
+    for title, arms in ((f"of {len(both)} arms that {peer} knows", both), ("of the others", None)):
+        ours = [r for r in igm if r["solver"] == OURS and (r["arm"] in both) == (arms is not None)]
+        theirs = [r for r in igm if r["solver"] != OURS and arms is not None]
+        if not ours:
+            continue
+        many, singular = (sum(r[k] for r in ours) for k in ("poses", "singular"))
+        title = f"poses whose posture was not given back, {title}: {many}, {singular} singular"
+        lost = [sum(r["lost"] for r in rows) for rows in (ours, theirs)]
+        lines.append(f"| {title} | {lost[0]} | {f'{peer} {lost[1]}' if theirs else ''} |")
+    best = {}
+    for r in camera:
+        tool = r["name"].partition(":")[0]
+        best[tool] = min(best.get(tool, (float("inf"), 0.0)), tuple(r["leave one out"]))
+    told = {k: f"{1e3 * p:.2f} mm, {degrees(a):.2f} deg" for k, (p, a) in best.items()}
+    others = "; ".join(f"{k} {v}" for k, v in told.items() if k != OURS)
+    title = "UR10 and camera, 23 real poses, each left out in turn, the best way of each tool: rms"
+    lines.append(f"| {title} | {told[OURS]} | {others} |")
+    return lines
+
+
+def told_time(entry: Row, unit: str) -> str:
+    """A median with its unit, and its way."""
+    return f"{figure(entry['median'])} {unit}" + (f" ({entry['how']})" if entry["how"] else "")
+
+
+def replaced(readme: str, new: str) -> str:
+    """The README with the tables between its two lines."""
+    before, begin, rest = readme.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not begin or not end:
+        raise ValueError(f"The README lacks the lines {BEGIN!r} and {END!r}, in this order.")
+    return f"{before}{BEGIN}\n{new}\n{END}{after}"
+
+
+def main() -> None:
+    """Replace, or check."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--check", action="store_true", help="change nothing")
+    parser.add_argument("--readme", type=Path, default=RESULTS.parents[1] / "README.md")
+    given = parser.parse_args()
+    old = given.readme.read_text(encoding="utf-8")
+    new = replaced(old, tables())
+    if given.check:
+        if new != old:
+            sys.exit("README.md is not what the results give: benchmarks/readme_tables.py does it.")
+    elif new != old:
+        given.readme.write_text(new, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,181 @@
+"""Poses, Jacobians, single calls, inverse dynamics, regressors: on the Puma 560, with inertia."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+import robotmodels as rm
+from benchmarks.measure import loop
+from benchmarks.side_by_side.works import Entry, Goal, Settings, Tool, Work, at_most, module, named
+
+FEW = 2_000
+IN_PARALLEL = "rneaInParallel, 1 thread"
+Motion = tuple[np.ndarray, np.ndarray, np.ndarray]
+
+
+@dataclass(frozen=True, slots=True)
+class Puma:
+    """The robot in every tool's words, and random motion."""
+
+    model: rm.RobotModel
+    motion: Motion
+    pose: Callable[[np.ndarray], np.ndarray]
+    jacobian: Callable[[np.ndarray], np.ndarray]
+    rnea: Callable[..., np.ndarray]
+    toolbox: Any
+
+    @property
+    def few(self) -> Motion:
+        """The first samples, for what goes one by one."""
+        q, v, a = self.motion
+        return q[:FEW], v[:FEW], a[:FEW]
+
+
+def puma(settings: Settings) -> Puma:
+    """The Puma 560, which all have with inertia."""
+    model = rm.load("puma560")
+    rng = np.random.default_rng(0)
+    q, v, a = rng.uniform(-2.0, 2.0, (3, settings.number(100_000, 20_000), model.n))
+    pm, data = model.pin_model, model.pin_model.createData()
+    tip = pm.getFrameId("tool", pin.FrameType.BODY)
+
+    def pose(x: np.ndarray) -> np.ndarray:
+        pin.forwardKinematics(pm, data, x)
+        return pin.updateFramePlacement(pm, data, tip).homogeneous
+
+    def jacobian(x: np.ndarray) -> np.ndarray:
+        return pin.computeFrameJacobian(pm, data, x, tip, pin.LOCAL_WORLD_ALIGNED)
+
+    def rnea(*x: np.ndarray) -> np.ndarray:
+        return pin.rnea(pm, data, *x)
+
+    toolbox = None
+    if module(Tool.RTB) is not None:
+        from roboticstoolbox import models
+
+        toolbox = models.DH.Puma560()
+    return Puma(model, (q, v, a), pose, jacobian, rnea, toolbox)
+
+
+def pose(settings: Settings) -> Iterator[Work]:
+    """Pose of the tool, in batch."""
+    p = puma(settings)
+    q, few = p.motion[0], p.few[0]
+    entries = [
+        Entry(Tool.OURS, "", lambda: rm.dgm(p.model, q), len(q)),
+        Entry(Tool.PINOCCHIO, "Python loop", loop(p.pose, few), FEW),
+    ]
+    if p.toolbox is not None:
+        ets = p.toolbox.ets()
+        entries += [
+            Entry(Tool.RTB, "ets.eval", lambda: ets.eval(q), len(q)),
+            Entry(Tool.RTB, "fkine", loop(p.toolbox.fkine, few), FEW),
+        ]
+    goal = [at_most(0.3, "us")]
+    yield Work("pose", f"pose of the tool, {len(q)} configurations", "us", entries, goal)
+
+
+def jacobian(settings: Settings) -> Iterator[Work]:
+    """Jacobian of the tool, in batch."""
+    p = puma(settings)
+    q, few = p.motion[0], p.few[0]
+    entries = [
+        Entry(Tool.OURS, "", lambda: rm.jacobian(p.model, q), len(q)),
+        Entry(Tool.PINOCCHIO, "Python loop", loop(p.jacobian, few), FEW),
+    ]
+    if p.toolbox is not None:
+        entries += [
+            Entry(Tool.RTB, "ets.jacob0", loop(p.toolbox.ets().jacob0, few), FEW),
+            Entry(Tool.RTB, "jacob0", loop(p.toolbox.jacob0, few), FEW),
+        ]
+    goal = [at_most(0.5, "us")]
+    yield Work("jacobian", f"Jacobian, {len(q)} configurations", "us", entries, goal)
+
+
+def single(settings: Settings) -> Iterator[Work]:
+    """One call with all its checks."""
+    p = puma(settings)
+    few = p.few
+    entries = [
+        Entry(Tool.OURS, "", loop(lambda x: rm.dgm(p.model, x), few[0]), FEW),
+        Entry(Tool.PINOCCHIO, "no checks", loop(p.pose, few[0]), FEW),
+    ]
+    if p.toolbox is not None:
+        entries.append(Entry(Tool.RTB, "fkine", loop(p.toolbox.fkine, few[0]), FEW))
+    yield Work("single", "one dgm call with its checks", "us", entries, [at_most(8.0, "us")])
+    robots = {"rigid": p.model.with_drive(None), "rotors and friction": p.model}
+    for title, robot in robots.items():
+        entries = [
+            Entry(Tool.OURS, "", loop(lambda *x, m=robot: rm.idm(m, *x), *few), FEW),
+            Entry(Tool.PINOCCHIO, "rigid, no checks", loop(p.rnea, *few), FEW),
+        ]
+        if p.toolbox is not None:
+            entries.append(Entry(Tool.RTB, "rne", loop(p.toolbox.rne, *few), FEW))
+        title = f"one idm call with its checks, {title}"
+        yield Work("single", title, "us", entries, [at_most(8.0, "us")])
+
+
+def inverse_dynamics(settings: Settings) -> Iterator[Work]:
+    """Inverse dynamics of links, in batch."""
+    p = puma(settings)
+    model, motion = p.model.with_drive(None), p.motion
+    count = len(motion[0])
+    pool = pin.ModelPool(model.pin_model, 1)
+    columns = [np.asfortranarray(x.T) for x in motion]
+    entries = [
+        Entry(Tool.OURS, "", lambda: rm.idm(model, *motion), count),
+        Entry(
+            Tool.PINOCCHIO, IN_PARALLEL, lambda: pin.rneaInParallel(1, pool, *columns), count
+        ),
+    ]  # fmt: skip
+    if p.toolbox is not None:
+        entries.append(Entry(Tool.RTB, "rne", lambda: p.toolbox.rne(*motion), count))
+    ours, theirs = named(Tool.OURS, ""), named(Tool.PINOCCHIO, IN_PARALLEL)
+    goal = Goal(
+        "<= 1.3 x rneaInParallel",
+        lambda t: t[ours].processor.median <= 1.3 * t[theirs].processor.median,
+    )
+    yield Work("inverse_dynamics", f"inverse dynamics, {count} samples", "us", entries, [goal])
+
+
+def regressor(settings: Settings) -> Iterator[Work]:
+    """Torque regressor of links, streamed in pieces that stay in the cache."""
+    p = puma(settings)
+    model, motion, few = p.model, p.motion, p.few
+    count = len(motion[0])
+    pm, data = model.pin_model, model.pin_model.createData()
+
+    def streamed() -> None:
+        for _ in rm.torque_regressor_chunks(model, *motion, drive=False):
+            pass
+
+    def one(*x: np.ndarray) -> np.ndarray:
+        return pin.computeJointTorqueRegressor(pm, data, *x)
+
+    entries = [
+        Entry(Tool.OURS, "", streamed, count),
+        Entry(Tool.PINOCCHIO, "Python loop", loop(one, *few), FEW),
+    ]
+    if settings.figaroh is not None:
+        drive = rm.DriveParameters.zeros(model.n)
+        job = settings.figaroh.job(
+            urdf=rm.to_urdf(model.with_drive(None)), Ia=drive.Ia, Fv=drive.Fv, Fc=drive.Fc,
+            q=few[0], v=few[1], a=few[2],
+        )  # fmt: skip
+        entries.append(Entry(Tool.FIGAROH, "", settings.figaroh.task("regressor", job), FEW))
+    title = f"torque regressor 6 x 60, {count} samples, streamed"
+    yield Work("regressor", title, "us", entries, [at_most(1.2, "us")])
+
+
+WORKS = {
+    "pose": pose,
+    "jacobian": jacobian,
+    "single": single,
+    "inverse_dynamics": inverse_dynamics,
+    "regressor": regressor,
+}

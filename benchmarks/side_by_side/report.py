@@ -1,0 +1,76 @@
+"""The table of one run, as Markdown and as JSON."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from benchmarks.machine import head
+from benchmarks.rounded import figure
+from benchmarks.side_by_side.works import Tool
+
+Row = dict[str, Any]
+PEERS = [tool.value for tool in Tool][1:]
+CONTEXT = """\
+Medians of the processor's time over rounds in which the contestants take turns, one thread.
+`ratio`: the fastest of the others to the first way of ours, so above 1 ours is faster; a Pinocchio
+figure is that of raw calls from Python, without checks, and what does a part of the work only (a
+regressor alone, one posture of eight, an answer that is mostly wrong) enters no ratio. Every way,
+its spread and what it found are in the second table."""
+
+
+def markdown(facts: dict[str, str], rows: list[Row], absent: list[str]) -> str:
+    """Both tables."""
+    lines = head("Side by side with what people would pick instead", facts)
+    lines += [CONTEXT, ""]
+    if absent:
+        lines += [f"Left out: {'; '.join(absent)}.", ""]
+    lines += compact(rows)
+    lines += ["", "## Every way", "", *detailed(rows)]
+    return "\n".join(lines) + "\n"
+
+
+def compact(rows: list[Row]) -> list[str]:
+    """A line for each work."""
+    columns = ["work", "unit", "ours", *PEERS, "ratio", "goal", "met"]
+    lines = [f"| {' | '.join(columns)} |", "|---" * len(columns) + "|"]
+    for r in rows:
+        cells = [r["work"], r["unit"]]
+        cells += [
+            "; ".join(cell(e) for e in r["entries"] if e["tool"] == tool)
+            for tool in (Tool.OURS.value, *PEERS)
+        ]
+        ratio = fastest(r)
+        cells += ["" if ratio is None else figure(ratio), r["goal"], said(r["met"])]
+        lines.append(f"| {' | '.join(cells)} |")
+    return lines
+
+
+def detailed(rows: list[Row]) -> list[str]:
+    """A line for each way."""
+    columns = ["work", "way", "unit", "median", "least", "most", "clock", "rounds", "x", "note"]
+    lines = [f"| {' | '.join(columns)} |", "|---" * len(columns) + "|"]
+    for r in rows:
+        for e in r["entries"]:
+            way = e["tool"] + (f", {e['how']}" if e["how"] else "")
+            numbers = [figure(e[k]) for k in ("median", "least", "most", "clock")]
+            cells = [r["work"], way, r["unit"], *numbers, f"{e['rounds']}", figure(e["ratio"])]
+            lines.append(f"| {' | '.join([*cells, e['note']])} |")
+    return lines
+
+
+def cell(entry: Row) -> str:
+    """A median with its way."""
+    return figure(entry["median"]) + (f" {entry['how']}" if entry["how"] else "")
+
+
+def fastest(row: Row) -> float | None:
+    """Ratio of the fastest of the others to ours, None where there are none."""
+    others = [
+        e["ratio"] for e in row["entries"] if e["tool"] != Tool.OURS.value and e["whole"]
+    ]  # fmt: skip
+    return min(others) if others else None
+
+
+def said(met: bool | None) -> str:
+    """A goal in a word."""
+    return "" if met is None else "yes" if met else "no"

@@ -1,0 +1,192 @@
+"""Benchmarks run without any peer, can fail, and the README says what they found."""
+
+import importlib.util
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from benchmarks import readme_tables
+from benchmarks.measure import Contestant, Spent, in_turns
+from benchmarks.side_by_side import report, works
+from benchmarks.side_by_side.works import Entry, Measured, Tool, Work, at_most
+
+ROOT = Path(__file__).parents[1]
+
+
+def run(*words, cwd=ROOT):
+    command = [sys.executable, *words]
+    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, check=False)
+
+
+# --- the one command -----------------------------------------------------------------------------
+
+WITHOUT_PEERS = """
+import sys
+for name in ("roboticstoolbox", "eaik", "ssik", "ik_geo", "ruckig", "figaroh", "pybotics"):
+    sys.modules[name] = None  # the import fails
+import runpy
+sys.argv = ["benchmarks", "--quick", "--only", "pose", "jacobian", "--out", sys.argv[1]]
+runpy.run_module("benchmarks", run_name="__main__")
+"""
+
+
+def test_one_command_runs_without_any_peer(tmp_path):
+    done = run("-c", WITHOUT_PEERS, str(tmp_path))
+    assert done.returncode == 0, done.stderr
+    left_out = [line for line in done.stdout.splitlines() if line.startswith("left out:")]
+    peers = {tool.value for tool in Tool} - {"robotmodels", "Pinocchio"}
+    assert {name for name in peers if any(name in line for line in left_out)} == peers
+    assert len(left_out) == len(peers)
+    kept = json.loads((tmp_path / "peers.json").read_text())
+    assert [row["row"] for row in kept["rows"]] == ["pose", "jacobian"]
+    for row in kept["rows"]:
+        assert [e["tool"] for e in row["entries"]] == ["robotmodels", "Pinocchio"]
+        for e in row["entries"]:
+            assert 0.0 < e["least"] <= e["median"] <= e["most"]
+            assert e["rounds"] == 3
+        assert row["met"] in (True, False)
+    assert {"cpu", "python", "numpy", "load"} <= set(kept["machine"])
+    text = (tmp_path / "peers.md").read_text()
+    assert text in done.stdout
+    assert len([line for line in text.splitlines() if line.startswith("| pose")]) == 3
+
+
+def test_a_row_that_is_not_known_is_refused():
+    done = run("-m", "benchmarks", "--only", "poses")
+    assert done.returncode == 2
+    assert "'poses'" in done.stderr
+    assert "inverse_dynamics" in done.stderr
+
+
+# --- measuring -----------------------------------------------------------------------------------
+
+
+def test_contestants_take_turns():
+    order = []
+    field = [
+        Contestant("a", lambda: order.append("a")),
+        Contestant("b", lambda: order.append("b"), said=lambda _: "a note"),
+        Contestant("once", lambda: order.append("once"), rounds=1),
+    ]
+    found = in_turns(field, 4)
+    assert "".join(x[0] for x in order) == "ab" + "abo" + "ababab"
+    assert {name: t.rounds for name, t in found.items()} == {"a": 4, "b": 4, "once": 1}
+    assert found["b"].note == "a note"
+
+
+def test_time_of_another_process_is_taken_as_it_says():
+    told = iter([9.0, 4.0, 6.0, 5.0])
+    slow = Contestant("slow", lambda: Spent(next(told), 8.0, "far away"), count=2)
+    found = in_turns([slow], 3)["slow"]
+    assert (found.processor.median, found.processor.least, found.processor.most) == (2.5, 2.0, 3.0)
+    assert found.clock.median == 4.0
+    assert found.note == "far away"
+
+
+def test_rounds_end_with_the_budget_but_not_before_three():
+    assert in_turns([Contestant("a", lambda: None)], 50, budget=0.0)["a"].rounds == 3
+
+
+def test_two_of_one_name_are_refused():
+    with pytest.raises(ValueError, match="one name"):
+        in_turns([Contestant("a", lambda: None), Contestant("a", lambda: None)], 3)
+
+
+@pytest.mark.parametrize(("limit", "met"), [(2.1, True), (1.9, False)])
+def test_goals_and_ratios(limit, met):
+    entries = [
+        Entry(Tool.OURS, "batch", lambda: Spent(2e-6, 2e-6)),
+        Entry(Tool.RTB, "", lambda: Spent(5e-6, 5e-6)),
+        Entry(Tool.EAIK, "", lambda: Spent(3e-6, 3e-6)),
+    ]
+    work = Work("some", "some work", "us", entries, [at_most(limit, "us", "batch")])
+    row = next(works.measured(iter([work]), works.Settings(rounds=3))).as_json()
+    assert row["met"] is met
+    assert [round(e["median"], 9) for e in row["entries"]] == [2.0, 5.0, 3.0]
+    assert report.fastest(row) == pytest.approx(1.5)
+    line = report.compact([row])[-1]
+    cells = [cell.strip() for cell in line.split("|")[1:-1]]
+    assert cells[:3] == ["some work", "us", "2.00 batch"]
+    assert cells[-3:] == ["1.50", f"<= {limit:g} us", "yes" if met else "no"]
+
+
+def test_work_without_goal_is_neither_met_nor_missed():
+    work = Work("some", "some work", "us", [Entry(Tool.OURS, "", lambda: Spent(1e-6, 1e-6))])
+    timings = in_turns([Contestant("robotmodels", lambda: Spent(1e-6, 1e-6))], 3)
+    assert Measured(work, timings).met is None
+
+
+# --- README --------------------------------------------------------------------------------------
+
+
+def test_readme_is_what_the_results_give():
+    done = run("benchmarks/readme_tables.py", "--check")
+    assert done.returncode == 0, done.stderr
+
+
+def test_readme_tables_are_put_between_their_lines(tmp_path):
+    readme = tmp_path / "README.md"
+    readme.write_text(f"before\n{readme_tables.BEGIN}\nold\n{readme_tables.END}\nafter\n")
+    assert run("benchmarks/readme_tables.py", "--check", "--readme", str(readme)).returncode == 1
+    assert "old" in readme.read_text()
+    assert run("benchmarks/readme_tables.py", "--readme", str(readme)).returncode == 0
+    text = readme.read_text()
+    assert text.startswith(f"before\n{readme_tables.BEGIN}\n")
+    assert text.endswith(f"\n{readme_tables.END}\nafter\n")
+    assert readme_tables.tables() in text
+    assert run("benchmarks/readme_tables.py", "--check", "--readme", str(readme)).returncode == 0
+    with pytest.raises(ValueError, match="lacks the lines"):
+        readme_tables.replaced("nothing here", "tables")
+
+
+def test_tables_hold_every_work_and_stay_short():
+    kept = json.loads((readme_tables.RESULTS / "peers.json").read_text())
+    rows = [line for line in readme_tables.tables().splitlines() if line.startswith("| ")]
+    assert all(any(r["work"] in line for line in rows) for r in kept["rows"])
+    assert len(rows) <= 28
+
+
+# --- ratios --------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def ratios():
+    spec = importlib.util.spec_from_file_location("ratios", ROOT / ".ci" / "ratios.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["ratios"] = module  # where its classes look themselves up
+    spec.loader.exec_module(module)
+    yield module
+    del sys.modules["ratios"]
+
+
+def spent(seconds):
+    return lambda: Spent(seconds, seconds)
+
+
+def test_ratio_is_checked_again_before_it_fails(ratios):
+    pair = ratios.Pair("some", "a yardstick", spent(3.0), spent(2.0))
+    assert pair.ratio() == 1.5
+    assert ratios.checked(pair, 1.0) == (1.5, 1)
+    assert ratios.checked(pair, 0.9) == (1.5, ratios.ATTEMPTS)
+    assert ratios.judged(1.59, 1.0)
+    assert not ratios.judged(1.61, 1.0)
+    counted = ratios.Pair("some", "a yardstick", spent(3.0), spent(2.0), (10, 1))
+    assert counted.ratio() == pytest.approx(0.15)
+    took = iter([9.0] * 8 + [3.0] * 8)
+    busy = ratios.Pair(
+        "some", "a yardstick", lambda: Spent((s := next(took)), s), spent(2.0)
+    )  # fmt: skip
+    assert ratios.checked(busy, 1.0) == (1.5, 2)
+
+
+def test_ratio_that_is_kept_is_near_and_half_the_speed_fails():
+    name = "idm, batch"
+    good = run(".ci/ratios.py", "--only", name)
+    assert good.returncode == 0, good.stdout + good.stderr
+    slow = run(".ci/ratios.py", "--only", name, "--slowed", name)
+    assert slow.returncode == 1, slow.stdout
+    assert f"slower than it was, beside its yardstick: {name}" in slow.stderr
+    assert "attempt 3" in slow.stdout
