@@ -93,7 +93,7 @@ def test_nothing_covers_anything_else(results, name, plot):
         assert min(width, height) <= slack
     for text in figure.findobj(Text):
         if text.get_visible() and text.get_text():
-            assert 6.5 <= text.get_size() <= 10.0, text
+            assert 8.0 <= text.get_size() <= 10.0, text
 
 
 def test_residuals_are_those_of_the_result(results):

@@ -141,7 +141,7 @@ def test_processing_shows_cutoffs_and_what_they_cut(found):
     log, chosen = found.system.log, found.system.processing
     figure = drawn(plot_processing(log, chosen, model=found.model))
     assert len(figure.axes) == 6
-    assert figure.axes[0].get_ylabel() == "m/√Hz"
+    assert figure.axes[0].get_ylabel() == "(m/√Hz)"
     for k, cutoff in enumerate((chosen.cutoff, chosen.torque_cutoff)):
         own = lines(figure.axes[k])
         assert own["cutoff"].get_xdata()[0] == cutoff

@@ -196,7 +196,7 @@ def test_texts_are_legible_under_any_style(name):
         seen = [text for text in figure.findobj(Text) if text.get_visible() and text.get_text()]
         assert len(seen) > 8
         for text in seen:
-            assert 6.5 <= text.get_size() <= 9.5, text
+            assert 8.0 <= text.get_size() <= 10.0, text
             assert sum(to_rgb(text.get_color())) < 1.0, text  # ink on white paper
         assert figure.get_facecolor() == (1.0, 1.0, 1.0, 1.0)
         assert all(to_rgb(axes.get_facecolor()) == (1.0, 1.0, 1.0) for axes in figure.axes)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_exact
 from ..errors import InvalidValueError, MissingExtraError, ShapeError
 from ..visual import Color
-from .palette import PALETTE
+from .palette import GRID, INK, LINE_COLORS, PALE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,20 +21,15 @@ if TYPE_CHECKING:
 COLUMN, PAGE = 3.5, 7.1
 """Widths of one column and of two in print, inches. Texts are sized for them."""
 
-INK: Color = (0.1, 0.1, 0.1, 1.0)
-PALE: Color = (0.62, 0.62, 0.62, 1.0)
-ALERT: Color = (0.80, 0.15, 0.10, 1.0)
-"""Texts; helping lines; what lies beyond a limit."""
+LABEL_SIZE, SMALL_SIZE = 8.5, 8.0
+"""Of the texts, points: what a printed column can be read at."""
 
-LABEL_SIZE, SMALL_SIZE = 8.0, 7.0
-"""Of the texts, points."""
+LINE_WIDTH, LIMIT_WIDTH, THIN_WIDTH = 1.3, 0.8, 0.8
+"""Of data, of limits and of all that helps to read them, points: none thinner, for print."""
 
-LINE_WIDTH, LIMIT_WIDTH = 1.3, 0.8
 LIMIT_DASHES = (0, (4.0, 2.5))
 
 _DPI = 150  # a column is then 525 pixels wide in a notebook
-# the palette, the hues that are far from each other first, and yellow, pale on white, late
-_ORDER = (0, 3, 2, 4, 7, 5, 1, 6)
 _DASHES = (
     (0, ()), (0, (5.0, 1.5)), (0, (1.3, 1.1)), (0, (6.0, 1.3, 1.3, 1.3)), (0, (9.0, 2.0)),
     (0, (3.0, 1.0, 1.0, 1.0, 1.0, 1.0)), (0, (2.2, 2.2)),
@@ -66,9 +61,7 @@ def line_style(k: int) -> LineStyle:
     >>> line_style(0).dashes, len({line_style(k) for k in range(112)})
     ((0, ()), 112)
     """
-    hues = len(_ORDER)
-    color = PALETTE[_ORDER[k % hues] + hues * (k // hues % 2)]
-    return LineStyle(color, _DASHES[k % len(_DASHES)])
+    return LineStyle(LINE_COLORS[k % len(LINE_COLORS)], _DASHES[k % len(_DASHES)])
 
 
 def texts(values: Any, count: int, name: str, of: str) -> list[str]:
@@ -196,11 +189,11 @@ def styled(axes: Axes) -> Axes:
     """
     axes.set_facecolor("white")
     for side, spine in axes.spines.items():
-        spine.set(color=PALE, linewidth=0.6, visible=side in ("left", "bottom"))
+        spine.set(color=PALE, linewidth=THIN_WIDTH, visible=side in ("left", "bottom"))
     axes.tick_params(
-        which="both", labelsize=SMALL_SIZE, labelcolor=INK, color=PALE, length=2.5, width=0.6
+        which="both", labelsize=SMALL_SIZE, labelcolor=INK, color=PALE, length=2.5, width=THIN_WIDTH
     )
-    axes.grid(True, color="0.9", linewidth=0.5, linestyle="-")
+    axes.grid(True, color=GRID, linewidth=THIN_WIDTH, linestyle="-")
     axes.set_axisbelow(True)
     for axis in (axes.xaxis, axes.yaxis):
         axis.label.set(size=LABEL_SIZE, color=INK)

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
-from .figures import INK, LABEL_SIZE
+from .figures import LABEL_SIZE
+from .palette import INK
 from .plot_pose_path import _taken
 
 if TYPE_CHECKING:

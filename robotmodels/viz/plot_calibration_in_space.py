@@ -11,7 +11,8 @@ from .._arrays import Array, as_exact
 from ..calibration.residuals import MeasuredResiduals, measured_residuals
 from ..calibration.result import CalibrationResult
 from ..errors import InvalidValueError
-from .figures import ALERT, INK, LABEL_SIZE, PAGE, new_figure
+from .figures import LABEL_SIZE, PAGE, new_figure
+from .palette import ALERT, INK
 from .plot_calibration_cells import Cell, far_apart, fill_cells
 from .plot_calibration_residuals import AFTER, BEFORE, as_result
 from .plot_pose_path import _across, _box, _style

@@ -9,16 +9,8 @@ from numpy.typing import ArrayLike
 
 from ..calibration.residuals import measured_residuals
 from ..calibration.result import CalibrationResult
-from .figures import (
-    INK,
-    LIMIT_DASHES,
-    PAGE,
-    PALE,
-    legend_above,
-    line_style,
-    new_figure,
-    panels,
-)
+from .figures import LIMIT_DASHES, PAGE, legend_above, line_style, new_figure, panels
+from .palette import INK, PALE
 from .plot_calibration_residuals import as_result
 
 if TYPE_CHECKING:

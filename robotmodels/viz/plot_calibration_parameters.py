@@ -14,7 +14,8 @@ from ..calibration.result import CalibrationResult
 from ..calibration.skeleton import skeleton_of
 from ..errors import InvalidValueError, ShapeError
 from ..estimation import confidence_intervals
-from .figures import INK, PAGE, PALE, SMALL_SIZE, legend_above, line_style, new_figure, panels
+from .figures import PAGE, SMALL_SIZE, legend_above, line_style, new_figure, panels
+from .palette import INK, PALE
 from .plot_calibration_residuals import as_result
 from .plot_correlation import correlation_figure
 from .plot_units import Unit

@@ -12,17 +12,16 @@ from ..calibration.residuals import MeasuredResiduals, measured_residuals
 from ..calibration.result import CalibrationResult
 from ..errors import InvalidValueError
 from .figures import (
-    ALERT,
-    INK,
     LABEL_SIZE,
     PAGE,
-    PALE,
     SMALL_SIZE,
+    THIN_WIDTH,
     legend_above,
     line_style,
     new_figure,
     panels,
 )
+from .palette import ALERT, INK, PALE
 from .plot_units import Unit
 
 if TYPE_CHECKING:
@@ -152,7 +151,7 @@ def plot_calibration_residuals(
             axes = grid[row, side]
             axes.axhline(0.0, color=PALE, linewidth=0.8, zorder=1.2)
             if len(x) <= _FEW:
-                axes.vlines(x, 0.0, y, color=style.color, linewidth=0.7, alpha=0.6)
+                axes.vlines(x, 0.0, y, color=style.color, linewidth=THIN_WIDTH, alpha=0.6)
             axes.plot(
                 x, y, linestyle="", marker="o" if side else "D", markersize=dot,
                 color=style.color, markeredgewidth=0.0,
@@ -212,7 +211,7 @@ def _names(grid: Any, parts: list[MeasuredResiduals]) -> None:
         return
     for part in parts[1:]:
         for axes in grid.flat:
-            axes.axvline(part.blocks[0] + 0.5, color=PALE, linewidth=0.6)
+            axes.axvline(part.blocks[0] + 0.5, color=PALE, linewidth=THIN_WIDTH)
     total = int(parts[-1].blocks[-1]) + 1
     for part in parts:
         room = (len(part.blocks) / total) * 3.0 * 72.0

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array
-from .figures import INK, PAGE, PALE, SMALL_SIZE, new_figure, panels
+from .figures import PAGE, SMALL_SIZE, THIN_WIDTH, new_figure, panels
+from .palette import INK, PALE, SIGNED_MAP
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -45,7 +46,7 @@ def correlation_figure(
     figure = new_figure(side + 0.6, side, size)
     axes = panels(figure, 1)[0, 0]
     picture = axes.imshow(
-        correlation, cmap="PuOr", vmin=-1.0, vmax=1.0, interpolation="nearest", aspect="auto"
+        correlation, cmap=SIGNED_MAP, vmin=-1.0, vmax=1.0, interpolation="nearest", aspect="auto"
     )
     every = max(1, int(np.ceil(len(names) * (SMALL_SIZE * 1.15 / 72.0) / (side - 1.1))))
     ticks = range(0, len(names), every)
@@ -55,7 +56,7 @@ def correlation_figure(
     bar = figure.colorbar(picture, ax=axes, fraction=0.045, pad=0.02)
     bar.set_label("correlation", size=SMALL_SIZE + 1.0, color=INK)
     bar.ax.tick_params(labelsize=SMALL_SIZE, labelcolor=INK, color=PALE, length=2.5)
-    bar.outline.set(edgecolor=PALE, linewidth=0.6)  # type: ignore[operator]
+    bar.outline.set(edgecolor=PALE, linewidth=THIN_WIDTH)  # type: ignore[operator]
     if title is not None:
         figure.suptitle(title, size=SMALL_SIZE + 2.0, color=INK)
     return figure

@@ -13,15 +13,15 @@ from ..simulation.result import Simulation
 from ..simulation.status import SimulationEventKind
 from .figures import (
     COLUMN,
-    INK,
     LIMIT_DASHES,
     LINE_WIDTH,
-    PALE,
+    THIN_WIDTH,
     legend_above,
     line_style,
     new_figure,
     panels,
 )
+from .palette import INK, PALE
 from .plot_trajectory import draw_line
 
 if TYPE_CHECKING:
@@ -139,4 +139,6 @@ def _marks(axes: Axes, sim: Simulation) -> None:
     """Thin lines where joints stick and break away: the last ones, if there are many."""
     marked = [event for event in sim.events if event.kind in _MARKED]
     for event in marked[-_MOST_MARKS:]:
-        axes.axvline(event.t, color=PALE, linewidth=0.5, linestyle="-", zorder=1.2, label="_event")
+        axes.axvline(
+            event.t, color=PALE, linewidth=THIN_WIDTH, linestyle="-", zorder=1.2, label="_event"
+        )

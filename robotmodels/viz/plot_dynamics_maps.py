@@ -15,17 +15,17 @@ from ..geometry import PRISMATIC
 from ..simulation.dynamics_map import DynamicsMap
 from .figures import (
     COLUMN,
-    INK,
     LABEL_SIZE,
     PAGE,
-    PALE,
     SMALL_SIZE,
+    THIN_WIDTH,
     heading,
     legend_above,
     line_style,
     new_figure,
     panels,
 )
+from .palette import INK, PALE, POSITIVE_MAP, SIGNED_MAP
 from .plot_trajectory import draw_line
 from .plot_units import Unit, joint_names
 
@@ -37,7 +37,6 @@ _PAIRS = 5  # lines of coupling that can be told apart
 _LEAST = 0.005  # a coupling below it is not seen
 _SPREAD = 50.0  # of inertias, from which on their axis is logarithmic
 _ROUNDING = 1e-12
-_SIGNED, _POSITIVE = "RdBu_r", "viridis"
 
 
 def plot_inertia_map(
@@ -138,7 +137,7 @@ def _lines(
         label = f"{names[i]} and {names[j]}"
         draw_line(coupling, x, grid.coupling[:, i, j], line_style(k), label)
     coupling.set_ylim(-1.08, 1.08)
-    coupling.axhline(0.0, color=PALE, linewidth=0.6, zorder=1.2, label="_zero")
+    coupling.axhline(0.0, color=PALE, linewidth=THIN_WIDTH, zorder=1.2, label="_zero")
     if not drawn:
         _note(coupling, "no coupling" if pairs else "one joint: no coupling")
     coupling.set_xlabel(f"{names[grid.joints[0]]} ({unit})")
@@ -179,7 +178,7 @@ def _maps(
     x, y = x_factor * grid.ranges[0], y_factor * grid.ranges[1]
     for axes, (label, unit, values, signed) in zip(places, maps, strict=True):
         _map(figure, axes, x, y, values, unit, signed)
-        heading(axes, label, PAGE / 3.0)
+        heading(axes, label, PAGE / 3.0 - 0.6)  # beside the bar
         axes.set_xlabel(f"{names[grid.joints[0]]} ({x_unit})")
         _ticks(axes.xaxis, x_unit)
     places[0].set_ylabel(f"{names[grid.joints[1]]} ({y_unit})")
@@ -200,19 +199,23 @@ def _map(
     elif high - low <= 1e-9 * size:
         low, high = low - 0.5 * (size or 1.0), high + 0.5 * (size or 1.0)
     image = axes.pcolormesh(
-        x, y, z, cmap=_SIGNED if signed else _POSITIVE, vmin=low, vmax=high, shading="nearest",
-        rasterized=True,
+        x, y, z, cmap=SIGNED_MAP if signed else POSITIVE_MAP, vmin=low, vmax=high,
+        shading="nearest", rasterized=True,
     )  # fmt: skip
     if z.count() and float(np.ptp(z)) > 1e-9 * size:
-        axes.contour(x, y, z, levels=8, colors=[INK], linewidths=0.4, linestyles="-", alpha=0.6)
+        axes.contour(
+            x, y, z, levels=8, colors=[INK], linewidths=THIN_WIDTH, linestyles="-", alpha=0.6
+        )
     elif not size:
         _note(axes, "zero everywhere" if z.count() else "a joint moves\nno inertia")
     axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
     axes.grid(False)
     bar: Any = figure.colorbar(image, ax=axes, pad=0.03, aspect=25)
-    bar.ax.tick_params(labelsize=SMALL_SIZE, labelcolor=INK, color=PALE, length=2.5, width=0.6)
+    bar.ax.tick_params(
+        labelsize=SMALL_SIZE, labelcolor=INK, color=PALE, length=2.5, width=THIN_WIDTH
+    )
     bar.ax.set_facecolor("white")
-    bar.outline.set(edgecolor=PALE, linewidth=0.6)
+    bar.outline.set(edgecolor=PALE, linewidth=THIN_WIDTH)
     bar.ax.yaxis.get_offset_text().set(size=SMALL_SIZE, color=INK)
     bar.set_label(unit if unit == "no unit" else f"({unit})", size=LABEL_SIZE, color=INK)
 

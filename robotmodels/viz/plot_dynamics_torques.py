@@ -19,16 +19,16 @@ from ..simulation.torque_parts import TorqueParts, simulated_torque_parts, torqu
 from ..trajectories.trajectory import Samples, Trajectory
 from .figures import (
     COLUMN,
-    INK,
     LINE_WIDTH,
     PAGE,
-    PALE,
     SMALL_SIZE,
+    THIN_WIDTH,
     legend_above,
     line_style,
     new_figure,
     panels,
 )
+from .palette import INK, PALE
 from .plot_sampling import drawn
 from .plot_trajectory import draw_line
 from .plot_units import joint_names
@@ -128,7 +128,7 @@ def plot_torque_parts(
         axes.set_visible(False)
     for k, j in enumerate(shown):
         axes = order[k]
-        axes.axhline(0.0, color=PALE, linewidth=0.6, zorder=1.2, label="_zero")
+        axes.axhline(0.0, color=PALE, linewidth=THIN_WIDTH, zorder=1.2, label="_zero")
         for values, style, label in present:
             draw_line(axes, times, values[:, k], style, label)
         axes.plot(times, total[:, k], color=INK, linewidth=1.4 * LINE_WIDTH, alpha=0.85,

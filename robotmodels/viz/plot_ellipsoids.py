@@ -12,7 +12,17 @@ from .._arrays import Array
 from ..errors import InvalidValueError
 from ..kinematics.ellipsoid import Ellipsoid, EllipsoidQuantity
 from .ellipsoid import as_ellipsoids
-from .figures import INK, PAGE, LineStyle, legend_above, line_style, new_figure, panels, texts
+from .figures import (
+    PAGE,
+    THIN_WIDTH,
+    LineStyle,
+    legend_above,
+    line_style,
+    new_figure,
+    panels,
+    texts,
+)
+from .palette import INK
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -137,7 +147,7 @@ def _shadow(
             continue
         end = u * (far if no_end else radius)
         axes.plot(
-            (-end[0], end[0]), (-end[1], end[1]), color=style.color, linewidth=0.6,
+            (-end[0], end[0]), (-end[1], end[1]), color=style.color, linewidth=THIN_WIDTH,
             linestyle=(0, (6.0, 3.0)) if no_end else "-", alpha=0.8, zorder=2.5,
             label="_axis without end" if no_end else "_axis",
         )  # fmt: skip

@@ -16,19 +16,19 @@ from ..identification.excitation import (
     ExcitingTrajectory,
 )
 from .figures import (
-    INK,
     LIMIT_DASHES,
     LIMIT_WIDTH,
     LINE_WIDTH,
     PAGE,
-    PALE,
     SMALL_SIZE,
+    THIN_WIDTH,
     legend_above,
     limit_lines,
     line_style,
     new_figure,
     styled,
 )
+from .palette import INK, PALE
 from .plot_sampling import drawn
 from .plot_trajectory import QUANTITIES, draw_limits, draw_line, limit_handles
 from .plot_units import joint_names, joint_units
@@ -162,7 +162,8 @@ def _draw_search(axes: Axes, found: ExcitingTrajectory) -> None:
         front = k == best
         color = line_style(0).color if front else PALE
         axes.plot(np.arange(1, len(values) + 1), values, color=color, label="_start",
-                  linewidth=LINE_WIDTH if front else 0.7, zorder=3 if front else 2)  # fmt: skip
+                  linewidth=LINE_WIDTH if front else THIN_WIDTH,
+                  zorder=3 if front else 2)  # fmt: skip
     for end in np.cumsum(found.starts[best].stages)[:-1]:
         axes.axvline(end, color=PALE, linewidth=LIMIT_WIDTH, linestyle=LIMIT_DASHES, zorder=1.5)
     if ratio:

@@ -11,17 +11,16 @@ from .._arrays import Array
 from ..identification.reporting.diagnostics import NOT_SEEN
 from ..identification.result import IdentificationResult
 from .figures import (
-    INK,
     LIMIT_DASHES,
     LIMIT_WIDTH,
     PAGE,
-    PALE,
     SMALL_SIZE,
     legend_above,
     line_style,
     new_figure,
     panels,
 )
+from .palette import INK, PALE
 from .plot_correlation import correlation_figure
 from .plot_decades import plain_decades
 from .plot_identification_torques import as_identification

@@ -13,17 +13,8 @@ from ..identification.preparation.filters import decimation_window, zero_phase
 from ..identification.preparation.processing import Processing
 from ..logs import Log
 from ..model import RobotModel
-from .figures import (
-    ALERT,
-    INK,
-    LIMIT_DASHES,
-    PAGE,
-    SMALL_SIZE,
-    legend_above,
-    line_style,
-    new_figure,
-    panels,
-)
+from .figures import LIMIT_DASHES, PAGE, SMALL_SIZE, legend_above, line_style, new_figure, panels
+from .palette import ALERT, BAND, INK
 from .plot_decades import plain_decades
 from .plot_units import joint_names, joint_units
 
@@ -134,7 +125,7 @@ def plot_processing(
             axes.loglog(f, before[:, j], color=_BEFORE, linewidth=0.9, label="as recorded")
             axes.loglog(f, after[:, j], color=_AFTER, linewidth=1.2, label="kept")
             if cutoff is not None:
-                axes.axvspan(cutoff, nyquist, color="0.92", linewidth=0.0, zorder=0.4)
+                axes.axvspan(cutoff, nyquist, color=BAND, linewidth=0.0, zorder=0.4)
                 axes.axvline(cutoff, color=INK, linewidth=0.9, label="cutoff")
             axes.axvline(processing.motion, color=INK, linewidth=0.9, linestyle=LIMIT_DASHES,
                          label="motion: 99.9 % of the velocity's power")  # fmt: skip
@@ -147,7 +138,7 @@ def plot_processing(
             what = ("position", "torque")[column]
             axes.set_title(f"{name}, {what}: {cut[j]:.2g} {of[j]} rms cut", loc="left",
                            size=SMALL_SIZE, color=INK, pad=2.0)  # fmt: skip
-            axes.set_ylabel(f"{of[j]}/√Hz" if " or " not in of[j] else "density (1/√Hz)")
+            axes.set_ylabel(f"({of[j]}/√Hz)" if " or " not in of[j] else "density (1/√Hz)")
         grid[-1, column].set_xlabel("frequency (Hz)")
     for axes in grid.flat:
         plain_decades(axes.yaxis, 4)

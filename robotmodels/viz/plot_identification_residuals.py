@@ -14,7 +14,8 @@ from ..identification.reporting.diagnostics import residual_diagnostics
 from ..identification.reporting.parameters import kind_names, kind_units
 from ..identification.result import IdentificationResult
 from ..logs import Log
-from .figures import INK, PAGE, PALE, SMALL_SIZE, legend_above, line_style, new_figure, panels
+from .figures import PAGE, SMALL_SIZE, THIN_WIDTH, legend_above, line_style, new_figure, panels
+from .palette import BAND, INK, PALE
 from .plot_identification_torques import as_identification, check_test
 
 if TYPE_CHECKING:
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
 
 _MOST = 4000
 """Residuals that are drawn as points; beyond, only the farthest of a group."""
-_BAND = "0.88"
 
 
 def plot_identification_residuals(
@@ -89,17 +89,17 @@ def plot_identification_residuals(
     for j in range(m):
         left, right = grid[j]
         sigma = float(found.estimate.sigma[j])
-        left.axhspan(-2.0 * sigma, 2.0 * sigma, color=_BAND, linewidth=0.0, zorder=0.5,
+        left.axhspan(-2.0 * sigma, 2.0 * sigma, color=BAND, linewidth=0.0, zorder=0.5,
                      label="two deviations; 95 % of white residuals")  # fmt: skip
-        left.axhline(0.0, color=PALE, linewidth=0.6, zorder=1.2, label="_zero")
+        left.axhline(0.0, color=PALE, linewidth=THIN_WIDTH, zorder=1.2, label="_zero")
         left.plot(t, e[:, j], linestyle="", marker="o", markersize=1.4, color=color,
                   markeredgewidth=0.0, label="residual; its autocorrelation")  # fmt: skip
         left.set_ylabel(f"residual ({units[j]})")
         left.set_title(f"{names[j]}: {100.0 * far[j]:.2g} % outside", loc="left", size=SMALL_SIZE,
                        color=INK, pad=2.0)  # fmt: skip
         bounds, rho = correlation.bounds[j, 1:], correlation.autocorrelation[j, 1:]
-        right.fill_between(lag, -bounds, bounds, color=_BAND, linewidth=0.0, zorder=0.5)
-        right.axhline(0.0, color=PALE, linewidth=0.6, zorder=1.2)
+        right.fill_between(lag, -bounds, bounds, color=BAND, linewidth=0.0, zorder=0.5)
+        right.axhline(0.0, color=PALE, linewidth=THIN_WIDTH, zorder=1.2)
         right.vlines(lag, 0.0, rho, color=color, linewidth=1.2)
         right.set_ylim(-1.05, 1.05)
         right.set_xlim(0.0, 1.03 * float(lag[-1]))

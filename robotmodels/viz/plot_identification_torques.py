@@ -15,16 +15,8 @@ from ..identification.preparation.signals import piece_signals, pieces
 from ..identification.reporting.parameters import effort_units
 from ..identification.result import IdentificationResult
 from ..logs import Log
-from .figures import (
-    INK,
-    PAGE,
-    PALE,
-    SMALL_SIZE,
-    legend_above,
-    line_style,
-    new_figure,
-    panels,
-)
+from .figures import PAGE, SMALL_SIZE, THIN_WIDTH, legend_above, line_style, new_figure, panels
+from .palette import BAND, INK, PALE
 from .plot_envelope import envelope
 
 if TYPE_CHECKING:
@@ -33,7 +25,6 @@ if TYPE_CHECKING:
 _POINTS = 700
 """Groups of samples over the length of a log."""
 _MEASURED, _PREDICTED, _LEFT = line_style(3).color, line_style(0).color, line_style(1).color
-_REST = "0.88"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -174,10 +165,10 @@ def plot_identification_torques(
             axes = grid[j, column]
             axes.fill_between(
                 drawn.slow_t, 0.0, 1.0, where=drawn.slow[:, j].astype(bool).tolist(), step="mid",
-                transform=axes.get_xaxis_transform(), color=_REST, linewidth=0.0, zorder=0.5,
+                transform=axes.get_xaxis_transform(), color=BAND, linewidth=0.0, zorder=0.5,
                 label="dead band",
             )  # fmt: skip
-            axes.axhline(0.0, color=PALE, linewidth=0.6, zorder=1.2, label="_zero")
+            axes.axhline(0.0, color=PALE, linewidth=THIN_WIDTH, zorder=1.2, label="_zero")
             for (t, y), color, width, label in (
                 (drawn.measured, _MEASURED, 0.7, "measured"),
                 (drawn.left, _LEFT, 0.6, "measured less predicted"),

@@ -16,7 +16,6 @@ from ..model import RobotModel
 from ..trajectories.limits import MotionLimits
 from .figures import (
     COLUMN,
-    INK,
     PAGE,
     LineStyle,
     heading,
@@ -28,6 +27,7 @@ from .figures import (
     texts,
     wrapped,
 )
+from .palette import INK
 from .plot_trajectory import as_limits, draw_line, limit_handles
 from .plot_units import Unit, as_unit, joint_names, joint_units
 

@@ -12,9 +12,7 @@ from .._arrays import Array, as_floats, as_reals
 from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel
 from .figures import (
-    ALERT,
     COLUMN,
-    INK,
     LIMIT_DASHES,
     LIMIT_WIDTH,
     PAGE,
@@ -24,6 +22,7 @@ from .figures import (
     new_figure,
     panels,
 )
+from .palette import ALERT, INK
 from .plot_trajectory import draw_line
 from .plot_units import Unit, joint_names, joint_units
 

@@ -15,8 +15,17 @@ from ..trajectories.joint_path import JointPath
 from ..trajectories.limits import MotionLimits
 from ..trajectories.path_events import PathEvent, PathEventKind
 from ..visual import Color
-from .figures import COLUMN, INK, PAGE, SMALL_SIZE, legend_above, line_style, new_figure, panels
-from .palette import PALETTE
+from .figures import (
+    COLUMN,
+    PAGE,
+    SMALL_SIZE,
+    THIN_WIDTH,
+    legend_above,
+    line_style,
+    new_figure,
+    panels,
+)
+from .palette import INK, LINE_COLORS
 from .plot_sampling import Drawn
 from .plot_trajectory import QUANTITIES, as_limits, draw_limits, draw_line, limit_handles
 from .plot_units import Unit, joint_names, joint_units
@@ -26,12 +35,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 EVENT_STYLES: dict[PathEventKind, tuple[str, Color, str]] = {
-    PathEventKind.OUT_OF_REACH: ("out of reach", PALETTE[7], "o"),
-    PathEventKind.OUTSIDE_LIMITS: ("outside limits", PALETTE[3], "s"),
-    PathEventKind.SINGULAR: ("singular", PALETTE[0], "D"),
-    PathEventKind.CHANGES_POSTURE: ("posture changes", PALETTE[2], "^"),
-    PathEventKind.JUMP: ("jump", PALETTE[4], "X"),
-    PathEventKind.TOO_FAST: ("too fast", PALETTE[1], "v"),
+    PathEventKind.OUT_OF_REACH: ("out of reach", LINE_COLORS[4], "o"),
+    PathEventKind.OUTSIDE_LIMITS: ("outside limits", LINE_COLORS[1], "s"),
+    PathEventKind.SINGULAR: ("singular", LINE_COLORS[0], "D"),
+    PathEventKind.CHANGES_POSTURE: ("posture changes", LINE_COLORS[2], "^"),
+    PathEventKind.JUMP: ("jump", LINE_COLORS[3], "X"),
+    PathEventKind.TOO_FAST: ("too fast", LINE_COLORS[6], "v"),
 }
 """Short text, colour and marker of what may happen on the way."""
 
@@ -190,7 +199,7 @@ def _trace(axes: Axes, kind: PathEventKind, start: float, stop: float) -> None:
         axes.axvspan(start, stop, color=color, alpha=0.2, linewidth=0.0, zorder=0.5,
                      label=f"_{text}")  # fmt: skip
     else:
-        axes.axvline(0.5 * (start + stop), color=color, linewidth=0.7, zorder=1.2,
+        axes.axvline(0.5 * (start + stop), color=color, linewidth=THIN_WIDTH, zorder=1.2,
                      label=f"_{text}")  # fmt: skip
 
 

@@ -14,7 +14,16 @@ from ..errors import InvalidValueError, ShapeError
 from ..trajectories.joint_path import JointPath
 from ..trajectories.pose_trajectory import PoseSamples, PoseTrajectory
 from ..visual import Color
-from .figures import COLUMN, INK, LABEL_SIZE, LINE_WIDTH, PALE, SMALL_SIZE, legend_above, new_figure
+from .figures import (
+    COLUMN,
+    LABEL_SIZE,
+    LINE_WIDTH,
+    SMALL_SIZE,
+    THIN_WIDTH,
+    legend_above,
+    new_figure,
+)
+from .palette import GRID, INK, PALE
 from .plot_joint_path import EVENT_STYLES
 from .plot_units import Unit, as_unit
 
@@ -249,9 +258,9 @@ def _style(axes: Any, unit: Unit, view: Array, edges: Array) -> None:
     for name, edge in zip("xyz", edges, strict=True):
         axis = getattr(axes, f"{name}axis")
         axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
-        axis.line.set(color=PALE, linewidth=0.6)
+        axis.line.set(color=PALE, linewidth=THIN_WIDTH)
         axis.set_major_locator(MaxNLocator(max(2, round(5.0 * edge / edges.max()))))
         axis.set_label_text(f"{name} ({unit.value})", size=LABEL_SIZE, color=INK)
-        axis._axinfo["grid"].update(color=(0.88, 0.88, 0.88, 1.0), linewidth=0.5)
+        axis._axinfo["grid"].update(color=GRID, linewidth=THIN_WIDTH)
         axes.tick_params(axis=name, labelsize=SMALL_SIZE, labelcolor=INK, color=PALE, pad=-1.0)
         axis.labelpad = -1.0

@@ -10,18 +10,18 @@ from numpy.typing import ArrayLike
 from ..calibration.selected import SelectedConfigurations
 from ..errors import InvalidValueError
 from .figures import (
-    INK,
     LIMIT_DASHES,
     LIMIT_WIDTH,
     LINE_WIDTH,
     PAGE,
-    PALE,
     SMALL_SIZE,
+    THIN_WIDTH,
     legend_above,
     line_style,
     new_figure,
     panels,
 )
+from .palette import INK, PALE
 from .plot_calibration_parameters import SHOWN, TITLES
 
 if TYPE_CHECKING:
@@ -111,7 +111,7 @@ def plot_selection(
     for axes, unit in zip(every[1:], kinds, strict=True):
         factor, symbol = SHOWN.get(unit, (1.0, unit))
         own = factor * selected.deviations[:, [k for k, u in enumerate(units) if u == unit]]
-        axes.plot(counts, own, color=PALE, linewidth=0.5, alpha=0.8)
+        axes.plot(counts, own, color=PALE, linewidth=THIN_WIDTH, alpha=0.8)
         handles["each"] = axes.get_lines()[0]
         for k, (name, values) in enumerate(
             (("largest", own.max(axis=1)), ("median", np.median(own, axis=1)))

@@ -14,25 +14,24 @@ from ..kinematics.formulas.singularity_map import SingularityMap
 from ..model import RobotModel
 from .figures import (
     COLUMN,
-    INK,
     LABEL_SIZE,
     LIMIT_DASHES,
     LIMIT_WIDTH,
     PAGE,
-    PALE,
     SMALL_SIZE,
+    THIN_WIDTH,
     heading,
     legend_above,
     new_figure,
     panels,
 )
+from .palette import INK, PALE, SIGNED_MAP
 from .plot_units import Unit, as_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_COLORS = "PuOr"  # diverging, and told apart by colour-blind readers
 _EVERY = 10  # of the postures of a long path has a marker
 _ASIDE = 1e-9  # of a cell
 _ZERO = 1e-12  # beside the greatest value
@@ -134,7 +133,7 @@ def _map(figure: Figure, axes: Axes, grid: SingularityMap, degrees: bool) -> Non
     most = float(np.abs(z).max())
     bound = most or 1.0
     image = axes.pcolormesh(
-        x, y, z, cmap=_COLORS, vmin=-bound, vmax=bound, shading="nearest", rasterized=True
+        x, y, z, cmap=SIGNED_MAP, vmin=-bound, vmax=bound, shading="nearest", rasterized=True
     )
     axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
     axes.set_xlabel(f"{grid.names[0]} ({x_unit})")
@@ -143,9 +142,11 @@ def _map(figure: Figure, axes: Axes, grid: SingularityMap, degrees: bool) -> Non
     for axis, unit in ((axes.xaxis, x_unit), (axes.yaxis, y_unit)):
         _ticks(axis, unit)
     bar: Any = figure.colorbar(image, ax=axes, pad=0.02, aspect=25)
-    bar.ax.tick_params(labelsize=SMALL_SIZE, labelcolor=INK, color=PALE, length=2.5, width=0.6)
+    bar.ax.tick_params(
+        labelsize=SMALL_SIZE, labelcolor=INK, color=PALE, length=2.5, width=THIN_WIDTH
+    )
     bar.ax.set_facecolor("white")
-    bar.outline.set(edgecolor=PALE, linewidth=0.6)
+    bar.outline.set(edgecolor=PALE, linewidth=THIN_WIDTH)
     bar.ax.yaxis.get_offset_text().set(size=SMALL_SIZE, color=INK)
     unit = grid.units[2].replace("^2", "²").replace("^3", "³")
     bar.set_label("value" if unit == "1" else f"value ({unit})", size=LABEL_SIZE, color=INK)

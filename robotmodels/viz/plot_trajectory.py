@@ -15,19 +15,19 @@ from ..model import RobotModel
 from ..trajectories.limits import MotionLimits
 from ..trajectories.trajectory import Samples, Trajectory
 from .figures import (
-    ALERT,
     COLUMN,
     LIMIT_DASHES,
     LIMIT_WIDTH,
     LINE_WIDTH,
     PAGE,
-    PALE,
+    THIN_WIDTH,
     legend_above,
     limit_lines,
     line_style,
     new_figure,
     panels,
 )
+from .palette import ALERT, PALE
 from .plot_sampling import Drawn, drawn
 from .plot_units import Unit, joint_names, joint_units
 
@@ -174,7 +174,9 @@ def break_lines(axes: Axes, motion: Drawn) -> None:
         All of whose joints change pieces together.
     """
     for time in motion.breaks[0][1:-1]:
-        axes.axvline(time, color=PALE, linewidth=0.5, linestyle="-", zorder=1.2, label="_break")
+        axes.axvline(
+            time, color=PALE, linewidth=THIN_WIDTH, linestyle="-", zorder=1.2, label="_break"
+        )
 
 
 def draw_limits(
