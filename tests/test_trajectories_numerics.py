@@ -5,6 +5,7 @@ import pytest
 from identities.random_robots import random_pose
 
 from robotmodels.errors import InvalidValueError
+from robotmodels.se3.orientation import rotation_vectors_of
 from robotmodels.trajectories import (
     MotionLimits,
     SplineEnds,
@@ -22,7 +23,7 @@ from robotmodels.trajectories import (
 )
 from robotmodels.trajectories.paths import FixedAxisPath
 from robotmodels.trajectories.point_to_point import along_line
-from robotmodels.trajectories.rotations import axis_and_angle, rotation_about, rotation_vector
+from robotmodels.trajectories.rotations import axis_and_angle, rotation_about
 
 # --- blends of poses -----------------------------------------------------------------------------
 
@@ -53,7 +54,7 @@ def step_speeds(move, samples=4001):
     """Greatest speeds of translation and rotation between neighbouring samples."""
     t = np.linspace(0.0, move.duration, samples)
     T = move.pose(t)
-    turn = rotation_vector(T[1:, :3, :3] @ np.swapaxes(T[:-1, :3, :3], -1, -2))
+    turn = rotation_vectors_of(T[1:, :3, :3] @ np.swapaxes(T[:-1, :3, :3], -1, -2))
     steps = np.stack((np.diff(T[:, :3, 3], axis=0), turn))
     return np.linalg.norm(steps, axis=-1).max(axis=-1) / t[1]
 

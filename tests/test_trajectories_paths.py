@@ -16,6 +16,7 @@ from robotmodels.errors import InvalidValueError, NotARotationError, ShapeError
 from robotmodels.igm import igm
 from robotmodels.kinematics import dgm, jacobian
 from robotmodels.robots import load
+from robotmodels.se3.orientation import rotation_vectors_of
 from robotmodels.trajectories import (
     MotionLimits,
     PathEventKind,
@@ -36,7 +37,7 @@ from robotmodels.trajectories import (
 )
 from robotmodels.trajectories.follow import _following
 from robotmodels.trajectories.path_task import _inverted
-from robotmodels.trajectories.rotations import rotation_about, rotation_vector
+from robotmodels.trajectories.rotations import rotation_about
 
 
 def central(f, t, h=1e-5):
@@ -46,7 +47,7 @@ def central(f, t, h=1e-5):
 def twist_of(pose, t, h=1e-5):
     """Velocity of a pose by central differences, world axes."""
     after, before = pose(t + h), pose(t - h)
-    w = rotation_vector(after[:, :3, :3] @ np.swapaxes(before[:, :3, :3], -1, -2)) / (2 * h)
+    w = rotation_vectors_of(after[:, :3, :3] @ np.swapaxes(before[:, :3, :3], -1, -2)) / (2 * h)
     return np.hstack(((after[:, :3, 3] - before[:, :3, 3]) / (2 * h), w))
 
 
@@ -58,7 +59,7 @@ def test_rotation_vectors_are_exact_at_every_angle(rng):
         u = rng.normal(size=(50, 3))
         u /= np.linalg.norm(u, axis=-1, keepdims=True)
         R = rotation_about(u, np.full(50, angle))
-        r = rotation_vector(R)
+        r = rotation_vectors_of(R)
         assert np.abs(np.linalg.norm(r, axis=-1) - angle).max() < 1e-14
         size = np.linalg.norm(r, axis=-1)
         back = rotation_about(
@@ -342,7 +343,7 @@ def test_limits_in_space_are_of_translation_and_rotation():
     # what does not move needs no limit, also where rounding sees a rotation
     rounded = np.eye(4)
     rounded[0, 1], rounded[1, 0] = 1e-16, -1e-16
-    assert rotation_vector(rounded[:3, :3]).any()
+    assert rotation_vectors_of(rounded[:3, :3]).any()
     for start in (A, rounded):
         end = se3.translation(1, 0, 0)
         assert straight_line(start, end, limits=no_turn).duration > 2.0

@@ -1,4 +1,4 @@
-"""Poses as 4x4 matrices: elementary motions, inverse, checks, MATLAB's order, roll-pitch-yaw.
+"""Poses as 4x4 matrices: elementary motions, inverse, checks, MATLAB's order, orientations.
 
 Seed book section 1.1, eq. [1.1]: the columns of a pose are s, n, a (the axes) and P.
 """

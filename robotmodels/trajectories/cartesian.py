@@ -16,6 +16,7 @@ from .. import se3
 from .._arrays import Array, as_exact, as_floats
 from .._choices import chosen
 from ..errors import InvalidValueError, ShapeError
+from ..se3.orientation import rotation_vectors_of
 from .asked import ROUNDING, given_durations, limits_along, refuse_short
 from .blends import PARABOLA, QUARTIC, schedule
 from .circle_timing import CircleLimits, circle_law
@@ -25,7 +26,7 @@ from .paths import BlendedPoses, FixedAxisPath, arc, line
 from .piecewise import PiecewisePolynomial
 from .point_to_point import Synchronisation, along_line, assembled, stretched
 from .pose_trajectory import PoseTrajectory
-from .rotations import rotation_about, rotation_vector
+from .rotations import rotation_about
 from .shown import least_shown
 from .trajectory import Trajectory
 
@@ -285,7 +286,7 @@ def blended_poses(
         )
     step = np.empty((len(T) - 1, 6))
     step[:, :3] = np.diff(T[:, :3, 3], axis=0)
-    step[:, 3:] = rotation_vector(T[1:, :3, :3] @ np.swapaxes(T[:-1, :3, :3], -1, -2))
+    step[:, 3:] = rotation_vectors_of(T[1:, :3, :3] @ np.swapaxes(T[:-1, :3, :3], -1, -2))
     step[np.linalg.norm(step[:, 3:], axis=-1) <= _NO_TURN, 3:] = 0.0
     size = np.stack((np.linalg.norm(step[:, :3], axis=-1), np.linalg.norm(step[:, 3:], axis=-1)))
     for name, bound in (("velocity", bounds.velocity), ("acceleration", bounds.acceleration)):

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import Array
 from ..kinematics import jacobian
 from ..model import RobotModel
-from .rotations import rotation_vector
+from ..se3.orientation import rotation_vectors_of
 
 
 class Task:
@@ -85,7 +85,7 @@ class Task:
         T, after = self._poses[steps], self._poses[steps + 1]
         move = np.empty((steps.size, 6))
         move[:, :3] = after[:, :3, 3] - T[:, :3, 3]
-        move[:, 3:] = rotation_vector(after[:, :3, :3] @ np.swapaxes(T[:, :3, :3], -1, -2))
+        move[:, 3:] = rotation_vectors_of(after[:, :3, :3] @ np.swapaxes(T[:, :3, :3], -1, -2))
         mean = 0.5 * (self._inverse[steps + 1] + self._inverse[steps])
         return (mean @ self._rows(move, T)[..., None])[..., 0]
 

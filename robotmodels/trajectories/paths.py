@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
-from .rotations import axis_and_angle, rotation_about, rotation_vector
+from ..se3.orientation import rotation_vectors_of
+from .rotations import axis_and_angle, rotation_about
 
 
 class PosePath(Protocol):
@@ -286,5 +287,5 @@ def arc(T0: Array, T1: Array, centre: Array, normal: Array, sweep: float) -> Fix
 
 
 def _turn(T0: Array, T1: Array) -> tuple[Array, float]:
-    axis, angle = axis_and_angle(rotation_vector(T1[:3, :3] @ T0[:3, :3].T))
+    axis, angle = axis_and_angle(rotation_vectors_of(T1[:3, :3] @ T0[:3, :3].T))
     return axis, float(angle)

@@ -25,9 +25,9 @@ from ..kinematics.inverse.status import IKMStatus
 from ..kinematics.inverse.tasks import Task
 from ..kinematics.poses import dgm
 from ..model import RobotModel, check_model
+from ..se3.orientation import rotation_vectors_of
 from .asked import ROUNDING
 from .pose_trajectory import PoseTrajectory
-from .rotations import rotation_vector
 from .shown import counted, greatest_shown, most_shown, seconds_shown
 
 
@@ -229,5 +229,5 @@ def _bounds_of_steps(limits: JointBounds | bool | None, step: float) -> JointBou
 
 def _behind(goal: Array, now: Array) -> Array:
     """Translation and rotation vector from where the tool is to where it should be."""
-    turn = rotation_vector(goal[:3, :3] @ now[:3, :3].T)
+    turn = rotation_vectors_of(goal[:3, :3] @ now[:3, :3].T)
     return np.concatenate((goal[:3, 3] - now[:3, 3], turn))

@@ -12,9 +12,10 @@ from .. import se3
 from .._arrays import Array, as_floats
 from .._choices import chosen
 from ..errors import InvalidValueError, ShapeError
+from ..se3.orientation import rotation_vectors_of
 from .laws import TimeLaw, law_of_duration
 from .piecewise import PiecewisePolynomial
-from .rotations import axis_and_angle, rotation_about, rotation_vector
+from .rotations import axis_and_angle, rotation_about
 from .trajectory import Samples, Trajectory
 
 
@@ -71,7 +72,7 @@ def cartesian_trajectory(
     s = _progress(law, N)
     R0 = first[..., :3, :3]
     # the turn seen in the world's axes
-    axis, angle = axis_and_angle(rotation_vector(last[..., :3, :3] @ np.swapaxes(R0, -1, -2)))
+    axis, angle = axis_and_angle(rotation_vectors_of(last[..., :3, :3] @ np.swapaxes(R0, -1, -2)))
     T = np.zeros((*batch, N, 4, 4))
     T[..., :3, :3] = rotation_about(axis, angle * s) @ R0
     T[..., :3, 3] = first[..., :3, 3] + s[:, None] * (last[..., :3, 3] - first[..., :3, 3])

@@ -1,9 +1,10 @@
 """Differentials of the coordinates of an orientation with respect to the entries of the rotation.
 
-What `angles_of`, `quaternions_of` and `vectors_of` compute, differentiated as it stands: given
-the derivative of the rotation in some direction, the derivatives of the coordinates in it; and the
-time derivatives of these along a motion, which is in another direction. A name that ends in _j
-is a derivative in the first direction, in _t in that of the motion, in _jt the second derivative.
+What `angles_of`, `quaternions_of` and `rotation_vectors_of` compute, differentiated as it stands:
+given the derivative of the rotation in some direction, the derivatives of the coordinates in it;
+and the time derivatives of these along a motion, which is in another direction. A name that ends
+in _j is a derivative in the first direction, in _t in that of the motion, in _jt the second
+derivative.
 """
 
 from __future__ import annotations
@@ -12,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..._arrays import Array
+from ...se3.orientation import linear_products_of, products_of
 from ._angles import ANGLE_SEQUENCES, AngleSequence, inclination
-from ._quaternions import linear_products_of, products_of, quaternions_of_vectors
+from ._quaternions import quaternions_of_vectors
 from ._vectors import inverse_left_factor, inverse_left_factor_slope
 from .conversion import columns_of, in_order
 from .kinds import OrientationKind

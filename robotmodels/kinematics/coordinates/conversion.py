@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from ..._arrays import Array, as_vector
 from ...errors import NotARotationError, ShapeError
 from ...se3 import ROTATION_TOLERANCE, as_pose
+from ...se3.orientation import quaternions_of, rotation_vectors_of
 from ._angles import (
     ANGLE_SEQUENCES,
     angles_near,
@@ -21,11 +22,9 @@ from ._angles import (
 )
 from ._quaternions import (
     quaternions_near,
-    quaternions_of,
     quaternions_of_vectors,
     rotation_of_quaternions,
     vectors_near,
-    vectors_of,
 )
 from .kinds import OrientationKind, orientation_kind
 
@@ -170,7 +169,7 @@ def coordinates_of_poses(T: Array, kind: OrientationKind, near: Array | None) ->
         if y is not None:
             o = quaternions_near(o, y)
     elif kind is OrientationKind.ANGLE_AXIS:
-        o = vectors_of(R) if y is None else vectors_near(R, y)
+        o = rotation_vectors_of(R) if y is None else vectors_near(R, y)
     else:
         o = columns_of(R, kind)
         if y is not None:

@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 from ..._arrays import Array
 from ...errors import ShapeError
 from ...se3 import as_pose
+from ...se3.orientation import quaternions_of
 from ._angles import ANGLE_SEQUENCES, continuous_angles
-from ._quaternions import continuous_quaternions, continuous_vectors, quaternions_of
+from ._quaternions import continuous_quaternions, continuous_vectors
 from .conversion import as_coordinates, columns_of, in_order
 from .kinds import OrientationKind, orientation_kind
 
