@@ -1,18 +1,13 @@
-"""The border: array-likes in, checked float64 arrays out, and the one rule for batches.
-
-Leading axes are batch axes and broadcast against each other; the last axes are the core.
-"""
+"""The border: array-likes in, checked float64 arrays of the right shape out."""
 
 from __future__ import annotations
 
-from dataclasses import fields
 from math import isfinite
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import InvalidValueError, ShapeError
+from ..errors import InvalidValueError, ShapeError
 
 Array = NDArray[np.float64]
 
@@ -173,147 +168,6 @@ def as_exact(value: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
     if array.shape != shape:
         raise ShapeError(f"{name}: expected shape {shape}, got {array.shape}.")
     return as_floats(array, name)
-
-
-def batch_shape(arrays: tuple[Array, ...], names: tuple[str, ...]) -> tuple[int, ...]:
-    """Broadcast the leading axes of vectors.
-
-    Parameters
-    ----------
-    arrays : tuple of ndarray, shapes (..., n_i)
-        Checked arrays; the last axis of each is its core.
-    names : tuple of str
-        Used in error messages.
-
-    Returns
-    -------
-    tuple of int
-        The common leading shape.
-
-    Raises
-    ------
-    ShapeError
-        The leading axes do not broadcast.
-    """
-    shapes = [a.shape[:-1] for a in arrays]
-    try:
-        return shapes[0] if len(set(shapes)) == 1 else np.broadcast_shapes(*shapes)
-    except ValueError:
-        got = ", ".join(f"{n} {a.shape}" for n, a in zip(names, arrays, strict=True))
-        raise ShapeError(
-            f"The leading (batch) axes do not broadcast against each other: {got}. "
-            "Give each the same number of rows, or a single row."
-        ) from None
-
-
-def batch_rows(
-    arrays: tuple[Array, ...], names: tuple[str, ...]
-) -> tuple[tuple[int, ...], list[Array]]:
-    """Broadcast the leading axes of vectors and lay each out as contiguous rows.
-
-    Parameters
-    ----------
-    arrays : tuple of ndarray, shapes (..., n_i)
-        Checked arrays; the last axis of each is its core.
-    names : tuple of str
-        Used in error messages.
-
-    Returns
-    -------
-    batch : tuple of int
-        The common leading shape.
-    rows : list of ndarray, shapes (N, n_i)
-        C-contiguous, N the product of ``batch``.
-
-    Raises
-    ------
-    ShapeError
-        The leading axes do not broadcast.
-    """
-    batch = batch_shape(arrays, names)
-    rows = [
-        np.ascontiguousarray(np.broadcast_to(a, (*batch, a.shape[-1]))).reshape(-1, a.shape[-1])
-        if a.shape[-1]
-        else np.empty((int(np.prod(batch)), 0))
-        for a in arrays
-    ]
-    return batch, rows
-
-
-def read_only(array: ArrayLike, dtype: type = np.float64) -> NDArray[Any]:
-    """A private, C-ordered, read-only copy.
-
-    Parameters
-    ----------
-    array : array_like
-        Values of any shape.
-    dtype : type
-        Of the copy.
-
-    Returns
-    -------
-    ndarray
-        The copy, not writeable.
-    """
-    copy = np.array(array, dtype=dtype, order="C")
-    copy.setflags(write=False)
-    return copy
-
-
-class Rebuilt:
-    """Base of frozen dataclasses whose arrays stay read-only when they are copied or unpickled.
-
-    NumPy forgets that an array is read-only when it is pickled.
-    """
-
-    __slots__ = ()
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        values = tuple(getattr(self, f.name) for f in fields(self) if f.init)  # type: ignore[arg-type]
-        return _rebuilt, (type(self), values)
-
-
-def _rebuilt(kind: type, values: tuple[Any, ...]) -> Any:
-    for value in values:
-        for array in value if isinstance(value, tuple) else (value,):
-            if isinstance(array, np.ndarray):
-                array.flags.writeable = False
-    return kind(*values)
-
-
-def same_value(a: object, b: object) -> bool:
-    """Equality of fields that may be arrays: same shape and same numbers.
-
-    Parameters
-    ----------
-    a, b : object
-        Two values of a field.
-
-    Returns
-    -------
-    bool
-        Whether they are equal.
-    """
-    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
-        return a.shape == b.shape and bool(np.array_equal(a, b))
-    return bool(a == b)
-
-
-def value_hash(*fields: object) -> int:
-    """Hash of fields that may be arrays, consistent with `same_value`.
-
-    Parameters
-    ----------
-    *fields : object
-        Hashable values or arrays.
-
-    Returns
-    -------
-    int
-        The hash.
-    """
-    # adding 0.0 makes -0.0 and 0.0 hash alike, as they compare alike
-    return hash(tuple((f + 0.0).tobytes() if isinstance(f, np.ndarray) else f for f in fields))
 
 
 def _converted(value: ArrayLike, name: str) -> Array:

@@ -1,0 +1,23 @@
+"""Arrays: array-likes in, checked float64 arrays out, one rule for batches, values nobody changes.
+
+Leading axes are batch axes and broadcast against each other; the last axes are the core.
+"""
+
+from .batch import batch_rows, batch_shape
+from .border import Array, as_core, as_exact, as_floats, as_reals, as_vector
+from .values import Rebuilt, read_only, same_value, value_hash
+
+__all__ = [
+    "Array",
+    "Rebuilt",
+    "as_core",
+    "as_exact",
+    "as_floats",
+    "as_reals",
+    "as_vector",
+    "batch_rows",
+    "batch_shape",
+    "read_only",
+    "same_value",
+    "value_hash",
+]

@@ -1,0 +1,73 @@
+"""The one rule for batches: leading axes broadcast, rows are contiguous."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import ShapeError
+from .border import Array
+
+
+def batch_shape(arrays: tuple[Array, ...], names: tuple[str, ...]) -> tuple[int, ...]:
+    """Broadcast the leading axes of vectors.
+
+    Parameters
+    ----------
+    arrays : tuple of ndarray, shapes (..., n_i)
+        Checked arrays; the last axis of each is its core.
+    names : tuple of str
+        Used in error messages.
+
+    Returns
+    -------
+    tuple of int
+        The common leading shape.
+
+    Raises
+    ------
+    ShapeError
+        The leading axes do not broadcast.
+    """
+    shapes = [a.shape[:-1] for a in arrays]
+    try:
+        return shapes[0] if len(set(shapes)) == 1 else np.broadcast_shapes(*shapes)
+    except ValueError:
+        got = ", ".join(f"{n} {a.shape}" for n, a in zip(names, arrays, strict=True))
+        raise ShapeError(
+            f"The leading (batch) axes do not broadcast against each other: {got}. "
+            "Give each the same number of rows, or a single row."
+        ) from None
+
+
+def batch_rows(
+    arrays: tuple[Array, ...], names: tuple[str, ...]
+) -> tuple[tuple[int, ...], list[Array]]:
+    """Broadcast the leading axes of vectors and lay each out as contiguous rows.
+
+    Parameters
+    ----------
+    arrays : tuple of ndarray, shapes (..., n_i)
+        Checked arrays; the last axis of each is its core.
+    names : tuple of str
+        Used in error messages.
+
+    Returns
+    -------
+    batch : tuple of int
+        The common leading shape.
+    rows : list of ndarray, shapes (N, n_i)
+        C-contiguous, N the product of ``batch``.
+
+    Raises
+    ------
+    ShapeError
+        The leading axes do not broadcast.
+    """
+    batch = batch_shape(arrays, names)
+    rows = [
+        np.ascontiguousarray(np.broadcast_to(a, (*batch, a.shape[-1]))).reshape(-1, a.shape[-1])
+        if a.shape[-1]
+        else np.empty((int(np.prod(batch)), 0))
+        for a in arrays
+    ]
+    return batch, rows

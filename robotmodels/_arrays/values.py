@@ -1,0 +1,85 @@
+"""Values nobody changes: read-only arrays, equality and hash of what holds them, copies of it."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+
+def read_only(array: ArrayLike, dtype: type = np.float64) -> NDArray[Any]:
+    """A private, C-ordered, read-only copy.
+
+    Parameters
+    ----------
+    array : array_like
+        Values of any shape.
+    dtype : type
+        Of the copy.
+
+    Returns
+    -------
+    ndarray
+        The copy, not writeable.
+    """
+    copy = np.array(array, dtype=dtype, order="C")
+    copy.setflags(write=False)
+    return copy
+
+
+class Rebuilt:
+    """Base of frozen dataclasses whose arrays stay read-only when they are copied or unpickled.
+
+    NumPy forgets that an array is read-only when it is pickled.
+    """
+
+    __slots__ = ()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        values = tuple(getattr(self, f.name) for f in fields(self) if f.init)  # type: ignore[arg-type]
+        return _rebuilt, (type(self), values)
+
+
+def _rebuilt(kind: type, values: tuple[Any, ...]) -> Any:
+    for value in values:
+        for array in value if isinstance(value, tuple) else (value,):
+            if isinstance(array, np.ndarray):
+                array.flags.writeable = False
+    return kind(*values)
+
+
+def same_value(a: object, b: object) -> bool:
+    """Equality of fields that may be arrays: same shape and same numbers.
+
+    Parameters
+    ----------
+    a, b : object
+        Two values of a field.
+
+    Returns
+    -------
+    bool
+        Whether they are equal.
+    """
+    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
+        return a.shape == b.shape and bool(np.array_equal(a, b))
+    return bool(a == b)
+
+
+def value_hash(*fields: object) -> int:
+    """Hash of fields that may be arrays, consistent with `same_value`.
+
+    Parameters
+    ----------
+    *fields : object
+        Hashable values or arrays.
+
+    Returns
+    -------
+    int
+        The hash.
+    """
+    # adding 0.0 makes -0.0 and 0.0 hash alike, as they compare alike
+    return hash(tuple((f + 0.0).tobytes() if isinstance(f, np.ndarray) else f for f in fields))
