@@ -1,4 +1,4 @@
-"""The command line: ``robotmodels demo | robots | info | igm | view``, each with ``--help``."""
+"""The command line: ``robotmodels COMMAND``, one file a command, each with ``--help``."""
 
 from .main import main
 

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import argparse
-import json
-import sys
-import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .._arrays import Array
-from ..errors import InvalidValueError, UrdfWarning
+from ..errors import InvalidValueError
 from ..model import RobotModel
 from .columns import column, columns
+from .exit_status import ExitStatus, ending
+from .file_units import add_units
 from .numbers import numbers
+from .output import Report, add_output, check_output, hand_over, with_extra
+from .progress import progress
 from .source import add_source, robot_of
 
 if TYPE_CHECKING:
@@ -35,9 +36,7 @@ examples:
       --kind point-contact --known-distance hole_0 hole_1 0.05 --out report/
 
 Into the folder of --out go report.txt, report.html (text and figures, one offline file),
-result.json and calibrated.urdf. Without --out the report is printed.
-
-exit status: 0 the fit has converged, 1 it has not, 2 an argument is wrong"""
+result.json (what --json prints) and calibrated.urdf. Without --out the report is printed."""
 
 
 def add_command(commands: Any) -> None:
@@ -54,17 +53,14 @@ def add_command(commands: Any) -> None:
     """
     parser = commands.add_parser(
         "calibrate",
-        help="geometric parameters of a robot from measurements",
         description="Geometric calibration: estimate the parameters that measurements tell, with "
-        "their deviations,\nthe errors before and after, and on measurements kept aside.",
-        epilog=_EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        "their deviations, the errors before and after, and on measurements kept aside.",
+        epilog=ending(_EXAMPLES, "the fit has not converged"),
     )
     add_source(parser, option=True)
     _add_files(parser.add_argument_group("the measurements"))
     _add_fit(parser.add_argument_group("the fit"))
-    parser.add_argument("--out", type=Path, metavar="FOLDER", help="where the files go")
-    parser.add_argument("--json", action="store_true", help="print the result as JSON")
+    add_output(parser)
     parser.set_defaults(run=run)
 
 
@@ -74,10 +70,7 @@ def _add_files(files: Any) -> None:
     files.add_argument("--kind", required=True, choices=_KINDS, help="what was measured")
     files.add_argument("--pattern", default="*.csv",
                        help="of the files in a folder (default: %(default)s)")  # fmt: skip
-    files.add_argument("--lengths", choices=("m", "mm"), default="m",
-                       help="unit of lengths in the files (default: %(default)s)")  # fmt: skip
-    files.add_argument("--angles", choices=("rad", "deg"), default="rad",
-                       help="unit of angles in the files (default: %(default)s)")  # fmt: skip
+    add_units(files)
     files.add_argument("--joint-angles", choices=("rad", "deg"),
                        help="unit of the readings of joints, if another")  # fmt: skip
     files.add_argument(
@@ -165,6 +158,7 @@ def run(arguments: argparse.Namespace) -> int:
     """
     from ..calibration import KnownDistance, ParameterPrior, fit
 
+    check_output(arguments)
     model = robot_of(arguments)
     measured = read(arguments, model, arguments.measurements)
     known = [
@@ -182,23 +176,17 @@ def run(arguments: argparse.Namespace) -> int:
     aside = arguments.held_out
     if arguments.test is not None:
         aside = read(arguments, model, arguments.test, name="test")
-    result = fit(
-        model, [measured, *known], parameters=arguments.parameters, known=arguments.known,
-        known_lengths=arguments.known_lengths, base=not arguments.fixed_base,
-        tool=not arguments.fixed_tool, gains=arguments.gains,
-        eccentricity=arguments.eccentricity, compliance=arguments.compliance,
-        loss=arguments.loss, prior=prior, folds=arguments.folds, held_out=aside,
-        progress=_progress if sys.stderr.isatty() else None,
-    )  # fmt: skip
-    if arguments.out is not None:
-        write(result, arguments.out, quiet=arguments.json)
-    if arguments.json:
-        from ..calibration.write import result_data
-
-        print(json.dumps(result_data(result), indent=2, ensure_ascii=False))
-    elif arguments.out is None:
-        print(result.report(), end="")
-    return 0 if result.solution.fit.converged else 1
+    with progress(arguments, "fits") as bar:
+        result = fit(
+            model, [measured, *known], parameters=arguments.parameters, known=arguments.known,
+            known_lengths=arguments.known_lengths, base=not arguments.fixed_base,
+            tool=not arguments.fixed_tool, gains=arguments.gains,
+            eccentricity=arguments.eccentricity, compliance=arguments.compliance,
+            loss=arguments.loss, prior=prior, folds=arguments.folds, held_out=aside,
+            progress=bar and bar.steps,
+        )  # fmt: skip
+    hand_over(_report(result), arguments)
+    return ExitStatus.DONE if result.solution.fit.converged else ExitStatus.NOT_REACHED
 
 
 def read(
@@ -241,51 +229,29 @@ def read(
     )  # fmt: skip
 
 
-def write(result: CalibrationResult, folder: Path, quiet: bool = False) -> None:
-    """Write the files of a report into a folder and say which.
+def _report(result: CalibrationResult) -> Report:
+    from ..calibration.write import result_data, write_result
 
-    Parameters
-    ----------
-    result : CalibrationResult
-        Of the fit.
-    folder : Path
-        Made if it is not there.
-    quiet : bool
-        Whether nothing is printed but warnings.
+    text = result.report()
 
-    Raises
-    ------
-    RobotModelsError, OSError
-        A file that cannot be made.
-    """
-    from ..calibration.write import write_result
-    from ..viz import html_report
+    def write(folder: Path) -> list[str]:
+        from ..viz import html_report
 
-    folder.mkdir(parents=True, exist_ok=True)
-    report = result.report()
-    (folder / "report.txt").write_text(report, encoding="utf-8")
-    write_result(result, folder / "result.json")
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", UrdfWarning)
+        names, page = ["report.txt", "result.json", "calibrated.urdf"], folder / "report.html"
+        (folder / "report.txt").write_text(text, encoding="utf-8")
+        write_result(result, folder / "result.json")
         write_result(result, folder / "calibrated.urdf")
-    for warning in caught:
-        print(f"robotmodels: calibrated.urdf: {warning.message}", file=sys.stderr)
-    html_report(result, folder / "report.html")
-    if not quiet:
-        print(report.split("What was measured", 1)[0].rstrip())
-        for name in ("report.txt", "report.html", "result.json", "calibrated.urdf"):
-            print(f"wrote {folder / name}")
+        return names + with_extra(page, lambda: html_report(result, page))
+
+    head = text.split("What was measured", 1)[0]
+    return Report(text.rstrip(), head.rstrip(), lambda: result_data(result), write)
 
 
 def _sigma(text: str | None) -> float | Array | None:
+    """One deviation, or one for each coordinate of a measurement."""
     if text is None:
         return None
     values = numbers(text, range(1, 7), "--sigma")
     if (values <= 0.0).any():
         raise InvalidValueError(f"--sigma: expected positive numbers in m and rad, got {text!r}.")
     return float(values[0]) if len(values) == 1 else values
-
-
-def _progress(done: int, of: int, doing: str) -> None:
-    end = "\n" if done == of else ""
-    print(f"\r{done} of {of} fits: {doing:<28}", end=end, file=sys.stderr, flush=True)

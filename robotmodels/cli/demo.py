@@ -6,6 +6,7 @@ import argparse
 import sys
 import textwrap
 import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +20,16 @@ from ..kinematics import dgm, dkm, jacobian
 from ..minimal_parameters import base_parameters
 from ..model import RobotModel, write_urdf
 from ..robots import load
+from .exit_status import ending
 from .info import pose_text
+from .output import check_output
 from .postures import as_text
+from .progress import add_quiet, progress
 
+_EXAMPLES = """\
+examples:
+  robotmodels demo
+  robotmodels demo --real --out tx40/"""
 _TERMINAL = 80  # columns
 _SAMPLES = 1000
 _BATCH = 100_000
@@ -45,10 +53,10 @@ def add_command(commands: Any) -> None:
     """
     parser = commands.add_parser(
         "demo",
-        help="two arms from table and URDF to every direct model and every posture",
         description="Take the Staubli RX-90 from its table to URDF and Pinocchio, and the UR5 "
         "from its URDF to its table; print every direct model of both and every posture that "
         "reaches a pose, and draw them. With --real, identify a Staubli TX40 from its log instead.",
+        epilog=ending(_EXAMPLES),
     )
     parser.add_argument(
         "--real", action="store_true",
@@ -59,6 +67,7 @@ def add_command(commands: Any) -> None:
         "--out", type=Path, default=Path("robotmodels-demo"), metavar="FOLDER",
         help="where the files go (default: %(default)s)",
     )  # fmt: skip
+    add_quiet(parser)
     parser.set_defaults(run=run)
 
 
@@ -68,7 +77,7 @@ def run(arguments: argparse.Namespace) -> None:
     Parameters
     ----------
     arguments : Namespace
-        With ``out``, the folder for the files, and ``real``.
+        With ``out``, the folder for the files, ``real`` and ``quiet``.
 
     Examples
     --------
@@ -76,13 +85,14 @@ def run(arguments: argparse.Namespace) -> None:
     (2, 4, 4)
     """
     started = time.perf_counter()
+    check_output(arguments)
     folder: Path = arguments.out
     folder.mkdir(parents=True, exist_ok=True)
     if arguments.real:
         from .demo_identification import identify_tx40
 
         _say("Staubli TX40: from a log of its motion to a robot that predicts its torques")
-        identify_tx40(folder)
+        identify_tx40(folder, partial(progress, arguments))
         print(f"\nDone in {time.perf_counter() - started:.1f} s.")
         return
     _say("Staubli RX-90: from the table of the seed book (Table 1.1) to URDF to Pinocchio")

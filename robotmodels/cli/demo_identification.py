@@ -14,15 +14,21 @@ from .._arrays import Array
 from ..errors import MissingExtraError, UrdfWarning
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+    from contextlib import AbstractContextManager
+
     from ..datasets import Tx40Log
     from ..identification import ConsistentFit, IdentificationResult, Log
+    from .progress import Bar
 
 _TERMINAL = 88  # columns, as the headings of the demonstration
 _PUBLISHED_RMSE = (6.40, 8.21, 4.13, 1.72, 2.65, 1.72)
 """N m: of the published fits the best one on each joint, on the rows that are kept aside."""
 
 
-def identify_tx40(folder: Path) -> None:
+def identify_tx40(
+    folder: Path, progress: Callable[[str], AbstractContextManager[Bar | None]]
+) -> None:
     """Identify the Staubli TX40 from its log, print what is found, and write files.
 
     What an extra is missing for is said, and the rest is done.
@@ -31,6 +37,8 @@ def identify_tx40(folder: Path) -> None:
     ----------
     folder : Path
         Where the files go; it is there.
+    progress : callable
+        Gives a bar for work of some name, or None.
 
     Raises
     ------
@@ -62,13 +70,15 @@ def identify_tx40(folder: Path) -> None:
     found = (*check_log(log, model), *check_joints(log, model))
     _print("\n".join(map(str, found)) or "Nothing strange is found in the log.")
     _print(str(synchronisation(log, model)))
-    whole = fit(model, log)
+    with progress("the whole log") as bar:
+        whole = fit(model, log, progress=bar and bar.fraction)
     print(f"  identified after {time.perf_counter() - started:.1f} s\n")
     print(comparison(data, whole))
     first = log.rows(data.training.start, data.training.stop)
     last = log.rows(data.held_out.start, data.held_out.stop)
     started = time.perf_counter()
-    trained = fit(model, first, test=last)
+    with progress("without the rows that test") as bar:
+        trained = fit(model, first, test=last, progress=bar and bar.fraction)
     seconds = time.perf_counter() - started
     print(f"\nFitted on samples {data.training.start} to {data.training.stop} ({seconds:.1f} s, "
           f"with all checks); torques of samples {data.held_out.start}\nto {data.held_out.stop} as "

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import argparse
-import json
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .._arrays import Array
 from ..errors import InvalidValueError
-from .numbers import numbers
+from .exit_status import ExitStatus, ending
+from .numbers import joint_numbers
+from .output import Report, add_output, check_output, hand_over, with_extra
+from .progress import progress
 from .source import add_source, robot_of
 
 if TYPE_CHECKING:
@@ -26,10 +28,8 @@ examples:
   robotmodels excite --robot panda.urdf --kind spline --points 12 --drive Ia Fv Fc offset --json
 
 Into the folder of --out go trajectory.csv (or .npz, .yaml: --format), trajectory.json (the
-coefficients and all numbers), trajectory.png (if Matplotlib is installed) and summary.txt. Without
---out the summary is printed.
-
-exit status: 0 a motion within all limits was found, 1 none was found, 2 an argument is wrong"""
+coefficients and all numbers, what --json prints), trajectory.png (if Matplotlib is installed) and
+summary.txt. Without --out the summary is printed."""
 
 
 def add_command(commands: Any) -> None:
@@ -46,26 +46,23 @@ def add_command(commands: Any) -> None:
     """
     parser = commands.add_parser(
         "excite",
-        help="a motion for the dynamic identification of a robot",
         description="Exciting trajectory: a periodic motion within the limits of a robot on which "
-        "its base parameters\nare seen best, with analytic gradients from several starts.",
-        epilog=_EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        "its base parameters are seen best, with analytic gradients from several starts.",
+        epilog=ending(_EXAMPLES, "no motion within all limits was found"),
     )
     add_source(parser, option=True)
     _add_motion(parser.add_argument_group("the motion"))
     _add_limits(parser.add_argument_group("the limits"))
     _add_search(parser.add_argument_group("the search"))
-    files = parser.add_argument_group("the files")
-    files.add_argument("--out", type=Path, metavar="FOLDER", help="where the files go")
+    files = add_output(parser)
     files.add_argument("--rate", type=float, default=1000.0,
                        help="samples per second in the file (default: %(default)s)")  # fmt: skip
     files.add_argument("--format", choices=("csv", "npz", "yaml"), default="csv",
                        help="of the samples; yaml: ROS JointTrajectory "
                        "(default: %(default)s)")  # fmt: skip
     files.add_argument("--degrees", action="store_true",
-                       help="write revolute joints in degrees")  # fmt: skip
-    files.add_argument("--json", action="store_true", help="print the result as JSON")
+                       help="revolute joints in degrees in the file; --json stays in "
+                       "radians")  # fmt: skip
     parser.set_defaults(run=run)
 
 
@@ -142,8 +139,8 @@ def run(arguments: argparse.Namespace) -> int:
     5
     """
     from ..identification.excitation import ExcitationStatus, exciting_trajectory
-    from ..identification.excitation.files import excitation_data
 
+    check_output(arguments)
     model = robot_of(arguments)
     n = model.n
     if arguments.seed < 0:
@@ -152,46 +149,38 @@ def run(arguments: argparse.Namespace) -> int:
         raise InvalidValueError("--degrees: ROS reads radians; leave it out with --format yaml.")
     if not 0.0 < arguments.rate < np.inf:
         raise InvalidValueError(f"--rate: expected a positive number, got {arguments.rate:g}.")
-    found = exciting_trajectory(
-        model, duration=arguments.duration, harmonics=arguments.harmonics,
-        points=arguments.points, kind=arguments.kind, criterion=arguments.criterion,
-        drive=tuple(arguments.drive) or False, limits=_limits(arguments, model),
-        torque_limits=_each(arguments.torque_limits, n, "--torque-limits"),
-        sigma=_each(arguments.sigma, n, "--sigma"), boxes=_boxes(arguments),
-        starts=arguments.starts, baseline=arguments.random, iterations=arguments.iterations,
-        rng=arguments.seed, progress=_progress if sys.stderr.isatty() else False,
-    )  # fmt: skip
-    if arguments.out is not None:
-        _write(found, arguments)
-    if arguments.json:
-        print(json.dumps(excitation_data(found), indent=2, ensure_ascii=False))
-    elif arguments.out is None:
-        print(found)
-    return int(found.status is ExcitationStatus.INFEASIBLE)
+    with progress(arguments, "stages of the search") as bar:
+        found = exciting_trajectory(
+            model, duration=arguments.duration, harmonics=arguments.harmonics,
+            points=arguments.points, kind=arguments.kind, criterion=arguments.criterion,
+            drive=tuple(arguments.drive) or False, limits=_limits(arguments, model),
+            torque_limits=_each(arguments.torque_limits, n, "--torque-limits"),
+            sigma=_each(arguments.sigma, n, "--sigma"), boxes=_boxes(arguments),
+            starts=arguments.starts, baseline=arguments.random, iterations=arguments.iterations,
+            rng=arguments.seed, progress=False if bar is None else bar.steps,
+        )  # fmt: skip
+    hand_over(_report(found, arguments), arguments)
+    infeasible = found.status is ExcitationStatus.INFEASIBLE
+    return ExitStatus.NOT_REACHED if infeasible else ExitStatus.DONE
 
 
-def _write(found: ExcitingTrajectory, arguments: argparse.Namespace) -> None:
-    """Write the files and say which."""
-    from ..errors import MissingExtraError
+def _report(found: ExcitingTrajectory, arguments: argparse.Namespace) -> Report:
     from ..identification.excitation import write_coefficients, write_trajectory
-    from ..viz import plot_excitation
+    from ..identification.excitation.files import excitation_data
 
-    folder = arguments.out
-    folder.mkdir(parents=True, exist_ok=True)
-    samples = f"trajectory.{arguments.format}"
-    names = [samples, "trajectory.json", "trajectory.png", "summary.txt"]
-    write_trajectory(found, folder / samples, arguments.rate, degrees=arguments.degrees)
-    write_coefficients(found, folder / "trajectory.json")
-    (folder / "summary.txt").write_text(f"{found}\n", encoding="utf-8")
-    try:
-        plot_excitation(found).savefig(folder / "trajectory.png")
-    except MissingExtraError as error:
-        names.remove("trajectory.png")
-        print(f"robotmodels: no trajectory.png: {error}", file=sys.stderr)
-    if not arguments.json:
-        print(found)
-        for name in names:
-            print(f"wrote {folder / name}")
+    text = str(found)
+
+    def write(folder: Path) -> list[str]:
+        from ..viz import plot_excitation
+
+        names = [f"trajectory.{arguments.format}", "trajectory.json", "summary.txt"]
+        write_trajectory(found, folder / names[0], arguments.rate, degrees=arguments.degrees)
+        write_coefficients(found, folder / "trajectory.json")
+        (folder / "summary.txt").write_text(f"{text}\n", encoding="utf-8")
+        picture = folder / "trajectory.png"
+        return names + with_extra(picture, lambda: plot_excitation(found).savefig(picture))
+
+    return Report(text, text, lambda: excitation_data(found), write)
 
 
 def _limits(arguments: argparse.Namespace, model: Any) -> MotionLimits | None:
@@ -208,14 +197,10 @@ def _limits(arguments: argparse.Namespace, model: Any) -> MotionLimits | None:
     return limits
 
 
-def _each(text: str | None, n: int, option: str) -> Any:
-    """One number for all joints, or one for each."""
-    if text is None:
-        return None
-    values = numbers(text, sorted({1, n}), option)
-    if not (values > 0.0).all():
-        raise InvalidValueError(f"{option}: expected positive numbers, got {text!r}.")
-    return np.full(n, values)
+def _each(text: str | None, n: int, option: str) -> Array | None:
+    """Positive numbers, one for each joint."""
+    values = joint_numbers(text, n, option, positive=True)
+    return None if values is None else np.full(n, values)
 
 
 def _boxes(arguments: argparse.Namespace) -> list[WorkspaceBox]:
@@ -233,8 +218,3 @@ def _boxes(arguments: argparse.Namespace) -> list[WorkspaceBox]:
                 raise InvalidValueError(f"{option}: expected six numbers in m, got {text!r}.")
             boxes.append(WorkspaceBox(corners[:3], corners[3:], inside=inside))
     return boxes
-
-
-def _progress(done: int, of: int) -> None:
-    end = "\n" if done == of else ""
-    print(f"\r{done} of {of} stages", end=end, file=sys.stderr, flush=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Sequence
 from typing import Any
 
@@ -15,7 +14,9 @@ from ..errors import InvalidValueError
 from ..igm import igm as inverse_model
 from ..kinematics import dgm
 from ..model import RobotModel
+from .exit_status import ExitStatus, ending
 from .numbers import numbers, posture, revolute
+from .output import add_json, print_json
 from .postures import as_json, as_text
 from .source import add_source, robot_of
 
@@ -25,9 +26,7 @@ examples:
   robotmodels igm lab_trr --xyz 0.4 0.2 0.5 --mask 1 1 1 0 0 0
   robotmodels igm arm.urdf --matrix 0 0 -1 0.4  0 1 0 0.1  1 0 0 0.6  0 0 0 1
   robotmodels igm erd:ur5 --q 0.3 -0.9 1.2 0.4 0.8 -0.2 --limits
-  robotmodels igm iiwa14 --q 10 30 0 -80 0 40 0 --degrees --arm-angle 20
-
-exit status: 0 the pose is reached, 1 it is not, 2 an argument is wrong"""
+  robotmodels igm iiwa14 --q 10 30 0 -80 0 40 0 --degrees --arm-angle 20"""
 
 
 def add_command(commands: Any) -> None:
@@ -44,12 +43,10 @@ def add_command(commands: Any) -> None:
     """
     parser = commands.add_parser(
         "igm",
-        help="all postures that bring the tool to a pose",
         description="Inverse geometric model: print every posture that brings the robot's tool to "
-        "a pose,\nwith its branch, what it misses and whether it is inside the joint limits; or "
-        "why there is\nnone. Lengths are in m, angles in rad unless --degrees is given.",
-        epilog=_EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        "a pose, with its branch, what it misses and whether it is inside the joint limits; or why "
+        "there is none. Lengths are in m, angles in rad unless --degrees is given.",
+        epilog=ending(_EXAMPLES, "the pose is not reached"),
     )
     add_source(parser)
     pose = parser.add_argument_group("the pose of the tool, in one of three ways")
@@ -89,7 +86,7 @@ def add_command(commands: Any) -> None:
         help="how much may be missing: metres and radians, or one number for both (default 1e-9); "
         "poses given with few digits need more",
     )  # fmt: skip
-    parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
+    add_json(parser)
     parser.set_defaults(run=run)
 
 
@@ -136,10 +133,10 @@ def run(arguments: argparse.Namespace) -> int:
         position_tolerance=float(tolerance[0]), orientation_tolerance=float(tolerance[-1]),
     )  # fmt: skip
     if arguments.json:
-        print(json.dumps(as_json(model, T, found, degrees), indent=2, ensure_ascii=False))
+        print_json(as_json(model, T, found, degrees))
     else:
         print(as_text(model, T, found, arguments.mask_axes, degrees))
-    return 0 if found.count else 1
+    return ExitStatus.DONE if found.count else ExitStatus.NOT_REACHED
 
 
 def pose_of(arguments: argparse.Namespace, model: RobotModel, mask: Array | None) -> Array:

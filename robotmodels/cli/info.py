@@ -3,14 +3,25 @@
 from __future__ import annotations
 
 import argparse
+import textwrap
 from typing import Any
 
 import numpy as np
 
 from ..geometry import PRISMATIC
+from ..inertia import PARAMETERS
 from ..model import RobotModel
 from ..table_text import boxed, length_text
+from .exit_status import ending
+from .output import add_json, print_json
 from .source import add_source, robot_of
+
+_WIDTH = 88  # columns
+_EXAMPLES = """\
+examples:
+  robotmodels info rx90
+  robotmodels info erd:ur5 --json
+  robotmodels info arm.urdf --tip-link flange"""
 
 
 def add_command(commands: Any) -> None:
@@ -27,11 +38,12 @@ def add_command(commands: Any) -> None:
     """
     parser = commands.add_parser(
         "info",
-        help="print a robot's table, limits, inertia and frames",
         description="Print the geometric table of a robot, its base and tool, joint limits, "
         "inertial parameters with their physical consistency, frames and notes.",
+        epilog=ending(_EXAMPLES),
     )
     add_source(parser)
+    add_json(parser)
     parser.set_defaults(run=run)
 
 
@@ -45,26 +57,96 @@ def run(arguments: argparse.Namespace) -> None:
 
     Examples
     --------
-    >>> source = dict(robot="rx90", base_link=None, tip_link=None, package_dir=[])
+    >>> source = dict(robot="rx90", base_link=None, tip_link=None, package_dir=[], json=False)
     >>> run(argparse.Namespace(**source))  # doctest: +ELLIPSIS
     rx90: 6 joints, 6 frames...
     """
     model = robot_of(arguments)
+    if arguments.json:
+        print_json(as_json(model))
+        return
     print(model)
     print("(angles in rad, lengths in m; R_0 and the tool below)")
     for label, pose in (("base Z", model.base), (f"tool E on frame {model.tip}", model.tool)):
         print(f"\n{label}:\n{pose_text(pose)}")
-    print(f"\nJoints:\n{joint_table(model)}")
+    print(f"\ngravity (m/s^2): {' '.join(f'{g:g}' for g in model.gravity)}")
+    print(f"\nJoints (rad, N m; slides m, N; seconds):\n{joint_table(model)}")
+    if model.transmission is not None:
+        K, q_0 = model.transmission.matrix, model.transmission.offset
+        print("\nTransmission, q = K q_motor + q_0 (rows of K, then q_0):")
+        for row, value in zip(K, q_0, strict=True):
+            print("  " + " ".join(f"{v:10.6g}" for v in row) + f"  | {value:g}")
     if model.inertia.values.any():
-        print(f"\nInertial parameters (about O_j, in R_j):\n{inertia_table(model)}")
-        print(f"Total mass {model.inertia.mass.sum():.6g} kg. Physical consistency:")
-        print(model.inertia.consistency())
+        print(f"\nInertial parameters (kg m^2, kg m, kg; about O_j, in R_j):\n"
+              f"{inertia_table(model)}")  # fmt: skip
+        print(f"Total mass {model.inertia.mass.sum():.6g} kg.")
+        if model.inertia.is_physical.all():
+            print("Every link is a body that can exist (physically consistent).")
+        else:
+            print(f"Physical consistency:\n{model.inertia.consistency()}")
     else:
         print("\nNo inertial parameters are known: the dynamic models see massless links.")
-    print(f"\nFrames: {', '.join(model.frame_names)}")
-    print(f"Configurations: {', '.join(model.configurations)}")
+    for label, names in (("Frames", model.frame_names), ("Configurations", model.configurations)):
+        print(_narrow(f"{label}: {', '.join(names)}"))
     for note in model.notes:
-        print(f"Note: {note}")
+        print(_narrow(f"Note: {note}"))
+
+
+def as_json(model: RobotModel) -> dict[str, Any]:
+    """A robot as what `print_json` writes: the content of the text.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot.
+
+    Returns
+    -------
+    dict
+        ``robot, table, base, tool, tip, gravity, joints, transmission, links, total_mass, frames,
+        configurations, notes``; SI units and radians, unlimited joints have infinite limits.
+
+    Examples
+    --------
+    >>> from ..robots import load
+    >>> as_json(load("rx90"))["table"][2]["d"]
+    0.45
+    """
+    table, drive = model.table, model.drive
+    quantities = ("antecedent", "sigma", "mu", "gamma", "b", "beta", "alpha", "d", "theta", "r")
+    known = bool(model.inertia.values.any())
+    links = zip(table.names, model.inertia.values, model.inertia.is_physical, strict=True)
+    return {
+        "robot": model.name,
+        "table": [
+            {"frame": j + 1, "name": table.names[j]}
+            | {word: getattr(table, word)[j].item() for word in quantities}
+            for j in range(model.f)
+        ],
+        "base": model.base,
+        "tool": model.tool,
+        "tip": int(model.tip),
+        "gravity": model.gravity,
+        "joints": [
+            {"name": name, "unit": unit}
+            | {word: getattr(table, word)[k] for word in ("lower", "upper", "velocity", "effort")}
+            | {word: getattr(drive, word)[k] for word in ("Ia", "Fv", "Fc", "offset")}
+            for k, (name, unit) in enumerate(zip(table.joint_names, _units(model), strict=True))
+        ],
+        "transmission": None
+        if model.transmission is None
+        else {"matrix": model.transmission.matrix, "offset": model.transmission.offset},
+        "links": [
+            {"name": name, **dict(zip(PARAMETERS, values, strict=True)), "physical": physical}
+            for name, values, physical in links
+        ]
+        if known
+        else None,
+        "total_mass": model.inertia.mass.sum() if known else None,
+        "frames": list(model.frame_names),
+        "configurations": dict(model.configurations),
+        "notes": list(model.notes),
+    }
 
 
 def pose_text(pose: np.ndarray) -> str:
@@ -108,10 +190,9 @@ def joint_table(model: RobotModel) -> str:
     10
     """
     table = model.table
-    units = ["m" if s == PRISMATIC else "rad" for s in table.sigma[table.joint_rows]]
     return boxed([
         ("joint", list(table.joint_names)),
-        ("unit", units),
+        ("unit", _units(model)),
         ("lower", [length_text(v) for v in table.lower]),
         ("upper", [length_text(v) for v in table.upper]),
         ("velocity", [length_text(v) for v in table.velocity]),
@@ -119,11 +200,12 @@ def joint_table(model: RobotModel) -> str:
         ("Ia", [length_text(v) for v in model.drive.Ia]),
         ("Fv", [length_text(v) for v in model.drive.Fv]),
         ("Fc", [length_text(v) for v in model.drive.Fc]),
+        ("offset", [length_text(v) for v in model.drive.offset]),
     ])  # fmt: skip
 
 
 def inertia_table(model: RobotModel) -> str:
-    """Inertial parameters in a box.
+    """Inertial parameters in two boxes: the inertia tensor; first moments and mass.
 
     Parameters
     ----------
@@ -133,7 +215,7 @@ def inertia_table(model: RobotModel) -> str:
     Returns
     -------
     str
-        Text of f + 4 lines.
+        Text of 2 (f + 4) lines.
 
     Examples
     --------
@@ -141,8 +223,16 @@ def inertia_table(model: RobotModel) -> str:
     >>> "ZZ" in inertia_table(load("puma560"))
     True
     """
-    from ..inertia import PARAMETERS
-
     values = model.inertia.values
     columns = [(p, [f"{v:.4g}" for v in values[:, i]]) for i, p in enumerate(PARAMETERS)]
-    return boxed([("frame", list(model.table.names)), *columns])
+    frames = ("frame", list(model.table.names))
+    return "\n".join(boxed([frames, *part]) for part in (columns[:6], columns[6:]))
+
+
+def _units(model: RobotModel) -> list[str]:
+    table = model.table
+    return ["m" if s == PRISMATIC else "rad" for s in table.sigma[table.joint_rows]]
+
+
+def _narrow(text: str) -> str:
+    return textwrap.fill(text, _WIDTH, subsequent_indent="  ", break_on_hyphens=False)

@@ -1,16 +1,40 @@
-"""Arguments of the command line, and what a person reads when something is wrong with them."""
+"""The commands, and what a person reads when something is wrong."""
 
 from __future__ import annotations
 
 import argparse
+import importlib
 import os
 import sys
+import traceback
 from collections.abc import Sequence
+from typing import Any
 
 from .. import __version__
-from ..errors import RobotModelsError
-from . import calibrate, demo, excite, identify, igm, info, listing, view
+from ..errors import RobotModelsError, nearest_names
+from .exit_status import ExitStatus, statuses
 from .numbers import joined
+from .option_words import in_options
+from .parsing import Parser
+from .streams import give_up_output, prepared, say
+
+COMMANDS = {
+    "demo": "two arms from table and URDF to every direct model and every posture",
+    "robots": "list the robots of the catalogue",
+    "info": "print a robot's table, limits, inertia and frames",
+    "igm": "all postures that bring the tool to a pose",
+    "calibrate": "geometric parameters of a robot from measurements",
+    "excite": "a motion for the dynamic identification of a robot",
+    "identify": "dynamic parameters of a robot from logs of its motion",
+    "view": "open a robot with joint sliders in the browser",
+}
+"""Each is the module of the same name, which is imported when it is asked for."""
+_EXAMPLES = """\
+examples:
+  robotmodels robots
+  robotmodels info rx90
+  robotmodels igm rx90 --xyz 0.3 0.2 0.5 --rpy 0 90 45 --degrees
+  robotmodels COMMAND --help"""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -24,8 +48,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 if it worked, 1 if a pose is not reached, a fit has not converged or no motion keeps its
-        limits, 2 if an argument was wrong.
+        An `ExitStatus`.
 
     Examples
     --------
@@ -33,27 +56,111 @@ def main(argv: Sequence[str] | None = None) -> int:
     rx90: 6 joints, 6 frames...
     0
     """
-    parser = argparse.ArgumentParser(
+    words = list(sys.argv[1:] if argv is None else argv)
+    with prepared():
+        try:
+            return _run(words)
+        except SystemExit as stop:  # of argparse: help, version, or a wrong argument
+            return stop.code if isinstance(stop.code, int) else ExitStatus.WRONG_INPUT
+
+
+def parser_of(command: str | None) -> tuple[Parser, Parser | None]:
+    """The parser, with all options of one command and the names of the others.
+
+    Parameters
+    ----------
+    command : str or None
+        Its name.
+
+    Returns
+    -------
+    parser : Parser
+        Of everything.
+    own : Parser or None
+        Of the command, if there is one of this name.
+
+    Examples
+    --------
+    >>> parser, own = parser_of("igm")
+    >>> "--arm-angle" in own.options()
+    True
+    """
+    parser = Parser(
         prog="robotmodels",
-        description="Kinematics and dynamics of robot manipulators from their Khalil-Kleinfinger "
-        "table or their URDF.",
+        description="Kinematics, dynamics, calibration and identification of robot manipulators "
+        "from their Khalil-Kleinfinger table or their URDF. SI units and radians, unless an option "
+        "says otherwise.",
+        epilog=f"{_EXAMPLES}\n\n{statuses()}\n\n"
+        "ROBOTMODELS_TRACEBACK=1 in the environment does what --traceback does.",
     )
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for module in (demo, listing, info, igm, calibrate, excite, identify, view):
-        module.add_command(commands)
-    parser.add_argument("--version", action="version", version=__version__)
-    arguments = parser.parse_args(joined(sys.argv[1:] if argv is None else argv))
-    code: int | None = 0
+    parser.add_argument("--version", action="version", version=f"robotmodels {__version__}")
+    _add_traceback(parser)
+    commands: Any = parser.add_subparsers(dest="command", metavar="COMMAND")
+    for name, summary in COMMANDS.items():
+        if name == command:
+            importlib.import_module(f".{name}", __package__).add_command(commands)
+        else:
+            commands.add_parser(name, help=summary)
+    own = commands.choices[command] if command in COMMANDS else None
+    if own is not None:
+        _add_traceback(own)
+    return parser, own
+
+
+def _add_traceback(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--traceback", action="store_true", default=argparse.SUPPRESS,
+                        help="after an error, show where it came from")  # fmt: skip
+
+
+def _run(words: list[str]) -> int:
+    command = next((word for word in words if not word.startswith("-")), None)
+    traced = "--traceback" in words or os.environ.get("ROBOTMODELS_TRACEBACK", "0") not in ("", "0")
+    options: list[str] = []
+    code: int | None = ExitStatus.DONE
     try:
-        code = arguments.run(arguments)
-        sys.stdout.flush()
+        parser, own = parser_of(command)
+        if own is not None:
+            options = own.options()
+            arguments, rest = parser.parse_known_args(joined(words))
+            if rest:
+                own.refuse(rest)
+            code = arguments.run(arguments)
+        elif command is None:
+            parser.parse_args(words)
+            parser.error(f"which command? There are {', '.join(COMMANDS)}")
+        else:
+            near = nearest_names(command, COMMANDS)
+            meant = f"Did you mean {' or '.join(near)}? " if near else ""
+            parser.error(f"no command {command!r}. {meant}There are {', '.join(COMMANDS)}")
+        if sys.stdout is not None:
+            sys.stdout.flush()
+        return code or ExitStatus.DONE
+    except BrokenPipeError:  # the reader (head, a pager) has seen enough
+        give_up_output()
+        return code or ExitStatus.DONE
+    except KeyboardInterrupt:
+        said, status = "interrupted.", ExitStatus.INTERRUPTED
     except RobotModelsError as error:
-        print(f"robotmodels: {error}", file=sys.stderr)
-        return 2
+        said, status = in_options(str(error), options), ExitStatus.WRONG_INPUT
     except OSError as error:
-        if not isinstance(error, BrokenPipeError):
-            print(f"robotmodels: {error.strerror}: {error.filename}", file=sys.stderr)
-            return 2
-        # the reader (head, a pager) has seen enough; keep Python from complaining at exit
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    return code or 0
+        said, status = _of_system(error), ExitStatus.WRONG_INPUT
+        if error.filename is None:
+            give_up_output()  # perhaps a full disk behind standard output
+    except MemoryError:
+        said, status = "there is not enough memory for this.", ExitStatus.WRONG_INPUT
+    except Exception as error:  # noqa: BLE001  # nobody reads a traceback at a terminal
+        status = ExitStatus.BUG
+        said = (
+            f"this is a bug: {type(error).__name__}: {error}. Please report it as an issue of the "
+            "repository of robotmodels, with what the same command prints with --traceback."
+        )
+    if traced and status is not ExitStatus.INTERRUPTED:
+        traceback.print_exc()
+    say(said)
+    return status
+
+
+def _of_system(error: OSError) -> str:
+    """What the operating system says, with the file if there is one."""
+    text = error.strerror or str(error) or type(error).__name__
+    return f"{text}: {error.filename}" if error.filename is not None else f"{text}."

@@ -7,16 +7,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from .._arrays import Array
-from ..errors import InvalidValueError
+from ..errors import InvalidValueError, nearest_names
 from ..geometry import REVOLUTE
 from ..model import RobotModel
 
 NUMBER_OPTIONS = (
     "--q", "--q-ref", "--xyz", "--rpy", "--matrix", "--mask", "--tolerance", "--arm-angle",
     "--sigma", "--prior", "--velocity", "--acceleration", "--torque-limits", "--box", "--keep-out",
-    "--gears", "--drive-gains", "--signs", "--offsets", "--dead-band",
+    "--gears", "--drive-gains", "--signs", "--offsets", "--dead-band", "--kp", "--kd", "--delay",
+    "--dt", "--cutoff", "--edges", "--strength", "--noise", "--forgetting", "--test-share",
+    "--held-out", "--duration", "--rate",
 )  # fmt: skip
-"""Options that take lists of numbers."""
+"""Options that take numbers, which may be negative."""
 
 
 def joined(argv: Sequence[str]) -> list[str]:
@@ -90,6 +92,45 @@ def numbers(text: str, count: int | Sequence[int], option: str) -> Array:
     return values
 
 
+def joint_numbers(
+    text: str | None, n: int, option: str, positive: bool = False
+) -> Array | float | None:
+    """One number for all joints, or one for each.
+
+    Parameters
+    ----------
+    text : str or None
+        What was given, if anything was.
+    n : int
+        Joints.
+    option : str
+        Its name, for the error message.
+    positive : bool
+        Whether all have to be above zero.
+
+    Returns
+    -------
+    float, ndarray of shape (n,), or None
+        The numbers; None where nothing was given.
+
+    Raises
+    ------
+    InvalidValueError
+        Another count, something that is no finite number, or one that is not above zero.
+
+    Examples
+    --------
+    >>> joint_numbers("3", 6, "--velocity"), joint_numbers(None, 6, "--velocity")
+    (3.0, None)
+    """
+    if text is None:
+        return None
+    values = numbers(text, sorted({1, n}), option)
+    if positive and not (values > 0.0).all():
+        raise InvalidValueError(f"{option}: expected positive numbers, got {text!r}.")
+    return float(values[0]) if len(values) == 1 else values
+
+
 def posture(text: str, model: RobotModel, option: str, degrees: bool) -> Array:
     """Joint variables from numbers, or from the name of a configuration of the robot.
 
@@ -127,9 +168,11 @@ def posture(text: str, model: RobotModel, option: str, degrees: bool) -> Array:
         q = numbers(text, model.n, option)
     except InvalidValueError:
         names = ", ".join(model.configurations)
+        near = nearest_names(text, model.configurations)
+        meant = f" Did you mean {near[0]!r}?" if near else ""
         raise InvalidValueError(
             f"{option}: expected {model.n} numbers, or the name of a configuration ({names}), "
-            f"got {text!r}."
+            f"got {text!r}.{meant}"
         ) from None
     return np.deg2rad(q, out=q, where=revolute(model)) if degrees else q
 

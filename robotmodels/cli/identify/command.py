@@ -1,0 +1,105 @@
+"""``robotmodels identify``: dynamic parameters of a robot from logs of positions and torques."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from ..exit_status import ExitStatus, ending
+from ..numbers import joint_numbers
+from ..output import add_output, check_output, hand_over
+from ..progress import progress
+from ..source import add_source, robot_of
+from .choices import controller, essential, prior, workers
+from .logs import logs
+from .options import add_options
+from .report import real_bodies, report
+
+_EXAMPLES = """\
+examples:
+  robotmodels identify --robot tx40 --log positions.csv --torques-from currents.csv --dt 2e-4 \\
+      --motor-side --test-share 0.3 --out report/
+  robotmodels identify --robot ur10e.urdf --log run1.csv run2.csv --test run3.csv --angles deg \\
+      --positions actual_q_0 actual_q_1 actual_q_2 actual_q_3 actual_q_4 actual_q_5 \\
+      --torques "current_*" --drive-gains 13.3 13.3 9.4 9.4 9.4 9.4 --method irls --out report/
+  robotmodels identify --robot arm.urdf --log run.npz --cutoff 40 --decimation 20 --json
+
+Into the folder of --out go report.txt, report.html (text and figures, one offline file),
+result.json (what --json prints: parameters, covariance, every option, hashes of the data) and
+identified.urdf (a robot of real bodies and drives). Without --out the report is printed."""
+
+
+def add_command(commands: Any) -> None:
+    """Add the command to the parser.
+
+    Parameters
+    ----------
+    commands : argparse subparsers
+        Where to add it.
+
+    Examples
+    --------
+    >>> add_command(argparse.ArgumentParser().add_subparsers())
+    """
+    parser = commands.add_parser(
+        "identify",
+        description="Dynamic identification: base parameters, frictions and rotor inertias from "
+        "positions and torques, with their deviations, and the errors on motion kept aside.",
+        epilog=ending(_EXAMPLES, "the method has not converged"),
+    )
+    add_source(parser, option=True)
+    add_options(parser)
+    add_output(parser)
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Read, fit, and print or write.
+
+    Parameters
+    ----------
+    arguments : Namespace
+        Parsed arguments.
+
+    Returns
+    -------
+    int
+        `ExitStatus.DONE`, or `ExitStatus.NOT_REACHED` if the method has not converged.
+
+    Raises
+    ------
+    RobotModelsError
+        A robot, files or options that make no sense.
+
+    Examples
+    --------
+    >>> parser = argparse.ArgumentParser()
+    >>> add_command(parser.add_subparsers())
+    >>> parser.parse_args(["identify", "--robot", "tx40", "--log", "a.csv"]).method
+    'wls'
+    """
+    from ...identification import EstimateStatus, fit
+
+    check_output(arguments)
+    model = robot_of(arguments)
+    log, test = logs(arguments, model)
+    kinds = tuple(dict.fromkeys(arguments.drive))
+    bodies = prior(arguments, model)
+    with workers(arguments.workers) as executor, progress(arguments, "reducing the log") as bar:
+        result = fit(
+            model, log, arguments.method, form=arguments.form, drive=kinds or False,
+            cutoff=arguments.cutoff, decimation=arguments.decimation,
+            dead_band=joint_numbers(arguments.dead_band, model.n, "--dead-band"),
+            edges=arguments.edges, essential=essential(arguments.essential),
+            loss=arguments.loss, strength=arguments.strength, noise=arguments.noise,
+            forgetting=arguments.forgetting, controller=controller(arguments, model),
+            prior=model if arguments.method == "ridge" else None, test=test,
+            checked=not arguments.no_check, executor=executor,
+            progress=bar and bar.fraction,
+        )  # fmt: skip
+    robot = None
+    if arguments.consistent or arguments.out is not None:
+        robot = real_bodies(result, bodies, asked=arguments.consistent)
+    hand_over(report(result, test, robot), arguments)
+    solved = result.estimate.status is EstimateStatus.SOLVED
+    return ExitStatus.DONE if solved else ExitStatus.NOT_REACHED

@@ -1,0 +1,144 @@
+"""The logs of ``robotmodels identify``: read, shifted, cut into what is fitted and what tests."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+from ...errors import InvalidValueError
+from ...model import RobotModel
+from ..columns import column, columns
+from ..numbers import joint_numbers, numbers
+
+if TYPE_CHECKING:
+    from ...identification import Log, Synchronisation
+
+
+def logs(arguments: argparse.Namespace, model: RobotModel) -> tuple[Log, Log | None]:
+    """The log that is fitted and the one that is kept aside.
+
+    Parameters
+    ----------
+    arguments : Namespace
+        Parsed arguments.
+    model : RobotModel
+        The robot.
+
+    Returns
+    -------
+    log : Log
+        For the fit.
+    test : Log or None
+        Kept aside.
+
+    Raises
+    ------
+    RobotModelsError
+        As `read_log`; several ways to keep motion aside.
+    """
+    from ...identification.preparation.synchronisation import synchronisation
+    from ...logs import with_delay
+
+    ways = (arguments.test, arguments.test_rows, arguments.test_share)
+    if sum(way is not None for way in ways) > 1:
+        raise InvalidValueError("--test, --test-rows and --test-share: give one of them.")
+    if arguments.test_torques_from is not None and arguments.test is None:
+        raise InvalidValueError("--test-torques-from: it belongs to --test.")
+    whole = _read(arguments, model, arguments.log, arguments.torques_from)
+    other = None
+    if arguments.test is not None:
+        other = _read(arguments, model, arguments.test, arguments.test_torques_from)
+    if arguments.delay is not None:
+        if arguments.delay == "auto":
+            delay = _estimated_delay(synchronisation(whole, model))
+        else:
+            delay = float(numbers(arguments.delay, 1, "--delay")[0])
+        whole = with_delay(whole, delay)
+        other = None if other is None else with_delay(other, delay)
+    first, last = (0, len(whole))
+    if arguments.rows is not None:
+        first, last = _range(arguments.rows, len(whole), "--rows")
+    if arguments.test_rows is not None:
+        if arguments.rows is None:
+            raise InvalidValueError("--test-rows: say with --rows which rows are fitted.")
+        start, stop = _range(arguments.test_rows, len(whole), "--test-rows")
+        if max(first, start) < min(last, stop):
+            raise InvalidValueError(
+                f"--test-rows: rows {start} to {stop} are not kept aside where {first} to {last} "
+                "are fitted; give rows that do not overlap."
+            )
+        other = whole.rows(start, stop)
+    elif (share := arguments.test_share) is not None:
+        if not 0.0 < share < 1.0:
+            raise InvalidValueError(f"--test-share: expected a part of 1, got {share:g}.")
+        middle = first + round((1.0 - share) * (last - first))
+        other = whole.rows(middle, last)
+        last = middle
+    return whole.rows(first, last), other
+
+
+def _range(rows: list[int], N: int, option: str) -> tuple[int, int]:
+    """First row and the one after the last, from 0."""
+    start, stop = (row + N if row < 0 else row for row in rows)
+    if not 0 <= start < stop <= N:
+        raise InvalidValueError(
+            f"{option}: expected a first row and the one after the last within the {N} rows of the "
+            f"log, got {rows[0]} {rows[1]}."
+        )
+    return start, stop
+
+
+def _estimated_delay(found: Synchronisation) -> float:
+    """The delay, where there is one that means something."""
+    from ...identification import SynchronisationStatus
+
+    if found.status is SynchronisationStatus.AT_THE_END:
+        raise InvalidValueError(
+            f"--delay auto: the torques fit best at an end of the delays that were tried "
+            f"({1e3 * found.delays[0]:.0f} to {1e3 * found.delays[-1]:.0f} ms); see whether "
+            "positions and torques are of the same motion, and give the delay in seconds."
+        )
+    if not found.status.is_success:
+        raise InvalidValueError(
+            f"--delay auto: {found.status.sentence} Give the delay in seconds, or leave it out."
+        )
+    return float(found.delay)
+
+
+def _read(
+    arguments: argparse.Namespace, model: RobotModel, files: list[str], torques: list[str] | None
+) -> Log:
+    from ...logs import read_log
+
+    time: Any = arguments.time
+    if time is not None:
+        time = False if time == "none" else column(time)
+    if arguments.motor_side and arguments.gears is not None:
+        raise InvalidValueError("--motor-side and --gears: give one of them.")
+    if arguments.motor_side and model.transmission is None:
+        raise InvalidValueError(
+            f"--motor-side: {model.name!r} has no transmission; give the ratios by --gears."
+        )
+    return read_log(
+        files, torques_from=torques, positions=_columns(arguments.positions),
+        torques=_columns(arguments.torques), velocities=_or_none(arguments.velocities),
+        accelerations=_or_none(arguments.accelerations),
+        position_references=_or_none(arguments.references), time=time, dt=arguments.dt,
+        times=arguments.times, angles=arguments.angles, lengths=arguments.lengths,
+        signs=joint_numbers(arguments.signs, model.n, "--signs"),
+        gears=joint_numbers(arguments.gears, model.n, "--gears"),
+        transmission=model.transmission if arguments.motor_side else None,
+        drive_gains=joint_numbers(arguments.drive_gains, model.n, "--drive-gains"),
+        offsets=joint_numbers(arguments.offsets, model.n, "--offsets"), model=model,
+        delimiter=arguments.delimiter,
+    )  # fmt: skip
+
+
+def _columns(words: list[str] | None) -> list[int | str] | int | str | None:
+    found = columns(words)
+    # one word may be a pattern, or the name of a matrix
+    return found[0] if found is not None and len(found) == 1 else found
+
+
+def _or_none(words: list[str] | None) -> Any:
+    return False if words == ["none"] else _columns(words)

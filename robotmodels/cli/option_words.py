@@ -1,0 +1,70 @@
+"""Messages of the package in the words of the command line: options in place of arguments."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection
+
+_WHOLE = (
+    ("transmission=model.transmission", "--motor-side"),
+    ("transmission=", "--motor-side"),
+    ("checked=False", "--no-check"),
+    ("time=False", "--time none"),
+    ("velocities=False", "--velocities none"),
+    ("accelerations=False", "--accelerations none"),
+    ("times='ms', 'us' or 'ns'", "--times ms, us or ns"),
+    ("base=False", "--fixed-base"),
+    ("tool=False", "--fixed-tool"),
+)
+"""Words of the package, and the option that says the same."""
+_OTHER_NAMES = {
+    "position_references": "--references",
+    "rng": "--seed",
+    "baseline": "--random",
+    "position_tolerance": "--tolerance",
+    "orientation_tolerance": "--tolerance",
+}
+"""Arguments whose option has another name."""
+_ARGUMENT = re.compile(r"(?<![\w-])([a-z_]+)=(?:\[\.\.\.\]|'([^']*)'|([0-9]+(?:\.[0-9]+)?))?")
+_FIRST = re.compile(r"^([a-z_]+)(?=: )")
+
+
+def in_options(message: str, options: Collection[str]) -> str:
+    """A message that names arguments of functions, in options of a command.
+
+    Parameters
+    ----------
+    message : str
+        Of an error.
+    options : collection of str
+        That the command has; arguments without one stay as they are.
+
+    Returns
+    -------
+    str
+        The message.
+
+    Examples
+    --------
+    >>> in_options("cutoff: too high; say angles='deg', or b2=3.", ["--cutoff", "--angles"])
+    '--cutoff: too high; say --angles deg, or b2=3.'
+    """
+    for words, option in _WHOLE:
+        if option.split()[0] in options:
+            message = message.replace(words, option)
+
+    def option_of(name: str) -> str | None:
+        option = _OTHER_NAMES.get(name, "--" + name.replace("_", "-"))
+        return option if option in options else None
+
+    def with_value(match: re.Match[str]) -> str:
+        name, word, number = match.groups()
+        option, value = option_of(name), word or number
+        if option is None:
+            return match.group()
+        return f"{option} {value}" if value else option
+
+    message = _ARGUMENT.sub(with_value, message)
+    if "--log" in options:
+        message = message.replace(" of read_log", "")
+    return _FIRST.sub(lambda match: option_of(match[1]) or match[1], message)

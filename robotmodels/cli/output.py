@@ -1,0 +1,225 @@
+"""What a command hands over: text or JSON on standard output, files in a folder."""
+
+from __future__ import annotations
+
+import argparse
+import errno
+import json
+import math
+import os
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InvalidValueError, MissingExtraError
+from .progress import add_quiet
+from .streams import say
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """A result in every form that a command may hand over.
+
+    Parameters
+    ----------
+    text : str
+        All of it.
+    head : str
+        What is printed of it where files have the whole.
+    data : callable
+        Gives it for `print_json`.
+    write : callable
+        Writes files into a folder that is there, and gives their names.
+    """
+
+    text: str
+    head: str
+    data: Callable[[], Any]
+    write: Callable[[Path], Sequence[str]]
+
+
+def add_json(parser: argparse.ArgumentParser) -> None:
+    """Add the option for JSON.
+
+    Parameters
+    ----------
+    parser : ArgumentParser
+        Of a command.
+
+    Examples
+    --------
+    >>> parser = argparse.ArgumentParser()
+    >>> add_json(parser)
+    >>> parser.parse_args(["--json"]).json
+    True
+    """
+    parser.add_argument("--json", action="store_true",
+                        help="print JSON in place of text; null is what is not finite or not "
+                        "known")  # fmt: skip
+
+
+def add_output(parser: argparse.ArgumentParser) -> Any:
+    """Add the options of commands that work long and write files.
+
+    Parameters
+    ----------
+    parser : ArgumentParser
+        Of a command.
+
+    Returns
+    -------
+    argparse group
+        For further options of what is handed over.
+
+    Examples
+    --------
+    >>> parser = argparse.ArgumentParser()
+    >>> group = add_output(parser)
+    >>> parser.parse_args(["--out", "report"]).out.name
+    'report'
+    """
+    group: Any = parser.add_argument_group("what is handed over")
+    group.add_argument("--out", type=Path, metavar="FOLDER",
+                       help="write files into this folder (made if it is not there)")  # fmt: skip
+    add_json(group)
+    add_quiet(group)
+    return group
+
+
+def hand_over(report: Report, arguments: argparse.Namespace) -> None:
+    """Write the files that are asked for, and print.
+
+    Parameters
+    ----------
+    report : Report
+        What there is.
+    arguments : Namespace
+        With ``out`` and ``json``, as `add_output` declares them.
+
+    Raises
+    ------
+    RobotModelsError, OSError
+        A file that cannot be written.
+    """
+    written: list[Path] = []
+    if arguments.out is not None:
+        folder = arguments.out
+        folder.mkdir(parents=True, exist_ok=True)
+        written = [folder / name for name in report.write(folder)]
+    if arguments.json:
+        print_json(report.data())
+        return
+    print(report.head if written else report.text)
+    for path in written:
+        print(f"wrote {path}")
+
+
+def check_output(arguments: argparse.Namespace) -> None:
+    """Refuse a folder that cannot be written before the work, not after it.
+
+    Parameters
+    ----------
+    arguments : Namespace
+        With ``out``.
+
+    Raises
+    ------
+    InvalidValueError
+        There is a file of this name.
+    OSError
+        Nothing can be written there.
+
+    Examples
+    --------
+    >>> check_output(argparse.Namespace(out=Path("new") / "report"))
+    """
+    if arguments.out is None:
+        return
+    there = next(path for path in (arguments.out, *arguments.out.absolute().parents)
+                 if path.exists())  # fmt: skip
+    if not there.is_dir():
+        raise InvalidValueError(f"--out: {str(there)!r} is a file; give a folder.")
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(there))
+
+
+def with_extra(path: Path, write: Callable[[], None]) -> list[str]:
+    """Write a file that needs an optional package, or say that there will be none.
+
+    Parameters
+    ----------
+    path : Path
+        Of the file.
+    write : callable
+        Writes it.
+
+    Returns
+    -------
+    list of str
+        Its name, if it was written.
+
+    Examples
+    --------
+    >>> with_extra(Path("figures/arm.png"), lambda: None)
+    ['arm.png']
+    """
+    try:
+        write()
+    except MissingExtraError as error:
+        say(f"no {path.name}: {error}")
+        return []
+    return [path.name]
+
+
+def print_json(data: Any) -> None:
+    """Print data as JSON that any reader takes.
+
+    Parameters
+    ----------
+    data : nested dicts, lists, arrays, numbers, words
+        What is not finite becomes null.
+
+    Examples
+    --------
+    >>> print_json({"q": np.array([0.5, np.nan]), "ok": np.True_})
+    {
+      "q": [0.5, null],
+      "ok": true
+    }
+    """
+    # a terminal without Unicode gets escapes, which mean the same
+    unicode = str(getattr(sys.stdout, "encoding", "") or "").lower().startswith("utf")
+    print(_json(_plain(data), json.JSONEncoder(ensure_ascii=not unicode, allow_nan=False)))
+
+
+def _json(data: Any, encoder: json.JSONEncoder, indent: str = "\n") -> str:
+    """JSON with an entry a line, but rows of numbers and words in one line."""
+    inner = indent + "  "
+    if isinstance(data, dict) and data:
+        entries = (
+            f"{encoder.encode(key)}: {_json(value, encoder, inner)}" for key, value in data.items()
+        )
+        return "{" + inner + f",{inner}".join(entries) + indent + "}"
+    if isinstance(data, list) and any(isinstance(value, (dict, list)) for value in data):
+        return "[" + inner + f",{inner}".join(_json(v, encoder, inner) for v in data) + indent + "]"
+    return encoder.encode(data)
+
+
+def _plain(data: Any) -> Any:
+    """What `json` knows, without NaN and infinity."""
+    if isinstance(data, dict):
+        return {str(key): _plain(value) for key, value in data.items()}
+    if isinstance(data, (list, tuple)):
+        return [_plain(value) for value in data]
+    if isinstance(data, (np.ndarray, np.generic)):
+        return _plain(data.tolist())
+    if isinstance(data, Enum):
+        return data.name
+    if isinstance(data, float) and not math.isfinite(data):
+        return None
+    return data

@@ -1,0 +1,68 @@
+"""``robotmodels robots``: the names of the catalogue."""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import sys
+import textwrap
+from typing import Any
+
+from ..robots import robots, title
+from .exit_status import ending
+from .output import add_json, print_json
+
+_ANY = 10_000  # columns
+_PREFIX = "example-robot-data: "  # which the names say
+_EXAMPLES = """\
+examples:
+  robotmodels robots
+  robotmodels robots --json
+
+Names that begin with erd: come from the files of example-robot-data."""
+
+
+def add_command(commands: Any) -> None:
+    """Add the command to the parser.
+
+    Parameters
+    ----------
+    commands : argparse subparsers
+        Where to add it.
+
+    Examples
+    --------
+    >>> add_command(argparse.ArgumentParser().add_subparsers())
+    """
+    parser = commands.add_parser(
+        "robots",
+        description="List the robots that `load` and the other commands know by name.",
+        epilog=ending(_EXAMPLES),
+    )
+    add_json(parser)
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Print each name with what it stands for.
+
+    Parameters
+    ----------
+    arguments : Namespace
+        With ``json``: a list of ``name`` and ``title``.
+
+    Examples
+    --------
+    >>> run(argparse.Namespace(json=False))  # doctest: +ELLIPSIS
+    lab_rr ...
+    """
+    names = robots()
+    if arguments.json:
+        print_json([{"name": name, "title": title(name)} for name in names])
+        return
+    width = max(map(len, names)) + 2
+    # pipes get a line for each robot, terminals lines that fit
+    columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else _ANY
+    for name in names:
+        text = f"{name:<{width}}{title(name).removeprefix(_PREFIX)}"
+        print(textwrap.fill(text, columns, subsequent_indent=" " * width, break_on_hyphens=False))
