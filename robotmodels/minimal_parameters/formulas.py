@@ -21,8 +21,9 @@ from ..drive import Drives
 from ..geometry import PRISMATIC, REVOLUTE
 from ..model import RobotModel
 from ..symbolic_dgm._angles import exact_turns
+from .gravity import loads_of
 from .restraint import EXACT, Turning, reach, restraints
-from .rules import RowConstants, loads_of, regrouped, rows_of_numbers
+from .rules import RowConstants, regrouped, rows_of_numbers
 
 _LONGEST = 40
 """Operations in a coefficient beyond which its number tells more."""

@@ -17,9 +17,9 @@ from ..model import RobotModel
 from ..regressors import parameter_names, torque_regressor, torque_regressor_chunks
 from .branches import columns_by_branches
 from .gap import FoundColumns, doubts, miss, unseen, with_clear_gap
+from .gravity import EARTH
 from .restraint import reach
 from .result import BaseMethod, BaseParameters
-from .rules import EARTH
 
 _ROWS_A_COLUMN = 3
 _PIECE = 1024

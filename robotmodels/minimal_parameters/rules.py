@@ -27,22 +27,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .._arrays import Array
 from ..drive import DriveKind, Drives, drive_kinds
 from ..geometry import FIXED, REVOLUTE
 from ..model import RobotModel
+from .gravity import axes_in_base, loads_of, weight_of
+from .regrouping import MX, MY, MZ, XX, YY, ZZ, Combination, M, Regrouping, unit_tensor
 from .restraint import EXACT, Restraint, Turning, parallel, restraints
-
-EARTH = 9.81
-"""Gravity that motion and torques are compared with, m/s^2."""
-
-Combination = dict[int, Any]
-"""Coefficients of standard parameters by their number; numbers or formulas."""
-
-_J = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
-_XX, _YY, _ZZ, _MX, _MY, _MZ, _M = 0, 3, 5, 6, 7, 8, 9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,52 +59,6 @@ class RowConstants:
     rotation: Array
     position: Array
     load: Any
-
-
-class _Regrouping:
-    """The standard parameters that stay, and what has been regrouped into each, while rules run."""
-
-    def __init__(self, model: RobotModel, columns: int) -> None:
-        self.antecedent = [int(a) for a in model.chain.antecedent]
-        self.stays: dict[int, Combination] = {k: {k: 1} for k in range(columns)}
-
-    def take(self, parameter: int) -> Combination:
-        """Remove a parameter; what stood for it."""
-        return self.stays.pop(parameter)
-
-    def add(self, parameter: int, factor: Any, combination: Combination) -> None:
-        """Regroup a combination into a parameter; one without effect takes nothing."""
-        place = self.stays.get(parameter)
-        if place is None or _is_zero(factor):
-            return
-        for k, coefficient in combination.items():
-            total = place.get(k, 0) + factor * coefficient
-            if _is_zero(total):
-                place.pop(k, None)
-            else:
-                place[k] = total
-
-    def add_tensor(self, frame: int, tensor: Array, combination: Combination) -> None:
-        """Regroup into the inertia tensor of a frame; frame 0 does not move."""
-        if frame:
-            for place, (i, k) in enumerate(_J):
-                self.add(10 * (frame - 1) + place, tensor[i, k], combination)
-
-    def add_moment(self, frame: int, moment: Array, P: Array, combination: Combination) -> None:
-        """Regroup a first moment at P into a frame."""
-        if frame:
-            for i in range(3):
-                self.add(10 * (frame - 1) + _MX + i, moment[i], combination)
-            crossed = _skew(P).T @ _skew(moment)
-            self.add_tensor(frame, crossed + crossed.T, combination)
-
-    def add_mass(self, frame: int, P: Array, combination: Combination) -> None:
-        """Regroup a mass at P into a frame."""
-        if frame:
-            self.add(10 * (frame - 1) + _M, 1, combination)
-            for i in range(3):
-                self.add(10 * (frame - 1) + _MX + i, P[i], combination)
-            self.add_tensor(frame, _skew(P).T @ _skew(P), combination)
 
 
 def regrouped(
@@ -158,7 +104,7 @@ def regrouped(
     f, n = model.f, model.n
     kinds = drive_kinds(drive)
     starts = {kind: 10 * f + n * i for i, kind in enumerate(kinds)}
-    work = _Regrouping(model, 10 * f + n * len(kinds))
+    work = Regrouping(model, 10 * f + n * len(kinds))
     found = restraints(model, tolerance)
     gravity = np.asarray(model.gravity) @ model.chain.base_rotation
     weight = weight_of(model, tolerance)
@@ -177,7 +123,7 @@ def regrouped(
         if sigma == FIXED:
             _regroup_body(work, j, row)
         elif own.turning is Turning.NONE:
-            _drop(work, j, range(_M))
+            _drop(work, j, range(M))
         elif sigma == REVOLUTE:
             _regroup_revolute(work, j, own, row, unloaded, weight == 0.0, tolerance)
         else:
@@ -221,114 +167,59 @@ def rows_of_numbers(
     return rows, [restraint.direction for restraint in restraints(model, tolerance)[1:]]
 
 
-def weight_of(model: RobotModel, tolerance: float = EXACT) -> float:
-    """Magnitude of gravity, exactly 0 where it is none.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    tolerance : float
-        Part of the earth's gravity that counts as none.
-
-    Returns
-    -------
-    float
-        m/s^2.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> weight_of(load("rx90"))
-    9.81
-    """
-    weight = float(np.linalg.norm(model.gravity))
-    return weight if weight > tolerance * EARTH else 0.0
-
-
-def loads_of(model: RobotModel, tolerance: float = EXACT) -> list[float]:
-    """Gravity along the axis of each frame with every joint at zero; none is exactly 0.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, f frames.
-    tolerance : float
-        As for `regrouped`.
-
-    Returns
-    -------
-    list of float, length f
-        m/s^2.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> loads_of(load("cobra_s600"))[2]
-    9.81
-    """
-    weight = weight_of(model, tolerance)
-    if weight == 0.0:
-        return [0.0] * model.f
-    gravity = np.asarray(model.gravity) @ model.chain.base_rotation
-    slight = tolerance * weight
-    loads = [float(gravity @ _in_base(model, j)[:, 2]) for j in range(1, model.f + 1)]
-    return [0.0 if abs(load) <= slight else load for load in loads]
-
-
 def _regroup_revolute(
-    work: _Regrouping, j: int, own: Restraint, row: RowConstants, unloaded: bool, weightless: bool,
+    work: Regrouping, j: int, own: Restraint, row: RowConstants, unloaded: bool, weightless: bool,
     tolerance: float,
 ) -> None:  # fmt: skip
     first, a = 10 * (j - 1), work.antecedent[j - 1]
     z, P = row.rotation[:, 2], row.position
-    work.add_mass(a, P, work.take(first + _M))
+    work.add_mass(a, P, work.take(first + M))
     if own.turning is Turning.ONE_DIRECTION:
-        _drop(work, j, (*range(_ZZ), _MZ))
+        _drop(work, j, (*range(ZZ), MZ))
         across = own.slides_across(own.direction, tolerance)
         if own.centre is not None and unloaded and not across:
-            _drop(work, j, (_MX, _MY))
+            _drop(work, j, (MX, MY))
         return
-    yy = work.take(first + _YY)
-    work.add(first + _XX, -1, yy)
+    yy = work.take(first + YY)
+    work.add(first + XX, -1, yy)
     work.add_tensor(a, np.eye(3, dtype=np.int64) - np.outer(z, z), yy)
-    work.add_moment(a, z, P, work.take(first + _MZ))
+    work.add_moment(a, z, P, work.take(first + MZ))
     if own.centre is not None and weightless:
         # all turns about one point: first moments are those of an inertia about it
         for i, place in ((0, 2), (1, 4)):
-            work.add(first + place, own.centre[2], work.take(first + _MX + i))
+            work.add(first + place, own.centre[2], work.take(first + MX + i))
 
 
 def _regroup_prismatic(
-    work: _Regrouping, j: int, own: Restraint, row: RowConstants, e: Array, tolerance: float
+    work: Regrouping, j: int, own: Restraint, row: RowConstants, e: Array, tolerance: float
 ) -> None:
     first, a, R = 10 * (j - 1), work.antecedent[j - 1], row.rotation
     for place in range(6):
-        tensor = R @ _symmetric(place) @ R.T
+        tensor = R @ unit_tensor(place) @ R.T
         work.add_tensor(a, tensor, work.take(first + place))
     if own.turning is not Turning.ONE_DIRECTION:
         return
     last = max(i for i in range(3) if abs(own.direction[i]) > tolerance)
-    along = work.take(first + _MX + last)
+    along = work.take(first + MX + last)
     for i in range(last):
         if abs(own.direction[i]) > tolerance:
-            work.add(first + _MX + i, -e[i] / e[last], along)
+            work.add(first + MX + i, -e[i] / e[last], along)
     if parallel(own.direction, np.array([0.0, 0.0, 1.0]), tolerance):
         for i in range(2):
-            work.add_moment(a, R[:, i], row.position, work.take(first + _MX + i))
+            work.add_moment(a, R[:, i], row.position, work.take(first + MX + i))
 
 
-def _regroup_body(work: _Regrouping, j: int, row: RowConstants) -> None:
+def _regroup_body(work: Regrouping, j: int, row: RowConstants) -> None:
     first, a, R, P = 10 * (j - 1), work.antecedent[j - 1], row.rotation, row.position
     for place in range(6):
-        work.add_tensor(a, R @ _symmetric(place) @ R.T, work.take(first + place))
+        work.add_tensor(a, R @ unit_tensor(place) @ R.T, work.take(first + place))
     for i in range(3):
-        work.add_moment(a, R[:, i], P, work.take(first + _MX + i))
-    work.add_mass(a, P, work.take(first + _M))
+        work.add_moment(a, R[:, i], P, work.take(first + MX + i))
+    work.add_mass(a, P, work.take(first + M))
 
 
 def _regroup_drive(
-    work: _Regrouping, model: RobotModel, j: int, drives: Mapping[DriveKind, int],
+    work: Regrouping, model: RobotModel, j: int, drives: Mapping[DriveKind, int],
     before: Restraint, row: RowConstants, loaded: bool, tolerance: float,
 ) -> None:  # fmt: skip
     first, Ia, offset = 10 * (j - 1), drives.get(DriveKind.IA), drives.get(DriveKind.OFFSET)
@@ -339,7 +230,7 @@ def _regroup_drive(
         is_first = before.turning is Turning.NONE
         crosses = before.turning is Turning.ONE_DIRECTION and abs(z @ before.direction) <= tolerance
         if is_first or crosses:
-            work.add(first + _ZZ, 1, work.take(Ia))
+            work.add(first + ZZ, 1, work.take(Ia))
         return
     still = before.turning is Turning.NONE or (
         before.turning is Turning.ONE_DIRECTION and parallel(z, before.direction, tolerance)
@@ -354,7 +245,7 @@ def _regroup_drive(
         work.add(Ia, -factor, moved)
     else:
         moved, factor = work.take(Ia), 1
-    work.add(first + _M, factor, moved)
+    work.add(first + M, factor, moved)
     a = work.antecedent[j - 1]
     work.add_mass(a, row.position, {k: -factor * c for k, c in moved.items()})
 
@@ -365,34 +256,11 @@ def _directions_along(
     """Of each frame, whether it turns about one direction and gravity acts along it."""
     return [
         restraint.turning is Turning.ONE_DIRECTION
-        and parallel(_in_base(model, j) @ restraint.direction, down, tolerance)
+        and parallel(axes_in_base(model, j) @ restraint.direction, down, tolerance)
         for j, restraint in enumerate(found)
     ]
 
 
-def _in_base(model: RobotModel, j: int) -> Array:
-    """Axes of frame j in frame 0 with every joint at zero."""
-    R = np.eye(3)
-    for number in model.table.path(j) if j else ():
-        R = R @ model.chain.rotation[number - 1]
-    return R
-
-
-def _drop(work: _Regrouping, j: int, places: Sequence[int] | range) -> None:
+def _drop(work: Regrouping, j: int, places: Sequence[int] | range) -> None:
     for place in places:
         work.take(10 * (j - 1) + place)
-
-
-def _symmetric(place: int) -> NDArray[np.int64]:
-    tensor = np.zeros((3, 3), dtype=np.int64)
-    i, k = _J[place]
-    tensor[i, k] = tensor[k, i] = 1
-    return tensor
-
-
-def _skew(p: Array) -> Array:
-    return np.array([[0, -p[2], p[1]], [p[2], 0, -p[0]], [-p[1], p[0], 0]])
-
-
-def _is_zero(value: Any) -> bool:
-    return bool(value == 0) or (isinstance(value, float) and abs(value) < 1e-14)

@@ -16,10 +16,11 @@ from ..geometry import PRISMATIC
 from ..model import RobotModel
 from ..regressors import parameter_names
 from .gap import doubts, miss
+from .gravity import EARTH
 from .numeric import base_columns, missed_torque, natural_sizes, torque_factors
 from .restraint import reach
 from .result import BaseMethod, BaseParameters
-from .rules import EARTH, regrouped, rows_of_numbers
+from .rules import regrouped, rows_of_numbers
 
 _FINEST, _COARSEST = 1e-13, 1e-2
 """Between these, sines and lengths relative to the robot's are neither nothing nor clear."""
