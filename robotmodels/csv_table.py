@@ -17,6 +17,8 @@ Column = int | str
 """A column: its number, from 0, or its name in the header."""
 
 _COMMENT = "#"
+_LONGEST = 2**20
+"""Letters of a line; a longer one is no row of a table (it has no line ends, say)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,6 +130,8 @@ class CsvTable:
         """
         try:
             values = self._loaded(columns)
+        except InvalidValueError:
+            raise
         except ValueError:
             values = np.zeros((0, len(columns)))
         if not len(values) or not np.isfinite(values).all():
@@ -137,10 +141,17 @@ class CsvTable:
     def _loaded(self, columns: Sequence[int]) -> Array:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # no data: said by the callers
-            return np.loadtxt(
+            values = np.loadtxt(
                 self.path, delimiter=self.delimiter, skiprows=self.first, quotechar='"',
                 usecols=list(columns), comments=_COMMENT, ndmin=2, encoding="utf-8-sig",
             )  # fmt: skip
+        # a quotation mark without its end takes the lines up to the next one into its cell
+        if _has_quotes(self.path) and len(values) != sum(1 for _ in self._rows()):
+            raise InvalidValueError(
+                f"{self.path}: a cell begins with a quotation mark that has no end in its line, so "
+                "that rows would be lost. Close it, or take it out."
+            )
+        return values
 
     def numbers_with_gaps(self, columns: Sequence[int]) -> Array:
         """Columns of numbers, NaN where a cell is empty, infinite or not a number by its own word.
@@ -162,6 +173,8 @@ class CsvTable:
         """
         try:
             values = self._loaded(columns)
+        except InvalidValueError:
+            raise
         except ValueError:
             values = self._cell_by_cell(columns)
         if not len(values):
@@ -207,12 +220,7 @@ class CsvTable:
 
     def first_row(self) -> tuple[int, list[str]]:
         """Number of the first line of data, from 1, and its cells; none if there is no data."""
-        with self.path.open(encoding="utf-8-sig") as file:
-            for number, line in enumerate(file, 1):
-                text = line.split(_COMMENT, 1)[0].strip("\r\n")
-                if number > self.first and text.strip():
-                    return number, cells_of(text, self.delimiter)
-        return self.first + 1, []
+        return next(self._rows(), (self.first + 1, []))
 
     def labels(self, column: int) -> tuple[str, ...]:
         """A column of labels.
@@ -245,15 +253,11 @@ class CsvTable:
         name = f" ({self.names[column]})" if column < len(self.names) else ""
         return f"column {column}{name}"
 
-    def _rows(self) -> list[tuple[int, list[str]]]:
+    def _rows(self) -> Iterator[tuple[int, list[str]]]:
         """Number of the line, from 1, and cells of every line of data."""
-        lines = self.path.read_text(encoding="utf-8-sig").splitlines()
-        rows = []
-        for number, line in enumerate(lines[self.first :], self.first + 1):
-            text = line.split(_COMMENT, 1)[0].strip("\r\n")
-            if text.strip():
-                rows.append((number, cells_of(text, self.delimiter)))
-        return rows
+        for number, text in _lines(self.path):
+            if number > self.first and text.strip():
+                yield number, cells_of(text, self.delimiter)
 
     def _raise_bad_cell(self, columns: Sequence[int]) -> None:
         for line, cells in self._rows():
@@ -341,22 +345,18 @@ def open_table(path: str | Path, delimiter: str | None = None) -> CsvTable:
         The file cannot be opened.
     """
     path = Path(path)
-    try:
-        with path.open(encoding="utf-8-sig") as file:
-            for first, line in enumerate(file):  # noqa: B007
-                if line.split(_COMMENT, 1)[0].strip():
-                    break
-            else:
-                raise InvalidValueError(f"{path}: the file is empty.")
-    except UnicodeDecodeError:
-        raise InvalidValueError(f"{path}: expected a text file of columns (CSV).") from None
-    text = line.split(_COMMENT, 1)[0].strip("\r\n")
+    found = next((line for line in _lines(path) if line[1].strip()), None)
+    if found is None:
+        raise InvalidValueError(f"{path}: the file is empty.")
+    number, text = found
     if delimiter is None:
         delimiter = next((mark for mark in (";", "\t", ",") if mark in text), None)
     cells = cells_of(text, delimiter)
     # labels of a file without a header are words too, but most of its cells are numbers
     header = 2 * sum(not _is_number(cell) for cell in cells) > len(cells)
-    return CsvTable(path, tuple(cells) if header else (), delimiter, len(cells), first + header)
+    return CsvTable(
+        path, tuple(cells) if header else (), delimiter, len(cells), number - 1 + header
+    )
 
 
 def stacked_columns(tables: Sequence[CsvTable], columns: Sequence[Sequence[int]]) -> Array:
@@ -376,6 +376,28 @@ def stacked_columns(tables: Sequence[CsvTable], columns: Sequence[Sequence[int]]
     """
     parts = [table.numbers(c) for table, c in zip(tables, columns, strict=True)]
     return read_only(np.concatenate(parts))
+
+
+def _lines(path: Path) -> Iterator[tuple[int, str]]:
+    """Number of every line, from 1, and its text without comment, as NumPy counts them."""
+    try:
+        with path.open(encoding="utf-8-sig") as file:
+            number = 0
+            while line := file.readline(_LONGEST + 1):
+                number += 1
+                if len(line) > _LONGEST:
+                    raise InvalidValueError(
+                        f"{path}, line {number}: it is longer than {_LONGEST} letters; expected "
+                        "a text file of columns (CSV) with a row on each line."
+                    )
+                yield number, line.split(_COMMENT, 1)[0].strip("\r\n")
+    except UnicodeDecodeError:
+        raise InvalidValueError(f"{path}: expected a text file of columns (CSV).") from None
+
+
+def _has_quotes(path: Path) -> bool:
+    with path.open("rb") as file:
+        return any(b'"' in part for part in iter(lambda: file.read(_LONGEST), b""))
 
 
 def _is_number(cell: str) -> bool:

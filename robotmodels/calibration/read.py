@@ -313,7 +313,7 @@ def _poses(
     p = np.zeros((len(values), 3)) if turned_only else length.factor * values[:, :3]
     o = values if turned_only else values[:, 3:]
     if written is OrientationKind.QUATERNION:
-        size = np.linalg.norm(o, axis=1)
+        size = np.sqrt(np.minimum(np.abs(o), 1e9) ** 2 @ np.ones(o.shape[1]))
         wrong = np.flatnonzero(abs(size - 1.0) > _DIGITS)
         if len(wrong):
             raise InvalidValueError(
@@ -344,13 +344,14 @@ def _check_lengths(
     p: Array, q: Array, model: RobotModel, unit: LengthUnit, file: Path, frame: Frame
 ) -> None:
     reach = characteristic_length(model, frame)
-    spread = float(np.linalg.norm(np.ptp(p, axis=0)))
+    # squares of what is farther apart than this are no numbers
+    spread = float(np.linalg.norm(np.ptp(np.clip(p, -1e150, 1e150), axis=0)))
     if unit is LengthUnit.METRE and spread > _SPREAD * reach:
         raise InvalidValueError(
             f"{file}: positions are spread over {spread:.4g} m, but the robot reaches "
             f"{reach:.3g} m; these look like millimetres. Say lengths='mm'."
         )
-    moved = float(np.ptp(q, axis=0).max(initial=0.0))
+    moved = float(np.ptp(np.clip(q, -1e150, 1e150), axis=0).max(initial=0.0))
     if unit is LengthUnit.MILLIMETRE and moved > 0.5 and spread < 0.005 * reach:
         raise InvalidValueError(
             f"{file}: positions are spread over {1e3 * spread:.3g} mm only, although the joints "

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,8 @@ import numpy as np
 from .._arrays import Array
 from ..csv_table import CsvTable, open_table
 from ..errors import InvalidValueError, MissingExtraError
+from .mat_file import read_mat
+from .sizes import check_unpacked, unpacked_npz, unpacked_parquet
 from .table import LogFormat, LogTable
 
 
@@ -57,7 +60,7 @@ def open_log_table(path: Path, kind: LogFormat | None, delimiter: str | None = N
     if kind is LogFormat.NPZ:
         return _arrays(path, _npz(path))
     if kind is LogFormat.MAT:
-        return _arrays(path, _mat(path))
+        return _arrays(path, read_mat(path))
     return _arrays(path, _parquet(path))
 
 
@@ -84,7 +87,7 @@ def _lists(table: CsvTable) -> dict[str, Any] | None:
     for i, name in enumerate(table.names):
         if i in listed:
             found[name] = _list_column(table, i)
-        elif _reads_as_number(first[i]):
+        elif _reads_as_number(first[i] if i < len(first) else ""):
             found[name] = table.numbers_with_gaps([i])[:, 0]
         else:
             found[name] = table.labels(i)[0]
@@ -116,55 +119,28 @@ def _reads_as_number(cell: str) -> bool:
     return True
 
 
-def _npz(path: Path) -> dict[str, Any]:
+@contextmanager
+def _unpacking(path: Path, what: str, advice: str = "") -> Iterator[None]:
+    """Say of a file that other packages unpack what is wrong with it."""
+    path.open("rb").close()  # what cannot be opened is an OSError; what is damaged is not
     try:
-        with np.load(path, allow_pickle=False) as stored:
-            if isinstance(stored, np.ndarray):
-                raise InvalidValueError(f"{path}: one array (NPY); expected named arrays (NPZ).")
-            return {name: stored[name] for name in stored.files}
-    except (ValueError, EOFError) as error:
-        if isinstance(error, InvalidValueError):
-            raise
+        yield
+    except InvalidValueError:
+        raise
+    # damaged bytes raise whatever the insides of a parser raise
+    except Exception as error:  # noqa: BLE001
         raise InvalidValueError(
-            f"{path}: it cannot be read as NPZ without objects in it ({error}); write it with "
-            "numpy.savez(file, q=..., tau=...)."
+            f"{path}: this is no {what} file that can be read ({type(error).__name__}: "
+            f"{error!s:.300}){advice}."
         ) from None
-    except OSError:
-        if not path.is_file():
-            raise
-        raise InvalidValueError(f"{path}: this is no NPZ file.") from None
 
 
-def _mat(path: Path) -> dict[str, Any]:
-    from scipy.io import loadmat
-    from scipy.io.matlab import MatReadError
-
-    with path.open("rb") as file:
-        head = file.read(128)
-    if head.startswith(b"MATLAB 7.3") or head[1:4] == b"HDF":
-        raise InvalidValueError(
-            f"{path}: this is a MAT file of version 7.3 (HDF5), which is not read here; in MATLAB "
-            "save it with save(file, '-v7'), or write CSV or Parquet."
-        )
-    try:
-        stored = loadmat(path)
-    # the last is what SciPy raises for versions and types of MAT files that it does not know
-    except (ValueError, MatReadError, TypeError, NotImplementedError) as error:
-        raise InvalidValueError(f"{path}: this is no MAT file that can be read: {error}.") from None
-    found: dict[str, Any] = {}
-    for name, value in stored.items():
-        if not name.startswith("__"):
-            _flatten(name, value, found)
-    return found
-
-
-def _flatten(name: str, value: Any, found: dict[str, Any]) -> None:
-    """Fields of structures under names with points: log.q."""
-    if value.dtype.names is None:
-        found[name] = value
-    elif value.size == 1:
-        for field in value.dtype.names:
-            _flatten(f"{name}.{field}", np.asarray(value.reshape(-1)[0][field]), found)
+def _npz(path: Path) -> dict[str, Any]:
+    advice = "; write it with numpy.savez(file, q=..., tau=...), without objects in it"
+    with _unpacking(path, "NPZ", advice):
+        check_unpacked(path, unpacked_npz(path))
+        with np.load(path, allow_pickle=False) as stored:
+            return {name: np.asarray(stored[name]) for name in stored.files}
 
 
 def _parquet(path: Path) -> dict[str, Any]:
@@ -175,22 +151,22 @@ def _parquet(path: Path) -> dict[str, Any]:
         raise MissingExtraError(
             "Parquet files need pyarrow: pip install 'robotmodels[logs]'."
         ) from None
-    try:
-        stored = pq.read_table(path)
-    except pa.ArrowInvalid as error:
-        raise InvalidValueError(f"{path}: this is no Parquet file: {error}.") from None
     found: dict[str, Any] = {}
-    for name, column in zip(stored.column_names, stored.columns, strict=True):
-        kind = column.type
-        if pa.types.is_timestamp(kind):
-            nanoseconds = column.cast(pa.timestamp("ns", kind.tz)).cast(pa.int64())
-            found[name] = nanoseconds.to_numpy()
-        elif pa.types.is_list(kind) or pa.types.is_fixed_size_list(kind):
-            found[name] = _parquet_lists(path, name, column)
-        elif pa.types.is_integer(kind) or pa.types.is_floating(kind):
-            found[name] = column.to_numpy()
-        elif len(column):
-            found[name] = str(column[0].as_py())
+    with _unpacking(path, "Parquet"):
+        file = pq.ParquetFile(path)
+        check_unpacked(path, unpacked_parquet(file.metadata))
+        stored = file.read()
+        for name, column in zip(stored.column_names, stored.columns, strict=True):
+            kind = column.type
+            if pa.types.is_timestamp(kind):
+                nanoseconds = column.cast(pa.timestamp("ns", kind.tz)).cast(pa.int64())
+                found[name] = nanoseconds.to_numpy()
+            elif pa.types.is_list(kind) or pa.types.is_fixed_size_list(kind):
+                found[name] = _parquet_lists(path, name, column)
+            elif pa.types.is_integer(kind) or pa.types.is_floating(kind):
+                found[name] = column.to_numpy()
+            elif len(column):
+                found[name] = str(column[0].as_py())
     return found
 
 

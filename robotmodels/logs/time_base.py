@@ -15,6 +15,8 @@ _REGULAR = 0.01
 """Stamps this close to a regular grid, in periods, are the grid: rounding, not sampling."""
 _COARSER = 1.5
 """Periods of the file above which a grid leaves out rows."""
+_FINER = 100.0
+"""Rows of a grid for one of the file, above which nothing is interpolated: nobody measured it."""
 _REPEATED = 0.1
 """Share of repeated stamps above which the stamps are too coarse to tell anything."""
 
@@ -228,6 +230,12 @@ def _on_grid(
         if jitter > 1e-6:
             notes.append(f"{told}; taken as regular at {period:.9g} s.")
         return blocks
+    spans = sum(float(times[-1] - times[0]) for times in stamps)
+    if not spans <= _FINER * grid * sum(map(len, stamps)):
+        raise InvalidValueError(
+            f"{source}: rows {grid:.4g} s apart would be more than {_FINER:g} for each row of the "
+            f"file, which has them {period:.4g} s apart; say a longer dt=, or leave it out."
+        )
     from scipy.interpolate import CubicSpline
 
     asked = "" if grid == period else f", asked for at {grid:g} s (the file has {period:.9g} s)"

@@ -53,15 +53,20 @@ class JointSide:
 
     def q(self, raw: Array) -> Array:
         """Positions of the joints, shape (N, n)."""
-        return raw @ self.positions + self.offset
+        return _times(raw, self.positions) + self.offset
 
     def rate(self, raw: Array) -> Array:
         """Their derivatives."""
-        return raw @ self.positions
+        return _times(raw, self.positions)
 
     def tau(self, raw: Array) -> Array:
         """Torques of the joints, shape (N, n)."""
-        return raw @ self.torques
+        return _times(raw, self.torques)
+
+
+def _times(raw: Array, matrix: Array) -> Array:
+    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused by the log
+        return raw @ matrix
 
 
 def joint_side(

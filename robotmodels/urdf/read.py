@@ -281,8 +281,14 @@ def _inertia(tree: UrdfTree, named: tuple[NamedFrame, ...], f: int) -> InertialP
         link = tree.links[frame.name]
         if frame.parent == 0:
             continue
-        own = InertialParameters.from_com([link.mass], [link.com], [link.inertia])
-        total[frame.parent - 1] += own.moved(frame.pose[None]).values[0]
+        with np.errstate(over="ignore", invalid="ignore"):  # refused below
+            own = InertialParameters.from_com([link.mass], [link.com], [link.inertia])
+            total[frame.parent - 1] += own.moved(frame.pose[None]).values[0]
+        if not np.isfinite(total[frame.parent - 1]).all():
+            raise UrdfError(
+                f"link {link.name!r}: its mass, its centre of mass or how far it is from its joint "
+                "is so large that its inertia there is no number."
+            )
     return InertialParameters(total)
 
 

@@ -1,0 +1,80 @@
+"""How large a file says that it is once it is unpacked, before it is unpacked."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+from typing import Any
+
+from ..errors import InvalidValueError
+
+_ALWAYS = 2**30
+"""Bytes that are unpacked from any file."""
+_TIMES = 100
+"""Sizes of the file that are unpacked from larger ones: samples of sensors repeat less."""
+
+
+def most_unpacked(size: int) -> int:
+    """Bytes that are unpacked at most from a file of a size, in bytes."""
+    return max(_ALWAYS, _TIMES * size)
+
+
+def check_unpacked(path: Path, unpacked: int) -> None:
+    """Refuse a file that is small on disk and fills the memory.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    unpacked : int
+        Bytes of what is in it.
+
+    Raises
+    ------
+    InvalidValueError
+        More than a gigabyte and more than a hundred times the file.
+    """
+    size = path.stat().st_size
+    if unpacked > most_unpacked(size):
+        raise InvalidValueError(
+            f"{path}: {size} bytes would become {unpacked / 2**30:.3g} GB; samples of sensors are "
+            "not so repetitive. If it is meant, write it without compression."
+        )
+
+
+def unpacked_npz(path: Path) -> int:
+    """Bytes of the members of an NPZ file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    int
+        As the archive says; no more than that is unpacked.
+
+    Raises
+    ------
+    zipfile.BadZipFile
+        It is no archive.
+    """
+    with zipfile.ZipFile(path) as archive:
+        return sum(member.file_size for member in archive.infolist())
+
+
+def unpacked_parquet(metadata: Any) -> int:
+    """Bytes of the columns of a Parquet file as numbers.
+
+    Parameters
+    ----------
+    metadata : pyarrow.parquet.FileMetaData
+        Of the file.
+
+    Returns
+    -------
+    int
+        Eight for each cell.
+    """
+    return 8 * int(metadata.num_rows) * int(metadata.num_columns)
