@@ -15,6 +15,7 @@ from .joint_kinds import FIXED, PRISMATIC, REVOLUTE
 ANGLES = ("gamma", "beta", "alpha", "theta")
 LENGTHS = ("b", "d", "r")
 LIMITS = ("lower", "upper", "velocity", "effort")
+_LARGEST = 2**31
 
 
 def whole_numbers(value: ArrayLike, name: str, size: int | None = None) -> NDArray[np.int64]:
@@ -23,7 +24,7 @@ def whole_numbers(value: ArrayLike, name: str, size: int | None = None) -> NDArr
     if array.ndim != 1 or (size is not None and array.size != size):
         wanted = "one number per row" if size is None else f"{size} numbers"
         raise ShapeError(f"{name}: expected {wanted}, got an array of shape {array.shape}.")
-    if (array != np.round(array)).any():
+    if (array != np.round(array)).any() or (np.abs(array) > _LARGEST).any():
         raise TableError(f"{name}: expected whole numbers, got {array.tolist()}.")
     return array.astype(np.int64)
 

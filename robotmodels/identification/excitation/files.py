@@ -204,8 +204,15 @@ def read_coefficients(path: str | Path) -> Trajectory:
             int(motion["order"]), bool(motion["rest"]),
         )  # fmt: skip
         coefficients = as_floats(motion["coefficients"], "coefficients")
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise InvalidValueError(f"{path}: the motion cannot be read: {error}.") from None
+    if not 0.0 < basis.duration < float("inf"):
+        raise InvalidValueError(f"{path}: a motion of {basis.duration} s; expected seconds.")
+    if basis.order > len(np.atleast_1d(coefficients)) + 1:  # said before anything is that large
+        raise ShapeError(
+            f"{path}: {len(np.atleast_1d(coefficients))} rows of coefficients for order "
+            f"{basis.order}."
+        )
     if coefficients.ndim != 2 or len(coefficients) != basis.count:
         raise ShapeError(
             f"{path}: expected {basis.count} rows of coefficients, got {coefficients.shape}."

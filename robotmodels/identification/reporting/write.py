@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..._arrays import Array
+from ..._arrays import Array, as_floats
 from ...drive import drive_kinds
 from ...errors import InvalidValueError
 from ...logs import Log
@@ -156,18 +156,33 @@ def read_estimate(path: str | Path) -> Estimate:
             f"{data.get('chapter')!r} of format {kind!r}."
         )
 
+    try:
+        return _estimate(data)
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        raise InvalidValueError(
+            f"{path}: the parameters cannot be read ({type(error).__name__}: {error!s:.200}); it "
+            "was changed after write_result wrote it."
+        ) from None
+
+
+def _estimate(data: dict[str, Any]) -> Estimate:
     def numbers(values: Any) -> Array:
         return np.array(values, dtype=np.float64)  # null becomes NaN
 
+    names = tuple(str(one["name"]) for one in data["parameters"])
+    p = len(names)
+    covariance = numbers(data["covariance"])
+    if covariance.shape != (p, p):
+        raise ValueError(f"a covariance of shape {covariance.shape} for {p} parameters")
     return Estimate(
         Method[data["method"]["name"]],
-        tuple(one["name"] for one in data["parameters"]),
-        numbers([one["value"] for one in data["parameters"]]),
-        numbers(data["covariance"]).reshape(len(data["parameters"]), -1),
+        names,
+        as_floats([one["value"] for one in data["parameters"]], "value"),
+        covariance,
         numbers(data["sigma"]),
         EstimateStatus[data["status"]["name"]],
         int(data["method"]["iterations"]),
-        tuple(data["method"]["notes"]),
+        tuple(map(str, data["method"]["notes"])),
     )
 
 
