@@ -13,8 +13,9 @@ from .robot import Look, draw_robot
 from .scene import Scene
 from .sliders import coupled_posture, coupling, slider_panel
 
-# The first picture has room for each joint turned by this much to either side, rad.
-_ROOM = np.radians(40.0)
+# The first picture has room for each joint turned by this much to either side, rad, or for this
+# part of the way to the ends of its stroke.
+_TURN, _STROKE = np.radians(25.0), 0.4
 
 
 def jog(
@@ -91,10 +92,13 @@ def _room(model: RobotModel, start: Array) -> Array:
     """Postures that the picture must hold: named ones, and each joint moved a little by itself."""
     independent, matrix, _ = coupling(model)
     turns = model.table.sigma[model.table.joint_rows] == REVOLUTE
-    low = np.where(turns, start - _ROOM, np.where(np.isfinite(model.lower), model.lower, start))
-    high = np.where(turns, start + _ROOM, np.where(np.isfinite(model.upper), model.upper, start))
+    low = np.where(turns, start - _TURN, start + _STROKE * (_finite(model.lower, start) - start))
+    high = np.where(turns, start + _TURN, start + _STROKE * (_finite(model.upper, start) - start))
     moved = [start, *model.configurations.values()]
     for k, i in enumerate(independent):
-        ends = max(low[i], model.lower[i]), min(high[i], model.upper[i])
-        moved += [start + matrix[:, k] * (end - start[i]) for end in ends]
+        moved += [start + matrix[:, k] * (end - start[i]) for end in (low[i], high[i])]
     return np.stack(moved)
+
+
+def _finite(limit: Array, start: Array) -> Array:
+    return np.where(np.isfinite(limit), limit, start)

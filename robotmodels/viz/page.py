@@ -51,11 +51,13 @@ _TEMPLATE = """<!DOCTYPE html>
 <style>
 body {{ margin: 0; }}
 #meshcat-pane {{ width: 100vw; height: 100vh; overflow: hidden; }}
-#legend {{ position: absolute; left: 10px; top: 10px; margin: 0; padding: 6px 10px;
+#legend {{ position: absolute; left: 10px; bottom: 10px; margin: 0; padding: 6px 10px;
  list-style: none; font: 13px/1.5 sans-serif; color: #222; background: rgba(255, 255, 255, 0.8);
  border-radius: 4px; }}
 #legend span {{ display: inline-block; width: 0.9em; height: 0.9em; margin-right: 0.5em;
  vertical-align: -0.1em; border-radius: 2px; }}
+.dg.main .close-button {{ background: none !important; color: #444 !important;
+ text-align: right !important; padding-right: 8px; box-sizing: border-box; }}
 #message {{ display: none; margin: 2em; font-family: sans-serif; }}
 {style}</style>
 </head>

@@ -182,8 +182,13 @@ def _pieces(model: RobotModel, table: DHTable, look: Look, size: float) -> list[
             shape, color = _solids(visual)[0]
             pieces.append(_Piece(j, f"{name}:{axis}", visual.pose, shape, color, False))
     if look.names:
-        for j, name in enumerate(model.table.names, start=1):
-            pose = se3.translation(0.0, 0.0, 0.125 * size)
+        before = [0] * (table.f + 1)
+        for j, name in enumerate(table.names, start=1):
+            # frames of a wrist share their origin, and often an axis: their names do not
+            k, i = j - 1, int(table.antecedent[j - 1])
+            if i and not (table.b[k] or table.d[k] or table.r[k] or table.sigma[k] == PRISMATIC):
+                before[j] = before[i] + 1
+            pose = se3.translation(0.0, 0.0, (0.125 + 0.04 * before[j]) * size)
             label = Label(name, 0.15 * size)
             pieces.append(_Piece(j, f"label:{j}", pose, label, (0.1, 0.1, 0.1, 1.0), False))
     return pieces

@@ -31,6 +31,7 @@ STYLE = """body { display: flex; }
 #panel td:nth-child(2), #panel td:nth-child(5) { min-width: 5.6em; text-align: right; }
 #panel td:nth-child(3) { padding-right: 12px; }
 #panel .row { margin-top: 6px; }
+@media (max-width: 560px) { #panel { font-size: 11px; padding: 6px; } }
 #problem { color: #b00020; }
 #problem:empty { display: none; }
 """
