@@ -162,7 +162,7 @@ def plot_calibration_residuals(
             if outlier.any():
                 axes.plot(
                     x[outlier], np.clip(y[outlier], -most, most), linestyle="", marker="o",
-                    markersize=_RING, markerfacecolor="none", markeredgecolor=ALERT,
+                    markersize=_RING, color=ALERT, markerfacecolor="none", markeredgecolor=ALERT,
                     markeredgewidth=0.9, clip_on=False, label="outlier (at the edge: beyond it)",
                 )  # fmt: skip
             rms = float(np.sqrt(np.mean(y**2)))  # outliers count, as in the report

@@ -123,10 +123,15 @@ def plot_processing(
         for j, name in enumerate(names):
             axes = grid[j, column]
             axes.loglog(f, before[:, j], color=_BEFORE, linewidth=0.9, label="as recorded")
-            axes.loglog(f, after[:, j], color=_AFTER, linewidth=1.2, label="kept")
+            axes.loglog(
+                f, after[:, j], color=_AFTER, linewidth=1.2, linestyle=(0, (5.0, 1.0)), label="kept"
+            )
             if cutoff is not None:
                 axes.axvspan(cutoff, nyquist, color=BAND, linewidth=0.0, zorder=0.4)
-                axes.axvline(cutoff, color=INK, linewidth=0.9, label="cutoff")
+                axes.axvline(
+                    cutoff, color=INK, linewidth=0.9, linestyle=(0, (6.0, 1.3, 1.3, 1.3)),
+                    label="cutoff",
+                )  # fmt: skip
             axes.axvline(processing.motion, color=INK, linewidth=0.9, linestyle=LIMIT_DASHES,
                          label="motion: 99.9 % of the velocity's power")  # fmt: skip
             if column == 0:

@@ -170,8 +170,8 @@ def plot_identification_torques(
             )  # fmt: skip
             axes.axhline(0.0, color=PALE, linewidth=THIN_WIDTH, zorder=1.2, label="_zero")
             for (t, y), color, width, label in (
-                (drawn.measured, _MEASURED, 0.7, "measured"),
-                (drawn.left, _LEFT, 0.6, "measured less predicted"),
+                (drawn.measured, _MEASURED, THIN_WIDTH, "measured"),
+                (drawn.left, _LEFT, THIN_WIDTH, "measured less predicted"),
                 (drawn.predicted, _PREDICTED, 1.1, "predicted"),
             ):
                 axes.plot(t[:, j], y[:, j], color=color, linewidth=width, label=label)

@@ -23,7 +23,7 @@ from .figures import (
     legend_above,
     new_figure,
 )
-from .palette import GRID, INK, PALE
+from .palette import GRID, INK, LINE_COLORS, PALE
 from .plot_joint_path import EVENT_STYLES
 from .plot_units import Unit, as_unit
 
@@ -31,9 +31,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _AXES: tuple[tuple[str, Color], ...] = (
-    ("x", (0.80, 0.13, 0.13, 1.0)),
-    ("y", (0.10, 0.55, 0.15, 1.0)),
-    ("z", (0.12, 0.28, 0.85, 1.0)),
+    ("x", LINE_COLORS[1]),
+    ("y", LINE_COLORS[2]),
+    ("z", LINE_COLORS[0]),
 )
 _DASHES = ((0, ()), (0, (3.0, 1.0)), (0, (1.0, 0.8)))
 _SAMPLES = 301
