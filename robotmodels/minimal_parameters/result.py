@@ -286,7 +286,7 @@ class BaseParameters:
             numbers = self.values(values)
         else:
             numbers = as_exact(values, (len(self),), "values")
-        return base_values(self, numbers)
+        return base_values(self.names, self.matrix, self.model.table.sigma, numbers)
 
     def belongs_to(self, model: RobotModel) -> bool:
         """Whether a robot has these base parameters, with values of its own.

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from .._arrays import Array, Rebuilt, read_only
 from ..errors import nearest_names
 from ..geometry import PRISMATIC
 from ..regressors.columns import plain_name
 from ..table_text import boxed
-
-if TYPE_CHECKING:
-    from .result import BaseParameters
 
 _LINK_UNITS = {"M": "kg", "MX": "kg m", "MY": "kg m", "MZ": "kg m"}
 _TURNING = {"Ia": "kg m^2", "Fv": "N m s/rad"}
@@ -89,49 +89,52 @@ class BaseValues(Rebuilt, Mapping[str, float]):
         return f"<BaseValues: {len(self)} base parameters>"
 
 
-def base_values(base: BaseParameters, values: Array) -> BaseValues:
+def base_values(
+    names: tuple[str, ...], matrix: Array, sigma: NDArray[np.int64], values: Array
+) -> BaseValues:
     """Base parameters with their values and units.
 
     Parameters
     ----------
-    base : BaseParameters
-        b of them.
+    names : tuple of str, length b
+        Of the kept standard parameters.
+    matrix : ndarray, shape (b, p)
+        What is regrouped into each.
+    sigma : ndarray of int, shape (f,)
+        Kinds of joints of the table, on which units depend.
     values : ndarray, shape (b,)
         Their values.
 
     Returns
     -------
     BaseValues
-        In the order of ``base.names``.
+        In the order of the names.
 
     Examples
     --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.minimal_parameters import base_parameters
-    >>> print(base_values(base_parameters(load("planar_2r"), drive=False), [4.0, 1.0, 0.5, 0.0]))
+    >>> matrix = np.array([[1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    >>> print(base_values(("ZZ1", "MX2"), matrix, np.array([0, 0]), np.array([4.0, 0.5])))
     ┌───────────┬───────┬────────┐
     │ parameter │ value │   unit │
     ├───────────┼───────┼────────┤
     │      ZZ1R │     4 │ kg m^2 │
-    │       ZZ2 │     1 │ kg m^2 │
     │       MX2 │   0.5 │   kg m │
-    │       MY2 │     0 │   kg m │
     └───────────┴───────┴────────┘
     """
-    several = (base.matrix != 0.0).sum(axis=1) > 1
-    printed = (f"{n}R" if more else n for n, more in zip(base.names, several, strict=True))
-    units = tuple(_unit(base, name) for name in base.names)
-    return BaseValues(base.names, tuple(printed), values, units)
+    several = (matrix != 0.0).sum(axis=1) > 1
+    printed = (f"{n}R" if more else n for n, more in zip(names, several, strict=True))
+    units = tuple(_unit(name, sigma) for name in names)
+    return BaseValues(names, tuple(printed), values, units)
 
 
-def _unit(base: BaseParameters, name: str) -> str:
+def _unit(name: str, sigma: NDArray[np.int64]) -> str:
     kind = name.rstrip("0123456789")
     frame = int(name[len(kind) :])
     if kind in _LINK_UNITS:
         return _LINK_UNITS[kind]
     if kind.isupper():
         return "kg m^2"
-    slides = int(base.model.table.sigma[frame - 1]) == PRISMATIC
+    slides = int(sigma[frame - 1]) == PRISMATIC
     plain = kind[:2]  # Iam, Fvm and frictions by direction are of the same unit
     if plain in _TURNING:
         return (_SLIDING if slides else _TURNING)[plain]
