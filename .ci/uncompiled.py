@@ -1,0 +1,37 @@
+"""pytest plugin for the leg that runs kernels as plain Python, so that their lines are counted.
+
+Plain Python takes some hundred times longer: a test that is not done after ``LONGEST`` seconds is
+given up, and what it has run by then counts. Whether results are right is told by the ordinary
+runs; a test that fails here fails as anywhere.
+"""
+
+import os
+import signal
+from collections.abc import Iterator
+from types import FrameType
+
+import pytest
+from hypothesis import settings
+
+LONGEST = float(os.environ.get("LONGEST", "20"))
+
+settings.register_profile(
+    "few", max_examples=3, deadline=None, derandomize=True, database=None, print_blob=True
+)
+os.environ["HYPOTHESIS_PROFILE"] = "few"
+
+
+def _give_up(number: int, frame: FrameType | None) -> None:
+    pytest.skip(f"not done after {LONGEST:.0f} s without compilation")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Iterator[None]:
+    """Call the test, for as long as it may take."""
+    before = signal.signal(signal.SIGALRM, _give_up)
+    signal.setitimer(signal.ITIMER_REAL, LONGEST)
+    try:
+        return (yield)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
