@@ -1,13 +1,13 @@
 """Speed beside yardsticks that stand still: fails where ours has become slower than they have.
 
-    python .ci/ratios.py [--write] [--only NAME ...] [--slowed NAME]
+    python .ci/ratios.py [--write] [--only NAME ...] [--slowed NAME [--times 3]]
 
 Each work of ours is timed in turns with something of other hands, NumPy, SciPy, Pinocchio, ruckig,
 in this process. Only the ratio of the two medians is looked at, never a time: a machine that is
 slow or busy is so for both. A ratio may be `MARGIN` times that of
 `benchmarks/results/ratios.json`; what is above is measured again, up to `ATTEMPTS` times, and the
-least ratio counts. ``--write`` writes the file anew. ``--slowed`` does a work of ours twice in
-every run: the check has to fail then.
+least ratio counts. ``--write`` writes the file anew, which another kind of processor may need.
+``--slowed`` does a work of ours more often than it says: the check has to fail then.
 """
 
 # ruff: noqa: E402
@@ -241,21 +241,21 @@ def checked(pair: Pair, kept: float) -> tuple[float, int]:
     return least, ATTEMPTS
 
 
-def twice(pair: Pair) -> Pair:
-    """With work of ours that is half as fast."""
+def slowed(pair: Pair, times: int) -> Pair:
+    """With work of ours that is done several times."""
 
-    def slowed() -> None:
-        pair.ours()
-        pair.ours()
+    def run() -> None:
+        for _ in range(times):
+            pair.ours()
 
-    return replace(pair, ours=slowed)
+    return replace(pair, ours=run)
 
 
 def write() -> None:
-    """Keep the ratios of this machine: the median of three, for each work."""
+    """Keep the ratios of this machine: the median of five, for each work."""
     ratios = {}
     for pair in pairs():
-        ratios[pair.name] = float(np.median([pair.ratio() for _ in range(3)]))
+        ratios[pair.name] = float(np.median([pair.ratio() for _ in range(5)]))
         print(f"{pair.name:28} {ratios[pair.name]:9.3f}  {pair.yardstick}", flush=True)
     kept = {"machine": machine(["ruckig"]), "ratios": ratios}
     FILE.write_text(json.dumps(kept, indent=2) + "\n", encoding="utf-8")
@@ -266,7 +266,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--write", action="store_true", help="keep the ratios of this machine")
     parser.add_argument("--only", nargs="+", default=None, metavar="NAME")
-    parser.add_argument("--slowed", metavar="NAME", help="do this work of ours twice")
+    parser.add_argument("--slowed", metavar="NAME", help="do this work of ours more often")
+    parser.add_argument("--times", type=int, default=3, help="how often, with --slowed")
     given = parser.parse_args()
     if given.write:
         write()
@@ -282,7 +283,7 @@ def main() -> None:
         if pair.name not in kept:
             sys.exit(f"{FILE.name} has no ratio of {pair.name!r}: .ci/ratios.py --write adds it.")
         if given.slowed == pair.name:
-            pair = twice(pair)
+            pair = slowed(pair, given.times)
         found, attempts = checked(pair, kept[pair.name])
         good = judged(found, kept[pair.name])
         if not good:
@@ -293,9 +294,11 @@ def main() -> None:
             f"{pair.yardstick}{f', attempt {attempts}' if attempts > 1 else ''}",
             flush=True,
         )
-    gone = sorted(set(kept) - seen)
+        if given.only is not None and seen.issuperset(given.only):
+            break
+    gone = sorted((set(kept) if given.only is None else set(given.only)) - seen)
     if gone:
-        sys.exit(f"{FILE.name} keeps ratios of what is no longer measured: {', '.join(gone)}.")
+        sys.exit(f"{FILE.name} or --only names what is not measured: {', '.join(gone)}.")
     print(f"{time.perf_counter() - start:.0f} s")
     if slow:
         sys.exit(f"slower than it was, beside its yardstick: {', '.join(slow)}")

@@ -44,9 +44,9 @@ def speed(peers: dict[str, Any]) -> list[str]:
     told = [f"{PACKAGES[k]} {v}" for k, v in facts.items() if k in PACKAGES and v[0].isdigit()]
     lines = [
         f"Medians of the processor's time, {facts['cpu']}, one thread, Python {facts['python']}, "
-        f"{', '.join(told)}. The last column: the fastest of the others to ours. Spreads, goals "
-        "and every way of each tool: `benchmarks/results/peers.md`; to measure them again: "
-        "`python -m benchmarks`.",
+        f"{', '.join(told)}{a_short_run(facts)}. The last column: the fastest of those who do the "
+        "whole work, to the first figure of ours. Spreads, goals and what was found: "
+        "`benchmarks/results/peers.md`; to measure it again: `python -m benchmarks`.",
         "",
         "| work | robotmodels | Pinocchio, raw calls from Python | peers | others / ours |",
         "|---|---|---|---|---|",
@@ -64,22 +64,28 @@ def speed(peers: dict[str, Any]) -> list[str]:
     return lines
 
 
+def a_short_run(facts: dict[str, str]) -> str:
+    """What is said of figures that are not of a full run."""
+    return f" ({facts['run']})" if "run" in facts else ""
+
+
 def accuracy(results: Path) -> list[str]:
     """What is found, beside those who find it too."""
     igm = json.loads((results / "accuracy_igm.json").read_text(encoding="utf-8"))["rows"]
     camera = json.loads((results / "calibration.json").read_text(encoding="utf-8"))["camera"]
-    both = [r["arm"] for r in igm if r["solver"] != OURS]
-    peer = next((r["solver"] for r in igm if r["solver"] != OURS), "")
     lines = ["| accuracy | robotmodels | peers |", "|---|---|---|"]
-    for title, arms in ((f"of {len(both)} arms that {peer} knows", both), ("of the others", None)):
-        ours = [r for r in igm if r["solver"] == OURS and (r["arm"] in both) == (arms is not None)]
-        theirs = [r for r in igm if r["solver"] != OURS and arms is not None]
-        if not ours:
-            continue
-        many, singular = (sum(r[k] for r in ours) for k in ("poses", "singular"))
-        title = f"poses whose posture was not given back, {title}: {many}, {singular} singular"
-        lost = [sum(r["lost"] for r in rows) for rows in (ours, theirs)]
-        lines.append(f"| {title} | {lost[0]} | {f'{peer} {lost[1]}' if theirs else ''} |")
+    ours = [r for r in igm if r["solver"] == OURS]
+    poses, singular, lost = (sum(r[k] for r in ours) for k in ("poses", "singular", "lost"))
+    title = (
+        f"postures not given back, of {poses} poses of {len(ours)} arms, {singular} of them "
+        "singular or nearly so"
+    )
+    theirs = []
+    for solver in dict.fromkeys(r["solver"] for r in igm if r["solver"] != OURS):
+        own = [r for r in igm if r["solver"] == solver]
+        count, missed = (sum(r[k] for r in own) for k in ("poses", "lost"))
+        theirs.append(f"{solver} {missed} of {count} ({len(own)} arms)")
+    lines.append(f"| {title} | {lost} | {'; '.join(theirs)} |")
     best = {}
     for r in camera:
         tool = r["name"].partition(":")[0]

@@ -58,6 +58,12 @@ def detailed(rows: list[Row]) -> list[str]:
     return lines
 
 
+def line(row: Row) -> str:
+    """What is printed as soon as a work is done."""
+    ways = "; ".join(f"{e['tool']} {cell(e)}" for e in row["entries"])
+    return f"{row['work']} [{row['unit']}]: {ways}"
+
+
 def cell(entry: Row) -> str:
     """A median with its way."""
     return figure(entry["median"]) + (f" {entry['how']}" if entry["how"] else "")
