@@ -1,0 +1,116 @@
+"""The tree of frames: how many there are, their geometric parameters, and the base."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .. import se3
+from .._arrays import Array
+from ..errors import ParFileError, RobotModelsError
+from ..geometry import FIXED, PRISMATIC
+from .keywords import GEOMETRY, INTEGERS
+from .numbers import Numbers
+from .statements import ParFile
+
+
+def counts(file: ParFile) -> tuple[int, int]:
+    """Number of links and of frames, of a file that is a tree on a fixed base."""
+    links, joints, kind = file.integer("NL", 0), file.integer("NJ", 0), file.integer("Type", 0)
+    f = file.integer("NF", max(links, 2 * joints - links))
+    for keyword, what in (("is_floating", "floating"), ("is_mobile", "mobile")):
+        if file.flag(keyword):
+            raise file.error(
+                f"a robot on a {what} base is not supported yet; set {keyword} = False, take entry "
+                "0 out of the dynamic lists and read the arm on a fixed base.",
+                file.line(keyword),
+            )
+    if joints > links:
+        cut, second = range(links + 1, joints + 1), range(joints + 1, f + 1)
+        raise file.error(
+            f"{file.name!r} has closed loops, which are not supported yet: with NL = {links} links "
+            f"and NJ = {joints} joints, its loops are cut at {_numbered('joint', cut)}"
+            + (f" (second: {_numbered('frame', second)})" if second else "")
+            + f". Give the spanning tree: keep the first {links} entries of the geometric, dynamic "
+            f"and joint lists and set NJ = NF = {links} and Type = 1.",
+            file.line("NJ"),
+        )
+    if kind == 2:
+        raise file.error(
+            f"Type = 2 says that {file.name!r} has closed loops, which are not supported yet, but "
+            f"NL = NJ = {links} cuts no joint; set Type = 1 if the file is the spanning tree.",
+            file.line("Type"),
+        )
+    if links < 1 or joints < links or f < links:
+        raise file.error(
+            f"NL = {links} links, NJ = {joints} joints and NF = {f} frames do not fit: a tree has "
+            "as many of each, at least one, and fixed frames (sigma 2) count as joints too.",
+            file.line("NL"),
+        )
+    return links, f
+
+
+def geometry(file: ParFile, numbers: Numbers, links: int, f: int) -> dict[str, Any]:
+    """Columns of the table, from its checked lists."""
+    rows = {k: file.entries(k, f, f"NF = {f} frames") for k in (*INTEGERS, *GEOMETRY)}
+    columns: dict[str, Any] = {
+        _column(k): [numbers.integer(entry) for entry in rows[k]] for k in INTEGERS if rows[k]
+    }
+    numbers.check_complete()
+    legal = {
+        "ant": (range(f + 1), f"the number of a frame, 0 (the base) to {f}"),
+        "sigma": ((0, PRISMATIC, FIXED), "0 (revolute), 1 (prismatic) or 2 (fixed)"),
+        "mu": ((0, 1), "1 (actuated) or 0 (passive)"),
+    }
+    for key, (allowed, expected) in legal.items():
+        for entry, value in zip(rows[key], columns.get(_column(key), ()), strict=True):
+            if value not in allowed:
+                raise ParFileError(f"{entry.place}: expected {expected}, got {value}.")
+    if any(kind != FIXED for kind in columns["sigma"][links:]):
+        raise file.error(
+            f"NF = {f} frames, but NL = {links} links: without loops only fixed frames (sigma 2) "
+            "may come after the links.",
+            file.line("NF") or file.line("sigma"),
+        )
+    own = {0: "theta", PRISMATIC: "r"}
+    offsets = {  # first, so that a variable elsewhere is known as one
+        (key, j): numbers.offset(rows[key][j], j + 1)
+        for j, kind in enumerate(columns["sigma"])
+        if (key := own.get(kind, "")) and rows[key]
+    }
+    for key in GEOMETRY:
+        if rows[key]:
+            columns[key] = [
+                offsets[key, j] if (key, j) in offsets else numbers.number(entry)
+                for j, entry in enumerate(rows[key])
+            ]
+    return columns
+
+
+def _column(keyword: str) -> str:
+    """Name of a geometric list in the table."""
+    return "antecedent" if keyword == "ant" else keyword
+
+
+def base_pose(file: ParFile, numbers: Numbers) -> Array:
+    """Pose of frame 0 in the world."""
+    entries = file.entries("Z", 16, "a 4x4 matrix row by row")
+    if not entries:
+        return np.eye(4)
+    if any(set(numbers.free(entry)) for entry in entries):
+        for entry in entries:
+            numbers.number(entry)
+        return np.eye(4)
+    Z = np.array([numbers.number(entry) for entry in entries]).reshape(4, 4)
+    try:
+        return se3.as_single_pose(Z, "Z")
+    except RobotModelsError as error:
+        raise file.error(
+            f"{error} Z holds the pose of frame 0 in the world, row by row.", file.line("Z")
+        ) from None
+
+
+def _numbered(what: str, numbers: range) -> str:
+    listed = ", ".join(map(str, numbers))
+    return f"{what} {listed}" if len(numbers) == 1 else f"{what}s {listed}"

@@ -1,0 +1,121 @@
+"""A SYMORO file as a robot."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from numpy.typing import ArrayLike
+
+from ..errors import RobotModelsWarning
+from ..geometry import DHTable
+from ..model import RobotModel
+from .dynamics import check_rigid_fixed, dynamics, gravity_of, left_out, listed_parameters
+from .frames import base_pose, counts, geometry
+from .numbers import Numbers, checked_values
+from .statements import ParFile
+
+
+def read_par(
+    path: str | Path,
+    values: Mapping[str, float] | None = None,
+    gravity: ArrayLike | None = None,
+) -> RobotModel:
+    """Read a SYMORO ``.par`` file; SYMORO+'s and OpenSYMORO's spelling are both understood.
+
+    The symbol in a joint's own column (theta if revolute, r if prismatic) is its variable,
+    whatever its name; what is added to it is the offset, so ``q`` is SYMORO's. A number alone in
+    that column is an offset. All other symbols get numbers from ``values``. Dynamic parameters
+    that only stand for themselves (``XX1``, ``FV2``) and are not in ``values`` are 0; a warning
+    and the model's ``notes`` say which. Frames with sigma 2 and mu are kept.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file. UTF-8 or Latin-1.
+    values : mapping of str to float, optional
+        Numbers for the file's symbols, e.g. ``{"D3": 0.45}``: metres, radians, SI.
+    gravity : array_like, shape (3,), optional
+        Acceleration in the world frame, m/s^2, instead of the file's. The file's ``G`` is the
+        acceleration of gravity in frame 0: ``{0, 0, G3}`` with z0 upwards needs ``G3 = -9.81``.
+        If it is symbolic along a vertical z0 and not in ``values``, it is 9.81 downwards.
+
+    Returns
+    -------
+    RobotModel
+        Named as the file says, else after the file; ``Z`` is its base, ``IA``, ``FV``, ``FS``
+        are its ``Ia``, ``Fv``, ``Fc``. The tip is the last frame.
+
+    Raises
+    ------
+    ParFileError
+        The file is missing or not a ``.par`` file; lists of the wrong length, entries that are
+        not expressions, symbols without a number, a variable with another sign or factor than
+        +1; loops, floating or mobile bases, flexible joints.
+    TableError
+        Antecedents that do not come before their successors.
+    InvalidValueError
+        A value that is not a finite number.
+
+    Warns
+    -----
+    RobotModelsWarning
+        Lists dynamic parameters without numbers and keywords that are not SYMORO's.
+
+    References
+    ----------
+    W. Khalil and D. Creusot, "SYMORO+: a system for the symbolic modelling of robots", Robotica
+    15, 1997. Seed book section 1.2.1, Table 1.1.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> text = '''(* Robotname = 'elbow' *)
+    ... NL = 2
+    ... NJ = 2
+    ... NF = 2
+    ... Type = 0 (* Simple *)
+    ... Ant = {0, 1}
+    ... Sigma = {0, 0}
+    ... B = {0, 0}
+    ... d = {0, D2}
+    ... R = {0.3, 0}
+    ... gamma = {0, 0}
+    ... Alpha = {0, Pi/2}
+    ... Mu = {1, 1}
+    ... Theta = {t1, t2 + Pi/2}
+    ... '''
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "elbow.par"
+    ...     _ = path.write_text(text)
+    ...     model = read_par(path, values={"D2": 0.4})
+    >>> model.name, model.table.d, model.table.theta
+    ('elbow', array([0. , 0.4]), array([0. , 1.57079633]))
+    """
+    file = ParFile(Path(path))
+    numbers = Numbers(file, checked_values(values, file))
+    links, f = counts(file)
+    columns = geometry(file, numbers, links, f)
+    inertia, drive, silent = dynamics(file, numbers, links, columns["sigma"])
+    base = base_pose(file, numbers)
+    acceleration, gravity_notes = gravity_of(file, numbers, base, gravity)
+    check_rigid_fixed(file, numbers)
+    numbers.check_complete()
+    table = DHTable(**columns)
+
+    alarms = [f"{word!r} is not a keyword of SYMORO and is left out" for word in file.unknown]
+    if silent:
+        alarms.append(
+            f"{listed_parameters(silent, links)} have no numbers and are 0 (pass values="
+            f"{{{silent[0]!r}: ...}} for the dynamic models)"
+        )
+    if alarms:
+        warnings.warn(f"{file.label}: {'; '.join(alarms)}.", RobotModelsWarning, stacklevel=2)
+    notes = [f"{alarm[0].upper()}{alarm[1:]}." for alarm in alarms]
+    notes += gravity_notes + left_out(file, numbers, columns["sigma"])
+    model = RobotModel.from_table(
+        table, inertia=inertia, drive=drive, base=base, gravity=acceleration, name=file.name
+    )
+    return replace(model, notes=tuple(notes))
