@@ -20,6 +20,7 @@ from .finding_columns import (
     joints_of,
     time_unit_of,
 )
+from .interpolation import splined
 from .log import RefusedRows
 from .table import LogTable
 from .units import check_headers, check_position_units, check_torque_units
@@ -319,8 +320,6 @@ def _beside(
         refused.append(
             RefusedRows(second.path.name, tuple(lost.tolist()), "a number is missing or not finite")
         )
-    from scipy.interpolate import CubicSpline
-
     found = np.full((N, tau.shape[1]), np.nan)
     step = float(np.median(np.diff(stamps)))
     after = np.searchsorted(stamps, t, side="left")
@@ -329,7 +328,7 @@ def _beside(
     exact = stamps[np.clip(after, 0, len(stamps) - 1)] == t
     near = inside & (exact | (stamps[high] - stamps[high - 1] <= _NEAR * step))
     if near.any():
-        found[near] = CubicSpline(stamps, rows)(t[near])
+        found[near] = splined(stamps, rows, t[near], second.path.name)
     notes.append(
         f"{names} were joined by time: torques by cubic splines at the times of the positions; "
         f"{int((~near).sum())} of {N} rows have no torque near in time."

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from .._arrays import Array
 from ..errors import InvalidValueError
+from .interpolation import splined
 from .log import RefusedRows
 
 _REGULAR = 0.01
@@ -236,8 +237,6 @@ def _on_grid(
             f"{source}: rows {grid:.4g} s apart would be more than {_FINER:g} for each row of the "
             f"file, which has them {period:.4g} s apart; say a longer dt=, or leave it out."
         )
-    from scipy.interpolate import CubicSpline
-
     asked = "" if grid == period else f", asked for at {grid:g} s (the file has {period:.9g} s)"
     notes.append(
         f"{told} and up to {off:.2g} from the grid: brought to it by cubic splines{asked}."
@@ -250,5 +249,5 @@ def _on_grid(
         # one more where rounding alone leaves the last sample out
         count = int(np.floor((times[-1] - times[0]) / grid + 1e-6)) + 1
         wanted = np.minimum(times[0] + grid * np.arange(count), times[-1])
-        found.append(CubicSpline(times, block)(wanted))
+        found.append(splined(times, block, wanted, source))
     return found
