@@ -25,4 +25,5 @@ def _keeps_digits(row: Array) -> bool:
     if 0.0 < M < _SMALLEST_MASS:
         return False  # Pinocchio takes masses below its epsilon for zero in sums
     # up to two digits, for a robot of about a metre
-    return bool(moments @ moments <= 100.0 * M * (np.abs(row[:6]).sum() + M))
+    with np.errstate(over="ignore"):  # masses near the largest float
+        return bool(moments @ moments <= 100.0 * M * (np.abs(row[:6]).sum() + M))
