@@ -5,13 +5,16 @@ import json
 import re
 import subprocess
 import sys
+import tempfile
 import threading
+import webbrowser
 
 import numpy as np
 import pytest
 
 import robotmodels as rm
 from robotmodels import se3
+from robotmodels.cli import main
 from robotmodels.errors import (
     FrameNotFoundError,
     InvalidValueError,
@@ -20,11 +23,12 @@ from robotmodels.errors import (
     ShapeError,
     UrdfError,
 )
-from robotmodels.visual import Box, Cylinder, Sphere, skeleton
+from robotmodels.visual import Box, Cylinder, Mesh, Sphere, skeleton
 from robotmodels.viz import page as page_module
 from robotmodels.viz.camera import FIELD_OF_VIEW, framed
 from robotmodels.viz.motion import keyframes
 from robotmodels.viz.nodes import Label, Segments, Triangles, extent
+from robotmodels.viz.stand_ins import with_stand_ins
 from robotmodels.viz.surroundings import path_tube, workspace_box
 
 H = np.pi / 2
@@ -799,3 +803,177 @@ def test_skeleton_is_deterministic_and_tells_wrist_axes_apart():
     joints = {v.frame: v.shape for v in first if v.color and v.color[0] == 0.95}
     assert joints[4].radius > joints[5].radius > joints[6].radius
     assert joints[4].length < joints[5].length < joints[6].length
+
+
+# ---------------------------------------------------------------- sliders
+
+
+MIMIC = TREE.with_transmission(
+    rm.Transmission([[1, 0, 0, 0], [0, 0, 0, 0], [0, 0.5, 0, 0], [3, 0, 0, 0]], [0, 0.1, 0.2, 0.3])
+)
+
+
+def test_sliders_are_the_independent_joints():
+    for model in (RX90, SCARA, TREE, rm.load("tx40")):  # coupled motors leave joints independent
+        panel = rm.viz.jog(model).sliders
+        assert panel.independent.tolist() == list(range(model.n))
+        assert np.array_equal(panel.matrix, np.eye(model.n))
+        assert not panel.offset.any()
+    scene = rm.viz.jog(MIMIC)
+    panel = scene.sliders
+    assert panel.independent.tolist() == [0, 2]
+    assert panel.matrix.tolist() == [[1, 0], [0, 0], [0, 1], [3, 0]]
+    assert panel.offset.tolist() == [0, 0.1, 0, 0.3]
+    assert [joint.follows for joint in panel.joints] == [(), (), (), ("joint_1",)]
+    assert panel.q.tolist() == [0, 0.1, 0, 0.3]
+    assert [name for name, _ in panel.postures] == ["zero (coupled joints follow)"]
+    poses = rm.link_poses(MIMIC, panel.q)
+    for j, name in enumerate(MIMIC.table.names):
+        assert np.allclose(scene.pose(frame_path(scene, name)), poses[j], atol=1e-12)
+    assert "follows joint_1; " in scene.html()
+    assert "does not move; " in scene.html()
+    assert repr(scene).endswith(", 2 sliders>")
+
+
+def test_coupled_joints_are_in_the_range_of_a_transmission(rng):
+    # any rank, any order: what the sliders reach is what the encoders reach
+    for rank in (1, 2, 3):
+        K = rng.normal(size=(4, rank)) @ rng.normal(size=(rank, 4))
+        model = TREE.with_transmission(rm.Transmission(K, rng.normal(size=4)))
+        panel = rm.viz.jog(model).sliders
+        assert panel.independent.size == rank
+        q = model.transmission.to_joint(rng.normal(size=4))
+        assert np.allclose(panel.matrix @ q[panel.independent] + panel.offset, q, atol=1e-9)
+
+
+def test_start_configurations_and_limits_of_sliders():
+    model = rm.load("puma560")
+    q = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
+    scene = rm.viz.jog(model, q)
+    assert scene.sliders.start.tolist() == q
+    assert {name for name, _ in scene.sliders.postures} == set(model.configurations)
+    assert [joint.ends for joint in scene.sliders.joints] == [
+        *zip(model.lower, model.upper, strict=True)
+    ]
+    limits = [(-np.inf, np.inf), (-np.inf, -2.0), (0.5, np.inf)]
+    table = rm.DHTable(
+        antecedent=[0, 1, 2], sigma=[0, 1, 0], mu=[1, 0, 1],
+        lower=[a for a, _ in limits], upper=[b for _, b in limits],
+    )  # fmt: skip
+    scene = rm.viz.jog(rm.RobotModel.from_table(table))
+    ends = [joint.ends for joint in scene.sliders.joints]
+    assert np.allclose(ends, [(-np.pi, np.pi), (-4.0, -2.0), (0.5, 0.5 + 2 * np.pi)])
+    text = scene.html()
+    assert "no limits, slider -180 to 180 deg<" in text
+    assert "up to -2 m, no lower limit, slider from -4 m, passive<" in text
+    assert "from 28.648 deg, no upper limit, slider to 388.65 deg<" in text
+
+
+def test_names_cannot_break_out_of_the_panel():
+    table = rm.DHTable(antecedent=[0], sigma=[0], names=("</script><b>x",))
+    model = rm.RobotModel.from_table(
+        table, name="<b>&", configurations={"</select><script>": [0.1]}
+    )
+    text = rm.viz.jog(model).html()
+    assert text.count("</script>") == 5
+    assert text.count("</select>") == 2
+    assert "<b>" not in text.split('id="panel"')[1].split("<script")[0]
+
+
+def test_wrong_jog():
+    with pytest.raises(InvalidValueError, match="load it first"):
+        rm.viz.jog("rx90")
+    with pytest.raises(ShapeError, match=r"q: expected shape \(6,\), got \(5,\)"):
+        rm.viz.jog(RX90, np.zeros(5))
+    with pytest.raises(ShapeError, match=r"q: expected shape \(6,\), got \(2, 6\)"):
+        rm.viz.jog(RX90, np.zeros((2, 6)))
+    with pytest.raises(InvalidValueError, match="opacity"):
+        rm.viz.jog(RX90, opacity=2.0)
+    with pytest.raises(InvalidValueError, match=r"q: joint_5 moves with other joints"):
+        rm.viz.jog(MIMIC, [0.5, 0.1, 0.0, 0.3])
+
+
+# ---------------------------------------------------------------- the command that opens a page
+
+
+@pytest.fixture
+def view(capsys, monkeypatch):
+    """Exit status, output and pages opened of `robotmodels view`."""
+    opened = []
+    monkeypatch.setattr(webbrowser, "open", lambda url: opened.append(url) or True)
+
+    def view(*words):
+        code = main(["view", *map(str, words)])
+        return code, capsys.readouterr(), opened
+
+    return view
+
+
+def test_view_opens_the_page_where_there_is_a_display(view, tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "platform", "linux")
+    for name in ("WAYLAND_DISPLAY", "BROWSER"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("DISPLAY", ":0")
+    page = tmp_path / "an arm.html"
+    code, said, opened = view("rx90", "--out", page)
+    assert (code, opened) == (0, [page.as_uri()])
+    assert said.out == f"Scene of rx90 at q = [0. 0. 0. 0. 0. 0.] written to {page}\n"
+    assert 'type="range"' in page.read_text(encoding="utf-8")
+    code, said, opened = view("rx90", "--out", page, "--no-open")
+    assert len(opened) == 1
+    assert "no display" not in said.out
+    monkeypatch.delenv("DISPLAY")
+    code, said, opened = view("rx90", "--out", page)
+    assert (code, len(opened)) == (0, 1)
+    assert "There is no display or no browser here" in said.out
+
+
+def test_view_writes_to_the_folder_for_temporary_files(view, tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    code, said, _ = view("planar_2r", "--no-open", "--json", "--q", 90, 0, "--degrees")
+    data = json.loads(said.out)
+    (page,) = tmp_path.iterdir()
+    assert code == 0
+    assert data["page"] == str(page)
+    assert page.name.startswith("robotmodels_planar_2r_")
+    assert data["q"] == [H, 0.0]
+    assert (data["opened"], data["missing_meshes"]) == (False, [])
+
+
+def test_view_draws_a_skeleton_for_missing_meshes(view, tmp_path):
+    file = tmp_path / "one.urdf"
+    file.write_text(urdf("package://nowhere/arm.stl"))
+    page = tmp_path / "one.html"
+    code, said, _ = view(file, "--no-open", "--out", page)
+    assert code == 0
+    assert (
+        "Mesh files not found, a skeleton is drawn for them: package://nowhere/arm.stl." in said.out
+    )
+    assert "CylinderGeometry" in page.read_text(encoding="utf-8")
+    code, said, _ = view(file, "--no-open", "--skeleton", "--out", page)
+    assert "not found" not in said.out
+
+
+def test_stand_ins_take_the_place_of_missing_meshes_only(tmp_path):
+    path = tmp_path / "arm.stl"
+    path.write_text(TRIANGLE_STL)
+    model = rm.RobotModel.from_urdf(urdf(str(path)))
+    assert with_stand_ins(model) == (model, ())
+    path.unlink()
+    drawn, missing = with_stand_ins(model)
+    assert missing == (str(path),)
+    assert drawn.visuals
+    assert {visual.frame for visual in drawn.visuals} == {1}
+    assert not any(isinstance(visual.shape, Mesh) for visual in drawn.visuals)
+    assert rm.viz.jog(drawn).nodes
+
+
+def test_view_says_what_is_wrong(view, tmp_path):
+    code, said, opened = view("rx90", "--out", tmp_path / "nowhere" / "arm.html")
+    assert code == 2
+    assert "No such file or directory" in said.err
+    code, said, opened = view("rx90", "--q", 1, 2)
+    assert code == 2
+    assert "--q: expected 6 numbers" in said.err
+    assert not opened

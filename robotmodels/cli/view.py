@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import re
 import sys
@@ -14,7 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from .exit_status import ending
 from .numbers import posture
+from .output import add_json, print_json
 from .source import add_source, robot_of
 
 _EXAMPLES = """\
@@ -44,9 +45,8 @@ def add_command(commands: Any) -> None:
         "view",
         help="open a robot with joint sliders in the browser",
         description="Draw a robot with a slider for each joint and the pose of its tool, write it "
-        "as one HTML file\nand open it in the browser.",
-        epilog=_EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        "as one HTML file and open it in the browser.",
+        epilog=ending(_EXAMPLES),
     )
     add_source(parser)
     parser.add_argument("--q", metavar="NUMBERS", help="where the robot is at first: joint "
@@ -62,7 +62,7 @@ def add_command(commands: Any) -> None:
                         help="page to write; default a new file in the folder for temporary "
                         "files")  # fmt: skip
     parser.add_argument("--no-open", action="store_true", help="only write the page")
-    parser.add_argument("--json", action="store_true", help="print JSON instead of sentences")
+    add_json(parser)
     parser.set_defaults(run=run)
 
 
@@ -97,10 +97,10 @@ def run(arguments: argparse.Namespace) -> None:
     opened = not arguments.no_open and _open(path)
     start = scene.sliders.q if scene.sliders is not None else model.configurations["zero"]
     if arguments.json:
-        print(json.dumps({
-            "robot": model.name, "joints": model.table.joint_names, "q": start.tolist(),
+        print_json({
+            "robot": model.name, "joints": model.table.joint_names, "q": start,
             "page": str(path), "opened": opened, "missing_meshes": missing,
-        }))  # fmt: skip
+        })  # fmt: skip
         return
     text = np.array2string(start, precision=4, suppress_small=True, max_line_width=10_000)
     print(f"Scene of {model.name} at q = {text} written to {path}")
