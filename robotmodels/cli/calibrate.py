@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .._arrays import Array
-from ..errors import InvalidValueError
 from ..model import RobotModel
 from .columns import column, columns
 from .exit_status import ExitStatus, ending
-from .file_units import add_units
+from .file_options import add_delimiter, add_units
 from .numbers import numbers
 from .output import Report, add_output, check_output, hand_over, with_extra
 from .progress import progress
@@ -28,12 +27,12 @@ _LOSSES = ("squares", "huber", "cauchy", "tukey")
 _COMPLIANCES = ("none", "joints", "links", "isotropic", "uniform")
 _EXAMPLES = """\
 examples:
-  robotmodels calibrate --robot ur10e.urdf --measurements tracker.csv --kind position \\
+  robotmodels calibrate --robot arm.urdf --measurements tracker.csv --kind position \\
       --lengths mm --angles deg --out report/
   robotmodels calibrate --robot rx90 --measurements camera.csv --kind pose \\
       --orientation quaternion --loss huber --json
-  robotmodels calibrate --robot panda.urdf --measurements hole_0.csv hole_1.csv \\
-      --kind point-contact --known-distance hole_0 hole_1 0.05 --out report/
+  robotmodels calibrate --robot rx90 --measurements hole_0.csv hole_1.csv \\
+      --kind point-contact --known-distance hole_0 hole_1 0.1 --parameters b7 d7 r7
 
 Into the folder of --out go report.txt, report.html (text and figures, one offline file),
 result.json (what --json prints) and calibrated.urdf. Without --out the report is printed."""
@@ -53,6 +52,8 @@ def add_command(commands: Any) -> None:
     """
     parser = commands.add_parser(
         "calibrate",
+        usage="robotmodels calibrate --robot ROBOT --measurements FILE [FILE ...] --kind KIND "
+        "[options]",
         description="Geometric calibration: estimate the parameters that measurements tell, with "
         "their deviations, the errors before and after, and on measurements kept aside.",
         epilog=ending(_EXAMPLES, "the fit has not converged"),
@@ -67,7 +68,13 @@ def add_command(commands: Any) -> None:
 def _add_files(files: Any) -> None:
     files.add_argument("--measurements", required=True, nargs="+", metavar="FILE",
                        help="CSV files, or one folder")  # fmt: skip
-    files.add_argument("--kind", required=True, choices=_KINDS, help="what was measured")
+    files.add_argument(
+        "--kind",
+        required=True,
+        choices=_KINDS,
+        metavar="KIND",
+        help=f"what was measured: {', '.join(_KINDS)}",
+    )
     files.add_argument("--pattern", default="*.csv",
                        help="of the files in a folder (default: %(default)s)")  # fmt: skip
     add_units(files)
@@ -87,7 +94,7 @@ def _add_files(files: Any) -> None:
     files.add_argument("--label", metavar="COLUMN",
                        help="column that says which point or plane is touched; default: the names "
                        "of the files")  # fmt: skip
-    files.add_argument("--delimiter", help="between cells; default ; tab or , as found")
+    add_delimiter(files)
     files.add_argument("--frame", help="measured end: a frame of the robot (default: the tool)")
     files.add_argument("--sigma", metavar="NUMBERS",
                        help="standard deviations of a measurement in m and rad: one, or one for "
@@ -171,7 +178,7 @@ def run(arguments: argparse.Namespace) -> int:
     ]  # fmt: skip
     prior = None
     if arguments.prior is not None:
-        length, angle = numbers(arguments.prior, 2, "--prior")
+        length, angle = numbers(arguments.prior, 2, "--prior", positive=True)
         prior = ParameterPrior(length=float(length), angle=float(angle))
     aside = arguments.held_out
     if arguments.test is not None:
@@ -251,7 +258,5 @@ def _sigma(text: str | None) -> float | Array | None:
     """One deviation, or one for each coordinate of a measurement."""
     if text is None:
         return None
-    values = numbers(text, range(1, 7), "--sigma")
-    if (values <= 0.0).any():
-        raise InvalidValueError(f"--sigma: expected positive numbers in m and rad, got {text!r}.")
+    values = numbers(text, range(1, 7), "--sigma", positive=True)
     return float(values[0]) if len(values) == 1 else values

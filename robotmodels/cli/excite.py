@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
 _EXAMPLES = """\
 examples:
-  robotmodels excite --robot rx90 --duration 10 --harmonics 5 --criterion condition --out motion/
+  robotmodels excite --robot planar_2r --duration 10 --harmonics 3 --starts 1 --out motion/
   robotmodels excite --robot ur10e --acceleration 4 --box -inf -inf 0.1 inf inf inf \\
-      --seed 1 --out motion/
-  robotmodels excite --robot panda.urdf --kind spline --points 12 --drive Ia Fv Fc offset --json
+      --seed 1 --starts 1 --iterations 5 --random 5 --json
+  robotmodels excite --robot arm.urdf --kind spline --drive Fv Fc offset --starts 1 --iterations 20
 
 Into the folder of --out go trajectory.csv (or .npz, .yaml: --format), trajectory.json (the
 coefficients and all numbers, what --json prints), trajectory.png (if Matplotlib is installed) and
@@ -46,6 +46,7 @@ def add_command(commands: Any) -> None:
     """
     parser = commands.add_parser(
         "excite",
+        usage="robotmodels excite --robot ROBOT [options]",
         description="Exciting trajectory: a periodic motion within the limits of a robot on which "
         "its base parameters are seen best, with analytic gradients from several starts.",
         epilog=ending(_EXAMPLES, "no motion within all limits was found"),
@@ -207,14 +208,17 @@ def _boxes(arguments: argparse.Namespace) -> list[WorkspaceBox]:
     from ..identification.excitation import WorkspaceBox
 
     boxes = []
-    for given, inside in ((arguments.box, True), (arguments.keep_out, False)):
+    for option, given, inside in (("--box", arguments.box, True),
+                                  ("--keep-out", arguments.keep_out, False)):  # fmt: skip
         for text in given:
-            try:
+            try:  # infinity means that there is no face
                 corners = [float(word) for word in text.replace(",", " ").split()]
             except ValueError:
                 corners = []
             if len(corners) != 6:
-                option = "--box" if inside else "--keep-out"
                 raise InvalidValueError(f"{option}: expected six numbers in m, got {text!r}.")
-            boxes.append(WorkspaceBox(corners[:3], corners[3:], inside=inside))
+            try:
+                boxes.append(WorkspaceBox(corners[:3], corners[3:], inside=inside))
+            except InvalidValueError as error:
+                raise InvalidValueError(f"{option}: {error}") from error
     return boxes

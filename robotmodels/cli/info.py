@@ -21,7 +21,7 @@ _EXAMPLES = """\
 examples:
   robotmodels info rx90
   robotmodels info erd:ur5 --json
-  robotmodels info arm.urdf --tip-link flange"""
+  robotmodels info arm.urdf --tip-link link_5"""
 
 
 def add_command(commands: Any) -> None:
@@ -105,6 +105,7 @@ def as_json(model: RobotModel) -> dict[str, Any]:
     dict
         ``robot, table, base, tool, tip, gravity, joints, transmission, links, total_mass, frames,
         configurations, notes``; SI units and radians, unlimited joints have infinite limits.
+        `DHTable.from_rows` takes ``table``.
 
     Examples
     --------
@@ -119,8 +120,7 @@ def as_json(model: RobotModel) -> dict[str, Any]:
     return {
         "robot": model.name,
         "table": [
-            {"frame": j + 1, "name": table.names[j]}
-            | {word: getattr(table, word)[j].item() for word in quantities}
+            {"name": table.names[j]} | {word: getattr(table, word)[j].item() for word in quantities}
             for j in range(model.f)
         ],
         "base": model.base,

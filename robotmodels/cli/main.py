@@ -132,32 +132,37 @@ def _run(words: list[str]) -> int:
             near = nearest_names(command, COMMANDS)
             meant = f"Did you mean {' or '.join(near)}? " if near else ""
             parser.error(f"no command {command!r}. {meant}There are {', '.join(COMMANDS)}")
-        if sys.stdout is not None:
-            sys.stdout.flush()
+        sys.stdout.flush()
         return code or ExitStatus.DONE
     except BrokenPipeError:  # the reader (head, a pager) has seen enough
         give_up_output()
         return code or ExitStatus.DONE
     except KeyboardInterrupt:
-        said, status = "interrupted.", ExitStatus.INTERRUPTED
-    except RobotModelsError as error:
-        said, status = in_options(str(error), options), ExitStatus.WRONG_INPUT
-    except OSError as error:
-        said, status = _of_system(error), ExitStatus.WRONG_INPUT
+        say("interrupted.")
+        return ExitStatus.INTERRUPTED
+    except Exception as error:  # noqa: BLE001  # nobody asked for a traceback at a terminal
+        if traced:
+            traceback.print_exc()
+        said, status = _outcome(error, options)
+        say(said)
+        return status
+
+
+def _outcome(error: Exception, options: Sequence[str]) -> tuple[str, ExitStatus]:
+    """What is said of an error, and how the command ends."""
+    if isinstance(error, RobotModelsError):
+        return in_options(str(error), options), ExitStatus.WRONG_INPUT
+    if isinstance(error, OSError):
         if error.filename is None:
             give_up_output()  # perhaps a full disk behind standard output
-    except MemoryError:
-        said, status = "there is not enough memory for this.", ExitStatus.WRONG_INPUT
-    except Exception as error:  # noqa: BLE001  # nobody reads a traceback at a terminal
-        status = ExitStatus.BUG
-        said = (
-            f"this is a bug: {type(error).__name__}: {error}. Please report it as an issue of the "
-            "repository of robotmodels, with what the same command prints with --traceback."
-        )
-    if traced and status is not ExitStatus.INTERRUPTED:
-        traceback.print_exc()
-    say(said)
-    return status
+        return _of_system(error), ExitStatus.WRONG_INPUT
+    if isinstance(error, MemoryError):
+        return "there is not enough memory for this.", ExitStatus.WRONG_INPUT
+    said = (
+        f"this is a bug: {type(error).__name__}: {error}. Please report it as an issue of the "
+        "repository of robotmodels, with what the same command prints with --traceback."
+    )
+    return said, ExitStatus.BUG
 
 
 def _of_system(error: OSError) -> str:

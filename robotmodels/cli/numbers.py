@@ -53,7 +53,7 @@ def joined(argv: Sequence[str]) -> list[str]:
     return words
 
 
-def numbers(text: str, count: int | Sequence[int], option: str) -> Array:
+def numbers(text: str, count: int | Sequence[int], option: str, positive: bool = False) -> Array:
     """Numbers of an option.
 
     Parameters
@@ -64,6 +64,8 @@ def numbers(text: str, count: int | Sequence[int], option: str) -> Array:
         How many there may be.
     option : str
         Its name, for the error message.
+    positive : bool
+        Whether all have to be above zero.
 
     Returns
     -------
@@ -73,7 +75,7 @@ def numbers(text: str, count: int | Sequence[int], option: str) -> Array:
     Raises
     ------
     InvalidValueError
-        Another count, or something that is no finite number.
+        Another count, something that is no finite number, or one that is not above zero.
 
     Examples
     --------
@@ -89,6 +91,8 @@ def numbers(text: str, count: int | Sequence[int], option: str) -> Array:
         wanted = " or ".join(map(str, counts))
         what = "finite number" + "s" * (counts != (1,))
         raise InvalidValueError(f"{option}: expected {wanted} {what}, got {text!r}.")
+    if positive and not (values > 0.0).all():
+        raise InvalidValueError(f"{option}: expected positive numbers, got {text!r}.")
     return values
 
 
@@ -125,9 +129,7 @@ def joint_numbers(
     """
     if text is None:
         return None
-    values = numbers(text, sorted({1, n}), option)
-    if positive and not (values > 0.0).all():
-        raise InvalidValueError(f"{option}: expected positive numbers, got {text!r}.")
+    values = numbers(text, sorted({1, n}), option, positive)
     return float(values[0]) if len(values) == 1 else values
 
 

@@ -15,7 +15,13 @@ _WHOLE = (
     ("times='ms', 'us' or 'ns'", "--times ms, us or ns"),
     ("base=False", "--fixed-base"),
     ("tool=False", "--fixed-tool"),
-)
+    (" of read_log", ""),
+    ("sorted(Path(...).glob('*.csv'))", "FOLDER/*.csv"),
+    ("All names: robots().", "All names: robotmodels robots."),
+    ("A URDF file is read with RobotModel.from_urdf(path).", "Or give a .urdf or .par file."),
+    ("use RobotModel.from_urdf(path, base_link, tip_link)",
+     "give its path, with --base-link and --tip-link"),
+)  # fmt: skip
 """Words of the package, and the option that says the same."""
 _OTHER_NAMES = {
     "position_references": "--references",
@@ -23,9 +29,12 @@ _OTHER_NAMES = {
     "baseline": "--random",
     "position_tolerance": "--tolerance",
     "orientation_tolerance": "--tolerance",
+    "kind": "--orientation",  # where --kind is one of the words of the command line
 }
 """Arguments whose option has another name."""
-_ARGUMENT = re.compile(r"(?<![\w-])([a-z_]+)=(?:\[\.\.\.\]|'([^']*)'|([0-9]+(?:\.[0-9]+)?))?")
+_ARGUMENT = re.compile(
+    r"(?<![\w-])([a-z_]+)=(?:\[\.\.\.\]|\(\.\.\.\)|'([^']*)'|([0-9]+(?:\.[0-9]+)?))?"
+)
 _FIRST = re.compile(r"^([a-z_]+)(?=: )")
 
 
@@ -50,12 +59,12 @@ def in_options(message: str, options: Collection[str]) -> str:
     '--cutoff: too high; say --angles deg, or b2=3.'
     """
     for words, option in _WHOLE:
-        if option.split()[0] in options:
+        if not option.startswith("--") or option.split()[0] in options:
             message = message.replace(words, option)
 
     def option_of(name: str) -> str | None:
-        option = _OTHER_NAMES.get(name, "--" + name.replace("_", "-"))
-        return option if option in options else None
+        candidates = (_OTHER_NAMES.get(name), "--" + name.replace("_", "-"))
+        return next((option for option in candidates if option in options), None)
 
     def with_value(match: re.Match[str]) -> str:
         name, word, number = match.groups()
@@ -65,6 +74,4 @@ def in_options(message: str, options: Collection[str]) -> str:
         return f"{option} {value}" if value else option
 
     message = _ARGUMENT.sub(with_value, message)
-    if "--log" in options:
-        message = message.replace(" of read_log", "")
     return _FIRST.sub(lambda match: option_of(match[1]) or match[1], message)

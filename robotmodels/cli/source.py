@@ -81,4 +81,9 @@ def robot_of(arguments: argparse.Namespace) -> RobotModel:
             f"--base-link, --tip-link and --package-dir are for URDF files; {name!r} is a name of "
             "the catalogue."
         )
+    if suffix and Path(name).exists():
+        raise InvalidValueError(
+            f"{name!r}: robots are read from files named .urdf, .xml, .xacro or .par; to see the "
+            "names of the catalogue run robotmodels robots."
+        )
     return load(name)

@@ -62,6 +62,8 @@ def prepared() -> Iterator[None]:
     ...     print("│")
     │
     """
+    if sys.stdout is None:  # closed by the shell; at exit nothing is left to be closed
+        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     streams = [s for s in (sys.stdout, sys.stderr) if isinstance(s, io.TextIOWrapper)]
     before = [stream.errors for stream in streams]
     for stream in streams:

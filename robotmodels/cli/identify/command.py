@@ -17,12 +17,11 @@ from .report import real_bodies, report
 
 _EXAMPLES = """\
 examples:
-  robotmodels identify --robot tx40 --log positions.csv --torques-from currents.csv --dt 2e-4 \\
-      --motor-side --test-share 0.3 --out report/
-  robotmodels identify --robot ur10e.urdf --log run1.csv run2.csv --test run3.csv --angles deg \\
-      --positions actual_q_0 actual_q_1 actual_q_2 actual_q_3 actual_q_4 actual_q_5 \\
-      --torques "current_*" --drive-gains 13.3 13.3 9.4 9.4 9.4 9.4 --method irls --out report/
-  robotmodels identify --robot arm.urdf --log run.npz --cutoff 40 --decimation 20 --json
+  robotmodels identify --robot planar_2r --log positions.csv --torques-from torques.csv \\
+      --dt 0.005 --angles deg --test-share 0.25 --prior 5 --out report/
+  robotmodels identify --robot arm.urdf --log run1.csv run2.csv --test run3.csv --dt 0.005 \\
+      --positions "actual_q_*" --torques "current_*" --drive-gains 13.3 9.4 --method irls
+  robotmodels identify --robot arm.urdf --log run.npz --cutoff 20 --decimation 10 --json
 
 Into the folder of --out go report.txt, report.html (text and figures, one offline file),
 result.json (what --json prints: parameters, covariance, every option, hashes of the data) and
@@ -43,6 +42,7 @@ def add_command(commands: Any) -> None:
     """
     parser = commands.add_parser(
         "identify",
+        usage="robotmodels identify --robot ROBOT --log FILE [FILE ...] [options]",
         description="Dynamic identification: base parameters, frictions and rotor inertias from "
         "positions and torques, with their deviations, and the errors on motion kept aside.",
         epilog=ending(_EXAMPLES, "the method has not converged"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..file_units import add_units
+from ..file_options import add_delimiter, add_units
 
 METHODS = (
     "ols", "wls", "irls", "robust", "tls", "ridge", "iv", "didim", "cloe", "sequential",
@@ -64,7 +64,7 @@ def _add_files(files: Any) -> None:
     files.add_argument("--signs", metavar="NUMBERS", help="1 or -1 for each joint")
     files.add_argument("--offsets", metavar="NUMBERS",
                        help="added to the positions, rad or m")  # fmt: skip
-    files.add_argument("--delimiter", help="between cells; default found")
+    add_delimiter(files)
     files.add_argument("--rows", nargs=2, type=int, metavar=("FROM", "TO"),
                        help="rows that are fitted; default all")  # fmt: skip
     files.add_argument("--delay", metavar="SECONDS",
@@ -83,8 +83,9 @@ def _add_test(test: Any) -> None:
 
 
 def _add_fit(fitted: Any) -> None:
-    fitted.add_argument("--method", choices=METHODS, default="wls",
-                        help="how the equations are solved (default: %(default)s)")  # fmt: skip
+    fitted.add_argument("--method", choices=METHODS, default="wls", metavar="METHOD",
+                        help=f"how the equations are solved: {', '.join(METHODS)} (default: "
+                        "%(default)s)")  # fmt: skip
     fitted.add_argument("--form", choices=FORMS, default="torque",
                         help="what the equations balance (default: %(default)s)")  # fmt: skip
     fitted.add_argument("--drive", nargs="*", choices=_KINDS, default=list(_KINDS), metavar="KIND",
