@@ -259,8 +259,8 @@ def _style(axes: Any, unit: Unit, view: Array, edges: Array) -> None:
         axis = getattr(axes, f"{name}axis")
         axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
         axis.line.set(color=PALE, linewidth=THIN_WIDTH)
-        axis.set_major_locator(MaxNLocator(max(2, round(5.0 * edge / edges.max()))))
+        axis.set_major_locator(MaxNLocator(max(2, round(3.6 * edge / edges.max()))))
         axis.set_label_text(f"{name} ({unit.value})", size=LABEL_SIZE, color=INK)
         axis._axinfo["grid"].update(color=GRID, linewidth=THIN_WIDTH)
         axes.tick_params(axis=name, labelsize=SMALL_SIZE, labelcolor=INK, color=PALE, pad=-1.0)
-        axis.labelpad = -1.0
+        axis.labelpad = 4.0
