@@ -1,7 +1,7 @@
 """pytest plugin for the leg that runs kernels as plain Python, so that their lines are counted.
 
-Plain Python takes some hundred times longer: a test that is not done after ``LONGEST`` seconds is
-given up, and what it has run by then counts. Whether results are right is told by the ordinary
+Plain Python takes some hundred times longer: a test that is not done after ``LONGEST`` seconds of
+the processor is given up, and what it has run by then counts. Whether results are right is told by the ordinary
 runs; a test that fails here fails as anywhere.
 """
 
@@ -28,10 +28,10 @@ def _give_up(number: int, frame: FrameType | None) -> None:
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call(item: pytest.Item) -> Iterator[None]:
     """Call the test, for as long as it may take."""
-    before = signal.signal(signal.SIGALRM, _give_up)
-    signal.setitimer(signal.ITIMER_REAL, LONGEST)
+    before = signal.signal(signal.SIGVTALRM, _give_up)
+    signal.setitimer(signal.ITIMER_VIRTUAL, LONGEST)
     try:
         return (yield)
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
+        signal.signal(signal.SIGVTALRM, before)

@@ -1,0 +1,53 @@
+"""Cases of the kernels that no ordinary robot meets."""
+
+import numpy as np
+import pytest
+
+import robotmodels as rm
+from robotmodels.kernels.direct_dynamics import joint_accelerations
+
+
+def accelerations_of(mass, tau):
+    """What `joint_accelerations` answers, and writes, for a mass matrix given as rotor inertia."""
+    mass, tau = np.array(mass, dtype=float), np.atleast_2d(np.asarray(tau, dtype=float))
+    n = len(mass)
+    model = rm.RobotModel.from_table(rm.DHTable.from_rows([{"sigma": 1, "alpha": 0.3}] * n))
+    rest, out = np.zeros(tau.shape), np.empty(tau.shape)
+    code = joint_accelerations(
+        rest, rest, tau, *model.chain, np.zeros((n, 10)), model.gravity, mass, out
+    )
+    return code, out
+
+
+@pytest.mark.parametrize(
+    "mass",
+    [
+        # what is left of the second pivot is nothing, and the third row has to take its place
+        [[1, 1, 0], [1, 1, 1], [0, 1, 1]],
+        # nothing on the diagonal at all
+        [[0, 2, 0], [2, 0, 0], [0, 0, 3]],
+        [[0, 0, 5], [0, -1, 0], [5, 0, 0]],
+    ],
+)
+@pytest.mark.parametrize("units", [(1.0, 1.0, 1.0), (1e3, 1.0, 1e-3)], ids=["alike", "apart"])
+def test_indefinite_mass_matrices_are_solved_by_exchanging_rows(mass, units):
+    mass = np.array(mass) * np.outer(units, units)
+    accelerations = np.array([[1.0, -2.0, 3.0], [0.5, 0.0, -4.0]]) / units
+    code, out = accelerations_of(mass, accelerations @ mass)
+    assert code == -2  # the first sample has a matrix with negative eigenvalues
+    np.testing.assert_allclose(out * units, accelerations * units, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "mass",
+    [
+        [[1, 1, 0], [1, 1, 0], [0, 0, 1]],
+        [[1, 2, 3], [2, 4, 6], [3, 6, 9]],
+        [[0, 0, 0], [0, 1, 0], [0, 0, 1]],
+        [[1, 2, 3], [2, 1, 3], [3, 3, 6]],  # indefinite, and the third row is the sum of the others
+    ],
+)
+def test_singular_mass_matrices_are_told_whatever_their_sign(mass):
+    code, out = accelerations_of(mass, [[1.0, 2.0, 3.0]])
+    assert code == 0
+    assert np.isnan(out).all()
