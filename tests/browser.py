@@ -31,7 +31,7 @@ OPTIONS = (
     "--hide-scrollbars",
     "--host-resolver-rules=MAP * ~NOTFOUND",
 )
-TIMEOUT = 120.0  # seconds; a page takes 3 to 10
+TIMEOUT = 300.0  # seconds; a page takes 3 to 10, on a busy machine ten times as long
 
 
 def chromium() -> str:

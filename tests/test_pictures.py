@@ -301,8 +301,8 @@ def test_the_address_holds_a_posture(tmp_path):
     ]
     assert_pose(pose, rm.dgm(model, q))
     assert f'href="#q={shown}"' in text
-    text = document(page, tmp_path, "#q=1,2,nonsense")
-    assert "The link does not hold 6 numbers in the order of the sliders: #q=1,2,nonsense" in text
+    text = document(page, tmp_path, "#q=1%2C2,%nonsense")
+    assert "does not hold 6 numbers in the order of the sliders: #q=1%2C2,%nonsense<" in text
     assert 'href="#q=0,0,0,0,0,0"' in text
 
 

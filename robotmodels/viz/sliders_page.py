@@ -17,6 +17,7 @@ STYLE = """body { display: flex; }
  border-right: 1px solid #ccc; }
 #panel h1 { margin: 0 0 4px; font-size: 16px; overflow-wrap: anywhere; }
 #panel button, #panel select, #panel input { font: inherit; max-width: 100%; }
+#panel #frame { max-width: 10em; }
 #panel .joint { margin-top: 8px; }
 #panel .line { display: flex; gap: 4px; align-items: baseline; }
 #panel .line label { flex: 1; min-width: 0; overflow-wrap: anywhere; }
@@ -136,9 +137,10 @@ SCRIPT = """(function () {
   }
 
   function fromAddress() {
-    var found = /^#q=(.*)$/.exec(decodeURIComponent(location.hash));
+    var found = /^#q=(.*)$/.exec(location.hash);
     if (!found) return;
-    var words = found[1].split(","), read = words.map(Number);
+    // some programs write a comma as %2C when they pass an address on
+    var words = found[1].replace(/%2C/gi, ",").split(","), read = words.map(Number);
     var good = words.every(function (word, k) { return word.trim() && isFinite(read[k]); });
     if (!good || read.length !== x.length) {
       byId("problem").textContent = "The link does not hold " + x.length +
