@@ -20,6 +20,4 @@ def test_import_takes_little_more_than_numpy_and_pinocchio():
     for _ in range(5):
         below.append(seconds("import numpy, pinocchio"))
         own.append(seconds("import robotmodels"))
-    assert min(own) < 2.7 * min(below), (
-        f"{min(own):.2f} s, and {min(below):.2f} s for what it needs"
-    )
+    assert min(own) < 2.7 * min(below), f"{min(own):.2f} s, and {min(below):.2f} s below it"
