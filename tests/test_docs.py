@@ -73,6 +73,11 @@ def test_every_public_name_is_in_the_reference():
     assert missing == []
 
 
+def test_what_is_left_out_is_there():
+    gone = {room: names - set(module(room).__all__) for room, names in FOR_OTHER_ROOMS.items()}
+    assert {room: names for room, names in gone.items() if names} == {}
+
+
 def test_the_reference_lists_a_name_once():
     seen = {}
     for page, room, name in listed():
