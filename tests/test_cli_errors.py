@@ -170,7 +170,8 @@ def test_closed_and_full_outputs():
 
 # --- progress -------------------------------------------------------------------------------------
 
-SHORT = ["excite", "--robot", "planar_2r", "--starts", "1", "--random", "2", "--iterations", "3"]
+SHORT = ["excite", "--robot", "planar_2r", "--starts", "1", "--random", "2", "--iterations", "1",
+         "--harmonics", "2"]  # fmt: skip
 
 
 def on_terminal(words):

@@ -230,7 +230,8 @@ NOT_HERE = {
 """Meshes change no number, and nor do these arms' limits and slides, of which they have none:
 `test_limits_drop_postures` and the tests of the readers hold them."""
 WITH = {
-    ("igm", "--xyz"): POSE, ("igm", "--rpy"): POSE,     ("igm", "--mask-axes"): ["--mask", 1, 1, 1, 1, 1, 0],
+    ("igm", "--xyz"): POSE,
+    ("igm", "--rpy"): POSE,     ("igm", "--mask-axes"): ["--mask", 1, 1, 1, 1, 1, 0],
     ("excite", "--points"): ["--kind", "spline"], ("excite", "--rate"): ["--out", "new"],
     ("excite", "--format"): ["--out", "new"], ("excite", "--degrees"): ["--out", "new"],
     ("calibrate", "--pattern"): ["--measurements", "."],

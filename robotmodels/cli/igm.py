@@ -101,7 +101,7 @@ def run(arguments: argparse.Namespace) -> int:
     Returns
     -------
     int
-        0 if the pose is reached, else 1.
+        `ExitStatus.DONE` if the pose is reached, else `ExitStatus.NOT_REACHED`.
 
     Raises
     ------
@@ -114,7 +114,7 @@ def run(arguments: argparse.Namespace) -> int:
     >>> add_command(parser.add_subparsers())
     >>> run(parser.parse_args(["igm", "lab_rr", "--q=0.1,0.2"]))  # doctest: +ELLIPSIS
     lab_rr: 1 posture...
-    0
+    <ExitStatus.DONE: 0>
     """
     model = robot_of(arguments)
     mask = None if arguments.mask is None else numbers(arguments.mask, 6, "--mask")

@@ -59,9 +59,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if argv is None else argv)
     with prepared():
         try:
-            return _run(words)
+            return int(_run(words))
         except SystemExit as stop:  # of argparse: help, version, or a wrong argument
-            return stop.code if isinstance(stop.code, int) else ExitStatus.WRONG_INPUT
+            return int(stop.code) if isinstance(stop.code, int) else 2
 
 
 def parser_of(command: str | None) -> tuple[Parser, Parser | None]:
