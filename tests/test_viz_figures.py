@@ -134,14 +134,14 @@ def colors_and_widths(figure):
             found += [artist.get_color()] if artist.get_text().strip() else []
         elif isinstance(artist, Line2D):
             found.append(artist.get_color())
-            if artist.get_linestyle() not in ("None", "", " ") and len(artist.get_xdata()):
+            if artist.get_linestyle() not in ("None", "", " ") and np.size(artist.get_xdata()):
                 widths.append(artist.get_linewidth())
         elif isinstance(artist, Collection):
             if artist.get_array() is not None or not len(artist.get_paths()):
                 continue  # a map, or nothing
             found += [*artist.get_facecolor(), *artist.get_edgecolor()]
             if len(artist.get_edgecolor()):
-                widths += list(artist.get_linewidth())
+                widths += np.atleast_1d(artist.get_linewidth()).tolist()
         elif isinstance(artist, Patch):
             found += [artist.get_facecolor(), artist.get_edgecolor()]
             if to_rgba(artist.get_edgecolor())[3] and artist.get_linewidth():
