@@ -21,7 +21,7 @@ def jerk_limited(settings: Settings) -> Iterator[Work]:
     batch = settings.number(BATCH, MOTIONS)
     q0, q1 = rng.uniform(-1.5, 1.5, (2, batch, 7))
     v0 = rng.uniform(-0.3, 0.3, (batch, 7))
-    limits = tr.MotionLimits(*LIMITS)
+    limits = tr.MotionLimits(*(np.full(7, x) for x in LIMITS))
     same = tr.Synchronisation.SAME_TIME
 
     def plan(*states: np.ndarray) -> tr.Trajectory:

@@ -87,7 +87,9 @@ def _least_squares(settings: Settings, folder: Path) -> Work:
     def said(found: Any) -> str:
         error = float(np.sqrt(np.mean(found.fitted.rmse**2)))
         more = [f"{mb:.0f} MB more memory for {n:g} samples" for n, mb in grown.items()]
-        return ", ".join([f"rank {len(found.names)}", f"RMSE {error:.3f} N m of the raw", *more])
+        return ", ".join(
+            [f"rank {len(found.names)}", f"RMSE {error:.3f} N m of the raw torques", *more]
+        )
 
     sig = signals(log, choose_processing(log, decimation=1))
     pm, data = model.pin_model, model.pin_model.createData()
