@@ -11,9 +11,9 @@ import pytest
 import robotmodels as rm
 from robotmodels import se3
 from robotmodels.cli import main
-from robotmodels.cli.main import parser_of
 from robotmodels.cli.numbers import joined, numbers
 from robotmodels.cli.option_words import in_options
+from robotmodels.cli.program import parser_of
 from robotmodels.minimal_parameters import uniform_bodies
 
 POINT = ["--mask", "1", "1", "1", "0", "0", "0"]

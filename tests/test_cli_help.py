@@ -14,8 +14,8 @@ import robotmodels as rm
 from robotmodels import se3
 from robotmodels.cli import main
 from robotmodels.cli.exit_status import ExitStatus
-from robotmodels.cli.main import COMMANDS, parser_of
 from robotmodels.cli.numbers import NUMBER_OPTIONS
+from robotmodels.cli.program import COMMANDS, parser_of
 from robotmodels.minimal_parameters import uniform_bodies
 
 Q = np.array([0.3, 1.0, -1.8, 0.4, 0.8, -0.2])

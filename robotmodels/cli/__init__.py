@@ -1,5 +1,5 @@
 """The command line: ``robotmodels COMMAND``, one file a command, each with ``--help``."""
 
-from .main import main
+from .program import main
 
 __all__ = ["main"]
