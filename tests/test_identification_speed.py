@@ -26,7 +26,7 @@ from robotmodels.identification.preparation.filters import settling, zero_phase
 from robotmodels.identification.preparation.spectrum import power_density
 from robotmodels.identification.scale.kept_equations import kept_equations, plain
 from robotmodels.logs import FindingKind, Log, check_log
-from robotmodels.logs.checks import _Runs
+from robotmodels.logs.long_channels import Runs
 from robotmodels.logs.stretches import stretches
 from robotmodels.minimal_parameters import base_parameters
 
@@ -186,7 +186,7 @@ def test_runs_are_found_whatever_the_pieces():
     rng = np.random.default_rng(3)
     for _ in range(300):
         same = rng.random(rng.integers(0, 30)) < rng.random()
-        runs = _Runs(2)
+        runs = Runs(2)
         for part in np.split(same, sorted(rng.integers(0, len(same) + 1, 3))):
             runs.add(part)
         steps = np.diff(np.concatenate([[0], same.astype(int), [0]]))

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+from .log import Log
+
 
 class Severity(Enum):
     """How bad a finding is; the value says what follows.
@@ -82,3 +84,11 @@ class LogFinding:
 
     def __str__(self) -> str:
         return self.sentence
+
+
+def add_of_joint(
+    found: list[LogFinding], kind: FindingKind, severity: Severity, log: Log, j: int, words: str
+) -> None:
+    """Add what is wrong with joint ``j``, named in the sentence."""
+    name = log.names[j]
+    found.append(LogFinding(kind, severity, (name,), f"Joint {name}: {words}"))

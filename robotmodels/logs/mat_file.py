@@ -120,14 +120,24 @@ def _elements(data: bytes | memoryview, order: str, most: int) -> Iterator[_Elem
             continue
         if not most:
             raise _DamagedError("compressed data within compressed data")
-        unpacker = zlib.decompressobj()
-        whole = unpacker.decompress(part, most + 1)
-        if len(whole) > most:
-            raise _DamagedError(f"its {len(part)} bytes become more than {most}")
-        if not unpacker.eof:
-            raise _DamagedError("compressed data that are cut off")
+        whole = _unpacked(part, order, most)
         most -= len(whole)
         yield from _elements(whole, order, 0)
+
+
+def _unpacked(part: memoryview, order: str, most: int) -> bytes:
+    """One element that was compressed, which says in its tag how long it is."""
+    unpacker = zlib.decompressobj()
+    tag = unpacker.decompress(part, 8)
+    if len(tag) < 8:
+        raise _DamagedError("compressed data without a tag")
+    said = struct.unpack(f"{order}II", tag)[1]
+    if said > most:
+        raise _DamagedError(f"its {len(part)} bytes become more than {most}")
+    inside = unpacker.decompress(unpacker.unconsumed_tail, said + 8)
+    if len(inside) < said or not (unpacker.eof or unpacker.decompress(b"", 1) == b""):
+        raise _DamagedError("compressed data of another length than is said")
+    return tag + inside
 
 
 def _matrix(data: memoryview, order: str, name: str, found: dict[str, Any], depth: int) -> Any:
