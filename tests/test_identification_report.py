@@ -18,26 +18,22 @@ from robotmodels.identification import (
     fit,
 )
 from robotmodels.identification.consistency.identified_robot import consistent_robot, prior_bodies
-from robotmodels.identification.reporting.diagnostics import (
-    not_seen,
-    residual_diagnostics,
-    strong_correlations,
-    understatement,
-    wrong_signs,
-)
 from robotmodels.identification.reporting.parameters import (
     intervals,
     kind_names,
     kind_units,
     stands_for,
 )
+from robotmodels.identification.reporting.residuals import residual_diagnostics
+from robotmodels.identification.reporting.result_data import log_data, result_data
 from robotmodels.identification.reporting.text import report_text
-from robotmodels.identification.reporting.write import (
-    log_data,
-    read_estimate,
-    result_data,
-    write_result,
+from robotmodels.identification.reporting.weak_parameters import (
+    not_seen,
+    strong_correlations,
+    understatement,
+    wrong_signs,
 )
+from robotmodels.identification.reporting.write import read_estimate, write_result
 from robotmodels.minimal_parameters import uniform_bodies
 
 DT = 0.005

@@ -71,16 +71,15 @@ from .preparation.joint_checks import check_joints
 from .preparation.processing import Processing, choose_processing
 from .preparation.signals import Signals, signals
 from .preparation.synchronisation import Synchronisation, SynchronisationStatus, synchronisation
-from .reporting.diagnostics import (
-    ResidualDiagnostics,
+from .reporting.residuals import ResidualDiagnostics, residual_diagnostics
+from .reporting.text import report_text
+from .reporting.weak_parameters import (
     WrongSign,
     not_seen,
-    residual_diagnostics,
     strong_correlations,
     understatement,
     wrong_signs,
 )
-from .reporting.text import report_text
 from .reporting.write import read_estimate, write_result
 from .result import IdentificationResult
 from .scale.many_robots import reduce_many

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array
-from ..identification.reporting.diagnostics import NOT_SEEN
+from ..identification.reporting.weak_parameters import NOT_SEEN
 from ..identification.result import IdentificationResult
 from .figures import (
     LIMIT_DASHES,

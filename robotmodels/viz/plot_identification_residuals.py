@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array
 from ..identification.equations import Equations
-from ..identification.reporting.diagnostics import residual_diagnostics
+from ..identification.reporting.residuals import residual_diagnostics
 from ..identification.reporting.parameters import kind_names, kind_units
 from ..identification.result import IdentificationResult
 from ..logs import Log

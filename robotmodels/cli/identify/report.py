@@ -31,8 +31,9 @@ def report(result: IdentificationResult, test: Log | None, robot: ConsistentFit 
     Report
         Text, data and files.
     """
+    from ...identification.reporting.result_data import result_data
     from ...identification.reporting.text import report_text
-    from ...identification.reporting.write import result_data, write_result
+    from ...identification.reporting.write import write_result
 
     text = report_text(result, robot)
 

@@ -13,7 +13,7 @@ from ...model import RobotModel
 from ...table_text import ReportTable, table_of
 from ..equations import EquationForm
 from ..methods.estimate import Estimate
-from .diagnostics import NOT_SEEN
+from .weak_parameters import NOT_SEEN
 
 if TYPE_CHECKING:
     from ..result import IdentificationResult

@@ -8,38 +8,19 @@ import numpy as np
 
 from ..._arrays import Array
 from ...estimation.diagnostics import ResidualTest
-from ...logs import Log
 from ...table_text import ReportSection, ReportTable, table_of
 from ..validation import Validation
-from .diagnostics import (
-    NOT_SEEN,
-    STRONG,
-    ResidualDiagnostics,
-    not_seen,
-    residual_diagnostics,
-    strong_correlations,
-    understatement,
-    wrong_signs,
-)
-from .parameters import (
-    effort_units,
-    kind_names,
-    kind_units,
-    number,
-    parameter_tables,
-    percent,
-)
+from .data_section import data_section, processing_section
+from .parameters import effort_units, kind_names, kind_units, number, parameter_tables, percent
+from .residuals import ResidualDiagnostics, residual_diagnostics
+from .verdict import verdict
+from .weak_parameters import NOT_SEEN, STRONG, strong_correlations
 
 if TYPE_CHECKING:
     from ..consistency.result import ConsistentFit
     from ..result import IdentificationResult
 
 _PAIRS = 12
-_UNEXPLAINED = 0.3
-"""Part of a joint's filtered torque left over, above which something is wrong."""
-_MORE = 1.5
-"""Errors on data kept aside, relative to those on the log, from which they are named."""
-_GOOD_CONDITION = 100.0
 
 
 def report_text(result: IdentificationResult, robot: ConsistentFit | None = None) -> str:
@@ -101,249 +82,10 @@ def report_sections(
     """
     found = residual_diagnostics(result.system, result.values)
     parts = (
-        _verdict(result, found), _data(result), _processing(result), _errors(result),
+        verdict(result, found), data_section(result), processing_section(result), _errors(result),
         _parameters(result), _trust(result, found), _real(robot), _notes(result),
     )  # fmt: skip
     return tuple(part for part in parts if part is not None)
-
-
-def _verdict(result: IdentificationResult, found: ResidualDiagnostics) -> ReportSection:
-    estimate = result.estimate
-    sentences = [
-        f"{estimate.status.sentence} {_capital(estimate.method.value)} of "
-        f"{len(result.names)} parameters on {result.reduction.rows} equations "
-        f"({result.system.form.value})"
-        + (f", {estimate.iterations} iterations." if estimate.iterations > 1 else "."),
-        _prediction(result),
-    ]
-    sentences = [*_doubts(result), *sentences]
-    weak = not_seen(estimate)
-    if weak:
-        sentences.append(
-            f"{len(weak)} of {len(result.names)} parameters are not seen (relative deviation above "
-            f"{100.0 * NOT_SEEN:.0f} %), the least first: {', '.join(weak)}."
-        )
-    else:
-        sentences.append(
-            "All parameters are seen: no relative deviation is above "
-            f"{100.0 * NOT_SEEN:.0f} % (largest {_largest_percent(result)})."
-        )
-    if result.unseen:
-        sentences.append(f"The log does not tell apart: {', '.join(result.unseen)}.")
-    if result.not_essential:
-        sentences.append(f"Left out as not essential: {', '.join(result.not_essential)}.")
-    sentences.append(_excitation(result))
-    sentences.append(_whiteness(result, found))
-    sentences += [sign.sentence for sign in wrong_signs(result.base, estimate)]
-    return ReportSection("Verdict", tuple(f"* {sentence}" for sentence in sentences))
-
-
-def _doubts(result: IdentificationResult) -> list[str]:
-    """What comes before all else: joints whose torques the model does not explain."""
-    names = result.model.table.joint_names
-    share = result.fitted.filtered_relative
-    bad = [f"{names[j]} ({100.0 * share[j]:.3g} %)" for j in np.flatnonzero(share > _UNEXPLAINED)]
-    if not bad:
-        return []
-    return [
-        f"Doubtful: much of the filtered torque is not explained: {', '.join(bad)}. The order of "
-        "the joints, signs, zeros, units, the sampling period or the model are wrong for them, or "
-        "they hardly move. Parameters of these joints are not to be used before that is known."
-    ]
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
-
-
-def _largest_percent(result: IdentificationResult) -> str:
-    k = int(np.argmax(result.relative_deviations))
-    return f"{percent(result.relative_deviations[k])}, {result.names[k]}"
-
-
-def _prediction(result: IdentificationResult) -> str:
-    own, aside = result.fitted, result.held_out
-    names = result.model.table.joint_names
-    worst = np.fmax(own.relative, -np.inf if aside is None else aside.relative)
-    lost = [f"{name} ({100 * worst[j]:.3g} %)" for j, name in enumerate(names) if worst[j] >= 1.0]
-    text = (
-        f"Predicted torques differ from those of the log by {_span(own.relative)} of their size, "
-        f"joint by joint (filtered alike: {_span(own.filtered_relative)})"
-    )
-    if aside is None:
-        if lost:
-            text += f". {_lost(lost)}"
-        return (
-            f"{text.rstrip('.')}. No log was kept aside: how well other motion is predicted is not "
-            "known; give test= (--test)."
-        )
-    text += (
-        f"; from those kept aside by {_span(aside.relative)} "
-        f"(filtered alike: {_span(aside.filtered_relative)})."
-    )
-    more = [
-        f"{name} ({100 * own.relative[j]:.3g} -> {100 * aside.relative[j]:.3g} %)"
-        for j, name in enumerate(names)
-        if aside.rmse[j] > _MORE * own.rmse[j] and aside.relative[j] > _MORE * own.relative[j]
-    ]
-    if lost:
-        return f"{text} {_lost(lost)}"
-    if more:
-        return (
-            f"{text} Some err by much more there than on the log: {', '.join(more)}; the "
-            "parameters do not carry over to that motion. Use a log that excites these joints more."
-        )
-    return f"{text} The parameters carry over to motion that was not fitted."
-
-
-def _lost(joints: list[str]) -> str:
-    return (
-        f"The prediction is farther off than no torque at all of {', '.join(joints)}: the "
-        "parameters are not to be used for that."
-    )
-
-
-def _span(values: Array) -> str:
-    if not np.isfinite(values).any():
-        return "-"
-    low, high = 100.0 * float(np.nanmin(values)), 100.0 * float(np.nanmax(values))
-    return f"{low:.3g} %" if len(values) == 1 else f"{low:.3g} to {high:.3g} %"
-
-
-def _excitation(result: IdentificationResult) -> str:
-    whole, scaled = result.condition, result.condition_scaled
-    text = (
-        f"The condition number of the regressor is {whole:.3g} as it is and {scaled:.3g} with "
-        "columns of length one: "
-    )
-    if scaled > _GOOD_CONDITION:
-        return (
-            f"{text}above {_GOOD_CONDITION:.0f}, the motion hardly tells some parameters apart; an "
-            "exciting trajectory would."
-        )
-    text += "the motion tells the parameters apart"
-    if not_seen(result.estimate) and whole > _GOOD_CONDITION:
-        return f"{text}; those that are not seen act little on the torques."
-    return f"{text}."
-
-
-def _whiteness(result: IdentificationResult, found: ResidualDiagnostics) -> str:
-    factor = understatement(result)
-    factor = factor[np.isfinite(factor)]
-    names = kind_names(result)
-    coloured = [names[j] for j, test in enumerate(found.whiteness) if not test.passed]
-    if not coloured:
-        text = "The residuals are white."
-    elif len(coloured) == len(names):
-        text = "The residuals are correlated in time."
-    else:
-        text = f"The residuals of {', '.join(coloured)} are correlated in time."
-    if not factor.size:
-        return text
-    if not result.lags:
-        return f"{text} The deviations hold for white residuals."
-    middle = float(np.median(factor))
-    way = "smaller" if middle >= 1.0 else "larger"
-    return (
-        f"{text} The deviations here take correlation over {result.lags} equations into account; "
-        f"those for white residuals, which are usually published, are {way} by a factor of "
-        f"{max(middle, 1.0 / max(middle, 1e-9)):.2g} (median)."
-    )
-
-
-def _data(result: IdentificationResult) -> ReportSection:
-    log = result.system.log
-    runs = len(log.starts)
-    body: list[str | ReportTable] = [
-        f"{len(log)} samples of {log.n} joints at {1.0 / log.dt:.6g} Hz, {log.duration:.4g} s"
-        + (f" in {runs} recordings." if runs > 1 else ".")
-    ]
-    if log.delay:
-        body.append(f"{1e3 * log.delay:.4g} ms of delay of the torques were taken out.")
-    if log.sources:
-        rows = [(source.name, str(source.rows), source.sha256[:16]) for source in log.sources]
-        body.append(table_of(("source", "samples", "SHA-256 begins"), rows))
-    body.append(_refused(log))
-    body.append(_ranges(result))
-    return ReportSection("Data", tuple(body))
-
-
-def _refused(log: Log) -> str:
-    if not log.refused:
-        return "No rows were refused."
-    total = sum(len(some.rows) for some in log.refused)
-    parts = [
-        f"{some.source}: {len(some.rows)} ({_rows(some.rows)}), {some.reason.rstrip('.')}"
-        for some in log.refused
-    ]
-    return f"{total} rows were refused. {'; '.join(parts)}."
-
-
-def _rows(rows: tuple[int, ...]) -> str:
-    """Runs of numbers, the first few."""
-    runs: list[list[int]] = []
-    for k in rows:
-        if runs and k == runs[-1][1] + 1:
-            runs[-1][1] = k
-        else:
-            runs.append([k, k])
-    words = [str(a) if a == b else f"{a} to {b}" for a, b in runs[:5]]
-    return ("rows " if len(rows) > 1 else "row ") + ", ".join(words) + (
-        ", ..." if len(runs) > 5 else ""
-    )  # fmt: skip
-
-
-def _ranges(result: IdentificationResult) -> ReportTable:
-    log, counts = result.system.log, result.reduction
-    table = result.model.table
-    low, high = log.q.min(axis=0), log.q.max(axis=0)
-    rms = np.sqrt(np.einsum("ij,ij->j", log.tau, log.tau) / len(log))
-    top = np.maximum(log.tau.max(axis=0), -log.tau.min(axis=0))
-    whole = len(counts.counts) == log.n
-    rows = []
-    for j, name in enumerate(table.joint_names):
-        effort = effort_units(result.model)[j]
-        cells = [
-            name, "m" if effort == "N" else "rad", f"{low[j]:.4g}", f"{high[j]:.4g}", effort,
-            f"{rms[j]:.4g}", f"{top[j]:.4g}",
-        ]  # fmt: skip
-        if whole:
-            cells += [str(int(counts.counts[j])), str(int(counts.left_out[j]))]
-        rows.append(tuple(cells))
-    headings = ["joint", "unit", "from", "to", "unit", "rms torque", "largest"]
-    headings += ["equations", "in dead band"] if whole else []
-    return table_of(tuple(headings), rows)
-
-
-def _processing(result: IdentificationResult) -> ReportSection:
-    chosen = result.system.processing
-    names = result.model.table.joint_names
-    filtered = (
-        "none"
-        if chosen.cutoff is None
-        else f"{chosen.cutoff:.4g} Hz (-3 dB), zero phase, order {chosen.order} twice"
-    )
-    cut = chosen.torque_cutoff
-    thinned = (
-        "none"
-        if cut is None
-        else f"one of {chosen.decimation}, low-pass at {cut:.4g} Hz, {chosen.rate:.4g} Hz after it"
-    )
-    slides = effort_units(result.model)
-    band = ", ".join(
-        f"{name} {width:.2g} {'m/s' if unit == 'N' else 'rad/s'}"
-        for name, width, unit in zip(names, chosen.dead_band.tolist(), slides, strict=True)
-    )
-    lines = [
-        f"* Low-pass of the positions: {filtered}.",
-        f"* Derivatives: central differences of order {chosen.accuracy}.",
-        f"* Decimation of regressor and torque: {thinned}.",
-        f"* Dead band of the velocities: {band}.",
-        f"* Cut at both ends of each recording: {chosen.edges} samples "
-        f"({chosen.edges * chosen.dt:.3g} s).",
-        "Why: " + " ".join(chosen.notes),
-    ]
-    return ReportSection("Processing", tuple(lines))
 
 
 def _errors(result: IdentificationResult) -> ReportSection:

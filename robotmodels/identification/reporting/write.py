@@ -2,42 +2,22 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
-import platform
-from dataclasses import fields, is_dataclass
-from enum import Enum
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..._arrays import Array, as_floats
-from ...drive import drive_kinds
 from ...errors import InvalidValueError
-from ...logs import Log
-from ...model import RobotModel, to_urdf
+from ...model import to_urdf
 from ..consistency.identified_robot import consistent_robot
 from ..methods.estimate import Estimate, EstimateStatus, Method
-from .diagnostics import (
-    not_seen,
-    residual_diagnostics,
-    strong_correlations,
-    understatement,
-    wrong_signs,
-)
-from .parameters import intervals, kind_names, parameter_units
+from .result_data import FORMAT, result_data
 
 if TYPE_CHECKING:
     from ..consistency.result import ConsistentFit
     from ..result import IdentificationResult
-    from ..solving import MethodOptions
-
-_FORMAT = 1
-"""Raised when the meaning of an entry changes."""
-_ROWS = 1 << 16
-_PACKAGES = ("robotmodels", "numpy", "scipy", "numba", "pin")
 
 
 def write_result(
@@ -127,7 +107,7 @@ def read_estimate(path: str | Path) -> Estimate:
 
     Examples
     --------
-    >>> from robotmodels.identification import fit
+    >>> from robotmodels.identification import Log, fit
     >>> from robotmodels.dynamics import idm
     >>> from robotmodels.minimal_parameters import uniform_bodies
     >>> from robotmodels.robots import load
@@ -150,9 +130,9 @@ def read_estimate(path: str | Path) -> Estimate:
         kind = data["format"]
     except (ValueError, TypeError, KeyError):
         raise InvalidValueError(f"{path}: not a result of an identification.") from None
-    if kind != _FORMAT or data.get("chapter") != "identification":
+    if kind != FORMAT or data.get("chapter") != "identification":
         raise InvalidValueError(
-            f"{path}: expected an identification of format {_FORMAT}, got "
+            f"{path}: expected an identification of format {FORMAT}, got "
             f"{data.get('chapter')!r} of format {kind!r}."
         )
 
@@ -184,216 +164,3 @@ def _estimate(data: dict[str, Any]) -> Estimate:
         int(data["method"]["iterations"]),
         tuple(map(str, data["method"]["notes"])),
     )
-
-
-def result_data(result: IdentificationResult, robot: ConsistentFit | None = None) -> dict[str, Any]:
-    """An identification as plain lists, numbers and words, as `write_result` writes it.
-
-    Parameters
-    ----------
-    result : IdentificationResult
-        Of `fit`.
-    robot : ConsistentFit, optional
-        Of `consistent_robot`.
-
-    Returns
-    -------
-    dict
-        SI units; None for what is not finite.
-
-    References
-    ----------
-    Seed book section 1.6.5.
-    """
-    estimate, base = result.estimate, result.base
-    ends, units, factor = intervals(estimate), parameter_units(result), understatement(result)
-    found = residual_diagnostics(result.system, result.values)
-    parameters = [
-        {
-            "name": name, "unit": units[k], "value": _number(result.values[k]),
-            "std": _number(result.deviations[k]),
-            "relative_std": _number(result.relative_deviations[k]),
-            "interval_95": _numbers(ends[k]), "std_white": _number(result.white[k]),
-            "std_over_white": _number(factor[k]),
-            "stands_for": dict(base.regrouping[name]),
-        }
-        for k, name in enumerate(result.names)
-    ]  # fmt: skip
-    return {
-        "format": _FORMAT,
-        "chapter": "identification",
-        "robot": result.model.name,
-        "status": {"name": estimate.status.name, "sentence": estimate.status.sentence},
-        "method": {
-            "name": estimate.method.name, "sentence": estimate.method.value,
-            "iterations": estimate.iterations, "lags": result.lags, "notes": list(estimate.notes),
-            "options": option_data(result.options), "essential": result.essential_rule,
-            "form": result.system.form.name,
-            "drive": [kind.value for kind in drive_kinds(base.drive)],
-            "friction": None if base.friction is None else repr(base.friction),
-        },
-        "data": log_data(result.system.log),
-        "processing": _processing(result),
-        "parameters": parameters,
-        "covariance": [_numbers(row) for row in result.estimate.covariance],
-        "sigma": _numbers(estimate.sigma),
-        "unseen": list(result.unseen),
-        "not_essential": list(result.not_essential),
-        "relative_std_above_30_percent": list(not_seen(estimate)),
-        "negative": [one.name for one in wrong_signs(base, estimate)],
-        "strong_correlations": [[a, b, _number(c)] for a, b, c in strong_correlations(estimate)],
-        "condition": _number(result.condition),
-        "condition_scaled": _number(result.condition_scaled),
-        "gap": _numbers(np.array(result.gap)),
-        "equations": [
-            {"of": name, "used": int(used), "in_dead_band": int(left)}
-            for name, used, left in zip(
-                kind_names(result), result.reduction.counts, result.reduction.left_out, strict=True
-            )
-        ],
-        "residuals": [
-            {
-                "of": name, "mean": _number(found.mean[j]), "std": _number(found.deviation[j]),
-                "autocorrelation": _numbers(found.autocorrelation[j]),
-                "white_p": _number(found.whiteness[j].p), "skewness": _number(found.skewness[j]),
-                "kurtosis": _number(found.kurtosis[j]),
-                "normal_p": _number(found.normality[j].p),
-            }
-            for j, name in enumerate(kind_names(result))
-        ],
-        "errors": {
-            "joints": list(result.model.table.joint_names),
-            "fitted": _errors(result.fitted), "held_out": _errors(result.held_out),
-        },
-        "consistent": None if robot is None else _robot(robot),
-        "versions": _versions(),
-        "notes": list(result.notes),
-    }  # fmt: skip
-
-
-def option_data(options: MethodOptions) -> dict[str, Any]:
-    """What a method was given beyond the equations, ready for JSON.
-
-    Parameters
-    ----------
-    options : MethodOptions
-        Of the fit.
-
-    Returns
-    -------
-    dict
-        Those that were given, by name: numbers, lists, words; a robot by its name, a controller by
-        its fields.
-
-    Examples
-    --------
-    >>> from robotmodels.identification.solving import MethodOptions
-    >>> option_data(MethodOptions(loss="tukey", strength=2.0))
-    {'loss': 'tukey', 'strength': 2.0}
-    """
-    given = ((f.name, getattr(options, f.name)) for f in fields(options))
-    return {name: _option(value) for name, value in given if value is not None}
-
-
-def _option(value: Any) -> Any:
-    if isinstance(value, RobotModel):
-        return value.name
-    if isinstance(value, Enum):
-        return value.name.lower()
-    if is_dataclass(value):
-        parts = ((f.name, getattr(value, f.name)) for f in fields(value))
-        return {name: _option(part) for name, part in parts if part is not None}
-    if isinstance(value, (str, bool)):
-        return value
-    return np.asarray(value).tolist()
-
-
-def log_data(log: Log) -> dict[str, Any]:
-    """What a log was made of, with hashes by which the same data are known again.
-
-    Parameters
-    ----------
-    log : Log
-        The log.
-
-    Returns
-    -------
-    dict
-        ``sha256`` is of the bytes of q and tau as they were used: 64-bit numbers, little end
-        first, row by row, q before tau.
-
-    Examples
-    --------
-    >>> found = log_data(Log(0.01, np.zeros((100, 2)), np.zeros((100, 2))))
-    >>> found["sha256"] == hashlib.sha256(bytes(2 * 100 * 2 * 8)).hexdigest()
-    True
-    """
-    return {
-        "samples": len(log), "joints": list(log.names), "dt": log.dt, "duration": log.duration,
-        "starts": log.starts.tolist(), "delay": log.delay, "sha256": _hash(log),
-        "sources": [
-            {"name": one.name, "sha256": one.sha256, "rows": one.rows} for one in log.sources
-        ],
-        "refused": [
-            {"source": one.source, "rows": list(one.rows), "reason": one.reason}
-            for one in log.refused
-        ],
-        "measured": [
-            name for name in ("v", "a", "q_ref", "v_ref") if getattr(log, name) is not None
-        ],
-        "notes": list(log.notes),
-    }  # fmt: skip
-
-
-def _hash(log: Log) -> str:
-    total = hashlib.sha256()
-    for array in (log.q, log.tau):
-        for first in range(0, len(log), _ROWS):
-            rows = np.ascontiguousarray(array[first : first + _ROWS], dtype="<f8")
-            total.update(rows.tobytes())
-    return total.hexdigest()
-
-
-def _processing(result: IdentificationResult) -> dict[str, Any]:
-    chosen = result.system.processing
-    return {
-        "dt": chosen.dt, "cutoff": chosen.cutoff, "order": chosen.order,
-        "accuracy": chosen.accuracy, "decimation": chosen.decimation,
-        "torque_cutoff": chosen.torque_cutoff, "dead_band": _numbers(chosen.dead_band),
-        "edges": chosen.edges, "motion": chosen.motion, "notes": list(chosen.notes),
-    }  # fmt: skip
-
-
-def _errors(side: Any) -> dict[str, Any] | None:
-    if side is None:
-        return None
-    names = ("rmse", "relative", "bias", "filtered_rmse", "filtered_relative", "correlation")
-    return {"samples": side.samples} | {name: _numbers(getattr(side, name)) for name in names}
-
-
-def _robot(robot: ConsistentFit) -> dict[str, Any]:
-    return {
-        "status": {"name": robot.status.name, "sentence": robot.status.sentence},
-        "price_percent": _number(robot.price), "distance": _number(robot.distance),
-        "gap": _number(robot.gap), "active": list(robot.active),
-        "standard": dict(zip(robot.standard_names, _numbers(robot.values), strict=True)),
-        "base": dict(zip(robot.names, _numbers(robot.base_values), strict=True)),
-    }  # fmt: skip
-
-
-def _versions() -> dict[str, str]:
-    found = {"python": platform.python_version()}
-    for name in _PACKAGES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:  # such as a source tree that was never installed
-            found[name] = "unknown"
-    return found
-
-
-def _number(value: Any) -> float | None:
-    return float(value) if np.isfinite(value) else None
-
-
-def _numbers(values: Array) -> list[float | None]:
-    return [_number(value) for value in values]
