@@ -9,6 +9,7 @@ import enum
 import importlib
 import inspect
 import re
+import sys
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -18,6 +19,8 @@ from docutils import nodes
 from docutils.statemachine import StringList
 from sphinx.addnodes import pending_xref
 from sphinx.application import Sphinx
+from sphinx.errors import PycodeError
+from sphinx.pycode import ModuleAnalyzer
 from sphinx.util.docutils import SphinxDirective
 
 import robotmodels
@@ -71,9 +74,26 @@ def directive_lines(path: str, thing: Any) -> list[str]:
         if issubclass(thing, enum.Enum):
             lines.append("   :undoc-members:")  # their values are sentences
         return lines
-    if callable(thing) and hasattr(thing, "__name__"):
+    if inspect.isroutine(thing):
         return [f".. autofunction:: {path}"]
-    return [f".. autodata:: {path}"]
+    value = repr(thing)
+    lines = [f".. py:data:: {path}"]
+    if not isinstance(thing, tuple) and len(value) < 100:
+        lines.append(f"   :value: {value}")
+    return [*lines, "", *(f"   {line}" for line in written_below(path))]
+
+
+def written_below(path: str) -> list[str]:
+    """The text below a constant where its room defines it; autodoc would show its type's."""
+    package, _, name = path.rpartition(".")
+    for module in sorted(m for m in sys.modules if m == package or m.startswith(package + ".")):
+        try:
+            found = ModuleAnalyzer.for_module(module).find_attr_docs()
+        except PycodeError:
+            continue
+        if ("", name) in found:
+            return found["", name]
+    return []
 
 
 class Names(SphinxDirective):
