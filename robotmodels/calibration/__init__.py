@@ -9,6 +9,7 @@ from .calibrated import (
     calibrated_pose,
     calibrated_urdf,
 )
+from .candidates import candidate_parameters
 from .changed import IdentifiabilityChange, identifiability_change
 from .corrected import corrected_igm
 from .corrected_solutions import CorrectedSolutions, CorrectionStatus
@@ -40,7 +41,7 @@ from .measurements import (
 from .observability import Criterion, Observability, observability
 from .obstacles import Box, HalfSpace, Sphere, clearance
 from .offsets import JointOffsets, PoseOffsets, joint_offsets, pose_offsets
-from .parameters import GeometricParameter, GeometricParameters, candidate_parameters
+from .parameters import GeometricParameter, GeometricParameters
 from .prior import ParameterPrior
 from .problem import Problem, problem_of
 from .read import read_measurements

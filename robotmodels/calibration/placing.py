@@ -7,11 +7,12 @@ from typing import NamedTuple
 
 from ..model import RobotModel
 from .calibrated import calibrated_model
+from .candidates import candidate_parameters
 from .elements import ErrorLaw
 from .errors_seen import BlockErrors, block_errors
 from .identifiable import identifiable_on
 from .measurements import Measurement
-from .parameters import GeometricParameters, candidate_parameters
+from .parameters import GeometricParameters
 from .problem import problem_of
 from .registration import registered
 from .solve import first_scales, solve

@@ -15,6 +15,7 @@ from .._arrays import Array, as_floats
 from .._choices import chosen
 from ..errors import InvalidValueError, ShapeError
 from ..model import RobotModel, check_model
+from .candidates import candidate_parameters
 from .exchange import Progress, exchanged, greedy, index_of, nested
 from .group_rows import group_rows
 from .identifiable import identifiable_on
@@ -22,7 +23,7 @@ from .kinds import Groups, Kind, as_kind, drawn_groups, groups_of, measurement_o
 from .measurements import Measurement
 from .observability import Criterion, Observability, of_singular_values
 from .obstacles import Obstacle, clearance
-from .parameters import GeometricParameters, candidate_parameters
+from .parameters import GeometricParameters
 from .selected import SelectedConfigurations
 from .skeleton import Frame
 

@@ -11,11 +11,12 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_exact
 from ..errors import InvalidValueError
 from ..model import RobotModel, check_model
+from .candidates import candidate_parameters
 from .elements import Compliance
 from .identifiable import IdentifiableParameters, identifiable_on
 from .kinds import Kind, as_kind, drawn_groups, measurement_of
 from .measurements import Measurement
-from .parameters import GeometricParameters, candidate_parameters
+from .parameters import GeometricParameters
 from .problem import measured_frames
 from .skeleton import Frame
 
