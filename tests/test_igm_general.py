@@ -258,7 +258,8 @@ def test_the_count_is_that_of_an_independent_search(seed, sigma, rng):
 
 def union_of_two(seed, sigma=REVOLUTE, count=2):
     """Postures found by the solver, by its best two representations apart, and what was lost."""
-    from robotmodels.igm import general
+    from robotmodels.igm.general.gathered import Gathered
+    from robotmodels.igm.general.search import one_way
 
     chain = random_arm(seed, sigma)
     solver = prepare_general(chain, tests=40)
@@ -267,9 +268,9 @@ def union_of_two(seed, sigma=REVOLUTE, count=2):
     q, valid, double = general_postures(solver, U)
     goals = U.copy()
     goals[:, :3, 3] /= solver.unit
-    union = general._Found(count)
+    union = Gathered(count)
     for way in solver.representations[:2]:
-        general._one_way(solver, way, goals, union)
+        one_way(solver, way, goals, union)
     odd = int(np.sum((valid.sum(axis=1) + double.sum(axis=1)) % 2))
     return int(valid.sum()), int(union.count.sum()), lost(chain, q0, q, valid), odd
 

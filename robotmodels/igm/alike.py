@@ -14,8 +14,9 @@ import numpy as np
 from .. import se3
 from .._arrays import read_only
 from .closed_form import ClosedForm, prepare_closed_form
-from .general import GeneralArm, shortened
+from .general import GeneralArm
 from .loop import JointChain
+from .shortened import shortened
 from .solver import Prepare, Solver
 
 

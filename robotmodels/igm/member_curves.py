@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
-from .general import shortened
 from .loop import JointChain
+from .shortened import shortened
 
 __all__ = ["MemberCurve", "curves_through"]
 

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from .._arrays import Array, read_only
 from .check import checked
-from .general import shortened
 from .loop import JointChain
 from .self_motion import settle_families, singular_postures
+from .shortened import shortened
 from .solver import Found, Tolerances, postures
 
 __all__ = ["FourRevolute", "PrismaticArm", "prepare_prismatic"]

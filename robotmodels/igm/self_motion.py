@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from .._arrays import Array
 from .check import checked
-from .general import shortened
 from .loop import JointChain
+from .shortened import shortened
 from .solver import Found, Tolerances
 
 __all__ = ["Settled", "double_roots", "settle_families", "singular_postures"]
