@@ -1,8 +1,8 @@
 """pytest plugin for the leg that runs kernels as plain Python, so that their lines are counted.
 
 Plain Python takes some hundred times longer: a test that is not done after ``LONGEST`` seconds of
-the processor is given up, and what it has run by then counts. Whether results are right is told by the ordinary
-runs; a test that fails here fails as anywhere.
+the processor is given up, and what it has run by then counts. Whether results are right is told by
+the ordinary runs; a test that fails here fails as anywhere.
 """
 
 import os

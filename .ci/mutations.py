@@ -1,0 +1,245 @@
+"""Change one sign, index or factor of the numeric core at a time: a test must fail each time.
+
+    python .ci/mutations.py                 # all of them, and tests/mutations.md is written
+    python .ci/mutations.py --sample 5      # some, chosen at random: for every change
+    python .ci/mutations.py --only dry      # those whose room or fault has this word
+    python .ci/mutations.py --places        # only look whether every text is still found
+
+The list is `mutation_list.py`. Each fault is put into a copy of the package in a temporary folder,
+never into the checkout. Kernels run uncompiled there (``NUMBA_DISABLE_JIT``), which is quick where
+tests are small and needs no compilation, except where the list says ``compiled``; hypothesis draws
+three examples (`uncompiled.py`). Tests are first run without a fault: they must pass.
+"""
+
+import argparse
+import multiprocessing
+import os
+import random
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+sys.path.insert(0, str(Path(__file__).parent))
+from mutation_list import MUTATIONS, Mutation
+
+CHECKOUT = Path(__file__).resolve().parent.parent
+# Importing what the package stands on takes longer than most tests here: it is done once.
+FORKS = multiprocessing.get_context("forkserver")
+STOOD_ON = ["numpy", "numba", "pinocchio", "hypothesis", "pytest", "scipy.linalg", "scipy.optimize"]
+LONGEST = 600.0  # seconds; a fault may keep an iteration from ending
+KILLED, SURVIVED, BROKEN = "killed", "SURVIVED", "NO RESULT"
+
+
+class Outcome(NamedTuple):
+    """What became of a mutation: by which test, and how long it took."""
+
+    mutation: Mutation
+    verdict: str
+    by: str
+    seconds: float
+
+
+def texts_of(package: Path) -> dict[Path, str]:
+    """What the files of the package say."""
+    return {p.relative_to(package): p.read_text("utf-8") for p in sorted(package.rglob("*.py"))}
+
+
+def place_of(texts: dict[Path, str], mutation: Mutation) -> tuple[Path, int]:
+    """File and position of the text to be changed: the first one behind the place named."""
+    found = [path for path, text in texts.items() if mutation.after in text]
+    if len(found) != 1 or texts[found[0]].count(mutation.after) != 1:
+        where = ", ".join(map(str, found)) or "no file"
+        raise LookupError(f"{mutation.after!r} is to be there once, found in: {where}")
+    text = texts[found[0]]
+    at = text.find(mutation.old, text.index(mutation.after))
+    if at < 0:
+        raise LookupError(f"{mutation.old!r} does not follow {mutation.after!r} in {found[0]}")
+    return found[0], at
+
+
+def run(folder: Path, mutation: Mutation) -> tuple[int, str]:
+    """Exit code of pytest and the first test that failed."""
+    paths, _, words = mutation.tests.partition(" -k ")
+    arguments = [
+        "-x", "-q", "--no-header", "--tb=no", "-rfE", "-p", "no:cacheprovider",
+        "-W", "ignore::pytest.PytestAssertRewriteWarning",
+        *paths.split(), *(["-k", words] if words else []),
+    ]  # fmt: skip
+    report = folder / "report.txt"
+    report.write_text("")
+    if mutation.compiled:
+        code = in_own_process(folder, arguments, report)
+    else:
+        plain = ["-p", "uncompiled", "-W", "ignore::RuntimeWarning"]  # zero may divide in kernels
+        code = in_fork(folder, [*plain, *arguments], report)
+    if code is None:
+        return 1, f"no end within {LONGEST:.0f} s"
+    text = report.read_text(encoding="utf-8", errors="replace")
+    failed = re.search(r"^(?:FAILED|ERROR) (.+?)(?: - |$)", text, flags=re.MULTILINE)
+    return code, failed[1] if failed else (text.strip().splitlines() or ["no output"])[-1]
+
+
+def in_own_process(folder: Path, arguments: list[str], report: Path) -> int | None:
+    """Run pytest with the compiler, whose cache is the folder's own and empty."""
+    shutil.rmtree(folder / "compiled", ignore_errors=True)
+    environment = os.environ | {
+        "PYTHONPATH": str(folder),
+        "NUMBA_CACHE_DIR": str(folder / "compiled"),
+        "NUMBA_DISABLE_JIT": "0",
+    }
+    command = [sys.executable, "-m", "pytest", *arguments]
+    with report.open("w") as out:
+        try:
+            done = subprocess.run(
+                command, cwd=folder, env=environment, stdout=out, stderr=out, timeout=LONGEST
+            )
+        except subprocess.TimeoutExpired:
+            return None
+    return done.returncode
+
+
+def in_fork(folder: Path, arguments: list[str], report: Path) -> int | None:
+    """Run pytest in a fork of a process that has imported all but this package."""
+    child = FORKS.Process(target=run_pytest, args=(str(folder), arguments, str(report)))
+    child.start()
+    child.join(LONGEST)
+    if child.is_alive():
+        child.kill()
+        child.join()
+        return None
+    return child.exitcode
+
+
+def run_pytest(folder: str, arguments: list[str], report: str) -> None:
+    """In the fork: the package is that of the folder."""
+    out = os.open(report, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+    os.dup2(out, 1)
+    os.dup2(out, 2)
+    os.chdir(folder)
+    sys.path[:0] = [folder, str(Path(__file__).parent)]
+    import pytest
+
+    import robotmodels
+
+    if not robotmodels.__file__.startswith(folder):
+        os._exit(99)
+    code = pytest.main(arguments)
+    sys.stdout.flush()
+    os._exit(int(code))
+
+
+def copied(folder: Path) -> None:
+    """The package, the tests and their settings."""
+    leave = shutil.ignore_patterns("__pycache__")
+    for name in ("robotmodels", "tests", "urdf"):
+        shutil.copytree(CHECKOUT / name, folder / name, ignore=leave)
+    for name in ("pyproject.toml", "README.md"):
+        shutil.copy(CHECKOUT / name, folder / name)
+
+
+def tried(folder: Path, chosen: list[Mutation], texts: dict[Path, str]) -> list[Outcome]:
+    """Outcome of each mutation; the tests without a fault come first."""
+    outcomes = []
+    sound: dict[tuple[str, bool], str] = {}
+    stamp = int(time.time())
+    for mutation in chosen:
+        start = time.monotonic()
+        key = mutation.tests, mutation.compiled
+        if key not in sound:
+            code, first = run(folder, mutation)
+            sound[key] = "" if code == 0 else f"fails without a fault: {first}"
+        if sound[key]:
+            verdict, by = BROKEN, sound[key]
+        else:
+            name, at = place_of(texts, mutation)
+            path, text = folder / "robotmodels" / name, texts[name]
+            end = at + len(mutation.old)
+            for content in (text[:at] + mutation.new + text[end:], text):
+                path.write_text(content, encoding="utf-8")
+                stamp += 2  # byte code is taken again where the second and the size are the same
+                os.utime(path, (stamp, stamp))
+                if content is not text:
+                    code, by = run(folder, mutation)
+            verdict = {0: SURVIVED, 1: KILLED}.get(code, BROKEN)
+        taken = time.monotonic() - start
+        outcomes.append(Outcome(mutation, verdict, by, taken))
+        print(f"{verdict:9} {taken:5.0f} s  {mutation.room}: {mutation.fault}  [{by}]", flush=True)
+    return outcomes
+
+
+def page(outcomes: list[Outcome]) -> str:
+    """The list as a table."""
+    killed = sum(o.verdict == KILLED for o in outcomes)
+    lines = [
+        "# Faults that were tried",
+        "",
+        "One sign, index, factor or term of the numeric core is changed at a time; a test must",
+        "fail. Written by `python .ci/mutations.py`; the changes themselves, text by text, are in",
+        "`.ci/mutation_list.py`.",
+        "",
+        f"{len(outcomes)} faults, {killed} found.",
+        "",
+        "| room | fault | outcome | first test that fails |",
+        "|---|---|---|---|",
+    ]
+    for o in outcomes:
+        by = o.by.removeprefix("tests/") if o.verdict == KILLED else "none"
+        by = by.replace("|", "\\|")
+        lines.append(f"| {o.mutation.room} | {o.mutation.fault} | {o.verdict} | `{by}` |")
+    return "\n".join(lines) + "\n"
+
+
+def main() -> int:
+    """Read the arguments, try the chosen mutations, tell; 1 if any was not found."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
+    parser.add_argument("--sample", type=int, metavar="N", help="only N, chosen at random")
+    parser.add_argument("--seed", type=int, help="of the choice; default: another one each time")
+    parser.add_argument("--only", metavar="WORD", help="only those with this word")
+    parser.add_argument("--places", action="store_true", help="only look for the texts")
+    parser.add_argument("--write", type=Path, metavar="FILE", help="where the table goes")
+    given = parser.parse_args()
+    word = given.only or ""
+    chosen = [m for m in MUTATIONS if word in f"{m.room} {m.fault} {m.tests}"]
+    texts = texts_of(CHECKOUT / "robotmodels")
+    lost = []
+    for mutation in chosen:
+        try:
+            place_of(texts, mutation)
+        except LookupError as error:
+            lost.append(f"{mutation.room}, {mutation.fault}: {error}")
+    if lost:
+        print("\n".join(lost), "repair .ci/mutation_list.py", sep="\n")
+        return 1
+    if given.places:
+        print(f"{len(chosen)} texts are found")
+        return 0
+    whole = given.sample is None and not given.only
+    if given.sample is not None:
+        seed = random.randrange(10**6) if given.seed is None else given.seed
+        print(f"--seed {seed}")
+        chosen = random.Random(seed).sample(chosen, min(given.sample, len(chosen)))
+    os.environ |= {
+        "LONGEST": "300",
+        "NUMBA_DISABLE_JIT": "1",
+        "OPENBLAS_NUM_THREADS": "1",
+        "MPLBACKEND": "Agg",
+    }
+    FORKS.set_forkserver_preload(STOOD_ON)
+    with tempfile.TemporaryDirectory() as temporary:
+        copied(Path(temporary))
+        outcomes = tried(Path(temporary), chosen, texts_of(Path(temporary, "robotmodels")))
+    target = given.write or (CHECKOUT / "tests" / "mutations.md" if whole else None)
+    if target:
+        target.write_text(page(outcomes), encoding="utf-8")
+    bad = [o for o in outcomes if o.verdict != KILLED]
+    print(f"{len(outcomes) - len(bad)} of {len(outcomes)} faults were found")
+    return 1 if bad else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
