@@ -9,12 +9,8 @@ from robotmodels.drive import DriveParameters
 from robotmodels.dynamics import idm, with_payload
 from robotmodels.errors import InvalidValueError
 from robotmodels.identification import choose_processing
-from robotmodels.identification.several_logs.drive_gains import (
-    GainMethod,
-    GainStatus,
-    identify_drive_gains,
-    motor_side,
-)
+from robotmodels.identification.several_logs.drive_gains import identify_drive_gains, motor_side
+from robotmodels.identification.several_logs.drive_gains_result import GainMethod, GainStatus
 from robotmodels.identification.several_logs.known_payload import KnownPayload, LoadedLog
 from robotmodels.inertia import InertialParameters
 from robotmodels.logs import Log

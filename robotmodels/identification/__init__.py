@@ -84,7 +84,8 @@ from .reporting.write import read_estimate, write_result
 from .result import IdentificationResult
 from .scale.many_robots import reduce_many
 from .scale.reduction import Reduction, reduce_equations
-from .several_logs.drive_gains import DriveGains, GainMethod, GainStatus, identify_drive_gains
+from .several_logs.drive_gains import identify_drive_gains
+from .several_logs.drive_gains_result import DriveGains, GainMethod, GainStatus
 from .several_logs.known_payload import KnownPayload, LoadedLog
 from .several_logs.payload import PayloadEstimate, PayloadStatus, identify_payload
 from .validation import Validation, validate
