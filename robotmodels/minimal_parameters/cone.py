@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from .._arrays import Array
+from ..estimation.conic import Cone, ConeOutcome, ConeSolution, Constraint, solve_cones, triangle_of
 from ..inertia import InertialParameters
-from .conic import Cone, ConeOutcome, ConeSolution, Constraint, solve_cones, triangle_of
 from .coupled_drives import coupled_blocks, drive_sizes, dry_rows
 from .prior import pseudo_inertias
 from .real_drives import drive_constraints, positive_drives

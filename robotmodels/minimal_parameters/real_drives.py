@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from .._arrays import Array
 from ..drive import DriveKind, drive_kinds
+from ..estimation.conic import Cone, Constraint
 from ..friction import (
     AsymmetricFriction,
     CoulombFriction,
@@ -15,7 +16,6 @@ from ..friction import (
     StribeckFriction,
     ViscousFriction,
 )
-from .conic import Cone, Constraint
 from .coupled_drives import coupled_blocks, dry_rows
 from .result import BaseParameters
 

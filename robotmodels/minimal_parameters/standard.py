@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, Rebuilt, as_core, as_exact, read_only
 from ..drive import DriveParameters, Transmission
 from ..errors import InvalidValueError, ShapeError
+from ..estimation.conic import ConeOutcome
 from ..inertia import InertialParameters
 from ..model import RobotModel
 from .cone import ConeProblem
-from .conic import ConeOutcome
 from .prior import check_definite
 from .result import BaseParameters
 from .robot_parts import robot_parts, standard_vector

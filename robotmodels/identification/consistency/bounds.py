@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..._arrays import Array, Rebuilt, as_exact, as_reals, read_only
 from ...errors import InvalidValueError, ShapeError
-from ...minimal_parameters.conic import Cone, Constraint
+from ...estimation.conic import Cone, Constraint
 
 _AXES = "xyz"
 _ROTATED = 1e-9

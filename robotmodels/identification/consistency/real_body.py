@@ -5,14 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..._arrays import Array
+from ...estimation.conic import Cone, ConeOutcome, Constraint, solve_cones, triangle_of
 from ...inertia import InertialParameters
-from ...minimal_parameters.conic import (
-    Cone,
-    ConeOutcome,
-    Constraint,
-    solve_cones,
-    triangle_of,
-)
 from ...minimal_parameters.prior import pseudo_inertias
 
 _MARGIN = 1e-7
