@@ -16,7 +16,7 @@ import robotmodels as rm
 from robotmodels import se3
 from robotmodels.errors import InvalidValueError, NotARotationError, RobotModelsError, ShapeError
 from robotmodels.igm import IGMStatus, igm_numeric
-from robotmodels.igm import _descent as descent
+from robotmodels.igm.numeric import _pose_error as compiled_error
 
 ORACLES = Path(__file__).parent / "oracles"
 POSITION = [1, 1, 1, 0, 0, 0]
@@ -78,9 +78,9 @@ def check_met(model, T, found, mask=None, tolerance=1e-6):
 
 @njit
 def probe(q, arm, goal, z, o, e, J):
-    R, p = descent.forward(q, arm, z, o)
-    phi = descent.missing(R, p, goal, e)
-    descent.error_jacobian(p, phi, goal, arm, z, o, J)
+    R, p = compiled_error.forward(q, arm, z, o)
+    phi = compiled_error.missing(R, p, goal, e)
+    compiled_error.error_jacobian(p, phi, goal, arm, z, o, J)
 
 
 def plain(array):

@@ -2,7 +2,7 @@
 
 What `corrected_igm` does with the closed form of a nominal arm: every posture of a pose is brought
 home to the calibrated arm on its own, with the exact derivative of the error of any mask (see
-`_descent`). Square systems are solved by elimination, others and nearly singular ones by the
+`numeric`). Square systems are solved by elimination, others and nearly singular ones by the
 shortest step of a singular value decomposition.
 """
 
@@ -30,7 +30,7 @@ from ..kernels._compile import (
 )
 from ..kernels._vectors import whole_matrix, whole_vector
 from ..kernels.svd import orthogonal_rows
-from ._descent import Arm, Goal, error_jacobian, forward, missing
+from .numeric._pose_error import Arm, Goal, error_jacobian, forward, missing
 
 __all__ = ["brought_home"]
 

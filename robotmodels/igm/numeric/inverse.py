@@ -11,13 +11,13 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .. import se3
-from .._arrays import Array, as_vector, batch_rows, read_only
-from ..errors import InvalidValueError
-from ..geometry import REVOLUTE
-from ..model import RobotModel
-from .asked import above_zero, mask_of
-from .solutions import IGMSolutions
+from ... import se3
+from ..._arrays import Array, as_vector, batch_rows, read_only
+from ...errors import InvalidValueError
+from ...geometry import REVOLUTE
+from ...model import RobotModel
+from ..asked import above_zero, mask_of
+from ..solutions import IGMSolutions
 
 METHOD = "numeric (Levenberg-Marquardt)"
 """What `igm_numeric` calls itself in its results."""
@@ -154,7 +154,7 @@ def igm_numeric(
     valid, inside = np.empty((2, N), dtype=np.bool_)
     unmoved, family = np.empty((2, N, n), dtype=np.bool_)
     status = np.empty(N, dtype=np.int8)
-    from ._descent import solve_poses
+    from ._solve import solve_poses
 
     solve_poses(
         targets.reshape(N, 4, 4), first, int(q0 is not None), search.starts, search.poses,
@@ -234,7 +234,7 @@ def _new_search(model: RobotModel, limits: bool, restarts: int, rng: Any) -> _Se
     low, high = _ranges(model, revolute, limits, length)
     starts = low + rng.random((max(restarts, _FEWEST_STARTS), n)) * (high - low)
     poses = np.empty((len(starts), 4, 4))
-    from ..kernels.poses import tip_poses
+    from ...kernels.poses import tip_poses
 
     tip_poses(starts, *chain, *tool, poses)
     middle = read_only(0.5 * (low + high) if limits else np.zeros(n))
