@@ -1,6 +1,7 @@
 """Estimation: numerics of linear and nonlinear models that know no robot."""
 
 from .columns import ColumnBasis, column_basis
+from .coverage import Coverage, coverage
 from .diagnostics import (
     FitDiagnostics,
     Linearity,
@@ -24,6 +25,7 @@ __all__ = [
     "column_basis",
     "factors_by_kind",
     "triangular_factor",
+    "Coverage",
     "FitDiagnostics",
     "FitStatus",
     "Leverage",
@@ -35,6 +37,7 @@ __all__ = [
     "StrengthSelection",
     "VarianceComponents",
     "confidence_intervals",
+    "coverage",
     "fit_diagnostics",
     "fit_nonlinear",
     "held_out",
