@@ -9,17 +9,15 @@ from identities.random_robots import random_model, random_pose, robot_size
 
 import robotmodels as rm
 from robotmodels.calibration import candidate_parameters, differential_model
-from robotmodels.calibration.calibrated import (
-    calibrated_model,
-    calibrated_pose,
-    calibrated_urdf,
-)
+from robotmodels.calibration.calibrated import calibrated_model
+from robotmodels.calibration.calibrated_pose import calibrated_pose
 from robotmodels.calibration.corrected import CorrectionStatus, corrected_igm
 from robotmodels.calibration.elements import Compliance, Element, ErrorLaw
 from robotmodels.calibration.joint_errors import encoder_transmission, joint_errors_of
 from robotmodels.calibration.offsets import joint_offsets, pose_offsets
 from robotmodels.calibration.parameters import GeometricParameter, GeometricParameters
 from robotmodels.calibration.reading_jacobian import missing_of_pose, reading_jacobian
+from robotmodels.calibration.write import calibrated_urdf
 from robotmodels.errors import InvalidValueError, ShapeError, UrdfWarning
 
 

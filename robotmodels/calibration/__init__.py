@@ -2,13 +2,8 @@
 
 from ..file_units import AngleUnit, LengthUnit
 from .bending import Bending
-from .calibrated import (
-    CalibratedEnd,
-    CalibratedRobot,
-    calibrated_model,
-    calibrated_pose,
-    calibrated_urdf,
-)
+from .calibrated import CalibratedEnd, CalibratedRobot, calibrated_model
+from .calibrated_pose import calibrated_pose
 from .candidates import candidate_parameters
 from .changed import IdentifiabilityChange, identifiability_change
 from .corrected import corrected_igm
@@ -55,7 +50,8 @@ from .six_parameters import SixParameters, base_parameters_of, pose_of_elements,
 from .skeleton import Skeleton, skeleton_of
 from .solve import Solution
 from .structural import identifiable_parameters
-from .write import result_data, write_result
+from .true_errors import TrueErrors, true_errors
+from .write import calibrated_urdf, result_data, write_result
 
 __all__ = [
     "AngleUnit",
@@ -107,6 +103,7 @@ __all__ = [
     "Skeleton",
     "Solution",
     "Sphere",
+    "TrueErrors",
     "base_parameters_of",
     "calibrated_model",
     "calibrated_pose",
@@ -136,5 +133,6 @@ __all__ = [
     "side_by_side",
     "skeleton_of",
     "tool_parameters_of",
+    "true_errors",
     "write_result",
 ]

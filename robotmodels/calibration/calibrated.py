@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from .._arrays import Array, Rebuilt, as_exact, as_vector, read_only
-from ..errors import InvalidValueError, UrdfWarning
-from ..kinematics import dgm
-from ..model import RobotModel, to_urdf
+from .._arrays import Array, Rebuilt, as_exact, read_only
+from ..errors import InvalidValueError
+from ..model import RobotModel
 from .bending import Bending, bending_of
 from .elements import Element, ErrorLaw
 from .joint_errors import JointErrors, joint_errors_of
@@ -217,7 +215,8 @@ def calibrated_model(parameters: GeometricParameters, deviation: ArrayLike) -> C
 
     Examples
     --------
-    >>> from robotmodels.calibration import candidate_parameters, differential_model
+    >>> from robotmodels.calibration import calibrated_pose, candidate_parameters
+    >>> from robotmodels.calibration import differential_model
     >>> from robotmodels.robots import load
     >>> parameters = candidate_parameters(load("rx90"), gains=True)
     >>> xi = 1e-3 * np.random.default_rng(0).normal(size=len(parameters))
@@ -305,134 +304,6 @@ def as_calibrated(robot: Any) -> CalibratedRobot:
             "deviation)."
         )
     return found
-
-
-def calibrated_pose(robot: CalibratedRobot, q_read: ArrayLike, frame: Frame = None) -> Array:
-    """Direct geometric model of a calibrated robot, from the readings of its joints.
-
-    Parameters
-    ----------
-    robot : CalibratedRobot
-        The robot, n joints.
-    q_read : array_like, shape (..., n)
-        Readings, rad or m.
-    frame : str, int or None
-        A measured end or any frame of the model; None is the tool.
-
-    Returns
-    -------
-    ndarray, shape (..., 4, 4)
-        World poses, metres.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, FrameNotFoundError
-        Wrong length, NaN or infinity; an unknown frame.
-
-    References
-    ----------
-    Seed book sections 1.2.2 and 1.4.6.
-
-    Examples
-    --------
-    See `calibrated_model`.
-    """
-    readings = as_vector(q_read, robot.model.n, "q_read")
-    q = robot.joint_errors.actual(readings)
-    if not robot.bending.is_zero:
-        n, (path, after) = robot.model.n, tip_of(robot, frame)
-        T = robot.bending.poses(readings.reshape(-1, n), q.reshape(-1, n), path, after)
-        return T.reshape(*q.shape[:-1], 4, 4)
-    end = robot.end(frame)
-    if end is None:
-        return dgm(robot.model, q, frame)
-    return dgm(robot.model, q, end.parent) @ end.pose
-
-
-def tip_of(robot: CalibratedRobot, frame: Frame = None) -> tuple[NDArray[np.int64], Array]:
-    """Where a frame hangs in the extended table.
-
-    Parameters
-    ----------
-    robot : CalibratedRobot
-        The robot.
-    frame : str, int or None
-        A measured end or any frame of the model; None is the tool.
-
-    Returns
-    -------
-    path : ndarray of int, shape (k,)
-        Rows from the world: to the end, or to the frame of the table that carries the frame.
-    after : ndarray, shape (4, 4)
-        Constant pose behind the last of them, metres.
-
-    Raises
-    ------
-    FrameNotFoundError
-        An unknown frame.
-
-    Examples
-    --------
-    >>> from robotmodels.calibration import candidate_parameters
-    >>> from robotmodels.robots import load
-    >>> parameters = candidate_parameters(load("rx90"))
-    >>> tip_of(calibrated_model(parameters, np.zeros(len(parameters))), 2)[0]
-    array([0, 1, 2])
-    """
-    skeleton, end = robot.parameters.skeleton, robot.end(frame)
-    if end is not None:
-        return robot.bending.path_to(end.row), skeleton.after[end.row - 1 - robot.model.f]
-    found, pose = robot.model.twin.frame(frame), np.eye(4)
-    pose[:3, :3], pose[:3, 3] = found.rotation, found.position
-    return robot.bending.path_to(found.parent), pose
-
-
-def calibrated_urdf(robot: CalibratedRobot) -> str:
-    """URDF text of the calibrated table, base and tool.
-
-    Parameters
-    ----------
-    robot : CalibratedRobot
-        The robot.
-
-    Returns
-    -------
-    str
-        Text that `RobotModel.from_urdf` reads back to the same poses. Its joint variables are
-        where the joints are, not what they read.
-
-    Raises
-    ------
-    UrdfError
-        As `to_urdf`.
-
-    Warns
-    -----
-    UrdfWarning
-        Lists what a URDF has no place for, the errors of the readings among it.
-
-    References
-    ----------
-    Seed book section 1.4.6.
-
-    Examples
-    --------
-    >>> from robotmodels.calibration import candidate_parameters
-    >>> from robotmodels.robots import load
-    >>> parameters = candidate_parameters(load("lab_rr"))
-    >>> text = calibrated_urdf(calibrated_model(parameters, np.full(len(parameters), 1e-3)))
-    >>> RobotModel.from_urdf(text).n
-    2
-    """
-    text = to_urdf(robot.model)
-    if robot.notes:
-        warnings.warn(
-            f"Not in the URDF: {' '.join(robot.notes)} Keep the calibrated robot (pickle) to "
-            "keep them.",
-            UrdfWarning,
-            stacklevel=2,
-        )
-    return text
 
 
 def _same(a: Frame, b: Frame) -> bool:

@@ -19,7 +19,8 @@ from ..igm.solutions import IGMSolutions
 from ..igm.status import IGMStatus
 from ..kinematics import dgm
 from ..model import RobotModel
-from .calibrated import CalibratedRobot, as_calibrated, tip_of
+from .calibrated import CalibratedRobot, as_calibrated
+from .calibrated_pose import tip_of
 from .corrected_rows import put_together, same_as
 from .corrected_solutions import CorrectedSolutions, CorrectionStatus
 from .homing import Flags, Home, Postures
@@ -97,7 +98,8 @@ def corrected_igm(
     Examples
     --------
     >>> from robotmodels.calibration import candidate_parameters
-    >>> from robotmodels.calibration.calibrated import calibrated_model, calibrated_pose
+    >>> from robotmodels.calibration.calibrated import calibrated_model
+    >>> from robotmodels.calibration.calibrated_pose import calibrated_pose
     >>> from robotmodels.robots import load
     >>> parameters = candidate_parameters(load("rx90"), gains=True)
     >>> xi = 1e-3 * np.random.default_rng(0).normal(size=len(parameters))

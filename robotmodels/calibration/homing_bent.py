@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from .._arrays import Array
 from ..kinematics import dgm
-from .calibrated import CalibratedRobot, calibrated_pose
+from .calibrated import CalibratedRobot
+from .calibrated_pose import calibrated_pose
 from .reading_jacobian import missing_of_pose, missing_slope, reading_jacobian
 
 NEWTON_STEPS = 20

@@ -13,7 +13,8 @@ from .._arrays import Array, Rebuilt, as_vector, read_only
 from ..errors import InvalidValueError
 from ..igm.asked import above_zero, mask_of
 from ..kinematics import dgm
-from .calibrated import CalibratedRobot, as_calibrated, calibrated_pose
+from .calibrated import CalibratedRobot, as_calibrated
+from .calibrated_pose import calibrated_pose
 from .corrected import CorrectedSolutions, corrected_igm
 from .reading_jacobian import missing_of_pose, missing_slope, reading_jacobian
 

@@ -8,7 +8,8 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_vector
 from ..igm.components import rotation_vectors
 from ..kinematics import jacobian
-from .calibrated import CalibratedRobot, tip_of
+from .calibrated import CalibratedRobot
+from .calibrated_pose import tip_of
 
 
 def reading_jacobian(robot: CalibratedRobot, q_read: ArrayLike) -> Array:

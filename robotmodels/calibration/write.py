@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import json
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .._arrays import Array
-from ..errors import InvalidValueError, MissingExtraError
+from ..errors import InvalidValueError, MissingExtraError, UrdfWarning
 from ..estimation import confidence_intervals
-from .calibrated import calibrated_urdf
+from ..model import to_urdf
+from .calibrated import CalibratedRobot
 from .errors_seen import BlockErrors
 
 if TYPE_CHECKING:
@@ -211,3 +213,52 @@ def _number(value: Any) -> float | None:
 
 def _numbers(values: Array) -> list[float | None]:
     return [_number(value) for value in values]
+
+
+def calibrated_urdf(robot: CalibratedRobot) -> str:
+    """URDF text of the calibrated table, base and tool.
+
+    Parameters
+    ----------
+    robot : CalibratedRobot
+        The robot.
+
+    Returns
+    -------
+    str
+        Text that `RobotModel.from_urdf` reads back to the same poses. Its joint variables are
+        where the joints are, not what they read.
+
+    Raises
+    ------
+    UrdfError
+        As `to_urdf`.
+
+    Warns
+    -----
+    UrdfWarning
+        Lists what a URDF has no place for, the errors of the readings among it.
+
+    References
+    ----------
+    Seed book section 1.4.6.
+
+    Examples
+    --------
+    >>> from robotmodels.calibration import calibrated_model, candidate_parameters
+    >>> from robotmodels.model import RobotModel
+    >>> from robotmodels.robots import load
+    >>> parameters = candidate_parameters(load("lab_rr"))
+    >>> text = calibrated_urdf(calibrated_model(parameters, np.full(len(parameters), 1e-3)))
+    >>> RobotModel.from_urdf(text).n
+    2
+    """
+    text = to_urdf(robot.model)
+    if robot.notes:
+        warnings.warn(
+            f"Not in the URDF: {' '.join(robot.notes)} Keep the calibrated robot (pickle) to "
+            "keep them.",
+            UrdfWarning,
+            stacklevel=2,
+        )
+    return text
