@@ -3,8 +3,8 @@
     python .ci/fuzz.py TARGET --runs N [--seed K] [--corpus FOLDER]
 
 Needs atheris (Apache-2.0, pip install atheris), which is no dependency of the package, in the
-environment of the package. TARGET is one of those of tests/robustness/inputs.py, or all. Inputs are made
-from good files by tests/robustness/mutations.py, and kept for further damage when they reach lines
+environment of the package. TARGET is one of those of tests/robustness/inputs.py, or all. Inputs are
+made from good files by tests/robustness/mutations.py, and damaged further when they reach lines
 that no other reached. A crash, a hang, a warning of NumPy or an answer that is not finite ends the
 run with the input in the folder of the corpus; otherwise counts are printed.
 """
@@ -32,6 +32,7 @@ READERS = [
 
 
 def main() -> None:
+    """Read the arguments and fuzz one target or, each in a process of its own, all."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("target", help="one of those of tests/robustness/inputs.py, or all")
     parser.add_argument("--runs", type=int, default=10_000)

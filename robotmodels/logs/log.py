@@ -134,7 +134,7 @@ class Log:
         given = {"tau": tau, "v": v, "a": a, "q_ref": q_ref, "v_ref": v_ref}
         object.__setattr__(self, "q", positions)
         for name, value in given.items():
-            array = None if value is None else _rows(value, name)
+            array = None if value is None and name != "tau" else _rows(value, name)
             if array is not None and array.shape != positions.shape:
                 raise ShapeError(
                     f"{name}: expected shape {positions.shape} as q has it, got {array.shape}."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -57,11 +58,24 @@ def unpacked_npz(path: Path) -> int:
 
     Raises
     ------
-    zipfile.BadZipFile
-        It is no archive.
+    zipfile.BadZipFile, ValueError
+        It is no archive of arrays, or an array says that it is larger than its member.
     """
+    from numpy.lib import format as npy
+
+    total = 0
     with zipfile.ZipFile(path) as archive:
-        return sum(member.file_size for member in archive.infolist())
+        for member in archive.infolist():
+            total += member.file_size
+            with archive.open(member) as file:
+                header = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
+                read = header.get(npy.read_magic(file))
+                if read is None:
+                    raise ValueError(f"{member.filename} is an array of another version")
+                shape, _, dtype = read(file)
+                if math.prod(shape) * dtype.itemsize > member.file_size:
+                    raise ValueError(f"{member.filename} is shorter than its shape {shape}")
+    return total
 
 
 def unpacked_parquet(metadata: Any) -> int:

@@ -16,6 +16,7 @@ _ROBOT_NAME = re.compile(r"\(\*\s*Robotname\s*=\s*(['\"])(.*?)\1", re.IGNORECASE
 _HEAD = re.compile(r"(\w+)\s*=[ \t]*")
 _BLANKS = re.compile(r"\s*")
 _MOST_UNKNOWN = 200
+_MOST_ENTRIES = 5000
 _LARGEST = 4 * 2**20
 """Bytes; the files of SYMORO have a few thousand."""
 
@@ -46,7 +47,7 @@ class ParFile:
                 self.unknown.append(word)
                 if len(self.unknown) > _MOST_UNKNOWN:
                     raise self.error(
-                        f"more than {_MOST_UNKNOWN} words that are no keywords, such as {word!r:.60}. "
+                        f"over {_MOST_UNKNOWN} words that are no keywords, like {word!r:.60}. "
                         "Is this a .par file of SYMORO?",
                         line,
                     )
@@ -154,8 +155,13 @@ class ParFile:
                 f"{keyword}: expected a list in braces such as {{0, 1}}, got {body.strip()!r}.",
                 line,
             )
+        texts = split_entries(body[1:-1])
+        if len(texts) > _MOST_ENTRIES:
+            raise self.error(
+                f"{keyword}: {len(texts)} entries; at most {_MOST_ENTRIES} are read.", line
+            )
         entries, at = [], start + 1
-        for i, text in enumerate(split_entries(body[1:-1]), start=1):
+        for i, text in enumerate(texts, start=1):
             # white space before an entry may hold line breaks
             first = at + len(text) - len(text.lstrip())
             here = self._line_at(first)

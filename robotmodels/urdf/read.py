@@ -15,7 +15,7 @@ import numpy as np
 from .. import se3
 from .._arrays import Array
 from ..drive import DriveParameters, Transmission
-from ..errors import FrameNotFoundError, UrdfError
+from ..errors import FrameNotFoundError, InvalidValueError, UrdfError
 from ..geometry import DHTable
 from ..inertia import InertialParameters
 from ..khalil_frames import JointAxis, khalil_frames
@@ -281,10 +281,14 @@ def _inertia(tree: UrdfTree, named: tuple[NamedFrame, ...], f: int) -> InertialP
         link = tree.links[frame.name]
         if frame.parent == 0:
             continue
-        with np.errstate(over="ignore", invalid="ignore"):  # refused below
-            own = InertialParameters.from_com([link.mass], [link.com], [link.inertia])
-            total[frame.parent - 1] += own.moved(frame.pose[None]).values[0]
-        if not np.isfinite(total[frame.parent - 1]).all():
+        try:
+            with np.errstate(over="ignore", invalid="ignore"):  # refused below
+                own = InertialParameters.from_com([link.mass], [link.com], [link.inertia])
+                total[frame.parent - 1] += own.moved(frame.pose[None]).values[0]
+            large = not np.isfinite(total[frame.parent - 1]).all()
+        except InvalidValueError:  # which does not know the link
+            large = True
+        if large:
             raise UrdfError(
                 f"link {link.name!r}: its mass, its centre of mass or how far it is from its joint "
                 "is so large that its inertia there is no number."

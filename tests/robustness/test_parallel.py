@@ -1,4 +1,4 @@
-"""Threads and processes give the numbers of one thread, bit for bit; so does a first call in a race."""
+"""Threads and processes give the numbers of one thread, bit for bit, first calls among them."""
 
 import json
 import multiprocessing
