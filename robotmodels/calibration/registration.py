@@ -72,7 +72,7 @@ def registered(
         return model
     start = model
     if base:
-        world = _best_motion(computed, measured)
+        world = best_motion(computed, measured)
         start = model.with_base(world @ model.base)
     if tool and poses:
         found = np.concatenate([se3.inverse(dgm(start, m.q)) @ m.T for m in poses])
@@ -87,8 +87,30 @@ def _positions(m: Pose | Position) -> Array:
     return m.T[:, :3, 3] if isinstance(m, Pose) else m.p
 
 
-def _best_motion(points: Array, targets: Array) -> Array:
-    """Pose that moves points onto targets with the least sum of squares."""
+def best_motion(points: Array, targets: Array) -> Array:
+    """Motion that brings points onto targets with the least sum of squares.
+
+    Parameters
+    ----------
+    points, targets : ndarray, shape (N, 3)
+        In the same order, metres.
+
+    Returns
+    -------
+    ndarray, shape (4, 4)
+        A pose.
+
+    References
+    ----------
+    W. Kabsch, "A solution for the best rotation to relate two sets of vectors", Acta
+    Crystallographica A32, 1976.
+
+    Examples
+    --------
+    >>> p = np.random.default_rng(0).normal(size=(5, 3))
+    >>> best_motion(p, p + [1.0, 2.0, 3.0])[:3, 3].round(12)
+    array([1., 2., 3.])
+    """
     a, b = points.mean(axis=0), targets.mean(axis=0)
     T = np.eye(4)
     T[:3, :3] = _nearest_rotation((targets - b).T @ (points - a))
