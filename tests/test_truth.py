@@ -1,0 +1,140 @@
+"""Estimates and calibrated robots beside a truth that is known."""
+
+import numpy as np
+import pytest
+
+import robotmodels as rm
+from robotmodels import calibration as cal
+from robotmodels.errors import InvalidValueError, ShapeError
+from robotmodels.estimation import coverage
+
+rng = np.random.default_rng(5)
+Q = rng.uniform(-2.0, 2.0, (60, 6))
+
+
+def rms(errors):
+    return [e.summary("m").rms for e in errors]
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return rm.load("rx90").with_tool(rm.se3.translation(0.05, 0.02, 0.12))
+
+
+def moved(arm, base=None, tool=None, d3=0.0):
+    """The arm with another place, another tool and another length of the upper arm."""
+    d = np.add(arm.table.d, [0.0, 0.0, d3, 0.0, 0.0, 0.0])
+    found = arm.with_table(arm.table.replace(d=d))
+    if base is not None:
+        found = found.with_base(base @ arm.base)
+    return found if tool is None else found.with_tool(arm.tool @ tool)
+
+
+@pytest.mark.parametrize("far", [1e-3, 2.0])
+def test_what_base_and_tool_explain_is_taken_away(arm, far):
+    base = rm.se3.translation(far, -far, 0.3) @ rm.se3.rotation("z", far) @ rm.se3.rotation("x", 1)
+    tool = rm.se3.translation(0.01, -0.02, 0.005)
+    stands, placed, both = rms(cal.true_errors(arm, moved(arm, base), Q))
+    assert stands > 1e-3
+    assert placed < 1e-14
+    assert both < 1e-14
+    stands, placed, both = rms(cal.true_errors(arm, moved(arm, base, tool), Q))
+    assert stands > 1e-3
+    assert placed > 5e-3
+    assert both < 1e-13
+
+
+def test_what_the_table_is_to_blame_for_is_left(arm):
+    real = moved(arm, rm.se3.rotation("y", 0.4), rm.se3.translation(0.004, 0.0, 0.01), 1e-3)
+    stands, placed, both = rms(cal.true_errors(arm, real, Q))
+    assert stands > placed > both > 1e-4
+    # the robot itself has no errors
+    assert max(rms(cal.true_errors(real, real, Q))) < 1e-13
+
+
+def test_the_least_errors_are_those_of_a_fit_of_base_and_tool(arm):
+    real = moved(arm, rm.se3.rotation("y", 0.02), rm.se3.translation(0.004, 0.0, 0.01), 2e-3)
+    truth = cal.Position(Q, rm.dgm(real, Q)[:, :3, 3])
+    base = ("b0", "d0", "r0", "gamma0", "alpha0", "theta0")
+    found = cal.true_errors(arm, real, Q)
+    for free, errors in ((base, found[1]), ((*base, "b7", "d7", "r7"), found[2])):
+        fitted = cal.fit(arm, truth, parameters=free, folds=0, held_out=0.0)
+        # the fit fixes what it cannot tell, which moves no position
+        assert errors.summary("m").rms == pytest.approx(fitted.after.summary("m").rms, rel=1e-9)
+
+
+def test_joint_errors_and_compliance_are_of_the_robot_that_is_judged(arm):
+    parameters = cal.candidate_parameters(arm, gains=True, compliance="uniform")
+    xi = 1e-3 * rng.normal(size=len(parameters)) * [not u.startswith("rad/") for u in
+                                                    parameters.units]  # fmt: skip
+    xi[parameters.names.index("compliance_joints")] = 2e-5
+    real = cal.calibrated_model(parameters, xi)
+    # the model alone has neither gains nor compliance, the calibrated robot has
+    assert max(rms(cal.true_errors(real, real, Q))) < 1e-13
+    assert rms(cal.true_errors(real.model, real, Q))[2] > 1e-4
+    apart = np.linalg.norm((cal.calibrated_pose(real, Q) - rm.dgm(arm, Q))[:, :3, 3], axis=1)
+    assert np.allclose(cal.true_errors(arm, real, Q).as_it_stands.position, apart, atol=1e-15)
+
+
+def test_a_planar_robot_and_a_slide_have_base_and_tool_that_are_not_told_apart():
+    for name in ("planar_2r", "lab_rrt", "cobra_s600"):
+        model = rm.load(name)
+        q = rng.uniform(-0.5, 0.5, (20, model.n))
+        real = model.with_base(rm.se3.translation(0.1, 0.2, 0.0) @ model.base)
+        stands, placed, both = rms(cal.true_errors(model, real, q))
+        assert stands > 0.2
+        assert placed < 1e-13
+        assert both < 1e-13
+
+
+def test_the_end_can_be_a_frame_and_a_result_of_a_fit(arm):
+    real = moved(arm, d3=1e-3)
+    found = cal.fit(arm, cal.Position(Q, rm.dgm(real, Q)[:, :3, 3]), folds=0, held_out=0.0)
+    assert rms(cal.true_errors(found, real, Q + 0.3))[0] < 1e-9
+    elbow = cal.true_errors(arm, real, Q, frame=3)
+    assert elbow.as_it_stands.position == pytest.approx(
+        np.full(60, 1e-3)
+    )  # frame 3 is d3 behind frame 2
+    assert np.isnan(elbow.as_it_stands.angle).all()
+
+
+def test_mistakes_are_told(arm):
+    with pytest.raises(InvalidValueError, match="three configurations"):
+        cal.true_errors(arm, arm, Q[:2])
+    with pytest.raises(InvalidValueError, match="robot with the 6 joints"):
+        cal.true_errors(arm, rm.load("planar_2r"), Q)
+    with pytest.raises(InvalidValueError, match="expected a RobotModel"):
+        cal.true_errors("rx90", arm, Q)
+    with pytest.raises(ShapeError):
+        cal.true_errors(arm, arm, Q[:, :5])
+
+
+def test_intervals_hold_the_truth_as_often_as_they_say():
+    deviation = rng.uniform(0.1, 10.0, 20000)
+    truth = rng.normal(size=20000)
+    values = truth + deviation * rng.normal(size=20000)
+    for level in (0.5, 0.95):
+        found = coverage(values, deviation, truth, level)
+        assert found.held == pytest.approx(level, abs=0.01)  # three deviations of a share of 20000
+    assert found.rms_standardised == pytest.approx(1.0, abs=0.02)
+    assert found.rms == pytest.approx(np.sqrt(np.mean((values - truth) ** 2)))
+    assert coverage(values, deviation / 3.0, truth).held < 0.6
+
+
+def test_an_estimate_that_claims_to_be_exact_is_right_or_infinitely_wrong():
+    found = coverage([1.0, 2.0], [0.0, 0.0], [1.0, 3.0])
+    assert found.standardised.tolist() == [0.0, -np.inf]
+    assert found.held == 0.5
+
+
+def test_coverage_tells_mistakes():
+    with pytest.raises(ShapeError, match="truth: expected shape"):
+        coverage([1.0, 2.0], [1.0, 1.0], [1.0])
+    with pytest.raises(ShapeError, match="values"):
+        coverage([], [], [])
+    with pytest.raises(InvalidValueError, match="deviations"):
+        coverage([1.0], [-1.0], [1.0])
+    with pytest.raises(InvalidValueError, match="level"):
+        coverage([1.0], [1.0], [1.0], 95)
+    with pytest.raises(InvalidValueError):
+        coverage([np.nan], [1.0], [1.0])
