@@ -68,10 +68,9 @@ def mask_of(mask: ArrayLike | None) -> NDArray[np.bool_]:
     """
     if mask is None:
         return np.ones(6, dtype=np.bool_)
-    numbers = np.asarray(mask)
-    if numbers.dtype == np.bool_:
-        numbers = numbers.astype(np.float64)
-    numbers = as_floats(numbers, "mask")
+    given = isinstance(mask, np.ndarray) and mask.dtype == np.bool_
+    flags = given or (isinstance(mask, (list, tuple)) and set(map(type, mask)) == {bool})
+    numbers = as_floats(np.asarray(mask, np.float64) if flags else mask, "mask")
     if numbers.shape != (6,):
         raise ShapeError(f"mask: expected six numbers x y z rx ry rz, got shape {numbers.shape}.")
     if not np.isin(numbers, (0.0, 1.0)).all():

@@ -23,9 +23,9 @@ from .crossings import Relations, relations, solved_with_relations, within_reach
 from .general import GeneralArm
 from .lock import Locked, locked_chain
 from .loop import JointChain
-from .member_curves import MemberCurve, curves_through
 from .motion import jacobians
 from .redundant import LockedArms, at_an_end, locked_postures
+from .self_motion import MemberCurve, curves_through
 from .solver import Found, Prepare, Solver, Tolerances, nothing_found, postures
 
 __all__ = ["Related", "prepare_related"]

@@ -14,11 +14,11 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import Array
-from .check import checked
-from .loop import JointChain
-from .shortened import shortened
-from .solver import Found, Tolerances
+from ..._arrays import Array
+from ..check import checked
+from ..loop import JointChain
+from ..shortened import shortened
+from ..solver import Found, Tolerances
 
 __all__ = ["Settled", "double_roots", "settle_families", "singular_postures"]
 
@@ -135,7 +135,7 @@ def singular_postures(
     >>> bool(np.all(double == found.valid)), bool(member.any())  # stretched elbow
     (True, False)
     """
-    from ._self_motion import singular_postures as singular
+    from ._members import singular_postures as singular
 
     D, unit = shortened(chain)
     double = np.zeros(found.valid.shape, np.bool_)
@@ -220,7 +220,7 @@ def _settled(
     chain: JointChain, U: Array, found: Found, references: Array, tolerances: Tolerances
 ) -> Settled:
     """Poses with families: their postures, and the joints that move."""
-    from ._self_motion import settled_already
+    from ._members import settled_already
     from .family_curves import Family, settled_members
 
     D, unit = shortened(chain)

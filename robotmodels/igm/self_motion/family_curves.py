@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import Array
+from ..._arrays import Array
 
 SAME = 1e-6  # postures closer than this in every joint are one
 STILL = 1e-6  # range, or part of a direction, below which a joint does not move
@@ -74,14 +74,14 @@ class Family:
 
     def corrected(self, q: Array, held: int, spare: int) -> tuple[Array, float]:
         """The posture brought back to the pose, and its error."""
-        from ._self_motion import corrected
+        from ._correction import corrected
 
         out = np.array(q)
         return out, corrected(self.sigma, self.D, self.U, out, held, spare)
 
     def directions(self, q: Array, held: int) -> tuple[Array, int]:
         """Directions (d, k) in which the family goes on, and the dimension of the null space."""
-        from ._self_motion import directions
+        from ._directions import directions
 
         rows = np.empty((24, q.size))
         count, null = directions(self.sigma, self.D, self.U, q, held, rows)
@@ -89,7 +89,7 @@ class Family:
 
     def tangent(self, q: Array, held: int, before: Array) -> tuple[Array, float]:
         """Direction of a curve at a posture, and the second flattest singular value."""
-        from ._self_motion import tangent
+        from ._directions import tangent
 
         out = np.empty(q.size)
         return out, tangent(self.sigma, self.D, q, held, before, out)[1]
@@ -119,7 +119,8 @@ def settled_members(family: Family, q: Array) -> list[tuple[Waiting, bool]]:
         Postures and whether each is a double root of what is left with its joints held. Those that
         an earlier call gave are not repeated.
     """
-    from ._self_motion import MET, PROBE, on_fold
+    from ._correction import MET, on_fold
+    from ._directions import PROBE
 
     head = len(family.waiting)
     family.add(q, 0, 0, False)
@@ -204,7 +205,7 @@ def _elsewhere(
 
     A linkage of four bars may be put together in two ways that no motion joins.
     """
-    from ._self_motion import MET, sought
+    from ._correction import MET, sought
 
     rng = np.random.default_rng(0)
     centre, spread = np.mean(points, axis=0), np.ptp(points, axis=0)
@@ -223,7 +224,7 @@ def _elsewhere(
 
 def _walk(family: Family, start: Array, along: Array, held: int) -> tuple[Curve, bool]:
     """A curve one way from the start; whether it came back."""
-    from ._self_motion import walked
+    from ._directions import walked
 
     room, k = POINTS, start.size
     while True:
@@ -306,7 +307,7 @@ def _crossing(
     family: Family, a: Array, b: Array, joint: int, value: float, held: int
 ) -> Array | None:
     """The point between two of a curve at which a joint has a value."""
-    from ._self_motion import MET
+    from ._correction import MET
 
     near = a
     low, high, f_low, f_high = 0.0, 1.0, a[joint] - value, b[joint] - value
@@ -351,7 +352,7 @@ def _turning_point(family: Family, curve: Curve, i: int, joint: int) -> Array:
 
 def _branchings(family: Family, curve: Curve) -> list[Array]:
     """Postures at which another curve crosses this one: a second singular value vanishes."""
-    from ._self_motion import SINGULAR
+    from ._directions import SINGULAR
 
     flat, found = curve.flat, []
     low = np.minimum(flat[:-2], flat[2:])
@@ -406,7 +407,8 @@ def _driven(
     family: Family, q: Array, basis: Array, joint: int, held: int, sense: float
 ) -> tuple[Array, float]:
     """Move until a joint has its reference, or turns round; how far from it it stopped."""
-    from ._self_motion import MET, SINGULAR, STRIDE, decomposed
+    from ._correction import MET, decomposed
+    from ._directions import SINGULAR, STRIDE
 
     k, rank = q.size, len(basis)
     left = -sense * family.offset(q, joint)

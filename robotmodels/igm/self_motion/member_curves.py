@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import Array
-from .loop import JointChain
-from .shortened import shortened
+from ..._arrays import Array
+from ..loop import JointChain
+from ..shortened import shortened
 
 __all__ = ["MemberCurve", "curves_through"]
 
@@ -64,7 +64,7 @@ def curves_through(chain: JointChain, U: Array, q: Array, most: int = 64) -> lis
     >>> bool(np.abs(U - U[0]).max() < 1e-10)
     True
     """
-    from ._self_motion import walked
+    from ._directions import walked
 
     D, unit = shortened(chain)
     sigma = np.ascontiguousarray(chain.sigma)
