@@ -1,0 +1,278 @@
+"""The course: thin notebooks in the book's order, whose words name what exists.
+
+Nothing is executed here: `.ci/notebooks.py` does.
+"""
+
+import ast
+import importlib
+import inspect
+import re
+from pathlib import Path
+
+import nbformat
+import pytest
+
+import robotmodels as rm
+
+FOLDER = Path(__file__).parents[1] / "notebooks"
+PATHS = sorted(FOLDER.glob("*.ipynb"))
+LONGEST = 45  # lines of a cell of code: more is a program
+TRY = "## Try yourself"
+
+# Sections of the two chapters that the course follows, from the book's table of contents.
+SECTIONS = {
+    "1.1", "1.2", "1.2.1", "1.2.2", "1.2.3", "1.2.3.1", "1.2.3.2", "1.3", "1.3.1", "1.3.1.1",
+    "1.3.1.2", "1.3.1.3", "1.3.1.4", "1.3.2", "1.3.2.1", "1.3.2.2", "1.3.2.3", "1.3.2.4", "1.4",
+    "1.4.1", "1.4.2", "1.4.2.1", "1.4.2.2", "1.4.2.3", "1.4.3", "1.4.4", "1.4.4.1", "1.4.4.2",
+    "1.4.4.3", "1.4.5", "1.4.5.1", "1.4.5.2", "1.4.6", "1.5", "1.5.1", "1.5.1.1", "1.5.1.2",
+    "1.5.1.3", "1.5.1.4", "1.5.1.5", "1.5.1.6", "1.5.2", "1.5.2.1", "1.5.2.2", "1.5.3", "1.6",
+    "1.6.1", "1.6.2", "1.6.2.1", "1.6.2.2", "1.6.2.3", "1.6.2.4", "1.6.2.5", "1.6.3", "1.6.4",
+    "1.6.5", "1.7", "1.8", "4.1", "4.2", "4.2.1", "4.2.2", "4.2.3", "4.3", "4.4", "4.4.1",
+    "4.4.1.1", "4.4.1.2", "4.4.2", "4.4.2.1", "4.4.2.2", "4.4.2.3", "4.4.2.4", "4.4.3", "4.5",
+    "4.5.1", "4.5.1.1", "4.5.1.2", "4.5.2", "4.5.2.1", "4.5.2.2", "4.5.2.3", "4.6", "4.7",
+}  # fmt: skip
+NUMBER = r"\d(?:\.\d+)+"
+EQUATIONS = {f"1.{k}" for k in range(1, 19)}  # as far as the pages at hand go
+
+every = pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
+
+
+def read(path):
+    return nbformat.read(path, as_version=4)
+
+
+def sources(path, kind):
+    return [cell.source for cell in read(path).cells if cell.cell_type == kind]
+
+
+def statements(path):
+    return ast.parse("\n".join(sources(path, "code")))
+
+
+# --- what a cell of code may hold ----------------------------------------------------------------
+
+
+def logic(tree):
+    """What is a program and no story, one line for each finding."""
+    found = []
+    for node in ast.walk(tree):
+        word = type(node).__name__
+        if isinstance(
+            node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef | ast.Lambda | ast.While
+        ):
+            found.append(f"line {node.lineno}: {word}")
+        if isinstance(node, ast.For):
+            inner = [n for statement in node.body for n in ast.walk(statement)]
+            if any(isinstance(n, ast.For) for n in inner):
+                found.append(f"line {node.lineno}: a loop in a loop")
+            calls = [n.func for n in inner if isinstance(n, ast.Call)]
+            if not any(isinstance(f, ast.Name) and f.id == "print" for f in calls):
+                found.append(f"line {node.lineno}: a loop that prints nothing")
+            if any(isinstance(n, ast.AugAssign | ast.If) and has_body(n) for n in inner):
+                found.append(f"line {node.lineno}: a loop that computes")
+            if any(isinstance(f, ast.Attribute) and f.attr == "append" for f in calls):
+                found.append(f"line {node.lineno}: a loop that gathers")
+        expression = isinstance(node, ast.ListComp | ast.DictComp | ast.SetComp | ast.GeneratorExp)
+        if expression and len(node.generators) > 1:
+            found.append(f"line {node.lineno}: two loops in one expression")
+    return found
+
+
+def has_body(node):
+    """A sum, or a choice between two ways; a choice of what to print is none."""
+    return isinstance(node, ast.AugAssign) or bool(node.orelse)
+
+
+@every
+def test_no_logic_is_defined(path):
+    assert logic(statements(path)) == []
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "def f(x):\n    return x",
+        "class A:\n    pass",
+        "f = lambda x: x",
+        "while True:\n    break",
+        "for a in b:\n    for c in a:\n        print(c)",
+        "for a in b:\n    total = a",
+        "for a in b:\n    total += a\n    print(total)",
+        "for a in b:\n    print(a)\n    found.append(a)",
+        "[c for a in b for c in a]",
+    ],
+)
+def test_logic_is_seen(text):
+    assert logic(ast.parse(text)) != []
+
+
+@every
+def test_cells_are_short(path):
+    assert max(len(text.splitlines()) for text in sources(path, "code")) <= LONGEST
+
+
+# --- form ----------------------------------------------------------------------------------------
+
+
+@every
+def test_outputs_are_stripped_and_the_format_holds(path):
+    notebook = read(path)
+    nbformat.validate(notebook)
+    for cell in notebook.cells:
+        if cell.cell_type == "code":
+            assert cell.outputs == []
+            assert cell.execution_count is None
+    assert len({cell.id for cell in notebook.cells}) == len(notebook.cells)
+    assert notebook.metadata.kernelspec.name == "python3"
+
+
+def test_notebooks_are_numbered():
+    assert [path.name[:3] for path in PATHS] == [f"{k:02d}_" for k in range(1, len(PATHS) + 1)]
+    assert len(PATHS) >= 7
+
+
+@every
+def test_head_says_where_one_is_and_the_neighbours_are_linked(path):
+    k = PATHS.index(path)
+    first = sources(path, "markdown")[0]
+    last = sources(path, "markdown")[-1]
+    assert first.startswith(f"# {path.name[:2]} ")
+    for word in ("**Where you are:**", "**You need:**", "**You will be able to:**"):
+        assert word in first
+    assert "Headings carry the book's numbers" in first
+    head_links = re.findall(r"\]\(([^)]+)\)", first)
+    assert head_links == [p.name for p in (*PATHS[:k][-1:], *PATHS[k + 1 :][:1])]
+    assert last.startswith(TRY)
+    ending = PATHS[(k + 1) % len(PATHS)].name
+    assert re.findall(r"\]\(([^)]+)\)", last) == [ending]
+    assert len(re.findall(r"^\d\. ", last, re.MULTILINE)) == 3
+
+
+@every
+def test_links_lead_somewhere(path):
+    for text in sources(path, "markdown"):
+        for link in re.findall(r"\]\(([^)#]+)\)", text):
+            assert link.startswith("https://") or (FOLDER / link).is_file(), link
+        for named in re.findall(r"`((?:benchmarks|notebooks|tests|\.docs)/[\w./]+)`", text):
+            assert (FOLDER.parent / named).exists(), named
+
+
+def test_the_index_has_all_notebooks_and_their_titles():
+    index = next(text for text in sources(PATHS[0], "markdown") if text.startswith("## The course"))
+    rows = re.findall(r"^\| \[?(\d\d) ([^\]|(]+?) ?(?:\]\((\S+)\)|\(this one\)) \|", index, re.M)
+    assert [number for number, _, _ in rows] == [path.name[:2] for path in PATHS]
+    for path, (number, title, link) in zip(PATHS, rows, strict=True):
+        assert link in ("", path.name)
+        assert sources(path, "markdown")[0].startswith(f"# {number} {title}")
+
+
+@every
+def test_something_is_drawn(path):
+    assert any(
+        re.search(r"^rm\.viz\.(show|animate|plot_)", text, re.M) for text in sources(path, "code")
+    )
+
+
+# --- the book's numbers --------------------------------------------------------------------------
+
+
+def cited_sections(text):
+    """Section numbers of the book in a cell: of headings, of 'sections', and all long ones."""
+    found = set(re.findall(r"(?<![\w.\[-])\d(?:\.\d){2,3}(?![\w.]*\d)", text))
+    for line in text.splitlines():
+        if line.startswith("#") and "Exercise" not in line:
+            found |= set(re.findall(rf"(?<=# ){NUMBER}|(?<=, ){NUMBER}", line))
+        for words in re.findall(rf"[Ss]ections? ((?:(?:, | and )?{NUMBER})+)", line):
+            found |= set(re.findall(NUMBER, words))
+    return found - set(re.findall(rf"FIGAROH ({NUMBER})", text))
+
+
+@every
+def test_cited_sections_and_equations_are_in_the_book(path):
+    texts = sources(path, "markdown")
+    sections = set().union(*map(cited_sections, texts))
+    assert sections
+    assert sections - SECTIONS == set()
+    equations = set(re.findall(r"\[(\d\.\d+)\]", "\n".join(texts)))
+    assert equations - EQUATIONS == set()
+
+
+def test_a_wrong_section_is_seen():
+    assert cited_sections("## 1.9 Flying") == {"1.9"}
+    assert cited_sections("as sections 1.2.9 and 1.7 say") == {"1.2.9", "1.7"}
+    assert cited_sections("FIGAROH 1.0.2 has 0.1 mm") == set()
+
+
+# --- names ---------------------------------------------------------------------------------------
+
+
+def modules(tree):
+    """Modules of the package by the name that a notebook gives them."""
+    found = {"rm": rm}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("robotmodels"):
+            for name in node.names:
+                whole = importlib.import_module(node.module)
+                value = getattr(whole, name.name, None)
+                if value is None:
+                    value = importlib.import_module(f"{node.module}.{name.name}")
+                found[name.asname or name.name] = value
+    return found
+
+
+def resolves(start, parts):
+    """Whether modules and classes lead along the names; behind a value nothing is known."""
+    value = start
+    for part in parts:
+        if not (inspect.ismodule(value) or inspect.isclass(value)):
+            return True
+        if not hasattr(value, part):
+            return False
+        value = getattr(value, part)
+    return True
+
+
+def chains(tree):
+    """Dotted names in code, as lists that begin with a plain name."""
+    for node in ast.walk(tree):
+        parts = []
+        while isinstance(node, ast.Attribute):
+            parts.append(node.attr)
+            node = node.value
+        if parts and isinstance(node, ast.Name):
+            yield [node.id, *reversed(parts)]
+
+
+def unknown_names(tree, texts):
+    """Names of the package, in code and between backticks, that it does not have."""
+    known = modules(tree)
+    roots = "|".join(known)
+    written = [*chains(tree)]
+    called = set()
+    for code in re.findall(r"`([^`]+)`", "\n".join(texts)):
+        written += [name.split(".") for name in re.findall(rf"\b(?:{roots})\.[\w.]+\b", code)]
+        rest = re.sub(rf"\b(?:{roots})\.[\w.]+", "", code)
+        called |= set(re.findall(r"(?:^|[\s.(])([a-z_]\w+)\(", rest))
+    rooms = [*known.values(), rm.RobotModel, rm.DHTable]
+    return [
+        *(".".join(w) for w in written if w[0] in known and not resolves(known[w[0]], w[1:])),
+        *(f"{c}()" for c in called - {"ctraj"} if not any(hasattr(room, c) for room in rooms)),
+    ]
+
+
+@every
+def test_names_of_the_package_exist(path):
+    assert unknown_names(statements(path), sources(path, "markdown")) == []
+
+
+def test_an_unknown_name_is_seen():
+    tree = ast.parse(
+        "import robotmodels as rm\nfrom robotmodels import calibration as cal\nrm.dgn(a)"
+    )
+    assert unknown_names(tree, []) == ["rm.dgn"]
+    none = ast.parse("from robotmodels import calibration as cal")
+    assert unknown_names(none, ["`cal.Kind.SMELL` and `rm.fit_all`"]) == [
+        "cal.Kind.SMELL", "rm.fit_all",
+    ]  # fmt: skip
+    assert unknown_names(none, ["`rx90.with_toll(1)`"]) == ["with_toll()"]
+    assert unknown_names(none, ["`rm.load`, `cal.Kind.POSE`, `rx90.with_tool(1)`"]) == []
