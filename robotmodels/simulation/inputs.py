@@ -224,8 +224,9 @@ def as_times(t: ArrayLike) -> tuple[float, float, Array | None]:
         raise ShapeError(
             f"t: expected a duration, or times of shape (N,) with N at least 1, got {times.shape}."
         )
-    if (np.diff(times) <= 0.0).any():
-        k = int(np.flatnonzero(np.diff(times) <= 0.0)[0])
+    falls = times[1:] <= times[:-1]
+    if falls.any():
+        k = int(np.flatnonzero(falls)[0])
         raise InvalidValueError(
             f"t: expected ascending times, got {times[k]} s and then {times[k + 1]} s at [{k + 1}]."
         )

@@ -22,6 +22,8 @@ from .limits import MotionLimits
 from .piecewise import PiecewisePolynomial
 from .trajectory import Trajectory
 
+_LONGEST = 1e150
+
 
 class Synchronisation(Enum):
     """How joints that move together are kept in step; the value says what is common to them.
@@ -276,9 +278,15 @@ def along_line(
     bounds = checked_limits(limits, n, start, end)
     together = bounds is None or synchronisation is Synchronisation.COORDINATED
     # one law for all joints of a motion, or one law each
-    way = (end - start)[:, None, :] if together else (end - start)[:, :, None]
+    with np.errstate(over="ignore"):  # refused below
+        difference = end - start
+    way = difference[:, None, :] if together else difference[:, :, None]
     laws = 1 if together else n  # of each motion
     length = np.abs(way).max(axis=-1, initial=0.0).reshape(-1)
+    if (length > _LONGEST).any():
+        raise InvalidValueError(
+            f"q0, q1: a way of {length.max():.3g} is too long for its polynomial to have numbers."
+        )
     with np.errstate(invalid="ignore", divide="ignore"):
         direction = np.where(way != 0.0, way / length.reshape(*way.shape[:2], 1), 0.0)
     if bounds is None:

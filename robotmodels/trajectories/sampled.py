@@ -18,6 +18,9 @@ from .piecewise import PiecewisePolynomial
 from .rotations import axis_and_angle, rotation_about
 from .trajectory import Samples, Trajectory
 
+_MOST = 10**9
+"""Samples; more would be a mistake."""
+
 
 def cartesian_trajectory(
     T0: Any, T1: Any, N: int, law: TimeLaw | str = TimeLaw.TRAPEZOIDAL
@@ -128,11 +131,11 @@ def joint_trajectory(
     >>> joint_trajectory([0.0], [1.0], [0.0, 1.0, 2.0]).v.ravel()
     array([0.    , 0.9375, 0.    ])
     """
-    if np.ndim(N) == 0:  # type: ignore[arg-type]
+    if not isinstance(N, (list, tuple)) and np.ndim(N) == 0:  # type: ignore[arg-type]
         t = np.linspace(0.0, 1.0, _whole(N, "N"))
     else:
         t = as_floats(N, "N")  # type: ignore[arg-type]
-        if t.ndim != 1 or (np.diff(t) < 0.0).any():
+        if t.ndim != 1 or (t[1:] < t[:-1]).any():
             raise InvalidValueError("N: expected a number of samples or times that ascend.")
     from .polynomials import quintic
 
@@ -161,4 +164,6 @@ def _whole(value: Any, name: str) -> int:
         number = -1
     if number < 0:
         raise InvalidValueError(f"{name}: expected a whole number from 0, got {value!r}.")
+    if number > _MOST:
+        raise InvalidValueError(f"{name}: expected at most {_MOST} samples, got more.")
     return number
