@@ -85,8 +85,7 @@ def run(folder: Path, mutation: Mutation) -> tuple[int, str]:
 
 
 def in_own_process(folder: Path, arguments: list[str], report: Path) -> int | None:
-    """Run pytest with the compiler, whose cache is the folder's own and empty."""
-    shutil.rmtree(folder / "compiled", ignore_errors=True)
+    """Run pytest with the compiler, whose cache is the folder's own."""
     environment = os.environ | {
         "PYTHONPATH": str(folder),
         "NUMBA_CACHE_DIR": str(folder / "compiled"),
@@ -160,6 +159,8 @@ def tried(folder: Path, chosen: list[Mutation], texts: dict[Path, str]) -> list[
             path, text = folder / "robotmodels" / name, texts[name]
             end = at + len(mutation.old)
             for content in (text[:at] + mutation.new + text[end:], text):
+                if "compiled" in text:  # kernels do not see a change of what they call
+                    shutil.rmtree(folder / "compiled", ignore_errors=True)
                 path.write_text(content, encoding="utf-8")
                 stamp += 2  # byte code is taken again where the second and the size are the same
                 os.utime(path, (stamp, stamp))

@@ -5,6 +5,7 @@ import pytest
 
 import robotmodels as rm
 from robotmodels.kernels.direct_dynamics import joint_accelerations
+from robotmodels.kernels.triangles import fold_equations, fold_rows
 
 
 def accelerations_of(mass, tau):
@@ -51,3 +52,27 @@ def test_singular_mass_matrices_are_told_whatever_their_sign(mass):
     code, out = accelerations_of(mass, [[1.0, 2.0, 3.0]])
     assert code == 0
     assert np.isnan(out).all()
+
+
+@pytest.mark.parametrize("rows", [1, 3, 4, 66, 200])
+def test_triangles_have_the_products_of_all_rows_folded_into_them(rng, rows):
+    """R^T R = sum of A^T A over the pieces, also where columns are empty or one another's sums."""
+    pieces = [rng.normal(size=(rows, 6)) for _ in range(3)]
+    for A in pieces:
+        A[:, 2] = 0.0
+        A[:, 4] = A[:, 0] - 2.0 * A[:, 1]
+    R = np.zeros((6, 6))
+    for A in pieces:
+        fold_rows(A, R)
+    np.testing.assert_array_equal(R, np.triu(R))
+    whole = np.vstack(pieces)
+    np.testing.assert_allclose(R.T @ R, whole.T @ whole, rtol=0, atol=1e-12 * rows)
+
+
+def test_triangles_of_equations_take_the_rows_and_columns_asked_for(rng):
+    W, y = rng.normal(size=(150, 2, 7)), rng.normal(size=(150, 2))
+    rows, columns = np.flatnonzero(rng.random(150) < 0.7), np.array([1, 2, 5])
+    R = np.zeros((4, 4))
+    fold_equations(W, y, 1, rows, columns, R)
+    A = np.column_stack((W[rows, 1][:, columns], y[rows, 1]))
+    np.testing.assert_allclose(R.T @ R, A.T @ A, rtol=0, atol=1e-11)
