@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_vector
-from ..igm.components import rotation_vectors
 from ..kinematics import jacobian
+from ..se3.orientation import rotation_vectors_of
 from .calibrated import CalibratedRobot
 from .calibrated_pose import tip_of
 
@@ -78,7 +78,7 @@ def missing_of_pose(T: Array, wanted: Array) -> Array:
     array([[0., 0., 0., 0., 0., 0.]])
     """
     turn = wanted[:, :3, :3] @ T[:, :3, :3].swapaxes(-1, -2)
-    return np.concatenate([wanted[:, :3, 3] - T[:, :3, 3], rotation_vectors(turn)], axis=1)
+    return np.concatenate([wanted[:, :3, 3] - T[:, :3, 3], rotation_vectors_of(turn)], axis=1)
 
 
 def missing_slope(J: Array, phi: Array) -> Array:

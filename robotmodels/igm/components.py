@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._arrays import Array
+from ..se3.orientation import rotation_vectors_of
 from .loop import JointChain
 from .motion import jacobians, tool_poses
 
@@ -83,7 +84,7 @@ def missing_components(
     P = tool_poses(chain, q)
     axes = mask_axes(chain, U, components)
     translation = U[:, :3, 3] - P[:, :3, 3]
-    rotation = rotation_vectors(U[:, :3, :3] @ np.swapaxes(P[:, :3, :3], 1, 2))
+    rotation = rotation_vectors_of(U[:, :3, :3] @ np.swapaxes(P[:, :3, :3], 1, 2))
     return _along(axes, translation), _along(axes, rotation)
 
 
@@ -108,34 +109,6 @@ def asked_jacobians(chain: JointChain, U: Array, q: Array, components: Component
     J = jacobians(chain, q)
     axes = np.swapaxes(mask_axes(chain, U, components), 1, 2)
     return np.concatenate([axes @ J[:, :3], axes @ J[:, 3:]], axis=1)[:, np.array(components.asked)]
-
-
-def quaternions(R: Array) -> Array:
-    """Unit quaternions ``(c, x, y, z)`` of rotations (N, 3, 3), exact at any angle, c >= 0."""
-    xx, yy, zz = R[:, 0, 0], R[:, 1, 1], R[:, 2, 2]
-    # 4 times the products of each component with all: the largest row loses no digits
-    K = np.empty((len(R), 4, 4))
-    K[:, 0, 0], K[:, 1, 1] = 1 + xx + yy + zz, 1 + xx - yy - zz
-    K[:, 2, 2], K[:, 3, 3] = 1 - xx + yy - zz, 1 - xx - yy + zz
-    K[:, 0, 1] = K[:, 1, 0] = R[:, 2, 1] - R[:, 1, 2]
-    K[:, 0, 2] = K[:, 2, 0] = R[:, 0, 2] - R[:, 2, 0]
-    K[:, 0, 3] = K[:, 3, 0] = R[:, 1, 0] - R[:, 0, 1]
-    K[:, 1, 2] = K[:, 2, 1] = R[:, 1, 0] + R[:, 0, 1]
-    K[:, 1, 3] = K[:, 3, 1] = R[:, 0, 2] + R[:, 2, 0]
-    K[:, 2, 3] = K[:, 3, 2] = R[:, 2, 1] + R[:, 1, 2]
-    best = np.argmax(np.diagonal(K, axis1=1, axis2=2), axis=1)
-    Q = K[np.arange(len(R)), best]
-    Q /= np.linalg.norm(Q, axis=1)[:, None]
-    return np.where(Q[:, :1] < 0.0, -Q, Q)
-
-
-def rotation_vectors(R: Array) -> Array:
-    """``log`` of rotations (N, 3, 3), shape (N, 3) [rad]."""
-    Q = quaternions(R)
-    half_sine = np.linalg.norm(Q[:, 1:], axis=1)
-    angle = 2.0 * np.arctan2(half_sine, Q[:, 0])
-    scale = np.where(half_sine > 1e-150, angle / np.maximum(half_sine, 1e-150), 2.0)
-    return Q[:, 1:] * scale[:, None]
 
 
 def _along(axes: Array, vectors: Array) -> Array:

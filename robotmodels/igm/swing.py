@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
+from ..se3.orientation import quaternions_of
 from .alike import prepare_alike
-from .components import Components, asked_errors, mask_axes, quaternions
+from .components import Components, asked_errors, mask_axes
 from .dependent import DEPENDENT, held_chain, prepare_held
 from .gather import assembled, merged, rows_of
 from .loop import JointChain
@@ -219,7 +220,7 @@ def _equations(
     asked = np.flatnonzero(components.asked[:3])
     across = np.swapaxes(axes[:, :, asked], 1, 2)
     away = (across @ (U[:, :3, 3] - P[:, :3, 3])[..., None])[..., 0] / length
-    Q = quaternions(U[:, :3, :3] @ np.swapaxes(P[:, :3, :3], 1, 2))
+    Q = quaternions_of(U[:, :3, :3] @ np.swapaxes(P[:, :3, :3], 1, 2))
     e = axes[:, :, int(np.flatnonzero(components.asked[3:])[0])]
     twist = 2.0 * np.sum(e * Q[:, 1:], axis=1)
     # (c, v) becomes (c, v) (1, -w/2) where the tool turns by w
