@@ -1,5 +1,6 @@
 """How commands end when something is wrong: one line, a status, no traceback unasked."""
 
+import ctypes
 import io
 import json
 import os
@@ -117,6 +118,18 @@ def test_a_bug_is_said_in_one_line_and_told_when_asked_for(run, monkeypatch):
 def test_what_stops_a_command_is_said(run, monkeypatch, error, code, line):
     failing(monkeypatch, error)
     assert run("robots") == (code, "", f"robotmodels: {line}\n")
+
+
+def test_an_interrupt_in_a_callback_of_compiled_code_is_no_bug(run, monkeypatch):
+    def interrupted():
+        raise KeyboardInterrupt
+
+    def compiling(arguments):
+        ctypes.CFUNCTYPE(None)(interrupted)()  # Python cannot raise through it
+        raise RuntimeError("no compiled object yet")
+
+    monkeypatch.setattr(robots_command, "run", compiling)
+    assert run("robots") == (ExitStatus.INTERRUPTED, "", "robotmodels: interrupted.\n")
 
 
 def test_warnings_of_the_package_are_lines(run, monkeypatch):

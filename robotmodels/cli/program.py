@@ -7,12 +7,13 @@ import importlib
 import os
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from .. import __version__
 from ..errors import RobotModelsError, nearest_names
 from .exit_status import ExitStatus, statuses
+from .interrupts import noticed
 from .numbers import joined
 from .option_words import in_options
 from .parsing import Parser
@@ -57,9 +58,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     0
     """
     words = list(sys.argv[1:] if argv is None else argv)
-    with prepared():
+    with prepared(), noticed() as interrupted:
         try:
-            return int(_run(words))
+            return int(_run(words, interrupted))
         except SystemExit as stop:  # of argparse: help, version, or a wrong argument
             return int(stop.code) if isinstance(stop.code, int) else 2
 
@@ -112,7 +113,7 @@ def _add_traceback(parser: argparse.ArgumentParser) -> None:
                         help="after an error, show where it came from")  # fmt: skip
 
 
-def _run(words: list[str]) -> int:
+def _run(words: list[str], interrupted: Callable[[], bool]) -> int:
     command = next((word for word in words if not word.startswith("-")), None)
     traced = "--traceback" in words or os.environ.get("ROBOTMODELS_TRACEBACK", "0") not in ("", "0")
     options: list[str] = []
@@ -143,6 +144,9 @@ def _run(words: list[str]) -> int:
     except Exception as error:  # noqa: BLE001  # nobody asked for a traceback at a terminal
         if traced:
             traceback.print_exc()
+        if interrupted():
+            say("interrupted.")
+            return ExitStatus.INTERRUPTED
         said, status = _outcome(error, options)
         say(said)
         return status
