@@ -165,8 +165,8 @@ def test_options_that_take_numbers_take_negative_ones(command):
 
 # --- every option that is parsed changes something ------------------------------------------------
 
-SAME = {"-h", "--help", "--traceback", "--quiet", "--json", "--out"}
-"""They change how a command speaks, which other tests hold."""
+SAME = {"-h", "--help", "--traceback", "--quiet", "--json", "--out", "--mimic"}
+"""They change how a command speaks, which other tests hold; mimic joints are tried at the end."""
 BASE = {
     "info": ["info", "arm.urdf"],
     "igm": ["igm", "arm.urdf", "--q", *Q],
@@ -296,3 +296,28 @@ def changed(words, options):
         after = (j for j in range(first, len(given)) if str(given[j]).startswith("--"))
         given[first : next(after, len(given))] = values
     return given
+
+
+MIMICS = """<robot name="two"><link name="base"/><link name="left"/><link name="right"/>
+<joint name="a" type="continuous"><parent link="base"/><child link="left"/><axis xyz="0 0 1"/>
+</joint>
+<joint name="b" type="continuous"><parent link="base"/><child link="right"/><axis xyz="0 0 1"/>
+<mimic joint="a" multiplier="-2" offset="0.1"/></joint></robot>"""
+
+
+def test_mimic_joints_follow_where_it_is_asked_for(run, tmp_path):
+    path = tmp_path / "two.urdf"
+    path.write_text(MIMICS)
+
+    def page(*options):
+        scene = tmp_path / "two.html"
+        code, out, err = run("view", path, *options, "--no-open", "--out", scene, "--json")
+        assert (code, err) == (0, "")
+        sliders = set(re.findall(r'<input type="range"[^>]*', scene.read_text()))
+        return json.loads(out)["q"], len(sliders)
+
+    assert page() == ([0.0, 0.0], 2)
+    assert page("--mimic") == ([0.0, 0.1], 1)
+    code, _, err = run("info", "rx90", "--mimic")
+    assert code == ExitStatus.WRONG_INPUT
+    assert "--mimic are for URDF files" in err

@@ -39,6 +39,9 @@ def add_source(parser: argparse.ArgumentParser, option: bool = False) -> None:
         "--package-dir", action="append", default=[], metavar="FOLDER",
         help="URDF only: folder that holds packages with meshes; may be repeated",
     )  # fmt: skip
+    parser.add_argument("--mimic", action="store_true",
+                        help="URDF only: mimic joints follow their masters; without it they move "
+                        "by themselves")  # fmt: skip
 
 
 def robot_of(arguments: argparse.Namespace) -> RobotModel:
@@ -74,12 +77,13 @@ def robot_of(arguments: argparse.Namespace) -> RobotModel:
         return read_par(name)
     if suffix in (".urdf", ".xml", ".xacro"):
         return RobotModel.from_urdf(
-            name, arguments.base_link, arguments.tip_link, package_dirs=arguments.package_dir
-        )
-    if arguments.base_link or arguments.tip_link or arguments.package_dir:
+            name, arguments.base_link, arguments.tip_link, package_dirs=arguments.package_dir,
+            mimic=arguments.mimic,
+        )  # fmt: skip
+    if arguments.base_link or arguments.tip_link or arguments.package_dir or arguments.mimic:
         raise InvalidValueError(
-            f"--base-link, --tip-link and --package-dir are for URDF files; {name!r} is a name of "
-            "the catalogue."
+            f"--base-link, --tip-link, --package-dir and --mimic are for URDF files; {name!r} is a "
+            "name of the catalogue."
         )
     if suffix and Path(name).exists():
         raise InvalidValueError(
