@@ -1,4 +1,9 @@
-"""Check that every notebook is stripped, run it with this interpreter's kernel, export the page."""
+"""Check that every notebook is stripped, run it with this interpreter's kernel, export the page.
+
+The pages are for looking at figures and scenes. Those of nbconvert take MathJax and other scripts
+from the network, so that formulas stay plain text without it; the course as it is read is in the
+site made from `.docs`, which needs no network.
+"""
 
 import os
 import subprocess
