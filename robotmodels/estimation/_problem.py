@@ -59,7 +59,9 @@ class Problem:
         r = r * weight
         J = J * weight[:, None]
         # a sum is finite only if every term is (one that overflows is of no use either)
-        if not (np.isfinite(r @ r) and np.isfinite(J.sum())):
+        with np.errstate(over="ignore", invalid="ignore"):
+            finite = np.isfinite(r @ r) and np.isfinite(J.sum())
+        if not finite:
             return None
         if self.order is not None:
             r, J = r[self.order], J[self.order]

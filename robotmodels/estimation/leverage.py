@@ -110,7 +110,7 @@ def leverage(fit: NonlinearFit) -> Leverage:
     starts = np.concatenate(([0], np.cumsum(sizes)[:-1]))
     shares = np.zeros(len(labels))
     influence = np.zeros(len(labels))
-    noise = 1.0 if fit.sigma_known else max(fit.scale, np.finfo(float).tiny) ** 2
+    noise = 1.0 if fit.sigma_known else max(fit.scale**2, np.finfo(float).tiny)
     for k in np.unique(sizes):
         which = np.flatnonzero(sizes == k)
         rows = order[starts[which][:, None] + np.arange(k)]
