@@ -254,7 +254,7 @@ MUTATIONS = [
         "replace(t, sign=-t.sign)", "replace(t, sign=t.sign)",
         "tests/test_symbolic_dgm.py -k (rx90 or opposite or lab_rr or equation)"),
     Mutation("symbolic dgm", "whole turns are not taken off", "def wrapped(turns: Fraction)",
-        "1 - (1 - turns) % 2", "turns", "tests/test_symbolic_dgm.py -k not (catalogue or foreign)"),
+        "1 - (1 - turns) % 2", "turns", "tests/test_symbolic_cases.py"),
     # --- inverse geometric model -----------------------------------------------------------------
     Mutation("igm: wrist", "the second wrist angle is taken about the other constant",
         "def wrist_postures(", "atan2(R[1, 2], R[0, 2]) - atan2(n1, n0)",
