@@ -22,7 +22,8 @@ from .limits import MotionLimits
 from .piecewise import PiecewisePolynomial
 from .trajectory import Trajectory
 
-_LONGEST = 1e150
+_LONGEST = 1e300
+"""Of a way, so that ten times its polynomial's largest coefficient is a number."""
 
 
 class Synchronisation(Enum):

@@ -11,7 +11,7 @@ from robustness.inputs import TARGETS
 from robustness.outcomes import Outcome
 
 # slow ones draw fewer: they are fuzzed for longer by .ci/fuzz.py
-EXAMPLES = {"urdf": 400, "par": 400, "log_csv": 300, "rows": 300}
+EXAMPLES = {"urdf": 300, "par": 300, "log_csv": 200, "rows": 300}
 
 
 @pytest.mark.parametrize("name", list(TARGETS))
@@ -33,7 +33,7 @@ def test_a_damaged_file_is_read_or_refused(name, tmp_path_factory):
     target = TARGETS[name]
     thorough = os.environ.get("HYPOTHESIS_PROFILE") == "thorough"
 
-    @settings(max_examples=1000 if thorough else EXAMPLES.get(name, 200))
+    @settings(max_examples=1000 if thorough else EXAMPLES.get(name, 150))
     @given(chance=st.randoms(use_true_random=False))
     def run(chance):
         target.judged(target.damaged(chance), folder, chance)
