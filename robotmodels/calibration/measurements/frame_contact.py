@@ -3,39 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Self
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..._arrays import Array
 from ..skeleton import Frame
-from .dilations import have_common_place
-from .labelled import Labelled, Labels, as_known, as_labels
-from .labelled_poses import (
-    SIX,
-    as_known_pose,
-    guessed_poses,
-    labelled_poses,
-    pose_fixtures,
-)
+from .contact import Contact
+from .labelled import Labels
+from .labelled_poses import SIX, as_known_pose, guessed_poses, labelled_poses, pose_fixtures
 from .measurement import (
     POSE_AXES,
     POSE_UNITS,
     Evaluation,
     Fixture,
     Linearised,
-    View,
-    as_noise,
-    as_readings,
-    part_of_noise,
 )
 from .moving_poses import difference, widened
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)
-class FrameContact(Labelled):
+class FrameContact(Contact):
     """The same pose in several postures of the arm (frame coupling, "same pose").
 
     The poses are unknown and estimated along as position and rotation vector, unless they are
@@ -74,6 +64,8 @@ class FrameContact(Labelled):
     'frame:1.rx'
     """
 
+    _met: ClassVar[str] = "pose"
+
     q: Array
     pose: tuple[str, ...]
     known: Mapping[str, Array]
@@ -92,26 +84,7 @@ class FrameContact(Labelled):
         frame: Frame = None,
         name: str = "frame",
     ) -> None:
-        set_ = object.__setattr__
-        set_(self, "q", as_readings(q))
-        labels = as_labels(pose, len(self.q), "pose")
-        set_(self, "pose", labels)
-        set_(self, "known", as_known(known, labels, "pose", as_known_pose))
-        noise = as_noise(sigma, covariance, len(self.q), 6)
-        set_(self, "sigma", noise[0])
-        set_(self, "covariance", noise[1])
-        set_(self, "frame", frame)
-        set_(self, "name", name)
-
-    @property
-    def label(self) -> tuple[str, ...]:
-        """Pose that each row reaches."""
-        return self.pose
-
-    @property
-    def blocks(self) -> int:
-        """Number of configurations."""
-        return len(self.q)
+        self._settle(q, pose, known, as_known_pose, sigma, covariance, frame, name)
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -124,35 +97,15 @@ class FrameContact(Labelled):
         return POSE_UNITS
 
     @property
-    def views(self) -> tuple[View, ...]:
-        """The end each time."""
-        return (View(self.frame, self.q),)
-
-    @property
     def fixtures(self) -> tuple[Fixture, ...]:
         """Position and rotation vector of each unknown pose."""
         return pose_fixtures(self, SIX)
-
-    @property
-    def is_constraint(self) -> bool:
-        """It is."""
-        return True
 
     @property
     def dilation_centres(self) -> tuple[Array, Array]:
         """The origins of the known poses."""
         places = [T[:3, 3] for T in self.known.values()]
         return np.tile(np.eye(3), (len(places), 1)), np.array(places).reshape(-1)
-
-    @property
-    def knows_length(self) -> bool:
-        """Two known poses with different origins are a known length; a single one is not."""
-        return not have_common_place(*self.dilation_centres)
-
-    @property
-    def sees_base(self) -> bool:
-        """Only through poses that are known in the world."""
-        return bool(self.known)
 
     def guess(self, evaluations: Sequence[Evaluation]) -> Array | None:
         """Mean of the poses that the nominal robot thinks it reaches."""
@@ -164,17 +117,3 @@ class FrameContact(Labelled):
         end = widened(evaluations[0], len(fixtures))
         residual, J = difference(end, labelled_poses(self, SIX, fixtures, P))
         return Linearised(residual, J[..., :P], J[..., P:])
-
-    def with_configurations(self, configurations: Sequence[Array]) -> Self:
-        """The same poses at other readings."""
-        (q,) = configurations
-        return replace(self, q=q)
-
-    def subset(self, blocks: NDArray[np.int64]) -> Self:
-        """Some of the configurations."""
-        sigma, covariance = part_of_noise(self, blocks)
-        pose = tuple(self.pose[b] for b in blocks)
-        return replace(
-            self, q=self.q[blocks], pose=pose, known=self.known_of(pose), sigma=sigma,
-            covariance=covariance,
-        )  # fmt: skip

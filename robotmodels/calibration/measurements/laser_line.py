@@ -3,31 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Self
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..._arrays import Array, as_exact, read_only
 from ...errors import InvalidValueError
 from ..skeleton import Frame
-from .dilations import have_common_place
-from .labelled import Labelled, Labels, as_known, as_labels
-from .measurement import (
-    Evaluation,
-    Fixture,
-    Linearised,
-    View,
-    as_noise,
-    as_readings,
-    part_of_noise,
-)
+from .contact import Contact
+from .labelled import Labels
+from .measurement import Evaluation, Fixture, Linearised
 from .rotation_vectors import tilt_of, tilted_axes, unit_vector
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)
-class LaserLine(Labelled):
+class LaserLine(Contact):
     """Configurations in which the end's origin lies on a line, known or not.
 
     A line is the axis z of the world turned about x and y (rx, ry, rad) and moved along the turned
@@ -67,6 +59,8 @@ class LaserLine(Labelled):
     ['line:0.rx', 'line:0.ry', 'line:0.x', 'line:0.y']
     """
 
+    _met: ClassVar[str] = "line"
+
     q: Array
     line: tuple[str, ...]
     known: Mapping[str, Array]
@@ -85,26 +79,7 @@ class LaserLine(Labelled):
         frame: Frame = None,
         name: str = "line",
     ) -> None:
-        set_ = object.__setattr__
-        set_(self, "q", as_readings(q))
-        labels = as_labels(line, len(self.q), "line")
-        set_(self, "line", labels)
-        set_(self, "known", as_known(known, labels, "line", _as_line))
-        noise = as_noise(sigma, covariance, len(self.q), 2)
-        set_(self, "sigma", noise[0])
-        set_(self, "covariance", noise[1])
-        set_(self, "frame", frame)
-        set_(self, "name", name)
-
-    @property
-    def label(self) -> tuple[str, ...]:
-        """Line of each configuration."""
-        return self.line
-
-    @property
-    def blocks(self) -> int:
-        """Number of configurations."""
-        return len(self.q)
+        self._settle(q, line, known, _as_line, sigma, covariance, frame, name)
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -117,11 +92,6 @@ class LaserLine(Labelled):
         return ("m", "m")
 
     @property
-    def views(self) -> tuple[View, ...]:
-        """The end at every configuration."""
-        return (View(self.frame, self.q),)
-
-    @property
     def fixtures(self) -> tuple[Fixture, ...]:
         """Two turns and two coordinates of each unknown line."""
         return tuple(
@@ -131,26 +101,11 @@ class LaserLine(Labelled):
         )
 
     @property
-    def is_constraint(self) -> bool:
-        """It is."""
-        return True
-
-    @property
     def dilation_centres(self) -> tuple[Array, Array]:
         """The known lines."""
         four = np.array([_four(line) for line in self.known.values()]).reshape(-1, 4)
         across = tilted_axes(four[:, :2])[0][:, :, :2]
         return across.swapaxes(1, 2).reshape(-1, 3), four[:, 2:].reshape(-1)
-
-    @property
-    def knows_length(self) -> bool:
-        """Known lines that do not meet in a point are a known length."""
-        return not have_common_place(*self.dilation_centres)
-
-    @property
-    def sees_base(self) -> bool:
-        """Only through lines that are known in the world."""
-        return bool(self.known)
 
     def guess(self, evaluations: Sequence[Evaluation]) -> Array | None:
         """Mean line of the positions on each: direction where they spread most."""
@@ -181,20 +136,6 @@ class LaserLine(Labelled):
             by_fixtures[group == g, :, 4 * g : 4 * g + 4] = by_four[group == g]
         residual = (across @ p[..., None])[..., 0] - four[:, 2:]
         return Linearised(residual, across @ psi[:, :3], by_fixtures)
-
-    def with_configurations(self, configurations: Sequence[Array]) -> Self:
-        """The same lines at other readings."""
-        (q,) = configurations
-        return replace(self, q=q)
-
-    def subset(self, blocks: NDArray[np.int64]) -> Self:
-        """Some of the configurations."""
-        sigma, covariance = part_of_noise(self, blocks)
-        line = tuple(self.line[b] for b in blocks)
-        return replace(
-            self, q=self.q[blocks], line=line, known=self.known_of(line), sigma=sigma,
-            covariance=covariance,
-        )  # fmt: skip
 
 
 def _as_line(value: Any, name: str) -> Array:

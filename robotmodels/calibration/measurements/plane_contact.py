@@ -3,33 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Self
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..._arrays import Array, as_exact, read_only
 from ...errors import InvalidValueError
 from ..skeleton import Frame
-from .dilations import have_common_place
-from .labelled import Labelled, Labels, as_known, as_labels
-from .measurement import (
-    Evaluation,
-    Fixture,
-    Linearised,
-    View,
-    as_noise,
-    as_readings,
-    part_of_noise,
-)
+from .contact import Contact
+from .labelled import Labels
+from .measurement import Evaluation, Fixture, Linearised
 from .rotation_vectors import tilt_of, tilted_axes, unit_vector
 
 _UNIT = 1e-6
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)
-class PlaneContact(Labelled):
+class PlaneContact(Contact):
     """Touches of planes by the end's origin.
 
     A plane is ``normal . p = offset``. Unknown planes are estimated along: the normal as the turn
@@ -77,6 +69,8 @@ class PlaneContact(Labelled):
     ['table:0.rx', 'table:0.ry', 'table:0.offset']
     """
 
+    _met: ClassVar[str] = "plane"
+
     q: Array
     plane: tuple[str, ...]
     known: Mapping[str, Array]
@@ -95,26 +89,7 @@ class PlaneContact(Labelled):
         frame: Frame = None,
         name: str = "plane",
     ) -> None:
-        set_ = object.__setattr__
-        set_(self, "q", as_readings(q))
-        labels = as_labels(plane, len(self.q), "plane")
-        set_(self, "plane", labels)
-        set_(self, "known", as_known(known, labels, "plane", _as_plane))
-        noise = as_noise(sigma, covariance, len(self.q), 1)
-        set_(self, "sigma", noise[0])
-        set_(self, "covariance", noise[1])
-        set_(self, "frame", frame)
-        set_(self, "name", name)
-
-    @property
-    def label(self) -> tuple[str, ...]:
-        """Plane of each touch."""
-        return self.plane
-
-    @property
-    def blocks(self) -> int:
-        """Number of touches."""
-        return len(self.q)
+        self._settle(q, plane, known, _as_plane, sigma, covariance, frame, name)
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -127,11 +102,6 @@ class PlaneContact(Labelled):
         return ("m",)
 
     @property
-    def views(self) -> tuple[View, ...]:
-        """The end at every touch."""
-        return (View(self.frame, self.q),)
-
-    @property
     def fixtures(self) -> tuple[Fixture, ...]:
         """Two turns and the offset of each unknown plane."""
         return tuple(
@@ -141,25 +111,10 @@ class PlaneContact(Labelled):
         )
 
     @property
-    def is_constraint(self) -> bool:
-        """It is."""
-        return True
-
-    @property
     def dilation_centres(self) -> tuple[Array, Array]:
         """The known planes."""
         planes = np.array(list(self.known.values())).reshape(-1, 4)
         return planes[:, :3], planes[:, 3]
-
-    @property
-    def knows_length(self) -> bool:
-        """Known planes without a common point are a known length: parallel ones, or four."""
-        return not have_common_place(*self.dilation_centres)
-
-    @property
-    def sees_base(self) -> bool:
-        """Only through planes that are known in the world."""
-        return bool(self.known)
 
     def guess(self, evaluations: Sequence[Evaluation]) -> Array | None:
         """Mean plane of the touches of each: normal where they spread least."""
@@ -194,20 +149,6 @@ class PlaneContact(Labelled):
         return Linearised(
             ((normal * p).sum(axis=1) - offset)[:, None], normal[:, None] @ psi[:, :3], by_fixtures
         )
-
-    def with_configurations(self, configurations: Sequence[Array]) -> Self:
-        """The same touches at other readings."""
-        (q,) = configurations
-        return replace(self, q=q)
-
-    def subset(self, blocks: NDArray[np.int64]) -> Self:
-        """Some of the touches."""
-        sigma, covariance = part_of_noise(self, blocks)
-        plane = tuple(self.plane[b] for b in blocks)
-        return replace(
-            self, q=self.q[blocks], plane=plane, known=self.known_of(plane), sigma=sigma,
-            covariance=covariance,
-        )  # fmt: skip
 
 
 def _as_plane(value: Any, name: str) -> Array:

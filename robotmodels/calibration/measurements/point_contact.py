@@ -3,30 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Self
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..._arrays import Array
 from ..skeleton import Frame
-from .dilations import have_common_place
-from .labelled import Labelled, Labels, as_known, as_labels
+from .contact import Contact
+from .labelled import Labels
 from .labelled_points import as_point, known_points, labelled_points, point_fixtures
-from .measurement import (
-    Evaluation,
-    Fixture,
-    Linearised,
-    View,
-    as_noise,
-    as_readings,
-    part_of_noise,
-)
+from .measurement import Evaluation, Fixture, Linearised
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)
-class PointContact(Labelled):
+class PointContact(Contact):
     """Touches of points by the end's origin: a ball in a socket, a tip in a centre hole.
 
     The places of the points are unknown and estimated along, unless they are given.
@@ -64,6 +56,8 @@ class PointContact(Labelled):
     ('0', '1')
     """
 
+    _met: ClassVar[str] = "point"
+
     q: Array
     point: tuple[str, ...]
     known: Mapping[str, Array]
@@ -82,26 +76,7 @@ class PointContact(Labelled):
         frame: Frame = None,
         name: str = "point",
     ) -> None:
-        set_ = object.__setattr__
-        set_(self, "q", as_readings(q))
-        labels = as_labels(point, len(self.q), "point")
-        set_(self, "point", labels)
-        set_(self, "known", as_known(known, labels, "point", as_point))
-        noise = as_noise(sigma, covariance, len(self.q), 3)
-        set_(self, "sigma", noise[0])
-        set_(self, "covariance", noise[1])
-        set_(self, "frame", frame)
-        set_(self, "name", name)
-
-    @property
-    def label(self) -> tuple[str, ...]:
-        """Point of each touch."""
-        return self.point
-
-    @property
-    def blocks(self) -> int:
-        """Number of touches."""
-        return len(self.q)
+        self._settle(q, point, known, as_point, sigma, covariance, frame, name)
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -114,34 +89,14 @@ class PointContact(Labelled):
         return ("m", "m", "m")
 
     @property
-    def views(self) -> tuple[View, ...]:
-        """The end at every touch."""
-        return (View(self.frame, self.q),)
-
-    @property
     def fixtures(self) -> tuple[Fixture, ...]:
         """Coordinates of the unknown points."""
         return point_fixtures(self)
 
     @property
-    def is_constraint(self) -> bool:
-        """It is."""
-        return True
-
-    @property
     def dilation_centres(self) -> tuple[Array, Array]:
         """The known points."""
         return known_points(self)
-
-    @property
-    def knows_length(self) -> bool:
-        """Two known points are a known length; about a single one the robot can shrink."""
-        return not have_common_place(*self.dilation_centres)
-
-    @property
-    def sees_base(self) -> bool:
-        """Only through points that are known in the world."""
-        return bool(self.known)
 
     def guess(self, evaluations: Sequence[Evaluation]) -> Array | None:
         """Mean position of the touches of each point."""
@@ -155,17 +110,3 @@ class PointContact(Labelled):
         T, psi = evaluations[0]
         target, by_fixtures = labelled_points(self, fixtures)
         return Linearised(T[:, :3, 3] - target, psi[:, :3], -by_fixtures)
-
-    def with_configurations(self, configurations: Sequence[Array]) -> Self:
-        """The same touches at other readings."""
-        (q,) = configurations
-        return replace(self, q=q)
-
-    def subset(self, blocks: NDArray[np.int64]) -> Self:
-        """Some of the touches."""
-        sigma, covariance = part_of_noise(self, blocks)
-        point = tuple(self.point[b] for b in blocks)
-        return replace(
-            self, q=self.q[blocks], point=point, known=self.known_of(point), sigma=sigma,
-            covariance=covariance,
-        )  # fmt: skip
