@@ -17,7 +17,7 @@ from robotmodels.calibration.joint_errors import encoder_transmission, joint_err
 from robotmodels.calibration.offsets import joint_offsets, pose_offsets
 from robotmodels.calibration.parameters import GeometricParameter, GeometricParameters
 from robotmodels.calibration.reading_jacobian import missing_of_pose, reading_jacobian
-from robotmodels.calibration.write import calibrated_urdf
+from robotmodels.calibration.reporting.write import calibrated_urdf
 from robotmodels.errors import InvalidValueError, ShapeError, UrdfWarning
 
 

@@ -15,7 +15,7 @@ from robotmodels.calibration.measurements import (
     RelativePose,
 )
 from robotmodels.calibration.read import read_measurements
-from robotmodels.calibration.write import result_data, write_result
+from robotmodels.calibration.reporting.write import result_data, write_result
 from robotmodels.csv_table import open_table
 from robotmodels.errors import InvalidValueError, NotARotationError
 from robotmodels.geometry import DHTable

@@ -12,8 +12,8 @@ from robotmodels.calibration import KnownDistance, PointContact, Pose, Position,
 from robotmodels.calibration.candidates import candidate_parameters
 from robotmodels.calibration.differential import differential_model
 from robotmodels.calibration.problem import linearised
-from robotmodels.calibration.report import report_sections, report_text, strong_correlations
-from robotmodels.calibration.report_parts import degrees, in_unit, millimetres
+from robotmodels.calibration.reporting.text import report_sections, report_text, strong_correlations
+from robotmodels.calibration.reporting.units import degrees, in_unit, millimetres
 from robotmodels.calibration.residuals import measured_residuals
 from robotmodels.errors import InvalidValueError
 from robotmodels.kinematics import dgm

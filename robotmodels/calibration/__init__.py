@@ -41,7 +41,8 @@ from .prior import ParameterPrior
 from .problem import Problem, problem_of
 from .read import read_measurements
 from .reading_jacobian import reading_jacobian
-from .report import report_text
+from .reporting.text import report_text
+from .reporting.write import calibrated_urdf, result_data, write_result
 from .residuals import measured_residuals
 from .result import CalibrationResult
 from .select import select_configurations
@@ -51,7 +52,6 @@ from .skeleton import Skeleton, skeleton_of
 from .solve import Solution
 from .structural import identifiable_parameters
 from .true_errors import TrueErrors, true_errors
-from .write import calibrated_urdf, result_data, write_result
 
 __all__ = [
     "AngleUnit",

@@ -148,6 +148,6 @@ class CalibrationResult(Rebuilt):
 
     def report(self) -> str:
         """All of it as text."""
-        from .report import report_text
+        from .reporting.text import report_text
 
         return report_text(self)

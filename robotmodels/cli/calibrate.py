@@ -237,7 +237,7 @@ def read(
 
 
 def _report(result: CalibrationResult) -> Report:
-    from ..calibration.write import result_data, write_result
+    from ..calibration.reporting.write import result_data, write_result
 
     text = result.report()
 

@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..calibration.report import report_sections
+from ..calibration.reporting.text import report_sections
 from ..calibration.result import CalibrationResult
 from .plot_calibration_in_space import plot_calibration_in_space
 from .plot_calibration_normality import plot_calibration_normality

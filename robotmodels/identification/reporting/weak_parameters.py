@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..._arrays import Array
+from ...estimation.correlation import correlated_pairs
 from ...minimal_parameters import BaseParameters
 from ..methods.estimate import Estimate
 
@@ -131,13 +132,7 @@ def strong_correlations(
     >>> strong_correlations(Estimate(Method.OLS, ("Fv1", "Fc1"), np.ones(2), P, np.ones(1)))
     (('Fv1', 'Fc1', 0.95),)
     """
-    C = estimate.correlation
-    first, second = np.nonzero(np.triu(np.abs(np.nan_to_num(C)) > least, k=1))
-    pairs = [
-        (estimate.names[i], estimate.names[j], float(C[i, j]))
-        for i, j in zip(first.tolist(), second.tolist(), strict=True)
-    ]
-    return tuple(sorted(pairs, key=lambda pair: -abs(pair[2])))
+    return correlated_pairs(estimate.correlation, estimate.names, least)
 
 
 def not_seen(estimate: Estimate, least: float = NOT_SEEN) -> tuple[str, ...]:

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._arrays import Array
-from ..errors import InvalidValueError, MissingExtraError, UrdfWarning
-from ..estimation import confidence_intervals
-from ..model import to_urdf
-from .calibrated import CalibratedRobot
-from .errors_seen import BlockErrors
+from ..._arrays import Array
+from ...errors import InvalidValueError, MissingExtraError, UrdfWarning
+from ...estimation import confidence_intervals
+from ...model import to_urdf
+from ..calibrated import CalibratedRobot
+from ..errors_seen import BlockErrors
 
 if TYPE_CHECKING:
-    from .result import CalibrationResult
+    from ..result import CalibrationResult
 
 _FORMAT = 1
 """Raised when the meaning of an entry changes."""
