@@ -69,3 +69,10 @@ def test_house_names_every_room():
     assert rooms - named == {
         "csv_table", "file_units", "latex_text", "table_text", "khalil_frames", "visual",
     }  # fmt: skip
+
+
+def test_what_it_links_to_is_in_the_repository():
+    linked = re.findall(r"\]\(([^)#]+)\)", re.sub(r"^```.*?^```", "", TEXT, flags=re.M | re.S))
+    inside = [link for link in linked if not link.startswith("https://")]
+    assert any(link.endswith(".png") for link in inside)
+    assert [link for link in inside if not (Path(__file__).parents[1] / link).is_file()] == []
