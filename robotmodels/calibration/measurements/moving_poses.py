@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..._arrays import Array
+from ...se3 import skew
 from .measurement import Evaluation
-from .rotation_vectors import inverse_left_jacobians, rotation_errors, skew_of
+from .rotation_vectors import inverse_left_jacobians, rotation_errors
 
 
 def widened(pose: Evaluation, columns: int) -> Evaluation:
@@ -48,7 +49,7 @@ def product(a: Evaluation, b: Evaluation) -> Evaluation:
     R = a.T[:, :3, :3]
     arm = (R @ b.T[:, :3, 3:])[..., 0]
     psi = np.empty_like(a.psi)
-    psi[:, :3] = a.psi[:, :3] - skew_of(arm) @ a.psi[:, 3:] + R @ b.psi[:, :3]
+    psi[:, :3] = a.psi[:, :3] - skew(arm) @ a.psi[:, 3:] + R @ b.psi[:, :3]
     psi[:, 3:] = a.psi[:, 3:] + R @ b.psi[:, 3:]
     return Evaluation(a.T @ b.T, psi)
 
@@ -72,7 +73,7 @@ def relative(a: Evaluation, b: Evaluation) -> Evaluation:
     T[:, :3, :3] = Rt @ b.T[:, :3, :3]
     T[:, :3, 3] = (Rt @ apart[..., None])[..., 0]
     psi = np.empty_like(a.psi)
-    psi[:, :3] = Rt @ (b.psi[:, :3] - a.psi[:, :3] + skew_of(apart) @ a.psi[:, 3:])
+    psi[:, :3] = Rt @ (b.psi[:, :3] - a.psi[:, :3] + skew(apart) @ a.psi[:, 3:])
     psi[:, 3:] = Rt @ (b.psi[:, 3:] - a.psi[:, 3:])
     return Evaluation(T, psi)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..._arrays import Array
+from ...se3 import skew
 
 
 def rotation_errors(R: Array, R_measured: Array) -> Array:
@@ -47,7 +48,7 @@ def inverse_left_jacobians(u: Array) -> Array:
     T. D. Barfoot, State Estimation for Robotics, Cambridge 2017, eq. (7.76).
     """
     angle = np.linalg.norm(u, axis=-1)[:, None, None]
-    K = skew_of(u)
+    K = skew(u)
     half = 0.5 * angle
     small = angle < 1e-4
     safe = np.where(small, 1.0, half)
@@ -70,30 +71,12 @@ def left_jacobians(u: Array) -> Array:
         Left Jacobians of SO(3).
     """
     angle = np.linalg.norm(u, axis=-1)[:, None, None]
-    K = skew_of(u)
+    K = skew(u)
     small = angle < 1e-4
     safe = np.where(small, 1.0, angle)
     a = np.where(small, 0.5 - angle**2 / 24.0, (1.0 - np.cos(safe)) / safe**2)
     b = np.where(small, 1.0 / 6.0 - angle**2 / 120.0, (safe - np.sin(safe)) / safe**3)
     return np.eye(3) + a * K + b * (K @ K)
-
-
-def skew_of(u: Array) -> Array:
-    """Matrices of the vector product.
-
-    Parameters
-    ----------
-    u : ndarray, shape (..., 3)
-        Vectors.
-
-    Returns
-    -------
-    ndarray, shape (..., 3, 3)
-        ``skew_of(u) @ x`` is ``cross(u, x)``.
-    """
-    K = np.zeros((*u.shape, 3))
-    K[..., 0, 1], K[..., 0, 2], K[..., 1, 2] = -u[..., 2], u[..., 1], -u[..., 0]
-    return K - K.swapaxes(-1, -2)
 
 
 def rotations_of(u: Array) -> Array:
@@ -172,7 +155,7 @@ def tilted_axes(tilt: Array) -> tuple[Array, Array]:
     u = np.column_stack([tilt, np.zeros(len(tilt))])
     R = rotations_of(u)
     w = left_jacobians(u)[:, :, :2]
-    turned = -skew_of(R.swapaxes(-1, -2)) @ w[:, None]
+    turned = -skew(R.swapaxes(-1, -2)) @ w[:, None]
     return R, turned.swapaxes(1, 2)
 
 
