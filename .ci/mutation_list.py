@@ -30,8 +30,6 @@ BASE = (
     "tests/test_base_parameters.py"
     " -k (random_robots or book or prismatic or horizontal or wrist or keeps)"
 )
-IKM = "tests/test_ikm.py tests/test_ikm_levels.py"
-PAUL = "tests/test_igm_paul.py -k (type_ or quartic or polynomial)"
 FILTERS = "tests/test_identification_signals.py"
 
 # fmt: off
@@ -272,7 +270,7 @@ MUTATIONS = [
         "middle[i, 3] -= pose[j, i] * pose[j, 3]", "middle[i, 3] += pose[j, i] * pose[j, 3]",
         "tests/test_igm_cases.py"),
     Mutation("igm: quadratic", "4 a c becomes 2 a c", "def quadratic_roots(", "b * b - 4.0 * a * c",
-        "b * b - 2.0 * a * c", PAUL),
+        "b * b - 2.0 * a * c", "tests/test_igm_cases.py"),
     Mutation("igm: general", "one of the fourteen functions loses a factor 2", "def fourteen(",
         "pp * ly - 2 * pl * py", "pp * ly - pl * py", "tests/test_igm_general.py -k manocha"),
     Mutation("igm: general", "a joint of the far side turns forwards", "def right_side(",
