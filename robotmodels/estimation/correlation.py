@@ -33,9 +33,9 @@ def correlated_pairs(
     >>> correlated_pairs(np.array([[1.0, -0.95], [-0.95, 1.0]]), ("a", "b"), 0.9)
     (('a', 'b', -0.95),)
     """
-    strong = np.triu(np.abs(np.nan_to_num(correlation)) > least, k=1)
+    first, second = np.nonzero(np.triu(np.abs(np.nan_to_num(correlation)) > least, k=1))
     pairs = [
         (names[i], names[j], float(correlation[i, j]))
-        for i, j in zip(*(places.tolist() for places in np.nonzero(strong)), strict=True)
+        for i, j in zip(first.tolist(), second.tolist(), strict=True)
     ]
     return tuple(sorted(pairs, key=lambda pair: -abs(pair[2])))
