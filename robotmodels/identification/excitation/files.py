@@ -35,6 +35,10 @@ class TrajectoryFile(Enum):
     YAML = ".yaml"
 
 
+_MODERATE = 500
+"""Order up to which functions are made before their number is compared."""
+
+
 def write_trajectory(
     trajectory: Trajectory | ExcitingTrajectory,
     path: str | Path,
@@ -208,11 +212,9 @@ def read_coefficients(path: str | Path) -> Trajectory:
         raise InvalidValueError(f"{path}: the motion cannot be read: {error}.") from None
     if not 0.0 < basis.duration < float("inf"):
         raise InvalidValueError(f"{path}: a motion of {basis.duration} s; expected seconds.")
-    if basis.order > len(np.atleast_1d(coefficients)) + 1:  # said before anything is that large
-        raise ShapeError(
-            f"{path}: {len(np.atleast_1d(coefficients))} rows of coefficients for order "
-            f"{basis.order}."
-        )
+    rows = len(np.atleast_1d(coefficients))
+    if basis.order > max(_MODERATE, rows + 1):  # before functions of that order are made
+        raise ShapeError(f"{path}: {rows} rows of coefficients cannot be of order {basis.order}.")
     if coefficients.ndim != 2 or len(coefficients) != basis.count:
         raise ShapeError(
             f"{path}: expected {basis.count} rows of coefficients, got {coefficients.shape}."
