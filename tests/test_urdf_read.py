@@ -736,3 +736,15 @@ def test_an_inertial_without_mass_is_refused():
     <joint name="j" type="continuous"><parent link="a"/><child link="b"/></joint></robot>"""
     with pytest.raises(UrdfError, match="needs <mass"):
         read(text)
+
+
+def test_a_mimic_joint_that_moves_by_itself_is_said():
+    text = """<robot name="pair"><link name="base"/><link name="a"/><link name="b"/>
+    <joint name="one" type="revolute"><parent link="base"/><child link="a"/><axis xyz="0 0 1"/>
+      <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+    <joint name="two" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>
+      <origin xyz="1 0 0"/><mimic joint="one"/>
+      <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+    said = "joint 'two' mimics 'one' and moves by itself here"
+    assert any(said in note for note in RobotModel.from_urdf(text).notes)
+    assert not any(said in note for note in RobotModel.from_urdf(text, mimic=True).notes)

@@ -164,6 +164,13 @@ def _parts(
         for joint in joints
         if joint.mimic and joint.mimic[0] not in tree.joints
     ]
+    if not mimic:
+        notes += [
+            f"joint {joint.name!r} mimics {joint.mimic[0]!r} and moves by itself here; read with "
+            "mimic=True to couple them."
+            for joint in joints
+            if joint.mimic and joint.mimic[0] in tree.joints
+        ]
     tip_frame = _tip(tree, placed, named, len(joints), tip_link)
     if tip_link is None and tip_frame.name != TOOL and len(_leaves(table)) > 1:
         notes.append(
