@@ -746,5 +746,5 @@ def test_a_mimic_joint_that_moves_by_itself_is_said():
       <origin xyz="1 0 0"/><mimic joint="one"/>
       <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
     said = "joint 'two' mimics 'one' and moves by itself here"
-    assert any(said in note for note in RobotModel.from_urdf(text).notes)
-    assert not any(said in note for note in RobotModel.from_urdf(text, mimic=True).notes)
+    assert any(said in note for note in rm.RobotModel.from_urdf(text).notes)
+    assert not any(said in note for note in rm.RobotModel.from_urdf(text, mimic=True).notes)
