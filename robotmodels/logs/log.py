@@ -131,7 +131,7 @@ class Log:
             raise InvalidValueError(f"dt: expected the sampling period in seconds, got {dt!r:.60}.")
         object.__setattr__(self, "dt", float(period))
         positions = _rows(q, "q")
-        given = {"tau": tau, "v": v, "a": a, "q_ref": q_ref, "v_ref": v_ref}
+        given: dict[str, Any] = {"tau": tau, "v": v, "a": a, "q_ref": q_ref, "v_ref": v_ref}
         object.__setattr__(self, "q", positions)
         for name, value in given.items():
             array = None if value is None and name != "tau" else _rows(value, name)
