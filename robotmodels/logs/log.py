@@ -285,7 +285,9 @@ def check_is_log(log: object) -> None:
     raise InvalidValueError(f"log: expected a Log, got {type(log).__name__}; {advice}.")
 
 
-def _rows(value: ArrayLike, name: str) -> Array:
+def _rows(value: ArrayLike | None, name: str) -> Array:
+    if value is None:
+        raise InvalidValueError(f"{name}: expected samples of shape (N, n), got None.")
     array = as_floats(value, name)
     if array.ndim != 2:
         raise ShapeError(f"{name}: expected samples of shape (N, n), got {array.shape}.")
