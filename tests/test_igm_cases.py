@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import robotmodels as rm
+from robotmodels import se3
 from robotmodels.igm.closed_form import closed_form_postures, plan_loop
+from robotmodels.igm.general._eigenproblem import assemble
 from robotmodels.igm.loop import joint_chain
 
 SERVED = ("rx90", "stanford_arm", "irb140", "ur5", "ur10e", "gantry")
@@ -51,3 +53,40 @@ def check(model, rng):
     between = postures[:, None] - postures
     between[..., turning] = (between[..., turning] + np.pi) % (2.0 * np.pi) - np.pi
     assert np.abs(between).max(axis=-1)[np.triu_indices(len(postures), 1)].min() > 1e-6
+
+
+@pytest.mark.parametrize("swapped", [0, 1])
+@pytest.mark.parametrize("slide", [None, 0, 1, 3, 4])
+@pytest.mark.parametrize("seed", range(2))
+def test_the_matrix_of_a_general_arm_has_its_posture_among_its_eigenvalues(seed, slide, swapped):
+    """A loop closed at random joint values: tan((q_2 - angle) / 2) is an eigenvalue.
+
+    And the equations hold: six in joints 2, 3, 4 alone, eight that tell of joints 0 and 1.
+    """
+    rng = np.random.default_rng(seed)
+    kinds = np.zeros(6, dtype=np.int64)
+    if slide is not None:
+        kinds[slide] = 1
+    q = rng.uniform(-2.0, 2.0, 6)
+    links, T = np.tile(np.eye(4), (6, 1, 1)), np.eye(4)
+    for k in range(6):
+        turn = se3.rotation("z", q[k]) if kinds[k] == 0 else se3.translation(0.0, 0.0, q[k])
+        T = T @ turn
+        if k < 5:
+            links[k] = se3.from_rpy(rng.uniform(-2.0, 2.0, 3), rng.uniform(-0.7, 0.7, 3))
+            T = T @ links[k]
+    closing = se3.inverse(T)[None]
+    M, P, Q = np.empty((1, 16, 16)), np.empty((1, 14, 27)), np.empty((1, 8, 8))
+    order, angle, quality = np.empty((1, 8), dtype=np.int64), np.empty(1), np.empty(1)
+    assemble(kinds, links, 5, closing, swapped, M, P, Q, order, angle, quality)
+    assert quality[0] > 1e-6
+    asked = np.tan(0.5 * (q[2] - angle[0]))
+    assert np.abs(np.linalg.eigvals(M[0]) - asked).min() < 1e-7 * max(1.0, abs(asked))
+    basis = [
+        (1.0, x, x * x) if kind else (1.0, np.cos(x), np.sin(x))
+        for kind, x in zip(kinds, q, strict=True)
+    ]
+    left = P[0] @ np.kron(basis[2], np.kron(basis[3], basis[4]))
+    right = np.kron(basis[0], basis[1])[1:][order[0]]
+    np.testing.assert_allclose(left[8:], 0.0, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(left[:8], Q[0] @ right, rtol=0, atol=1e-12)
