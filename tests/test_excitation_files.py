@@ -189,4 +189,4 @@ def test_wrong_arguments_of_excite(run, words, message):
 def test_help_of_excite_shows_examples(run):
     code, out, _ = run("excite", "--help")
     assert code == 0
-    assert "robotmodels excite --robot rx90" in out
+    assert "robotmodels excite --robot planar_2r" in out
