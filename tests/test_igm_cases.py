@@ -4,12 +4,15 @@ from itertools import product
 
 import numpy as np
 import pytest
+from numba import njit
+from scipy.spatial.transform import Rotation
 
 import robotmodels as rm
 from robotmodels import se3
 from robotmodels.igm.closed_form import closed_form_postures, plan_loop
 from robotmodels.igm.general._eigenproblem import assemble
 from robotmodels.igm.loop import joint_chain
+from robotmodels.igm.numeric._pose_error import rotation_vector
 
 SERVED = ("rx90", "stanford_arm", "irb140", "ur5", "ur10e", "gantry")
 
@@ -90,3 +93,19 @@ def test_the_matrix_of_a_general_arm_has_its_posture_among_its_eigenvalues(seed,
     right = np.kron(basis[0], basis[1])[1:][order[0]]
     np.testing.assert_allclose(left[8:], 0.0, rtol=0, atol=1e-12)
     np.testing.assert_allclose(left[:8], Q[0] @ right, rtol=0, atol=1e-12)
+
+
+def test_rotation_vectors_of_the_iteration_keep_their_sign_up_to_half_a_turn(rng):
+    """Each of the four ways to the quaternion, whichever component is the largest."""
+
+    @njit
+    def call(m):
+        return rotation_vector(m)
+
+    axes = np.vstack((np.eye(3), -np.eye(3), rng.normal(size=(60, 3))))
+    axes /= np.linalg.norm(axes, axis=1)[:, None]
+    for axis in axes:
+        for angle in (1e-9, 0.4, 2.0, 3.0, np.pi - 1e-3):
+            R = Rotation.from_rotvec(angle * axis).as_matrix()
+            found = np.array(call(tuple(R.ravel().tolist())))
+            np.testing.assert_allclose(found, angle * axis, rtol=0, atol=1e-14 * max(1.0, angle))
