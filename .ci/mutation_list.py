@@ -30,7 +30,6 @@ BASE = (
     "tests/test_base_parameters.py"
     " -k (random_robots or book or prismatic or horizontal or wrist or keeps)"
 )
-FILTERS = "tests/test_identification_signals.py"
 
 # fmt: off
 MUTATIONS = [
@@ -327,7 +326,7 @@ MUTATIONS = [
         "tests/test_estimation_nonlinear.py"),
     Mutation("estimation: nonlinear", "Marquardt's damping loses a square",
         "def step(self, damping: float)", "s * s / s[0] ** 2 + damping", "s / s[0] + damping",
-        "tests/test_estimation_nonlinear.py"),
+        "tests/test_estimation_cases.py -k marquardt"),
     Mutation("estimation: nonlinear", "Huber's loss bends at twice its constant", "def loss_terms(",
         "(2 * u - c) * c", "(u - c) * c", "tests/test_estimation_nonlinear.py"),
     Mutation("estimation: variances", "freedom used by the parameters is not taken off",
@@ -344,20 +343,26 @@ MUTATIONS = [
         "tests/test_calibration_differential.py"),
     Mutation("calibration: differential model", "a second action of a parameter replaces the first",
         "def erroneous_poses(", "out_psi[i, 3 + s, owner[c]] += f * w[s]",
-        "out_psi[i, 3 + s, owner[c]] = f * w[s]", "tests/test_calibration_differential.py"),
+        "out_psi[i, 3 + s, owner[c]] = f * w[s]",
+        "tests/test_kernels_cases.py -k several_elements"),
     # --- identification --------------------------------------------------------------------------
     Mutation("identification: differences", "a weight of the fourth order", "_DIFFERENCES = {",
-        "-1 / 12", "-1 / 10", FILTERS),
+        "-1 / 12", "-1 / 10", "tests/test_identification_signals.py -k central"),
     Mutation("identification: filter", "the backward pass goes forward again",
-        "def forward_backward(", "buffer[::-1]", "buffer", FILTERS),
+        "def forward_backward(", "buffer[::-1]", "buffer",
+        "tests/test_identification_signals.py -k (three_decibels or lines)"),
     Mutation("identification: filter", "ends are continued by their mirror image, not the point's",
-        "def forward_backward(", "2.0 * x[0, c] - x[pad - i, c]", "x[pad - i, c]", FILTERS),
+        "def forward_backward(", "2.0 * x[0, c] - x[pad - i, c]", "x[pad - i, c]",
+        "tests/test_identification_signals.py -k (three_decibels or lines)"),
     Mutation("identification: filter", "two passes take 6 dB at the cutoff", "def _butterworth(",
-        "(np.sqrt(2.0) - 1.0) ** (0.5 / order)", "1.0", FILTERS),
+        "(np.sqrt(2.0) - 1.0) ** (0.5 / order)", "1.0",
+        "tests/test_identification_signals.py -k three_decibels"),
     Mutation("identification: decimation", "outputs are centred one sample late", "def add_rows(",
-        "tap = place + r - o * step + half", "tap = place + r - o * step + half - 1", FILTERS),
+        "tap = place + r - o * step + half", "tap = place + r - o * step + half - 1",
+        "tests/test_identification_signals.py -k falls_to_half"),
     Mutation("identification: decimation", "a row left out counts", "def add_rows(",
-        "use[(start + r) * m + j] != 0", "use[(start + r) * m + j] >= 0", FILTERS),
+        "use[(start + r) * m + j] != 0", "use[(start + r) * m + j] >= 0",
+        "tests/test_identification_signals.py -k dead_band"),
     Mutation("identification: equations", "filtered form: momenta fall where they rise",
         "chunks = momentum_regressor_chunks(", "(ahead - behind)", "(behind - ahead)",
         "tests/test_identification_forms.py -k exact", True),

@@ -5,6 +5,7 @@ import pytest
 
 from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.estimation import (
+    Loss,
     Prior,
     confidence_intervals,
     fit_diagnostics,
@@ -13,6 +14,8 @@ from robotmodels.estimation import (
     select_strength,
     variance_components,
 )
+from robotmodels.estimation._problem import Weighing, checked_problem
+from robotmodels.estimation._step import linear_problem
 from robotmodels.estimation.merging import merged_factor, merged_tree
 
 Y = np.array([1.0, 2.0, 4.0, 3.0])
@@ -115,3 +118,18 @@ def test_merged_factors_keep_products_and_leave_short_ones_alone(rng):
     np.testing.assert_allclose(R.T @ R, A.T @ A + B.T @ B, rtol=1e-13, atol=1e-13)
     few = merged_factor(A[:1], B[:2])
     np.testing.assert_array_equal(few, np.vstack((A[:1], B[:2])))
+
+
+@pytest.mark.parametrize("damping", [0.0, 1e-6, 1e-2, 1.0, 100.0])
+def test_a_damped_step_is_that_of_marquardt_and_predicts_what_it_gains(rng, damping):
+    """(A^T A + damping s_1^2 D^2) dx = -A^T r, with D the lengths of the columns."""
+    A, r = rng.normal(size=(30, 4)) * [1.0, 10.0, 0.01, 1.0], rng.normal(size=30)
+    problem, point = checked_problem(lambda x: (A @ x + r, A), np.zeros(4), 1.0, None, None)
+    linear = linear_problem(problem, Weighing.of(Loss.SQUARES, problem.rows, 1.0), point, 0.0, None)
+    dx, gain, _ = linear.step(damping)
+    D = np.linalg.norm(A, axis=0)
+    s = np.linalg.svd(A / D, compute_uv=False)
+    expected = np.linalg.solve(A.T @ A + damping * s[0] ** 2 * np.diag(D**2), -A.T @ r)
+    np.testing.assert_allclose(dx * D, expected * D, rtol=0, atol=1e-12)
+    left = A @ dx + r
+    assert gain == pytest.approx(r @ r - left @ left, rel=1e-9)

@@ -5,7 +5,9 @@ import pytest
 
 import robotmodels as rm
 from robotmodels.kernels.direct_dynamics import joint_accelerations
+from robotmodels.kernels.erroneous_poses import erroneous_poses
 from robotmodels.kernels.triangles import fold_equations, fold_rows
+from robotmodels.se3 import from_rpy
 
 
 def accelerations_of(mass, tau):
@@ -76,3 +78,34 @@ def test_triangles_of_equations_take_the_rows_and_columns_asked_for(rng):
     fold_equations(W, y, 1, rows, columns, R)
     A = np.column_stack((W[rows, 1][:, columns], y[rows, 1]))
     np.testing.assert_allclose(R.T @ R, A.T @ A, rtol=0, atol=1e-11)
+
+
+def test_a_parameter_that_acts_on_several_elements_moves_the_end_by_all_of_them(rng):
+    """One deviation that is added to elements of two rows, one of them twice, with factors."""
+    nominal = rng.uniform(-1.0, 1.0, (3, 7))
+    sigma, joint = np.array([0, 1, 0]), np.arange(3)
+    path, q = np.arange(3), rng.uniform(-1.0, 1.0, (2, 3))
+    owner = np.array([0, 0, 0, 0, 1])
+    row, element = np.array([0, 1, 1, 2, 2]), np.array([5, 3, 4, 2, 0])
+    factor = rng.uniform(0.5, 2.0, (2, 5))
+    before, after = from_rpy([0.1, 0.2, 0.3], [1, 2, 3]), from_rpy([0.3, -0.5, 0.1], [0.2, 0, 1])
+
+    def poses(deviation):
+        T, psi = np.empty((2, 4, 4)), np.empty((2, 6, 2))
+        erroneous_poses(
+            q, nominal, sigma, joint, path,
+            np.ascontiguousarray(before[:3, :3]), np.ascontiguousarray(before[:3, 3]),
+            np.ascontiguousarray(after[:3, :3]), np.ascontiguousarray(after[:3, 3]),
+            np.asarray(deviation, dtype=float), owner, row, element, factor, T, psi,
+        )  # fmt: skip
+        return T, psi
+
+    x, h = np.array([0.02, -0.03]), 1e-6
+    T, psi = poses(x)
+    for k in range(2):
+        ahead, behind = (poses(x + s * h * np.eye(2)[k])[0] for s in (1.0, -1.0))
+        rate = (ahead - behind) / (2.0 * h)
+        turn = rate[:, :3, :3] @ np.swapaxes(T[:, :3, :3], 1, 2)
+        w = np.stack([turn[:, 2, 1], turn[:, 0, 2], turn[:, 1, 0]], axis=-1)
+        np.testing.assert_allclose(psi[:, :3, k], rate[:, :3, 3], rtol=0, atol=1e-8)
+        np.testing.assert_allclose(psi[:, 3:, k], w, rtol=0, atol=1e-8)
