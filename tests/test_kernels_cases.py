@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import robotmodels as rm
+from robotmodels.kernels.decimation import add_rows
 from robotmodels.kernels.direct_dynamics import joint_accelerations
 from robotmodels.kernels.erroneous_poses import erroneous_poses
 from robotmodels.kernels.triangles import fold_equations, fold_rows
@@ -109,3 +110,27 @@ def test_a_parameter_that_acts_on_several_elements_moves_the_end_by_all_of_them(
         w = np.stack([turn[:, 2, 1], turn[:, 0, 2], turn[:, 1, 0]], axis=-1)
         np.testing.assert_allclose(psi[:, :3, k], rate[:, :3, 3], rtol=0, atol=1e-8)
         np.testing.assert_allclose(psi[:, 3:, k], w, rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("piece", [1, 3, 5, 40])
+def test_thinned_rows_are_the_weighted_sums_around_their_centres(rng, piece):
+    """By the definition, whatever the pieces that rows come in, and for rows that are left out."""
+    N, step, centre = 40, 3, 4
+    rows, use = rng.normal(size=(N, 2, 3)), rng.random((N, 2)) < 0.8
+    taps = np.array([0.1, 0.2, 0.5, 0.9, 0.5, 0.2, 0.1])
+    sums, weights = np.zeros((9, 2, 3)), np.zeros((9, 2))
+    for first in range(0, N, piece):
+        some = slice(first, first + piece)
+        kept = use[some].astype(np.int64).ravel()
+        own = np.ascontiguousarray(rows[some])
+        add_rows(own, kept, np.array([0, 1]), taps, step, first, centre, sums, weights)
+    expected, total = np.zeros_like(sums), np.zeros_like(weights)
+    for o in range(9):
+        for away in range(-3, 4):
+            i = centre + o * step + away
+            if 0 <= i < N:
+                expected[o] += taps[away + 3] * rows[i] * use[i][:, None]
+                total[o] += taps[away + 3] * use[i]
+    expected[:, 1, 0] = 0.0  # columns before the first one that counts are not touched
+    np.testing.assert_allclose(sums, expected, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(weights, total, rtol=0, atol=1e-14)
