@@ -1,4 +1,4 @@
-"""Check that a wheel holds the package, its type marker and every URDF file, nothing else, and is small."""
+"""Check that a wheel holds the package, its type marker and every URDF file, no more, and is small."""
 
 import subprocess
 import sys

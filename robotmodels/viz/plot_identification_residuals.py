@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array
 from ..identification.equations import Equations
-from ..identification.reporting.residuals import residual_diagnostics
 from ..identification.reporting.parameters import kind_names, kind_units
+from ..identification.reporting.residuals import residual_diagnostics
 from ..identification.result import IdentificationResult
 from ..logs import Log
 from .figures import PAGE, SMALL_SIZE, THIN_WIDTH, legend_above, line_style, new_figure, panels
