@@ -1,4 +1,4 @@
-"""Check that a wheel holds the package, its type marker and every URDF file, no more, and is small."""
+"""Check that a wheel is small and holds the package, its type marker and all URDF files, no more."""
 
 import subprocess
 import sys
