@@ -1,4 +1,4 @@
-"""Check that a wheel is small and holds the package, its type marker and all URDF files, no more."""
+"""Check that a wheel is small and holds the package, its type marker and URDF files, no more."""
 
 import subprocess
 import sys
