@@ -16,7 +16,6 @@ import re
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -28,6 +27,17 @@ CHECKOUT = Path(__file__).resolve().parent.parent
 README = CHECKOUT / "README.md"
 UNIT = 1024.0 if sys.platform.startswith("linux") else 1024.0**2  # ru_maxrss: kB, elsewhere bytes
 
+# A process begins with the peak of the one that started it: a small one starts the examples.
+LAUNCH = """
+import os, sys, time
+start = time.perf_counter()
+child = os.posix_spawn(sys.argv[1], sys.argv[1:], os.environ, file_actions=[
+    (os.POSIX_SPAWN_OPEN, 1, os.devnull, os.O_WRONLY, 0)
+])
+_, status, usage = os.wait4(child, 0)
+print(usage.ru_maxrss, usage.ru_utime + usage.ru_stime, time.perf_counter() - start)
+sys.exit(os.waitstatus_to_exitcode(status))
+"""
 RUN_BLOCKS = """
 import doctest, sys
 blocks = open(sys.argv[1], encoding="utf-8").read().split("\\0")
@@ -123,26 +133,17 @@ def spent(example: Example, folder: Path) -> Spent:
             "MPLBACKEND": "Agg",
             "PYTHONWARNINGS": "ignore",
         }
-        start = time.perf_counter()
-        process = subprocess.Popen(
-            [sys.executable, *example.arguments],
+        done = subprocess.run(
+            [sys.executable, "-I", "-S", "-c", LAUNCH, sys.executable, *example.arguments],
             cwd=work,
             env=environment,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
+            capture_output=True,
+            text=True,
         )
-        assert process.stderr is not None
-        said = process.stderr.read()
-        _, status, usage = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
-        if process.returncode:
-            sys.exit(f"{example.name} ended with {process.returncode}:\n{said.decode()}")
-    return Spent(
-        example.name,
-        usage.ru_maxrss / UNIT,
-        usage.ru_utime + usage.ru_stime,
-        time.perf_counter() - start,
-    )
+    if done.returncode:
+        sys.exit(f"{example.name} failed:\n{done.stderr}")
+    peak, processor, clock = map(float, done.stdout.split())
+    return Spent(example.name, peak / UNIT, processor, clock)
 
 
 def report(rows: list[Spent], about: dict[str, str]) -> str:
