@@ -374,11 +374,10 @@ MUTATIONS = [
         "tests/test_identification_fit.py -k weights_are", True),
     Mutation("identification: weighting", "deviations forget what the parameters took",
         "def deviations_of(", "left = counts - taken", "left = counts + taken",
-        "tests/test_identification_fit.py -k (weights_are or covariance)", True),
+        "tests/test_identification_cases.py"),
     Mutation("identification: instruments", "deviations by the inverse twice, untransposed",
-        "spread = inverse @ B", "inverse.T", "inverse", "tests/test_identification_methods.py "
-        "tests/test_identification_closed_loop_noise.py -k (instrument or deviations)", True),
+        "spread = inverse @ B", "inverse.T", "inverse", "tests/test_identification_cases.py"),
     Mutation("identification: instruments", "products of instruments for those with the regressor",
         "use = block.use[:, j]\n", "ZW[j] += z.T @ w", "ZW[j] += z.T @ z",
-        "tests/test_identification_closed_loop.py -k exact_parameters", True),
+        "tests/test_identification_cases.py"),
 ]
