@@ -91,11 +91,11 @@ MUTATIONS = [
     Mutation("kernels: accelerations",
         "Coriolis acceleration of a prismatic joint loses its factor 2",
         "def accelerations(\n    q: Floats", "scale(2.0, cross(w, motion))", "cross(w, motion)",
-        "tests/test_ikm.py -k accelerations"),
+        "tests/test_kernels_cases.py -k tool_far"),
     Mutation("kernels: accelerations", "centripetal acceleration of the tool is lost",
         "# the tool does not move in the last frame",
         "add(cross(dw, arm), cross(w, cross(w, arm)))", "cross(dw, arm)",
-        "tests/test_ikm.py -k accelerations"),
+        "tests/test_kernels_cases.py -k tool_far"),
     # --- dynamics --------------------------------------------------------------------------------
     Mutation("kernels: Newton-Euler", "gravity pulls upwards",
         "# A base that accelerates against gravity loads the links", "(-g[0], -g[1], -g[2])",

@@ -134,3 +134,19 @@ def test_thinned_rows_are_the_weighted_sums_around_their_centres(rng, piece):
     expected[:, 1, 0] = 0.0  # columns before the first one that counts are not touched
     np.testing.assert_allclose(sums, expected, rtol=0, atol=1e-14)
     np.testing.assert_allclose(weights, total, rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("reference", ["world_aligned", "local", "world"])
+@pytest.mark.parametrize("name", ["rx90", "stanford_arm"])
+def test_a_tool_far_from_its_frame_accelerates_as_its_velocity_changes(rng, name, reference):
+    model = rm.load(name)
+    model = model.with_tool(from_rpy([0.3, -0.5, 0.9], [0.4, -0.7, 0.5]))
+    q, v, a = rng.uniform(-1.0, 1.0, (3, 6, model.n)) * [[[1.0]], [[2.0]], [[3.0]]]
+    h = 1e-5
+
+    def twist(t):
+        return rm.dkm(model, q + t * v + 0.5 * t * t * a, v + t * a, reference=reference)
+
+    expected = (twist(h) - twist(-h)) / (2.0 * h)
+    found = rm.dkm_second_order(model, q, v, a, reference=reference)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-7)
