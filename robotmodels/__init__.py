@@ -8,6 +8,7 @@ Pinocchio are imported here, the rest where it is used.
 from __future__ import annotations
 
 import importlib
+import threading
 from typing import TYPE_CHECKING, Any
 
 from . import errors, friction, kinematics, regressors
@@ -237,12 +238,17 @@ _ROOMS = {
     ".symoro": ("read_par",),
 }
 _ROOM_OF = {name: room for room, names in _ROOMS.items() for name in names}
+# Threads that import rooms which import each other would otherwise see half of one.
+_OPENING = threading.RLock()
 
 
 def __getattr__(name: str) -> Any:
     """Import rooms, pictures and derivations when they are first asked for."""
-    if name in ("calibration", "datasets", "identification", "simulation", "trajectories", "viz"):
-        return importlib.import_module(f".{name}", __name__)
-    if name in _ROOM_OF:
-        return getattr(importlib.import_module(_ROOM_OF[name], __name__), name)
+    with _OPENING:
+        if name in (
+            "calibration", "datasets", "identification", "simulation", "trajectories", "viz",
+        ):  # fmt: skip
+            return importlib.import_module(f".{name}", __name__)
+        if name in _ROOM_OF:
+            return getattr(importlib.import_module(_ROOM_OF[name], __name__), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -57,7 +57,8 @@ def run(arguments: argparse.Namespace) -> None:
 
     Examples
     --------
-    >>> source = dict(robot="rx90", base_link=None, tip_link=None, package_dir=[], json=False)
+    >>> source = dict(robot="rx90", base_link=None, tip_link=None, package_dir=[], mimic=False,
+    ...               json=False)
     >>> run(argparse.Namespace(**source))  # doctest: +ELLIPSIS
     rx90: 6 joints, 6 frames...
     """

@@ -11,6 +11,8 @@ Hypothesis draws (and shrinks) the structure and the options; the numbers come f
 draws too, so a failing example prints the call that builds it again.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from hypothesis import strategies as st
 
@@ -173,7 +175,7 @@ def random_model(
     """
     table = random_table(rng, f, tree, prismatic, fixed, passive, limits)
     bodies = {"physical": random_bodies, "any": random_parameters, None: lambda *_: None}[inertia]
-    return rm.RobotModel.from_table(
+    robot = rm.RobotModel.from_table(
         table,
         inertia=bodies(rng, f),
         drive=random_drive(rng, table.n) if drive else None,
@@ -184,6 +186,17 @@ def random_model(
         transmission=random_transmission(rng, table.n) if transmission else None,
         name=name,
     )
+    return robot.with_drive(with_coupled_rotors(robot)) if transmission else robot
+
+
+def with_coupled_rotors(robot):
+    """The drives, with the rotors of coupled motors in the Ia of every joint that turns them.
+
+    Iam alone is the part of such a rotor that couples joints: without the rest it is of no motor.
+    """
+    turns = np.linalg.inv(robot.transmission.matrix)
+    ratios = turns / np.diag(turns)[:, None]
+    return replace(robot.drive, Ia=robot.drive.Ia + robot.transmission.Iam @ ratios**2)
 
 
 def random_state(model, rng, *batch):

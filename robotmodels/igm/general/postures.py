@@ -37,6 +37,7 @@ def general_postures(
 
     Examples
     --------
+    >>> from robotmodels.igm.general import prepare_general
     >>> from robotmodels.igm.loop import joint_chain
     >>> from robotmodels.kinematics import dgm
     >>> from robotmodels.robots import load
@@ -90,6 +91,7 @@ def on_infinite_family(
     --------
     Joint 3 of the CRX at -90 degrees brings four of its axes together.
 
+    >>> from robotmodels.igm.general import prepare_general
     >>> from robotmodels.igm.loop import joint_chain
     >>> from robotmodels.kinematics import dgm
     >>> from robotmodels.robots import load
