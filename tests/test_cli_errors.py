@@ -140,10 +140,15 @@ def test_warnings_of_the_package_are_lines(run, monkeypatch):
     assert run("robots") == (0, "", "robotmodels: warning: a tool is missing\n")
 
 
+def heed_interrupts():
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def test_interrupt_of_a_process():
     words = ["excite", "--robot", "rx90", "--starts", "50", "--random", "2000"]
+    # who runs the tests in the background ignores interrupts, and their children would too
     child = subprocess.Popen([*COMMAND, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                             text=True)  # fmt: skip
+                             text=True, preexec_fn=heed_interrupts)  # fmt: skip
     maps = Path(f"/proc/{child.pid}/maps")
     until = time.monotonic() + 60.0
     # once Pinocchio is there the door is open, and the command is at work or about to be
