@@ -369,7 +369,10 @@ def test_executed_notebooks_show_arms(tmp_path):
         text = exported(nbformat.read(path, as_version=4))
         if "<iframe srcdoc=" not in text:
             continue
+        played = ["set_animation&quot;," in frame for frame in text.split("<iframe srcdoc=")[1:]]
         for k, cell in enumerate(frames_of(text, tmp_path, path.stem)):
-            assert arm_problem(cell) == "", f"{escape(path.name)}, frame {k + 1}"
+            # a picture that plays has room for the whole motion, of which one posture is a part
+            problem = arm_problem(cell, least=0.004 if played[k] else 0.01)
+            assert problem == "", f"{escape(path.name)}, frame {k + 1}"
             seen += 1
     assert seen, f"no notebook of {folder} has a scene in its outputs"
