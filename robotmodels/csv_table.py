@@ -340,11 +340,15 @@ def open_table(path: str | Path, delimiter: str | None = None) -> CsvTable:
     Raises
     ------
     InvalidValueError
-        An empty file, or one that is no text.
+        An empty file, or one that is no text; a delimiter that is not one character.
     OSError
         The file cannot be opened.
     """
     path = Path(path)
+    if delimiter is not None and len(delimiter) != 1:
+        raise InvalidValueError(
+            f"delimiter: expected one character, got {delimiter!r}; leave it out for blanks."
+        )
     found = next((line for line in _lines(path) if line[1].strip()), None)
     if found is None:
         raise InvalidValueError(f"{path}: the file is empty.")

@@ -68,6 +68,10 @@ class MissingExtraError(RobotModelsError, ImportError):
     """An optional package is not installed."""
 
 
+_LISTED = 12
+"""Most names in a message."""
+
+
 class _NameNotFoundError(RobotModelsError, KeyError):
     """A name is unknown; the nearest known ones are in the message and in ``nearest``.
 
@@ -89,8 +93,9 @@ class _NameNotFoundError(RobotModelsError, KeyError):
         self.known = known
         self.nearest = tuple(nearest_names(str(name), known))
         hint = f" Did you mean {_listed(self.nearest)}?" if self.nearest else ""
-        few = known if len(known) <= 12 or not self.nearest else ()
-        shown = _listed(few[:40]) + (f" and {len(few) - 40} more" if len(few) > 40 else "")
+        few = known if len(known) <= _LISTED or not self.nearest else ()
+        left = len(few) - _LISTED
+        shown = _listed(few[:_LISTED]) + (f" and {left} more" if left > 0 else "")
         listing = f" Known: {shown}." if few or not known else ""
         super().__init__(f"No {kind} {name!r}.{hint}{listing} {advice}".rstrip())
 

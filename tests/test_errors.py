@@ -68,7 +68,7 @@ def test_errors_about_names_without_anything_near():
     assert str(FrameNotFoundError("frame", "x", ["base"])) == "No frame 'x'. Known: 'base'."
     assert str(FrameNotFoundError("frame", "x", [])) == "No frame 'x'. Known: none."
     many = FrameNotFoundError("frame", 99, [f"link_{i}" for i in range(60)])
-    assert "'link_39' and 20 more" in str(many)
+    assert "'link_11' and 48 more" in str(many)
 
 
 @pytest.mark.parametrize(

@@ -88,6 +88,10 @@ def test_mistakes_in_the_choice_of_a_strength(folds, strengths, words):
 def test_groups_of_noise_have_a_number_for_each_row_and_progress_ends_at_one():
     with pytest.raises(InvalidValueError, match="a whole number for each row"):
         variance_components(mean_of, [0.0], group=[0.5, 1.0, 1.0, 2.0])
+    with pytest.raises(ShapeError, match="group: expected one number for each of the 4 rows, got"):
+        variance_components(mean_of, [0.0], group=[0, 0, 1])
+    with pytest.raises(ShapeError, match="sigma"):
+        variance_components(mean_of, [0.0], group=[0, 0, 1, 1], sigma=[1.0, 2.0])
     told = []
     variance_components(mean_of, [0.0], group=[0, 0, 1, 1], progress=told.append)
     assert told == sorted(told)

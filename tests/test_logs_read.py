@@ -51,6 +51,12 @@ def test_names_are_found_and_said(file):
     assert any("torques were found in tau1, tau2, tau3" in note for note in log.notes)
 
 
+@pytest.mark.parametrize("delimiter", ["", ", ", "tab"])
+def test_a_delimiter_is_one_character(file, delimiter):
+    with pytest.raises(InvalidValueError, match="delimiter: expected one character"):
+        read_log(file, delimiter=delimiter)
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_any_table_of_numbers_is_read_as_it_is(tmp_path, seed):
     # delimiters, shuffled columns, other columns, with and without a header, odd magnitudes

@@ -107,7 +107,7 @@ def run(arguments: argparse.Namespace) -> None:
     # the postures of the RX-90 differ by turns of links about their own length, so that they
     # would hide one another if they stood in one place
     _show_inverse(rx90, _RX90_POSTURE, folder, columns=4)
-    _show_inverse(ur5, _UR5_POSTURE, folder, columns=None)
+    _show_inverse(ur5, _UR5_POSTURE, folder, columns=4)
     _say("Drawing both arms with meshcat")
     from ..viz import show
 

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from ..identification.excitation import ExcitingTrajectory, WorkspaceBox
     from ..trajectories import MotionLimits
 
+_RATE = 1000.0
+"""Samples per second of a file, unless asked otherwise."""
+
 _EXAMPLES = """\
 examples:
   robotmodels excite --robot planar_2r --duration 10 --harmonics 3 --starts 1 --out motion/
@@ -56,14 +59,17 @@ def add_command(commands: Any) -> None:
     _add_limits(parser.add_argument_group("the limits"))
     _add_search(parser.add_argument_group("the search"))
     files = add_output(parser)
-    files.add_argument("--rate", type=float, default=1000.0,
-                       help="samples per second in the file (default: %(default)s)")  # fmt: skip
-    files.add_argument("--format", choices=("csv", "npz", "yaml"), default="csv",
-                       help="of the samples; yaml: ROS JointTrajectory "
-                       "(default: %(default)s)")  # fmt: skip
+    files.add_argument(
+        "--rate",
+        type=float,
+        help=f"with --out: samples per second in the file (default: {_RATE:g})",
+    )
+    files.add_argument("--format", choices=("csv", "npz", "yaml"),
+                       help="with --out: of the samples; yaml: ROS JointTrajectory "
+                       "(default: csv)")  # fmt: skip
     files.add_argument("--degrees", action="store_true",
-                       help="revolute joints in degrees in the file; --json stays in "
-                       "radians")  # fmt: skip
+                       help="with --out: revolute joints in degrees in the file; --json stays "
+                       "in radians")  # fmt: skip
     parser.set_defaults(run=run)
 
 
@@ -146,10 +152,7 @@ def run(arguments: argparse.Namespace) -> int:
     n = model.n
     if arguments.seed < 0:
         raise InvalidValueError(f"--seed: expected a number from 0, got {arguments.seed}.")
-    if arguments.degrees and arguments.format == "yaml":
-        raise InvalidValueError("--degrees: ROS reads radians; leave it out with --format yaml.")
-    if not 0.0 < arguments.rate < np.inf:
-        raise InvalidValueError(f"--rate: expected a positive number, got {arguments.rate:g}.")
+    _check_file(arguments)
     with progress(arguments, "stages of the search") as bar:
         found = exciting_trajectory(
             model, duration=arguments.duration, harmonics=arguments.harmonics,
@@ -165,6 +168,19 @@ def run(arguments: argparse.Namespace) -> int:
     return ExitStatus.NOT_REACHED if infeasible else ExitStatus.DONE
 
 
+def _check_file(arguments: argparse.Namespace) -> None:
+    """Refuse what cannot be asked of the file with the samples."""
+    for option in ("rate", "format", "degrees"):
+        if arguments.out is None and getattr(arguments, option) not in (None, False):
+            raise InvalidValueError(
+                f"--{option}: says what the file of --out is like; give --out, or leave it out."
+            )
+    if arguments.degrees and arguments.format == "yaml":
+        raise InvalidValueError("--degrees: ROS reads radians; leave it out with --format yaml.")
+    if arguments.rate is not None and not 0.0 < arguments.rate < np.inf:
+        raise InvalidValueError(f"--rate: expected a positive number, got {arguments.rate:g}.")
+
+
 def _report(found: ExcitingTrajectory, arguments: argparse.Namespace) -> Report:
     from ..identification.excitation import write_coefficients, write_trajectory
     from ..identification.excitation.files import excitation_data
@@ -174,8 +190,9 @@ def _report(found: ExcitingTrajectory, arguments: argparse.Namespace) -> Report:
     def write(folder: Path) -> list[str]:
         from ..viz import plot_excitation
 
-        names = [f"trajectory.{arguments.format}", "trajectory.json", "summary.txt"]
-        write_trajectory(found, folder / names[0], arguments.rate, degrees=arguments.degrees)
+        names = [f"trajectory.{arguments.format or 'csv'}", "trajectory.json", "summary.txt"]
+        rate = _RATE if arguments.rate is None else arguments.rate
+        write_trajectory(found, folder / names[0], rate, degrees=arguments.degrees)
         write_coefficients(found, folder / "trajectory.json")
         (folder / "summary.txt").write_text(f"{text}\n", encoding="utf-8")
         picture = folder / "trajectory.png"

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import Array, Rebuilt, read_only
 from .._choices import chosen
 from ..errors import InvalidValueError, ShapeError
-from ._problem import Linearise
+from ._problem import Linearise, checked_problem
 from .leverage import orthonormal_rows
 from .losses import Loss, robust_scale
 from .nonlinear import fit_nonlinear
@@ -116,20 +116,19 @@ def variance_components(
         raise InvalidValueError(
             f"group: expected a whole number for each row, got {numbers.dtype} {numbers.shape}."
         )
+    stated = checked_problem(linearise, x0, sigma, block, prior)[0].sigma
+    if len(numbers) != len(stated):
+        raise ShapeError(
+            f"group: expected one number for each of the {len(stated)} rows, got {len(numbers)}."
+        )
     labels, place = np.unique(numbers, return_inverse=True)
     factors = np.ones(len(labels))
-    stated = np.broadcast_to(np.asarray(sigma, dtype=np.float64), numbers.shape)
     x = x0
     done = 0
     while True:
         fit = fit_nonlinear(
             linearise, x, sigma=stated * factors[place], block=block, loss=loss, prior=prior
         )
-        if len(fit.residuals) != len(numbers):
-            raise ShapeError(
-                f"group: expected one number for each of the {len(fit.residuals)} rows, got "
-                f"{len(numbers)}."
-            )
         x = fit.x
         share = (orthonormal_rows(fit) ** 2).sum(axis=1)
         used = np.asarray(np.bincount(place, share, len(labels)), dtype=np.float64)
