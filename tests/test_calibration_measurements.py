@@ -27,7 +27,7 @@ from robotmodels.calibration.measurements import (
     length_is_known,
     lonely_labels,
 )
-from robotmodels.calibration.measurements.measurement import whitened
+from robotmodels.calibration.measurements.noise import whitened
 from robotmodels.calibration.measurements.pivots import pivot_of
 from robotmodels.calibration.problem import guessed_fixtures, linearised, satisfying
 from robotmodels.calibration.structural import identifiable_parameters

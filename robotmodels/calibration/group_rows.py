@@ -12,7 +12,7 @@ from ..errors import InvalidValueError, ShapeError
 from ..kinematics.lengths import characteristic_length
 from .kinds import Kind, groups_of, measurement_of
 from .measurements import Measurement
-from .measurements.measurement import whitened
+from .measurements.noise import whitened
 from .parameters import GeometricParameters
 from .problem import linearised, problem_of
 from .skeleton import Frame

@@ -12,7 +12,7 @@ from .._arrays import Array, Rebuilt
 from ..errors import InvalidValueError, ShapeError
 from .differential import differential_model
 from .measurements import Evaluation, Fixture, Linearised, Measurement
-from .measurements.measurement import whitened
+from .measurements.noise import whitened
 from .parameters import GeometricParameters
 
 

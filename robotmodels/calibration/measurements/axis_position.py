@@ -12,17 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from ..._arrays import Array, as_exact, read_only
 from ...errors import InvalidValueError
 from ..skeleton import Frame
-from .measurement import (
-    Evaluation,
-    Fixture,
-    Linearised,
-    Measurement,
-    View,
-    as_noise,
-    as_readings,
-    as_values,
-    part_of_noise,
-)
+from .measurement import Evaluation, Fixture, Linearised, Measurement, View
+from .noise import as_noise, part_of_noise
+from .readings import as_readings, as_values
 from .rotation_vectors import rotations_of, tilt_of, tilted_axes, unit_vector
 
 

@@ -13,20 +13,10 @@ from ..._arrays import Array
 from ..skeleton import Frame
 from .labelled import Labelled, Labels, as_known, as_labels
 from .labelled_poses import as_known_pose, guessed_poses, labelled_poses, pose_fixtures
-from .measurement import (
-    POSE_AXES,
-    POSE_UNITS,
-    Evaluation,
-    Fixture,
-    Linearised,
-    View,
-    as_measured_poses,
-    as_noise,
-    as_readings,
-    as_rows,
-    part_of_noise,
-)
+from .measurement import POSE_AXES, POSE_UNITS, Evaluation, Fixture, Linearised, View
 from .moving_poses import difference, motionless, relative, widened
+from .noise import as_noise, part_of_noise
+from .readings import as_measured_poses, as_readings, as_rows
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)

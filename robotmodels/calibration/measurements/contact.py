@@ -13,7 +13,9 @@ from ..._arrays import Array
 from ..skeleton import Frame
 from .dilations import have_common_place
 from .labelled import Labelled, Labels, as_known, as_labels
-from .measurement import View, as_noise, as_readings, part_of_noise
+from .measurement import View
+from .noise import as_noise, part_of_noise
+from .readings import as_readings
 
 
 class Contact(Labelled):

@@ -14,18 +14,10 @@ from ...errors import InvalidValueError
 from ..skeleton import Frame
 from .labelled import Labelled, Labels, as_known, as_labels
 from .labelled_points import as_point, known_points, labelled_points, point_fixtures
-from .measurement import (
-    Evaluation,
-    Fixture,
-    Linearised,
-    View,
-    as_noise,
-    as_readings,
-    as_values,
-    part_of_noise,
-    same_number_of_readings,
-)
+from .measurement import Evaluation, Fixture, Linearised, View
+from .noise import as_noise, part_of_noise
 from .pivots import pivot_of
+from .readings import as_readings, as_values, same_number_of_readings
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)

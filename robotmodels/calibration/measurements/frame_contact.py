@@ -14,13 +14,7 @@ from ..skeleton import Frame
 from .contact import Contact
 from .labelled import Labels
 from .labelled_poses import SIX, as_known_pose, guessed_poses, labelled_poses, pose_fixtures
-from .measurement import (
-    POSE_AXES,
-    POSE_UNITS,
-    Evaluation,
-    Fixture,
-    Linearised,
-)
+from .measurement import POSE_AXES, POSE_UNITS, Evaluation, Fixture, Linearised
 from .moving_poses import difference, widened
 
 

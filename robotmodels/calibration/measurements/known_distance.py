@@ -11,15 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..._arrays import Array, as_floats
 from ...errors import InvalidValueError
-from .measurement import (
-    Evaluation,
-    Fixture,
-    Linearised,
-    Measurement,
-    View,
-    as_noise,
-    part_of_noise,
-)
+from .measurement import Evaluation, Fixture, Linearised, Measurement, View
+from .noise import as_noise, part_of_noise
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)

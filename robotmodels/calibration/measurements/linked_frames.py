@@ -21,18 +21,10 @@ from .labelled_poses import (
     labelled_poses,
     pose_fixtures,
 )
-from .measurement import (
-    POSE_AXES,
-    POSE_UNITS,
-    Evaluation,
-    Fixture,
-    Linearised,
-    View,
-    as_noise,
-    as_readings,
-    part_of_noise,
-)
+from .measurement import POSE_AXES, POSE_UNITS, Evaluation, Fixture, Linearised, View
 from .moving_poses import difference, product, relative, widened
+from .noise import as_noise, part_of_noise
+from .readings import as_readings
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)

@@ -12,19 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from ..._arrays import Array, as_core
 from ...errors import ShapeError
 from ..skeleton import Frame
-from .measurement import (
-    POSE_AXES,
-    POSE_UNITS,
-    Evaluation,
-    Linearised,
-    Measurement,
-    View,
-    as_measured_poses,
-    as_noise,
-    as_readings,
-    as_rows,
-    part_of_noise,
-)
+from .measurement import POSE_AXES, POSE_UNITS, Evaluation, Linearised, Measurement, View
+from .noise import as_noise, part_of_noise
+from .readings import as_measured_poses, as_readings, as_rows
 from .rotation_vectors import inverse_left_jacobians, rotation_errors
 
 

@@ -11,16 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..._arrays import Array, as_exact, read_only
 from ..skeleton import Frame
-from .measurement import (
-    Evaluation,
-    Linearised,
-    Measurement,
-    View,
-    as_noise,
-    as_readings,
-    as_rows,
-    part_of_noise,
-)
+from .measurement import Evaluation, Linearised, Measurement, View
+from .noise import as_noise, part_of_noise
+from .readings import as_readings, as_rows
 
 _AXES = ("x", "y", "z")
 

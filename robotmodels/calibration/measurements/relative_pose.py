@@ -12,21 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from ..._arrays import Array
 from ...errors import InvalidValueError
 from ..skeleton import Frame
-from .measurement import (
-    POSE_AXES,
-    POSE_UNITS,
-    Evaluation,
-    Linearised,
-    Measurement,
-    View,
-    as_measured_poses,
-    as_noise,
-    as_readings,
-    as_rows,
-    part_of_noise,
-    same_number_of_readings,
-)
+from .measurement import POSE_AXES, POSE_UNITS, Evaluation, Linearised, Measurement, View
 from .moving_poses import difference, motionless, relative
+from .noise import as_noise, part_of_noise
+from .readings import as_measured_poses, as_readings, as_rows, same_number_of_readings
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)

@@ -4,12 +4,14 @@ Seed book sections 1.3.1.4 and 1.3.2.3.
 """
 
 from .boundary import WorkspaceSide
-from .classification import SingularityReport, classify_singularity
+from .classification import classify_singularity
 from .flags import SingularityFlags, SingularityStatus, singularity_flags
 from .frames import LostDirections
 from .motion import SelfMotion, SelfMotionKind
-from .nearest import NearestSingularities, NearestStatus, SearchOutcome, nearest_singularity
+from .nearest import nearest_singularity
+from .nearest_result import NearestSingularities, NearestStatus, SearchOutcome
 from .rank import JacobianRank, OperationalDimension, jacobian_rank, operational_dimension
+from .report import SingularityReport
 
 __all__ = [
     "JacobianRank",
