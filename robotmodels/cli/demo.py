@@ -106,8 +106,8 @@ def run(arguments: argparse.Namespace) -> None:
     _say("Inverse geometric model: every posture of both arms that reaches the pose of q")
     # the postures of the RX-90 differ by turns of links about their own length, so that they
     # would hide one another if they stood in one place
-    _show_inverse(rx90, _RX90_POSTURE, folder, columns=4)
-    _show_inverse(ur5, _UR5_POSTURE, folder, columns=4)
+    _show_inverse(rx90, _RX90_POSTURE, folder)
+    _show_inverse(ur5, _UR5_POSTURE, folder)
     _say("Drawing both arms with meshcat")
     from ..viz import show
 
@@ -215,7 +215,7 @@ def _show_models(model: RobotModel, q: Array, folder: Path) -> None:
           "of 5 runs)")  # fmt: skip
 
 
-def _show_inverse(model: RobotModel, q: Array, folder: Path, columns: int | None) -> None:
+def _show_inverse(model: RobotModel, q: Array, folder: Path) -> None:
     from ..viz import show
 
     T = dgm(model, q)
@@ -226,7 +226,7 @@ def _show_inverse(model: RobotModel, q: Array, folder: Path, columns: int | None
     print(as_text(model, T, found, "world", degrees=True))
     path = folder / f"{model.name}-postures.html"
     words = [f"{k + 1}: {branch}" for k, branch in enumerate(found.branch)]
-    show(model, found.q, columns=columns, frames=columns is not None, legend=words).save(path)
+    show(model, found.q, columns=4, frames=True, legend=words).save(path)
     print(f"Offline scene of the {found.count} postures: {path.resolve()}")
     Q = np.random.default_rng(2).uniform(-np.pi, np.pi, (_INVERSE_BATCH, model.n))
     T = dgm(model, Q)
