@@ -7,7 +7,7 @@ import pytest
 
 from robotmodels import se3
 from robotmodels.calibration import KnownDistance, PointContact, Pose, Position, fit
-from robotmodels.calibration.calibrated_pose import calibrated_pose
+from robotmodels.calibration.calibrated_robot.calibrated_pose import calibrated_pose
 from robotmodels.calibration.measurements import (
     Distance,
     FrameContact,

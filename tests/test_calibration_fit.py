@@ -19,7 +19,7 @@ from robotmodels.calibration import (
     fit,
     joint_offsets,
 )
-from robotmodels.calibration.calibrated_pose import calibrated_pose
+from robotmodels.calibration.calibrated_robot.calibrated_pose import calibrated_pose
 from robotmodels.calibration.measurements import (
     AxisPosition,
     CameraPose,

@@ -16,10 +16,10 @@ from robotmodels.calibration import (
     differential_model,
     identifiable_on,
 )
-from robotmodels.calibration.changed import identifiability_change
-from robotmodels.calibration.identifiable import DEPENDENT
-from robotmodels.calibration.kinds import Kind, as_kind, drawn_groups
-from robotmodels.calibration.structural import identifiable_parameters
+from robotmodels.calibration.identifiability.changed import identifiability_change
+from robotmodels.calibration.identifiability.identifiable import DEPENDENT
+from robotmodels.calibration.identifiability.structural import identifiable_parameters
+from robotmodels.calibration.measurements.kinds import Kind, as_kind, drawn_groups
 from robotmodels.errors import InvalidValueError
 
 ANGLES = [0.0, np.pi / 2, -np.pi / 2, np.pi, 0.4]

@@ -8,7 +8,8 @@ from identities.random_robots import random_model, random_pose, random_state
 
 import robotmodels as rm
 from robotmodels.calibration import Reason, candidate_parameters, differential_model, problem_of
-from robotmodels.calibration.identifiable import identifiable_on
+from robotmodels.calibration.identifiability.identifiable import identifiable_on
+from robotmodels.calibration.identifiability.structural import identifiable_parameters
 from robotmodels.calibration.joined import side_by_side
 from robotmodels.calibration.measurements import (
     AxisPosition,
@@ -30,7 +31,6 @@ from robotmodels.calibration.measurements import (
 from robotmodels.calibration.measurements.noise import whitened
 from robotmodels.calibration.measurements.pivots import pivot_of
 from robotmodels.calibration.problem import guessed_fixtures, linearised, satisfying
-from robotmodels.calibration.structural import identifiable_parameters
 from robotmodels.errors import InvalidValueError, NotARotationError, ShapeError
 
 B = 12

@@ -8,14 +8,14 @@ import pytest
 
 import robotmodels as rm
 from robotmodels.calibration import PointContact, candidate_parameters, differential_model
-from robotmodels.calibration.exchange import added, exchanged, greedy, index_of, nested
-from robotmodels.calibration.group_rows import group_rows
-from robotmodels.calibration.kinds import Kind, drawn_groups, groups_of, measurement_of
-from robotmodels.calibration.observability import Criterion, observability
-from robotmodels.calibration.obstacles import Box, HalfSpace, Sphere, clearance
+from robotmodels.calibration.identifiability.structural import identifiable_parameters
+from robotmodels.calibration.measurements.kinds import Kind, drawn_groups, groups_of, measurement_of
 from robotmodels.calibration.problem import guessed_fixtures, problem_of, stacked
-from robotmodels.calibration.select import select_configurations
-from robotmodels.calibration.structural import identifiable_parameters
+from robotmodels.calibration.selection.exchange import added, exchanged, greedy, index_of, nested
+from robotmodels.calibration.selection.group_rows import group_rows
+from robotmodels.calibration.selection.observability import Criterion, observability
+from robotmodels.calibration.selection.obstacles import Box, HalfSpace, Sphere, clearance
+from robotmodels.calibration.selection.select import select_configurations
 from robotmodels.errors import InvalidValueError, ShapeError
 
 RX90 = rm.load("rx90")

@@ -534,7 +534,7 @@ def test_identify_takes_choices_and_files_that_only_test(run, motion):
 
 def test_choices_are_those_of_the_package():
     """The commands list them without importing the rooms that define them."""
-    from robotmodels.calibration.elements import Compliance
+    from robotmodels.calibration.extended_table.elements import Compliance
     from robotmodels.cli import calibrate
     from robotmodels.cli.identify import options
     from robotmodels.estimation.losses import Loss

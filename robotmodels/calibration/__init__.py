@@ -1,23 +1,33 @@
 """Geometric calibration: from measurements, or from the robot touching things (section 1.4)."""
 
 from ..file_units import AngleUnit, LengthUnit
-from .bending import Bending
-from .calibrated import CalibratedEnd, CalibratedRobot, calibrated_model
-from .calibrated_pose import calibrated_pose
-from .candidates import candidate_parameters
-from .changed import IdentifiabilityChange, identifiability_change
-from .corrected import corrected_igm
-from .corrected_solutions import CorrectedSolutions, CorrectionStatus
-from .differential import DifferentialModel, differential_model
-from .elements import Compliance, Element, ErrorLaw
+from .calibrated_robot.bending import Bending
+from .calibrated_robot.calibrated import CalibratedEnd, CalibratedRobot, calibrated_model
+from .calibrated_robot.calibrated_pose import calibrated_pose
+from .calibrated_robot.joint_errors import JointErrors, encoder_transmission, joint_errors_of
+from .calibrated_robot.reading_jacobian import reading_jacobian
+from .correction.corrected import corrected_igm
+from .correction.corrected_solutions import CorrectedSolutions, CorrectionStatus
+from .correction.offsets import JointOffsets, PoseOffsets, joint_offsets, pose_offsets
 from .errors_seen import BlockErrors, ErrorSummary
+from .extended_table.candidates import candidate_parameters
+from .extended_table.differential import DifferentialModel, differential_model
+from .extended_table.elements import Compliance, Element, ErrorLaw
+from .extended_table.parameters import GeometricParameter, GeometricParameters
+from .extended_table.six_parameters import (
+    SixParameters,
+    base_parameters_of,
+    pose_of_elements,
+    tool_parameters_of,
+)
+from .extended_table.skeleton import Skeleton, skeleton_of
 from .file_kinds import FileKind
 from .fit import fit
 from .folds import AsideErrors
-from .identifiable import IdentifiableParameters, Reason, identifiable_on
+from .identifiability.changed import IdentifiabilityChange, identifiability_change
+from .identifiability.identifiable import IdentifiableParameters, Reason, identifiable_on
+from .identifiability.structural import identifiable_parameters
 from .joined import side_by_side
-from .joint_errors import JointErrors, encoder_transmission, joint_errors_of
-from .kinds import Kind, drawn_groups
 from .measurements import (
     AxisPosition,
     CameraPose,
@@ -33,24 +43,19 @@ from .measurements import (
     Position,
     RelativePose,
 )
-from .observability import Criterion, Observability, observability
-from .obstacles import Box, HalfSpace, Sphere, clearance
-from .offsets import JointOffsets, PoseOffsets, joint_offsets, pose_offsets
-from .parameters import GeometricParameter, GeometricParameters
+from .measurements.kinds import Kind, drawn_groups
 from .prior import ParameterPrior
 from .problem import Problem, problem_of
 from .read import read_measurements
-from .reading_jacobian import reading_jacobian
 from .reporting.text import report_text
 from .reporting.write import calibrated_urdf, result_data, write_result
 from .residuals import measured_residuals
 from .result import CalibrationResult
-from .select import select_configurations
-from .selected import SelectedConfigurations
-from .six_parameters import SixParameters, base_parameters_of, pose_of_elements, tool_parameters_of
-from .skeleton import Skeleton, skeleton_of
+from .selection.observability import Criterion, Observability, observability
+from .selection.obstacles import Box, HalfSpace, Sphere, clearance
+from .selection.select import select_configurations
+from .selection.selected import SelectedConfigurations
 from .solve import Solution
-from .structural import identifiable_parameters
 from .true_errors import TrueErrors, true_errors
 
 __all__ = [

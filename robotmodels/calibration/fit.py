@@ -11,14 +11,14 @@ from .._choices import chosen
 from ..errors import InvalidValueError
 from ..estimation import Loss
 from ..model import RobotModel, check_model
-from .candidates import candidate_parameters
-from .elements import Compliance
 from .errors_seen import block_errors
+from .extended_table.candidates import candidate_parameters
+from .extended_table.elements import Compliance
+from .extended_table.parameters import GeometricParameters, as_names
 from .folds import Refit, errors_of_others, errors_of_splits, split_aside, splits, suited_fixtures
-from .identifiable import Reason, all_deviations, identifiable_on
+from .identifiability.identifiable import Reason, all_deviations, identifiable_on
 from .measurements import Measurement
 from .notes import check_enough, notes_after, notes_before, notes_of_gain
-from .parameters import GeometricParameters, as_names
 from .placing import placed_robot
 from .prior import ParameterPrior, estimated_with, settled_prior
 from .problem import as_measurements, guessed_fixtures, measured_frames, problem_of

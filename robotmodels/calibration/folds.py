@@ -14,8 +14,8 @@ from ..errors import InvalidValueError
 from ..estimation import Prior, fit_nonlinear
 from .dealing import dealt_blocks
 from .errors_seen import BlockErrors, block_errors
+from .extended_table.parameters import GeometricParameters
 from .measurements import Measurement
-from .parameters import GeometricParameters
 from .problem import Problem, guessed_fixtures, problem_of, stacked
 from .solve import Solution, first_scales, solve
 

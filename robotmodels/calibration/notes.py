@@ -10,10 +10,10 @@ from ..estimation import FitStatus
 from ..geometry import REVOLUTE
 from ..kinematics import dgm
 from ..kinematics.lengths import characteristic_length
-from .elements import ErrorLaw
 from .errors_seen import BlockErrors
+from .extended_table.elements import ErrorLaw
 from .folds import AsideErrors
-from .identifiable import IdentifiableParameters
+from .identifiability.identifiable import IdentifiableParameters
 from .measurements import Distance, Pose, Position, lonely_labels
 from .problem import Problem, measured_frames
 from .solve import Solution, size_of_robot

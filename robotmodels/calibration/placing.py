@@ -6,13 +6,13 @@ from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 from ..model import RobotModel
-from .calibrated import calibrated_model
-from .candidates import candidate_parameters
-from .elements import ErrorLaw
+from .calibrated_robot.calibrated import calibrated_model
 from .errors_seen import BlockErrors, block_errors
-from .identifiable import identifiable_on
+from .extended_table.candidates import candidate_parameters
+from .extended_table.elements import ErrorLaw
+from .extended_table.parameters import GeometricParameters
+from .identifiability.identifiable import identifiable_on
 from .measurements import Measurement
-from .parameters import GeometricParameters
 from .problem import problem_of
 from .registration import registered
 from .solve import first_scales, solve

@@ -11,9 +11,9 @@ from .._arrays import Rebuilt, as_reals
 from ..errors import InvalidValueError
 from ..estimation import Loss, Prior, select_strength
 from .dealing import dealt_blocks
-from .elements import ErrorLaw
-from .identifiable import IdentifiableParameters, Reason
-from .parameters import GeometricParameter, GeometricParameters
+from .extended_table.elements import ErrorLaw
+from .extended_table.parameters import GeometricParameter, GeometricParameters
+from .identifiability.identifiable import IdentifiableParameters, Reason
 from .problem import Problem, guessed_fixtures, stacked
 from .solve import solve
 

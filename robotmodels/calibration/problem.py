@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from .._arrays import Array, Rebuilt
 from ..errors import InvalidValueError, ShapeError
-from .differential import differential_model
+from .extended_table.differential import differential_model
+from .extended_table.parameters import GeometricParameters
 from .measurements import Evaluation, Fixture, Linearised, Measurement
 from .measurements.noise import whitened
-from .parameters import GeometricParameters
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -338,7 +338,7 @@ def satisfying(problem: Problem, xi: Array, fixtures: Array) -> Problem:
     ----------
     Seed book section 1.4.5.
     """
-    from .satisfied import satisfied_measurement
+    from .measurements.satisfied import satisfied_measurement
 
     moved = []
     for m in problem.measurements:

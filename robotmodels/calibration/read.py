@@ -19,9 +19,9 @@ from ..kinematics import OrientationKind, pose_from_coordinates
 from ..kinematics.coordinates.kinds import orientation_kind
 from ..kinematics.lengths import characteristic_length
 from ..model import RobotModel, check_model
+from .extended_table.skeleton import Frame
 from .file_kinds import CONTACTS, FileKind, as_file_kind
 from .measurements import Distance, Measurement, Pose, Position, RelativePose
-from .skeleton import Frame
 
 _POSITION_NAMES = ("x", "y", "z")
 _QUATERNION_NAMES = ("qw", "qx", "qy", "qz")

@@ -9,11 +9,11 @@ import numpy as np
 from .._arrays import Array, Rebuilt
 from ..estimation import FitStatus
 from ..model import RobotModel
-from .calibrated import CalibratedRobot, calibrated_model
+from .calibrated_robot.calibrated import CalibratedRobot, calibrated_model
 from .errors_seen import BlockErrors
+from .extended_table.parameters import GeometricParameters
 from .folds import AsideErrors, fixtures_by_name
-from .identifiable import IdentifiableParameters
-from .parameters import GeometricParameters
+from .identifiability.identifiable import IdentifiableParameters
 from .solve import Solution
 
 

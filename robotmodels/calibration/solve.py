@@ -9,7 +9,7 @@ import numpy as np
 from .._arrays import Array, Rebuilt, read_only
 from ..estimation import FitStatus, Loss, NonlinearFit, Prior, fit_nonlinear
 from ..estimation.losses import robust_scale
-from .elements import Element
+from .extended_table.elements import Element
 from .measurements import Measurement
 from .problem import Problem, guessed_fixtures, stacked
 

@@ -12,12 +12,12 @@ from ..errors import InvalidValueError
 from ..kinematics import dgm
 from ..model import RobotModel
 from ..se3 import skew
-from .calibrated import CalibratedRobot, as_calibrated
-from .calibrated_pose import calibrated_pose
+from .calibrated_robot.calibrated import CalibratedRobot, as_calibrated
+from .calibrated_robot.calibrated_pose import calibrated_pose
 from .errors_seen import BlockErrors
+from .extended_table.skeleton import Frame
 from .registration import best_motion
 from .result import CalibrationResult
-from .skeleton import Frame
 
 _STEPS = 50
 _ROUNDING = 1e-13

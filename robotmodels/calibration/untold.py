@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from .._arrays import Array
-from .elements import ErrorLaw
-from .identifiable import IdentifiableParameters, Reason
-from .parameters import GeometricParameter
+from .extended_table.elements import ErrorLaw
+from .extended_table.parameters import GeometricParameter
+from .identifiability.identifiable import IdentifiableParameters, Reason
 from .problem import stacked
 from .solve import Solution, size_of_robot
 

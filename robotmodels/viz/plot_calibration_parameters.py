@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_exact, as_reals
-from ..calibration.parameters import GeometricParameters
+from ..calibration.extended_table.parameters import GeometricParameters
+from ..calibration.extended_table.skeleton import skeleton_of
 from ..calibration.result import CalibrationResult
-from ..calibration.skeleton import skeleton_of
 from ..errors import InvalidValueError, ShapeError
 from ..estimation import confidence_intervals
 from .figures import PAGE, SMALL_SIZE, legend_above, line_style, new_figure, panels

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..._arrays import Array, Rebuilt
-from ..skeleton import Frame
+from ..extended_table.skeleton import Frame
 
 
 class View(NamedTuple):

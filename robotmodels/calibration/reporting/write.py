@@ -13,7 +13,7 @@ from ..._arrays import Array
 from ...errors import InvalidValueError, MissingExtraError, UrdfWarning
 from ...estimation import confidence_intervals
 from ...model import to_urdf
-from ..calibrated import CalibratedRobot
+from ..calibrated_robot.calibrated import CalibratedRobot
 from ..errors_seen import BlockErrors
 
 if TYPE_CHECKING:

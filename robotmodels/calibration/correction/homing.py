@@ -1,0 +1,344 @@
+"""Newton's method from many postures to the poses of a calibrated robot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from math import pi
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..._arrays import Array
+from ...geometry import REVOLUTE
+from ...igm.solutions import IGMSolutions
+from ..calibrated_robot.calibrated import CalibratedRobot
+from .homing_bent import Task, moved_back, reading_errors, settled_readings, sizes
+
+STEPS = 15
+ROUNDS = 12  # of bringing the readings of held joints to their values
+BENT_ROUNDS = 12  # of moving targets back by what bends
+SETTLING = 0.3  # of an error that a round leaves: if more, exact slopes are quicker
+ROUNDED = 1e-14  # error that is rounding
+
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Postures:
+    """Candidates of N poses: where they arrived, their readings, what is left.
+
+    Parameters
+    ----------
+    q, reading : ndarray, shape (N, C, n)
+        Variables of the calibrated table and readings, rad or m.
+    met : ndarray of bool, shape (N, C)
+        Whether the pose is met.
+    residual, least : ndarray, shape (N, C)
+        What is missing, and the least singular value of the Jacobian without units.
+    double : ndarray of bool, shape (N, C)
+        Double roots.
+    free, family : ndarray of bool, shape (N, C, n)
+        As in `IGMSolutions`.
+    """
+
+    q: Array
+    reading: Array
+    met: Flags
+    residual: Array
+    least: Array
+    double: Flags
+    free: Flags
+    family: Flags
+
+    @staticmethod
+    def none(N: int, n: int) -> Postures:
+        """No candidates."""
+        rows, flags = np.empty((N, 0, n)), np.zeros((N, 0), np.bool_)
+        loose = np.zeros((N, 0, n), np.bool_)
+        return Postures(rows, rows, flags, rows[..., 0], rows[..., 0], flags, loose, loose)
+
+    @property
+    def readable(self) -> Flags:
+        """Whether readings lead there, shape (N, C)."""
+        return np.asarray(np.isfinite(self.reading).all(axis=-1), np.bool_)
+
+    def spread(
+        self, chosen: NDArray[np.int64], N: int, own: IGMSolutions | None = None
+    ) -> Postures:
+        """The same among N poses, with what `igm` says of them."""
+
+        def put(values: NDArray[Any]) -> NDArray[Any]:
+            all_rows = np.zeros((N, *values.shape[1:]), values.dtype)
+            all_rows[chosen] = values
+            return all_rows
+
+        told = (self.double, self.free, self.family)
+        if own is not None:
+            told = (own.double, own.free_joints, own.family_joints)
+        return Postures(*map(
+            put, (self.q, self.reading, self.met, self.residual, self.least, *told)
+        ))  # fmt: skip
+
+    def and_also(self, more: Postures) -> Postures:
+        """Both, the others behind."""
+        return Postures(*(
+            np.concatenate([getattr(self, f.name), getattr(more, f.name)], axis=1)
+            for f in fields(Postures)
+        ))  # fmt: skip
+
+
+class Home:
+    """Newton's method for one robot and task.
+
+    Parameters
+    ----------
+    robot : CalibratedRobot
+        The robot.
+    mask : ndarray of bool, shape (6,)
+        Components that are asked for.
+    in_tool_axes : bool
+        Components along the axes of the tool at its target.
+    locked : list of int
+        Columns of q whose readings are given.
+    tolerance : float
+        Metres and radians.
+    """
+
+    def __init__(
+        self,
+        robot: CalibratedRobot,
+        mask: Flags,
+        in_tool_axes: bool,
+        locked: list[int],
+        tolerance: float,
+    ) -> None:
+        model = robot.model
+        tool = model.twin.frame(None)
+        joints = model.chain.joint[tool.path - 1]
+        on_path = np.zeros(model.n, np.bool_)
+        on_path[joints[joints >= 0]] = True
+        links = np.linalg.norm(model.chain.position[tool.path[1:] - 1], axis=-1).sum()
+        self.length = float(links + np.linalg.norm(tool.position)) or 1.0
+        self.turns: Flags = np.asarray(
+            model.table.sigma[model.table.joint_rows] == REVOLUTE, np.bool_
+        )
+        self.unit = np.where(on_path, np.where(self.turns, 1.0, self.length), 0.0)
+        self.locked = np.zeros(model.n, np.bool_)
+        self.locked[locked] = True
+        self.robot, self.errors = robot, robot.joint_errors
+        self.mask, self.in_tool_axes, self.tolerance = mask, in_tool_axes, tolerance
+        self.is_redundant = int((on_path & ~self.locked).sum()) > int(mask.sum())
+        self._arm = (*model.chain, *tool.kernel_arguments)
+
+    def bring(
+        self, targets: Array, starts: Array, there: Flags, held: Flags, wanted: Array
+    ) -> Postures:
+        """Bring candidates home.
+
+        Parameters
+        ----------
+        targets : ndarray, shape (N, 4, 4)
+            World poses, metres.
+        starts : ndarray, shape (N, C, n)
+            Candidates, variables of the calibrated table, rad or m.
+        there : ndarray of bool, shape (N, C)
+            Which of them are there.
+        held : ndarray of bool, shape (N, C, n)
+            Joints that keep a reading.
+        wanted : ndarray, shape (N, C, n)
+            The readings of held joints, rad or m.
+
+        Returns
+        -------
+        Postures
+            Where they arrived.
+        """
+        axes = self.axes_of(targets)
+        found = self._rigid(targets, axes, starts, there, held, wanted)
+        if self.robot.bending.is_zero or not there.any():
+            return found
+        return self._bent(targets, axes, found, there, held, wanted)
+
+    def axes_of(self, targets: Array) -> Array:
+        """Axes of the components, shape (N, 3, 3)."""
+        if self.in_tool_axes:
+            return np.ascontiguousarray(targets[:, :3, :3])
+        return np.broadcast_to(np.eye(3), (len(targets), 3, 3)).copy()
+
+    def task(self, targets: Array, held: Flags) -> Task:
+        """What is asked of M postures: ``targets (M, 4, 4)``, ``held (M, n)``."""
+        return Task(
+            self.robot, targets, self.axes_of(targets), self.mask, held, self.unit, self.length
+        )
+
+    def aimed(self, targets: Array, tried: Postures, rows: NDArray[np.int64]) -> Array:
+        """Targets for the inverse model of the table, which knows of no bending.
+
+        Parameters
+        ----------
+        targets : ndarray, shape (M, 4, 4)
+            World poses, metres.
+        tried : Postures
+            Of N poses.
+        rows : ndarray of int, shape (M,)
+            Which of them these are.
+
+        Returns
+        -------
+        ndarray, shape (M, 4, 4)
+            Moved back by what bends at the posture that came nearest, where there is one.
+        """
+        if self.robot.bending.is_zero or not tried.met.shape[1]:
+            return targets
+        residual = np.where(tried.readable, tried.residual, np.inf)[rows]
+        best = residual.argmin(axis=1)
+        some = np.flatnonzero(np.isfinite(residual.min(axis=1)))
+        aims = targets.copy()
+        reading = tried.reading[rows[some], best[some]]
+        aims[some] = moved_back(self.robot, targets[some], reading)
+        return aims
+
+    def settled(
+        self, targets: Array, reading: Array, residual: Array, rows: Flags, held: Flags
+    ) -> tuple[Array, Array]:
+        """Bent postures whose readings were changed a little, brought home again.
+
+        Parameters
+        ----------
+        targets, reading, residual : ndarray, shapes (N, 4, 4), (N, C, n) and (N, C)
+            World poses (m), readings (rad or m), what was missing before the change.
+        rows : ndarray of bool, shape (N, C)
+            Those that count.
+        held : ndarray of bool, shape (N, C, n)
+            Joints that keep their readings.
+
+        Returns
+        -------
+        reading, residual : ndarray, shapes (N, C, n) and (N, C)
+            As they are then.
+        """
+        pose, candidate = np.nonzero(rows)
+        task = self.task(targets[pose], held[pose, candidate])
+        there = reading[pose, candidate]
+        size = sizes(reading_errors(task, there), self.mask)
+        left = np.flatnonzero(size > np.maximum(10.0 * residual[pose, candidate], ROUNDED))
+        if left.size:
+            some = task.at(left)
+            there[left] = settled_readings(some, there[left])
+            size[left] = sizes(reading_errors(some, there[left]), self.mask)
+        reading, residual = reading.copy(), residual.copy()
+        reading[pose, candidate], residual[pose, candidate] = there, size
+        return reading, residual
+
+    def _rigid(
+        self, targets: Array, axes: Array, starts: Array, there: Flags, held: Flags, wanted: Array
+    ) -> Postures:
+        """With nothing bent."""
+        q = np.array(starts, np.float64, order="C")
+        there, held = np.ascontiguousarray(there), np.ascontiguousarray(held)
+        q[~there] = 0.0
+        residual, least = self._steps(targets, axes, q, there, held, STEPS)
+        turns = self.turns
+        q[..., turns] = wrapped(q[..., turns])
+        reading = q.copy()
+        if not self.errors.is_zero and q.size:
+            wanted = np.where(there[..., None], wanted, 0.0)
+            for _ in range(ROUNDS):
+                reading = self.errors.reading(q)
+                if not held.any():
+                    break
+                off = np.where(held & there[..., None], wanted - reading, 0.0)
+                off[..., turns] = wrapped(off[..., turns])
+                rows = np.asarray((np.abs(off) > 1e-15 * (1.0 + np.abs(wanted))).any(axis=-1))
+                rows &= np.isfinite(reading).all(axis=-1)
+                if not rows.any():
+                    break
+                q[rows] += off[rows]
+                some, value = self._steps(targets, axes, q, rows, held, STEPS)
+                residual[rows], least[rows] = some[rows], value[rows]
+                q[..., turns] = wrapped(q[..., turns])
+            known = there & np.isfinite(reading).all(axis=-1)
+            # what the readings lead to is what counts
+            actual = q.copy()
+            actual[known] = self.errors.actual(reading[known])
+            residual[known] = self._steps(targets, axes, actual, known, held, 0)[0][known]
+            off = np.where(held & known[..., None], wanted - reading, 0.0)
+            off[..., turns] = wrapped(off[..., turns])
+            residual[~(np.abs(off) <= 1e-12).all(axis=-1)] = np.inf
+        flags = np.zeros(there.shape, np.bool_)
+        loose = np.zeros(held.shape, np.bool_)
+        met = there & (residual <= self.tolerance)
+        return Postures(q, reading, met, residual, least, flags, loose, loose)
+
+    def _bent(
+        self, targets: Array, axes: Array, found: Postures, there: Flags, held: Flags, wanted: Array
+    ) -> Postures:
+        """Targets are moved back by what bends at the posture, until that stays as it is.
+
+        Bending changes little from posture to posture, so that each round leaves a small part of
+        the error. Where it does not, near singular postures, Newton's method with exact slopes
+        takes over.
+        """
+        pose, candidate = np.nonzero(there & found.readable)
+        goals, held, wanted = targets[pose], held[pose, candidate], wanted[pose, candidate]
+        axes, held_one = axes[pose], held[:, None]
+        q, reading = found.q[pose, candidate], found.reading[pose, candidate]
+        task = self.task(goals, held)
+        residual = sizes(reading_errors(task, reading), self.mask)
+        going = np.arange(len(pose))
+        for _ in range(BENT_ROUNDS):
+            if not going.size:
+                break
+            moved = moved_back(self.robot, goals[going], reading[going])
+            some = self._rigid(
+                moved, axes[going], q[going, None], np.ones((going.size, 1), np.bool_),
+                held_one[going], wanted[going, None],
+            )  # fmt: skip
+            # a posture that does not arrive leads on all the same, but without readings none does
+            led = some.readable[:, 0] & np.isfinite(some.residual[:, 0])
+            going, there_q, there_r = going[led], some.q[led, 0], some.reading[led, 0]
+            now = sizes(reading_errors(task.at(going), there_r), self.mask)
+            better = now < residual[going]
+            settles = better & (now < SETTLING * residual[going]) & (now > ROUNDED)
+            at = going[better]
+            q[at], reading[at], residual[at] = there_q[better], there_r[better], now[better]
+            going = going[settles]
+        left = np.flatnonzero(residual > min(self.tolerance, 1e-12))
+        if left.size:
+            there_r = settled_readings(task.at(left), reading[left])
+            now = sizes(reading_errors(task.at(left), there_r), self.mask)
+            better = now < residual[left]
+            at = left[better]
+            reading[at], residual[at] = there_r[better], now[better]
+            q[at] = self.errors.actual(reading[at])
+        off = np.where(held, wanted - reading, 0.0)
+        off[:, self.turns] = wrapped(off[:, self.turns])
+        residual[(np.abs(off) > 1e-12).any(axis=-1)] = np.inf
+        at = (pose, candidate)
+        every_q, every_reading = found.q.copy(), found.reading.copy()
+        every_residual, least = found.residual.copy(), found.least
+        every_q[at], every_reading[at], every_residual[at] = q, reading, residual
+        met = there & (every_residual <= self.tolerance)
+        return Postures(every_q, every_reading, met, every_residual, least, found.double,
+                        found.free, found.family)  # fmt: skip
+
+    def _steps(
+        self, targets: Array, axes: Array, q: Array, there: Flags, held: Flags, most: int
+    ) -> tuple[Array, Array]:
+        from ...igm._homing import brought_home
+
+        residual, least = np.empty(there.shape), np.empty(there.shape)
+        brought_home(
+            targets, axes, q, there, held, *self._arm, self.mask.astype(np.int64), self.unit,
+            self.length, most, residual, least,
+        )  # fmt: skip
+        return residual, least
+
+
+def wrapped(angle: Array) -> Array:
+    """Angles into (-pi, pi], those inside to the last digit as they are."""
+    if not ((angle > pi) | (angle <= -pi)).any():
+        return angle
+    inside = np.abs(angle) <= pi
+    return np.where(inside & (angle > -pi), angle, pi - np.mod(pi - angle, 2.0 * pi))

@@ -1,0 +1,290 @@
+"""Correction for controllers that keep their nominal model: false joint values, false targets."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..._arrays import Array, Rebuilt, as_vector, read_only
+from ...errors import InvalidValueError
+from ...igm.asked import above_zero, mask_of
+from ...kinematics import dgm
+from ..calibrated_robot.calibrated import CalibratedRobot, as_calibrated
+from ..calibrated_robot.calibrated_pose import calibrated_pose
+from ..calibrated_robot.reading_jacobian import missing_of_pose, missing_slope, reading_jacobian
+from .corrected import CorrectedSolutions, corrected_igm
+
+STEPS = 50
+DEPENDENT = 1e-9  # singular values beside the largest below which offsets are not told apart
+
+if TYPE_CHECKING:
+    from ..result import CalibrationResult
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointOffsets(Rebuilt):
+    """One constant offset for each joint, and what it leaves.
+
+    Parameters
+    ----------
+    offset : ndarray, shape (n,)
+        To be added to what the controller commands, rad or m.
+    rank : int
+        How many combinations of offsets the configurations tell apart; of the others the smallest
+        are taken.
+    before, after : ndarray, shape (N, 6)
+        What the real tool misses of the commanded pose without and with them: position (m) and
+        rotation vector (rad), world axes.
+
+    References
+    ----------
+    Seed book section 1.4.6.
+
+    Examples
+    --------
+    See `joint_offsets`.
+    """
+
+    offset: Array
+    rank: int
+    before: Array
+    after: Array
+
+    def __post_init__(self) -> None:
+        for name in ("offset", "before", "after"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    @property
+    def position(self) -> tuple[float, float]:
+        """Root mean square of the position errors before and after, metres."""
+        return _rms(self.before[:, :3]), _rms(self.after[:, :3])
+
+    @property
+    def orientation(self) -> tuple[float, float]:
+        """Root mean square of the rotation errors before and after, radians."""
+        return _rms(self.before[:, 3:]), _rms(self.after[:, 3:])
+
+    @property
+    def worst(self) -> tuple[float, float]:
+        """Largest position error (m) and rotation error (rad) that remain."""
+        sizes = np.linalg.norm(self.after.reshape(-1, 2, 3), axis=-1).max(axis=0, initial=0.0)
+        return float(sizes[0]), float(sizes[1])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoseOffsets(Rebuilt):
+    """False targets: commanded to a controller with the nominal model, they lead to the true ones.
+
+    Parameters
+    ----------
+    solutions : CorrectedSolutions
+        What the joints must read.
+    command : ndarray, shape (..., S, 4, 4)
+        The pose that the nominal robot has there, metres; NaN in rows without a solution. The
+        controller must stay on the branch of the row.
+
+    References
+    ----------
+    Seed book section 1.4.6.
+
+    Examples
+    --------
+    See `pose_offsets`.
+    """
+
+    solutions: CorrectedSolutions
+    command: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "command", read_only(self.command))
+
+    def nearest(self, q: ArrayLike) -> Array:
+        """False target of the solution nearest to a posture.
+
+        Parameters
+        ----------
+        q : array_like, shape (..., n)
+            Postures, rad or m.
+
+        Returns
+        -------
+        ndarray, shape (..., 4, 4)
+            World poses, metres; NaN for poses without a solution.
+
+        Raises
+        ------
+        ShapeError, InvalidValueError
+            ``q`` of the wrong length, or with NaN or infinity.
+        """
+        found = self.solutions
+        nearest = found.nearest(q)
+        if not found.q.shape[-2]:
+            return np.full((*nearest.shape[:-1], 4, 4), np.nan)
+        same = (found.q == nearest[..., None, :]).all(axis=-1).argmax(axis=-1)
+        command = np.broadcast_to(
+            self.command, (*nearest.shape[:-1], *self.command.shape[-3:])
+        )  # fmt: skip
+        return np.take_along_axis(command, same[..., None, None, None], axis=-3)[..., 0, :, :]
+
+
+def joint_offsets(
+    robot: CalibratedRobot | CalibrationResult,
+    q: ArrayLike,
+    mask: ArrayLike | None = None,
+    length: float | None = None,
+) -> JointOffsets:
+    """Constant joint offsets that serve best over a set of configurations, in least squares.
+
+    Parameters
+    ----------
+    robot : CalibratedRobot or CalibrationResult
+        The robot, n joints.
+    q : array_like, shape (N, n)
+        What the controller would command, rad or m: the nominal model is to hold there.
+    mask : array_like, shape (6,), optional
+        Components ``x y z rx ry rz`` (world axes) that count; default all, and positions alone for
+        a result of positions alone: orientations that nobody measured must not weigh.
+    length : float, optional
+        Metres that weigh as much as a radian; default the mean distance of the tool from the
+        base.
+
+    Returns
+    -------
+    JointOffsets
+        Offsets, and the errors before and after. Where only the joints' own offsets are off they
+        are cancelled exactly.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Wrong shapes, NaN or infinity, no configuration, a mask that leaves nothing, a length that
+        is not above zero.
+
+    References
+    ----------
+    Seed book section 1.4.6.
+
+    Examples
+    --------
+    >>> from robotmodels.calibration import candidate_parameters
+    >>> from robotmodels.calibration.calibrated_robot.calibrated import calibrated_model
+    >>> from robotmodels.robots import load
+    >>> parameters = candidate_parameters(load("rx90"))
+    >>> robot = calibrated_model(parameters, 0.01 * (np.array(parameters.names) == "theta3"))
+    >>> q = np.random.default_rng(0).uniform(-2, 2, size=(20, 6))
+    >>> found = joint_offsets(robot, q)
+    >>> found.offset.round(9) + 0.0
+    array([ 0.  ,  0.  , -0.01,  0.  ,  0.  ,  0.  ])
+    """
+    if mask is None:
+        mask = getattr(robot, "measured_mask", None)
+    robot = as_calibrated(robot)
+    n = robot.model.n
+    commanded = np.atleast_2d(as_vector(q, n, "q")).reshape(-1, n)
+    asked = mask_of(mask)
+    if not len(commanded):
+        raise InvalidValueError("q: expected one configuration or more, got none.")
+    wanted = dgm(robot.nominal, commanded)
+    if length is None:
+        away = np.linalg.norm(wanted[:, :3, 3] - robot.nominal.base[:3, 3], axis=1)
+        length = float(away.mean()) or 1.0
+    length = above_zero(length, "length")
+    weight = np.where(asked, np.repeat([1.0, length], 3), 0.0)
+    revolute = robot.model.table.sigma[robot.model.table.joint_rows] == 0
+    unit = np.where(revolute, 1.0, length)
+    offset = np.zeros(n)
+    before = error = _missing(robot, commanded, wanted)
+    cost, rank = float(np.sum((weight * error) ** 2)), 0
+    for _ in range(STEPS):
+        J = reading_jacobian(robot, commanded + offset)
+        W = weight[:, None] * missing_slope(J, error[:, 3:]) * unit
+        solved = np.linalg.lstsq(W.reshape(-1, n), (weight * error).ravel(), rcond=DEPENDENT)
+        rank = int(solved[2])
+        step = solved[0] * unit
+        for _ in range(10):
+            trial = _missing(robot, commanded + offset + step, wanted)
+            after = float(np.sum((weight * trial) ** 2))
+            if after <= cost:
+                break
+            step = 0.5 * step
+        else:
+            break  # only rounding is left
+        offset, error = offset + step, trial
+        done = cost - after <= 1e-15 * cost and np.abs(step / unit).max() < 1e-12
+        cost = after
+        if done or cost == 0.0:
+            break
+    return JointOffsets(offset, rank, before, error)
+
+
+def pose_offsets(
+    robot: CalibratedRobot | CalibrationResult,
+    T: ArrayLike,
+    q_ref: ArrayLike | None = None,
+    mask: ArrayLike | None = None,
+    mask_axes: str = "world",
+    limits: bool = False,
+    lock: Mapping[int | str, float] | None = None,
+) -> PoseOffsets:
+    """False targets for a controller that solves the nominal inverse model.
+
+    The controller finds the joint values of ``command`` with its nominal model; at those readings
+    the real tool is at ``T``. Exact for six joints, posture by posture; with fewer or more joints
+    the controller must resolve its choice as it does for the nominal robot.
+
+    Parameters
+    ----------
+    robot : CalibratedRobot
+        The robot.
+    T : array_like, shape (..., 4, 4)
+        World poses that the tool shall reach, metres.
+    q_ref, mask, mask_axes, limits, lock
+        As for `corrected_igm`.
+
+    Returns
+    -------
+    PoseOffsets
+        Commands, one for each posture.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError, NotARotationError
+        As `corrected_igm`.
+
+    References
+    ----------
+    Seed book section 1.4.6.
+
+    Examples
+    --------
+    >>> from robotmodels.calibration import candidate_parameters
+    >>> from robotmodels.calibration.calibrated_robot.calibrated import calibrated_model
+    >>> from robotmodels.igm import igm
+    >>> from robotmodels.robots import load
+    >>> parameters = candidate_parameters(load("rx90"))
+    >>> xi = 1e-3 * np.random.default_rng(0).normal(size=len(parameters))
+    >>> robot, q = calibrated_model(parameters, xi), np.array([0.1, 0.2, 1.3, 0.4, 0.5, 0.6])
+    >>> T = dgm(robot.nominal, q)
+    >>> false = pose_offsets(robot, T, q).command[0]
+    >>> there = calibrated_pose(robot, igm(robot.nominal, false).nearest(q))
+    >>> bool(np.abs(there - T).max() < 1e-12)
+    True
+    """
+    robot = as_calibrated(robot)
+    found = corrected_igm(robot, T, q_ref, mask, mask_axes, limits, lock)
+    command = np.full((*found.valid.shape, 4, 4), np.nan)
+    command[found.valid] = dgm(robot.nominal, found.q[found.valid])
+    return PoseOffsets(found, command)
+
+
+def _missing(robot: CalibratedRobot, q_read: Array, wanted: Array) -> Array:
+    """What the real tool misses, (N, 6), world axes."""
+    return missing_of_pose(calibrated_pose(robot, q_read), wanted)
+
+
+def _rms(rows: Array) -> float:
+    return float(np.sqrt(np.mean(np.sum(rows**2, axis=-1)))) if len(rows) else 0.0

@@ -1,0 +1,108 @@
+"""What gravity does to an element of the table: the load that a compliance is multiplied by."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..._arrays import Array
+from ...kinematics import link_poses
+from .elements import Element
+from .six_parameters import pose_of_elements
+from .skeleton import Skeleton
+
+
+def gravity_loads(
+    skeleton: Skeleton, q: Array, elements: Sequence[tuple[int, Element, int]]
+) -> Array:
+    """Forces of gravity along elements: moments about rotations, forces along translations.
+
+    For the element of a joint it is minus its gravity torque. For others it is what bends a link
+    or tilts the mount.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        The extended table; masses are those of its model.
+    q : ndarray, shape (N, n)
+        Joint variables, rad or m.
+    elements : sequence of (int, Element, int)
+        K of them: row, element, and the row whose bodies, with all behind it, are the load.
+
+    Returns
+    -------
+    ndarray, shape (N, K)
+        ``-dU/d element``, N m or N.
+
+    References
+    ----------
+    Seed book section 1.5.1.1 (potential energy).
+
+    Examples
+    --------
+    >>> from robotmodels.dynamics import gravity_torque
+    >>> from robotmodels.robots import load
+    >>> arm, q = load("erd:ur10"), np.full((1, 6), 0.3)
+    >>> from robotmodels.calibration import skeleton_of
+    >>> load_of_2 = gravity_loads(skeleton_of(arm), q, [(2, Element.THETA, 2)])
+    >>> bool(np.isclose(load_of_2[0, 0], -gravity_torque(arm, q)[0, 1]))
+    True
+    """
+    model = skeleton.model
+    T = link_poses(model, q)
+    mass = model.inertia.values[:, 9]
+    moment = T[..., :3, :3] @ model.inertia.values[:, 6:9, None]
+    moment = moment[..., 0] + mass[:, None] * T[..., :3, 3]
+    carried = _carried(skeleton)
+    loads = np.empty((len(q), len(elements)))
+    for k, (row, element, carrier) in enumerate(elements):
+        axis, origin = _axis(skeleton, T, row, element)
+        bodies = carried[carrier]
+        total = mass[bodies].sum()
+        if element.is_length:
+            moved = total * axis
+        else:
+            moved = np.cross(axis, moment[:, bodies].sum(axis=1) - total * origin)
+        loads[:, k] = moved @ model.gravity
+    return loads
+
+
+def _axis(skeleton: Skeleton, T: Array, row: int, element: Element) -> tuple[Array, Array]:
+    """World direction and origin of an element at every configuration, shapes (N, 3)."""
+    if element in (Element.THETA, Element.R) and 1 <= row <= skeleton.model.f:
+        # theta and r are along z_j, with the joint's own motion done or not
+        return T[:, row - 1, :3, 2], T[:, row - 1, :3, 3]
+    before = np.where(np.arange(len(Element)) < element, skeleton.nominal[row], 0.0)
+    antecedent = int(skeleton.antecedent[row])
+    if row == 0:
+        start = np.broadcast_to(skeleton.before, (len(T), 4, 4))
+    elif antecedent == 0:
+        start = np.broadcast_to(skeleton.model.base, (len(T), 4, 4))
+    else:
+        start = T[:, antecedent - 1]
+    there = start @ pose_of_elements(before)
+    return there[:, :3, _DIRECTIONS[element]], there[:, :3, 3]
+
+
+_DIRECTIONS = {
+    Element.GAMMA: 2,
+    Element.B: 2,
+    Element.BETA: 1,
+    Element.ALPHA: 0,
+    Element.D: 0,
+    Element.THETA: 2,
+    Element.R: 2,
+}
+
+
+def _carried(skeleton: Skeleton) -> dict[int, list[int]]:
+    """Bodies (from 0) that each row moves, the base's row all of them."""
+    f = skeleton.model.f
+    carried: dict[int, list[int]] = {row: [] for row in range(skeleton.rows)}
+    for body in range(f):
+        row = body + 1
+        while row >= 0:
+            carried[row].append(body)
+            row = int(skeleton.antecedent[row])
+    return carried

@@ -1,0 +1,1 @@
+"""Configurations that show the parameters best."""
