@@ -18,7 +18,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from benchmarks.rounded import figure
+from benchmarks.rounded import figure, told_ratios, way_of
 
 BEGIN = "<!-- tables from benchmarks/results: begin -->"
 END = "<!-- tables from benchmarks/results: end -->"
@@ -44,9 +44,10 @@ def speed(peers: dict[str, Any]) -> list[str]:
     told = [f"{PACKAGES[k]} {v}" for k, v in facts.items() if k in PACKAGES and v[0].isdigit()]
     lines = [
         f"Medians of the processor's time, {facts['cpu']}, one thread, Python {facts['python']}, "
-        f"{', '.join(told)}{a_short_run(facts)}. The last column: the fastest of those who do the "
-        "whole work, to the first figure of ours. Spreads, goals and what was found: "
-        "`benchmarks/results/peers.md`; to measure it again: `python -m benchmarks`.",
+        f"{', '.join(told)}{a_short_run(facts)}. Others / ours, above 1 where ours is faster: like "
+        "with like, the fastest of those who do the whole work in one mode (in brackets) to ours "
+        "in that mode; no figure where nobody else has a mode of ours. Spreads, and what was "
+        "found: `benchmarks/results/peers.md`; to measure it again: `python -m benchmarks`.",
         "",
         "| work | robotmodels | Pinocchio, raw calls from Python | peers | others / ours |",
         "|---|---|---|---|---|",
@@ -58,8 +59,7 @@ def speed(peers: dict[str, Any]) -> list[str]:
         raw = "; ".join(told_time(e, unit) for e in entries if e["tool"] == RAW)
         others = [e for e in entries if e["tool"] not in (OURS, RAW)]
         by_tool = [f"{e['tool']} {told_time(e, unit)}" for e in others]
-        ratios = [e["ratio"] for e in entries if e["tool"] != OURS and e["whole"]]
-        ratio = f"{figure(min(ratios))}" if ratios else ""
+        ratio = told_ratios(r, "{ratio} ({mode})")
         lines.append(f"| {r['work']} | {ours} | {raw} | {'; '.join(by_tool)} | {ratio} |")
     return lines
 
@@ -98,8 +98,9 @@ def accuracy(results: Path) -> list[str]:
 
 
 def told_time(entry: Row, unit: str) -> str:
-    """A median with its unit, and its way."""
-    return f"{figure(entry['median'])} {unit}" + (f" ({entry['how']})" if entry["how"] else "")
+    """A median with its unit, its mode and way."""
+    way = way_of(entry)
+    return f"{figure(entry['median'])} {unit}" + (f" ({way})" if way else "")
 
 
 def replaced(readme: str, new: str) -> str:

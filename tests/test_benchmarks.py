@@ -47,7 +47,10 @@ def test_one_command_runs_without_any_peer(tmp_path):
     kept = json.loads((tmp_path / "peers.json").read_text())
     assert [row["row"] for row in kept["rows"]] == ["pose", "jacobian"]
     for row in kept["rows"]:
-        assert [e["tool"] for e in row["entries"]] == ["robotmodels", "Pinocchio"]
+        assert [(e["tool"], e["mode"]) for e in row["entries"]] == [
+            ("robotmodels", "batch"), ("robotmodels", "one by one"), ("Pinocchio", "one by one"),
+        ]  # fmt: skip
+        assert list(row["ratios"]) == ["one by one"]  # nobody else is here with a batch
         for e in row["entries"]:
             assert 0.0 < e["least"] <= e["median"] <= e["most"]
             assert e["rounds"] == 3
@@ -55,7 +58,7 @@ def test_one_command_runs_without_any_peer(tmp_path):
     assert {"cpu", "python", "numpy", "load"} <= set(kept["machine"])
     text = (tmp_path / "peers.md").read_text()
     assert text in done.stdout
-    assert len([line for line in text.splitlines() if line.startswith("| pose")]) == 3
+    assert len([line for line in text.splitlines() if line.startswith("| pose")]) == 4
 
 
 def test_a_row_that_is_not_known_is_refused():
@@ -102,19 +105,41 @@ def test_two_of_one_name_are_refused():
 @pytest.mark.parametrize(("limit", "met"), [(2.1, True), (1.9, False)])
 def test_goals_and_ratios(limit, met):
     entries = [
-        Entry(Tool.OURS, "batch", lambda: Spent(2e-6, 2e-6)),
-        Entry(Tool.RTB, "", lambda: Spent(5e-6, 5e-6)),
-        Entry(Tool.EAIK, "", lambda: Spent(3e-6, 3e-6)),
+        Entry(Tool.OURS, "", lambda: Spent(2e-6, 2e-6), mode="batch"),
+        Entry(Tool.RTB, "", lambda: Spent(5e-6, 5e-6), mode="batch"),
+        Entry(Tool.EAIK, "", lambda: Spent(3e-6, 3e-6), mode="batch"),
+        Entry(Tool.SSIK, "a part", lambda: Spent(1e-6, 1e-6), mode="batch", whole=False),
     ]
     work = Work("some", "some work", "us", entries, [at_most(limit, "us", "batch")])
     row = next(works.measured(iter([work]), works.Settings(rounds=3))).as_json()
     assert row["met"] is met
-    assert [round(e["median"], 9) for e in row["entries"]] == [2.0, 5.0, 3.0]
-    assert report.fastest(row) == pytest.approx(1.5)
+    assert [round(e["median"], 9) for e in row["entries"]] == [2.0, 5.0, 3.0, 1.0]
+    assert row["ratios"] == {"batch": pytest.approx(1.5)}
     line = report.compact([row])[-1]
     cells = [cell.strip() for cell in line.split("|")[1:-1]]
     assert cells[:3] == ["some work", "us", "2.00 batch"]
-    assert cells[-3:] == ["1.50", f"<= {limit:g} us", "yes" if met else "no"]
+    assert cells[-3:] == ["1.50 batch", f"<= {limit:g} us", "yes" if met else "no"]
+
+
+def test_only_like_is_set_in_ratio_with_like():
+    entries = [
+        Entry(Tool.OURS, "", lambda: Spent(2e-6, 2e-6), mode="batch"),
+        Entry(Tool.OURS, "", lambda: Spent(8e-6, 8e-6), mode="one by one"),
+        Entry(Tool.OURS, "", lambda: Spent(1e-6, 1e-6), mode="kernel"),
+        Entry(Tool.RTB, "", lambda: Spent(4e-6, 4e-6), mode="one by one"),
+        Entry(Tool.EAIK, "", lambda: Spent(6e-6, 6e-6), mode="batch"),
+        Entry(Tool.FIGAROH, "", lambda: Spent(6e-6, 6e-6), mode="every row"),
+    ]
+    work = Work("some", "some work", "us", entries)
+    row = next(works.measured(iter([work]), works.Settings(rounds=3))).as_json()
+    assert row["ratios"] == {"batch": pytest.approx(3.0), "one by one": pytest.approx(0.5)}
+    assert [e["ratio"] for e in row["entries"]] == [1.0, 1.0, 1.0, 0.5, pytest.approx(3.0), None]
+    peers = {"machine": {"cpu": "some", "python": "3"}, "rows": [row]}
+    line = readme_tables.speed(peers)[-1]
+    assert "| 3.00 (batch); 0.50 (one by one) |" in line
+    assert "RTB 4.00 us (one by one); EAIK 6.00 us (batch)" in line
+    with pytest.raises(ValueError, match="one mode"):
+        Work("some", "some work", "us", [entries[0], entries[0]])
 
 
 def test_work_without_goal_is_neither_met_nor_missed():

