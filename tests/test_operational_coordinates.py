@@ -21,6 +21,10 @@ from robotmodels.errors import (
     NotARotationError,
     ShapeError,
 )
+from robotmodels.kinematics.coordinates._differentials import (
+    orientation_differential,
+    orientation_differential_rate,
+)
 from robotmodels.kinematics.coordinates._orientation_rates import SINGULAR
 from robotmodels.kinematics.coordinates.conversion import (
     operational_coordinates,
@@ -681,6 +685,34 @@ def test_rates_of_rotation_vectors_do_not_exist_at_whole_turns(rng):
 
 
 # --- Jacobian of the coordinates ---------------------------------------------------------------
+
+
+@every_kind
+def test_coordinates_change_as_the_entries_of_the_rotation_do(kind, rng):
+    """``R exp(a [u]) exp(b [w])``: differences by a, and of the derivatives by a along b."""
+    T, x = tame_poses(kind, rng, 20)
+    R, u, w = T[:, None, :3, :3], rng.normal(size=3), rng.normal(size=3)
+    U, W = se3.skew(u), se3.skew(w)
+
+    def by_a(b):
+        turned = R @ rotation_by(b * w)
+        y = operational_coordinates(poses_of(T, turned[:, 0]), kind, x)[:, None, 3:]
+        return orientation_differential(kind, y, turned, R @ U @ rotation_by(b * w))[:, 0]
+
+    def coordinates(a):
+        return operational_coordinates(poses_of(T, R[:, 0] @ rotation_by(a * u)), kind, x)[:, 3:]
+
+    same(by_a(0.0), five_point(coordinates, 2e-4), 1e-9)
+    rate = orientation_differential_rate(kind, x[:, None, 3:], R, R @ U, R @ W, R @ U @ W)
+    same(rate[:, 0], five_point(by_a, 2e-4), 1e-8)
+    assert np.abs(rate).max() > 0.1
+
+
+def poses_of(T, R):
+    """The same positions with other rotations."""
+    T = T.copy()
+    T[:, :3, :3] = R
+    return T
 
 
 def growth(*matrices):
