@@ -50,6 +50,17 @@ def processor() -> str:
     return platform.processor() or platform.machine()
 
 
+BUSY = 1.0
+"""A load above this when a run begins is warned of."""
+
+
+def too_busy() -> str:
+    """A warning where others are at work on the machine, else empty."""
+    if hasattr(os, "getloadavg") and os.getloadavg()[0] > BUSY:
+        return f"others were at work when the run began (load {load()}): times are too long"
+    return ""
+
+
 def load() -> str:
     """How busy the machine is."""
     if not hasattr(os, "getloadavg"):

@@ -18,7 +18,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from benchmarks.rounded import figure, told_ratios, way_of
+from benchmarks.rounded import figure, told_goals, told_ratios, way_of
 
 BEGIN = "<!-- tables from benchmarks/results: begin -->"
 END = "<!-- tables from benchmarks/results: end -->"
@@ -34,6 +34,8 @@ Row = dict[str, Any]
 def tables(results: Path = RESULTS) -> str:
     """Everything that stands between the two lines."""
     peers = json.loads((results / "peers.json").read_text(encoding="utf-8"))
+    if any("goals" not in r for r in peers["rows"]):
+        raise ValueError("peers.json is of an older form: python -m benchmarks writes it anew.")
     parts = [speed(peers), accuracy(results)]
     return "\n\n".join("\n".join(part) for part in parts if part)
 
@@ -44,13 +46,15 @@ def speed(peers: dict[str, Any]) -> list[str]:
     told = [f"{PACKAGES[k]} {v}" for k, v in facts.items() if k in PACKAGES and v[0].isdigit()]
     lines = [
         f"Medians of the processor's time, {facts['cpu']}, one thread, Python {facts['python']}, "
-        f"{', '.join(told)}{a_short_run(facts)}. Others / ours, above 1 where ours is faster: like "
-        "with like, the fastest of those who do the whole work in one mode (in brackets) to ours "
-        "in that mode; no figure where nobody else has a mode of ours. Spreads, and what was "
-        "found: `benchmarks/results/peers.md`; to measure it again: `python -m benchmarks`.",
+        f"{', '.join(told)}; load {facts['load']}{a_warning(facts)}; run: {facts['run']}. "
+        "Others / ours, above 1 where ours is faster: like with like, the fastest of those who do "
+        "the whole work in one mode (in brackets) to ours in that mode; no figure where nobody "
+        "else has a mode of ours. Goal: what was asked of ours, of a machine at rest. Spreads, "
+        "and what was found: `benchmarks/results/peers.md`; to measure it again: "
+        "`python -m benchmarks`.",
         "",
-        "| work | robotmodels | Pinocchio, raw calls from Python | peers | others / ours |",
-        "|---|---|---|---|---|",
+        "| work | robotmodels | Pinocchio, raw calls from Python | peers | others / ours | goal |",
+        "|---|---|---|---|---|---|",
     ]
     for r in peers["rows"]:
         entries = r["entries"]
@@ -60,13 +64,14 @@ def speed(peers: dict[str, Any]) -> list[str]:
         others = [e for e in entries if e["tool"] not in (OURS, RAW)]
         by_tool = [f"{e['tool']} {told_time(e, unit)}" for e in others]
         ratio = told_ratios(r, "{ratio} ({mode})")
-        lines.append(f"| {r['work']} | {ours} | {raw} | {'; '.join(by_tool)} | {ratio} |")
+        cells = [r["work"], ours, raw, "; ".join(by_tool), ratio, told_goals(r)]
+        lines.append(f"| {' | '.join(cells)} |")
     return lines
 
 
-def a_short_run(facts: dict[str, str]) -> str:
-    """What is said of figures that are not of a full run."""
-    return f" ({facts['run']})" if "run" in facts else ""
+def a_warning(facts: dict[str, str]) -> str:
+    """What is said of figures of a busy machine."""
+    return f", **{facts['warning']}**" if "warning" in facts else ""
 
 
 def accuracy(results: Path) -> list[str]:

@@ -23,3 +23,8 @@ def told_ratios(row: dict[str, Any], form: str) -> str:
         for mode, ratio in row["ratios"].items()
     ]
     return "; ".join(told)
+
+
+def told_goals(row: dict[str, Any]) -> str:
+    """What is asked of ours, each with whether it is met."""
+    return "; ".join(f"{g['text']}, {'met' if g['met'] else 'not met'}" for g in row["goals"])

@@ -9,10 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import readme_tables
+from benchmarks import machine, readme_tables
+from benchmarks.machine import BUSY
 from benchmarks.measure import Contestant, Spent, in_turns
 from benchmarks.side_by_side import report, works
-from benchmarks.side_by_side.works import Entry, Measured, Tool, Work, at_most
+from benchmarks.side_by_side.works import Entry, Tool, Work, at_most
 
 ROOT = Path(__file__).parents[1]
 
@@ -54,8 +55,15 @@ def test_one_command_runs_without_any_peer(tmp_path):
         for e in row["entries"]:
             assert 0.0 < e["least"] <= e["median"] <= e["most"]
             assert e["rounds"] == 3
-        assert row["met"] in (True, False)
-    assert {"cpu", "python", "numpy", "load"} <= set(kept["machine"])
+        (goal,) = row["goals"]
+        assert goal["text"].startswith("<= 0.")
+        assert goal["met"] in (True, False)
+    facts = kept["machine"]
+    assert {"cpu", "python", "numpy", "load"} <= set(facts)
+    assert facts["run"].startswith("quick")
+    busy = float(facts["load"].split()[0]) > BUSY
+    assert ("warning" in facts) is busy
+    assert ("warning: others were at work" in done.stderr) is busy
     text = (tmp_path / "peers.md").read_text()
     assert text in done.stdout
     assert len([line for line in text.splitlines() if line.startswith("| pose")]) == 4
@@ -112,13 +120,26 @@ def test_goals_and_ratios(limit, met):
     ]
     work = Work("some", "some work", "us", entries, [at_most(limit, "us", "batch")])
     row = next(works.measured(iter([work]), works.Settings(rounds=3))).as_json()
-    assert row["met"] is met
+    assert row["goals"] == [{"text": f"<= {limit:g} us", "met": met}]
     assert [round(e["median"], 9) for e in row["entries"]] == [2.0, 5.0, 3.0, 1.0]
     assert row["ratios"] == {"batch": pytest.approx(1.5)}
     line = report.compact([row])[-1]
     cells = [cell.strip() for cell in line.split("|")[1:-1]]
     assert cells[:3] == ["some work", "us", "2.00 batch"]
-    assert cells[-3:] == ["1.50 batch", f"<= {limit:g} us", "yes" if met else "no"]
+    told = f"<= {limit:g} us, {'met' if met else 'not met'}"
+    assert cells[-2:] == ["1.50 batch", told]
+    facts = {"cpu": "some", "python": "3", "load": "0.3 on 2 cores", "run": "full"}
+    lines = readme_tables.speed({"machine": facts, "rows": [row]})
+    assert lines[-1].endswith(f"| 1.50 (batch) | {told} |")
+    assert "load 0.3 on 2 cores; run: full." in lines[0]
+    busy = readme_tables.speed({"machine": {**facts, "warning": "too busy"}, "rows": [row]})
+    assert "load 0.3 on 2 cores, **too busy**; run: full." in busy[0]
+
+
+@pytest.mark.parametrize(("others", "warned"), [(0.9, False), (1.1, True)])
+def test_a_busy_machine_is_warned_of(others, warned, monkeypatch):
+    monkeypatch.setattr(os, "getloadavg", lambda: (others, 0.0, 0.0), raising=False)
+    assert bool(machine.too_busy()) is warned
 
 
 def test_only_like_is_set_in_ratio_with_like():
@@ -134,8 +155,8 @@ def test_only_like_is_set_in_ratio_with_like():
     row = next(works.measured(iter([work]), works.Settings(rounds=3))).as_json()
     assert row["ratios"] == {"batch": pytest.approx(3.0), "one by one": pytest.approx(0.5)}
     assert [e["ratio"] for e in row["entries"]] == [1.0, 1.0, 1.0, 0.5, pytest.approx(3.0), None]
-    peers = {"machine": {"cpu": "some", "python": "3"}, "rows": [row]}
-    line = readme_tables.speed(peers)[-1]
+    facts = {"cpu": "some", "python": "3", "load": "none", "run": "full"}
+    line = readme_tables.speed({"machine": facts, "rows": [row]})[-1]
     assert "| 3.00 (batch); 0.50 (one by one) |" in line
     assert "RTB 4.00 us (one by one); EAIK 6.00 us (batch)" in line
     with pytest.raises(ValueError, match="one mode"):
@@ -144,8 +165,8 @@ def test_only_like_is_set_in_ratio_with_like():
 
 def test_work_without_goal_is_neither_met_nor_missed():
     work = Work("some", "some work", "us", [Entry(Tool.OURS, "", lambda: Spent(1e-6, 1e-6))])
-    timings = in_turns([Contestant("robotmodels", lambda: Spent(1e-6, 1e-6))], 3)
-    assert Measured(work, timings).met is None
+    row = next(works.measured(iter([work]), works.Settings(rounds=3))).as_json()
+    assert report.compact([row])[-1].endswith("|  |  |")
 
 
 # --- README --------------------------------------------------------------------------------------

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from benchmarks.machine import head
-from benchmarks.rounded import figure, told_ratios, way_of
+from benchmarks.rounded import figure, told_goals, told_ratios, way_of
 from benchmarks.side_by_side.works import Tool
 
 Row = dict[str, Any]
@@ -33,7 +33,7 @@ def markdown(facts: dict[str, str], rows: list[Row], absent: list[str]) -> str:
 
 def compact(rows: list[Row]) -> list[str]:
     """A line for each work."""
-    columns = ["work", "unit", "ours", *PEERS, "ratio", "goal", "met"]
+    columns = ["work", "unit", "ours", *PEERS, "ratio", "goal"]
     lines = [f"| {' | '.join(columns)} |", "|---" * len(columns) + "|"]
     for r in rows:
         cells = [r["work"], r["unit"]]
@@ -41,7 +41,7 @@ def compact(rows: list[Row]) -> list[str]:
             "; ".join(cell(e) for e in r["entries"] if e["tool"] == tool)
             for tool in (Tool.OURS.value, *PEERS)
         ]
-        cells += [told_ratios(r, "{ratio} {mode}"), r["goal"], said(r["met"])]
+        cells += [told_ratios(r, "{ratio} {mode}"), told_goals(r)]
         lines.append(f"| {' | '.join(cells)} |")
     return lines
 
@@ -69,8 +69,3 @@ def line(row: Row) -> str:
 def cell(entry: Row) -> str:
     """A median with its mode and way."""
     return " ".join([figure(entry["median"]), way_of(entry)]).strip()
-
-
-def said(met: bool | None) -> str:
-    """A goal in a word."""
-    return "" if met is None else "yes" if met else "no"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import sys
 from collections.abc import Iterable
 from contextlib import ExitStack
 from dataclasses import replace
@@ -10,7 +11,7 @@ from pathlib import Path
 
 from benchmarks.foreign import Foreign
 from benchmarks.kept import keep
-from benchmarks.machine import load, machine
+from benchmarks.machine import load, machine, too_busy
 from benchmarks.side_by_side import report
 from benchmarks.side_by_side.works import PACKAGES, Settings, Tool, measured, module
 
@@ -51,8 +52,11 @@ def run(
         for line in absent:
             print(f"left out: {line}")
         facts = machine([name for name, _ in PACKAGES.values()], interpreters)
-        if settings.quick:
-            facts["run"] = "quick: smaller batches, three rounds"
+        facts["run"] = "quick: smaller batches, three rounds" if settings.quick else "full"
+        warning = too_busy()
+        if warning:
+            facts["warning"] = warning
+            print(f"warning: {warning}", file=sys.stderr)
         rows = []
         for part, name in wanted:
             works = importlib.import_module(f"benchmarks.side_by_side.{part}").WORKS[name]

@@ -134,12 +134,6 @@ class Measured:
     work: Work
     timings: dict[str, Timing]
 
-    @property
-    def met(self) -> bool | None:
-        """Whether every goal is met, None where there is none."""
-        goals = self.work.goals
-        return all(goal.met(self.timings) for goal in goals) if goals else None
-
     def as_json(self) -> dict[str, Any]:
         """Everything as lists and numbers; times in the unit of the work."""
         factor = UNITS[self.work.unit]
@@ -170,8 +164,10 @@ class Measured:
         return {
             "row": self.work.row, "work": self.work.title, "unit": self.work.unit,
             "entries": entries, "ratios": ratios,
-            "goal": ", ".join(goal.text for goal in self.work.goals),
-            "met": self.met,
+            "goals": [
+                {"text": goal.text, "met": bool(goal.met(self.timings))}
+                for goal in self.work.goals
+            ],
         }  # fmt: skip
 
 
