@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from identities.random_robots import random_pose
 
+from robotmodels import trajectories
 from robotmodels.errors import InvalidValueError
 from robotmodels.se3.orientation import rotation_vectors_of
 from robotmodels.trajectories import (
@@ -356,3 +357,45 @@ def test_a_rounding_after_the_end_is_the_end(rng):
     many = np.cumsum(np.full(3, 0.1))  # 0.30000000000000004
     short = cubic_spline([0.0, 1.0], [0.0, 0.3], v1=2.0)
     assert short.v(many)[-1] == pytest.approx(2.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("unit", [1e-300, 1e-200, 1e-160, 1e-20, 1.0, 1e20, 1e160, 1e250])
+@pytest.mark.parametrize("name", ["cubic", "quintic", "smoothed_trapezoidal", "jerk_limited"])
+def test_times_do_not_depend_on_the_unit_of_length(name, unit):
+    law = getattr(trajectories, name)
+    for V, A, J in ((1.0, 1.0, 1.0), (1.0, 0.3, 7.0), (0.2, 5.0, 0.1)):
+        one = law([0.0], [1.0], limits=MotionLimits(V, A, J))
+        other = law([0.0], [unit], limits=MotionLimits(V * unit, A * unit, J * unit))
+        assert other.duration == pytest.approx(one.duration, rel=1e-12)
+        t = np.linspace(0.0, 1.0, 7) * min(one.duration, other.duration)
+        np.testing.assert_allclose(other.q(t) / unit, one.q(t), rtol=1e-9, atol=1e-14)
+
+
+def test_limits_that_do_not_act_may_be_of_any_size():
+    move = trajectories.jerk_limited([0.0], [1e-200], limits=MotionLimits(1.0, 1e-200, 1.0))
+    assert move.duration == pytest.approx(2.0, rel=1e-12)
+    assert move.q(1.0) == pytest.approx(5e-201, rel=1e-12)
+    move = trajectories.trapezoidal([0.0], [1.0], limits=MotionLimits(1e-200, 1e200))
+    assert move.duration == pytest.approx(1e200, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["linear", "cubic", "quintic", "smoothed_trapezoidal"])
+def test_durations_that_no_float_holds_are_refused(name):
+    law = getattr(trajectories, name)
+    with pytest.raises(InvalidValueError, match="no float holds"):
+        law([0.0], [1e300], limits=MotionLimits(1e-9, 1.0, 1.0))
+    with pytest.raises(InvalidValueError, match="beyond every float"):
+        law([0.0], [1.0], duration=1e-200)
+    with pytest.raises(InvalidValueError, match="beyond every float"):
+        law([0.0], [1.0], limits=MotionLimits(1e300, 1e308))
+
+
+@pytest.mark.parametrize("name", ["cubic", "quintic", "jerk_limited"])
+@pytest.mark.parametrize(
+    ("way", "speed", "limits"),
+    [(1e300, 1e-10, (1e-9, 1.0, 1.0)), (1e-200, 1e-205, (1.0, 1e-200, 1.0)),
+     (1.0, 1e-205, (1.0, 1.0, 1.0)), (1.0, 0.1, (1e100, 1.0, 1.0))],
+)  # fmt: skip
+def test_extreme_states_at_the_ends_are_refused(name, way, speed, limits):
+    with pytest.raises(InvalidValueError, match=r"1e-50 to 1e\+50"):
+        getattr(trajectories, name)([0.0], [way], limits=MotionLimits(*limits), v0=[speed])

@@ -16,6 +16,9 @@ from .shown import least_shown
 ROUNDING = 1e-12
 """Relative shortfall of a given duration that is put down to rounding."""
 
+_EXTREME = 1e50
+"""Of states and limits: cubes of their ratios are floats."""
+
 
 def joint_vectors(**given: Any) -> tuple[dict[str, Array], tuple[int, ...], bool]:
     """Check positions and rates given for the same joints and give them one shape.
@@ -234,3 +237,69 @@ def refuse_short(T: Array | None, least: Array, length: Array) -> None:
         )
     if ((T == 0.0) & (length > 0.0).any(axis=-1)).any():
         raise InvalidValueError("duration: expected a positive time for a motion, got 0 s.")
+
+
+def refuse_rates(length: Array, T: Array) -> None:
+    """Refuse durations so short that a rate of the motion is no float.
+
+    Parameters
+    ----------
+    length : ndarray, shape (R, ...)
+        Lengths of the motions.
+    T : ndarray, shape (R,)
+        Durations, s.
+
+    Raises
+    ------
+    InvalidValueError
+        With the duration.
+
+    Examples
+    --------
+    >>> refuse_rates(np.ones((1, 2)), np.array([1e-9]))
+    """
+    size = 1e3 * np.minimum(length.reshape(T.size, -1).max(axis=-1, initial=0.0), 1e300)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        rate = np.where((T > 0.0) & (size > 0.0), size / T, 0.0)
+        rate = np.where(T < 1.0, np.where(rate > 0.0, rate / T / T, 0.0), rate)
+    if np.isinf(rate).any():
+        i = int(np.isinf(rate).argmax())
+        raise InvalidValueError(
+            f"duration: over {T[i]:.3g} s the rates of a motion of {size[i] / 1e3:.3g} are beyond "
+            "every float; check the units of the durations and of the limits."
+        )
+
+
+def refuse_extremes(states: dict[str, Array], limits: MotionLimits) -> None:
+    """Refuse states at the ends and limits whose powers, which tell durations, are no floats.
+
+    Parameters
+    ----------
+    states : dict of ndarray, shapes (R, n)
+        Positions, velocities and accelerations at the ends.
+    limits : MotionLimits
+        Of n joints.
+
+    Raises
+    ------
+    InvalidValueError
+        A number beyond 1e50, or a limit, velocity or acceleration below 1e-50 that is not 0.
+
+    Examples
+    --------
+    >>> refuse_extremes({"q0": np.zeros((1, 2))}, MotionLimits(1.0).for_joints(2))
+    """
+    bounds = {
+        f"limits: {name}": np.abs(getattr(limits, name))
+        for name in ("velocity", "velocity_lower", "acceleration", "acceleration_lower", "jerk",
+                     "jerk_lower")
+    }  # fmt: skip
+    for name, given in (*((k, np.abs(v)) for k, v in states.items()), *bounds.items()):
+        small = (given > 0.0) & (given < 1.0 / _EXTREME) & (name not in ("q0", "q1"))
+        wrong = np.isfinite(given) & ((given > _EXTREME) | small)
+        if wrong.any():
+            raise InvalidValueError(
+                f"{name}: expected sizes from {1.0 / _EXTREME:g} to {_EXTREME:g} (or 0) for a "
+                f"motion that does not begin and end at rest, got {given[wrong][0]:.3g}; check "
+                "the units."
+            )

@@ -15,7 +15,14 @@ from numpy.typing import ArrayLike
 from .._arrays import Array
 from .._choices import chosen
 from ..errors import InvalidValueError
-from .asked import ROUNDING, checked_limits, given_durations, joint_vectors, limits_along
+from .asked import (
+    ROUNDING,
+    checked_limits,
+    given_durations,
+    joint_vectors,
+    limits_along,
+    refuse_extremes,
+)
 from .laws import TimeLaw
 from .limits import MotionLimits
 from .piecewise import PiecewisePolynomial
@@ -98,6 +105,7 @@ def jerk_limited(
     T = given_durations(duration, batch)
     bounds = checked_limits(limits, n, states["q0"], states["q1"])
     assert bounds is not None
+    refuse_extremes(states, bounds)
     breaks, c = np.zeros((R, n, _PHASES + 2)), np.zeros((R, _PHASES + 1, 4, n))
     lengths = np.zeros((R, n, _PHASES + 1))
     for i in range(R):

@@ -15,6 +15,7 @@ from .asked import (
     given_durations,
     joint_vectors,
     limits_along,
+    refuse_rates,
     refuse_short,
 )
 from .laws import LineLimits, Pieces, TimeLaw, law_of_duration, law_of_limits
@@ -302,6 +303,7 @@ def along_line(
         if T is None and synchronisation is Synchronisation.INDEPENDENT:
             _refuse_waiting(law, along, totals)
     refuse_short(T, least, length.reshape(R, laws))
+    refuse_rates(length.reshape(R, laws), least if T is None else T)
     pieces = stretched(pieces, T, least, synchronisation, laws)
     return assembled(pieces, laws, start, direction, batch, scalar, T)
 

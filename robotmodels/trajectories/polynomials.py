@@ -7,7 +7,15 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array
 from ..errors import InvalidValueError
-from .asked import ROUNDING, checked_limits, given_durations, joint_vectors, refuse_short
+from .asked import (
+    ROUNDING,
+    checked_limits,
+    given_durations,
+    joint_vectors,
+    refuse_extremes,
+    refuse_rates,
+    refuse_short,
+)
 from .laws import TimeLaw
 from .limits import MotionLimits
 from .piecewise import PiecewisePolynomial
@@ -155,6 +163,7 @@ def _between_states(
     if T is not None:
         refuse_short(T, np.zeros(R), np.ones((R, 1)))
     if bounds is not None:
+        refuse_extremes(states, bounds)
         rows = [{name: value[i] for name, value in states.items()} for i in range(R)]
         if T is None:
             T = np.array([_least(order, row, bounds) for row in rows])
@@ -162,6 +171,7 @@ def _between_states(
             if excess(order, row, np.array([time]), bounds)[0] > ROUNDING:
                 _refuse(order, row, bounds, float(time))
     assert T is not None
+    refuse_rates(np.abs(states["q1"] - states["q0"]), T)
     c = between_states(order, states, T[:, None])
     motion = PiecewisePolynomial(
         np.stack((np.zeros(R), T), axis=-1).reshape(*batch, 1, 2),
