@@ -15,6 +15,7 @@ from .arm_angle import ArmAngle, arm_angle_postures
 from .asked import IMPROPER, WHOLE_POSE, Task
 from .branches import branches
 from .by_plan import TOLERANCES, plan_kernel
+from .centred import centred, put_back
 from .components import Components, asked_jacobians
 from .known import KnownArm
 from .loop import JointChain
@@ -107,7 +108,7 @@ def rows_by_family(call: Call, poses: Array, references: Array, psi: Array | Non
         references = references.copy()
         references[:, locked] = [value for _, value in task.locks]
     columns = arm.columns[~np.isin(arm.columns, locked)]
-    found = _settled(call, U, psi, np.ascontiguousarray(references[:, columns]))
+    found = _near_or_far(call, U, psi, np.ascontiguousarray(references[:, columns]))
     code, labels = branches(call.solver, found)
     N, S, _ = found.q.shape
     S, n = max(S, 1), model.n
@@ -243,6 +244,18 @@ def rows_of_doubtful(call: Call, poses: Array, references: Array, rows: Rows) ->
         closest=closest,
         missing=missing,
     )
+
+
+def _near_or_far(call: Call, U: Array, psi: Array | None, references: Array) -> Settled:
+    """Postures of a chain; slides at its ends that are far out are brought back for it."""
+    task, solver = call.task, call.solver
+    components, where = Components(task.mask, task.in_tool_axes), None
+    if solver is not None and not task.relations:
+        where = centred(solver.chain, U, references, components)
+    if solver is None or where is None:
+        return _settled(call, U, psi, references)
+    found = _settled(call, np.ascontiguousarray(where.U), psi, where.references)
+    return put_back(solver.chain, U, references, where, found, components, call.tolerances)
 
 
 def _settled(call: Call, U: Array, psi: Array | None, references: Array) -> Settled:
