@@ -2,7 +2,8 @@
 
 Needs FIGAROH and nothing of this project. Tasks, each with the file of its arrays:
 
-- ``["regressor", JOB]``: links alone, all samples
+- ``["regressor", JOB, NOTE]``: links alone, all samples; the note comes back with the time
+- ``["keep_regressor", JOB]``: the same once, kept in ``JOB.answer.npy``
 - ``["base", JOB]``: base parameters with rotors and friction
 - ``["identify", JOB]``: least squares of given signals
 - ``["calibrate", JOB]``: geometric calibration on poses
@@ -57,10 +58,17 @@ def motion(path):
     return [content(path)[name] for name in ("q", "v", "a")]
 
 
-def regress(path):
+def regress(path, note=""):
     """The regressor of the links."""
     figaroh, samples = figaroh_of(path), motion(path)
-    return timed(lambda: figaroh.stack(samples, drive=False), lambda _: "")
+    return timed(lambda: figaroh.stack(samples, drive=False), lambda _: note)
+
+
+def keep_regressor(path):
+    """The same, for others to look at."""
+    W = figaroh_of(path).stack(motion(path), drive=False)
+    np.save(f"{path}.answer.npy", W)
+    return told(0.0, 0.0, "")
 
 
 def base(path):
@@ -107,7 +115,10 @@ def told(processor, clock, note):
     return {"processor": processor, "clock": clock, "note": note}
 
 
-TASKS = {"regressor": regress, "base": base, "identify": least_squares, "calibrate": calibrate}
+TASKS = {
+    "regressor": regress, "keep_regressor": keep_regressor, "base": base,
+    "identify": least_squares, "calibrate": calibrate,
+}  # fmt: skip
 
 
 def main():
@@ -116,8 +127,8 @@ def main():
     if "ready" not in READY:
         return
     for line in sys.stdin:
-        name, path = json.loads(line)
-        print(json.dumps(TASKS[name](path)), flush=True)
+        name, *words = json.loads(line)
+        print(json.dumps(TASKS[name](*words)), flush=True)
 
 
 if __name__ == "__main__":

@@ -20,6 +20,11 @@ import numpy as np
 from benchmarks.measure import Spent
 
 
+def kept_beside(job: str) -> str:
+    """Where a peer keeps an array that it is asked for, so that it is looked at."""
+    return f"{job}.answer.npy"
+
+
 class Foreign:
     """A peer's process, from `start` until the end of the ``with`` block.
 

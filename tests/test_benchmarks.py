@@ -7,12 +7,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from benchmarks import machine, readme_tables
+import robotmodels as rm
+from benchmarks import igm_peers, machine, readme_tables
 from benchmarks.machine import BUSY
 from benchmarks.measure import Contestant, Spent, in_turns
-from benchmarks.side_by_side import report, works
+from benchmarks.side_by_side import agreement, report, works
 from benchmarks.side_by_side.works import Entry, Tool, Work, at_most
 
 ROOT = Path(__file__).parents[1]
@@ -167,6 +169,45 @@ def test_work_without_goal_is_neither_met_nor_missed():
     work = Work("some", "some work", "us", [Entry(Tool.OURS, "", lambda: Spent(1e-6, 1e-6))])
     row = next(works.measured(iter([work]), works.Settings(rounds=3))).as_json()
     assert report.compact([row])[-1].endswith("|  |  |")
+
+
+# --- both sides computed the same ----------------------------------------------------------------
+
+
+def test_arrays_that_differ_end_the_run():
+    ours = np.array([[1.0, 20.0], [3.0, 4.0]])
+    assert agreement.same("pose", ours, ours + 1e-12)(None) == "as ours to 5e-14 on 2"
+    with pytest.raises(agreement.DisagreementError, match=r"pose differs from ours by 5\.0e-06"):
+        agreement.same("pose", ours, ours + 1e-4)
+    with pytest.raises(agreement.DisagreementError, match="differs"):
+        agreement.same("pose", ours, ours * np.nan)
+    with pytest.raises(agreement.DisagreementError, match="shape"):
+        agreement.same("pose", ours, ours[:1])
+
+
+def test_postures_that_differ_end_the_run():
+    arm = rm.load("ur5e")
+    T = rm.dgm(arm, np.random.default_rng(0).uniform(-2.0, 2.0, (5, 6)))
+    all_of = [rm.igm(arm, x) for x in T]
+    rows = [found.q[found.valid] for found in all_of]
+    peer = igm_peers.Peer("some", lambda x: x, lambda x: x, lambda q: rm.dgm(arm, q))
+    assert agreement.same_robot(arm, peer)
+    moved = igm_peers.Peer("some", peer.solve, peer.postures, lambda q: rm.dgm(arm, q) @ T[0])
+    assert not agreement.same_robot(arm, moved)
+    total = sum(map(len, rows))
+    told = agreement.same_postures("some", arm, T, peer, rows)
+    assert told.startswith(f"{total} postures of 5 poses, as ours to ")
+    turned = [q + 2.0 * np.pi for q in rows]
+    assert f"{total} postures" in agreement.same_postures("some", arm, T, peer, turned)
+    astray = [np.vstack([rows[0], np.zeros(6)]), *rows[1:]]
+    assert "1 that miss the pose" in agreement.same_postures("some", arm, T, peer, astray)
+    fewer = [rows[0][:-1], *rows[1:]]
+    with pytest.raises(agreement.DisagreementError, match="1 of ours are not among them"):
+        agreement.same_postures("some", arm, T, peer, fewer)
+    one_each = [q[:1] for q in rows]
+    assert "5 postures" in agreement.same_postures("some", arm, T, peer, one_each, every=False)
+    with pytest.raises(agreement.DisagreementError, match="0 postures"):
+        agreement.same_postures("some", arm, T, peer, [np.empty((0, 6))] * 5, every=False)
 
 
 # --- README --------------------------------------------------------------------------------------

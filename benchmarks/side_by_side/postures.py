@@ -14,6 +14,7 @@ from benchmarks.bench_igm_numeric import contestants as numeric_field
 from benchmarks.bench_igm_numeric import met
 from benchmarks.igm_peers import Peer, peers_of
 from benchmarks.measure import Timing, loop
+from benchmarks.side_by_side.agreement import same_postures, same_robot
 from benchmarks.side_by_side.works import (
     BATCH,
     ONE,
@@ -63,11 +64,21 @@ def postures_batch(settings: Settings) -> Iterator[Work]:
         yield _batch(model, title, peers, settings.number(100_000, 10_000))
 
 
-def _alone(peer: Peer, n: int) -> Entry:
+def _alone(peer: Peer, model: rm.RobotModel) -> Entry:
     tool, how = TOOLS[peer.name]
-    q = np.random.default_rng(0).uniform(-np.pi, np.pi, (FEW, n))
-    poses = np.array([peer.direct(x) for x in q])
-    return Entry(tool, how, loop(peer.solve, poses), FEW, whole=how not in PARTIAL, mode=ONE)
+    whole = how not in PARTIAL
+    if same_robot(model, peer):
+        poses = reachable(model, FEW)
+        found = [peer.solve(T) for T in poses]
+        note = same_postures(peer.name, model, poses, peer, found, whole)
+    else:
+        q = np.random.default_rng(0).uniform(-np.pi, np.pi, (FEW, model.n))
+        poses = np.array([peer.direct(x) for x in q])
+        count = sum(len(peer.postures(peer.solve(T))) for T in poses)
+        note = f"{count} postures of {FEW} poses of the robot it ships, which is not ours"
+    return Entry(
+        tool, how, loop(peer.solve, poses), FEW, lambda _: note, whole=whole, mode=ONE
+    )  # fmt: skip
 
 
 def _one_pose(model: rm.RobotModel, title: str, peers: list[Peer]) -> Work:
@@ -77,7 +88,7 @@ def _one_pose(model: rm.RobotModel, title: str, peers: list[Peer]) -> Work:
     entries = [
         Entry(Tool.OURS, "", loop(lambda x: rm.igm(model, x), T[:FEW]), FEW, mode=ONE),
         Entry(Tool.OURS, "", compiled, THOUSAND, mode=KERNEL),
-        *(_alone(peer, model.n) for peer in peers),
+        *(_alone(peer, model) for peer in peers),
     ]
     goals = [at_most(12.0, "us", ONE), at_most(3.0, "us", KERNEL, said="in the kernel")]
     return Work("postures", f"all 8 postures of one pose, {title}", "us", entries, goals)
@@ -86,9 +97,14 @@ def _one_pose(model: rm.RobotModel, title: str, peers: list[Peer]) -> Work:
 def _batch(model: rm.RobotModel, title: str, peers: list[Peer], count: int) -> Work:
     T = reachable(model, count)
     entries = [Entry(Tool.OURS, "", lambda: rm.igm(model, T), count)]
-    entries += [
-        Entry(*TOOLS[p.name], lambda f=p.batch: f(T), count) for p in peers if p.batch is not None
-    ]
+    for p in peers:
+        if p.batch is not None:
+            solve = p.batch
+            note = same_postures(p.name, model, T[:FEW], p, solve(T[:FEW]))
+            tool, how = TOOLS[p.name]
+            entries.append(
+                Entry(tool, how, lambda f=solve: f(T), count, lambda _, told=note: told)
+            )  # fmt: skip
     title = f"all 8 postures, batch of {count} poses, {title}"
     return Work("postures_batch", title, "us", entries, [at_most(2.5, "us")])
 
@@ -104,7 +120,7 @@ def general_6r(settings: Settings) -> Iterator[Work]:
             Entry(Tool.OURS, how, lambda m=model, x=T: rm.igm(m, x), count, mode=BATCH),
             Entry(Tool.OURS, "", loop(lambda x, m=model: rm.igm(m, x), T[:20]), 20, mode=ONE),
         ]
-        entries += [_alone(p, 6) for p in peers_of(model, name) if p.name in TOOLS]
+        entries += [_alone(p, model) for p in peers_of(model, name) if p.name in TOOLS]
         goals = [at_most(450.0, "us", BATCH, how, "in batch")]
         title = f"general 6R, up to 16 postures, {name}"
         yield Work("general_6r", title, "us", entries, goals)
