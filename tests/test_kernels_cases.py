@@ -3,11 +3,14 @@
 import numpy as np
 import pytest
 from numba import njit
+from scipy import signal
 
 import robotmodels as rm
 from robotmodels.igm import _homing, _prismatic
 from robotmodels.igm._arrange import AT_LIMIT
 from robotmodels.igm._regular import ordered_rows
+from robotmodels.kernels.biquads import forward_backward
+from robotmodels.kernels.bounded_velocity import nearest_inside
 from robotmodels.kernels.decimation import add_rows
 from robotmodels.kernels.differentiated_poses import (
     differentiated_pose_rates,
@@ -35,6 +38,11 @@ eliminated, least_of_square, size_of, three_lengths = (
 @njit
 def shortest(r, m, x, work):
     return _homing.shortest(r, m, x, work)
+
+
+@njit
+def nearest(x, F, f, wish, lower, upper, v, active, sides, press, r, z, E, R):
+    return nearest_inside(x, F, f, wish, lower, upper, v, active, sides, press, r, z, E, R)
 
 
 @njit
@@ -365,6 +373,45 @@ def test_lengths_along_three_directions(rng):
         three_lengths(Z.copy(), Z @ wanted, reference, r)
         np.testing.assert_allclose(Z @ r, Z @ wanted, rtol=0, atol=1e-12)
         assert r[one] == reference[one]
+
+
+@pytest.mark.parametrize("order", [1, 2, 5])
+def test_sections_forward_and_backward_are_scipys(rng, order):
+    """They start at rest at the first value, which is far from zero here."""
+    sos = signal.butter(order, 0.2, output="sos")
+    sos[:, :3] += rng.uniform(0.1, 0.3, (len(sos), 3))  # no two coefficients are the same
+    x = 5.0 + rng.normal(size=(50, 2))
+    out = np.empty(x.shape)
+    assert forward_backward(np.ascontiguousarray(np.delete(sos, 3, axis=1)), x, 20, out) == 90
+    expected = signal.sosfiltfilt(sos, x, axis=0, padtype="odd", padlen=20)
+    np.testing.assert_allclose(out, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize(("f", "n"), [(1, 4), (3, 5), (5, 8), (6, 6)])
+def test_velocities_inside_bounds_are_the_nearest_by_their_multipliers(rng, f, n):
+    """What is missing of the wish is what the active bounds press, none of them outwards."""
+    found = 0
+    for _ in range(30):
+        basis = np.linalg.qr(rng.normal(size=(n, n)))[0].T
+        F, inside = np.ascontiguousarray(basis[:f]), rng.uniform(-1.0, 1.0, n)
+        x = inside - F.T @ (F @ inside)
+        lower, upper = inside - rng.uniform(0.0, 0.5, n), inside + rng.uniform(0.0, 0.5, n)
+        wish = inside + 4.0 * rng.normal(size=n)
+        v, sides, press, r, z = (np.zeros(n) for _ in range(5))
+        active, E, R = np.zeros(n, np.int64), np.zeros((n, n)), np.zeros((n, n))
+        k, joint, _, _ = nearest(
+            x, F, f, wish, lower, upper, v, active, sides, press, r, z, E, R
+        )  # fmt: skip
+        assert joint == -1
+        assert ((v >= lower - 1e-11) & (v <= upper + 1e-11)).all()
+        np.testing.assert_allclose(v - F.T @ (F @ v), x, rtol=0, atol=1e-12)
+        bound = np.where(sides > 0.0, upper[active], lower[active])[:k]
+        np.testing.assert_allclose(v[active[:k]], bound, rtol=0, atol=1e-11)
+        pressed = F[:, active[:k]] @ (sides[:k] * press[:k])
+        np.testing.assert_allclose(F @ (wish - v), pressed, rtol=0, atol=1e-10)
+        assert (press[:k] >= 0.0).all()
+        found += k
+    assert found > 20
 
 
 # --- postures and poses ----------------------------------------------------------------------
