@@ -1,22 +1,29 @@
 """Speed beside yardsticks that stand still: fails where ours has become slower than they have.
 
-    python .ci/ratios.py [--write] [--only NAME ...] [--slowed NAME [--times 3]]
+    python .ci/ratios.py [--write [--attempts 16]] [--only NAME ...] [--slowed NAME [--times 2]]
 
 Each work of ours is timed in turns with something of other hands, NumPy, SciPy, Pinocchio, ruckig,
 in this process. Only the ratio of the two medians is looked at, never a time: a machine that is
-slow or busy is so for both. A ratio may be `MARGIN` times that of
-`benchmarks/results/ratios.json`; what is above is measured again, up to `ATTEMPTS` times, and the
-least ratio counts. ``--write`` writes the file anew, which another kind of processor may need.
-``--slowed`` does a work of ours more often than it says: the check has to fail then.
+slow or busy is so for both. `benchmarks/results/ratios.json` keeps the median of such ratios and
+their spread, the standard deviation of their logarithm. A ratio that is above the kept one by more
+than `margin` of the spread, or below `FASTER` of it, is found again until there are `ATTEMPTS`,
+and their median is judged: above fails, below is said. ``--write`` writes the file anew, which
+another kind of processor may need: half of the attempts on the machine as it is, half beside
+processes that keep it busy, so that the spread holds for both. ``--slowed`` does a work of ours
+more often than it says: the check has to fail then.
 """
 
 # ruff: noqa: E402
 import argparse
 import json
+import math
+import os
+import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -34,7 +41,9 @@ from benchmarks.measure import Contestant, in_turns, loop
 from robotmodels import trajectories as tr
 
 FILE = ROOT / "benchmarks" / "results" / "ratios.json"
-MARGIN, ATTEMPTS, ROUNDS = 1.6, 3, 7
+ATTEMPTS, ROUNDS = 5, 7
+FASTER, LEAST, SPREADS = 0.75, 1.25, 3.0
+BURN = "import numpy as np; x = np.ones(10**6)\nwhile True: x = x * 0.5 + 0.5"
 Run = Callable[[], object]
 
 
@@ -56,6 +65,34 @@ class Pair:
         ]
         found = in_turns(field, ROUNDS)
         return found["ours"].processor.median / found["theirs"].processor.median
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """What is known of a pair: its ratio, and the standard deviation of the ratio's logarithm."""
+
+    ratio: float
+    spread: float
+
+    @property
+    def margin(self) -> float:
+        """How many times the ratio is still good."""
+        return max(LEAST, math.exp(SPREADS * self.spread))
+
+    def slower(self, found: float) -> bool:
+        """Whether a ratio is above what spread explains."""
+        return found > self.margin * self.ratio
+
+    def faster(self, found: float) -> bool:
+        """Whether a ratio is so much better that it should be kept."""
+        return found < FASTER * self.ratio
+
+    def alarm(self, times: float = 1.0) -> float:
+        """Probability that a run calls a work slower that takes ``times`` as long."""
+        away = math.log(self.margin / times) / max(self.spread, 1e-3)
+        p = 0.5 * math.erfc(away / math.sqrt(2.0))
+        # the first attempt, and then at least two of four
+        return p * (1.0 - (1.0 - p) ** 4 - 4.0 * p * (1.0 - p) ** 3)
 
 
 def pairs() -> Iterator[Pair]:
@@ -137,14 +174,14 @@ def inverse_models() -> Iterator[Pair]:
         yield Pair(f"igm, one pose, {name}", "NumPy's SVD of one 6 x 6", each, decompose_each)
     T = rm.dgm(model, q[:500])
     yield Pair(
-        "igm_numeric, batch", svd, lambda: rm.igm_numeric(model, T), decompose, (500, 2000)
+        "igm_numeric, batch", svd, lambda x=T: rm.igm_numeric(model, x), decompose, (500, 2000)
     )  # fmt: skip
     general = rm.load("crx10ia")
     T = rm.dgm(general, q[:100])
     pencil = rng.normal(size=(50, 24, 24))
     yield Pair(
         "igm, general 6R, batch", "LAPACK's eigenvalues, batch of 24 x 24",
-        lambda: rm.igm(general, T), lambda: np.linalg.eigvals(pencil), (100, 50),
+        lambda x=T: rm.igm(general, x), lambda: np.linalg.eigvals(pencil), (100, 50),
     )  # fmt: skip
 
 
@@ -226,19 +263,12 @@ def estimations() -> Iterator[Pair]:
     )  # fmt: skip
 
 
-def judged(found: float, kept: float) -> bool:
-    """Whether a ratio is near enough to that which was kept."""
-    return found <= MARGIN * kept
-
-
-def checked(pair: Pair, kept: float) -> tuple[float, int]:
-    """The least ratio, and in how many attempts it was found."""
-    least = float("inf")
-    for attempt in range(1, ATTEMPTS + 1):
-        least = min(least, pair.ratio())
-        if judged(least, kept):
-            return least, attempt
-    return least, ATTEMPTS
+def checked(pair: Pair, kept: Kept) -> tuple[float, int]:
+    """The ratio, and of how many attempts it is the median."""
+    found = [pair.ratio()]
+    if kept.slower(found[0]) or kept.faster(found[0]):
+        found += [pair.ratio() for _ in range(ATTEMPTS - 1)]
+    return float(np.median(found)), len(found)
 
 
 def slowed(pair: Pair, times: int) -> Pair:
@@ -251,14 +281,57 @@ def slowed(pair: Pair, times: int) -> Pair:
     return replace(pair, ours=run)
 
 
-def write() -> None:
-    """Keep the ratios of this machine: the median of five, for each work."""
-    ratios = {}
+@contextmanager
+def others_at_work() -> Iterator[None]:
+    """A process for each core that keeps it busy."""
+    count = os.cpu_count() or 1
+    busy = [subprocess.Popen([sys.executable, "-c", BURN]) for _ in range(count)]
+    try:
+        yield
+    finally:
+        for process in busy:
+            process.kill()
+            process.wait()
+
+
+def write(attempts: int) -> None:
+    """Keep the ratios of this machine and their spread."""
+    about = machine(["ruckig"])
+    told = {}
     for pair in pairs():
-        ratios[pair.name] = float(np.median([pair.ratio() for _ in range(5)]))
-        print(f"{pair.name:28} {ratios[pair.name]:9.3f}  {pair.yardstick}", flush=True)
-    kept = {"machine": machine(["ruckig"]), "ratios": ratios}
-    FILE.write_text(json.dumps(kept, indent=2) + "\n", encoding="utf-8")
+        found = [pair.ratio() for _ in range(attempts // 2)]
+        with others_at_work():
+            found += [pair.ratio() for _ in range(attempts - attempts // 2)]
+        kept = Kept(float(np.median(found)), float(np.std(np.log(found))))
+        told[pair.name] = kept
+        print(f"{pair.name:28} {kept.ratio:9.3f}  {rates(kept)}  {pair.yardstick}", flush=True)
+    keep(about, told, attempts)
+
+
+def keep(about: dict[str, str], told: dict[str, Kept], attempts: int) -> None:
+    """Write the file, and say how well it tells what is slow."""
+    pairs_kept = {name: asdict(kept) for name, kept in told.items()}
+    text = json.dumps({"machine": about, "attempts": attempts, "pairs": pairs_kept}, indent=2)
+    FILE.write_text(text + "\n", encoding="utf-8")
+    print(summary(told))
+
+
+def rates(kept: Kept) -> str:
+    """Margin, and what it sees."""
+    return (
+        f"spread {kept.spread:.3f}, margin {kept.margin:.2f}, sees 1.5 x in {kept.alarm(1.5):.0%}, "
+        f"2 x in {kept.alarm(2.0):.1%}"
+    )
+
+
+def summary(told: dict[str, Kept]) -> str:
+    """False alarms of a run, and the least that is seen of a work twice as slow."""
+    false = 1.0 - math.prod(1.0 - kept.alarm() for kept in told.values())
+    seen = [kept.alarm(2.0) for kept in told.values()]
+    return (
+        f"by their spreads: {false:.0e} false alarms a run; a work twice as slow is seen in "
+        f"{min(seen):.0%} to {max(seen):.0%} of the runs, of all works {np.mean(seen):.1%}"
+    )
 
 
 def main() -> None:
@@ -267,15 +340,17 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help="keep the ratios of this machine")
     parser.add_argument("--only", nargs="+", default=None, metavar="NAME")
     parser.add_argument("--slowed", metavar="NAME", help="do this work of ours more often")
-    parser.add_argument("--times", type=int, default=3, help="how often, with --slowed")
+    parser.add_argument("--times", type=int, default=2, help="how often, with --slowed")
+    parser.add_argument("--attempts", type=int, default=16, help="of each pair, with --write")
     given = parser.parse_args()
     if given.write:
-        write()
+        write(given.attempts)
         return
     start = time.perf_counter()
-    kept = json.loads(FILE.read_text(encoding="utf-8"))["ratios"]
-    print(f"{load()}; ratios to yardsticks, at most {MARGIN:g} x as kept")
-    slow, seen = [], set()
+    told = json.loads(FILE.read_text(encoding="utf-8"))["pairs"]
+    kept = {name: Kept(**known) for name, known in told.items()}
+    print(f"{load()}; ratios to yardsticks. {summary(kept)}")
+    slow, fast, seen = [], [], set()
     for pair in pairs():
         seen.add(pair.name)
         if given.only is not None and pair.name not in given.only:
@@ -284,14 +359,17 @@ def main() -> None:
             sys.exit(f"{FILE.name} has no ratio of {pair.name!r}: .ci/ratios.py --write adds it.")
         if given.slowed == pair.name:
             pair = slowed(pair, given.times)
-        found, attempts = checked(pair, kept[pair.name])
-        good = judged(found, kept[pair.name])
-        if not good:
+        known = kept[pair.name]
+        found, attempts = checked(pair, known)
+        if known.slower(found):
             slow.append(pair.name)
+        if known.faster(found):
+            fast.append(pair.name)
         print(
-            f"{pair.name:28} {found:9.3f}  kept {kept[pair.name]:9.3f}  "
-            f"{found / kept[pair.name]:5.2f} x  {'' if good else 'SLOWER  '}"
-            f"{pair.yardstick}{f', attempt {attempts}' if attempts > 1 else ''}",
+            f"{pair.name:28} {found:9.3f}  kept {known.ratio:9.3f}  "
+            f"{found / known.ratio:5.2f} x, at most {known.margin:.2f}  "
+            f"{'SLOWER  ' if known.slower(found) else ''}"
+            f"{pair.yardstick}{f', median of {attempts}' if attempts > 1 else ''}",
             flush=True,
         )
         if given.only is not None and seen.issuperset(given.only):
@@ -299,6 +377,8 @@ def main() -> None:
     gone = sorted((set(kept) if given.only is None else set(given.only)) - seen)
     if gone:
         sys.exit(f"{FILE.name} or --only names what is not measured: {', '.join(gone)}.")
+    if fast:
+        print(f"faster than {FASTER:g} of what is kept, --write keeps it: {', '.join(fast)}")
     print(f"{time.perf_counter() - start:.0f} s")
     if slow:
         sys.exit(f"slower than it was, beside its yardstick: {', '.join(slow)}")

@@ -257,20 +257,54 @@ def spent(seconds):
     return lambda: Spent(seconds, seconds)
 
 
-def test_ratio_is_checked_again_before_it_fails(ratios):
+def test_ratio_that_is_unusual_is_the_median_of_five(ratios):
     pair = ratios.Pair("some", "a yardstick", spent(3.0), spent(2.0))
     assert pair.ratio() == 1.5
-    assert ratios.checked(pair, 1.0) == (1.5, 1)
-    assert ratios.checked(pair, 0.9) == (1.5, ratios.ATTEMPTS)
-    assert ratios.judged(1.59, 1.0)
-    assert not ratios.judged(1.61, 1.0)
+    assert ratios.checked(pair, ratios.Kept(1.5, 0.1)) == (1.5, 1)
+    assert ratios.checked(pair, ratios.Kept(1.0, 0.1)) == (1.5, ratios.ATTEMPTS)
+    assert ratios.checked(pair, ratios.Kept(2.1, 0.1)) == (1.5, ratios.ATTEMPTS)
     counted = ratios.Pair("some", "a yardstick", spent(3.0), spent(2.0), (10, 1))
     assert counted.ratio() == pytest.approx(0.15)
-    took = iter([9.0] * 8 + [3.0] * 8)
-    busy = ratios.Pair(
-        "some", "a yardstick", lambda: Spent((s := next(took)), s), spent(2.0)
-    )  # fmt: skip
-    assert ratios.checked(busy, 1.0) == (1.5, 2)
+
+    def busy(*attempts):
+        # a run before the rounds, and the rounds, of each attempt
+        took = iter([x for x in attempts for _ in range(1 + ratios.ROUNDS)])
+        return ratios.Pair(
+            "some", "a yardstick", lambda: Spent((s := next(took)), s), spent(2.0)
+        )  # fmt: skip
+
+    kept = ratios.Kept(1.0, 0.1)
+    assert ratios.checked(busy(9.0, 2.0, 2.2, 8.0, 2.0), kept) == (1.1, 5)
+    # one lucky attempt does not hide what is slow
+    found, attempts = ratios.checked(busy(4.0, 2.0, 4.0, 4.2, 4.0), kept)
+    assert (found, attempts) == (2.0, 5)
+    assert kept.slower(found)
+
+
+def test_margin_follows_the_spread(ratios):
+    quiet, wild = ratios.Kept(2.0, 0.02), ratios.Kept(2.0, 0.1)
+    assert quiet.margin == ratios.LEAST
+    assert wild.margin == pytest.approx(np.exp(0.3))
+    assert not wild.slower(2.69)
+    assert wild.slower(2.71)
+    assert wild.faster(1.49)
+    assert not wild.faster(1.51)
+    # the rates are those of the rule, tried on random attempts
+    rng = np.random.default_rng(0)
+    for times in (1.0, 1.35, 2.0):
+        r = 2.0 * times * np.exp(0.1 * rng.normal(size=(20_000, 5)))
+        called = (r[:, 0] > wild.margin * 2.0) & (np.median(r, axis=1) > wild.margin * 2.0)
+        assert called.mean() == pytest.approx(wild.alarm(times), abs=0.01)
+    assert wild.alarm() < 1e-6
+    assert wild.alarm(2.0) > 0.999
+
+
+def test_what_is_kept_hardly_ever_raises_a_false_alarm(ratios):
+    told = json.loads(ratios.FILE.read_text())["pairs"]
+    kept = [ratios.Kept(**known) for known in told.values()]
+    assert len(kept) > 20
+    assert sum(known.alarm() for known in kept) < 1e-3
+    assert min(known.alarm(2.0) for known in kept) > 0.8
 
 
 def test_ratio_that_is_kept_is_near_and_slowed_work_fails():
@@ -280,4 +314,4 @@ def test_ratio_that_is_kept_is_near_and_slowed_work_fails():
     slow = run(".ci/ratios.py", "--only", name, "--slowed", name)
     assert slow.returncode == 1, slow.stdout
     assert f"slower than it was, beside its yardstick: {name}" in slow.stderr
-    assert "attempt 3" in slow.stdout
+    assert "median of 5" in slow.stdout
