@@ -30,6 +30,25 @@ BASE = (
     "tests/test_base_parameters.py"
     " -k (random_robots or book or prismatic or horizontal or wrist or keeps)"
 )
+CASES = "tests/test_kernels_cases.py"
+COORDINATES = (
+    "tests/test_operational_coordinates.py -k (of_scipy or nearest_of_all or random_poses"
+    " or each_sample or left_inverse or rates_of_rates or every_length or entries_of)"
+)
+BOUNDS = (
+    "tests/test_ikm_bounds.py::test_the_scale_is_the_largest_and_the_motion_the_least[3-7-regular]"
+    " tests/test_ikm_bounds.py::test_levels_under_bounds[7-sizes0]"
+    " tests/test_ikm_bounds.py::test_a_drift_that_cannot_be_held_is_met_in_part"
+)
+LEVELS = (
+    "tests/test_ikm_levels.py::test_one_level_is_the_weighted_pseudo_inverse[6-3]"
+    " tests/test_ikm_levels.py::test_one_level_is_the_weighted_pseudo_inverse[3-7]"
+    " tests/test_ikm_levels.py::test_the_least_motion_that_meets_all_levels"
+)
+RAMPS = (
+    "tests/test_trajectories.py"
+    " -k (least_times_of_smooth or (derivatives and not cubic and not quintic))"
+)
 
 # fmt: off
 MUTATIONS = [
@@ -96,6 +115,15 @@ MUTATIONS = [
         "# the tool does not move in the last frame",
         "add(cross(dw, arm), cross(w, cross(w, arm)))", "cross(dw, arm)",
         "tests/test_kernels_cases.py -k tool_far"),
+    Mutation("kernels: differentiated poses",
+        "a differentiated rotation with one sign of the rotation itself", "def times_turn(",
+        "m[1] * c - m[0] * s", "m[1] * c + m[0] * s", CASES + " -k differentiated"),
+    Mutation("kernels: differentiated poses", "the factors behind a joint do not move",
+        "def differentiated_pose_rates(", "scale(vj, times(turn, b))", "scale(0.0, times(turn, b))",
+        CASES + " -k differentiated"),
+    Mutation("kernels: differentiated poses", "a slide behind a joint does not move the tool",
+        "def differentiated_pose_rates(", "scale(vj, z)", "scale(0.0, z)",
+        CASES + " -k differentiated"),
     # --- dynamics --------------------------------------------------------------------------------
     Mutation("kernels: Newton-Euler", "gravity pulls upwards",
         "# A base that accelerates against gravity loads the links", "(-g[0], -g[1], -g[2])",
@@ -168,6 +196,15 @@ MUTATIONS = [
     Mutation("kernels: drives", "dry friction helps where the joint runs backwards",
         "def drive_torques(", "(-Fc[j] if v[i, j] < 0.0 else 0.0)",
         "(Fc[j] if v[i, j] < 0.0 else 0.0)", "tests/test_drive.py"),
+    Mutation("kernels: regressor gradient",
+        "w x (w x b) is differentiated as if it were linear in w",
+        "def triple(a: Vector, w: Vector, b: Vector)", "- 2.0 * w[1] * ab", "- w[1] * ab",
+        CASES + " -k contracted"),
+    Mutation("kernels: regressor gradient", "z x J w for J w x z", "def regressor_gradients(",
+        "cross(Jw, z)", "cross(z, Jw)", CASES + " -k contracted"),
+    Mutation("kernels: regressor gradient", "a slide moves along a row of the rotation",
+        "def regressor_gradients(", "(R[2], R[5], R[8])", "(R[6], R[7], R[8])",
+        CASES + " -k contracted"),
     # --- velocities ------------------------------------------------------------------------------
     Mutation("kernels: singular values", "rotations turn the other way", "def orthogonal_rows(",
         "B[i, c] = cosine * x - sine * y", "B[i, c] = cosine * x + sine * y",
@@ -193,6 +230,11 @@ MUTATIONS = [
     Mutation("kinematics: factors", "transport between the frames with the other sign",
         "def jacobian_factors(", "-se3.skew(lever)", "se3.skew(lever)",
         "tests/test_jacobian_factors.py"),
+    Mutation("kernels: bounded velocity", "back substitution adds", "def dependence(",
+        "r[i] -= R[i, j] * r[j]", "r[i] += R[i, j] * r[j]", BOUNDS),
+    Mutation("kernels: levels", "what higher levels do to a task is counted twice, not taken off",
+        "def level_velocities(\n    J: Floats", "rest[a] -= A[a, j] * x[j]",
+        "rest[a] += A[a, j] * x[j]", LEVELS),
     # --- description -----------------------------------------------------------------------------
     Mutation("se3", "rotations turn the other way", "def rotation(axis: str", "= -s, s", "= s, -s",
         SE3),
@@ -230,6 +272,17 @@ MUTATIONS = [
         "tests/test_friction.py"),
     Mutation("friction", "backward friction pushes", "class AsymmetricFriction(",
         "back, np.sign(back)]", "back, -np.sign(back)]", "tests/test_friction.py"),
+    Mutation("coordinates: angles", "first angle of z-x-z with the other sign",
+        "def angles_of(sequence", "np.arctan2(gx, -gy)", "np.arctan2(gx, gy)", COORDINATES),
+    Mutation("coordinates: angles", "the other solution mirrors pitch at zero",
+        "def other_solution(", "pi if sequence.level else 0.0", "0.0 if sequence.level else pi",
+        COORDINATES),
+    Mutation("coordinates: angles", "a rotation of angles is left-handed",
+        "def rotation_of_angles(", "(right_handed * sine)", "(-right_handed * sine)", COORDINATES),
+    Mutation("kernels: proper poses", "products of rows with columns", "def improper_pose(",
+        "T[n, i, k] * T[n, j, k]", "T[n, i, k] * T[n, k, j]", CASES + " -k proper"),
+    Mutation("kernels: proper poses", "determinant: a middle term with the other sign",
+        "def improper_pose(", "- T[n, 0, 1] *", "+ T[n, 0, 1] *", CASES + " -k proper"),
     # --- minimal parameters ----------------------------------------------------------------------
     Mutation("minimal parameters", "YY goes to +XX", "def _regroup_revolute(", "-1, yy)", "1, yy)",
         BASE),
@@ -283,6 +336,29 @@ MUTATIONS = [
     Mutation("igm: numeric", "near half a turn: a sign of the quaternion",
         "def rotation_vector(m: Matrix)", "1.0 + 2.0 * m[0] - trace, m[1] + m[3]",
         "1.0 + 2.0 * m[0] - trace, m[1] - m[3]", "tests/test_igm_cases.py -k rotation"),
+    Mutation("igm: three prismatic joints", "elimination adds to the right-hand side",
+        "def three_lengths(", "g[i] -= share * g[best]", "g[i] += share * g[best]",
+        CASES + " -k lengths_along"),
+    Mutation("igm: three prismatic joints", "a dependent direction's reference is added",
+        "def three_lengths(", "value -= Z[row, j]", "value += Z[row, j]",
+        CASES + " -k lengths_along"),
+    Mutation("igm: point", "the product of two sines and cosines: half of cos 2x",
+        "def _square(a: Floats, b", "0.5 * (cc - ss)", "(cc - ss)",
+        "tests/test_igm_cases.py -k wrists_behind"),
+    Mutation("igm: point", "the second of two sliding axes' quadratic loses its factor 2",
+        "def _middle_slides(", "2.0 * lam[other] * f[2, m]", "lam[other] * f[2, m]",
+        "tests/test_igm_cases.py -k wrists_behind"),
+    Mutation("igm: regular", "angles are compared with the reference without whole turns",
+        "def ordered_rows(", "way -= 2.0 * pi * np.round", "way += 2.0 * pi * np.round",
+        CASES + " -k sorted"),
+    Mutation("igm: regular", "postures are ordered the other way", "def ordered_rows(",
+        "if not before(row[i]", "if before(row[i]", CASES + " -k sorted"),
+    Mutation("igm: homing", "the larger of the two sizes is the smaller", "def size_of(e: Floats",
+        "max(linear, angular)", "min(linear, angular)", CASES + " -k size_of_an_error"),
+    Mutation("igm: homing", "elimination: a row is added", "def eliminated(A: Floats, n: int",
+        "A[i, j] -= f * A[k, j]", "A[i, j] += f * A[k, j]", CASES + " -k newtons"),
+    Mutation("igm: homing", "a wide system: singular value once", "def shortest(r: int",
+        "f /= lengths[k] * lengths[k]", "f /= lengths[k]", CASES + " -k newtons"),
     # --- trajectories ----------------------------------------------------------------------------
     Mutation("trajectories", "quintic: 10 x^3 becomes 9 x^3", "TimeLaw.QUINTIC: (0.0, 0.0, 0.0",
         "10.0, -15.0", "9.0, -15.0",
@@ -299,6 +375,23 @@ MUTATIONS = [
     Mutation("trajectories", "a derivative takes its power twice", "def piecewise_derivatives(",
         "c = c * (i - r) / h", "c = c * i / h",
         "tests/test_trajectories.py -k (derivatives or meet_their_end)"),
+    Mutation("kernels: phases of jerk", "a longer phase shifts those behind it the other way",
+        "def polished_phases(", "v + left * (a", "v - left * (a", CASES + " -k nearly_right"),
+    Mutation("kernels: phases of jerk", "what earlier equations meet is added to later ones",
+        "def _least_step(", "left -= along * wanted[r]", "left += along * wanted[r]",
+        CASES + " -k nearly_right"),
+    Mutation("kernels: inverses", "exchanged rows keep the determinant's sign",
+        "def inverses(A: Floats", "if row != c:\n                s = -s",
+        "if row != c:\n                s = s", CASES + " -k inverses_of"),
+    Mutation("kernels: inverses", "conditioning by the matrix alone", "def inverses(A: Floats",
+        "np.sqrt(size) * np.sqrt(other)", "np.sqrt(size) * np.sqrt(size)",
+        CASES + " -k inverses_of"),
+    Mutation("kernels: posture chains", "angles are compared by twice their difference",
+        "def following_postures(", "np.sin(0.5 * way)", "np.sin(way)", CASES + " -k go_on"),
+    Mutation("trajectories: seven phases", "falling acceleration covers as much as rising",
+        "def ramp(V: Array", "fall * fall / 3.0", "fall * fall / 6.0", RAMPS),
+    Mutation("trajectories: seven phases", "a phase run backwards with one sign",
+        "def phases(L: Array", "-(p2 + 3.0 * p3)", "-p2 + 3.0 * p3", RAMPS),
     # --- simulation ------------------------------------------------------------------------------
     Mutation("simulation: dry friction", "a joint that breaks away slips against its torque",
         "def loosened(self, mode", "np.sign(over[first])", "-np.sign(over[first])",
@@ -380,4 +473,11 @@ MUTATIONS = [
     Mutation("identification: instruments", "products of instruments for those with the regressor",
         "use = block.use[:, j]\n", "ZW[j] += z.T @ w", "ZW[j] += z.T @ z",
         "tests/test_identification_cases.py"),
+    Mutation("kernels: state space", "the sample before and the sample after are exchanged",
+        "def filtered(\n", "present[r], last", "present[r], u[k]",
+        "tests/test_regressors.py -k a_ramp"),
+    Mutation("kernels: state space", "what goes straight through is lost", "def filtered(\n",
+        "out[k], through, u[k]", "out[k], 0.0, u[k]", "tests/test_regressors.py -k a_ramp"),
+    Mutation("kernels: sections", "state of rest: a sign of the recursive part",
+        "def run_sections(", "(b2 - a2 * gain)", "(b2 + a2 * gain)", CASES + " -k scipys"),
 ]

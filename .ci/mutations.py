@@ -3,24 +3,31 @@
     python .ci/mutations.py                 # all of them, and tests/mutations.md is written
     python .ci/mutations.py --sample 5      # some, chosen at random: for every change
     python .ci/mutations.py --only dry      # those whose room or fault has this word
+    python .ci/mutations.py --jobs 1        # one after the other; default: as processors
     python .ci/mutations.py --places        # only look whether every text is still found
 
 The list is `mutation_list.py`. Each fault is put into a copy of the package in a temporary folder,
-never into the checkout. Kernels run uncompiled there (``NUMBA_DISABLE_JIT``), which is quick where
-tests are small and needs no compilation, except where the list says ``compiled``; hypothesis draws
-three examples (`uncompiled.py`). Tests are first run without a fault: they must pass.
+one for each job, never into the checkout. Kernels run uncompiled there (``NUMBA_DISABLE_JIT``),
+which is quick where tests are small and needs no compilation, except where the list says
+``compiled``; hypothesis draws three examples (`uncompiled.py`). Tests are first run without a
+fault: they must pass.
 """
 
 import argparse
+import itertools
 import multiprocessing
 import os
+import queue
 import random
 import re
 import shutil
 import subprocess
 import sys
 import tempfile
+import threading
 import time
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
@@ -141,36 +148,71 @@ def copied(folder: Path) -> None:
         shutil.copy(CHECKOUT / name, folder / name)
 
 
-def tried(folder: Path, chosen: list[Mutation], texts: dict[Path, str]) -> list[Outcome]:
-    """Outcome of each mutation; the tests without a fault come first."""
-    outcomes = []
-    sound: dict[tuple[str, bool], str] = {}
-    stamp = int(time.time())
-    for mutation in chosen:
+class Trial:
+    """The faults, tried one in each folder at a time; the tests without a fault come first."""
+
+    def __init__(self, folders: list[Path], chosen: list[Mutation]) -> None:
+        self.texts = texts_of(folders[0] / "robotmodels")
+        self.chosen = chosen
+        self.jobs = len(folders)
+        self.free: queue.SimpleQueue[Path] = queue.SimpleQueue()
+        for folder in folders:
+            self.free.put(folder)
+        self.waiting = {(m.tests, m.compiled): threading.Lock() for m in chosen}
+        self.sound: dict[tuple[str, bool], str] = {}
+        # byte code is taken again where the second and the size are the same
+        self.stamps = itertools.count(int(time.time()), 2)
+
+    def outcomes(self) -> list[Outcome]:
+        """What became of the faults, in the order of the list."""
+        # tests that no other fault is waiting for come first, so that jobs do not wait either
+        seen: Counter[tuple[str, bool]] = Counter()
+        turns = []
+        for place, mutation in enumerate(self.chosen):
+            turns.append((seen[mutation.tests, mutation.compiled], place))
+            seen[mutation.tests, mutation.compiled] += 1
+        order = [place for _, place in sorted(turns)]
+        with ThreadPoolExecutor(self.jobs) as pool:
+            found = dict(zip(order, pool.map(self.one, order), strict=True))
+        return [found[place] for place in range(len(order))]
+
+    def one(self, place: int) -> Outcome:
+        """Try one fault in a folder that is free."""
+        mutation = self.chosen[place]
+        folder = self.free.get()
         start = time.monotonic()
-        key = mutation.tests, mutation.compiled
-        if key not in sound:
-            code, first = run(folder, mutation)
-            sound[key] = "" if code == 0 else f"fails without a fault: {first}"
-        if sound[key]:
-            verdict, by = BROKEN, sound[key]
-        else:
-            name, at = place_of(texts, mutation)
-            path, text = folder / "robotmodels" / name, texts[name]
-            end = at + len(mutation.old)
-            for content in (text[:at] + mutation.new + text[end:], text):
-                if "compiled" in text:  # kernels do not see a change of what they call
-                    shutil.rmtree(folder / "compiled", ignore_errors=True)
-                path.write_text(content, encoding="utf-8")
-                stamp += 2  # byte code is taken again where the second and the size are the same
-                os.utime(path, (stamp, stamp))
-                if content is not text:
-                    code, by = run(folder, mutation)
-            verdict = {0: SURVIVED, 1: KILLED}.get(code, BROKEN)
+        try:
+            wrong = self.without_fault(folder, mutation)
+            verdict, by = (BROKEN, wrong) if wrong else self.with_fault(folder, mutation)
+        finally:
+            self.free.put(folder)
         taken = time.monotonic() - start
-        outcomes.append(Outcome(mutation, verdict, by, taken))
         print(f"{verdict:9} {taken:5.0f} s  {mutation.room}: {mutation.fault}  [{by}]", flush=True)
-    return outcomes
+        return Outcome(mutation, verdict, by, taken)
+
+    def without_fault(self, folder: Path, mutation: Mutation) -> str:
+        """Why the tests of a fault say nothing; empty if they pass without it."""
+        key = mutation.tests, mutation.compiled
+        with self.waiting[key]:
+            if key not in self.sound:
+                code, first = run(folder, mutation)
+                self.sound[key] = "" if code == 0 else f"fails without a fault: {first}"
+        return self.sound[key]
+
+    def with_fault(self, folder: Path, mutation: Mutation) -> tuple[str, str]:
+        """Put the fault in, run its tests, take it out."""
+        name, at = place_of(self.texts, mutation)
+        path, text = folder / "robotmodels" / name, self.texts[name]
+        code, by = 0, ""
+        for content in (text[:at] + mutation.new + text[at + len(mutation.old) :], text):
+            if "compiled" in text:  # kernels do not see a change of what they call
+                shutil.rmtree(folder / "compiled", ignore_errors=True)
+            path.write_text(content, encoding="utf-8")
+            stamp = next(self.stamps)
+            os.utime(path, (stamp, stamp))
+            if content is not text:
+                code, by = run(folder, mutation)
+        return {0: SURVIVED, 1: KILLED}.get(code, BROKEN), by
 
 
 def page(outcomes: list[Outcome]) -> str:
@@ -201,6 +243,8 @@ def main() -> int:
     parser.add_argument("--sample", type=int, metavar="N", help="only N, chosen at random")
     parser.add_argument("--seed", type=int, help="of the choice; default: another one each time")
     parser.add_argument("--only", metavar="WORD", help="only those with this word")
+    jobs = os.cpu_count() or 1
+    parser.add_argument("--jobs", type=int, default=jobs, metavar="N", help=f"default: {jobs}")
     parser.add_argument("--places", action="store_true", help="only look for the texts")
     parser.add_argument("--write", type=Path, metavar="FILE", help="where the table goes")
     given = parser.parse_args()
@@ -232,8 +276,10 @@ def main() -> int:
     }
     FORKS.set_forkserver_preload(STOOD_ON)
     with tempfile.TemporaryDirectory() as temporary:
-        copied(Path(temporary))
-        outcomes = tried(Path(temporary), chosen, texts_of(Path(temporary, "robotmodels")))
+        folders = [Path(temporary, str(job)) for job in range(max(1, given.jobs))]
+        for folder in folders:
+            copied(folder)
+        outcomes = Trial(folders, chosen).outcomes()
     target = given.write or (CHECKOUT / "tests" / "mutations.md" if whole else None)
     if target:
         target.write_text(page(outcomes), encoding="utf-8")
