@@ -317,6 +317,8 @@ def reversed_arm(model):
         ({"T": np.full((4, 4), np.nan)}, InvalidValueError, "finite"),
         ({"T": np.diag([2.0, 1, 1, 1])}, NotARotationError, "rotation"),
         ({"T": np.diag([-1.0, 1, 1, 1])}, NotARotationError, "rotation"),
+        ({"T": rm.se3.translation(1.7e308, -1.7e308, 0)}, InvalidValueError, "1e\\+100 m, got"),
+        ({"T": rm.se3.translation(0, 0, 2e100)[None], "lock": {0: 0}}, InvalidValueError, "got"),
         ({"q_ref": [0.0] * 5}, ShapeError, "q_ref"),
         ({"q_ref": [np.nan] * 6}, InvalidValueError, "q_ref"),
         ({"mask": [0] * 6}, InvalidValueError, "nothing"),

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..kernels._compile import INT, MATRIX, STACK, VECTOR, Floats, Ints, compiled
 from ..kernels.proper_poses import improper_pose
 from ._arrange import AT_LIMIT, before, turned_inside
-from .asked import FARTHEST, IMPROPER
+from .asked import FARTHEST, FARTHEST_POSITION, IMPROPER
 from .paul._run import run_plan
 from .status import IGMStatus
 
@@ -145,10 +145,14 @@ def regular_postures(
     ``labels`` gives the branch of the ways through the plan, ``joints (3, n)`` holds lower and
     upper limits and 1 for joints that turn. ``flags (2, N, S)`` become valid and within the limits.
     Returns the most postures of any pose, -1 - most if some poses are left to others, or IMPROPER
-    if a pose is none or a reference is not finite, before anything is solved.
+    if a pose is none or too far, or a reference not finite, before anything is solved.
     """
     if improper_pose(poses) >= 0:
         return IMPROPER
+    for p in range(poses.shape[0]):
+        for i in range(3):
+            if abs(poses[p, i, 3]) > FARTHEST_POSITION:
+                return IMPROPER
     for p in range(references.shape[0]):
         for m in range(references.shape[1]):
             if not abs(references[p, m]) <= FARTHEST:

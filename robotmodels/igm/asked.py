@@ -12,13 +12,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import as_floats
+from .. import se3
+from .._arrays import Array, as_floats
 from ..errors import InvalidValueError, ShapeError, nearest_names
 from ..model import RobotModel
 
 WHOLE_POSE = (True,) * 6
 FARTHEST = 1e6
 """Largest joint value of a reference [rad or m]: beyond, adding whole turns costs digits."""
+FARTHEST_POSITION = 1e100
+"""Largest coordinate of a position [m]: beyond, squares of squares of lengths are no numbers."""
 IMPROPER = -1000
 """What the kernel of plans says of a pose or reference that the border has to look at."""
 
@@ -81,6 +84,34 @@ def mask_of(mask: ArrayLike | None) -> NDArray[np.bool_]:
     if not numbers.any():
         raise InvalidValueError("mask: all six are 0, so nothing is asked for.")
     return numbers == 1.0
+
+
+def poses_of(T: ArrayLike) -> Array:
+    """Poses of the tool, checked.
+
+    Parameters
+    ----------
+    T : array_like, shape (..., 4, 4)
+        World poses [m].
+
+    Returns
+    -------
+    ndarray, shape (..., 4, 4)
+        The poses, their rotations proper to rounding.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError, NotARotationError
+        Not poses, or positions beyond `FARTHEST_POSITION`.
+    """
+    poses = se3.as_pose(T)
+    farthest = float(np.abs(poses[..., :3, 3]).max(initial=0.0))
+    if farthest > FARTHEST_POSITION:
+        raise InvalidValueError(
+            f"T: expected positions within +-{FARTHEST_POSITION:g} m, got {farthest:g}; lengths "
+            "like this leave no digits for an arm."
+        )
+    return poses
 
 
 def above_zero(value: Any, name: str) -> float:

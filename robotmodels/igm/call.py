@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .. import se3
 from .._arrays import Array, as_core, as_vector, batch_rows, read_only
 from ..errors import InvalidValueError
 from ..model import RobotModel
-from .asked import FARTHEST, Task, above_zero, locks_of, mask_of, relations_of
+from .asked import FARTHEST, Task, above_zero, locks_of, mask_of, poses_of, relations_of
 from .by_plan import TOLERANCES
 from .known import known_arm, solver_for
 from .rows import Call, Rows, rows_by_family, rows_by_plan, rows_of_doubtful
@@ -168,7 +167,7 @@ def _checked(
     model: RobotModel, T: ArrayLike, q_ref: ArrayLike | None, limits: bool
 ) -> tuple[tuple[int, ...], Array, Array]:
     """The same, checked, or an error."""
-    poses = se3.as_pose(T)
+    poses = poses_of(T)
     flat = poses.reshape(*poses.shape[:-2], 16)
     reference = np.zeros(model.n) if q_ref is None else as_vector(q_ref, model.n, "q_ref")
     if np.abs(reference).max(initial=0.0) > FARTHEST:

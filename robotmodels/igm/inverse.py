@@ -78,9 +78,9 @@ def igm(
     Raises
     ------
     ShapeError, InvalidValueError, NotARotationError
-        ``T`` that are not poses; arguments of the wrong length, with NaN or infinity; a mask that
-        leaves nothing or asks for what is no mask; locked joints that do not exist; an arm angle
-        for an arm without one.
+        ``T`` that are not poses, or beyond 1e100 m; arguments of the wrong length, with NaN or
+        infinity; a mask that leaves nothing or asks for what is no mask; locked joints that do
+        not exist; an arm angle for an arm without one.
 
     Notes
     -----
