@@ -7,6 +7,7 @@ import pytest
 from identities.random_robots import random_model, random_pose
 
 import robotmodels as rm
+from robotmodels import calibration
 from robotmodels.calibration import (
     PointContact,
     Pose,
@@ -317,3 +318,31 @@ def test_mistakes_are_named():
     with pytest.raises(InvalidValueError, match="would do here: none"):
         identifiable_parameters(wrist, Kind.POINT_CONTACT)
     assert as_kind("point-contact") is as_kind(PointContact) is Kind.POINT_CONTACT
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1e-4, 1e-2, 1e2, 1e4, 1e6])
+def test_the_unit_of_length_does_not_tell_what_is_identifiable(unit):
+    rng = np.random.default_rng(3)
+    q, noise = rng.uniform(-1.0, 1.0, (30, 4)), rng.normal(size=(30, 3))
+
+    def found(size):
+        rows = [
+            {"sigma": 0}, {"sigma": 0, "alpha": np.pi / 2, "d": size},
+            {"sigma": 0, "d": 4.0 * size}, {"sigma": 0, "d": 3.0 * size, "alpha": 0.5, "r": size},
+        ]  # fmt: skip
+        arm = rm.RobotModel.from_table(rm.DHTable.from_rows(rows))
+        there = rm.dgm(arm, q)
+        there[:, :3, 3] += 1e-4 * size * noise
+        measured = calibration.fit(arm, Pose(q, there), folds=0, held_out=0)
+        exact = calibration.fit(arm, Pose(q, rm.dgm(arm, q)), folds=0, held_out=0)
+        contact = identifiable_parameters(arm, "point_contact", known_lengths=["d3"])
+        return measured, exact.status, contact.names
+
+    one, exact, contact = found(1.0)
+    other, other_exact, other_contact = found(unit)
+    assert len(one.names) == 22
+    assert other.names == one.names
+    assert other_contact == contact
+    assert (other_exact, other.status) == (exact, one.status)
+    rms = other.after.summary("m").rms / unit
+    assert rms == pytest.approx(one.after.summary("m").rms, rel=1e-9)

@@ -16,7 +16,7 @@ from .folds import AsideErrors
 from .identifiability.identifiable import IdentifiableParameters
 from .measurements import Distance, Pose, Position, lonely_labels
 from .problem import Problem, measured_frames
-from .solve import Solution, size_of_robot
+from .solve import Solution
 
 _TURNS = 30.0
 """Reading of a revolute joint beyond which degrees are more likely, rad."""
@@ -207,7 +207,7 @@ def notes_after(
             "standard deviations are uncertain and intervals too short. Measure more "
             "configurations."
         )
-    length = size_of_robot(problem)
+    length = problem.parameters.skeleton.size
     for m, scale in zip(problem.measurements, solution.scales, strict=True):
         if m.sigma is None and m.covariance is None and not fit.sigma_known:
             size = max(
@@ -266,7 +266,7 @@ def _unlikely_deviations(solution: Solution) -> list[str]:
     """Parameters of the table that would be another robot's."""
     parameters = solution.problem.parameters
     f = parameters.model.f
-    size = size_of_robot(solution.problem)
+    size = solution.problem.parameters.skeleton.size
     far = [
         f"{entry.name} by {value:.3g} {entry.unit}"
         for entry, value in zip(parameters.entries, solution.deviation, strict=True)

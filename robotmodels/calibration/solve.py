@@ -9,7 +9,6 @@ import numpy as np
 from .._arrays import Array, Rebuilt, read_only
 from ..estimation import FitStatus, Loss, NonlinearFit, Prior, fit_nonlinear
 from ..estimation.losses import robust_scale
-from .extended_table.elements import Element
 from .measurements import Measurement
 from .problem import Problem, guessed_fixtures, stacked
 
@@ -21,7 +20,8 @@ _NOTHING = 1e-13
 _ROUGH = 1e-6
 """Tolerance of the steps while the noise is still being estimated."""
 _EXACT = 1e-9
-"""Smallest standard deviation that is estimated, m or rad: below, the data are exact."""
+"""Smallest standard deviation that is estimated, rad or part of the robot's size: below, the data
+are exact."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,7 +67,7 @@ def first_scales(problem: Problem) -> tuple[Array, ...]:
     tuple of ndarray
         For each measurement, by the units of its rows.
     """
-    angle = _FIRST_LENGTH / size_of_robot(problem)
+    angle = _FIRST_LENGTH / problem.parameters.skeleton.size
     return tuple(
         read_only([_FIRST_LENGTH if unit == "m" else angle for unit in m.units])
         for m in problem.measurements
@@ -132,9 +132,9 @@ def solve(
         ratios = np.concatenate([new / old for new, old in zip(current, previous, strict=True)])
         changed = np.ptp(ratios) if prior is None else np.abs(ratios - 1.0).max()
         is_settled = float(changed) < _SETTLED * float(ratios.max())
-        if min(float(scale.min()) for scale in current) <= _EXACT:
+        if _is_exact(problem, current):
             tolerance = max(tolerance, _ROUGH)  # exact data: steps are rounding long before
-    if fit.status is FitStatus.STALLED and min(float(s.min()) for s in current) <= _EXACT:
+    if fit.status is FitStatus.STALLED and _is_exact(problem, current):
         # what is left is rounding, which no step lowers
         fit = replace(fit, status=FitStatus.CONVERGED)
     return Solution(problem, fit, current)
@@ -144,11 +144,24 @@ def _states_noise(m: Measurement) -> bool:
     return m.sigma is not None or m.covariance is not None
 
 
+def _floor(unit: str, size: float) -> float:
+    """Smallest standard deviation that is estimated."""
+    return _EXACT * size if unit == "m" else _EXACT
+
+
+def _is_exact(problem: Problem, scales: tuple[Array, ...]) -> bool:
+    size = problem.parameters.skeleton.size
+    return any(
+        bool((scale <= [_floor(unit, size) for unit in m.units]).any())
+        for m, scale in zip(problem.measurements, scales, strict=True)
+    )
+
+
 def _estimated_scales(
     problem: Problem, fit: NonlinearFit, scales: tuple[Array, ...]
 ) -> tuple[Array, ...]:
     """Noise of each measurement and unit from its residuals, freedom shared by leverage."""
-    leverage = _leverage(fit)
+    leverage, size = _leverage(fit), problem.parameters.skeleton.size
     new, first = [], 0
     for m, scale in zip(problem.measurements, scales, strict=True):
         k = len(m.axes)
@@ -170,7 +183,7 @@ def _estimated_scales(
             else:
                 count = np.full(m.blocks, of_unit.sum())
                 factor = robust_scale(np.linalg.norm(residual[:, of_unit], axis=1), count, fitted)
-            values[of_unit] = np.maximum(scale[of_unit] * factor, _EXACT)
+            values[of_unit] = np.maximum(scale[of_unit] * factor, _floor(unit, size))
         new.append(read_only(values))
     return tuple(new)
 
@@ -185,21 +198,3 @@ def _leverage(fit: NonlinearFit) -> Array:
     values, vectors = np.linalg.eigh(J.T @ J + np.diag((information / length) ** 2))
     told = values > _NOTHING * values[-1]
     return ((J @ (vectors[:, told] / np.sqrt(values[told]))) ** 2).sum(axis=1)
-
-
-def size_of_robot(problem: Problem) -> float:
-    """A length that deviations are compared with: the robot stretched out.
-
-    Parameters
-    ----------
-    problem : Problem
-        The calibration.
-
-    Returns
-    -------
-    float
-        Metres; 1 for a robot without lengths.
-    """
-    lengths = problem.parameters.skeleton.nominal[1:, [Element.B, Element.D, Element.R]]
-    size = float(np.abs(lengths).sum())
-    return size if size > _FIRST_LENGTH else 1.0

@@ -11,7 +11,7 @@ from .extended_table.elements import ErrorLaw
 from .extended_table.parameters import GeometricParameter
 from .identifiability.identifiable import IdentifiableParameters, Reason
 from .problem import stacked
-from .solve import Solution, size_of_robot
+from .solve import Solution
 
 LARGEST_LENGTH, LARGEST_ANGLE = 0.02, 0.05
 """Standard deviations that say nothing of a parameter: in sizes of the robot, and rad."""
@@ -42,7 +42,7 @@ def untold_by(solution: Solution, start: Array) -> list[str]:
     """
     problem = solution.problem
     model = problem.parameters.model
-    reach = size_of_robot(problem)
+    reach = problem.parameters.skeleton.size
     limit = np.full(problem.P + problem.F, np.inf)
     limit[: problem.P] = [_limit(e, model.f, reach) for e in problem.parameters.entries]
     _, J = stacked(problem, start, solution.scales)

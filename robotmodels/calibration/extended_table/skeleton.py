@@ -13,10 +13,13 @@ from ..._arrays import Array, Rebuilt, read_only
 from ...errors import InvalidValueError
 from ...geometry import FIXED
 from ...model import RobotModel, check_model
+from .elements import Element
 from .six_parameters import base_parameters_of, tool_parameters_of
 
 Frame = str | int | None
 """A frame of a model: a name, a number, or None for the tool."""
+_NO_LENGTH = 1e-12
+"""All lengths of a robot together that are put down to rounding, m."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,6 +73,13 @@ class Skeleton(Rebuilt):
     def rows(self) -> int:
         """Number of rows: base, frames of the table, ends."""
         return len(self.sigma)
+
+    @property
+    def size(self) -> float:
+        """A length that deviations are compared with, m: the robot stretched out; 1 without any."""
+        lengths = self.nominal[1:, [Element.B, Element.D, Element.R]]
+        size = float(np.abs(lengths).sum())
+        return size if size > _NO_LENGTH else 1.0
 
     def end_row(self, frame: Frame) -> int:
         """Row of a measured end.

@@ -251,13 +251,15 @@ def identifiable_on(
             "the order of the joints and the tool (a first value of its length helps)."
         )
     W = _all_rows(there, xi, values)
+    size = problem.parameters.skeleton.size
+    told = W / _sizes(there, size)[:, None]  # lengths as parts of the robot's size
     if not scale_is_known and needs_a_length(problem, (*known, *known_lengths)):
         fixed = [*known, *known_lengths]
         if not problem.sees_base:
             fixed += [
                 e.name for e in candidates.entries if e.row == 0 and e.law is ErrorLaw.CONSTANT
             ]
-        check_scale(there, W, fixed, known_lengths)
+        check_scale(there, told, fixed, known_lengths)
     for k, entry in enumerate(candidates.entries):
         if k in at:
             reasons[entry.name] = Reason.KNOWN
@@ -266,7 +268,9 @@ def identifiable_on(
     free = np.array([k for k, name in enumerate(candidates.names) if name not in reasons], int)
     F = problem.F
     columns = np.concatenate([np.arange(F), F + free]).astype(int)
-    basis = _angle_basis(W[:, columns], dependent)
+    unit = [size if f.unit == "m" else 1.0 for f in problem.fixtures]
+    unit += [size if e.element.is_length else 1.0 for e in candidates.entries]
+    basis = _angle_basis(told[:, columns], dependent, np.array(unit)[columns])
     kept = [k - F for k in basis.kept if k >= F]
     for k in basis.empty:
         if k >= F:
@@ -282,8 +286,8 @@ def identifiable_on(
                 candidates.names[free[c]]: float(row[c]) for c in np.flatnonzero(row)
             }
     chosen = W[:, columns][:, basis.kept]
-    unit = chosen / np.linalg.norm(chosen, axis=0)
-    singular = np.linalg.svd(unit, compute_uv=False) if len(basis.kept) else np.ones(1)
+    alike = chosen / np.linalg.norm(chosen, axis=0)
+    singular = np.linalg.svd(alike, compute_uv=False) if len(basis.kept) else np.ones(1)
     return IdentifiableParameters(
         candidates=candidates,
         kept=candidates.subset([candidates.names[free[k]] for k in kept]),
@@ -325,13 +329,21 @@ def all_deviations(
     return values
 
 
-def _angle_basis(W: Array, dependent: float) -> ColumnBasis:
+def _angle_basis(W: Array, dependent: float, unit: Array) -> ColumnBasis:
     """Columns are compared by angles: a metre and a radian have no common length."""
-    length = np.linalg.norm(W, axis=0)
+    length = np.linalg.norm(W * unit, axis=0)
     longest = length.max(initial=0.0) or 1.0
-    return column_basis(
-        W, scale=1.0 / np.where(length > _EMPTY * longest, length, longest), nothing=dependent
-    )
+    size = np.where(length > _EMPTY * longest, length, longest)
+    return column_basis(W, scale=unit / size, nothing=dependent)
+
+
+def _sizes(problem: Problem, size: float) -> Array:
+    """Of each row, what its unit is: a length or a radian, shape (M,)."""
+    units = [
+        np.tile([size if unit == "m" else 1.0 for unit in m.units], m.blocks)
+        for m in problem.measurements
+    ]
+    return np.concatenate(units)
 
 
 def _all_rows(problem: Problem, xi: Array, fixtures: Array) -> Array:

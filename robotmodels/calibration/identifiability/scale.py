@@ -75,10 +75,11 @@ def check_scale(problem: Problem, W: Array, fixed: Sequence[str], named: Sequenc
         Nothing gives the scale, or what was named does not; with the names that would.
     """
     p, F = problem.parameters, problem.F
+    least = _ZERO * problem.parameters.skeleton.size
     lengths = [
         entry.name
         for entry, value in zip(p.entries, p.nominal, strict=True)
-        if entry.law is ErrorLaw.CONSTANT and entry.element.is_length and abs(value) > _ZERO
+        if entry.law is ErrorLaw.CONSTANT and entry.element.is_length and abs(value) > least
         and 0 < entry.row <= p.model.f
     ]  # fmt: skip
     R = np.asarray(np.linalg.qr(W, mode="r"))

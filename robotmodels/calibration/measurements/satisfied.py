@@ -58,6 +58,8 @@ def satisfied_measurement(
         return measurement
     motions = _joint_motions(parameters.skeleton)
     none = np.zeros(len(motions))
+    size = parameters.skeleton.size
+    scale = np.array([size if unit == "m" else 1.0 for unit in measurement.units])
     both = replace(parameters, entries=parameters.entries + motions.entries)
     values = np.concatenate([xi, none])
     q = [view.q.copy() for view in measurement.views]
@@ -82,7 +84,8 @@ def satisfied_measurement(
             for k in range(len(seen))
         ]
         residual = parts[0].residual
-        satisfied = np.abs(residual).max(axis=1) < _SATISFIED
+        off = np.abs(residual / scale).max(axis=1)
+        satisfied = off < _SATISFIED
         if satisfied.all():
             break
         together = [
@@ -95,7 +98,7 @@ def satisfied_measurement(
         for k, f in enumerate(first):
             at = own.index(f) * count
             q[k] = q[k] + step[:, at : at + count]
-    kept = np.flatnonzero(satisfied | (np.abs(residual).max(axis=1) < 1e-10))
+    kept = np.flatnonzero(satisfied | (off < 1e-10))
     if not len(kept):
         return None
     moved = measurement.with_configurations(q)
