@@ -118,3 +118,40 @@ def test_info_shows_coupled_motors_and_bodies_that_cannot_be(capsys, tmp_path):
     )
     assert main(["info", str(tmp_path / "arm.urdf")]) == 0
     assert "Physical consistency:" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("size", [1e-200, 1e-155, 1e60, 1e152, 1e300])
+def test_logs_whose_squares_are_no_numbers(size):
+    rows = torques = np.sin(np.linspace(0.0, 20.0, 500))[:, None] * [1.0, 0.3]
+    with pytest.raises(InvalidValueError, match=r"tau: expected .*check the units"):
+        Log(0.01, rows, torques * size)
+    with pytest.raises(InvalidValueError, match=r"q: expected .*check the units"):
+        Log(0.01, rows * size, torques)
+    with pytest.raises(InvalidValueError, match=r"dt: expected .*check the units"):
+        Log(size, rows, torques)
+    assert Log(0.01, rows, 0.0 * torques).n == 2
+
+
+def test_positions_of_joints_without_limits_are_told_in_turns():
+    arm = rm.load("planar_2r")
+    q = np.sin(np.linspace(0.0, 20.0, 500))[:, None] * [1e40, 1.0]
+    with pytest.raises(InvalidValueError, match="turns; the model has no limits") as caught:
+        fit(arm, Log(0.01, q, q))
+    assert "inf" not in str(caught.value)
+
+
+@pytest.mark.parametrize("size", [1e60, 1e160, 1e308])
+def test_models_whose_products_are_no_numbers(size):
+    rows = [{"sigma": 0}, {"sigma": 1, "d": size}]
+    for call in (
+        lambda: rm.DHTable.from_rows(rows),
+        lambda: rm.InertialParameters([[0, 0, 0, 0, 0, 0, 0, 0, 0, size]]),
+        lambda: rm.InertialParameters.from_com([size], np.zeros((1, 3)), np.zeros((1, 3, 3))),
+        lambda: rm.DriveParameters(Fv=[1.0, size]),
+        lambda: rm.load("planar_2r").with_gravity([0.0, 0.0, -size]),
+        lambda: rm.load("planar_2r").with_base(
+            np.block([[np.eye(3), np.full((3, 1), size)], [np.zeros((1, 3)), np.ones((1, 1))]])
+        ),
+    ):
+        with pytest.raises(InvalidValueError, match=r"expected entries up to 1e\+50"):
+            call()

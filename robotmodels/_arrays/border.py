@@ -11,6 +11,8 @@ from ..errors import InvalidValueError, ShapeError
 
 Array = NDArray[np.float64]
 
+LARGEST = 1e50
+"""Of lengths, inertia and what else makes a model: products of several are floats."""
 _FLOAT64 = np.dtype(np.float64)
 _AT_A_TIME = 2**18
 """Numbers that are looked at together."""
@@ -44,6 +46,50 @@ def as_floats(value: ArrayLike, name: str) -> Array:
         raise InvalidValueError(
             f"{name}: expected finite numbers, got {array[tuple(bad)]}{where}; "
             "remove or repair such values before the call."
+        )
+    return array
+
+
+def as_bounded(value: ArrayLike, name: str, largest: float, least: float = 0.0) -> Array:
+    """Finite floats of sizes whose squares and products are floats as well.
+
+    Parameters
+    ----------
+    value : array_like
+        Numbers of any shape.
+    name : str
+        Used in error messages.
+    largest : float
+        Bound of the absolute values.
+    least : float
+        What the largest absolute value has at least, unless all numbers are zero.
+
+    Returns
+    -------
+    ndarray of float64, same shape
+        As `as_floats`.
+
+    Raises
+    ------
+    InvalidValueError
+        As `as_floats`; an entry beyond ``largest``, or all of them below ``least``.
+
+    Examples
+    --------
+    >>> as_bounded([1.0, -2.0], "d", 1e50)
+    array([ 1., -2.])
+    """
+    array = _converted(value, name)
+    size = _size(array)
+    if not size <= largest:
+        as_floats(array, name)  # names NaN and infinity
+        raise InvalidValueError(
+            f"{name}: expected entries up to {largest:g}, got {size:.3g}; check the units."
+        )
+    if 0.0 < size < least:
+        raise InvalidValueError(
+            f"{name}: expected zeros, or a largest entry of at least {least:g}, got {size:.3g}; "
+            "check the units."
         )
     return array
 
@@ -196,6 +242,17 @@ def _all_finite(array: Array) -> bool:
     # long logs piece by piece: what isfinite tells of all of them would be held at once
     rows = max(1, _AT_A_TIME * len(array) // array.size)
     return all(bool(np.isfinite(array[k : k + rows]).all()) for k in range(0, len(array), rows))
+
+
+def _size(array: Array) -> float:
+    """Largest absolute value; NaN where one is."""
+    if array.size <= _AT_A_TIME:
+        if not array.size:
+            return 0.0
+        return max(float(array.max()), -float(array.min()))
+    rows = max(1, _AT_A_TIME * len(array) // array.size)
+    sizes = [_size(array[k : k + rows]) for k in range(0, len(array), rows)]
+    return float(np.max(sizes))
 
 
 def _shape_message(name: str, core: tuple[int, ...], shape: tuple[int, ...]) -> str:

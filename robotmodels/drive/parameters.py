@@ -11,7 +11,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_floats, read_only, same_value, value_hash
+from .._arrays import LARGEST, Array, as_bounded, read_only, same_value, value_hash
 from ..errors import InertiaError, ShapeError
 
 
@@ -61,7 +61,7 @@ class DriveParameters:
         offset: ArrayLike | None = None,
     ) -> None:
         given = {"Ia": Ia, "Fv": Fv, "Fc": Fc, "offset": offset}
-        values = {name: as_floats(v, name) for name, v in given.items() if v is not None}
+        values = {name: as_bounded(v, name, LARGEST) for name, v in given.items() if v is not None}
         if not values:
             raise InertiaError("Give at least one of Ia, Fv, Fc, offset, each of shape (n,).")
         shape = next(iter(values.values())).shape

@@ -14,7 +14,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, as_exact, read_only, same_value, value_hash
+from .._arrays import LARGEST, Array, as_bounded, as_exact, read_only, same_value, value_hash
 from ..errors import TableError
 from ..table_text import SMALLEST, angle_text, boxed, length_text, variable_text
 from .columns import check_structure, checked_limits, whole_numbers
@@ -130,7 +130,8 @@ class DHTable:
             "gamma": gamma, "b": b, "beta": beta, "alpha": alpha, "d": d, "theta": theta, "r": r,
         }  # fmt: skip
         for column, given in geometric.items():
-            values[column] = np.zeros(f) if given is None else as_exact(given, (f,), column)
+            exact = np.zeros(f) if given is None else as_exact(given, (f,), column)
+            values[column] = as_bounded(exact, column, LARGEST)
         values |= checked_limits(
             {"lower": lower, "upper": upper, "velocity": velocity, "effort": effort}, n
         )

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import se3
-from .._arrays import Array, as_core, as_floats, read_only, same_value, value_hash
+from .._arrays import LARGEST, Array, as_bounded, as_core, read_only, same_value, value_hash
 from ..errors import InertiaError, ShapeError
 from ..geometry import DHTable
 from .consistency import ConsistencyReport, link_finding
@@ -56,7 +56,7 @@ class InertialParameters:
     values: Array
 
     def __init__(self, values: ArrayLike) -> None:
-        rows = as_floats(values, "values")
+        rows = as_bounded(values, "values", LARGEST)
         if rows.ndim != 2 or rows.shape[1] != 10:
             raise ShapeError(
                 f"values: expected one row of ten parameters ({' '.join(PARAMETERS)}) for each "
@@ -115,7 +115,7 @@ class InertialParameters:
         >>> InertialParameters.from_com([2.0], [[0.1, 0, 0]], [np.diag([0.1, 0.2, 0.3])]).values
         array([[0.1 , 0.  , 0.  , 0.22, 0.  , 0.32, 0.2 , 0.  , 0.  , 2.  ]])
         """
-        mass = as_floats(mass, "mass")
+        mass = as_bounded(mass, "mass", LARGEST)
         if mass.ndim != 1:
             raise ShapeError(f"mass: expected shape (f,), got {mass.shape}.")
         com, tensor = as_core(com, (3,), "com"), as_core(inertia, (3, 3), "inertia")

@@ -9,8 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, as_floats
+from .._arrays import Array, as_bounded, as_floats
 from ..errors import InvalidValueError, ShapeError
+
+_LARGEST, _LEAST = 1e50, 1e-50
+"""Of samples: their squares, and products of these, are floats."""
+_LONGEST = 1e12
+"""Period, s; the shortest is its inverse."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +88,8 @@ class Log:
     Raises
     ------
     ShapeError, InvalidValueError
-        Arrays that do not fit each other, NaN or infinity, a period that is not positive.
+        Arrays that do not fit each other, NaN or infinity, a period that is not positive; numbers
+        beyond 1e50, or a channel all below 1e-50, whose squares would be no floats.
 
     References
     ----------
@@ -129,6 +135,7 @@ class Log:
         period = as_floats(dt, "dt")
         if period.ndim != 0 or not period > 0.0:
             raise InvalidValueError(f"dt: expected the sampling period in seconds, got {dt!r:.60}.")
+        as_bounded(period, "dt", _LONGEST, 1.0 / _LONGEST)
         object.__setattr__(self, "dt", float(period))
         positions = _rows(q, "q")
         given: dict[str, Any] = {"tau": tau, "v": v, "a": a, "q_ref": q_ref, "v_ref": v_ref}
@@ -288,7 +295,7 @@ def check_is_log(log: object) -> None:
 def _rows(value: ArrayLike | None, name: str) -> Array:
     if value is None:
         raise InvalidValueError(f"{name}: expected samples of shape (N, n), got None.")
-    array = as_floats(value, name)
+    array = as_bounded(value, name, _LARGEST, _LEAST)
     if array.ndim != 2:
         raise ShapeError(f"{name}: expected samples of shape (N, n), got {array.shape}.")
     if not array.shape[0]:

@@ -63,9 +63,14 @@ def position_units(log: Log, model: RobotModel, found: list[LogFinding]) -> None
             q = ratio.to_joint(log.q[rows])
             motors &= bool(((q >= lower - margin) & (q <= upper + margin))[:, known].all())
     names = tuple(log.names[j] for j in outside)
+    limits = [
+        f"limits {lower[j]:.4g} to {upper[j]:.4g}"
+        if known[j]
+        else f"{size[j] / (2.0 * np.pi):.3g} turns; the model has no limits"
+        for j in range(log.n)
+    ]
     listed = ", ".join(
-        f"{log.names[j]} ({least[j]:.4g} to {most[j]:.4g}, limits {lower[j]:.4g} to {upper[j]:.4g})"
-        for j in outside
+        f"{log.names[j]} ({least[j]:.4g} to {most[j]:.4g}, {limits[j]})" for j in outside
     )
     reach = np.where(known, np.maximum(np.abs(lower), np.abs(upper)), np.pi)
     surely = (size[outside] > _FACTOR * reach[outside]).any()

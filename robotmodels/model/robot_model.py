@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import se3
-from .._arrays import Array, as_exact, read_only, same_value, value_hash
+from .._arrays import LARGEST, Array, as_bounded, as_exact, read_only, same_value, value_hash
 from ..drive import DriveMatrices, DriveParameters, Transmission, drive_matrices
 from ..geometry import DHTable
 from ..inertia import InertialParameters
@@ -110,7 +110,10 @@ class RobotModel(Changeable):
         set_(self, "tip", int(self.tip))
         set_(self, "base", read_only(se3.as_single_pose(self.base, "base")))
         set_(self, "tool", read_only(se3.as_single_pose(self.tool, "tool")))
-        set_(self, "gravity", read_only(as_exact(self.gravity, (3,), "gravity")))
+        for end in ("base", "tool"):
+            as_bounded(getattr(self, end)[:3, 3], end, LARGEST)
+        gravity = as_bounded(as_exact(self.gravity, (3,), "gravity"), "gravity", LARGEST)
+        set_(self, "gravity", read_only(gravity))
         set_(self, "configurations", checked_postures(self.configurations, n))
 
     @classmethod
