@@ -51,7 +51,7 @@ def speed(peers: dict[str, Any]) -> list[str]:
         "the whole work in one mode (in brackets) to ours in that mode; no figure where nobody "
         "else has a mode of ours. Goal: what was asked of ours, of a machine at rest. Spreads, "
         "and what was found: `benchmarks/results/peers.md`; to measure it again: "
-        "`python -m benchmarks`.",
+        f"`python -m benchmarks`.{left_out(peers)}",
         "",
         "| work | robotmodels | Pinocchio, raw calls from Python | peers | others / ours | goal |",
         "|---|---|---|---|---|---|",
@@ -67,6 +67,11 @@ def speed(peers: dict[str, Any]) -> list[str]:
         cells = [r["work"], ours, raw, "; ".join(by_tool), ratio, told_goals(r)]
         lines.append(f"| {' | '.join(cells)} |")
     return lines
+
+
+def left_out(peers: dict[str, Any]) -> str:
+    """What was not measured."""
+    return f" Left out: {'; '.join(peers['absent'])}." if peers["absent"] else ""
 
 
 def a_warning(facts: dict[str, str]) -> str:

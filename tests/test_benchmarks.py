@@ -131,11 +131,15 @@ def test_goals_and_ratios(limit, met):
     told = f"<= {limit:g} us, {'met' if met else 'not met'}"
     assert cells[-2:] == ["1.50 batch", told]
     facts = {"cpu": "some", "python": "3", "load": "0.3 on 2 cores", "run": "full"}
-    lines = readme_tables.speed({"machine": facts, "rows": [row]})
+    lines = readme_tables.speed({"machine": facts, "rows": [row], "absent": []})
     assert lines[-1].endswith(f"| 1.50 (batch) | {told} |")
     assert "load 0.3 on 2 cores; run: full." in lines[0]
-    busy = readme_tables.speed({"machine": {**facts, "warning": "too busy"}, "rows": [row]})
+    busy = readme_tables.speed(
+        {"machine": {**facts, "warning": "too busy"}, "rows": [row], "absent": ["x"]}
+    )
     assert "load 0.3 on 2 cores, **too busy**; run: full." in busy[0]
+    assert busy[0].endswith("Left out: x.")
+    assert "Left out" not in lines[0]
 
 
 @pytest.mark.parametrize(("others", "warned"), [(0.9, False), (1.1, True)])
@@ -158,7 +162,7 @@ def test_only_like_is_set_in_ratio_with_like():
     assert row["ratios"] == {"batch": pytest.approx(3.0), "one by one": pytest.approx(0.5)}
     assert [e["ratio"] for e in row["entries"]] == [1.0, 1.0, 1.0, 0.5, pytest.approx(3.0), None]
     facts = {"cpu": "some", "python": "3", "load": "none", "run": "full"}
-    line = readme_tables.speed({"machine": facts, "rows": [row]})[-1]
+    line = readme_tables.speed({"machine": facts, "rows": [row], "absent": []})[-1]
     assert "| 3.00 (batch); 0.50 (one by one) |" in line
     assert "RTB 4.00 us (one by one); EAIK 6.00 us (batch)" in line
     with pytest.raises(ValueError, match="one mode"):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 import sys
-from collections.abc import Iterable
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +17,7 @@ from benchmarks.side_by_side.works import PACKAGES, Settings, Tool, measured, mo
 
 
 def run(
-    wanted: Iterable[tuple[str, str]],
+    wanted: Sequence[tuple[str, str]],
     settings: Settings,
     figaroh: str = "",
     pybotics: str = "",
@@ -49,6 +49,8 @@ def run(
                     settings = replace(settings, **{word: peer})
             if why is not None:
                 absent.append(f"{tool.value} ({why})")
+        if not settings.slow and module(Tool.SSIK) and "general_6r" in [row for _, row in wanted]:
+            absent.append("ssik's preparation of a new general arm (minutes: --slow)")
         for line in absent:
             print(f"left out: {line}")
         facts = machine([name for name, _ in PACKAGES.values()], interpreters)

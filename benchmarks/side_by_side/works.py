@@ -57,7 +57,7 @@ class Settings:
     """How much is measured, and the peers of other interpreters."""
 
     rounds: int = 15
-    budget: float = 15.0
+    budget: float = 8.0
     quick: bool = False
     slow: bool = False
     figaroh: Foreign | None = None
