@@ -32,9 +32,10 @@ BASE = (
 )
 CASES = "tests/test_kernels_cases.py"
 COORDINATES = (
-    "tests/test_operational_coordinates.py -k (of_scipy or nearest_of_all or random_poses"
-    " or each_sample or left_inverse or rates_of_rates or every_length or entries_of)"
+    "tests/test_operational_coordinates.py"
+    " -k (of_scipy or nearest_of_all or random_poses or each_sample)"
 )
+RATES = "tests/test_operational_coordinates.py -k (entries_of or rates_of_rates)"
 BOUNDS = (
     "tests/test_ikm_bounds.py::test_the_scale_is_the_largest_and_the_motion_the_least[3-7-regular]"
     " tests/test_ikm_bounds.py::test_levels_under_bounds[7-sizes0]"
@@ -232,9 +233,22 @@ MUTATIONS = [
         "tests/test_jacobian_factors.py"),
     Mutation("kernels: bounded velocity", "back substitution adds", "def dependence(",
         "r[i] -= R[i, j] * r[j]", "r[i] += R[i, j] * r[j]", BOUNDS),
+    Mutation("kernels: bounded velocity", "active bounds press more where they should press less",
+        "def nearest_inside(", "press[i] -= step * r[i]", "press[i] += step * r[i]",
+        CASES + " -k multipliers"),
+    Mutation("kernels: bounded velocity", "room of active bounds with the other sign",
+        "def largest_part(", "space = -r[i] * sides[i]", "space = r[i] * sides[i]", BOUNDS),
+    Mutation("kernels: levels", "a drift is added to the task",
+        "def level_velocities(\n    J: Floats", "rest[a] = -row_weights", "rest[a] = row_weights",
+        BOUNDS),
     Mutation("kernels: levels", "what higher levels do to a task is counted twice, not taken off",
         "def level_velocities(\n    J: Floats", "rest[a] -= A[a, j] * x[j]",
         "rest[a] += A[a, j] * x[j]", LEVELS),
+    Mutation("kernels: levels",
+        "left and right singular vectors exchanged where rows outnumber freedoms",
+        "def decomposed(W: Floats", "V[i, c] = B[i, m + c]", "V[c, i] = B[i, m + c]", LEVELS),
+    Mutation("kernels: levels", "what fits is left in the part to be scaled",
+        "# No part of the rate alone fits", "w[j] -= x[j]", "w[j] += x[j]", BOUNDS),
     # --- description -----------------------------------------------------------------------------
     Mutation("se3", "rotations turn the other way", "def rotation(axis: str", "= -s, s", "= s, -s",
         SE3),
@@ -279,6 +293,27 @@ MUTATIONS = [
         COORDINATES),
     Mutation("coordinates: angles", "a rotation of angles is left-handed",
         "def rotation_of_angles(", "(right_handed * sine)", "(-right_handed * sine)", COORDINATES),
+    Mutation("coordinates: differentials", "second angle's rate with one sign",
+        "def _angles(sequence", "g[..., 2] * s_j - s * g_j", "g[..., 2] * s_j + s * g_j", RATES),
+    Mutation("coordinates: differentials", "a mixed product of the second derivatives is lost",
+        "def _angles_rate(", "            + _outer(g_t, R_j[..., k])\n", "", RATES),
+    Mutation("coordinates: differentials",
+        "rotation vector: its stretch is differentiated with one factor", "def _vector(vector",
+        "gamma * f**2", "gamma * f", RATES),
+    Mutation("coordinates: rates", "the derivative of c / s takes s once", "def _angle_rates_rate(",
+        "-dtheta / s**2", "-dtheta / s", RATES),
+    Mutation("coordinates: rates", "rate of [v]^2 takes one product twice",
+        "def _vector_rates_rate(", "dS @ S + S @ dS", "2 * dS @ S", RATES),
+    Mutation("coordinates: quaternions", "one product of the rotation with the other sign",
+        "def rotation_of_quaternions(", "2.0 * (y * z - w * x)", "2.0 * (y * z + w * x)",
+        COORDINATES),
+    Mutation("coordinates: quaternions", "a sequence's sign is that of the first sample alone",
+        "def continuous_quaternions(", "np.cumprod(signs)", "signs", COORDINATES),
+    Mutation("coordinates: vectors", "slope of gamma beyond the series",
+        "def inverse_left_factor_slope(", "0.5 * turning", "turning", RATES),
+    Mutation("coordinates: conversion", "normal of two axes: a x n for n x a",
+        "def pose_from_coordinates(", "np.cross(axes[..., 0, :], axes[..., 1, :])",
+        "np.cross(axes[..., 1, :], axes[..., 0, :])", COORDINATES),
     Mutation("kernels: proper poses", "products of rows with columns", "def improper_pose(",
         "T[n, i, k] * T[n, j, k]", "T[n, i, k] * T[n, k, j]", CASES + " -k proper"),
     Mutation("kernels: proper poses", "determinant: a middle term with the other sign",
@@ -347,6 +382,9 @@ MUTATIONS = [
         "tests/test_igm_cases.py -k wrists_behind"),
     Mutation("igm: point", "the second of two sliding axes' quadratic loses its factor 2",
         "def _middle_slides(", "2.0 * lam[other] * f[2, m]", "lam[other] * f[2, m]",
+        "tests/test_igm_cases.py -k wrists_behind"),
+    Mutation("igm: point", "Cramer's rule with a sign", "def turning_pair(",
+        "- row[0, 1] * b[1, m]", "+ row[0, 1] * b[1, m]",
         "tests/test_igm_cases.py -k wrists_behind"),
     Mutation("igm: regular", "angles are compared with the reference without whole turns",
         "def ordered_rows(", "way -= 2.0 * pi * np.round", "way += 2.0 * pi * np.round",
