@@ -90,3 +90,37 @@ def test_references_limits_and_masks_count_from_the_true_zero(rng):
     P = rm.dgm(arm, pointed.q[pointed.valid])
     assert np.abs(P[:, :3, 3] - T[0, :3, 3]).max() < 1e-9
     assert np.abs(P[:, :3, 0] - T[0, :3, 0]).max() < 1e-9
+
+
+ONE_TOO_MANY = (
+    {"sigma": 1}, {"alpha": RIGHT, "d": 0.2}, {"d": 0.4}, {"alpha": RIGHT, "r": 0.3},
+    {"alpha": -RIGHT}, {"alpha": RIGHT},
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("far", [100.5, 1e4, -3e3])
+def test_a_reference_out_of_reach_of_a_family_still_names_its_free_joint(far):
+    """The rail slides across three parallel axes: 0 is too far, the nearest value is taken."""
+    arm = rm.RobotModel.from_table(rm.DHTable.from_rows(ONE_TOO_MANY))
+    T = rm.dgm(arm, [far, -0.9, -1.8, -1.9, 1.25, 1.65])
+    found = rm.igm(arm, T)
+    assert found.status == rm.IGMStatus.REACHED_FAMILY
+    assert found.count == 2  # stretched out, the wrist either way
+    assert np.all(found.free_joints == [True, False, False, False, False, False])
+    assert np.all(found.family_joints == [False, True, True, True, True, True])
+    rail = found.q[:, 0]
+    assert np.ptp(rail) < 1e-9
+    # the arm reaches there along the rail and no further
+    behind = rail[0] - np.sign(far) * 1e-3
+    assert rm.igm(arm, T, lock={0: behind}).count == 0
+    assert rm.igm(arm, T, lock={0: rail[0] + np.sign(far) * 1e-3}).count > 0
+
+
+def test_what_is_met_is_never_said_to_be_too_far():
+    arm = rm.RobotModel.from_table(rm.DHTable.from_rows(ONE_TOO_MANY))
+    T = rm.dgm(arm, [1e4, -0.9, -1.8, -1.9, 1.25, 1.65])
+    for restarts in (1, 4, 20):
+        found = rm.igm_numeric(arm, T, position_tolerance=1e-9, orientation_tolerance=1e-9,
+                               restarts=restarts, iterations=60)  # fmt: skip
+        if found.status in (rm.IGMStatus.TOO_FAR, rm.IGMStatus.TOO_NEAR):
+            assert np.linalg.norm(found.error[0, :3]) > 1e-9

@@ -23,6 +23,7 @@ DEPENDENT = 1e-9  # singular values beside the largest that count as zero at any
 SHARE = 1e-6  # part of a joint in a null direction that counts
 GRID = 36  # values of the joint that are tried where the reference has no posture
 MEMORY = 64  # chains with a value of the joint that are kept
+_SHARES = np.linspace(-1.0, 1.0, 21)  # of the reach of a held slide, tried last
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -158,11 +159,14 @@ def _(solver: DependentJoints, U: Array, references: Array, tolerances: Toleranc
     out = nothing_found(N, 0, solver.chain.k)
     empty = np.arange(N)
     wanted = references[:, solver.held]
-    for step in (0.0, *_steps(solver)):
+    # around the reference, so that equal references share chains; of a slide around the pose too
+    tried = [wanted + step for step in (0.0, *_steps(solver))]
+    if solver.chain.sigma[solver.held] == 1:
+        tried += [_reach(solver, U) * share for share in _SHARES]
+    for values in tried:
         if empty.size == 0:
             break
-        # around the reference, so that equal references share chains
-        part = _at(solver, wanted[empty] + step, U[empty], references[empty], tolerances)
+        part = _at(solver, values[empty], U[empty], references[empty], tolerances)
         there = np.flatnonzero(part.valid.any(axis=1))
         rest = np.setdiff1d(np.arange(N), empty[there])
         new = empty[there], rows_of(part, there)
@@ -179,6 +183,13 @@ def _steps(solver: DependentJoints) -> Array:
     else:  # lengths grow without end
         far = solver.length * np.tan(0.45 * np.pi * half)
     return np.stack([far, -far], axis=1).reshape(-1)
+
+
+def _reach(solver: DependentJoints, U: Array) -> Array:
+    """How far the held slide can be out at poses, as powers of two, which share chains, (N,)."""
+    links = float(np.linalg.norm(solver.chain.D[:, :3, 3], axis=1).sum())
+    far = links + np.linalg.norm(U[:, :3, 3], axis=1)
+    return np.exp2(np.ceil(np.log2(np.maximum(far, 1e-9))))
 
 
 def _at(

@@ -15,12 +15,15 @@ from .arm_angle import ArmAngle, arm_angle_postures
 from .asked import IMPROPER, WHOLE_POSE, Task
 from .branches import branches
 from .by_plan import TOLERANCES, plan_kernel
-from .centred import centred, put_back
+from .centred import Centred, centred, put_back
+from .check import checked
 from .components import Components, asked_jacobians
+from .dependent import DependentJoints
+from .gather import MERGE
 from .known import KnownArm
 from .loop import JointChain
 from .motion import lever
-from .self_motion import Settled, settle_families, singular_postures
+from .self_motion import Settled, replaced, settle_families, singular_postures
 from .solver import Found, Solver, Tolerances, nothing_found, postures
 from .status import IGMStatus
 from .thorough import MET
@@ -98,8 +101,6 @@ def rows_by_family(call: Call, poses: Array, references: Array, psi: Array | Non
     Rows
         What was found.
     """
-    from ._arrange import arranged
-
     model, arm, task = call.model, call.arm, call.task
     U = np.ascontiguousarray(arm.to_base @ poses)
     # locked joints are not solved for: like joints off the path they keep their reference
@@ -109,9 +110,49 @@ def rows_by_family(call: Call, poses: Array, references: Array, psi: Array | Non
         references[:, locked] = [value for _, value in task.locks]
     columns = arm.columns[~np.isin(arm.columns, locked)]
     found = _near_or_far(call, U, psi, np.ascontiguousarray(references[:, columns]))
+    rows = _laid_out(call, found, references, columns)
+    reasons = search(
+        model, task, call.solver is None, poses, references, call.limits, call.tolerances,
+        rows.status,
+    )  # fmt: skip
+    if reasons is None:
+        return rows
+    whole = call.solver is not None and task == Task(locks=task.locks)
+    members = reasons.met & reasons.family.any(axis=1)
+    if whole and psi is None and not call.limits and members.any():
+        # the search came upon members of families: they are settled like others
+        at = reasons.rows[members]
+        part = _settled_members(
+            call, U[at], reasons.closest[np.ix_(at, columns)], references[np.ix_(at, columns)]
+        )
+        found = replaced(found, found.moving, at, part)
+        rows = _laid_out(call, found, references, columns)
+    q, residual, valid, codes = rows.q, rows.residual, rows.valid, rows.code
+    assert rows.family is not None
+    there = valid[reasons.rows].any(axis=1)
+    rows.status[reasons.rows[~there]] = reasons.status[~there]
+    # a posture that the search came upon all the same
+    chosen = reasons.met & ~there
+    met = reasons.rows[chosen]
+    closest = reasons.closest
+    q[met, 0], residual[met, 0] = closest[met], reasons.residual[chosen]
+    valid[met, 0], codes[met, 0] = True, 0
+    rows.family[met, 0] = reasons.family[chosen]
+    low, high = model.lower <= closest[met], closest[met] <= model.upper
+    rows.inside[met, 0] = np.all(low & high, axis=-1)
+    return rows._replace(
+        most=max(rows.most, int(met.size > 0)), closest=closest, missing=reasons.missing
+    )
+
+
+def _laid_out(call: Call, found: Settled, references: Array, columns: NDArray[np.int64]) -> Rows:
+    """Postures of a chain as rows of a result, in the columns of the model."""
+    from ._arrange import arranged
+
+    arm = call.arm
     code, labels = branches(call.solver, found)
     N, S, _ = found.q.shape
-    S, n = max(S, 1), model.n
+    S, n = max(S, 1), call.model.n
     q, residual = np.full((N, S, n), np.nan), np.full((N, S), np.nan)
     valid, inside, double = np.zeros((3, N, S), np.bool_)
     codes, status = np.full((N, S), -1, np.int16), np.empty(N, np.int8)
@@ -124,24 +165,21 @@ def rows_by_family(call: Call, poses: Array, references: Array, psi: Array | Non
         arm.joints, int(call.limits), q, valid, residual, inside, codes, double, free, family,
         status,
     )  # fmt: skip
-    reasons = search(
-        model, task, call.solver is None, poses, references, call.limits, call.tolerances, status
-    )
-    closest = missing = None
-    if reasons is not None:
-        closest, missing = reasons.closest, reasons.missing
-        status[reasons.rows] = reasons.status
-        met = reasons.rows[reasons.met]
-        # a posture that the search came upon all the same
-        q[met, 0], residual[met, 0] = closest[met], reasons.residual[reasons.met]
-        valid[met, 0], codes[met, 0] = True, 0
-        low, high = model.lower <= closest[met], closest[met] <= model.upper
-        inside[met, 0] = np.all(low & high, axis=-1)
-        most = max(most, int(met.size > 0))
-    return Rows(
-        q, valid, residual, inside, codes, status, labels, most, double, free, family, closest,
-        missing,
-    )  # fmt: skip
+    return Rows(q, valid, residual, inside, codes, status, labels, most, double, free, family)
+
+
+def _settled_members(call: Call, U: Array, q: Array, references: Array) -> Settled:
+    """The postures at the reference, of the families that some postures ``(m, k)`` belong to."""
+    assert call.solver is not None
+    chain, components = call.solver.chain, Components(WHOLE_POSE, in_tool_axes=False)
+    where = centred(chain, U, references, components)
+    if where is None:
+        where = Centred(U, references, np.zeros(references.shape))
+    goals, there = np.ascontiguousarray(where.U), np.ones((len(U), 1), np.bool_)
+    found = checked(chain, goals, (q - where.moved)[:, None], there, call.tolerances)
+    found.family[...] = found.valid
+    settled = settle_families(chain, goals, found, where.references, call.tolerances)
+    return put_back(chain, U, references, where, settled, components, call.tolerances)
 
 
 def rows_by_plan(
@@ -284,6 +322,12 @@ def _settled(call: Call, U: Array, psi: Array | None, references: Array) -> Sett
         found = postures(solver, U, references, tolerances)
     whole = call.task.mask == WHOLE_POSE
     if solver is not None and whole and solver.chain.k <= 6:
+        if isinstance(solver, DependentJoints):
+            # at a value that was only tried the family is not settled yet
+            way = found.q - references[:, None]
+            turns = np.where(solver.chain.sigma == 0, np.round(way / (2.0 * np.pi)), 0.0)
+            way = np.abs(way - 2.0 * np.pi * turns)
+            found.free[np.any(found.free & (way > MERGE), axis=-1)] = False
         return _of_six(solver.chain, U, found, references, tolerances)
     moving = np.zeros(found.q.shape, np.bool_)
     if solver is not None and psi is None and whole:

@@ -37,6 +37,8 @@ class Search:
         Of all poses: the posture that comes closest [rad or m]; NaN for those not asked about.
     missing : ndarray, shape (N, 6)
         What it misses, in the axes of the mask [m, rad].
+    family : ndarray of bool, shape (m, n)
+        Joints that move while the tool stays where the search reached it.
     """
 
     rows: NDArray[np.int64]
@@ -45,6 +47,7 @@ class Search:
     residual: Array
     closest: Array
     missing: Array
+    family: NDArray[np.bool_]
 
 
 def search(
@@ -102,7 +105,11 @@ def search(
         closest[empty, column] = value
     closest[np.ix_(empty, columns)] = found.closest
     missing[empty] = found.error[:, 0]
-    return Search(empty, found.status, found.valid[:, 0], found.residual[:, 0], closest, missing)
+    family = np.zeros((empty.size, model.n), np.bool_)
+    family[:, columns] = found.family_joints[:, 0]
+    return Search(
+        empty, found.status, found.valid[:, 0], found.residual[:, 0], closest, missing, family
+    )
 
 
 def _with_locked_joints(model: RobotModel, task: Task) -> RobotModel:

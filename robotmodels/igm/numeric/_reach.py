@@ -211,4 +211,9 @@ def reach_position(
             break
     settle(q, turns, box, first)
     copy(q, kept)
+    look(goal, arm, work)
+    away, off = sizes(e, mask)
+    if away <= tolerance[0]:
+        # the last steps came upon the position after all
+        return FOUND if off <= tolerance[1] else NO_ORIENTATION
     return side

@@ -6,13 +6,14 @@ members at the reference; `member_curves` walks them for the postures that a rel
 """
 
 from .member_curves import MemberCurve, curves_through
-from .settle import Settled, double_roots, settle_families, singular_postures
+from .settle import Settled, double_roots, replaced, settle_families, singular_postures
 
 __all__ = [
     "MemberCurve",
     "Settled",
     "curves_through",
     "double_roots",
+    "replaced",
     "settle_families",
     "singular_postures",
 ]

@@ -20,7 +20,7 @@ from ..loop import JointChain
 from ..shortened import shortened
 from ..solver import Found, Tolerances
 
-__all__ = ["Settled", "double_roots", "settle_families", "singular_postures"]
+__all__ = ["Settled", "double_roots", "replaced", "settle_families", "singular_postures"]
 
 _Kind = TypeVar("_Kind", bound=np.generic)
 
@@ -97,7 +97,7 @@ def settle_families(
         return _with_moving(found, np.broadcast_to(np.False_, (N, S, k)))
     goals = np.ascontiguousarray(U[chosen])
     part = _settled(chain, goals, _rows(found, chosen), references[chosen], tolerances)
-    return _replaced(found, np.zeros((N, S, k), np.bool_), chosen, part)
+    return replaced(found, np.zeros((N, S, k), np.bool_), chosen, part)
 
 
 def singular_postures(
@@ -174,7 +174,7 @@ def _rows(found: Found, chosen: NDArray[np.int64]) -> Found:
     )
 
 
-def _replaced(
+def replaced(
     whole: Found, moving: NDArray[np.bool_], chosen: NDArray[np.int64], part: Settled
 ) -> Settled:
     """The postures with those of some poses replaced; more rows where they need more."""
@@ -268,4 +268,4 @@ def _settled(
     d = np.where(sigma == 0, np.minimum(d, np.abs(d - 2.0 * np.pi)), d).max(axis=-1)
     source = np.argmin(np.where(np.isnan(d), np.inf, d), axis=-1)
     moves = _bits(np.take_along_axis(marks[1], source, axis=1), k) & part.valid[..., None]
-    return _replaced(found, _bits(moving, k), unsettled, _with_moving(part, moves))
+    return replaced(found, _bits(moving, k), unsettled, _with_moving(part, moves))
