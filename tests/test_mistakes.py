@@ -155,3 +155,14 @@ def test_models_whose_products_are_no_numbers(size):
     ):
         with pytest.raises(InvalidValueError, match=r"expected entries up to 1e\+50"):
             call()
+
+
+def test_torques_in_a_wrong_unit_end_with_a_status():
+    com, tensor = [[0.5, 0.0, 0.0]] * 2, [0.083 * np.eye(3)] * 2
+    arm = rm.RobotModel.from_table(
+        rm.DHTable.from_rows([{"sigma": 0, "alpha": np.pi / 2}, {"sigma": 0, "d": 1.0}]),
+        inertia=rm.InertialParameters.from_com([1.0, 1.0], com, tensor),
+    )
+    wild = rm.simulate(arm, [0.0, 0.0], [0.0, 0.0], [1e5, 1e5], t=1.0)
+    assert "evaluations of the model were used up" in wild.reason
+    assert 100_000 <= wild.evaluations < 112_000
