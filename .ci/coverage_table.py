@@ -6,6 +6,7 @@
 """
 
 import json
+import subprocess
 import sys
 from collections import Counter
 from pathlib import Path
@@ -39,13 +40,16 @@ def main(report: str, target: str) -> None:
         rooms.setdefault(room, Counter()).update(counts)
     total = sum(files.values(), Counter())
     worst = sorted(files, key=lambda path: share(files[path]))[:LEAST_SEEN]
+    commit = subprocess.run(
+        ["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=True
+    ).stdout.strip()
     head = ["| | statements | not run | branches | not taken | % |", "|---|---|---|---|---|---|"]
     lines = [
         "# Coverage",
         "",
         "Statements and branches of the package that its tests run, kernels as plain Python in a",
         f"second leg. Written by `bash .ci/coverage`: coverage.py {data['meta']['version']}, "
-        f"{data['meta']['timestamp'][:10]}.",
+        f"{data['meta']['timestamp'][:10]}, commit {commit}.",
         "",
         *head,
         *(row(name, rooms[name]) for name in sorted(rooms)),
