@@ -244,7 +244,7 @@ def refuse_rates(length: Array, T: Array) -> None:
 
     Parameters
     ----------
-    length : ndarray, shape (R, ...)
+    length : ndarray, shape (R, k)
         Lengths of the motions.
     T : ndarray, shape (R,)
         Durations, s.
@@ -258,7 +258,7 @@ def refuse_rates(length: Array, T: Array) -> None:
     --------
     >>> refuse_rates(np.ones((1, 2)), np.array([1e-9]))
     """
-    size = 1e3 * np.minimum(length.reshape(T.size, -1).max(axis=-1, initial=0.0), 1e300)
+    size = 1e3 * np.minimum(length.max(axis=-1, initial=0.0), 1e300)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         rate = np.where((T > 0.0) & (size > 0.0), size / T, 0.0)
         rate = np.where(T < 1.0, np.where(rate > 0.0, rate / T / T, 0.0), rate)
