@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from types import MappingProxyType
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..drive import Drives, drive_kinds
+from .._arrays import read_only
+from ..drive import DriveKind, Drives, drive_kinds
 from ..errors import InvalidValueError, ShapeError, nearest_names
 from ..friction import Friction, LinearFriction, check_friction, check_linear
 from ..inertia import PARAMETERS
@@ -85,13 +88,8 @@ def friction_of(model: RobotModel, friction: Friction | None) -> LinearFriction 
 def standard_blocks(model: RobotModel, drive: Drives, friction: Friction | None) -> Blocks:
     """Columns of the torque and of what is derived from it."""
     kinds = drive_kinds(drive)
-    frames = [int(row) + 1 for row in model.table.joint_rows]
-    motors = [frames[m - 1] for m in coupled_motors(model)]
-    blocks: dict[str, tuple[str, ...]] = {LINKS: _link_names(model)}
-    blocks |= {kind.value: tuple(f"{kind.value}{j}" for j in frames) for kind in kinds}
-    if motors:
-        coupled = (kind.coupling for kind in kinds if kind.coupling is not None)
-        blocks |= {name: tuple(f"{name}{j}" for j in motors) for name in coupled}
+    frames = tuple((model.table.joint_rows + 1).tolist())
+    blocks = dict(_named_blocks(model.f, frames, coupled_motors(model), tuple(kinds)))
     if (linear := friction_of(model, friction)) is not None:
         for kind in linear.kinds:
             if kind in blocks:
@@ -103,6 +101,19 @@ def standard_blocks(model: RobotModel, drive: Drives, friction: Friction | None)
                 )
             blocks[kind] = tuple(f"{kind}{j}" for j in frames)
     return blocks
+
+
+@lru_cache(maxsize=64)
+def _named_blocks(
+    f: int, frames: tuple[int, ...], motors: tuple[int, ...], kinds: tuple[DriveKind, ...]
+) -> Blocks:
+    """Names without friction models: robots of one structure share them, call after call."""
+    blocks = {LINKS: tuple(f"{p}{j}" for j in range(1, f + 1) for p in PARAMETERS)}
+    blocks |= {kind.value: tuple(f"{kind.value}{j}" for j in frames) for kind in kinds}
+    if motors:
+        coupled = (kind.coupling for kind in kinds if kind.coupling is not None)
+        blocks |= {name: tuple(f"{name}{frames[m - 1]}" for m in motors) for name in coupled}
+    return MappingProxyType(blocks)
 
 
 def energy_blocks(model: RobotModel, drive: Drives) -> Blocks:
@@ -135,20 +146,30 @@ def chosen_columns(blocks: Blocks, columns: Columns | None, model: RobotModel) -
     ShapeError
         A mask of another length.
     """
-    every = tuple(name for names in blocks.values() for name in names)
     if columns is None:
-        chosen = np.arange(len(every))
-    else:
-        if isinstance(columns, KeptColumns):
-            columns.check(model)
-        chosen = np.array(_numbers(every, columns), dtype=np.int64).reshape(-1)
-        if np.unique(chosen).size != chosen.size:
-            raise InvalidValueError("columns: a column is asked for twice; give each once.")
+        return _all_columns(tuple(blocks.items()))
+    every = tuple(name for names in blocks.values() for name in names)
+    if isinstance(columns, KeptColumns):
+        columns.check(model)
+    chosen = np.array(_numbers(every, columns), dtype=np.int64).reshape(-1)
+    if np.unique(chosen).size != chosen.size:
+        raise InvalidValueError("columns: a column is asked for twice; give each once.")
     place = np.full(len(every), -1, dtype=np.int64)
     place[chosen] = np.arange(chosen.size)
+    return ChosenColumns(tuple(every[k] for k in chosen), _placed(place, blocks))
+
+
+@lru_cache(maxsize=64)
+def _all_columns(blocks: tuple[tuple[str, tuple[str, ...]], ...]) -> ChosenColumns:
+    every = tuple(name for _, names in blocks for name in names)
+    return ChosenColumns(every, _placed(np.arange(len(every)), dict(blocks)))
+
+
+def _placed(place: NDArray[np.int64], blocks: Blocks) -> Mapping[str, NDArray[np.int64]]:
+    """The column of each parameter, kind by kind; read-only, since calls share them."""
     ends = np.cumsum([len(names) for names in blocks.values()])[:-1]
-    pieces = (np.ascontiguousarray(piece) for piece in np.split(place, ends))
-    return ChosenColumns(tuple(every[k] for k in chosen), dict(zip(blocks, pieces, strict=True)))
+    pieces = (read_only(piece, np.int64) for piece in np.split(place, ends))
+    return dict(zip(blocks, pieces, strict=True))
 
 
 def _numbers(every: tuple[str, ...], columns: Columns) -> list[int]:
@@ -199,7 +220,3 @@ def _number(every: tuple[str, ...], column: object) -> int:
             f"columns: numbers are from 0 to {len(every) - 1} here, got {int(column)}."
         )
     return int(column)
-
-
-def _link_names(model: RobotModel) -> tuple[str, ...]:
-    return tuple(f"{p}{j}" for j in range(1, model.f + 1) for p in PARAMETERS)
