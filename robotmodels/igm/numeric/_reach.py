@@ -214,6 +214,6 @@ def reach_position(
     look(goal, arm, work)
     away, off = sizes(e, mask)
     if away <= tolerance[0]:
-        # the last steps came upon the position after all
-        return FOUND if off <= tolerance[1] else NO_ORIENTATION
+        # the last steps came upon the position after all: it is neither too far nor too near
+        return FOUND if off <= tolerance[1] else NOTHING_FOUND
     return side
