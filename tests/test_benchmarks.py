@@ -286,21 +286,21 @@ def test_ratio_that_is_unusual_is_the_median_of_five(ratios):
 
 
 def test_margin_follows_the_spread(ratios):
-    quiet, wild = ratios.Kept(2.0, 0.02), ratios.Kept(2.0, 0.1)
+    quiet, wild = ratios.Kept(2.0, 0.02), ratios.Kept(2.0, 0.125)
     assert quiet.margin == ratios.LEAST
-    assert wild.margin == pytest.approx(np.exp(0.3))
-    assert not wild.slower(2.69)
-    assert wild.slower(2.71)
+    assert wild.margin == pytest.approx(np.exp(0.375))
+    assert not wild.slower(2.90)
+    assert wild.slower(2.92)
     assert wild.faster(1.49)
     assert not wild.faster(1.51)
     # the rates are those of the rule, tried on random attempts
     rng = np.random.default_rng(0)
-    for times in (1.0, 1.35, 2.0):
-        r = 2.0 * times * np.exp(0.1 * rng.normal(size=(20_000, 5)))
+    for times in (1.0, 1.45, 2.0):
+        r = 2.0 * times * np.exp(0.125 * rng.normal(size=(20_000, 5)))
         called = (r[:, 0] > wild.margin * 2.0) & (np.median(r, axis=1) > wild.margin * 2.0)
         assert called.mean() == pytest.approx(wild.alarm(times), abs=0.01)
     assert wild.alarm() < 1e-6
-    assert wild.alarm(2.0) > 0.999
+    assert wild.alarm(2.0) > 0.99
 
 
 def test_what_is_kept_hardly_ever_raises_a_false_alarm(ratios):
