@@ -173,17 +173,19 @@ def test_excite_prints_json_and_tells_when_limits_cannot_be_kept(run):
         (["--velocity", "1", "2"], "--velocity"),
         (["--acceleration", "-1"], "positive"),
         (["--box", "0", "0", "1"], "six numbers"),
-        (["--rate", "0"], "--rate"),
+        (["--out", "new", "--rate", "0"], "--rate: expected a positive"),
         (["--seed", "-1"], "--seed"),
-        (["--degrees", "--format", "yaml"], "radians"),
+        (["--out", "new", "--degrees", "--format", "yaml"], "radians"),
         (["--duration", "0"], "duration"),
         (["--points", "4"], "harmonics"),
     ],
 )
-def test_wrong_arguments_of_excite(run, words, message):
+def test_wrong_arguments_of_excite(run, words, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     code, _, err = run("excite", "--robot", "rx90", *FEW, *words)
     assert code == 2
     assert message in err
+    assert not list(tmp_path.iterdir())
 
 
 def test_help_of_excite_shows_examples(run):

@@ -26,13 +26,13 @@ def unit_diagonal(M: Array) -> tuple[Array, Array]:
     Returns
     -------
     scaled : ndarray, shape (m, m)
-        ``M / (size size^T)``; zeros where a row is zero.
+        ``M / (size size^T)``; zeros where a row is zero or an entry is infinite.
     size : ndarray, shape (m,)
         Square roots of the diagonal, or of the largest entry of a row where that is zero.
     """
     size = np.abs(np.diag(M))
     size = np.sqrt(np.where(size > 0.0, size, np.abs(M).max(axis=1, initial=0.0)))
-    if not size.all():
+    if not (size.all() and np.isfinite(size).all()):
         return np.zeros_like(M), size
     return M / (size[:, None] * size), size
 
