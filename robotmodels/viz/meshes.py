@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -67,7 +68,9 @@ def _read(
             "drawing mesh files needs trimesh; run: pip install 'yourdfpy>=0.0.58'"
         ) from None
     try:
-        scene = trimesh.load_scene(str(path), process=False)
+        with warnings.catch_warnings():  # what its readers will have to change is not the caller's
+            warnings.simplefilter("ignore", DeprecationWarning)
+            scene = trimesh.load_scene(str(path), process=False)
         if scene.units is not None:
             scene = scene.convert_units("meters")
         parts = []
