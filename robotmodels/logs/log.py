@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, as_bounded, as_floats
+from .._arrays import LARGEST, Array, as_bounded, as_floats
 from ..errors import InvalidValueError, ShapeError
 
-_LARGEST, _LEAST = 1e50, 1e-50
-"""Of samples: their squares, and products of these, are floats."""
+_LEAST = 1e-50
+"""Of the largest sample of a channel that is not zero: its square is a float."""
 _LONGEST = 1e12
 """Period, s; the shortest is its inverse."""
 
@@ -295,7 +295,7 @@ def check_is_log(log: object) -> None:
 def _rows(value: ArrayLike | None, name: str) -> Array:
     if value is None:
         raise InvalidValueError(f"{name}: expected samples of shape (N, n), got None.")
-    array = as_bounded(value, name, _LARGEST, _LEAST)
+    array = as_bounded(value, name, LARGEST, _LEAST)
     if array.ndim != 2:
         raise ShapeError(f"{name}: expected samples of shape (N, n), got {array.shape}.")
     if not array.shape[0]:
