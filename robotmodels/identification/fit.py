@@ -26,13 +26,18 @@ from .methods.essential import Essential, EssentialRule, with_columns
 from .methods.essential import essential as essential_parameters
 from .methods.estimate import Estimate, Method
 from .methods.least_squares import shares, solved, used_weights
+from .prediction import friction_ramp
 from .preparation.accepted import accepted_log, accepted_test
-from .preparation.processing import Processing, choose_processing
+from .preparation.delay_rows import looked_at
+from .preparation.processing import Processing
+from .preparation.signals import signals
+from .processing_choice import processing_for
 from .result import IdentificationResult
 from .scale.kept_equations import kept_equations, plain
 from .scale.reduction import Reduction, reduce_equations
 from .solving import MethodOptions, solve
 from .validation import validate
+from .weak_prior import plausible_sizes, shrunk
 
 if TYPE_CHECKING:
     from ..estimation import Loss
@@ -40,6 +45,11 @@ if TYPE_CHECKING:
 
 _LINEAR = (Method.OLS, Method.WLS, Method.IRLS)
 """Methods whose covariance is formed here, for correlated residuals."""
+_ONE_AT_A_TIME = (
+    "Noise of the velocities is on both sides of equations of power or energy, so that parameters "
+    "are off by more than their standard errors where positions are noisy; they show less than "
+    "those of the torques."
+)
 _NOTHING = 1e-7
 """Length of a column relative to the longest, below which the log does not show it."""
 
@@ -69,6 +79,7 @@ def fit(
     start: ArrayLike | None = None,
     output: Output | str | None = None,
     essential: bool | float | EssentialRule | str = False,
+    shrinkage: bool | None = None,
     test: Log | None = None,
     checked: bool = True,
     executor: Executor | None = None,
@@ -112,6 +123,10 @@ def fit(
     essential : bool, float, EssentialRule or str
         Leave out parameters whose relative deviations say that they are not seen: True as is
         usual (30), a ratio of relative deviations, or a rule: "ratio", "f_test", "aic".
+    shrinkage : bool, optional
+        Of methods "ols", "wls" and "irls": whether parameters are shrunk toward zero by a weak
+        prior, whose size the log gives (empirical Bayes). Default where the log leaves parameters
+        less certain than their plausible sizes, which is told in the notes.
     test : Log, optional
         Kept aside: the predicted torques are compared with it.
     checked : bool
@@ -167,9 +182,10 @@ def fit(
     if test is not None:
         findings = (*findings, *accepted_test(log, test, model, checked))
     if processing is None:
-        processing = choose_processing(log, cutoff, decimation, dead_band, edges)
-        if decimation is None and not balance.by_joint:
-            processing = _denser(processing, model.n)
+        kinds = log.n if balance.by_joint else 1
+        processing = processing_for(base, log, cutoff, decimation, dead_band, edges, kinds)
+        if not balance.by_joint:
+            processing = replace(processing, notes=(*processing.notes, _ONE_AT_A_TIME))
     elif any(x is not None for x in (cutoff, decimation, dead_band, edges)):
         raise InvalidValueError(
             "processing: it holds every choice; leave out cutoff, decimation, dead_band and edges, "
@@ -196,8 +212,15 @@ def fit(
         lags = spread.lags
         linear = way in _LINEAR
         own = estimate.covariance * np.outer(ratio, ratio)
+        drawn = None
+        if linear and not (shrinkage is False or (shrinkage is None and essential is not False)):
+            drawn = _shrunk(system, reduction, estimate, spread, ratio, shrinkage is True)
+        if drawn is not None:
+            linear, estimate = False, drawn
+            own = estimate.covariance * np.outer(ratio, ratio)
         estimate = replace(estimate, covariance=spread.covariance if linear else own)
     values = estimate.values
+    ramp = friction_ramp(system.base, system.names, values, log, processing)
     return IdentificationResult(
         system=plain(system),
         reduction=reduction,
@@ -209,11 +232,12 @@ def fit(
         not_essential=dropped,
         condition=float(np.linalg.cond(R)),
         condition_scaled=float(np.linalg.cond(R / np.linalg.norm(R, axis=0))),
-        fitted=validate(system.base, system.names, values, log, processing, system),
+        fitted=validate(system.base, system.names, values, log, processing, system, ramp),
         held_out=None
         if test is None
-        else validate(system.base, system.names, values, test, processing),
+        else validate(system.base, system.names, values, test, processing, ramp=ramp),
         options=options,
+        ramp=ramp,
         essential_rule=_rule_name(found, essential),
         notes=(*log.notes, *findings, *processing.notes, *estimate.notes, *_notes(unseen, dropped)),
     )
@@ -235,6 +259,22 @@ def _spread(
     spread = correlated_covariance(system, at, weights, inverse, taken=taken)
     white = rest / (reduction.rows - len(values)) * np.diag(inverse)
     return spread, np.sqrt(np.diag(spread.covariance) / np.where(white > 0.0, white, 1.0))
+
+
+def _shrunk(
+    system: Equations,
+    reduction: Reduction,
+    estimate: Estimate,
+    spread: CorrelatedCovariance,
+    ratio: Array,
+    always: bool,
+) -> Estimate | None:
+    """The estimate with a weak prior, where the log needs it."""
+    part = looked_at(system.log, system.processing.motion)
+    found = signals(part, system.processing)
+    sizes = plausible_sizes(system.base, system.names, found.v, found.a, found.tau)
+    deviations = np.sqrt(np.diag(spread.covariance))
+    return shrunk(reduction, estimate, deviations, ratio, sizes, always)
 
 
 def _essential(
@@ -273,18 +313,6 @@ def _refuse_other_period(processing: Processing, log: Log) -> None:
             f"processing: it was chosen for samples of {processing.dt:g} s, the log has "
             f"{log.dt:g} s; choose_processing(log) makes one for this log."
         )
-
-
-def _denser(processing: Processing, n: int) -> Processing:
-    """As many equations for forms with one at a time as for those with one for each joint."""
-    step = max(1, processing.decimation // n)
-    notes = (
-        f"One equation at a time for all joints: one of {step} samples is kept instead.",
-        "Noise of the velocities is on both sides of such equations, so that parameters are off by "
-        "more than their deviations say where positions are noisy; they tell less than those of "
-        "the torques, and need a prior (method 'ridge') on short logs.",
-    )
-    return replace(processing, decimation=step, notes=(*processing.notes, *notes))
 
 
 def _seen(

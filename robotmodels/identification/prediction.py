@@ -7,8 +7,15 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_exact, as_vector, batch_rows
 from ..friction import check_linear
+from ..logs import Log
 from ..minimal_parameters import BaseParameters
 from ..regressors import torque_regressor_chunks
+from .preparation.delay_rows import looked_at
+from .preparation.processing import Processing
+from .preparation.signals import piece_signals, pieces
+
+_RAMPS = (0.0, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
+"""Widths over which dry friction may rise, in dead bands."""
 
 
 def predicted_torque(
@@ -78,6 +85,32 @@ def predicted_torque(
     terms = dict(zip(names, b.tolist(), strict=True))
     tau += _over_dead_band(base, terms, rows[1], band)
     return tau.reshape(*batch, n)
+
+
+def friction_ramp(
+    base: BaseParameters, names: tuple[str, ...], values: Array, log: Log, processing: Processing
+) -> Array:
+    """Velocities (n,) over which dry friction rises, so that the log's torques fit best.
+
+    Near rest friction is not known from the equations, which leave its dead band out. Multiples of
+    the dead bands are tried on the samples there, from an ideal step to far beyond.
+    """
+    band = processing.dead_band
+    if not band.any():
+        return band
+    part = looked_at(log, processing.motion)
+    squares = np.zeros((len(_RAMPS), log.n))
+    for piece in pieces(part, processing):
+        found = piece_signals(part, processing, piece, 0)
+        rows = (np.abs(found.v) < max(_RAMPS) * band).any(axis=1)
+        q, v, a, tau = (x[rows] for x in (found.q, found.v, found.a, found.tau))
+        e = tau - predicted_torque(base, names, values, q, v, a)
+        terms = dict(zip(names, values.tolist(), strict=True))
+        for k, times in enumerate(_RAMPS):
+            squares[k] += ((e - _over_dead_band(base, terms, v, times * band)) ** 2).sum(axis=0)
+    least = squares.min(axis=0)
+    relative = squares / np.where(least > 0.0, least, 1.0)
+    return _RAMPS[int(np.argmin(relative.sum(axis=1)))] * band
 
 
 def _over_dead_band(base: BaseParameters, terms: dict[str, float], v: Array, band: Array) -> Array:

@@ -50,6 +50,8 @@ class IdentificationResult(Rebuilt):
         On the log that was kept aside.
     options : MethodOptions
         What the method was given beyond the equations.
+    ramp : ndarray, shape (n,)
+        Velocities (rad/s or m/s) over which dry friction rises where torques are predicted.
     essential_rule : str
         By which parameters were left out; empty where all were kept.
     notes : tuple of str
@@ -73,6 +75,7 @@ class IdentificationResult(Rebuilt):
     fitted: Validation
     held_out: Validation | None
     options: MethodOptions
+    ramp: Array
     essential_rule: str
     notes: tuple[str, ...]
 
@@ -147,10 +150,10 @@ class IdentificationResult(Rebuilt):
         Returns
         -------
         ndarray, shape (..., n)
-            N m or N; dry friction rises linearly over the dead band.
+            N m or N; dry friction rises linearly over `ramp`.
         """
         return predicted_torque(
-            self.base, self.names, self.values, q, v, a, self.system.processing.dead_band
+            self.base, self.names, self.values, q, v, a, self.ramp
         )
 
     def validate(self, log: Log) -> Validation:
@@ -166,7 +169,9 @@ class IdentificationResult(Rebuilt):
         Validation
             By joint.
         """
-        return validate(self.base, self.names, self.values, log, self.system.processing)
+        return validate(
+            self.base, self.names, self.values, log, self.system.processing, ramp=self.ramp
+        )
 
     def report(self) -> str:
         """One page that a person reads: data, choices, parameters, errors, verdict.

@@ -60,6 +60,7 @@ def validate(
     log: Log,
     processing: Processing,
     system: Equations | None = None,
+    ramp: Array | None = None,
 ) -> Validation:
     """Compare predicted torques with those of a log, which may be another one.
 
@@ -77,6 +78,8 @@ def validate(
         How positions become velocities and accelerations.
     system : Equations, optional
         The equations of these torques, where they have been made; others are not used.
+    ramp : ndarray, shape (n,), optional
+        Velocities over which dry friction rises, rad/s or m/s; default the dead bands.
 
     Returns
     -------
@@ -106,6 +109,7 @@ def validate(
     if system is None or system.form is not EquationForm.TORQUE or system.names != names:
         system = Equations(base, names, log, processing)
     n = log.n
+    widths = processing.dead_band if ramp is None else ramp
     squares, sums, whole = np.zeros(n), np.zeros(n), np.zeros(n)
     samples = 0
     kept, filtered, taken = np.zeros(n), np.zeros(n), np.zeros(n)
@@ -114,7 +118,7 @@ def validate(
     for piece in pieces(log, processing):
         found = piece_signals(log, processing, piece, 0)
         e = found.tau - predicted_torque(
-            base, names, values, found.q, found.v, found.a, processing.dead_band
+            base, names, values, found.q, found.v, found.a, widths
         )
         squares += (e * e).sum(axis=0)
         sums += e.sum(axis=0)

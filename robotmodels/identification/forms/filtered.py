@@ -60,7 +60,7 @@ def filtered_block(system: Equations, piece: Piece) -> Block:
     count = -(-length // step)
     # samples begin SHORT inside, and so does the first equation
     inner = slice(SHORT, max(len(found) - SHORT, SHORT))
-    sliding, tau, v = moving(system, found.v[inner]), found.tau[inner], found.v[inner]
+    sliding, tau, v = moving(system, found)[inner], found.tau[inner], found.v[inner]
     regressors = Thinned(count, (n, len(system.names)), step, first)
     for part, W in _regressors(system, found):
         regressors.add(W, sliding[part])

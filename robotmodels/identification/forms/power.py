@@ -10,7 +10,7 @@ import numpy as np
 from ..._arrays import Array
 from ...regressors import power_regressor_chunks
 from ..preparation.signals import Piece, piece_signals
-from .torque import decimated, moving
+from .torque import decimated, turning
 
 if TYPE_CHECKING:
     from ..equations import Block, Equations
@@ -63,6 +63,6 @@ def power_block(system: Equations, piece: Piece) -> Block:
     first = piece.start - max(piece.start - processing.reach, piece.low)
     kept = decimated(rows(), step, first, -(-(piece.stop - piece.start) // step), width)
     v = kept[:, b + 1 :]
-    use = np.logical_or.reduce(moving(system, v), axis=1)[:, None]
+    use = np.logical_or.reduce(turning(system, v), axis=1)[:, None]
     t = found.t[first : first + piece.stop - piece.start : step]
     return Block(t, kept[:, None, :b], kept[:, b : b + 1], use, v)

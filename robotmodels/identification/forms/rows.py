@@ -53,7 +53,7 @@ def formed_block(system: Equations, piece: Piece, form: RowForm) -> Block:
     first = piece.start - max(piece.start - processing.reach, piece.low)
     kept = slice(first, first + piece.stop - piece.start, step)
     count = -(-(piece.stop - piece.start) // step)
-    sliding = moving(system, found.v)
+    sliding = moving(system, found)
     chunks = torque_regressor_chunks(
         system.model, found.q, found.v, found.a, system.base.drive, _CHUNK,
         columns=system.names, friction=system.base.friction,

@@ -65,7 +65,7 @@ def signals_block(system: Equations, piece: Piece, found: Signals) -> Block:
     kept = slice(first, first + piece.stop - piece.start, step)
     count = -(-(piece.stop - piece.start) // step)
     options = {"columns": system.names, "friction": system.base.friction}
-    sliding = moving(system, found.v)
+    sliding = moving(system, found)
     if step == 1:
         q, v, a = found.q[kept], found.v[kept], found.a[kept]
         W = torque_regressor(system.model, q, v, a, system.base.drive, **options)
@@ -143,21 +143,25 @@ def decimated(rows: Iterator[Array], step: int, centre: int, count: int, width: 
     return thinned.means(np.ones((count, 1), dtype=bool))[:, 0]
 
 
-def moving(system: Equations, v: Array) -> NDArray[np.bool_]:
-    """Where the direction of dry friction is known: the joint and its coupled motors turn.
+def moving(system: Equations, found: Signals) -> NDArray[np.bool_]:
+    """Samples (k, n) at which the direction of dry friction is known.
 
-    Parameters
-    ----------
-    system : Equations
-        Robot, parameters and choices.
-    v : ndarray, shape (k, n)
-        Velocities.
-
-    Returns
-    -------
-    ndarray of bool, shape (k, n)
-        Which samples tell something.
+    Where the sign of a velocity changes, the acceleration steps; the filter of the positions smears
+    that over a time, so that samples of this time beside the dead band are left out as well.
     """
+    from scipy.ndimage import maximum_filter1d
+
+    v = np.concatenate([x for x in (found.before, found.v, found.after) if x is not None])
+    start = 0 if found.before is None else len(found.before)
+    slow = ~turning(system, v)
+    if system.processing.guard and slow.any():
+        size = 2 * system.processing.guard + 1
+        slow = maximum_filter1d(slow.astype(np.uint8), size, axis=0, mode="nearest") > 0
+    return ~slow[start : start + len(found)]
+
+
+def turning(system: Equations, v: Array) -> NDArray[np.bool_]:
+    """Where joints, and the coupled motors that turn them, are outside their dead bands (k, n)."""
     band = system.processing.dead_band
     found = ~(np.abs(v) < band)
     transmission = system.model.transmission

@@ -11,6 +11,7 @@ from ..._arrays import Array, Rebuilt, as_floats, read_only
 from ...errors import InvalidValueError, ShapeError
 from ...logs import Log
 from .filters import central_differences, decimation_window, zero_phase
+from .position_noise import noise_draw, noise_levels
 from .spectrum import power_density
 
 _POWER = 0.999
@@ -21,12 +22,18 @@ _TORQUES = 2.5
 """Cutoff of the decimation, in frequencies of the motion."""
 _HALF = 0.4
 """Where the decimation's window falls to half, in sampling rates after it."""
-_SLOW = 0.01
+_SLOW = 0.003
 """Dead band relative to the greatest velocity."""
 _NOISY = 4.0
 """Dead band relative to the deviation of the velocities' noise."""
 _ABOVE = 10.0
 """Density relative to that of the noise below which a spectrum is noise."""
+_FEW = 100.0
+"""Steps of an encoder over which a joint moves at least where its motion is judged."""
+_LEVELS = 20
+"""Parts of a spectrum over which the level of the noise is averaged."""
+_SMEAR = 0.3
+"""Periods of the cutoff over which a step of the acceleration is smeared on either side."""
 _EDGE = 3.0
 """Periods of the cutoff after which the filter's transient is gone from what a fit could see."""
 _HIGHEST = 0.4
@@ -96,6 +103,13 @@ class Processing(Rebuilt):
     def torque_cutoff(self) -> float | None:
         """Hz, where the decimation's window falls to half; None without decimation."""
         return None if self.decimation == 1 else _HALF * self.rate
+
+    @property
+    def guard(self) -> int:
+        """Samples on either side of a dead band over which the filter smears a reversal."""
+        if self.cutoff is None or not self.dead_band.any():
+            return 0
+        return int(np.ceil(_SMEAR / (self.cutoff * self.dt)))
 
     @property
     def reach(self) -> int:
@@ -183,7 +197,7 @@ def choose_processing(
                 f"cutoff: expected a frequency between 0 and half the sampling rate ({nyquist:g} "
                 f"Hz), got {cutoff!r}."
             )
-        notes.append(f"Positions are cut off at {band:.3g} Hz, as asked.")
+        notes.append(f"Positions are cut off at {band:.3g} Hz.")
     step = _step(log, decimation, motion, longest, notes)
     return Processing(
         log.dt, band, order, accuracy, step,
@@ -196,18 +210,22 @@ def _step(log: Log, asked: int | None, motion: float, longest: int, notes: list[
     if asked is None:
         step = max(1, min(int(_HALF / (log.dt * _TORQUES * motion)), longest // 20))
         if step > 1:
-            notes.append(
-                f"Regressor and torque are cut off at {_HALF / (step * log.dt):.3g} Hz and one of "
-                f"{step} samples is kept."
-            )
+            notes.append(_decimated(step, log.dt))
         return step
     if not isinstance(asked, (int, np.integer)) or not 1 <= asked <= longest:
         raise InvalidValueError(
             f"decimation: expected a whole number from 1 to {longest} (samples of the longest "
             f"recording), got {asked!r}."
         )
-    notes.append(f"One of {asked} samples is kept, as asked." if asked > 1 else "No decimation.")
+    notes.append(_decimated(int(asked), log.dt) if asked > 1 else "No decimation.")
     return int(asked)
+
+
+def _decimated(step: int, dt: float) -> str:
+    return (
+        f"Regressor and torque are cut off at {_HALF / (step * dt):.3g} Hz and one of {step} "
+        "samples is kept."
+    )
 
 
 def _dead_band(
@@ -281,45 +299,49 @@ def _windows(log: Log) -> list[slice]:
 
 
 def _motion(log: Log) -> tuple[float, Array]:
-    """Frequency of the motion, and deviation of the positions' noise."""
+    """Frequency of the motion, and standard deviation of the positions' noise."""
     rate = 1.0 / log.dt
-    bands, powers, floors = [], [], []
+    rng = np.random.default_rng(0)
+    levels = noise_levels(log)
+    bands, powers = [], []
     for part in _windows(log):
-        v = np.diff(np.asarray(log.q[part]), axis=0) * rate
-        f, P = power_density(v, rate, len(v))
-        f, P = f[1:], P[1:]
-        # what a difference does to positions
-        gain = (2.0 * rate * np.sin(np.pi * f / rate))[:, None] ** 2
-        S = P / gain
-        high = (f > 0.25 * rate) & (f < 0.45 * rate)
-        floor = np.median(S[high], axis=0) if high.any() else np.zeros(log.n)
-        found = [_band(f, P[:, j], S[:, j], gain[:, 0], floor[j]) for j in range(log.n)]
-        bands.append([max(band, float(f[0])) for band, _ in found])
+        q = np.asarray(log.q[part])
+        noise = noise_draw(q, log.dt, levels, rng)
+        both = np.diff(np.concatenate((q, noise), axis=1), axis=0) * rate
+        f, P = power_density(both, rate, len(both))
+        found = [_band(f[1:], P[1:, j], P[1:, log.n + j]) for j in range(log.n)]
+        bands.append([max(band, float(f[1])) for band, _ in found])
         powers.append([power for _, power in found])
-        floors.append(floor)
     power = np.array(powers)
-    # windows in which a joint hardly moves tell nothing of its motion
+    # where a joint hardly moves, or over few steps of its encoder, its motion does not show
     moves = (power > 0.0) & (power > _MOVES * power.max(axis=0))
+    moves &= np.ptp(np.asarray(log.q), axis=0) > _FEW * levels.step
     motion = float(np.where(moves, bands, 0.0).max())
     if not motion > 0.0:
         motion = float(np.min(bands))
-    return motion, np.sqrt(np.median(floors, axis=0) * rate / 2.0)
+    return motion, levels.deviation
 
 
-def _band(f: Array, P: Array, S: Array, gain: Array, floor: float) -> tuple[float, float]:
-    """Frequency of the motion of a joint and its power, from spectra of velocity and position."""
-    # noise is a plain; the motion is where the spectrum stands out from it
-    width = max(3, 2 * (len(S) // 1000) + 1)
-    if len(S) < width:
+def _band(f: Array, P: Array, noise: Array) -> tuple[float, float]:
+    """Frequency of a joint's motion and its power, from spectra of its velocity and their noise."""
+    width = max(3, 2 * (len(P) // 1000) + 1)
+    if len(P) < width:
         return float(f[0]), float(P.sum())
-    smooth = np.convolve(np.pad(S, width // 2, mode="edge"), np.full(width, 1.0 / width), "valid")
-    left = np.where(smooth >= _ABOVE * floor, np.maximum(P - gain * floor, 0.0), 0.0)
+    # of positions, so that their level changes little within the average
+    gain = np.sin(0.5 * np.pi * f / f[-1]) ** 2
+    # the noise is a level, not lines: an average over many frequencies does not scatter
+    S, N = _averaged(P / gain, width), _averaged(noise / gain, 2 * (len(P) // _LEVELS) + 3)
+    left = np.where(S >= _ABOVE * N, np.maximum(P - gain * N, 0.0), 0.0)
     power = np.cumsum(left)
     if not power[-1] > 0.0:
         return 0.0, 0.0
     most, bulk = (float(f[int(np.searchsorted(power, x * power[-1]))]) for x in (_POWER, _BULK))
-    # noise that is no plain, of coarse encoders, is far away from where most of the power is
+    # power far beyond the frequencies of most of it is noise that the model of it does not have
     return (_WIDER * bulk if most > _FAR * bulk else most), float(power[-1])
+
+
+def _averaged(S: Array, width: int) -> Array:
+    return np.convolve(np.pad(S, width // 2, mode="edge"), np.full(width, 1.0 / width), "valid")
 
 
 def _fastest(log: Log, cutoff: float | None) -> Array:

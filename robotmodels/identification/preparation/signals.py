@@ -35,6 +35,8 @@ class Signals(Rebuilt):
         Filtered positions, velocities, accelerations.
     tau : ndarray, shape (N, n)
         Torques as they were measured.
+    before, after : ndarray, shape (k, n), optional
+        Velocities of the samples before the first and after the last one.
     """
 
     t: Array
@@ -42,6 +44,8 @@ class Signals(Rebuilt):
     v: Array
     a: Array
     tau: Array
+    before: Array | None = None
+    after: Array | None = None
 
     def __post_init__(self) -> None:
         for name in ("t", "q", "v", "a", "tau"):
@@ -104,7 +108,7 @@ def signals(log: Log, processing: Processing) -> Signals:
     True
     """
     parts = [piece_signals(log, processing, piece, 0) for piece in pieces(log, processing)]
-    names = (field.name for field in fields(Signals))
+    names = ("t", "q", "v", "a", "tau")
     return Signals(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
@@ -143,7 +147,7 @@ def piece_signals(log: Log, processing: Processing, piece: Piece, reach: int) ->
     piece : Piece
         Which rows.
     reach : int
-        Rows more on either side.
+        Rows more on either side; velocities of the guard beside dead bands come with them.
 
     Returns
     -------
@@ -151,12 +155,15 @@ def piece_signals(log: Log, processing: Processing, piece: Piece, reach: int) ->
         The first row is ``max(piece.start - reach, piece.low)``.
     """
     first, last, begin, end = _looked_at(log, processing, piece, reach)
+    guard = processing.guard
     if begin < 0 or end > len(log):
         raise InvalidValueError(
             f"piece: its rows {first} to {last} are made of rows {begin} to {end}, and the log has "
             f"rows 0 to {len(log)}; take the pieces of this log, of `pieces`."
         )
     inner = slice(first - begin, last - begin)
+    ahead = slice(max(first - guard, piece.low) - begin, first - begin)
+    behind = slice(last - begin, min(last + guard, piece.high) - begin)
 
     def filtered(x: Array) -> Array:
         rows = np.array(x[begin:end])
@@ -169,7 +176,7 @@ def piece_signals(log: Log, processing: Processing, piece: Piece, reach: int) ->
     a = central_differences(v, log.dt, processing.accuracy) if log.a is None else filtered(log.a)
     return Signals(
         log.dt * np.arange(first, last, dtype=np.float64), q[inner], v[inner], a[inner],
-        np.array(log.tau[first:last]),
+        np.array(log.tau[first:last]), v[ahead], v[behind],
     )  # fmt: skip
 
 
@@ -206,7 +213,7 @@ def _looked_at(
     """First and last row of a piece with so many beside it, and of those that they are made of."""
     first, last = max(piece.start - reach, piece.low), min(piece.stop + reach, piece.high)
     # the filter forgets what is farther away; differences look a few samples further
-    margin = 2 * processing.accuracy
+    margin = 2 * processing.accuracy + processing.guard
     if processing.cutoff is not None:
         margin += _settling(processing.cutoff, log.dt, processing.order)
     return first, last, max(first - margin, piece.begin), min(last + margin, piece.end)

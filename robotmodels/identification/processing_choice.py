@@ -1,0 +1,103 @@
+"""Choices of the processing for a robot and a log: those with which torques are predicted best."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import Array
+from ..logs import Log
+from ..minimal_parameters import BaseParameters
+from .preparation.processing import Processing, choose_processing
+from .regressor_noise import bias_ratio, regressor_noise
+
+_EQUATIONS = 20
+"""Equations for each parameter at least."""
+_BIAS = 0.1
+"""Bias by noise in the regressor at most, in standard errors."""
+_HIGHEST, _OF_MOTION = 15.0, 2.5
+"""Cutoff of the equations at most: Hz (joints are flexible above), or in those of the motion."""
+_STEP = 1.25
+_POSITIONS = 2.5
+"""Cutoff of the positions, in cutoffs of the equations, so that it does not distort them."""
+_HALF, _NYQUIST = 0.4, 0.4
+"""Where the decimation's window falls to half, in rates of the equations; highest filter, in rates
+of the log."""
+
+
+def processing_for(
+    base: BaseParameters,
+    log: Log,
+    cutoff: float | None = None,
+    decimation: int | None = None,
+    dead_band: ArrayLike | None = None,
+    edges: float | None = None,
+    kinds: int | None = None,
+) -> Processing:
+    """Choose the processing; ``kinds`` equations at a time (default one for each joint).
+
+    The cutoff of the equations is the highest at which noise of the positions biases no parameter
+    by more than `_BIAS` standard errors; there are never fewer than `_EQUATIONS` equations for a
+    parameter, if the log has as many samples.
+    """
+    plain = choose_processing(log, cutoff, decimation, dead_band, edges)
+    most = max(1, len(log) * (kinds or log.n) // (_EQUATIONS * len(base)))
+    highest = min(max(_HIGHEST, _OF_MOTION * plain.motion), _NYQUIST / log.dt)
+    lowest = min(plain.motion, highest)
+    if cutoff is not None:
+        lowest, highest = min(lowest, cutoff), max(highest, cutoff)
+    noise = regressor_noise(base, log, lowest, highest)
+    if cutoff is not None:
+        step = decimation or max(1, min(plain.decimation, most))
+        asked = min(cutoff, _HALF / (step * log.dt))
+        ratio = bias_ratio(noise, asked)
+        chosen = choose_processing(log, cutoff, step, dead_band, edges)
+        return _told(chosen, base, log, kinds, asked, ratio)
+    count = int(np.log(highest / lowest) / np.log(_STEP)) + 1
+    grid = [highest / _STEP**k for k in range(count)]
+    if decimation is not None:
+        grid = [min(x, _HALF / (decimation * log.dt)) for x in grid]
+    low, high = 0, len(grid) - 1
+    ratios = {low: bias_ratio(noise, grid[low])}
+    if ratios[low].max(initial=0.0) > _BIAS:
+        while high - low > 1:
+            middle = (low + high) // 2
+            ratios[middle] = bias_ratio(noise, grid[middle])
+            low, high = (
+                (middle, high) if ratios[middle].max(initial=0.0) > _BIAS else (low, middle)
+            )
+        low = high
+    band = grid[low]
+    ratio = ratios[low] if low in ratios else bias_ratio(noise, band)
+    step = decimation or max(1, min(int(_HALF / (band * log.dt)), most))
+    # where more equations are asked for than the noise leaves to know, positions are cut off lower
+    wider = np.clip(_POSITIONS * band * step * log.dt / _HALF, 1.0, _POSITIONS)
+    positions = min(float(wider) * band, _NYQUIST / log.dt)
+    chosen = choose_processing(log, positions, step, dead_band, edges)
+    return _told(chosen, base, log, kinds, band, ratio)
+
+
+def _told(
+    chosen: Processing, base: BaseParameters, log: Log, kinds: int | None, band: float, ratio: Array
+) -> Processing:
+    """The choices, with sentences on the noise and on the number of equations."""
+    rate = len(log) * (kinds or log.n) / chosen.decimation / len(base)
+    notes = [
+        f"The equations hold frequencies up to {band:.3g} Hz, about {rate:.3g} equations for each "
+        f"of {len(base)} parameters."
+    ]
+    worst = int(np.argmax(ratio)) if len(ratio) else 0
+    if ratio.max(initial=0.0) > _BIAS:
+        notes.append(
+            f"Noise of the positions biases parameters by up to {ratio[worst]:.2g} standard errors "
+            f"({base.names[worst]}) at this cutoff, as predicted; a lower cutoff=, better position "
+            "signals, or method 'iv' avoid that."
+        )
+    if rate < _EQUATIONS:
+        notes.append(
+            f"That is fewer than {_EQUATIONS} equations for each parameter: the log is short for "
+            "so many parameters. Record a longer one, or identify fewer."
+        )
+    return replace(chosen, notes=(*chosen.notes, *notes))
