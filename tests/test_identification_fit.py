@@ -119,7 +119,7 @@ def test_covariance_of_correlated_residuals():
         e = rng.normal(size=(3004, 2))
         e = sum(e[k : k + 3000] for k in range(5)) / 5.0
         log = Log(clean.dt, clean.q, clean.tau + e, clean.v, clean.a)
-        found = fit(model, log, processing=choices)
+        found = fit(model, log, processing=choices, shrinkage=False)
         error = found.values - found.base.values(model)
         z.append(error / found.deviations)
         white.append(error / found.white)
@@ -179,12 +179,12 @@ def test_tx40_held_out(trained):
 def test_tx40_choices_come_from_the_log(whole):
     choices = whole.system.processing
     assert 5.0 < choices.motion < 10.0
-    assert 50.0 < choices.cutoff < 100.0
-    assert 80 < choices.decimation < 130
-    # the dead bands that were published with the data
-    assert choices.dead_band == pytest.approx(
-        [0.0501, 0.0501, 0.0750, 0.0716, 0.0559, 0.1222], rel=0.25
-    )
+    assert 2.5 * choices.motion < choices.torque_cutoff < choices.cutoff < 100.0
+    assert whole.reduction.rows >= 20 * len(whole.names)
+    # the dead bands published with the data are about the ramps that the log's friction shows
+    published = np.array([0.0501, 0.0501, 0.0750, 0.0716, 0.0559, 0.1222])
+    assert (choices.dead_band < published).all()
+    assert ((0.5 * published < whole.ramp) & (whole.ramp < 1.5 * published)).all()
     assert whole.condition_scaled < 40.0 < whole.condition
 
 
@@ -301,7 +301,7 @@ def test_choices_are_values(tx40):
     assert (choices.cutoff, choices.decimation, choices.edges) == (40.0, 50, 500)
     assert choices.rate == pytest.approx(100.0)
     assert choices.torque_cutoff == pytest.approx(40.0)
-    assert any("as asked" in note for note in choices.notes)
+    assert any("cut off at 40 Hz" in note for note in choices.notes)
     with pytest.raises(ValueError):
         choices.dead_band[0] = 1.0
 

@@ -65,9 +65,7 @@ def processing_for(
         while high - low > 1:
             middle = (low + high) // 2
             ratios[middle] = bias_ratio(noise, grid[middle])
-            low, high = (
-                (middle, high) if ratios[middle].max(initial=0.0) > _BIAS else (low, middle)
-            )
+            low, high = (middle, high) if ratios[middle].max(initial=0.0) > _BIAS else (low, middle)
         low = high
     band = grid[low]
     ratio = ratios[low] if low in ratios else bias_ratio(noise, band)

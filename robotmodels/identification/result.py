@@ -152,9 +152,7 @@ class IdentificationResult(Rebuilt):
         ndarray, shape (..., n)
             N m or N; dry friction rises linearly over `ramp`.
         """
-        return predicted_torque(
-            self.base, self.names, self.values, q, v, a, self.ramp
-        )
+        return predicted_torque(self.base, self.names, self.values, q, v, a, self.ramp)
 
     def validate(self, log: Log) -> Validation:
         """Errors of the predicted torques on another log, processed alike.

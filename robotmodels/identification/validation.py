@@ -117,9 +117,7 @@ def validate(
     last = np.zeros((0, n))
     for piece in pieces(log, processing):
         found = piece_signals(log, processing, piece, 0)
-        e = found.tau - predicted_torque(
-            base, names, values, found.q, found.v, found.a, widths
-        )
+        e = found.tau - predicted_torque(base, names, values, found.q, found.v, found.a, widths)
         squares += (e * e).sum(axis=0)
         sums += e.sum(axis=0)
         whole += (found.tau**2).sum(axis=0)

@@ -52,7 +52,11 @@ def plausible_sizes(
 
 
 def shrunk(
-    reduction: Reduction, estimate: Estimate, deviations: Array, inflation: Array, sizes: Array,
+    reduction: Reduction,
+    estimate: Estimate,
+    deviations: Array,
+    inflation: Array,
+    sizes: Array,
     always: bool = False,
 ) -> Estimate | None:
     """Shrink an estimate toward zero where the log leaves parameters less certain than the prior.
