@@ -5,7 +5,8 @@ import sys
 
 import numpy as np
 import pytest
-from identification_logs import clean_log, odd_robots
+from identification_logs import clean_log, odd_robots, swinging
+from identities.random_robots import random_drive
 
 import robotmodels as rm
 from robotmodels.errors import InvalidValueError, ShapeError
@@ -60,6 +61,29 @@ def test_exact_parameters_without_noise(name, method):
         off = np.abs(found.values - truth).max() / np.abs(truth).max()
         assert off < 1e-8, (name, decimation, off)
         assert found.fitted.filtered_rmse[~np.isnan(found.fitted.filtered_rmse)].max() < 1e-7
+
+
+@pytest.mark.parametrize("name", ["erd:xarm7", "rx90"])
+def test_right_angles_of_few_digits_give_no_parameter_that_no_log_shows(name):
+    rng = np.random.default_rng(3)
+    model = rm.load(name)
+    table = model.table.replace(alpha=model.table.alpha.round(4))  # as many files are written
+    model = model.with_table(table).with_drive(random_drive(rng, model.n))
+    log = clean_log(model, rng, noise=0.1)
+    found = fit(model, log, base=rm.base_parameters(model, drive=True))
+    assert found.condition_scaled < 100
+    assert not any("cannot be told apart" in note for note in found.notes)
+    assert any(note.startswith("Taken as exact: axis 2 and axis 1") for note in found.base.notes)
+    z = (found.values - found.base.values(model)) / found.deviations
+    assert np.sqrt((z**2).mean()) < 1.3
+    every = fit(model, log, base=rm.base_parameters(model, drive=True, tolerance=1e-11))
+    assert every.condition_scaled > 1e4 * found.condition_scaled
+    # what is predicted is the torque of the table as given, to the angles that were taken
+    q, v, a = swinging(model, rng, samples=400)
+    one, other = (x.predict(q, v, a) for x in (found, every))
+    torque = rm.idm(model, q, v, a)
+    errors = [np.sqrt(((x - torque) ** 2).mean()) for x in (one, other)]
+    assert errors[0] < 1.05 * errors[1] + 1e-5 * np.abs(torque).max()
 
 
 def test_exact_from_positions_alone_to_what_differences_allow():

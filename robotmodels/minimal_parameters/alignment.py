@@ -1,61 +1,180 @@
-"""Which axes are parallel, perpendicular or along gravity only nearly, in words."""
+"""Axes that are aligned but for a small angle, and the robot with these axes aligned."""
 
 from __future__ import annotations
 
-from math import ceil, log10
+from dataclasses import dataclass, field
+from functools import reduce
+from math import ceil, copysign, log10
+from typing import NamedTuple
 
 import numpy as np
 
+from .. import se3
 from .._arrays import Array
-from ..geometry import FIXED
+from ..geometry import FIXED, REVOLUTE
 from ..model import RobotModel
 
+ALIGNED = 1e-5
+"""Angle in radians up to which axes count as aligned; a right angle "1.5708" is 3.7e-6 off."""
 _ROUNDING, _NEAR = 1e-13, 1e-4
 _GREATEST = 1e-2  # of a tolerance
 _LONGEST_LIST = 4
+_STEPS = 6
+_LEAST = 1e-3
+"""Part of the largest below which a singular value of the derivatives of an axis is none."""
 
 
-def near_alignments(model: RobotModel, tolerance: float) -> tuple[str, ...]:
-    """Sentences about axes that a file with few digits has nearly parallel or perpendicular.
+class AlignedRobot(NamedTuple):
+    """A robot whose nearly aligned axes are aligned.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The given one if no axis had to be turned.
+    notes : tuple of str
+        A sentence about axes that were taken as aligned, and one about those that nearly are; none
+        if all axes are aligned to rounding or clearly not.
+    """
+
+    model: RobotModel
+    notes: tuple[str, ...]
+
+
+def aligned_robot(model: RobotModel, angle: float) -> AlignedRobot:
+    """Turn axes that are parallel or perpendicular but for an angle, by the least.
+
+    The axis of a joint is compared with the joint axes before it that keep their direction relative
+    to it: the last one, those that only prismatic joints separate from it, and gravity where all
+    joints before it are prismatic. So are the axes of frames that do not turn about their own z.
 
     Parameters
     ----------
     model : RobotModel
         The robot.
-    tolerance : float
-        Sine of an angle that counts as none.
+    angle : float
+        Angle (its sine) that is taken as none, rad.
 
     Returns
     -------
-    tuple of str
-        One about those that were taken as exact, one about those that were not; none if all axes
-        are aligned to rounding or clearly not.
+    AlignedRobot
+        With the same frames, joints, lengths and parameters.
 
     Examples
     --------
     >>> from robotmodels.robots import load
-    >>> near_alignments(load("rx90"), 1e-11)
-    ()
+    >>> arm = load("rx90")
+    >>> aligned_robot(arm, 1e-5).model is arm
+    True
+    >>> rounded = arm.with_table(arm.table.replace(alpha=arm.table.alpha.round(4)))
+    >>> found = aligned_robot(rounded, 1e-5).model.table.alpha
+    >>> bool(np.allclose(found, arm.table.alpha, rtol=0, atol=1e-14))
+    True
     """
-    taken: list[tuple[float, str]] = []
-    apart: list[tuple[float, str]] = []
-    for name, a, b in _pairs(model):
-        across = float(np.linalg.norm(np.cross(a, b)))
-        for word, off in (("parallel", across), ("perpendicular", abs(float(a @ b)))):
-            if _ROUNDING < off < _NEAR:
-                said = f"{name} {word} but for {off:.1e} rad"
-                (taken if off <= tolerance else apart).append((off, said))
-    out = []
-    if taken:
-        out.append(f"Taken as exact: {_listed(taken)}.")
-    if apart:
-        greatest = max(off for off, _ in apart)
-        enough = min(10.0 ** (ceil(log10(greatest)) + 1), _GREATEST)
-        out.append(
-            f"Not exact: {_listed(apart)}. What they show beyond {tolerance:.0e} of the largest "
-            f"torque is kept; tolerance={enough:.0e} takes them as exact."
-        )
-    return tuple(out)
+    chain, table = model.chain, model.table
+    rows = np.stack((table.gamma, table.beta, table.alpha, table.theta))
+    pairs = _Pairs(angle)
+    gravity = np.asarray(model.gravity) @ chain.base_rotation
+    weight = float(np.linalg.norm(gravity))
+    # of each frame, the directions that do not turn relative to it, in its axes
+    still: list[dict[str, Array]] = [{"gravity": gravity / weight} if weight > 0 else {}]
+    for k in range(model.f):
+        sigma, row, R = int(chain.sigma[k]), rows[:, k], chain.rotation[k]
+        around = still[int(chain.antecedent[k])]
+        name = f"axis {k + 1}" if sigma != FIXED else f"z of frame {k + 1}"
+        known = len(pairs.taken)
+        z = pairs.aligned(name, R[:, 2], around)
+        if z is not None:
+            if not _turn_axis(row, z):  # beta and alpha both near a right angle: no small change
+                pairs.apart += pairs.taken[known:]
+                del pairs.taken[known:]
+            R = _rotation(*row)
+        if sigma == REVOLUTE:
+            still.append({name: np.array([0.0, 0.0, 1.0])})
+            continue
+        for i, letter in enumerate("xy"):  # they decide which first moments are kept
+            x = pairs.aligned(f"{letter} of frame {k + 1}", R[:, i], {**around, name: R[:, 2]})
+            if x is not None:
+                cosine, sine = x @ _rotation(*row[:3], 0.5 * np.pi * i)[:, :2]
+                row[3] = np.arctan2(sine, cosine)
+                R = _rotation(*row)
+        if sigma != FIXED:
+            around = {**around, name: R[:, 2]}
+        still.append({other: e @ R for other, e in around.items()})
+    if not pairs.taken:
+        return AlignedRobot(model, pairs.notes)
+    gamma, beta, alpha, theta = rows
+    table = table.replace(gamma=gamma, beta=beta, alpha=alpha, theta=theta)
+    return AlignedRobot(model.with_table(table), pairs.notes)
+
+
+@dataclass
+class _Pairs:
+    """Pairs of directions that are nearly aligned, with the angle that they are off."""
+
+    angle: float
+    taken: list[tuple[float, str]] = field(default_factory=list)
+    apart: list[tuple[float, str]] = field(default_factory=list)
+
+    def aligned(self, name: str, u: Array, others: dict[str, Array]) -> Array | None:
+        """The nearest unit vector that is aligned with the others; None if it is the same."""
+        turned = False
+        across: list[Array] = []
+        along: list[Array] = []
+        for other, e in others.items():
+            cosine, sine = float(u @ e), float(np.linalg.norm(np.cross(u, e)))
+            for word, off, found in (
+                ("parallel", sine, along), ("perpendicular", abs(cosine), across)
+            ):  # fmt: skip
+                said = off, f"{name} and {other} {word} but for {off:.1e} rad"
+                if off <= self.angle:
+                    found.append(copysign(1.0, cosine) * e)
+                    if off > _ROUNDING:
+                        self.taken.append(said)
+                        turned = True
+                elif off < _NEAR:
+                    self.apart.append(said)
+        if not turned:
+            return None
+        if along:
+            return along[0]
+        u = u - np.linalg.pinv(across, rcond=_LEAST) @ (across @ u)
+        return u / np.linalg.norm(u)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """A sentence about the pairs taken as aligned, and one about those that are not."""
+        out = []
+        if self.taken:
+            out.append(f"Taken as exact: {_listed(self.taken)}.")
+        if self.apart:
+            greatest = max(off for off, _ in self.apart)
+            enough = min(10.0 ** (ceil(log10(greatest)) + 1), _GREATEST)
+            out.append(
+                f"Not exact: {_listed(self.apart)}. What they show is kept; "
+                f"tolerance={enough:.0e} takes them as exact."
+            )
+        return tuple(out)
+
+
+def _turn_axis(row: Array, z: Array) -> bool:
+    """Change gamma, beta and alpha of a row by the least, so that its axis is z."""
+    given = row.copy()
+    for _ in range(_STEPS):
+        gamma, beta, alpha, _ = row
+        about_z, both = se3.rotation("z", gamma)[:3, :3], _rotation(gamma, beta, alpha)
+        axes = np.stack(([0.0, 0.0, 1.0], about_z[:, 1], both[:, 0]))
+        slopes = np.cross(axes, both[:, 2]).T
+        row[:3] += np.linalg.lstsq(slopes, z - both[:, 2], rcond=_LEAST)[0]
+    found = np.linalg.norm(z - _rotation(*row)[:, 2]) < _ROUNDING
+    if not found:
+        row[:] = given
+    return bool(found)
+
+
+def _rotation(gamma: float, beta: float, alpha: float, theta: float = 0.0) -> Array:
+    """Rotation of a row of the table."""
+    turns = zip("zyxz", (gamma, beta, alpha, theta), strict=True)
+    return reduce(np.matmul, [se3.rotation(axis, float(angle))[:3, :3] for axis, angle in turns])
 
 
 def _listed(found: list[tuple[float, str]]) -> str:
@@ -63,25 +182,3 @@ def _listed(found: list[tuple[float, str]]) -> str:
     words = "; ".join(said for _, said in found[:_LONGEST_LIST])
     more = len(found) - _LONGEST_LIST
     return words + (f"; and {more} more" if more > 0 else "")
-
-
-def _pairs(model: RobotModel) -> list[tuple[str, Array, Array]]:
-    """Each axis and the one before it, and gravity with what moves on the base."""
-    chain = model.chain
-    gravity = np.asarray(model.gravity) @ chain.base_rotation
-    weight = float(np.linalg.norm(gravity))
-    pairs: list[tuple[str, Array, Array]] = []
-    # of each frame, the last moving frame up to it and the turn from that to this
-    last: list[tuple[int, Array]] = [(0, np.eye(3))]
-    for j in range(1, model.f + 1):
-        before, turn = last[int(chain.antecedent[j - 1])]
-        R = turn @ chain.rotation[j - 1]
-        if chain.sigma[j - 1] == FIXED:
-            last.append((before, R))
-            continue
-        if before:
-            pairs.append((f"axes {before} and {j}", np.array([0.0, 0.0, 1.0]), R[:, 2]))
-        elif weight > 0:
-            pairs.append((f"axis {j} and gravity", gravity / weight, R[:, 2]))
-        last.append((j, np.eye(3)))
-    return pairs

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
@@ -15,8 +16,8 @@ from ..estimation import column_basis
 from ..estimation.columns import NOTHING
 from ..friction import Friction, check_friction, check_linear
 from ..model import RobotModel, check_model
-from .alignment import near_alignments
-from .numeric import base_by_numbers
+from .alignment import ALIGNED, aligned_robot
+from .numeric import base_by_numbers, missed_torque, shown_parameters
 from .result import BaseMethod, BaseParameters
 from .symbolic import base_by_rules
 
@@ -61,7 +62,7 @@ def base_parameters(
     drive: Drives = True,
     motion: Motion | None = None,
     constraint: ArrayLike | Transmission | None = None,
-    tolerance: float = NOTHING,
+    tolerance: float | None = None,
     friction: Friction | None = None,
 ) -> BaseParameters:
     """Base inertial parameters: the fewest that give the same torques.
@@ -88,16 +89,16 @@ def base_parameters(
     constraint : array_like, shape (n, u), or Transmission, optional
         Joints that are bound to each other, ``v = constraint u`` (mimic joints, a transmission):
         the torques are those of the u free variables. Of the numeric method.
-    tolerance : float
+    tolerance : float, optional
         What counts as nothing, by both methods: the part of the largest torque that a parameter
-        may have without being kept, the sine of an angle between axes that are taken as parallel,
-        and a coefficient (of parameters in their natural units); at most 0.01. The default keeps
-        the torques of each parameter to 1e-11 of the largest: whole torques to 1e-12 where axes are
-        aligned or clearly are not, and to about 3e-10 where they are off by some 1e-10 rad. On
-        logged motion the line goes to the widest gap within a factor of 30. A file
-        whose right angles are written "1.5708" has torques that differ from those of right angles
-        by 4e-6: take 1e-4 for the table that is meant. `BaseParameters.notes` says which axes are
-        nearly aligned, and which value takes them as exact.
+        may have without being kept, the angle in rad up to which axes are taken as parallel or
+        perpendicular, and a coefficient (of parameters in their natural units); at most 0.01.
+        By default axes within 1e-5 rad are taken as aligned (a file may write 1.5708 for a right
+        angle), and of the robot with these axes the torques of each parameter are kept to 1e-11 of
+        the largest. The torques of the robot as given differ by about the angle;
+        `BaseParameters.notes` says which axes these are, their angles, and by how much the torques
+        differ. ``tolerance=1e-11`` takes every digit of the table as meant. On logged motion the
+        limit of the torques goes to the widest gap within a factor of 30.
     friction : Friction, optional
         A friction model that is linear in its parameters (`robotmodels.friction`), whose columns
         come after those of the drives.
@@ -131,10 +132,11 @@ def base_parameters(
     check_model(model)
     way = chosen(BaseMethod, method, "method")
     kinds = drive_kinds(drive)
-    tolerance = _part(tolerance)
+    angle, least = (ALIGNED, NOTHING) if tolerance is None else (_part(tolerance),) * 2
     if friction is not None:
         check_linear(check_friction(friction, model.n))
-    notes = (*near_alignments(model, tolerance), *_transmission_notes(model, constraint))
+    aligned, notes = aligned_robot(model, angle)
+    notes = (*notes, *_transmission_notes(model, constraint))
     if way is BaseMethod.SYMBOLIC:
         given = {"motion": motion, "constraint": constraint}
         names = [name for name, value in given.items() if value is not None]
@@ -142,13 +144,31 @@ def base_parameters(
             raise InvalidValueError(
                 f"{names[0]}: the symbolic method knows the table alone; use method='numeric'."
             )
-        return base_by_rules(model, kinds, tolerance, friction, notes)
+        base = base_by_rules(aligned, kinds, least, friction, notes)
+        return _as_given(base, model, angle)
     samples = None if motion is None else _samples(model, motion)
     bound = None
     if constraint is not None:
         bound, columns = _bound(model, constraint)
         notes = (*notes, *_constraint_notes(bound, columns))
-    return base_by_numbers(model, kinds, samples, bound, tolerance, friction, notes)
+    base = base_by_numbers(aligned, kinds, samples, bound, least, friction, notes)
+    return _as_given(base, model, angle, samples, bound)
+
+
+def _as_given(
+    base: BaseParameters, model: RobotModel, angle: float,
+    samples: tuple[Array, Array, Array] | None = None, bound: Array | None = None,
+) -> BaseParameters:  # fmt: skip
+    """Base parameters of the robot with aligned axes as those of the robot as given."""
+    if base.model is model:
+        return replace(base, angle=angle)
+    base = replace(base, model=model, angle=angle)
+    shown = shown_parameters(model, base.drive, samples, bound, base.friction)
+    neglected = np.array(base.parameter_names)[shown & ~base.matrix.any(axis=0)].tolist()
+    missed = missed_torque(base, samples, bound)
+    said = f"Torques differ by {missed:.0e} of the largest from those of exact axes."
+    notes = (base.notes[0], said, *base.notes[1:])
+    return replace(base, neglected=tuple(neglected), missed=missed, notes=notes)
 
 
 def _part(tolerance: Any) -> float:

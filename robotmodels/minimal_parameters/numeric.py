@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import ceil, sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._arrays import Array
 from ..drive import DriveKind, Drives, drive_kinds
-from ..estimation import ColumnBasis, column_basis
+from ..estimation import column_basis
 from ..estimation.columns import NOTHING
 from ..estimation.triangles import factors_by_kind
 from ..friction import Friction, check_linear
@@ -83,11 +85,12 @@ def base_by_numbers(
     if samples is not None:
         whole = base_columns(model, kinds, None, constraint, tolerance, friction).basis.kept
         notes = (*notes, *unseen(names, basis.kept, whole))
-    missed = missed_torque(model, kinds, friction, constraint, samples, basis)
-    return BaseParameters(
+    base = BaseParameters(
         model, kinds, basis.kept, basis.coefficients, BaseMethod.NUMERIC, basis.gap, friction,
-        tolerance, (*notes, *miss(missed, tolerance)), found.neglected, missed,
+        tolerance, notes, found.neglected,
     )  # fmt: skip
+    missed = missed_torque(base, samples, constraint)
+    return replace(base, notes=(*notes, *miss(missed, tolerance)), missed=missed)
 
 
 def base_columns(
@@ -123,11 +126,27 @@ def base_columns(
         basis = column_basis(W, None, scale, tolerance)
     if samples is not None:
         basis = with_clear_gap(W, scale, tolerance, basis)
-    length = np.sqrt((W * W).sum(axis=0)) * scale
-    shows = length > NOTHING * length.max(initial=0.0)
     names = parameter_names(model, kinds, friction)
-    neglected = np.flatnonzero(shows & ~basis.coefficients.any(axis=0))
+    neglected = np.flatnonzero(_shown(W, scale) & ~basis.coefficients.any(axis=0))
     return FoundColumns(basis, tuple(names[k] for k in neglected))
+
+
+def shown_parameters(
+    model: RobotModel,
+    drive: Drives,
+    samples: tuple[Array, Array, Array] | None = None,
+    constraint: Array | None = None,
+    friction: Friction | None = None,
+) -> NDArray[np.bool_]:
+    """Of each standard parameter, whether torques show it; arguments as `base_by_numbers`."""
+    factors = torque_factors(model, drive, samples, constraint, friction)
+    scale = natural_sizes(model, drive, friction)
+    return _shown(np.vstack([np.zeros((0, len(scale))), *factors]), scale)
+
+
+def _shown(W: Array, scale: Array) -> NDArray[np.bool_]:
+    length = np.sqrt((W * W).sum(axis=0)) * scale
+    return length > NOTHING * length.max(initial=0.0)
 
 
 def torque_factors(
@@ -230,9 +249,10 @@ def natural_sizes(model: RobotModel, drive: Drives, friction: Friction | None = 
 
 
 def missed_torque(
-    model: RobotModel, drive: tuple[DriveKind, ...], friction: Friction | None,
-    constraint: Array | None, samples: tuple[Array, Array, Array] | None, basis: ColumnBasis,
-) -> float:  # fmt: skip
+    base: BaseParameters,
+    samples: tuple[Array, Array, Array] | None = None,
+    constraint: Array | None = None,
+) -> float:
     """Part of the torques of some parameters that their base parameters miss.
 
     Looked at on a motion that has not been used and does not know the size that the robot was
@@ -240,10 +260,10 @@ def missed_torque(
 
     Parameters
     ----------
-    model, drive, friction, constraint, samples
-        As for `base_by_numbers`.
-    basis : ColumnBasis
+    base : BaseParameters
         What was found.
+    samples, constraint
+        As for `base_by_numbers`.
 
     Returns
     -------
@@ -253,10 +273,10 @@ def missed_torque(
     Examples
     --------
     >>> from robotmodels.robots import load
-    >>> arm = load("planar_2r")
-    >>> missed_torque(arm, (), None, None, None, base_columns(arm, False).basis) < 1e-13
+    >>> missed_torque(base_by_numbers(load("planar_2r"), False)) < 1e-13
     True
     """
+    model = base.model
     rng = np.random.default_rng(1)
     if samples is None:
         G = np.eye(model.n) if constraint is None else constraint
@@ -268,11 +288,11 @@ def missed_torque(
     else:
         some = np.unique(np.linspace(0, len(samples[0]) - 1, _FRESH).astype(np.int64))
         samples = samples[0][some], samples[1][some], samples[2][some]
-    W = torque_regressor(model, *samples, drive=drive, friction=friction)
+    W = torque_regressor(model, *samples, drive=base.drive, friction=base.friction)
     if constraint is not None:
         W = np.einsum("iu,kip->kup", constraint, W)
     pi = rng.normal(size=W.shape[-1])
     torque = W @ pi
-    missed = W[..., basis.kept] @ (basis.coefficients @ pi) - torque
+    missed = W[..., base.kept] @ (base.matrix @ pi) - torque
     largest = float(np.abs(torque).max(initial=0.0))
     return float(np.abs(missed).max(initial=0.0)) / largest if largest > 0.0 else 0.0

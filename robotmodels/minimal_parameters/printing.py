@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from ..drive import drive_kinds
 from ..geometry import PRISMATIC
 from ..latex_text import escaped, powers
+from .alignment import aligned_robot
 from .formulas import Constant, Formula, constants_of
 
 if TYPE_CHECKING:
@@ -79,7 +80,8 @@ def _heading(base: BaseParameters) -> str:
 
 
 def _neglected(base: BaseParameters) -> str:
-    return f"Neglected, less than {base.tolerance:.0e} of the largest torque"
+    part = max(base.tolerance, base.angle)
+    return f"Neglected, about {part:.0e} of the largest torque or less"
 
 
 def _shown(base: BaseParameters) -> list[tuple[Formula, Formula]]:
@@ -184,7 +186,9 @@ def _used(base: BaseParameters) -> Sequence[Constant]:
         for word in re.findall(r"[A-Z]+\d*", term.text)
     }
     return [
-        constant for constant in constants_of(base.model, base.tolerance) if constant.text in words
+        constant
+        for constant in constants_of(aligned_robot(base.model, base.angle).model, base.tolerance)
+        if constant.text in words
     ]
 
 

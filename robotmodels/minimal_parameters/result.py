@@ -19,6 +19,7 @@ from ..friction import Friction
 from ..latex_text import markdown
 from ..model import RobotModel, check_model
 from ..regressors import energy_parameter_names, parameter_names, parameter_vector
+from .alignment import aligned_robot
 from .belonging import differences
 from .formulas import Formula, numeric_formulas, symbolic_formulas
 from .printing import table_latex, table_text
@@ -71,10 +72,13 @@ class BaseParameters:
         What is to be known of the result, in sentences: axes that are aligned only nearly, joints
         that are constrained, a rank that is in doubt, a motion that shows little.
     neglected : tuple of str
-        Parameters that torques show, but with less than the tolerance.
+        Parameters that torques show, but with less than the tolerance, or only by the angles of
+        axes that were taken as aligned.
     missed : float, optional
         Largest torque that they miss on a motion that was not used to find them, as part of the
         largest; of logged motion on its own samples. None where rules alone gave them.
+    angle : float
+        Angle in rad up to which axes were taken as parallel or perpendicular.
 
     Raises
     ------
@@ -108,6 +112,7 @@ class BaseParameters:
     notes: tuple[str, ...] = ()
     neglected: tuple[str, ...] = ()
     missed: float | None = None
+    angle: float = NOTHING
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "drive", drive_kinds(self.drive))
@@ -345,8 +350,9 @@ class BaseParameters:
         Of the symbolic method with the coefficients in symbols of the table, else in numbers.
         """
         if self.method is BaseMethod.SYMBOLIC:
+            model = aligned_robot(self.model, self.angle).model
             return symbolic_formulas(
-                self.model, self.drive, self.kept, self.matrix, self.parameter_names, self.tolerance
+                model, self.drive, self.kept, self.matrix, self.parameter_names, self.tolerance
             )
         return self.numbers
 
@@ -380,5 +386,5 @@ class BaseParameters:
     def __reduce__(self) -> tuple[object, ...]:  # rebuilt, so that its arrays are read-only again
         return type(self), (
             self.model, self.drive, self.kept, self.matrix, self.method, self.gap, self.friction,
-            self.tolerance, self.notes, self.neglected, self.missed,
+            self.tolerance, self.notes, self.neglected, self.missed, self.angle,
         )  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import sqrt
 
 import numpy as np
@@ -80,12 +81,13 @@ def base_by_rules(
     kept, matrix = basis.kept, np.asarray(basis.coefficients)
     if _holds(model, kinds, tolerance, friction, basis, ruled, ruled_matrix):
         kept, matrix = ruled, ruled_matrix
-    missed = missed_torque(model, kinds, friction, None, None, basis)
-    notes = (*notes, *doubts(names, basis, tolerance, False), *miss(missed, tolerance))
-    return BaseParameters(
+    base = BaseParameters(
         model, kinds, kept, matrix, BaseMethod.SYMBOLIC, None, friction, tolerance, notes,
-        found.neglected, missed,
+        found.neglected,
     )  # fmt: skip
+    missed = missed_torque(base)
+    notes = (*notes, *doubts(names, basis, tolerance, False), *miss(missed, tolerance))
+    return replace(base, notes=notes, missed=missed)
 
 
 def _by_rules(

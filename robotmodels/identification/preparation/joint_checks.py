@@ -11,8 +11,8 @@ from ..._arrays import Array
 from ...errors import ShapeError
 from ...logs import FindingKind, Log, LogFinding, Severity
 from ...logs.log import check_is_log
+from ...minimal_parameters import base_parameters
 from ...model import RobotModel, check_model
-from ...regressors import torque_regressor
 from .delay_rows import ThinRows, looked_at, thin_rows
 from .synchronisation import SynchronisationStatus, synchronisation
 
@@ -31,7 +31,7 @@ def check_joints(log: Log, model: RobotModel) -> tuple[LogFinding, ...]:
       are clearly better explained by each other's joints, they look swapped.
     - Friction takes energy. Where viscous and Coulomb friction that fit a torque give energy,
       significantly, the sign of its torque (or of its position) looks wrong.
-    - The regressor's rank on this motion is compared with that on random motion.
+    - The regressor's rank on this motion is compared with the number of base parameters.
     - The delay of the torques is estimated, see `synchronisation`.
 
     Of a log of more than 1e5 samples so many are looked at, in up to 20 stretches spread evenly
@@ -176,13 +176,8 @@ def _friction_power(W: Array, tau: Array, v: Array, own_columns: set[int]) -> tu
 
 
 def _excited(log: Log, model: RobotModel, rows: ThinRows, found: list[LogFinding]) -> None:
-    rng = np.random.default_rng(0)
-    most = 40 * model.table.f
-    lower, upper = np.maximum(model.lower, -np.pi), np.minimum(model.upper, np.pi)
-    q = rng.uniform(lower, upper, (most, model.n))
-    v, a = rng.normal(0.0, 2.0, (2, most, model.n))
-    possible = _rank([torque_regressor(model, q, v, a).reshape(most * model.n, -1)])
-    seen = _rank(rows.regressors)
+    base = base_parameters(model, drive=True)
+    possible, seen = len(base), _rank([base.reduce(W) for W in rows.regressors])
     if seen < possible:
         found.append(
             LogFinding(
