@@ -94,7 +94,8 @@ def aligned_robot(model: RobotModel, angle: float) -> AlignedRobot:
         for i, letter in enumerate("xy"):  # they decide which first moments are kept
             x = pairs.aligned(f"{letter} of frame {k + 1}", R[:, i], {**around, name: R[:, 2]})
             if x is not None:
-                cosine, sine = x @ _rotation(*row[:3], 0.5 * np.pi * i)[:, :2]
+                gamma, beta, alpha, _ = row
+                cosine, sine = x @ _rotation(gamma, beta, alpha, 0.5 * np.pi * i)[:, :2]
                 row[3] = np.arctan2(sine, cosine)
                 R = _rotation(*row)
         if sigma != FIXED:
