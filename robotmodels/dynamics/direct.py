@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_vector, batch_rows, batch_shape
 from ..drive import check_all_or_none
 from ..friction import Friction, check_friction
+from ..friction.protocols import torque_at
 from ..model import RobotModel, check_model
 from .definite import (
     is_definite,
@@ -94,7 +95,7 @@ def ddm(
         wrench = as_vector(wrench, 6, "wrench")
         batch_shape((q, v, tau, wrench), ("q", "v", "tau", "wrench"))
     if friction is not None:
-        tau = tau - check_friction(friction, n).torque(v)
+        tau = tau - torque_at(check_friction(friction, n), v, q)
     drives = model.drive_matrices if drive else None
     if drives is not None:
         tau = tau - drives.torque(v, None)

@@ -11,6 +11,7 @@ from .._arrays import Array, as_exact, as_vector, batch_rows, batch_shape
 from ..drive import DriveKind, DriveParameters, Drives, Transmission, drive_kinds
 from ..errors import InvalidValueError
 from ..friction import Friction, check_friction, check_linear
+from ..friction.protocols import basis_at, torque_at
 from ..inertia import InertialParameters
 from ..model import RobotModel, check_model
 from .wrench import wrench_torque
@@ -208,9 +209,9 @@ def idm_from_base(
     if wrench is not None:
         tau = tau + wrench_torque(model, q, wrench)
     if friction is not None:
-        tau = tau + friction.torque(v)
+        tau = tau + torque_at(friction, v, q)
     if extra is not None and base.friction is not None:
-        tau = tau + (check_linear(base.friction).basis(v) * extra).sum(axis=-2)
+        tau = tau + (basis_at(check_linear(base.friction), v, q) * extra).sum(axis=-2)
     return tau
 
 

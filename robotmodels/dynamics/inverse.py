@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_vector, batch_shape
 from ..drive import check_all_or_none
 from ..friction import Friction, check_friction
+from ..friction.protocols import torque_at
 from ..model import RobotModel, check_model
 from .rigid import rigid_torques
 from .wrench import wrench_torque
@@ -93,5 +94,5 @@ def idm(
     if wrench is not None:
         tau = tau + wrench_torque(model, q, wrench)
     if friction is not None:
-        tau = tau + friction.torque(v)
+        tau = tau + torque_at(friction, v, q)
     return tau

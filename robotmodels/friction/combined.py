@@ -9,7 +9,16 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array
 from ..errors import InvalidValueError
-from .protocols import Friction, LinearFriction, breakaway_torques, check_friction, check_linear
+from .protocols import (
+    Friction,
+    LinearFriction,
+    basis_at,
+    breakaway_torques,
+    check_friction,
+    check_linear,
+    needs_position,
+    torque_at,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,15 +72,21 @@ class FrictionSum:
     @property
     def breakaway(self) -> Array:
         """Torques between which a joint at rest sticks, shape (2, n): lower, upper."""
-        return breakaway_torques(self)
+        moving, _ = by_dependence(self)
+        return np.zeros((2, self.n)) if moving is None else breakaway_torques(moving)
 
-    def basis(self, v: ArrayLike) -> Array:
+    @property
+    def needs_position(self) -> bool:
+        """Whether a part of it depends on positions."""
+        return any(needs_position(part) for part in self.parts)
+
+    def basis(self, v: ArrayLike, q: ArrayLike | None = None) -> Array:
         """Torque per unit of each parameter, see `LinearFriction`."""
-        return np.concatenate([part.basis(v) for part in self._linear], axis=-2)
+        return np.concatenate([basis_at(part, v, q) for part in self._linear], axis=-2)
 
-    def torque(self, v: ArrayLike) -> Array:
+    def torque(self, v: ArrayLike, q: ArrayLike | None = None) -> Array:
         """Torque that the joints need to overcome friction, shape (..., n)."""
-        return np.sum([part.torque(v) for part in self.parts], axis=0)
+        return np.sum([torque_at(part, v, q) for part in self.parts], axis=0)
 
     def __add__(self, other: object) -> FrictionSum:
         return together(self, other)
@@ -82,6 +97,20 @@ class FrictionSum:
     @property
     def _linear(self) -> tuple[LinearFriction, ...]:
         return tuple(check_linear(part) for part in self.parts)
+
+
+def by_dependence(friction: Friction | None) -> tuple[Friction | None, Friction | None]:
+    """The parts of a model that depend on velocities alone, and those that need positions."""
+    if friction is None:
+        return None, None
+    parts = friction.parts if isinstance(friction, FrictionSum) else (friction,)
+    moving = tuple(part for part in parts if not needs_position(part))
+    placed = tuple(part for part in parts if needs_position(part))
+    return _one(moving), _one(placed)
+
+
+def _one(parts: tuple[Friction, ...]) -> Friction | None:
+    return FrictionSum(parts) if len(parts) > 1 else next(iter(parts), None)
 
 
 def together(first: object, second: object) -> FrictionSum:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol, runtime_checkable
+from typing import Protocol, cast, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,7 +16,11 @@ _NOTHING = 1e-300  # what viscous friction takes at it
 
 @runtime_checkable
 class Friction(Protocol):
-    """What `idm` and `ddm` need of a friction model; models of your own may have just this."""
+    """What `idm` and `ddm` need of a friction model; models of your own may have just this.
+
+    A model whose torque depends on positions too has ``needs_position = True`` beside, and takes
+    them as a second argument: ``torque(v, q)``, ``basis(v, q)``.
+    """
 
     @property
     def n(self) -> int:
@@ -47,8 +51,37 @@ class LinearFriction(Friction, Protocol):
         ...
 
 
+class _AtPosition(Protocol):
+    """What a model with ``needs_position`` has."""
+
+    def torque(self, v: ArrayLike, q: ArrayLike | None) -> Array: ...
+
+    def basis(self, v: ArrayLike, q: ArrayLike | None) -> Array: ...
+
+
+def needs_position(friction: Friction) -> bool:
+    """Whether the torque depends on positions."""
+    return bool(getattr(friction, "needs_position", False))
+
+
+def torque_at(friction: Friction, v: ArrayLike, q: ArrayLike | None) -> Array:
+    """Torque of any friction model at velocities and positions (..., n)."""
+    if needs_position(friction):
+        return cast(_AtPosition, friction).torque(v, q)
+    return friction.torque(v)
+
+
+def basis_at(friction: LinearFriction, v: ArrayLike, q: ArrayLike | None) -> Array:
+    """Torque per unit of each parameter (..., k, n) of any model at velocities and positions."""
+    if needs_position(friction):
+        return cast(_AtPosition, friction).basis(v, q)
+    return friction.basis(v)
+
+
 def breakaway_torques(friction: Friction) -> Array:
-    """Limits of the torque from below and above zero velocity, sorted."""
+    """Limits of the torque from below and above zero velocity, sorted; what needs q has none."""
+    if needs_position(friction):
+        return np.zeros((2, friction.n))
     limits = [friction.torque(np.full(friction.n, s * _SLOWEST)) for s in (-1.0, 1.0)]
     return np.sort(np.where(np.abs(limits) < _NOTHING, 0.0, limits), axis=0)
 

@@ -178,7 +178,7 @@ def fit(
         base = base_parameters(model, drive=drive, friction=friction)
     else:
         base.check(model)
-    findings = accepted_log(log, model, "log") if checked else ()
+    findings = accepted_log(log, model, "log", base.friction) if checked else ()
     if test is not None:
         findings = (*findings, *accepted_test(log, test, model, checked))
     if processing is None:

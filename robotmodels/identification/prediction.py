@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_exact, as_vector, batch_rows
 from ..friction import check_linear
+from ..friction.protocols import basis_at
 from ..logs import Log
 from ..minimal_parameters import BaseParameters
 from ..regressors import torque_regressor_chunks
@@ -83,7 +84,7 @@ def predicted_torque(
         for part, W in chunks:
             tau[part] = W @ b
     terms = dict(zip(names, b.tolist(), strict=True))
-    tau += _over_dead_band(base, terms, rows[1], band)
+    tau += _over_dead_band(base, terms, rows[0], rows[1], band)
     return tau.reshape(*batch, n)
 
 
@@ -107,13 +108,16 @@ def friction_ramp(
         e = tau - predicted_torque(base, names, values, q, v, a)
         terms = dict(zip(names, values.tolist(), strict=True))
         for k, times in enumerate(_RAMPS):
-            squares[k] += ((e - _over_dead_band(base, terms, v, times * band)) ** 2).sum(axis=0)
+            ramp = _over_dead_band(base, terms, q, v, times * band)
+            squares[k] += ((e - ramp) ** 2).sum(axis=0)
     least = squares.min(axis=0)
     relative = squares / np.where(least > 0.0, least, 1.0)
     return _RAMPS[int(np.argmin(relative.sum(axis=1)))] * band
 
 
-def _over_dead_band(base: BaseParameters, terms: dict[str, float], v: Array, band: Array) -> Array:
+def _over_dead_band(
+    base: BaseParameters, terms: dict[str, float], q: Array, v: Array, band: Array
+) -> Array:
     """What dry friction inside the dead bands is, less what its sign makes of it."""
     model = base.model
     out = np.zeros(v.shape)
@@ -128,9 +132,9 @@ def _over_dead_band(base: BaseParameters, terms: dict[str, float], v: Array, ban
         friction = check_linear(base.friction)
         inner = np.where(inside, v, band)  # anything outside: its share is zero below
         share = (inner / wide + 1.0) / 2.0
-        low, high = friction.basis(-wide), friction.basis(wide)
+        low, high = basis_at(friction, -wide, q), basis_at(friction, wide, q)
         between = low + share[:, None] * (high - low)
-        change = np.where(inside[:, None], between - friction.basis(v), 0.0)
+        change = np.where(inside[:, None], between - basis_at(friction, v, q), 0.0)
         own = [[terms.get(f"{kind}{j}", 0.0) for j in frames] for kind in friction.kinds]
         out += (change * np.array(own)).sum(axis=1)
     if model.transmission is not None:

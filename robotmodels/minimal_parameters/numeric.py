@@ -14,6 +14,7 @@ from ..estimation import column_basis
 from ..estimation.columns import NOTHING
 from ..estimation.triangles import factors_by_kind
 from ..friction import Friction, check_linear
+from ..friction.protocols import basis_at
 from ..geometry import PRISMATIC
 from ..model import RobotModel
 from ..regressors import parameter_names, torque_regressor, torque_regressor_chunks
@@ -29,6 +30,8 @@ _MANY = 250
 """Columns beyond which a tree is taken path by path."""
 _SLOWEST = 6.0
 """Decades of velocities that friction is looked at on."""
+_LEAST = 1e-3
+"""Torque of a friction parameter, in SI units, below which it is none."""
 _FRESH = 40
 """Samples on which the torques are compared at last."""
 
@@ -242,8 +245,10 @@ def natural_sizes(model: RobotModel, drive: Drives, friction: Friction | None = 
     if friction is not None:
         linear = check_linear(friction)
         speeds = unit * rate * 10.0 ** -np.arange(0.0, _SLOWEST + 1.0)[:, None]
-        basis = np.abs(linear.basis(np.concatenate((speeds, -speeds))))
-        extra = list(torque / np.maximum(1.0, basis.max(axis=0)))
+        speeds = np.concatenate((speeds, -speeds))
+        angles = np.linspace(-np.pi, np.pi, len(speeds))[:, None] * np.ones(model.n)
+        basis = np.abs(basis_at(linear, speeds, angles))
+        extra = list(torque / np.maximum(_LEAST, basis.max(axis=0)))
     own = [of_kind[kind][0] for kind in kinds]
     return np.concatenate((np.tile(link, model.f), *own, *joined, *extra))
 

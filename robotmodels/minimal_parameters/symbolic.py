@@ -13,6 +13,7 @@ from ..drive import DriveKind, Drives, drive_kinds
 from ..estimation import ColumnBasis, column_basis
 from ..estimation.columns import NOTHING
 from ..friction import Friction, check_linear
+from ..friction.protocols import needs_position
 from ..geometry import PRISMATIC
 from ..model import RobotModel
 from ..regressors import parameter_names
@@ -108,9 +109,11 @@ def _by_rules(
             row[k] = coefficient
     sizes = natural_sizes(model, drive)
     matrix[abs(matrix * sizes) <= tolerance * sizes[kept][:, None]] = 0.0
-    if p > ruled:
-        kept, matrix = _with_couplings(model, drive, kept, matrix, ruled, tolerance)
-    if friction is not None:
+    placed = friction is not None and needs_position(friction)
+    if p > ruled or placed:
+        own = friction if placed else None
+        kept, matrix = _with_numbers(model, drive, own, kept, matrix, ruled, tolerance)
+    if friction is not None and not placed:
         kept, matrix = _with_friction(model, drive, friction, kept, matrix, tolerance)
     return kept, matrix
 
@@ -149,18 +152,18 @@ def _holds(
     return bool(np.sqrt((missed * missed).sum(axis=0)).max(initial=0.0) <= tolerance * longest)
 
 
-def _with_couplings(
-    model: RobotModel, drive: tuple[DriveKind, ...], kept: NDArray[np.int64], matrix: Array,
-    ruled: int, tolerance: float,
+def _with_numbers(
+    model: RobotModel, drive: tuple[DriveKind, ...], friction: Friction | None,
+    kept: NDArray[np.int64], matrix: Array, ruled: int, tolerance: float,
 ) -> tuple[NDArray[np.int64], Array]:  # fmt: skip
-    """Add the columns of coupled motors: kept, or combinations of the others."""
-    basis = base_columns(model, drive, tolerance=tolerance).basis
+    """Add columns that no rule knows: of coupled motors, of friction that depends on positions."""
+    basis = base_columns(model, drive, tolerance=tolerance, friction=friction).basis
     own = basis.kept[basis.kept >= ruled]
-    numbers = np.concatenate((kept, own))
-    whole = np.vstack((matrix, np.zeros((len(own), matrix.shape[1]))))
-    if np.array_equal(numbers, basis.kept):
-        whole[:, ruled:] = basis.coefficients[:, ruled:]
-    return numbers, whole
+    whole = basis.coefficients.copy()
+    if np.array_equal(np.concatenate((kept, own)), basis.kept):
+        whole[:, :ruled] = 0.0
+        whole[: len(kept), :ruled] = matrix[:, :ruled]
+    return basis.kept, whole
 
 
 def _with_friction(

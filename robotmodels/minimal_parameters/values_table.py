@@ -18,6 +18,7 @@ from ..table_text import boxed
 _LINK_UNITS = {"M": "kg", "MX": "kg m", "MY": "kg m", "MZ": "kg m"}
 _TURNING = {"Ia": "kg m^2", "Fv": "N m s/rad"}
 _SLIDING = {"Ia": "kg", "Fv": "N s/m"}
+_OF_CYLINDERS = {"Kc": "N/m", "Pc": "N"}
 
 
 class KeptNames(dict[str, Any]):
@@ -130,8 +131,8 @@ def base_values(
 def _unit(name: str, sigma: NDArray[np.int64]) -> str:
     kind = name.rstrip("0123456789")
     frame = int(name[len(kind) :])
-    if kind in _LINK_UNITS:
-        return _LINK_UNITS[kind]
+    if unit := (_LINK_UNITS | _OF_CYLINDERS).get(kind):
+        return unit
     if kind.isupper():
         return "kg m^2"
     slides = int(sigma[frame - 1]) == PRISMATIC

@@ -10,6 +10,7 @@ import numpy as np
 from .._arrays import Array, read_only
 from ..drive import Transmission
 from ..friction import LinearFriction
+from ..friction.protocols import basis_at
 from ..model import RobotModel
 from .columns import ChosenColumns
 
@@ -29,14 +30,14 @@ def _couplings(transmission: Transmission) -> list[tuple[Array, Array]]:
 
 
 def joint_terms(
-    v: Array, rotor: Array | None, friction: LinearFriction | None
+    q: Array, v: Array, rotor: Array | None, friction: LinearFriction | None
 ) -> Iterator[tuple[str, Array]]:
     """Torque per unit of each kind of parameter that acts on its own joint.
 
     Parameters
     ----------
-    v : ndarray, shape (N, n)
-        Joint velocities.
+    q, v : ndarray, shape (N, n)
+        Joint variables and velocities.
     rotor : ndarray, shape (N, n), or None
         What multiplies rotor inertia (accelerations); None leaves friction alone.
     friction : LinearFriction or None
@@ -55,7 +56,7 @@ def joint_terms(
     yield "Fc", np.sign(v)
     yield "offset", np.ones_like(v)
     if friction is not None:
-        basis = friction.basis(v)
+        basis = basis_at(friction, v, q)
         for k, kind in enumerate(friction.kinds):
             yield kind, basis[:, k]
 
@@ -93,6 +94,7 @@ def coupled_terms(
 def add_torques(
     model: RobotModel,
     chosen: ChosenColumns,
+    q: Array,
     v: Array,
     rotor: Array | None,
     friction: LinearFriction | None,
@@ -100,7 +102,7 @@ def add_torques(
     W: Array,
 ) -> None:
     """Write drive and friction columns of a torque, times a sign, into ``W (N, n, c)``."""
-    for kind, values in joint_terms(v, rotor, friction):
+    for kind, values in joint_terms(q, v, rotor, friction):
         joints, columns = _wanted(chosen, kind)
         if joints.size:
             W[:, joints, columns] = sign * values[:, joints]
@@ -113,13 +115,14 @@ def add_torques(
 def add_powers(
     model: RobotModel,
     chosen: ChosenColumns,
+    q: Array,
     v: Array,
     rotor: Array,
     friction: LinearFriction | None,
     rows: Array,
 ) -> None:
     """Write the power of drive and friction columns into ``rows (N, c)``."""
-    for kind, values in joint_terms(v, rotor, friction):
+    for kind, values in joint_terms(q, v, rotor, friction):
         joints, columns = _wanted(chosen, kind)
         if joints.size:
             rows[:, columns] = values[:, joints] * v[:, joints]

@@ -11,6 +11,7 @@ from .._arrays import Array, as_exact, as_floats, as_vector
 from ..drive import Drives
 from ..errors import InvalidValueError, ShapeError
 from ..friction import Friction, LinearFriction
+from ..friction.protocols import basis_at
 from ..model import RobotModel, check_model
 from .chunks import check_log, check_size, pieces
 from .columns import ChosenColumns, Columns, chosen_columns, friction_of, standard_blocks
@@ -283,7 +284,7 @@ def _fill(
                 )
                 out[:, column] = _summed(work[:, None], local)[:, 0]
     if friction is not None and chosen.has(*friction.kinds):
-        works = _friction_works(h, dx, friction)
+        works = _friction_works(h, x, dx, friction)
         for kind, work in zip(friction.kinds, works, strict=True):
             place = chosen.places[kind]
             joints = np.flatnonzero(place >= 0)
@@ -320,7 +321,7 @@ def _moves(h: Array, x: Array, v: Array) -> Array:
 _BY_JOINT = {"Fv": _viscous, "Fc": _distances, "offset": _moves}
 
 
-def _friction_works(h: Array, v: Array, friction: LinearFriction) -> Array:
+def _friction_works(h: Array, x: Array, v: Array, friction: LinearFriction) -> Array:
     """Work of unit parameters (k, N - 1, n): Gauss quadrature on either side of a turn."""
     a, b = v[:-1], v[1:]
     turn = np.divide(a, a - b, out=np.ones_like(a), where=np.sign(a) * np.sign(b) < 0.0)
@@ -330,7 +331,10 @@ def _friction_works(h: Array, v: Array, friction: LinearFriction) -> Array:
         for node, weight in zip(_NODES, _WEIGHTS, strict=True):
             s = first + 0.5 * (1.0 + node) * length
             speed = a + s * (b - a)
-            terms = np.moveaxis(friction.basis(speed), -2, 0)
+            # at positions of this speed that end where the samples do
+            way = 0.5 * s * ((2.0 - s) * a + s * b) * h[:, None]
+            way = way + s * (np.diff(x, axis=0) - 0.5 * (a + b) * h[:, None])
+            terms = np.moveaxis(basis_at(friction, speed, x[:-1] + way), -2, 0)
             works = works + 0.5 * weight * terms * speed * (length * h[:, None])
     return np.asarray(works)
 

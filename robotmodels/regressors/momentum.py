@@ -168,7 +168,7 @@ def fill_momenta(
 
     momentum_regressors(*rows, *model.chain, model.gravity, chosen.places[LINKS], P, S)
     add_rotor_momenta(model, chosen, rows[1], P)
-    add_torques(model, chosen, rows[1], None, friction, -1.0, S)
+    add_torques(model, chosen, rows[0], rows[1], None, friction, -1.0, S)
 
 
 def _stream(

@@ -148,5 +148,5 @@ def _fill(
     from ..kernels.power_regressor import power_regressors
 
     power_regressors(*rows, *model.chain, model.gravity, chosen.places[LINKS], out[:, None])
-    _, v, a = rows
-    add_powers(model, chosen, v, a, friction, out)
+    q, v, a = rows
+    add_powers(model, chosen, q, v, a, friction, out)

@@ -159,5 +159,5 @@ def fill_torques(
     from ..kernels.torque_regressor import torque_regressors
 
     torque_regressors(*rows, *model.chain, model.gravity, chosen.places[LINKS], W)
-    _, v, a = rows
-    add_torques(model, chosen, v, a, friction, 1.0, W)
+    q, v, a = rows
+    add_torques(model, chosen, q, v, a, friction, 1.0, W)

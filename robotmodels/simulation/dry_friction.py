@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from .._arrays import Array
 from ..errors import InvalidValueError
 from ..friction import Friction
+from ..friction.combined import by_dependence
 from ..model import RobotModel
 
 _SLOWEST = 5e-324  # the smallest velocity that has a sign
@@ -313,8 +314,9 @@ def dry_friction(model: RobotModel, drive: bool, friction: Friction | None) -> D
     drives = model.drive_matrices if drive else None
     own = np.zeros(n) if drives is None else drives.coulomb
     extra = np.zeros((2, n))
-    if friction is not None:
-        extra = np.stack([friction.torque(np.full(n, s * _SLOWEST)) for s in (-1.0, 1.0)])
+    moving, _ = by_dependence(friction)
+    if moving is not None:
+        extra = np.stack([moving.torque(np.full(n, s * _SLOWEST)) for s in (-1.0, 1.0)])
     lower, upper = extra[0] - own, extra[1] + own
     joints = np.flatnonzero(lower != upper)
     rates, levels, motors = np.zeros((0, n)), np.empty(0), np.empty(0, np.int64)

@@ -13,6 +13,8 @@ import numpy as np
 
 from .._arrays import Array
 from ..friction import Friction
+from ..friction.combined import by_dependence
+from ..friction.protocols import torque_at
 from ..model import RobotModel
 from .dry_friction import DryFriction, Mode
 
@@ -66,7 +68,8 @@ class Forces:
 
         n = model.n
         self.n, self.control, self.wrench = n, control, wrench
-        self.extra, self.dry, self.width = friction, dry, width
+        self.extra, self.placed = by_dependence(friction)
+        self.dry, self.width = dry, width
         drives = model.drive_matrices if drive else None
         self.rotor = np.zeros((n, n)) if drives is None else np.ascontiguousarray(drives.rotor)
         self.viscous = None if drives is None or not drives.viscous.any() else drives.viscous
@@ -198,6 +201,8 @@ class Forces:
         time = min(t, self.latest)
         tau = self._still[0] if self.control is None else self.control(time, q, v)
         friction = self.friction(v)
+        if self.placed is not None:
+            friction = friction + torque_at(self.placed, v, q)
         tool = self._still[0]
         if self.wrench is not None:
             self._jacobians(q.reshape(1, n), *self._tool, self._J)
@@ -205,7 +210,7 @@ class Forces:
         return tau - friction - self.offset - tool, tau, friction, tool
 
     def friction(self, v: Array) -> Array:
-        """Torque of friction without what holds parts that stick, shape (n,)."""
+        """Torque of friction that depends on velocities, without what holds parts that stick."""
         torque = self._dry_torque
         if self.viscous is not None:
             torque = torque + v @ self.viscous

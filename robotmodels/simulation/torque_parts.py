@@ -13,6 +13,7 @@ from ..drive import check_all_or_none
 from ..dynamics import gravity_torque, idm
 from ..errors import InvalidValueError
 from ..friction import Friction, check_friction
+from ..friction.protocols import torque_at
 from ..model import RobotModel, check_model
 from .result import Simulation
 
@@ -132,7 +133,7 @@ def torque_parts(
         inertia = inertia + a @ drives.rotor
         taken = taken + drives.torque(v, None)
     if friction is not None:
-        taken = taken + check_friction(friction, n).torque(v)
+        taken = taken + torque_at(check_friction(friction, n), v, q)
     tool = still
     if wrench is not None:
         tool = idm(weightless, q, still, still, wrench=arrays[3], drive=False)

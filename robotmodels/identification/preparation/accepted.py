@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from ...errors import InvalidValueError
+from ...friction import Friction
 from ...logs import Log, Severity, check_log
 from ...model import RobotModel
 from .joint_checks import check_joints
 
 
-def accepted_log(log: Log, model: RobotModel, name: str) -> tuple[str, ...]:
+def accepted_log(
+    log: Log, model: RobotModel, name: str, friction: Friction | None = None
+) -> tuple[str, ...]:
     """Sentences on a log that may be used; one that may not is refused with all of them.
 
     Parameters
@@ -21,6 +24,8 @@ def accepted_log(log: Log, model: RobotModel, name: str) -> tuple[str, ...]:
         The robot.
     name : str
         Of the argument, for messages.
+    friction : Friction, optional
+        The friction model of the fit, as for `check_joints`.
 
     Returns
     -------
@@ -34,7 +39,7 @@ def accepted_log(log: Log, model: RobotModel, name: str) -> tuple[str, ...]:
     """
     found = check_log(log, model)
     if not any(finding.severity is Severity.USELESS for finding in found):
-        found = (*found, *check_joints(log, model))
+        found = (*found, *check_joints(log, model, friction))
     useless = [str(finding) for finding in found if finding.severity is Severity.USELESS]
     if useless:
         raise InvalidValueError(

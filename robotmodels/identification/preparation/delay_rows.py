@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 
 from ..._arrays import Array
 from ...errors import InvalidValueError
+from ...friction import Friction
+from ...friction.combined import by_dependence
 from ...logs import Log
 from ...logs.stretches import SAMPLES, stretches
 from ...model import RobotModel
-from ...regressors import torque_regressor_chunks
+from ...regressors import parameter_names, torque_regressor_chunks
 from .filters import central_differences, zero_phase
 
 _PER_CUTOFF = 2.5
@@ -47,6 +49,8 @@ class ThinRows:
         after them Coulomb friction of motors that joints share.
     shared : ndarray, shape (k, n)
         Weights of the joints in the speeds of these motors.
+    names : tuple of str, length p
+        Of the columns.
     """
 
     bases: tuple[Array, ...]
@@ -57,10 +61,16 @@ class ThinRows:
     viscous: int
     dry: int
     shared: Array
+    names: tuple[str, ...]
 
 
 def thin_rows(
-    log: Log, model: RobotModel, cutoff: float, margin: int, whole: bool = True
+    log: Log,
+    model: RobotModel,
+    cutoff: float,
+    margin: int,
+    whole: bool = True,
+    friction: Friction | None = None,
 ) -> ThinRows:
     """Filter, differentiate, thin out, and leave out rows near a joint's standstill.
 
@@ -80,6 +90,8 @@ def thin_rows(
         Rows left out at both ends of each recording.
     whole : bool
         False leaves the regressors out, for which there are bases.
+    friction : Friction, optional
+        Whose parts that depend on positions have columns too.
 
     Returns
     -------
@@ -110,11 +122,15 @@ def thin_rows(
             f"{cutoff:g} Hz and the delays that are tried need; give a higher cutoff or try fewer."
         )
     places = np.concatenate(taken)
-    friction = _dry_friction(log, model, v, cutoff, places)
+    dry_columns = _dry_friction(log, model, v, cutoff, places)
+    _, placed = by_dependence(friction)
     moving = _moving(model, v, places, int(np.ceil(0.25 / (cutoff * log.dt))))
-    regressors = _rows_by_joint(model, (q[places], v[places], a[places]), friction, moving)
-    dry = regressors[0].shape[1] - friction.shape[2]
-    del q, a, friction
+    samples = q[places], v[places], a[places]
+    regressors = _rows_by_joint(model, samples, placed, dry_columns, moving)
+    names = parameter_names(model, _SMOOTH, placed)
+    dry = len(names)
+    names = (*names, *parameter_names(model, ("Fc",))[10 * model.f :])
+    del q, a, samples, dry_columns
     bases = []
     for j, rows in enumerate(regressors):
         U, s, _ = np.linalg.svd(rows / _sizes(rows), full_matrices=False)
@@ -131,27 +147,29 @@ def thin_rows(
         10 * model.table.f + log.n,
         dry,
         _shared(model),
+        names,
     )
 
 
 def _rows_by_joint(
     model: RobotModel,
     samples: tuple[Array, Array, Array],
-    friction: Array,
+    placed: Friction | None,
+    dry: Array,
     moving: NDArray[np.bool_],
 ) -> list[Array]:
     """Rows of each joint at which it may be looked at, links and drives, then dry friction."""
     found: list[Array] = []
     counts = np.zeros(model.n, dtype=np.int64)
-    for part, W in torque_regressor_chunks(model, *samples, drive=_SMOOTH):
+    for part, W in torque_regressor_chunks(model, *samples, drive=_SMOOTH, friction=placed):
         if not found:
-            width = W.shape[2] + friction.shape[2]
+            width = W.shape[2] + dry.shape[2]
             found = [np.empty((int(k), width)) for k in moving.sum(axis=0)]
         for j, rows in enumerate(found):
             use = moving[part, j]
             here = slice(counts[j], counts[j] + int(use.sum()))
             rows[here, : W.shape[2]] = W[use, j]
-            rows[here, W.shape[2] :] = friction[part][use, j]
+            rows[here, W.shape[2] :] = dry[part][use, j]
             counts[j] = here.stop
     return found
 

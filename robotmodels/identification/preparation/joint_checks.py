@@ -9,6 +9,7 @@ import numpy as np
 
 from ..._arrays import Array
 from ...errors import ShapeError
+from ...friction import Friction
 from ...logs import FindingKind, Log, LogFinding, Severity
 from ...logs.log import check_is_log
 from ...minimal_parameters import base_parameters
@@ -24,7 +25,9 @@ _SIGNIFICANT = 6.0
 _RANK = 1e-6
 
 
-def check_joints(log: Log, model: RobotModel) -> tuple[LogFinding, ...]:
+def check_joints(
+    log: Log, model: RobotModel, friction: Friction | None = None
+) -> tuple[LogFinding, ...]:
     """What the dynamic model tells of a log: joints swapped, wrong signs, delay, what is excited.
 
     - Each torque is explained by the model of each joint, its parameters free. Where two torques
@@ -43,6 +46,9 @@ def check_joints(log: Log, model: RobotModel) -> tuple[LogFinding, ...]:
         What was recorded.
     model : RobotModel
         The robot it is of; its inertia and friction are not used.
+    friction : Friction, optional
+        Gravity compensators of the robot, alone or in a sum: a compensator that is not given may
+        look like a wrong sign.
 
     Returns
     -------
@@ -80,7 +86,7 @@ def check_joints(log: Log, model: RobotModel) -> tuple[LogFinding, ...]:
     cutoff = min(_CUTOFF, _SHARE / log.dt)
     part = looked_at(log, cutoff)
     found: list[LogFinding] = []
-    _dynamic(part, model, thin_rows(part, model, cutoff, 2), found)
+    _dynamic(part, model, thin_rows(part, model, cutoff, 2, friction=friction), found)
     _in_step(part, model, found)
     if part is not log:
         said = f" (Judged by {len(part)} of {len(log)} samples.)"
@@ -177,7 +183,8 @@ def _friction_power(W: Array, tau: Array, v: Array, own_columns: set[int]) -> tu
 
 def _excited(log: Log, model: RobotModel, rows: ThinRows, found: list[LogFinding]) -> None:
     base = base_parameters(model, drive=True)
-    possible, seen = len(base), _rank([base.reduce(W) for W in rows.regressors])
+    kept = [rows.names.index(name) for name in base.names]
+    possible, seen = len(base), _rank([W[:, kept] for W in rows.regressors])
     if seen < possible:
         found.append(
             LogFinding(

@@ -1,0 +1,179 @@
+"""Gravity compensators: springs and hydraulic cylinders beside a joint."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .._arrays import Array, as_floats, as_vector, read_only
+from ..errors import InvalidValueError, ShapeError
+from .joint import JointFriction
+
+
+@dataclass(frozen=True, slots=True, init=False, eq=False)
+class GravityCompensator(JointFriction):
+    """Spring or hydraulic cylinder beside revolute joints: torque as a function of their angle.
+
+    With known geometry it acts between a point of the link before the joint, at distance ``a`` from
+    the joint's axis, and a point of the link behind it, at distance ``b``, which are in line with
+    the axis and on the same side of it at ``q = phi``. Across the axis its length is
+    ``l(q) = sqrt(a^2 + b^2 - 2 a b cos(q - phi))``, and it pulls the points together with the force
+    ``Kc l + Pc``: a spring of stiffness k and free length l0 has ``Kc = k, Pc = -k l0``; a cylinder
+    with an accumulator, of force F0 at the length l1, ``Kc = k, Pc = F0 - k l1``; one of constant
+    force ``Kc = 0``. The joint needs ``tau = (Kc l + Pc) dl/dq``.
+
+    Without geometry it is a Fourier series of the angle:
+    ``tau = Gs sin(q) + Gc cos(q) + Gss sin(2 q) + Gcc cos(2 q)``.
+
+    Unlike friction it depends on positions and takes no energy; its torque is needed also at rest.
+    Where gravity turns a link as a compensator does, base parameters regroup ``Kc``, ``Gs`` and
+    ``Gc`` into first moments of the link: only their sum is seen.
+
+    Parameters
+    ----------
+    n : int
+        Number of joints of the robot.
+    joints : int or array_like of int, shape (k,)
+        Numbers 1..n of the revolute joints that have one; the others have parameters without
+        effect.
+    a, b, phi : array_like, scalar or shape (k,), optional
+        Geometry of each: distances in metres, positive, and angle in rad; all three or none.
+    values : array_like, shape (m,) or (m, k), optional
+        ``Kc`` (N/m) and ``Pc`` (N) with geometry, the four amplitudes (N m) without; default zeros,
+        as for a model that is to be identified.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Joints that are not there or given twice; a part of the geometry; distances that are not
+        positive; values of another shape; NaN or infinity.
+
+    References
+    ----------
+    The potential energy of the element is ``Kc l^2 / 2 + Pc l``, and the torque its derivative by
+    the joint variable (seed book section 1.5.1.2 for potential energy).
+
+    Examples
+    --------
+    >>> spring = GravityCompensator(n=2, joints=2, a=0.3, b=0.4, phi=0.0, values=[1000.0, 0.0])
+    >>> spring.torque([0.0, 0.0], q=[0.0, np.pi / 2]).round(9)
+    array([  0., 120.])
+    >>> GravityCompensator(n=2, joints=2).kinds
+    ('Gs', 'Gc', 'Gss', 'Gcc')
+    """
+
+    needs_position: ClassVar[bool] = True
+    n: int
+    joints: NDArray[np.int64]
+    a: Array | None
+    b: Array | None
+    phi: Array | None
+    values: Array
+
+    def __init__(
+        self,
+        n: int,
+        joints: ArrayLike,
+        a: ArrayLike | None = None,
+        b: ArrayLike | None = None,
+        phi: ArrayLike | None = None,
+        values: ArrayLike | None = None,
+    ) -> None:
+        numbers = np.atleast_1d(as_floats(joints, "joints"))
+        outside = ~np.isin(numbers, np.arange(1, n + 1))
+        if numbers.ndim != 1 or outside.any() or np.unique(numbers).size != numbers.size:
+            raise InvalidValueError(
+                f"joints: expected different numbers from 1 to {n}, got {joints!r:.60}."
+            )
+        k, geometry = numbers.size, {"a": a, "b": b, "phi": phi}
+        missing = [name for name, value in geometry.items() if value is None]
+        if 0 < len(missing) < 3:
+            raise InvalidValueError(
+                f"{missing[0]}: expected a, b and phi together; leave out all three where the "
+                "geometry is not known."
+            )
+        set_ = object.__setattr__
+        set_(self, "n", int(n))
+        set_(self, "joints", read_only(numbers, np.int64))
+        for name, value in geometry.items():
+            lengths = None if value is None else _spread(value, (k,), name)
+            if lengths is not None and name != "phi" and (lengths <= 0.0).any():
+                raise InvalidValueError(f"{name}: expected positive metres, got {lengths.min()}.")
+            set_(self, name, lengths)
+        rows = np.zeros(len(self.kinds)) if values is None else as_floats(values, "values")
+        rows = rows[:, None] if rows.ndim == 1 else rows
+        set_(self, "values", _spread(rows, (len(self.kinds), k), "values"))
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Names of a joint's parameters."""
+        return ("Gs", "Gc", "Gss", "Gcc") if self.a is None else ("Kc", "Pc")
+
+    @property
+    def parameters(self) -> Array:
+        """Values of the parameters that the torque is linear in, shape (m, n)."""
+        return self._of_all(self.values)
+
+    def basis(self, v: ArrayLike, q: ArrayLike | None = None) -> Array:
+        """Torque per unit of each parameter of its joint, shape (..., m, n).
+
+        Parameters
+        ----------
+        v, q : array_like, shape (..., n)
+            Joint velocities, which do not matter but for their number, and joint variables.
+        """
+        if q is None:
+            raise InvalidValueError(
+                "q: the torque of a gravity compensator depends on the joint variables; give them "
+                "beside the velocities."
+            )
+        v, q = np.broadcast_arrays(as_vector(v, self.n, "v"), as_vector(q, self.n, "q"))
+        x = q[..., self.joints - 1]
+        if self.a is None or self.b is None or self.phi is None:
+            return self._of_all(np.stack([np.sin(x), np.cos(x), np.sin(2 * x), np.cos(2 * x)], -2))
+        x = x - self.phi
+        slope = self.a * self.b * np.sin(x)
+        length = np.sqrt((self.a - self.b) ** 2 + 4 * self.a * self.b * np.sin(x / 2) ** 2)
+        rate = np.divide(slope, length, out=np.zeros_like(slope), where=length > 0.0)
+        return self._of_all(np.stack([slope, rate], -2))
+
+    def torque(self, v: ArrayLike, q: ArrayLike | None = None) -> Array:
+        """Torque that the joints need against the compensators.
+
+        Parameters
+        ----------
+        v, q : array_like, shape (..., n)
+            Joint velocities, which do not matter but for their number, and joint variables, rad.
+
+        Returns
+        -------
+        ndarray, shape (..., n)
+            N m.
+
+        Raises
+        ------
+        InvalidValueError, ShapeError
+            No ``q``; wrong length; NaN or infinity.
+        """
+        return (self.basis(v, q) * self.parameters).sum(axis=-2)
+
+    def _of_all(self, columns: Array) -> Array:
+        """Columns (..., k) of the joints that have one as columns (..., n) of all joints."""
+        out = np.zeros((*columns.shape[:-1], self.n))
+        out[..., self.joints - 1] = columns
+        return out
+
+
+def _spread(value: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
+    """One for each joint that has one, or the same for all."""
+    given = as_floats(value, name)
+    try:
+        return read_only(np.broadcast_to(given, shape))
+    except ValueError:
+        raise ShapeError(
+            f"{name}: expected shape {shape}, the last axis for the joints that have one, got "
+            f"{np.shape(value)}."
+        ) from None

@@ -1,0 +1,242 @@
+"""Gravity compensators: torque by energy, in all models, identified, regrouped with gravity."""
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+from identification_logs import swinging
+from identities.random_robots import random_bodies, random_drive, random_table
+
+import robotmodels as rm
+from robotmodels.dynamics import idm_from_base
+from robotmodels.errors import InvalidValueError, ShapeError
+from robotmodels.friction import AsymmetricFriction, GravityCompensator
+from robotmodels.identification import Log, choose_processing, fit
+from robotmodels.regressors import parameter_names, parameter_vector, torque_regressor
+from robotmodels.simulation import torque_parts
+
+GEOMETRY = {"a": 0.3, "b": 0.5, "phi": 0.4}
+SPRING = {**GEOMETRY, "values": [4000.0, -600.0]}
+SERIES = {"values": [30.0, -20.0, 8.0, -5.0]}
+
+
+def random_arm(rng, f=4):
+    """Revolute joints, axes that are aligned or clearly are not, any gravity."""
+    table = random_table(rng, f, prismatic=False, limits=False)
+    table = table.replace(beta=np.where(abs(table.beta) < 1e-2, 0.0, table.beta))
+    model = rm.RobotModel.from_table(table, gravity=rng.normal(size=3) * 6)
+    return model.with_inertia(random_bodies(rng, f)).with_drive(random_drive(rng, f))
+
+
+def log_of(model, friction, rng):
+    q, v, a = swinging(model, rng)
+    return Log(2e-3, q, rm.idm(model, q, v, a, friction=friction), v, a)
+
+
+def fitted(model, log, friction, **options):
+    choices = choose_processing(log, decimation=20, dead_band=1e-3, filtered=False)
+    base = rm.base_parameters(model, drive=True, friction=friction)
+    return fit(model, log, base=base, processing=choices, **options)
+
+
+def test_the_torque_is_the_slope_of_the_energy():
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        a, b, phi = *rng.uniform(0.05, 1.0, 2), rng.uniform(-np.pi, np.pi)
+        K, P = rng.normal(size=2) * [3000.0, 500.0]
+        one = GravityCompensator(2, 2, a, b, phi, [K, P])
+        q = rng.uniform(-np.pi, np.pi, (20, 2))
+
+        def energy(angle, a=a, b=b, phi=phi, K=K, P=P):
+            away = a * np.exp(1j * phi) - b * np.exp(1j * angle)
+            length = np.abs(away)
+            return 0.5 * K * length**2 + P * length
+
+        h = 1e-5
+        slope = (energy(q[:, 1] + h) - energy(q[:, 1] - h)) / (2 * h)
+        torque = one.torque(np.zeros(2), q)
+        assert abs(torque[:, 1] - slope).max() < 1e-6 * (abs(K) + abs(P))
+        assert not torque[:, 0].any()
+
+
+def test_forces_by_hand():
+    # at a right angle of a 3-4-5 triangle: the arm of a force along the long side is 0.24 m
+    cylinder = GravityCompensator(1, 1, a=0.3, b=0.4, phi=0.0, values=[0.0, 100.0])
+    np.testing.assert_allclose(cylinder.torque([0.0], [np.pi / 2]), [24.0])
+    np.testing.assert_allclose(cylinder.torque([0.0], [-np.pi / 2]), [-24.0])
+    series = GravityCompensator(1, 1, values=[1.0, 2.0, 3.0, 4.0])
+    np.testing.assert_allclose(series.torque([0.0], [np.pi / 2]), [1.0 - 4.0], atol=1e-14)
+    np.testing.assert_allclose(series.torque([0.0], [np.pi / 4]), [1.5 * np.sqrt(2.0) + 3.0])
+    equal = GravityCompensator(1, 1, a=0.3, b=0.3, phi=0.0, values=[0.0, 100.0])
+    assert equal.torque([0.0], [0.0]) == 0.0  # length zero: no direction, no torque
+    two = GravityCompensator(3, [3, 1], a=[0.3, 0.2], b=0.4, phi=0.0, values=[0.0, 100.0])
+    np.testing.assert_allclose(
+        two.torque(np.zeros(3), np.full(3, np.pi / 2)), [8.0 / np.sqrt(0.2), 0.0, 24.0]
+    )
+
+
+@pytest.mark.parametrize("options", [SPRING, SERIES])
+def test_it_is_a_value_and_adds_up_with_friction(options):
+    one = GravityCompensator(2, 2, **options)
+    for again in (pickle.loads(pickle.dumps(one)), copy.deepcopy(one)):
+        assert again == one
+        assert hash(again) == hash(one)
+        assert not again.values.flags.writeable
+    assert one != GravityCompensator(2, 1, **options)
+    gears = AsymmetricFriction([1.0, 2.0], [3.0, 4.0], [5.0, 6.0], [7.0, 8.0])
+    v, q = np.random.default_rng(1).normal(size=(2, 7, 2))
+    both = gears + one
+    np.testing.assert_allclose(both.torque(v, q), gears.torque(v) + one.torque(v, q))
+    assert both.kinds == (*gears.kinds, *one.kinds)
+    np.testing.assert_array_equal(both.breakaway, gears.breakaway)
+    assert one.breakaway.tolist() == [[0.0, 0.0], [0.0, 0.0]]
+    assert (one + gears).needs_position
+
+
+@pytest.mark.parametrize(
+    ("make", "error", "words"),
+    [
+        (lambda: GravityCompensator(2, 3), InvalidValueError, r"joints: expected .* 1 to 2"),
+        (lambda: GravityCompensator(2, [1, 1]), InvalidValueError, "joints: expected different"),
+        (lambda: GravityCompensator(2, 1, a=0.1), InvalidValueError, "b: expected a, b and phi"),
+        (lambda: GravityCompensator(2, 1, 0.1, -1.0, 0.0), InvalidValueError, "b: expected pos"),
+        (lambda: GravityCompensator(2, 1, values=[1.0]).values, None, ""),
+        (lambda: GravityCompensator(2, 1, values=[1.0, 2.0]), ShapeError, r"values: .*\(4, 1\)"),
+        (lambda: GravityCompensator(2, 1).torque([0, 0]), InvalidValueError, "q: the torque"),
+        (lambda: GravityCompensator(2, 1).torque([0, 0], [0]), ShapeError, "q: "),
+        (lambda: rm.idm(rm.load("rx90"), *np.zeros((3, 6)), friction=GravityCompensator(2, 1)),
+         ShapeError, "friction of 6 joints, got 2"),
+    ],
+)  # fmt: skip
+def test_mistakes_are_named(make, error, words):
+    if error is None:
+        make()
+        return
+    with pytest.raises(error, match=words):
+        make()
+
+
+@pytest.mark.parametrize("options", [SPRING, SERIES])
+def test_every_model_has_it(options):
+    rng = np.random.default_rng(2)
+    model = random_arm(rng)
+    one = GravityCompensator(model.n, 2, **options) + AsymmetricFriction(
+        *rng.uniform(0.5, 2.0, (4, model.n))
+    )
+    q, v, a = rng.normal(size=(3, 30, model.n))
+    extra = one.torque(v, q)
+    tau = rm.idm(model, q, v, a) + extra
+    close = {"rtol": 0, "atol": 1e-11 * np.abs(tau).max()}
+    np.testing.assert_allclose(rm.idm(model, q, v, a, friction=one), tau, **close)
+    np.testing.assert_allclose(rm.idm(model, q[0], v[0], a[0], friction=one), tau[0], **close)
+    parts = torque_parts(model, q, v, a, friction=one)
+    np.testing.assert_allclose(parts.total, tau, **close)
+    back = rm.ddm(model, q, v, tau, friction=one)
+    np.testing.assert_allclose(back, rm.ddm(model, q, v, tau - extra), rtol=1e-9, atol=1e-9)
+    W = torque_regressor(model, q, v, a, drive=True, friction=one)
+    np.testing.assert_allclose(W @ parameter_vector(model, True, one), tau, **close)
+    names = parameter_names(model, True, one)
+    assert sum(name.endswith("2") and name[:-1] in one.kinds for name in names) == len(one.kinds)
+    for method in ("symbolic", "numeric"):
+        base = rm.base_parameters(model, method, drive=True, friction=one)
+        np.testing.assert_allclose(base.reduce(W) @ base.values(model), tau, **close)
+        found = idm_from_base(model, base, base.values(model), q, v, a)
+        np.testing.assert_allclose(found, tau, **close)
+
+
+@pytest.mark.parametrize("width", [None, 1e-3])
+def test_simulation_keeps_energy_and_joints_stick_against_it(width):
+    rng = np.random.default_rng(3)
+    model = random_arm(rng, 2)
+    spring = GravityCompensator(2, 2, a=0.2, b=0.3, phi=0.4, values=[400.0, -60.0])
+    smooth = model.with_drive(rm.DriveParameters(Ia=[0.5, 0.5], Fv=[0.1, 0.2]))
+    sim = rm.simulate(smooth, [0.5, -0.3], [0, 0], t=0.8, friction=spring, smoothing=width)
+    assert np.ptp(sim.q[:, 1]) > 0.05
+    assert sim.relative_drift < 1e-8
+    tau = rm.idm(smooth, sim.q, sim.v, sim.a, friction=spring)
+    assert np.abs(tau).max() < 1e-9 * np.abs(spring.torque(sim.v, sim.q)).max()
+    if width is not None:
+        return
+    # at rest without gravity, the spring moves the joint only if dry friction does not hold it
+    still = model.with_gravity(np.zeros(3))
+    force = abs(spring.torque(np.zeros(2), [0.5, -0.3])[1])
+    for share, moves in ((0.99, True), (1.01, False)):
+        stuck = still.with_drive(rm.DriveParameters(Ia=[0.1, 0.1], Fc=[1e4, share * force]))
+        sim = rm.simulate(stuck, [0.5, -0.3], [0.0, 0.0], t=0.05, friction=spring)
+        assert (np.ptp(sim.q[:, 1]) > 1e-6) == moves
+
+
+@pytest.mark.parametrize("options", [SPRING, SERIES])
+@pytest.mark.parametrize("form", ["torque", "filtered", "power", "energy"])
+def test_it_is_identified_exactly_without_noise(options, form):
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        model = random_arm(rng)
+        true = GravityCompensator(model.n, 2, **options)
+        start = GravityCompensator(model.n, 2, **({} if options is SERIES else GEOMETRY))
+        found = fitted(model, log_of(model, true, rng), start, form=form)
+        base = rm.base_parameters(model, drive=True, friction=true)
+        truth = base.values(model)
+        limit = 1e-8
+        assert np.abs(found.values - truth).max() < limit * np.abs(truth).max()
+        q, v, a = swinging(model, rng, samples=500)
+        torque = rm.idm(model, q, v, a, friction=true)
+        quick = (np.abs(v) > 1e-3).all(axis=1)  # beyond the dead band
+        off = np.abs(found.predict(q, v, a) - torque)[quick].max()
+        assert off < limit * np.abs(torque).max()
+
+
+def test_a_compensator_that_is_left_out_is_seen_in_the_residuals():
+    rng = np.random.default_rng(5)
+    model = random_arm(rng)
+    true = GravityCompensator(model.n, 2, **SPRING)
+    log = log_of(model, true, rng)
+    noise = 0.5 * rng.normal(size=log.tau.shape)
+    noisy = Log(log.dt, log.q, log.tau + noise, log.v, log.a)
+    none = Log(log.dt, log.q, noisy.tau - true.torque(log.v, log.q), log.v, log.a)
+    least = fitted(model, none, None).fitted.filtered_rmse[1]
+    without = fitted(model, noisy, None, checked=False).fitted.filtered_rmse[1]
+    spring = fitted(model, noisy, GravityCompensator(model.n, 2, **GEOMETRY))
+    series = fitted(model, noisy, GravityCompensator(model.n, 2))
+    assert spring.fitted.filtered_rmse[1] == pytest.approx(least, rel=0.05)
+    assert without > 20 * least
+    # two harmonics are most of a spring whose geometry is not known
+    assert series.fitted.filtered_rmse[1] < 0.3 * without
+    assert np.abs(spring.value("Kc2") - 4000.0) < 4 * spring.deviation("Kc2")
+
+
+def test_what_gravity_does_alike_is_regrouped():
+    """About a horizontal axis first moments turn with sin q and cos q, as a spring does."""
+    pendulum = [{"sigma": 0}, {"sigma": 0, "d": 0.4}]
+    model = rm.RobotModel.from_table(rm.DHTable.from_rows(pendulum), gravity=[0.0, -9.81, 0.0])
+    rng = np.random.default_rng(6)
+    model = model.with_inertia(random_bodies(rng, 2)).with_drive(random_drive(rng, 2))
+    for method in ("symbolic", "numeric"):
+        series = GravityCompensator(2, [1, 2], **SERIES)
+        base = rm.base_parameters(model, method, drive=True, friction=series)
+        assert "Gs1" not in base.names
+        assert "Gc1" not in base.names
+        # -m g x cos q: 9.81 MX1 and Gc1 are one parameter
+        assert base.regrouping["MX1"]["Gc1"] == pytest.approx(1 / 9.81)
+        assert base.regrouping["MY1"]["Gs1"] == pytest.approx(-1 / 9.81)
+        assert {"Gss1", "Gcc1", "Gs2", "Gc2"} <= {*base.names}  # MX2 is known by its inertia
+        spring = GravityCompensator(2, 1, **SPRING)
+        base = rm.base_parameters(model, method, drive=True, friction=spring)
+        assert "Kc1" not in base.names
+        assert "Pc1" in base.names
+        assert base.regrouping["MX1"]["Kc1"] == pytest.approx(-0.15 * np.sin(0.4) / 9.81)
+        assert {"Kc2", "Pc2"} <= {*base.no_effect}
+        units = base.value_table(model).units
+        assert units[base.names.index("Pc1")] == "N"
+        # without gravity they are told apart
+        free = rm.base_parameters(
+            model.with_gravity(np.zeros(3)), method, drive=True, friction=series
+        )
+        assert {"Gs1", "Gc1", "Gs2", "Gc2"} <= {*free.names}
+    log = log_of(model, spring, rng)
+    found = fitted(model, log, GravityCompensator(2, 1, **GEOMETRY))
+    assert (
+        np.abs(found.values - found.base.matrix @ parameter_vector(model, True, spring)).max()
+        < 1e-6
+    )
