@@ -30,6 +30,8 @@ BASE = (
     "tests/test_base_parameters.py"
     " -k (random_robots or book or prismatic or horizontal or wrist or keeps)"
 )
+ALIGNED = "tests/test_base_parameters.py -k (aligned or slope or gravity)"
+COMPENSATOR = "tests/test_gravity_compensator.py"
 CASES = "tests/test_kernels_cases.py"
 COORDINATES = (
     "tests/test_operational_coordinates.py"
@@ -286,6 +288,11 @@ MUTATIONS = [
         "tests/test_friction.py"),
     Mutation("friction", "backward friction pushes", "class AsymmetricFriction(",
         "back, np.sign(back)]", "back, -np.sign(back)]", "tests/test_friction.py"),
+    Mutation("friction", "a cylinder's force acts on an arm of its length",
+        "class GravityCompensator(", "np.divide(slope, length,", "np.multiply(slope, length,",
+        COMPENSATOR),
+    Mutation("friction", "energy form: positions stay behind between samples",
+        "def _friction_works(", "(2.0 - s) * a", "(1.0 - s) * a", COMPENSATOR),
     Mutation("coordinates: angles", "first angle of z-x-z with the other sign",
         "def angles_of(sequence", "np.arctan2(gx, -gy)", "np.arctan2(gx, gy)", COORDINATES),
     Mutation("coordinates: angles", "the other solution mirrors pitch at zero",
@@ -334,6 +341,11 @@ MUTATIONS = [
     Mutation("minimal parameters", "a numeric kept column is divided by its scale twice",
         "def column_basis(", "combinations[rows] * scale[kept][:, None] / scale",
         "combinations[rows] / scale", "tests/test_estimation.py"),
+    Mutation("minimal parameters", "an axis near a right angle is turned parallel",
+        "def aligned(self, name", "u = u - np.linalg.pinv", "u = np.linalg.pinv", ALIGNED),
+    Mutation("minimal parameters", "axes behind prismatic joints are not compared",
+        "def aligned_robot(", "around = {**around, name: R[:, 2]}", "around = {name: R[:, 2]}",
+        ALIGNED),
     # --- formulas --------------------------------------------------------------------------------
     Mutation("symbolic dgm", "an angle of opposite axes is added", "class Angle:",
         "replace(t, sign=-t.sign)", "replace(t, sign=t.sign)",
