@@ -13,7 +13,12 @@ from robotmodels.dynamics import idm_from_base
 from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.friction import AsymmetricFriction, GravityCompensator
 from robotmodels.identification import Log, choose_processing, fit
-from robotmodels.regressors import parameter_names, parameter_vector, torque_regressor
+from robotmodels.regressors import (
+    energy_difference_regressor,
+    parameter_names,
+    parameter_vector,
+    torque_regressor,
+)
 from robotmodels.simulation import torque_parts
 
 GEOMETRY = {"a": 0.3, "b": 0.5, "phi": 0.4}
@@ -143,6 +148,23 @@ def test_every_model_has_it(options):
         np.testing.assert_allclose(base.reduce(W) @ base.values(model), tau, **close)
         found = idm_from_base(model, base, base.values(model), q, v, a)
         np.testing.assert_allclose(found, tau, **close)
+
+
+def test_its_work_between_samples_is_the_change_of_its_energy():
+    """With velocities that are linear between samples, also through zero; and none around."""
+    arm = rm.RobotModel.from_table(rm.DHTable(antecedent=[0, 1], sigma=[0, 0]))
+    one = GravityCompensator(2, 2, **GEOMETRY)
+    t = np.array([0.0, 0.01, 0.03, 0.06])
+    v = np.array([[0.0, 1.0], [0.0, 2.0], [0.0, -3.0], [0.0, 1.0]])
+    steps = 0.5 * (v[1:] + v[:-1]) * np.diff(t)[:, None]
+    q = np.array([0.3, 0.2]) + np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
+    rows = energy_difference_regressor(arm, t, q, v, columns=["Kc2", "Pc2"], friction=one)
+    length = np.abs(0.3 * np.exp(0.4j) - 0.5 * np.exp(1j * q[:, 1]))
+    energies = np.stack([0.5 * length**2, length], axis=1)
+    np.testing.assert_allclose(rows, np.diff(energies, axis=0), rtol=0, atol=1e-12)
+    # rounded velocities: the work still ends where the samples do
+    rows = energy_difference_regressor(arm, t, q, v + 1e-6, columns=["Kc2", "Pc2"], friction=one)
+    np.testing.assert_allclose(rows, np.diff(energies, axis=0), rtol=0, atol=2e-8)
 
 
 @pytest.mark.parametrize("width", [None, 1e-3])
