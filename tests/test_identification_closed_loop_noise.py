@@ -1,6 +1,7 @@
 """Noise of the positions: least squares are biased and the test says so; the others are not."""
 
 import numpy as np
+import pytest
 
 import robotmodels as rm
 from robotmodels.drive import DriveParameters
@@ -50,12 +51,14 @@ def recorded():
 
 
 def studied(count, position, torque, decimation, methods):
-    """Errors in deviations, by method, and probabilities of the test, of so many noisy logs."""
+    """Of so many noisy logs: errors in deviations by method, verdicts of the test, and errors of
+    the least squares that it tests.
+    """
     control, exact = recorded()
     base = rm.base_parameters(arm(), drive=True)
     truth = base.values(arm())
     rng = np.random.default_rng(1)
-    errors, chances = [], []
+    errors, verdicts, off = [], [], []
     for _ in range(count):
         e = position * rng.normal(size=exact.q.shape)
         de = central_differences(e, DT)
@@ -74,22 +77,36 @@ def studied(count, position, torque, decimation, methods):
         found = (ordinary(reduction), *both)
         errors.append([(one.values - truth) / one.deviations for one in found])
         verdict = hausman_test(system, both[0], lags=0)
-        chances.append(verdict.p)
-    return np.array(errors), np.array(chances)
+        off.append((both[0].values + verdict.effect - truth) / verdict.least_squares_errors)
+        verdicts.append(verdict)
+    return np.array(errors), verdicts, np.array(off)
 
 
 def test_differentiated_noise_biases_least_squares_alone_and_the_test_says_so():
     count = 8
-    errors, chances = studied(count, 1e-4, 0.5, 1, (instrumental, didim))
+    errors, verdicts, _ = studied(count, 1e-4, 0.5, 1, (instrumental, didim))
     z = errors.mean(axis=0) * np.sqrt(count)  # of order one where nothing is biased
     assert np.abs(z[0]).max() > 6.0
     assert np.abs(z[1:]).max() < 4.0
-    assert (chances < 1e-3).all()
+    for verdict in verdicts:
+        assert verdict.p < 1e-3
+        named = [x for x, bad in zip(verdict.names, verdict.biased_parameters, strict=True) if bad]
+        assert named
+        assert all(f"{name} (" in verdict.sentence for name in named)
 
 
-def test_without_noise_of_positions_the_test_rejects_as_often_as_asked():
-    count = 30
-    _, chances = studied(count, 0.0, 0.5, 10, (instrumental,))
-    # 5 % of 30: 1.5, its deviation 1.2
-    assert (chances < 0.05).mean() <= 0.17
-    assert 0.25 < np.median(chances) < 0.75
+def test_the_test_names_parameters_whose_bias_matters_and_no_others():
+    _, verdicts, off = studied(6, 3e-5, 0.5, 1, (instrumental,))
+    bias = np.abs(off.mean(axis=0))
+    named = np.mean([verdict.biased_parameters for verdict in verdicts], axis=0)
+    assert (bias > 2.0).sum() >= 3
+    assert (named[bias > 2.0] == 1.0).all()
+    assert (bias < 0.5).sum() >= 3
+    assert (named[bias < 0.5] == 0.0).all()
+
+
+@pytest.mark.parametrize(("position", "decimation"), [(0.0, 10), (3e-6, 1), (3e-5, 10)])
+def test_noise_whose_bias_does_not_matter_is_not_rejected(position, decimation):
+    _, verdicts, off = studied(10, position, 0.5, decimation, (instrumental,))
+    assert np.abs(off.mean(axis=0)).max() < 0.7  # half a standard error, and what ten logs tell
+    assert np.mean([verdict.biased for verdict in verdicts]) <= 0.1

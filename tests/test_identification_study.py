@@ -163,9 +163,7 @@ def test_instruments_and_didim_are_unbiased_and_the_test_has_nothing_to_say():
     for errors in map(np.array, z.values()):
         assert unbiased(errors)
         assert 0.6 < np.sqrt(np.mean(errors**2)) < 1.5
-    # three values below it have a probability of a thousandth of a percent
-    assert max(verdicts) > 0.05
-    assert min(verdicts) > 1e-4
+    assert min(verdicts) > 0.05
 
 
 def test_least_squares_without_filter_are_biased_and_the_test_says_so():

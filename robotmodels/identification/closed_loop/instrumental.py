@@ -143,7 +143,7 @@ def instrumental(
             yield block.W, replace(own, use=own.use & block.use)
 
     def advance(values: Array) -> InstrumentStep:
-        return _step(reduction, values, pairs(values), size)
+        return instrument_step(reduction, values, pairs(values), size)
 
     ended = iterated(first, advance, size, iterations)
     last = ended.last
@@ -172,7 +172,7 @@ def instrumental(
     )  # fmt: skip
 
 
-def _step(
+def instrument_step(
     reduction: Reduction, values: Array, pairs: Iterator[tuple[Array, Block]], size: Array
 ) -> InstrumentStep:
     """Solve ``Z^T S (y - W b) = 0`` from residuals of the values before, which keeps its digits."""
