@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from robotmodels.identification.closed_loop.instrumental import _step
+from robotmodels.identification.closed_loop.instrumental import instrument_step
 from robotmodels.identification.equations import Block
 from robotmodels.identification.methods.least_squares import ordinary
 from robotmodels.identification.scale.reduction import Reduction
@@ -53,7 +53,7 @@ def test_a_step_of_instruments_is_the_instrumental_estimate(rng):
     y = W[:, 0] @ [1.0, -2.0, 3.0] + 0.01 * rng.normal(size=N)
     block = Block(np.arange(N) * 1.0, W, y[:, None], np.ones((N, 1), bool), np.ones((N, 1)))
     start, size = np.array([0.9, -2.1, 3.2]), np.array([1.0, 0.5, 2.0])
-    found = _step(reduction_of((W[:, 0], y)), start, iter([(Z, block)]), size)
+    found = instrument_step(reduction_of((W[:, 0], y)), start, iter([(Z, block)]), size)
     z, w = Z[:, 0], W[:, 0]
     np.testing.assert_allclose(found.values, np.linalg.solve(z.T @ w, z.T @ y), rtol=1e-10)
     sigma = np.sqrt(((y - w @ start) ** 2).sum() / (N - 3))

@@ -132,6 +132,7 @@ def test_weights_are_those_of_the_joints():
 # --- deviations of correlated residuals --------------------------------------------------------
 
 
+@pytest.mark.filterwarnings("ignore:The prediction is poor")  # such noise hides the torques
 def test_covariance_of_correlated_residuals():
     # residuals that are a moving average over five samples: white deviations are too small
     model = rm.load("planar_2r").with_gravity((0.0, -9.81, 0.0))

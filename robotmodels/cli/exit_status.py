@@ -24,7 +24,7 @@ class ExitStatus(IntEnum):
 _SENTENCES = {
     ExitStatus.DONE: "done",
     ExitStatus.NOT_REACHED: "the mathematics has no answer: a pose out of reach, a fit that has "
-    "not converged, no motion within the limits",
+    "not converged or predicts badly, no motion within the limits",
     ExitStatus.WRONG_INPUT: "an argument or a file is wrong, or an optional package is missing",
     ExitStatus.BUG: "an error inside robotmodels; --traceback shows where",
     ExitStatus.INTERRUPTED: "interrupted (Ctrl-C)",

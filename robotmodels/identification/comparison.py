@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import product
@@ -12,7 +13,7 @@ import numpy as np
 
 from .._arrays import Array
 from .._choices import chosen
-from ..errors import InvalidValueError
+from ..errors import InvalidValueError, RobotModelsWarning
 from ..logs import Log
 from ..model import RobotModel
 from ..table_text import boxed
@@ -57,7 +58,9 @@ class ComparedFit:
         """Residual torque relative to the torque, both filtered; NaN where refused."""
         if self.result is None:
             return np.nan
-        return float(np.sqrt(np.nanmean(self.result.fitted.filtered_relative**2)))
+        parts = self.result.fitted.filtered_relative
+        parts = parts[np.isfinite(parts)]
+        return float(np.sqrt(np.mean(parts**2))) if len(parts) else np.nan
 
     @property
     def rmse(self) -> Array | None:
@@ -236,7 +239,9 @@ def compare_methods(
         start = perf_counter()
         result, why = None, ""
         try:
-            result = fit(model, log, method, form=form, test=test, **options)
+            with warnings.catch_warnings():  # the table has their status
+                warnings.simplefilter("ignore", RobotModelsWarning)
+                result = fit(model, log, method, form=form, test=test, **options)
         except InvalidValueError as error:
             last, why = error, str(error)
         rows.append(ComparedFit(method, form, result, perf_counter() - start, why))
@@ -251,17 +256,19 @@ def _worst(result: IdentificationResult) -> str:
     """Largest relative deviation and whose it is."""
     relative = result.relative_deviations
     k = int(np.argmax(relative))
+    if np.isnan(relative[k]):
+        return "-"
     return f"{_number(100.0 * float(relative[k]))} ({result.names[k]})"
 
 
 def _number(value: float) -> str:
-    return "" if np.isnan(value) else f"{value:.3g}"
+    return "-" if np.isnan(value) else f"{value:.3g}"
 
 
 def _with_deviation(value: float, deviation: float) -> str:
     """A value to the second digit of its deviation."""
     if np.isnan(value):
-        return ""
+        return "-"
     if not (np.isfinite(deviation) and deviation > 0.0):
         return f"{value:.4g} ± {deviation:.2g}"
     digits = max(0, 1 - int(np.floor(np.log10(deviation))))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import replace
@@ -13,7 +14,7 @@ from numpy.typing import ArrayLike
 from .._arrays import Array
 from .._choices import chosen
 from ..drive import Drives
-from ..errors import InvalidValueError
+from ..errors import InvalidValueError, RobotModelsWarning
 from ..estimation import column_basis
 from ..friction import Friction
 from ..logs import Log
@@ -24,7 +25,7 @@ from .correlated import CorrelatedCovariance, correlated_covariance
 from .equations import EquationForm, Equations, equations
 from .methods.essential import Essential, EssentialRule, with_columns
 from .methods.essential import essential as essential_parameters
-from .methods.estimate import Estimate, Method
+from .methods.estimate import Estimate, EstimateStatus, Method
 from .methods.least_squares import shares, solved, used_weights
 from .prediction import friction_ramp
 from .preparation.accepted import accepted_log, accepted_test
@@ -36,7 +37,7 @@ from .result import IdentificationResult
 from .scale.kept_equations import kept_equations, plain
 from .scale.reduction import Reduction, reduce_equations
 from .solving import MethodOptions, solve
-from .validation import validate
+from .validation import Validation, no_validation, poor_prediction, validate
 from .weak_prior import plausible_sizes, shrunk
 
 if TYPE_CHECKING:
@@ -140,7 +141,14 @@ def fit(
     Returns
     -------
     IdentificationResult
-        Parameters, deviations, errors.
+        Parameters, deviations, errors; its status is POOR_PREDICTION where torques are predicted
+        badly, and UNSTABLE, with NaN for all numbers, where the simulated robot ran away.
+
+    Warns
+    -----
+    RobotModelsWarning
+        Torques of the log, or of the one kept aside, are predicted badly: more than 30 % of them
+        are not explained; which, and what to do. It stands in the notes too.
 
     Raises
     ------
@@ -219,8 +227,17 @@ def fit(
             linear, estimate = False, drawn
             own = estimate.covariance * np.outer(ratio, ratio)
         estimate = replace(estimate, covariance=spread.covariance if linear else own)
-    values = estimate.values
-    ramp = friction_ramp(system.base, system.names, values, log, processing)
+    lost = estimate.status is EstimateStatus.UNSTABLE
+    ramp = (
+        processing.dead_band
+        if lost
+        else friction_ramp(system.base, system.names, estimate.values, log, processing)
+    )
+    fitted = _validated(system, estimate, log, ramp, system)
+    held_out = None if test is None else _validated(system, estimate, test, ramp)
+    estimate, doubts = _judged(system, estimate, fitted, held_out)
+    for doubt in doubts:
+        warnings.warn(doubt, RobotModelsWarning, stacklevel=2)
     return IdentificationResult(
         system=plain(system),
         reduction=reduction,
@@ -232,15 +249,37 @@ def fit(
         not_essential=dropped,
         condition=float(np.linalg.cond(R)),
         condition_scaled=float(np.linalg.cond(R / np.linalg.norm(R, axis=0))),
-        fitted=validate(system.base, system.names, values, log, processing, system, ramp),
-        held_out=None
-        if test is None
-        else validate(system.base, system.names, values, test, processing, ramp=ramp),
+        fitted=fitted,
+        held_out=held_out,
         options=options,
         ramp=ramp,
         essential_rule=_rule_name(found, essential),
-        notes=(*log.notes, *findings, *processing.notes, *estimate.notes, *_notes(unseen, dropped)),
-    )
+        notes=(
+            *doubts, *log.notes, *findings, *processing.notes, *estimate.notes,
+            *_notes(unseen, dropped),
+        ),
+    )  # fmt: skip
+
+
+def _validated(
+    system: Equations, estimate: Estimate, log: Log, ramp: Array, own: Equations | None = None
+) -> Validation:
+    """Errors on a log, whose equations may be there already; NaN without parameters."""
+    if estimate.status is EstimateStatus.UNSTABLE:
+        return no_validation(log.n)
+    return validate(system.base, system.names, estimate.values, log, system.processing, own, ramp)
+
+
+def _judged(
+    system: Equations, estimate: Estimate, fitted: Validation, held_out: Validation | None
+) -> tuple[Estimate, tuple[str, ...]]:
+    """The estimate with the status that its predictions deserve, and what `fit` warns of."""
+    if estimate.status is EstimateStatus.UNSTABLE:
+        return estimate, (f"{estimate.status.sentence} {estimate.notes[-1]}",)
+    doubt = poor_prediction(system.model, system.processing, fitted, held_out)
+    if doubt and estimate.status is EstimateStatus.SOLVED:
+        estimate = replace(estimate, status=EstimateStatus.POOR_PREDICTION)
+    return estimate, (doubt,) if doubt else ()
 
 
 def _spread(
@@ -280,7 +319,7 @@ def _shrunk(
 def _essential(
     reduction: Reduction, estimate: Estimate, asked: bool | float | EssentialRule | str
 ) -> Essential | None:
-    if asked is False:
+    if asked is False or estimate.status is EstimateStatus.UNSTABLE:
         return None
     if asked is True:
         return essential_parameters(reduction, estimate)

@@ -12,7 +12,7 @@ from ..logs import Log
 from ..minimal_parameters import BaseParameters
 from ..model import RobotModel
 from .equations import Equations
-from .methods.estimate import Estimate
+from .methods.estimate import Estimate, EstimateStatus, check_values
 from .prediction import predicted_torque
 from .scale.reduction import Reduction
 from .solving import MethodOptions
@@ -151,7 +151,13 @@ class IdentificationResult(Rebuilt):
         -------
         ndarray, shape (..., n)
             N m or N; dry friction rises linearly over `ramp`.
+
+        Raises
+        ------
+        InvalidValueError
+            The simulated robot ran away: there are no parameters.
         """
+        check_values(self.estimate)
         return predicted_torque(self.base, self.names, self.values, q, v, a, self.ramp)
 
     def validate(self, log: Log) -> Validation:
@@ -166,7 +172,13 @@ class IdentificationResult(Rebuilt):
         -------
         Validation
             By joint.
+
+        Raises
+        ------
+        InvalidValueError
+            The simulated robot ran away: there are no parameters.
         """
+        check_values(self.estimate)
         return validate(
             self.base, self.names, self.values, log, self.system.processing, ramp=self.ramp
         )
@@ -211,6 +223,8 @@ class IdentificationResult(Rebuilt):
         return self.names.index(plain)
 
     def __repr__(self) -> str:
+        if self.estimate.status is EstimateStatus.UNSTABLE:
+            return f"<IdentificationResult of {self.model.name!r}: {self.estimate.status.sentence}>"
         error = 100.0 * float(np.sqrt(np.nanmean(self.fitted.filtered_relative**2)))
         return (
             f"<IdentificationResult of {self.model.name!r}: {len(self.names)} parameters by "

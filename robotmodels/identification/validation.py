@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -10,10 +10,18 @@ from .._arrays import Array, Rebuilt, read_only
 from ..errors import InvalidValueError
 from ..logs import Log
 from ..minimal_parameters import BaseParameters
+from ..model import RobotModel
 from .equations import EquationForm, Equations
 from .prediction import predicted_torque
+from .preparation.filters import decimation_window
 from .preparation.processing import Processing
 from .preparation.signals import piece_signals, pieces
+from .reporting.parameters import percent
+
+POOR = 0.3
+"""Part of the torque that is left over, above which a prediction is bad."""
+_NOISE = 2.0
+"""Noise is not always white: how much more of its square may be at low frequencies."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,6 +43,8 @@ class Validation(Rebuilt):
         Its part of the filtered torque.
     correlation : ndarray, shape (n,)
         Of successive residuals of the equations.
+    noise : ndarray, shape (n,)
+        Root mean square of the part of the errors that is white, from their second differences.
     samples : int
         Of the log, edges left out.
     """
@@ -45,12 +55,12 @@ class Validation(Rebuilt):
     filtered_rmse: Array
     filtered_relative: Array
     correlation: Array
+    noise: Array
     samples: int
 
     def __post_init__(self) -> None:
-        names = ("rmse", "relative", "bias", "filtered_rmse", "filtered_relative", "correlation")
-        for name in names:
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+        for field in fields(self)[:-1]:
+            object.__setattr__(self, field.name, read_only(getattr(self, field.name)))
 
 
 def validate(
@@ -113,7 +123,7 @@ def validate(
     squares, sums, whole = np.zeros(n), np.zeros(n), np.zeros(n)
     samples = 0
     kept, filtered, taken = np.zeros(n), np.zeros(n), np.zeros(n)
-    products = np.zeros(n)
+    products, rough, steps = np.zeros(n), np.zeros(n), 0
     last = np.zeros((0, n))
     for piece in pieces(log, processing):
         found = piece_signals(log, processing, piece, 0)
@@ -122,6 +132,8 @@ def validate(
         sums += e.sum(axis=0)
         whole += (found.tau**2).sum(axis=0)
         samples += len(e)
+        rough += (np.diff(e, 2, axis=0) ** 2).sum(axis=0)
+        steps += max(len(e) - 2, 0)
         block = system.block(piece)
         r = np.where(block.use, block.y - block.W @ values, 0.0)
         kept += (r * r).sum(axis=0)
@@ -138,5 +150,80 @@ def validate(
     with np.errstate(divide="ignore", invalid="ignore"):
         return Validation(
             np.sqrt(squares / samples), np.sqrt(squares / whole), sums / samples,
-            np.sqrt(kept / taken), np.sqrt(kept / filtered), products / kept, samples,
+            np.sqrt(kept / taken), np.sqrt(kept / filtered), products / kept,
+            np.sqrt(rough / (6.0 * max(steps, 1))), samples,
         )  # fmt: skip
+
+
+def no_validation(n: int) -> Validation:
+    """The errors of an estimate without values."""
+    return Validation(*np.full((7, n), np.nan), samples=0)
+
+
+def poor_prediction(
+    model: RobotModel, processing: Processing, fitted: Validation, held_out: Validation | None
+) -> str:
+    """Which torques are predicted badly, as sentences; empty where none is.
+
+    That of a joint is poor where more than `POOR` of its filtered torque is left over, noise taken
+    off, or as much as there is. On a log kept aside that may be a small torque of a motion in which
+    the joint hardly works: it counts as the geometric mean with that of the log which was fitted.
+    That of all joints together is poor where more than `POOR` of their torques is left over; joints
+    that rest, of which no equation is, count with their torques as they are.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot.
+    processing : Processing
+        Of the errors.
+    fitted, held_out : Validation
+        On the log itself, and on the one kept aside.
+
+    Returns
+    -------
+    str
+        What it is, what it comes from, what to do.
+    """
+    names = np.array(model.table.joint_names)
+    sides = {"the log": fitted}
+    if held_out is not None:
+        sides["the log kept aside"] = held_out
+    gain = float((decimation_window(processing.decimation) ** 2).sum())
+    slides = model.table.sigma[model.table.joint_rows] == 1
+    usual = None
+    found: list[str] = []
+    beyond = np.zeros(model.n, dtype=bool)
+    for log, side in sides.items():
+        rests = np.isnan(side.filtered_relative)
+        error = np.where(rests, side.rmse, side.filtered_rmse) ** 2
+        part = np.where(rests, side.relative, side.filtered_relative)
+        known = (part > 0.0) & np.isfinite(part)
+        torque = np.where(known, error, np.inf) / np.where(known, part, 1.0) ** 2
+        left = error - _NOISE * np.where(rests, 1.0, gain) * side.noise**2
+        usual = np.where(known, torque, 0.0) if usual is None else usual
+        worse = ~rests & (left > torque)
+        poor = worse | ~rests & (left > POOR**2 * np.sqrt(torque * np.maximum(torque, usual)))
+        beyond |= worse
+        named = [f"{names[j]} ({percent(part[j])})" for j in np.flatnonzero(poor)]
+        total = np.where(rests, left, error)
+        kinds = [kind for kind in (known & slides, known & ~slides) if kind.any()]  # N and N m
+        whole = max((total[kind].sum() / torque[kind].sum() for kind in kinds), default=0.0)
+        if whole > POOR**2:
+            named.append(f"all joints together ({percent(np.sqrt(whole))})")
+        if named:
+            found.append(f"of {log} {', '.join(named)}")
+    if not found:
+        return ""
+    text = f"The prediction is poor; parts of the torque that are not explained: {'; '.join(found)}"
+    if beyond.any():
+        text += f"; farther off than no torque at all: {', '.join(names[beyond])}"
+    why = (
+        "The parameters do not carry over to that motion: use a log that excites these joints "
+        "more, or fewer parameters (essential=True)."
+        if found[0].startswith("of the log kept aside")
+        else "The order of the joints, signs, zeros, units, the sampling period or the model may "
+        "be wrong, the log too short or too noisy, or the method or form unsuitable (compare "
+        "method 'wls' and form 'torque')."
+    )
+    return f"{text}. {why} The parameters are not to be used before the cause is known."

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array
 from ..errors import InvalidValueError, ShapeError
+from ..identification.methods.estimate import check_values
 from ..identification.prediction import predicted_torque
 from ..identification.preparation.signals import piece_signals, pieces
 from ..identification.reporting.parameters import effort_units
@@ -64,13 +65,14 @@ def as_identification(result: Any) -> IdentificationResult:
     Raises
     ------
     InvalidValueError
-        Something else.
+        Something else; a result without parameters, whose simulated robot ran away.
     """
     if not isinstance(result, IdentificationResult):
         raise InvalidValueError(
             "result: expected an IdentificationResult of identification.fit, got "
             f"{type(result).__name__}."
         )
+    check_values(result.estimate)
     return result
 
 

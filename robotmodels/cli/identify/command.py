@@ -10,6 +10,7 @@ from ..numbers import joint_numbers
 from ..output import add_output, check_output, hand_over
 from ..progress import progress
 from ..source import add_source, robot_of
+from ..streams import say
 from .choices import controller, essential, prior, workers
 from .logs import logs
 from .options import add_options
@@ -64,7 +65,8 @@ def run(arguments: argparse.Namespace) -> int:
     Returns
     -------
     int
-        `ExitStatus.DONE`, or `ExitStatus.NOT_REACHED` if the method has not converged.
+        `ExitStatus.DONE`, or `ExitStatus.NOT_REACHED` if the method has not converged or
+        the prediction is poor.
 
     Raises
     ------
@@ -97,6 +99,9 @@ def run(arguments: argparse.Namespace) -> int:
             checked=not arguments.no_check, executor=executor,
             progress=bar and bar.fraction,
         )  # fmt: skip
+    if result.estimate.status is EstimateStatus.UNSTABLE:
+        say(result.report().rstrip())
+        return ExitStatus.NOT_REACHED
     robot = None
     if arguments.consistent or arguments.out is not None:
         robot = real_bodies(result, bodies, asked=arguments.consistent)

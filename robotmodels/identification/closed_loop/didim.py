@@ -135,7 +135,7 @@ def didim(
         if loop is not None and controller is None:
             loop = _quicker(system, first, loop)
     if loop is None:
-        return ran_away(Method.DIDIM, system, first, loop)
+        return ran_away(Method.DIDIM, system, loop)
     way = loop
 
     def blocks(values: Array) -> Iterator[Block]:
@@ -149,8 +149,8 @@ def didim(
 
     ended = reweighted(first, advance, torque_sizes(reduction), iterations, memory=_MEMORY)
     last = ended.last
-    if last is None:
-        return ran_away(Method.DIDIM, system, first, loop)
+    if last is None or ended.status is EstimateStatus.UNSTABLE:
+        return ran_away(Method.DIDIM, system, loop, ended.iterations)
     equations = given(system, lambda: blocks(ended.values))
     spread = sandwich(equations, ended.values, last.weights, last.inverse, lags)
     notes = loop.notes

@@ -132,7 +132,7 @@ def instrumental(
     if loop is None:
         loop = closed_loop(system, first, controller)
     if loop is None:
-        return ran_away(Method.IV, system, first, loop)
+        return ran_away(Method.IV, system, loop)
     way = loop
     measured = measured_blocks(system)
     size = torque_sizes(reduction)
@@ -147,8 +147,8 @@ def instrumental(
 
     ended = iterated(first, advance, size, iterations)
     last = ended.last
-    if last is None:
-        return ran_away(Method.IV, system, first, loop)
+    if last is None or ended.status is EstimateStatus.UNSTABLE:
+        return ran_away(Method.IV, system, loop, ended.iterations)
 
     def scores() -> Iterator[Block]:
         for Z, own in pairs(ended.values):
@@ -263,9 +263,9 @@ def torque_sizes(reduction: Reduction) -> Array:
 
 
 def ran_away(
-    method: Method, system: Equations, values: Array, loop: ClosedLoop | None
+    method: Method, system: Equations, loop: ClosedLoop | None, iterations: int = 0
 ) -> SimulatedEstimate:
-    """The values that a simulation could not begin with.
+    """The estimate without values of a robot that cannot be simulated.
 
     Parameters
     ----------
@@ -273,25 +273,27 @@ def ran_away(
         Which one asked.
     system : Equations
         Robot and log.
-    values : ndarray, shape (b,)
-        Of the start.
     loop : ClosedLoop or None
         How it was to be simulated.
+    iterations : int
+        After which it ran away.
 
     Returns
     -------
     SimulatedEstimate
-        Status UNSTABLE; its deviations are infinite.
+        Status UNSTABLE; its numbers are NaN.
     """
-    b, n = len(values), system.model.n
+    b, n = len(system.names), system.model.n
     why = "its mass matrix is not positive definite" if loop is None else "it runs away"
+    whose = f"parameters after {iterations} iterations" if iterations else "first parameters"
     note = (
-        f"The robot of the first parameters cannot be simulated: {why}. Give start= of a robot "
+        f"The robot of the {whose} cannot be simulated: {why}. Give start= of a robot "
         "whose joints all move inertia (such as base.values of a model with its inertia), or "
         "lower gains."
     )
+    none = np.full(b, np.nan)
     return SimulatedEstimate(
-        method, system.names, values, np.diag(np.full(b, np.inf)), np.full(n, np.inf),
-        EstimateStatus.UNSTABLE, 0, (*(() if loop is None else loop.notes), note),
-        np.full(b, np.inf), 0, np.nan, 0.0, loop,
+        method, system.names, none, np.full((b, b), np.nan), np.full(n, np.nan),
+        EstimateStatus.UNSTABLE, iterations, (*(() if loop is None else loop.notes), note),
+        none, 0, np.nan, 0.0, loop,
     )  # fmt: skip

@@ -139,7 +139,7 @@ def output_error(
     if loop is None:
         loop = closed_loop(system, first, controller)
     if loop is None:
-        return ran_away(Method.CLOE, system, first, loop)
+        return ran_away(Method.CLOE, system, loop)
     way = loop
     size = torque_sizes(reduction)
 
@@ -156,8 +156,8 @@ def output_error(
 
     ended = reweighted(first, advance, size, iterations, _SLACK * reduction.rows)
     last = ended.last
-    if last is None:
-        return ran_away(Method.CLOE, system, first, loop)
+    if last is None or ended.status is EstimateStatus.UNSTABLE:
+        return ran_away(Method.CLOE, system, loop, ended.iterations)
     equations = given(system, lambda: outputs.blocks(ended.values))
     spread = sandwich(equations, ended.values, last.weights, last.inverse, lags)
     notes = loop.notes

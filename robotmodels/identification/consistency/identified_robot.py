@@ -11,7 +11,7 @@ from ...inertia import InertialParameters
 from ...minimal_parameters import uniform_bodies
 from ...minimal_parameters.prior import check_definite
 from ...model import RobotModel
-from ..methods.estimate import Method
+from ..methods.estimate import Method, check_values
 from ..methods.least_squares import used_weights, weights_of
 from ..scale.reduction import reduce_equations
 
@@ -42,6 +42,8 @@ def consistent_robot(
     ------
     InertiaError
         A prior that is no set of real bodies; a model without any masses, and no prior.
+    InvalidValueError
+        The simulated robot ran away: there are no parameters.
     MissingExtraError
         The solver for cones is not installed.
 
@@ -62,6 +64,7 @@ def consistent_robot(
     """
     from .fit_consistent import fit_consistent
 
+    check_values(result.estimate)
     if prior is None:
         prior, _ = prior_bodies(result.model)
     reduction = result.reduction

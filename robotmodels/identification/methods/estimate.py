@@ -9,6 +9,7 @@ import numpy as np
 
 from ..._arrays import Array, Rebuilt, read_only
 from ..._outcomes import Outcome
+from ...errors import InvalidValueError
 
 
 class Method(Enum):
@@ -49,7 +50,13 @@ class EstimateStatus(Outcome):
     )
     UNSTABLE = (
         2,
-        "The simulated robot ran away; the parameters are those before, not the solution.",
+        "The simulated robot ran away, so that there are no parameters. Give the robot's own "
+        "controller= and references, or start= of a robot that is near, or take method 'wls'.",
+    )
+    POOR_PREDICTION = (
+        3,
+        "The parameters solve the equations best, but the torques that they predict are far from "
+        "the measured ones; they are not to be used before the cause is known.",
     )
 
 
@@ -64,7 +71,7 @@ class Estimate(Rebuilt):
     names : tuple of str
         The b parameters.
     values : ndarray, shape (b,)
-        SI units.
+        SI units; NaN, as all that follows from them, where the simulated robot ran away.
     covariance : ndarray, shape (b, b)
         Of the estimates.
     sigma : ndarray, shape (m,)
@@ -107,3 +114,9 @@ class Estimate(Rebuilt):
         s = self.deviations
         with np.errstate(divide="ignore", invalid="ignore"):
             return self.covariance / np.outer(s, s)
+
+
+def check_values(estimate: Estimate) -> None:
+    """Refuse an estimate without parameters, whose simulated robot ran away."""
+    if estimate.status is EstimateStatus.UNSTABLE:
+        raise InvalidValueError(f"result: {estimate.status.sentence}")

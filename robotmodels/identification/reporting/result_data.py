@@ -15,6 +15,7 @@ from ..._arrays import Array
 from ...drive import drive_kinds
 from ...logs import Log
 from ...model import RobotModel
+from ..methods.estimate import check_values
 from .parameters import intervals, kind_names, parameter_units
 from .residuals import residual_diagnostics
 from .weak_parameters import not_seen, strong_correlations, understatement, wrong_signs
@@ -45,11 +46,17 @@ def result_data(result: IdentificationResult, robot: ConsistentFit | None = None
     dict
         SI units; None for what is not finite.
 
+    Raises
+    ------
+    InvalidValueError
+        The simulated robot ran away: there are no parameters.
+
     References
     ----------
     Seed book section 1.6.5.
     """
     estimate, base = result.estimate, result.base
+    check_values(estimate)
     ends, units, factor = intervals(estimate), parameter_units(result), understatement(result)
     found = residual_diagnostics(result.system, result.values)
     parameters = [

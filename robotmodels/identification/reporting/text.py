@@ -9,11 +9,12 @@ import numpy as np
 from ..._arrays import Array
 from ...estimation.diagnostics import ResidualTest
 from ...table_text import ReportSection, ReportTable, table_of
+from ..methods.estimate import EstimateStatus
 from ..validation import Validation
 from .data_section import data_section, processing_section
 from .parameters import effort_units, kind_names, kind_units, number, parameter_tables, percent
 from .residuals import ResidualDiagnostics, residual_diagnostics
-from .verdict import verdict
+from .verdict import doubts, verdict, without_values
 from .weak_parameters import NOT_SEEN, STRONG, strong_correlations
 
 if TYPE_CHECKING:
@@ -80,6 +81,9 @@ def report_sections(
     --------
     See `report_text`.
     """
+    if result.estimate.status is EstimateStatus.UNSTABLE:
+        told = data_section(result), processing_section(result), _notes(result)
+        return without_values(result), *(part for part in told if part is not None)
     found = residual_diagnostics(result.system, result.values)
     parts = (
         verdict(result, found), data_section(result), processing_section(result), _errors(result),
@@ -210,7 +214,7 @@ def _real(robot: ConsistentFit | None) -> ReportSection | None:
 
 
 def _notes(result: IdentificationResult) -> ReportSection | None:
-    # the reasons of the processing stand with the processing
-    told = set(result.system.processing.notes)
+    # the reasons of the processing stand with the processing, doubts in the verdict
+    told = {*result.system.processing.notes, *doubts(result)}
     notes = [note for note in dict.fromkeys(result.notes) if note not in told]
     return ReportSection("Notes", tuple(f"* {note}" for note in notes)) if notes else None

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..._arrays import Array
 from ...table_text import ReportSection
+from ..validation import poor_prediction
 from .parameters import kind_names, percent
 from .residuals import ResidualDiagnostics
 from .weak_parameters import NOT_SEEN, not_seen, understatement, wrong_signs
@@ -15,8 +16,6 @@ from .weak_parameters import NOT_SEEN, not_seen, understatement, wrong_signs
 if TYPE_CHECKING:
     from ..result import IdentificationResult
 
-_UNEXPLAINED = 0.3
-"""Part of a joint's filtered torque left over, above which something is wrong."""
 _MORE = 1.5
 """Errors on data kept aside, relative to those on the log, from which they are named."""
 _GOOD_CONDITION = 100.0
@@ -32,7 +31,7 @@ def verdict(result: IdentificationResult, found: ResidualDiagnostics) -> ReportS
         + (f", {estimate.iterations} iterations." if estimate.iterations > 1 else "."),
         _prediction(result),
     ]
-    sentences = [*_doubts(result), *sentences]
+    sentences = [*doubts(result), *sentences]
     weak = not_seen(estimate)
     if weak:
         sentences.append(
@@ -54,18 +53,17 @@ def verdict(result: IdentificationResult, found: ResidualDiagnostics) -> ReportS
     return ReportSection("Verdict", tuple(f"* {sentence}" for sentence in sentences))
 
 
-def _doubts(result: IdentificationResult) -> list[str]:
-    """What comes before all else: joints whose torques the model does not explain."""
-    names = result.model.table.joint_names
-    share = result.fitted.filtered_relative
-    bad = [f"{names[j]} ({100.0 * share[j]:.3g} %)" for j in np.flatnonzero(share > _UNEXPLAINED)]
-    if not bad:
-        return []
-    return [
-        f"Doubtful: much of the filtered torque is not explained: {', '.join(bad)}. The order of "
-        "the joints, signs, zeros, units, the sampling period or the model are wrong for them, or "
-        "they hardly move. Parameters of these joints are not to be used before that is known."
-    ]
+def without_values(result: IdentificationResult) -> ReportSection:
+    """The verdict on a fit whose simulated robot ran away."""
+    estimate = result.estimate
+    method = _capital(estimate.method.value)
+    return ReportSection("Verdict", (f"* {estimate.status.sentence} Method: {method}.",))
+
+
+def doubts(result: IdentificationResult) -> tuple[str, ...]:
+    """What comes before all else: the joints whose torques are predicted badly."""
+    doubt = poor_prediction(result.model, result.system.processing, result.fitted, result.held_out)
+    return (doubt,) if doubt else ()
 
 
 def _capital(text: str) -> str:
@@ -80,17 +78,13 @@ def _largest_percent(result: IdentificationResult) -> str:
 def _prediction(result: IdentificationResult) -> str:
     own, aside = result.fitted, result.held_out
     names = result.model.table.joint_names
-    worst = np.fmax(own.relative, -np.inf if aside is None else aside.relative)
-    lost = [f"{name} ({100 * worst[j]:.3g} %)" for j, name in enumerate(names) if worst[j] >= 1.0]
     text = (
         f"Predicted torques differ from those of the log by {_span(own.relative)} of their size, "
         f"joint by joint (filtered alike: {_span(own.filtered_relative)})"
     )
     if aside is None:
-        if lost:
-            text += f". {_lost(lost)}"
         return (
-            f"{text.rstrip('.')}. No log was kept aside: how well other motion is predicted is not "
+            f"{text}. No log was kept aside: how well other motion is predicted is not "
             "known; give test= (--test)."
         )
     text += (
@@ -102,21 +96,14 @@ def _prediction(result: IdentificationResult) -> str:
         for j, name in enumerate(names)
         if aside.rmse[j] > _MORE * own.rmse[j] and aside.relative[j] > _MORE * own.relative[j]
     ]
-    if lost:
-        return f"{text} {_lost(lost)}"
+    if doubts(result):
+        return text
     if more:
         return (
-            f"{text} Some err by much more there than on the log: {', '.join(more)}; the "
-            "parameters do not carry over to that motion. Use a log that excites these joints more."
+            f"{text} Some err by much more there than on the log: {', '.join(more)}; a log that "
+            "excites these joints more would carry over better."
         )
     return f"{text} The parameters carry over to motion that was not fitted."
-
-
-def _lost(joints: list[str]) -> str:
-    return (
-        f"The prediction is farther off than no torque at all of {', '.join(joints)}: the "
-        "parameters are not to be used for that."
-    )
 
 
 def _span(values: Array) -> str:

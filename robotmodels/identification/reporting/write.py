@@ -12,7 +12,7 @@ from ..._arrays import Array, as_floats
 from ...errors import InvalidValueError
 from ...model import to_urdf
 from ..consistency.identified_robot import consistent_robot
-from ..methods.estimate import Estimate, EstimateStatus, Method
+from ..methods.estimate import Estimate, EstimateStatus, Method, check_values
 from .result_data import FORMAT, result_data
 
 if TYPE_CHECKING:
@@ -41,7 +41,8 @@ def write_result(
     Raises
     ------
     InvalidValueError
-        Another suffix; the solver found no robot.
+        Another suffix; the solver found no robot; the simulated robot ran away, so that there are
+        no parameters.
     UrdfError
         As `to_urdf`.
     InertiaError, MissingExtraError
@@ -75,6 +76,7 @@ def write_result(
     """
     path = Path(path)
     suffix = path.suffix.lower()
+    check_values(result.estimate)
     if suffix == ".urdf":
         found = consistent_robot(result) if robot is None else robot
         text = to_urdf(found.of(result.model))

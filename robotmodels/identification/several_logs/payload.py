@@ -19,6 +19,7 @@ from ...logs import Log
 from ...minimal_parameters import base_parameters
 from ...model import RobotModel, check_model
 from ...table_text import boxed
+from ..methods.estimate import check_values
 from ..preparation.processing import Processing
 from ..result import IdentificationResult
 from .payload_equations import PayloadProblem, Solution, payload_problem, solve_payload
@@ -249,6 +250,7 @@ def identify_payload(
     """
     check_model(model)
     if isinstance(reference, IdentificationResult):
+        check_values(reference.estimate)
         base = reference.base
         base.check(model)
         if reference.unseen or reference.not_essential:
