@@ -36,6 +36,7 @@ from .processing_choice import processing_for
 from .result import IdentificationResult
 from .scale.kept_equations import kept_equations, plain
 from .scale.reduction import Reduction, reduce_equations
+from .segment_spread import segment_inflation
 from .solving import MethodOptions, solve
 from .validation import Validation, no_validation, poor_prediction, validate
 from .weak_prior import plausible_sizes, shrunk
@@ -50,6 +51,11 @@ _ONE_AT_A_TIME = (
     "Noise of the velocities is on both sides of equations of power or energy, so that parameters "
     "are off by more than their standard errors where positions are noisy; they show less than "
     "those of the torques."
+)
+_SEEN = 1.2
+_SEGMENTS = (
+    "Standard errors are {:.2g} times those of stationary residuals: segments of the log differ by "
+    "more than its noise explains, so that the model leaves something out."
 )
 _NOTHING = 1e-7
 """Length of a column relative to the longest, below which the log does not show it."""
@@ -216,7 +222,9 @@ def fit(
     if isinstance(estimate, SimulatedEstimate):
         white, lags = estimate.white, estimate.lags
     else:
-        spread, ratio = _spread(way, system, reduction, estimate)
+        spread, ratio, grown = _spread(way, system, reduction, estimate)
+        if grown > _SEEN:
+            estimate = replace(estimate, notes=(*estimate.notes, _SEGMENTS.format(grown)))
         lags = spread.lags
         linear = way in _LINEAR
         own = estimate.covariance * np.outer(ratio, ratio)
@@ -284,8 +292,8 @@ def _judged(
 
 def _spread(
     way: Method, system: Equations, reduction: Reduction, estimate: Estimate
-) -> tuple[CorrelatedCovariance, Array]:
-    """Covariance for correlated residuals, and how much larger it makes deviations.
+) -> tuple[CorrelatedCovariance, Array, float]:
+    """Covariance for correlated residuals, its ratio of standard errors, and that of segments.
 
     Methods that are not linear, or not of all equations at once, have a covariance of their own for
     white residuals; correlation makes it larger as it does that of weighted least squares.
@@ -297,7 +305,10 @@ def _spread(
     at = estimate.values if way in _LINEAR else values
     spread = correlated_covariance(system, at, weights, inverse, taken=taken)
     white = rest / (reduction.rows - len(values)) * np.diag(inverse)
-    return spread, np.sqrt(np.diag(spread.covariance) / np.where(white > 0.0, white, 1.0))
+    grown = segment_inflation(system, reduction, weights, np.sqrt(np.diag(spread.covariance)))
+    spread = replace(spread, covariance=grown**2 * spread.covariance)
+    ratio = np.sqrt(np.diag(spread.covariance) / np.where(white > 0.0, white, 1.0))
+    return spread, ratio, grown
 
 
 def _shrunk(

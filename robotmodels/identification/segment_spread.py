@@ -1,0 +1,58 @@
+"""How much more parameters vary between segments of a log than stationary residuals explain."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from .._arrays import Array
+from .equations import Equations
+from .methods.ridge import segments
+from .preparation.delay_rows import looked_at
+from .scale.reduction import Reduction
+
+_SEGMENTS = 10
+_LARGEST_SHARE = 0.999
+"""Leverage of a segment at most: beyond, its residuals show nothing."""
+
+
+def segment_inflation(
+    system: Equations, reduction: Reduction, weights: Array, deviations: Array
+) -> float:
+    """Factor, at least 1, by which standard errors grow to those between segments of the log.
+
+    A model that leaves something out (flexibility, friction of another law) errs alike over
+    seconds, and differently from one motion to the next; correlations over a few equations do not
+    show that. The covariance between segments does, its residuals corrected for their leverage. Of
+    ten segments a single parameter's would be rough, so that all have one factor: the root mean
+    square of the ratios of standard errors.
+
+    References
+    ----------
+    R. Bell and D. McCaffrey, "Bias reduction in standard errors for linear regression with
+    multi-stage samples", Survey Methodology 28(2), 2002.
+    """
+    part = looked_at(system.log, system.processing.motion)
+    own, whole = system, reduction
+    if part is not system.log:
+        own = replace(system, log=part)
+    total = sum(len(block) for block in own.blocks())
+    if total < _SEGMENTS:
+        return 1.0
+    parts = segments(own, _SEGMENTS)
+    R, y, _ = whole.stacked(weights)
+    inverse = np.linalg.inv(R)
+    values = inverse @ y
+    covariance = np.zeros(R.shape)
+    for segment in parts:
+        T, z, _ = segment.stacked(weights)
+        A = T @ inverse
+        leverage, Q = np.linalg.eigh(A @ A.T)
+        corrected = (Q.T @ (z - T @ values)) / np.sqrt(1.0 - np.clip(leverage, 0, _LARGEST_SHARE))
+        score = A.T @ (Q @ corrected)
+        covariance += np.outer(score, score)
+    # of a long log only a part was looked at
+    between = np.diag(inverse @ covariance @ inverse.T) * (len(system.log) / len(part))
+    ratio = between / np.maximum(deviations**2, 1e-300)
+    return float(max(1.0, np.sqrt(ratio.mean())))
