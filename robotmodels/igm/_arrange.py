@@ -53,8 +53,8 @@ def before(a: Floats, code_a: int, key_a: float, b: Floats, code_b: int, key_b: 
 
 @compiled(
     types.int64(
-        STACK, _IN2, MATRIX, _IN2, _IN3, _IN3, _CODES2_IN, INTS, INTS, MATRIX, INT, MATRIX,
-        INT, _FLOATS3, _FLAGS, _FLOATS2, _FLAGS, _CODES2, _FLAGS, _FLAGS3, _FLAGS3, _CODES1,
+        STACK, _IN2, MATRIX, _IN2, _IN3, _IN3, _CODES2_IN, INTS, MATRIX, INT, MATRIX, INT,
+        _FLOATS3, _FLAGS, _FLOATS2, _FLAGS, _CODES2, _FLAGS, _FLAGS3, _FLAGS3, _CODES1,
     )
 )  # fmt: skip
 def arranged(
@@ -66,7 +66,6 @@ def arranged(
     moving: Flags,
     branch: NDArray[np.int16],
     columns: Ints,
-    off_path: Ints,
     references: Floats,
     given: int,
     joints: Floats,
@@ -82,6 +81,8 @@ def arranged(
     status: NDArray[np.int8],
 ) -> int:
     """Fill the rows of a result; returns the most postures of any pose.
+
+    Joints without a column in ``columns`` do not move the tool: they keep their reference.
 
     ``joints (3, n)`` holds lower and upper limits and 1 for joints that turn.
     """
@@ -139,8 +140,6 @@ def arranged(
             for m in range(n):
                 q[p, at, m] = rows[i, m]
                 fits = fits and lower[m] - AT_LIMIT <= rows[i, m] <= upper[m] + AT_LIMIT
-                # a joint that does not move the tool keeps its reference
-                free[p, at, m] = off_path[m] == 1
             inside[p, at] = fits
             for m in range(k):
                 free[p, at, columns[m]] = took[p, i, m]

@@ -44,6 +44,8 @@ def igm(
         Reference postures [rad or m]; the leading axes broadcast with those of ``T``. Solutions
         are ordered by their distance to it, and joints that a pose leaves free take its value
         (0 without it; where no posture exists at that value, the nearest one where one does).
+        Joints that do not move the tool keep its value (0 without it, within limits if asked for);
+        they are no redundancy: the others are solved as if they were the whole arm.
     mask : array_like, shape (6,), optional
         Ones for the components ``x y z rx ry rz`` that are asked for, zeros for the others;
         default all. Rotations are the components of ``log(R_desired R^T)``.

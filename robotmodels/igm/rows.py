@@ -157,11 +157,9 @@ def _laid_out(call: Call, found: Settled, references: Array, columns: NDArray[np
     valid, inside, double = np.zeros((3, N, S), np.bool_)
     codes, status = np.full((N, S), -1, np.int16), np.empty(N, np.int8)
     free, family = np.zeros((2, N, S, n), np.bool_)
-    off_path = np.ones(n, np.int64)
-    off_path[arm.columns] = 0
     most = arranged(
         found.q, found.valid, found.residual, found.double, found.free,
-        np.ascontiguousarray(found.moving), code, columns, off_path, references, int(call.given),
+        np.ascontiguousarray(found.moving), code, columns, references, int(call.given),
         arm.joints, int(call.limits), q, valid, residual, inside, codes, double, free, family,
         status,
     )  # fmt: skip

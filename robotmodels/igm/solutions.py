@@ -45,7 +45,8 @@ class IGMSolutions:
     double : ndarray of bool, shape (..., S)
         Double roots, which are given once.
     free_joints : ndarray of bool, shape (..., S, n)
-        Joints whose value was taken from the reference posture, because it does not matter.
+        Joints of an infinite family whose value was taken from the reference posture, one for each
+        of its dimensions. Joints that do not move the tool keep their reference and are not marked.
     family_joints : ndarray of bool, shape (..., S, n)
         Other joints that move along the infinite family the row belongs to.
     method : str

@@ -21,6 +21,7 @@ from ..visual import Visual
 from .chain import multiplied_out
 from .changed import Changeable
 from .part_checks import check_count, check_name, check_table, check_tip, checked_postures
+from .tip_text import tip_text
 from .twin import PinocchioTwin
 
 GRAVITY = (0.0, 0.0, -9.81)
@@ -211,8 +212,7 @@ class RobotModel(Changeable):
             Link whose frame is the world; default the root. What is above it is left out.
         tip_link : str, optional
             Link whose frame is the tool. Only the joints between base and tip are kept, others
-            are locked at zero. Default: all joints below the base; the tool is the link called
-            ``tool``, else the link carried by the last joint, or what alone is fixed to it.
+            are locked at zero. Default: all joints below the base are kept; see Notes for the tool.
         gravity : array_like, shape (3,)
             Acceleration in the world frame (the axes of the base link), m/s^2.
         package_dirs : path or iterable of paths
@@ -237,6 +237,21 @@ class RobotModel(Changeable):
             A mesh is not in the given package folders.
         FrameNotFoundError
             ``base_link`` or ``tip_link`` is unknown, or the tip is not below the base.
+
+        Notes
+        -----
+        Without ``tip_link`` the tool is the link called ``tool``, else the link carried by the last
+        joint of the file, or what is fixed to it as long as that is a single link; of equal arms it
+        is thus the last one. Where a hand or gripper lies beyond the arm, the tool is the last link
+        before it. A hand is where the chain divides into branches with moving joints, all shorter
+        (in joints) than the chain up to there, and either the two longest are equal or six joints
+        or more lie before them. If a link fixed to that last link is called ``tool0``, ``tcp``,
+        ``tool``, ``ee_link``, ``flange`` or ``hand``, the tool is this one, the first in this
+        order; a link of that name also marks the end of the arm before a single finger.
+        ``print(model)`` names the tip and other links, ``notes`` say what was chosen.
+
+        Joints that do not move the tool are no redundancy: inverse models leave them at their
+        reference.
 
         Examples
         --------
@@ -335,7 +350,8 @@ class RobotModel(Changeable):
         return f"<RobotModel {self.name!r}: {self.n} joints, {self.f} frames>"
 
     def __str__(self) -> str:
-        text = f"{self.name}: {self.n} joints, {self.f} frames\n{self.table}"
+        head = f"{self.name}: {self.n} joints, {self.f} frames"
+        text = f"{head}\n{self.table}\n{tip_text(self.parts)}"
         if not self.inertia.values.any():
             text += (
                 "\nNo inertial parameters are known: links without mass, torques of drives only."

@@ -34,7 +34,7 @@ class ErdArm:
     srdf : str, optional
         File with named postures, relative to the folder of robots.
     tool : str, optional
-        Link that is the tool, where that is not the end of the last branch.
+        Link that is the tool, where the rule of `RobotModel.from_urdf` finds another.
 
     Examples
     --------
@@ -223,7 +223,7 @@ def load_erd(name: str) -> RobotModel:
 
 def _without_branches(model: RobotModel) -> tuple[str, ...]:
     """Notes of a model whose tool has been chosen: the one about the choice is void."""
-    return tuple(note for note in model.notes if "branches; the tool is" not in note)
+    return tuple(note for note in model.notes if "the tool is link" not in note)
 
 
 def erd_folder() -> Path:

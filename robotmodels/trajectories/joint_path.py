@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from .. import se3
 from .._arrays import Array, as_exact, as_floats, read_only
 from ..errors import InvalidValueError, ShapeError
-from ..geometry import FIXED
 from ..igm import IGMSolutions, igm, igm_numeric
+from ..igm.loop import joint_chain
 from ..model import RobotModel
 from .follow import continuous, follow, follow_singly
 from .path_events import PathEvent, PathEventKind, path_events
@@ -136,7 +136,8 @@ def joint_path(
     poses : PoseTrajectory or array_like, shape (N, 4, 4)
         World poses of the tool, m.
     q_start : array_like, shape (n,), optional
-        Posture from which the robot comes, rad or m. Joints that do not matter keep its value. A
+        Posture from which the robot comes, rad or m. Joints that do not move the tool keep its
+        value (without it 0, or the nearest value inside their limits). A
         first posture that is more than 0.1 away from it is reported as a jump.
     t : array_like, shape (N,), optional
         Times of an array of poses, s, ascending; without them there are no velocities.
@@ -216,17 +217,21 @@ def joint_path(
         )
 
     asked = 6 if mask is None else int(np.count_nonzero(mask))
-    joints = model.table.sigma[np.asarray(model.table.path(model.tip)) - 1] != FIXED
+    columns = joint_chain(model).columns
     found = None
-    if np.count_nonzero(joints) <= asked:
+    if columns.size <= asked:
         # without a reference postures come in the order of their branches
         found = solve(T, None)
     if found is not None and (found.q.shape[-2] > 1 or not found.method.startswith("numeric")):
         rows = follow(model, T, found, start, lambda i, near: solve(T[i], near))
     else:
         rows = follow_singly(model, len(T), start, lambda i, near: solve(T[i], near), go_on)
+    # joints that do not move the tool stand still: at the start, else near zero
+    still = np.setdiff1d(np.arange(model.n), columns)
+    rest = np.clip(np.zeros(model.n), model.lower, model.upper) if start is None else start
+    rows.q[np.ix_(rows.reached, still)] = rest[still]
     q = continuous(model, rows.q, rows.reached, start)
-    task = Task(model, T, q, rows.reached, mask, mask_axes)
+    task = Task(model, T, q, rows.reached, mask, mask_axes, columns)
     if twists is not None and task.square:
         v = task.rates(twists)
     else:

@@ -30,6 +30,8 @@ class Task:
         Components that are asked for.
     mask_axes : str
         ``"world"`` or ``"tool"``.
+    columns : ndarray of int, shape (k,)
+        Columns of q of the joints that move the tool; the others stand still.
 
     Attributes
     ----------
@@ -60,6 +62,7 @@ class Task:
         reached: NDArray[np.bool_],
         mask: ArrayLike | None,
         mask_axes: str,
+        columns: NDArray[np.int64],
     ) -> None:
         N, n = q.shape
         self._asked = np.ones(6, np.bool_) if mask is None else np.asarray(mask, np.bool_)
@@ -68,12 +71,13 @@ class Task:
         lever = np.linalg.norm(J[:, :3], axis=-2).max(initial=0.0)
         self._length = float(lever) if lever > 0.0 else 1.0
         J[:, :3] /= self._length
-        J = J[:, self._asked]
+        J = J[:, self._asked][..., columns]
         self.square = J.shape[-1] == J.shape[-2]
         self.conditioning, self.sign = np.full(N, np.nan), np.zeros(N)
         self._inverse = np.full((N, n, J.shape[-2]), np.nan)
         inverse, conditioning, sign = _inverted(J)
-        self._inverse[reached], self.conditioning[reached] = inverse, conditioning
+        self._inverse[reached], self.conditioning[reached] = 0.0, conditioning
+        self._inverse[np.ix_(reached, columns)] = inverse
         self.sign[reached] = sign
 
     def rates(self, twists: Array) -> Array:

@@ -22,6 +22,7 @@ from ..khalil_frames import JointAxis, khalil_frames
 from ..visual import Visual
 from .meshes import MeshFinder
 from .parts import TOOL, NamedFrame, RobotParts
+from .tip import default_tip
 from .tree import MOVING_TYPES, OTHER_TYPES, UrdfJoint, UrdfTree, parse_urdf
 
 
@@ -43,9 +44,8 @@ def read_urdf(
         Link whose frame is the world; default the root. What is above it is left out.
     tip_link : str, optional
         Link whose frame is the tool. The joints between base and tip are kept, others are locked
-        at zero. Default: every joint below the base is kept, and the tool is the link called
-        ``tool`` (as `urdf_text` writes it), else the link that the last joint carries, or what is
-        fixed to it as long as there is one such link only.
+        at zero. Default: every joint below the base is kept, and the tool is the end of the arm,
+        see `RobotModel.from_urdf`.
     package_dirs : path or iterable of paths
         Folders that hold the packages named in ``package://`` meshes.
     dynamics : bool
@@ -171,12 +171,11 @@ def _parts(
             for joint in joints
             if joint.mimic and joint.mimic[0] in tree.joints
         ]
-    tip_frame = _tip(tree, placed, named, len(joints), tip_link)
-    if tip_link is None and tip_frame.name != TOOL and len(_leaves(table)) > 1:
-        notes.append(
-            f"the robot has {len(_leaves(table))} branches; the tool is link {tip_frame.name!r} at "
-            "the end of the last one. Choose another with tip_link or with_tool."
-        )
+    if tip_link is None:
+        tip_frame, beyond = default_tip(tree, table.names, table.antecedent.tolist(), named)
+        notes += _tip_notes(tip_frame.name, beyond, len(_leaves(table)))
+    else:
+        tip_frame = next(frame for frame in named if frame.name == tip_link)
     zeros = np.zeros(len(joints))
     return RobotParts(
         name=tree.name,
@@ -256,24 +255,15 @@ def _walk(
         stack += [(j, link) for j in reversed(following.get(joint.child, []))]
 
 
-def _tip(
-    tree: UrdfTree,
-    placed: list[_Placed],
-    named: tuple[NamedFrame, ...],
-    last: int,
-    tip_link: str | None,
-) -> NamedFrame:
-    if tip_link is not None:
-        return next(frame for frame in named if frame.name == tip_link)
-    own = next((frame for frame in named if frame.name == TOOL and frame.parent > 0), None)
-    if own is not None:
-        return own
-    name = next(p.name for p in placed if p.owner == last and not p.merged)
-    following = tree.children(name)
-    while len(following) == 1 and following[0].kind == "fixed":
-        name = following[0].child
-        following = tree.children(name)
-    return next(frame for frame in named if frame.name == name)
+def _tip_notes(tip: str, beyond: int, branches: int) -> list[str]:
+    """Where the tool is, if there was a choice."""
+    if tip == TOOL or (branches == 1 and not beyond):
+        return []
+    several = f"the robot has {branches} branches; " if branches > 1 else ""
+    end = " at the end of the last one" if branches > 1 else ""
+    if beyond:
+        end += f", before {beyond} moving joint{'s' * (beyond > 1)} of a hand or gripper"
+    return [f"{several}the tool is link {tip!r}{end}. Choose another with tip_link or with_tool."]
 
 
 def _leaves(table: DHTable) -> list[int]:

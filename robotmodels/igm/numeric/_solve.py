@@ -94,7 +94,7 @@ def row_space(J: Floats, weight: Floats, unit: Floats, rows: Floats, moves: Floa
     NOTHING(
         STACK, MATRIX, INT, MATRIX, STACK, *CHAIN, INTS, MATRIX, VECTOR, VECTOR, VECTOR, INT,
         INTS, INT, FLOAT, FLOAT, VECTOR, INT, INT, OUT2, OUT2, OUT2, OUT1, ROW_FLAGS,
-        ROW_FLAGS, JOINT_FLAGS, JOINT_FLAGS, CODES,
+        ROW_FLAGS, JOINT_FLAGS, CODES,
     )
 )  # fmt: skip
 def solve_poses(
@@ -129,7 +129,6 @@ def solve_poses(
     residual: Floats,
     valid: Flags,
     inside: Flags,
-    unmoved: Flags,
     family: Flags,
     status: Codes,
 ) -> None:
@@ -172,8 +171,8 @@ def solve_poses(
         Written: what that posture misses, and the larger of the sizes that were asked for.
     valid, inside : (N,) bool
         Written: whether it is a solution, and one inside the limits.
-    unmoved, family : (N, n) bool
-        Written: joints off the path; joints that move in the infinite family it belongs to.
+    family : (N, n) bool
+        Written: joints that move in the infinite family it belongs to.
     status : (N,) int8
         Written: codes of `IGMStatus`.
     """
@@ -276,9 +275,8 @@ def solve_poses(
         known = known and row_space(J, asked, unit, rows, moves) == generic
         within = solved
         for c in range(n):
-            unmoved[i, c] = solved and unit[c] == 0.0
             family[i, c] = known and moves[c] > 1e-10
-            if unmoved[i, c] or family[i, c]:
+            if family[i, c]:
                 outcome = FAMILY
             within = within and q[c] >= lower[c] and q[c] <= upper[c]
             closest[i, c] = q[c]

@@ -58,7 +58,7 @@ def igm_numeric(
     q0 : array_like, shape (..., n), optional
         Where to start, rad or m; broadcasts with the poses. The solution found from it is usually
         near it. Joints that do not move the tool keep its value. Without it nothing is
-        preferred, and such joints stay at 0 (with ``limits`` at mid-range).
+        preferred, and such joints stay at 0 (with ``limits`` at the nearest value inside them).
     mask : array_like, shape (6,), optional
         Ones for the components ``x y z rx ry rz`` that are asked for, zeros for the others;
         default all. Rotations are the components of ``log(R_desired R^T)``.
@@ -152,7 +152,7 @@ def igm_numeric(
     closest, q, error, residual = (np.empty((N, n)), np.empty((N, n)), np.empty((N, 6)),
                                    np.empty(N))  # fmt: skip
     valid, inside = np.empty((2, N), dtype=np.bool_)
-    unmoved, family = np.empty((2, N, n), dtype=np.bool_)
+    family = np.empty((N, n), dtype=np.bool_)
     status = np.empty(N, dtype=np.int8)
     from ._solve import solve_poses
 
@@ -160,7 +160,7 @@ def igm_numeric(
         targets.reshape(N, 4, 4), first, int(q0 is not None), search.starts, search.poses,
         *model.chain, *search.tool, model.lower, model.upper, int(limits),
         asked.astype(np.int64), int(mask_axes == "tool"), search.length, search.reach, tolerance,
-        restarts, iterations, closest, q, error, residual, valid, inside, unmoved, family, status,
+        restarts, iterations, closest, q, error, residual, valid, inside, family, status,
     )  # fmt: skip
     rows = (*batch, 1)
     return IGMSolutions(
@@ -172,7 +172,7 @@ def igm_numeric(
         labels=("",),
         status=status.reshape(batch),
         double=np.zeros(rows, dtype=np.bool_),
-        free_joints=unmoved.reshape(*rows, n),
+        free_joints=np.zeros((*rows, n), dtype=np.bool_),
         family_joints=family.reshape(*rows, n),
         method=METHOD,
         periodic=search.revolute & (not limits),
@@ -237,9 +237,11 @@ def _new_search(model: RobotModel, limits: bool, restarts: int, rng: Any) -> _Se
     from ...kernels.poses import tip_poses
 
     tip_poses(starts, *chain, *tool, poses)
-    middle = read_only(0.5 * (low + high) if limits else np.zeros(n))
+    still = np.zeros(n)
+    if limits:
+        still = np.where(on_path, 0.5 * (low + high), np.clip(still, model.lower, model.upper))
     return _Search(
-        tool, revolute, length, float(reach), middle, read_only(starts), read_only(poses)
+        tool, revolute, length, float(reach), read_only(still), read_only(starts), read_only(poses)
     )
 
 
