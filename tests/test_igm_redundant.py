@@ -327,7 +327,8 @@ def test_a_relation_of_one_joint_is_a_lock(name, joint):
 
 
 def test_two_relations_of_eight_joints():
-    chain = joint_chain(load("erd:baxter"))
+    baxter = load("erd:baxter")  # with a finger as the tip, which is the eighth joint
+    chain = joint_chain(baxter.with_tool(np.eye(4), tip=baxter.tip + 2))
     rng = np.random.default_rng(12)
     q = random_postures(chain, 3, seed=13)
     A = np.zeros((2, 8))

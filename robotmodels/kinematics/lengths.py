@@ -57,8 +57,9 @@ def spread_configurations(model: RobotModel, count: int, rng: np.random.Generato
 def characteristic_length(model: RobotModel, frame: str | int | None = None) -> float:
     """Reach of a frame: its greatest distance from a revolute axis that moves it.
 
-    It depends neither on where the robot stands nor on where along its axis each frame of the
-    table is placed, and it does not see the limits of revolute joints.
+    It depends neither on where the robot stands, nor on joints that do not move the frame, nor on
+    where along its axis each frame of the table is placed, and it does not see the limits of
+    revolute joints.
 
     Parameters
     ----------
@@ -134,17 +135,24 @@ def length_of(model: RobotModel, frame: str | int | None, length: float | None) 
 
 
 def _reach(model: RobotModel, frame: str | int | None) -> float:
-    width = np.where(_kinds(model) == PRISMATIC, 2.0 * _table_size(model), tau)
-    turning = _kinds(model) == REVOLUTE
+    path = model.twin.frame(frame).path - 1
+    columns = model.chain.joint[path]
+    columns = columns[columns >= 0]
+    size = np.linalg.norm(model.chain.position[path], axis=1).sum()
+    size = float(size + np.linalg.norm(model.tool[:3, 3])) or 1.0
+    kinds = _kinds(model)[columns]
+    turning = kinds == REVOLUTE
     lower, upper = _finite_range(
-        np.where(turning, -pi, model.lower), np.where(turning, pi, model.upper), width
-    )
+        np.where(turning, -pi, model.lower[columns]), np.where(turning, pi, model.upper[columns]),
+        np.where(kinds == PRISMATIC, 2.0 * size, tau),
+    )  # fmt: skip
     rng = np.random.default_rng(_SEED)
-    q = lower + (upper - lower) * rng.random((_SAMPLES, model.n))
-    levers = np.linalg.norm(jacobian(model, q, frame)[:, :3, turning], axis=1)
+    q = np.zeros((_SAMPLES, model.n))
+    q[:, columns] = lower + (upper - lower) * rng.random((_SAMPLES, columns.size))
+    levers = np.linalg.norm(jacobian(model, q, frame)[:, :3, columns[turning]], axis=1)
     reach = float(levers.max(initial=0.0))
     # a lever of rounding size beside the lengths of the table is no lever
-    if reach <= 1e-12 * _table_size(model):
+    if reach <= 1e-12 * size:
         return 1.0
     # few digits: a number to read, and the same one whatever rounding the samples bring
     unit = 10.0 ** (np.floor(np.log10(reach)) - 1)

@@ -1,0 +1,339 @@
+"""The tip of a robot: which link it is without ``tip_link``, and joints that do not move it."""
+
+import warnings
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from identities.random_robots import random_pose, random_table
+
+import robotmodels as rm
+from robotmodels.errors import UrdfWarning
+from robotmodels.igm import IGMStatus
+from robotmodels.trajectories import joint_path
+
+LIMIT = '<limit lower="-2" upper="2" velocity="3" effort="4"/>'
+NAMES = ("tool0", "tcp", "tool", "ee_link", "flange", "hand")
+# robots with joints that do not move the tip: their tips now
+TREES = {
+    "erd:panda": "panda_hand_tcp",
+    "erd:panda_collision": "panda_hand_tcp",
+    "erd:bravo7_gripper": "bravo_finger_jaws_base_link",
+    "erd:allegro_right_hand": "link_15.0_tip",
+    "erd:allegro_left_hand": "link_15.0_tip",
+    "erd:baxter": "left_gripper_base_link",
+    "erd:alex_nub_hands": "rightNub",
+    "erd:alex_psyonic_hands": "Right_thumb_base",
+    "erd:alex_sake_hands": "RightSakePalmLink",
+    "erd:tiago": "hand_palm_link",
+    "erd:tiago_dual": "hand_right_palm_link",
+    "erd:tiago_no_hand": "wrist_ft_tool_link",
+    "erd:tiago_pro": "gripper_right_base_link",
+}
+
+
+# --- the tip of a URDF --------------------------------------------------------------------------
+
+
+def urdf(*joints):
+    """A URDF from (parent, child) for a joint that moves and (parent, child, "fixed")."""
+    links = dict.fromkeys(name for parent, child, *_ in joints for name in (parent, child))
+    text = "".join(f'<link name="{name}"/>' for name in links)
+    for k, (parent, child, *kind) in enumerate(joints):
+        text += (
+            f'<joint name="to_{child}" type="{kind[0] if kind else "revolute"}">'
+            f'<parent link="{parent}"/><child link="{child}"/>'
+            f'<origin xyz="0.1 {0.01 * k} 0.2" rpy="0.{k % 7} 0.4 -0.3"/><axis xyz="0 0 1"/>'
+            f"{LIMIT}</joint>"
+        )
+    return f'<robot name="r">{text}</robot>'
+
+
+def arm(length, end="hand_base"):
+    """Joints of an arm from base to the link ``wrist``, and ``end`` fixed to it."""
+    names = ["base", *(f"l{k}" for k in range(1, length)), "wrist"]
+    return [*pairwise(names), ("wrist", end, "fixed")]
+
+
+def fingers(*lengths, on="hand_base"):
+    """Fingers of some joints each."""
+    out = []
+    for i, length in enumerate(lengths):
+        names = [on, *(f"finger{i}_{k}" for k in range(length))]
+        out += pairwise(names)
+    return out
+
+
+def tip_of(text):
+    """Name of the link whose frame is the tool, the only one there."""
+    model = rm.RobotModel.from_urdf(text)
+    return [f.name for f in model.frames if f.parent == model.tip
+            and np.array_equal(f.pose, model.tool)]  # fmt: skip
+
+
+@pytest.mark.parametrize("length", [3, 4, 6, 7])
+@pytest.mark.parametrize("lengths", [(1, 1), (1, 1, 1), (2, 2), (2, 2, 1, 2)])
+def test_the_arm_ends_before_its_fingers(length, lengths):
+    text = urdf(*arm(length), *fingers(*lengths))
+    assert tip_of(text) == ["hand_base"]
+    model = rm.RobotModel.from_urdf(text)
+    assert model.n == length + sum(lengths), "the fingers stay joints"
+    assert model.tip == length
+    beyond = sum(lengths)
+    assert any(f"before {beyond} moving joints of a hand" in note for note in model.notes)
+
+
+def test_the_tip_is_the_last_link_that_all_fingers_share():
+    text = urdf(*arm(6), ("hand_base", "palm", "fixed"), *fingers(2, on="palm"),
+                ("hand_base", "thumb"), ("thumb", "thumb_tip"))  # fmt: skip
+    assert tip_of(text) == ["hand_base"]
+
+
+@pytest.mark.parametrize("first", range(len(NAMES)))
+def test_links_named_as_tools_come_first_in_their_order(first):
+    """Anywhere on the body that carries the fingers, in any order of the file."""
+    named = [("wrist" if i % 2 else "hand_base", NAMES[i], "fixed") for i in range(first, 6)]
+    text = urdf(*arm(5), *reversed(named), *fingers(1, 1))
+    assert tip_of(text) == [NAMES[first]]
+    # exact names only
+    text = urdf(*arm(5), ("wrist", f"my_{NAMES[first]}", "fixed"), *fingers(1, 1))
+    assert tip_of(text) == ["hand_base"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_named_link_ends_the_arm_before_a_single_finger(name):
+    text = urdf(*arm(6), ("hand_base", name, "fixed"), *fingers(1))
+    assert tip_of(text) == [name]
+    assert "finger0_0" in tip_of(urdf(*arm(6), *fingers(1))), "as in version 0.1"
+
+
+def test_named_links_do_not_move_the_tip_of_a_robot_without_fingers():
+    """UR arms keep wrist_3_link, beside ee_link and tool0."""
+    text = urdf(*arm(6, "ee_link"), ("wrist", "tool0", "fixed"))
+    assert tip_of(text) == ["wrist"]
+    for name in ("ur3", "ur5", "ur10", "ur5_gripper", "ur3_gripper", "ur10_limited"):
+        model = rm.load(f"erd:{name}")
+        q = np.linspace(-1, 1, model.n)
+        assert np.array_equal(rm.dgm(model, q), rm.dgm(model, q, "wrist_3_link")), name
+
+
+@pytest.mark.parametrize(
+    ("joints", "tip"),
+    [
+        # two arms, and legs: the last one, to its hand if it has one
+        ([("base", "x"), *fingers(6, 6, on="x")], "finger1_5"),
+        (fingers(3, 3, 3, 3, on="base"), "finger3_2"),
+        ([*fingers(6, on="base"), *arm(6), ("hand_base", "jaw"), ("hand_base", "other")],
+         "hand_base"),
+        # a camera that turns beside the arm does not end it, wherever it stands in the file
+        ([*arm(6), ("l3", "camera")], "camera"),
+        ([*arm(3)[:2], ("l2", "camera"), ("l2", "a"), ("a", "b"), ("b", "end")], "end"),
+        # a mobile base and a torso with a head before the arm
+        ([*arm(2, "torso"), ("torso", "head"), *fingers(5, on="torso")], "finger0_4"),
+        # a hand alone, longer than what carries it
+        ([("base", "palm"), *fingers(3, 3, on="palm")], "finger1_2"),
+    ],
+)  # fmt: skip
+def test_where_version_01_stays(joints, tip):
+    assert tip_of(urdf(*joints)) == [tip]
+
+
+def test_a_written_robot_keeps_its_tool():
+    """to_urdf calls the tool ``tool``; read back it is the tool beside tool0 and fingers, too."""
+    model = rm.RobotModel.from_urdf(urdf(*arm(6), ("wrist", "tool0", "fixed"), *fingers(1, 1)))
+    for tool in (model.tool, random_pose(np.random.default_rng(0))):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UrdfWarning)
+            back = rm.RobotModel.from_urdf(rm.to_urdf(model.with_tool(tool)))
+        q = np.linspace(-0.5, 0.6, model.n)
+        assert np.abs(rm.dgm(back, q) - rm.dgm(model.with_tool(tool), q)).max() < 1e-12
+
+
+@pytest.mark.parametrize("name", TREES)
+def test_tips_of_trees(name):
+    model = rm.load(name)
+    q = np.random.default_rng(0).uniform(-1, 1, model.n)
+    assert np.array_equal(rm.dgm(model, q), rm.dgm(model, q, TREES[name]))
+
+
+def test_all_other_robots_have_no_joint_that_does_not_move_the_tip():
+    for name in rm.robots():
+        model = rm.load(name)
+        if name not in TREES:
+            assert len(model.table.path(model.tip)) == model.f, name
+
+
+def test_print_names_the_tip_and_others():
+    lines = str(rm.load("erd:panda")).splitlines()
+    tip = "Tip: link panda_hand_tcp on frame 7 (panda_joint7); 2 of 9 joints do not move it"
+    assert tip in lines
+    line = next(line for line in lines if line.startswith("Other tips (tip_link=)"))
+    others = set(line.split(": ")[1].split(", "))
+    assert {"panda_hand", "panda_leftfinger", "panda_rightfinger"} <= others
+    ur5 = str(rm.load("erd:ur5"))
+    assert "Tip: link wrist_3_link on frame 6" in ur5
+    assert "Other tips (tip_link=): ee_link, tool0" in ur5
+    many = str(rm.load("erd:tiago_dual")).splitlines()
+    assert "Tip: link" in many[-2]
+    assert many[-1].count(",") == 5
+    assert many[-1].endswith(" more")
+    assert "Tip: frame 6 (joint_6)" in str(rm.load("rx90"))
+    for name in ("erd:panda", "erd:ur5", "erd:allegro_right_hand"):
+        model = rm.load(name)
+        line = next(line for line in str(model).splitlines() if line.startswith("Other tips"))
+        for link in line.split(": ")[1].split(" and ")[0].split(", "):
+            assert link in model.frame_names
+
+
+# --- joints that do not move the tip ------------------------------------------------------------
+
+
+def with_side_joints(rng, model, more):
+    """The robot with joints on side branches, somewhere in the table; its own columns of q."""
+    f, table = model.f, model.table
+    rows = [{"row": j, "after": int(table.antecedent[j]) - 1} for j in range(f)]
+    side = random_table(rng, more, limits=False)
+    carriers = [int(rng.integers(-1, f + i)) for i in range(more)]
+    rows += [{"row": f + i, "after": carriers[i]} for i in range(more)]
+    order, left = [], list(range(f + more))
+    while left:  # any order in which a frame follows the one that carries it
+        ready = [j for j in left if rows[j]["after"] < 0 or rows[j]["after"] in order]
+        order.append(int(rng.choice(ready)))
+        left.remove(order[-1])
+    fields = ("sigma", "mu", "gamma", "b", "beta", "alpha", "d", "theta", "r")
+    columns = {
+        name: np.concatenate((getattr(table, name), getattr(side, name)))[order] for name in fields
+    }
+    antecedent = [0 if rows[j]["after"] < 0 else order.index(rows[j]["after"]) + 1 for j in order]
+    limits = {
+        name: np.concatenate((getattr(table, name), getattr(side, name)))
+        for name in ("lower", "upper")
+    }
+    moving = [j for j in order if [*table.sigma, *side.sigma][j] != 2]
+    numbers = {j: k for k, j in enumerate([*table.joint_rows, *(f + side.joint_rows)])}
+    joints = [numbers[j] for j in moving]
+    tree = rm.RobotModel.from_table(
+        rm.DHTable(antecedent=antecedent, **columns,
+                   **{name: limit[joints] for name, limit in limits.items()}),
+        base=model.base, tool=model.tool, tip=order.index(model.tip - 1) + 1,
+    )  # fmt: skip
+    return tree, np.array([joints.index(k) for k in range(model.n)])
+
+
+ALONE = ("puma560", "ur5e", "stanford_arm", "iiwa14", "panda", "cobra_s600", "lab_trr", "crx10ia")
+
+
+@pytest.mark.parametrize("name", ALONE)
+def test_side_joints_change_nothing(name):
+    """Postures, counts, statuses and families are those of the arm alone; they keep q_ref."""
+    rng = np.random.default_rng(ALONE.index(name))
+    alone = rm.load(name)
+    tree, own = with_side_joints(rng, alone, int(rng.integers(1, 5)))
+    still = np.setdiff1d(np.arange(tree.n), own)
+    q = rng.uniform(-1.5, 1.5, (4, tree.n))
+    q[:, own] = np.clip(q[:, own], np.maximum(alone.lower, -3), np.minimum(alone.upper, 3))
+    T = rm.dgm(tree, q)
+    np.testing.assert_allclose(T, rm.dgm(alone, q[:, own]), atol=1e-14)
+    T[3, :3, 3] += 50.0  # out of reach
+    for given in (True, False):
+        found = rm.igm(tree, T, q if given else None)
+        wanted = rm.igm(alone, T, q[:, own] if given else None)
+        assert np.array_equal(found.count, wanted.count)
+        assert np.array_equal(found.status, wanted.status)
+        for one, other in zip(found.q[found.valid], wanted.q[wanted.valid], strict=True):
+            np.testing.assert_allclose(one[own], other, atol=1e-6)
+        for field in ("free_joints", "family_joints"):
+            marks = getattr(found, field)
+            assert not marks[..., still].any()
+            assert np.array_equal(marks[..., own], getattr(wanted, field))
+        rows = found.valid.nonzero()
+        rest = q[rows[0]][:, still] if given else 0.0
+        assert np.all(found.q[rows][:, still] == rest)
+    near = rm.igm(tree, T[:3], q[:3]).nearest(q[:3])
+    np.testing.assert_allclose(near, q[:3], atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["puma560", "panda", "lab_trr"])
+def test_side_joints_change_nothing_of_the_other_inverse_models(name):
+    rng = np.random.default_rng(5)
+    alone = rm.load(name)
+    tree, own = with_side_joints(rng, alone, 3)
+    still = np.setdiff1d(np.arange(tree.n), own)
+    q = rng.uniform(-1, 1, (5, tree.n))
+    found = rm.igm_numeric(tree, rm.dgm(tree, q), q)
+    wanted = rm.igm_numeric(alone, rm.dgm(tree, q), q[:, own])
+    assert np.array_equal(found.status, wanted.status)
+    assert np.array_equal(found.q[..., still][found.valid], q[:, still])
+    assert not found.free_joints.any()
+    assert np.array_equal(found.family_joints[..., own], wanted.family_joints)
+    twists = rng.normal(size=(5, 6))
+    found, wanted = rm.ikm(tree, q, twists), rm.ikm(alone, q[:, own], twists)
+    np.testing.assert_allclose(found.v[:, own], wanted.v, rtol=1e-9, atol=1e-9)
+    assert not found.v[:, still].any()
+    assert np.array_equal(found.status, wanted.status)
+
+
+@pytest.mark.parametrize("name", ["puma560", "iiwa14", "lab_trr"])
+def test_side_joints_stand_still_on_a_path(name):
+    rng = np.random.default_rng(8)
+    alone = rm.load(name)
+    # as many side joints as would make the Jacobian of the arm square, were they counted
+    tree, own = with_side_joints(rng, alone, max(6 - alone.n, 2))
+    still = np.setdiff1d(np.arange(tree.n), own)
+    start = rng.uniform(0.2, 0.8, tree.n)
+    q = start + np.linspace(0, 0.2, 15)[:, None]
+    T, t = rm.dgm(tree, q), np.linspace(0, 1, 15)
+    for begin in (start, None):
+        path = joint_path(tree, T, begin, t)
+        wanted = joint_path(alone, T, None if begin is None else begin[own], t)
+        np.testing.assert_allclose(path.q[:, own], wanted.q, atol=1e-6)
+        assert np.array_equal(path.status, wanted.status)
+        np.testing.assert_allclose(path.conditioning, wanted.conditioning, rtol=1e-6)
+        assert [e.kind for e in path.events] == [e.kind for e in wanted.events]
+        assert np.all(path.q[:, still] == (0.0 if begin is None else start[still]))
+        assert np.all(np.abs(path.v[:, still]) < 1e-12)
+
+
+@pytest.mark.parametrize("name", TREES)
+def test_postures_of_trees(name):
+    """igm finds the posture again, the other joints at their reference."""
+    model = rm.load(name)
+    rng = np.random.default_rng(1)
+    lower, upper = np.maximum(model.lower, -2), np.minimum(model.upper, 2)
+    q = lower + (upper - lower) * rng.random(model.n)
+    path = model.table.path(model.tip)
+    still = np.array([row + 1 not in path for row in model.table.joint_rows])
+    found = rm.igm(model, rm.dgm(model, q), q)
+    assert found.count > 0
+    assert np.all(found.q[found.valid][:, still] == q[still])
+    np.testing.assert_allclose(found.nearest(q), q, atol=1e-6)
+    assert not (found.free_joints | found.family_joints)[..., still].any()
+    assert (found.status == IGMStatus.REACHED_FAMILY) == (np.count_nonzero(~still) > 6)
+
+
+def test_an_arm_with_fingers_is_solved_in_closed_form():
+    """Six axes and two fingers, as many as eight postures; without q_ref the fingers are at 0."""
+    bravo = rm.load("erd:bravo7_gripper")
+    q = np.array([0.3, 1.0, 0.7, 0.4, -0.9, 0.2, 0.1, 0.05])
+    found = rm.igm(bravo, rm.dgm(bravo, q))
+    assert "numeric" not in found.method
+    assert found.count >= 2
+    assert found.status == IGMStatus.REACHED
+    assert np.all(found.q[:, 6:] == 0.0)
+
+
+def test_fingers_whose_limits_leave_zero_out():
+    """With limits they take the nearest value inside, in every inverse model."""
+    model = rm.RobotModel.from_urdf(urdf(*arm(6), *fingers(1, 1)))
+    lower, upper = model.lower.copy(), model.upper.copy()
+    lower[6], upper[7] = 0.5, -0.25
+    model = model.with_table(model.table.replace(lower=lower, upper=upper))
+    q = np.array([0.3, -0.4, 0.5, 0.6, -0.7, 0.8, 0.0, 0.0])
+    T = rm.dgm(model, q)
+    for found in (rm.igm(model, T, limits=True), rm.igm_numeric(model, T, limits=True)):
+        assert found.count > 0
+        assert np.all(found.q[found.valid][:, 6:] == [0.5, -0.25])
+        assert found.within_limits[found.valid].all()
+    assert np.all(joint_path(model, T[None]).q[:, 6:] == [0.5, -0.25])
+    inside = rm.igm(model, T, np.r_[q[:6], 1.0, -1.0], limits=True)
+    assert np.all(inside.q[inside.valid][:, 6:] == [1.0, -1.0])
