@@ -85,7 +85,7 @@ def robot() -> rm.RobotModel:
 @cache
 def base() -> rm.BaseParameters:
     """Its base parameters."""
-    return rm.base_parameters(robot())
+    return rm.base_parameters(robot(), drive=True)
 
 
 @cache

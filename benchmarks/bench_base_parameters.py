@@ -4,12 +4,10 @@
 
 Contestants of a row take turns, round after round; figures are medians of the processor's time,
 with the median of the time on the clock beside it. Base parameters: links, rotor inertia and
-friction, of robots told to all through Pinocchio's model of ours. `rank` counts base parameters
-without the offsets, which ours has besides (as the last columns, so that they change no rank
-before them) and FIGAROH is not asked for. The reference is the number of singular values of
-Pinocchio's regressor, columns scaled to length 1, with its gap. Memory: growth of the highest
-resident memory over that before the call, in a process of its own, the motion not counted (of
-Linux alone, elsewhere left out and that is said).
+friction without offsets, of robots told to all through Pinocchio's model of ours. The reference
+is the number of singular values of Pinocchio's regressor, columns scaled to length 1, with its
+gap. Memory: growth of the highest resident memory over that before the call, in a process of its
+own, the motion not counted (of Linux alone, elsewhere left out and that is said).
 FIGAROH is optional (`pip install figaroh`); without it its entries are left out and that is said.
 """
 
@@ -125,7 +123,7 @@ def said_of(base: rm.BaseParameters, motion: Motion) -> str:
     model = base.model
     few: Motion = (motion[0][:1000], motion[1][:1000], motion[2][:1000])
     tau = rm.torque_regressor(model, *few) @ rm.parameter_vector(model)
-    own = base.reduce(rm.torque_regressor(model, *few)) @ base.values(model)
+    own = base.reduce(rm.torque_regressor(model, *few, drive=base.drive)) @ base.values(model)
     error = np.abs(own - tau).max() / np.abs(tau).max()
     gap = "" if base.gap is None else f", gap {base.gap[0]:.2f} / {base.gap[1]:.0e}"
     return f"rank {rank_of(base)}{gap}, torques kept to {error:.0e}"
@@ -195,7 +193,7 @@ def regressor_rows(peer: bool, rounds: int) -> list[Row]:
     q, v, _ = motion
     few: Motion = (motion[0][:FEW], motion[1][:FEW], motion[2][:FEW])
     pm, data = model.pin_model, model.pin_model.createData()
-    base = rm.base_parameters(model)
+    base = rm.base_parameters(model, drive=True)
     links = rm.base_parameters(model, drive=False)
     goal = {"robotmodels": ("<= 1.2 us", 1.2)}
 

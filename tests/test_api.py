@@ -227,7 +227,7 @@ potential_energy(model, q)
 torque_regressor(model, q, v, a, drive=True)
 parameter_names(model, drive=True)
 energy_regressor(model, q, v, drive=True)
-base_parameters(model, method="symbolic", drive=True)
+base_parameters(model, method="symbolic", drive=("Ia", "Fv", "Fc"))
 BaseParameters.reduce(W)
 BaseParameters.values(model)
 igm(model, T, q_ref=None, mask=None, mask_axes="world", limits=False, lock=None, arm_angle=None, \

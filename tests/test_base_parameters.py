@@ -177,15 +177,15 @@ def test_tiny_lengths_are_no_unit_of_the_rank(length):
         model = filled(rm.RobotModel.from_table(table_of(*rows)), rng)
         friction = AsymmetricFriction(*rng.uniform(0.5, 2.0, (4, model.n)))
         for more in (None, friction):
-            rules = base_parameters(model, friction=more)
-            numbers = base_parameters(model, "numeric", friction=more)
+            rules = base_parameters(model, friction=more, drive=True)
+            numbers = base_parameters(model, "numeric", friction=more, drive=True)
             equal(rules, numbers)
             if length < 1e-9 and more is None:
                 nothing = [{k: x for k, x in row.items() if k not in "dr"} for row in rows]
-                exact = base_parameters(rm.RobotModel.from_table(table_of(*nothing)))
+                exact = base_parameters(rm.RobotModel.from_table(table_of(*nothing)), drive=True)
                 assert numbers.names == exact.names
-        keeps_torque(base_parameters(model, "numeric"), model, rng, True)
-        keeps_torque(base_parameters(model), model, rng, True)
+        keeps_torque(base_parameters(model, "numeric", drive=True), model, rng, True)
+        keeps_torque(base_parameters(model, drive=True), model, rng, True)
 
 
 def slightly_off(rng):
@@ -207,10 +207,14 @@ def test_methods_agree_on_what_is_nearly_aligned():
     rng = np.random.default_rng(11)
     for _ in range(120):
         model = filled(slightly_off(rng), rng)
-        rules, numbers = base_parameters(model), base_parameters(model, "numeric")
+        rules, numbers = (
+            base_parameters(model, drive=True),
+            base_parameters(model, "numeric", drive=True),
+        )
         assert rules.names == numbers.names
-        exact = base_parameters(model, tolerance=1e-11)
-        assert exact.names == base_parameters(model, "numeric", tolerance=1e-11).names
+        exact = base_parameters(model, tolerance=1e-11, drive=True)
+        numeric = base_parameters(model, "numeric", tolerance=1e-11, drive=True)
+        assert exact.names == numeric.names
         assert turned(exact) < 1e-9
         for base in (rules, numbers, exact):
             keeps_torque(base, model, rng, tolerance=3e-10)
@@ -343,7 +347,7 @@ def test_symoro(name):
 
 
 def test_rx90_prints_as_the_book():
-    base = base_parameters(rm.load("rx90"))
+    base = base_parameters(rm.load("rx90"), drive=True)
     inertial = [n for n in base.names if not n.startswith(("Fv", "Fc", "offset"))]
     assert len(inertial) == 40
     assert len(base.no_effect) == 11
@@ -418,7 +422,7 @@ def test_rotor_inertia_with_a_horizontal_first_axis():
 
 def test_gravity_loaded_prismatic_joint_keeps_its_mass_and_rotor():
     for method in ("symbolic", "numeric"):
-        base = base_parameters(rm.RobotModel.from_table(table_of({"sigma": 1})), method)
+        base = base_parameters(rm.RobotModel.from_table(table_of({"sigma": 1})), method, drive=True)
         assert base.names == ("M1", "Ia1", "Fv1", "Fc1")
         assert base.regrouping["M1"]["offset1"] == pytest.approx(
             1 / 9.81
@@ -443,6 +447,23 @@ def test_counts_of_the_literature():
         ur10 = base_parameters(rm.load("erd:ur10"), method, drive=("Ia", "Fv", DriveKind.FC))
         assert len(ur10) == 52
     assert rotors.drive == (DriveKind.IA,)
+
+
+@pytest.mark.parametrize("method", ["symbolic", "numeric"])
+def test_default_drives_are_rotors_and_friction(method):
+    """RX-90: 52 by default, 58 with the offsets, which add nothing but themselves."""
+    rx90 = rm.load("rx90")
+    base, whole = base_parameters(rx90, method), base_parameters(rx90, method, drive=True)
+    assert (len(base), len(whole)) == (52, 58)
+    assert base.drive == (DriveKind.IA, DriveKind.FV, DriveKind.FC)
+    assert [name for name in whole.names if not name.startswith("offset")] == list(base.names)
+    equal(base, base_parameters(rx90, method, drive=("Ia", "Fv", "Fc")))
+    # what does not fit says which regressor does
+    q = np.zeros((3, 6))
+    W = rm.torque_regressor(rx90, q, q, q, drive=base.drive)
+    assert base.reduce(W).shape == (3, 6, 52)
+    with pytest.raises(ShapeError, match=r"drive=\('Ia', 'Fv', 'Fc'\)\), got \(3, 6, 84\)"):
+        base.reduce(rm.torque_regressor(rx90, q, q, q))
 
 
 @pytest.mark.parametrize(
@@ -501,9 +522,9 @@ def test_motion_that_shows_less_keeps_less(rng):
     model = rm.load("rx90")
     q, v, a = rng.normal(size=(3, 400, 6))
     still = np.array([1, 1, 1, 0, 0, 0.0])
-    whole = base_parameters(model, "numeric", motion=(q, v, a))
-    assert whole.names == base_parameters(model).names
-    part = base_parameters(model, "numeric", motion=(q * still, v * still, a * still))
+    whole = base_parameters(model, "numeric", motion=(q, v, a), drive=True)
+    assert whole.names == base_parameters(model, drive=True).names
+    part = base_parameters(model, "numeric", motion=(q * still, v * still, a * still), drive=True)
     assert len(part) < len(whole)
     W = torque_regressor(model, q * still, v * still, a * still)
     again = part.reduce(W) @ part.matrix
@@ -521,7 +542,7 @@ def test_a_log_without_a_clear_gap_says_so():
     model, rng = rm.load("rx90"), np.random.default_rng(0)
     moved = doubted = 0
     for amplitude in 10.0 ** np.linspace(-5.0, -3.0, 9):
-        base = base_parameters(model, "numeric", motion=small_log(rng, amplitude))
+        base = base_parameters(model, "numeric", motion=small_log(rng, amplitude), drive=True)
         kept, other = base.gap
         assert kept > other  # what is reported is what decided
         if kept < 100 * other:
@@ -544,7 +565,7 @@ def test_a_log_without_a_clear_gap_says_so():
     assert doubted
     assert moved
     still = np.full((20, 6), 0.3), np.zeros((20, 6)), np.zeros((20, 6))
-    base = base_parameters(model, "numeric", motion=still)
+    base = base_parameters(model, "numeric", motion=still, drive=True)
     assert "This motion shows 6 of the 58 base parameters; not kept: ZZ1," in base.notes[0]
 
 
@@ -564,14 +585,14 @@ def test_joints_bound_to_each_other(rng):
     model = rm.load("planar_3r")
     model = model.with_inertia(random_bodies(rng, 3)).with_drive(random_drive(rng, 3))
     G = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
-    base = base_parameters(model, "numeric", constraint=G)
-    assert len(base) < len(base_parameters(model))
+    base = base_parameters(model, "numeric", constraint=G, drive=True)
+    assert len(base) < len(base_parameters(model, drive=True))
     u, du, ddu = rng.normal(size=(3, 30, 2))
     W = torque_regressor(model, u @ G.T, du @ G.T, ddu @ G.T)
     torque = np.einsum("ku,nkp->nup", G, W)
     assert np.allclose(base.reduce(torque) @ base.matrix, torque, atol=1e-9 * abs(W).max())
-    same = base_parameters(model, "numeric", constraint=rm.Transmission(np.eye(3)))
-    assert same.names == base_parameters(model).names
+    same = base_parameters(model, "numeric", constraint=rm.Transmission(np.eye(3)), drive=True)
+    assert same.names == base_parameters(model, drive=True).names
 
 
 @pytest.mark.parametrize("name", ["rx90", "cobra_s600", "gantry", "stanford_arm", "erd:so101"])
@@ -605,9 +626,9 @@ def test_friction_models_are_columns_of_both_methods(name, rng):
     assert "Fs1" in rules.names
     assert pickle.loads(pickle.dumps(rules)).names == rules.names
     with pytest.raises(InvalidValueError, match=r"Fv columns already.*drive=\('Ia', 'offset'\)"):
-        base_parameters(model, friction=stribeck)
+        base_parameters(model, friction=stribeck, drive=True)
     with pytest.raises(InvalidValueError, match="expected a friction model"):
-        base_parameters(model, friction=3.0)
+        base_parameters(model, friction=3.0, drive=True)
 
 
 def test_a_trajectory_is_a_motion():
@@ -651,9 +672,9 @@ def test_a_tolerance_takes_few_digits_for_what_is_meant(name):
 
 def test_notes_tell_the_tolerance_to_use():
     model = rm.load("erd:bravo7_no_ee")
-    exact = base_parameters(model, tolerance=1e-11)
+    exact = base_parameters(model, tolerance=1e-11, drive=True)
     assert "tolerance=1e-08 takes them as exact" in exact.notes[0]
-    meant = base_parameters(model, tolerance=1e-8)
+    meant = base_parameters(model, tolerance=1e-8, drive=True)
     assert len(meant) == 58 < len(exact)
     assert "Taken as exact" in meant.text
     # what a great tolerance leaves out has an effect, and is not said to have none
@@ -661,10 +682,12 @@ def test_notes_tell_the_tolerance_to_use():
     assert "Neglected, about 1e-08 of the largest torque or less: MX1, MY1, MZ2" in meant.text
     assert r"MX_{1}" in meant.latex.split("Neglected")[1]
     assert not {*meant.neglected} & {*meant.no_effect, *meant.alone, *meant.in_combination}
-    assert base_parameters(model, "numeric", tolerance=1e-8).neglected == meant.neglected
-    assert base_parameters(model).neglected == meant.neglected
-    assert base_parameters(model).names == meant.names
-    assert not base_parameters(rm.load("rx90"), tolerance=1e-4).neglected
+    assert (
+        base_parameters(model, "numeric", tolerance=1e-8, drive=True).neglected == meant.neglected
+    )
+    assert base_parameters(model, drive=True).neglected == meant.neglected
+    assert base_parameters(model, drive=True).names == meant.names
+    assert not base_parameters(rm.load("rx90"), tolerance=1e-4, drive=True).neglected
     for base in (exact, meant):
         assert max(map(len, base.text.splitlines())) <= 100
 
@@ -728,7 +751,7 @@ def test_constraints_are_told():
 
 def test_null_space_is_unseen(rng):
     model = rm.load("stanford_arm")
-    base = base_parameters(model)
+    base = base_parameters(model, drive=True)
     W = torque_regressor(model, *rng.normal(size=(3, 50, 6)))
     assert base.null_space.shape == (84, 84 - len(base))
     assert abs(W @ base.null_space).max() < 1e-11
@@ -740,7 +763,7 @@ def test_null_space_is_unseen(rng):
 
 
 def test_result_is_a_value():
-    base = base_parameters(rm.load("cobra_s600"))
+    base = base_parameters(rm.load("cobra_s600"), drive=True)
     again = pickle.loads(pickle.dumps(base))
     assert again.names == base.names
     assert again.text == base.text

@@ -491,7 +491,7 @@ def test_identify_writes_a_report_and_a_robot(run, motion, tmp_path):
     names = {"report.txt", "report.html", "result.json", "identified.urdf"}
     assert {path.name for path in out_folder.iterdir()} == names
     data = json.loads((out_folder / "result.json").read_text())
-    base = rm.base_parameters(real)
+    base = rm.base_parameters(real, drive=True)
     expected = dict(zip(base.names, base.values(real), strict=True))
     for one in data["parameters"]:
         assert abs(one["value"] - expected[one["name"]]) < 5.0 * one["std"] + 1e-3

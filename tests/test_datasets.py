@@ -223,7 +223,7 @@ def test_the_tx40_moves_within_its_limits_and_does_the_work_of_its_motors(tx40):
 
 
 def test_published_parameters_of_the_tx40_are_grouped_as_those_of_the_model(tx40):
-    base = rm.base_parameters(tx40.model)
+    base = rm.base_parameters(tx40.model, drive=True)
     ours = {name.removesuffix("R") for name in base.names}
     assert ours - {p.name for p in tx40.published} == {"Ia6"}
     assert {p.name for p in tx40.published} < ours
@@ -244,7 +244,7 @@ def test_the_tx40_gives_its_published_parameters_again(tx40):
     q = filtfilt(*butter(4, 50 * 2 * log.dt), log.q, axis=0)
     v = np.gradient(q, log.dt, axis=0)
     a = np.gradient(v, log.dt, axis=0)
-    base = rm.base_parameters(tx40.model)
+    base = rm.base_parameters(tx40.model, drive=True)
     W = rm.torque_regressor(tx40.model, q[::5], v[::5], a[::5], columns=base)
     slow = butter(4, 40 * 2 * 5 * log.dt)
     rows = slice(100, -100, 10)

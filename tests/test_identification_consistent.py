@@ -41,7 +41,7 @@ def factor(W, tau):
 
 def noisy(model, rng, noise, samples=60, prior_mass=6.0):
     """Torques of a robot with noise: base, R, y, rest, rows, W, tau."""
-    base = base_parameters(model)
+    base = base_parameters(model, drive=True)
     W = regressor(base, rng, samples)
     tau = W @ base.values(model)
     tau = tau + noise * np.sqrt(np.mean(tau**2)) * rng.normal(size=len(tau))
@@ -236,7 +236,7 @@ def test_a_prior_of_other_sizes_is_no_proof_of_a_bad_fit(drives, rng):
 def test_what_the_data_does_not_determine_is_the_priors(rng):
     """A log that never moves joint 2: its columns are empty, the prior stands in."""
     model = arm(rng)
-    base = base_parameters(model)
+    base = base_parameters(model, drive=True)
     q, v, a = rng.normal(size=(3, 40, 2))
     v[:, 1] = a[:, 1] = 0.0
     W = base.reduce(rm.torque_regressor(model, q, v, a)).reshape(-1, len(base))

@@ -104,7 +104,7 @@ def test_two_loads_without_a_log_of_the_bare_robot():
 def test_noise_leaves_no_bias_and_the_deviations_are_true():
     model = robot("planar_2r")
     gains = np.array([0.5, 2.0])
-    base = base_parameters(model)
+    base = base_parameters(model, drive=True)
     bare = currents(model, motion(2, 1500, 1), gains)
     full = currents(with_payload(model, MASS, COM, INERTIA), motion(2, 1500, 2), gains)
     choices, z = raw(bare, 5), []

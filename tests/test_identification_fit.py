@@ -227,7 +227,7 @@ def test_a_result_survives_pickling(whole):
 def test_prediction_is_the_inverse_model(name):
     model = ROBOTS[name]
     rng = np.random.default_rng(6)
-    base = rm.base_parameters(model)
+    base = rm.base_parameters(model, drive=True)
     q, v, a = rng.normal(size=(3, 50, model.n))
     tau = predicted_torque(base, base.names, base.values(model), q, v, a)
     truth = rm.idm(model, q, v, a)

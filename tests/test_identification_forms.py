@@ -41,7 +41,7 @@ def collected(system):
 def test_every_form_recovers_exact_parameters(name, form, decimation):
     model = ROBOTS[name]
     log = clean_log(model, np.random.default_rng(3))
-    base = base_parameters(model)
+    base = base_parameters(model, drive=True)
     system = equations(base, log, plain(log, decimation), form)
     found = weighted(reduce_equations(system))
     true = base.values(model)
@@ -52,7 +52,7 @@ def test_every_form_recovers_exact_parameters(name, form, decimation):
 @pytest.mark.parametrize("form", [EquationForm.ENERGY, EquationForm.FILTERED])
 def test_what_integration_cuts_off_falls_with_the_sixth_power_of_the_period(form):
     model = ROBOTS["serial"]
-    base = base_parameters(model)
+    base = base_parameters(model, drive=True)
     errors = []
     for dt in (0.016, 0.008, 0.004):
         log = clean_log(model, np.random.default_rng(3), dt=dt, samples=int(8.0 / dt))
@@ -149,7 +149,7 @@ def test_forms_take_friction_models_and_no_drives(form):
 @pytest.mark.parametrize("form", FORMS)
 def test_several_recordings_some_too_short(form):
     model = ROBOTS["serial"]
-    base = base_parameters(model)
+    base = base_parameters(model, drive=True)
     parts = [
         swinging(model, np.random.default_rng(k), samples=n) for k, n in enumerate((900, 5, 2, 800))
     ]

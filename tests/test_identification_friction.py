@@ -77,7 +77,7 @@ def test_an_exact_log_gives_the_exact_curve(exponent):
     assert found.exponent[0] == exponent
     assert found.drop[1] == 0.0
     assert np.isnan(found.vs[1])
-    base = base_parameters(model)
+    base = base_parameters(model, drive=True)
     np.testing.assert_allclose(found.values, base.values(model), atol=1e-8)
     friction = found.friction
     np.testing.assert_allclose(friction.Fs - friction.Fc, [2.0, 0.0], atol=1e-8)
@@ -123,7 +123,9 @@ def test_an_exact_log_gives_the_exact_friction_by_load(name):
     found = fit_load_friction(model, log, processing=raw(log))
     assert found.status is LoadFrictionStatus.SOLVED
     np.testing.assert_allclose(found.Fl, Fl, atol=1e-8)
-    np.testing.assert_allclose(found.values, base_parameters(model).values(model), atol=1e-8)
+    np.testing.assert_allclose(
+        found.values, base_parameters(model, drive=True).values(model), atol=1e-8
+    )
     np.testing.assert_allclose(found.friction.Fl, Fl, atol=1e-8)
 
 

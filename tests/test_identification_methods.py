@@ -31,7 +31,7 @@ from robotmodels.identification.scale.reduction import Reduction
 from robotmodels.minimal_parameters import base_parameters
 
 ROBOTS = odd_robots()
-BASES = {name: base_parameters(model) for name, model in ROBOTS.items()}
+BASES = {name: base_parameters(model, drive=True) for name, model in ROBOTS.items()}
 METHODS = {
     "huber": robust,
     "tukey": lambda s, r: robust(s, r, "tukey"),
@@ -286,7 +286,7 @@ def resting_first_joint(rng, noise):
     q[:, 0], v[:, 0], a[:, 0] = 0.4, 0.0, 0.0
     tau = rm.idm(model, q, v, a)
     log = Log(1e-2, q, tau + noise * rng.normal(size=tau.shape), v, a)
-    base = base_parameters(model)
+    base = base_parameters(model, drive=True)
     processing = choose_processing(log, filtered=False, decimation=1, edges=0.0, dead_band=0.0)
     every = equations(base, log, processing)
     R, _, _ = reduce_equations(every).stacked()
@@ -360,7 +360,7 @@ def test_recursion_ends_where_weighted_least_squares_are(name):
 def test_as_many_rows_as_columns_are_reduced_before_they_are_judged():
     """b + 1 equations without a change of sign: Fc is the offset, though no diagonal shows it."""
     model = rm.RobotModel.from_table(rm.DHTable(antecedent=[0], sigma=[0]))
-    base = base_parameters(model)
+    base = base_parameters(model, drive=True)
     b, t = len(base), 0.02 * np.arange(370)[:, None]
     q, v, a = np.sin(3 * t), 3 * np.cos(3 * t), -9 * np.sin(3 * t)
     true = np.linspace(1.0, 2.0, b)

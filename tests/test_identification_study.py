@@ -49,7 +49,7 @@ def arm():
 
 @cache
 def base():
-    return rm.base_parameters(arm())
+    return rm.base_parameters(arm(), drive=True)
 
 
 def truth():

@@ -432,7 +432,7 @@ def test_energy_of_base_parameters_with_rotors(model):
     energy = rm.kinetic_energy(model, q, v) + rm.potential_energy(model, q)
     change = (h[0] - h[1]) @ base.values(model)
     np.testing.assert_allclose(change, energy[0] - energy[1], rtol=1e-9)
-    whole = base_parameters(model)
+    whole = base_parameters(model, drive=True)
     with pytest.raises(InvalidValueError, match=r"have no column here: Fv.*drive=\('Ia',\)"):
         rm.energy_regressor(model, q, v, columns=whole)
     with pytest.raises(ShapeError, match=r"An energy has no columns of Fv, Fc, offset.*'Ia'"):

@@ -53,7 +53,7 @@ def test_the_urdf_of_it_has_the_same_torques(rng):
 def test_nothing_is_nearer_to_the_prior(rng):
     """Small steps along what no torque shows do not come nearer without leaving real bodies."""
     model = robot("planar_2r", rng)
-    base = base_parameters(model)
+    base = base_parameters(model, drive=True)
     prior = uniform_bodies(model, 10.0)
     found = standard_parameters(base, base.values(model), prior=prior)
     P0 = pseudo_inertias(prior)
@@ -114,7 +114,7 @@ def test_a_prior_of_another_order_of_magnitude(scale, rng):
 
 def test_base_parameters_of_no_robot(rng):
     model = robot("planar_2r", rng)
-    base = base_parameters(model)
+    base = base_parameters(model, drive=True)
     values = base.values(model)
     values[base.names.index("ZZ2")] = -1.0
     found = standard_parameters(base, values, prior=uniform_bodies(model, 10.0))

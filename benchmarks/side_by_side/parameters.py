@@ -31,7 +31,7 @@ FLAT = 1.25
 def base_parameters(settings: Settings) -> Iterator[Work]:
     """Base parameters of a UR10: by the rules, and by the columns of the regressor."""
     model = rm.load("erd:ur10")
-    # FIGAROH is not asked for offsets, which ours has besides
+    # neither is asked for offsets
     drive = rm.DriveParameters.zeros(model.n)
 
     def said(base: rm.BaseParameters) -> str:
@@ -71,7 +71,7 @@ def base_parameters(settings: Settings) -> Iterator[Work]:
 
 def _disagreement(model: rm.RobotModel) -> float:
     """Largest relative difference of the torques that the two sets of base parameters give."""
-    W = rm.torque_regressor(model, *motion_of(model.n, 1000))
+    W = rm.torque_regressor(model, *motion_of(model.n, 1000), drive=("Ia", "Fv", "Fc"))
     bases = rm.base_parameters(model), rm.base_parameters(model, "numeric")
     if len(bases[0]) != len(bases[1]):
         return float("inf")

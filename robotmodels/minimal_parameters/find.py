@@ -59,7 +59,7 @@ _LARGEST = 1e-2
 def base_parameters(
     model: RobotModel,
     method: Literal["symbolic", "numeric"] | BaseMethod = "symbolic",
-    drive: Drives = True,
+    drive: Drives = ("Ia", "Fv", "Fc"),
     motion: Motion | None = None,
     constraint: ArrayLike | Transmission | None = None,
     tolerance: float | None = None,
@@ -80,8 +80,8 @@ def base_parameters(
     method : {"symbolic", "numeric"}
         By Khalil's rules, with formulas, or from the columns of the torque regressor.
     drive : bool or collection of DriveKind or str
-        Which drive parameters are among the standard ones: all, none, or kinds such as ``"Ia"`` or
-        ``("Ia", "Fv", "Fc")``. What couples motors goes with its kind.
+        Which drive parameters are among the standard ones: kinds such as ``"Ia"``, True for all
+        (the offsets too), False for none. What couples motors goes with its kind.
     motion : tuple of array_like, shapes (N, n), Samples or Trajectory, optional
         Joint variables (rad or m), velocities and accelerations that the regressor is taken on, of
         the numeric method; default random ones. A trajectory is taken at 1000 times. What logged

@@ -187,7 +187,8 @@ class BaseParameters:
         Parameters
         ----------
         W : array_like, shape (..., p)
-            Regressor with a column for each standard parameter, such as `torque_regressor`.
+            Regressor with a column for each standard parameter, such as `torque_regressor` of
+            the same ``drive``.
 
         Returns
         -------
@@ -211,7 +212,8 @@ class BaseParameters:
         if W.ndim < 1 or W.shape[-1] != p:
             raise ShapeError(
                 f"W: expected shape (..., {p}), a column for each standard parameter (with the "
-                f"same drives and friction as these base parameters), got {W.shape}."
+                "same friction as these base parameters, and the same drives: "
+                f"drive={tuple(kind.value for kind in drive_kinds(self.drive))}), got {W.shape}."
                 + self._energy_hint(W.shape[-1] if W.ndim else 0)
             )
         return np.ascontiguousarray(W[..., self.kept])

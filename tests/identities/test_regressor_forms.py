@@ -148,7 +148,7 @@ def test_any_subset_of_columns_is_that_of_the_whole(model, seed):
 @given(model=models(max_frames=6), seed=seeds)
 def test_base_parameters_choose_their_columns(model, seed):
     q, v, a = random_state(model, np.random.default_rng(seed), 3)
-    base = base_parameters(model)
+    base = base_parameters(model, drive=True)
     W = torque_regressor(model, q, v, a, columns=base)
     np.testing.assert_array_equal(W, base.reduce(torque_regressor(model, q, v, a)))
     d = power_regressor(model, q, v, a, columns=base)

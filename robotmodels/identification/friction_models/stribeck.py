@@ -237,7 +237,7 @@ def fit_stribeck(
 def with_dry_friction(model: RobotModel, base: BaseParameters | None) -> BaseParameters:
     """Base parameters with the Coulomb friction that a curve is added to."""
     if base is None:
-        return base_parameters(model)
+        return base_parameters(model, drive=True)
     base.check(model)
     if not any(name.rstrip("0123456789") == "Fc" for name in base.names):
         raise InvalidValueError(

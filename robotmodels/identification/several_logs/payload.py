@@ -260,7 +260,7 @@ def identify_payload(
             processing = reference.system.processing if processing is None else processing
             reference = reference.system.log
     else:
-        base = base_parameters(model, friction=friction)
+        base = base_parameters(model, drive=True, friction=friction)
     problem = payload_problem(base, loaded, reference, frame, own, processing, executor)
     return _estimate(problem, solve_payload(problem, consistent), consistent)
 
