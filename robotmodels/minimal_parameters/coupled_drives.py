@@ -124,7 +124,7 @@ def dry_rows(base: BaseParameters) -> Array:
     >>> from robotmodels.robots import load
     >>> from robotmodels.minimal_parameters import base_parameters
     >>> dry_rows(base_parameters(load("tx40"))).shape
-    (2, 87)
+    (2, 81)
     """
     motors, weights = _motors(base)
     f, n, p = base.model.f, base.model.n, len(base.parameter_names)

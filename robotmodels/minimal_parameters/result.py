@@ -257,7 +257,7 @@ class BaseParameters:
         >>> from robotmodels.minimal_parameters import base_parameters
         >>> arm = load("planar_2r")
         >>> base_parameters(arm).values(arm).shape
-        (11,)
+        (9,)
         """
         self.check(model)
         return self.matrix @ parameter_vector(model, self.drive, self.friction)

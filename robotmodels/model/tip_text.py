@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..urdf import TOOL_LINKS, RobotParts
+from ..urdf import RobotParts
+from ..urdf.tip import TOOL_LINKS
 
 _SHOWN = 6
 

@@ -2,7 +2,6 @@
 
 from .parts import TOOL, NamedFrame, RobotParts
 from .read import read_urdf
-from .tip import TOOL_LINKS
 from .write import urdf_text
 
-__all__ = ["TOOL", "TOOL_LINKS", "NamedFrame", "RobotParts", "read_urdf", "urdf_text"]
+__all__ = ["TOOL", "NamedFrame", "RobotParts", "read_urdf", "urdf_text"]
