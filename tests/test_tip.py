@@ -8,8 +8,10 @@ import pytest
 from identities.random_robots import random_pose, random_table
 
 import robotmodels as rm
+from robotmodels.cli import main
 from robotmodels.errors import UrdfWarning
 from robotmodels.igm import IGMStatus
+from robotmodels.robots.erd import ERD_ARMS, erd_folder
 from robotmodels.trajectories import joint_path
 
 LIMIT = '<limit lower="-2" upper="2" velocity="3" effort="4"/>'
@@ -183,6 +185,22 @@ def test_print_names_the_tip_and_others():
         line = next(line for line in str(model).splitlines() if line.startswith("Other tips"))
         for link in line.split(": ")[1].split(" and ")[0].split(", "):
             assert link in model.frame_names
+
+
+def test_the_command_line_names_the_tip(capsys):
+    assert main(["info", "erd:panda"]) == 0
+    assert "Tip: link panda_hand_tcp" in capsys.readouterr().out
+
+
+def test_a_model_file_of_a_panda_ends_at_its_hand():
+    """The catalogue names panda_hand_tcp; the file alone has a hand with two fingers."""
+    path = erd_folder() / ERD_ARMS["panda"].urdf
+    model = rm.RobotModel.from_urdf(path)
+    q = np.linspace(-0.2, 0.4, 9)
+    assert np.array_equal(rm.dgm(model, q), rm.dgm(model, q, "panda_hand"))
+    alone = rm.RobotModel.from_urdf(path, tip_link="panda_hand")
+    assert alone.n == 7, "a tip that is given locks what is beyond it"
+    assert np.abs(rm.dgm(alone, q[:7]) - rm.dgm(model, q)).max() < 1e-14
 
 
 # --- joints that do not move the tip ------------------------------------------------------------
