@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from identities.random_robots import random_pose, random_table
+from identities.random_robots import random_model, random_pose, random_table
 
 import robotmodels as rm
 from robotmodels.cli import main
@@ -269,6 +269,38 @@ def test_side_joints_change_nothing(name):
         assert np.all(found.q[rows][:, still] == rest)
     near = rm.igm(tree, T[:3], q[:3]).nearest(q[:3])
     np.testing.assert_allclose(near, q[:3], atol=1e-6)
+
+
+def chain_alone(model):
+    """The frames from base to tip as a robot of their own, and its columns of q."""
+    rows = np.array(model.table.path(model.tip)) - 1
+    number = {int(row): k + 1 for k, row in enumerate(rows)}
+    fields = ("sigma", "mu", "gamma", "b", "beta", "alpha", "d", "theta", "r")
+    own = np.flatnonzero(np.isin(model.table.joint_rows, rows))
+    table = rm.DHTable(
+        antecedent=[number.get(int(model.table.antecedent[row]) - 1, 0) for row in rows],
+        **{name: getattr(model.table, name)[rows] for name in fields},
+        lower=model.lower[own], upper=model.upper[own],
+    )  # fmt: skip
+    return rm.RobotModel.from_table(table, base=model.base, tool=model.tool), own
+
+
+@pytest.mark.parametrize("seed", range(1, 9))
+def test_random_trees_are_solved_as_their_chain_alone(seed):
+    rng = np.random.default_rng(seed)
+    model = random_model(rng, f=8, tree=True, fixed=True, tip="any")
+    alone, own = chain_alone(model)
+    q = rng.uniform(-1, 1, (3, model.n))
+    T = rm.dgm(model, q)
+    np.testing.assert_allclose(rm.dgm(alone, q[:, own]), T, atol=1e-13)
+    found, wanted = rm.igm(model, T, q), rm.igm(alone, T, q[:, own])
+    assert np.array_equal(found.count, wanted.count)
+    assert np.array_equal(found.status, wanted.status)
+    assert np.array_equal(found.free_joints[..., own], wanted.free_joints)
+    np.testing.assert_allclose(found.nearest(q), q, atol=1e-6)
+    still = np.setdiff1d(np.arange(model.n), own)
+    assert not found.free_joints[..., still].any()
+    assert np.array_equal(found.q[:, 0, still], q[:, still])
 
 
 @pytest.mark.parametrize("name", ["puma560", "panda", "lab_trr"])
