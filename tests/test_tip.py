@@ -11,6 +11,7 @@ import robotmodels as rm
 from robotmodels.cli import main
 from robotmodels.errors import UrdfWarning
 from robotmodels.igm import IGMStatus
+from robotmodels.kinematics.lengths import characteristic_length
 from robotmodels.robots.erd import ERD_ARMS, erd_folder
 from robotmodels.trajectories import joint_path
 
@@ -85,6 +86,12 @@ def test_the_arm_ends_before_its_fingers(length, lengths):
     assert any(f"before {beyond} moving joints of a hand" in note for note in model.notes)
 
 
+@pytest.mark.parametrize("length", [6, 7, 8])
+@pytest.mark.parametrize("lengths", [(1, 2), (4, 3, 3)])
+def test_fingers_of_any_lengths_end_an_arm_that_places_a_hand_anywhere(length, lengths):
+    assert tip_of(urdf(*arm(length), *fingers(*lengths))) == ["hand_base"]
+
+
 def test_the_tip_is_the_last_link_that_all_fingers_share():
     text = urdf(*arm(6), ("hand_base", "palm", "fixed"), *fingers(2, on="palm"),
                 ("hand_base", "thumb"), ("thumb", "thumb_tip"))  # fmt: skip
@@ -130,6 +137,7 @@ def test_named_links_do_not_move_the_tip_of_a_robot_without_fingers():
         # a camera that turns beside the arm does not end it, wherever it stands in the file
         ([*arm(6), ("l3", "camera")], "camera"),
         ([*arm(3)[:2], ("l2", "camera"), ("l2", "a"), ("a", "b"), ("b", "end")], "end"),
+        ([*arm(5)[:4], ("l4", "camera"), ("l4", "a"), ("a", "b"), ("b", "end")], "end"),
         # a mobile base and a torso with a head before the arm
         ([*arm(2, "torso"), ("torso", "head"), *fingers(5, on="torso")], "finger0_4"),
         # a hand alone, longer than what carries it
@@ -253,6 +261,8 @@ def test_side_joints_change_nothing(name):
     T = rm.dgm(tree, q)
     np.testing.assert_allclose(T, rm.dgm(alone, q[:, own]), atol=1e-14)
     T[3, :3, 3] += 50.0  # out of reach
+    # by which rows of Jacobians are compared
+    assert characteristic_length(tree) == characteristic_length(alone)
     for given in (True, False):
         found = rm.igm(tree, T, q if given else None)
         wanted = rm.igm(alone, T, q[:, own] if given else None)
