@@ -258,14 +258,16 @@ def solve_cones(
 
 def lower_bound(
     value: float, gradient: Array, x: Array, constraints: Sequence[Constraint],
-    multipliers: Sequence[Array], curvature: Array,
+    multipliers: Sequence[Array], root: Array,
 ) -> float:  # fmt: skip
     """What a convex objective is at least within constraints, proved by multipliers.
 
     Any multipliers that the cones allow prove a bound, those of the optimum the best: nothing of
-    the solver is trusted. With slacks s, curvature C and what is left of the stationarity,
-    ``r = gradient + sum rows^T z``, every x' that meets the constraints has
+    the solver is trusted. With slacks s, curvature ``C = root^T root`` and what is left of the
+    stationarity, ``r = gradient + sum rows^T z``, every x' that meets the constraints has
     ``f(x') >= f(x) - z s + r (x' - x) + |x' - x|_C^2 / 2 >= f(x) - z s - r C^-1 r / 2``.
+    The bound is tight only where C is all of the curvature: what is left in directions that are
+    curved hardly costs anything.
 
     Parameters
     ----------
@@ -279,8 +281,9 @@ def lower_bound(
         All that hold.
     multipliers : sequence of ndarray
         Of each constraint; brought into the cone first.
-    curvature : ndarray, shape (p, p)
-        Positive definite, no more than the second derivative of the objective anywhere.
+    root : ndarray, shape (k, p)
+        Of full column rank; its Gram matrix is no more than the second derivative of the objective
+        anywhere. The root itself, since squares of small singular values have no digits left.
 
     Returns
     -------
@@ -299,9 +302,9 @@ def lower_bound(
         allowed = one.dual(z)
         left += one.rows.T @ allowed
         paid += float(allowed @ (one.right - one.rows @ x))
-    unit = 1.0 / np.sqrt(np.diag(curvature))
-    scaled = np.linalg.solve(curvature * unit * unit[:, None], left * unit)
-    return value - paid - 0.5 * float((left * unit) @ scaled)
+    unit = 1.0 / np.linalg.norm(root, axis=0)
+    triangle = np.linalg.qr(root * unit, mode="r")
+    return value - paid - 0.5 * float(np.sum(np.linalg.solve(triangle.T, left * unit) ** 2))
 
 
 def _outcome(word: str) -> ConeOutcome:

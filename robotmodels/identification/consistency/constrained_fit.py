@@ -192,8 +192,11 @@ class ConstrainedFit:
             float(miss @ miss) / total + weight * float(change @ problem.metric @ change)
         )
         gradient = system.fit.T @ miss / total + weight * problem.metric @ change
+        # squares and distance are both curved: the one where the torques see, the other elsewhere
+        root = np.linalg.cholesky(weight * problem.metric).T
+        root = np.vstack((system.fit / np.sqrt(total), root))
         bound = 2.0 * lower_bound(
-            value, gradient, sought, self.constraints, found.multipliers, weight * problem.metric
+            value, gradient, sought, self.constraints, found.multipliers, root
         )
         here = (system.sum(x) - system.least) / total
         if self.gamma > 0.0:  # of the sum that was asked for
