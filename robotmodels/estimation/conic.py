@@ -171,7 +171,7 @@ def triangle_of(S: Array) -> Array:
 
 def solve_cones(
     H: Array, g: Array, constraints: Sequence[Constraint], unit: Array, size: float = 1.0,
-    fit: tuple[Array, Array] | None = None,
+    fit: tuple[Array, Array] | None = None, squares: float = 1.0,
 ) -> ConeSolution:  # fmt: skip
     """Least of ``x H x / 2 + g x + |F x - t|^2 / 2`` within constraints.
 
@@ -213,42 +213,48 @@ def solve_cones(
     from scipy import sparse
 
     p = len(g)
-    F, t = (np.zeros((0, p)), np.zeros(0)) if fit is None else fit
-    k = len(t)
+    whole = unit * size
+    turn, start = np.diag(whole), np.zeros(p)
+    P, linear = H * whole * whole[:, None], g * whole
+    if fit is not None:
+        # coordinates along the singular vectors, in units of the residuals where the squares are
+        # steeper than one: no row or column is much greater than the others
+        F, t = fit
+        U, s, V = np.linalg.svd(F * whole)
+        s = np.concatenate((s, np.zeros(p - len(s))))
+        unitless = 1.0 / np.maximum(s, 1.0)
+        seen = U.T[: len(s)] @ t
+        seen = np.concatenate((seen[:p], np.zeros(max(0, p - len(seen)))))
+        turn = whole[:, None] * V.T * unitless
+        z0 = np.where(s > 1.0, seen, 0.0)
+        start = turn @ z0
+        slope = s * unitless
+        P = turn.T @ H @ turn + np.diag(squares * slope**2)
+        linear = turn.T @ (g + H @ start) + squares * slope * (slope * z0 - seen)
     of_cone = {
         Cone.ZERO: clarabel.ZeroConeT,
         Cone.NONNEGATIVE: clarabel.NonnegativeConeT,
         Cone.SECOND_ORDER: clarabel.SecondOrderConeT,
     }
     used = [one for one in constraints if len(one.right)]
-    rows = [np.hstack((one.rows * unit, np.zeros((len(one.right), k)))) for one in used]
-    right = [one.right / size for one in used]
+    rows = [one.rows @ turn / size for one in used]
+    right = [(one.right - one.rows @ start) / size for one in used]
     cones = [
         clarabel.PSDTriangleConeT(len(matrix_of(one.right)))
         if one.cone is Cone.SEMIDEFINITE
         else of_cone[one.cone](len(one.right))
         for one in used
     ]
-    if k:
-        scale = 1.0 / np.maximum(1.0, np.abs(F * unit * size).max(axis=1))
-        rows.append(np.hstack((F * unit * size, -np.eye(k))) * scale[:, None])
-        right.append(t * scale)
-        cones.append(clarabel.ZeroConeT(k))
-    scaled = H * unit * unit[:, None] * size**2
-    largest = max(float(np.abs(scaled).max(initial=0.0)), 1.0 if k else 1e-300)
-    P = np.zeros((p + k, p + k))
-    P[:p, :p] = np.triu(scaled) / largest
-    P[p:, p:] = np.eye(k) / largest
-    linear = np.concatenate((g * unit * size / largest, np.zeros(k)))
+    largest = max(float(np.abs(P).max(initial=0.0)), 1e-300)
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-11
     settings.max_iter = 500
     solution = clarabel.DefaultSolver(
-        sparse.csc_matrix(P), linear, sparse.csc_matrix(np.concatenate(rows)),
-        np.concatenate(right), cones, settings,
+        sparse.csc_matrix(np.triu(P) / largest), linear / largest,
+        sparse.csc_matrix(np.concatenate(rows)), np.concatenate(right), cones, settings,
     ).solve()  # fmt: skip
-    x = size * unit * np.array(solution.x)[:p]
+    x = start + turn @ np.array(solution.x)
     z = np.array(solution.z) * (largest / size)
     ends = np.cumsum([len(one.right) for one in used])
     parts = iter(np.split(z, ends)[: len(used)] if used else [])

@@ -24,7 +24,7 @@ _FIRST = 1e-8
 user gives none: it only decides what the torques do not."""
 SOUGHT = 1e-5
 """Part of the squares that the weight may cost in the end, where the least is looked for."""
-_ROUNDS = 4
+_ROUNDS = 8
 """How often the fit is scaled again at most."""
 _SIZES = 4.0
 """How much the size of the numbers may be off without scaling again."""
@@ -36,8 +36,6 @@ _PROVED = 2e-4
 """Part of the squares within which the fit is known to be the best, else it is said."""
 _REAL = 5e-9
 """Violation that is rounding, in natural units as many as the robot is away from the prior."""
-_FAR = 1e2
-"""How much greater than they were taken to be the squares are where the fit is scaled again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +88,8 @@ class ConstrainedFit:
         """The best fit, and of equal ones the nearest."""
         problem, system = self.problem, self.system
         smallest = max(system.least, 1e-8 * float(system.target @ system.target), 1e-300)
-        total = smallest
+        # from above: beside squares taken too small, robots that are far away look impossible
+        total = max(smallest, system.sum(problem.prior))
         weight = self.gamma / total if self.gamma > 0.0 else _FIRST
         size = problem.size(system.best)
         found = self.fitted(total, weight, size)
@@ -98,16 +97,14 @@ class ConstrainedFit:
             # how great squares, distance and numbers are is known only now
             if not np.isfinite(found.x).all():
                 break
-            reached, far = system.sum(found.x), self.reach(found.x)
-            wide = self.size_of(found.x)
-            # a run that failed may have said too much
-            more = reached > _FAR * total or _SIZES * max(reached, smallest) < total
-            light = self.gamma > 0.0 or (not more and weight * far**2 <= 4.0 * SOUGHT)
-            if not more and light and max(size, wide) <= _SIZES * min(size, wide):
+            reached, wide = max(smallest, system.sum(found.x)), self.size_of(found.x)
+            far = problem.distance(found.x)
+            even = max(reached, total) <= _SIZES * min(reached, total)
+            light = self.gamma > 0.0 or weight * far**2 <= 2.0 * SOUGHT
+            if even and light and max(size, wide) <= _SIZES * min(size, wide):
                 break
-            lighter = _FIRST if more else min(weight, SOUGHT / (1.0 + far**2))
-            now = max(smallest, reached) if more else total
-            trial = self.gamma / now if self.gamma > 0.0 else lighter
+            now = total if even else reached
+            trial = self.gamma / now if self.gamma > 0.0 else min(_FIRST, SOUGHT / (1.0 + far**2))
             again = self.fitted(now, trial, wide)
             if again.outcome is not ConeOutcome.SOLVED and found.outcome is ConeOutcome.SOLVED:
                 break
@@ -125,28 +122,21 @@ class ConstrainedFit:
             status = ConsistentStatus.FAILED
         return self.finished(signed, gap, clipped, status)
 
-    def reach(self, x: Array) -> float:
-        """How far from the prior a robot is, or the least squares are, whichever is farther.
-
-        A fit that stayed near the prior only because its numbers were off is not taken for proof.
-        """
-        problem, system = self.problem, self.system
-        missed = system.level - system.same @ problem.prior
-        moved = problem.unit * (np.linalg.pinv(system.same * problem.unit) @ missed)
-        return max(problem.distance(x), problem.distance(problem.prior + moved))
-
     def settled(self, x: Array) -> Array:
         """Known values exact, bounds missed by rounding met, signs turned back."""
-        unit = self.problem.unit
-        off = [
-            (one.rows, one.right)
-            for one in self.bounds
-            if one.cone is Cone.ZERO or (one.cone is Cone.NONNEGATIVE and one.slack(x)[0] < 0.0)
-        ]
-        if off:
-            E = np.concatenate([rows for rows, _ in off])
-            e = np.concatenate([right for _, right in off])
-            x = x + unit * (np.linalg.pinv(E * unit) @ (e - E @ x))
+        unit, moved = self.problem.unit, x
+        held = [one for one in self.bounds if one.cone is Cone.ZERO]
+        for _ in self.bounds:  # what meets one bound may miss another
+            if held:
+                E = np.concatenate([one.rows for one in held])
+                e = np.concatenate([one.right for one in held])
+                moved = x + unit * (np.linalg.pinv(E * unit) @ (e - E @ x))
+            sides = (one for one in self.bounds if one.cone is Cone.NONNEGATIVE)
+            missed = [one for one in sides if one not in held and one.slack(moved)[0] < 0.0]
+            if not missed:
+                break
+            held += missed
+        x = moved
         return self.problem.with_signs(x)
 
     def size_of(self, x: Array) -> float:
@@ -168,7 +158,7 @@ class ConstrainedFit:
         )
         found = solve_cones(
             problem.metric, -problem.metric @ problem.prior, (*self.constraints, same),
-            problem.unit, self.size_of(x),
+            problem.unit, self.size_of(x), (system.fit / radius, system.target / radius), 0.0,
         )  # fmt: skip
         if found.outcome is ConeOutcome.SOLVED and self.is_met(self.settled(found.x)):
             return found.x
@@ -201,8 +191,8 @@ class ConstrainedFit:
         here = (system.sum(x) - system.least) / total
         if self.gamma > 0.0:  # of the sum that was asked for
             here += weight * problem.distance(x) ** 2
-        else:  # of the squares alone, for robots as far as twice this one or the least squares
-            bound -= 4.0 * weight * self.reach(x) ** 2
+        else:  # of the squares alone, for robots at most twice as far as this one
+            bound -= 4.0 * weight * problem.distance(x) ** 2
         # squares without any constraint are a bound as well
         return max(0.0, here - max(bound, 0.0)) / (here + system.least / total)
 
