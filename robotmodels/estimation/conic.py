@@ -13,6 +13,8 @@ from .._arrays import Array
 from ..errors import MissingExtraError
 
 _ROOT = float(np.sqrt(2.0))
+_ITERATIONS = 500
+"""Of the interior-point solver at most; a budget that does not depend on the machine."""
 
 
 class ConeOutcome(Enum):
@@ -85,6 +87,11 @@ class Constraint:
             return np.abs(z)
         return np.array([float(np.linalg.norm(z))])
 
+    def share(self, x: Array, z: Array) -> Array:
+        """What room times multiplier leaves of a gap, one for each sentence; 0 at the optimum."""
+        parts = z * (self.right - self.rows @ x)
+        return parts if self.cone in (Cone.ZERO, Cone.NONNEGATIVE) else parts.sum(keepdims=True)
+
     def dual(self, z: Array) -> Array:
         """The nearest multipliers that the cone allows."""
         if self.cone is Cone.ZERO:
@@ -113,11 +120,14 @@ class ConeSolution:
         Of each constraint; where the outcome is ``INFEASIBLE``, those that prove it.
     outcome : ConeOutcome
         What the solver says.
+    ended : str
+        The solver's own word, and its iterations.
     """
 
     x: Array
     multipliers: tuple[Array, ...]
     outcome: ConeOutcome
+    ended: str = ""
 
 
 def matrix_of(stacked: Array) -> Array:
@@ -175,7 +185,10 @@ def solve_cones(
 ) -> ConeSolution:  # fmt: skip
     """Least of ``x H x / 2 + g x + |F x - t|^2 / 2`` within constraints.
 
-    The sum of squares has variables of its own, so that F is not squared and keeps its digits.
+    With a sum of squares the solver's variables are along the singular vectors of F: in units of
+    the residuals, from their least, where the squares are steep, and in natural units elsewhere. So
+    F is not squared and keeps its digits, and all numbers of the solver are of order one, however
+    well or badly the rows show the variables.
 
     Parameters
     ----------
@@ -191,6 +204,8 @@ def solve_cones(
         How many units the variables are expected to have; the solver's numbers are of order one.
     fit : (ndarray, ndarray), optional
         F of shape (k, p), and t of shape (k,).
+    squares : float
+        Weight of the sum of squares; 0 where it only gives the coordinates.
 
     Returns
     -------
@@ -214,23 +229,14 @@ def solve_cones(
 
     p = len(g)
     whole = unit * size
-    turn, start = np.diag(whole), np.zeros(p)
-    P, linear = H * whole * whole[:, None], g * whole
-    if fit is not None:
-        # coordinates along the singular vectors, in units of the residuals where the squares are
-        # steeper than one: no row or column is much greater than the others
-        F, t = fit
-        U, s, V = np.linalg.svd(F * whole)
-        s = np.concatenate((s, np.zeros(p - len(s))))
-        unitless = 1.0 / np.maximum(s, 1.0)
-        seen = U.T[: len(s)] @ t
-        seen = np.concatenate((seen[:p], np.zeros(max(0, p - len(seen)))))
-        turn = whole[:, None] * V.T * unitless
-        z0 = np.where(s > 1.0, seen, 0.0)
-        start = turn @ z0
-        slope = s * unitless
-        P = turn.T @ H @ turn + np.diag(squares * slope**2)
-        linear = turn.T @ (g + H @ start) + squares * slope * (slope * z0 - seen)
+    if fit is None:
+        turn, start, P, linear = np.diag(whole), np.zeros(p), H * whole * whole[:, None], g * whole
+    else:
+        turn, steep, target = _even_coordinates(*fit, whole)
+        start = turn @ np.where(steep == 1.0, target, 0.0)
+        P = turn.T @ H @ turn + np.diag(squares * steep**2)
+        miss = np.where(steep == 1.0, 0.0, -target)
+        linear = turn.T @ (g + H @ start) + squares * steep * miss
     of_cone = {
         Cone.ZERO: clarabel.ZeroConeT,
         Cone.NONNEGATIVE: clarabel.NonnegativeConeT,
@@ -249,7 +255,7 @@ def solve_cones(
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-11
-    settings.max_iter = 500
+    settings.max_iter = _ITERATIONS
     solution = clarabel.DefaultSolver(
         sparse.csc_matrix(np.triu(P) / largest), linear / largest,
         sparse.csc_matrix(np.concatenate(rows)), np.concatenate(right), cones, settings,
@@ -259,7 +265,8 @@ def solve_cones(
     ends = np.cumsum([len(one.right) for one in used])
     parts = iter(np.split(z, ends)[: len(used)] if used else [])
     multipliers = tuple(next(parts) if len(one.right) else np.zeros(0) for one in constraints)
-    return ConeSolution(x, multipliers, _outcome(str(solution.status)))
+    ended = f"{solution.status} after {solution.iterations} of {_ITERATIONS} iterations"
+    return ConeSolution(x, multipliers, _outcome(str(solution.status)), ended)
 
 
 def lower_bound(
@@ -311,6 +318,21 @@ def lower_bound(
     unit = 1.0 / np.linalg.norm(root, axis=0)
     triangle = np.linalg.qr(root * unit, mode="r")
     return value - paid - 0.5 * float(np.sum(np.linalg.solve(triangle.T, left * unit) ** 2))
+
+
+def _even_coordinates(F: Array, t: Array, unit: Array) -> tuple[Array, Array, Array]:
+    """Map (p, p) of coordinates z to x, with ``|F x - t| = |steep z - target|`` but for a constant.
+
+    ``steep`` (p,) is 1 where a coordinate in natural units would be steeper, else less.
+    """
+    p = len(unit)
+    if len(t) > p:
+        Q, F = np.linalg.qr(F)
+        t = Q.T @ t
+    U, values, V = np.linalg.svd(F * unit)
+    s, target = np.zeros(p), np.zeros(p)
+    s[: len(values)], target[: len(values)] = values, (U.T @ t)[: len(values)]
+    return unit[:, None] * V.T / np.maximum(s, 1.0), np.minimum(s, 1.0), target
 
 
 def _outcome(word: str) -> ConeOutcome:

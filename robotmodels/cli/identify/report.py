@@ -93,7 +93,7 @@ def real_bodies(
         return None
     if found.status is ConsistentStatus.FAILED:
         if asked:
-            raise InvalidValueError(f"--consistent: {found.status.sentence}")
-        say(f"no identified.urdf: {found.status.sentence}")
+            raise InvalidValueError(f"--consistent: {found.reason()}")
+        say(f"no identified.urdf: {found.reason()}")
         return None
     return found

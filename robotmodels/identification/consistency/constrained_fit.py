@@ -48,6 +48,7 @@ class FoundRobot:
     violation: float
     clipped: float
     active: tuple[str, ...]
+    stopped: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +111,9 @@ class ConstrainedFit:
                 break
             found, total, weight, size = again, now, trial, wide
         if not np.isfinite(found.x).all():
-            return FoundRobot(problem.prior, ConsistentStatus.FAILED, np.inf, np.inf, 0.0, ())
+            failed = ConsistentStatus.FAILED
+            said = f"The cone solver ended: {found.ended}."
+            return FoundRobot(problem.prior, failed, np.inf, np.inf, 0.0, (), said)
         x = found.x if self.gamma > 0.0 else self.nearest(found.x)
         signed = self.settled(x)
         clipped = float(np.abs((signed - x) / problem.unit).max())
@@ -120,7 +123,25 @@ class ConstrainedFit:
             status = ConsistentStatus.LOOSE
         if not self.is_met(signed):
             status = ConsistentStatus.FAILED
-        return self.finished(signed, gap, clipped, status)
+        stopped = self.stopped(signed, found, status)
+        return self.finished(signed, gap, clipped, status, stopped)
+
+    def stopped(self, x: Array, found: ConeSolution, status: ConsistentStatus) -> str:
+        """Where the solver stopped early: its last word, and the constraint that is worst there."""
+        if status is ConsistentStatus.LOOSE:
+            said = "What holds the greatest part of the gap:"
+            parts = [
+                one.share(found.x, one.dual(z))
+                for one, z in zip(self.constraints, found.multipliers, strict=True)
+            ]
+        elif status is ConsistentStatus.FAILED:
+            said = "What is missed most:"
+            parts = [-one.slack(x) for one in self.constraints]
+        else:
+            return ""
+        sentences = [said for one in self.constraints for said in one.sentences]
+        worst = sentences[int(np.argmax(np.concatenate(parts)))]
+        return f"The cone solver ended: {found.ended}. {said} {worst}"
 
     def settled(self, x: Array) -> Array:
         """Known values exact, bounds missed by rounding met, signs turned back."""
@@ -206,7 +227,7 @@ class ConstrainedFit:
         return real and self.violation(x) <= _REAL * (1.0 + self.problem.distance(x))
 
     def finished(
-        self, x: Array, gap: float, clipped: float, status: ConsistentStatus
+        self, x: Array, gap: float, clipped: float, status: ConsistentStatus, stopped: str = ""
     ) -> FoundRobot:
         """The robot, with the constraints that it leaves no room."""
         active = []
@@ -214,7 +235,7 @@ class ConstrainedFit:
             if one.cone is not Cone.ZERO:
                 slack = one.slack(x)
                 active += [said for s, said in zip(slack, one.sentences, strict=True) if s < _TIGHT]
-        return FoundRobot(x, status, gap, self.violation(x), clipped, tuple(active))
+        return FoundRobot(x, status, gap, self.violation(x), clipped, tuple(active), stopped)
 
     def contradiction(self) -> str:
         """Which bounds no real bodies meet together: as few as still contradict."""

@@ -156,4 +156,5 @@ def fit_consistent(
         *parts, found.status, base.names, base.matrix @ found.x, system.best,
         base.parameter_names, problem.prior, found.x, squares, system.least, rows, found.gap,
         found.violation, found.clipped, problem.distance(found.x), float(gamma), found.active,
+        found.stopped,
     )  # fmt: skip

@@ -81,6 +81,9 @@ class ConsistentFit(Rebuilt):
         Weight of its square beside the squares of the residuals.
     active : tuple of str
         Constraints without room that are left, a sentence each; known values are not listed.
+    stopped : str
+        Where the solver stopped early: its last word and the constraint that is worst there; else
+        empty.
 
     Examples
     --------
@@ -108,11 +111,38 @@ class ConsistentFit(Rebuilt):
     distance: float
     gamma: float
     active: tuple[str, ...]
+    stopped: str = ""
 
     def __post_init__(self) -> None:
         for name in ("friction", "base_values", "least_squares", "prior", "values"):
             if (value := getattr(self, name)) is not None:
                 object.__setattr__(self, name, read_only(value))
+
+    def reason(self) -> str:
+        """The status in words: how near the best fit is, and which bounds keep it from less.
+
+        Returns
+        -------
+        str
+            Where the solver stopped early, at which iteration and which constraint as well.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from robotmodels.identification.consistency.fit_consistent import fit_consistent
+        >>> from robotmodels.robots import load
+        >>> from robotmodels.minimal_parameters import base_parameters, uniform_bodies
+        >>> arm = load("planar_2r")
+        >>> base = base_parameters(arm, drive=False)
+        >>> found = fit_consistent(base, np.eye(4), [0.2, -0.1, 0.3, 0.0],
+        ...                        prior=uniform_bodies(arm, 5.0))
+        >>> "The pseudo-inertia of link 2 is singular to the margin." in found.reason()
+        True
+        """
+        parts = [self.status.sentence, self.stopped] if self.stopped else [self.status.sentence]
+        if self.status is not ConsistentStatus.FREE:
+            parts.append(f"No robot has squares less by more than {100.0 * self.gap:.1g} %.")
+        return " ".join((*parts, *self.active))
 
     @property
     def price(self) -> float:
@@ -163,7 +193,7 @@ class ConsistentFit(Rebuilt):
         """
         if self.status is ConsistentStatus.FAILED:
             raise InvalidValueError(
-                f"{self.status.sentence} Ask for a smaller margin, wider bounds or another prior."
+                f"{self.reason()} Ask for a smaller margin, wider bounds or another prior."
             )
         whole = model.with_inertia(self.inertia).with_drive(self.drive)
         return whole.with_transmission(self.transmission)
@@ -172,6 +202,7 @@ class ConsistentFit(Rebuilt):
         price = "without bound" if self.price == inf else f"{self.price:.3g} %"
         lines = [
             self.status.sentence,
+            *([self.stopped] if self.stopped else ()),
             f"Residuals: {price} more than least squares (root of weighted squares "
             f"{sqrt(self.squares):.6g}, unconstrained {sqrt(self.least):.6g}); no robot has "
             f"squares less by more than {100.0 * self.gap:.1g} %.",

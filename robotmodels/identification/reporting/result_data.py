@@ -226,7 +226,7 @@ def _robot(robot: ConsistentFit) -> dict[str, Any]:
     return {
         "status": {"name": robot.status.name, "sentence": robot.status.sentence},
         "price_percent": _number(robot.price), "distance": _number(robot.distance),
-        "gap": _number(robot.gap), "active": list(robot.active),
+        "gap": _number(robot.gap), "active": list(robot.active), "stopped": robot.stopped,
         "standard": dict(zip(robot.standard_names, _numbers(robot.values), strict=True)),
         "base": dict(zip(robot.names, _numbers(robot.base_values), strict=True)),
     }  # fmt: skip

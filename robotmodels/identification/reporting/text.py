@@ -199,7 +199,8 @@ def _real(robot: ConsistentFit | None) -> ReportSection | None:
     if robot is None:
         return None
     body: list[str | ReportTable] = [
-        f"{robot.status.sentence} Its residuals are {robot.price:.3g} % more than those of least "
+        " ".join((robot.status.sentence, robot.stopped)).strip()
+        + f" Its residuals are {robot.price:.3g} % more than those of least "
         f"squares (root of the weighted squares); none has {100.0 * robot.gap:.1g} % less."
     ]
     body += [f"* {sentence}" for sentence in robot.active]
