@@ -79,7 +79,7 @@ def weighted(base, motion, tau, sigma):
 
 @pytest.mark.parametrize("seed", range(30))
 def test_noisy_logs_of_heavy_arms_converge(seed):
-    """180 to 1200 equations, noise of 5 to 30 %, unmodelled torques, a prior ten times too light."""
+    """180 to 1200 equations, noise of 5 to 30 %, unmodelled torques, a prior ten times light."""
     rng = np.random.default_rng(seed)
     arm, bare = heavy_arm(rng)
     unmodelled = rng.uniform(0.0, 0.3) if seed % 3 else 0.0
