@@ -137,11 +137,11 @@ def test_gradients_of_criteria(function, equal):
 def test_smooth_condition_is_an_upper_bound_that_closes():
     W = np.random.default_rng(4).normal(size=(50, 8))
     exact = np.log(np.linalg.cond(W))
-    values = [smooth_condition(W, power)[0] for power in (2.0, 8.0, 60.0, 1000.0)]
+    values = [smooth_condition(W, power)[0] for power in (2.0, 8.0, 60.0, 200.0)]
     assert np.all(np.diff(values) < 0.0)
     assert all(
         exact - 1e-12 <= value <= exact + 2.0 * np.log(8) / power
-        for value, power in zip(values, (2.0, 8.0, 60.0, 1000.0), strict=True)
+        for value, power in zip(values, (2.0, 8.0, 60.0, 200.0), strict=True)
     )
     assert np.isclose(log_volume(W)[0], -np.linalg.slogdet(W.T @ W)[1] / 16.0)
 

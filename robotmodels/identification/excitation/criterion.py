@@ -9,6 +9,10 @@ import numpy as np
 from ..._arrays import Array
 
 _LEAST = 1e-12
+"""Least part of a column's length that a triangular factor has on its diagonal, for an inverse."""
+_BLOCK = 2**18
+"""Multiplications of a matrix product that one thread does: beyond it OpenBLAS divides the work
+among threads, which wait for each other longer than it takes, and far longer on a busy machine."""
 
 
 class ExcitationCriterion(Enum):
@@ -24,28 +28,49 @@ class ExcitationCriterion(Enum):
     LOG_DET = "minus the logarithm of the determinant of the information matrix"
 
 
-def singular_values(W: Array) -> tuple[Array, Array]:
-    """Singular values and right singular vectors of a tall matrix.
+def _product(W: Array, M: Array) -> Array:
+    """``W @ M``, shape (N, b), in blocks of rows that one thread multiplies."""
+    N, b = W.shape
+    size = max(1, _BLOCK // b**2)
+    whole = N - N % size
+    blocks = W[:whole].reshape(-1, size, b) @ M
+    return np.concatenate((blocks.reshape(whole, M.shape[1]), W[whole:] @ M))
 
-    Parameters
-    ----------
-    W : ndarray, shape (N, b)
-        N >= b.
 
-    Returns
-    -------
-    s : ndarray, shape (b,)
-        Descending.
-    Vt : ndarray, shape (b, b)
-        The vectors as rows.
+def triangular_factor(W: Array) -> Array:
+    """Triangular factor (b, b) of rows (N, b), compiled: the same with any number of threads."""
+    from ...kernels.triangles import fold_rows
 
-    Examples
-    --------
-    >>> singular_values(np.diag([3.0, 2.0]))[0]
-    array([3., 2.])
-    """
-    _, s, Vt = np.linalg.svd(np.linalg.qr(W, mode="r"))
-    return s, Vt
+    R = np.zeros((W.shape[1], W.shape[1]))
+    fold_rows(np.ascontiguousarray(W), R)
+    return R
+
+
+def _inverted(W: Array) -> tuple[Array, Array]:
+    """Triangular factor R of rows, and the inverse of ``R^T R``, shapes (b, b)."""
+    R = triangular_factor(W)
+    # with columns of one length the inverse keeps its digits where some are short
+    lengths = np.linalg.norm(R, axis=0)
+    lengths = np.maximum(lengths, _LEAST * lengths.max()) + np.finfo(float).tiny
+    R /= lengths
+    corner = np.diagonal(R)
+    R[np.diag_indices_from(R)] = np.copysign(np.maximum(np.abs(corner), _LEAST), corner)
+    inverse = np.linalg.inv(R) / lengths[:, None]
+    return R * lengths, _product(inverse, inverse.T)
+
+
+def _slope(S: Array, power: int) -> tuple[float, Array]:
+    """``log(tr(S^m)) / m`` and its derivative ``S^(m - 1) / tr(S^m)``, m the power."""
+    size = float(np.trace(S))
+    square, left, raised = S / size, power - 1, np.eye(len(S))
+    while left:
+        if left % 2:
+            raised = _product(raised, square)
+        left //= 2
+        if left:
+            square = _product(square, square)
+    total = float((raised * S).sum()) / size
+    return np.log(size) + np.log(total) / power, raised / (total * size)
 
 
 def smooth_condition(W: Array, power: float) -> tuple[float, Array]:
@@ -53,14 +78,15 @@ def smooth_condition(W: Array, power: float) -> tuple[float, Array]:
 
     The largest singular value is replaced by the p-norm of all, and the smallest by that of their
     inverses. The bound is at most ``log(b) / p * 2`` above the logarithm, and unlike it has a
-    gradient where singular values meet, as the smallest do at an optimum.
+    gradient where singular values meet, as the smallest do at an optimum. Both are traces of powers
+    of the Gram matrix and of its inverse: products of small matrices on one thread.
 
     Parameters
     ----------
     W : ndarray, shape (N, b)
         N >= b.
     power : float
-        p, at least 1.
+        p, an even number: half of it is the power of the Gram matrix.
 
     Returns
     -------
@@ -75,12 +101,11 @@ def smooth_condition(W: Array, power: float) -> tuple[float, Array]:
     >>> round(float(np.exp(value)), 6), gradient.diagonal()
     (4.0, array([ 0.25, -1.  ]))
     """
-    s, Vt = singular_values(W)
-    s = np.maximum(s, _LEAST * s[0])
-    up, down = (s / s[0]) ** power, (s[-1] / s) ** power
-    value = np.log(s[0] / s[-1]) + (np.log(up.sum()) + np.log(down.sum())) / power
-    slope = (up / up.sum() - down / down.sum()) / s
-    return float(value), W @ ((Vt.T * (slope / s)) @ Vt)
+    R, inverse = _inverted(W)
+    half = round(power / 2.0)
+    up, rise = _slope(_product(R.T, R), half)
+    down, fall = _slope(inverse, half)
+    return 0.5 * (up + down), _product(W, rise - _product(_product(inverse, fall), inverse))
 
 
 def log_volume(W: Array) -> tuple[float, Array]:
@@ -106,6 +131,6 @@ def log_volume(W: Array) -> tuple[float, Array]:
     >>> value, bool(np.allclose(gradient, -0.5 / np.e * np.eye(2)))
     (-1.0, True)
     """
-    s, Vt = singular_values(W)
-    s = np.maximum(s, _LEAST * s[0])
-    return float(-np.log(s).mean()), W @ ((Vt.T * (-1.0 / (s.size * s**2))) @ Vt)
+    R, inverse = _inverted(W)
+    b = W.shape[1]
+    return float(-np.log(np.abs(np.diagonal(R))).mean()), _product(W, inverse / -b)

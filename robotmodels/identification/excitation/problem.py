@@ -107,12 +107,13 @@ class ExcitationProblem:
     def judged(self, W: Array, power: float) -> tuple[float, Array]:
         """Criterion of the base columns (N, n, b), and its gradient by them."""
         N, n, b = W.shape
-        rows = (W * self.weight).reshape(N * n, b) / np.sqrt(N)
+        # joint by joint: their rows have zeros in the same columns, which the factor skips
+        rows = (W * (self.weight / np.sqrt(N))).transpose(1, 0, 2).reshape(n * N, b)
         if self.criterion is ExcitationCriterion.LOG_DET:
             value, gradient = log_volume(rows)
         else:
             value, gradient = smooth_condition(rows, power)
-        return value, gradient.reshape(N, n, b) * self.weight / np.sqrt(N)
+        return value, gradient.reshape(n, N, b).transpose(1, 0, 2) * (self.weight / np.sqrt(N))
 
     def value(self, x: Array, stage: Stage) -> tuple[float, Array]:
         """Criterion and penalties of coefficients.

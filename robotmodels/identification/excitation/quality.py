@@ -9,7 +9,7 @@ import numpy as np
 
 from ..._arrays import Array
 from ...trajectories import Trajectory
-from .criterion import ExcitationCriterion
+from .criterion import ExcitationCriterion, triangular_factor
 from .problem import ExcitationProblem
 from .stacked import StackedRegressor
 
@@ -81,8 +81,9 @@ def quality(problem: ExcitationProblem, trajectory: Trajectory, times: Array) ->
     base = problem.base
     W = StackedRegressor(problem.model, base.names, base.drive).matrix(q, v, a)
     b = len(base)
-    plain = np.linalg.qr(W.reshape(-1, b), mode="r")
-    weighted = np.linalg.qr((W * problem.weight).reshape(-1, b), mode="r")
+    plain = triangular_factor(W.reshape(-1, b))
+    alike = (problem.weight == 1.0).all()
+    weighted = plain if alike else triangular_factor((W * problem.weight).reshape(-1, b))
     lengths = np.linalg.norm(plain, axis=0)
     s = np.linalg.svd(weighted, compute_uv=False) / np.sqrt(len(times))
     with np.errstate(divide="ignore"):

@@ -68,11 +68,21 @@ def within_limits(problem: ExcitationProblem, X: Array) -> Array | None:
         Coefficients; None if even a twentieth of the motion breaks a limit.
     """
     still = problem.basis.centred(_means(problem, X))
-    for factor in _FACTORS:
-        less = still + factor * (X - still)
-        if limits_kept(problem, problem.basis.trajectory(less)).kept:
-            return less
-    return None
+
+    def kept(k: int) -> bool:
+        less = still + _FACTORS[k] * (X - still)
+        return limits_kept(problem, problem.basis.trajectory(less)).kept
+
+    # bisection: broken keeps no limits, good is the largest factor that was seen to
+    broken, good = -1, len(_FACTORS)
+    k = 0  # the whole motion first, then in the middle
+    while good - broken > 1:
+        if kept(k):
+            good = k
+        else:
+            broken = k
+        k = (broken + good) // 2
+    return None if good == len(_FACTORS) else still + _FACTORS[good] * (X - still)
 
 
 def _means(problem: ExcitationProblem, X: Array) -> Array:
