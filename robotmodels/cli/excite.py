@@ -109,13 +109,15 @@ def _add_search(search: Any) -> None:
     search.add_argument("--sigma", metavar="NUMBERS",
                         help="standard deviations of the torques, N m or N: one, or one for each "
                         "joint")  # fmt: skip
-    search.add_argument("--starts", type=int, default=8,
-                        help="motions that are improved (default: %(default)s)")  # fmt: skip
-    search.add_argument("--random", type=int, default=100, metavar="COUNT",
+    search.add_argument("--starts", type=int,
+                        help="motions that are improved "
+                        "(default: 8, or as many as the budget has)")  # fmt: skip
+    search.add_argument("--random", type=int, metavar="COUNT",
                         help="random motions, of which the best are improved "
-                        "(default: %(default)s)")  # fmt: skip
-    search.add_argument("--iterations", type=int, default=200,
-                        help="most of each stage of a start (default: %(default)s)")  # fmt: skip
+                        "(default: 100, or as many as the budget has)")  # fmt: skip
+    search.add_argument("--iterations", type=int,
+                        help="most of each stage of a start "
+                        "(default: what the budget has)")  # fmt: skip
     search.add_argument("--seed", type=int, default=0,
                         help="of chance (default: %(default)s)")  # fmt: skip
 

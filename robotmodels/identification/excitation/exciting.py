@@ -24,7 +24,7 @@ from .kept import limits_kept
 from .problem import ExcitationProblem
 from .quality import quality
 from .result import ExcitationStart, ExcitationStatus, ExcitingTrajectory
-from .search import STAGES, improved
+from .search import ITERATIONS, STAGES, gain_of_twice, improved, shared_budget
 from .starts import random_motion
 
 _LOG = logging.getLogger(__name__)
@@ -51,9 +51,9 @@ def exciting_trajectory(
     samples: int | None = None,
     margin: float = 0.005,
     rest: bool = True,
-    starts: int = 8,
-    baseline: int = 100,
-    iterations: int = 200,
+    starts: int | None = None,
+    baseline: int | None = None,
+    iterations: int | None = None,
     rng: np.random.Generator | int | None = None,
     progress: bool | Progress = False,
 ) -> ExcitingTrajectory:
@@ -103,13 +103,17 @@ def exciting_trajectory(
     rest : bool
         Whether a Fourier series begins and ends with zero velocity and acceleration, by two linear
         equations for the coefficients of each joint. Splines always do.
-    starts : int
-        How many of the random motions are improved.
-    baseline : int
-        How many random motions are made, at least ``starts``.
-    iterations : int
-        Most of each of the four stages of a start. A stage ends where the criterion falls by less
-        than 1 % over 25 of them.
+    starts : int, optional
+        How many of the random motions are improved; default 8, fewer for robots whose evaluations
+        are so long that the budget has no more. Twice as many are twice the budget; the notes say
+        how much they would bring.
+    baseline : int, optional
+        How many random motions are made, at least ``starts``; default 100, or fewer likewise.
+    iterations : int, optional
+        Most of each of the four stages of a start, however long they take. A stage ends where the
+        criterion falls by less than 1 % over 25 of them. Default 200 within a budget of
+        evaluations, so that 8 starts take about ten seconds of a processor; it counts
+        multiplications and not time, so that the same search is made each time.
     rng : Generator or int, optional
         Chance, or its seed; default another one each time.
     progress : bool or callable
@@ -158,7 +162,6 @@ def exciting_trajectory(
         )
     bounds, notes = excitation_limits(model, limits)
     torques, torque_notes = excitation_torques(model, torque_limits)
-    count, pool = _whole(starts, "starts"), _whole(baseline, "baseline")
     each = 20 if way is MotionKind.FOURIER else 10
     samples = max(each * order, 60) if samples is None else _whole(samples, "samples")
     if samples * model.n < len(base) or samples < 2 * order + 1:
@@ -173,6 +176,14 @@ def exciting_trajectory(
         _sizes(sigma, model.n, "sigma"), _sizes(scale, len(base), "scale"), float(margin),
     )  # fmt: skip
     times = basis.duration / (_DENSE * samples) * np.arange(_DENSE * samples, dtype=np.float64)
+    count, evaluations, pool = shared_budget(problem)
+    count = count if starts is None else _whole(starts, "starts")
+    pool = pool if baseline is None else _whole(baseline, "baseline")
+    most, allowed = (
+        (ITERATIONS, evaluations)
+        if iterations is None
+        else (_whole(iterations, "iterations"), None)
+    )
     chance = np.random.default_rng(rng)
     drawn = [random_motion(problem, chance) for _ in range(max(pool, count))]
     judged = [quality(problem, basis.trajectory(X), times) for X in drawn]
@@ -187,9 +198,7 @@ def exciting_trajectory(
         def stage_done(stages: int, s: int = s) -> None:
             report(s * len(STAGES) + stages, count * len(STAGES))
 
-        X, history, stages, status = improved(
-            problem, drawn[k], _whole(iterations, "iterations"), stage_done
-        )
+        X, history, stages, status = improved(problem, drawn[k], most, allowed, stage_done)
         after = quality(problem, basis.trajectory(X), times)
         if kept[k] and (
             status is ExcitationStatus.INFEASIBLE or after.of(aim) > judged[k].of(aim)
@@ -213,7 +222,7 @@ def exciting_trajectory(
     return ExcitingTrajectory(
         trajectory, model, base, aim, done[first].after, limits_kept(problem, trajectory),
         tuple(done), random, basis, ends[first], done[first].status,
-        (*notes, *torque_notes, *_advice(done[first].status)),
+        (*notes, *torque_notes, *_advice(done[first].status), *_more(done, aim)),
     )  # fmt: skip
 
 
@@ -224,6 +233,34 @@ def _advice(status: ExcitationStatus) -> tuple[str, ...]:
             "more starts; a robot that cannot hold its own weight needs larger torque_limits.",
         )
     return ()
+
+
+def _more(done: Sequence[ExcitationStart], aim: ExcitationCriterion) -> tuple[str, ...]:
+    """How much a greater budget would bring, by the spread of the starts and their last steps."""
+    kept = [one for one in done if one.status is not ExcitationStatus.INFEASIBLE]
+    if not kept:
+        return ()
+    values = np.array([one.after.of(aim) for one in kept])
+    if aim is ExcitationCriterion.CONDITION:
+        gain = f"lower the condition number by about {100.0 * gain_of_twice(np.log(values)):.2g} %"
+    else:
+        gain = f"raise the log det by about {gain_of_twice(values):.2g}"
+    found = []
+    if len(values) > 1:
+        ends = values if aim is ExcitationCriterion.CONDITION else -values
+        found.append(
+            f"Twice the budget (starts={2 * len(done)}) would {gain}: the {len(values)} starts "
+            f"ended at {ends.min():.4g} to {ends.max():.4g}."
+        )
+    best = kept[int(values.argmin())]
+    last = best.history[len(best.history) - int(best.stages[-1]) :]
+    if best.status is ExcitationStatus.LIMIT_OF_ITERATIONS and len(last) > 1:
+        fall = 100.0 * (1.0 - np.exp(min(0.0, last[-1] - last[len(last) // 2])))
+        found.append(
+            f"The last half of the last stage still lowered the criterion by {fall:.2g} %: more "
+            f"iterations (iterations={2 * max(int(best.stages.max()), 1)}) would lower it further."
+        )
+    return tuple(found)
 
 
 def _checked_base(model: RobotModel, base: BaseParameters | None, drive: Drives) -> BaseParameters:

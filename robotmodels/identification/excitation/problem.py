@@ -95,6 +95,12 @@ class ExcitationProblem:
         self.bounds = [self._bounds(order) for order in range(self.orders)]
         self.units = self._units()
 
+    @property
+    def work(self) -> float:
+        """Cost of an evaluation, in multiplications of the factor and of its powers."""
+        N, n, b = len(self.t), self.model.n, len(self.base)
+        return 1e6 + N * n * b**2 + 3.0 * b**3
+
     def motion(self, x: Array) -> list[Array]:
         """Positions and derivatives (N, n) at the samples, of coefficients x (P n,) in units."""
         X = self.coefficients(x)

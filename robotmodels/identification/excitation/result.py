@@ -27,7 +27,7 @@ class ExcitationStatus(Outcome):
     """
 
     CONVERGED = 0, "The criterion fell by less than 1 % over the last 25 iterations, or not at all."
-    LIMIT_OF_ITERATIONS = 1, "The iterations ended before the criterion stood still."
+    LIMIT_OF_ITERATIONS = 1, "The budget of evaluations ended before the criterion stood still."
     INFEASIBLE = 2, "No motion was found that keeps every limit."
 
 
