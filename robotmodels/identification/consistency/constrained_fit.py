@@ -205,7 +205,7 @@ class ConstrainedFit:
         gradient = system.fit.T @ miss / total + weight * problem.metric @ change
         # squares and distance are both curved: the one where the torques see, the other elsewhere
         root = np.linalg.cholesky(weight * problem.metric).T
-        root = np.vstack((system.fit / np.sqrt(total), root))
+        root = np.vstack((system.fit / np.sqrt(total), root), dtype=np.float64)
         bound = 2.0 * lower_bound(
             value, gradient, sought, self.constraints, found.multipliers, root
         )
