@@ -316,7 +316,7 @@ def lower_bound(
         left += one.rows.T @ allowed
         paid += float(allowed @ (one.right - one.rows @ x))
     unit = 1.0 / np.linalg.norm(root, axis=0)
-    triangle = np.linalg.qr(root * unit, mode="r")
+    triangle = np.asarray(np.linalg.qr(root * unit, mode="r"), dtype=np.float64)
     return value - paid - 0.5 * float(np.sum(np.linalg.solve(triangle.T, left * unit) ** 2))
 
 
@@ -327,8 +327,8 @@ def _even_coordinates(F: Array, t: Array, unit: Array) -> tuple[Array, Array, Ar
     """
     p = len(unit)
     if len(t) > p:
-        Q, F = np.linalg.qr(F)
-        t = Q.T @ t
+        whole = np.asarray(np.linalg.qr(np.column_stack((F, t)), mode="r"), dtype=np.float64)
+        F, t = whole[:, :p], whole[:, p]  # the last row is what no x takes away
     U, values, V = np.linalg.svd(F * unit)
     s, target = np.zeros(p), np.zeros(p)
     s[: len(values)], target[: len(values)] = values, (U.T @ t)[: len(values)]
