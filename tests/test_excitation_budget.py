@@ -55,6 +55,7 @@ def test_long_evaluations_leave_fewer_starts_and_random_motions(monkeypatch):
     found = exciting_trajectory(rm.load("ur10e"), rng=0)
     assert len(found.starts) == 1
     assert len(found.baseline) <= 8
+    assert any("more starts would bring is not known" in note for note in found.notes)
     assert found.limits.kept
     monkeypatch.setattr(search, "BUDGET", 3e10)
     again = exciting_trajectory(rm.load("planar_2r"), harmonics=2, rng=0)

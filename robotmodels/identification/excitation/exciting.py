@@ -246,7 +246,9 @@ def _more(done: Sequence[ExcitationStart], aim: ExcitationCriterion) -> tuple[st
     else:
         gain = f"raise the log det by about {gain_of_twice(values):.2g}"
     found = []
-    if len(values) > 1:
+    if len(values) == 1:
+        found.append("How much more starts would bring is not known of one: it takes starts=2.")
+    else:
         ends = values if aim is ExcitationCriterion.CONDITION else -values
         found.append(
             f"Twice the budget (starts={2 * len(done)}) would {gain}: the {len(values)} starts "
