@@ -41,6 +41,7 @@ class FindingKind(Enum):
     RATES_OFF_POSITIONS = "velocities or accelerations do not follow from the positions"
     TORQUE_ABOVE_LIMITS = "torques are above the limits"
     TORQUE_BELOW_USE = "torques are too small to be torques of the joints"
+    TORQUE_OFF_INERTIA = "torques are of another size than those of the model's inertia"
     CONSTANT_POSITION = "a joint does not move"
     CONSTANT_TORQUE = "a torque is constant"
     NOTHING_MOVES = "nothing moves"

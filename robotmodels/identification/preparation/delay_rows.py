@@ -9,12 +9,10 @@ from numpy.typing import NDArray
 
 from ..._arrays import Array
 from ...errors import InvalidValueError
-from ...friction import Friction
-from ...friction.combined import by_dependence
 from ...logs import Log
 from ...logs.stretches import SAMPLES, stretches
 from ...model import RobotModel
-from ...regressors import parameter_names, torque_regressor_chunks
+from ...regressors import torque_regressor_chunks
 from .filters import central_differences, zero_phase
 
 _PER_CUTOFF = 2.5
@@ -29,6 +27,28 @@ _SMOOTH = ("Ia", "Fv", "offset")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class FilteredSamples:
+    """A log through a zero-phase filter, and its thinned rows.
+
+    Parameters
+    ----------
+    q, v, a, tau : ndarray, shape (N, n)
+        Positions, their derivatives, torques; not filtered in recordings that are too short.
+    places : ndarray of int, shape (T,)
+        Thinned rows, away from the ends of recordings.
+    cutoff : float
+        Hz.
+    """
+
+    q: Array
+    v: Array
+    a: Array
+    tau: Array
+    places: NDArray[np.int64]
+    cutoff: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class ThinRows:
     """Equations of one joint at a time, from filtered and thinned samples.
 
@@ -36,74 +56,45 @@ class ThinRows:
     ----------
     bases : tuple of ndarray, each shape (N_j, r_j)
         Orthonormal bases of what the columns of joint j span.
-    regressors : tuple of ndarray, each shape (N_j, p)
-        Their rows; none where they are left out.
     places : tuple of ndarray of int, each shape (N_j,)
         Rows of the log.
-    velocities : ndarray, shape (rows of the log, n)
-        Of the filtered positions.
     tau : ndarray, shape (rows of the log, n)
         Filtered torques.
-    viscous, dry : int
-        Columns of viscous and Coulomb friction of the first joint, those of the others follow, and
-        after them Coulomb friction of motors that joints share.
-    shared : ndarray, shape (k, n)
-        Weights of the joints in the speeds of these motors.
-    names : tuple of str, length p
-        Of the columns.
     """
 
     bases: tuple[Array, ...]
-    regressors: tuple[Array, ...]
     places: tuple[NDArray[np.int64], ...]
-    velocities: Array
     tau: Array
-    viscous: int
-    dry: int
-    shared: Array
-    names: tuple[str, ...]
 
 
-def thin_rows(
-    log: Log,
-    model: RobotModel,
-    cutoff: float,
-    margin: int,
-    whole: bool = True,
-    friction: Friction | None = None,
-) -> ThinRows:
-    """Filter, differentiate, thin out, and leave out rows near a joint's standstill.
+def filtered_samples(log: Log, cutoff: float, margin: int, most: int = _MOST) -> FilteredSamples:
+    """Filter and differentiate a log, and thin out its rows.
 
     Positions and torques pass the same zero-phase filter, so that what is left of the one fits what
-    is left of the other. Near standstill the sign of the velocity, which friction follows, is lost
-    in that: these rows are left out.
+    is left of the other.
 
     Parameters
     ----------
     log : Log
         What was recorded.
-    model : RobotModel
-        Of its joints.
     cutoff : float
         Hz.
     margin : int
-        Rows left out at both ends of each recording.
-    whole : bool
-        False leaves the regressors out, for which there are bases.
-    friction : Friction, optional
-        Whose parts that depend on positions have columns too.
+        Rows left out at both ends of each recording, besides what the filter needs.
+    most : int
+        Thinned rows at most.
 
     Returns
     -------
-    ThinRows
-        Joint by joint.
+    FilteredSamples
+        Of the whole log, with the numbers of the thinned rows.
 
     Raises
     ------
     InvalidValueError
-        No recording is long enough, or a joint has no rows.
+        No recording is long enough.
     """
-    step = max(1, int(1.0 / (_PER_CUTOFF * cutoff * log.dt)), len(log) // _MOST)
+    step = max(1, int(1.0 / (_PER_CUTOFF * cutoff * log.dt)))
     settled = margin + int(np.ceil(1.0 / (cutoff * log.dt)))
     v, a, q = np.zeros_like(log.q), np.zeros_like(log.q), np.zeros_like(log.q)
     tau = np.array(log.tau)
@@ -122,54 +113,71 @@ def thin_rows(
             f"{cutoff:g} Hz and the delays that are tried need; give a higher cutoff or try fewer."
         )
     places = np.concatenate(taken)
-    dry_columns = _dry_friction(log, model, v, cutoff, places)
-    _, placed = by_dependence(friction)
-    moving = _moving(model, v, places, int(np.ceil(0.25 / (cutoff * log.dt))))
-    samples = q[places], v[places], a[places]
-    regressors = _rows_by_joint(model, samples, placed, dry_columns, moving)
-    names = parameter_names(model, _SMOOTH, placed)
-    dry = len(names)
-    names = (*names, *parameter_names(model, ("Fc",))[10 * model.f :])
-    del q, a, samples, dry_columns
+    if len(places) > most:
+        places = places[np.linspace(0, len(places) - 1, most).round().astype(int)]
+    return FilteredSamples(q, v, a, tau, places, cutoff)
+
+
+def thin_rows(log: Log, model: RobotModel, cutoff: float, margin: int) -> ThinRows:
+    """Equations of each joint, without those near its standstill.
+
+    Near standstill the sign of the velocity, which friction follows, is lost in the filter: these
+    rows are left out.
+
+    Parameters
+    ----------
+    log : Log
+        What was recorded.
+    model : RobotModel
+        Of its joints.
+    cutoff : float
+        Hz.
+    margin : int
+        Rows left out at both ends of each recording.
+
+    Returns
+    -------
+    ThinRows
+        Joint by joint.
+
+    Raises
+    ------
+    InvalidValueError
+        No recording is long enough, or a joint has no rows.
+    """
+    x = filtered_samples(log, cutoff, margin)
+    places = x.places
+    near = int(np.ceil(0.25 / (cutoff * log.dt)))
+    moving = _moving(model, x.v, places, near)
+    samples = (x.q[places], x.v[places], x.a[places])
+    friction = _dry_friction(log, model, x.v, cutoff, places)
+    regressors = _rows_by_joint(model, samples, friction, moving)
+    del friction
     bases = []
-    for j, rows in enumerate(regressors):
+    for rows in regressors:
         U, s, _ = np.linalg.svd(rows / _sizes(rows), full_matrices=False)
         bases.append(np.ascontiguousarray(U[:, s > _RANK * s.max(initial=0.0)]))
-        if not whole:
-            regressors[j] = np.empty((0, rows.shape[1]))
-    own = [places[moving[:, j]] for j in range(log.n)]
-    return ThinRows(
-        tuple(bases),
-        tuple(regressors),
-        tuple(own),
-        v,
-        tau,
-        10 * model.table.f + log.n,
-        dry,
-        _shared(model),
-        names,
-    )
+    return ThinRows(tuple(bases), tuple(places[moving[:, j]] for j in range(log.n)), x.tau)
 
 
 def _rows_by_joint(
     model: RobotModel,
     samples: tuple[Array, Array, Array],
-    placed: Friction | None,
-    dry: Array,
+    friction: Array,
     moving: NDArray[np.bool_],
 ) -> list[Array]:
     """Rows of each joint at which it may be looked at, links and drives, then dry friction."""
     found: list[Array] = []
     counts = np.zeros(model.n, dtype=np.int64)
-    for part, W in torque_regressor_chunks(model, *samples, drive=_SMOOTH, friction=placed):
+    for part, W in torque_regressor_chunks(model, *samples, drive=_SMOOTH):
         if not found:
-            width = W.shape[2] + dry.shape[2]
+            width = W.shape[2] + friction.shape[2]
             found = [np.empty((int(k), width)) for k in moving.sum(axis=0)]
         for j, rows in enumerate(found):
             use = moving[part, j]
             here = slice(counts[j], counts[j] + int(use.sum()))
             rows[here, : W.shape[2]] = W[use, j]
-            rows[here, W.shape[2] :] = dry[part][use, j]
+            rows[here, W.shape[2] :] = friction[part][use, j]
             counts[j] = here.stop
     return found
 
@@ -197,7 +205,7 @@ def _dry_friction(
     log: Log, model: RobotModel, v: Array, cutoff: float, places: NDArray[np.int64]
 ) -> Array:
     """Columns of Coulomb friction, whose steps pass the filter as those of the torques do."""
-    n, shared = log.n, _shared(model)
+    n, shared = log.n, shared_motors(model)
     steps = np.sign(np.concatenate([v, v @ shared.T], axis=1))
     for rows in log.recordings():
         if rows.stop - rows.start > 1:
@@ -210,7 +218,7 @@ def _dry_friction(
     return columns
 
 
-def _shared(model: RobotModel) -> Array:
+def shared_motors(model: RobotModel) -> Array:
     """Weights of the joints in the speeds of motors that they share, shape (k, n)."""
     if model.transmission is None:
         return np.zeros((0, model.n))
@@ -227,7 +235,7 @@ def _moving(
     model: RobotModel, v: Array, places: NDArray[np.int64], near: int
 ) -> NDArray[np.bool_]:  # fmt: skip
     """Rows at which joints, and motors that they share, keep the sign of their velocity."""
-    weights = _shared(model)
+    weights = shared_motors(model)
     speed = np.concatenate([v, v @ weights.T], axis=1)
     owner = np.concatenate([np.eye(v.shape[1], dtype=bool), weights != 0.0])
     least = _STILL * np.abs(speed).max(axis=0)

@@ -2,39 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from ..._arrays import Array
 from ...errors import ShapeError
-from ...friction import Friction
 from ...logs import FindingKind, Log, LogFinding, Severity
 from ...logs.log import check_is_log
-from ...minimal_parameters import base_parameters
 from ...model import RobotModel, check_model
-from .delay_rows import ThinRows, looked_at, thin_rows
+from ...regressors import torque_regressor
+from .delay_rows import filtered_samples, looked_at
+from .joint_hypotheses import Hypothesis, JointSamples, better_hypotheses
 from .synchronisation import SynchronisationStatus, synchronisation
+from .torque_sizes import torque_sizes
 
 _CUTOFF, _SHARE = 15.0, 0.1
-_CLEARLY = 0.5
-"""A wrong joint must leave less than this part of the variance that the own joint leaves."""
-_EXPLAINED = 0.8
-_SIGNIFICANT = 6.0
+_ROWS = 300
+"""Samples at which the equations of all joints are compared."""
 _RANK = 1e-6
 
 
-def check_joints(
-    log: Log, model: RobotModel, friction: Friction | None = None
-) -> tuple[LogFinding, ...]:
-    """What the dynamic model tells of a log: joints swapped, wrong signs, delay, what is excited.
+def check_joints(log: Log, model: RobotModel) -> tuple[LogFinding, ...]:
+    """What the dynamic model tells of a log: signs, order, units, delay, what is excited.
 
-    - Each torque is explained by the model of each joint, its parameters free. Where two torques
-      are clearly better explained by each other's joints, they look swapped.
-    - Friction takes energy. Where viscous and Coulomb friction that fit a torque give energy,
-      significantly, the sign of its torque (or of its position) looks wrong.
-    - The regressor's rank on this motion is compared with the number of base parameters.
+    - Readings of the log with the sign of a joint's position, torque or both changed, with two
+      joints swapped in these, with all torques turned, and with positions in degrees are fitted
+      to the equations of all joints at once, see `better_hypotheses`. Where one fits significantly
+      better than the log as given, it is named.
+    - Where the model has masses, torques are compared in size with those of its inertia.
+    - The regressor's rank on this motion is compared with that on random motion.
     - The delay of the torques is estimated, see `synchronisation`.
 
     Of a log of more than 1e5 samples so many are looked at, in up to 20 stretches spread evenly
@@ -45,10 +42,7 @@ def check_joints(
     log : Log
         What was recorded.
     model : RobotModel
-        The robot it is of; its inertia and friction are not used.
-    friction : Friction, optional
-        Gravity compensators of the robot, alone or in a sum: a compensator that is not given may
-        look like a wrong sign.
+        The robot it is of; its inertia is used for the size of torques alone.
 
     Returns
     -------
@@ -86,7 +80,10 @@ def check_joints(
     cutoff = min(_CUTOFF, _SHARE / log.dt)
     part = looked_at(log, cutoff)
     found: list[LogFinding] = []
-    _dynamic(part, model, thin_rows(part, model, cutoff, 2, friction=friction), found)
+    samples = JointSamples.of(filtered_samples(part, cutoff, 2, _ROWS))
+    _signs_and_order(part, model, samples, found)
+    torque_sizes(part, model, samples, found)
+    _excited(part, model, samples, found)
     _in_step(part, model, found)
     if part is not log:
         said = f" (Judged by {len(part)} of {len(log)} samples.)"
@@ -94,97 +91,71 @@ def check_joints(
     return tuple(found)
 
 
-def _dynamic(log: Log, model: RobotModel, rows: ThinRows, found: list[LogFinding]) -> None:
-    if not _swapped(log, rows, found):
-        _signs(log, rows, found)
-    _excited(log, model, rows, found)
+def _signs_and_order(
+    log: Log, model: RobotModel, samples: JointSamples, found: list[LogFinding]
+) -> None:
+    """Report flips, swaps and degrees, one after the other where there are several."""
+    for _ in range(log.n):
+        likely = better_hypotheses(samples, model)
+        if not likely:
+            return
+        best, others = likely[0], likely[1:]
+        (kind, words, advice), names = (
+            _in_words(best, log),
+            tuple(log.names[j] for j in best.joints),
+        )
+        alike = " As likely: " + "; ".join(_in_words(x, log)[1] for x in others) + "."
+        found.append(
+            LogFinding(
+                kind, Severity.USELESS if best.certain else Severity.DOUBTFUL, names,
+                f"{words[0].upper()}{words[1:]}: read so, the equations of all joints together "
+                f"leave {100.0 * best.left:.2g} % of the variance of the torques concerned instead "
+                f"of {100.0 * best.given:.2g} % ({best.significance:.0f} standard errors). "
+                f"{advice}{alike if others else ''}",
+            )
+        )  # fmt: skip
+        if not best.certain:
+            return
+        samples = samples.read_as(best)
 
 
-def _swapped(log: Log, rows: ThinRows, found: list[LogFinding]) -> bool:
-    n = log.n
-    rest = np.ones((n, n))  # of torque i, what the model of joint j leaves
-    for j in range(n):
-        basis, at = rows.bases[j], rows.places[j]
-        if len(at) < 3 * basis.shape[1] or np.ptp(log.q[:, j]) < 1e-9:
-            continue
-        y = rows.tau[at]
-        y = y - y.mean(axis=0)
-        size = (y**2).sum(axis=0)
-        left = ((y - basis @ (basis.T @ y)) ** 2).sum(axis=0)
-        rest[:, j] = np.where(size > 0.0, left / np.where(size > 0.0, size, 1.0), 1.0)
-    taken: set[int] = set()
-    for i in range(n):
-        for j in range(i + 1, n):
-            if taken & {i, j}:
-                continue
-            if (
-                rest[i, j] < _CLEARLY * rest[i, i] and rest[j, i] < _CLEARLY * rest[j, j]
-                and max(rest[i, j], rest[j, i]) < 1.0 - _EXPLAINED
-            ):  # fmt: skip
-                taken |= {i, j}
-                names = (log.names[i], log.names[j])
-                found.append(
-                    LogFinding(
-                        FindingKind.SWAPPED_JOINTS, Severity.USELESS, names,
-                        f"Joints {names[0]} and {names[1]} look swapped: the torque of each "
-                        f"follows the motion of the other (unexplained {100 * rest[i, j]:.1f} and "
-                        f"{100 * rest[j, i]:.1f} % instead of {100 * rest[i, i]:.1f} and "
-                        f"{100 * rest[j, j]:.1f} %). See the order of the columns of positions and "
-                        "of torques.",
-                    )
-                )  # fmt: skip
-    return bool(taken)
+def _in_words(x: Hypothesis, log: Log) -> tuple[FindingKind, str, str]:
+    """Kind, name and advice of a hypothesis."""
+    names = [log.names[j] for j in x.joints]
+    both, (q, tau) = "positions and torques", x.changes
+    if x.is_unit:
+        return FindingKind.POSITIONS_IN_DEGREES, "positions look like degrees", (
+            "Read the log with angles='deg', or with gears= or transmission= if they are motor "
+            "angles."
+        )  # fmt: skip
+    if len(names) == 2 and (x.torque if tau else x.position).trace() >= 0.0:
+        what = both if q and tau else "positions" if q else "torques"
+        return FindingKind.SWAPPED_JOINTS, (
+            f"joints {names[0]} and {names[1]} look swapped in {what}"
+        ), "See the order of the columns (positions=, torques= of read_log)."  # fmt: skip
+    if len(names) > 1:
+        return FindingKind.WRONG_SIGN, "the torques of all joints have the wrong sign", (
+            "See drive_gains= of read_log, which may be negative."
+        )  # fmt: skip
+    if q and tau:
+        return FindingKind.WRONG_SIGN, (
+            f"joint {names[0]} looks flipped, in position and torque"
+        ), "Give it -1 in signs= of read_log."  # fmt: skip
+    what = "position" if q else "torque"
+    return FindingKind.WRONG_SIGN, f"the {what} of joint {names[0]} has the wrong sign", (
+        "Of read_log, signs= turns position and torque, a negative entry of drive_gains= the "
+        "torque alone."
+    )  # fmt: skip
 
 
-def _signs(log: Log, rows: ThinRows, found: list[LogFinding]) -> None:
-    """Report joints whose friction gives energy."""
-    for j in range(log.n):
-        W, at = rows.regressors[j], rows.places[j]
-        if not len(at):
-            continue
-        # Coulomb friction of motors that it shares is lost in it too
-        shared = np.flatnonzero(rows.shared[:, j]).tolist()
-        own = {rows.viscous + j, rows.dry + j, *(rows.dry + log.n + k for k in shared)}
-        power, deviation = _friction_power(W, rows.tau[at, j], rows.velocities[at, j], own)
-        if power < -_SIGNIFICANT * deviation:
-            name = log.names[j]
-            found.append(
-                LogFinding(
-                    FindingKind.WRONG_SIGN, Severity.USELESS, (name,),
-                    f"Joint {name}: its friction would give {-power:.3g} W on the average, where "
-                    "friction takes energy. The sign of its torque or of its position looks wrong: "
-                    "see signs= and drive_gains= of read_log.",
-                )
-            )  # fmt: skip
-
-
-def _friction_power(W: Array, tau: Array, v: Array, own_columns: set[int]) -> tuple[float, float]:
-    """Mean power that the friction of a joint takes, and its standard deviation."""
-    size = np.sqrt((W**2).sum(axis=0))
-    kept = np.flatnonzero(size > 1e-9 * size.max(initial=1.0))
-    A = W[:, kept] / size[kept]
-    own = [k for k, column in enumerate(kept.tolist()) if column in own_columns]
-    if not own or len(A) < 3 * len(kept):
-        return 0.0, 1.0
-    others = np.delete(A, own, axis=1)
-    U, s, _ = np.linalg.svd(others, full_matrices=False)
-    U = U[:, s > _RANK * s.max(initial=0.0)]
-    clean = A[:, own] - U @ (U.T @ A[:, own])
-    y = tau - U @ (U.T @ tau)
-    x, _, rank, _ = np.linalg.lstsq(clean, y, rcond=1e-6)
-    rest = y - clean @ x
-    if rank < len(own):
-        return 0.0, 1.0
-    freedom = max(1, len(y) - U.shape[1] - len(own))
-    covariance = float(rest @ rest) / freedom * np.linalg.inv(clean.T @ clean)
-    gain = (v[:, None] * A[:, own]).mean(axis=0)
-    return float(gain @ x), float(np.sqrt(gain @ covariance @ gain)) + 1e-300
-
-
-def _excited(log: Log, model: RobotModel, rows: ThinRows, found: list[LogFinding]) -> None:
-    base = base_parameters(model, drive=True)
-    kept = [rows.names.index(name) for name in base.names]
-    possible, seen = len(base), _rank([W[:, kept] for W in rows.regressors])
+def _excited(log: Log, model: RobotModel, samples: JointSamples, found: list[LogFinding]) -> None:
+    rng = np.random.default_rng(0)
+    most = 40 * model.table.f
+    lower, upper = np.maximum(model.lower, -np.pi), np.minimum(model.upper, np.pi)
+    q = rng.uniform(lower, upper, (most, model.n))
+    v, a = rng.normal(0.0, 2.0, (2, most, model.n))
+    possible = _rank(torque_regressor(model, q, v, a))
+    seen = _rank(torque_regressor(model, samples.q, samples.v, samples.a))
     if seen < possible:
         found.append(
             LogFinding(
@@ -196,10 +167,9 @@ def _excited(log: Log, model: RobotModel, rows: ThinRows, found: list[LogFinding
         )  # fmt: skip
 
 
-def _rank(parts: Sequence[Array]) -> int:
-    factors = [np.asarray(np.linalg.qr(W, mode="r")) for W in parts]
-    R = np.asarray(np.linalg.qr(np.concatenate(factors), mode="r"))
-    size = np.sqrt((R**2).sum(axis=0))  # of the columns of all parts
+def _rank(W: Array) -> int:
+    R = np.asarray(np.linalg.qr(W.reshape(-1, W.shape[-1]), mode="r"))
+    size = np.sqrt((R**2).sum(axis=0))
     kept = size > 1e-9 * size.max(initial=0.0)
     s = np.linalg.svd(R[:, kept] / size[kept], compute_uv=False)
     return int((s > _RANK * s.max(initial=0.0)).sum())

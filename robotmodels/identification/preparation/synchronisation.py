@@ -169,7 +169,7 @@ def synchronisation(
     delays: Array = np.asarray(reach * np.arange(-steps, steps + 1), np.float64)
     margin = int(np.ceil((delays[-1] + 2.0 * reach) / log.dt)) + 2
     log = looked_at(log, min(fc, 1.0 / span))
-    rows = thin_rows(log, model, fc, margin, whole=False)
+    rows = thin_rows(log, model, fc, margin)
     seen = [j for j in range(log.n) if len(rows.places[j]) > rows.bases[j].shape[1] + 10]
     if not seen:
         raise InvalidValueError(
