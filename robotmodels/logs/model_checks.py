@@ -14,6 +14,8 @@ _DEGREES = 180.0 / np.pi
 _BEYOND = 0.05
 """Of its range, how far a joint may be outside its limits: sensors and stops are not exact."""
 _TURNS = 30.0
+_MOST = 1000.0
+"""Angle, rad, that no joint of an arm reaches, limits or not."""
 _FACTOR = 4.0
 """Times its limit that a joint must be at to be in another unit, not only off its zero."""
 _PER_PARAMETER = 10
@@ -52,9 +54,11 @@ def position_units(log: Log, model: RobotModel, found: list[LogFinding]) -> None
     if not outside:
         return
     turning = ~prismatic & known
-    fits = ((least / _DEGREES >= lower - margin) & (most / _DEGREES <= upper + margin))[
-        turning
-    ].all()
+    fits = np.where(
+        known,
+        (least / _DEGREES >= lower - margin) & (most / _DEGREES <= upper + margin),
+        size <= 360.0,
+    )[~prismatic].all()
     ratio = model.transmission
     motors = False
     if ratio is not None and ratio.is_invertible and not np.allclose(ratio.matrix, np.eye(log.n)):
@@ -73,34 +77,30 @@ def position_units(log: Log, model: RobotModel, found: list[LogFinding]) -> None
         f"{log.names[j]} ({least[j]:.4g} to {most[j]:.4g}, {limits[j]})" for j in outside
     )
     reach = np.where(known, np.maximum(np.abs(lower), np.abs(upper)), np.pi)
-    surely = (size[outside] > _FACTOR * reach[outside]).any()
+    far = bool((size > _FACTOR * reach)[outside].any())
+    # a joint without limits may turn on and on: whether it does is told by the dynamic model
+    surely = bool((size > np.where(known, _FACTOR * reach, _MOST))[outside].any())
     if motors and surely:
         kind, advice = FindingKind.MOTOR_SIDE_POSITIONS, (
             "through the model's transmission they would be within: read the log with "
             "transmission=model.transmission."
         )  # fmt: skip
-    elif fits and turning.any() and surely:
+    elif fits and far:
         kind, advice = FindingKind.POSITIONS_IN_DEGREES, (
-            "as degrees they would be within: read the log with angles='deg', or with gears= or "
-            "transmission= if they are motor angles."
+            f"as degrees they would be within{'' if turning.any() else ' a turn'}: read the log "
+            "with angles='deg', or with gears= or transmission= if they are motor angles."
         )  # fmt: skip
-    elif surely:
+    elif far:
         kind, advice = FindingKind.MOTOR_SIDE_POSITIONS, (
             "these may be motor angles: read the log with gears= or transmission=."
         )  # fmt: skip
     else:
-        found.append(
-            LogFinding(
-                FindingKind.OUTSIDE_LIMITS, Severity.DOUBTFUL, names,
-                f"Joints outside their limits: {listed}; see units, offsets and signs, or the "
-                "limits of the model.",
-            )
+        kind, advice = FindingKind.OUTSIDE_LIMITS, (
+            "see units, offsets and signs, or the limits of the model."
         )  # fmt: skip
-        return
+    severity = Severity.USELESS if surely else Severity.DOUBTFUL
     found.append(
-        LogFinding(
-            kind, Severity.USELESS, names, f"Joints outside their limits: {listed}; {advice}"
-        )
+        LogFinding(kind, severity, names, f"Joints outside their limits: {listed}; {advice}")
     )
 
 

@@ -29,6 +29,8 @@ _RIDGE = 1e-10
 _NOTHING = 1e-9
 _REVERSAL = 0.25
 """Periods of the filter's cutoff over which it spreads a reversal."""
+_TURN = 2.0 * np.pi
+"""Position that a joint must pass for degrees to be a hypothesis."""
 _LIMITED = (0, 3, 5, 9)
 """Second moments and mass, where XX YY ZZ of a link are replaced by the second moments."""
 
@@ -125,7 +127,7 @@ def better_hypotheses(samples: JointSamples, model: RobotModel) -> tuple[Hypothe
     given = _Fit(samples, model, unit)
     base = given.constrained(unit)
     found: list[tuple[float, Hypothesis]] = []
-    for position, torques in _readings(model):
+    for position, torques in _readings(model, samples.q):
         fit = given if np.array_equal(position, unit) else _Fit(samples, model, position)
         for joints, torque in torques:
             least = min(len(joints), 2) * _LIKELY
@@ -143,11 +145,15 @@ def better_hypotheses(samples: JointSamples, model: RobotModel) -> tuple[Hypothe
     return tuple(what for gain, what in found if gain > found[0][0] - _LIKELY)
 
 
-def _readings(model: RobotModel) -> Iterator[tuple[Array, list[tuple[tuple[int, ...], Array]]]]:
+def _readings(
+    model: RobotModel, q: Array
+) -> Iterator[tuple[Array, list[tuple[tuple[int, ...], Array]]]]:
     """Matrices of the positions, each with joints concerned and matrices of the torques."""
     n = model.n
     unit = np.eye(n)
-    changes = [((j,), unit - 2.0 * np.diag(unit[j])) for j in range(n)]
+    changes: list[tuple[tuple[int, ...], Array]] = [
+        ((j,), unit - 2.0 * np.diag(unit[j])) for j in range(n)
+    ]
     for pair in combinations(range(n), 2):
         order = np.arange(n)
         order[list(pair)] = pair[::-1]
@@ -157,7 +163,7 @@ def _readings(model: RobotModel) -> Iterator[tuple[Array, list[tuple[tuple[int, 
     for joints, change in changes:
         yield change, [(joints, unit), (joints, change)]
     turning = model.table.sigma[model.table.joint_rows] != PRISMATIC
-    if turning.any():
+    if (np.abs(q[:, turning]) > _TURN).any():
         degrees = np.diag(np.where(turning, np.pi / 180.0, 1.0))
         yield degrees, [(tuple(np.flatnonzero(turning).tolist()), unit)]
 
@@ -236,7 +242,7 @@ def _solved(A: Array, b: Array, free: int) -> Array:
         return b
     scale = np.sqrt(np.diag(A))
     R = cholesky(A / np.outer(scale, scale) + _RIDGE * np.eye(len(A)), check_finite=False)
-    c = solve_triangular(R, b / scale, trans="T", check_finite=False)
+    c = solve_triangular(R, b / scale, trans=1, check_finite=False)
     x = np.zeros(len(A))
     if free < len(A):
         x[free:] = nnls(R[free:, free:], c[free:])[0]

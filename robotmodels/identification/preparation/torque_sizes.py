@@ -66,11 +66,11 @@ def _add(
 ) -> None:
     """Add one finding of several joints."""
     names = tuple(log.names[j] for j in gains)
-    listed = ", ".join(f"{log.names[j]} {number(gain)}" for j, gain in gains.items())
+    listed = ", ".join(f"{log.names[j]}: {number(gain)}" for j, gain in gains.items())
     found.append(
         LogFinding(
             FindingKind.TORQUE_OFF_INERTIA, Severity.DOUBTFUL, names,
-            f"Torques, friction taken off, are {joining} those of the model's own inertia (joint "
-            f"{listed}); {advice}",
+            f"Torques, friction taken off, are {joining} those of the model's own inertia "
+            f"({listed}); {advice}",
         )
     )  # fmt: skip
