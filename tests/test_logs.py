@@ -61,12 +61,36 @@ def test_rows_are_not_left_out_without_a_filter():
 
 def test_gaps_may_be_allowed():
     t = np.delete(DT * np.arange(200), [50, 51])
-    split = regular_rows(t, values(t), "x")
+    split = regular_rows(t, values(t), "x", largest_gap=1.5)
     assert len(split.starts) == 2
-    whole = regular_rows(t, values(t), "x", dt=DT, largest_gap=5.0, largest_jitter=5.0)
+    whole = regular_rows(t, values(t), "x", dt=DT, largest_gap=5.0)
     assert len(whole.starts) == 1
     assert len(whole.values) == 200
-    np.testing.assert_allclose(whole.values, values(DT * np.arange(200)), atol=1e-6)
+    np.testing.assert_allclose(whole.values, values(DT * np.arange(200)), atol=1e-4)
+
+
+@pytest.mark.parametrize("stamped", [True, False])
+def test_missing_samples_are_interpolated_up_to_a_tenth_of_the_shortest_period(stamped):
+    rng = np.random.default_rng(1)
+    dt, N = 0.004, 2500
+    t = dt * np.arange(N)
+    data = np.column_stack([np.sin(2.0 * np.pi * 0.9 * t), np.sin(2.0 * np.pi * 0.3 * t)])
+    noisy = data + rng.normal(0.0, 1e-4, data.shape)
+    lost = rng.random(N) < 0.03
+    lost[[0, -1]] = False
+    lost[500:515] = lost[1500:1560] = True  # 0.06 and 0.24 s
+    lost[[499, 515, 1499, 1560]] = False
+    rows = noisy[~lost] if stamped else np.where(lost[:, None], np.nan, noisy)
+    found = regular_rows(t[~lost] if stamped else None, rows, "x", dt=None if stamped else dt)
+    assert found.starts.tolist() == [0, 1500]
+    assert found.dt == pytest.approx(dt, rel=1e-9)
+    truth = np.delete(data, slice(1500, 1560), axis=0)
+    np.testing.assert_allclose(found.values, truth, atol=1e-3)
+    (note,) = [note for note in found.notes if "interpolated" in note]
+    inserted = len(found.values) - int((~lost).sum())
+    assert f"x: {inserted} missing samples were interpolated, in gaps of up to 0.064 s" in note
+    shortest = float(note.split("motion is ")[1].split()[0])
+    assert 0.7 < shortest < 1.12
 
 
 def test_repeated_stamps_are_refused_and_listed():

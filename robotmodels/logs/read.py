@@ -53,7 +53,7 @@ def read_log(
     offsets: ArrayLike | None = None,
     joints: Sequence[str] | None = None,
     model: RobotModel | None = None,
-    largest_gap: float = 1.5,
+    largest_gap: float | None = None,
     largest_jitter: float = 0.5,
     format: LogFormat | str | None = None,  # noqa: A002 - what it is called everywhere
     delimiter: str | None = None,
@@ -110,8 +110,10 @@ def read_log(
         Names of the joints, in order; default the model's, or those of the file.
     model : RobotModel, optional
         Says how many joints there are, their names and kinds.
-    largest_gap : float
-        Periods; longer ones split the log.
+    largest_gap : float, optional
+        Periods; samples missing in shorter gaps are interpolated, longer ones split the log.
+        Default a tenth of the shortest period of the motion, that of the frequency below which
+        velocities have 99.9 % of their power.
     largest_jitter : float
         Periods; differences of stamps that are further off are an error.
     format : LogFormat or str, optional
@@ -180,7 +182,7 @@ def read_log(
             n, angles=angle, lengths=length, signs=signs, gears=gears, transmission=transmission,
             drive_gains=drive_gains, offsets=offsets, model=model,
         )  # fmt: skip
-        rows = regular_rows(raw.t, raw.values, file.name, dt, largest_gap, largest_jitter)
+        rows = regular_rows(raw.t, raw.values, file.name, dt, largest_gap, largest_jitter, n)
         if raw.t is not None and not _SHORTEST <= rows.dt <= _LONGEST:
             raise InvalidValueError(
                 f"{file}: rows would be {rows.dt:.4g} s apart; say times='ms', 'us' or 'ns' if "

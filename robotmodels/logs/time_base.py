@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from .._arrays import Array
 from ..errors import InvalidValueError
-from .interpolation import splined
+from .interpolation import filled, splined
 from .log import RefusedRows
+from .motion import SHARE, shortest_period
 
 _REGULAR = 0.01
 """Stamps this close to a regular grid, in periods, are the grid: rounding, not sampling."""
@@ -18,6 +19,13 @@ _COARSER = 1.5
 """Periods of the file above which a grid leaves out rows."""
 _FINER = 100.0
 """Rows of a grid for one of the file, above which nothing is interpolated: nobody measured it."""
+_GAP = 1.5
+"""Periods between rows above which samples are missing."""
+_JITTER = 0.25
+"""Periods, for nine of ten stamps, above which it is not told what is missing."""
+_STRETCH = 10
+"""Periods of the gaps that straight lines bridge where the motion is estimated."""
+_UNKNOWN = 1e6
 _REPEATED = 0.1
 """Share of repeated stamps above which the stamps are too coarse to tell anything."""
 
@@ -52,15 +60,17 @@ def regular_rows(
     values: Array,
     source: str,
     dt: float | None = None,
-    largest_gap: float = 1.5,
+    largest_gap: float | None = None,
     largest_jitter: float = 0.5,
+    joints: int | None = None,
 ) -> RegularRows:
     """Bring samples to a regular grid, recording by recording.
 
-    A row that lacks a number is refused and ends a recording, since nothing may be filtered over
-    it. A stamp that repeats the one before is refused. Time that goes back, or on by more than
-    ``largest_gap`` periods, starts a recording. Stamps that are off the grid by less than a
-    hundredth of a period are taken as regular; others are brought to it by cubic splines.
+    Rows that lack a number, and stamps that repeat the one before, are refused. Time that goes
+    back, or on by more than ``largest_gap`` periods, starts a recording, since nothing may be
+    filtered over it; samples missing in shorter gaps are interpolated. Stamps that are off the grid
+    by less than a hundredth of a period are taken as regular; others are brought to it by cubic
+    splines.
 
     Parameters
     ----------
@@ -73,10 +83,13 @@ def regular_rows(
     dt : float, optional
         Period of the grid, s; needed without ``t``, else default the mean of the stamps'
         differences, and at most 1.5 times that.
-    largest_gap : float
-        In periods of the file.
+    largest_gap : float, optional
+        In periods of the file; default a tenth of the shortest period of the motion, at least 1.5,
+        and 1.5 where stamps are far from regular.
     largest_jitter : float
         How much of a period the differences of stamps may be off before that is an error.
+    joints : int, optional
+        How many of the first columns are positions, which tell the motion; default all.
 
     Returns
     -------
@@ -100,28 +113,29 @@ def regular_rows(
         refused.append(
             RefusedRows(source, tuple(bad.tolist()), "a number is missing or not finite")
         )
+        notes.append(
+            f"{source}: {len(bad)} of {N} rows lack a number and were left out (the first is row "
+            f"{bad[0]})."
+        )
     if len(bad) == N:
         raise InvalidValueError(
             f"{source}: every one of its {N} rows lacks a number; see whether the right columns "
             "were given, and whether they were recorded at the same times."
         )
     kept = np.flatnonzero(good)
-    broken = np.diff(kept) > 1
-    if len(bad):
-        notes.append(
-            f"{source}: {len(bad)} of {N} rows lack a number and were left out (the first is row "
-            f"{bad[0]}); the log is split there."
-        )
     if t is None:
         if dt is None:
             raise InvalidValueError(
                 f"{source}: no column of times was given or found; say dt=, the sampling period in "
                 "seconds, or time=, the column."
             )
-        period = dt
+        stamps: Array = np.asarray(dt * np.arange(N), np.float64)
     else:
-        kept, broken = _without_repeated(t, kept, broken, source, refused, notes)
-        period, broken = _split(t, kept, broken, source, largest_gap, notes)
+        kept = _without_repeated(t, kept, source, refused, notes)
+        stamps = t
+    period, counts, broken = _split(
+        stamps, values[:, :joints], kept, source, None if t is not None else dt, largest_gap, notes
+    )
     edges = np.flatnonzero(broken) + 1
     pieces, alone = [], []
     for piece in np.split(kept, edges):
@@ -134,11 +148,17 @@ def regular_rows(
         raise InvalidValueError(
             f"{source}: no two rows follow each other in time without a gap; nothing is left."
         )
-    blocks = [values[piece] for piece in pieces]
+    places = np.concatenate([[0], np.cumsum(counts)])
+    at = np.searchsorted(kept, [piece[0] for piece in pieces])
+    whole = [
+        _filled(places[k : k + len(piece)], stamps[piece], values[piece])
+        for k, piece in zip(at, pieces, strict=True)
+    ]
+    blocks = [block for _, block in whole]
     if t is not None:
-        stamps = [t[piece] for piece in pieces]
         grid = period if dt is None else dt
-        blocks = _on_grid(stamps, blocks, period, grid, source, largest_jitter, notes)
+        times = [each for each, _ in whole]
+        blocks = _on_grid(times, blocks, period, grid, source, largest_jitter, notes)
         period = grid
     starts = np.concatenate([[0], np.cumsum([len(block) for block in blocks])[:-1]])
     return RegularRows(
@@ -147,15 +167,26 @@ def regular_rows(
     )  # fmt: skip
 
 
+def _filled(places: NDArray[np.int64], stamps: Array, rows: Array) -> tuple[Array, Array]:
+    """Stamps and rows with those that are missing between their places."""
+    every = np.arange(places[0], places[-1] + 1)
+    if len(every) == len(places):
+        return stamps, rows
+    missing = np.setdiff1d(every, places)
+    values = np.empty((len(every), rows.shape[1]))
+    values[places - places[0]] = rows
+    values[missing - places[0]] = filled(places, rows, missing)
+    return np.interp(every, places, stamps), values
+
+
 def _without_repeated(
-    t: Array, kept: NDArray[np.int64], broken: NDArray[np.bool_], source: str,
-    refused: list[RefusedRows], notes: list[str],
-) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:  # fmt: skip
+    t: Array, kept: NDArray[np.int64], source: str, refused: list[RefusedRows], notes: list[str]
+) -> NDArray[np.int64]:
     again = np.zeros(len(kept), bool)
     again[1:] = np.diff(t[kept]) == 0.0
     count = int(again.sum())
     if not count:
-        return kept, broken
+        return kept
     if count > _REPEATED * len(kept):
         raise InvalidValueError(
             f"{source}: {count} of {len(kept)} stamps repeat the one before: they are coarser than "
@@ -167,28 +198,36 @@ def _without_repeated(
         f"{source}: {count} rows repeat the time of the row before and were left out (the first "
         f"is row {rows[0]}, at {t[rows[0]]:.9g} s)."
     )
-    # what was broken before a row that is left out stays broken before the next one
-    piece = np.concatenate([[0], np.cumsum(broken)])[~again]
-    return kept[~again], np.diff(piece) > 0
+    return kept[~again]
 
 
 def _split(
-    t: Array, kept: NDArray[np.int64], broken: NDArray[np.bool_], source: str, largest_gap: float,
-    notes: list[str],
-) -> tuple[float, NDArray[np.bool_]]:  # fmt: skip
-    """Mean period within recordings, and where new ones start."""
+    t: Array, positions: Array, kept: NDArray[np.int64], source: str, dt: float | None,
+    largest_gap: float | None, notes: list[str],
+) -> tuple[float, NDArray[np.int64], NDArray[np.bool_]]:  # fmt: skip
+    """Period within recordings, periods from each row to the next, and where new ones start."""
     steps = np.diff(t[kept])
     back = steps < 0.0
-    inside = steps[~broken & ~back]
-    if not len(inside):
+    beside = steps[(np.diff(kept) == 1) & ~back]
+    if not len(beside):
+        beside = steps[~back]
+    if not len(beside):
         raise InvalidValueError(
             f"{source}: no two rows follow each other in time; see whether time names the right "
             "column."
         )
-    median = float(np.median(inside))
-    gap = (steps > largest_gap * median) & ~broken
+    median = float(np.median(beside)) if dt is None else dt
+    missing = ~back & (steps > _GAP * median)
+    counts = np.ones(len(steps), np.int64)
+    shortest = 0.0
+    if missing.any() and np.quantile(np.abs(beside / median - 1.0), 0.9) <= _JITTER:
+        counts[missing] = np.minimum(np.round(steps[missing] / median), _UNKNOWN)
+        if largest_gap is None:
+            shortest = _motion(positions[kept], counts, back | (counts > _STRETCH), median)
+    limit = max(_GAP, SHARE * shortest / median) if largest_gap is None else largest_gap
+    gap = (steps > limit * median * (1.0 + 1e-6)) & ~back
     for once, often, where in (
-        ("goes back once", "goes back {} times", back & ~broken),
+        ("goes back once", "goes back {} times", back),
         ("has one gap", "has {} gaps", gap),
     ):
         found = np.flatnonzero(where)
@@ -200,8 +239,30 @@ def _split(
                 f"{kept[first + 1]}, from {t[kept[first]]:.9g} to {t[kept[first + 1]]:.9g} s); the "
                 "log is split there."
             )
-    broken = broken | back | gap
-    return float(steps[~broken].mean()) if (~broken).any() else median, broken
+    broken = back | gap
+    counts[broken] = 1
+    if (counts > 1).any():
+        why = f" (the shortest period of the motion is {shortest:.3g} s)" if shortest else ""
+        notes.append(
+            f"{source}: {int((counts - 1).sum())} missing samples were interpolated, in gaps of up "
+            f"to {median * counts.max():.3g} s{why}."
+        )
+    joined = ~broken
+    period = float(steps[joined].sum() / counts[joined].sum()) if joined.any() else median
+    return period, counts, broken
+
+
+def _motion(
+    positions: Array, counts: NDArray[np.int64], ends: NDArray[np.bool_], period: float
+) -> float:
+    """Shortest period of the motion, of the longest stretch without an end."""
+    cuts = [0, *(np.flatnonzero(ends) + 1).tolist(), len(positions)]
+    k = int(np.diff(cuts).argmax())
+    part = positions[cuts[k] : cuts[k + 1]]
+    places = np.concatenate([[0], np.cumsum(counts[cuts[k] : cuts[k + 1] - 1])])
+    every = np.arange(places[-1] + 1)
+    lines = [np.interp(every, places, column) for column in part.T]
+    return shortest_period(np.column_stack(lines), period)
 
 
 def _on_grid(
