@@ -192,9 +192,11 @@ def fit(
         base = base_parameters(model, drive=drive, friction=friction)
     else:
         base.check(model)
-    findings = accepted_log(log, model, "log", base.friction) if checked else ()
+    given = log
+    log, findings = accepted_log(log, model, "log") if checked else (log, ())
     if test is not None:
-        findings = (*findings, *accepted_test(log, test, model, checked))
+        test, of_test = accepted_test(given, test, model, checked)
+        findings = (*findings, *of_test)
     if processing is None:
         kinds = log.n if balance.by_joint else 1
         processing = processing_for(base, log, cutoff, decimation, dead_band, edges, kinds)

@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
+from .bad_samples import bad_samples
 from .findings import FindingKind, LogFinding, Severity, add_of_joint
 from .log import Log
-from .long_channels import Runs, chunks, moves, spread
+from .long_channels import Runs, chunks, moves, resolution, spread
 
 _OFTEN = 0.01
 _SATURATED = 0.02
-_STUCK = 50
 _ROWS = 3
 """Rows in all channels alike, one after the other, that show a recorder that is too fast."""
 _JUMP = 20.0
@@ -85,66 +85,41 @@ def coarse(log: Log, moving: NDArray[np.bool_], found: list[LogFinding]) -> None
             )  # fmt: skip
 
 
-def resolution(values: Array) -> float:
-    """Step of a channel that has few values; 0 if it has none that shows.
-
-    Parameters
-    ----------
-    values : ndarray, shape (N,)
-        Samples.
-
-    Returns
-    -------
-    float
-        The step, in the unit of the values.
-
-    Examples
-    --------
-    >>> round(resolution(np.round(np.sin(np.linspace(0.0, 6.0, 1000)), 2)), 6)
-    0.01
-    """
-    levels = np.unique(values)
-    if len(levels) < 2 or len(levels) > 0.5 * len(values):
-        return 0.0
-    steps = np.diff(levels)
-    steps = steps[steps > 1e-9 * float(np.ptp(levels))]
-    return float(np.median(steps)) if len(steps) else 0.0
+def bad(log: Log, found: list[LogFinding]) -> None:
+    """Report samples that no joint had, which a fit leaves out."""
+    for some in bad_samples(log):
+        rows, word = some.rows, "position" if some.channel == "q" else "torque"
+        if some.repeats:
+            runs = np.flatnonzero(np.diff(rows, prepend=-2) > 1).tolist()
+            first = [*runs, len(rows)][1]
+            kind, words = FindingKind.STUCK, (
+                f"its {word} repeats for {first + 1} samples from row {rows[0] - 1}"
+                + (f", and {len(runs) - 1} times more" if len(runs) > 1 else "")
+                + " while it moves; the sensor or the recorder stopped. A fit leaves these rows "
+                "out."
+            )  # fmt: skip
+        else:
+            kind, words = FindingKind.SPIKES, (
+                f"{len(rows)} of the samples of its {word} stand{'s' * (len(rows) == 1)} out of "
+                f"those beside (the first at row {rows[0]}); a fit leaves them out and "
+                "interpolates."
+            )  # fmt: skip
+        add_of_joint(found, kind, Severity.DOUBTFUL, log, some.joint, words)
 
 
 def stuck(log: Log, moving: NDArray[np.bool_], found: list[LogFinding]) -> None:
-    """Report positions and torques that all repeat at once: samples that were not taken."""
+    """Report rows that repeat in every channel: samples that were not taken."""
     if not moving.any():
         return
     whole, repeated = Runs(_ROWS), 0
-    alone = {j: Runs(_STUCK) for j in np.flatnonzero(moving).tolist()}
     for rows in chunks(len(log) - 1):
         both = slice(rows.start, rows.stop + 1)
         still = np.diff(log.q[both], axis=0) == 0.0
-        for j, runs in alone.items():
-            runs.add(still[:, j])
         same = still[:, moving].all(axis=1) & (np.diff(log.tau[both], axis=0) == 0.0).all(axis=1)
         whole.add(same)
         repeated += int(same.sum())
     if repeated == len(log) - 1:
         return
-    # one sensor alone that stops while its torque goes on
-    for j, runs in alone.items():
-        long = runs.ended()
-        if not long:
-            continue
-        q = log.q[:, j]
-        usual = float(np.quantile(moves(q), 0.9))
-        for start, end in long:
-            if start == 0 or end == len(log) - 1:
-                continue
-            before = float(np.abs(np.diff(q[max(0, start - 3) : start + 1])).mean())
-            if before > 0.3 * usual and abs(float(q[end + 1] - q[end])) > 5.0 * usual > 0.0:
-                add_of_joint(
-                    found, FindingKind.STUCK, Severity.DOUBTFUL, log, j,
-                    f"its position repeats for {end - start + 1} samples from row {start} and then "
-                    "jumps; the sensor or the recorder stopped. Leave these rows out.",
-                )  # fmt: skip
-                break
     rows_alike = whole.ended()
     if rows_alike and repeated > _OFTEN * len(log):
         first, last = max(rows_alike, key=lambda run: run[1] - run[0])

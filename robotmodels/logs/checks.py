@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..model import RobotModel, check_model
-from .channel_checks import coarse, constant, jumps, one_way, saturated, stuck
+from .channel_checks import bad, coarse, constant, jumps, one_way, saturated, stuck
 from .findings import FindingKind, LogFinding, Severity
 from .log import Log, check_is_log
 from .model_checks import joint_order, position_units, samples, torques_and_speeds
@@ -17,10 +17,10 @@ def check_log(log: Log, model: RobotModel | None = None) -> tuple[LogFinding, ..
     """What is wrong or strange in a log, each with what to do about it.
 
     Without a model: joints that do not move and torques that are constant, saturation, coarse
-    steps, values that repeat, jumps, recordings that are too short, a period that is too long,
-    velocities and accelerations that do not follow from the positions. With one, besides: numbers
-    of joints and their order, degrees, motor angles, limits of position, velocity and torque,
-    samples for the number of parameters. Of a long log quantiles, steps of sensors and turns are
+    steps, single samples that stand out, values that repeat, jumps, recordings that are too short,
+    a period that is too long, velocities and accelerations that do not follow from the positions.
+    With one, besides: numbers of joints and their order, degrees, motor angles, limits of position,
+    velocity and torque, samples for the number of parameters. Of a long log quantiles, steps of sensors and turns are
     those of about 1e5 samples spread evenly over it; everything else is looked at in every sample.
     Whether joints are swapped, signs are wrong, and the motion shows the parameters is told by
     `robotmodels.identification.check_joints`, since it takes the dynamic model.
@@ -71,6 +71,7 @@ right column was read.
     moving = constant(log, found)
     saturated(log, found)
     coarse(log, moving, found)
+    bad(log, found)
     stuck(log, moving, found)
     jumps(log, moving, found)
     one_way(log, moving, found)

@@ -48,6 +48,7 @@ class FindingKind(Enum):
     SATURATED = "torques stay at their extreme values"
     QUANTISED = "positions have coarse steps"
     STUCK = "values repeat for a long time"
+    SPIKES = "single samples stand out of those beside them"
     JUMP = "positions jump"
     TOO_SHORT = "it is short for what is to be found"
     SLOWER_THAN_LOG = "a joint does not come back in the time of the log"

@@ -29,6 +29,32 @@ def moves(q: Array) -> Array:
     return np.abs(spread(q[1:]) - spread(q[:-1]))
 
 
+def resolution(values: Array) -> float:
+    """Step of a channel that has few values; 0 if it has none that shows.
+
+    Parameters
+    ----------
+    values : ndarray, shape (N,)
+        Samples.
+
+    Returns
+    -------
+    float
+        The step, in the unit of the values.
+
+    Examples
+    --------
+    >>> round(resolution(np.round(np.sin(np.linspace(0.0, 6.0, 1000)), 2)), 6)
+    0.01
+    """
+    levels = np.unique(values)
+    if len(levels) < 2 or len(levels) > 0.5 * len(values):
+        return 0.0
+    steps = np.diff(levels)
+    steps = steps[steps > 1e-9 * float(np.ptp(levels))]
+    return float(np.median(steps)) if len(steps) else 0.0
+
+
 class Runs:
     """Runs of True of a row that is told piece by piece, those that are long enough."""
 

@@ -44,13 +44,13 @@ def shortest_period(q: Array, dt: float) -> float:
         return 0.0
     rate = 1.0 / dt
     v = np.diff(q, axis=0) * rate
-    f, P = welch(v, rate, nperseg=min(len(v), max(_LEAST, int(_LONGEST * rate))), axis=0)
-    f, P = f[1:], P[1:]
+    f, density = welch(v, rate, nperseg=min(len(v), max(_LEAST, int(_LONGEST * rate))), axis=0)
+    f, density = f[1:], density[1:]
     # of a difference of white noise
     gain = (2.0 * rate * np.sin(np.pi * f / rate))[:, None] ** 2
-    floor = np.median((P / gain)[(f > 0.25 * rate) & (f < 0.45 * rate)], axis=0)
+    floor = np.median((density / gain)[(f > 0.25 * rate) & (f < 0.45 * rate)], axis=0)
     noise = gain * floor
-    motion = np.where(P / _ABOVE > noise, P - noise, 0.0)
+    motion = np.where(density / _ABOVE > noise, density - noise, 0.0)
     power = np.cumsum(motion, axis=0)
     moves = power[-1] > 1e-12 * power[-1].max(initial=0.0)
     if not moves.any():

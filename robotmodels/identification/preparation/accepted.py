@@ -5,16 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from ...errors import InvalidValueError
-from ...friction import Friction
-from ...logs import Log, Severity, check_log
+from ...logs import FindingKind, Log, LogFinding, Severity, check_log
+from ...logs.bad_samples import cleaned
 from ...model import RobotModel
 from .joint_checks import check_joints
 
 
-def accepted_log(
-    log: Log, model: RobotModel, name: str, friction: Friction | None = None
-) -> tuple[str, ...]:
-    """Sentences on a log that may be used; one that may not is refused with all of them.
+def accepted_log(log: Log, model: RobotModel, name: str) -> tuple[Log, tuple[str, ...]]:
+    """A log that may be used, and sentences on it; one that may not is refused with all of them.
 
     Parameters
     ----------
@@ -24,12 +22,12 @@ def accepted_log(
         The robot.
     name : str
         Of the argument, for messages.
-    friction : Friction, optional
-        The friction model of the fit, as for `check_joints`.
 
     Returns
     -------
-    tuple of str
+    log : Log
+        Without samples that no joint had: spikes, and channels that stop while the joint moves.
+    sentences : tuple of str
         What is doubtful.
 
     Raises
@@ -37,24 +35,21 @@ def accepted_log(
     InvalidValueError
         What makes a fit meaningless, each finding with what to do.
     """
-    found = check_log(log, model)
+    log, found = _cleaned(log, model)
     if not any(finding.severity is Severity.USELESS for finding in found):
-        found = (*found, *check_joints(log, model, friction))
-    useless = [str(finding) for finding in found if finding.severity is Severity.USELESS]
-    if useless:
-        raise InvalidValueError(
-            f"{name}: " + " ".join(useless) + " (checked=False takes the log as it is.)"
-        )
-    return tuple(str(finding) for finding in found)
+        found = (*found, *check_joints(log, model))
+    return log, _sentences(found, name)
 
 
-def accepted_test(log: Log, test: Log, model: RobotModel, checked: bool) -> tuple[str, ...]:
-    """What is to be said of the log that is kept aside; it must be like the other, and another.
+def accepted_test(
+    log: Log, test: Log, model: RobotModel, checked: bool
+) -> tuple[Log, tuple[str, ...]]:
+    """The log that is kept aside, and what is to be said of it; it must be like the other.
 
     Parameters
     ----------
     log, test : Log
-        The log that is fitted, and the one kept aside.
+        The log that is fitted, as given, and the one kept aside.
     model : RobotModel
         The robot.
     checked : bool
@@ -62,7 +57,9 @@ def accepted_test(log: Log, test: Log, model: RobotModel, checked: bool) -> tupl
 
     Returns
     -------
-    tuple of str
+    test : Log
+        Without samples that no joint had.
+    sentences : tuple of str
         What is doubtful.
 
     Raises
@@ -83,12 +80,23 @@ def accepted_test(log: Log, test: Log, model: RobotModel, checked: bool) -> tupl
             "that are not fitted."
         )
     if not checked:
-        return ()
+        return test, ()
     # how it moves does not matter, but what it is in does
-    found = check_log(test, model)
+    test, found = _cleaned(test, model)
+    return test, tuple(f"Of the log kept aside: {each}" for each in _sentences(found, "test"))
+
+
+def _cleaned(log: Log, model: RobotModel) -> tuple[Log, tuple[LogFinding, ...]]:
+    found = check_log(log, model)
+    if any(finding.kind in (FindingKind.STUCK, FindingKind.SPIKES) for finding in found):
+        log = cleaned(log)
+    return log, found
+
+
+def _sentences(found: tuple[LogFinding, ...], name: str) -> tuple[str, ...]:
     useless = [str(finding) for finding in found if finding.severity is Severity.USELESS]
     if useless:
         raise InvalidValueError(
-            "test: " + " ".join(useless) + " (checked=False takes the log as it is.)"
+            f"{name}: " + " ".join(useless) + " (checked=False takes the log as it is.)"
         )
-    return tuple(f"Of the log kept aside: {finding}" for finding in found)
+    return tuple(str(finding) for finding in found)

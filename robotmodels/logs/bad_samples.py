@@ -1,0 +1,212 @@
+"""Samples that no joint had: single ones that stand out, and channels that stop while it moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import Array
+from .interpolation import filled
+from .log import Log, RefusedRows
+from .long_channels import Runs, chunks, moves, resolution, spread
+from .motion import SHARE, shortest_period
+
+_TIMES = 6.0
+"""Times the usual roughness, of nine of ten samples and of three of four nearby, that a sample must
+be off: 14 standard deviations of white noise."""
+_STEPS = 4.0
+"""Steps of a coarse sensor that it must be off."""
+_NEAR = 25
+"""Samples on either side that tell the roughness nearby."""
+_ROUNDING = 1e-9
+_STUCK = 8
+"""Repeated samples of a channel that has stopped."""
+_SLOW, _LEAP = 0.3, 5.0
+"""Speed before a stop, and leap after it, in moves that nine of ten samples do not exceed."""
+_RARE = 0.01
+"""Share of repeated samples elsewhere, above which repeating says nothing."""
+_LEAST = 9
+"""Samples of a recording that is looked at."""
+_WINDOW = 100_000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BadSamples:
+    """Samples of one channel that no joint had.
+
+    Parameters
+    ----------
+    joint : int
+        Whose.
+    channel : str
+        "q" or "tau".
+    repeats : bool
+        Whether they repeat the sample before, or stand out.
+    rows : ndarray of int
+        Of the log, ascending.
+    """
+
+    joint: int
+    channel: str
+    repeats: bool
+    rows: NDArray[np.int64]
+
+
+def _spikes(x: Array) -> NDArray[np.int64]:
+    """Samples that stand out of those beside them, of one channel of one recording, shape (N,)."""
+    some = spread(x)
+    rounding = _ROUNDING * float(np.abs(some).max())
+    usual = float(np.quantile(_roughness(x[:_WINDOW]), 0.9))
+    least = max(_TIMES * usual, _STEPS * resolution(some), rounding)
+    found: set[int] = set()
+    for rows in chunks(len(x)):
+        start = max(0, rows.start - 2)
+        found.update(start + 2 + np.flatnonzero(_roughness(x[start : rows.stop + 2]) > least))
+    return np.array([k for k in sorted(found) if _stands_out(x, k, least)], np.int64)
+
+
+def _roughness(x: Array) -> Array:
+    """Distances of samples from the cubic through two on either side, shape (N - 4,)."""
+    found: Array = np.abs(x[2:-2] - (4.0 * (x[1:-3] + x[3:-1]) - (x[:-4] + x[4:])) / 6.0)
+    return found
+
+
+def _stands_out(x: Array, k: int, least: float) -> bool:
+    """Whether a sample is off all that is near it: a step is on the level of what follows."""
+    off = abs(float(x[k] - np.median(x[k - 2 : k + 3])))
+    if not off > least:
+        return False
+    start = max(0, k - _NEAR)
+    near = np.delete(_roughness(x[start : k + _NEAR + 1]), slice(max(0, k - start - 4), k - start))
+    return len(near) > 0 and off > _TIMES * float(np.quantile(near, 0.75))
+
+
+def _stops(x: Array, other: Array, torque: bool) -> list[tuple[int, int]]:
+    """First and last row of runs in which a channel repeats while the joint moves.
+
+    A position that stops goes on where the joint has come to meanwhile. A torque that stops does so
+    while the position goes on, below its extreme values, which a drive may hold.
+    """
+    runs, repeated = Runs(_STUCK), 0
+    for rows in chunks(len(x) - 1):
+        same = np.diff(x[rows.start : rows.stop + 1]) == 0.0
+        runs.add(same)
+        repeated += int(same.sum())
+    long = runs.ended()
+    if not long or repeated == len(x) - 1:
+        return []
+    usual = float(np.quantile(moves(x), 0.9))
+    if not torque:
+        return [
+            (start, end)
+            for start, end in long
+            if start > 0
+            and end < len(x) - 1
+            and np.abs(np.diff(x[max(0, start - 3) : start + 1])).mean() > _SLOW * usual
+            and abs(float(x[end + 1] - x[end])) > _LEAP * usual > 0.0
+        ]
+    if repeated - sum(end - start for start, end in long) > _RARE * len(x):
+        return []
+    speed = float(np.quantile(moves(other), 0.9))
+    extremes = (float(x.min()), float(x.max()))
+    return [
+        (start, end)
+        for start, end in long
+        if x[start] not in extremes
+        and np.abs(np.diff(other[start : end + 1])).mean() > _SLOW * speed > 0.0
+    ]
+
+
+def bad_samples(log: Log) -> list[BadSamples]:
+    """Samples that stand out or repeat, joint by joint."""
+    found: list[BadSamples] = []
+    for j in range(log.n):
+        for channel, other in (("q", "tau"), ("tau", "q")):
+            single: list[int] = []
+            repeated: list[int] = []
+            for rows in log.recordings():
+                x, beside = (getattr(log, name)[rows, j] for name in (channel, other))
+                if len(x) < _LEAST:
+                    continue
+                single += (rows.start + _spikes(x)).tolist()
+                for start, end in _stops(x, beside, channel == "tau"):
+                    repeated += range(rows.start + start + 1, rows.start + end + 1)
+            for repeats, bad in ((False, single), (True, repeated)):
+                if bad:
+                    found.append(BadSamples(j, channel, repeats, np.array(bad)))
+    return found
+
+
+def cleaned(log: Log) -> Log:
+    """The log without single samples that stand out and without rows of channels that stop.
+
+    Where they are shorter than a tenth of the motion's shortest period they are interpolated, as
+    missing samples are; otherwise the log is split around them, so that what filters reach beside
+    them is left out as well. The notes count both.
+    """
+    found = bad_samples(log)
+    bad = {"q": np.zeros(log.q.shape, bool), "tau": np.zeros(log.q.shape, bool)}
+    for some in found:
+        bad[some.channel][some.rows, some.joint] = True
+    if not found:
+        return log
+    said = [
+        f"{sum(len(some.rows) for some in found if some.repeats == repeats)} that {what}"
+        for repeats, what in ((False, "stand out"), (True, "repeat while the joint moves"))
+    ]
+    return _without(log, bad, " and ".join(said))
+
+
+def _without(log: Log, bad: dict[str, NDArray[np.bool_]], said: str) -> Log:
+    limit = max(1.0, SHARE * _shortest(log, bad["q"]) / log.dt - 1.0)
+    arrays: dict[str, Any] = {"q": np.array(log.q), "tau": np.array(log.tau)}
+    drop = np.zeros(len(log), bool)
+    filled_in = 0
+    for rows in log.recordings():
+        for name, mask in bad.items():
+            for j in np.flatnonzero(mask[rows].any(axis=0)).tolist():
+                x, wrong = arrays[name][rows, j], mask[rows, j]
+                runs = Runs(1)
+                runs.add(wrong)
+                for start, end in runs.ended():
+                    if end - start > limit or start == 0 or end == len(x):
+                        drop[rows.start + start : rows.start + end] = True
+                places, wanted = np.flatnonzero(~wrong), np.flatnonzero(wrong & ~drop[rows])
+                x[wanted] = filled(places, x[places, None], wanted)[:, 0]
+                filled_in += len(wanted)
+    kept = np.flatnonzero(~drop)
+    first = np.zeros(len(log), bool)
+    first[log.starts] = True
+    # a row after one that was left out, or after the end of a recording
+    begins = np.diff(np.cumsum(first)[kept], prepend=0) + (np.diff(kept, prepend=-1) > 1) > 0
+    notes = [
+        *log.notes,
+        f"Of samples that no joint had ({said}), {filled_in} were interpolated; {int(drop.sum())} "
+        f"rows were left out{', where the log is split' if drop.any() else ''}.",
+    ]
+    refused = list(log.refused)
+    if drop.any():
+        lost = tuple(np.flatnonzero(drop).tolist())
+        refused.append(RefusedRows("log", lost, "a channel repeats while the joint moves"))
+    more = {
+        name: None if (x := getattr(log, name)) is None else x[kept]
+        for name in ("v", "a", "q_ref", "v_ref")
+    }
+    return Log(
+        log.dt, arrays["q"][kept], arrays["tau"][kept], **more, starts=np.flatnonzero(begins),
+        names=log.names, delay=log.delay, sources=log.sources, refused=refused, notes=notes,
+    )  # fmt: skip
+
+
+def _shortest(log: Log, bad: NDArray[np.bool_]) -> float:
+    """Shortest period of the motion in the longest recording, straight lines over bad samples."""
+    rows = max(log.recordings(), key=lambda rows: rows.stop - rows.start)
+    rows = slice(rows.start, min(rows.stop, rows.start + _WINDOW))
+    q, every = np.array(log.q[rows]), np.arange(rows.stop - rows.start)
+    for j in np.flatnonzero(bad[rows].any(axis=0)).tolist():
+        good = ~bad[rows, j]
+        q[:, j] = np.interp(every, every[good], q[good, j])
+    return shortest_period(q, log.dt)
