@@ -103,11 +103,16 @@ def test_npz_round_trip_with_all_quantities(tmp_path):
     assert np.array_equal(other.tau, more["v"])
 
 
-def test_arrays_that_lie_on_their_side_are_named(tmp_path):
+def test_arrays_with_a_row_for_each_joint_are_turned_and_noted(tmp_path):
     t, q, tau = samples()
     np.savez(tmp_path / "run.npz", t=t, q=q.T, tau=tau)
-    with pytest.raises(InvalidValueError, match=r"q has shape \(3, 60\).*transposed"):
-        read_log(tmp_path / "run.npz")
+    log = read_log(tmp_path / "run.npz")
+    assert np.array_equal(log.q, q)
+    assert np.array_equal(log.tau, tau)
+    assert "run.npz: q has a row for each joint and was turned." in log.notes
+    # fewer samples than joints
+    np.savez(tmp_path / "short.npz", t=t[:2], q=q[:2], tau=tau[:2])
+    assert np.array_equal(read_log(tmp_path / "short.npz").q, q[:2])
 
 
 def test_objects_and_other_files_are_no_npz(tmp_path):
@@ -130,6 +135,39 @@ def test_mat_round_trip_also_of_structures(tmp_path):
     deep = read_log(tmp_path / "deep.mat", time="log.time", positions="log.q", torques="log.torque")
     assert np.array_equal(deep.tau, tau)
     assert np.array_equal(read_log(tmp_path / "deep.mat", dt=DT, time=False).tau, tau)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_of_a_mat_file_only_what_is_asked_for_is_read(tmp_path, turned):
+    from scipy.io import savemat
+
+    t, q, tau = samples()
+    cells = np.empty((1, 2), dtype=object)
+    cells[0] = [np.eye(3), "note"]
+    rows = np.random.default_rng(0)
+    other = {
+        "settings": {"gains": np.eye(4), "axes": cells, "deep": {"map": np.ones((7, 5 * N))}},
+        "several": np.array([(1.0,), (2.0,)], dtype=[("q", "f8")]),
+        "cube": np.ones((2, 3, 4)),
+        "table": rows.normal(size=(9 * N, 2)),
+        "wide": rows.normal(size=(4, 3 * N)),
+    }
+    file = tmp_path / "run.mat"
+    x, y = (q.T, tau.T) if turned else (q, tau)
+    savemat(file, {"run": {"arm": {"q": x, "tau": y}, "time": t}, **other})
+    asked = {"positions": "run.arm.q", "torques": "run.arm.tau", "time": "run.time"}
+    log = read_log(file, **asked)
+    assert np.array_equal(log.q, q)
+    assert np.array_equal(log.tau, tau)
+    assert log.dt == pytest.approx(DT)
+    said = [note for note in log.notes if "was turned" in note]
+    assert len(said) == 2 * turned
+    assert not any("settings" in note or "wide" in note for note in log.notes)
+    with pytest.raises(InvalidValueError, match=f"have {N}, {9 * N} samples; give times"):
+        read_log(file, **asked | {"time": "table[0]"})
+    # by their usual names, too, beside arrays of other lengths
+    savemat(file, {"q": x, "tau": y, "time": t, **other})
+    assert np.array_equal(read_log(file).tau, tau)
 
 
 def test_mat_of_version_73_says_what_to_do(tmp_path):

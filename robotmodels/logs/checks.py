@@ -20,8 +20,9 @@ def check_log(log: Log, model: RobotModel | None = None) -> tuple[LogFinding, ..
     steps, single samples that stand out, values that repeat, jumps, recordings that are too short,
     a period that is too long, velocities and accelerations that do not follow from the positions.
     With one, besides: numbers of joints and their order, degrees, motor angles, limits of position,
-    velocity and torque, samples for the number of parameters. Of a long log quantiles, steps of sensors and turns are
-    those of about 1e5 samples spread evenly over it; everything else is looked at in every sample.
+    velocity and torque, samples for the number of parameters. Of a long log quantiles, steps of
+    sensors and turns are those of about 1e5 samples spread evenly over it; everything else is
+    looked at in every sample.
     Whether joints are swapped, signs are wrong, and the motion shows the parameters is told by
     `robotmodels.identification.check_joints`, since it takes the dynamic model.
 

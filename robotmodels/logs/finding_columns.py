@@ -109,7 +109,7 @@ def find_quantity(
         Several sets of columns would do, or numbers are missing between.
     """
     sets: dict[str, dict[str, int]] = {}
-    for i, name in enumerate(table.names):
+    for i, name in enumerate(table.names[: table.alike]):
         where = _stem_and_joint(name, kind, joints)
         if where is not None:
             sets.setdefault(where[0], {}).setdefault(where[1], i)
@@ -197,7 +197,7 @@ def find_time(table: LogTable) -> FoundTime | None:
     FoundTime or None
         None if there is none.
     """
-    names = [_without_unit(name)[0].lower() for name in table.names]
+    names = [_without_unit(name)[0].lower() for name in table.names[: table.alike]]
     whole, parts = (
         [i for i, name in enumerate(names) if any(name.endswith(end) for end in ends)]
         for ends in (_SECONDS[:2], _SECONDS[2:])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from difflib import get_close_matches
@@ -58,10 +59,10 @@ def open_log_table(path: Path, kind: LogFormat | None, delimiter: str | None = N
     if kind is LogFormat.CSV:
         return _text(open_table(path, delimiter))
     if kind is LogFormat.NPZ:
-        return _arrays(path, _npz(path))
+        return _arrays(path, _npz(path), True)
     if kind is LogFormat.MAT:
-        return _arrays(path, read_mat(path))
-    return _arrays(path, _parquet(path))
+        return _arrays(path, read_mat(path), True)
+    return _arrays(path, _parquet(path), False)
 
 
 def _text(table: CsvTable) -> LogTable:
@@ -71,7 +72,7 @@ def _text(table: CsvTable) -> LogTable:
 
     lists = _lists(table)
     if lists is not None:
-        return _arrays(table.path, lists)
+        return _arrays(table.path, lists, False)
     return LogTable(
         table.path, table.names, table.width, {}, table.numbers_with_gaps, words
     )  # fmt: skip
@@ -187,8 +188,11 @@ def _parquet_lists(path: Path, name: str, column: Any) -> Any:
     return values
 
 
-def _arrays(path: Path, stored: dict[str, Any]) -> LogTable:
-    """Columns of arrays with names: those with as many rows as most numbers have."""
+def _arrays(path: Path, stored: dict[str, Any], turn: bool) -> LogTable:
+    """Columns of arrays with names, those as long as most first, then texts, then the others.
+
+    With ``turn`` arrays whose second axis is the samples' are turned.
+    """
     matrices: dict[str, Array] = {}
     texts: dict[str, str] = {}
     for name, value in stored.items():
@@ -201,36 +205,57 @@ def _arrays(path: Path, stored: dict[str, Any]) -> LogTable:
             matrices[name] = whole.reshape(-1, 1) if flat else whole
     if not matrices:
         raise InvalidValueError(f"{path}: no array of numbers in it; it has {list(stored)!r:.200}.")
-    N = max(len(value) for value in matrices.values())
-    for name, value in matrices.items():
-        if value.shape[0] < value.shape[1] and value.shape[1] == N:
-            raise InvalidValueError(
-                f"{path}: {name} has shape {value.shape}, a row for each joint; write it with a "
-                "row for each sample (transposed)."
-            )
-    matrices = {name: value for name, value in matrices.items() if len(value) == N}
+    lengths = Counter(
+        length
+        for value in matrices.values()
+        for length in {len(value), value.shape[1] if turn and value.shape[1] > 1 else len(value)}
+    )
+    N = max(lengths, key=lambda length: (lengths[length], length))
+    turned = {name for name, value in matrices.items() if turn and _lies(value, N)}
+    matrices = {name: x.T if name in turned else x for name, x in matrices.items()}
+    alike = [name for name, value in matrices.items() if len(value) == N]
     names: list[str] = []
     groups: dict[str, tuple[int, ...]] = {}
-    for name, value in matrices.items():
+    columns: list[Array | str] = []
+    for name in (*alike, *texts, *(name for name in matrices if name not in alike)):
+        if name in texts:
+            names.append(name)
+            columns.append(texts[name])
+            continue
+        value = matrices[name]
         k = value.shape[1]
-        own = tuple(range(len(names), len(names) + k))
-        names += [name] if k == 1 else [f"{name}[{i}]" for i in range(k)]
         if k > 1:
-            groups[name] = own
-    blocks = np.concatenate(list(matrices.values()), axis=1)
-    names += list(texts)
-    own_texts = list(texts.values())
+            groups[name] = tuple(range(len(names), len(names) + k))
+        names += [name] if k == 1 else [f"{name}[{i}]" for i in range(k)]
+        columns += list(value.T)
 
-    def read(columns: Sequence[int]) -> Array:
-        for column in columns:
-            if column >= blocks.shape[1]:
-                raise InvalidValueError(f"{path}: {names[column]} is text, not numbers.")
-        values = blocks[:, list(columns)]
+    def read(wanted: Sequence[int]) -> Array:
+        found: list[Array] = []
+        for i in wanted:
+            column = columns[i]
+            if isinstance(column, str):
+                raise InvalidValueError(f"{path}: {names[i]} is text, not numbers.")
+            if found and len(column) != len(found[0]):
+                raise InvalidValueError(
+                    f"{path}: {names[i]} has {len(column)} samples, {names[wanted[0]]} has "
+                    f"{len(found[0])}; give columns of one recording."
+                )
+            found.append(column)
+        values = np.column_stack(found)
         values[~np.isfinite(values)] = np.nan
         return values
 
     def words(column: int) -> str:
-        k = column - blocks.shape[1]
-        return own_texts[k] if k >= 0 else repr(float(blocks[0, column]))
+        found = columns[column]
+        return found if isinstance(found, str) else repr(float(found[0]))
 
-    return LogTable(path, tuple(names), len(names), groups, read, words)
+    return LogTable(
+        path, tuple(names), len(names), groups, read, words,
+        sum(matrices[name].shape[1] for name in alike), frozenset(turned),
+    )  # fmt: skip
+
+
+def _lies(value: Array, N: int) -> bool:
+    """Whether the samples of an array are along its second axis."""
+    rows, width = value.shape
+    return rows != N and width > 1 and (width == N or rows < width)

@@ -103,7 +103,7 @@ def raw_samples(
     _refuse_twice(table, "positions", where, "time", t_columns)
     check_headers([angle_unit_of(table.names[i]) for i in where if table.names], angle,
                   str(table.path))  # fmt: skip
-    values = [table.read(where)]
+    values = [_read(table, where, notes)]
     owners = [joints_of(table, Quantity.POSITION, where)]
     order = [Quantity.POSITION, Quantity.TORQUE]
     refused: list[RefusedRows] = []
@@ -112,14 +112,14 @@ def raw_samples(
         _refuse_twice(table, "torques", taken, "positions", where)
         _refuse_twice(table, "torques", taken, "time", t_columns)
         notes += check_torque_units(table, taken, currents)
-        values.append(table.read(taken))
+        values.append(_read(table, taken, notes))
         owners.append(joints_of(table, Quantity.TORQUE, taken))
     else:
         t2, columns = _time(second, time, unit, notes)
         taken = _torques(second, torques, names, notes, columns, currents, n, False)
         _refuse_twice(second, "torques", taken, "time", columns)
         notes += check_torque_units(second, taken, currents)
-        tau = second.read(taken)
+        tau = _read(second, taken, notes)
         values.append(_beside(t, t2, len(values[0]), tau, table, second, notes, refused))
         owners.append(joints_of(second, Quantity.TORQUE, taken))
     for quantity, given in extras.items():
@@ -145,7 +145,7 @@ def raw_samples(
             _refuse_twice(table, quantity.argument, found, "positions", where)
         check_headers([angle_unit_of(table.names[i]) for i in found if table.names], angle,
                       str(table.path))  # fmt: skip
-        values.append(table.read(found))
+        values.append(_read(table, found, notes))
         owners.append(joints_of(table, quantity, found))
         order.append(quantity)
     own = owners[0]
@@ -177,9 +177,25 @@ def raw_samples(
             f"{table.path.name}: its joints are called {', '.join(own)}; they were taken as "
             f"{', '.join(names)}, in this order."
         )
+    lengths = {len(block) for block in values} | (set() if t is None else {len(t)})
+    if len(lengths) > 1:
+        raise InvalidValueError(
+            f"{table.path}: the columns asked for have {', '.join(map(str, sorted(lengths)))} "
+            "samples; give times, positions and torques of one recording."
+        )
     return RawSamples(
         t, np.concatenate(values, axis=1), tuple(order), n, own, tuple(refused), tuple(notes)
     )
+
+
+def _read(table: LogTable, columns: Sequence[int], notes: list[str]) -> Array:
+    """Samples of columns, noted where their array was turned."""
+    arrays = {table.names[i].rpartition("[")[0] for i in columns if table.names}
+    notes += [
+        f"{table.path.name}: {name} has a row for each joint and was turned."
+        for name in sorted(arrays & table.turned)
+    ]
+    return table.read(columns)
 
 
 def _refuse_twice(

@@ -73,6 +73,11 @@ class LogTable:
         Numbers of columns, shape (N, k), NaN where nothing was measured.
     words : callable
         What a column has in its first row, as text; empty where that is not known.
+    alike : int or None
+        How many of the first columns have as many samples as most: among them usual names are
+        looked for; None for all.
+    turned : frozenset of str
+        Arrays that have a row for each joint in the file.
     """
 
     path: Path
@@ -81,6 +86,8 @@ class LogTable:
     groups: Mapping[str, tuple[int, ...]]
     read: Callable[[Sequence[int]], Array]
     words: Callable[[int], str]
+    alike: int | None = None
+    turned: frozenset[str] = frozenset()
 
     def choice(self, given: Column | Sequence[Column], what: str) -> tuple[int, ...]:
         """Columns that an argument names.
