@@ -101,6 +101,14 @@ def test_what_no_log_is_made_of_is_left_out(tmp_path):
     assert found["q"].tolist() == [[1.0, 2.0]]
 
 
+@pytest.mark.parametrize("kind", [3, 5, 16, 17])
+def test_objects_of_another_layout_are_left_out(tmp_path, kind):
+    # a table or a function has texts where arrays have their shape
+    parts = element(UINT32, struct.pack("<II", kind, 0)) + element(INT8, b"table")
+    odd = element(MATRIX, parts + element(INT8, b"MCOS"))
+    assert list(read_mat(written(tmp_path / "a.mat", odd, GOOD))) == ["q"]
+
+
 def test_letters_of_two_bytes(tmp_path):
     for order in "<>":
         text = "µ°".encode("utf-16-le" if order == "<" else "utf-16-be")

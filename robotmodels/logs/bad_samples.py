@@ -21,11 +21,17 @@ _STEPS = 4.0
 """Steps of a coarse sensor that it must be off."""
 _NEAR = 25
 """Samples on either side that tell the roughness nearby."""
+_ALIKE = 0.8
+_SHARES = {"q": 0.0, "tau": 0.25}
+"""Of the range of 98 % of the samples: small spikes of a position are large ones of acceleration,
+those of a torque are small beside it, and may be friction that reverses."""
 _ROUNDING = 1e-9
 _STUCK = 8
 """Repeated samples of a channel that has stopped."""
 _SLOW, _LEAP = 0.3, 5.0
 """Speed before a stop, and leap after it, in moves that nine of ten samples do not exceed."""
+_MOVES = 0.1
+"""Speed of a joint, in these, above which it moves while its torque stops."""
 _RARE = 0.01
 """Share of repeated samples elsewhere, above which repeating says nothing."""
 _LEAST = 9
@@ -55,12 +61,13 @@ class BadSamples:
     rows: NDArray[np.int64]
 
 
-def _spikes(x: Array) -> NDArray[np.int64]:
-    """Samples that stand out of those beside them, of one channel of one recording, shape (N,)."""
+def _spikes(x: Array, share: float) -> NDArray[np.int64]:
+    """Samples that stand out of those beside them, by a share of the range of the channel."""
     some = spread(x)
-    rounding = _ROUNDING * float(np.abs(some).max())
+    low, high = np.quantile(some, [0.01, 0.99])
+    span = max(share * float(high - low), _ROUNDING * float(np.abs(some).max()))
     usual = float(np.quantile(_roughness(x[:_WINDOW]), 0.9))
-    least = max(_TIMES * usual, _STEPS * resolution(some), rounding)
+    least = max(_TIMES * usual, _STEPS * resolution(some), span)
     found: set[int] = set()
     for rows in chunks(len(x)):
         start = max(0, rows.start - 2)
@@ -75,12 +82,17 @@ def _roughness(x: Array) -> Array:
 
 
 def _stands_out(x: Array, k: int, least: float) -> bool:
-    """Whether a sample is off all that is near it: a step is on the level of what follows."""
+    """Whether a sample is off what is beside it by as much as it is off what is further away.
+
+    A step is on the level of what follows, and what is beside a spike is on that of the others.
+    """
     off = abs(float(x[k] - np.median(x[k - 2 : k + 3])))
-    if not off > least:
-        return False
     start = max(0, k - _NEAR)
-    near = np.delete(_roughness(x[start : k + _NEAR + 1]), slice(max(0, k - start - 4), k - start))
+    rough = _roughness(x[start : k + _NEAR + 1])
+    at = k - start - 2
+    if not off > max(least, _ALIKE * float(rough[at])):
+        return False
+    near = np.delete(rough, slice(max(0, at - 2), at + 3))
     return len(near) > 0 and off > _TIMES * float(np.quantile(near, 0.75))
 
 
@@ -116,7 +128,7 @@ def _stops(x: Array, other: Array, torque: bool) -> list[tuple[int, int]]:
         (start, end)
         for start, end in long
         if x[start] not in extremes
-        and np.abs(np.diff(other[start : end + 1])).mean() > _SLOW * speed > 0.0
+        and np.abs(np.diff(other[start : end + 1])).mean() > _MOVES * speed > 0.0
     ]
 
 
@@ -131,7 +143,7 @@ def bad_samples(log: Log) -> list[BadSamples]:
                 x, beside = (getattr(log, name)[rows, j] for name in (channel, other))
                 if len(x) < _LEAST:
                     continue
-                single += (rows.start + _spikes(x)).tolist()
+                single += (rows.start + _spikes(x, _SHARES[channel])).tolist()
                 for start, end in _stops(x, beside, channel == "tau"):
                     repeated += range(rows.start + start + 1, rows.start + end + 1)
             for repeats, bad in ((False, single), (True, repeated)):

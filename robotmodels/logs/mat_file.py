@@ -151,6 +151,8 @@ def _matrix(data: memoryview, order: str, name: str, found: dict[str, Any], dept
     if not len(flags):
         raise _DamagedError("an array without its class")
     kind = int(flags[0]) & 0xFF
+    if kind not in (_CELL, _STRUCTURE, _CHARACTERS, *_NUMBERS):
+        return None  # tables, strings of two quotes, functions, sparse matrices: of another layout
     shape = tuple(map(int, _integers(_next(parts), order)))
     if len(shape) < 2 or any(size < 0 for size in shape):
         raise _DamagedError(f"an array of shape {shape}")
