@@ -82,7 +82,7 @@ def filled(places: ArrayLike, values: Array, wanted: ArrayLike) -> Array:
     x, at = np.asarray(places, np.float64), np.asarray(wanted, np.float64)
     found = np.empty((len(at), values.shape[1]))
     ends = [0, *(np.flatnonzero(np.diff(at) != 1.0) + 1).tolist(), len(at)]
-    for start, end in pairwise(ends):
+    for start, end in pairwise(ends if len(at) else ()):
         gap = at[start:end]
         near, k = int(np.searchsorted(x, gap[0])), max(_BESIDE, end - start)
         beside = slice(max(0, near - k), near + k)
