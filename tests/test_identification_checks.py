@@ -237,10 +237,10 @@ def test_spikes_and_channels_that_stop_are_left_out(good):
     # the same rows fitted are what they were before
     fitted = fit(model, bad, checked=False)
     assert not any("stand out" in note for note in fitted.notes)
-    rms = [np.sqrt((r.validation.in_sample.rmse**2).sum()) for r in (clean, found, fitted)]
+    rms = [np.sqrt((r.fitted.rmse**2).sum()) for r in (clean, found, fitted)]
     assert rms[1] < 1.1 * rms[0] < rms[2]
     # a log kept aside is cleaned as well
     half = len(log) // 2
     tested = fit(model, log.rows(0, half), test=bad.rows(half, len(log)))
     assert any("Of the log kept aside: Joint 2" in note for note in tested.notes)
-    assert (tested.validation.held_out.rmse < 3.0 * tested.validation.in_sample.rmse).all()
+    assert (tested.held_out.rmse < 3.0 * tested.fitted.rmse).all()
