@@ -244,3 +244,14 @@ def test_spikes_and_channels_that_stop_are_left_out(good):
     tested = fit(model, log.rows(0, half), test=bad.rows(half, len(log)))
     assert any("Of the log kept aside: Joint 2" in note for note in tested.notes)
     assert (tested.held_out.rmse < 3.0 * tested.fitted.rmse).all()
+
+
+def test_what_cannot_be_judged_is_no_mistake(good):
+    model, log = good
+    t = log.dt * np.arange(4000)[:, None]
+    moves = np.where((t > 7.9) & (t < 8.1), 0.1 * np.sin(10.0 * np.pi * (t - 7.9)) ** 4, 0.0)
+    rest = Log(log.dt, log.q[:1] + moves, log.tau[:1] + moves)
+    for part in (rest, log.rows(0, 30)):
+        assert not useless(check_joints(part, model))
+    (short,) = check_joints(log.rows(0, 30), model)
+    assert "could be judged: log: no recording is longer than" in short.sentence

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..._arrays import Array
-from ...errors import ShapeError
+from ...errors import InvalidValueError, ShapeError
 from ...logs import FindingKind, Log, LogFinding, Severity
 from ...logs.log import check_is_log
 from ...model import RobotModel, check_model
@@ -52,7 +52,7 @@ def check_joints(log: Log, model: RobotModel) -> tuple[LogFinding, ...]:
     Raises
     ------
     ShapeError, InvalidValueError
-        The model has other joints; the log is too short to be filtered.
+        The model has other joints; what was given is no log.
 
     See Also
     --------
@@ -80,11 +80,15 @@ def check_joints(log: Log, model: RobotModel) -> tuple[LogFinding, ...]:
     cutoff = min(_CUTOFF, _SHARE / log.dt)
     part = looked_at(log, cutoff)
     found: list[LogFinding] = []
-    samples = JointSamples.of(filtered_samples(part, cutoff, 2, _ROWS))
-    _signs_and_order(part, model, samples, found)
-    torque_sizes(part, model, samples, found)
-    _excited(part, model, samples, found)
-    _in_step(part, model, found)
+    try:
+        samples = JointSamples.of(filtered_samples(part, cutoff, 2, _ROWS))
+        _signs_and_order(part, model, samples, found)
+        torque_sizes(part, model, samples, found)
+        _excited(part, model, samples, found)
+        _in_step(part, model, found)
+    except InvalidValueError as error:  # too short or at rest: no mistake of the log
+        words = f"Not all of signs, order, excitation and delay could be judged: {error}"
+        found.append(LogFinding(FindingKind.TOO_SHORT, Severity.DOUBTFUL, (), words))
     if part is not log:
         said = f" (Judged by {len(part)} of {len(log)} samples.)"
         found = [replace(finding, sentence=finding.sentence + said) for finding in found]
