@@ -1,5 +1,7 @@
 """Logs as values: the time base, joining, moving in time, and checks that name what is wrong."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -78,13 +80,13 @@ def test_missing_samples_are_interpolated_up_to_a_tenth_of_the_shortest_period(s
     noisy = data + rng.normal(0.0, 1e-4, data.shape)
     lost = rng.random(N) < 0.03
     lost[[0, -1]] = False
-    lost[500:515] = lost[1500:1560] = True  # 0.06 and 0.24 s
-    lost[[499, 515, 1499, 1560]] = False
+    lost[500:515] = lost[1500:1540] = True  # 0.06 and 0.16 s
+    lost[[499, 515, 1499, 1540]] = False
     rows = noisy[~lost] if stamped else np.where(lost[:, None], np.nan, noisy)
     found = regular_rows(t[~lost] if stamped else None, rows, "x", dt=None if stamped else dt)
     assert found.starts.tolist() == [0, 1500]
     assert found.dt == pytest.approx(dt, rel=1e-9)
-    truth = np.delete(data, slice(1500, 1560), axis=0)
+    truth = np.delete(data, slice(1500, 1540), axis=0)
     np.testing.assert_allclose(found.values, truth, atol=1e-3)
     (note,) = [note for note in found.notes if "interpolated" in note]
     inserted = len(found.values) - int((~lost).sum())
@@ -303,6 +305,26 @@ def test_a_sensor_that_stops_is_named(tx40):
     finding = kinds(changed(tx40.log, q=q))[FindingKind.STUCK]
     assert finding.joints == ("joint_1",)
     assert f"for 120 samples from row {row}" in finding.sentence
+
+
+def test_joints_that_rest_between_moves_have_not_stopped():
+    rng = np.random.default_rng(2)
+    corners = np.cumsum(rng.normal(size=(9, 3)), axis=0)
+    for dt, step in ((0.001, 0.0), (0.01, 0.0), (0.004, 1e-3), (0.004, 1e-5)):
+        parts = []
+        for a, b in pairwise(corners):  # as long at rest as in motion
+            s = np.clip(np.arange(0.0, 2.0, dt), 0.0, 1.0)[:, None]
+            ramp = np.where(s < 0.5, 2.0 * s**2, 1.0 - 2.0 * (1.0 - s) ** 2)
+            parts.append(a + (b - a) * ramp)
+        q = np.concatenate(parts)
+        q = np.round(q / step) * step if step else q
+        tau = np.gradient(np.gradient(q, dt, axis=0), dt, axis=0) + rng.normal(size=q.shape)
+        assert not {FindingKind.STUCK, FindingKind.SPIKES} & set(kinds(Log(dt, q, tau)))
+        stopped = np.array(q)
+        row = int(0.5 / dt) + 7
+        stopped[row:, 1] = stopped[row, 1]  # for good
+        if step < 1e-3:
+            assert kinds(Log(dt, stopped, tau))[FindingKind.STUCK].joints == ("2",)
 
 
 def test_short_and_one_way_logs_are_named(tx40):

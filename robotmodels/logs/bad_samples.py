@@ -99,8 +99,9 @@ def _stands_out(x: Array, k: int, least: float) -> bool:
 def _stops(x: Array, other: Array, torque: bool) -> list[tuple[int, int]]:
     """First and last row of runs in which a channel repeats while the joint moves.
 
-    A position that stops goes on where the joint has come to meanwhile. A torque that stops does so
-    while the position goes on, below its extreme values, which a drive may hold.
+    A position that stops does so at once, and goes on where the joint has come to meanwhile. A
+    torque that stops does so while the position goes on, below its extreme values, which a drive
+    may hold.
     """
     runs, repeated = Runs(_STUCK), 0
     for rows in chunks(len(x) - 1):
@@ -110,16 +111,12 @@ def _stops(x: Array, other: Array, torque: bool) -> list[tuple[int, int]]:
     long = runs.ended()
     if not long or repeated == len(x) - 1:
         return []
-    usual = float(np.quantile(moves(x), 0.9))
+    steps = moves(x)
+    usual = float(np.quantile(steps[steps > 0.0], 0.9)) if steps.any() else 0.0
     if not torque:
-        return [
-            (start, end)
-            for start, end in long
-            if start > 0
-            and end < len(x) - 1
-            and np.abs(np.diff(x[max(0, start - 3) : start + 1])).mean() > _SLOW * usual
-            and abs(float(x[end + 1] - x[end])) > _LEAP * usual > 0.0
-        ]
+        some = spread(x)
+        fine = usual > _STEPS * resolution(some[1:][np.diff(some) != 0.0])
+        return [run for run in long if _stops_at_once(x, run, usual, fine)]
     if repeated - sum(end - start for start, end in long) > _RARE * len(x):
         return []
     speed = float(np.quantile(moves(other), 0.9))
@@ -130,6 +127,16 @@ def _stops(x: Array, other: Array, torque: bool) -> list[tuple[int, int]]:
         if x[start] not in extremes
         and np.abs(np.diff(other[start : end + 1])).mean() > _MOVES * speed > 0.0
     ]
+
+
+def _stops_at_once(x: Array, run: tuple[int, int], usual: float, fine: bool) -> bool:
+    """Whether a position at speed repeats from one sample to the next; a coarse one leaps after."""
+    start, end = run
+    before = np.abs(np.diff(x[max(0, start - 3) : start + 1]))
+    if not len(before) or not before.mean() > _SLOW * usual > 0.0:
+        return False
+    leap = end < len(x) - 1 and abs(float(x[end + 1] - x[end])) > _LEAP * usual
+    return leap or (fine and float(before.min()) > _SLOW * usual)
 
 
 def bad_samples(log: Log) -> list[BadSamples]:
