@@ -10,6 +10,7 @@ from ..._arrays import Array
 from ...errors import InvalidValueError, ShapeError
 from ...logs import FindingKind, Log, LogFinding, Severity
 from ...logs.log import check_is_log
+from ...minimal_parameters import base_parameters
 from ...model import RobotModel, check_model
 from ...regressors import torque_regressor
 from .delay_rows import filtered_samples, looked_at
@@ -31,7 +32,7 @@ def check_joints(log: Log, model: RobotModel) -> tuple[LogFinding, ...]:
       to the equations of all joints at once, see `better_hypotheses`. Where one fits significantly
       better than the log as given, it is named.
     - Where the model has masses, torques are compared in size with those of its inertia.
-    - The regressor's rank on this motion is compared with that on random motion.
+    - The regressor's rank on this motion is compared with the number of base parameters.
     - The delay of the torques is estimated, see `synchronisation`.
 
     Of a log of more than 1e5 samples so many are looked at, in up to 20 stretches spread evenly
@@ -153,13 +154,9 @@ def _in_words(x: Hypothesis, log: Log) -> tuple[FindingKind, str, str]:
 
 
 def _excited(log: Log, model: RobotModel, samples: JointSamples, found: list[LogFinding]) -> None:
-    rng = np.random.default_rng(0)
-    most = 40 * model.table.f
-    lower, upper = np.maximum(model.lower, -np.pi), np.minimum(model.upper, np.pi)
-    q = rng.uniform(lower, upper, (most, model.n))
-    v, a = rng.normal(0.0, 2.0, (2, most, model.n))
-    possible = _rank(torque_regressor(model, q, v, a))
-    seen = _rank(torque_regressor(model, samples.q, samples.v, samples.a))
+    base = base_parameters(model, drive=True)
+    W = torque_regressor(model, samples.q, samples.v, samples.a, columns=base.names)
+    possible, seen = len(base), _rank(W)
     if seen < possible:
         found.append(
             LogFinding(
