@@ -95,9 +95,12 @@ def partners(
             if apart <= MERGE:
                 double[n, k - 1] = True
                 continue
+            # where all between the two meets the pose as well, one may be all there is to find
+            merged = small * small < 2.0 * abs(h) * tolerance.min()
+            reach = (1.5 if merged else 0.3) * apart
             known = False
             for j in range(count[n]):
-                if j != k - 1 and distance(sigma, found[n, j], start) < 0.3 * apart:
+                if j != k - 1 and distance(sigma, found[n, j], start) < reach:
                     known = True
             if known:
                 continue
@@ -109,6 +112,8 @@ def partners(
                     count[n] = keep(sigma, q, found[n], count[n])
                 if count[n] > before:
                     break
+            else:
+                double[n, k - 1] = merged
 
 
 @compiled(NOTHING(INTS, STACK, STACK, INTS, FLAGS))
