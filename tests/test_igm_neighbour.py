@@ -87,7 +87,7 @@ def multi_start(chain, U, starts, seed=1):
             [R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1
         )
         step = np.linalg.solve(J + 1e-14 * np.eye(6), e[..., None])[..., 0]
-        q = q + step * np.minimum(1.0, 0.5 / np.abs(step).max(axis=1))[:, None]
+        q = q + step / np.maximum(1.0, 2.0 * np.abs(step).max(axis=1))[:, None]
     near = (np.abs(e).max(axis=1) < 1e-11) & (np.trace(R, axis1=1, axis2=2) > 2.9)
     roots = []
     for x in q[near]:

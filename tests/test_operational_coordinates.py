@@ -396,7 +396,8 @@ def test_orientations_that_are_nearly_or_not_at_all_rotations(kind, rng):
     noise[:, :3] = 0.0
     T = pose_from_coordinates(x + 2e-7 * noise, kind)
     R = T[:, :3, :3]
-    assert np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max() < 8 * EPS
+    # what `as_pose` takes as a rotation without a change: rounding of products of 3 x 3 matrices
+    assert np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max() < 18 * EPS
     assert np.abs(operational_coordinates(T, kind, near=x) - x).max() < 1e-6
     off = x.copy()
     off[2, 3:] *= 1.001
