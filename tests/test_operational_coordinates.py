@@ -44,6 +44,7 @@ from robotmodels.kinematics.coordinates.rates import (
 from robotmodels.kinematics.coordinates.sequences import continuous_coordinates
 
 EPS = np.finfo(float).eps
+THERE_AND_BACK = 3 * 2 * np.pi * EPS  # three angles up to pi, each with two roundings
 TURN = 2 * np.pi
 KINDS = tuple(OrientationKind)
 EULER = (OrientationKind.EULER, OrientationKind.EULER_ZYZ)
@@ -167,7 +168,7 @@ def test_random_poses_come_back(kind, rng):
     assert x.shape == (2000, kind.dimension)
     assert np.array_equal(x[:, :3], T[:, :3, 3])
     back = pose_from_coordinates(x, kind)
-    assert np.abs(back - T).max() < 10 * EPS
+    assert np.abs(back - T).max() < THERE_AND_BACK
     assert np.array_equal(back[:, 3], T[:, 3])
 
 
@@ -175,7 +176,7 @@ def test_random_poses_come_back(kind, rng):
 def test_special_rotations_come_back(kind, rng):
     T = poses(np.array(list(special_rotations())), rng)
     back = pose_from_coordinates(operational_coordinates(T, kind), kind)
-    assert np.abs(back - T).max() < 12 * EPS
+    assert np.abs(back - T).max() < THERE_AND_BACK
 
 
 @every_angle
@@ -187,7 +188,7 @@ def test_angles_are_exact_at_and_near_gimbal_lock(kind, gap, rng):
     T = se3.as_pose(pose_from_coordinates(x, kind))
     for near in (None, x, x + rng.normal(size=x.shape)):
         y = operational_coordinates(T, kind, near)
-        assert np.abs(pose_from_coordinates(y, kind) - T).max() < 12 * EPS
+        assert np.abs(pose_from_coordinates(y, kind) - T).max() < THERE_AND_BACK
     if gap == 0.0:
         y = operational_coordinates(T, kind)
         assert (y[:, 5 if kind is ROLL[1] else 3] == 0.0).all()
@@ -277,7 +278,7 @@ def test_small_rotation_vectors_keep_their_digits(angle, rng):
     v = rng.normal(size=(50, 3)) * angle
     x = np.concatenate([np.zeros((50, 3)), v], axis=1)
     y = operational_coordinates(pose_from_coordinates(x, "angle_axis"), "angle_axis")
-    np.testing.assert_allclose(y[:, 3:], v, rtol=0, atol=4 * EPS * angle)
+    np.testing.assert_allclose(y[:, 3:], v, rtol=0, atol=4 * EPS * np.abs(v).max())
 
 
 def test_angles_and_vectors_of_many_turns(rng):
@@ -478,7 +479,8 @@ def test_a_sequence_is_each_sample_near_the_one_before(kind, with_near, rng):
             same(x[0], operational_coordinates(T[0], kind, near), 1e-13)
         for i in range(1, len(T)):
             same(x[i], operational_coordinates(T[i], kind, near=x[i - 1]), 1e-12)
-        assert np.abs(pose_from_coordinates(x, kind) - T).max() < 60 * EPS
+        turns = max(1.0, np.abs(x[:, 3:]).max() / np.pi)
+        assert np.abs(pose_from_coordinates(x, kind) - T).max() < turns * THERE_AND_BACK
 
 
 @every_kind
