@@ -566,7 +566,11 @@ def test_scale_of_the_robot_does_not_matter():
     tool[:3, 3] *= k
     found = nearest_singularity(arm, q)
     large = nearest_singularity(big.with_tool(tool, tip=arm.tip), q * stretch)
-    np.testing.assert_allclose(large.distance, found.distance, atol=1e-6)
+    # det J has a factor r3^2 and 1e-13 counts as singular: both strokes are known to the root,
+    # whose curvature is measured a little aside
+    aside = found.q[0] + np.eye(6)[2] * 1e-3 * found.length
+    known = 1e-3 * np.sqrt(1e-13 / singularity_flags(arm, aside).weakest)
+    np.testing.assert_allclose(large.distance, found.distance, rtol=1e-12, atol=2.2 * known)
     assert large.kind == found.kind
 
 
