@@ -33,8 +33,8 @@ def general_postures(
         Rows that hold a posture. Each meets its pose to 1e-13 m and rad, beside infinite families
         to 1e-12.
     double : ndarray of bool, shape (N, 16)
-        Rows that hold two postures merged to less than 1e-6, or to less than the pose, met all
-        the way between them, can tell apart.
+        Rows that hold two merged postures: less than 1e-6 apart, or so near that the pose is met
+        everywhere between them and only one is found.
 
     Examples
     --------
