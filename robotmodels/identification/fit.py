@@ -193,7 +193,7 @@ def fit(
     else:
         base.check(model)
     given = log
-    log, findings = accepted_log(log, model, "log") if checked else (log, ())
+    log, findings = accepted_log(log, model, "log", base.friction) if checked else (log, ())
     if test is not None:
         test, of_test = accepted_test(given, test, model, checked)
         findings = (*findings, *of_test)

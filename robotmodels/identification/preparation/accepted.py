@@ -5,13 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from ...errors import InvalidValueError
+from ...friction import Friction
 from ...logs import FindingKind, Log, LogFinding, Severity, check_log
 from ...logs.bad_samples import cleaned
 from ...model import RobotModel
 from .joint_checks import check_joints
 
 
-def accepted_log(log: Log, model: RobotModel, name: str) -> tuple[Log, tuple[str, ...]]:
+def accepted_log(
+    log: Log, model: RobotModel, name: str, friction: Friction | None = None
+) -> tuple[Log, tuple[str, ...]]:
     """A log that may be used, and sentences on it; one that may not is refused with all of them.
 
     Parameters
@@ -22,6 +25,8 @@ def accepted_log(log: Log, model: RobotModel, name: str) -> tuple[Log, tuple[str
         The robot.
     name : str
         Of the argument, for messages.
+    friction : Friction, optional
+        The friction model of the fit, as for `check_joints`.
 
     Returns
     -------
@@ -37,7 +42,7 @@ def accepted_log(log: Log, model: RobotModel, name: str) -> tuple[Log, tuple[str
     """
     log, found = _cleaned(log, model)
     if not any(finding.severity is Severity.USELESS for finding in found):
-        found = (*found, *check_joints(log, model))
+        found = (*found, *check_joints(log, model, friction))
     return log, _sentences(found, name)
 
 

@@ -8,6 +8,8 @@ import numpy as np
 
 from ..._arrays import Array
 from ...errors import InvalidValueError, ShapeError
+from ...friction import Friction
+from ...friction.combined import by_dependence
 from ...logs import FindingKind, Log, LogFinding, Severity
 from ...logs.log import check_is_log
 from ...minimal_parameters import base_parameters
@@ -24,7 +26,9 @@ _ROWS = 300
 _RANK = 1e-6
 
 
-def check_joints(log: Log, model: RobotModel) -> tuple[LogFinding, ...]:
+def check_joints(
+    log: Log, model: RobotModel, friction: Friction | None = None
+) -> tuple[LogFinding, ...]:
     """What the dynamic model tells of a log: signs, order, units, delay, what is excited.
 
     - Readings of the log with the sign of a joint's position, torque or both changed, with two
@@ -44,6 +48,9 @@ def check_joints(log: Log, model: RobotModel) -> tuple[LogFinding, ...]:
         What was recorded.
     model : RobotModel
         The robot it is of; its inertia is used for the size of torques alone.
+    friction : Friction, optional
+        Gravity compensators of the robot, alone or in a sum: without them their torques may look
+        like those of other joints.
 
     Returns
     -------
@@ -83,7 +90,7 @@ def check_joints(log: Log, model: RobotModel) -> tuple[LogFinding, ...]:
     found: list[LogFinding] = []
     try:
         samples = JointSamples.of(filtered_samples(part, cutoff, 2, _ROWS))
-        _signs_and_order(part, model, samples, found)
+        _signs_and_order(part, model, samples, by_dependence(friction)[1], found)
         torque_sizes(part, model, samples, found)
         _excited(part, model, samples, found)
         _in_step(part, model, found)
@@ -97,11 +104,15 @@ def check_joints(log: Log, model: RobotModel) -> tuple[LogFinding, ...]:
 
 
 def _signs_and_order(
-    log: Log, model: RobotModel, samples: JointSamples, found: list[LogFinding]
+    log: Log,
+    model: RobotModel,
+    samples: JointSamples,
+    placed: Friction | None,
+    found: list[LogFinding],
 ) -> None:
     """Report flips, swaps and degrees, one after the other where there are several."""
     for _ in range(log.n):
-        likely = better_hypotheses(samples, model)
+        likely = better_hypotheses(samples, model, placed)
         if not likely:
             return
         best, others = likely[0], likely[1:]

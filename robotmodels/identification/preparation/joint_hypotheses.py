@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..._arrays import Array
+from ...friction import Friction
 from ...geometry import PRISMATIC
 from ...model import RobotModel
 from ...regressors import torque_regressor
@@ -107,13 +108,15 @@ class Hypothesis:
         return bool((size[size > 0.0] != 1.0).any())
 
 
-def better_hypotheses(samples: JointSamples, model: RobotModel) -> tuple[Hypothesis, ...]:
+def better_hypotheses(
+    samples: JointSamples, model: RobotModel, placed: Friction | None = None
+) -> tuple[Hypothesis, ...]:
     """Readings that fit significantly better than the log as given, the best first.
 
     Every hypothesis has the same parameters: those of links, rotors, friction and offsets, with
     second moments of mass, masses, rotor inertias and friction coefficients not negative, and an
-    elasticity at each joint for what the model lacks. Each joint is weighted by its own residual
-    variance. The difference of the log-likelihoods has a standard error from blocks of time, which
+    elasticity at each joint for what the model lacks (and ``placed``, a gravity compensator). Each
+    joint is weighted by its own residual variance. The difference of the log-likelihoods has a standard error from blocks of time, which
     holds for residuals that are correlated within a block.
 
     Returned with the best are those that fit as well.
@@ -124,11 +127,11 @@ def better_hypotheses(samples: JointSamples, model: RobotModel) -> tuple[Hypothe
     Econometrica 57(2), 1989.
     """
     unit = np.eye(model.n)
-    given = _Fit(samples, model, unit)
+    given = _Fit(samples, model, unit, placed)
     base = given.constrained(unit)
     found: list[tuple[float, Hypothesis]] = []
     for position, torques in _readings(model, samples.q):
-        fit = given if np.array_equal(position, unit) else _Fit(samples, model, position)
+        fit = given if np.array_equal(position, unit) else _Fit(samples, model, position, placed)
         for joints, torque in torques:
             least = min(len(joints), 2) * _LIKELY
             # without limits it fits at least as well
@@ -199,9 +202,11 @@ class _Residuals:
 class _Fit:
     """Least squares of the equations of all joints, positions through a matrix."""
 
-    def __init__(self, samples: JointSamples, model: RobotModel, position: Array) -> None:
+    def __init__(
+        self, samples: JointSamples, model: RobotModel, position: Array, placed: Friction | None
+    ) -> None:
         q, v, a = (x @ position.T for x in (samples.q, samples.v, samples.a))
-        W, limited = _columns(model, q, v, a, samples.cutoff)
+        W, limited = _columns(model, (q, v, a), samples.cutoff, placed)
         size = np.sqrt(np.einsum("tnp,tnp->p", W, W))
         seen = np.flatnonzero(size > _NOTHING * size.max(initial=0.0))
         order = seen[np.argsort(limited[seen], kind="stable")]
@@ -253,11 +258,12 @@ def _solved(A: Array, b: Array, free: int) -> Array:
 
 
 def _columns(
-    model: RobotModel, q: Array, v: Array, a: Array, cutoff: float
+    model: RobotModel, state: tuple[Array, Array, Array], cutoff: float, placed: Friction | None
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Rows of all joints, shape (T, n, p), and which parameters cannot be negative."""
+    q, v, a = state
     n, links = model.n, 10 * model.table.f
-    W = torque_regressor(model, q, v, a, drive=("Ia", "Fv", "offset"))
+    W = torque_regressor(model, q, v, a, drive=("Ia", "Fv", "offset"), friction=placed)
     bodies = W[:, :, :links].reshape(len(q), n, -1, 10)
     XX, YY, ZZ = (bodies[..., k].copy() for k in (0, 3, 5))
     # XX = Lyy + Lzz and so on: second moments Lxx, Lyy, Lzz of a body are not negative
