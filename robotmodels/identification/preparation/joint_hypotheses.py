@@ -116,8 +116,8 @@ def better_hypotheses(
     Every hypothesis has the same parameters: those of links, rotors, friction and offsets, with
     second moments of mass, masses, rotor inertias and friction coefficients not negative, and an
     elasticity at each joint for what the model lacks (and ``placed``, a gravity compensator). Each
-    joint is weighted by its own residual variance. The difference of the log-likelihoods has a standard error from blocks of time, which
-    holds for residuals that are correlated within a block.
+    joint is weighted by its own residual variance. The difference of the log-likelihoods has a
+    standard error from blocks of time, which holds for residuals correlated within a block.
 
     Returned with the best are those that fit as well.
 
