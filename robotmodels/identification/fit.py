@@ -324,7 +324,7 @@ def _shrunk(
     """The estimate with a weak prior, where the log needs it."""
     part = looked_at(system.log, system.processing.motion)
     found = signals(part, system.processing)
-    sizes = plausible_sizes(system.base, system.names, found.v, found.a, found.tau)
+    sizes = plausible_sizes(system.base, system.names, found.q, found.v, found.a, found.tau)
     deviations = np.sqrt(np.diag(spread.covariance))
     return shrunk(reduction, estimate, deviations, ratio, sizes, always)
 

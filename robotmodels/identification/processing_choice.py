@@ -11,15 +11,16 @@ from .._arrays import Array
 from ..logs import Log
 from ..minimal_parameters import BaseParameters
 from .preparation.processing import Processing, choose_processing
-from .regressor_noise import bias_ratio, regressor_noise
+from .regressor_noise import RegressorNoise, bias_ratio, regressor_noise
 
 _EQUATIONS = 20
 """Equations for each parameter at least."""
 _BIAS = 0.1
 """Bias by noise in the regressor at most, in standard errors."""
 _HIGHEST, _OF_MOTION = 15.0, 2.5
-"""Cutoff of the equations at most: Hz (joints are flexible above), or in those of the motion."""
-_STEP = 1.25
+"""Highest cutoff of the equations, Hz (joints are flexible above), and lowest, in frequencies of
+the motion."""
+_STEP = 1.3
 _POSITIONS = 2.5
 """Cutoff of the positions, in cutoffs of the equations, so that it does not distort them."""
 _HALF, _NYQUIST = 0.4, 0.4
@@ -45,36 +46,34 @@ def processing_for(
     plain = choose_processing(log, cutoff, decimation, dead_band, edges)
     most = max(1, len(log) * (kinds or log.n) // (_EQUATIONS * len(base)))
     highest = min(max(_HIGHEST, _OF_MOTION * plain.motion), _NYQUIST / log.dt)
-    lowest = min(plain.motion, highest)
+    lowest = min(_OF_MOTION * plain.motion, highest)
     if cutoff is not None:
         lowest, highest = min(lowest, cutoff), max(highest, cutoff)
     noise = regressor_noise(base, log, lowest, highest)
     if cutoff is not None:
         step = decimation or max(1, min(plain.decimation, most))
         asked = min(cutoff, _HALF / (step * log.dt))
-        ratio = bias_ratio(noise, asked)
         chosen = choose_processing(log, cutoff, step, dead_band, edges)
-        return _told(chosen, base, log, kinds, asked, ratio)
-    count = int(np.log(highest / lowest) / np.log(_STEP)) + 1
-    grid = [highest / _STEP**k for k in range(count)]
+        return _told(chosen, base, log, kinds, asked, bias_ratio(noise, asked))
     if decimation is not None:
-        grid = [min(x, _HALF / (decimation * log.dt)) for x in grid]
-    low, high = 0, len(grid) - 1
-    ratios = {low: bias_ratio(noise, grid[low])}
-    if ratios[low].max(initial=0.0) > _BIAS:
-        while high - low > 1:
-            middle = (low + high) // 2
-            ratios[middle] = bias_ratio(noise, grid[middle])
-            low, high = (middle, high) if ratios[middle].max(initial=0.0) > _BIAS else (low, middle)
-        low = high
-    band = grid[low]
-    ratio = ratios[low] if low in ratios else bias_ratio(noise, band)
+        highest = min(highest, _HALF / (decimation * log.dt))
+    band, ratio = _highest_cutoff(noise, min(lowest, highest), highest)
     step = decimation or max(1, min(int(_HALF / (band * log.dt)), most))
     # where more equations are asked for than the noise leaves to know, positions are cut off lower
     wider = np.clip(_POSITIONS * band * step * log.dt / _HALF, 1.0, _POSITIONS)
     positions = min(float(wider) * band, _NYQUIST / log.dt)
     chosen = choose_processing(log, positions, step, dead_band, edges)
     return _told(chosen, base, log, kinds, band, ratio)
+
+
+def _highest_cutoff(noise: RegressorNoise, lowest: float, highest: float) -> tuple[float, Array]:
+    """The highest cutoff at which no parameter is noticeably biased, and the biases there."""
+    band = highest
+    ratio = bias_ratio(noise, band)
+    while ratio.max(initial=0.0) > _BIAS and band > lowest:
+        band = max(lowest, band / _STEP)
+        ratio = bias_ratio(noise, band)
+    return band, ratio
 
 
 def _told(

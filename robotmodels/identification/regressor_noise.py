@@ -18,6 +18,8 @@ from .weak_prior import plausible_sizes
 _THINNED, _PASSED = 0.05, 4.0
 """Periods of the highest cutoff between samples that are kept, and what passes, in cutoffs."""
 _ROWS = 4000
+_PRIOR = 0.3
+"""Standard deviation of the weak prior, in plausible sizes."""
 _PER_CUTOFF = 2.5
 """Rows in a period of the cutoff: filtered signals hold no more."""
 _DEAD = 0.01
@@ -59,9 +61,9 @@ def regressor_noise(
 def bias_ratio(given: RegressorNoise, cutoff: float) -> Array:
     """Predicted bias by noise in the regressor over the standard error, of each parameter (b,).
 
-    With ``D`` what noise changes in the regressor ``W``, least squares (with the weak prior) are
+    With ``D`` what noise changes in the regressor ``W``, least squares (with a weak prior) are
     biased by about ``-(W^T W)^-1 E[D^T D] b``; positions and torques pass one filter of this
-    cutoff. Parameters that neither the log nor the prior shows have a ratio of 0.
+    cutoff.
 
     References
     ----------
@@ -77,7 +79,7 @@ def bias_ratio(given: RegressorNoise, cutoff: float) -> Array:
     speed = np.abs(signals[1])
     use = speed > _DEAD * speed.max(axis=0, initial=0.0)
     W, D, y = W * use[:, :, None], D * use[:, :, None], torques * use
-    sizes = plausible_sizes(base, base.names, signals[1], signals[2], torques)
+    sizes = plausible_sizes(base, base.names, *signals, torques) * _PRIOR
     weights = np.ones(base.model.n)
     for _ in range(2):
         A = (W * weights[:, None]).reshape(-1, len(sizes)) * sizes

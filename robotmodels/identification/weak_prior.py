@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._arrays import Array
 from ..geometry import PRISMATIC
@@ -15,22 +16,26 @@ from .methods.least_squares import ordinary, weights_of
 from .methods.ridge import ridge
 from .scale.reduction import Reduction
 
-_WEAK = 0.5
-"""Standard error of a parameter, in deviations of the prior, from which the prior matters."""
+_WEAK = 0.15
+"""Standard error of a parameter, in plausible sizes, from which a prior matters."""
 _NAMED = 8
+_ALIKE = (("M", "MX", "MY", "MZ"), ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "Ia", "Iam"))
+"""Kinds whose sizes have a common factor; every other kind has its own."""
+_SCALES = np.logspace(-2.5, 1.5, 17)
+_ROUNDS = 3
 _SAMPLES = 200
 _LEAST = 0.01
 """Least torque of a joint that is taken into account, relative to the largest of its kind."""
 
 
 def plausible_sizes(
-    base: BaseParameters, names: tuple[str, ...], v: Array, a: Array, tau: Array
+    base: BaseParameters, names: tuple[str, ...], q: Array, v: Array, a: Array, tau: Array
 ) -> Array:
-    """Standard deviations (b,) of a prior around zero, from measured v, a and tau (N, n).
+    """Standard deviations (b,) of a prior around zero, from measured q, v, a and tau (N, n).
 
-    On a random motion as fast as that of the fastest joint of its kind, a parameter would by itself
-    give about the torque that was measured, at the joint where it acts most. Parameters that the
-    motion shows are hardly drawn by it; those that it does not show stay small.
+    On a random motion, each joint as fast as the fastest of its kind, a parameter of this size
+    would by itself give the torque that was measured, at the joint where it acts most. Parameters
+    that the log shows are hardly drawn by such a prior; those that it does not show stay small.
     """
     model = base.model
     slides = np.asarray(model.table.sigma[model.table.joint_rows] == PRISMATIC)
@@ -41,9 +46,12 @@ def plausible_sizes(
             size[kind] = np.maximum(size[kind], _LEAST * size[kind].max())
     rng = np.random.default_rng(0)
     shape = (_SAMPLES, model.n)
-    q = rng.uniform(np.maximum(model.lower, -np.pi), np.minimum(model.upper, np.pi), shape)
+    span = np.ptp(q, axis=0)
+    lower = np.maximum(model.lower, np.where(slides, q.min(axis=0) - span, -np.pi))
+    upper = np.minimum(model.upper, np.where(slides, q.max(axis=0) + span, np.pi))
     W = torque_regressor(
-        model, q, speed * rng.normal(size=shape), rate * rng.normal(size=shape), base.drive,
+        model, rng.uniform(lower, np.maximum(lower, upper), shape), speed * rng.normal(size=shape),
+        rate * rng.normal(size=shape), base.drive,
         columns=names, friction=base.friction,
     )  # fmt: skip
     given = np.sqrt(np.mean(W**2, axis=0)) / np.where(size > 0.0, size, np.inf)[:, None]
@@ -61,24 +69,21 @@ def shrunk(
 ) -> Estimate | None:
     """Shrink an estimate toward zero where the log leaves parameters less certain than the prior.
 
-    The size of the prior relative to ``sizes`` is that of the greatest marginal likelihood
-    (empirical Bayes). None where every parameter is known much better than that: then the prior
-    would hardly change it.
+    The sizes of parameters of one kind have a common factor, that of the greatest marginal
+    likelihood (empirical Bayes). None where every parameter is known much better than that: then
+    the prior would hardly change it.
 
     References
     ----------
     C. Morris, "Parametric empirical Bayes inference", J. American Statistical Association 78, 1983.
     """
-    correlated = max(1.0, float(np.median(inflation)))
-    R, y, _ = reduction.stacked(weights_of(ordinary(reduction).sigma, reduction) / correlated)
-    U, s, _ = np.linalg.svd(R * sizes)
-    z, grid = (U.T @ y) ** 2, np.logspace(-1.5, 1.5, 31)
-    gain = 1.0 + (grid[:, None] * s) ** 2
-    scale = float(grid[int(np.argmin((np.log(gain) + z / gain).sum(axis=1)))])
-    weak = np.flatnonzero(deviations > _WEAK * scale * sizes)
+    weak = np.flatnonzero(deviations > _WEAK * sizes)
     if not (weak.size or always):
         return None
-    found = ridge(reduction, None, scale * sizes, correlated**2)
+    correlated = max(1.0, float(np.median(inflation)))
+    R, y, _ = reduction.stacked(weights_of(ordinary(reduction).sigma, reduction) / correlated)
+    likely = _likely_sizes(R, y, sizes, _groups(reduction.names))
+    found = ridge(reduction, None, likely, correlated**2)
     order = weak[np.argsort(-(deviations / sizes)[weak])]
     names = ", ".join(reduction.names[k] for k in order[:_NAMED])
     more = f" and {len(order) - _NAMED} others" if len(order) > _NAMED else ""
@@ -91,3 +96,31 @@ def shrunk(
     return replace(
         found, method=estimate.method, status=estimate.status, notes=(*estimate.notes, note)
     )
+
+
+def _groups(names: tuple[str, ...]) -> NDArray[np.int64]:
+    """A number for each parameter: those of one number are of one kind."""
+    kinds = [name.rstrip("0123456789") for name in names]
+    alike = {kind: group for group in _ALIKE for kind in group}
+    found = [alike.get(kind, (kind,)) for kind in kinds]
+    order = {group: k for k, group in enumerate(dict.fromkeys(found))}
+    return np.array([order[group] for group in found])
+
+
+def _likely_sizes(R: Array, y: Array, sizes: Array, groups: NDArray[np.int64]) -> Array:
+    """Sizes times the factors of their groups with which ``y = R x + white`` is most likely."""
+    from scipy.linalg import cho_factor, cho_solve
+
+    def unlikely(scales: Array) -> float:
+        A = R * (sizes * scales[groups])
+        factor = cho_factor(A @ A.T + np.eye(len(A)), lower=True, check_finite=False)
+        half = 2.0 * np.log(np.diag(factor[0])).sum()
+        return float(half + y @ cho_solve(factor, y, check_finite=False))
+
+    scales = np.full(int(groups.max()) + 1, 0.3)
+    for _ in range(_ROUNDS):
+        for g in range(len(scales)):
+            tried = np.repeat(scales[None], len(_SCALES), axis=0)
+            tried[:, g] = _SCALES
+            scales = tried[int(np.argmin([unlikely(x) for x in tried]))]
+    return sizes * scales[groups]

@@ -34,7 +34,7 @@ _LEVELS = 20
 """Parts of a spectrum over which the level of the noise is averaged."""
 _SMEAR = 0.3
 """Periods of the cutoff over which a step of the acceleration is smeared on either side."""
-_EDGE = 3.0
+_EDGE = 1.5
 """Periods of the cutoff after which the filter's transient is gone from what a fit could see."""
 _HIGHEST = 0.4
 """Cutoff of the positions at most, in sampling rates."""
@@ -316,6 +316,9 @@ def _motion(log: Log) -> tuple[float, Array]:
     # where a joint hardly moves, or over few steps of its encoder, its motion does not show
     moves = (power > 0.0) & (power > _MOVES * power.max(axis=0))
     moves &= np.ptp(np.asarray(log.q), axis=0) > _FEW * levels.step
+    # and a joint whose noise is as large as its motion shows less than the others
+    clear = moves & (power > 2.0 * (levels.deviation * rate) ** 2)
+    moves = clear if clear.any() else moves
     motion = float(np.where(moves, bands, 0.0).max())
     if not motion > 0.0:
         motion = float(np.min(bands))
