@@ -239,7 +239,10 @@ def test_axes_within_1e_5_rad_are_aligned_in_the_regrouping():
         model = filled(right_angled_robot(rng), rng)
         rounded, far = few_digits(model, rng, 9e-6), few_digits(model, rng, 3e-4)
         for way in BaseMethod:
-            meant, base = base_parameters(model, way), base_parameters(rounded, way)
+            meant, base = (
+                base_parameters(model, way, drive=True),
+                base_parameters(rounded, way, drive=True),
+            )
             assert base.names == meant.names
             assert {*base.no_effect, *base.neglected} <= {*meant.no_effect}
             assert abs(base.matrix - meant.matrix).max(initial=0.0) < 1e-4
@@ -250,8 +253,8 @@ def test_axes_within_1e_5_rad_are_aligned_in_the_regrouping():
                 assert f"differ by {base.missed:.0e} of the largest" in base.notes[1]
                 assert 0.0 < base.missed < 3 * turned(base)
             # not so beyond 1e-5 rad, and not if every digit is meant
-            keeps_torque(base_parameters(far, way), far, rng, tolerance=3e-10)
-            exact = base_parameters(rounded, way, tolerance=1e-11)
+            keeps_torque(base_parameters(far, way, drive=True), far, rng, tolerance=3e-10)
+            exact = base_parameters(rounded, way, tolerance=1e-11, drive=True)
             assert turned(exact) < 1e-10
             apart += len(exact) > len(meant)
     assert apart > 50
@@ -265,10 +268,10 @@ def test_gravity_and_the_first_axis_are_aligned_in_any_base(rng):
     first = rm.link_poses(arm, np.zeros(2))[1][:3, :3]
     for down in (first[:, 2], first[:, 1]):
         off = down + 5e-6 * first[:, 2 if down is first[:, 1] else 0]
-        meant = base_parameters(arm.with_gravity(9.81 * down))
+        meant = base_parameters(arm.with_gravity(9.81 * down), drive=True)
         model = arm.with_gravity(9.81 * off / np.linalg.norm(off))
         for way in BaseMethod:
-            base = base_parameters(model, way)
+            base = base_parameters(model, way, drive=True)
             assert base.names == meant.names
             assert "axis 2 and gravity" in base.notes[0]
             assert "but for 5.0e-06 rad" in base.notes[0]
@@ -283,8 +286,8 @@ def test_a_slope_of_prismatic_joints_is_aligned(rng):
     exact = filled(rm.RobotModel.from_table(table_of(*rows)), rng)
     rounded = exact.with_table(exact.table.replace(alpha=exact.table.alpha.round(4)))
     for way in BaseMethod:
-        base = base_parameters(rounded, way)
-        assert base.names == base_parameters(exact, way).names
+        base = base_parameters(rounded, way, drive=True)
+        assert base.names == base_parameters(exact, way, drive=True).names
         assert "axis 3 and gravity" in base.notes[0]
         assert "axis 3 and axis 1 perpendicular" in base.notes[0]
         assert "ZZ" in base.text

@@ -569,7 +569,7 @@ def test_choices_are_those_of_the_package():
         (["--rows", "0", "-10", "--test-rows", "7000", "8000"], "rows that do not overlap"),
         (["--rows", "0", "90000"], "--rows: expected a first row"),
         (["--rows", "0", "10", "--test-rows", "10", "9000"], "within the 8000 rows"),
-        (["--angles", "rad"], "with --gears or --motor-side. (--no-check takes the log as it"),
+        (["--angles", "rad"], "with --gears or --motor-side if they are motor angles"),
         (["--delay", "0.2", "--rows", "0", "8000"], "7900 rows"),
     ],
 )

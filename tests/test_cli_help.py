@@ -216,7 +216,7 @@ EFFECTS = {
         "--delimiter": [";"], "--rows": [0, 1200], "--delay": [0.005], "--test": ["run.npz"],
         "--test-torques-from": ["torques.csv"], "--test-rows": [1000, 1500], "--test-share": [0.3],
         "--method": ["ols"], "--form": ["power"], "--drive": ["Fv", "Fc"], "--cutoff": [10],
-        "--decimation": [5], "--dead-band": [0.1], "--edges": [0.5], "--no-check": [],
+        "--decimation": [7], "--dead-band": [0.1], "--edges": [0.5], "--no-check": [],
         "--consistent": [], "--prior": [7], "--essential": [5], "--loss": ["tukey"],
         "--strength": [3], "--noise": [0.02], "--forgetting": [0.999], "--kp": [90], "--kd": [9],
         "--workers": [0],

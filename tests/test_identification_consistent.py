@@ -77,7 +77,7 @@ KINDS = (
 def test_a_real_robot_comes_back_at_no_price(kind, rng):
     for _ in range(1 if kind in ("rx90", "iiwa14", "tx40") else 3):
         model = robot(kind, rng)
-        base = base_parameters(model)
+        base = base_parameters(model, drive=True)
         values = base.values(model)
         W = regressor(base, rng)
         R, y, rest = factor(W, W @ values)
@@ -128,7 +128,7 @@ def test_the_optimum_of_an_independent_method(seed):
     """Data of no real robot: the same least as unconstrained least squares of Cholesky factors."""
     rng = np.random.default_rng(seed)
     model = arm(rng)
-    base = base_parameters(model)
+    base = base_parameters(model, drive=True)
     values = base.values(model)
     values[base.names.index("ZZ2")] *= -0.3
     values[base.names.index("Fc1")] = -0.4
@@ -194,7 +194,7 @@ def test_small_and_large_robots_are_the_same_problem(rng):
     true = model.with_inertia(uniform_bodies(model, 60.0))
     true = true.with_drive(rm.DriveParameters(Ia=[0] * 6, Fv=[10] * 6, Fc=[5] * 6, offset=[0] * 6))
     base, R, y, rest, *_ = noisy(true, rng, 0.3, samples=15)
-    base = base_parameters(model)
+    base = base_parameters(model, drive=True)
     fits = {
         s: fit_consistent(base, R, s * y, rest=s**2 * rest, prior=uniform_bodies(model, 60.0 * s))
         for s in (1e-6, 1e-3, 1.0, 1e3, 1e6)
@@ -334,7 +334,7 @@ def test_bounds_that_contradict_are_named(rng):
 @pytest.mark.parametrize("kind", ["tx40", "coupled"])
 def test_coupled_motors_stay_real(kind, rng):
     model = robot(kind, rng)
-    base = base_parameters(model)
+    base = base_parameters(model, drive=True)
     values = base.values(model)
     assert model.transmission is not None
     motor = model.transmission.coupled_motors[-1]

@@ -170,7 +170,7 @@ def test_least_squares_without_filter_are_biased_and_the_test_says_so():
     log = noisy(controlled(PERIOD), 3)
     moved = with_delay(log, -0.5 * DT)
     start = least_squares(moved, choose_processing(moved, **FILTER))[0].values
-    raw = choose_processing(moved, filtered=False, decimation=1, edges=0.2)
+    raw = choose_processing(moved, filtered=False, decimation=1, edges=0.2, dead_band=0.3)
     found, deviations, system, reduction = least_squares(moved, raw, ordinary)
     z = (found.values - truth()) / deviations
     # by chance, one of a hundred thousand is beyond 4.5

@@ -12,26 +12,26 @@ from .methods.ridge import segments
 from .preparation.delay_rows import looked_at
 from .scale.reduction import Reduction
 
-_SEGMENTS = 10
-_LARGEST_SHARE = 0.999
-"""Leverage of a segment at most: beyond, its residuals show nothing."""
+_SEGMENTS = 25
+_LARGEST_SHARE = 0.99
+"""Leverage of a segment at most: beyond, leaving it out shows nothing."""
 
 
 def segment_inflation(
     system: Equations, reduction: Reduction, weights: Array, deviations: Array
 ) -> float:
-    """Factor, at least 1, by which standard errors grow to those between segments of the log.
+    """Factor, at least 1, by which standard errors grow to those of a block jackknife.
 
-    A model that leaves something out (flexibility, friction of another law) errs alike over
-    seconds, and differently from one motion to the next; correlations over a few equations do not
-    show that. The covariance between segments does, its residuals corrected for their leverage. Of
-    ten segments a single parameter's would be rough, so that all have one factor: the root mean
-    square of the ratios of standard errors.
+    A model that leaves something out (flexibility, friction of another law) errs alike over times
+    much longer than a few equations, and differently from one motion to the next; correlations of
+    residuals do not show that. Estimates without each segment of the log in turn do. Those of a
+    single parameter would be rough, so that all have one factor: the root mean square of the ratios
+    of standard errors.
 
     References
     ----------
-    R. Bell and D. McCaffrey, "Bias reduction in standard errors for linear regression with
-    multi-stage samples", Survey Methodology 28(2), 2002.
+    H. Kuensch, "The jackknife and the bootstrap for general stationary observations", Annals of
+    Statistics 17(3), 1989.
     """
     part = looked_at(system.log, system.processing.motion)
     own, whole = system, reduction
@@ -49,7 +49,8 @@ def segment_inflation(
         T, z, _ = segment.stacked(weights)
         A = T @ inverse
         leverage, Q = np.linalg.eigh(A @ A.T)
-        corrected = (Q.T @ (z - T @ values)) / np.sqrt(1.0 - np.clip(leverage, 0, _LARGEST_SHARE))
+        # residuals of the segment by the parameters of all others
+        corrected = (Q.T @ (z - T @ values)) / (1.0 - np.clip(leverage, 0.0, _LARGEST_SHARE))
         score = A.T @ (Q @ corrected)
         covariance += np.outer(score, score)
     # of a long log only a part was looked at

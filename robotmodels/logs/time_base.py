@@ -220,8 +220,10 @@ def _split(
     missing = ~back & (steps > _GAP * median)
     counts = np.ones(len(steps), np.int64)
     shortest = 0.0
-    if missing.any() and np.quantile(np.abs(beside / median - 1.0), 0.9) <= _JITTER:
-        counts[missing] = np.minimum(np.round(steps[missing] / median), _UNKNOWN)
+    if missing.any() and np.quantile(np.abs(beside - median), 0.9) <= _JITTER * median:
+        # bounded before it is divided: damaged stamps may be as large as floats go
+        missed = np.minimum(steps[missing], _UNKNOWN * median)
+        counts[missing] = np.round(missed / median)
         if largest_gap is None:
             shortest = _motion(positions[kept], counts, back | (counts > _STRETCH), median)
     limit = max(_GAP, SHARE * shortest / median) if largest_gap is None else largest_gap
