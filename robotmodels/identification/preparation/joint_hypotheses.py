@@ -19,6 +19,9 @@ from .delay_rows import FilteredSamples, shared_motors
 _LIKELY, _CERTAIN = np.log(2.0), np.log(3.0)
 """Logarithms of the factors by which the residual variance of each joint concerned falls, in the
 mean, where a hypothesis is doubtful or certain: less is within what errors of the model explain."""
+_HALF = 0.5
+"""Part of the variance left of the torques concerned, relative to the log as given, of a certain
+hypothesis at most."""
 _SIGNIFICANT = 4.0
 """Standard errors by which the mean difference of the log-likelihoods must be positive."""
 _BLOCKS = 20
@@ -139,9 +142,10 @@ def better_hypotheses(
                 continue
             other = fit.constrained(torque)
             gain, significance = other.gain(base), other.significance(base)
-            if gain >= least and significance > _SIGNIFICANT:
-                certain = gain >= min(len(joints), 2) * _CERTAIN
-                left, before = (r.left(joints) for r in (other, base))
+            left, before = (r.left(joints) for r in (other, base))
+            # what other joints gain by it is no reason to turn this one
+            if gain >= least and significance > _SIGNIFICANT and left < before:
+                certain = gain >= min(len(joints), 2) * _CERTAIN and left < _HALF * before
                 what = Hypothesis(joints, position, torque, certain, left, before, significance)
                 found.append((gain, what))
     found.sort(key=lambda pair: -pair[0])

@@ -34,7 +34,7 @@ _LEVELS = 20
 """Parts of a spectrum over which the level of the noise is averaged."""
 _SMEAR = 0.3
 """Periods of the cutoff over which a step of the acceleration is smeared on either side."""
-_EDGE = 1.5
+_EDGE = 2.0
 """Periods of the cutoff after which the filter's transient is gone from what a fit could see."""
 _HIGHEST = 0.4
 """Cutoff of the positions at most, in sampling rates."""
