@@ -139,3 +139,28 @@ def textbook(model, log, cutoff=20.0):
         x = np.linalg.lstsq(A, b, rcond=None)[0]
         weights = 1.0 / (y - W @ x).std(axis=0)
     return lambda q, v, a: rm.torque_regressor(model, q, v, a)[..., kept] @ x
+
+
+def pair(seed, seconds=30.0):
+    """Two logs of one arm whose friction and joint 2 do what no model of the fit has."""
+    rng = np.random.default_rng(seed)
+    model, dt = arm(rng), 1.0 / float(rng.choice([250, 500]))
+    of_load, at_rest, spring = rng.uniform(0.0, 0.03, 3)
+    slides, n = model.table.sigma == 1, model.n
+    w = 2.0 * np.pi / seconds * np.arange(1, int(0.5 * seconds) + 1)
+    t = dt * np.arange(round(seconds / dt))
+    c, s = np.cos(np.outer(t, w)), np.sin(np.outer(t, w))
+    logs = []
+    for _ in range(2):
+        size = rng.normal(size=(2, len(w), n)) / np.sqrt(len(w)) / np.maximum(w, 0.6)[:, None]
+        a, b = size * np.where(slides, 0.25, 1.2)
+        q = rng.uniform(-1.0, 1.0, n) * np.where(slides, 0.2, 1.0) + s @ a - c @ b
+        v, acc = (c * w) @ a + (s * w) @ b, (c * w**2) @ b - (s * w**2) @ a
+        tau = rm.idm(model, q, v, acc)
+        load = tau.std(axis=0)
+        tau = tau + of_load * np.abs(rm.idm(model, q, v, acc, drive=False)) * np.tanh(v / 0.05)
+        tau = tau + at_rest * load * np.exp(-np.abs(v) / 0.1) * np.tanh(v / 0.02)
+        tau[:, 1] += spring * load[1] * np.sin(q[:, 1] + 0.5) * np.cos(2.0 * q[:, 1])
+        noise = rng.normal(size=(2, *q.shape))
+        logs.append(Log(dt, q + 1e-5 * noise[0], tau + 0.02 * load * noise[1]))
+    return model, logs

@@ -5,8 +5,9 @@ from functools import cache
 
 import numpy as np
 import pytest
-from identification_fleet import KINDS, case, textbook
+from identification_fleet import KINDS, case, pair, textbook
 
+import robotmodels as rm
 from robotmodels.errors import RobotModelsWarning
 from robotmodels.identification import fit
 
@@ -53,3 +54,24 @@ def test_intervals_hold_over_the_fleet():
     kept = [x for x in coverage if x is not None]
     assert len(kept) >= 18
     assert 0.92 <= np.mean(kept) <= 0.97
+
+
+def test_parameters_of_two_logs_of_one_robot_agree():
+    # friction of the load, of low speeds, and a spring that no model of the fit has
+    ratios = []
+    for seed in range(30):
+        model, logs = pair(seed)
+        first, second = (fit(model, log, checked=False, shrinkage=False) for log in logs)
+        assert first.names == second.names
+        apart = (first.values - second.values) / np.hypot(first.deviations, second.deviations)
+        ratios.append(np.sqrt(np.mean(apart**2)))
+    assert 0.8 < np.mean(ratios) < 1.2
+
+
+def test_halves_of_the_tx40_log_agree():
+    data = rm.datasets.load_tx40()
+    half = len(data.log) // 2
+    first = fit(data.model, data.log.rows(0, half))
+    second = fit(data.model, data.log.rows(half, len(data.log)))
+    apart = (first.values - second.values) / np.hypot(first.deviations, second.deviations)
+    assert np.sqrt(np.mean(apart**2)) < 1.5
