@@ -32,7 +32,7 @@ from .preparation.accepted import accepted_log, accepted_test
 from .preparation.delay_rows import looked_at
 from .preparation.processing import Processing
 from .preparation.signals import signals
-from .processing_choice import processing_for
+from .processing_choice import EQUATIONS, processing_for
 from .result import IdentificationResult
 from .scale.kept_equations import kept_equations, plain
 from .scale.reduction import Reduction, reduce_equations
@@ -57,6 +57,7 @@ _SEGMENTS = (
     "Standard errors are {:.2g} times those of stationary residuals: segments of the log differ by "
     "more than its noise explains, so that the model leaves something out."
 )
+_SPARE = 0.9
 _NOTHING = 1e-7
 """Length of a column relative to the longest, below which the log does not show it."""
 
@@ -197,19 +198,19 @@ def fit(
     if test is not None:
         test, of_test = accepted_test(given, test, model, checked)
         findings = (*findings, *of_test)
+    choices = (cutoff, decimation, dead_band, edges)
     if processing is None:
-        kinds = log.n if balance.by_joint else 1
-        processing = processing_for(base, log, cutoff, decimation, dead_band, edges, kinds)
-        if not balance.by_joint:
-            processing = replace(processing, notes=(*processing.notes, _ONE_AT_A_TIME))
-    elif any(x is not None for x in (cutoff, decimation, dead_band, edges)):
+        system, whole = _chosen(base, log, balance, choices, executor, progress)
+    elif any(x is not None for x in choices):
         raise InvalidValueError(
             "processing: it holds every choice; leave out cutoff, decimation, dead_band and edges, "
             "or leave out processing."
         )
-    _refuse_other_period(processing, log)
-    system: Equations = kept_equations(equations(base, log, processing, balance))
-    whole = reduce_equations(system, executor, progress)
+    else:
+        _refuse_other_period(processing, log)
+        system = kept_equations(equations(base, log, processing, balance))
+        whole = reduce_equations(system, executor, progress)
+    processing = system.processing
     _refuse_nothing(whole, processing)
     system, reduction, gap, unseen = _seen(system, whole)
     estimate = solve(system, reduction, way, options)
@@ -232,7 +233,8 @@ def fit(
         own = estimate.covariance * np.outer(ratio, ratio)
         drawn = None
         if linear and not (shrinkage is False or (shrinkage is None and essential is not False)):
-            drawn = _shrunk(system, reduction, estimate, spread, ratio, shrinkage is True)
+            few = reduction.rows < EQUATIONS * len(reduction.names)
+            drawn = _shrunk(system, reduction, estimate, spread, ratio, few or shrinkage is True)
         if drawn is not None:
             linear, estimate = False, drawn
             own = estimate.covariance * np.outer(ratio, ratio)
@@ -269,6 +271,38 @@ def fit(
             *_notes(unseen, dropped),
         ),
     )  # fmt: skip
+
+
+def _chosen(
+    base: BaseParameters,
+    log: Log,
+    balance: EquationForm,
+    choices: tuple[float | None, int | None, ArrayLike | None, float | None],
+    executor: Executor | None,
+    progress: Callable[[float], None] | None,
+) -> tuple[Equations, Reduction]:
+    """Equations with the processing that suits the log, and their reduction.
+
+    Where dead bands leave out so much that there are too few equations, less is thinned out.
+    """
+    cutoff, decimation, dead_band, edges = choices
+    kinds = log.n if balance.by_joint else 1
+
+    def made(step: int | None) -> Equations:
+        processing = processing_for(base, log, cutoff, step, dead_band, edges, kinds)
+        if not balance.by_joint:
+            processing = replace(processing, notes=(*processing.notes, _ONE_AT_A_TIME))
+        return kept_equations(equations(base, log, processing, balance))
+
+    system = made(decimation)
+    whole = reduce_equations(system, executor, progress)
+    share = whole.rows / (EQUATIONS * len(base))
+    step = system.processing.decimation
+    if decimation is None and share < 1.0 < step:
+        # a little less, since the cutoff and with it what is left out may change
+        system = made(max(1, int(_SPARE * share * step)))
+        whole = reduce_equations(system, executor)
+    return system, whole
 
 
 def _validated(

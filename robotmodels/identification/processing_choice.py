@@ -13,7 +13,7 @@ from ..minimal_parameters import BaseParameters
 from .preparation.processing import Processing, choose_processing
 from .regressor_noise import RegressorNoise, bias_ratio, regressor_noise
 
-_EQUATIONS = 20
+EQUATIONS = 20
 """Equations for each parameter at least."""
 _BIAS = 0.1
 """Bias by noise in the regressor at most, in standard errors."""
@@ -40,11 +40,11 @@ def processing_for(
     """Choose the processing; ``kinds`` equations at a time (default one for each joint).
 
     The cutoff of the equations is the highest at which noise of the positions biases no parameter
-    by more than `_BIAS` standard errors; there are never fewer than `_EQUATIONS` equations for a
+    by more than `_BIAS` standard errors; there are never fewer than `EQUATIONS` equations for a
     parameter, if the log has as many samples.
     """
     plain = choose_processing(log, cutoff, decimation, dead_band, edges)
-    most = max(1, len(log) * (kinds or log.n) // (_EQUATIONS * len(base)))
+    most = max(1, len(log) * (kinds or log.n) // (EQUATIONS * len(base)))
     highest = min(max(_HIGHEST, _OF_MOTION * plain.motion), _NYQUIST / log.dt)
     lowest = min(_OF_MOTION * plain.motion, highest)
     if cutoff is not None:
@@ -92,9 +92,9 @@ def _told(
             f"({base.names[worst]}) at this cutoff, as predicted; a lower cutoff=, better position "
             "signals, or method 'iv' avoid that."
         )
-    if rate < _EQUATIONS:
+    if rate < EQUATIONS:
         notes.append(
-            f"That is fewer than {_EQUATIONS} equations for each parameter: the log is short for "
+            f"That is fewer than {EQUATIONS} equations for each parameter: the log is short for "
             "so many parameters. Record a longer one, or identify fewer."
         )
     return replace(chosen, notes=(*chosen.notes, *notes))
