@@ -326,7 +326,7 @@ def test_choices_are_values(tx40):
     assert (choices.cutoff, choices.decimation, choices.edges) == (40.0, 50, 500)
     assert choices.rate == pytest.approx(100.0)
     assert choices.torque_cutoff == pytest.approx(40.0)
-    assert any("cut off at 40 Hz" in note for note in choices.notes)
+    assert any("filtered at 40 Hz, as requested" in note for note in choices.notes)
     with pytest.raises(ValueError):
         choices.dead_band[0] = 1.0
 

@@ -36,7 +36,7 @@ def test_default_fits_are_accepted_and_say_what_was_chosen(first):
     for seed in range(first, first + 5):
         _, _, equations, chosen = fitted(seed)
         assert equations >= 20.0, (seed, equations)
-        assert any("equations for each" in note for note in chosen.notes)
+        assert any("standard errors" in note for note in chosen.notes)
 
 
 def test_default_fits_predict_other_motion_as_a_textbook_fit_or_better():

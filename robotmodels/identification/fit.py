@@ -20,42 +20,29 @@ from ..friction import Friction
 from ..logs import Log
 from ..minimal_parameters import BaseParameters, base_parameters
 from ..model import RobotModel, check_model
-from .closed_loop.estimate import SimulatedEstimate
-from .correlated import CorrelatedCovariance, correlated_covariance
 from .equations import EquationForm, Equations, equations
 from .methods.essential import Essential, EssentialRule, with_columns
 from .methods.essential import essential as essential_parameters
 from .methods.estimate import Estimate, EstimateStatus, Method
-from .methods.least_squares import shares, solved, used_weights
 from .prediction import friction_ramp
 from .preparation.accepted import accepted_log, accepted_test
-from .preparation.delay_rows import looked_at
 from .preparation.processing import Processing
-from .preparation.signals import signals
 from .processing_choice import EQUATIONS, processing_for
 from .result import IdentificationResult
 from .scale.kept_equations import kept_equations, plain
 from .scale.reduction import Reduction, reduce_equations
-from .segment_spread import segment_inflation
 from .solving import MethodOptions, solve
+from .uncertainty import with_uncertainty
 from .validation import Validation, no_validation, poor_prediction, validate
-from .weak_prior import plausible_sizes, shrunk
 
 if TYPE_CHECKING:
     from ..estimation import Loss
     from .closed_loop import ClosedLoop, Controller, Output
 
-_LINEAR = (Method.OLS, Method.WLS, Method.IRLS)
-"""Methods whose covariance is formed here, for correlated residuals."""
 _ONE_AT_A_TIME = (
-    "Noise of the velocities is on both sides of equations of power or energy, so that parameters "
-    "are off by more than their standard errors where positions are noisy; they show less than "
-    "those of the torques."
-)
-_SEEN = 1.2
-_SEGMENTS = (
-    "Standard errors are {:.2g} times those of stationary residuals: segments of the log differ by "
-    "more than its noise explains, so that the model leaves something out."
+    "In equations of power or energy, noise of the velocities enters both sides: parameters may be "
+    "biased by more than their standard errors where positions are noisy, and fewer are "
+    "identifiable than with equations of torques."
 )
 _SPARE = 0.9
 _NOTHING = 1e-7
@@ -114,7 +101,9 @@ def fit(
     processing : Processing, optional
         All choices of the signal processing; instead of them single ones:
     cutoff, decimation, dead_band, edges
-        As for `choose_processing`; default what the log suggests.
+        As for `choose_processing`. By default they are chosen for prediction: the highest cutoff at
+        which noise of the positions is predicted to bias no parameter by more than 0.1 standard
+        errors, and at least 20 equations for each parameter where the log is long enough.
     loss
         Of method "robust": "huber" (default), "cauchy" or "tukey".
     prior, prior_deviations, strength
@@ -132,14 +121,16 @@ def fit(
         Leave out parameters whose relative deviations say that they are not seen: True as is
         usual (30), a ratio of relative deviations, or a rule: "ratio", "f_test", "aic".
     shrinkage : bool, optional
-        Of methods "ols", "wls" and "irls": whether parameters are shrunk toward zero by a weak
-        prior, whose size the log gives (empirical Bayes). Default where the log leaves parameters
-        less certain than their plausible sizes, which is told in the notes.
+        Of methods "ols", "wls" and "irls": whether parameters are shrunk towards zero by a weak
+        prior whose scale is estimated from the log (empirical Bayes). By default where standard
+        errors exceed 15 % of plausible sizes or there are fewer than 20 equations for each
+        parameter; a note reports it.
     test : Log, optional
         Kept aside: the predicted torques are compared with it.
     checked : bool
-        Whether the log is looked at first: units, signs, order of the joints, channels that say
-        nothing, delay. What makes a fit meaningless is an error, what is doubtful a note.
+        Whether the log is checked first: units, signs, order of the joints, constant channels,
+        delay. Errors that make a fit meaningless are raised, doubts become notes; outliers and
+        frozen samples are interpolated or left out. False takes the log as it is.
     executor : concurrent.futures.Executor, optional
         Who computes the pieces of the log; the result does not depend on it.
     progress : callable, optional
@@ -221,24 +212,10 @@ def fit(
         reduction = with_columns(reduction, found.names)
         estimate = solve(system, reduction, way, options)
     R, _, _ = reduction.stacked()
-    white, lags = estimate.deviations, 0
-    if isinstance(estimate, SimulatedEstimate):
-        white, lags = estimate.white, estimate.lags
-    else:
-        spread, ratio, grown = _spread(way, system, reduction, estimate)
-        if grown > _SEEN:
-            estimate = replace(estimate, notes=(*estimate.notes, _SEGMENTS.format(grown)))
-        lags = spread.lags
-        linear = way in _LINEAR
-        own = estimate.covariance * np.outer(ratio, ratio)
-        drawn = None
-        if linear and not (shrinkage is False or (shrinkage is None and essential is not False)):
-            few = reduction.rows < EQUATIONS * len(reduction.names)
-            drawn = _shrunk(system, reduction, estimate, spread, ratio, few or shrinkage is True)
-        if drawn is not None:
-            linear, estimate = False, drawn
-            own = estimate.covariance * np.outer(ratio, ratio)
-        estimate = replace(estimate, covariance=spread.covariance if linear else own)
+    chosen_prior = shrinkage is None and essential is not False
+    estimate, white, lags = with_uncertainty(
+        way, system, reduction, estimate, False if chosen_prior else shrinkage
+    )
     lost = estimate.status is EstimateStatus.UNSTABLE
     ramp = (
         processing.dead_band
@@ -268,7 +245,7 @@ def fit(
         essential_rule=_rule_name(found, essential),
         notes=(
             *doubts, *log.notes, *findings, *processing.notes, *estimate.notes,
-            *_notes(unseen, dropped),
+            *_notes(reduction, unseen, dropped),
         ),
     )  # fmt: skip
 
@@ -326,43 +303,6 @@ def _judged(
     return estimate, (doubt,) if doubt else ()
 
 
-def _spread(
-    way: Method, system: Equations, reduction: Reduction, estimate: Estimate
-) -> tuple[CorrelatedCovariance, Array, float]:
-    """Covariance for correlated residuals, its ratio of standard errors, and that of segments.
-
-    Methods that are not linear, or not of all equations at once, have a covariance of their own for
-    white residuals; correlation makes it larger as it does that of weighted least squares.
-    """
-    linear = way if way in _LINEAR else Method.WLS
-    weights = used_weights(linear, reduction)
-    values, inverse, rest = solved(reduction, weights)
-    taken = shares(reduction, weights, inverse)
-    at = estimate.values if way in _LINEAR else values
-    spread = correlated_covariance(system, at, weights, inverse, taken=taken)
-    white = rest / (reduction.rows - len(values)) * np.diag(inverse)
-    grown = segment_inflation(system, reduction, weights, np.sqrt(np.diag(spread.covariance)))
-    spread = replace(spread, covariance=grown**2 * spread.covariance)
-    ratio = np.sqrt(np.diag(spread.covariance) / np.where(white > 0.0, white, 1.0))
-    return spread, ratio, grown
-
-
-def _shrunk(
-    system: Equations,
-    reduction: Reduction,
-    estimate: Estimate,
-    spread: CorrelatedCovariance,
-    ratio: Array,
-    always: bool,
-) -> Estimate | None:
-    """The estimate with a weak prior, where the log needs it."""
-    part = looked_at(system.log, system.processing.motion)
-    found = signals(part, system.processing)
-    sizes = plausible_sizes(system.base, system.names, found.q, found.v, found.a, found.tau)
-    deviations = np.sqrt(np.diag(spread.covariance))
-    return shrunk(reduction, estimate, deviations, ratio, sizes, always)
-
-
 def _essential(
     reduction: Reduction, estimate: Estimate, asked: bool | float | EssentialRule | str
 ) -> Essential | None:
@@ -388,8 +328,9 @@ def _refuse_nothing(whole: Reduction, processing: Processing) -> None:
         return
     bands = " ".join(f"{band:.3g}" for band in processing.dead_band)
     raise InvalidValueError(
-        f"log: no equation is left of it: {int(whole.left_out.sum())} are in the dead bands "
-        f"({bands} rad/s or m/s). Give a smaller dead_band=, or a log in which the joints move."
+        f"log: no equations are left: {int(whole.left_out.sum())} lie in the dead bands ({bands} "
+        "rad/s or m/s) or within 0.3 periods of the cutoff beside them. Give a smaller dead_band=, "
+        "a higher cutoff=, or a log in which the joints move."
     )
 
 
@@ -397,7 +338,7 @@ def _refuse_other_period(processing: Processing, log: Log) -> None:
     if abs(processing.dt - log.dt) > 1e-6 * log.dt:
         raise InvalidValueError(
             f"processing: it was chosen for samples of {processing.dt:g} s, the log has "
-            f"{log.dt:g} s; choose_processing(log) makes one for this log."
+            f"{log.dt:g} s; leave out processing= for the default choice."
         )
 
 
@@ -423,8 +364,18 @@ def _seen(
     return replace(system, base=seen, names=names), reduction, found.gap, unseen
 
 
-def _notes(unseen: tuple[str, ...], dropped: tuple[str, ...]) -> tuple[str, ...]:
-    notes: list[str] = []
+def _notes(
+    reduction: Reduction, unseen: tuple[str, ...], dropped: tuple[str, ...]
+) -> tuple[str, ...]:
+    each = reduction.rows / len(reduction.names)
+    notes = [
+        f"{reduction.rows} equations, {each:.3g} for each of {len(reduction.names)} parameters."
+    ]
+    if each < EQUATIONS:
+        notes.append(
+            f"Fewer than {EQUATIONS} equations for each parameter: record a longer log, or "
+            "identify fewer parameters."
+        )
     if unseen:
         notes.append(
             f"The log does not tell {', '.join(unseen)} from other parameters: their joints do not "

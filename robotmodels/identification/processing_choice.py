@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array
 from ..logs import Log
 from ..minimal_parameters import BaseParameters
-from .preparation.processing import Processing, choose_processing
+from .preparation.processing import (
+    Processing,
+    checked_cutoff,
+    checked_decimation,
+    completed,
+    decimated,
+    motion_of,
+    requested_cutoff,
+)
 from .regressor_noise import RegressorNoise, bias_ratio, regressor_noise
 
 EQUATIONS = 20
@@ -39,62 +45,60 @@ def processing_for(
 ) -> Processing:
     """Choose the processing; ``kinds`` equations at a time (default one for each joint).
 
-    The cutoff of the equations is the highest at which noise of the positions biases no parameter
-    by more than `_BIAS` standard errors; there are never fewer than `EQUATIONS` equations for a
-    parameter, if the log has as many samples.
+    The cutoff of the equations is the highest at which noise of the positions is predicted to bias
+    no parameter by more than `_BIAS` standard errors, and the decimation leaves `EQUATIONS`
+    equations for each parameter where the log has as many samples. What the user gives is kept.
     """
-    plain = choose_processing(log, cutoff, decimation, dead_band, edges)
+    motion, noise = motion_of(log)
     most = max(1, len(log) * (kinds or log.n) // (EQUATIONS * len(base)))
-    highest = min(max(_HIGHEST, _OF_MOTION * plain.motion), _NYQUIST / log.dt)
-    lowest = min(_OF_MOTION * plain.motion, highest)
+    step = None if decimation is None else checked_decimation(log, decimation)
+    highest = min(max(_HIGHEST, _OF_MOTION * motion), _NYQUIST / log.dt)
+    lowest = min(_OF_MOTION * motion, highest)
     if cutoff is not None:
-        lowest, highest = min(lowest, cutoff), max(highest, cutoff)
-    noise = regressor_noise(base, log, lowest, highest)
-    if cutoff is not None:
-        step = decimation or max(1, min(plain.decimation, most))
-        asked = min(cutoff, _HALF / (step * log.dt))
-        chosen = choose_processing(log, cutoff, step, dead_band, edges)
-        return _told(chosen, base, log, kinds, asked, bias_ratio(noise, asked))
-    if decimation is not None:
-        highest = min(highest, _HALF / (decimation * log.dt))
-    band, ratio = _highest_cutoff(noise, min(lowest, highest), highest)
-    step = decimation or max(1, min(int(_HALF / (band * log.dt)), most))
-    # where more equations are asked for than the noise leaves to know, positions are cut off lower
-    wider = np.clip(_POSITIONS * band * step * log.dt / _HALF, 1.0, _POSITIONS)
-    positions = min(float(wider) * band, _NYQUIST / log.dt)
-    chosen = choose_processing(log, positions, step, dead_band, edges)
-    return _told(chosen, base, log, kinds, band, ratio)
+        positions = checked_cutoff(log, cutoff)
+        step = step or max(1, min(int(_HALF * _POSITIONS / (positions * log.dt)), most))
+        band = min(positions, _HALF / (step * log.dt), _NYQUIST / log.dt)
+        given = regressor_noise(base, log, min(lowest, band), max(highest, band))
+        ratio = bias_ratio(given, band)
+        why = requested_cutoff(positions)
+        lowered = ""
+    else:
+        highest = highest if step is None else min(highest, _HALF / (step * log.dt))
+        given = regressor_noise(base, log, min(lowest, highest), highest)
+        band, ratio, lowered = _highest_cutoff(given, min(lowest, highest), highest)
+        step = step or max(1, min(int(_HALF / (band * log.dt)), most))
+        # with more equations than the noise allows for, it is the positions that are cut off lower
+        wider = np.clip(_POSITIONS * band * step * log.dt / _HALF, 1.0, _POSITIONS)
+        positions = min(float(wider) * band, _NYQUIST / log.dt)
+        why = (
+            f"Positions are low-pass filtered at {positions:.3g} Hz, so that noise of the "
+            f"positions is predicted to bias no parameter by more than {_BIAS:g} standard errors."
+        )
+    reasons = [why + lowered, decimated(step, log.dt)]
+    if ratio.max(initial=0.0) > _BIAS:
+        worst = int(np.argmax(ratio))
+        reasons[0] = (
+            f"Positions are low-pass filtered at {positions:.3g} Hz"
+            f"{', as requested' if cutoff is not None else ', the lowest for this motion'}. Noise "
+            f"of the positions is predicted to bias parameters by up to {ratio[worst]:.2g} "
+            f"standard errors ({base.names[worst]}) there; use a lower cutoff=, better position "
+            "signals, or method 'iv'."
+        )
+    return completed(log, motion, noise, positions, step, dead_band, edges, tuple(reasons))
 
 
-def _highest_cutoff(noise: RegressorNoise, lowest: float, highest: float) -> tuple[float, Array]:
-    """The highest cutoff at which no parameter is noticeably biased, and the biases there."""
-    band = highest
-    ratio = bias_ratio(noise, band)
+def _highest_cutoff(
+    given: RegressorNoise, lowest: float, highest: float
+) -> tuple[float, Array, str]:
+    """The highest cutoff without noticeable bias, the biases there, and why it was lowered."""
+    band, ratio, why = highest, bias_ratio(given, highest), ""
+    if ratio.max(initial=0.0) > _BIAS:
+        name = given.base.names[int(np.argmax(ratio))]
+        why = (
+            f" Equations up to {highest:.3g} Hz would bias {name} by "
+            f"{ratio.max():.2g} standard errors."
+        )
     while ratio.max(initial=0.0) > _BIAS and band > lowest:
         band = max(lowest, band / _STEP)
-        ratio = bias_ratio(noise, band)
-    return band, ratio
-
-
-def _told(
-    chosen: Processing, base: BaseParameters, log: Log, kinds: int | None, band: float, ratio: Array
-) -> Processing:
-    """The choices, with sentences on the noise and on the number of equations."""
-    rate = len(log) * (kinds or log.n) / chosen.decimation / len(base)
-    notes = [
-        f"The equations hold frequencies up to {band:.3g} Hz, about {rate:.3g} equations for each "
-        f"of {len(base)} parameters."
-    ]
-    worst = int(np.argmax(ratio)) if len(ratio) else 0
-    if ratio.max(initial=0.0) > _BIAS:
-        notes.append(
-            f"Noise of the positions biases parameters by up to {ratio[worst]:.2g} standard errors "
-            f"({base.names[worst]}) at this cutoff, as predicted; a lower cutoff=, better position "
-            "signals, or method 'iv' avoid that."
-        )
-    if rate < EQUATIONS:
-        notes.append(
-            f"That is fewer than {EQUATIONS} equations for each parameter: the log is short for "
-            "so many parameters. Record a longer one, or identify fewer."
-        )
-    return replace(chosen, notes=(*chosen.notes, *notes))
+        ratio = bias_ratio(given, band)
+    return band, ratio, why

@@ -34,14 +34,12 @@ def segment_inflation(
     Statistics 17(3), 1989.
     """
     part = looked_at(system.log, system.processing.motion)
-    own, whole = system, reduction
-    if part is not system.log:
-        own = replace(system, log=part)
+    own = system if part is system.log else replace(system, log=part)
     total = sum(len(block) for block in own.blocks())
     if total < _SEGMENTS:
         return 1.0
     parts = segments(own, _SEGMENTS)
-    R, y, _ = whole.stacked(weights)
+    R, y, _ = reduction.stacked(weights)
     inverse = np.linalg.inv(R)
     values = inverse @ y
     covariance = np.zeros(R.shape)

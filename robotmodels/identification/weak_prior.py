@@ -87,11 +87,16 @@ def shrunk(
     order = weak[np.argsort(-(deviations / sizes)[weak])]
     names = ", ".join(reduction.names[k] for k in order[:_NAMED])
     more = f" and {len(order) - _NAMED} others" if len(order) > _NAMED else ""
+    few = (
+        f"{len(weak)} of {len(reduction.names)} parameters ({names}{more}) are poorly determined "
+        "by the log (standard errors above 15 % of their plausible sizes)"
+        if weak.size
+        else "there are few equations for each parameter, or it was requested"
+    )
     note = (
-        f"Shrinkage: the log leaves {len(weak)} of {len(reduction.names)} parameters less certain "
-        f"than their plausible sizes ({names}{more}); all are estimated with a weak prior around "
-        "zero, which changes hardly any but these. Their standard errors hold as far as the prior "
-        "does. shrinkage=False leaves the prior out; a more exciting motion makes it needless."
+        f"Shrinkage: {few}. All parameters were estimated with a weak prior around zero, which "
+        "hardly changes well-determined ones; the standard errors assume this prior. "
+        "shrinkage=False switches it off; a more exciting motion makes it unnecessary."
     )
     return replace(
         found, method=estimate.method, status=estimate.status, notes=(*estimate.notes, note)

@@ -67,8 +67,7 @@ class Processing(Rebuilt):
         Samples of the log for one equation of each joint; 1 keeps all.
     dead_band : ndarray, shape (n,)
         Velocities (rad/s or m/s) below which a joint's equations are left out, since the direction
-        of its dry friction is not known there; where torques are predicted, dry friction rises
-        linearly over it.
+        of its dry friction is not known there, and samples of the guard beside them as well.
     edges : int
         Samples cut at both ends of each recording, of every channel.
     motion : float
@@ -131,9 +130,10 @@ def choose_processing(
 
     The motion has the frequency below which the velocities have 99.9 % of their power (that of
     noise taken off). Positions are cut off at ten times that, so that they are not distorted;
-    regressor and torque at two and a half times that, by the decimation; what lies within a
-    hundredth of a joint's greatest velocity, or four deviations of the noise of its velocity, is
-    its dead band.
+    regressor and torque at two and a half times that, by the decimation. Velocities below 0.3 % of
+    a joint's greatest velocity, or below four standard deviations of its velocity noise, form its
+    dead band; samples within 0.3 periods of the cutoff beside it are left out as well. This is a
+    choice from the log alone; `fit` also uses the robot.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def choose_processing(
     dead_band : array_like, scalar or shape (n,), optional
         rad/s or m/s; 0 leaves nothing out.
     edges : float, optional
-        Seconds cut at both ends of each recording; default three periods of the cutoff.
+        Seconds cut at both ends of each recording; default two periods of the cutoff.
     order, accuracy : int
         Of the filter's passes and of the central differences.
     filtered : bool
@@ -175,13 +175,8 @@ def choose_processing(
     >>> round(chosen.motion, 1), round(chosen.cutoff), chosen.decimation
     (1.1, 11, 150)
     """
-    longest = max(part.stop - part.start for part in log.recordings())
-    motion, noise = _motion(log)
-    nyquist = 0.5 / log.dt
-    notes = [
-        f"The velocities have {100 * _POWER:g} % of their power below {motion:.3g} Hz; noise of "
-        f"the positions {_listed(noise)} (deviation)."
-    ]
+    motion, noise = motion_of(log)
+    notes: list[str] = []
     if not filtered:
         if cutoff is not None:
             raise InvalidValueError("cutoff: filtered=False leaves the positions as they are.")
@@ -189,16 +184,36 @@ def choose_processing(
         band = None
     elif cutoff is None:
         band = min(_POSITIONS * motion, _HIGHEST / log.dt)
-        notes.append(f"Positions are cut off at {band:.3g} Hz, {band / motion:.3g} times that.")
+        notes.append(
+            f"Positions are low-pass filtered at {band:.3g} Hz, {band / motion:.3g} times the "
+            "frequency of the motion."
+        )
     else:
-        band = float(as_floats(cutoff, "cutoff"))
-        if not 0.0 < band < nyquist:
-            raise InvalidValueError(
-                f"cutoff: expected a frequency between 0 and half the sampling rate ({nyquist:g} "
-                f"Hz), got {cutoff!r}."
-            )
-        notes.append(f"Positions are cut off at {band:.3g} Hz.")
-    step = _step(log, decimation, motion, longest, notes)
+        band = checked_cutoff(log, cutoff)
+        notes.append(requested_cutoff(band))
+    longest = max(part.stop - part.start for part in log.recordings())
+    if decimation is None:
+        step = max(1, min(int(_HALF / (log.dt * _TORQUES * motion)), longest // 20))
+    else:
+        step = checked_decimation(log, decimation)
+    notes.append(decimated(step, log.dt))
+    return completed(
+        log, motion, noise, band, step, dead_band, edges, tuple(notes), order, accuracy
+    )
+
+
+def completed(
+    log: Log, motion: float, noise: Array, band: float | None, step: int,
+    dead_band: ArrayLike | None, edges: float | None, reasons: tuple[str, ...],
+    order: int = 4, accuracy: int = 4,
+) -> Processing:  # fmt: skip
+    """A processing of these cutoffs, with the dead bands and edges that go with them."""
+    longest = max(part.stop - part.start for part in log.recordings())
+    notes = [
+        f"The velocities have {100 * _POWER:g} % of their power below {motion:.3g} Hz; noise of "
+        f"the positions {_listed(noise)} (standard deviation).",
+        *reasons,
+    ]
     return Processing(
         log.dt, band, order, accuracy, step,
         _dead_band(log, dead_band, noise, motion, band, notes),
@@ -206,25 +221,40 @@ def choose_processing(
     )  # fmt: skip
 
 
-def _step(log: Log, asked: int | None, motion: float, longest: int, notes: list[str]) -> int:
-    if asked is None:
-        step = max(1, min(int(_HALF / (log.dt * _TORQUES * motion)), longest // 20))
-        if step > 1:
-            notes.append(_decimated(step, log.dt))
-        return step
+def checked_cutoff(log: Log, cutoff: float) -> float:
+    """A cutoff that the user gives, below half the sampling rate."""
+    band = float(as_floats(cutoff, "cutoff"))
+    if not 0.0 < band < 0.5 / log.dt:
+        raise InvalidValueError(
+            "cutoff: expected a frequency between 0 and half the sampling rate "
+            f"({0.5 / log.dt:g} Hz), got {cutoff!r}."
+        )
+    return band
+
+
+def checked_decimation(log: Log, asked: int) -> int:
+    """A decimation that the user gives, within the longest recording."""
+    longest = max(part.stop - part.start for part in log.recordings())
     if not isinstance(asked, (int, np.integer)) or not 1 <= asked <= longest:
         raise InvalidValueError(
             f"decimation: expected a whole number from 1 to {longest} (samples of the longest "
             f"recording), got {asked!r}."
         )
-    notes.append(_decimated(int(asked), log.dt) if asked > 1 else "No decimation.")
     return int(asked)
 
 
-def _decimated(step: int, dt: float) -> str:
+def requested_cutoff(band: float) -> str:
+    """Sentence on a cutoff that the user gave."""
+    return f"Positions are low-pass filtered at {band:.3g} Hz, as requested."
+
+
+def decimated(step: int, dt: float) -> str:
+    """Sentence on the decimation."""
+    if step == 1:
+        return "No decimation."
     return (
-        f"Regressor and torque are cut off at {_HALF / (step * dt):.3g} Hz and one of {step} "
-        "samples is kept."
+        f"Regressor and torque are low-pass filtered at {_HALF / (step * dt):.3g} Hz, and one of "
+        f"{step} samples is kept."
     )
 
 
@@ -298,7 +328,7 @@ def _windows(log: Log) -> list[slice]:
     return found
 
 
-def _motion(log: Log) -> tuple[float, Array]:
+def motion_of(log: Log) -> tuple[float, Array]:
     """Frequency of the motion, and standard deviation of the positions' noise."""
     rate = 1.0 / log.dt
     rng = np.random.default_rng(0)
