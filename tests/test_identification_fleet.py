@@ -9,7 +9,7 @@ from identification_fleet import KINDS, case, pair, textbook
 
 import robotmodels as rm
 from robotmodels.errors import RobotModelsWarning
-from robotmodels.identification import fit
+from robotmodels.identification import Log, fit
 
 ARMS = range(60, 90)  # others than those the defaults were chosen with
 
@@ -75,3 +75,32 @@ def test_halves_of_the_tx40_log_agree():
     second = fit(data.model, data.log.rows(half, len(data.log)))
     apart = (first.values - second.values) / np.hypot(first.deviations, second.deviations)
     assert np.sqrt(np.mean(apart**2)) < 1.5
+
+
+def test_a_log_may_begin_at_rest_with_a_coarse_encoder():
+    one = case(61)
+    rest, step = round(5.0 / one.log.dt), 2.0 * np.pi / 2**13
+    q, _, _ = (np.concatenate((np.repeat(x[:1], rest, axis=0), x)) for x in (one.q, one.v, one.a))
+    tau = np.concatenate((np.repeat(one.tau[:1], rest, axis=0), one.tau))
+    found = fit(one.model, Log(one.log.dt, np.round(q / step) * step, tau), checked=False)
+    assert found.system.processing.motion < 10.0
+    assert one.error(found.predict) < 0.1
+
+
+@pytest.mark.filterwarnings("ignore:Poor prediction", "ignore:The prediction is poor")
+@pytest.mark.parametrize("seed", [61, 65, 69, 73])
+def test_a_correct_short_log_is_not_refused(seed):
+    one = case(seed)
+    for seconds in (0.6, 2.0):
+        rows = round(seconds / one.log.dt)
+        if 4 * len(one.log.q[:rows]) * one.log.n > 5 * len(rm.base_parameters(one.model)):
+            fit(one.model, one.log.rows(0, rows), drive=("Ia", "Fv", "Fc"))
+
+
+def test_long_logs_keep_their_measured_velocities():
+    from robotmodels.logs.stretches import stretches
+
+    q = np.zeros((1000, 2))
+    part = stretches(Log(0.01, q, q, q + 1.0, q + 2.0), 50, 200)
+    assert (part.v == 1.0).all()
+    assert (part.a == 2.0).all()

@@ -121,7 +121,7 @@ def fit(
         Leave out parameters whose relative deviations say that they are not seen: True as is
         usual (30), a ratio of relative deviations, or a rule: "ratio", "f_test", "aic".
     shrinkage : bool, optional
-        Of methods "ols", "wls" and "irls": whether parameters are shrunk towards zero by a weak
+        Of methods "wls" and "irls": whether parameters are shrunk towards zero by a weak
         prior whose scale is estimated from the log (empirical Bayes). By default where standard
         errors exceed 15 % of plausible sizes or there are fewer than 20 equations for each
         parameter; a note reports it.

@@ -13,8 +13,8 @@ from .preparation.delay_rows import looked_at
 from .scale.reduction import Reduction
 
 _SEGMENTS = 25
-_LARGEST_SHARE = 0.99
-"""Leverage of a segment at most: beyond, leaving it out shows nothing."""
+_LARGEST_SHARE = 0.5
+"""Leverage at most: what a single segment alone determines shows no spread."""
 
 
 def segment_inflation(

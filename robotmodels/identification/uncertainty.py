@@ -21,10 +21,12 @@ from .weak_prior import plausible_sizes, shrunk
 
 _LINEAR = (Method.OLS, Method.WLS, Method.IRLS)
 """Methods whose covariance is formed here, for correlated residuals."""
-_NOTED = 1.2
+_WEIGHTED = (Method.WLS, Method.IRLS)
+_NOTED = 1.5
 _SEGMENTS = (
     "Standard errors were multiplied by {:.2g}: estimates from segments of the log differ by more "
-    "than stationary residuals explain, so that the model is probably incomplete."
+    "than stationary residuals explain. The model may be incomplete, or the motion may excite "
+    "different parameters at different times."
 )
 
 
@@ -43,7 +45,7 @@ def with_uncertainty(
     if grown > _NOTED:
         estimate = replace(estimate, notes=(*estimate.notes, _SEGMENTS.format(grown)))
     prior = None
-    if way in _LINEAR and shrinkage is not False:
+    if way in _WEIGHTED and shrinkage is not False:
         always = shrinkage is True or reduction.rows < EQUATIONS * len(reduction.names)
         prior = _shrunk(system, reduction, estimate, spread, ratio, always)
     if prior is not None:

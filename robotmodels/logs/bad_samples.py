@@ -37,6 +37,8 @@ _RARE = 0.01
 _LEAST = 9
 """Samples of a recording that is looked at."""
 _WINDOW = 100_000
+_PART, _PARTS = 20_000, 5
+"""Samples of parts, spread over a channel, that its usual roughness is judged by."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,7 +68,9 @@ def _spikes(x: Array, share: float) -> NDArray[np.int64]:
     some = spread(x)
     low, high = np.quantile(some, [0.01, 0.99])
     span = max(share * float(high - low), _ROUNDING * float(np.abs(some).max()))
-    usual = float(np.quantile(_roughness(x[:_WINDOW]), 0.9))
+    # over the whole channel, which may begin at rest
+    starts = np.linspace(0, max(0, len(x) - _PART), _PARTS).astype(int)
+    usual = max(float(np.quantile(_roughness(x[k : k + _PART]), 0.9)) for k in starts)
     least = max(_TIMES * usual, _STEPS * resolution(some), span)
     found: set[int] = set()
     for rows in chunks(len(x)):

@@ -53,4 +53,7 @@ def stretches(log: Log, length: int, samples: int = SAMPLES) -> Log:
     taken = [whole[k] for k in places]
     starts = np.cumsum([0, *(rows.stop - rows.start for rows in taken)])[:-1]
     q, tau = (np.concatenate([x[rows] for rows in taken]) for x in (log.q, log.tau))
-    return Log(log.dt, q, tau, starts=starts, names=log.names, delay=log.delay)
+    v, a = (
+        None if x is None else np.concatenate([x[rows] for rows in taken]) for x in (log.v, log.a)
+    )
+    return Log(log.dt, q, tau, v, a, starts=starts, names=log.names, delay=log.delay)

@@ -19,6 +19,9 @@ from .delay_rows import FilteredSamples, shared_motors
 _LIKELY, _CERTAIN = np.log(2.0), np.log(3.0)
 """Logarithms of the factors by which the residual variance of each joint concerned falls, in the
 mean, where a hypothesis is doubtful or certain: less is within what errors of the model explain."""
+_CYCLES, _SLOW = 6, 0.05
+"""Reversals of a joint, at more than this part of its speed, below which a motion is too short for
+a certain hypothesis."""
 _HALF = 0.5
 """Part of the variance left of the torques concerned, relative to the log as given, of a certain
 hypothesis at most."""
@@ -130,6 +133,7 @@ def better_hypotheses(
     Econometrica 57(2), 1989.
     """
     unit = np.eye(model.n)
+    many = _reversals(samples.v) >= _CYCLES
     given = _Fit(samples, model, unit, placed)
     base = given.constrained(unit)
     found: list[tuple[float, Hypothesis]] = []
@@ -145,11 +149,20 @@ def better_hypotheses(
             left, before = (r.left(joints) for r in (other, base))
             # what other joints gain by it is no reason to turn this one
             if gain >= least and significance > _SIGNIFICANT and left < before:
-                certain = gain >= min(len(joints), 2) * _CERTAIN and left < _HALF * before
+                certain = gain >= min(len(joints), 2) * _CERTAIN and many and left < _HALF * before
                 what = Hypothesis(joints, position, torque, certain, left, before, significance)
                 found.append((gain, what))
     found.sort(key=lambda pair: -pair[0])
     return tuple(what for gain, what in found if gain > found[0][0] - _LIKELY)
+
+
+def _reversals(v: Array) -> int:
+    """How often the joint that reverses most does so, its slowest motion left out."""
+    found = 0
+    for x in v.T:
+        signs = np.sign(x[np.abs(x) > _SLOW * np.abs(x).max(initial=0.0)])
+        found = max(found, int((np.diff(signs) != 0.0).sum()))
+    return found
 
 
 def _readings(

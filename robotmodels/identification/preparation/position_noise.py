@@ -9,11 +9,12 @@ import numpy as np
 from ..._arrays import Array
 from ...logs import Log
 from ...logs.channel_checks import resolution
+from ...logs.stretches import stretches
 from .filters import zero_phase
 from .spectrum import power_density
 
-_SAMPLES = 16384
-"""Samples of a log, spread over it, that its noise is judged by."""
+_WINDOWS, _SAMPLES = 4, 4096
+"""Windows of a log, spread over it, and samples of each, that its noise is judged by."""
 _WINDOW = 1024
 _SMOOTH, _SHARE = 20.0, 0.2
 """Hz, and sampling rates: below it is motion that an encoder quantises, not noise."""
@@ -29,15 +30,17 @@ class NoiseLevels:
 
 def noise_levels(log: Log) -> NoiseLevels:
     """Measure the noise of positions: white where it has a floor, else an encoder's steps."""
-    rows = max(log.recordings(), key=lambda part: part.stop - part.start)
-    q = np.asarray(log.q[rows])[:_SAMPLES]
-    length = min(len(q), _WINDOW)
-    deviation = np.zeros(log.n)
-    if length >= 16:
-        f, P = power_density(q - q[0], 1.0, length)
-        high = (f > 0.25) & (f < 0.45)
-        deviation = np.sqrt(0.5 * np.median(P[high], axis=0))
-    step = np.array([resolution(x) for x in q.T])
+    part = stretches(log, _SAMPLES, _WINDOWS * _SAMPLES)
+    deviation, step = np.zeros(log.n), np.zeros(log.n)
+    for rows in part.recordings():
+        # the largest: an encoder of a joint at rest shows no noise
+        q = np.asarray(part.q[rows])
+        length = min(len(q), _WINDOW)
+        if length >= 16:
+            f, P = power_density(q - q[0], 1.0, length)
+            high = (f > 0.25) & (f < 0.45)
+            deviation = np.maximum(deviation, np.sqrt(0.5 * np.median(P[high], axis=0)))
+        step = np.maximum(step, [resolution(x) for x in q.T])
     uniform = step / np.sqrt(12.0)
     coarse = uniform > deviation / 1.5
     return NoiseLevels(

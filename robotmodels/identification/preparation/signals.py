@@ -162,8 +162,8 @@ def piece_signals(log: Log, processing: Processing, piece: Piece, reach: int) ->
             f"rows 0 to {len(log)}; take the pieces of this log, of `pieces`."
         )
     inner = slice(first - begin, last - begin)
-    ahead = slice(max(first - guard, piece.low) - begin, first - begin)
-    behind = slice(last - begin, min(last + guard, piece.high) - begin)
+    ahead = slice(max(first - guard, begin) - begin, first - begin)
+    behind = slice(last - begin, min(last + guard, end) - begin)
 
     def filtered(x: Array) -> Array:
         rows = np.array(x[begin:end])
