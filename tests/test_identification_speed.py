@@ -197,8 +197,15 @@ def test_runs_are_found_whatever_the_pieces():
 def test_what_happens_once_in_a_long_log_is_found():
     q = np.sin(1e-3 * np.arange(250_000))[:, None] * [1.0, 0.7]
     q[99_950:100_060, 1] = q[99_950, 1]  # a sensor that stops, over the end of a piece
-    q[230_000, 0] += 0.5
-    log = Log(1e-3, q, np.cos(q) + 1e-3 * np.random.default_rng(0).normal(size=q.shape))
+    q[230_000:, 0] += 0.5
+    tau = np.cos(q) + 1e-3 * np.random.default_rng(0).normal(size=q.shape)
+    q[150_000, 0] += 2.0
+    log = Log(1e-3, q, tau)
     found = {(f.kind, f.joints): f.sentence for f in check_log(log)}
     assert "110 samples from row 99950" in found[FindingKind.STUCK, ("2",)]
-    assert "at row 23000" in found[FindingKind.JUMP, ("1",)]
+    assert (
+        "1 sample of its position is an outlier (at row 150000)"
+        in (found[FindingKind.SPIKES, ("1",)])
+    )
+    assert "by 0.5 at row 230000" in found[FindingKind.JUMP, ("1",)]
+    assert (FindingKind.JUMP, ("2",)) not in found

@@ -1,4 +1,4 @@
-"""Samples that no joint had: single ones that stand out, and channels that stop while it moves."""
+"""Outliers, and frozen samples of channels that stop while the joint moves."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ _PART, _PARTS = 20_000, 5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BadSamples:
-    """Samples of one channel that no joint had.
+    """Outliers or frozen samples of one channel.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class BadSamples:
     channel : str
         "q" or "tau".
     repeats : bool
-        Whether they repeat the sample before, or stand out.
+        Whether they are frozen, each like the sample before, or outliers.
     rows : ndarray of int
         Of the log, ascending.
     """
@@ -64,7 +64,7 @@ class BadSamples:
 
 
 def _spikes(x: Array, share: float) -> NDArray[np.int64]:
-    """Samples that stand out of those beside them, by a share of the range of the channel."""
+    """Outliers among the samples beside them, by a share of the range of the channel."""
     some = spread(x)
     low, high = np.quantile(some, [0.01, 0.99])
     span = max(share * float(high - low), _ROUNDING * float(np.abs(some).max()))
@@ -144,7 +144,7 @@ def _stops_at_once(x: Array, run: tuple[int, int], usual: float, fine: bool) -> 
 
 
 def bad_samples(log: Log) -> list[BadSamples]:
-    """Samples that stand out or repeat, joint by joint."""
+    """Outliers and frozen samples, joint by joint."""
     found: list[BadSamples] = []
     for j in range(log.n):
         for channel, other in (("q", "tau"), ("tau", "q")):
@@ -164,7 +164,7 @@ def bad_samples(log: Log) -> list[BadSamples]:
 
 
 def cleaned(log: Log) -> Log:
-    """The log without single samples that stand out and without rows of channels that stop.
+    """The log without outliers and frozen samples.
 
     Where they are shorter than a tenth of the motion's shortest period they are interpolated, as
     missing samples are; otherwise the log is split around them, so that what filters reach beside
@@ -176,14 +176,18 @@ def cleaned(log: Log) -> Log:
         bad[some.channel][some.rows, some.joint] = True
     if not found:
         return log
-    said = [
-        f"{sum(len(some.rows) for some in found if some.repeats == repeats)} that {what}"
-        for repeats, what in ((False, "stand out"), (True, "repeat while the joint moves"))
+    counts = [
+        (sum(len(some.rows) for some in found if some.repeats == repeats), what)
+        for repeats, what in ((False, "outlier"), (True, "frozen sample"))
     ]
-    return _without(log, bad, " and ".join(said))
+    return _without(log, bad, " and ".join(_counted(k, what) for k, what in counts if k))
 
 
-def _without(log: Log, bad: dict[str, NDArray[np.bool_]], said: str) -> Log:
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}{'s' * (count != 1)}"
+
+
+def _without(log: Log, bad: dict[str, NDArray[np.bool_]], found: str) -> Log:
     limit = max(1.0, SHARE * _shortest(log, bad["q"]) / log.dt - 1.0)
     arrays: dict[str, Any] = {"q": np.array(log.q), "tau": np.array(log.tau)}
     drop = np.zeros(len(log), bool)
@@ -205,13 +209,13 @@ def _without(log: Log, bad: dict[str, NDArray[np.bool_]], said: str) -> Log:
     first[log.starts] = True
     # a row after one that was left out, or after the end of a recording
     begins = np.diff(np.cumsum(first)[kept], prepend=0) + (np.diff(kept, prepend=-1) > 1) > 0
-    notes = [
-        *log.notes,
-        f"Of samples that no joint had ({said}), {filled_in} were interpolated; {int(drop.sum())} "
-        f"rows were left out{', where the log is split' if drop.any() else ''}.",
-    ]
+    dropped = int(drop.sum())
+    done = [f"{_counted(filled_in, 'sample')} interpolated"] if filled_in else []
+    if dropped:
+        done.append(f"{_counted(dropped, 'row')} left out, where the log is split")
+    notes = [*log.notes, f"{found}: {' and '.join(done)}."]
     refused = list(log.refused)
-    if drop.any():
+    if dropped:
         lost = tuple(np.flatnonzero(drop).tolist())
         refused.append(RefusedRows("log", lost, "a channel repeats while the joint moves"))
     more = {

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
-from .bad_samples import bad_samples
+from .bad_samples import BadSamples
 from .findings import FindingKind, LogFinding, Severity, add_of_joint
 from .log import Log
 from .long_channels import Runs, chunks, moves, resolution, spread
@@ -85,9 +85,9 @@ def coarse(log: Log, moving: NDArray[np.bool_], found: list[LogFinding]) -> None
             )  # fmt: skip
 
 
-def bad(log: Log, found: list[LogFinding]) -> None:
-    """Report samples that no joint had, which a fit leaves out."""
-    for some in bad_samples(log):
+def report_bad_samples(log: Log, bad: list[BadSamples], found: list[LogFinding]) -> None:
+    """Report outliers and frozen samples, which a fit interpolates or leaves out."""
+    for some in bad:
         rows, word = some.rows, "position" if some.channel == "q" else "torque"
         if some.repeats:
             runs = np.flatnonzero(np.diff(rows, prepend=-2) > 1).tolist()
@@ -95,14 +95,15 @@ def bad(log: Log, found: list[LogFinding]) -> None:
             kind, words = FindingKind.STUCK, (
                 f"its {word} repeats for {first + 1} samples from row {rows[0] - 1}"
                 + (f", and {len(runs) - 1} times more" if len(runs) > 1 else "")
-                + " while it moves; the sensor or the recorder stopped. A fit leaves these rows "
-                "out."
+                + " while the joint moves; the sensor or the recorder stopped. fit interpolates "
+                "these samples where the gap is short and leaves the rows out where it is long."
             )  # fmt: skip
         else:
+            one = len(rows) == 1
             kind, words = FindingKind.SPIKES, (
-                f"{len(rows)} of the samples of its {word} stand{'s' * (len(rows) == 1)} out of "
-                f"those beside (the first at row {rows[0]}); a fit leaves them out and "
-                "interpolates."
+                f"{len(rows)} sample{'' if one else 's'} of its {word} "
+                f"{'is an outlier (' if one else 'are outliers (the first '}at row {rows[0]}); "
+                f"fit replaces {'it' if one else 'them'} by interpolation."
             )  # fmt: skip
         add_of_joint(found, kind, Severity.DOUBTFUL, log, some.joint, words)
 
@@ -133,20 +134,28 @@ def stuck(log: Log, moving: NDArray[np.bool_], found: list[LogFinding]) -> None:
         )  # fmt: skip
 
 
-def jumps(log: Log, moving: NDArray[np.bool_], found: list[LogFinding]) -> None:
-    """Report positions that jump from a sample to the next."""
+def jumps(
+    log: Log, moving: NDArray[np.bool_], bad: list[BadSamples], found: list[LogFinding]
+) -> None:
+    """Report positions that jump from a sample to the next; not to or from bad samples."""
     for j in np.flatnonzero(moving).tolist():
         largest, at, usual = 0.0, 0, 0.0
+        known = np.ones(len(log), dtype=bool)
+        for some in bad:
+            if some.joint == j and some.channel == "q":
+                known[some.rows] = False
         for rows in log.recordings():
             q = log.q[rows, j]
             if len(q) < 2:
                 continue
             usual = max(usual, float(np.quantile(moves(q), 0.99)))
             for part in chunks(len(q) - 1):
-                steps = np.abs(np.diff(q[part.start : part.stop + 1]))
+                first = rows.start + part.start
+                good = known[first : rows.start + part.stop + 1]
+                steps = np.abs(np.diff(q[part.start : part.stop + 1])) * (good[1:] & good[:-1])
                 k = int(steps.argmax())
                 if steps[k] > largest:
-                    largest, at = float(steps[k]), rows.start + part.start + k + 1
+                    largest, at = float(steps[k]), first + k + 1
         if usual > 0.0 and largest > _JUMP * usual:
             turn = abs(largest - 2.0 * np.pi) < 0.1
             add_of_joint(

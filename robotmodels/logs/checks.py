@@ -3,7 +3,16 @@
 from __future__ import annotations
 
 from ..model import RobotModel, check_model
-from .channel_checks import bad, coarse, constant, jumps, one_way, saturated, stuck
+from .bad_samples import bad_samples
+from .channel_checks import (
+    coarse,
+    constant,
+    jumps,
+    one_way,
+    report_bad_samples,
+    saturated,
+    stuck,
+)
 from .findings import FindingKind, LogFinding, Severity
 from .log import Log, check_is_log
 from .model_checks import joint_order, position_units, samples, torques_and_speeds
@@ -72,9 +81,10 @@ right column was read.
     moving = constant(log, found)
     saturated(log, found)
     coarse(log, moving, found)
-    bad(log, found)
+    bad = bad_samples(log)
+    report_bad_samples(log, bad, found)
     stuck(log, moving, found)
-    jumps(log, moving, found)
+    jumps(log, moving, bad, found)
     one_way(log, moving, found)
     found += rates_off(log)
     if model is not None:

@@ -28,7 +28,7 @@ class FindingKind(Enum):
     Examples
     --------
     >>> FindingKind.STUCK.value
-    'values repeat for a long time'
+    'a channel repeats its value'
     """
 
     WRONG_JOINT_COUNT = "its joints are not as many as the model's"
@@ -41,14 +41,14 @@ class FindingKind(Enum):
     RATES_OFF_POSITIONS = "velocities or accelerations do not follow from the positions"
     TORQUE_ABOVE_LIMITS = "torques are above the limits"
     TORQUE_BELOW_USE = "torques are too small to be torques of the joints"
-    TORQUE_OFF_INERTIA = "torques are of another size than those of the model's inertia"
+    TORQUE_OFF_INERTIA = "torques differ in size from those of the model's inertia"
     CONSTANT_POSITION = "a joint does not move"
     CONSTANT_TORQUE = "a torque is constant"
     NOTHING_MOVES = "nothing moves"
     SATURATED = "torques stay at their extreme values"
     QUANTISED = "positions have coarse steps"
-    STUCK = "values repeat for a long time"
-    SPIKES = "single samples stand out of those beside them"
+    STUCK = "a channel repeats its value"
+    SPIKES = "single samples are outliers"
     JUMP = "positions jump"
     TOO_SHORT = "it is short for what is to be found"
     SLOWER_THAN_LOG = "a joint does not come back in the time of the log"

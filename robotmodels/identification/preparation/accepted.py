@@ -15,7 +15,7 @@ from .joint_checks import check_joints
 def accepted_log(
     log: Log, model: RobotModel, name: str, friction: Friction | None = None
 ) -> tuple[Log, tuple[str, ...]]:
-    """A log that may be used, and sentences on it; one that may not is refused with all of them.
+    """Check and clean a log; raise if it is unusable.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ def accepted_log(
     Returns
     -------
     log : Log
-        Without samples that no joint had: spikes, and channels that stop while the joint moves.
+        Without outliers and frozen samples, which are interpolated or left out.
     sentences : tuple of str
         What is doubtful.
 
@@ -49,7 +49,7 @@ def accepted_log(
 def accepted_test(
     log: Log, test: Log, model: RobotModel, checked: bool
 ) -> tuple[Log, tuple[str, ...]]:
-    """The log that is kept aside, and what is to be said of it; it must be like the other.
+    """Check and clean the test log, which must match the fitted one.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def accepted_test(
     Returns
     -------
     test : Log
-        Without samples that no joint had.
+        Without outliers and frozen samples.
     sentences : tuple of str
         What is doubtful.
 

@@ -152,7 +152,6 @@ def thin_rows(log: Log, model: RobotModel, cutoff: float, margin: int) -> ThinRo
     samples = (x.q[places], x.v[places], x.a[places])
     friction = _dry_friction(log, model, x.v, cutoff, places)
     regressors = _rows_by_joint(model, samples, friction, moving)
-    del friction
     bases = []
     for rows in regressors:
         U, s, _ = np.linalg.svd(rows / _sizes(rows), full_matrices=False)

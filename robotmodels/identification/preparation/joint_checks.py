@@ -18,7 +18,7 @@ from ...regressors import torque_regressor
 from .delay_rows import filtered_samples, looked_at
 from .joint_hypotheses import Hypothesis, JointSamples, better_hypotheses
 from .synchronisation import SynchronisationStatus, synchronisation
-from .torque_sizes import torque_sizes
+from .torque_sizes import check_torque_sizes
 
 _CUTOFF, _SHARE = 15.0, 0.1
 _ROWS = 300
@@ -29,10 +29,10 @@ _RANK = 1e-6
 def check_joints(
     log: Log, model: RobotModel, friction: Friction | None = None
 ) -> tuple[LogFinding, ...]:
-    """What the dynamic model tells of a log: signs, order, units, delay, what is excited.
+    """Check a log by the dynamic model: signs, order, units, delay, excitation.
 
     - Readings of the log with the sign of a joint's position, torque or both changed, with two
-      joints swapped in these, with all torques turned, and with positions in degrees are fitted
+      joints swapped in these, with all torques negated, and with positions in degrees are fitted
       to the equations of all joints at once, see `better_hypotheses`. Where one fits significantly
       better than the log as given, it is named.
     - Where the model has masses, torques are compared in size with those of its inertia.
@@ -91,11 +91,11 @@ def check_joints(
     try:
         samples = JointSamples.of(filtered_samples(part, cutoff, 2, _ROWS))
         _signs_and_order(part, model, samples, by_dependence(friction)[1], found)
-        torque_sizes(part, model, samples, found)
+        check_torque_sizes(part, model, samples, found)
         _excited(part, model, samples, found)
         _in_step(part, model, found)
     except InvalidValueError as error:  # too short or at rest: no mistake of the log
-        words = f"Not all of signs, order, excitation and delay could be judged: {error}"
+        words = f"Signs, order, excitation or delay were not checked: {error}"
         found.append(LogFinding(FindingKind.TOO_SHORT, Severity.DOUBTFUL, (), words))
     if part is not log:
         said = f" (Judged by {len(part)} of {len(log)} samples.)"
@@ -107,12 +107,12 @@ def _signs_and_order(
     log: Log,
     model: RobotModel,
     samples: JointSamples,
-    placed: Friction | None,
+    position_dependent: Friction | None,
     found: list[LogFinding],
 ) -> None:
     """Report flips, swaps and degrees, one after the other where there are several."""
     for _ in range(log.n):
-        likely = better_hypotheses(samples, model, placed)
+        likely = better_hypotheses(samples, model, position_dependent)
         if not likely:
             return
         best, others = likely[0], likely[1:]
@@ -120,13 +120,14 @@ def _signs_and_order(
             _in_words(best, log),
             tuple(log.names[j] for j in best.joints),
         )
-        alike = " As likely: " + "; ".join(_in_words(x, log)[1] for x in others) + "."
+        alike = " Equally likely: " + "; ".join(_in_words(x, log)[1] for x in others) + "."
         found.append(
             LogFinding(
                 kind, Severity.USELESS if best.certain else Severity.DOUBTFUL, names,
-                f"{words[0].upper()}{words[1:]}: read so, the equations of all joints together "
-                f"leave {100.0 * best.left:.2g} % of the variance of the torques concerned instead "
-                f"of {100.0 * best.given:.2g} % ({best.significance:.0f} standard errors). "
+                f"{words[0].upper()}{words[1:]}: with this correction the equations of all joints "
+                f"leave {100.0 * best.left:.2g} % of the variance of the affected torques "
+                f"unexplained instead of {100.0 * best.given:.2g} % ({best.significance:.0f} "
+                "standard errors). "
                 f"{advice}{alike if others else ''}",
             )
         )  # fmt: skip
@@ -148,19 +149,19 @@ def _in_words(x: Hypothesis, log: Log) -> tuple[FindingKind, str, str]:
         what = both if q and tau else "positions" if q else "torques"
         return FindingKind.SWAPPED_JOINTS, (
             f"joints {names[0]} and {names[1]} look swapped in {what}"
-        ), "See the order of the columns (positions=, torques= of read_log)."  # fmt: skip
+        ), "Check the order of the columns (positions=, torques= of read_log)."  # fmt: skip
     if len(names) > 1:
         return FindingKind.WRONG_SIGN, "the torques of all joints have the wrong sign", (
-            "See drive_gains= of read_log, which may be negative."
+            "Use negative drive_gains= of read_log."
         )  # fmt: skip
     if q and tau:
         return FindingKind.WRONG_SIGN, (
-            f"joint {names[0]} looks flipped, in position and torque"
+            f"joint {names[0]} looks flipped (wrong sign of position and torque)"
         ), "Give it -1 in signs= of read_log."  # fmt: skip
     what = "position" if q else "torque"
     return FindingKind.WRONG_SIGN, f"the {what} of joint {names[0]} has the wrong sign", (
-        "Of read_log, signs= turns position and torque, a negative entry of drive_gains= the "
-        "torque alone."
+        "Use signs= of read_log to reverse position and torque together, or negative "
+        "drive_gains= to reverse the torque alone."
     )  # fmt: skip
 
 

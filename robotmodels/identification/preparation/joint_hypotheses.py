@@ -115,15 +115,16 @@ class Hypothesis:
 
 
 def better_hypotheses(
-    samples: JointSamples, model: RobotModel, placed: Friction | None = None
+    samples: JointSamples, model: RobotModel, position_dependent: Friction | None = None
 ) -> tuple[Hypothesis, ...]:
     """Readings that fit significantly better than the log as given, the best first.
 
     Every hypothesis has the same parameters: those of links, rotors, friction and offsets, with
     second moments of mass, masses, rotor inertias and friction coefficients not negative, and an
-    elasticity at each joint for what the model lacks (and ``placed``, a gravity compensator). Each
-    joint is weighted by its own residual variance. The difference of the log-likelihoods has a
-    standard error from blocks of time, which holds for residuals correlated within a block.
+    elasticity at each joint for what the model lacks (and ``position_dependent``, a gravity
+    compensator). Each joint is weighted by its own residual variance. The difference of the
+    log-likelihoods has a standard error from blocks of time, which holds for residuals correlated
+    within a block.
 
     Returned with the best are those that fit as well.
 
@@ -134,11 +135,12 @@ def better_hypotheses(
     """
     unit = np.eye(model.n)
     many = _reversals(samples.v) >= _CYCLES
-    given = _Fit(samples, model, unit, placed)
+    given = _Fit(samples, model, unit, position_dependent)
     base = given.constrained(unit)
     found: list[tuple[float, Hypothesis]] = []
     for position, torques in _readings(model, samples.q):
-        fit = given if np.array_equal(position, unit) else _Fit(samples, model, position, placed)
+        same = np.array_equal(position, unit)
+        fit = given if same else _Fit(samples, model, position, position_dependent)
         for joints, torque in torques:
             least = min(len(joints), 2) * _LIKELY
             # without limits it fits at least as well
@@ -150,10 +152,12 @@ def better_hypotheses(
             # what other joints gain by it is no reason to turn this one
             if gain >= least and significance > _SIGNIFICANT and left < before:
                 certain = gain >= min(len(joints), 2) * _CERTAIN and many and left < _HALF * before
-                what = Hypothesis(joints, position, torque, certain, left, before, significance)
-                found.append((gain, what))
+                hypothesis = Hypothesis(
+                    joints, position, torque, certain, left, before, significance
+                )
+                found.append((gain, hypothesis))
     found.sort(key=lambda pair: -pair[0])
-    return tuple(what for gain, what in found if gain > found[0][0] - _LIKELY)
+    return tuple(hypothesis for gain, hypothesis in found if gain > found[0][0] - _LIKELY)
 
 
 def _reversals(v: Array) -> int:
@@ -220,10 +224,14 @@ class _Fit:
     """Least squares of the equations of all joints, positions through a matrix."""
 
     def __init__(
-        self, samples: JointSamples, model: RobotModel, position: Array, placed: Friction | None
+        self,
+        samples: JointSamples,
+        model: RobotModel,
+        position: Array,
+        position_dependent: Friction | None,
     ) -> None:
         q, v, a = (x @ position.T for x in (samples.q, samples.v, samples.a))
-        W, limited = _columns(model, (q, v, a), samples.cutoff, placed)
+        W, limited = _columns(model, (q, v, a), samples.cutoff, position_dependent)
         size = np.sqrt(np.einsum("tnp,tnp->p", W, W))
         seen = np.flatnonzero(size > _NOTHING * size.max(initial=0.0))
         order = seen[np.argsort(limited[seen], kind="stable")]
@@ -275,12 +283,15 @@ def _solved(A: Array, b: Array, free: int) -> Array:
 
 
 def _columns(
-    model: RobotModel, state: tuple[Array, Array, Array], cutoff: float, placed: Friction | None
+    model: RobotModel,
+    state: tuple[Array, Array, Array],
+    cutoff: float,
+    position_dependent: Friction | None,
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Rows of all joints, shape (T, n, p), and which parameters cannot be negative."""
     q, v, a = state
     n, links = model.n, 10 * model.table.f
-    W = torque_regressor(model, q, v, a, drive=("Ia", "Fv", "offset"), friction=placed)
+    W = torque_regressor(model, q, v, a, drive=("Ia", "Fv", "offset"), friction=position_dependent)
     bodies = W[:, :, :links].reshape(len(q), n, -1, 10)
     XX, YY, ZZ = (bodies[..., k].copy() for k in (0, 3, 5))
     # XX = Lyy + Lzz and so on: second moments Lxx, Lyy, Lzz of a body are not negative

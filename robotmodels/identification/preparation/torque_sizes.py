@@ -18,12 +18,12 @@ _EXPLAINED = 0.5
 _SAME = 3.0
 
 
-def torque_sizes(
+def check_torque_sizes(
     log: Log, model: RobotModel, samples: JointSamples, found: list[LogFinding]
 ) -> None:
-    """Report joints whose torques are of another size than the model's links need.
+    """Report joints whose torques differ in size from those of the model's inertia.
 
-    Nothing is told by a model without masses, and of joints whose torque does not follow from them.
+    Models without masses, and joints whose torque the inertia does not explain, are skipped.
     """
     inertia = model.inertia
     if inertia is None or not (inertia.values[:, 9] > 0.0).any():
@@ -43,15 +43,15 @@ def torque_sizes(
     if large:
         _add(
             found, log, large, lambda gain: f"{gain:.3g} times", "much larger than",
-            "they look like mN m: read the log with drive_gains=0.001."
-            if thousand else "see units, drive_gains= and gears= of read_log.",
+            "they may be in mN m: use drive_gains=0.001."
+            if thousand else "check units, drive_gains= and gears= of read_log.",
         )  # fmt: skip
     if small:
         every = len(small) == len(gains) > 1
         _add(
             found, log, small, lambda gain: f"1/{1.0 / gain:.3g}", "much smaller than",
-            "they look like torques of the motors"
-            + (", or are in kN m" if every else " where those of the other joints are not")
+            "they may be motor torques"
+            + (" or in kN m" if every else " at these joints only")
             + ": see gears=, transmission= and drive_gains= of read_log.",
         )  # fmt: skip
 
@@ -70,7 +70,7 @@ def _add(
     found.append(
         LogFinding(
             FindingKind.TORQUE_OFF_INERTIA, Severity.DOUBTFUL, names,
-            f"Torques, friction taken off, are {joining} those of the model's own inertia "
+            f"Torques without friction are {joining} those computed from the model's inertia "
             f"({listed}); {advice}",
         )
     )  # fmt: skip
