@@ -209,7 +209,7 @@ def test_it_is_identified_exactly_without_noise(options, form):
         assert off < limit * np.abs(torque).max()
 
 
-@pytest.mark.filterwarnings("ignore:The prediction is poor")  # on purpose
+@pytest.mark.filterwarnings("ignore:Poor prediction")  # on purpose
 def test_a_compensator_that_is_left_out_is_seen_in_the_residuals():
     rng = np.random.default_rng(5)
     model = random_arm(rng)

@@ -195,7 +195,7 @@ def test_a_joint_that_turns_on_and_on_is_no_motor(good):
         (1.0 / np.array([1.0, 100.0, 1.0, 1.0, 1.0]), "2", "motor torques at these joints only"),
     ],
 )
-@pytest.mark.filterwarnings("ignore:The prediction is poor")  # on purpose
+@pytest.mark.filterwarnings("ignore:Poor prediction")  # on purpose
 def test_torques_beside_the_models_own_inertia(good, factor, joints, words):
     model, log = good
     wrong = Log(log.dt, log.q, factor * log.tau)
@@ -213,7 +213,7 @@ def test_torques_beside_the_models_own_inertia(good, factor, joints, words):
     assert not any(f.kind.name == "TORQUE_OFF_INERTIA" for f in check_joints(wrong, bare))
 
 
-@pytest.mark.filterwarnings("ignore:The prediction is poor")  # on purpose
+@pytest.mark.filterwarnings("ignore:Poor prediction")  # on purpose
 def test_spikes_and_channels_that_stop_are_left_out(good):
     model, log = good
     clean = fit(model, log)

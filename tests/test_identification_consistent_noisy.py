@@ -170,4 +170,7 @@ def test_a_solver_that_stops_early_says_where(monkeypatch):
         assert "after 5 of 5 iterations" in text
         assert "link" in early.stopped or "is zero" in early.stopped
         assert early.stopped in text
+        assert f"The sum of squares is within {100.0 * early.gap:.1g} % of the optimum." in text
+    assert early.stopped.startswith("The cone solver stopped: ")
+    assert "Constraint with the largest share of the duality gap: " in early.stopped
     assert best.stopped == ""

@@ -76,7 +76,7 @@ def test_every_method_and_form_is_silent_on_a_good_log(method, form):
                           test=log_of(seed=1))  # fmt: skip
     assert said == []
     assert found.estimate.status is EstimateStatus.SOLVED
-    assert not any("prediction is poor" in note for note in found.notes)
+    assert not any("Poor prediction" in note for note in found.notes)
 
 
 @pytest.mark.parametrize(("method", "form"), FITS)
@@ -92,7 +92,7 @@ def test_every_method_and_form_warns_of_a_log_that_it_cannot_explain(method, for
         assert said[0].startswith(status.sentence)
         assert verdict.startswith(status.sentence)
     else:
-        assert said[0].startswith("The prediction is poor")
+        assert said[0].startswith("Poor prediction. Unexplained part of the torque on the log: ")
         assert verdict == said[0]
 
 
@@ -100,13 +100,13 @@ def test_the_sentence_names_joints_parts_and_the_log():
     wrong = log_of(lambda q, v, tau: tau * [1.0, -1.0])
     found, said = noticed(arm(), log_of(), test=wrong, checked=False)
     assert found.estimate.status is EstimateStatus.POOR_PREDICTION
-    assert "of the log kept aside joint_2 (200 %)" in said[0]
+    assert "on the log kept aside: joint_2 (200 %)" in said[0]
     assert "joint_1" not in said[0]
-    assert "farther off than no torque at all: joint_2." in said[0]
+    assert "worse than predicting zero torque: joint_2." in said[0]
     assert "do not carry over" in said[0]
     # the same log fitted, which no parameters explain
     found, said = noticed(arm(), wrong, checked=False)
-    assert "of the log joint_" in said[0]
+    assert "on the log: joint_" in said[0]
     assert "signs" in said[0]
 
 
@@ -131,11 +131,11 @@ def test_of_random_robots_joints_are_named_from_thirty_per_cent_on(seed):
         text = " ".join(said)
         for j, name in enumerate(model.table.joint_names):
             if own.filtered_relative[j] > 0.31:
-                assert f"{name} (" in text.split("; of the log kept aside")[0]
+                assert f"{name} (" in text.split("; on the log kept aside")[0]
             if max(own.filtered_relative[j], aside.filtered_relative[j]) < 0.29:
                 assert f"{name} (" not in text
             if aside.relative[j] > 1.05:
-                assert name in text.split("no torque at all: ")[1]
+                assert name in text.split("zero torque: ")[1]
         kinds = model.table.sigma[model.table.joint_rows]
         for side in (own, aside):
             for kind in set(kinds.tolist()):

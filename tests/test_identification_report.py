@@ -243,8 +243,8 @@ def test_a_prediction_worse_than_none_is_said(found):
     log = log_of(model, seed=3)
     other = Log(DT, log.q, -log.tau, v=log.v, a=log.a)
     text = " ".join(report_text(replace(found, held_out=found.validate(other))).split())
-    assert text.split(" * ")[1].startswith("The prediction is poor")
-    assert "farther off than no torque at all: " in text
+    assert text.split(" * ")[1].startswith("Poor prediction.")
+    assert "worse than predicting zero torque: " in text
     assert "carry over to motion" not in text
 
 

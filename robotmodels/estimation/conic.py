@@ -88,7 +88,7 @@ class Constraint:
         return np.array([float(np.linalg.norm(z))])
 
     def share(self, x: Array, z: Array) -> Array:
-        """What room times multiplier leaves of a gap, one for each sentence; 0 at the optimum."""
+        """Contributions to the duality gap, one for each sentence; 0 at the optimum."""
         parts = z * (self.right - self.rows @ x)
         return parts if self.cone in (Cone.ZERO, Cone.NONNEGATIVE) else parts.sum(keepdims=True)
 
@@ -121,7 +121,7 @@ class ConeSolution:
     outcome : ConeOutcome
         What the solver says.
     ended : str
-        The solver's own word, and its iterations.
+        Status and iteration count of the solver.
     """
 
     x: Array

@@ -212,18 +212,18 @@ def poor_prediction(
         if whole > POOR**2:
             named.append(f"all joints together ({percent(np.sqrt(whole))})")
         if named:
-            found.append(f"of {log} {', '.join(named)}")
+            found.append(f"on {log}: {', '.join(named)}")
     if not found:
         return ""
-    text = f"The prediction is poor; parts of the torque that are not explained: {'; '.join(found)}"
+    text = f"Poor prediction. Unexplained part of the torque {'; '.join(found)}"
     if beyond.any():
-        text += f"; farther off than no torque at all: {', '.join(names[beyond])}"
+        text += f"; worse than predicting zero torque: {', '.join(names[beyond])}"
     why = (
         "The parameters do not carry over to that motion: use a log that excites these joints "
         "more, or fewer parameters (essential=True)."
-        if found[0].startswith("of the log kept aside")
+        if found[0].startswith("on the log kept aside")
         else "The order of the joints, signs, zeros, units, the sampling period or the model may "
         "be wrong, the log too short or too noisy, or the method or form unsuitable (compare "
         "method 'wls' and form 'torque')."
     )
-    return f"{text}. {why} The parameters are not to be used before the cause is known."
+    return f"{text}. {why} Do not use the parameters until the cause is known."

@@ -12,7 +12,7 @@ import robotmodels as rm
 from robotmodels import calibration, identification, trajectories
 
 # torques that have nothing to do with the motion are as good as any here
-pytestmark = pytest.mark.filterwarnings("ignore:The prediction is poor")
+pytestmark = pytest.mark.filterwarnings("ignore:Poor prediction")
 
 BAD = (
     None, True, "a", "", b"1", 1j, object(), float("nan"), float("inf"), -1e308, 1e308, 10**400, 3,

@@ -67,12 +67,12 @@ class HausmanResult(Rebuilt):
 
     @property
     def biased_parameters(self) -> NDArray[np.bool_]:
-        """Which are off by more than half a standard error of least squares, shape (b,)."""
+        """Parameters whose bias exceeds half a standard error of least squares, shape (b,)."""
         return self.parameter_p < self.level
 
     @property
     def biased(self) -> bool:
-        """Whether any is."""
+        """Whether any parameter is biased."""
         return bool(self.biased_parameters.any())
 
     @property
@@ -82,15 +82,15 @@ class HausmanResult(Rebuilt):
             return "Whether least squares are biased was not tested: the robot was not simulated."
         if not self.biased:
             return (
-                "Nothing speaks against least squares: no bias is above half a standard error "
+                "No bias of least squares above half a standard error was found "
                 f"(Durbin-Wu-Hausman, p = {self.p:.2g})."
             )
         size = np.abs(self.effect) / self.least_squares_errors
         order = [k for k in np.argsort(-size) if self.biased_parameters[k]]
         named = ", ".join(f"{self.names[k]} ({size[k]:.2g})" for k in order)
         return (
-            f"Least squares are biased (Durbin-Wu-Hausman, p = {self.p:.2g}), in standard errors: "
-            f"{named}. Filter the positions better, or use instrumental variables."
+            f"Least squares are biased (Durbin-Wu-Hausman, p = {self.p:.2g}). Bias in standard "
+            f"errors: {named}. Use a lower cutoff= or instrumental variables."
         )
 
 
@@ -191,7 +191,7 @@ def hausman_test(
     found, inverse, _ = solved(squares, step.weights)
 
     def residuals() -> Iterator[Block]:
-        """What a residual does to the difference, and to least squares."""
+        """Scores of the difference and of least squares."""
         for Z, own in both():
             least = own.W @ inverse
             W = np.concatenate((least - Z @ step.inverse.T, least), axis=2)

@@ -33,7 +33,7 @@ _TIGHT = 1e-5
 _KEPT = 1e-9
 """Deviation from the least squares, relative to the largest, that is none."""
 _PROVED = 2e-4
-"""Part of the squares within which the fit is known to be the best, else it is said."""
+"""Part of the squares within which the fit is known to be the best; else its status says so."""
 _REAL = 5e-9
 """Violation that is rounding, in natural units as many as the robot is away from the prior."""
 
@@ -112,8 +112,8 @@ class ConstrainedFit:
             found, total, weight, size = again, now, trial, wide
         if not np.isfinite(found.x).all():
             failed = ConsistentStatus.FAILED
-            said = f"The cone solver ended: {found.ended}."
-            return FoundRobot(problem.prior, failed, np.inf, np.inf, 0.0, (), said)
+            stopped = f"The cone solver stopped: {found.ended}."
+            return FoundRobot(problem.prior, failed, np.inf, np.inf, 0.0, (), stopped)
         x = found.x if self.gamma > 0.0 else self.nearest(found.x)
         signed = self.settled(x)
         clipped = float(np.abs((signed - x) / problem.unit).max())
@@ -127,21 +127,21 @@ class ConstrainedFit:
         return self.finished(signed, gap, clipped, status, stopped)
 
     def stopped(self, x: Array, found: ConeSolution, status: ConsistentStatus) -> str:
-        """Where the solver stopped early: its last word, and the constraint that is worst there."""
+        """Where the solver stopped early: its status, iterations and the worst constraint."""
         if status is ConsistentStatus.LOOSE:
-            said = "What holds the greatest part of the gap:"
+            heading = "Constraint with the largest share of the duality gap:"
             parts = [
                 one.share(found.x, one.dual(z))
                 for one, z in zip(self.constraints, found.multipliers, strict=True)
             ]
         elif status is ConsistentStatus.FAILED:
-            said = "What is missed most:"
+            heading = "Most violated constraint:"
             parts = [-one.slack(x) for one in self.constraints]
         else:
             return ""
-        sentences = [said for one in self.constraints for said in one.sentences]
+        sentences = [sentence for one in self.constraints for sentence in one.sentences]
         worst = sentences[int(np.argmax(np.concatenate(parts)))]
-        return f"The cone solver ended: {found.ended}. {said} {worst}"
+        return f"The cone solver stopped: {found.ended}. {heading} {worst}"
 
     def settled(self, x: Array) -> Array:
         """Known values exact, bounds missed by rounding met, signs turned back."""
@@ -234,7 +234,8 @@ class ConstrainedFit:
         for one in self.constraints:
             if one.cone is not Cone.ZERO:
                 slack = one.slack(x)
-                active += [said for s, said in zip(slack, one.sentences, strict=True) if s < _TIGHT]
+                pairs = zip(slack, one.sentences, strict=True)
+                active += [sentence for s, sentence in pairs if s < _TIGHT]
         return FoundRobot(x, status, gap, self.violation(x), clipped, tuple(active), stopped)
 
     def contradiction(self) -> str:
@@ -244,7 +245,7 @@ class ConstrainedFit:
             fewer = [other for other in bounds if other is not one]
             if not self.is_possible(tuple(fewer)):
                 bounds = fewer
-        names = " ".join(said for one in bounds for said in one.sentences)
+        names = " ".join(sentence for one in bounds for sentence in one.sentences)
         return (
             "bounds: no real bodies meet them together. What contradicts, each as it would be at "
             f"its bound: {names} Widen one of them, or ask for a smaller margin."

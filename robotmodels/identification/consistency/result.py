@@ -82,8 +82,8 @@ class ConsistentFit(Rebuilt):
     active : tuple of str
         Constraints without room that are left, a sentence each; known values are not listed.
     stopped : str
-        Where the solver stopped early: its last word and the constraint that is worst there; else
-        empty.
+        Status and iteration count of the solver where it stopped early, and the constraint that is
+        worst there; else empty.
 
     Examples
     --------
@@ -141,8 +141,13 @@ class ConsistentFit(Rebuilt):
         """
         parts = [self.status.sentence, self.stopped] if self.stopped else [self.status.sentence]
         if self.status is not ConsistentStatus.FREE:
-            parts.append(f"No robot has squares less by more than {100.0 * self.gap:.1g} %.")
+            parts.append(self.optimality)
         return " ".join((*parts, *self.active))
+
+    @property
+    def optimality(self) -> str:
+        """How near the sum of squares is to the optimum."""
+        return f"The sum of squares is within {100.0 * self.gap:.1g} % of the optimum."
 
     @property
     def price(self) -> float:
@@ -204,8 +209,8 @@ class ConsistentFit(Rebuilt):
             self.status.sentence,
             *([self.stopped] if self.stopped else ()),
             f"Residuals: {price} more than least squares (root of weighted squares "
-            f"{sqrt(self.squares):.6g}, unconstrained {sqrt(self.least):.6g}); no robot has "
-            f"squares less by more than {100.0 * self.gap:.1g} %.",
+            f"{sqrt(self.squares):.6g}, unconstrained {sqrt(self.least):.6g}). "
+            f"{self.optimality}",
             f"Distance from the prior {self.distance:.4g}"
             + (f", weight {self.gamma:g}." if self.gamma else "."),
         ]

@@ -56,7 +56,7 @@ class EstimateStatus(Outcome):
     POOR_PREDICTION = (
         3,
         "The parameters solve the equations best, but the torques that they predict are far from "
-        "the measured ones; they are not to be used before the cause is known.",
+        "the measured ones. Do not use the parameters until the cause is known.",
     )
 
 

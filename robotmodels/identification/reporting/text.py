@@ -32,7 +32,7 @@ def report_text(result: IdentificationResult, robot: ConsistentFit | None = None
     result : IdentificationResult
         Of `fit`.
     robot : ConsistentFit, optional
-        Of `consistent_robot`: what it costs is told too.
+        Of `consistent_robot`: what it costs is given too.
 
     Returns
     -------
@@ -82,8 +82,8 @@ def report_sections(
     See `report_text`.
     """
     if result.estimate.status is EstimateStatus.UNSTABLE:
-        told = data_section(result), processing_section(result), _notes(result)
-        return without_values(result), *(part for part in told if part is not None)
+        rest = data_section(result), processing_section(result), _notes(result)
+        return without_values(result), *(part for part in rest if part is not None)
     found = residual_diagnostics(result.system, result.values)
     parts = (
         verdict(result, found), data_section(result), processing_section(result), _errors(result),
@@ -200,8 +200,8 @@ def _real(robot: ConsistentFit | None) -> ReportSection | None:
         return None
     body: list[str | ReportTable] = [
         " ".join((robot.status.sentence, robot.stopped)).strip()
-        + f" Its residuals are {robot.price:.3g} % more than those of least "
-        f"squares (root of the weighted squares); none has {100.0 * robot.gap:.1g} % less."
+        + f" Its residuals are {robot.price:.3g} % more than those of least squares (root of the "
+        f"weighted squares). {robot.optimality}"
     ]
     body += [f"* {sentence}" for sentence in robot.active]
     rows = [
@@ -216,6 +216,6 @@ def _real(robot: ConsistentFit | None) -> ReportSection | None:
 
 def _notes(result: IdentificationResult) -> ReportSection | None:
     # the reasons of the processing stand with the processing, doubts in the verdict
-    told = {*result.system.processing.notes, *doubts(result)}
-    notes = [note for note in dict.fromkeys(result.notes) if note not in told]
+    shown_elsewhere = {*result.system.processing.notes, *doubts(result)}
+    notes = [note for note in dict.fromkeys(result.notes) if note not in shown_elsewhere]
     return ReportSection("Notes", tuple(f"* {note}" for note in notes)) if notes else None
