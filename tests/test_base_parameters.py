@@ -249,8 +249,8 @@ def test_axes_within_1e_5_rad_are_aligned_in_the_regrouping():
             assert base.model is rounded  # poses and torques keep the digits
             keeps_torque(base, rounded, rng)
             if base.notes:
-                assert base.notes[0].startswith("Taken as exact: ")
-                assert f"differ by {base.missed:.0e} of the largest" in base.notes[1]
+                assert base.notes[0].startswith("Treated as aligned: ")
+                assert f"aligned robot by up to {base.missed:.0e} of the largest" in base.notes[1]
                 assert 0.0 < base.missed < 3 * turned(base)
             # not so beyond 1e-5 rad, and not if every digit is meant
             keeps_torque(base_parameters(far, way, drive=True), far, rng, tolerance=3e-10)
@@ -667,7 +667,7 @@ def test_a_tolerance_takes_few_digits_for_what_is_meant(name):
     assert len(meant[0]) <= len(exact)
     assert meant[0].names == base_parameters(model, drive=False).names
     for base in meant:
-        assert "Taken as exact: ax" in base.text
+        assert "Treated as aligned: ax" in base.text
         assert abs(base.matrix[base.matrix != 0]).min() > 1e-6
         assert "e-1" not in base.text.split("Regrouped")[1].split("Rank")[0]
     assert not base_parameters(rm.load("rx90")).notes
@@ -676,10 +676,10 @@ def test_a_tolerance_takes_few_digits_for_what_is_meant(name):
 def test_notes_tell_the_tolerance_to_use():
     model = rm.load("erd:bravo7_no_ee")
     exact = base_parameters(model, tolerance=1e-11, drive=True)
-    assert "tolerance=1e-08 takes them as exact" in exact.notes[0]
+    assert "tolerance=1e-08 would align them" in exact.notes[0]
     meant = base_parameters(model, tolerance=1e-8, drive=True)
     assert len(meant) == 58 < len(exact)
-    assert "Taken as exact" in meant.text
+    assert "Treated as aligned" in meant.text
     # what a great tolerance leaves out has an effect, and is not said to have none
     assert meant.neglected == ("MX1", "MY1", "MZ2")
     assert "Neglected, about 1e-08 of the largest torque or less: MX1, MY1, MZ2" in meant.text

@@ -40,7 +40,7 @@ def test_the_budget_bounds_the_multiplications_of_any_robot(name, monkeypatch):
     assert 0.5 * budget < seen["evaluations"] * seen["work"] < 1.2 * budget
     assert len(one.starts) == 1
     assert one.status is ExcitationStatus.LIMIT_OF_ITERATIONS
-    assert one.status.sentence.startswith("The budget of evaluations ended")
+    assert one.status.sentence.startswith("The limit on iterations or evaluations was")
     assert any("more iterations (iterations=" in note for note in one.notes)
     assert one.limits.kept
     assert one.condition < one.baseline_conditions[0]
@@ -55,7 +55,7 @@ def test_long_evaluations_leave_fewer_starts_and_random_motions(monkeypatch):
     found = exciting_trajectory(rm.load("ur10e"), rng=0)
     assert len(found.starts) == 1
     assert len(found.baseline) <= 8
-    assert any("more starts would bring is not known" in note for note in found.notes)
+    assert any("benefit of more starts cannot be estimated" in note for note in found.notes)
     assert found.limits.kept
     monkeypatch.setattr(search, "BUDGET", 3e10)
     again = exciting_trajectory(rm.load("planar_2r"), harmonics=2, rng=0)

@@ -109,7 +109,7 @@ def test_arrays_with_a_row_for_each_joint_are_turned_and_noted(tmp_path):
     log = read_log(tmp_path / "run.npz")
     assert np.array_equal(log.q, q)
     assert np.array_equal(log.tau, tau)
-    assert "run.npz: q has a row for each joint and was turned." in log.notes
+    assert "run.npz: q has shape (joints, samples) and was transposed." in log.notes
     # fewer samples than joints
     np.savez(tmp_path / "short.npz", t=t[:2], q=q[:2], tau=tau[:2])
     assert np.array_equal(read_log(tmp_path / "short.npz").q, q[:2])
@@ -160,7 +160,7 @@ def test_of_a_mat_file_only_what_is_asked_for_is_read(tmp_path, turned):
     assert np.array_equal(log.q, q)
     assert np.array_equal(log.tau, tau)
     assert log.dt == pytest.approx(DT)
-    said = [note for note in log.notes if "was turned" in note]
+    said = [note for note in log.notes if "was transposed" in note]
     assert len(said) == 2 * turned
     assert not any("settings" in note or "wide" in note for note in log.notes)
     with pytest.raises(InvalidValueError, match=f"have {N}, {9 * N} samples; give times"):

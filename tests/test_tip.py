@@ -83,7 +83,12 @@ def test_the_arm_ends_before_its_fingers(length, lengths):
     assert model.n == length + sum(lengths), "the fingers stay joints"
     assert model.tip == length
     beyond = sum(lengths)
-    assert any(f"before {beyond} moving joints of a hand" in note for note in model.notes)
+    wanted = (
+        f"the tool is link 'hand_base', the end of the last of {len(lengths)} branches, before "
+        f"{beyond} moving joints of a hand or gripper. Use tip_link= or with_tool to choose "
+        "another."
+    )
+    assert wanted in model.notes
 
 
 @pytest.mark.parametrize("length", [6, 7, 8])

@@ -188,10 +188,10 @@ def _parquet_lists(path: Path, name: str, column: Any) -> Any:
     return values
 
 
-def _arrays(path: Path, stored: dict[str, Any], turn: bool) -> LogTable:
+def _arrays(path: Path, stored: dict[str, Any], transpose: bool) -> LogTable:
     """Columns of arrays with names, those as long as most first, then texts, then the others.
 
-    With ``turn`` arrays whose second axis is the samples' are turned.
+    With ``transpose`` arrays whose second axis is the samples' are transposed.
     """
     matrices: dict[str, Array] = {}
     texts: dict[str, str] = {}
@@ -208,11 +208,16 @@ def _arrays(path: Path, stored: dict[str, Any], turn: bool) -> LogTable:
     lengths = Counter(
         length
         for value in matrices.values()
-        for length in {len(value), value.shape[1] if turn and value.shape[1] > 1 else len(value)}
+        for length in {
+            len(value),
+            value.shape[1] if transpose and value.shape[1] > 1 else len(value),
+        }
     )
     N = max(lengths, key=lambda length: (lengths[length], length))
-    turned = {name for name, value in matrices.items() if turn and _lies(value, N)}
-    matrices = {name: x.T if name in turned else x for name, x in matrices.items()}
+    transposed = {
+        name for name, value in matrices.items() if transpose and _has_samples_last(value, N)
+    }
+    matrices = {name: x.T if name in transposed else x for name, x in matrices.items()}
     alike = [name for name, value in matrices.items() if len(value) == N]
     names: list[str] = []
     groups: dict[str, tuple[int, ...]] = {}
@@ -251,11 +256,11 @@ def _arrays(path: Path, stored: dict[str, Any], turn: bool) -> LogTable:
 
     return LogTable(
         path, tuple(names), len(names), groups, read, words,
-        sum(matrices[name].shape[1] for name in alike), frozenset(turned),
+        sum(matrices[name].shape[1] for name in alike), frozenset(transposed),
     )  # fmt: skip
 
 
-def _lies(value: Array, N: int) -> bool:
+def _has_samples_last(value: Array, N: int) -> bool:
     """Whether the samples of an array are along its second axis."""
     rows, width = value.shape
     return rows != N and width > 1 and (width == N or rows < width)

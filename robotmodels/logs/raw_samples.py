@@ -189,11 +189,11 @@ def raw_samples(
 
 
 def _read(table: LogTable, columns: Sequence[int], notes: list[str]) -> Array:
-    """Samples of columns, noted where their array was turned."""
+    """Samples of columns, noted where their array was transposed."""
     arrays = {table.names[i].rpartition("[")[0] for i in columns if table.names}
     notes += [
-        f"{table.path.name}: {name} has a row for each joint and was turned."
-        for name in sorted(arrays & table.turned)
+        f"{table.path.name}: {name} has shape (joints, samples) and was transposed."
+        for name in sorted(arrays & table.transposed)
     ]
     return table.read(columns)
 

@@ -76,8 +76,8 @@ class LogTable:
     alike : int or None
         How many of the first columns have as many samples as most: among them usual names are
         looked for; None for all.
-    turned : frozenset of str
-        Arrays that have a row for each joint in the file.
+    transposed : frozenset of str
+        Arrays that have shape (joints, samples) in the file.
     """
 
     path: Path
@@ -87,7 +87,7 @@ class LogTable:
     read: Callable[[Sequence[int]], Array]
     words: Callable[[int], str]
     alike: int | None = None
-    turned: frozenset[str] = frozenset()
+    transposed: frozenset[str] = frozenset()
 
     def choice(self, given: Column | Sequence[Column], what: str) -> tuple[int, ...]:
         """Columns that an argument names.

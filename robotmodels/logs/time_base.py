@@ -244,10 +244,11 @@ def _split(
     broken = back | gap
     counts[broken] = 1
     if (counts > 1).any():
-        why = f" (the shortest period of the motion is {shortest:.3g} s)" if shortest else ""
+        why = f"; shortest period of the motion {shortest:.3g} s" if shortest else ""
+        count = int((counts - 1).sum())
         notes.append(
-            f"{source}: {int((counts - 1).sum())} missing samples were interpolated, in gaps of up "
-            f"to {median * counts.max():.3g} s{why}."
+            f"{source}: {count} missing sample{'s were' if count > 1 else ' was'} interpolated "
+            f"(gaps up to {median * counts.max():.3g} s{why})."
         )
     joined = ~broken
     period = float(steps[joined].sum() / counts[joined].sum()) if joined.any() else median

@@ -126,14 +126,14 @@ class _Pairs:
             for word, off, found in (
                 ("parallel", sine, along), ("perpendicular", abs(cosine), across)
             ):  # fmt: skip
-                said = off, f"{name} and {other} {word} but for {off:.1e} rad"
+                pair = off, f"{name} and {other} {word} but for {off:.1e} rad"
                 if off <= self.angle:
                     found.append(copysign(1.0, cosine) * e)
                     if off > _ROUNDING:
-                        self.taken.append(said)
+                        self.taken.append(pair)
                         turned = True
                 elif off < _NEAR:
-                    self.apart.append(said)
+                    self.apart.append(pair)
         if not turned:
             return None
         if along:
@@ -146,13 +146,13 @@ class _Pairs:
         """A sentence about the pairs taken as aligned, and one about those that are not."""
         out = []
         if self.taken:
-            out.append(f"Taken as exact: {_listed(self.taken)}.")
+            out.append(f"Treated as aligned: {_listed(self.taken)}.")
         if self.apart:
             greatest = max(off for off, _ in self.apart)
             enough = min(10.0 ** (ceil(log10(greatest)) + 1), _GREATEST)
             out.append(
-                f"Not exact: {_listed(self.apart)}. What they show is kept; "
-                f"tolerance={enough:.0e} takes them as exact."
+                f"Not treated as aligned: {_listed(self.apart)}; tolerance={enough:.0e} would "
+                "align them."
             )
         return tuple(out)
 
@@ -180,6 +180,6 @@ def _rotation(gamma: float, beta: float, alpha: float, theta: float = 0.0) -> Ar
 
 def _listed(found: list[tuple[float, str]]) -> str:
     found = sorted(found, key=lambda item: -item[0])
-    words = "; ".join(said for _, said in found[:_LONGEST_LIST])
+    words = "; ".join(sentence for _, sentence in found[:_LONGEST_LIST])
     more = len(found) - _LONGEST_LIST
     return words + (f"; and {more} more" if more > 0 else "")

@@ -166,8 +166,11 @@ def _as_given(
     shown = shown_parameters(model, base.drive, samples, bound, base.friction)
     neglected = np.array(base.parameter_names)[shown & ~base.matrix.any(axis=0)].tolist()
     missed = missed_torque(base, samples, bound)
-    said = f"Torques differ by {missed:.0e} of the largest from those of exact axes."
-    notes = (base.notes[0], said, *base.notes[1:])
+    sentence = (
+        "The torques of the robot as given differ from those of the aligned robot by up to "
+        f"{missed:.0e} of the largest."
+    )
+    notes = (base.notes[0], sentence, *base.notes[1:])
     return replace(base, neglected=tuple(neglected), missed=missed, notes=notes)
 
 
@@ -208,16 +211,16 @@ def _constraint_notes(G: Array, columns: int) -> tuple[str, ...]:
     if rank == n:
         return ()
     free = "one free variable" if rank == 1 else f"{rank} free variables"
-    said = (
+    sentence = (
         f"Joint variables are constrained: rank {rank} of {n}, so that the torques are those of "
         f"{free}."
     )
     if rank < columns:
-        said += (
+        sentence += (
             f" The {columns} columns of the constraint depend on each other; if no joint is meant "
             "to follow others, the matrix is wrong."
         )
-    return (said,)
+    return (sentence,)
 
 
 def _transmission_notes(

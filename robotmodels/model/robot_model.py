@@ -240,15 +240,15 @@ class RobotModel(Changeable):
 
         Notes
         -----
-        Without ``tip_link`` the tool is the link called ``tool``, else the link carried by the last
-        joint of the file, or what is fixed to it as long as that is a single link; of equal arms it
-        is thus the last one. Where a hand or gripper lies beyond the arm, the tool is the last link
-        before it. A hand is where the chain divides into branches with moving joints, all shorter
-        (in joints) than the chain up to there, and either the two longest are equal or six joints
-        or more lie before them. If a link fixed to that last link is called ``tool0``, ``tcp``,
-        ``tool``, ``ee_link``, ``flange`` or ``hand``, the tool is this one, the first in this
-        order; a link of that name also marks the end of the arm before a single finger.
-        ``print(model)`` names the tip and other links, ``notes`` say what was chosen.
+        Without ``tip_link`` the tool is the link called ``tool``. Else it is the link carried by
+        the last joint of the file, or what is fixed to it as long as that is a single link. Of
+        several arms it is thus that of the last one. If a hand or gripper follows the arm, the tool
+        is the last link before it. A hand is a point where the chain branches into shorter moving
+        branches, if the two longest are equal or at least six joints precede it. If links fixed to
+        that last link are called ``tool0``, ``tcp``, ``tool``, ``ee_link``, ``flange`` or ``hand``,
+        the tool is the first of them in this order. A link of such a name also marks the end of the
+        arm before a single finger. ``print(model)`` names the tip and other links; ``notes`` say
+        what was chosen.
 
         Joints that do not move the tool are no redundancy: inverse models leave them at their
         reference.

@@ -259,11 +259,10 @@ def _tip_notes(tip: str, beyond: int, branches: int) -> list[str]:
     """Where the tool is, if there was a choice."""
     if tip == TOOL or (branches == 1 and not beyond):
         return []
-    several = f"the robot has {branches} branches; " if branches > 1 else ""
-    end = " at the end of the last one" if branches > 1 else ""
+    end = f", the end of the last of {branches} branches" if branches > 1 else ""
     if beyond:
         end += f", before {beyond} moving joint{'s' * (beyond > 1)} of a hand or gripper"
-    return [f"{several}the tool is link {tip!r}{end}. Choose another with tip_link or with_tool."]
+    return [f"the tool is link {tip!r}{end}. Use tip_link= or with_tool to choose another."]
 
 
 def _leaves(table: DHTable) -> list[int]:

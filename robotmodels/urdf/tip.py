@@ -8,7 +8,7 @@ from .parts import TOOL, NamedFrame
 from .tree import UrdfTree
 
 TOOL_LINKS = ("tool0", "tcp", TOOL, "ee_link", "flange", "hand")
-"""Names of links that mark the end of an arm, the most telling first."""
+"""Names of links that mark the end of an arm, in order of preference."""
 _WHOLE_ARM = 6  # joints that place a body anywhere: what moves beyond it is no part of the arm
 
 
@@ -72,7 +72,7 @@ def default_tip(
 
 
 def _tool_link(frames: tuple[NamedFrame, ...], j: int) -> NamedFrame | None:
-    """The link with the most telling name among those that joint j moves."""
+    """The link with the preferred name among those that joint j moves."""
     named = [frame for frame in frames if frame.parent == j and frame.name in TOOL_LINKS]
     return min(named, key=lambda frame: TOOL_LINKS.index(frame.name), default=None)
 

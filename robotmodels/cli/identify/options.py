@@ -92,16 +92,19 @@ def _add_fit(fitted: Any) -> None:
                         help="drive parameters that are identified (default: Ia Fv Fc "
                         "offset)")  # fmt: skip
     fitted.add_argument("--cutoff", type=float, metavar="HZ",
-                        help="-3 dB of the positions' low-pass; default by the log")  # fmt: skip
+                        help="-3 dB of the positions' low-pass; default: chosen for "
+                        "prediction, see the notes")  # fmt: skip
     fitted.add_argument("--decimation", type=int, metavar="N",
-                        help="samples for an equation; default by the log, 1: all")  # fmt: skip
+                        help="samples for an equation, 1: all; default: chosen for prediction, see "
+                        "the notes")  # fmt: skip
     fitted.add_argument("--dead-band", metavar="NUMBERS",
                         help="velocities (rad/s, m/s) below which a joint's equations are left "
                         "out")  # fmt: skip
     fitted.add_argument("--edges", type=float, metavar="SECONDS",
                         help="cut at both ends of each recording")  # fmt: skip
     fitted.add_argument("--no-check", action="store_true",
-                        help="do not look for wrong units, signs and order first")  # fmt: skip
+                        help="skip the checks of units, signs and order, and the removal of "
+                        "outliers and frozen samples")  # fmt: skip
     fitted.add_argument("--consistent", action="store_true",
                         help="tell what real bodies and drives cost (as --out does)")  # fmt: skip
     fitted.add_argument("--prior", metavar="ROBOT",

@@ -87,8 +87,16 @@ class ConsistentFit(Rebuilt):
 
     Examples
     --------
-    >>> ConsistentFit.__slots__[:2]
-    ('inertia', 'drive')
+    >>> import numpy as np
+    >>> from robotmodels.identification.consistency.fit_consistent import fit_consistent
+    >>> from robotmodels.robots import load
+    >>> from robotmodels.minimal_parameters import base_parameters, uniform_bodies
+    >>> arm = load("planar_2r")
+    >>> base = base_parameters(arm, drive=False)
+    >>> found = fit_consistent(base, np.eye(4), [0.2, -0.1, 0.3, 0.0],
+    ...                        prior=uniform_bodies(arm, 5.0))
+    >>> "The pseudo-inertia of link 2 is singular to the margin." in found.reason()
+    True
     """
 
     inertia: InertialParameters
@@ -128,16 +136,7 @@ class ConsistentFit(Rebuilt):
 
         Examples
         --------
-        >>> import numpy as np
-        >>> from robotmodels.identification.consistency.fit_consistent import fit_consistent
-        >>> from robotmodels.robots import load
-        >>> from robotmodels.minimal_parameters import base_parameters, uniform_bodies
-        >>> arm = load("planar_2r")
-        >>> base = base_parameters(arm, drive=False)
-        >>> found = fit_consistent(base, np.eye(4), [0.2, -0.1, 0.3, 0.0],
-        ...                        prior=uniform_bodies(arm, 5.0))
-        >>> "The pseudo-inertia of link 2 is singular to the margin." in found.reason()
-        True
+        See `ConsistentFit`.
         """
         parts = [self.status.sentence, self.stopped] if self.stopped else [self.status.sentence]
         if self.status is not ConsistentStatus.FREE:

@@ -110,10 +110,10 @@ def exciting_trajectory(
     baseline : int, optional
         How many random motions are made, at least ``starts``; default 100, or fewer likewise.
     iterations : int, optional
-        Most of each of the four stages of a start, however long they take. A stage ends where the
-        criterion falls by less than 1 % over 25 of them. Default 200 within a budget of
-        evaluations, so that 8 starts take about ten seconds of a processor; it counts
-        multiplications and not time, so that the same search is made each time.
+        Largest number of iterations of each of the four stages of a start; a stage ends earlier
+        where the criterion falls by less than 1 % over 25 of them. Without it, 200 and a budget of
+        evaluations (about 10 s of a processor for 8 starts). The budget counts multiplications, so
+        that searches repeat exactly.
     rng : Generator or int, optional
         Chance, or its seed; default another one each time.
     progress : bool or callable
@@ -247,19 +247,19 @@ def _more(done: Sequence[ExcitationStart], aim: ExcitationCriterion) -> tuple[st
         gain = f"raise the log det by about {gain_of_twice(values):.2g}"
     found = []
     if len(values) == 1:
-        found.append("How much more starts would bring is not known of one: it takes starts=2.")
+        found.append("With one start the benefit of more starts cannot be estimated; use starts=2.")
     else:
         ends = values if aim is ExcitationCriterion.CONDITION else -values
         found.append(
-            f"Twice the budget (starts={2 * len(done)}) would {gain}: the {len(values)} starts "
-            f"ended at {ends.min():.4g} to {ends.max():.4g}."
+            f"Doubling the number of starts (starts={2 * len(done)}) is expected to {gain}; the "
+            f"{len(values)} starts ended between {ends.min():.4g} and {ends.max():.4g}."
         )
     best = kept[int(values.argmin())]
     last = best.history[len(best.history) - int(best.stages[-1]) :]
     if best.status is ExcitationStatus.LIMIT_OF_ITERATIONS and len(last) > 1:
         fall = 100.0 * (1.0 - np.exp(min(0.0, last[-1] - last[len(last) // 2])))
         found.append(
-            f"The last half of the last stage still lowered the criterion by {fall:.2g} %: more "
+            f"In the second half of the last stage the criterion still fell by {fall:.2g} %; more "
             f"iterations (iterations={2 * max(int(best.stages.max()), 1)}) would lower it further."
         )
     return tuple(found)

@@ -27,7 +27,10 @@ class ExcitationStatus(Outcome):
     """
 
     CONVERGED = 0, "The criterion fell by less than 1 % over the last 25 iterations, or not at all."
-    LIMIT_OF_ITERATIONS = 1, "The budget of evaluations ended before the criterion stood still."
+    LIMIT_OF_ITERATIONS = (
+        1,
+        "The limit on iterations or evaluations was reached before the criterion converged.",
+    )
     INFEASIBLE = 2, "No motion was found that keeps every limit."
 
 

@@ -101,7 +101,7 @@ def improved(
         most = np.inf
         if evaluations is not None:
             most = (evaluations - used) // (len(STAGES) - k)
-        follow = _Follow(history, most)
+        follow = _StageCallback(history, most)
         found = minimize(
             follow.counted(problem.value), x, args=(stage,), jac=True, method="BFGS",
             callback=follow, options={"maxiter": iterations, "gtol": 1e-4},
@@ -121,8 +121,8 @@ def improved(
     return feasible, np.array(history), np.array(counts), status
 
 
-class _Follow:
-    """What SciPy calls after each iteration: a stage ends where it gains little or has no more."""
+class _StageCallback:
+    """SciPy callback: ends a stage when progress is below 1 % or the evaluations are used up."""
 
     def __init__(self, history: list[float], most: float) -> None:
         self.history, self.first, self.most = history, len(history), most
