@@ -87,7 +87,7 @@ def test_a_log_may_begin_at_rest_with_a_coarse_encoder():
     assert one.error(found.predict) < 0.1
 
 
-@pytest.mark.filterwarnings("ignore:Poor prediction", "ignore:The prediction is poor")
+@pytest.mark.filterwarnings("ignore:Poor prediction")
 @pytest.mark.parametrize("seed", [61, 65, 69, 73])
 def test_a_correct_short_log_is_not_refused(seed):
     one = case(seed)

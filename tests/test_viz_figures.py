@@ -33,6 +33,7 @@ NUMBERS = {  # counts, ratios and scales that have no unit
     "residual / standard deviation", "normal quantile", "condition number", "criterion",
     "smooth condition number", "smooth criterion", "minus log det", "correlation", "value",
     "autocorrelation", "least singular value", "no unit",
+    "bias / standard error", "equations / parameter",
 }  # fmt: skip
 
 
@@ -297,7 +298,8 @@ FIGURES: dict[str, dict[str, Callable[[], Figure]]] = {
     "processing": {
         "": lambda: rm.viz.plot_processing(
             identified().system.log, identified().system.processing, model=identified().model
-        )
+        ),
+        "result": lambda: rm.viz.plot_processing(identified(), title="Cutoffs"),
     },
     "profiles": {
         side: lambda side=side: rm.viz.plot_profiles(

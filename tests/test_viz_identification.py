@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import robotmodels as rm
-from robotmodels.errors import InvalidValueError, ShapeError
+from robotmodels.errors import InvalidValueError, RobotModelsWarning, ShapeError
 from robotmodels.identification import Log, choose_processing, fit
 from robotmodels.identification.reporting.text import report_text
 from robotmodels.minimal_parameters import uniform_bodies
@@ -144,7 +144,10 @@ def test_processing_shows_cutoffs_and_what_they_cut(found):
     assert figure.axes[0].get_ylabel() == "(m/√Hz)"
     for k, cutoff in enumerate((chosen.cutoff, chosen.torque_cutoff)):
         own = lines(figure.axes[k])
-        assert own["cutoff"].get_xdata()[0] == cutoff
+        assert own["cutoff of the positions"].get_xdata()[0] == chosen.cutoff
+        assert own["cutoff of regressor and torques"].get_xdata()[0] == chosen.torque_cutoff
+        assert own["motion: 99.9 % of the velocity's power"].get_xdata()[0] == chosen.motion
+        assert min(patch.get_x() for patch in figure.axes[k].patches) == cutoff  # grey: cut
         f = np.asarray(own["kept"].get_xdata(), dtype=float)
         before = np.asarray(own["as recorded"].get_ydata(), dtype=float)
         after = np.asarray(own["kept"].get_ydata(), dtype=float)
@@ -156,7 +159,69 @@ def test_processing_shows_cutoffs_and_what_they_cut(found):
     assert noise == pytest.approx(1e-5 * np.sqrt(1.0 - 2.0 * DT * chosen.cutoff), rel=0.1)
     raw = choose_processing(log, filtered=False, decimation=1)
     figure = drawn(plot_processing(log, raw))
-    assert "cutoff" not in lines(figure.axes[0])
+    assert not any("cutoff" in name for name in lines(figure.axes[0]))
+    assert not figure.axes[0].patches
+
+
+def test_torques_that_are_cut_are_told_relative_to_all(found):
+    log, chosen = found.system.log, found.system.processing
+    for axes, tau in zip(drawn(plot_processing(found)).axes[1:6:2], log.tau.T, strict=True):
+        title = axes.get_title(loc="left")
+        cut, share = re.search(r"torque: (\S+) N(?: m)? rms \((\S+) %\) cut", title).groups()
+        # white noise of 0.1 was added; the decimation passes what is below its cutoff
+        assert float(cut) > 0.09 * np.sqrt(1.0 - 2.0 * DT * chosen.torque_cutoff)
+        rms = np.sqrt(np.mean(tau[:3500] ** 2))  # spectra are made of the longest recording
+        assert float(share) == pytest.approx(100.0 * float(cut) / rms, rel=0.1)
+
+
+def test_processing_of_a_result_shows_why(found):
+    """The last row: bias by noise and equations for each parameter, bounds and choice."""
+    chosen, b = found.system.processing, len(found.base)
+    figure = drawn(plot_processing(found, title="a title"))
+    assert len(figure.axes) == 8
+    bias, count = (lines(axes) for axes in figure.axes[6:])
+    bound = "bounds: 0.1 standard errors, 20 equations"
+    assert bias[bound].get_ydata()[0] == 0.1
+    assert count[bound].get_ydata()[0] == 20
+    for own, cutoff in ((bias, min(chosen.cutoff, chosen.torque_cutoff)),
+                        (count, chosen.torque_cutoff)):  # fmt: skip
+        f, curve = own["at other cutoffs"].get_data()
+        [x], [y] = own["choice"].get_data()
+        assert x == cutoff
+        assert f[0] == chosen.motion
+        assert y == curve[np.flatnonzero(f == cutoff)[0]]  # the choice lies on the curve
+        assert f[-1] > 5.0 * cutoff
+    # the bias grows with the cutoff and passes its bound between the choice and its double
+    f, curve = bias["at other cutoffs"].get_data()
+    [x], [y] = bias["choice"].get_data()
+    assert 0.01 < y < 0.1
+    assert (curve[f < 0.5 * x] < 0.01).all()
+    assert (curve[f > 2.0 * x] > 0.1).all()
+    # one equation of each joint for each sample that is kept
+    expected = len(found.system.log) * 3 / chosen.decimation / b
+    assert count["choice"].get_ydata()[0] == pytest.approx(expected)
+    assert found.reduction.rows / b <= expected
+    assert figure.axes[7].get_title(loc="left") == (
+        f"{expected:.3g} equations for each parameter, with edges and dead bands"
+    )
+
+
+def test_processing_of_a_result_shows_what_an_asked_cutoff_does(found):
+    model, log = found.model, found.system.log
+    noisy = Log(DT, log.q + 2e-4 * np.random.default_rng(5).normal(size=log.q.shape), log.tau)
+    with pytest.warns(RobotModelsWarning, match="Poor prediction"):
+        asked = fit(model, noisy, cutoff=30.0, decimation=1, checked=False)
+    bias, count = (lines(axes) for axes in drawn(plot_processing(asked)).axes[6:])
+    [x], [y] = bias["choice"].get_data()
+    assert x == 30.0
+    assert y > 0.5  # above the bound, as the notes tell
+    note = next(note for note in asked.notes if "predicted to bias parameters" in note)
+    assert y == pytest.approx(float(re.search(r"up to (\S+) standard errors", note)[1]), rel=0.5)
+    [x], [y] = count["choice"].get_data()
+    assert (x, y) == (0.4 / DT, len(log) * 3 / len(asked.base))  # no decimation
+    one = fit(model, log, form="power", checked=False)
+    [_], [y] = lines(plot_processing(one).axes[7])["choice"].get_data()
+    assert y == pytest.approx(len(log) / one.system.processing.decimation / len(one.base))
 
 
 @pytest.mark.parametrize("name", ["pendulum", "planar_2r", "rx90", "iiwa14"])
@@ -169,7 +234,7 @@ def test_every_number_of_joints(name):
         plot_identification_parameters(result),
         plot_identification_deviations(result),
         plot_identification_correlations(result),
-        plot_processing(result.system.log, result.system.processing, model=result.model),
+        plot_processing(result),
     ]
     assert len(figures[0].axes) == model.n
     for figure in figures:
@@ -197,5 +262,9 @@ def test_wrong_arguments(found):
         plot_identification_torques(found, two)
     with pytest.raises(InvalidValueError, match="expected a Processing"):
         plot_processing(found.system.log, None)
+    with pytest.raises(InvalidValueError, match="expected a Log or an IdentificationResult"):
+        plot_processing("log")
+    with pytest.raises(InvalidValueError, match="the result holds them"):
+        plot_processing(found, found.system.processing)
     with pytest.raises(ShapeError, match="2 joints, got 3"):
         plot_processing(two, found.system.processing)

@@ -27,7 +27,7 @@ from .methods.estimate import Estimate, EstimateStatus, Method
 from .prediction import friction_ramp
 from .preparation.accepted import accepted_log, accepted_test
 from .preparation.processing import Processing
-from .processing_choice import EQUATIONS, processing_for
+from .processing_choice import LEAST_EQUATIONS, processing_for
 from .result import IdentificationResult
 from .scale.kept_equations import kept_equations, plain
 from .scale.reduction import Reduction, reduce_equations
@@ -273,7 +273,7 @@ def _chosen(
 
     system = made(decimation)
     whole = reduce_equations(system, executor, progress)
-    share = whole.rows / (EQUATIONS * len(base))
+    share = whole.rows / (LEAST_EQUATIONS * len(base))
     step = system.processing.decimation
     if decimation is None and share < 1.0 < step:
         # a little less, since the cutoff and with it what is left out may change
@@ -371,9 +371,9 @@ def _notes(
     notes = [
         f"{reduction.rows} equations, {each:.3g} for each of {len(reduction.names)} parameters."
     ]
-    if each < EQUATIONS:
+    if each < LEAST_EQUATIONS:
         notes.append(
-            f"Fewer than {EQUATIONS} equations for each parameter: record a longer log, or "
+            f"Fewer than {LEAST_EQUATIONS} equations for each parameter: record a longer log, or "
             "identify fewer parameters."
         )
     if unseen:

@@ -19,9 +19,9 @@ from .preparation.processing import (
 )
 from .regressor_noise import RegressorNoise, bias_ratio, regressor_noise
 
-EQUATIONS = 20
+LEAST_EQUATIONS = 20
 """Equations for each parameter at least."""
-_BIAS = 0.1
+MOST_BIAS = 0.1
 """Bias by noise in the regressor at most, in standard errors."""
 _HIGHEST, _OF_MOTION = 15.0, 2.5
 """Highest cutoff of the equations, Hz (joints are flexible above), and lowest, in frequencies of
@@ -46,17 +46,18 @@ def processing_for(
     """Choose the processing; ``kinds`` equations at a time (default one for each joint).
 
     The cutoff of the equations is the highest at which noise of the positions is predicted to bias
-    no parameter by more than `_BIAS` standard errors, and the decimation leaves `EQUATIONS`
-    equations for each parameter where the log has as many samples. What the user gives is kept.
+    no parameter by more than `MOST_BIAS` standard errors, and the decimation leaves
+    `LEAST_EQUATIONS` equations for each parameter where the log has as many samples. What the user
+    gives is kept.
     """
     motion, noise = motion_of(log)
-    most = max(1, len(log) * (kinds or log.n) // (EQUATIONS * len(base)))
+    most = max(1, int(equations_per_parameter(base, log, kinds, 1) / LEAST_EQUATIONS))
     step = None if decimation is None else checked_decimation(log, decimation)
     highest = min(max(_HIGHEST, _OF_MOTION * motion), _NYQUIST / log.dt)
     lowest = min(_OF_MOTION * motion, highest)
     if cutoff is not None:
         positions = checked_cutoff(log, cutoff)
-        step = step or max(1, min(int(_HALF * _POSITIONS / (positions * log.dt)), most))
+        step = step or min(decimation_for(positions / _POSITIONS, log.dt), most)
         band = min(positions, _HALF / (step * log.dt), _NYQUIST / log.dt)
         given = regressor_noise(base, log, min(lowest, band), max(highest, band))
         ratio = bias_ratio(given, band)
@@ -66,16 +67,16 @@ def processing_for(
         highest = highest if step is None else min(highest, _HALF / (step * log.dt))
         given = regressor_noise(base, log, min(lowest, highest), highest)
         band, ratio, lowered = _highest_cutoff(given, min(lowest, highest), highest)
-        step = step or max(1, min(int(_HALF / (band * log.dt)), most))
+        step = step or min(decimation_for(band, log.dt), most)
         # with more equations than the noise allows for, it is the positions that are cut off lower
         wider = np.clip(_POSITIONS * band * step * log.dt / _HALF, 1.0, _POSITIONS)
         positions = min(float(wider) * band, _NYQUIST / log.dt)
         why = (
-            f"Positions are low-pass filtered at {positions:.3g} Hz, so that noise of the "
-            f"positions is predicted to bias no parameter by more than {_BIAS:g} standard errors."
+            f"Positions are low-pass filtered at {positions:.3g} Hz, so that their noise is "
+            f"predicted to bias no parameter by more than {MOST_BIAS:g} standard errors."
         )
     reasons = [why + lowered, decimated(step, log.dt)]
-    if ratio.max(initial=0.0) > _BIAS:
+    if ratio.max(initial=0.0) > MOST_BIAS:
         worst = int(np.argmax(ratio))
         reasons[0] = (
             f"Positions are low-pass filtered at {positions:.3g} Hz"
@@ -87,18 +88,30 @@ def processing_for(
     return completed(log, motion, noise, positions, step, dead_band, edges, tuple(reasons))
 
 
+def decimation_for(cutoff: float, dt: float) -> int:
+    """Samples for one equation of each joint where equations are cut off at ``cutoff`` Hz."""
+    return max(1, int(_HALF / (cutoff * dt) * (1.0 + 1e-9)))  # not one less by rounding
+
+
+def equations_per_parameter(
+    base: BaseParameters, log: Log, kinds: int | None, decimation: int
+) -> float:
+    """Equations for each parameter, ``kinds`` at a time; edges and dead bands are not taken off."""
+    return len(log) * (kinds or log.n) / (decimation * len(base))
+
+
 def _highest_cutoff(
     given: RegressorNoise, lowest: float, highest: float
 ) -> tuple[float, Array, str]:
     """The highest cutoff without noticeable bias, the biases there, and why it was lowered."""
     band, ratio, why = highest, bias_ratio(given, highest), ""
-    if ratio.max(initial=0.0) > _BIAS:
+    if ratio.max(initial=0.0) > MOST_BIAS:
         name = given.base.names[int(np.argmax(ratio))]
         why = (
             f" Equations up to {highest:.3g} Hz would bias {name} by "
             f"{ratio.max():.2g} standard errors."
         )
-    while ratio.max(initial=0.0) > _BIAS and band > lowest:
+    while ratio.max(initial=0.0) > MOST_BIAS and band > lowest:
         band = max(lowest, band / _STEP)
         ratio = bias_ratio(given, band)
     return band, ratio, why

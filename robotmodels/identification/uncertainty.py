@@ -14,7 +14,7 @@ from .methods.estimate import Estimate, Method
 from .methods.least_squares import shares, solved, used_weights
 from .preparation.delay_rows import looked_at
 from .preparation.signals import signals
-from .processing_choice import EQUATIONS
+from .processing_choice import LEAST_EQUATIONS
 from .scale.reduction import Reduction
 from .segment_spread import segment_inflation
 from .weak_prior import plausible_sizes, shrunk
@@ -46,7 +46,7 @@ def with_uncertainty(
         estimate = replace(estimate, notes=(*estimate.notes, _SEGMENTS.format(grown)))
     prior = None
     if way in _WEIGHTED and shrinkage is not False:
-        always = shrinkage is True or reduction.rows < EQUATIONS * len(reduction.names)
+        always = shrinkage is True or reduction.rows < LEAST_EQUATIONS * len(reduction.names)
         prior = _shrunk(system, reduction, estimate, spread, ratio, always)
     if prior is not None:
         estimate = replace(prior, covariance=prior.covariance * np.outer(ratio, ratio))

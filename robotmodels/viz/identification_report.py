@@ -74,7 +74,6 @@ def identification_html(
     """
     found = as_identification(result)
     check_test(found, test)
-    system = found.system
     figures = [
         (
             partial(plot_identification_torques, found, test),
@@ -106,8 +105,10 @@ def identification_html(
         ),
         (partial(plot_identification_correlations, found), "Correlations of the estimates."),
         (
-            partial(plot_processing, system.log, system.processing, model=found.model),
-            "What was kept of positions and torques, and what was cut off as noise (grey).",
+            partial(plot_processing, found),
+            "What was kept of positions and torques, and what was cut off as noise (grey); below, "
+            "what decided it: the bias that noise of the positions causes, and the number of "
+            "equations.",
         ),
     ]
     title = f"Dynamic identification of {found.model.name}"

@@ -1,4 +1,4 @@
-"""What the signal processing of an identification keeps of a log, and what it cuts off."""
+"""Spectra of a log before and after its processing, and the reasons for the choice of it."""
 
 from __future__ import annotations
 
@@ -9,8 +9,17 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array
 from ..errors import InvalidValueError, ShapeError
+from ..identification.equations import Equations
 from ..identification.preparation.filters import decimation_window, zero_phase
 from ..identification.preparation.processing import Processing
+from ..identification.processing_choice import (
+    LEAST_EQUATIONS,
+    MOST_BIAS,
+    decimation_for,
+    equations_per_parameter,
+)
+from ..identification.regressor_noise import bias_ratio, regressor_noise
+from ..identification.result import IdentificationResult
 from ..logs import Log
 from ..model import RobotModel
 from .figures import LIMIT_DASHES, PAGE, SMALL_SIZE, legend_above, line_style, new_figure, panels
@@ -19,35 +28,42 @@ from .plot_decades import plain_decades
 from .plot_units import joint_names, joint_units
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_BEFORE, _AFTER = line_style(1).color, line_style(0).color
+_BEFORE, _AFTER, _CURVE = line_style(1).color, line_style(0).color, line_style(4).color
+_POSITIONS, _TORQUES, _BOUNDS = (0, (6.0, 1.3, 1.3, 1.3)), (0, (1.3, 1.8)), (0, (2.2, 2.2))
 _LONGEST = 1 << 18
 """Samples of the longest recording that spectra are made of, at most."""
 _SEGMENTS = 2
 _KAISER = 18.0
 """Of the window: noise is more than six decades below the motion, which must not leak over it."""
 _BINS = 240
+_CUTOFFS, _WIDTH, _HIGHEST = 16, 10.0, 0.4
+"""Cutoffs at which the effect of the noise is predicted; highest of them, in cutoffs of the
+equations and in sampling rates."""
+_LEAST_BIAS = 1e-6
+"""Standard errors; a smaller bias is drawn at the lower edge of its panel."""
 
 
 def plot_processing(
-    log: Log,
-    processing: Processing,
+    log: Log | IdentificationResult,
+    processing: Processing | None = None,
     *,
     model: RobotModel | None = None,
     title: str | None = None,
     size: ArrayLike | None = None,
 ) -> Figure:
-    """Spectra of positions and torques before and after what a processing does to them.
+    """Spectra of positions and torques before and after their processing, and why it was chosen.
 
     Parameters
     ----------
-    log : Log
-        The log.
-    processing : Processing
-        The choices, of `identification.choose_processing`.
+    log : Log or IdentificationResult
+        The log; or a result of `identification.fit`, which holds its log, processing and robot.
+    processing : Processing, optional
+        The choices for a log, of `identification.choose_processing`.
     model : RobotModel, optional
-        The robot, for units and names of its joints.
+        The robot of a log, for units and names of its joints.
     title : str, optional
         Over the figure.
     size : array_like, shape (2,), optional
@@ -56,21 +72,30 @@ def plot_processing(
     Returns
     -------
     matplotlib.figure.Figure
-        A row for each joint: positions with the frequency of the motion, the cutoff of the filter
-        and the noise; torques with the cutoff of the decimation. What is right of the cutoffs, on
-        grey, is cut; its root mean square stands over each panel. Densities are averaged over
-        bins of equal width on the logarithmic axis.
+        A row for each joint: densities of position and torque, with the frequency of the motion,
+        the cutoff of the positions (of their filter), the cutoff of regressor and torques (of the
+        decimation) and the noise of the positions. What is right of a panel's cutoff, on grey, is
+        cut; its root mean square stands over the panel, of torques also relative to theirs.
+        Densities are averaged over bins of equal width on the logarithmic axis.
+
+        Of a result, a last row shows why these: the largest bias of a parameter that noise of the
+        positions is predicted to cause, in standard errors of the parameter, against the lower of
+        both cutoffs; and the equations for each parameter (edges and dead bands not taken off)
+        against that of regressor and torques. Dots mark the choice, dashed lines its bounds. A bias
+        below 1e-6 is drawn at the lower edge.
 
     Raises
     ------
     InvalidValueError, ShapeError
-        Not a log, not a processing, or of other joints; fewer than 16 samples.
+        Not a log, not a processing, or of other joints; fewer than 16 samples; a result together
+        with a processing or a model.
     MissingExtraError
         Matplotlib is not installed.
 
     References
     ----------
-    Seed book sections 1.6.2.4 and 1.6.2.5.
+    Seed book sections 1.6.2.4 and 1.6.2.5; W. Fuller, "Measurement Error Models", 1987, section
+    1.1 (bias by noise in the regressor).
 
     Examples
     --------
@@ -80,17 +105,7 @@ def plot_processing(
     >>> [axes.get_xlabel() for axes in plot_processing(log, choose_processing(log)).axes]
     ['frequency (Hz)', 'frequency (Hz)']
     """
-    if not isinstance(log, Log):
-        raise InvalidValueError(f"log: expected a Log, got {type(log).__name__}.")
-    if not isinstance(processing, Processing):
-        raise InvalidValueError(
-            "processing: expected a Processing of choose_processing, got "
-            f"{type(processing).__name__}."
-        )
-    if len(processing.dead_band) != log.n:
-        raise ShapeError(
-            f"processing: expected one of {log.n} joints, got {len(processing.dead_band)}."
-        )
+    log, processing, model, system = _given(log, processing, model)
     part = max(log.recordings(), key=lambda rows: rows.stop - rows.start)
     rows = slice(part.start, min(part.stop, part.start + _LONGEST))
     if rows.stop - rows.start < 16:
@@ -109,8 +124,9 @@ def plot_processing(
     names = joint_names(None, log.n, model)
     units = [unit.value for unit in joint_units(None, log.n, model)]
     efforts = [{"rad": "N m", "m": "N"}.get(unit, "N m or N") for unit in units]
-    figure = new_figure(PAGE, 1.1 + 1.15 * log.n, size)
-    grid = panels(figure, log.n, 2, sharex=True)
+    rows_of = log.n + (system is not None)
+    figure = new_figure(PAGE, 1.2 + 1.15 * rows_of, size)
+    grid = panels(figure, rows_of, 2, sharex=True)
     sides: tuple[tuple[Array, Array, float | None, list[str]], ...] = (
         (q, kept_q, processing.cutoff, units),
         (tau, kept_tau, processing.torque_cutoff, efforts),
@@ -119,7 +135,7 @@ def plot_processing(
     for column, (whole, kept, cutoff, of) in enumerate(sides):
         f, before = _density(whole[inner], log.dt)
         _, after = _density(kept[inner], log.dt)
-        cut = np.sqrt(np.mean((whole - kept)[inner] ** 2, axis=0))
+        cut, rms = (np.sqrt(np.mean(x[inner] ** 2, axis=0)) for x in (whole - kept, whole))
         for j, name in enumerate(names):
             axes = grid[j, column]
             axes.loglog(f, before[:, j], color=_BEFORE, linewidth=0.9, label="as recorded")
@@ -128,12 +144,7 @@ def plot_processing(
             )
             if cutoff is not None:
                 axes.axvspan(cutoff, nyquist, color=BAND, linewidth=0.0, zorder=0.4)
-                axes.axvline(
-                    cutoff, color=INK, linewidth=0.9, linestyle=(0, (6.0, 1.3, 1.3, 1.3)),
-                    label="cutoff",
-                )  # fmt: skip
-            axes.axvline(processing.motion, color=INK, linewidth=0.9, linestyle=LIMIT_DASHES,
-                         label="motion: 99.9 % of the velocity's power")  # fmt: skip
+            _frequencies(axes, processing)
             if column == 0:
                 floor = _floor(f, before[:, j], nyquist)
                 if floor > 0.0:
@@ -141,19 +152,102 @@ def plot_processing(
                                  label="noise of the positions")  # fmt: skip
             _limit(axes, before[:, j], after[:, j])
             what = ("position", "torque")[column]
-            axes.set_title(f"{name}, {what}: {cut[j]:.2g} {of[j]} rms cut", loc="left",
-                           size=SMALL_SIZE, color=INK, pad=2.0)  # fmt: skip
+            share = f" ({100.0 * cut[j] / rms[j]:.2g} %)" if column and rms[j] > 0.0 else ""
+            _over(axes, f"{name}, {what}: {cut[j]:.2g} {of[j]} rms{share} cut")
             axes.set_ylabel(f"({of[j]}/√Hz)" if " or " not in of[j] else "density (1/√Hz)")
         grid[-1, column].set_xlabel("frequency (Hz)")
+    if system is not None:
+        _reasons(grid[-1], system)
     for axes in grid.flat:
         plain_decades(axes.yaxis, 4)
         plain_decades(axes.xaxis, 6)
     handles: dict[str, Any] = {}
-    for axes in grid[0]:
+    for axes in (*grid[0], grid[-1, 0]):
         for line in axes.get_lines():
             handles.setdefault(str(line.get_label()), line)
     legend_above(figure, list(handles.values()), title)
     return figure
+
+
+def _given(
+    log: Log | IdentificationResult, processing: Processing | None, model: RobotModel | None
+) -> tuple[Log, Processing, RobotModel | None, Equations | None]:
+    """Log, choices, robot and, of a result, its equations."""
+    if isinstance(log, IdentificationResult):
+        if processing is not None or model is not None:
+            raise InvalidValueError(
+                "processing, model: the result holds them; leave them out, or give its log."
+            )
+        return log.system.log, log.system.processing, log.model, log.system
+    if not isinstance(log, Log):
+        raise InvalidValueError(
+            f"log: expected a Log or an IdentificationResult, got {type(log).__name__}."
+        )
+    if not isinstance(processing, Processing):
+        raise InvalidValueError(
+            "processing: expected a Processing of choose_processing, got "
+            f"{type(processing).__name__}."
+        )
+    if len(processing.dead_band) != log.n:
+        raise ShapeError(
+            f"processing: expected one of {log.n} joints, got {len(processing.dead_band)}."
+        )
+    return log, processing, model, None
+
+
+def _frequencies(axes: Axes, processing: Processing) -> None:
+    """Lines at the frequency of the motion and at both cutoffs."""
+    for frequency, dashes, label in (
+        (processing.motion, LIMIT_DASHES, "motion: 99.9 % of the velocity's power"),
+        (processing.cutoff, _POSITIONS, "cutoff of the positions"),
+        (processing.torque_cutoff, _TORQUES, "cutoff of regressor and torques"),
+    ):
+        if frequency is not None:
+            axes.axvline(frequency, color=INK, linewidth=1.1, linestyle=dashes, label=label)
+
+
+def _over(axes: Axes, text: str) -> None:
+    axes.set_title(text, loc="left", size=SMALL_SIZE, color=INK, pad=2.0)
+
+
+def _reasons(row: Any, system: Equations) -> None:
+    """Bias by noise and equations for each parameter against cutoffs, with their bounds."""
+    base, log, processing = system.base, system.log, system.processing
+    top = _HIGHEST / log.dt
+    thinned = processing.torque_cutoff or top
+    lower = min(processing.cutoff or top, thinned)
+    lowest, highest = min(processing.motion, lower), max(min(_WIDTH * lower, top), thinned)
+    f = np.union1d(np.geomspace(lowest, highest, _CUTOFFS), (lower, thinned))
+    noise = regressor_noise(base, log, lowest, highest)
+    ratios = [bias_ratio(noise, x) for x in f]
+    biases = np.array([ratio.max(initial=0.0) for ratio in ratios])
+    here = ratios[int(np.searchsorted(f, lower))]
+    worst = int(np.argmax(here))
+    counts = [
+        equations_per_parameter(base, log, system.kinds, decimation_for(x, log.dt)) for x in f
+    ]
+    count = equations_per_parameter(base, log, system.kinds, processing.decimation)
+    drawn = (
+        # without noise there is no bias, and logarithmic axes have no place for it
+        (np.where(biases > 0.0, biases, np.nan), lower, max(here[worst], _LEAST_BIAS), MOST_BIAS),
+        (np.array(counts), thinned, count, LEAST_EQUATIONS),
+    )
+    bounds = f"bounds: {MOST_BIAS:g} standard errors, {LEAST_EQUATIONS} equations"
+    for axes, (curve, cutoff, value, bound) in zip(row, drawn, strict=True):
+        axes.loglog(f, curve, color=_CURVE, linewidth=1.2, label="at other cutoffs")
+        axes.axhline(bound, color=ALERT, linewidth=0.9, linestyle=_BOUNDS, label=bounds)
+        axes.plot(
+            cutoff, value, "o", color=INK, markersize=4.0, clip_on=False, zorder=3.0, label="choice"
+        )
+        _frequencies(axes, processing)
+        low, high = axes.get_ylim()
+        axes.set_ylim(max(min(low, bound / 3.0), _LEAST_BIAS), max(high, 3.0 * bound))
+    row[0].set_xlabel("lower of both cutoffs (Hz)")
+    row[1].set_xlabel("cutoff of regressor and torques (Hz)")
+    row[0].set_ylabel("bias /\nstandard error")
+    row[1].set_ylabel("equations /\nparameter")
+    _over(row[0], f"bias by noise: {here[worst]:.2g} standard errors ({base.names[worst]})")
+    _over(row[1], f"{count:.3g} equations for each parameter, with edges and dead bands")
 
 
 def _thinned(tau: Array, step: int) -> Array:
