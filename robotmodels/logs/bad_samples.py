@@ -217,7 +217,9 @@ def _without(log: Log, bad: dict[str, NDArray[np.bool_]], found: str) -> Log:
     refused = list(log.refused)
     if dropped:
         lost = tuple(np.flatnonzero(drop).tolist())
-        refused.append(RefusedRows("log", lost, "a channel repeats while the joint moves"))
+        refused.append(
+            RefusedRows("log", lost, "outliers or frozen samples that are not interpolated")
+        )
     more = {
         name: None if (x := getattr(log, name)) is None else x[kept]
         for name in ("v", "a", "q_ref", "v_ref")

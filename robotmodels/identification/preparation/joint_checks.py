@@ -98,8 +98,8 @@ def check_joints(
         words = f"Signs, order, excitation or delay were not checked: {error}"
         found.append(LogFinding(FindingKind.TOO_SHORT, Severity.DOUBTFUL, (), words))
     if part is not log:
-        said = f" (Judged by {len(part)} of {len(log)} samples.)"
-        found = [replace(finding, sentence=finding.sentence + said) for finding in found]
+        extent = f" (Judged by {len(part)} of {len(log)} samples.)"
+        found = [replace(finding, sentence=finding.sentence + extent) for finding in found]
     return tuple(found)
 
 

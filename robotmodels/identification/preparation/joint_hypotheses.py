@@ -238,8 +238,8 @@ class _Fit:
         self.free_columns = int((~limited[order]).sum())
         self.W = np.ascontiguousarray((W[:, :, order] / size[order]).transpose(1, 0, 2))
         self.tau = samples.tau
-        turned = self.W.transpose(0, 2, 1)
-        self.grams, self.moments = turned @ self.W, turned @ self.tau
+        transposed = self.W.transpose(0, 2, 1)
+        self.grams, self.moments = transposed @ self.W, transposed @ self.tau
 
     def free(self, torque: Array) -> _Residuals:
         """Residuals of least squares without limits."""
