@@ -202,7 +202,7 @@ def test_processing_of_a_result_shows_why(found):
     assert count["choice"].get_ydata()[0] == pytest.approx(expected)
     assert found.reduction.rows / b <= expected
     assert figure.axes[7].get_title(loc="left") == (
-        f"{expected:.3g} equations for each parameter, with edges and dead bands"
+        f"about {expected:.3g} equations for each parameter"
     )
 
 

@@ -247,7 +247,7 @@ def _reasons(row: Any, system: Equations) -> None:
     row[0].set_ylabel("bias /\nstandard error")
     row[1].set_ylabel("equations /\nparameter")
     _over(row[0], f"bias by noise: {here[worst]:.2g} standard errors ({base.names[worst]})")
-    _over(row[1], f"{count:.3g} equations for each parameter, with edges and dead bands")
+    _over(row[1], f"about {count:.3g} equations for each parameter")
 
 
 def _thinned(tau: Array, step: int) -> Array:
