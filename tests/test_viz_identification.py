@@ -224,6 +224,18 @@ def test_processing_of_a_result_shows_what_an_asked_cutoff_does(found):
     assert y == pytest.approx(len(log) / one.system.processing.decimation / len(one.base))
 
 
+def test_predicted_bias_leaves_out_what_the_equations_leave_out():
+    """Noise turns the sign of a coupled motor's velocity only in its dead band."""
+    data = rm.datasets.load_tx40()
+    asked = fit(data.model, data.log, cutoff=60.0, decimation=20)
+    assert not any(note.startswith("Noise of the positions biases") for note in asked.notes)
+    own = lines(plot_processing(asked).axes[12])
+    f, curve = own["at other cutoffs"].get_data()
+    below = f <= 60.0
+    assert curve[below].max() < 0.1
+    assert (np.diff(np.log(curve[below])) < np.log(20.0)).all()  # no jump
+
+
 @pytest.mark.parametrize("name", ["pendulum", "planar_2r", "rx90", "iiwa14"])
 def test_every_number_of_joints(name):
     model = pendulum() if name == "pendulum" else rm.load(name)

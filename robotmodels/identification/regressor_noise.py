@@ -10,6 +10,7 @@ from .._arrays import Array
 from ..logs import Log
 from ..minimal_parameters import BaseParameters
 from ..regressors import torque_regressor
+from .forms.torque import turning
 from .preparation.delay_rows import looked_at
 from .preparation.filters import central_differences, zero_phase
 from .preparation.position_noise import noise_draw, noise_levels
@@ -76,8 +77,8 @@ def bias_ratio(given: RegressorNoise, cutoff: float) -> Array:
         return np.zeros(len(base))
     W = torque_regressor(base.model, *signals, base.drive, **columns)
     D = torque_regressor(base.model, *moved, base.drive, **columns) - W
-    speed = np.abs(signals[1])
-    use = speed > _DEAD * speed.max(axis=0, initial=0.0)
+    band = np.maximum(_DEAD * np.abs(signals[1]).max(axis=0), np.finfo(float).tiny)
+    use = turning(base.model, band, signals[1])
     W, D, y = W * use[:, :, None], D * use[:, :, None], torques * use
     sizes = plausible_sizes(base, base.names, *signals, torques) * _PRIOR
     weights = np.ones(base.model.n)

@@ -63,6 +63,7 @@ def power_block(system: Equations, piece: Piece) -> Block:
     first = piece.start - max(piece.start - processing.reach, piece.low)
     kept = decimated(rows(), step, first, -(-(piece.stop - piece.start) // step), width)
     v = kept[:, b + 1 :]
-    use = np.logical_or.reduce(turning(system, v), axis=1)[:, None]
+    moves = turning(system.model, processing.dead_band, v)
+    use = np.logical_or.reduce(moves, axis=1)[:, None]
     t = found.t[first : first + piece.stop - piece.start : step]
     return Block(t, kept[:, None, :b], kept[:, b : b + 1], use, v)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..._arrays import Array
+from ...model import RobotModel
 from ...regressors import torque_regressor, torque_regressor_chunks
 from ..preparation.filters import decimation_window
 from ..preparation.signals import Piece, Signals, piece_signals
@@ -153,18 +154,17 @@ def moving(system: Equations, found: Signals) -> NDArray[np.bool_]:
 
     v = np.concatenate([x for x in (found.before, found.v, found.after) if x is not None])
     start = 0 if found.before is None else len(found.before)
-    slow = ~turning(system, v)
+    slow = ~turning(system.model, system.processing.dead_band, v)
     if system.processing.guard and slow.any():
         size = 2 * system.processing.guard + 1
         slow = maximum_filter1d(slow.astype(np.uint8), size, axis=0, mode="nearest") > 0
     return ~slow[start : start + len(found)]
 
 
-def turning(system: Equations, v: Array) -> NDArray[np.bool_]:
+def turning(model: RobotModel, band: Array, v: Array) -> NDArray[np.bool_]:
     """Where joints, and the coupled motors that turn them, are outside their dead bands (k, n)."""
-    band = system.processing.dead_band
     found = ~(np.abs(v) < band)
-    transmission = system.model.transmission
+    transmission = model.transmission
     if transmission is not None:
         for m in transmission.coupled_motors:
             w = transmission.weights[m - 1]
