@@ -144,7 +144,7 @@ def better_hypotheses(
         for joints, torque in torques:
             least = min(len(joints), 2) * _LIKELY
             # without limits it fits at least as well
-            if fit.free(torque).gain(base) < least:
+            if fit.free(torque, base).gain(base) < least:
                 continue
             other = fit.constrained(torque)
             gain, significance = other.gain(base), other.significance(base)
@@ -241,21 +241,24 @@ class _Fit:
         transposed = self.W.transpose(0, 2, 1)
         self.grams, self.moments = transposed @ self.W, transposed @ self.tau
 
-    def free(self, torque: Array) -> _Residuals:
-        """Residuals of least squares without limits."""
-        return self._residuals(torque, self.W.shape[2])
+    def free(self, torque: Array, near: _Residuals) -> _Residuals:
+        """Residuals of least squares without limits, weighted by those of a fit that is near."""
+        start = near.variances / np.maximum(near.sizes, 1e-300)
+        return self._residuals(torque, self.W.shape[2], start, 2)
 
     def constrained(self, torque: Array) -> _Residuals:
         """Residuals of least squares without negative masses, rotors and friction."""
         return self._residuals(torque, self.free_columns)
 
-    def _residuals(self, torque: Array, free: int) -> _Residuals:
+    def _residuals(
+        self, torque: Array, free: int, start: Array | float = 1.0, weightings: int = _WEIGHTINGS
+    ) -> _Residuals:
         y = self.tau @ torque.T
         moments = np.einsum("jpk,jk->jp", self.moments, torque)
         sizes = y.var(axis=0)
         floor = np.maximum(_FLOOR * sizes, 1e-300)
-        e, variances = y, np.maximum(sizes, floor)
-        for _ in range(_WEIGHTINGS):
+        e, variances = y, np.maximum(start * sizes, floor)
+        for _ in range(weightings):
             weights = 1.0 / variances
             x = _solved(np.tensordot(weights, self.grams, 1), weights @ moments, free)
             e = y - (self.W @ x).T
