@@ -176,8 +176,9 @@ def fit(
     check_model(model)
     way = chosen(Method, method, "method")
     options = MethodOptions(
-        loss, prior, prior_deviations, strength, noise, forgetting, controller, loop, start, output
-    )
+        loss, prior, prior_deviations, strength, noise, forgetting, controller, loop, start, output,
+        shrinkage,
+    )  # fmt: skip
     options.check(way)
     balance = chosen(EquationForm, form, "form")
     if base is None:
@@ -212,10 +213,9 @@ def fit(
         reduction = with_columns(reduction, found.names)
         estimate = solve(system, reduction, way, options)
     R, _, _ = reduction.stacked()
-    chosen_prior = shrinkage is None and essential is not False
-    estimate, white, lags = with_uncertainty(
-        way, system, reduction, estimate, False if chosen_prior else shrinkage
-    )
+    if shrinkage is None and essential is not False:
+        shrinkage = False  # the user's own choice of parameters
+    estimate, white, lags = with_uncertainty(way, system, reduction, estimate, shrinkage)
     lost = estimate.status is EstimateStatus.UNSTABLE
     ramp = (
         processing.dead_band

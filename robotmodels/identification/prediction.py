@@ -91,10 +91,10 @@ def predicted_torque(
 def friction_ramp(
     base: BaseParameters, names: tuple[str, ...], values: Array, log: Log, processing: Processing
 ) -> Array:
-    """Velocities (n,) over which dry friction rises, so that the log's torques fit best.
+    """Velocities (n,) over which predicted dry friction rises linearly, fitted to the log.
 
-    Near rest friction is not known from the equations, which leave its dead band out. Multiples of
-    the dead bands are tried on the samples there, from an ideal step to far beyond.
+    The equations leave out the dead bands, so that they do not determine friction near rest. Widths
+    from zero (an ideal step) to eight dead bands are compared on the samples there.
     """
     band = processing.dead_band
     if not band.any():

@@ -1,4 +1,4 @@
-"""Choices of the processing for a robot and a log: those with which torques are predicted best."""
+"""Choice of the processing for a robot and a log, so that other motion is predicted well."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from .preparation.processing import (
 from .regressor_noise import RegressorNoise, bias_ratio, regressor_noise
 
 LEAST_EQUATIONS = 20
-"""Equations for each parameter at least."""
+"""Least number of equations for each parameter."""
 MOST_BIAS = 0.1
-"""Bias by noise in the regressor at most, in standard errors."""
+"""Largest bias by noise in the regressor, in standard errors."""
 _HIGHEST, _OF_MOTION = 15.0, 2.5
 """Highest cutoff of the equations, Hz (joints are flexible above), and lowest, in frequencies of
 the motion."""
@@ -68,7 +68,7 @@ def processing_for(
         given = regressor_noise(base, log, min(lowest, highest), highest)
         band, ratio, lowered = _highest_cutoff(given, min(lowest, highest), highest)
         step = step or min(decimation_for(band, log.dt), most)
-        # with more equations than the noise allows for, it is the positions that are cut off lower
+        # where the equations go beyond what the noise allows, the positions are filtered lower
         wider = np.clip(_POSITIONS * band * step * log.dt / _HALF, 1.0, _POSITIONS)
         positions = min(float(wider) * band, _NYQUIST / log.dt)
         why = (
@@ -89,7 +89,7 @@ def processing_for(
 
 
 def decimation_for(cutoff: float, dt: float) -> int:
-    """Samples for one equation of each joint where equations are cut off at ``cutoff`` Hz."""
+    """Decimation that leaves frequencies up to ``cutoff`` Hz in the equations."""
     return max(1, int(_HALF / (cutoff * dt) * (1.0 + 1e-9)))  # not one less by rounding
 
 
@@ -103,7 +103,7 @@ def equations_per_parameter(
 def _highest_cutoff(
     given: RegressorNoise, lowest: float, highest: float
 ) -> tuple[float, Array, str]:
-    """The highest cutoff without noticeable bias, the biases there, and why it was lowered."""
+    """Highest cutoff without noticeable bias, the bias ratios there, and why it was lowered."""
     band, ratio, why = highest, bias_ratio(given, highest), ""
     if ratio.max(initial=0.0) > MOST_BIAS:
         name = given.base.names[int(np.argmax(ratio))]

@@ -1,4 +1,4 @@
-"""How much the noise of the positions biases least squares, predicted at any cutoff."""
+"""Predicted bias of least squares by noise of the positions, at any cutoff."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ _PRIOR = 0.3
 _PER_CUTOFF = 2.5
 """Rows in a period of the cutoff: filtered signals hold no more."""
 _DEAD = 0.01
-"""Velocities relative to the largest, below which the sign of dry friction is not relied on."""
+"""Velocity, relative to the largest, below which a joint's equations are left out here."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RegressorNoise:
-    """Recordings of positions, noise as theirs, and torques: what `bias_ratio` needs.
+    """Positions, simulated noise and torques of a log, from which `bias_ratio` predicts.
 
-    ``parts`` are arrays (N, 3 n) of a part of the log, filtered and thinned out to samples of
-    ``dt``; ``share`` is the part.
+    ``parts`` are arrays (N, 3 n), one for each recording, filtered and thinned out to a period
+    ``dt``; ``share`` is the part of the log that they cover.
     """
 
     base: BaseParameters

@@ -1,4 +1,4 @@
-"""How much more parameters vary between segments of a log than stationary residuals explain."""
+"""Block jackknife: variation of the parameters between segments of a log."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .scale.reduction import Reduction
 
 _SEGMENTS = 25
 _LARGEST_SHARE = 0.5
-"""Leverage at most: what a single segment alone determines shows no spread."""
+"""Largest leverage: a direction that one segment alone determines shows no spread."""
 
 
 def segment_inflation(

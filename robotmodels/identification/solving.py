@@ -53,6 +53,9 @@ class MethodOptions:
         Parameters that methods that simulate begin with; default weighted least squares.
     output : Output or str, optional
         What closed-loop output error compares: "torque", "position" or "both".
+    shrinkage : bool, optional
+        Of weighted least squares: whether a weak prior shrinks the parameters; default where the
+        log determines too little.
     """
 
     loss: Loss | str | None = None
@@ -65,6 +68,7 @@ class MethodOptions:
     loop: ClosedLoop | None = None
     start: ArrayLike | None = None
     output: Output | str | None = None
+    shrinkage: bool | None = None
 
     def check(self, method: Method) -> None:
         """Refuse options that a method does not take: none is ignored."""
@@ -89,6 +93,7 @@ _TAKERS = {
     "loop": _SIMULATED,
     "start": _SIMULATED,
     "output": (Method.CLOE,),
+    "shrinkage": (Method.WLS, Method.IRLS),
 }
 
 

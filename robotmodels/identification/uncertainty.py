@@ -1,4 +1,4 @@
-"""Standard errors of an estimate that hold on a real robot, and shrinkage where they are large."""
+"""Final standard errors of an estimate, and shrinkage where they are large."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ _SEGMENTS = (
 def with_uncertainty(
     way: Method, system: Equations, reduction: Reduction, estimate: Estimate, shrinkage: bool | None
 ) -> tuple[Estimate, Array, int]:
-    """The estimate with its final covariance, white standard errors (b,), and lags used.
+    """Estimate with its final covariance, standard errors for white residuals (b,), and lags.
 
-    Methods that simulate the robot have made their own. Linear ones are shrunk by a weak prior
-    where that is asked for or, by default, where the log determines too little.
+    Methods that simulate the robot bring their own covariance. Weighted least squares is shrunk by
+    a weak prior on request or, by default, where the log determines too little.
     """
     if isinstance(estimate, SimulatedEstimate):
         return estimate, estimate.white, estimate.lags

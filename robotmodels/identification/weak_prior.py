@@ -1,4 +1,4 @@
-"""Shrinkage by a weak prior: how large parameters may be, given the torques measured."""
+"""Shrinkage by a weak prior, scaled by the measured torques."""
 
 from __future__ import annotations
 
@@ -67,11 +67,10 @@ def shrunk(
     sizes: Array,
     always: bool = False,
 ) -> Estimate | None:
-    """Shrink an estimate toward zero where the log leaves parameters less certain than the prior.
+    """Shrink an estimate towards zero where the log determines some parameters poorly.
 
-    The sizes of parameters of one kind have a common factor, that of the greatest marginal
-    likelihood (empirical Bayes). None where every parameter is known much better than that: then
-    the prior would hardly change it.
+    The plausible sizes of parameters of one kind are scaled by a common factor, which maximises the
+    marginal likelihood (empirical Bayes). None where the log determines every parameter well.
 
     References
     ----------
@@ -104,7 +103,7 @@ def shrunk(
 
 
 def _groups(names: tuple[str, ...]) -> NDArray[np.int64]:
-    """A number for each parameter: those of one number are of one kind."""
+    """Group number of each parameter; parameters of one kind share a group."""
     kinds = [name.rstrip("0123456789") for name in names]
     alike = {kind: group for group in _ALIKE for kind in group}
     found = [alike.get(kind, (kind,)) for kind in kinds]
@@ -113,7 +112,7 @@ def _groups(names: tuple[str, ...]) -> NDArray[np.int64]:
 
 
 def _likely_sizes(R: Array, y: Array, sizes: Array, groups: NDArray[np.int64]) -> Array:
-    """Sizes times the factors of their groups with which ``y = R x + white`` is most likely."""
+    """Sizes scaled group by group so that ``y = R x + white noise`` has the highest likelihood."""
     from scipy.linalg import cho_factor, cho_solve
 
     def unlikely(scales: Array) -> float:

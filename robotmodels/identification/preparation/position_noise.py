@@ -14,10 +14,10 @@ from .filters import zero_phase
 from .spectrum import power_density
 
 _WINDOWS, _SAMPLES = 4, 4096
-"""Windows of a log, spread over it, and samples of each, that its noise is judged by."""
+"""Number and length in samples of the windows from which the noise is estimated."""
 _WINDOW = 1024
 _SMOOTH, _SHARE = 20.0, 0.2
-"""Hz, and sampling rates: below it is motion that an encoder quantises, not noise."""
+"""Smoothing cutoff of quantised positions: Hz, and at most this part of the sampling rate."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,11 +29,11 @@ class NoiseLevels:
 
 
 def noise_levels(log: Log) -> NoiseLevels:
-    """Measure the noise of positions: white where it has a floor, else an encoder's steps."""
+    """Estimate the noise of positions: white noise, or the quantisation of an encoder."""
     part = stretches(log, _SAMPLES, _WINDOWS * _SAMPLES)
     deviation, step = np.zeros(log.n), np.zeros(log.n)
     for rows in part.recordings():
-        # the largest: an encoder of a joint at rest shows no noise
+        # the largest, since an encoder shows no noise while its joint rests
         q = np.asarray(part.q[rows])
         length = min(len(q), _WINDOW)
         if length >= 16:
@@ -49,11 +49,11 @@ def noise_levels(log: Log) -> NoiseLevels:
 
 
 def noise_draw(q: Array, dt: float, levels: NoiseLevels, rng: np.random.Generator) -> Array:
-    """Noise as that of positions q (N, n): white, or what an encoder of such steps makes of them.
+    """Draw noise like that of positions q (N, n): white, or the quantisation error of an encoder.
 
-    The error of an encoder is white only where it moves over many steps between two samples; in
-    slow motion it has most of its power at low frequencies. So it is that of quantising the
-    smoothed positions once more, the steps elsewhere.
+    Quantisation error is white only where the encoder passes many steps between two samples; in
+    slow motion most of its power is at low frequencies. So the smoothed positions are quantised
+    once more, with a random offset of the steps.
     """
     found = levels.deviation * rng.normal(size=q.shape)
     coarse = np.flatnonzero(levels.step > 0.0)
