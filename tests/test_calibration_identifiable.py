@@ -333,8 +333,10 @@ def test_the_unit_of_length_does_not_tell_what_is_identifiable(unit):
         arm = rm.RobotModel.from_table(rm.DHTable.from_rows(rows))
         there = rm.dgm(arm, q)
         there[:, :3, 3] += 1e-4 * size * noise
-        measured = calibration.fit(arm, Pose(q, there), folds=0, held_out=0)
-        exact = calibration.fit(arm, Pose(q, rm.dgm(arm, q)), folds=0, held_out=0)
+        prior = calibration.ParameterPrior(length=1e-3 * size)
+        options = {"prior": prior, "folds": 0, "held_out": 0}
+        measured = calibration.fit(arm, Pose(q, there), **options)
+        exact = calibration.fit(arm, Pose(q, rm.dgm(arm, q)), **options)
         contact = identifiable_parameters(arm, "point_contact", known_lengths=["d3"])
         return measured, exact.status, contact.names
 

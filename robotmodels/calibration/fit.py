@@ -29,6 +29,7 @@ from .untold import untold_by, without_untold
 Progress = Callable[[int, int, str], None]
 """Called with the number of fits done, of all, and what is being done."""
 
+_PRIOR = ParameterPrior()
 _SEED = 1
 _TRIES = 4
 """Fits until noise hides no parameter any more."""
@@ -50,7 +51,7 @@ def fit(
     compliance: Compliance | str = Compliance.NONE,
     eccentricity: bool = False,
     loss: Loss | str = Loss.SQUARES,
-    prior: ParameterPrior | None = None,
+    prior: ParameterPrior | None = _PRIOR,
     truncation: float | None = None,
     folds: int = 5,
     held_out: float | Measurement | Sequence[Measurement] = 0.2,
@@ -80,7 +81,8 @@ def fit(
     loss : Loss or str
         ``"squares"``, or against outliers ``"huber"``, ``"cauchy"``, ``"tukey"``.
     prior : ParameterPrior, optional
-        How large the deviations are thought to be: the estimate is then the maximum a posteriori.
+        How large the deviations are thought to be: the estimate is then the maximum a posteriori,
+        and parameters that noise hides stay where they are. None for none.
     truncation : float, optional
         Directions whose singular value relative to the largest is smaller are left out.
     folds : int
@@ -169,7 +171,7 @@ def fit(
         zero = np.zeros(problem.P)
         start = np.concatenate([zero, guessed_fixtures(problem, zero)])
         solution = solve(problem, start, loss=loss, prior=gaussian, truncation=truncation)
-        untold = [] if gaussian is not None or truncation else untold_by(solution, start)
+        untold = [] if truncation else untold_by(solution, start)
         if not untold:
             break
         identifiable = without_untold(identifiable, untold)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .._arrays import Rebuilt, as_reals
+from .._arrays import Array, Rebuilt, as_reals
 from ..errors import InvalidValueError
 from ..estimation import Loss, Prior, select_strength
 from .dealing import dealt_blocks
@@ -29,17 +29,17 @@ class ParameterPrior(Rebuilt):
     length, angle : float
         Standard deviation of constant deviations of lengths (m) and angles (rad) of the table;
         infinite where nothing is known. Base and tools have no prior, unless they are named.
-    gain, compliance, eccentricity : float
+    gain, compliance, eccentricity : float, optional
         Of gains and couplings (1, or the ratio of the units), of compliances (rad or m per N m or
-        N), and of errors in sine and cosine (rad).
+        N), and of errors in sine and cosine (rad). By default such an error may move its joint as
+        far as a constant one (``angle``, ``length``) at the largest reading or load measured.
     named : mapping of str to float
         Standard deviations of single parameters, before the others.
     strength : float or None
         Factor on the information; None chooses it by cross-validation.
     truncated : bool
-        Whether parameters that the measurements cannot tell from others stay as they are. By
-        default the error is shared among all that may have caused it, as the prior allows: a
-        column that takes the part of another has no reason to be as small.
+        Whether parameters that act like combinations of others stay as they are (the default), or
+        share the error with them, each as its standard deviation allows.
 
     Raises
     ------
@@ -58,12 +58,12 @@ class ParameterPrior(Rebuilt):
 
     length: float = 1e-3
     angle: float = 5e-3
-    gain: float = np.inf
-    compliance: float = np.inf
-    eccentricity: float = np.inf
+    gain: float | None = None
+    compliance: float | None = None
+    eccentricity: float | None = None
     named: Mapping[str, float] = field(default_factory=dict)
     strength: float | None = 1.0
-    truncated: bool = False
+    truncated: bool = True
 
     def __post_init__(self) -> None:
         sizes = {
@@ -71,7 +71,7 @@ class ParameterPrior(Rebuilt):
             "compliance": self.compliance, "eccentricity": self.eccentricity, **self.named,
         }  # fmt: skip
         for name, value in sizes.items():
-            if not float(as_reals(value, name)) > 0.0:
+            if value is not None and not float(as_reals(value, name)) > 0.0:
                 raise InvalidValueError(
                     f"{name}: expected a positive standard deviation, or infinity for none, got "
                     f"{value!r}. Name what is known exactly in known=(...)."
@@ -103,7 +103,7 @@ def estimated_with(prior: ParameterPrior, found: IdentifiableParameters) -> Geom
         if entry.name in found.names
         or (
             found.reasons.get(entry.name) is Reason.REGROUPED
-            and np.isfinite(prior.named.get(entry.name, _size(prior, entry, f)))
+            and np.isfinite(prior.named.get(entry.name, _size(prior, entry, f, 1.0)))
         )
     )
 
@@ -134,11 +134,7 @@ def settled_prior(
     InvalidValueError
         Too few measurements to keep some of them aside.
     """
-    entries = problem.parameters.entries
-    size = np.array([_size(prior, entry, problem.parameters.model.f) for entry in entries])
-    for k, entry in enumerate(entries):
-        size[k] = prior.named.get(entry.name, size[k])
-    whole = np.concatenate([size, np.full(problem.F, np.inf)])
+    whole = np.concatenate([standard_deviations(prior, problem), np.full(problem.F, np.inf)])
     mean = np.zeros(len(whole))
     if prior.strength is not None:
         return Prior(mean, whole, prior.strength)
@@ -163,11 +159,31 @@ def settled_prior(
 _STRENGTHS = np.logspace(-3.0, 3.0, 13)
 
 
-def _size(prior: ParameterPrior, entry: GeometricParameter, f: int) -> float:
+def standard_deviations(prior: ParameterPrior, problem: Problem) -> Array:
+    """What a prior gives to the P parameters of a problem, shape (P,); infinite for none."""
+    parameters = problem.parameters
+    f = parameters.model.f
+    return np.array([
+        prior.named.get(e.name, _size(prior, e, f, size))
+        for e, size in zip(parameters.entries, largest_factors(problem), strict=True)
+    ])  # fmt: skip
+
+
+def largest_factors(problem: Problem) -> Array:
+    """What each of P parameters is multiplied by at most (1, readings, loads), shape (P,)."""
+    largest = np.zeros(problem.P)
+    for views in problem.factors:
+        for factors in views:
+            np.maximum.at(largest, problem.parameters.actions[0], np.abs(factors).max(axis=0))
+    return largest
+
+
+def _size(prior: ParameterPrior, entry: GeometricParameter, f: int, largest: float) -> float:
+    constant = prior.length if entry.element.is_length else prior.angle
     if entry.law is ErrorLaw.CONSTANT:
-        if entry.row == 0 or entry.row > f:
-            return np.inf
-        return prior.length if entry.element.is_length else prior.angle
-    if entry.law is ErrorLaw.GAIN:
-        return prior.gain
-    return prior.compliance if entry.law is ErrorLaw.COMPLIANCE else prior.eccentricity
+        return constant if 0 < entry.row <= f else np.inf
+    given = {ErrorLaw.GAIN: prior.gain, ErrorLaw.COMPLIANCE: prior.compliance}
+    size = given.get(entry.law, prior.eccentricity)
+    if size is not None:
+        return size
+    return constant / largest if largest > 0.0 else np.inf

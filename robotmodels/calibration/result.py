@@ -14,7 +14,11 @@ from .errors_seen import BlockErrors
 from .extended_table.parameters import GeometricParameters
 from .folds import AsideErrors, fixtures_by_name
 from .identifiability.identifiable import IdentifiableParameters
+from .other_tool import PredictedError, other_tool_error
 from .solve import Solution
+
+_SAYS_LITTLE = 0.7
+"""Standard error relative to the prior's from which the measurements say little of a parameter."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,6 +132,20 @@ class CalibrationResult(Rebuilt):
         return self.robot.model
 
     @property
+    def other_tool(self) -> PredictedError:
+        """How far another tool could be off where this one was measured, see `other_tool_error`."""
+        return other_tool_error(self)
+
+    @property
+    def held_by_prior(self) -> tuple[str, ...]:
+        """Parameters that the measurements say little of: they stay near where they were."""
+        told = (
+            self.standard_deviation
+            < _SAYS_LITTLE * self.solution.fit.prior.deviation[: len(self.names)]
+        )
+        return tuple(name for name, is_told in zip(self.names, told, strict=True) if not is_told)
+
+    @property
     def measured_mask(self) -> tuple[int, ...]:
         """Components x y z rx ry rz that the measurements have seen."""
         units = {unit for m in self.solution.problem.measurements for unit in m.units}
@@ -143,7 +161,8 @@ class CalibrationResult(Rebuilt):
         ]
         return (
             f"<CalibrationResult of {self.nominal.name}: {len(self.names)} parameters, "
-            f"{self.status.name.lower()}, {', '.join(errors)}; .report() tells all>"
+            f"{self.status.name.lower()}, {', '.join(errors)}; another tool about "
+            f"{self.other_tool.rms:.2g} m; see .report()>"
         )
 
     def report(self) -> str:

@@ -7,59 +7,55 @@ from dataclasses import replace
 import numpy as np
 
 from .._arrays import Array
-from .extended_table.elements import ErrorLaw
-from .extended_table.parameters import GeometricParameter
 from .identifiability.identifiable import IdentifiableParameters, Reason
+from .prior import largest_factors
 from .problem import stacked
 from .solve import Solution
 
-LARGEST_LENGTH, LARGEST_ANGLE = 0.02, 0.05
-"""Standard deviations that say nothing of a parameter: in sizes of the robot, and rad."""
+LARGEST_LENGTH, LARGEST_ANGLE = 0.01, 0.02
+"""Standard errors that say nothing of a parameter: in sizes of the robot, and rad. Errors that
+depend on the reading or the load are compared by what they move at most."""
+_TINY, _SINGULAR = 1e-300, 1e-13
 
 
 def untold_by(solution: Solution, start: Array) -> list[str]:
-    """Parameters of the table that the measurements do not tell from nothing, at their noise.
+    """Parameters that the measurements and the prior do not tell from nothing, at their noise.
 
-    The standard deviations are those of the linear model where the fit started: a fit that ran
-    away along such a parameter would find it well told there. The least told is left out first,
-    as it may hide others.
-
-    Parameters
-    ----------
-    solution : Solution
-        A fit, for its noise.
-    start : ndarray, shape (P + F,)
-        Where it started.
-
-    Returns
-    -------
-    list of str
-        Names.
-
-    References
-    ----------
-    Seed book section 1.4.4.2.
+    The standard errors are those of the linear model, the larger of two: where the fit started, as
+    a fit that ran away along such a parameter finds it well told there; and where it ended, as the
+    constraints that are violated at the start seem to tell more than they do. The least told
+    parameter is left out first, as it may hide others.
     """
-    problem = solution.problem
-    model = problem.parameters.model
+    problem, prior = solution.problem, solution.fit.prior
     reach = problem.parameters.skeleton.size
     limit = np.full(problem.P + problem.F, np.inf)
-    limit[: problem.P] = [_limit(e, model.f, reach) for e in problem.parameters.entries]
-    _, J = stacked(problem, start, solution.scales)
-    length = np.linalg.norm(J, axis=0)
-    length[length == 0.0] = 1.0
-    J = J / length
-    kept = list(range(J.shape[1]))
+    limit[: problem.P] = [
+        LARGEST_LENGTH * reach if entry.element.is_length else LARGEST_ANGLE
+        for entry in problem.parameters.entries
+    ] / np.maximum(largest_factors(problem), _TINY)
+    information = np.diag(np.sqrt(prior.strength) / prior.deviation)
+    factors = [
+        np.asarray(np.linalg.qr(np.vstack([stacked(problem, x, solution.scales)[1], information]))[1])
+        for x in (start, solution.fit.x)
+    ]
+    kept = list(range(len(limit)))
     left_out: list[str] = []
     while kept:
-        inverse = np.linalg.pinv(J[:, kept].T @ J[:, kept], rcond=1e-15, hermitian=True)
-        deviation = np.sqrt(np.maximum(np.diagonal(inverse), 0.0)) / length[kept]
-        ratio = deviation / limit[kept]
+        ratios = [_standard_errors(R[:, kept]) / limit[kept] for R in factors]
+        ratio = np.maximum(*ratios)
         worst = int(np.argmax(ratio))
         if ratio[worst] <= 1.0:
             break
         left_out.append(problem.parameters.names[kept.pop(worst)])
     return left_out
+
+
+def _standard_errors(R: Array) -> Array:
+    """Square roots of the diagonal of the inverse of R^T R, for any columns of a factor."""
+    length = np.linalg.norm(R, axis=0)
+    length[length == 0.0] = 1.0
+    inverse = np.linalg.pinv(R / length, rcond=_SINGULAR)
+    return np.linalg.norm(inverse, axis=1) / length
 
 
 def without_untold(found: IdentifiableParameters, names: list[str]) -> IdentifiableParameters:
@@ -83,9 +79,3 @@ def without_untold(found: IdentifiableParameters, names: list[str]) -> Identifia
         reasons={**found.reasons, **dict.fromkeys(names, Reason.NOISE)},
         regrouping={k: v for k, v in found.regrouping.items() if k not in names},
     )
-
-
-def _limit(entry: GeometricParameter, f: int, reach: float) -> float:
-    if entry.law is not ErrorLaw.CONSTANT or not 0 < entry.row <= f:
-        return np.inf
-    return LARGEST_LENGTH * reach if entry.element.is_length else LARGEST_ANGLE

@@ -125,7 +125,7 @@ def _add_fit(fitted: Any) -> None:
     )  # fmt: skip
     fitted.add_argument("--prior", metavar="NUMBERS",
                         help="standard deviations of the table's lengths (m) and angles (rad) that "
-                        "are expected, such as 1e-3 5e-3")  # fmt: skip
+                        "are expected, or none (default: 1e-3 5e-3)")  # fmt: skip
     fitted.add_argument(
         "--folds", type=int, default=5,
         help="of the cross-validation, 0 for none (default: %(default)s)",
@@ -176,8 +176,10 @@ def run(arguments: argparse.Namespace) -> int:
         )
         for a, b, length in arguments.known_distance
     ]  # fmt: skip
-    prior = None
-    if arguments.prior is not None:
+    prior: ParameterPrior | None = ParameterPrior()
+    if arguments.prior == "none":
+        prior = None
+    elif arguments.prior is not None:
         length, angle = numbers(arguments.prior, 2, "--prior", positive=True)
         prior = ParameterPrior(length=float(length), angle=float(angle))
     aside = arguments.held_out

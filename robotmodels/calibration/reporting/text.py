@@ -87,7 +87,7 @@ def _outcome(result: CalibrationResult) -> ReportSection:
         result.status.sentence,
         f"{problem.P} parameters and {problem.F} coordinates of fixtures from {problem.rows} rows "
         f"of {problem.blocks} measurements; loss {fit.loss.name.lower()}, {fit.iterations} steps."
-        + (" With a prior." if np.isfinite(fit.prior.deviation).any() else "")
+        + (" With a prior." if np.isfinite(fit.prior.deviation).any() else " Without a prior.")
         + (f" {len(fit.dropped)} directions were left out." if len(fit.dropped) else ""),
     ]
     for unit, text in (("m", millimetres), ("rad", degrees)):
@@ -101,6 +101,12 @@ def _outcome(result: CalibrationResult) -> ReportSection:
             found += f"; on data kept aside {text(aside.after.summary(unit).rms)}"
             found += f" {printed_unit(unit)}"
         sentences.append(found + ".")
+    tool = result.other_tool
+    sentences.append(
+        f"Another tool of known pose, its point {1e3 * tool.length:.0f} mm from the last frame, is "
+        f"off by about {1e3 * tool.rms:.2g} mm and {np.rad2deg(tool.angle):.2g} deg where this one "
+        f"was measured (predicted; on the nominal robot {1e3 * tool.nominal:.2g} mm)."
+    )
     return ReportSection("Outcome", tuple(sentences))
 
 
