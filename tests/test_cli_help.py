@@ -243,6 +243,7 @@ WITH = {
     ("calibrate", "--eccentricity"): ["--parameters", "sine1", "b7"],
     ("calibrate", "--compliance"): ["--parameters", "compliance2", "b7"],
     ("calibrate", "--label"): ["--kind", "point-contact"],
+    ("calibrate", "--prior"): ["--parameters", "theta2", "b7"],
     ("identify", "--delimiter"): ["--log", "run1.csv"],
     ("identify", "--no-check"): ["--log", "positions.csv", "--torques-from", "torques.csv",
                                  "--dt", 0.005],
