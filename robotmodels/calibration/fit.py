@@ -20,7 +20,7 @@ from .identifiability.identifiable import Reason, all_deviations, identifiable_o
 from .measurements import Measurement
 from .notes import check_enough, notes_after, notes_before, notes_of_gain
 from .placing import placed_robot
-from .prior import ParameterPrior, estimated_with, settled_prior
+from .prior import ParameterPrior, estimated_with, note_of_prior, settled_prior, widened
 from .problem import as_measurements, guessed_fixtures, measured_frames, problem_of
 from .result import CalibrationResult
 from .solve import solve
@@ -163,18 +163,21 @@ def fit(
         candidates, measured, known_lengths, known, dependent=_TOLD_APART
     )
     check_enough(problem_of(identifiable.kept, measured))
-    prior_of = None if prior is None else partial(settled_prior, prior, loss=loss, rng=chance)
+    prior_of, used = None, prior
     for _ in range(_TRIES):
-        estimated = identifiable.kept if prior is None else estimated_with(prior, identifiable)
+        if used is not None:
+            prior_of = partial(settled_prior, used, loss=loss, rng=chance)
+        estimated = identifiable.kept if used is None else estimated_with(used, identifiable)
         problem = problem_of(estimated, measured)
         gaussian = None if prior_of is None else prior_of(problem)
         zero = np.zeros(problem.P)
         start = np.concatenate([zero, guessed_fixtures(problem, zero)])
         solution = solve(problem, start, loss=loss, prior=gaussian, truncation=truncation)
+        wider = None if used is None else widened(used, solution)
         untold = [] if truncation else untold_by(solution, start)
-        if not untold:
+        if not untold and wider is used:
             break
-        identifiable = without_untold(identifiable, untold)
+        used, identifiable = wider, without_untold(identifiable, untold)
     step("all measurements")
     preferred = candidates.preferring(estimated.names)
     again = identifiable_on(
@@ -204,6 +207,7 @@ def fit(
         notes=(
             *notes_of_gain(before, validation, kept_aside),
             *notes,
+            *note_of_prior(prior, used),
             *notes_after(solution, identifiable, again),
         ),
     )  # fmt: skip

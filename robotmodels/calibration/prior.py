@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -15,9 +15,11 @@ from .extended_table.elements import ErrorLaw
 from .extended_table.parameters import GeometricParameter, GeometricParameters
 from .identifiability.identifiable import IdentifiableParameters, Reason
 from .problem import Problem, guessed_fixtures, stacked
-from .solve import solve
+from .solve import Solution, solve
 
 _FOLDS = 5
+_CONTRADICTED = 1.5
+"""Corrections relative to the prior, root mean square, from which it is widened."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -167,6 +169,46 @@ def standard_deviations(prior: ParameterPrior, problem: Problem) -> Array:
         prior.named.get(e.name, _size(prior, e, f, size))
         for e, size in zip(parameters.entries, largest_factors(problem), strict=True)
     ])  # fmt: skip
+
+
+def widened(prior: ParameterPrior, solution: Solution) -> ParameterPrior:
+    """The prior with larger lengths or angles, where the corrections found contradict it.
+
+    The mean square of the corrections relative to the prior, over as many parameters as the
+    measurements determine, is the factor that maximises the evidence (D. J. C. MacKay, "Bayesian
+    interpolation", Neural Computation 4, 1992).
+    """
+    problem, fit = solution.problem, solution.fit
+    f = problem.parameters.model.f
+    size = fit.prior.deviation / np.sqrt(fit.prior.strength)
+    found = {}
+    for name, is_length in (("length", True), ("angle", False)):
+        of_kind = [
+            k for k, e in enumerate(problem.parameters.entries)
+            if e.law is ErrorLaw.CONSTANT and 0 < e.row <= f and e.name not in prior.named
+            and e.element.is_length is is_length
+        ]  # fmt: skip
+        determined = 1.0 - np.diagonal(fit.covariance)[of_kind] / size[of_kind] ** 2
+        count = max(float(determined.sum()), 1.0)
+        ratio = np.sqrt(float(((fit.x[of_kind] / size[of_kind]) ** 2).sum()) / count)
+        if ratio > _CONTRADICTED:
+            found[name] = ratio * float(getattr(prior, name))
+    return replace(prior, **found) if found else prior
+
+
+def note_of_prior(given: ParameterPrior | None, used: ParameterPrior | None) -> tuple[str, ...]:
+    """A sentence where the prior of a fit is not the one that was given."""
+    if given is None or used is None or given is used:
+        return ()
+    changes = [
+        f"of {name}s from {getattr(given, name):.2g} to {getattr(used, name):.2g} {unit}"
+        for name, unit in (("length", "m"), ("angle", "rad"))
+        if getattr(given, name) != getattr(used, name)
+    ]
+    return (
+        "The corrections are larger than the prior expects, so its standard deviations were "
+        f"raised: {' and '.join(changes)}. See whether zeros and signs of joints are right.",
+    )
 
 
 def largest_factors(problem: Problem) -> Array:

@@ -14,6 +14,8 @@ from .problem import Problem, guessed_fixtures, stacked
 
 _FIRST_LENGTH = 1e-3
 """Standard deviation of lengths before it has been estimated, m."""
+_LITTLE = 0.05
+"""Noise that the estimation begins with beside a prior, relative to that without one."""
 _ROUNDS = 10
 _SETTLED = 1e-3
 _NOTHING = 1e-13
@@ -115,6 +117,10 @@ def solve(
     known = all(_states_noise(m) for m in problem.measurements)
     estimated = scales is None and not known
     current = scales or from_scales or first_scales(problem)
+    if not (scales or from_scales or prior is None or _has_few_rows(problem)):
+        # beside a prior, noise that explains everything would be an answer too: it is the larger
+        # of two, and an estimate that begins with too little noise ends at the smaller
+        current = tuple(read_only(_LITTLE * scale) for scale in current)
     block = problem.block
     is_settled = not estimated
     for _ in range(_ROUNDS):
@@ -138,6 +144,11 @@ def solve(
         # what is left is rounding, which no step lowers
         fit = replace(fit, status=FitStatus.CONVERGED)
     return Solution(problem, fit, current)
+
+
+def _has_few_rows(problem: Problem) -> bool:
+    """Whether there are hardly more rows than unknowns, so that noise may seem to be none."""
+    return problem.rows < 1.5 * (problem.P + problem.F)
 
 
 def _states_noise(m: Measurement) -> bool:

@@ -35,7 +35,9 @@ def untold_by(solution: Solution, start: Array) -> list[str]:
     ] / np.maximum(largest_factors(problem), _TINY)
     information = np.diag(np.sqrt(prior.strength) / prior.deviation)
     factors = [
-        np.asarray(np.linalg.qr(np.vstack([stacked(problem, x, solution.scales)[1], information]))[1])
+        np.asarray(
+            np.linalg.qr(np.vstack([stacked(problem, x, solution.scales)[1], information]))[1]
+        )
         for x in (start, solution.fit.x)
     ]
     kept = list(range(len(limit)))
