@@ -11,6 +11,7 @@ from .._arrays import Array
 from ..kinematics import dgm
 from ..kinematics.lengths import characteristic_length
 from ..model import RobotModel
+from .calibrated_robot.calibrated import with_moved_tool
 from .measurements import Measurement, Pose, Position
 
 _NEAR = 0.2
@@ -79,7 +80,7 @@ def registered(
         offset = np.eye(4)
         offset[:3, :3] = _nearest_rotation(found[:, :3, :3].mean(axis=0))
         offset[:3, 3] = found[:, :3, 3].mean(axis=0)
-        start = start.with_tool(start.tool @ offset)
+        start = with_moved_tool(start, start.tool @ offset)
     return start
 
 

@@ -17,6 +17,7 @@ from ..geometry import DHTable
 from ..inertia import InertialParameters
 from ..kernels import Chain
 from ..urdf import NamedFrame, RobotParts, read_urdf
+from ..urdf.parts import UrdfSource
 from ..visual import Visual
 from .chain import multiplied_out
 from .changed import Changeable
@@ -29,7 +30,7 @@ GRAVITY = (0.0, 0.0, -9.81)
 
 _PARTS = (
     "name", "table", "inertia", "drive", "base", "tool", "tip", "gravity", "transmission",
-    "configurations", "frames", "visuals", "notes",
+    "configurations", "frames", "visuals", "notes", "source",
 )  # fmt: skip
 _NUMERIC_PARTS = _PARTS[:9]
 
@@ -69,6 +70,8 @@ class RobotModel(Changeable):
         Shapes of a source URDF.
     notes : tuple of str
         What a reader merged, locked or left out, in sentences.
+    source : UrdfSource or None
+        Text and options of the URDF that it was read from; no part of equality.
 
     References
     ----------
@@ -94,6 +97,7 @@ class RobotModel(Changeable):
     frames: tuple[NamedFrame, ...] = ()
     visuals: tuple[Visual, ...] = ()
     notes: tuple[str, ...] = ()
+    source: UrdfSource | None = None
     _twin: PinocchioTwin | None = field(default=None, init=False)
     _chain: Chain | None = field(default=None, init=False)
     _drives: tuple[DriveMatrices | None] | None = field(default=None, init=False)
@@ -267,7 +271,7 @@ class RobotModel(Changeable):
             base=parts.base, tool=parts.tool, tip=parts.tip,
             gravity=gravity,  # type: ignore[arg-type]
             transmission=parts.transmission, frames=parts.frames, visuals=parts.visuals,
-            notes=parts.notes,
+            notes=parts.notes, source=parts.source,
         )  # fmt: skip
 
     @property
@@ -344,6 +348,7 @@ class RobotModel(Changeable):
             name=self.name, table=self.table, base=self.base, tool=self.tool, tip=self.tip,
             inertia=self.inertia, drive=self.drive, transmission=self.transmission,
             frames=self.frames, visuals=self.visuals, notes=self.notes,
+            source=self.source,
         )  # fmt: skip
 
     def __repr__(self) -> str:

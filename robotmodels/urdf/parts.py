@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from .._arrays import Array, read_only
 from ..drive import DriveParameters, Transmission
@@ -47,6 +47,31 @@ class NamedFrame:
 
 
 @dataclass(frozen=True, slots=True)
+class UrdfSource:
+    """The URDF that a robot was read from.
+
+    Parameters
+    ----------
+    text : str
+        As it was read.
+    base_link, tip_link : str or None
+        The options of the reading.
+    tool_link : str
+        Link whose frame was the tool: ``tip_link``, or what stands for it.
+
+    Examples
+    --------
+    >>> UrdfSource("<robot/>", None, "flange", "flange").tool_link
+    'flange'
+    """
+
+    text: str = field(repr=False)
+    base_link: str | None
+    tip_link: str | None
+    tool_link: str
+
+
+@dataclass(frozen=True, slots=True)
 class RobotParts:
     """Everything a URDF can say about a robot, and what it cannot.
 
@@ -72,6 +97,8 @@ class RobotParts:
         Shapes; empty if the source has none.
     notes : tuple of str
         Sentences about what a reader merged, locked or left out.
+    source : UrdfSource, optional
+        What the parts were read from.
 
     Examples
     --------
@@ -93,3 +120,4 @@ class RobotParts:
     frames: tuple[NamedFrame, ...] = ()
     visuals: tuple[Visual, ...] = ()
     notes: tuple[str, ...] = ()
+    source: UrdfSource | None = None

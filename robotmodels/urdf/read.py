@@ -21,7 +21,7 @@ from ..inertia import InertialParameters
 from ..khalil_frames import JointAxis, khalil_frames
 from ..visual import Visual
 from .meshes import MeshFinder
-from .parts import TOOL, NamedFrame, RobotParts
+from .parts import TOOL, NamedFrame, RobotParts, UrdfSource
 from .tip import default_tip
 from .tree import MOVING_TYPES, OTHER_TYPES, UrdfJoint, UrdfTree, parse_urdf
 
@@ -80,7 +80,7 @@ def read_urdf(
     for link in (base_link, tip_link):
         if link is not None and (not isinstance(link, str) or link not in tree.links):
             raise FrameNotFoundError("link", link, tree.links)
-    return _parts(tree, base_link or tree.root, tip_link, dynamics, mimic)
+    return _parts(tree, text, base_link, tip_link, dynamics, mimic)
 
 
 def _text_of(source: str | Path) -> tuple[str, Path | None]:
@@ -123,17 +123,23 @@ class _Placed:
 
 
 def _parts(
-    tree: UrdfTree, base_link: str, tip_link: str | None, dynamics: bool, mimic: bool
+    tree: UrdfTree,
+    text: str,
+    base_link: str | None,
+    tip_link: str | None,
+    dynamics: bool,
+    mimic: bool,
 ) -> RobotParts:
-    kept = None if tip_link is None else _chain(tree, base_link, tip_link)
+    world = base_link or tree.root
+    kept = None if tip_link is None else _chain(tree, world, tip_link)
     joints: list[UrdfJoint] = []
     axes: list[JointAxis] = []
     notes: list[str] = []
-    placed = [_Placed(base_link, 0, np.eye(4), False)]
+    placed = [_Placed(world, 0, np.eye(4), False)]
     _walk(tree, placed[0], kept, joints, axes, placed, notes)
     if not joints:
         raise UrdfError(
-            f"no joint moves between {base_link!r} and "
+            f"no joint moves between {world!r} and "
             f"{repr(tip_link) if tip_link else 'the leaves'}: there is nothing to model. Choose "
             "base_link and tip_link on both sides of a moving joint."
         )
@@ -192,6 +198,7 @@ def _parts(
         frames=named,
         visuals=visuals,
         notes=tuple(notes),
+        source=UrdfSource(text, base_link, tip_link, tip_frame.name),
     )
 
 

@@ -67,14 +67,14 @@ def urdf_text(parts: RobotParts, visuals: bool = True) -> str:
     lines = ['<?xml version="1.0" encoding="utf-8"?>', f"<robot name={_quoted(parts.name)}>"]
     lines += _link(names.world, parts, -1, [])
     lines += _link(names.frames[0], parts, -1, shapes.get(0, []))
-    lines += _fixed(names.world, names.frames[0], parts.base, names.fixed[names.frames[0]])
+    lines += fixed_joint(names.world, names.frames[0], parts.base, names.fixed[names.frames[0]])
     C = constant_factors(table)
     column = 0
     for k in range(table.f):
         parent, child = names.frames[int(table.antecedent[k])], names.frames[k + 1]
         lines += _link(child, parts, k, shapes.get(k + 1, []))
         if table.sigma[k] == FIXED:
-            lines += _fixed(parent, child, C[k], table.names[k])
+            lines += fixed_joint(parent, child, C[k], table.names[k])
             continue
         kind = "prismatic" if table.sigma[k] == PRISMATIC else "revolute"
         lines.append(f"  <joint name={_quoted(table.names[k])} type={_quoted(kind)}>")
@@ -94,14 +94,14 @@ def urdf_text(parts: RobotParts, visuals: bool = True) -> str:
         lines.append("  </joint>")
         column += 1
     lines += _link(names.tool, parts, -1, [])
-    lines += _fixed(names.frames[parts.tip], names.tool, parts.tool, names.fixed[names.tool])
+    lines += fixed_joint(names.frames[parts.tip], names.tool, parts.tool, names.fixed[names.tool])
     written = {names.world, *names.frames, names.tool}
     for frame in parts.frames:
         if frame.name in written:
             continue
         lines += _link(frame.name, parts, -1, [])
         carrier = names.frames[frame.parent]
-        lines += _fixed(carrier, frame.name, frame.pose, names.fixed[frame.name])
+        lines += fixed_joint(carrier, frame.name, frame.pose, names.fixed[frame.name])
     return "\n".join([*lines, "</robot>", ""])
 
 
@@ -261,7 +261,7 @@ def _visual(visual: Visual) -> list[str]:
         geometry = _mesh(shape)
     lines = [
         "    <visual>",
-        f"      {_origin(visual.pose)}",
+        f"      {origin_element(visual.pose)}",
         f"      <geometry>{geometry}</geometry>",
     ]
     if visual.color is not None:
@@ -278,20 +278,22 @@ def _material(color: Color) -> str:
     return f'<material name="{escape(name)}"><color rgba="{_words(color)}"/></material>'
 
 
-def _fixed(parent: str, child: str, pose: Array, name: str) -> list[str]:
+def fixed_joint(parent: str, child: str, pose: Array, name: str) -> list[str]:
+    """Lines of a fixed joint that places one link in another."""
     head = f'  <joint name={_quoted(name)} type="fixed">'
     return [head, *_placement(parent, child, pose), "  </joint>"]
 
 
 def _placement(parent: str, child: str, pose: Array) -> list[str]:
     return [
-        f"    {_origin(pose)}",
+        f"    {origin_element(pose)}",
         f"    <parent link={_quoted(parent)}/>",
         f"    <child link={_quoted(child)}/>",
     ]
 
 
-def _origin(pose: Array) -> str:
+def origin_element(pose: Array) -> str:
+    """A pose as ``<origin>``, with all digits."""
     return f'<origin xyz="{_words(pose[:3, 3])}" rpy="{_words(se3.to_rpy(pose[:3, :3]))}"/>'
 
 

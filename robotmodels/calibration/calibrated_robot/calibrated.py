@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -11,6 +13,7 @@ from numpy.typing import ArrayLike
 from ..._arrays import Array, Rebuilt, as_exact, read_only
 from ...errors import InvalidValueError
 from ...model import RobotModel
+from ...urdf.in_place import tool_link
 from ..extended_table.elements import Element, ErrorLaw
 from ..extended_table.parameters import GeometricParameters
 from ..extended_table.six_parameters import pose_of_elements
@@ -123,8 +126,7 @@ class CalibratedRobot(Rebuilt):
         elsewhere = [
             self.parameters.skeleton.row_name(end.row)
             for end in self.ends
-            if end.frame not in (None, self.model.twin.names.tool)
-            and not _is_named(self.model, end.frame)
+            if end.frame not in _tool_names(self.model) and not _is_named(self.model, end.frame)
         ]
         if elsewhere:
             notes.append(
@@ -146,9 +148,8 @@ class CalibratedRobot(Rebuilt):
         CalibratedEnd or None
             None for a frame that was not a measured end.
         """
-        tool = self.model.twin.names.tool
-        also = {None: tool, tool: None}.get(frame, frame)  # type: ignore[arg-type]
-        for wanted in (frame, also):
+        names = _tool_names(self.model)
+        for wanted in (frame, *(names if frame in names else ())):
             for end in self.ends:
                 if _same(end.frame, wanted):
                     return end
@@ -245,18 +246,13 @@ def calibrated_model(parameters: GeometricParameters, deviation: ArrayLike) -> C
             pose[:3, :3], pose[:3, 3] = found.rotation, found.position
         ends.append(CalibratedEnd(frame, found.parent, read_only(pose), 1 + f + k))
     columns = {e.word: elements[1 : 1 + f, e] for e in Element}
-    by_name = [end for end in ends if end.frame in (None, nominal.twin.names.tool)]
+    by_name = [end for end in ends if end.frame in _tool_names(nominal)]
     tool = min(by_name, key=lambda end: end.frame is not None).pose if by_name else nominal.tool
     poses = {end.frame: end.pose for end in ends if isinstance(end.frame, str)}
     model = replace(
-        nominal,
+        with_moved_tool(nominal, tool, poses),
         table=nominal.table.replace(**columns),
         base=base,
-        tool=tool,
-        frames=tuple(
-            replace(named, pose=poses[named.name]) if named.name in poses else named
-            for named in nominal.frames
-        ),
         notes=(*nominal.notes, f"Calibrated: {int(np.count_nonzero(xi))} parameters are off."),
     )
     return CalibratedRobot(
@@ -268,6 +264,31 @@ def calibrated_model(parameters: GeometricParameters, deviation: ArrayLike) -> C
         bending=bending_of(parameters, elements, xi),
         ends=tuple(ends),
     )
+
+
+def with_moved_tool(
+    model: RobotModel, tool: Array, poses: Mapping[str, Array] = MappingProxyType({})
+) -> RobotModel:
+    """The same robot whose tool stands elsewhere, and with it the link that the tool is.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot.
+    tool : ndarray, shape (4, 4)
+        Pose of the tool in the tip frame, metres.
+    poses : mapping of str to ndarray, shape (4, 4)
+        Poses of other named frames, in the frames that they are fixed to.
+
+    Returns
+    -------
+    RobotModel
+        With another tool and other named frames.
+    """
+    link = tool_link(model.parts)
+    poses = {**({} if link is None else {link: tool}), **poses}
+    frames = (replace(named, pose=poses.get(named.name, named.pose)) for named in model.frames)
+    return replace(model, tool=tool, frames=tuple(frames))
 
 
 def as_calibrated(robot: Any) -> CalibratedRobot:
@@ -308,6 +329,11 @@ def as_calibrated(robot: Any) -> CalibratedRobot:
 
 def _same(a: Frame, b: Frame) -> bool:
     return type(a) is type(b) and a == b
+
+
+def _tool_names(model: RobotModel) -> tuple[str | None, ...]:
+    """Frames that are the tool: None, its name, and the link of a URDF that it is."""
+    return None, model.twin.names.tool, tool_link(model.parts)
 
 
 def _is_named(model: RobotModel, frame: Frame) -> bool:

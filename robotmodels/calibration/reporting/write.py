@@ -13,6 +13,7 @@ from ..._arrays import Array
 from ...errors import InvalidValueError, MissingExtraError, UrdfWarning
 from ...estimation import confidence_intervals
 from ...model import to_urdf
+from ...urdf.in_place import urdf_in_place
 from ..calibrated_robot.calibrated import CalibratedRobot
 from ..errors_seen import BlockErrors
 
@@ -216,7 +217,22 @@ def _numbers(values: Array) -> list[float | None]:
 
 
 def calibrated_urdf(robot: CalibratedRobot) -> str:
-    """URDF text of the calibrated table, base and tool.
+    """URDF text of the calibrated robot: its own URDF, calibrated in place.
+
+    Of a robot read by `RobotModel.from_urdf` only the ``<origin>`` elements of joints between the
+    base and the measured ends change. The link that is its tool (``tip_link``) and measured
+    links are the calibrated ones. All links, joints, meshes, masses, limits and comments stay;
+    what is fixed to a link moves with it.
+
+    - Base: the link that is the world (``base_link``, else the root) stays where it is. A fixed
+      joint that begins the chain takes the new place. Without one a new root ``world`` carries
+      the robot, or, if ``base_link`` was named, the first moving joint takes it.
+    - Tool: a tool of `RobotModel.with_tool` that is no link becomes a new link ``tool``, and the
+      tip link stays where it is. If the tool is a link that a joint moves, and its axis no longer
+      passes as it did, a new link carries it: all of it, its shapes too. To keep them where they
+      are, give the measured point by `RobotModel.with_tool`.
+
+    A robot without such a source (a table) is written by `to_urdf`.
 
     Parameters
     ----------
@@ -226,13 +242,14 @@ def calibrated_urdf(robot: CalibratedRobot) -> str:
     Returns
     -------
     str
-        Text that `RobotModel.from_urdf` reads back to the same poses. Its joint variables are
-        where the joints are, not what they read.
+        Text that `RobotModel.from_urdf` reads back to the same poses of the tool and the measured
+        links, with the same ``base_link`` and ``tip_link`` (``tip_link="tool"`` if that is new).
+        Its joint variables are where the joints are, not what they read.
 
     Raises
     ------
     UrdfError
-        As `to_urdf`.
+        As `to_urdf`; the robot's table has other joints than its URDF.
 
     Warns
     -----
@@ -253,10 +270,17 @@ def calibrated_urdf(robot: CalibratedRobot) -> str:
     >>> RobotModel.from_urdf(text).n
     2
     """
-    text = to_urdf(robot.model)
-    if robot.notes:
+    if robot.model.source is None:
+        text = to_urdf(robot.model)
+    else:
+        measured = [end.frame for end in robot.ends if isinstance(end.frame, str)]
+        text = urdf_in_place(robot.model.parts, measured)
+    notes, K = [*robot.notes], robot.model.transmission
+    if K is not None and K.is_invertible and robot.model.source is not None:
+        notes.append("The transmission is in model: the joints of the text are the table's.")
+    if notes:
         warnings.warn(
-            f"Not in the URDF: {' '.join(robot.notes)} Keep the calibrated robot (pickle) to "
+            f"Not in the URDF: {' '.join(notes)} Keep the calibrated robot (pickle) to "
             "keep them.",
             UrdfWarning,
             stacklevel=2,

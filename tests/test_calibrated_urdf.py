@@ -1,0 +1,421 @@
+"""The URDF of a calibrated robot: the user's own text, with other origins."""
+
+import pickle
+import re
+import warnings
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from identities.random_robots import random_pose
+
+import robotmodels as rm
+from robotmodels import calibration, se3
+from robotmodels.calibration import calibrated_model, calibrated_urdf, candidate_parameters
+from robotmodels.cli import main
+from robotmodels.datasets import panda_double_socket
+from robotmodels.errors import UrdfError, UrdfWarning
+from robotmodels.robots.erd import ERD_ARMS, erd_folder
+
+EXACT = 1e-9
+SEEDS = range(12)
+
+
+# --- robots as people write them ------------------------------------------------------------------
+
+
+def words(values):
+    return " ".join(f"{v:.6g}" for v in values)
+
+
+def origin(rng):
+    """A place, sometimes left out, sometimes with one part only, sometimes not closed at once."""
+    xyz, rpy = f'xyz="{words(rng.uniform(-0.4, 0.4, 3))}"', f'rpy="{words(rng.uniform(-3, 3, 3))}"'
+    return rng.choice([
+        "", f"<origin {xyz}/>", f"<origin {rpy} {xyz}  />", f"<origin {xyz} {rpy}></origin>",
+        f"<origin\n      {rpy}\n      {xyz}/>", f"<origin {xyz.replace(chr(34), chr(39))} {rpy}/>",
+    ])  # fmt: skip
+
+
+def link(name, body=True):
+    if not body:
+        return f'  <link name="{name}"/>'
+    return f"""  <!-- the <link> {name} > 0 -->
+  <link name="{name}">
+    <inertial><origin xyz="0.01 0 0.02"/><mass value="1.5"/>
+      <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial>
+    <visual><origin xyz="0 0 0.1" rpy="0 0 1"/><geometry>
+      <mesh filename="package://arm/{name}.dae"/></geometry><material name="grey"/></visual>
+    <collision><geometry><mesh filename="package://arm/{name}.stl"/></geometry></collision>
+  </link>"""
+
+
+def joint(rng, parent, child, kind=None, inside=""):
+    kind = kind or rng.choice(["revolute", "continuous", "prismatic"], p=[0.6, 0.2, 0.2])
+    axis = rng.choice(["<axis xyz='0 0 1'/>", '<axis xyz="0 -1 0"/>', "", '<axis xyz="1 -2 0.5"/>'])
+    limit = '<limit lower="-2.5" upper="2.25" effort="10" velocity="3"/>'
+    if kind == "fixed":
+        axis = limit = ""
+    return (
+        f'  <joint name="{parent}_{child}" type="{kind}">\n    <!-- <origin xyz="9 9 9"/> -->\n'
+        f'    <parent link="{parent}"/>{origin(rng)}\n    <child link="{child}"/>\n'
+        f"    {axis}{limit}{inside}\n  </joint>"
+    )
+
+
+def arm_text(rng, mount=False, stand=False, length=4, flange=True):
+    """An arm with a camera, a hand with two fingers beyond its tip, and a second arm."""
+    body = ["base", *(f"l{k}" for k in range(1, length + 1))]
+    joints = []
+    if stand:
+        joints.append(("stand", "base", "fixed"))
+    if mount:
+        joints += [("base", "mount", "fixed"), ("mount", "l1")]
+        body.insert(1, "mount")
+    else:
+        joints.append(("base", "l1"))
+    joints += [(f"l{k}", f"l{k + 1}") for k in range(1, length)]
+    joints += [("base", "plate", "fixed"), (f"l{length - 1}", "camera", "fixed"),
+               ("camera", "lens", "fixed"), ("base", "lamp"), ("l2", "cover")]  # fmt: skip
+    end = f"l{length}"
+    if flange:
+        joints += [(end, "flange", "fixed"), ("flange", "tip", "fixed")]
+        end = "tip"
+    joints += [(end, "hand", "fixed"), ("hand", "finger_1", "prismatic"),
+               ("hand", "finger_2", "prismatic")]  # fmt: skip
+    joints = [joints[k] for k in rng.permutation(len(joints))]
+    names = list(dict.fromkeys(name for a, b, *_ in joints for name in (a, b)))
+    mimic = '<mimic joint="hand_finger_1" multiplier="-1"/>'
+    lines = ['<?xml version="1.0"?>', "<!-- by xacro -->", '<robot name="arm">']
+    lines += ['  <material name="grey"><color rgba="0.5 0.5 0.5 1"/></material>']
+    lines += [link(name, name != "tip") for name in names]
+    lines += [
+        joint(rng, a, b, *kind, inside=mimic if b == "finger_2" else "") for a, b, *kind in joints
+    ]
+    lines += ['  <gazebo reference="l1"><selfCollide>true</selfCollide></gazebo>',
+              '  <transmission name="t1"><joint name="base_l1"/><origin xyz="1 1 1"/></transmission>',
+              "</robot>", ""]  # fmt: skip
+    return "\n".join(lines)
+
+
+def calibrated(model, rng, frames=(None,), size=0.02, **options):
+    """The robot with random errors in all candidates."""
+    parameters = candidate_parameters(model, frames, **options)
+    return calibrated_model(parameters, size * rng.normal(size=len(parameters)))
+
+
+def pin_pose(text, model, q, frame, world=None):
+    """Pose of a link in plain Pinocchio; joints that the model has not stand at zero."""
+    twin = pin.buildModelFromXML(text)
+    data, at = twin.createData(), pin.neutral(twin)
+    for name, value in zip(model.table.joint_names, q, strict=True):
+        j = twin.joints[twin.getJointId(name)]
+        at[j.idx_q : j.idx_q + j.nq] = [np.cos(value), np.sin(value)] if j.nq == 2 else value
+    pin.framesForwardKinematics(twin, data, at)
+    assert twin.existBodyName(frame)
+    pose = data.oMf[twin.getFrameId(frame, pin.FrameType.BODY)].homogeneous
+    if world is None:
+        return pose
+    return se3.inverse(data.oMf[twin.getFrameId(world, pin.FrameType.BODY)].homogeneous) @ pose
+
+
+def assert_same_poses(text, robot, rng, frame, link, options=None):
+    """In plain Pinocchio, and read again; the link is where the model has the frame."""
+    options = options or {}
+    model, world = robot.model, options.get("base_link")
+    again = rm.RobotModel.from_urdf(text, **options)
+    assert again.table.joint_names == model.table.joint_names
+    for q in rng.uniform(-2.0, 2.0, (4, model.n)):
+        there = rm.dgm(model, q, frame)
+        np.testing.assert_allclose(pin_pose(text, model, q, link, world), there, 0, EXACT)
+        np.testing.assert_allclose(rm.dgm(again, q, link), there, 0, EXACT)
+
+
+def without_origins(text):
+    """The text with the origins of joints taken out, and the spaces before them."""
+    text = re.sub(r"<!--.*?-->", lambda m: m[0].replace("<origin", "<comment"), text, flags=re.S)
+    return re.sub(
+        r'(  <joint name="[^"]*" type=.*?</joint>)',
+        lambda m: re.sub(r"\s*<origin[^>]*?(/>|></origin>)", "", m[0], flags=re.S), text, flags=re.S,
+    )  # fmt: skip
+
+
+def changed_joints(before, after):
+    """Names of the joints whose origin is another one."""
+    def origins(text):
+        return {
+            j.get("name"): None if (o := j.find("origin")) is None else dict(o.attrib)
+            for j in ET.fromstring(text).findall("joint")
+        }  # fmt: skip
+
+    old, new = origins(before), origins(after)
+    return {name for name in old if old[name] != new[name]}
+
+
+# --- the tip that was named, everything else stays ------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_named_tip_is_the_calibrated_one_and_only_origins_change(seed):
+    rng = np.random.default_rng(seed)
+    text = arm_text(rng, mount=seed % 2 == 0)
+    options = {"tip_link": "tip"}
+    model = rm.RobotModel.from_urdf(text, **options)
+    robot = calibrated(model, rng, base=seed % 2 == 0)
+    written = calibrated_urdf(robot)
+    assert_same_poses(written, robot, rng, None, "tip", options)
+    assert_same_poses(written, robot, rng, "tip", "tip", options)
+    assert without_origins(written) == without_origins(text)  # comments, meshes, order, all of it
+    own = {f"l{k}_l{k + 1}" for k in range(1, 4)} | {"flange_tip"}
+    own |= {"base_mount", "mount_l1"} if seed % 2 == 0 else {"base_l1"}
+    assert changed_joints(text, written) == own
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_links_beside_the_chain_keep_their_place_in_their_bodies(seed):
+    rng = np.random.default_rng(seed)
+    text = arm_text(rng)
+    model = rm.RobotModel.from_urdf(text, tip_link="tip")
+    robot = calibrated(model, rng, base=False)
+    written = calibrated_urdf(robot)
+    for q in rng.uniform(-2.0, 2.0, (3, model.n)):
+        for name, on in (("camera", "l3"), ("lens", "l3"), ("flange", "l4"), ("cover", "l2"),
+                         ("plate", "base"), ("lamp", "base"), ("hand", "tip"),
+                         ("finger_2", "tip")):  # fmt: skip
+            np.testing.assert_allclose(
+                pin_pose(written, model, q, name, on), pin_pose(text, model, q, name, on), 0, EXACT
+            )
+        for name in ("camera", "lens", "flange", "l3"):
+            there = rm.dgm(robot.model, q, name)
+            np.testing.assert_allclose(pin_pose(written, model, q, name), there, 0, EXACT)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_other_measured_links_are_calibrated_too(seed):
+    rng = np.random.default_rng(seed)
+    options = {"tip_link": None if seed % 2 else "tip"}
+    text = arm_text(rng, mount=True)
+    model = rm.RobotModel.from_urdf(text, **options)
+    frames = (None, "camera", "plate", "finger_1")  # on the chain, on the base, beyond the tip
+    robot = calibrated(model, rng, frames)
+    written = calibrated_urdf(robot)
+    tip = model.source.tool_link
+    for frame, name in ((None, tip), ("camera",) * 2, ("plate",) * 2, ("finger_1",) * 2):
+        assert_same_poses(written, robot, rng, frame, name, options)
+    added = len(ET.fromstring(written)) - len(ET.fromstring(text))
+    assert added == (2 if seed % 2 else 0)  # a finger that moves is measured off its own axis
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_tip_that_a_joint_moves_is_carried_by_one_more_link(seed):
+    rng = np.random.default_rng(seed)
+    text = arm_text(rng, flange=False)
+    options = {"tip_link": "l4"}
+    model = rm.RobotModel.from_urdf(text, **options)
+    same = calibrated_urdf(calibrated(model, rng, base=False, tool=False))
+    assert without_origins(same) == without_origins(text)
+    robot = calibrated(model, rng, base=False)
+    written = calibrated_urdf(robot)
+    assert_same_poses(written, robot, rng, None, "l4", options)
+    twin, before = pin.buildModelFromXML(written), pin.buildModelFromXML(text)
+    assert twin.nq == before.nq
+    names = {f.name for f in twin.frames} - {f.name for f in before.frames}
+    assert names == {"l3_l4_axis", "l4_fixed"}
+
+
+# --- base -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("base_link", [None, "base"])
+@pytest.mark.parametrize("mount", [False, True])
+@pytest.mark.parametrize("stand", [False, True])
+def test_the_base_is_placed_in_the_link_that_is_the_world(seed, base_link, mount, stand):
+    rng = np.random.default_rng(seed)
+    text = arm_text(rng, mount, stand)
+    options = {"base_link": base_link, "tip_link": "tip"}
+    model = rm.RobotModel.from_urdf(text, **options)
+    robot = calibrated(model.with_base(random_pose(rng) @ model.base), rng)
+    written = calibrated_urdf(robot)
+    assert_same_poses(written, robot, rng, None, "tip", options)
+    added = len(ET.fromstring(written)) - len(ET.fromstring(text))
+    at_root = base_link is None and not mount and not stand
+    assert added == (2 if at_root else 0)
+    q = np.zeros(model.n)
+    if at_root:  # all of the robot goes along, its own base and side links too
+        for name in ("base", "plate", "lamp"):
+            np.testing.assert_allclose(
+                pin_pose(written, model, q, name, "base"), pin_pose(text, model, q, name), 0, EXACT
+            )
+            moved = pin_pose(written, model, q, name, "world")
+            np.testing.assert_allclose(moved, rm.dgm(robot.model, q, name), 0, EXACT)
+
+
+# --- tools ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("tip_link", ["tip", "l4", None])
+def test_a_tool_that_is_no_link_becomes_one_and_the_tip_link_stays(seed, tip_link):
+    rng = np.random.default_rng(seed)
+    text = arm_text(rng).replace('name="lamp"', 'name="tool"').replace('link="lamp"', 'link="tool"')
+    bare = rm.RobotModel.from_urdf(text, tip_link=tip_link or "tip")
+    model = bare.with_tool(bare.tool @ se3.translation(0.0, 0.05, 0.1))
+    robot = calibrated(model, rng, base=False)
+    written = calibrated_urdf(robot)
+    named = bare.source.tool_link
+    assert_same_poses(written, robot, rng, None, "tool_new", {"tip_link": "tool_new"})
+    for q in rng.uniform(-2.0, 2.0, (3, model.n)):
+        there = rm.dgm(robot.model, q, named)
+        np.testing.assert_allclose(pin_pose(written, model, q, named), there, 0, EXACT)
+        np.testing.assert_allclose(
+            pin_pose(written, model, q, named, "l4"), pin_pose(text, model, q, named, "l4"), 0, EXACT
+        )
+
+
+def test_an_end_that_is_the_tip_link_is_the_tool(rng):
+    text = arm_text(rng)
+    model = rm.RobotModel.from_urdf(text, tip_link="tip")
+    robot = calibrated(model, rng, ("tip",), base=False)
+    q = rng.uniform(-1.0, 1.0, model.n)
+    assert robot.end().frame == "tip"
+    np.testing.assert_allclose(rm.dgm(robot.model, q), rm.dgm(robot.model, q, "tip"), 0, 1e-12)
+    assert_same_poses(calibrated_urdf(robot), robot, rng, None, "tip", {"tip_link": "tip"})
+
+
+def test_the_tool_at_another_measured_end(rng):
+    text = arm_text(rng)
+    model = rm.RobotModel.from_urdf(text, tip_link="tip")
+    robot = calibrated(model, rng, (None, "camera"), base=False)
+    assert calibrated_urdf(robot.with_tool_at("camera")) == calibrated_urdf(robot)
+
+
+# --- what the source is ---------------------------------------------------------------------------
+
+
+def test_a_robot_keeps_its_source(rng):
+    text = arm_text(rng)
+    model = rm.RobotModel.from_urdf(text, "base", "tip", mimic=True, dynamics=True)
+    assert model.source.text == text
+    for other in (
+        pickle.loads(pickle.dumps(model)), model.with_base(None), model.with_gravity([0, 0, 0]),
+        model.with_inertia(None), model.with_table(model.table.replace(d=model.table.d + 1e-3)),
+    ):  # fmt: skip
+        assert other.source == model.source
+    assert rm.RobotModel.from_urdf(text + "\n", "base", "tip") == rm.RobotModel.from_urdf(
+        text, "base", "tip"
+    )
+    assert rm.load("rx90").source is None
+
+
+def test_nothing_off_writes_the_text_as_it_was(rng):
+    text = arm_text(rng, mount=True)
+    for options in ({}, {"tip_link": "tip"}, {"base_link": "base"}, {"mimic": True}):
+        model = rm.RobotModel.from_urdf(text, **options)
+        robot = pickle.loads(pickle.dumps(calibrated(model, rng, size=0.0)))
+        assert calibrated_urdf(robot) == text
+
+
+def test_coupled_fingers_and_a_table_changed_by_hand_keep_the_text(rng):
+    text = arm_text(rng)
+    model = rm.RobotModel.from_urdf(text, mimic=True).with_drive(None)
+    named = model.source.tool_link
+    shifted = model.with_table(model.table.replace(r=model.table.r + 0.01 * (np.arange(model.f) == 1)))
+    robot = calibrated(shifted, rng, base=False)
+    written = calibrated_urdf(robot)
+    assert '<mimic joint="hand_finger_1" multiplier="-1"/>' in written
+    assert_same_poses(written, robot, rng, None, named)
+
+
+def test_a_table_with_other_joints_than_the_text_is_refused(rng):
+    model = rm.RobotModel.from_urdf(arm_text(rng), tip_link="tip")
+    other = model.with_table(model.table.replace(names=[f"j{k}" for k in range(model.f)]))
+    with pytest.raises(UrdfError, match="other joints .names. than the URDF"):
+        calibrated_urdf(calibrated(other, rng))
+
+
+def test_what_the_text_cannot_hold_is_warned_of(rng):
+    text = arm_text(rng)
+    model = rm.RobotModel.from_urdf(text, tip_link="tip")
+    robot = calibrated(model, rng, gains=True, eccentricity=True, compliance="joints")
+    with pytest.warns(UrdfWarning, match=r"Gains.*Eccentricity.*Compliance"):
+        calibrated_urdf(robot)
+    geared = model.with_transmission(rm.Transmission(np.diag(np.full(model.n, 0.01))))
+    with pytest.warns(UrdfWarning, match="transmission"):
+        calibrated_urdf(calibrated(geared, rng))
+
+
+# --- real robots ----------------------------------------------------------------------------------
+
+
+def test_the_panda_that_was_calibrated_by_its_own_ball_is_right_at_the_ball():
+    data = panda_double_socket()
+    sockets = data.places["front"]
+    contacts = calibration.PointContact(
+        np.vstack(sockets), np.repeat(["a", "b"], [len(q) for q in sockets])
+    )
+    result = calibration.fit(data.model, contacts, folds=0, held_out=0.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        written = calibrated_urdf(result.robot)
+    for q in sockets[0][:3]:
+        there = rm.dgm(result.model, q)
+        np.testing.assert_allclose(pin_pose(written, result.model, q, "ball_link"), there, 0, EXACT)
+    assert without_origins(written) == without_origins(data.urdf)
+
+
+@pytest.mark.parametrize("name", ["ur5", "panda", "iiwa", "kinova", "talos_arm", "xarm7"])
+def test_arms_of_example_robot_data_keep_all_but_origins(name):
+    rng = np.random.default_rng(1)
+    arm = ERD_ARMS[name]
+    text = (erd_folder() / arm.urdf).read_text(encoding="utf-8")
+    model = rm.load(f"erd:{name}")
+    robot = calibrated(model, rng, base=False, size=0.003)
+    written = calibrated_urdf(robot)
+    tip = arm.tool or model.source.tool_link
+    for q in rng.uniform(-1.0, 1.0, (3, model.n)):
+        there = rm.dgm(robot.model, q)
+        at = pin_pose(written, model, q, tip, arm.base_link)
+        np.testing.assert_allclose(at, there, 0, EXACT)
+    old, new = ET.fromstring(text), ET.fromstring(written)
+    for kind in ("link", "transmission", "gazebo", "material"):
+        before = [ET.tostring(e).strip() for e in old.findall(kind)]
+        assert [ET.tostring(e).strip() for e in new.findall(kind)][: len(before)] == before
+    for k, element in enumerate(old.findall("joint")):
+        other = new.findall("joint")[k]
+        for part in ("axis", "limit", "mimic", "parent", "dynamics", "safety_controller"):
+            a, b = element.find(part), other.find(part)
+            assert (a is None) == (b is None)
+            assert a is None or a.attrib == b.attrib
+        assert element.attrib == other.attrib
+
+
+# --- files ----------------------------------------------------------------------------------------
+
+
+def test_the_command_line_writes_the_same_text(tmp_path, rng):
+    text = arm_text(rng, length=3)
+    (tmp_path / "arm.urdf").write_text(text, encoding="utf-8")
+    model = rm.RobotModel.from_urdf(text, tip_link="tip")
+    real = calibrated(model, rng, base=False, size=0.005).model
+    q = rng.uniform(-2.0, 2.0, (60, model.n))
+    rows = np.hstack([q, rm.dgm(real, q)[:, :3, 3] + 1e-5 * rng.normal(size=(60, 3))])
+    header = ",".join([*model.table.joint_names, "x", "y", "z"])
+    np.savetxt(tmp_path / "m.csv", rows, delimiter=",", header=header, comments="")
+    out = tmp_path / "out"
+    assert main([
+        "calibrate", "--robot", str(tmp_path / "arm.urdf"), "--tip-link", "tip", "--measurements",
+        str(tmp_path / "m.csv"), "--kind", "position", "--lengths", "m", "--angles", "rad",
+        "--folds", "0", "--held-out", "0", "--fixed-base", "--out", str(out),
+    ]) == 0  # fmt: skip
+    written = (out / "calibrated.urdf").read_text(encoding="utf-8")
+    assert without_origins(written) == without_origins(text)
+    missed = [pin_pose(written, model, at, "tip")[:3, 3] - p for at, p in zip(q, rows[:, -3:], strict=True)]
+    assert np.sqrt(np.mean(np.square(missed))) < 2e-5
+    measured = calibration.read_measurements(
+        tmp_path / "m.csv", "position", model, lengths="m", angles="rad"
+    )
+    result = calibration.fit(model, measured, base=False, folds=0, held_out=0.0)
+    calibration.write_result(result, tmp_path / "again.urdf")
+    assert (tmp_path / "again.urdf").read_text(encoding="utf-8") == written
