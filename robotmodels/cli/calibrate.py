@@ -35,7 +35,8 @@ examples:
       --kind point-contact --known-distance hole_0 hole_1 0.1 --parameters b7 d7 r7
 
 Into the folder of --out go report.txt, report.html (text and figures, one offline file),
-result.json (what --json prints) and calibrated.urdf. Without --out the report is printed."""
+result.json (what --json prints) and calibrated.urdf (a robot read from a URDF keeps its own, with
+other origins of joints). Without --out the report is printed."""
 
 
 def add_command(commands: Any) -> None:

@@ -29,7 +29,7 @@ def tool_link(parts: RobotParts) -> str | None:
     at_tool = [
         frame.name
         for frame in parts.frames
-        if frame.parent == parts.tip and np.allclose(frame.pose, parts.tool, 0.0, _ROUNDING)
+        if frame.parent == parts.tip and not _differ(frame.pose, parts.tool)
     ]
     if parts.source is None or not at_tool:
         return None
@@ -133,7 +133,7 @@ def urdf_in_place(parts: RobotParts, measured: Collection[str] = ()) -> str:
 
 
 def _differ(a: Array, b: Array) -> bool:
-    return not np.allclose(a, b, 0.0, _ROUNDING)
+    return bool(np.abs(a - b).max() > _ROUNDING)
 
 
 def _carrier_of_tool(parts: RobotParts, links: dict[str, NamedFrame]) -> str:

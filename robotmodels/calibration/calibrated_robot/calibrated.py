@@ -148,12 +148,11 @@ class CalibratedRobot(Rebuilt):
         CalibratedEnd or None
             None for a frame that was not a measured end.
         """
+        for end in self.ends:
+            if _same(end.frame, frame):
+                return end
         names = _tool_names(self.model)
-        for wanted in (frame, *(names if frame in names else ())):
-            for end in self.ends:
-                if _same(end.frame, wanted):
-                    return end
-        return None
+        return next((e for e in self.ends if frame in names and e.frame in names), None)
 
     def with_tool_at(self, frame: Frame) -> Self:
         """The same robot whose tool is another measured end, so that inverse models serve it.

@@ -47,7 +47,7 @@ def write_result(result: CalibrationResult, path: str | Path) -> None:
     MissingExtraError
         PyYAML is not there.
     UrdfError
-        As `to_urdf`.
+        As `calibrated_urdf`.
     OSError
         The file cannot be written.
 
@@ -280,8 +280,7 @@ def calibrated_urdf(robot: CalibratedRobot) -> str:
         notes.append("The transmission is in model: the joints of the text are the table's.")
     if notes:
         warnings.warn(
-            f"Not in the URDF: {' '.join(notes)} Keep the calibrated robot (pickle) to "
-            "keep them.",
+            f"Not in the URDF: {' '.join(notes)} Keep the calibrated robot (pickle) to keep them.",
             UrdfWarning,
             stacklevel=2,
         )
