@@ -44,6 +44,7 @@ from .measurements import (
     RelativePose,
 )
 from .measurements.kinds import Kind, drawn_groups
+from .other_tool import PredictedError, other_tool_error
 from .prior import ParameterPrior
 from .problem import Problem, problem_of
 from .read import read_measurements
@@ -100,6 +101,7 @@ __all__ = [
     "Pose",
     "PoseOffsets",
     "Position",
+    "PredictedError",
     "Problem",
     "Reason",
     "RelativePose",
@@ -127,6 +129,7 @@ __all__ = [
     "joint_offsets",
     "measured_residuals",
     "observability",
+    "other_tool_error",
     "pose_of_elements",
     "pose_offsets",
     "problem_of",

@@ -17,6 +17,8 @@ _FIRST_LENGTH = 1e-3
 _LITTLE = 0.05
 """Noise that the estimation begins with beside a prior, relative to that without one."""
 _ROUNDS = 10
+_LENT = 50.0
+"""Rows of all measurements of a kind that each of them estimates its noise with, beside its own."""
 _SETTLED = 1e-3
 _NOTHING = 1e-13
 _ROUGH = 1e-6
@@ -171,32 +173,43 @@ def _is_exact(problem: Problem, scales: tuple[Array, ...]) -> bool:
 def _estimated_scales(
     problem: Problem, fit: NonlinearFit, scales: tuple[Array, ...]
 ) -> tuple[Array, ...]:
-    """Noise of each measurement and unit from its residuals, freedom shared by leverage."""
+    """Noise of each measurement and unit from its residuals, freedom shared by leverage.
+
+    Measurements of one kind lend each other some rows: one of few rows says little of its noise.
+    """
     leverage, size = _leverage(fit), problem.parameters.skeleton.size
-    new, first = [], 0
-    for m, scale in zip(problem.measurements, scales, strict=True):
-        k = len(m.axes)
-        rows = slice(first, first + m.blocks * k)
+    found: dict[tuple[type, str], list[tuple[int, float, float]]] = {}
+    first = 0
+    for k, (m, scale) in enumerate(zip(problem.measurements, scales, strict=True)):
+        rows = slice(first, first + m.blocks * len(m.axes))
         first = rows.stop
         if _states_noise(m):
-            new.append(scale)
             continue
-        residual = fit.residuals[rows].reshape(-1, k)
-        share = leverage[rows].reshape(-1, k)
-        values = scale.copy()
-        for unit in set(m.units):
+        residual = fit.residuals[rows].reshape(m.blocks, -1)
+        share = leverage[rows].reshape(m.blocks, -1)
+        for unit in sorted(set(m.units)):
             of_unit = np.array([u == unit for u in m.units])
             fitted = float(share[:, of_unit].sum())
+            freedom = max(of_unit.sum() * m.blocks - fitted, 0.0)
             if fit.loss is Loss.SQUARES:
-                freedom = of_unit.sum() * m.blocks - fitted
                 square = float((residual[:, of_unit] ** 2).sum())
                 factor = np.sqrt(square / freedom) if freedom > 0.5 else 1.0
             else:
                 count = np.full(m.blocks, of_unit.sum())
                 factor = robust_scale(np.linalg.norm(residual[:, of_unit], axis=1), count, fitted)
-            values[of_unit] = np.maximum(scale[of_unit] * factor, _floor(unit, size))
-        new.append(read_only(values))
-    return tuple(new)
+            own = float(scale[of_unit][0]) * float(factor)
+            found.setdefault((type(m), unit), []).append((k, own, freedom))
+    new = [scale.copy() for scale in scales]
+    for (_, unit), parts in found.items():
+        square = sum(own**2 * freedom for _, own, freedom in parts)
+        total = sum(freedom for _, _, freedom in parts)
+        for k, own, freedom in parts:
+            if total > 0.0 and len(parts) > 1:
+                lent = _LENT * square / total
+                own = np.sqrt((own**2 * freedom + lent) / (freedom + _LENT))
+            of_unit = [u == unit for u in problem.measurements[k].units]
+            new[k][of_unit] = max(own, _floor(unit, size))
+    return tuple(read_only(scale) for scale in new)
 
 
 def _leverage(fit: NonlinearFit) -> Array:
