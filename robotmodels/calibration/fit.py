@@ -16,14 +16,21 @@ from .extended_table.candidates import candidate_parameters
 from .extended_table.elements import Compliance
 from .extended_table.parameters import GeometricParameters, as_names
 from .folds import Refit, errors_of_others, errors_of_splits, split_aside, splits, suited_fixtures
-from .identifiability.identifiable import Reason, all_deviations, identifiable_on
+from .identifiability.identifiable import (
+    IdentifiableParameters,
+    Reason,
+    all_deviations,
+    identifiable_on,
+)
 from .measurements import Measurement
+from .next_term import note_of_structure, trials_of
 from .notes import check_enough, notes_after, notes_before, notes_of_gain
 from .placing import placed_robot
 from .prior import ParameterPrior, estimated_with, note_of_prior, settled_prior, widened
 from .problem import as_measurements, guessed_fixtures, measured_frames, problem_of
 from .result import CalibrationResult
 from .solve import solve
+from .structure import structure_of
 from .untold import untold_by, without_untold
 
 Progress = Callable[[int, int, str], None]
@@ -158,7 +165,6 @@ def fit(
             candidates = candidates_of(placed.model)
     before = errors_given if placed is None else placed.errors
     share = held_out if isinstance(held_out, float | int) else 0.0
-    step = _Steps(progress, 1 + folds + bool(share))
     identifiable = identifiable_on(
         candidates, measured, known_lengths, known, dependent=_TOLD_APART
     )
@@ -178,20 +184,27 @@ def fit(
         if not untold and wider is used:
             break
         used, identifiable = wider, without_untold(identifiable, untold)
+    structure = structure_of(solution, identifiable)
+    blocks = sum(m.blocks for m in measured if m.views)
+    parts = splits(measured, folds, chance) if folds and blocks >= 2 * folds else []
+    fits_to_try = len(structure.hinted) * (1 + len(parts)) if structure and parts else 0
+    step = _Steps(progress, 1 + len(parts) + bool(share) + fits_to_try)
     step("all measurements")
     preferred = candidates.preferring(estimated.names)
-    again = identifiable_on(
-        preferred, measured, known_lengths, (*known, *identifiable.of_reason(Reason.NOISE)),
-        deviation=all_deviations(preferred, estimated, solution.deviation),
-        fixtures=solution.fixtures, dependent=_TOLD_APART,
-    )  # fmt: skip
+
+    def identifiable_there(some: GeometricParameters) -> IdentifiableParameters:
+        return identifiable_on(
+            some, measured, known_lengths, (*known, *identifiable.of_reason(Reason.NOISE)),
+            deviation=all_deviations(some, estimated, solution.deviation),
+            fixtures=solution.fixtures, dependent=_TOLD_APART,
+        )  # fmt: skip
+
+    again = identifiable_there(preferred)
     refit = Refit(solution, prior_of, truncation)
     validation = None
-    blocks = sum(m.blocks for m in measured if m.views)
-    if folds and blocks < 2 * folds:
+    if folds and not parts:
         notes = (*notes, f"{blocks} measurements are too few for {folds} folds: none were made.")
     elif folds:
-        parts = splits(measured, folds, chance)
         validation = errors_of_splits(refit, parts, before, lambda: step("cross-validation"))
     kept_aside = None
     if aside:
@@ -199,6 +212,26 @@ def fit(
     elif share and (part := split_aside(measured, share, chance)) is not None:
         doing = "measurements kept aside"
         kept_aside = errors_of_splits(refit, [part], before, lambda: step(doing))
+    if structure is not None:
+
+        def estimated_of(some: GeometricParameters) -> GeometricParameters:
+            found = identifiable_there(some)
+            return found.kept if prior is None else estimated_with(prior, found)
+
+        tried = (
+            []
+            if validation is None
+            else trials_of(
+                structure,
+                refit,
+                preferred,
+                estimated_of,
+                parts,
+                validation,
+                lambda: step("terms to try next"),
+            )
+        )
+        notes = (*notes, note_of_structure(structure, tried, validation))
     return CalibrationResult(
         nominal=model, known=(*known_lengths, *known), identifiable=identifiable, again=again,
         solution=solution, given=errors_given, before=before,

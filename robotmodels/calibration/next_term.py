@@ -1,0 +1,180 @@
+"""The term to try next where residuals have structure, found by fits that include it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from .errors_seen import BlockErrors
+from .extended_table.parameters import GeometricParameters
+from .folds import AsideErrors, Refit, Split, errors_of_splits
+from .problem import problem_of
+from .reporting.units import in_unit, printed_unit
+from .solve import solve
+from .structure import Structure, TermFamily
+
+_SURE = 2.0
+"""Standard errors by which the mean square of errors on data kept aside must fall."""
+_GAIN = 0.02
+"""Part by which it must fall."""
+_ROUGH = 1e-6
+
+
+class Trial(NamedTuple):
+    """A fit with one more family: errors on data kept aside, and what it gains.
+
+    Attributes
+    ----------
+    family : TermFamily
+        What was added.
+    after : BlockErrors
+        On the data kept aside.
+    gain : float
+        Part by which their mean square falls.
+    helps : bool
+        Whether it falls by more than chance explains.
+    """
+
+    family: TermFamily
+    after: BlockErrors
+    gain: float
+    helps: bool
+
+
+def trials_of(
+    structure: Structure,
+    refit: Refit,
+    candidates: GeometricParameters,
+    estimated: Callable[[GeometricParameters], GeometricParameters],
+    parts: Sequence[Split],
+    without: AsideErrors,
+    done: Callable[[], None],
+) -> list[Trial]:
+    """Fit with each family that residuals resemble, and again without the data kept aside.
+
+    Parameters
+    ----------
+    structure : Structure
+        What the residuals resemble.
+    refit : Refit
+        The solution that the fits start from.
+    candidates : GeometricParameters
+        Of the fit, in the order of preference.
+    estimated : callable
+        Those of some candidates that are estimated.
+    parts : sequence of Split
+        Measurements kept aside.
+    without : AsideErrors
+        Errors of these without the family.
+    done : callable
+        Called after each fit, ``1 + len(parts)`` times for each family.
+
+    Returns
+    -------
+    list of Trial
+        The largest gain first.
+    """
+    solution = refit.solution
+    problem, old = solution.problem, solution.problem.parameters
+    trials = []
+    for family in structure.hinted:
+        new = [e for e in structure.parameters.entries if e.law in family.laws]
+        able = estimated(replace(candidates, entries=(*candidates.entries, *new)))
+        added = [e for e in new if e.name in able.names]
+        wider = problem_of(replace(old, entries=(*old.entries, *added)), problem.measurements)
+        start = np.concatenate([solution.deviation, np.zeros(len(added)), solution.fixtures])
+        found = solve(
+            wider, start, from_scales=solution.scales, loss=solution.fit.loss,
+            prior=None if refit.prior is None else refit.prior(wider),
+            truncation=refit.truncation, tolerance=_ROUGH,
+        )  # fmt: skip
+        done()
+        again = replace(refit, solution=found)
+        after = errors_of_splits(again, parts, without.before, done).after
+        trials.append(Trial(family, after, *_gain(without.after, after)))
+    return sorted(trials, key=lambda trial: -trial.gain)
+
+
+def _gain(before: BlockErrors, after: BlockErrors) -> tuple[float, bool]:
+    """Part by which the mean square falls, units by their rms before; whether for certain."""
+    scale = [before.summary(unit).rms for unit in ("m", "rad")]
+    was, now = (
+        np.nansum([(e / s) ** 2 for e, s in zip(errors, scale, strict=True) if s > 0.0], axis=0)
+        for errors in (before, after)
+    )
+    fallen = was - now
+    mean = float(fallen.mean())
+    gain = mean / float(was.mean())
+    is_sure = mean > _SURE * float(fallen.std()) / np.sqrt(len(fallen))
+    return gain, bool(is_sure and gain > _GAIN)
+
+
+def note_of_structure(
+    structure: Structure, trials: Sequence[Trial], without: AsideErrors | None
+) -> str:
+    """Say that residuals have structure, and which term to try next.
+
+    Parameters
+    ----------
+    structure : Structure
+        Of the residuals.
+    trials : sequence of Trial
+        What was tried, the largest gain first.
+    without : AsideErrors or None
+        Errors on data kept aside without any of it; None if none was.
+
+    Returns
+    -------
+    str
+        Sentences.
+    """
+    p = f"(p = {structure.p:.2g})"
+    text = [
+        f"Not geometry: residuals depend on the posture {p} in a way that no parameter of the "
+        "table takes."
+        if structure.is_complete
+        else f"Residuals depend on the posture {p} in a way that no estimated parameter takes; "
+        "parameters of the table that were left out may be the cause."
+    ]
+    text.append("Standard errors assume independent residuals and are too short.")
+    helpful = [trial for trial in trials if trial.helps]
+    if without is not None and helpful:
+        found = [
+            f"{trial.family.word} from {_change(without.after, trial.after)} "
+            f"(fit(..., {trial.family.option}))"
+            for trial in helpful
+        ]
+        text.append(
+            f"Try {helpful[0].family.word} next. On data kept aside it changes the rms error: "
+            f"{'; '.join(found)}."
+        )
+    useless = [trial.family.word for trial in trials if not trial.helps]
+    if useless:
+        text.append(f"Tried without a gain on data kept aside: {', '.join(useless)}.")
+    if without is None and structure.hinted:
+        terms = [f"{family.word} ({family.option})" for family in structure.hinted]
+        text.append(f"It resembles {' or '.join(terms)}: fit with folds, which tries them.")
+    if structure.others:
+        words = " or ".join(family.word for family in structure.others)
+        text.append(f"It does not resemble {words}.")
+    if not structure.parameters.model.inertia.values.any():
+        text.append("Give the model masses (with_inertia) to try joint compliance.")
+    if not helpful:
+        text.append(
+            "Backlash, friction, drift and bending links may be the cause: approach every posture "
+            "from the same side, and repeat some measurements at the end."
+        )
+    return " ".join(text)
+
+
+def _change(before: BlockErrors, after: BlockErrors) -> str:
+    """Rms errors before and after, of each unit that was measured."""
+    return " and ".join(
+        f"{in_unit(before.summary(unit).rms, unit)} to {in_unit(after.summary(unit).rms, unit)} "
+        f"{printed_unit(unit)}"
+        for unit in ("m", "rad")
+        if after.summary(unit).blocks
+    )
