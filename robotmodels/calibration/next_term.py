@@ -156,10 +156,10 @@ def note_of_structure(
         text.append(f"Tried without a gain on data kept aside: {', '.join(useless)}.")
     if without is None and structure.hinted:
         terms = [f"{family.word} ({family.option})" for family in structure.hinted]
-        text.append(f"It resembles {' or '.join(terms)}: fit with folds, which tries them.")
+        text.append(f"They resemble {' or '.join(terms)}: fit with folds, which tries them.")
     if structure.others:
         words = " or ".join(family.word for family in structure.others)
-        text.append(f"It does not resemble {words}.")
+        text.append(f"They do not resemble {words}.")
     if not structure.parameters.model.inertia.values.any():
         text.append("Give the model masses (with_inertia) to try joint compliance.")
     if not helpful:
