@@ -11,10 +11,12 @@ import numpy as np
 from .errors_seen import BlockErrors
 from .extended_table.parameters import GeometricParameters
 from .folds import AsideErrors, Refit, Split, errors_of_splits
+from .identifiability.identifiable import IdentifiableParameters
+from .prior import ParameterPrior, estimated_with
 from .problem import problem_of
 from .reporting.units import in_unit, printed_unit
 from .solve import solve
-from .structure import Structure, TermFamily
+from .structure import Structure, TermFamily, structure_of
 
 _SURE = 2.0
 """Standard errors by which the mean square of errors on data kept aside must fall."""
@@ -24,66 +26,41 @@ _ROUGH = 1e-6
 
 
 class Trial(NamedTuple):
-    """A fit with one more family: errors on data kept aside, and what it gains.
-
-    Attributes
-    ----------
-    family : TermFamily
-        What was added.
-    after : BlockErrors
-        On the data kept aside.
-    gain : float
-        Part by which their mean square falls.
-    helps : bool
-        Whether it falls by more than chance explains.
-    """
+    """A fit with one more family, judged on data kept aside."""
 
     family: TermFamily
     after: BlockErrors
     gain: float
+    """Part by which their mean square falls."""
     helps: bool
+    """Whether it falls by more than chance explains."""
+    explains_all: bool
+    """Whether the residuals with it may be independent."""
 
 
 def trials_of(
     structure: Structure,
     refit: Refit,
     candidates: GeometricParameters,
-    estimated: Callable[[GeometricParameters], GeometricParameters],
+    identify: Callable[[GeometricParameters], IdentifiableParameters],
+    prior: ParameterPrior | None,
     parts: Sequence[Split],
     without: AsideErrors,
     done: Callable[[], None],
 ) -> list[Trial]:
-    """Fit with each family that residuals resemble, and again without the data kept aside.
+    """Fit with each family that residuals resemble, again without each part; best gain first.
 
-    Parameters
-    ----------
-    structure : Structure
-        What the residuals resemble.
-    refit : Refit
-        The solution that the fits start from.
-    candidates : GeometricParameters
-        Of the fit, in the order of preference.
-    estimated : callable
-        Those of some candidates that are estimated.
-    parts : sequence of Split
-        Measurements kept aside.
-    without : AsideErrors
-        Errors of these without the family.
-    done : callable
-        Called after each fit, ``1 + len(parts)`` times for each family.
-
-    Returns
-    -------
-    list of Trial
-        The largest gain first.
+    ``identify`` gives those of some candidates that the measurements tell, ``without`` the errors
+    of the parts without the family; ``done`` is called after each of ``1 + len(parts)`` fits.
     """
     solution = refit.solution
     problem, old = solution.problem, solution.problem.parameters
     trials = []
     for family in structure.hinted:
         new = [e for e in structure.parameters.entries if e.law in family.laws]
-        able = estimated(replace(candidates, entries=(*candidates.entries, *new)))
-        added = [e for e in new if e.name in able.names]
+        told = identify(replace(candidates, entries=(*candidates.entries, *new)))
+        kept = told.kept if prior is None else estimated_with(prior, told)
+        added = [e for e in new if e.name in kept.names]
         wider = problem_of(replace(old, entries=(*old.entries, *added)), problem.measurements)
         start = np.concatenate([solution.deviation, np.zeros(len(added)), solution.fixtures])
         found = solve(
@@ -94,7 +71,8 @@ def trials_of(
         done()
         again = replace(refit, solution=found)
         after = errors_of_splits(again, parts, without.before, done).after
-        trials.append(Trial(family, after, *_gain(without.after, after)))
+        explains_all = structure_of(found, told) is None
+        trials.append(Trial(family, after, *_gain(without.after, after), explains_all))
     return sorted(trials, key=lambda trial: -trial.gain)
 
 
@@ -115,22 +93,7 @@ def _gain(before: BlockErrors, after: BlockErrors) -> tuple[float, bool]:
 def note_of_structure(
     structure: Structure, trials: Sequence[Trial], without: AsideErrors | None
 ) -> str:
-    """Say that residuals have structure, and which term to try next.
-
-    Parameters
-    ----------
-    structure : Structure
-        Of the residuals.
-    trials : sequence of Trial
-        What was tried, the largest gain first.
-    without : AsideErrors or None
-        Errors on data kept aside without any of it; None if none was.
-
-    Returns
-    -------
-    str
-        Sentences.
-    """
+    """Say that residuals have structure, and which of the terms tried is the one to try next."""
     p = f"(p = {structure.p:.2g})"
     text = [
         f"Not geometry: residuals depend on the posture {p} in a way that no parameter of the "
@@ -162,9 +125,12 @@ def note_of_structure(
         text.append(f"They do not resemble {words}.")
     if not structure.parameters.model.inertia.values.any():
         text.append("Give the model masses (with_inertia) to try joint compliance.")
-    if not helpful:
+    if helpful and not helpful[0].explains_all:
+        text.append(f"With {helpful[0].family.word} they still depend on the posture.")
+    is_explained = helpful and helpful[0].explains_all
+    if (trials or not structure.hinted) and not is_explained:
         text.append(
-            "Backlash, friction, drift and bending links may be the cause: approach every posture "
+            "Backlash, friction, drift or bending links may be the cause: approach every posture "
             "from the same side, and repeat some measurements at the end."
         )
     return " ".join(text)

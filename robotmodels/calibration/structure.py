@@ -54,26 +54,18 @@ FAMILIES = (
 
 
 class Structure(NamedTuple):
-    """Residuals that depend on the posture.
-
-    Attributes
-    ----------
-    p : float
-        Probability of residuals as much alike if the measurements are independent.
-    parameters : GeometricParameters
-        Those of the fit, the others of the table, and those of all families.
-    hinted, others : tuple of TermFamily
-        Families that the fit did not include: those that the residuals resemble, the best first,
-        and those that they do not.
-    is_complete : bool
-        Whether the test allows for every parameter of the table, base and tool.
-    """
+    """Residuals that depend on the posture, and the families of terms that they resemble."""
 
     p: float
+    """Probability of residuals as much alike if the measurements are independent."""
     parameters: GeometricParameters
+    """Those of the fit, the others of the table, and those of all families."""
     hinted: tuple[TermFamily, ...]
+    """Families that the fit did not include and that the residuals resemble."""
     others: tuple[TermFamily, ...]
+    """Families that it did not include either and that they do not resemble."""
     is_complete: bool
+    """Whether the test allows for every parameter of the table, base and tool."""
 
 
 def structure_of(solution: Solution, found: IdentifiableParameters) -> Structure | None:
@@ -81,24 +73,8 @@ def structure_of(solution: Solution, found: IdentifiableParameters) -> Structure
 
     The residuals are taken orthogonal to all columns of the geometry, so that a prior has no say.
     Each test compares the square of their projection on some columns with those after the signs
-    of whole postures have been drawn at random, which independent noise allows whatever its size.
-
-    Parameters
-    ----------
-    solution : Solution
-        Of the fit.
-    found : IdentifiableParameters
-        What it looked at.
-
-    Returns
-    -------
-    Structure or None
-        None if the residuals may be noise, or there are too few.
-
-    References
-    ----------
-    C. F. J. Wu, The Annals of Statistics 14, 1986 (random signs); X. Lin, Biometrika 84, 1997
-    (score test of a smooth effect).
+    of whole postures were drawn at random, which independent noise of any size allows (C. F. J.
+    Wu, The Annals of Statistics 14, 1986). None if they may be noise, or are too few.
     """
     whole, is_complete = _all_parameters(solution, found)
     problem = problem_of(whole, solution.problem.measurements)
@@ -107,7 +83,7 @@ def structure_of(solution: Solution, found: IdentifiableParameters) -> Structure
     deviation[: len(solution.deviation)] = solution.deviation
     errors = block_errors(problem, deviation, solution.fixtures)
     largest = max(np.nanmax(e, initial=0.0) for e in (errors.position / size, errors.angle))
-    posture = _postures(problem)
+    posture = _posture_of_rows(problem)
     count = int(posture.max()) + 1
     if largest < _ROUNDING or count < _FEWEST:
         return None
@@ -179,7 +155,7 @@ def _all_parameters(
     return GeometricParameters(skeleton, tuple(entries.values())), True
 
 
-def _postures(problem: Problem) -> NDArray[np.int64]:
+def _posture_of_rows(problem: Problem) -> NDArray[np.int64]:
     """Number of the posture of each row, shape (M,): blocks with the same readings share it."""
     numbers: dict[object, int] = {}
     found = []
