@@ -24,6 +24,7 @@ from ._spread import covariance, determined
 from ._step import Linear, linear_problem
 from .losses import Loss, length_quantile, robust_scale
 from .nonlinear_fit import FitStatus, NonlinearFit
+from .outlying import FALSE_OUTLIERS, outlying
 from .prior import Prior
 
 _SINGULAR = 1e-13
@@ -32,8 +33,6 @@ _UNSEEN = 1e-13
 """Relative decrease that the sum no longer shows: steps are then judged by their lengths."""
 _LEAST_SCALE = 1e-9
 """Scale of residuals relative to the longest: most measurements fit to rounding."""
-_FALSE_OUTLIERS = 0.05
-"""Outliers expected to be listed in a whole fit of Gaussian residuals."""
 
 
 def fit_nonlinear(
@@ -139,7 +138,7 @@ def fit_nonlinear(
         sigma=problem.sigma,
         block=problem.labels[problem.block],
         weights=weighing.terms(point.length)[1][problem.block],
-        outliers=_outliers(problem, point, freedom),
+        outliers=_outliers(problem, weighing, point, linear, freedom),
         loss=loss,
         sigma_known=sigma_known,
         prior=problem.prior,
@@ -266,12 +265,17 @@ def _scale(problem: Problem, point: Point, freedom: float, sigma_known: bool) ->
     return max(found, _LEAST_SCALE * longest) or 1.0
 
 
-def _outliers(problem: Problem, point: Point, freedom: float) -> NDArray[np.int64]:
+def _outliers(
+    problem: Problem, weighing: Weighing, point: Point, linear: Linear, freedom: float
+) -> NDArray[np.int64]:
     """Numbers of the measurements that noise of the scale of the others does not explain."""
     if point.length.max(initial=0.0) <= 1e-13 * np.abs(point.J).max(initial=0.0):
         return problem.labels[:0]  # rounding of the model is not Gaussian, and no news
+    if weighing.loss is Loss.SQUARES:
+        T = point.J @ linear.back
+        return problem.labels[outlying(T, point.r, problem.starts, freedom)]
     u = point.length / _scale(problem, point, freedom, False)
-    excess = u / length_quantile(problem.rows, 1 - _FALSE_OUTLIERS / max(len(u), 1))
+    excess = u / length_quantile(problem.rows, 1 - FALSE_OUTLIERS / max(len(u), 1))
     worst = np.argsort(-excess, kind="stable")
     return problem.labels[worst[excess[worst] > 1]]
 
