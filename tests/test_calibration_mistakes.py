@@ -12,6 +12,7 @@ from robotmodels.calibration import (
     Position,
     fit,
 )
+from robotmodels.datasets import panda_double_socket
 from robotmodels.errors import InvalidValueError
 from robotmodels.geometry import DHTable
 
@@ -77,3 +78,93 @@ def test_the_bad_rows_alone_are_outliers_under_squares(bad, prior):
 def test_without_a_bad_row_one_fit_in_twenty_lists_an_outlier():
     listings = [listed(Arm(seed), 0)[0] for seed in range(100, 220)]
     assert 1 <= sum(bool(listing) for listing in listings) <= 12
+
+
+# --- known distances ------------------------------------------------------------------------------
+
+
+def touching(arm, places, count=20, noise=1e-4):
+    """Readings at which the real tool is at each of some places, and their labels."""
+    q, labels = [], []
+    for label, place in enumerate(places):
+        T = np.tile(np.eye(4), (4 * count, 1, 1))
+        T[:, :3, 3] = place + noise * arm.rng.normal(size=(len(T), 3))
+        found = rm.igm_numeric(
+            arm.real, T, q0=arm.rng.uniform(-2.0, 2.0, (len(T), arm.nominal.n)),
+            mask=[1, 1, 1, 0, 0, 0], rng=arm.rng,
+        )  # fmt: skip
+        q.append(found.q[found.valid[:, 0], 0][:count])
+        labels += [label] * len(q[-1])
+    return np.concatenate(q), labels
+
+
+def contacts(seed, apart=((0.0, 0.03, 0.04),), count=20):
+    """Contacts of a random arm with a place and others beside it."""
+    arm = Arm(seed)
+    place = 0.8 * rm.dgm(arm.real, arm.readings(1))[0, :3, 3]
+    q, labels = touching(arm, [place, *(place + np.array(d) for d in apart)], count)
+    return arm, PointContact(q, labels)
+
+
+def between(length, other=1, **more):
+    return KnownDistance("point:0", f"point:{other}", length, **more)
+
+
+def said_of_distances(result):
+    return [note for note in result.notes if note.startswith("known distance")]
+
+
+REACHED = [0, 2, 3, 4, 5, 7, 8, 9]
+"""Seeds of arms that reach their points."""
+
+
+def test_a_known_distance_is_known_to_a_tenth_of_a_millimetre():
+    assert between(0.05).sigma == pytest.approx(1e-4)
+
+
+@pytest.mark.parametrize("seed", REACHED)
+def test_a_wrong_distance_is_contradicted_by_the_lengths_of_the_table(seed):
+    arm, touched = contacts(seed)
+    right = fit(arm.nominal, [touched, between(0.05)], prior=ParameterPrior(), **ALONE)
+    assert not said_of_distances(right)
+    assert touched.blocks not in right.solution.fit.outliers
+    wrong = fit(arm.nominal, [touched, between(0.051)], prior=ParameterPrior(), **ALONE)
+    (note,) = said_of_distances(wrong)
+    assert "point:0 to point:1: stated 51 mm, but the other measurements and the prior say" in note
+    said, doubt = (float(x) for x in note.split(" say ")[1].split(" mm")[0].split(" +- "))
+    assert abs(said - 50.0) < 4.0 * doubt < 1.0
+    assert "standard errors apart" in note
+    assert wrong.solution.fit.outliers.tolist()[0] == touched.blocks
+    assert "stated 51 mm" in wrong.report()
+
+
+@pytest.mark.parametrize("seed", REACHED)
+def test_a_distance_that_alone_gives_the_scale_is_contradicted_by_nothing(seed):
+    arm, touched = contacts(seed)
+    for length in (0.05, 0.051):
+        result = fit(arm.nominal, [touched, between(length)], **ALONE, prior=None)
+        assert not said_of_distances(result)
+        assert touched.blocks not in result.solution.fit.outliers
+
+
+@pytest.mark.parametrize("seed", REACHED[:4])
+def test_the_wrong_one_of_two_distances_is_named(seed):
+    arm, touched = contacts(seed, [(0.0, 0.03, 0.04), (0.2, 0.0, 0.0)])
+    stated = [touched, between(0.05), between(0.21, 2)]
+    result = fit(arm.nominal, stated, prior=ParameterPrior(), **ALONE)
+    (note,) = said_of_distances(result)
+    assert "point:0 to point:2: stated 210 mm" in note
+    assert touched.blocks + 1 in result.solution.fit.outliers
+    assert touched.blocks not in result.solution.fit.outliers
+    # without anything else either may be wrong
+    assert len(said_of_distances(fit(arm.nominal, stated, prior=None, **ALONE))) == 2
+
+
+def test_a_real_arm_contradicts_51_for_50():
+    data = panda_double_socket()
+    for place, (one, other) in data.places.items():
+        touched = PointContact(np.concatenate([one, other]), [0] * len(one) + [1] * len(other))
+        for length, expected in ((data.distance, 0), (data.distance + 1e-3, 1)):
+            known = between(length)
+            result = fit(data.model, [touched, known], prior=ParameterPrior(), **ALONE)
+            assert len(said_of_distances(result)) == expected, place

@@ -11,6 +11,7 @@ from .._choices import chosen
 from ..errors import InvalidValueError
 from ..estimation import Loss
 from ..model import RobotModel, check_model
+from .contradiction import contradictions, judged
 from .errors_seen import block_errors
 from .extended_table.candidates import candidate_parameters
 from .extended_table.elements import Compliance
@@ -186,6 +187,9 @@ def fit(
         if not untold and wider is used:
             break
         used, identifiable = wider, without_untold(identifiable, untold)
+    size_is_known = bool(known_lengths) or prior is not None
+    contradicted = contradictions(solution, size_is_known, truncation)
+    solution = judged(solution, contradicted)
     structure = structure_of(solution, identifiable)
     blocks = sum(m.blocks for m in measured if m.views)
     parts = splits(measured, folds, chance) if folds and blocks >= 2 * folds else []
@@ -229,6 +233,7 @@ def fit(
             *notes_of_gain(before, validation, kept_aside),
             *notes,
             *note_of_prior(prior, used),
+            *(c.sentence() for c in contradicted),
             *notes_after(solution, identifiable, again),
         ),
     )  # fmt: skip

@@ -66,7 +66,13 @@ class _Reduced:
         return found, sizes
 
 
-def outlying(T: Array, r: Array, starts: NDArray[np.int64], freedom: float) -> NDArray[np.int64]:
+def outlying(
+    T: Array,
+    r: Array,
+    starts: NDArray[np.int64],
+    freedom: float,
+    trusted: NDArray[np.bool_] | None = None,
+) -> NDArray[np.int64]:
     """Measurements that noise of the scale of the others does not explain, the worst first.
 
     The worst measurements by their deleted residuals, against the scale from the median, are taken
@@ -83,6 +89,8 @@ def outlying(T: Array, r: Array, starts: NDArray[np.int64], freedom: float) -> N
         First row of each measurement.
     freedom : float
         Parameters that the measurements determine.
+    trusted : ndarray of bool, shape (B,), optional
+        Measurements that are not judged.
 
     Returns
     -------
@@ -105,9 +113,10 @@ def outlying(T: Array, r: Array, starts: NDArray[np.int64], freedom: float) -> N
     reduced = _Reduced(T, r, starts)
     everything = np.arange(len(starts))
     chance = FALSE_OUTLIERS / max(len(starts), 1)
+    judged = np.ones(len(starts), dtype=bool) if trusted is None else ~trusted
     removed = everything[:0]
     while len(removed) < len(starts) // 2:
-        kept = everything[reduced.kept]
+        kept = everything[reduced.kept & judged]
         square, rows = reduced.squares(kept)
         length = np.sqrt(square)
         told = square > 0.0

@@ -26,7 +26,8 @@ class KnownDistance(Measurement):
     length : float
         Their distance, metres.
     sigma : float
-        Standard deviation of the length, m; default a micrometre.
+        Standard deviation of the length, m; default 0.1 mm, which a calliper or a drilled plate
+        reaches.
     name : str
         In reports.
 
@@ -57,7 +58,7 @@ class KnownDistance(Measurement):
         point: str,
         other: str,
         length: float,
-        sigma: ArrayLike | None = 1e-6,
+        sigma: ArrayLike | None = 1e-4,
         covariance: ArrayLike | None = None,
         name: str = "known distance",
     ) -> None:
