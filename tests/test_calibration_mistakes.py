@@ -12,6 +12,7 @@ from robotmodels.calibration import (
     Position,
     fit,
 )
+from robotmodels.calibration.measurements import Distance
 from robotmodels.datasets import panda_double_socket
 from robotmodels.errors import InvalidValueError
 from robotmodels.geometry import DHTable
@@ -168,3 +169,53 @@ def test_a_real_arm_contradicts_51_for_50():
             known = between(length)
             result = fit(data.model, [touched, known], prior=ParameterPrior(), **ALONE)
             assert len(said_of_distances(result)) == expected, place
+
+
+# --- too few measurements -------------------------------------------------------------------------
+
+
+def measured_by(kind, seed):
+    """A function that gives the first n measurements of a kind of a random arm."""
+    arm = Arm(seed)
+    q = arm.readings(40)
+    T = rm.dgm(arm.real, q)
+    T[:, :3, 3] += 1e-4 * arm.rng.normal(size=(40, 3))
+    if kind == "contact":
+        _, touched = contacts(seed)
+        mixed = touched.subset(np.argsort(np.arange(touched.blocks) % 20, kind="stable"))
+        return arm, lambda n: [mixed.subset(np.arange(n)), between(0.05)]
+    made = {
+        "pose": lambda n: Pose(q[:n], T[:n]),
+        "position": lambda n: Position(q[:n], T[:n, :3, 3]),
+        "distance": lambda n: Distance(q[:n], np.linalg.norm(T[:n, :3, 3] - 1.0, axis=1)),
+    }
+    return arm, made[kind]
+
+
+@pytest.mark.parametrize("prior", [None, ParameterPrior()])
+@pytest.mark.parametrize("seed", [0, 3, 9])
+@pytest.mark.parametrize("kind", ["pose", "position", "distance", "contact"])
+def test_the_number_of_missing_measurements_is_right_at_once(kind, seed, prior):
+    arm, first = measured_by(kind, seed)
+    needed = set()
+    for n in (2, 3, 4):
+        with pytest.raises(InvalidValueError, match=r"at least \d+ more configurations") as caught:
+            fit(arm.nominal, first(n), prior=prior, **ALONE)
+        needed.add(n + int(str(caught.value).split("at least ")[1].split()[0]))
+    (enough,) = needed
+    fit(arm.nominal, first(enough), prior=prior, **ALONE)
+    with pytest.raises(InvalidValueError, match="at least 1 more"):
+        fit(arm.nominal, first(enough - 1), prior=prior, **ALONE)
+
+
+def test_a_joint_that_stays_still_is_not_counted_as_missing():
+    arm = Arm(0)
+    q = arm.readings(40)
+    q[:, 2] = 0.3
+    p = arm.positions(q)
+    with pytest.raises(InvalidValueError, match="at least") as caught:
+        fit(arm.nominal, Position(q[:3], p[:3]), **ALONE)
+    enough = 3 + int(str(caught.value).split("at least ")[1].split()[0])
+    fit(arm.nominal, Position(q[:enough], p[:enough]), **ALONE)
+    with pytest.raises(InvalidValueError, match="at least 1 more"):
+        fit(arm.nominal, Position(q[: enough - 1], p[: enough - 1]), **ALONE)

@@ -12,6 +12,7 @@ from ..errors import InvalidValueError
 from ..estimation import Loss
 from ..model import RobotModel, check_model
 from .contradiction import contradictions, judged
+from .enough import check_enough
 from .errors_seen import block_errors
 from .extended_table.candidates import candidate_parameters
 from .extended_table.elements import Compliance
@@ -25,7 +26,7 @@ from .identifiability.identifiable import (
 )
 from .measurements import Measurement
 from .next_term import note_of_structure, trials_of
-from .notes import check_enough, notes_after, notes_before, notes_of_gain
+from .notes import notes_after, notes_before, notes_of_gain
 from .placing import placed_robot
 from .prior import ParameterPrior, estimated_with, note_of_prior, settled_prior, widened
 from .problem import as_measurements, guessed_fixtures, measured_frames, problem_of
@@ -171,7 +172,7 @@ def fit(
     identifiable = identifiable_on(
         candidates, measured, known_lengths, known, dependent=_TOLD_APART
     )
-    check_enough(problem_of(identifiable.kept, measured))
+    check_enough(identifiable, measured, known_lengths, known, _TOLD_APART)
     prior_of, used = None, prior
     for _ in range(_TRIES):
         if used is not None:

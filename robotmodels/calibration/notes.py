@@ -109,36 +109,6 @@ def notes_before(problem: Problem) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def check_enough(problem: Problem) -> None:
-    """Refuse fewer rows than unknowns.
-
-    Parameters
-    ----------
-    problem : Problem
-        Parameters that are to be estimated, and measurements.
-
-    Raises
-    ------
-    InvalidValueError
-        How many more measurements are needed.
-    """
-    unknowns = problem.P + problem.F
-    if not problem.P:
-        raise InvalidValueError(
-            "These measurements tell none of the parameters. See identifiable_parameters, and "
-            "measure with all joints spread over their ranges."
-        )
-    if problem.rows > unknowns:
-        return
-    rows = max(len(m.axes) for m in problem.measurements)
-    missing = -(-(unknowns + 1 - problem.rows) // rows)
-    raise InvalidValueError(
-        f"{problem.rows} rows cannot tell {problem.P} parameters and {problem.F} unknown "
-        f"coordinates of fixtures: measure at least {missing} more configurations (better three "
-        "times as many rows as unknowns), or name fewer parameters."
-    )
-
-
 def notes_after(
     solution: Solution, before: IdentifiableParameters, again: IdentifiableParameters
 ) -> tuple[str, ...]:

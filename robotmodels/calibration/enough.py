@@ -1,0 +1,101 @@
+"""Whether there are more rows than unknowns, and how many measurements are missing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from .._arrays import Array
+from ..errors import InvalidValueError
+from ..kinematics.lengths import spread_configurations
+from .identifiability.identifiable import DEPENDENT, IdentifiableParameters, identifiable_on
+from .measurements import Measurement
+from .problem import guessed_fixtures, problem_of
+
+_SEED = 17
+_ROWS = 4
+"""Rows for each unknown that tell what more measurements of the same kinds would tell."""
+_STILL = 0.02
+"""Range of the readings of a joint below which it is not meant to move, rad or m."""
+
+
+def check_enough(
+    found: IdentifiableParameters,
+    measured: Sequence[Measurement],
+    known_lengths: Iterable[str] = (),
+    known: Iterable[str] = (),
+    dependent: float = DEPENDENT,
+) -> None:
+    """Refuse fewer rows than unknowns.
+
+    Few rows tell few parameters, so that one row always seems to be missing. The unknowns are
+    counted as measurements of the same kinds in many more postures would tell them.
+
+    Parameters
+    ----------
+    found : IdentifiableParameters
+        What the measurements tell.
+    measured : sequence of Measurement
+        The measurements.
+    known_lengths, known : iterable of str
+        Parameters that stay as they are.
+    dependent : float
+        As `identifiable_on`.
+
+    Raises
+    ------
+    InvalidValueError
+        How many more measurements are needed.
+    """
+    problem = problem_of(found.kept, measured)
+    if problem.P and problem.rows > problem.P + problem.F:
+        return
+    P, F = _told_by_more(found, measured, known_lengths, known, dependent), problem.F
+    if not P:
+        raise InvalidValueError(
+            "These measurements tell none of the parameters. See identifiable_parameters, and "
+            "measure with all joints spread over their ranges."
+        )
+    rows = max(len(m.axes) for m in measured if m.views)
+    missing = max(1, -(-(P + F + 1 - problem.rows) // rows))
+    raise InvalidValueError(
+        f"{problem.rows} rows cannot tell {P} parameters and {F} unknown coordinates of fixtures: "
+        f"measure at least {missing} more configurations (better three times as many rows as "
+        "unknowns), or name fewer parameters."
+    )
+
+
+def _told_by_more(
+    found: IdentifiableParameters, measured: Sequence[Measurement], known_lengths: Iterable[str],
+    known: Iterable[str], dependent: float,
+) -> int:  # fmt: skip
+    """Number of parameters that the same kinds of measurement tell in many postures."""
+    candidates = found.candidates
+    rng = np.random.default_rng(_SEED)
+    seen = [view.q for m in measured for view in m.views]
+    if not seen:
+        return found.count
+    readings = np.concatenate(seen)
+    still = (np.ptp(readings, axis=0) < _STILL) & (len(np.unique(readings, axis=0)) > 1)
+    whole = problem_of(candidates, measured)
+    wanted = _ROWS * (whole.P + whole.F)
+    more = []
+    for m in measured:
+        if not m.views:
+            more.append(m)
+            continue
+        times = -(-wanted // (m.blocks * len(m.axes)))
+        larger = m.subset(np.tile(np.arange(m.blocks), times))
+        drawn: dict[int, Array] = {}
+        for view in larger.views:
+            q = spread_configurations(candidates.model, larger.blocks, rng)
+            q[:, still] = readings[0, still]
+            drawn.setdefault(id(view.q), q)
+        more.append(larger.with_configurations([drawn[id(view.q)] for view in larger.views]))
+    zero = np.zeros(whole.P)
+    kept = identifiable_on(
+        candidates, more, known_lengths, known, fixtures=guessed_fixtures(whole, zero),
+        dependent=dependent,
+    )  # fmt: skip
+    return max(kept.count, found.count)
