@@ -11,8 +11,9 @@ from robotmodels.calibration import (
     Pose,
     Position,
     fit,
+    read_measurements,
 )
-from robotmodels.calibration.measurements import Distance
+from robotmodels.calibration.measurements import CameraPose, Distance, RelativePose
 from robotmodels.datasets import panda_double_socket
 from robotmodels.errors import InvalidValueError
 from robotmodels.geometry import DHTable
@@ -219,3 +220,155 @@ def test_a_joint_that_stays_still_is_not_counted_as_missing():
     fit(arm.nominal, Position(q[:enough], p[:enough]), **ALONE)
     with pytest.raises(InvalidValueError, match="at least 1 more"):
         fit(arm.nominal, Position(q[: enough - 1], p[: enough - 1]), **ALONE)
+
+
+# --- units ----------------------------------------------------------------------------------------
+
+FACTORS = [
+    (1000.0, "these look like millimetres"), (100.0, "these look like centimetres"),
+    (1 / 0.0254, "these look like inches"), (25.4, "look like millimetres taken for inches"),
+    (10.0, "look like millimetres taken for centimetres"),
+    (0.1, "look like centimetres taken for millimetres"),
+    (1 / 25.4, "look like inches taken for millimetres"),
+    (1e-3, "look like metres taken for millimetres"),
+]  # fmt: skip
+
+
+def seen_by(kind, arm, q, factor):
+    """Measurements of a kind with their lengths in another unit."""
+    T = rm.dgm(arm.real, q)
+    scaled = T.copy()
+    scaled[:, :3, 3] *= factor
+    if kind == "position":
+        return Position(q, scaled[:, :3, 3])
+    if kind == "pose":
+        return Pose(q, scaled)
+    if kind == "pivot":
+        return Distance(q, factor * np.linalg.norm(T[:, :3, 3] - [0.5, 0.2, 1.0], axis=1))
+    if kind == "pair":
+        apart = T[:, :3, 3] - np.roll(T[:, :3, 3], 1, axis=0)
+        return Distance(q, factor * np.linalg.norm(apart, axis=1), np.roll(q, 1, axis=0))
+    seen = rm.se3.inverse(T) @ rm.se3.translation(1.0, 0.5, 0.2)
+    if kind == "relative":
+        seen = rm.se3.inverse(T) @ np.roll(T, 1, axis=0)
+    seen[:, :3, 3] *= factor
+    return CameraPose(q, seen) if kind == "camera" else RelativePose(q, np.roll(q, 1, 0), seen)
+
+
+KINDS = ["position", "pose", "pivot", "pair", "camera", "relative"]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(("factor", "sentence"), FACTORS)
+def test_the_unit_of_lengths_is_named(kind, factor, sentence):
+    for seed in range(6):
+        arm = Arm(seed)
+        measured = seen_by(kind, arm, arm.readings(25), factor)
+        with pytest.raises(InvalidValueError, match=sentence) as caught:
+            fit(arm.nominal, measured, **ALONE)
+        assert f"multiply by {1.0 / factor:.4g}" in str(caught.value)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_right_lengths_are_never_blamed_on_units(kind):
+    for seed in range(12):
+        arm = Arm(seed)
+        q = arm.readings(40)
+        fit(arm.nominal, seen_by(kind, arm, q, 1.0), **ALONE)
+        # nor is a scale that is wrong by another factor
+        result = fit(arm.nominal, seen_by(kind, arm, q, 1.5), **ALONE)
+        assert not any("look like" in note for note in result.notes)
+
+
+@pytest.mark.parametrize("prior", [None, ParameterPrior()])
+@pytest.mark.parametrize(("factor", "sentence"), FACTORS[:3] + FACTORS[4:6])
+def test_the_unit_of_a_known_distance_is_named(factor, sentence, prior):
+    for seed in (0, 3, 9):
+        arm, touched = contacts(seed)
+        with pytest.raises(InvalidValueError, match=r"point:0 to point:1") as caught:
+            fit(arm.nominal, [touched, between(0.05 * factor)], prior=prior, **ALONE)
+        assert sentence in str(caught.value)
+        assert "Pass metres: 0.05" in str(caught.value)
+
+
+@pytest.mark.parametrize("robot", ["panda_1", "panda_2"])
+def test_the_unit_of_a_known_distance_of_a_real_arm_is_named(robot):
+    data = panda_double_socket(robot)
+    for one, other in data.places.values():
+        touched = PointContact(np.concatenate([one, other]), [0] * len(one) + [1] * len(other))
+        for factor, unit in ((1000.0, "millimetres"), (100.0, "centimetres")):
+            with pytest.raises(InvalidValueError, match=f"look like {unit}. The nominal"):
+                fit(data.model, [touched, between(factor * data.distance)], **ALONE)
+
+
+@pytest.mark.parametrize(
+    ("factor", "lengths", "advice"),
+    [
+        (1e3, "m", "millimetres. Say lengths='mm'"), (1.0, "mm", "metres. Say lengths='m'"),
+        (1e2, "m", "centimetres. Convert"), (1e2, "mm", "centimetres. Convert"),
+        (1 / 0.0254, "mm", "inches. Convert"), (1e4, "m", None),
+        (1e3, "mm", None), (1.0, "m", None),
+    ],
+)  # fmt: skip
+def test_the_unit_of_a_file_is_named(tmp_path, factor, lengths, advice):
+    arm = Arm(1)
+    q = arm.readings(20)
+    rows = np.hstack([q, factor * arm.positions(q)])
+    file = tmp_path / "tracker.csv"
+    np.savetxt(file, rows, delimiter=",", header="q1,q2,q3,q4,q5,q6,x,y,z", comments="")
+    if advice is None and factor < 1e4:
+        assert read_measurements(file, "position", arm.nominal, lengths=lengths).blocks == 20
+        return
+    with pytest.raises(InvalidValueError, match=f"look like {advice or 'millimetres'}"):
+        read_measurements(file, "position", arm.nominal, lengths=lengths)
+
+
+# --- limits of joints -----------------------------------------------------------------------------
+
+
+def limited(arm, lower, upper):
+    table = arm.nominal.table
+    return arm.nominal.with_table(table.replace(lower=lower, upper=upper))
+
+
+LOWER, UPPER = np.array([-2, -2, -3, -3, -2, -0.1]), np.array([2, 2, 3, -0.1, 2, 3])
+"""Limits of two joints that are on one side of zero, as those of many arms."""
+
+
+def within_limits(arm, count=40):
+    return arm.rng.uniform(LOWER, UPPER, (count, 6))
+
+
+@pytest.mark.parametrize("mistake", ["order", "sign", "degrees"])
+def test_columns_beyond_the_limits_are_refused_before_any_fit(mistake):
+    arm = Arm(0)
+    q = within_limits(arm)
+    p = arm.positions(q)
+    model = limited(arm, LOWER, UPPER)
+    fit(model, Position(q, p), **ALONE)
+    wrong = {
+        "order": q[:, [0, 1, 2, 5, 4, 3]], "sign": q * [1, 1, 1, -1, 1, 1],
+        "degrees": np.rad2deg(0.1 * q),
+    }[mistake]  # fmt: skip
+    with pytest.raises(InvalidValueError, match="beyond the limits of the joints") as caught:
+        fit(model, Position(wrong, p), progress=lambda *_: pytest.fail("a fit"), **ALONE)
+    assert "joint 4" in str(caught.value)
+    assert "order of the joints, with the signs and zeros" in str(caught.value)
+
+
+def test_a_few_readings_beyond_the_limits_are_a_note():
+    arm = Arm(0)
+    q = within_limits(arm)
+    q[3, 1] = UPPER[1] + 0.3
+    model = limited(arm, LOWER, UPPER)
+    result = fit(model, Position(q, arm.positions(q)), **ALONE)
+    (note,) = (note for note in result.notes if "beyond the limits" in note)
+    assert "joint 2" in note
+    assert "1 of 40 readings, by up to 0.3 rad" in note
+    assert note in result.report().replace("\n", " ") or "beyond the limits" in result.report()
+    # a zero that is off by a degree is no news, and without limits there is nothing to say
+    q[3, 1] = UPPER[1] + 0.017
+    p = arm.positions(q)
+    assert not any("beyond" in n for n in fit(model, Position(q, p), **ALONE).notes)
+    q[:, 1] += 10.0
+    assert not any("beyond" in n for n in fit(arm.nominal, Position(q, p), **ALONE).notes)

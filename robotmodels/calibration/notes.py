@@ -5,21 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from .._arrays import Array
-from ..errors import InvalidValueError
 from ..estimation import FitStatus
 from ..geometry import REVOLUTE
-from ..kinematics import dgm
-from ..kinematics.lengths import characteristic_length
 from .errors_seen import BlockErrors
 from .extended_table.elements import ErrorLaw
 from .folds import AsideErrors
 from .identifiability.identifiable import IdentifiableParameters
-from .measurements import Distance, Pose, Position, lonely_labels
+from .measurements import Pose, Position, lonely_labels
 from .problem import Problem, measured_frames
+from .reading_limits import check_readings
 from .solve import Solution
+from .unit_slips import check_units
 
-_TURNS = 30.0
-"""Reading of a revolute joint beyond which degrees are more likely, rad."""
 _HARDLY = 0.02
 """Standard deviation of a joint's readings below which it hardly moves, rad or m."""
 _FAR = 50.0
@@ -50,41 +47,19 @@ def notes_before(problem: Problem) -> tuple[str, ...]:
     Raises
     ------
     InvalidValueError
-        Readings in degrees, positions in millimetres.
+        Readings in degrees or beyond the limits of the joints, lengths in other units.
     """
     model = problem.parameters.model
     revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
-    notes = []
-    length = characteristic_length(model)
+    moving = {
+        row
+        for f in measured_frames(problem.measurements)
+        for row in problem.parameters.skeleton.path(f)
+    }
+    notes = check_readings(model, problem.measurements, moving)
+    check_units(model, problem.measurements)
     for k, m in enumerate(problem.measurements):
         where = f"measurements[{k}] ({m.name})"
-        for view in m.views:
-            largest = float(np.abs(view.q[:, revolute]).max(initial=0.0))
-            if largest > _TURNS:
-                raise InvalidValueError(
-                    f"{where}: a revolute joint reads {largest:.4g} rad; these look like degrees. "
-                    "Pass radians: np.deg2rad(q)."
-                )
-        if isinstance(m, Pose | Position):
-            p = m.T[:, :3, 3] if isinstance(m, Pose) else m.p
-            spread = float(np.linalg.norm(np.ptp(p, axis=0)))
-            said = float(np.linalg.norm(np.ptp(dgm(model, m.q, m.frame)[..., :3, 3], axis=0)))
-            if 0.0 < spread < said / 200.0:
-                raise InvalidValueError(
-                    f"{where}: positions are spread over {spread:.3g} m, but those of the robot "
-                    f"over {said:.3g} m; these look like kilometres, or the same position all the "
-                    "time. Pass metres."
-                )
-            if spread > 50.0 * length:
-                raise InvalidValueError(
-                    f"{where}: positions are spread over {spread:.4g} m, but the robot reaches "
-                    f"{length:.3g} m; these look like millimetres. Pass metres: 1e-3 * p."
-                )
-        if isinstance(m, Distance) and float(np.median(m.length)) > 50.0 * length:
-            raise InvalidValueError(
-                f"{where}: lengths are about {float(np.median(m.length)):.4g} m, but the robot "
-                f"reaches {length:.3g} m; these look like millimetres. Pass metres: 1e-3 * length."
-            )
         twice = _duplicates(problem, k)
         if twice:
             notes.append(
@@ -95,11 +70,7 @@ def notes_before(problem: Problem) -> tuple[str, ...]:
     notes += [str(lonely) for lonely in lonely_labels(problem.measurements)]
     for j, reading in enumerate(_all_readings(problem).T):
         row = model.table.joint_rows[j] + 1
-        seen = any(
-            row in problem.parameters.skeleton.path(f)
-            for f in measured_frames(problem.measurements)
-        )
-        if seen and len(reading) and float(np.std(reading)) < _HARDLY:
+        if row in moving and len(reading) and float(np.std(reading)) < _HARDLY:
             unit = "rad" if revolute[j] else "m"
             notes.append(
                 f"Joint {j + 1} ({model.table.joint_names[j]}) moves by {np.ptp(reading):.2g} "

@@ -15,13 +15,13 @@ from ..csv_table import Column, CsvTable, open_table, stacked_columns
 from ..errors import InvalidValueError
 from ..file_units import AngleUnit, LengthUnit, as_file_unit
 from ..geometry import REVOLUTE
-from ..kinematics import OrientationKind, pose_from_coordinates
+from ..kinematics import OrientationKind, dgm, pose_from_coordinates
 from ..kinematics.coordinates.kinds import orientation_kind
-from ..kinematics.lengths import characteristic_length
 from ..model import RobotModel, check_model
 from .extended_table.skeleton import Frame
 from .file_kinds import CONTACTS, FileKind, as_file_kind
 from .measurements import Distance, Measurement, Pose, Position, RelativePose
+from .unit_slips import slip_of_positions, slip_of_spread
 
 _POSITION_NAMES = ("x", "y", "z")
 _QUATERNION_NAMES = ("qw", "qx", "qy", "qz")
@@ -29,7 +29,6 @@ _DIGITS = 1e-3
 """How far from 1 the length of a quaternion of few digits may be."""
 _TURNS = 30.0
 _TURN = 2.0 * np.pi
-_SPREAD = 50.0
 
 
 def read_measurements(
@@ -343,17 +342,13 @@ def _check_turns(values: Array, unit: AngleUnit, file: Path, argument: str) -> N
 def _check_lengths(
     p: Array, q: Array, model: RobotModel, unit: LengthUnit, file: Path, frame: Frame
 ) -> None:
-    reach = characteristic_length(model, frame)
     # squares of what is farther apart than this are no numbers
-    spread = float(np.linalg.norm(np.ptp(np.clip(p, -1e150, 1e150), axis=0)))
-    if unit is LengthUnit.METRE and spread > _SPREAD * reach:
-        raise InvalidValueError(
-            f"{file}: positions are spread over {spread:.4g} m, but the robot reaches "
-            f"{reach:.3g} m; these look like millimetres. Say lengths='mm'."
-        )
-    moved = float(np.ptp(np.clip(q, -1e150, 1e150), axis=0).max(initial=0.0))
-    if unit is LengthUnit.MILLIMETRE and moved > 0.5 and spread < 0.005 * reach:
-        raise InvalidValueError(
-            f"{file}: positions are spread over {1e3 * spread:.3g} mm only, although the joints "
-            f"move by {moved:.2g}; these look like metres. Say lengths='m'."
-        )
+    nominal, p = dgm(model, np.clip(q, -1e3, 1e3), frame)[:, :3, 3], np.clip(p, -1e150, 1e150)
+    spread = float(np.linalg.norm(np.ptp(p, axis=0)))
+    slip = slip_of_positions(nominal, p) or slip_of_spread(model, frame, spread)
+    if slip is None:
+        return
+    stated = "metres" if unit is LengthUnit.METRE else "millimetres"
+    symbol = {"metres": "m", "millimetres": "mm"}.get(slip.unit)
+    advice = f"Say lengths={symbol!r}." if symbol and slip.taken == stated else "Convert them."
+    raise InvalidValueError(f"{file}: positions are {slip.sentence(stated)}. {advice}")

@@ -1,0 +1,86 @@
+"""Readings of joints beyond what they can be: degrees, another order, sign or zero."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..errors import InvalidValueError
+from ..geometry import REVOLUTE
+from ..model import RobotModel
+from .measurements import Measurement
+
+_TURNS = 30.0
+"""Reading of a revolute joint beyond which degrees are more likely, rad."""
+_BEYOND, _PART = 0.02, 0.02
+"""What a reading may be beyond a limit, rad or m, or part of the range if that is more."""
+_MOST = 0.75
+"""Part of the readings of a joint beyond its limits that no zero or wear explains."""
+
+
+def check_readings(
+    model: RobotModel, measurements: Sequence[Measurement], rows: set[int]
+) -> list[str]:
+    """Compare readings with the limits of the joints.
+
+    Joints most of whose readings are beyond their limits are refused; of single readings a note
+    is taken. Joints without limits, and those that move no measured end, are not looked at.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot.
+    measurements : sequence of Measurement
+        With readings.
+    rows : set of int
+        Rows of the table, from 1, that move the measured ends.
+
+    Returns
+    -------
+    list of str
+        Notes.
+
+    Raises
+    ------
+    InvalidValueError
+        Readings in degrees, or of other joints than they are taken for.
+    """
+    notes = []
+    revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
+    lower, upper = model.lower, model.upper
+    room = np.maximum(_BEYOND, _PART * np.where(np.isfinite(upper - lower), upper - lower, 0.0))
+    checked = (upper > lower) & [row + 1 in rows for row in model.table.joint_rows]
+    for k, m in enumerate(measurements):
+        where = f"measurements[{k}] ({m.name})"
+        if not m.views:
+            continue
+        q = np.concatenate([view.q for view in m.views])
+        largest = float(np.abs(q[:, revolute]).max(initial=0.0))
+        if largest > _TURNS:
+            raise InvalidValueError(
+                f"{where}: a revolute joint reads {largest:.4g} rad; these look like degrees. "
+                "Pass radians: np.deg2rad(q)."
+            )
+        over = np.where(checked, np.maximum(lower - q, q - upper) - room, -np.inf)
+        number = (over > 0.0).sum(axis=0)
+        if not number.any():
+            continue
+        said = [
+            f"joint {j + 1} ({model.table.joint_names[j]}) in {number[j]} of {len(q)} readings, by "
+            f"up to {over[:, j].max() + room[j]:.3g} {'rad' if revolute[j] else 'm'} (reads "
+            f"{q[:, j].min():.4g} to {q[:, j].max():.4g}, limits {lower[j]:.4g} to {upper[j]:.4g})"
+            for j in np.flatnonzero(number)
+        ]
+        if (number > _MOST * len(q)).any():
+            raise InvalidValueError(
+                f"{where}: readings beyond the limits of the joints: {'; '.join(said)}. See "
+                "whether the columns are readings in the order of the joints, with the signs and "
+                "zeros of the model, in rad and m. If the limits of the model are wrong, give it "
+                "others: model.with_table(model.table.replace(lower=..., upper=...))."
+            )
+        notes.append(
+            f"{where}: readings beyond the limits of the joints: {'; '.join(said)}. See whether "
+            "sign, zero and unit of these readings are those of the model."
+        )
+    return notes
