@@ -1,5 +1,7 @@
 """Mistakes about measurements: each gets the sentence that names it, and nothing else does."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -14,8 +16,9 @@ from robotmodels.calibration import (
     read_measurements,
 )
 from robotmodels.calibration.measurements import CameraPose, Distance, RelativePose
+from robotmodels.cli import main
 from robotmodels.datasets import panda_double_socket
-from robotmodels.errors import InvalidValueError
+from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.geometry import DHTable
 
 ALONE = {"folds": 0, "held_out": 0}
@@ -372,3 +375,110 @@ def test_a_few_readings_beyond_the_limits_are_a_note():
     assert not any("beyond" in n for n in fit(model, Position(q, p), **ALONE).notes)
     q[:, 1] += 10.0
     assert not any("beyond" in n for n in fit(arm.nominal, Position(q, p), **ALONE).notes)
+
+
+# --- files ----------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def socket(tmp_path_factory):
+    """A folder with readings of two sockets beside poses that a controller believed in."""
+    data = panda_double_socket()
+    folder = tmp_path_factory.mktemp("data") / "front"
+    folder.mkdir()
+    for hole, q in enumerate(data.places["front"]):
+        np.savetxt(folder / f"hole_{hole}.csv", q, delimiter=",")
+        T = rm.dgm(data.model, q)
+        kind = rm.kinematics.OrientationKind.QUATERNION
+        poses = rm.operational_coordinates(T, kind)
+        np.savetxt(folder / f"hole_{hole}_pose.csv", poses, delimiter=",")
+    return data, folder
+
+
+@pytest.mark.parametrize("limits", [True, False])
+def test_a_folder_that_also_holds_poses_is_not_read_as_readings(socket, limits):
+    data, folder = socket
+    model = data.model
+    if not limits:
+        far = np.full(model.n, np.inf)
+        model = model.with_table(model.table.replace(lower=-far, upper=far))
+    with pytest.raises(InvalidValueError, match="do not look like readings") as caught:
+        read_measurements(folder, "point_contact", model)
+    for said in ("hole_0.csv, hole_0_pose.csv", "hole_1_pose.csv (", "pattern=..."):
+        assert said in str(caught.value)
+    assert "hole_1.csv (" not in str(caught.value)
+    found = read_measurements(folder, "point_contact", model, pattern="hole_?.csv")
+    assert found.labels == ("hole_0", "hole_1")
+
+
+@pytest.mark.parametrize("header", [True, False])
+def test_files_of_a_folder_have_the_same_columns(tmp_path, header):
+    arm = Arm(0)
+    q = arm.readings(5)
+    names = "q1,q2,q3,q4,q5,q6" if header else ""
+    more = names and f"{names},x,y,z,u,v,w"
+    for file, rows, head in (("a", q, names), ("b", q, names), ("c", np.hstack([q, q]), more)):
+        np.savetxt(tmp_path / f"{file}.csv", rows, delimiter=",", header=head, comments="")
+    with pytest.raises(InvalidValueError, match="do not have the same columns") as caught:
+        read_measurements(tmp_path, "point_contact", arm.nominal)
+    assert "a.csv, b.csv: " in str(caught.value)
+    assert "; c.csv: " in str(caught.value)
+    assert (
+        read_measurements(tmp_path, "point_contact", arm.nominal, pattern="[ab].csv").blocks == 10
+    )
+
+
+def test_the_files_read_are_listed(socket):
+    data, folder = socket
+    found = read_measurements(folder, "point_contact", data.model, pattern="hole_?.csv")
+    listed = "front/hole_0.csv (30 rows), front/hole_1.csv (32 rows)"
+    assert ", ".join(str(file) for file in found.files) == listed
+    known = KnownDistance("front:hole_0", "front:hole_1", data.distance)
+    result = fit(data.model, [found, known], prior=ParameterPrior(), **ALONE)
+    assert f"Read for front: {listed}." in result.report()
+    assert f"Read for front: {listed}." in pickle.loads(pickle.dumps(result)).report()
+    touched = PointContact(found.q, found.label, name="front")
+    by_hand = fit(data.model, [touched, known], prior=ParameterPrior(), **ALONE)
+    assert "Read for" not in by_hand.report()
+    assert np.array_equal(by_hand.values, result.values)
+
+
+def test_the_command_line_lists_the_files(socket, tmp_path, capsys):
+    data, folder = socket
+    urdf = tmp_path / "panda.urdf"
+    urdf.write_text(data.urdf)
+    words = [
+        "calibrate", "--robot", str(urdf), "--tip-link", "panda_link8", "--measurements",
+        str(folder), "--pattern", "hole_?.csv", "--kind", "point-contact", "--known-distance",
+        "hole_0", "hole_1", "0.05", "--prior", "1e-3 5e-3", "--folds", "0", "--held-out", "0",
+        "--test", str(folder / "hole_0.csv"),
+    ]  # fmt: skip
+    assert main(words) == 0
+    out = " ".join(capsys.readouterr().out.split())
+    assert "Read for front: front/hole_0.csv (30 rows), front/hole_1.csv (32 rows)." in out
+    assert "Read for test: front/hole_0.csv (30 rows)." in out
+    assert main([*words, "--out", str(tmp_path / "out")]) == 0
+    out = " ".join(capsys.readouterr().out.split())
+    assert "Read for front: front/hole_0.csv (30 rows), front/hole_1.csv (32 rows)." in out
+
+
+def test_joints_beside_the_chain_are_named_where_their_columns_are_missing(tmp_path):
+    arm = Arm(0)
+    q = arm.readings(5)
+    finger = {"sigma": 1, "alpha": 0.0, "d": 0.0, "theta": 0.0, "r": 0.1}
+    table = arm.nominal.table
+    rows = [
+        {name: getattr(table, name)[j] for name in ("sigma", "alpha", "d", "theta", "r")}
+        for j in range(6)
+    ]
+    hand = rm.RobotModel.from_table(DHTable.from_rows([*rows, finger]), tip=6)
+    file = tmp_path / "hole.csv"
+    np.savetxt(file, q, delimiter=",")
+    sentence = "All 7 joints of the model count: .*tip_link"
+    with pytest.raises(InvalidValueError, match=sentence) as caught:
+        read_measurements(file, "point_contact", hand)
+    assert f"{hand.table.joint_names[-1]} do not move the tool" in str(caught.value)
+    with pytest.raises(InvalidValueError, match=sentence):
+        read_measurements(file, "point_contact", hand, joints=range(6))
+    with pytest.raises(ShapeError, match=sentence):
+        fit(hand, PointContact(q), **ALONE)

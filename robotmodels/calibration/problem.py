@@ -12,6 +12,7 @@ from .._arrays import Array, Rebuilt
 from ..errors import InvalidValueError, ShapeError
 from .extended_table.differential import differential_model
 from .extended_table.parameters import GeometricParameters
+from .joints_asked import joints_that_count
 from .measurements import Evaluation, Fixture, Linearised, Measurement
 from .measurements.noise import whitened
 
@@ -123,7 +124,7 @@ def problem_of(
             if view.q.shape[1] != n:
                 raise ShapeError(
                     f"measurements[{k}] ({m.name}): expected readings of {n} joints, shape "
-                    f"(N, {n}), got {view.q.shape}."
+                    f"(N, {n}), got {view.q.shape}.{joints_that_count(parameters.model)}"
                 )
         for fixture in m.fixtures:
             if fixtures.setdefault(fixture.name, fixture).unit != fixture.unit:

@@ -20,6 +20,8 @@ from ..kinematics.coordinates.kinds import orientation_kind
 from ..model import RobotModel, check_model
 from .extended_table.skeleton import Frame
 from .file_kinds import CONTACTS, FileKind, as_file_kind
+from .files_read import check_columns, check_contents, files_read
+from .joints_asked import joints_that_count
 from .measurements import Distance, Measurement, Pose, Position, RelativePose
 from .unit_slips import slip_of_positions, slip_of_spread
 
@@ -104,13 +106,13 @@ def read_measurements(
     Returns
     -------
     Measurement
-        Metres and radians.
+        Metres and radians; ``files`` lists what was read.
 
     Raises
     ------
     InvalidValueError
         Columns that are not there; a cell that is empty or no finite number, with its line; units
-        that cannot be right.
+        that cannot be right; files of a folder that do not hold the same.
     OSError
         A file cannot be opened.
 
@@ -140,40 +142,52 @@ def read_measurements(
     written = None if orientation is None else orientation_kind(orientation)
     needs = _needed(kind, written, columns)
 
+    if folder is not None:
+        check_columns(tables)
+    counts: list[int] = []
+
     def readings(given: Sequence[Column] | None, what: str) -> Array:
         found = [_joint_columns(t, model, given, what, alone=not needs) for t in tables]
-        q = stacked_columns(tables, found).copy()
+        parts = [t.numbers(c) for t, c in zip(tables, found, strict=True)]
+        counts[:] = [len(part) for part in parts]
+        q = np.concatenate(parts)
         revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
         _check_turns(q[:, revolute], turn, files[0], "joint_angles" if joint_angles else "angles")
         return q * np.where(revolute, turn.factor, length.factor)
 
     q = readings(joints, "joints")
+    if len(tables) > 1:
+        check_contents(tables, np.split(q, np.cumsum(counts)[:-1]), model, frame)
     found = [_measured_columns(t, needs, columns) for t in tables]
     values = stacked_columns(tables, found) if needs else np.zeros((len(q), 0))
     more: dict[str, Any] = {"sigma": sigma, "frame": frame}
     called = name or (folder.resolve().name if folder is not None else None)
     if called is not None:
         more["name"] = called
-    if kind is FileKind.POSITION:
-        p = length.factor * values
-        _check_lengths(p, q, model, length, files[0], frame)
-        return Position(q, p, (1, 1, 1) if rows is None else rows, **more)
-    if written is not None and kind.has_orientation:
-        T = _poses(kind, written, values, length, angle, files[0])
-        if kind is FileKind.RELATIVE_POSE:
-            other = readings(other_joints, "other_joints")
-            return RelativePose(q, other, T, (1,) * 6 if rows is None else rows, **more)
-        if kind is FileKind.ORIENTATION:
-            more.setdefault("name", "orientation")
-            return Pose(q, T, (0, 0, 0, 1, 1, 1) if rows is None else rows, **more)
-        _check_lengths(T[:, :3, 3], q, model, length, files[0], frame)
-        return Pose(q, T, (1,) * 6 if rows is None else rows, **more)
-    if kind is FileKind.DISTANCE:
-        measured = length.factor * values[:, 0]
-        if other_joints is not None:
-            return Distance(q, measured, readings(other_joints, "other_joints"), **more)
-        return Distance(q, measured, pivot=_labels(tables, label, q), **more)
-    return CONTACTS[kind](q, _labels(tables, label, q), **more)
+
+    def measurement() -> Measurement:
+        if kind is FileKind.POSITION:
+            p = length.factor * values
+            _check_lengths(p, q, model, length, files[0], frame)
+            return Position(q, p, (1, 1, 1) if rows is None else rows, **more)
+        if written is not None and kind.has_orientation:
+            T = _poses(kind, written, values, length, angle, files[0])
+            if kind is FileKind.RELATIVE_POSE:
+                other = readings(other_joints, "other_joints")
+                return RelativePose(q, other, T, (1,) * 6 if rows is None else rows, **more)
+            if kind is FileKind.ORIENTATION:
+                more.setdefault("name", "orientation")
+                return Pose(q, T, (0, 0, 0, 1, 1, 1) if rows is None else rows, **more)
+            _check_lengths(T[:, :3, 3], q, model, length, files[0], frame)
+            return Pose(q, T, (1,) * 6 if rows is None else rows, **more)
+        if kind is FileKind.DISTANCE:
+            measured = length.factor * values[:, 0]
+            if other_joints is not None:
+                return Distance(q, measured, readings(other_joints, "other_joints"), **more)
+            return Distance(q, measured, pivot=_labels(tables, label, q), **more)
+        return CONTACTS[kind](q, _labels(tables, label, q), **more)
+
+    return measurement().of_files(files_read(tables, counts))
 
 
 def _check_arguments(
@@ -244,10 +258,12 @@ def _joint_columns(
         if isinstance(given, str) or len(given) != n:
             raise InvalidValueError(
                 f"{what}: expected a column for each of the {n} joints, got {given!r:.80}."
+                f"{joints_that_count(model)}"
             )
         return tuple(table.number(column, what) for column in given)
     names = model.table.joint_names
     advice = f"Give them as {what}=[...], a name or number (from 0) for each of the {n} joints."
+    advice += joints_that_count(model)
     if what == "other_joints":
         raise InvalidValueError(f"other_joints: two ends need two readings. {advice}")
     if table.names:

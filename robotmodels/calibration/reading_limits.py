@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .._arrays import Array
 from ..errors import InvalidValueError
 from ..geometry import REVOLUTE
 from ..model import RobotModel
@@ -48,9 +49,6 @@ def check_readings(
     """
     notes = []
     revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
-    lower, upper = model.lower, model.upper
-    room = np.maximum(_BEYOND, _PART * np.where(np.isfinite(upper - lower), upper - lower, 0.0))
-    checked = (upper > lower) & [row + 1 in rows for row in model.table.joint_rows]
     for k, m in enumerate(measurements):
         where = f"measurements[{k}] ({m.name})"
         if not m.views:
@@ -62,25 +60,52 @@ def check_readings(
                 f"{where}: a revolute joint reads {largest:.4g} rad; these look like degrees. "
                 "Pass radians: np.deg2rad(q)."
             )
-        over = np.where(checked, np.maximum(lower - q, q - upper) - room, -np.inf)
-        number = (over > 0.0).sum(axis=0)
-        if not number.any():
-            continue
-        said = [
-            f"joint {j + 1} ({model.table.joint_names[j]}) in {number[j]} of {len(q)} readings, by "
-            f"up to {over[:, j].max() + room[j]:.3g} {'rad' if revolute[j] else 'm'} (reads "
-            f"{q[:, j].min():.4g} to {q[:, j].max():.4g}, limits {lower[j]:.4g} to {upper[j]:.4g})"
-            for j in np.flatnonzero(number)
-        ]
-        if (number > _MOST * len(q)).any():
+        said, most = beyond_limits(model, q, rows)
+        if most:
             raise InvalidValueError(
                 f"{where}: readings beyond the limits of the joints: {'; '.join(said)}. See "
                 "whether the columns are readings in the order of the joints, with the signs and "
                 "zeros of the model, in rad and m. If the limits of the model are wrong, give it "
                 "others: model.with_table(model.table.replace(lower=..., upper=...))."
             )
-        notes.append(
-            f"{where}: readings beyond the limits of the joints: {'; '.join(said)}. See whether "
-            "sign, zero and unit of these readings are those of the model."
-        )
+        if said:
+            notes.append(
+                f"{where}: readings beyond the limits of the joints: {'; '.join(said)}. See "
+                "whether sign, zero and unit of these readings are those of the model."
+            )
     return notes
+
+
+def beyond_limits(model: RobotModel, q: Array, rows: set[int]) -> tuple[list[str], bool]:
+    """Joints that read more than their limits allow, and whether one does so most of the time.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot.
+    q : ndarray, shape (N, n)
+        Readings, rad or m.
+    rows : set of int
+        Rows of the table, from 1, of the joints that are looked at.
+
+    Returns
+    -------
+    said : list of str
+        For each such joint how many readings, by how much.
+    most : bool
+        Whether a joint is beyond its limits in most readings.
+    """
+    lower, upper = model.lower, model.upper
+    room = np.maximum(_BEYOND, _PART * np.where(np.isfinite(upper - lower), upper - lower, 0.0))
+    checked = (upper > lower) & [row + 1 in rows for row in model.table.joint_rows]
+    over = np.where(checked, np.maximum(lower - q, q - upper) - room, -np.inf)
+    number = (over > 0.0).sum(axis=0)
+    said = []
+    for j in np.flatnonzero(number):
+        unit = "rad" if model.table.sigma[model.table.joint_rows[j]] == REVOLUTE else "m"
+        said.append(
+            f"joint {j + 1} ({model.table.joint_names[j]}) in {number[j]} of {len(q)} readings, by "
+            f"up to {over[:, j].max() + room[j]:.3g} {unit} (reads {q[:, j].min():.4g} to "
+            f"{q[:, j].max():.4g}, limits {lower[j]:.4g} to {upper[j]:.4g})"
+        )
+    return said, bool((number > _MOST * len(q)).any())

@@ -195,7 +195,7 @@ def run(arguments: argparse.Namespace) -> int:
             loss=arguments.loss, prior=prior, folds=arguments.folds, held_out=aside,
             progress=bar and bar.steps,
         )  # fmt: skip
-    hand_over(_report(result), arguments)
+    hand_over(_report(result, aside), arguments)
     return ExitStatus.DONE if result.solution.fit.converged else ExitStatus.NOT_REACHED
 
 
@@ -239,10 +239,12 @@ def read(
     )  # fmt: skip
 
 
-def _report(result: CalibrationResult) -> Report:
+def _report(result: CalibrationResult, aside: Measurement | float) -> Report:
+    from ..calibration.reporting.measured_sections import files_sentence
     from ..calibration.reporting.write import result_data, write_result
 
-    text = result.report()
+    tested = "" if isinstance(aside, float) else f"\n{files_sentence(aside)}\n"
+    text = result.report() + tested
 
     def write(folder: Path) -> list[str]:
         from ..viz import html_report
@@ -254,6 +256,8 @@ def _report(result: CalibrationResult) -> Report:
         return names + with_extra(page, lambda: html_report(result, page))
 
     head = text.split("What was measured", 1)[0]
+    head += "\n".join(files_sentence(m) for m in result.solution.problem.measurements if m.files)
+    head += tested
     return Report(text.rstrip(), head.rstrip(), lambda: result_data(result), write)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields
 from types import MappingProxyType
 from typing import Any
 
@@ -26,9 +25,9 @@ class Labelled(Measurement):
 
     known: Mapping[str, Array]
 
-    def __reduce__(self) -> tuple[Any, ...]:  # a mapping proxy does not pickle
-        values = (getattr(self, f.name) for f in fields(self) if f.init)  # type: ignore[arg-type]
-        return type(self), tuple(dict(v) if isinstance(v, MappingProxyType) else v for v in values)
+    @property
+    def _arguments(self) -> tuple[Any, ...]:  # a mapping proxy does not pickle
+        return tuple(dict(v) if isinstance(v, MappingProxyType) else v for v in super()._arguments)
 
     @property
     @abstractmethod

@@ -8,13 +8,14 @@ block for each measurement, of a fixed number of rows.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from typing import NamedTuple, Self
+from collections.abc import Callable, Sequence
+from dataclasses import fields
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._arrays import Array, Rebuilt
+from ..._arrays import Array
 from ..extended_table.skeleton import Frame
 
 
@@ -81,14 +82,31 @@ class Linearised(NamedTuple):
     by_fixtures: Array
 
 
-class Measurement(Rebuilt, ABC):
+class Measurement(ABC):
     """Base of the kinds of measurement; frozen dataclasses with B blocks of k rows."""
 
-    __slots__ = ()
+    __slots__ = ("_files",)
 
     name: str
     sigma: Array | None
     covariance: Array | None
+
+    @property
+    def files(self) -> tuple[Any, ...]:
+        """Files that it was read from, with their numbers of rows; none if it was not."""
+        return getattr(self, "_files", ())
+
+    def of_files(self, files: tuple[Any, ...]) -> Self:
+        """The same measurement with the files that it was read from."""
+        return _of_files(type(self), self._arguments, files)
+
+    @property
+    def _arguments(self) -> tuple[Any, ...]:
+        """What it is made again from."""
+        return tuple(getattr(self, f.name) for f in fields(self) if f.init)  # type: ignore[arg-type]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _of_files, (type(self), self._arguments, self.files)
 
     @property
     @abstractmethod
@@ -165,6 +183,12 @@ class Measurement(Rebuilt, ABC):
     @abstractmethod
     def subset(self, blocks: NDArray[np.int64]) -> Self:
         """Only some of the blocks."""
+
+
+def _of_files(kind: Callable[..., Any], arguments: tuple[Any, ...], files: tuple[Any, ...]) -> Any:
+    made = kind(*arguments)
+    object.__setattr__(made, "_files", files)
+    return made
 
 
 POSE_AXES = ("x", "y", "z", "rx", "ry", "rz")

@@ -11,6 +11,7 @@ from ...geometry import PRISMATIC
 from ...model import RobotModel
 from ...table_text import ReportSection, ReportTable, table_of
 from ..errors_seen import BlockErrors
+from ..measurements import Measurement
 from .units import degrees, in_unit, millimetres, printed_unit
 
 if TYPE_CHECKING:
@@ -32,9 +33,27 @@ def measured_section(result: CalibrationResult) -> ReportSection:
     headings = ("", "name", "kind", "number", "rows", "unknown fixtures", "end")
     views = [view.q for m in problem.measurements for view in m.views]
     body: list[str | ReportTable] = [table_of(headings, rows)]
+    body += [sentence for m in problem.measurements if (sentence := files_sentence(m))]
     if views:
         body += ["Readings of the joints:", _ranges(model, np.concatenate(views))]
     return ReportSection("What was measured", tuple(body))
+
+
+def files_sentence(measurement: Measurement) -> str:
+    """Files that a measurement was read from; empty if it was not.
+
+    Parameters
+    ----------
+    measurement : Measurement
+        Of any kind.
+
+    Returns
+    -------
+    str
+        Names and numbers of rows.
+    """
+    files = ", ".join(str(file) for file in measurement.files)
+    return f"Read for {measurement.name}: {files}." if files else ""
 
 
 def _end(frame: str | int | None) -> str:

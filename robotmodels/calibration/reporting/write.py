@@ -134,6 +134,7 @@ def result_data(result: CalibrationResult) -> dict[str, Any]:
                 "name": m.name, "kind": type(m).__name__, "blocks": m.blocks,
                 "rows": list(m.axes), "units": list(m.units),
                 "noise": _numbers(scale) if m.sigma is None and m.covariance is None else None,
+                "files": [{"name": file.name, "rows": file.rows} for file in m.files],
             }
             for m, scale in zip(problem.measurements, result.solution.scales, strict=True)
         ],

@@ -1,0 +1,118 @@
+"""Files that measurements were read from: whether they hold the same, and how many rows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from .._arrays import Array
+from ..csv_table import CsvTable
+from ..errors import InvalidValueError
+from ..model import RobotModel
+from .extended_table.skeleton import Frame
+from .reading_limits import beyond_limits
+
+_UNIT = 1e-3
+"""How far from 1 the length of a quaternion of few digits may be."""
+_ROWS = 3
+"""Rows of unit length that are no chance."""
+
+
+class FileRows(NamedTuple):
+    """A file that was read.
+
+    Attributes
+    ----------
+    name : str
+        With its folder.
+    rows : int
+        How many measurements it gave.
+    """
+
+    name: str
+    rows: int
+
+    def __str__(self) -> str:
+        return f"{self.name} ({self.rows} rows)"
+
+
+def files_read(tables: Sequence[CsvTable], rows: Sequence[int]) -> tuple[FileRows, ...]:
+    """Names with their folders, and numbers of rows."""
+    names = [f"{t.path.resolve().parent.name}/{t.path.name}" for t in tables]
+    return tuple(FileRows(name, count) for name, count in zip(names, rows, strict=True))
+
+
+def check_columns(tables: Sequence[CsvTable]) -> None:
+    """Refuse files of a folder whose columns differ in number or name.
+
+    Parameters
+    ----------
+    tables : sequence of CsvTable
+        Files of one folder.
+
+    Raises
+    ------
+    InvalidValueError
+        With the files of each kind.
+    """
+    kinds: dict[str, list[str]] = {}
+    for t in tables:
+        columns = f"columns {', '.join(t.names)}" if t.names else f"{t.width} columns, no header"
+        kinds.setdefault(columns, []).append(t.path.name)
+    if len(kinds) > 1:
+        listed = "; ".join(f"{', '.join(names)}: {columns}" for columns, names in kinds.items())
+        raise InvalidValueError(
+            f"path: the files of {tables[0].path.parent} do not have the same columns ({listed}). "
+            "Say which are to be read: pattern=... (--pattern), or name the files."
+        )
+
+
+def check_contents(
+    tables: Sequence[CsvTable], readings: Sequence[Array], model: RobotModel, frame: Frame
+) -> None:
+    """Refuse files whose columns hold something else than the readings that other files hold.
+
+    Poses of seven columns pass for readings of seven joints, but four of their columns are
+    quaternions, of length 1, or they are beyond the limits of the joints.
+
+    Parameters
+    ----------
+    tables : sequence of CsvTable
+        Files that are read together.
+    readings : sequence of ndarray, shapes (N, n)
+        Of each file, rad or m.
+    model : RobotModel
+        The robot.
+    frame : str, int or None
+        The measured end.
+
+    Raises
+    ------
+    InvalidValueError
+        With the files that are read, and those that look like something else.
+    """
+    rows = set(model.twin.frame(frame).path.tolist())
+    other: dict[str, str] = {}
+    for t, q in zip(tables, readings, strict=True):
+        said, most = beyond_limits(model, q, rows)
+        if _has_quaternions(q):
+            other[t.path.name] = "four columns are unit quaternions: poses?"
+        elif most:
+            other[t.path.name] = f"beyond limits: {said[0]}"
+    if other and len(other) < len(tables):
+        raise InvalidValueError(
+            f"path: of {', '.join(t.path.name for t in tables)} some do not look like readings of "
+            f"the joints of {model.name}: "
+            + "; ".join(f"{name} ({why})" for name, why in other.items())
+            + ". Say which are to be read: pattern=... (--pattern), or name the files."
+        )
+
+
+def _has_quaternions(q: Array) -> bool:
+    """Whether four neighbouring columns have length 1 in every row."""
+    if len(q) < _ROWS or q.shape[1] < 4:
+        return False
+    square = np.lib.stride_tricks.sliding_window_view(q**2, 4, axis=1).sum(axis=-1)
+    return bool((np.abs(square - 1.0) < 2.0 * _UNIT).all(axis=0).any())
