@@ -482,3 +482,69 @@ def test_joints_beside_the_chain_are_named_where_their_columns_are_missing(tmp_p
         read_measurements(file, "point_contact", hand, joints=range(6))
     with pytest.raises(ShapeError, match=sentence):
         fit(hand, PointContact(q), **ALONE)
+
+
+# --- markers --------------------------------------------------------------------------------------
+
+MARKERS = {
+    "marker_1": np.array([0.05, 0.0, 0.02]),
+    "marker_2": np.array([0.0, 0.06, -0.03]),
+    "marker_3": np.array([-0.04, -0.02, 0.05]),
+}
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_markers_are_added_in_one_call_and_calibrated(seed):
+    arm = Arm(seed)
+    off = {name: p + 2e-3 * arm.rng.normal(size=3) for name, p in MARKERS.items()}
+    nominal, real = arm.nominal.with_frames(MARKERS), arm.real.with_frames(off)
+    q = arm.readings(40)
+    for name, place in MARKERS.items():
+        at = rm.dgm(arm.nominal, q) @ rm.se3.translation(*place)
+        assert rm.dgm(nominal, q, name) == pytest.approx(at, abs=1e-13)
+    measured = [
+        Position(q, rm.dgm(real, q, name)[:, :3, 3] + 5e-5 * arm.rng.normal(size=(40, 3)),
+                 frame=name, name=name)
+        for name in MARKERS
+    ]  # fmt: skip
+    for prior in (None, ParameterPrior()):
+        result = fit(nominal, measured, prior=prior, **ALONE)
+        fresh = arm.readings(30)
+        for name in MARKERS:
+            gap = (rm.dgm(result.model, fresh, name) - rm.dgm(real, fresh, name))[:, :3, 3]
+            assert np.linalg.norm(gap, axis=1).max() < 2e-4
+        # and they lie to each other as they do: a rigid hand
+        one, other = (rm.dgm(result.model, fresh[0], name)[:3, 3] for name in list(MARKERS)[:2])
+        apart = np.linalg.norm(off["marker_1"] - off["marker_2"])
+        assert np.linalg.norm(one - other) == pytest.approx(apart, abs=1e-4)
+
+
+def test_frames_are_given_in_any_frame_as_points_or_poses():
+    arm = Arm(1).nominal
+    turned = rm.se3.translation(0.1, 0.2, 0.3) @ rm.se3.rotation("x", 0.4)
+    model = arm.with_frames({"a": [0.1, 0.0, 0.0], "b": turned}, frame=3)
+    again = model.with_frames({"c": [0.0, 0.0, 0.1]}, frame="b")
+    q = np.linspace(-1.0, 1.0, 6)
+    for name, at in (("a", rm.se3.translation(0.1, 0, 0)), ("b", turned)):
+        assert rm.dgm(model, q, name) == pytest.approx(rm.dgm(arm, q, 3) @ at, abs=1e-14)
+    at = rm.dgm(model, q, "b") @ rm.se3.translation(0.0, 0.0, 0.1)
+    assert rm.dgm(again, q, "c") == pytest.approx(at, abs=1e-14)
+    assert "b" not in arm.frame_names
+    assert rm.dgm(pickle.loads(pickle.dumps(again)), q, "c") == pytest.approx(at, abs=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("frames", "frame", "error", "sentence"),
+    [
+        ({"joint_2": [0, 0, 0]}, None, InvalidValueError, "'joint_2' is taken"),
+        ({"tool": [0, 0, 0]}, None, InvalidValueError, "'tool' is taken"),
+        ({"a": [0, 0]}, None, ShapeError, r"frames\['a'\]"),
+        ({"a": 2.0 * np.eye(4)}, None, rm.errors.RobotModelsError, r"frames\['a'\]"),
+        ({"": [0, 0, 0]}, None, InvalidValueError, "not empty"),
+        ([[0, 0, 0]], None, InvalidValueError, "mapping of names"),
+        ({"a": [0, 0, 0]}, "hand", rm.errors.FrameNotFoundError, "hand"),
+    ],
+)
+def test_frames_that_make_no_sense_are_refused(frames, frame, error, sentence):
+    with pytest.raises(error, match=sentence):
+        Arm(1).nominal.with_frames(frames, frame)

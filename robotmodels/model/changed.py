@@ -10,8 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..drive import DriveParameters, Transmission
+from ..errors import InvalidValueError
 from ..geometry import DHTable
 from ..inertia import InertialParameters
+from ..urdf import NamedFrame
+from .part_checks import check_name, placed
+
+if TYPE_CHECKING:
+    from .twin import PinocchioTwin
 
 
 class Changeable:
@@ -31,6 +37,12 @@ class Changeable:
         __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
         table: DHTable
         tip: int
+        frames: tuple[NamedFrame, ...]
+
+        @property
+        def twin(self) -> PinocchioTwin:
+            """The Pinocchio side of the model."""
+            ...
 
     def with_table(self, table: DHTable) -> Self:
         """The same robot with other geometric parameters.
@@ -254,3 +266,53 @@ class Changeable:
         ['up', 'zero']
         """
         return replace(self, configurations=configurations)
+
+    def with_frames(self, frames: Mapping[str, ArrayLike], frame: str | int | None = None) -> Self:
+        """The same robot with more named frames: markers, targets, further tools.
+
+        They can be asked for and measured by their names, as ``Position(q, p, frame="marker_1")``.
+
+        Parameters
+        ----------
+        frames : mapping of str to array_like, shape (3,) or (4, 4)
+            By name the position (axes are those of ``frame``) or the pose, metres.
+        frame : str or int, optional
+            Frame in which these are given, and to whose body they are fixed; default the tool.
+
+        Returns
+        -------
+        RobotModel
+            A new model; this one stays as it is.
+
+        Raises
+        ------
+        ShapeError, InvalidValueError, NotARotationError, FrameNotFoundError
+            No mapping; a name that is taken; neither a position nor a pose; no such frame.
+
+        Examples
+        --------
+        >>> from robotmodels.model import RobotModel
+        >>> arm = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))
+        >>> arm.with_frames({"marker_1": [0, 0, 0.1], "marker_2": [0, 0.1, 0]}).frame_names
+        ('base', 'joint_1', 'marker_1', 'marker_2', 'tool')
+        """
+        if not isinstance(frames, Mapping):
+            raise InvalidValueError(
+                "frames: expected a mapping of names to positions or poses, such as "
+                f"{{'marker_1': [0, 0, 0.1]}}, got {type(frames).__name__}."
+            )
+        at, taken = self.twin.frame(frame), self.twin.frame_names()
+        place = np.eye(4)
+        place[:3, :3], place[:3, 3] = at.rotation, at.position
+        for name in frames:
+            check_name(name)
+            if name in taken:
+                raise InvalidValueError(
+                    f"frames: the name {name!r} is taken; the frames are "
+                    f"{', '.join(taken)}. Give another name."
+                )
+        new = tuple(
+            NamedFrame(name, at.parent, place @ placed(value, f"frames[{name!r}]"))
+            for name, value in frames.items()
+        )
+        return replace(self, frames=(*self.frames, *new))

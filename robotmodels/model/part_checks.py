@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import se3
 from .._arrays import Array, as_exact, read_only
 from ..errors import FrameNotFoundError, InvalidValueError, ShapeError
 from ..geometry import NOT_XML, DHTable
@@ -64,3 +65,10 @@ def checked_postures(configurations: object, n: int) -> Mapping[str, Array]:
         key: read_only(as_exact(value, (n,), f"configuration {key!r}"))
         for key, value in postures.items()
     })  # fmt: skip
+
+
+def placed(value: Any, name: str) -> Array:
+    """A pose (4, 4) from itself, or from a position (3,)."""
+    if not hasattr(value, "homogeneous") and np.shape(value) != (4, 4):
+        return se3.translation(*as_exact(value, (3,), name))
+    return se3.as_single_pose(value, name)
