@@ -23,6 +23,7 @@ from .file_kinds import CONTACTS, FileKind, as_file_kind
 from .files_read import check_columns, check_contents, files_read
 from .joints_asked import joints_that_count
 from .measurements import Distance, Measurement, Pose, Position, RelativePose
+from .measurements.measurement import of_files
 from .unit_slips import slip_of_positions, slip_of_spread
 
 _POSITION_NAMES = ("x", "y", "z")
@@ -187,7 +188,7 @@ def read_measurements(
             return Distance(q, measured, pivot=_labels(tables, label, q), **more)
         return CONTACTS[kind](q, _labels(tables, label, q), **more)
 
-    return measurement().of_files(files_read(tables, counts))
+    return of_files(measurement(), files_read(tables, counts))
 
 
 def _check_arguments(

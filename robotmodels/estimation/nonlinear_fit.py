@@ -64,8 +64,8 @@ class NonlinearFit(Rebuilt):
     weights : ndarray, shape (M,)
         Weights of the loss, 1 for rows that count in full; those of a measurement are equal.
     outliers : ndarray of int, shape (K,)
-        Measurements longer than noise explains, the worst first. They stay in the fit with their
-        weights.
+        Measurements farther from what the others predict (squares: from fits without them) than
+        noise explains, the worst first. They stay in the fit with their weights.
     loss : Loss
         Which loss.
     sigma_known : bool

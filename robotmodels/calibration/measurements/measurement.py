@@ -96,17 +96,13 @@ class Measurement(ABC):
         """Files that it was read from, with their numbers of rows; none if it was not."""
         return getattr(self, "_files", ())
 
-    def of_files(self, files: tuple[Any, ...]) -> Self:
-        """The same measurement with the files that it was read from."""
-        return _of_files(type(self), self._arguments, files)
-
     @property
     def _arguments(self) -> tuple[Any, ...]:
         """What it is made again from."""
         return tuple(getattr(self, f.name) for f in fields(self) if f.init)  # type: ignore[arg-type]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _of_files, (type(self), self._arguments, self.files)
+        return _made_again, (type(self), self._arguments, self.files)
 
     @property
     @abstractmethod
@@ -185,7 +181,13 @@ class Measurement(ABC):
         """Only some of the blocks."""
 
 
-def _of_files(kind: Callable[..., Any], arguments: tuple[Any, ...], files: tuple[Any, ...]) -> Any:
+def of_files(measurement: Measurement, files: tuple[Any, ...]) -> Measurement:
+    """The same measurement with the files that it was read from."""
+    kind, arguments, _ = measurement.__reduce__()[1]
+    return _made_again(kind, arguments, files)
+
+
+def _made_again(kind: Callable[..., Any], arguments: tuple[Any, ...], files: Any) -> Any:
     made = kind(*arguments)
     object.__setattr__(made, "_files", files)
     return made
