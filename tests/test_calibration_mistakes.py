@@ -167,6 +167,13 @@ def test_the_wrong_one_of_two_distances_is_named(seed):
 
 def test_a_real_arm_contradicts_51_for_50():
     data = panda_double_socket()
+    contacts_of, known_of = [], []
+    for place, (one, other) in data.places.items():
+        labels = [0] * len(one) + [1] * len(other)
+        contacts_of.append(PointContact(np.concatenate([one, other]), labels, name=place))
+        known_of.append(KnownDistance(f"{place}:0", f"{place}:1", data.distance))
+    together = fit(data.model, [*contacts_of, *known_of], prior=ParameterPrior(), **ALONE)
+    assert not said_of_distances(together)
     for place, (one, other) in data.places.items():
         touched = PointContact(np.concatenate([one, other]), [0] * len(one) + [1] * len(other))
         for length, expected in ((data.distance, 0), (data.distance + 1e-3, 1)):

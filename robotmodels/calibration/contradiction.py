@@ -11,13 +11,16 @@ import numpy as np
 from ..estimation import Loss
 from ..estimation.leverage import orthonormal_rows
 from ..estimation.outlying import outlying
+from .errors_seen import block_errors
 from .identifiability.scale import needs_a_length
 from .measurements import KnownDistance
 from .solve import Solution, solve
 
-_DOUBTFUL, _CONTRADICTED = 2.0, 5.0
-"""Standard errors from which a distance is predicted by a fit without it, and is contradicted:
-three, as standard errors of real arms are up to 1.7 times too short."""
+_DOUBTFUL, _CONTRADICTED = 2.0, 3.0
+"""Standard errors from which a distance is predicted by a fit without it, and is contradicted."""
+_COMMON = 0.5
+"""Part of the residuals that may be common to all postures at a point: what no parameter takes does
+not average out."""
 _ALONE = 1e-8
 """Share of a row that is not fitted by itself, under which nothing else predicts it."""
 
@@ -115,7 +118,9 @@ def contradictions(
         if not 0.0 <= variance < np.inf:
             continue
         length = m.length + float(part.residual[0, 0])
-        found.append(Contradiction(at, m, sigma, length, math.sqrt(variance), without))
+        errors = block_errors(others, without.deviation, without.fixtures)
+        doubt = math.hypot(math.sqrt(variance), _COMMON * errors.summary("m").rms)
+        found.append(Contradiction(at, m, sigma, length, doubt, without))
     found = sorted((c for c in found if c.errors > _CONTRADICTED), key=lambda c: -c.errors)
     if not found or not size_is_known:
         return found  # of two that give the scale against each other, either may be wrong
