@@ -18,7 +18,7 @@ from .reporting.units import in_unit, printed_unit
 from .solve import solve
 from .structure import Structure, TermFamily, structure_of
 
-_SURE = 2.0
+_SURE = 3.0
 """Standard errors by which the mean square of errors on data kept aside must fall."""
 _GAIN = 0.02
 """Part by which it must fall."""
