@@ -114,9 +114,13 @@ def note_of_structure(
             f"Try {helpful[0].family.word} next. On data kept aside it changes the rms error: "
             f"{'; '.join(found)}."
         )
-    useless = [trial.family.word for trial in trials if not trial.helps]
-    if useless:
-        text.append(f"Tried without a gain on data kept aside: {', '.join(useless)}.")
+    doubtful = [
+        f"{trial.family.word} ({_change(without.after, trial.after)})"
+        for trial in trials
+        if without is not None and not trial.helps
+    ]
+    if doubtful:
+        text.append(f"Tried, without a certain gain on data kept aside: {', '.join(doubtful)}.")
     if without is None and structure.hinted:
         terms = [f"{family.word} ({family.option})" for family in structure.hinted]
         text.append(f"They resemble {' or '.join(terms)}: fit with folds, which tries them.")
