@@ -172,7 +172,7 @@ def test_orientations_tell_the_angles(scene):
 def test_contacts_with_a_known_distance_tell_the_shape(contacts):
     s, points, q, labels = contacts
     apart = np.linalg.norm(points[0] - points[1])
-    measured = [PointContact(q, labels), KnownDistance("point:0", "point:1", apart)]
+    measured = [PointContact(q, labels), KnownDistance("point:0", "point:1", apart, sigma=1e-9)]
     result = fit(s.nominal, measured, **ALONE)
     assert len(result.names) == 21  # 27 less the six of a base that nobody sees
     assert shape_error(result.model, s.real, s.fresh) < EXACT
