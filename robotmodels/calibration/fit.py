@@ -17,7 +17,14 @@ from .errors_seen import block_errors
 from .extended_table.candidates import candidate_parameters
 from .extended_table.elements import Compliance
 from .extended_table.parameters import GeometricParameters, as_names
-from .folds import Refit, errors_of_others, errors_of_splits, split_aside, splits, suited_fixtures
+from .folds import (
+    Refit,
+    Split,
+    errors_of_others,
+    errors_of_splits,
+    splits,
+    suited_fixtures,
+)
 from .identifiability.identifiable import (
     IdentifiableParameters,
     Reason,
@@ -97,10 +104,12 @@ def fit(
     truncation : float, optional
         Directions whose singular value relative to the largest is smaller are left out.
     folds : int
-        Number of folds of the cross-validation; 0 for none.
+        Largest number of folds of the cross-validation; 0 for none. A fold leaves out whole
+        places (three or more that are touched), else a run of successive postures with all that
+        is measured there.
     held_out : float, or Measurement or sequence of them
-        Share of the blocks that one more fit is tested on (0 for none), or measurements for that,
-        which never take part.
+        Share of the places or postures that one more fit is tested on (0 for none), or
+        measurements for that, which never take part.
     rng : numpy.random.Generator or int, optional
         For the folds; default the same each time.
     progress : callable, optional
@@ -193,9 +202,18 @@ def fit(
     solution = judged(solution, contradicted)
     structure = structure_of(solution, identifiable)
     blocks = sum(m.blocks for m in measured if m.views)
-    parts = splits(measured, folds, chance) if folds and blocks >= 2 * folds else []
+    parts: list[Split] = []
+    share_aside: list[Split] = []
+    if folds and blocks < 2 * folds:
+        notes = (*notes, f"{blocks} measurements are too few for {folds} folds: none were made.")
+    elif folds:
+        parts = splits(model, measured, folds, chance)
+    if share:
+        share_aside = splits(model, measured, max(round(1.0 / share), 2), chance)[:1]
+    if (folds or share) and blocks >= 2 * folds and not (parts or share_aside):
+        notes = (*notes, "Nothing can be kept aside: each thing is measured in one posture alone.")
     fits_to_try = len(structure.hinted) * (1 + len(parts)) if structure and parts else 0
-    step = _Steps(progress, 1 + len(parts) + bool(share) + fits_to_try)
+    step = _Steps(progress, 1 + len(parts) + len(share_aside) + fits_to_try)
     step("all measurements")
     preferred = candidates.preferring(estimated.names)
 
@@ -208,17 +226,14 @@ def fit(
 
     again = identifiable_there(preferred)
     refit = Refit(solution, prior_of, truncation)
-    validation = None
-    if folds and not parts:
-        notes = (*notes, f"{blocks} measurements are too few for {folds} folds: none were made.")
-    elif folds:
+    validation = kept_aside = None
+    if parts:
         validation = errors_of_splits(refit, parts, before, lambda: step("cross-validation"))
-    kept_aside = None
     if aside:
         kept_aside = errors_of_others(refit, aside)
-    elif share and (part := split_aside(measured, share, chance)) is not None:
+    elif share_aside:
         doing = "measurements kept aside"
-        kept_aside = errors_of_splits(refit, [part], before, lambda: step(doing))
+        kept_aside = errors_of_splits(refit, share_aside, before, lambda: step(doing))
     if structure is not None:
         tried = [] if validation is None else trials_of(
             structure, refit, preferred, identifiable_there, prior, parts, validation,
@@ -233,6 +248,7 @@ def fit(
         notes=(
             *notes_of_gain(before, validation, kept_aside),
             *notes,
+            *dict.fromkeys(p.dealing.note for p in (*parts, *share_aside) if p.dealing.note),
             *note_of_prior(prior, used),
             *(c.sentence() for c in contradicted),
             *notes_after(solution, identifiable, again),

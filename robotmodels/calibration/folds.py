@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array, Rebuilt
-from ..errors import InvalidValueError
 from ..estimation import Prior, fit_nonlinear
-from .dealing import dealt_blocks
+from ..model import RobotModel
+from .dealing import Dealing, Part, dealt_blocks, parted
 from .errors_seen import BlockErrors, block_errors
 from .extended_table.parameters import GeometricParameters
 from .measurements import Measurement
@@ -24,19 +24,13 @@ _ROUGH = 1e-6
 
 
 class Split(NamedTuple):
-    """Measurements to fit, and measurements kept aside.
-
-    Attributes
-    ----------
-    kept, aside : tuple of Measurement
-        Known distances and the like are always kept.
-    blocks : ndarray of int
-        Numbers of the blocks aside, counted through the measurements that have views.
-    """
+    """Measurements to fit and their numbers, those aside with their blocks, and how all parted."""
 
     kept: tuple[Measurement, ...]
     aside: tuple[Measurement, ...]
+    numbers: tuple[int, ...]
     blocks: NDArray[np.int64]
+    dealing: Dealing
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,93 +46,31 @@ class AsideErrors(Rebuilt):
         without these blocks, each with the fixtures that suit it best.
     folds : int
         Number of fits.
+    dealing : Dealing or None
+        How the blocks were chosen; None if the caller did.
     """
 
     blocks: NDArray[np.int64]
     before: BlockErrors
     after: BlockErrors
     folds: int
+    dealing: Dealing | None = None
 
 
 def splits(
-    measurements: Sequence[Measurement], folds: int, rng: np.random.Generator
+    model: RobotModel, measurements: Sequence[Measurement], folds: int, rng: np.random.Generator
 ) -> list[Split]:
-    """Deal the blocks of each measurement, and of each group in it, to folds.
-
-    Parameters
-    ----------
-    measurements : sequence of Measurement
-        Of any kinds.
-    folds : int
-        How many, two or more.
-    rng : numpy.random.Generator
-        Where chance comes from.
-
-    Returns
-    -------
-    list of Split
-        Each block is aside once; groups with a single block never are.
-
-    Raises
-    ------
-    InvalidValueError
-        Fewer than two folds, or fewer blocks than folds.
-    """
-    if folds < 2:
-        raise InvalidValueError(f"folds: expected 2 or more (0 for none), got {folds}.")
-    dealt = dealt_blocks(measurements, folds, rng)
-    parts = [_split(measurements, dealt, k) for k in range(folds)]
-    return [part for part in parts if part.aside]
+    """Parts that are kept aside in turn, at most ``folds``: whole places, or runs of postures."""
+    dealing = dealt_blocks(model, measurements, folds, rng)
+    return [_split(measurements, dealing, part) for part in dealing.parts]
 
 
-def split_aside(
-    measurements: Sequence[Measurement], share: float, rng: np.random.Generator
-) -> Split | None:
-    """Keep a share of the blocks of each group aside.
-
-    Parameters
-    ----------
-    measurements : sequence of Measurement
-        Of any kinds.
-    share : float
-        Between 0 and 1.
-    rng : numpy.random.Generator
-        Where chance comes from.
-
-    Returns
-    -------
-    Split or None
-        None if nothing can be kept aside.
-
-    Raises
-    ------
-    InvalidValueError
-        A share that is not between 0 and 1.
-    """
-    if not 0.0 < share < 1.0:
-        raise InvalidValueError(
-            f"held_out: expected a share between 0 and 1, or measurements, got {share!r}."
-        )
-    folds = max(round(1.0 / share), 2)
-    dealt = dealt_blocks(measurements, folds, rng)
-    part = _split(measurements, dealt, 0)
-    return part if part.aside else None
-
-
-def _split(
-    measurements: Sequence[Measurement], dealt: Sequence[NDArray[np.int64]], k: int
-) -> Split:
-    kept, aside, numbers, first = [], [], [], 0
-    for m, fold in zip(measurements, dealt, strict=True):
-        out = np.flatnonzero(fold == k)
-        numbers.append(first + out)
-        first += m.blocks if m.views else 0
-        if len(out):
-            aside.append(m.subset(out))
-            kept.append(m.subset(np.flatnonzero(fold != k)))
-        else:
-            kept.append(m)
-    return Split(tuple(kept), tuple(aside), np.concatenate(numbers).astype(np.int64))
+def _split(measurements: Sequence[Measurement], dealing: Dealing, part: Part) -> Split:
+    kept = parted(measurements, part.kept)
+    return Split(
+        tuple(m for _, m in kept), tuple(m for _, m in parted(measurements, part.aside) if m.views),
+        tuple(k for k, _ in kept), np.flatnonzero(part.aside), dealing,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -189,7 +121,8 @@ def errors_of_splits(
         start = [known[fixture.name] for fixture in problem.fixtures]
         solution = solve(
             problem, np.concatenate([refit.solution.deviation, start]),
-            from_scales=refit.solution.scales, loss=refit.solution.fit.loss,
+            from_scales=tuple(refit.solution.scales[k] for k in part.numbers),
+            loss=refit.solution.fit.loss,
             prior=None if refit.prior is None else refit.prior(problem),
             truncation=refit.truncation, tolerance=_ROUGH,
         )  # fmt: skip
@@ -202,7 +135,7 @@ def errors_of_splits(
         np.concatenate([e.position for e in found]), np.concatenate([e.angle for e in found])
     )
     there = BlockErrors(before.position[blocks], before.angle[blocks])
-    return AsideErrors(blocks, there, after, len(parts))
+    return AsideErrors(blocks, there, after, len(parts), parts[0].dealing)
 
 
 def errors_of_others(refit: Refit, aside: Sequence[Measurement]) -> AsideErrors:

@@ -149,8 +149,13 @@ def settled_prior(
     scales = solve(problem, loss=loss, prior=whole_prior).scales
     start = np.concatenate([mean[: problem.P], guessed_fixtures(problem, mean[: problem.P])])
     block = problem.block
-    dealt = np.concatenate(dealt_blocks(problem.measurements, _FOLDS, rng))[block]
-    masks = np.array([dealt == k for k in range(_FOLDS) if (dealt == k).any()])
+    seen = np.repeat([bool(m.views) for m in problem.measurements],
+                     [m.blocks for m in problem.measurements])  # fmt: skip
+    model, measurements = problem.parameters.model, problem.measurements
+    dealing = dealt_blocks(model, measurements, _FOLDS, rng, whole_places=False)
+    masks = np.zeros((len(dealing.parts), len(seen)), dtype=bool)
+    masks[:, seen] = [part.aside for part in dealing.parts]
+    masks = masks[:, block]
     tried = select_strength(
         lambda x: stacked(problem, x, scales), start, whole_prior, masks,
         strengths=_STRENGTHS, block=block, loss=loss,

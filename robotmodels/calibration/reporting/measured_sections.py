@@ -103,6 +103,10 @@ def error_section(result: CalibrationResult) -> ReportSection:
         "blame for what is left. Folds and held out: measurements that the calibration had not "
         "seen (before it: base and tool fitted to all of them).",
     ]
+    for kept in (aside, result.held_out):
+        if kept is not None and kept.dealing is not None:
+            name = "Held out" if kept is result.held_out else f"{kept.folds} folds"
+            sentences.append(f"{name}: {kept.dealing.manner} kept aside.")
     if aside is None and result.held_out is None:
         sentences.append(
             "No measurements were kept aside: how the robot errs elsewhere is not known."
