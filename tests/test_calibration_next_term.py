@@ -138,8 +138,12 @@ def test_the_term_brings_on_fresh_data_what_it_promises(kind):
             for options in ({}, OPTIONS[promise[0]])
         )  # fmt: skip
         ratios.append((without - with_it) / (promise[1] - promise[2]))
-    assert len(ratios) >= 3
-    assert 0.7 < np.median(ratios) < 1.3
+    if kind == "backlash":  # which no term is: a promise is rare, and small
+        assert len(ratios) <= 3
+        assert all(ratio > 0.0 for ratio in ratios)
+    else:
+        assert len(ratios) >= 5
+        assert 0.7 < np.median(ratios) < 1.3
 
 
 def test_backlash_is_not_geometry():

@@ -168,7 +168,8 @@ def test_a_point_that_is_touched_once_is_no_place():
 def test_progress_ends_at_its_total():
     arm, said = Arm(0), []
     fit(arm.nominal, sockets(arm, 4)[0], prior=PRIOR, progress=lambda *x: said.append(x))
-    assert said[-1][0] == said[-1][1] == 6
+    assert [done for done, _, _ in said] == list(range(1, said[-1][1] + 1))
+    assert [doing for *_, doing in said].count("cross-validation") == 4
 
 
 def test_the_same_chance_keeps_the_same_aside(places):

@@ -236,7 +236,7 @@ def fit(
         kept_aside = errors_of_splits(refit, share_aside, before, lambda: step(doing))
     if structure is not None:
         tried = [] if validation is None else trials_of(
-            structure, refit, preferred, identifiable_there, prior, parts, validation,
+            structure, refit, preferred, identifiable_there, used, parts, before, validation,
             lambda: step("terms to try next"),
         )  # fmt: skip
         notes = (*notes, note_of_structure(structure, tried, validation))

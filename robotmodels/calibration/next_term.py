@@ -45,13 +45,14 @@ def trials_of(
     identify: Callable[[GeometricParameters], IdentifiableParameters],
     prior: ParameterPrior | None,
     parts: Sequence[Split],
+    before: BlockErrors,
     without: AsideErrors,
     done: Callable[[], None],
 ) -> list[Trial]:
-    """Fit with each family that residuals resemble, again without each part; best gain first.
+    """Fit with each family that residuals resemble, and again without each part; best gain first.
 
-    ``identify`` gives those of some candidates that the measurements tell, ``without`` the errors
-    of the parts without the family; ``done`` is called after each of ``1 + len(parts)`` fits.
+    ``identify`` gives those of some candidates that the measurements tell; ``before`` are errors of
+    the nominal robot at all blocks, ``without`` those of the parts without the family.
     """
     solution = refit.solution
     problem, old = solution.problem, solution.problem.parameters
@@ -70,7 +71,7 @@ def trials_of(
         )  # fmt: skip
         done()
         again = replace(refit, solution=found)
-        after = errors_of_splits(again, parts, without.before, done).after
+        after = errors_of_splits(again, parts, before, done).after
         explains_all = structure_of(found, told) is None
         trials.append(Trial(family, after, *_gain(without.after, after), explains_all))
     return sorted(trials, key=lambda trial: -trial.gain)
