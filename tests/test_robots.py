@@ -159,9 +159,7 @@ def test_a_robot_builds_fast_is_a_value_and_prints(name):
 def test_a_robot_says_where_its_numbers_come_from(name):
     module = next(m for m, names in MODULES.items() if name in names)
     text = inspect.getdoc(getattr(import_module(f"robotmodels.robots.{module}"), name))
-    for section in ("Returns", "Examples"):
-        assert re.search(rf"^{section}\n-+$", text, re.M), section
-    assert re.search(r"^References\n-+$", text, re.M) or name == "gantry"
+    assert "\nSource: " in text or name == "gantry"
     assert "etres" in text
     assert "adians" in text
 

@@ -1,0 +1,194 @@
+"""Docstrings: the full NumPy form for names that a room exports, at most three lines for others."""
+
+import ast
+import functools
+import importlib
+import inspect
+import re
+from pathlib import Path
+
+from test_api import public_names, rooms
+
+ROOT = Path(__file__).parents[1]
+FILES = sorted((ROOT / "robotmodels").rglob("*.py"))
+SECTION = re.compile(r"^([A-Z]\w+(?: \w+)?)\n-{3,}$", re.MULTILINE)
+LONGEST = 3
+"""Lines of text of a docstring that no room exports: the summary, and the shapes of arrays."""
+
+
+def function_of(member):
+    """The function behind a property, a class method, a decorator or a compiler."""
+    if isinstance(member, functools.cached_property):
+        member = member.func
+    member = getattr(member, "fget", None) or getattr(member, "__func__", member)
+    member = getattr(member, "py_func", member)
+    return inspect.unwrap(member) if callable(member) else member
+
+
+def place(thing):
+    """(module, qualified name), or None where the package does not define it."""
+    module = getattr(thing, "__module__", None) or ""
+    return (module, thing.__qualname__) if module.startswith("robotmodels") else None
+
+
+@functools.cache
+def exported():
+    """Places of what rooms export, and of the public members of exported classes."""
+    names, members = set(), set()
+    for room in rooms().values():
+        for thing in (getattr(room, name) for name in public_names(room)):
+            if inspect.isclass(thing):
+                owners = [c for c in thing.__mro__ if c.__module__.startswith("robotmodels")]
+                public = [
+                    function_of(member)
+                    for owner in owners
+                    for name, member in vars(owner).items()
+                    if not name.startswith("_") or name.endswith("__")
+                ]
+                members |= {place(m) for m in public if inspect.isroutine(m) or inspect.isclass(m)}
+                names.add(place(thing))
+            elif inspect.isroutine(function_of(thing)):
+                names.add(place(function_of(thing)))
+    return names, members
+
+
+def definitions(node, path=""):
+    """(qualified name, node) of every function and class below a node."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+            yield path + child.name, child
+            kind = "." if isinstance(child, ast.ClassDef) else ".<locals>."
+            yield from definitions(child, path + child.name + kind)
+        else:
+            yield from definitions(child, path)
+
+
+def is_robot(module, node):
+    """Whether a function builds a robot of the catalogue: it names the source of each number."""
+    returns = ast.unparse(node.returns) if getattr(node, "returns", None) else ""
+    return (
+        module.startswith("robotmodels.robots.")
+        and returns == "RobotModel"
+        and not node.name.startswith("_")
+        and not node.args.args
+    )
+
+
+def missing_sections(node, have):
+    """Sections that the docstring of an exported function must have and does not."""
+    returns = ast.unparse(node.returns) if node.returns else "None"
+    if node.args.args + node.args.kwonlyargs and "Parameters" not in have:
+        yield "Parameters"
+    if returns != "None" and not have & {"Returns", "Yields"}:
+        yield "Returns"
+
+
+def faults(module, text, names, members):
+    """Sentences about the docstrings of one file."""
+    tree = ast.parse(text)
+    # Members of one family may share a docstring at the head of their file.
+    shared = set(SECTION.findall(ast.get_docstring(tree) or ""))
+    for name, node in definitions(tree):
+        docstring = ast.get_docstring(node) or ""
+        have = set(SECTION.findall(docstring))
+        lines = len([line for line in docstring.splitlines() if line.strip()])
+        if (module, name) in names:
+            if isinstance(node, ast.ClassDef):
+                continue  # see test_exported_classes_have_sections
+            for section in missing_sections(node, have | shared):
+                yield f"{module}.{name}: exported, without the section {section}"
+        elif (module, name) in members:
+            continue
+        elif have:
+            yield f"{module}.{name}: not exported, with the section {min(have)}"
+        elif lines > LONGEST and not is_robot(module, node):
+            yield f"{module}.{name}: not exported, {lines} lines instead of at most {LONGEST}"
+
+
+def module_of(path):
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts).removesuffix(".__init__")
+
+
+def test_only_exported_names_have_long_docstrings():
+    names, members = exported()
+    found = [
+        fault
+        for path in FILES
+        for fault in faults(module_of(path), path.read_text(encoding="utf-8"), names, members)
+    ]
+    assert "\n".join(found) == ""
+
+
+def test_exported_classes_have_sections():
+    """Or their base class, or the head of their file; a status and an exception need a line."""
+    without = []
+    for module, name in sorted(exported()[0]):
+        kind = functools.reduce(getattr, name.split("."), importlib.import_module(module))
+        if not inspect.isclass(kind) or issubclass(kind, int | str | BaseException):
+            continue
+        texts = [vars(c).get("__doc__") for c in kind.__mro__] + [inspect.getmodule(kind).__doc__]
+        head = "\n".join(inspect.cleandoc(text or "") for text in texts)
+        if not SECTION.search(head) and not inspect.isabstract(kind) and not is_protocol(kind):
+            without.append(f"{module}.{name}")
+    assert without == []
+
+
+def is_protocol(kind):
+    return getattr(kind, "_is_protocol", False)
+
+
+def test_the_rule_looks_at_every_room():
+    names, members = exported()
+    assert {"robotmodels.igm", "robotmodels.viz"} <= {m.rsplit(".", 1)[0] for m, _ in names}
+    assert len(names) > 400
+    assert len(members) > 1000
+    # A method, a property, an inherited method and a function behind a lazy import.
+    assert {("robotmodels.geometry.table", "DHTable.from_rows")} <= members
+    assert ("robotmodels.igm.paul.explain", "explain_igm") in names
+
+
+SOURCE = '''
+def public(q):
+    """Public."""
+
+
+def inner(q):
+    """Inner.
+
+    Parameters
+    ----------
+    q : ndarray
+    """
+
+
+class _Inner:
+    def method(self) -> None:
+        """One.
+
+        two
+        three
+        four
+        """
+
+    def short(self) -> None:
+        """One.
+
+        Shapes: A (m, n).
+        """
+'''
+
+
+def test_a_docstring_that_breaks_the_rule_is_found():
+    found = list(faults("robotmodels.room", SOURCE, {("robotmodels.room", "public")}, set()))
+    assert found == [
+        "robotmodels.room.public: exported, without the section Parameters",
+        "robotmodels.room.inner: not exported, with the section Parameters",
+        "robotmodels.room._Inner.method: not exported, 4 lines instead of at most 3",
+    ]
+
+
+def test_a_family_may_share_the_docstring_of_its_file():
+    text = f'"""Family.\n\nParameters\n----------\nq : ndarray\n"""\n{SOURCE}'
+    found = "".join(faults("robotmodels.room", text, {("robotmodels.room", "public")}, set()))
+    assert "public" not in found
