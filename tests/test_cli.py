@@ -532,6 +532,12 @@ def test_identify_takes_choices_and_files_that_only_test(run, motion):
     assert data["errors"]["held_out"]["samples"] == 7998 - 200
 
 
+def test_identify_takes_the_rule_of_essential_parameters_by_name(run, motion):
+    code, out, _ = run(*identify(motion[0]), "--essential", "aic", "--json")
+    assert code == 0
+    assert json.loads(out)["method"]["essential"] == "aic"
+
+
 def test_choices_are_those_of_the_package():
     """The commands list them without importing the rooms that define them."""
     from robotmodels.calibration.extended_table.elements import Compliance

@@ -793,6 +793,14 @@ def test_skeleton_of_a_gantry_stands_on_rails():
     np.testing.assert_allclose(bars[1.5].pose, factors[1], atol=1e-12)
 
 
+def test_skeleton_of_a_prismatic_joint_without_limits_is_finite():
+    table = rm.DHTable(antecedent=[0], sigma=[1], d=[0.3])
+    assert not np.isfinite(table.upper - table.lower).any()
+    bars = [v for v in skeleton(table, np.eye(4), 1) if isinstance(v.shape, Box)]
+    assert bars
+    assert all(np.isfinite(v.shape.size).all() and np.isfinite(v.pose).all() for v in bars)
+
+
 def test_skeleton_is_deterministic_and_tells_wrist_axes_apart():
     first, second = (skeleton(RX90.table, RX90.tool, 6) for _ in range(2))
     assert len(first) == len(second)
