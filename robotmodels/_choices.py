@@ -11,35 +11,7 @@ E = TypeVar("E", bound=Enum)
 
 
 def chosen(kind: type[E], value: Any, name: str) -> E:
-    """A member of an enum: the member itself, or its name in any case, with ``-``, ``_`` or blanks.
-
-    Parameters
-    ----------
-    kind : type
-        The enum.
-    value : member or str
-        What the caller passed.
-    name : str
-        Used in error messages.
-
-    Returns
-    -------
-    member
-        Of ``kind``.
-
-    Raises
-    ------
-    InvalidValueError
-        Something else; the message lists the members.
-
-    Examples
-    --------
-    >>> class Law(Enum):
-    ...     BANG_BANG = 1
-    ...     CUBIC = 2
-    >>> chosen(Law, "bang-bang", "law")
-    <Law.BANG_BANG: 1>
-    """
+    """Member of an enum from itself or from its name, in any case, with ``-``, ``_`` or blanks."""
     if isinstance(value, kind):
         return value
     if isinstance(value, str):

@@ -7,20 +7,7 @@ from typing import Self
 
 
 class Outcome(IntEnum):
-    """Base of status codes: a number that fits int8 and the sentence a person reads.
-
-    Attributes
-    ----------
-    sentence : str
-        What a person reads.
-
-    Examples
-    --------
-    >>> class Status(Outcome):
-    ...     DONE = 0, "It is done."
-    >>> Status(0).sentence, int(Status.DONE)
-    ('It is done.', 0)
-    """
+    """Base of status codes: a number that fits int8 and the sentence a person reads."""
 
     sentence: str
 

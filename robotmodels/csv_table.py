@@ -23,21 +23,7 @@ _LONGEST = 2**20
 
 @dataclass(frozen=True, slots=True)
 class CsvTable:
-    """A text file of columns; cells are read when a column is asked for.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    names : tuple of str
-        Of the columns; empty if the file has no header.
-    delimiter : str or None
-        Between cells; None for blanks.
-    width : int
-        Number of columns.
-    first : int
-        Number of the first line of data, from 0.
-    """
+    """Text file of columns, read column by column on demand."""
 
     path: Path
     names: tuple[str, ...]
@@ -46,18 +32,7 @@ class CsvTable:
     first: int
 
     def find(self, names: Sequence[str]) -> tuple[int, ...] | None:
-        """Numbers of columns by their names, capitals aside; None if one is missing.
-
-        Parameters
-        ----------
-        names : sequence of str
-            Of the header.
-
-        Returns
-        -------
-        tuple of int, or None
-            Numbers from 0.
-        """
+        """Numbers of columns by their names, capitals aside; None if one is missing."""
         lower = [name.lower() for name in self.names]
         wanted = [name.lower() for name in names]
         if any(lower.count(name) != 1 for name in wanted):
@@ -65,25 +40,7 @@ class CsvTable:
         return tuple(lower.index(name) for name in wanted)
 
     def number(self, column: Column, what: str) -> int:
-        """Number of a column.
-
-        Parameters
-        ----------
-        column : int or str
-            Its number, from 0, or its name.
-        what : str
-            The argument, for the error message.
-
-        Returns
-        -------
-        int
-            From 0.
-
-        Raises
-        ------
-        InvalidValueError
-            There is no such column, or several.
-        """
+        """Number of a column."""
         if isinstance(column, str):
             found = self.find([column])
             if found is not None:
@@ -110,24 +67,7 @@ class CsvTable:
         return column % self.width
 
     def numbers(self, columns: Sequence[int]) -> Array:
-        """Columns of numbers.
-
-        Parameters
-        ----------
-        columns : sequence of int
-            Which.
-
-        Returns
-        -------
-        ndarray, shape (N, number of columns)
-            As they are in the file.
-
-        Raises
-        ------
-        InvalidValueError
-            A cell that is empty or no finite number; a line of another length; no data. With the
-            number of the line.
-        """
+        """Columns of numbers. Shapes: -> (N, number of columns)."""
         try:
             values = self._loaded(columns)
         except InvalidValueError:
@@ -156,20 +96,7 @@ class CsvTable:
     def numbers_with_gaps(self, columns: Sequence[int]) -> Array:
         """Columns of numbers, NaN where a cell is empty, infinite or not a number by its own word.
 
-        Parameters
-        ----------
-        columns : sequence of int
-            Which.
-
-        Returns
-        -------
-        ndarray, shape (N, number of columns)
-            As they are in the file; rows without any number in them too.
-
-        Raises
-        ------
-        InvalidValueError
-            A cell of words; a line of another length; no data. With the number of the line.
+        Shapes: -> (N, number of columns).
         """
         try:
             values = self._loaded(columns)
@@ -201,20 +128,7 @@ class CsvTable:
         return np.array(rows, dtype=np.float64).reshape(len(rows), len(columns))
 
     def cells(self, column: int) -> Iterator[tuple[int, str]]:
-        """Cells of a column as text, each with the number of its line, from 1.
-
-        Parameters
-        ----------
-        column : int
-            Which.
-
-        Yields
-        ------
-        line : int
-            From 1.
-        cell : str
-            Empty where the line is too short.
-        """
+        """Cells of a column as text, each with the number of its line, from 1."""
         for line, cells in self._rows():
             yield line, cells[column] if column < len(cells) else ""
 
@@ -223,23 +137,7 @@ class CsvTable:
         return next(self._rows(), (self.first + 1, []))
 
     def labels(self, column: int) -> tuple[str, ...]:
-        """A column of labels.
-
-        Parameters
-        ----------
-        column : int
-            Which.
-
-        Returns
-        -------
-        tuple of str, length N
-            Without blanks around them.
-
-        Raises
-        ------
-        InvalidValueError
-            A cell that is empty.
-        """
+        """A column of labels."""
         found = []
         for line, cells in self._rows():
             if len(cells) <= column or not cells[column]:
@@ -295,25 +193,7 @@ class CsvTable:
 
 
 def cells_of(line: str, delimiter: str | None) -> list[str]:
-    """Cells of a line without blanks and quotation marks around them.
-
-    Parameters
-    ----------
-    line : str
-        The line.
-    delimiter : str or None
-        Between cells; None for blanks.
-
-    Returns
-    -------
-    list of str
-        Cells.
-
-    Examples
-    --------
-    >>> cells_of(' 1; "a" ;', ";")
-    ['1', 'a', '']
-    """
+    """Cells of a line without blanks and quotation marks around them."""
     if delimiter is not None and '"' in line and line.count('"') % 2 == 0:
         # a cell in quotation marks may have the delimiter in it; blanks may stand before them
         cells = next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
@@ -323,27 +203,7 @@ def cells_of(line: str, delimiter: str | None) -> list[str]:
 
 
 def open_table(path: str | Path, delimiter: str | None = None) -> CsvTable:
-    """Look at the first line of a file: if most of its cells are no numbers it is a header.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file; lines that begin with ``#`` are comments.
-    delimiter : str, optional
-        Between cells; default the first of ``;``, tab and ``,`` in the first line, else blanks.
-
-    Returns
-    -------
-    CsvTable
-        Its columns can be read.
-
-    Raises
-    ------
-    InvalidValueError
-        An empty file, or one that is no text; a delimiter that is not one character.
-    OSError
-        The file cannot be opened.
-    """
+    """Look at the first line of a file: if most of its cells are no numbers it is a header."""
     path = Path(path)
     if delimiter is not None and len(delimiter) != 1:
         raise InvalidValueError(
@@ -364,20 +224,7 @@ def open_table(path: str | Path, delimiter: str | None = None) -> CsvTable:
 
 
 def stacked_columns(tables: Sequence[CsvTable], columns: Sequence[Sequence[int]]) -> Array:
-    """Columns of several files below each other.
-
-    Parameters
-    ----------
-    tables : sequence of CsvTable
-        The files.
-    columns : sequence of sequences of int
-        For each file.
-
-    Returns
-    -------
-    ndarray, shape (N, number of columns)
-        Read-only.
-    """
+    """Columns of several files below each other. Shapes: -> (N, number of columns)."""
     parts = [table.numbers(c) for table, c in zip(tables, columns, strict=True)]
     return read_only(np.concatenate(parts))
 

@@ -73,19 +73,7 @@ _LISTED = 12
 
 
 class _NameNotFoundError(RobotModelsError, KeyError):
-    """A name is unknown; the nearest known ones are in the message and in ``nearest``.
-
-    Parameters
-    ----------
-    kind : str
-        What was looked up, e.g. ``"frame"``.
-    name : object
-        What was asked for.
-    known : iterable of str
-        The names that exist.
-    advice : str, optional
-        What else to do.
-    """
+    """A name is unknown; the nearest known ones are in the message and in ``nearest``."""
 
     def __init__(self, kind: str, name: object, known: Iterable[str], advice: str = "") -> None:
         known = tuple(known)
@@ -123,27 +111,7 @@ class UrdfWarning(RobotModelsWarning):
 
 
 def nearest_names(name: str, known: Iterable[str], count: int = 3) -> list[str]:
-    """The known names closest to a misspelt one, ignoring case.
-
-    Parameters
-    ----------
-    name : str
-        The name that was not found.
-    known : iterable of str
-        The names that exist.
-    count : int
-        How many to return at most.
-
-    Returns
-    -------
-    list of str
-        Closest first; empty if nothing is near.
-
-    Examples
-    --------
-    >>> nearest_names("RX9O", ["rx90", "tx40", "ur5e"])
-    ['rx90']
-    """
+    """The known names closest to a misspelt one, ignoring case."""
     by_key = {k.lower(): k for k in known}
     return [by_key[k] for k in difflib.get_close_matches(name.lower(), by_key, count, 0.5)]
 

@@ -47,13 +47,7 @@ class AngleUnit(Enum):
 
 
 class TimeUnit(Enum):
-    """Unit of the times in a file; the value is its symbol.
-
-    Examples
-    --------
-    >>> TimeUnit("ms").factor
-    0.001
-    """
+    """Unit of the times in a file; the value is its symbol."""
 
     SECOND = "s"
     MILLISECOND = "ms"
@@ -70,32 +64,7 @@ U = TypeVar("U", LengthUnit, AngleUnit, TimeUnit)
 
 
 def as_file_unit(kind: type[U], value: Any, name: str) -> U:
-    """A unit given as a member or by its symbol.
-
-    Parameters
-    ----------
-    kind : type
-        `LengthUnit`, `AngleUnit` or `TimeUnit`.
-    value : member or str
-        What the caller passed.
-    name : str
-        Used in the error message.
-
-    Returns
-    -------
-    member
-        Of ``kind``.
-
-    Raises
-    ------
-    InvalidValueError
-        Something else.
-
-    Examples
-    --------
-    >>> as_file_unit(LengthUnit, "mm", "lengths")
-    <LengthUnit.MILLIMETRE: 'mm'>
-    """
+    """A unit given as a member or by its symbol."""
     try:
         return kind(value)
     except ValueError:

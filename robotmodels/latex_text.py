@@ -21,36 +21,18 @@ _LETTERS = (
 
 
 def escaped(words: str) -> str:
-    r"""Words as LaTeX outside mathematics; what is between backticks in a fixed width.
-
-    Examples
-    --------
-    >>> print(escaped("`q_ref` of lab_rr"))
-    \texttt{q\_ref} of lab\_rr
-    """
+    """Words as LaTeX outside mathematics; what is between backticks in a fixed width."""
     plain = "".join(_SPECIAL.get(c, c) for c in words)
     return re.sub("`([^`]*)`", r"\\texttt{\1}", plain)
 
 
 def powers(number: str) -> str:
-    r"""A printed number as LaTeX: powers of ten are written as such.
-
-    Examples
-    --------
-    >>> print(powers("1.5e-07"))
-    1.5 \cdot 10^{-7}
-    """
+    """A printed number as LaTeX: powers of ten are written as such."""
     return re.sub(r"(?<=\d)e([+-]?\d+)", lambda m: rf" \cdot 10^{{{int(m[1])}}}", number)
 
 
 def meaning_latex(words: str) -> str:
-    r"""What a constant is, in mathematics: its symbols typeset, the words as text.
-
-    Examples
-    --------
-    >>> print(meaning_latex("cosine of alpha2"), meaning_latex("x of the tool"))
-    \text{cosine of }\alpha_{2} x\text{ of the tool}
-    """
+    """Meaning of a constant in LaTeX: symbols typeset, words as text."""
     out, end = "", 0
     for symbol in _SYMBOL.finditer(words):
         letter, number, axis, column = symbol.groups()
@@ -66,14 +48,7 @@ def meaning_latex(words: str) -> str:
 
 
 def table_latex(table: str) -> str:
-    r"""The printed table of a robot as an array: the same columns and cells.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> print(table_latex(str(load("lab_rrt").table)).splitlines()[2])
-    j & \sigma_{j} & \alpha_{j} & d_{j} & \theta_{j} & r_{j} \\
-    """
+    """The printed table of a robot as an array: the same columns and cells."""
     rows = [line.strip("│").split("│") for line in table.splitlines() if line.startswith("│")]
     head, *body = [[_cell(cell.strip()) for cell in row] for row in rows]
     lines = " \\\\\n".join(" & ".join(row) for row in body)
@@ -92,24 +67,7 @@ def _cell(words: str) -> str:
 
 
 def markdown(latex: str) -> str:
-    r"""LaTeX of an explanation as Markdown, which notebooks typeset: they read no LaTeX but maths.
-
-    Parameters
-    ----------
-    latex : str
-        Paragraphs with ``textbf``, ``texttt`` and inline mathematics, and ``align*`` and
-        ``equation*`` environments.
-
-    Returns
-    -------
-    str
-        Bold between ``**``, displayed mathematics between ``$$``.
-
-    Examples
-    --------
-    >>> print(markdown(r"\textbf{A\_b}, $x$"))
-    **A\_b**, $x$
-    """
+    """LaTeX of an explanation as Markdown with mathematics, for notebooks."""
     out, end = [], 0
     for block in _DISPLAY.finditer(latex):
         body = block[2]

@@ -26,36 +26,14 @@ _AXIS_COLORS: tuple[Color, Color, Color] = (
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """A box centred on its origin.
-
-    Parameters
-    ----------
-    size : tuple of 3 floats
-        Edge lengths along x, y, z in metres.
-
-    Examples
-    --------
-    >>> Box((0.1, 0.1, 0.2)).size[2]
-    0.2
-    """
+    """A box centred on its origin."""
 
     size: tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
 class Cylinder:
-    """A cylinder along z, centred on its origin.
-
-    Parameters
-    ----------
-    radius, length : float
-        Metres.
-
-    Examples
-    --------
-    >>> Cylinder(0.05, 0.3).length
-    0.3
-    """
+    """A cylinder along z, centred on its origin."""
 
     radius: float
     length: float
@@ -63,40 +41,14 @@ class Cylinder:
 
 @dataclass(frozen=True, slots=True)
 class Sphere:
-    """A sphere centred on its origin.
-
-    Parameters
-    ----------
-    radius : float
-        Metres.
-
-    Examples
-    --------
-    >>> Sphere(0.05).radius
-    0.05
-    """
+    """A sphere centred on its origin."""
 
     radius: float
 
 
 @dataclass(frozen=True, slots=True)
 class Mesh:
-    """A mesh file.
-
-    Parameters
-    ----------
-    filename : str
-        As the URDF names it, e.g. ``package://ur_description/meshes/base.stl``.
-    path : Path or None
-        Where it was found; None if it was not.
-    scale : tuple of 3 floats
-        Factors along x, y, z.
-
-    Examples
-    --------
-    >>> Mesh("base.stl", None).scale
-    (1.0, 1.0, 1.0)
-    """
+    """A mesh file."""
 
     filename: str
     path: Path | None
@@ -108,24 +60,7 @@ Shape = Box | Cylinder | Sphere | Mesh
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Visual:
-    """A shape fixed to a frame.
-
-    Parameters
-    ----------
-    frame : int
-        Number of the frame it moves with; 0 is R_0.
-    pose : ndarray, shape (4, 4)
-        Of the shape in that frame.
-    shape : Box, Cylinder, Sphere or Mesh
-        What to draw.
-    color : tuple of 4 floats, optional
-        Red, green, blue, opacity in [0, 1]; None leaves it to the mesh or the viewer.
-
-    Examples
-    --------
-    >>> Visual(0, np.eye(4), Sphere(0.1)).frame
-    0
-    """
+    """A shape fixed to a frame."""
 
     frame: int
     pose: Array
@@ -134,25 +69,7 @@ class Visual:
 
 
 def characteristic_length(table: DHTable, tool: Array) -> float:
-    """A length that says how large a robot is: its longest branch, its tool and longest stroke.
-
-    Parameters
-    ----------
-    table : DHTable
-        The geometric parameters.
-    tool : ndarray, shape (4, 4)
-        Pose of the tool in the last frame.
-
-    Returns
-    -------
-    float
-        Metres; 0.5 for a robot without any length.
-
-    Examples
-    --------
-    >>> characteristic_length(DHTable(antecedent=[0], sigma=[0], d=[0.3]), np.eye(4))
-    0.3
-    """
+    """Characteristic length of a robot: longest branch, tool and longest stroke."""
     lengths = np.abs(table.d) + np.abs(table.r) + np.abs(table.b)
     longest = max((float(lengths[np.array(table.path(j)) - 1].sum())
                    for j in range(1, table.f + 1)), default=0.0)  # fmt: skip
@@ -165,35 +82,7 @@ def characteristic_length(table: DHTable, tool: Array) -> float:
 
 
 def skeleton(table: DHTable, tool: Array, tip: int, axes: bool = True) -> tuple[Visual, ...]:
-    """Simple shapes for a robot that has none: joints, links, a foot and the tool's axes.
-
-    Revolute joints are cylinders along z_j and links are rods along b, d and r of the table.
-    Prismatic joints are a bar as long as the stroke and a block at the origin of their frame: a
-    rail on which the block travels if it stands on the base or carries another prismatic joint (a
-    gantry), otherwise a bar that moves with the block (a quill). Where axes intersect, as in a
-    wrist, each next cylinder is thinner and longer, so that all of them can be told apart.
-
-    Parameters
-    ----------
-    table : DHTable
-        The geometric parameters.
-    tool : ndarray, shape (4, 4)
-        Pose of the tool in the tip frame.
-    tip : int
-        Number of the tip frame.
-    axes : bool
-        Whether the tool's axes are among them.
-
-    Returns
-    -------
-    tuple of Visual
-        In table order; the same table gives the same shapes.
-
-    Examples
-    --------
-    >>> len(skeleton(DHTable(antecedent=[0], sigma=[0], d=[0.3]), np.eye(4), 1)) > 3
-    True
-    """
+    """Simple shapes for a robot that has none: joints, links, a foot and the tool's axes."""
     size = characteristic_length(table, tool)
     rod, radius = 0.022 * size, 0.036 * size
     shapes = [
@@ -245,27 +134,7 @@ def skeleton(table: DHTable, tool: Array, tip: int, axes: bool = True) -> tuple[
 
 
 def triad(frame: int, pose: Array, length: float) -> tuple[Visual, ...]:
-    """The three axes of a frame as thin cylinders: x red, y green, z blue.
-
-    Parameters
-    ----------
-    frame : int
-        Number of the frame they move with.
-    pose : ndarray, shape (4, 4)
-        Of the axes in that frame.
-    length : float
-        Metres.
-
-    Returns
-    -------
-    tuple of Visual
-        Three cylinders.
-
-    Examples
-    --------
-    >>> [v.color[0] > 0.5 for v in triad(1, np.eye(4), 0.1)]
-    [True, False, False]
-    """
+    """The three axes of a frame as thin cylinders: x red, y green, z blue."""
     turns = (se3.rotation("y", np.pi / 2), se3.rotation("x", -np.pi / 2), np.eye(4))
     return tuple(
         Visual(frame, pose @ turn @ se3.translation(0.0, 0.0, 0.5 * length),

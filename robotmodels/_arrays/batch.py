@@ -9,25 +9,7 @@ from .border import Array
 
 
 def batch_shape(arrays: tuple[Array, ...], names: tuple[str, ...]) -> tuple[int, ...]:
-    """Broadcast the leading axes of vectors.
-
-    Parameters
-    ----------
-    arrays : tuple of ndarray, shapes (..., n_i)
-        Checked arrays; the last axis of each is its core.
-    names : tuple of str
-        Used in error messages.
-
-    Returns
-    -------
-    tuple of int
-        The common leading shape.
-
-    Raises
-    ------
-    ShapeError
-        The leading axes do not broadcast.
-    """
+    """Broadcast the leading axes of vectors. Shapes: arrays (..., n_i)."""
     shapes = [a.shape[:-1] for a in arrays]
     try:
         return shapes[0] if len(set(shapes)) == 1 else np.broadcast_shapes(*shapes)
@@ -44,24 +26,7 @@ def batch_rows(
 ) -> tuple[tuple[int, ...], list[Array]]:
     """Broadcast the leading axes of vectors and lay each out as contiguous rows.
 
-    Parameters
-    ----------
-    arrays : tuple of ndarray, shapes (..., n_i)
-        Checked arrays; the last axis of each is its core.
-    names : tuple of str
-        Used in error messages.
-
-    Returns
-    -------
-    batch : tuple of int
-        The common leading shape.
-    rows : list of ndarray, shapes (N, n_i)
-        C-contiguous, N the product of ``batch``.
-
-    Raises
-    ------
-    ShapeError
-        The leading axes do not broadcast.
+    Shapes: arrays (..., n_i) -> rows (N, n_i).
     """
     batch = batch_shape(arrays, names)
     rows = [

@@ -19,25 +19,7 @@ _AT_A_TIME = 2**18
 
 
 def as_floats(value: ArrayLike, name: str) -> Array:
-    """Convert to a float64 array and refuse everything that is not a real finite number.
-
-    Parameters
-    ----------
-    value : array_like
-        Numbers of any shape.
-    name : str
-        Used in error messages.
-
-    Returns
-    -------
-    ndarray of float64, same shape
-        A view of the input where that is possible.
-
-    Raises
-    ------
-    InvalidValueError
-        Text, complex numbers, ragged lists, NaN or infinity.
-    """
+    """Convert to a float64 array and refuse everything that is not a real finite number."""
     array = _converted(value, name)
     if not _all_finite(array):
         bad = np.argwhere(~np.isfinite(array))[0]
@@ -51,34 +33,7 @@ def as_floats(value: ArrayLike, name: str) -> Array:
 
 
 def as_bounded(value: ArrayLike, name: str, largest: float, least: float = 0.0) -> Array:
-    """Finite floats of sizes whose squares and products are floats as well.
-
-    Parameters
-    ----------
-    value : array_like
-        Numbers of any shape.
-    name : str
-        Used in error messages.
-    largest : float
-        Bound of the absolute values.
-    least : float
-        What the largest absolute value has at least, unless all numbers are zero.
-
-    Returns
-    -------
-    ndarray of float64, same shape
-        As `as_floats`.
-
-    Raises
-    ------
-    InvalidValueError
-        As `as_floats`; an entry beyond ``largest``, or all of them below ``least``.
-
-    Examples
-    --------
-    >>> as_bounded([1.0, -2.0], "d", 1e50)
-    array([ 1., -2.])
-    """
+    """Finite floats within bounds, so that squares and products neither overflow nor underflow."""
     array = _converted(value, name)
     size = _size(array)
     if not size <= largest:
@@ -95,52 +50,12 @@ def as_bounded(value: ArrayLike, name: str, largest: float, least: float = 0.0) 
 
 
 def as_reals(value: ArrayLike, name: str) -> Array:
-    """Convert to a float64 array of real numbers that may be infinite or NaN, such as limits.
-
-    Parameters
-    ----------
-    value : array_like
-        Numbers of any shape.
-    name : str
-        Used in error messages.
-
-    Returns
-    -------
-    ndarray of float64, same shape
-        A view of the input where that is possible.
-
-    Raises
-    ------
-    InvalidValueError
-        Text, complex numbers, ragged lists.
-    """
+    """Convert to a float64 array of real numbers that may be infinite or NaN, such as limits."""
     return _converted(value, name)
 
 
 def as_core(value: ArrayLike, core: tuple[int, ...], name: str) -> Array:
-    """Finite floats of shape ``(..., *core)``.
-
-    Parameters
-    ----------
-    value : array_like, shape (..., *core)
-        Numbers.
-    core : tuple of int
-        Required trailing shape.
-    name : str
-        Used in error messages.
-
-    Returns
-    -------
-    ndarray, shape (..., *core)
-        Checked array.
-
-    Raises
-    ------
-    ShapeError
-        The trailing axes differ from ``core``.
-    InvalidValueError
-        As `as_floats`.
-    """
+    """Finite floats of shape ``(..., *core)``."""
     array = _converted(value, name)
     k = len(core)
     if array.shape[array.ndim - k :] != core or array.ndim < k:
@@ -149,27 +64,7 @@ def as_core(value: ArrayLike, core: tuple[int, ...], name: str) -> Array:
 
 
 def as_vector(value: ArrayLike, n: int, name: str) -> Array:
-    """Finite floats of shape ``(..., n)``; the quick path of `as_core` for joint vectors.
-
-    Parameters
-    ----------
-    value : array_like, shape (..., n)
-        Numbers.
-    n : int
-        Required length of the last axis.
-    name : str
-        Used in error messages.
-
-    Returns
-    -------
-    ndarray, shape (..., n)
-        Checked array.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        As `as_core`.
-    """
+    """Finite floats of shape ``(..., n)``; the quick path of `as_core` for joint vectors."""
     # the usual case quickly: one configuration, as an array or a list of numbers. A sum is finite
     # only if every term is (one that overflows takes the slow check)
     array = value
@@ -189,27 +84,7 @@ def as_vector(value: ArrayLike, n: int, name: str) -> Array:
 
 
 def as_exact(value: ArrayLike, shape: tuple[int, ...], name: str) -> Array:
-    """Finite floats of exactly this shape: no batch axes.
-
-    Parameters
-    ----------
-    value : array_like
-        Numbers.
-    shape : tuple of int
-        Required shape.
-    name : str
-        Used in error messages.
-
-    Returns
-    -------
-    ndarray
-        Checked array.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        As `as_core`.
-    """
+    """Finite floats of exactly this shape: no batch axes."""
     array = _converted(value, name)
     if array.shape != shape:
         raise ShapeError(f"{name}: expected shape {shape}, got {array.shape}.")

@@ -10,20 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 
 def read_only(array: ArrayLike, dtype: type = np.float64) -> NDArray[Any]:
-    """A private, C-ordered, read-only copy.
-
-    Parameters
-    ----------
-    array : array_like
-        Values of any shape.
-    dtype : type
-        Of the copy.
-
-    Returns
-    -------
-    ndarray
-        The copy, not writeable.
-    """
+    """A private, C-ordered, read-only copy."""
     copy = np.array(array, dtype=dtype, order="C")
     copy.setflags(write=False)
     return copy
@@ -51,35 +38,13 @@ def _rebuilt(kind: type, values: tuple[Any, ...]) -> Any:
 
 
 def same_value(a: object, b: object) -> bool:
-    """Equality of fields that may be arrays: same shape and same numbers.
-
-    Parameters
-    ----------
-    a, b : object
-        Two values of a field.
-
-    Returns
-    -------
-    bool
-        Whether they are equal.
-    """
+    """Equality of fields that may be arrays: same shape and same numbers."""
     if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
         return a.shape == b.shape and bool(np.array_equal(a, b))
     return bool(a == b)
 
 
 def value_hash(*fields: object) -> int:
-    """Hash of fields that may be arrays, consistent with `same_value`.
-
-    Parameters
-    ----------
-    *fields : object
-        Hashable values or arrays.
-
-    Returns
-    -------
-    int
-        The hash.
-    """
+    """Hash of fields that may be arrays, consistent with `same_value`."""
     # adding 0.0 makes -0.0 and 0.0 hash alike, as they compare alike
     return hash(tuple((f + 0.0).tobytes() if isinstance(f, np.ndarray) else f for f in fields))

@@ -62,25 +62,7 @@ class Contradiction(NamedTuple):
 def contradictions(
     solution: Solution, size_is_known: bool, truncation: float | None = None
 ) -> list[Contradiction]:
-    """Known distances that fits without them do not confirm, the worst first.
-
-    Doubtful ones are found by their deleted residuals in the linearised fit. A distance that alone
-    gives the scale is predicted by nothing.
-
-    Parameters
-    ----------
-    solution : Solution
-        The fit.
-    size_is_known : bool
-        Whether a prior or known parameters give the scale as well.
-    truncation : float, optional
-        Of the fit.
-
-    Returns
-    -------
-    list of Contradiction
-        Those that chance does not make.
-    """
+    """Known distances that fits without them do not confirm, the worst first."""
     problem, fit = solution.problem, solution.fit
     measurements = problem.measurements
     if not any(isinstance(m, KnownDistance) for m in measurements):

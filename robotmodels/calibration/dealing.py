@@ -57,24 +57,7 @@ def dealt_blocks(
     rng: np.random.Generator,
     whole_places: bool = True,
 ) -> Dealing:
-    """Part measurements by whole places or by runs of postures, equal readings always together.
-
-    A place is where the end stays while it touches things that are near each other. With fewer
-    than three, and for other measurements, each part has a run of the postures of each thing in
-    the order of measurement, and a third of its length on either side is not fitted (h-block
-    cross-validation: P. Burman, E. Chow, D. Nolan, Biometrika 81, 1994). A place without which no
-    length is known is never kept aside, nor a thing that takes all that its own rows say.
-
-    Examples
-    --------
-    >>> import robotmodels as rm
-    >>> from robotmodels.calibration import Position
-    >>> q = np.linspace(0.0, 1.0, 20)[:, None] * np.ones(6)
-    >>> seen = Position(q, np.zeros((20, 3)))
-    >>> dealing = dealt_blocks(rm.load("rx90"), [seen, seen], 4, np.random.default_rng(0))
-    >>> sorted(np.flatnonzero(part.aside).tolist()[:5] for part in dealing.parts)[1]
-    [5, 6, 7, 8, 9]
-    """
+    """Part measurements by whole places or by runs of postures, equal readings always together."""
     seen = [m for m in measurements if m.views]
     if not seen:
         return Dealing((), 0, False, "")

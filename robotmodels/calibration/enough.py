@@ -27,27 +27,7 @@ def check_enough(
     known: Iterable[str] = (),
     dependent: float = DEPENDENT,
 ) -> None:
-    """Refuse fewer rows than unknowns.
-
-    Few rows tell few parameters, so that one row always seems to be missing. The unknowns are
-    counted as measurements of the same kinds in many more postures would tell them.
-
-    Parameters
-    ----------
-    found : IdentifiableParameters
-        What the measurements tell.
-    measured : sequence of Measurement
-        The measurements.
-    known_lengths, known : iterable of str
-        Parameters that stay as they are.
-    dependent : float
-        As `identifiable_on`.
-
-    Raises
-    ------
-    InvalidValueError
-        How many more measurements are needed.
-    """
+    """Refuse fewer rows than unknowns."""
     problem = problem_of(found.kept, measured)
     if problem.P and problem.rows > problem.P + problem.F:
         return

@@ -34,18 +34,7 @@ class ErrorSummary(NamedTuple):
 
 
 def summary_of(lengths: Array) -> ErrorSummary:
-    """Summarise lengths of residuals.
-
-    Parameters
-    ----------
-    lengths : ndarray, shape (B,)
-        m or rad.
-
-    Returns
-    -------
-    ErrorSummary
-        NaN where there are none.
-    """
+    """Summarise lengths of residuals. Shapes: lengths (B,)."""
     if not len(lengths):
         return ErrorSummary(np.nan, np.nan, np.nan, 0)
     return ErrorSummary(
@@ -78,22 +67,7 @@ class BlockErrors(NamedTuple):
 
 
 def block_errors(problem: Problem, xi: Array, fixtures: Array) -> BlockErrors:
-    """Lengths of residuals at given parameters; known distances are left out.
-
-    Parameters
-    ----------
-    problem : Problem
-        Parameters and measurements.
-    xi : ndarray, shape (P,)
-        Deviations.
-    fixtures : ndarray, shape (F,)
-        Fixtures.
-
-    Returns
-    -------
-    BlockErrors
-        Of the measurements that have views, in their order.
-    """
+    """Lengths of residuals at given parameters; known distances are left out."""
     parts = linearised(problem, xi, fixtures)
     seen = [(m, part) for m, part in zip(problem.measurements, parts, strict=True) if m.views]
     if not seen:

@@ -58,30 +58,7 @@ _CLASSES: dict[type[Measurement], FileKind] = {
 
 
 def as_file_kind(value: Any, name: str = "kind") -> FileKind:
-    """A kind given as a member, by its name, or as the class of its measurements.
-
-    Parameters
-    ----------
-    value : FileKind, str or class
-        Such as ``"pose"`` or ``Pose``.
-    name : str
-        Used in the error message.
-
-    Returns
-    -------
-    FileKind
-        The member.
-
-    Raises
-    ------
-    InvalidValueError
-        Something else.
-
-    Examples
-    --------
-    >>> as_file_kind("point contact") is as_file_kind(PointContact)
-    True
-    """
+    """A kind given as a member, by its name, or as the class of its measurements."""
     if isinstance(value, type) and value in _CLASSES:
         return _CLASSES[value]
     return chosen(FileKind, value, name)

@@ -21,15 +21,7 @@ _ROWS = 3
 
 
 class FileRows(NamedTuple):
-    """A file that was read.
-
-    Attributes
-    ----------
-    name : str
-        With its folder.
-    rows : int
-        How many measurements it gave.
-    """
+    """A file that was read."""
 
     name: str
     rows: int
@@ -45,18 +37,7 @@ def files_read(tables: Sequence[CsvTable], rows: Sequence[int]) -> tuple[FileRow
 
 
 def check_columns(tables: Sequence[CsvTable]) -> None:
-    """Refuse files of a folder whose columns differ in number or name.
-
-    Parameters
-    ----------
-    tables : sequence of CsvTable
-        Files of one folder.
-
-    Raises
-    ------
-    InvalidValueError
-        With the files of each kind.
-    """
+    """Refuse files of a folder whose columns differ in number or name."""
     kinds: dict[str, list[str]] = {}
     for t in tables:
         columns = f"columns {', '.join(t.names)}" if t.names else f"{t.width} columns, no header"
@@ -74,24 +55,7 @@ def check_contents(
 ) -> None:
     """Refuse files whose columns hold something else than the readings that other files hold.
 
-    Poses of seven columns pass for readings of seven joints, but four of their columns are
-    quaternions, of length 1, or they are beyond the limits of the joints.
-
-    Parameters
-    ----------
-    tables : sequence of CsvTable
-        Files that are read together.
-    readings : sequence of ndarray, shapes (N, n)
-        Of each file, rad or m.
-    model : RobotModel
-        The robot.
-    frame : str, int or None
-        The measured end.
-
-    Raises
-    ------
-    InvalidValueError
-        With the files that are read, and those that look like something else.
+    Shapes: readings (N, n).
     """
     rows = set(model.twin.frame(frame).path.tolist())
     other: dict[str, str] = {}

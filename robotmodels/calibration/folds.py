@@ -75,17 +75,7 @@ def _split(measurements: Sequence[Measurement], dealing: Dealing, part: Part) ->
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Refit(Rebuilt):
-    """How to fit again without some measurements: from the solution.
-
-    Parameters
-    ----------
-    solution : Solution
-        Of all measurements.
-    prior : callable or None
-        The prior for a problem, from its own measurements alone.
-    truncation : float or None
-        The same truncation.
-    """
+    """Settings of a fit that is repeated without some measurements."""
 
     solution: Solution
     prior: Callable[[Problem], Prior] | None
@@ -95,24 +85,7 @@ class Refit(Rebuilt):
 def errors_of_splits(
     refit: Refit, parts: Sequence[Split], before: BlockErrors, done: Callable[[], None]
 ) -> AsideErrors:
-    """Errors of blocks kept aside by splits, each fitted without them.
-
-    Parameters
-    ----------
-    refit : Refit
-        Where each fit starts.
-    parts : sequence of Split
-        One fit each.
-    before : BlockErrors
-        Of the nominal robot at all blocks.
-    done : callable
-        Called after each fit.
-
-    Returns
-    -------
-    AsideErrors
-        Of the blocks aside.
-    """
+    """Validation errors of the held-out blocks of each split."""
     parameters = refit.solution.problem.parameters
     found, numbers = [], []
     known = fixtures_by_name(refit.solution)
@@ -139,20 +112,7 @@ def errors_of_splits(
 
 
 def errors_of_others(refit: Refit, aside: Sequence[Measurement]) -> AsideErrors:
-    """Errors of measurements that never took part.
-
-    Parameters
-    ----------
-    refit : Refit
-        The solution.
-    aside : sequence of Measurement
-        The others.
-
-    Returns
-    -------
-    AsideErrors
-        Before: the nominal robot with the fixtures that suit it.
-    """
+    """Errors of measurements that were not used in any fit."""
     solution = refit.solution
     parameters = solution.problem.parameters
     zero = np.zeros(len(parameters))
@@ -162,18 +122,7 @@ def errors_of_others(refit: Refit, aside: Sequence[Measurement]) -> AsideErrors:
 
 
 def fixtures_by_name(solution: Solution) -> dict[str, float]:
-    """Fixtures of a solution by name.
-
-    Parameters
-    ----------
-    solution : Solution
-        Of a fit.
-
-    Returns
-    -------
-    dict of str to float
-        m or rad.
-    """
+    """Fixtures of a solution by name."""
     names = (fixture.name for fixture in solution.problem.fixtures)
     return dict(zip(names, solution.fixtures.tolist(), strict=True))
 
@@ -184,48 +133,13 @@ def errors_aside(
     aside: Sequence[Measurement],
     known: dict[str, float],
 ) -> BlockErrors:
-    """Errors of measurements that did not take part in a fit.
-
-    Fixtures that the fit has found are taken from it; others (a point that only they touch) are
-    fitted to them, which needs some of their freedom.
-
-    Parameters
-    ----------
-    parameters : GeometricParameters
-        Of the robot.
-    deviation : ndarray, shape (P,)
-        Their values.
-    aside : sequence of Measurement
-        Kept aside.
-    known : dict of str to float
-        Fixtures by name.
-
-    Returns
-    -------
-    BlockErrors
-        Of every block.
-    """
+    """Errors of measurements that were not used in a fit. Shapes: deviation (P,)."""
     problem = problem_of(parameters, aside)
     return block_errors(problem, deviation, suited_fixtures(problem, deviation, known))
 
 
 def suited_fixtures(problem: Problem, deviation: Array, known: dict[str, float]) -> Array:
-    """Fixtures that suit a robot as it is.
-
-    Parameters
-    ----------
-    problem : Problem
-        Parameters and measurements.
-    deviation : ndarray, shape (P,)
-        Values of the parameters.
-    known : dict of str to float
-        Fixtures that stay as they are, by name.
-
-    Returns
-    -------
-    ndarray, shape (F,)
-        In the order of the problem.
-    """
+    """Least-squares fixtures at given parameters of the robot. Shapes: deviation (P,) -> (F,)."""
     names = [fixture.name for fixture in problem.fixtures]
     values = np.array([known.get(name, np.nan) for name in names])
     free = np.flatnonzero(np.isnan(values))

@@ -6,18 +6,7 @@ from ..model import RobotModel
 
 
 def joints_that_count(model: RobotModel) -> str:
-    """Which joints count, and how fingers and other branches are left out; empty if all count.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-
-    Returns
-    -------
-    str
-        A sentence behind an error, with a blank before it.
-    """
+    """Which joints count, and how fingers and other branches are left out; empty if all count."""
     moving = set(model.twin.frame(None).path.tolist())
     names = model.table.joint_names
     idle = [

@@ -32,23 +32,7 @@ _CONFUSED = 50.0
 
 
 def notes_before(problem: Problem) -> tuple[str, ...]:
-    """Look at measurements before they are fitted.
-
-    Parameters
-    ----------
-    problem : Problem
-        Parameters and measurements.
-
-    Returns
-    -------
-    tuple of str
-        Sentences; empty if nothing is strange.
-
-    Raises
-    ------
-    InvalidValueError
-        Readings in degrees or beyond the limits of the joints, lengths in other units.
-    """
+    """Notes on the measurements before the fit."""
     model = problem.parameters.model
     revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
     moving = {
@@ -83,20 +67,7 @@ def notes_before(problem: Problem) -> tuple[str, ...]:
 def notes_after(
     solution: Solution, before: IdentifiableParameters, again: IdentifiableParameters
 ) -> tuple[str, ...]:
-    """Look at a solution.
-
-    Parameters
-    ----------
-    solution : Solution
-        Of the fit.
-    before, again : IdentifiableParameters
-        As judged at the nominal robot, and at the solution.
-
-    Returns
-    -------
-    tuple of str
-        Sentences.
-    """
+    """Notes on the solution of a fit."""
     fit, problem = solution.fit, solution.problem
     notes = []
     if fit.status is not FitStatus.CONVERGED:
@@ -174,20 +145,7 @@ def notes_after(
 def notes_of_gain(
     before: BlockErrors, validation: AsideErrors | None, held_out: AsideErrors | None
 ) -> tuple[str, ...]:
-    """Say whether the robot errs less where it was not measured, which is what counts.
-
-    Parameters
-    ----------
-    before : BlockErrors
-        Of the nominal robot.
-    validation, held_out : AsideErrors or None
-        Errors on data kept aside.
-
-    Returns
-    -------
-    tuple of str
-        A sentence for each unit that gained nothing.
-    """
+    """Note whether the fit reduces the errors of data that were not fitted."""
     notes = []
     for aside, what in ((validation, "cross-validation"), (held_out, "data kept aside")):
         if aside is None:

@@ -21,15 +21,7 @@ _ROUGH = 1e-6
 
 
 class PlacedRobot(NamedTuple):
-    """A robot with fitted base and tool.
-
-    Attributes
-    ----------
-    model : RobotModel
-        The nominal table, base and tool as fitted.
-    errors : BlockErrors
-        What is left: what the table is to blame for.
-    """
+    """A robot with fitted base and tool."""
 
     model: RobotModel
     errors: BlockErrors
@@ -38,29 +30,7 @@ class PlacedRobot(NamedTuple):
 def placed_robot(
     candidates: GeometricParameters, measured: Sequence[Measurement], fixed: Collection[str]
 ) -> PlacedRobot | None:
-    """Fit base and tool alone.
-
-    A base or tool that is far off hides what the measurements can tell: the turn of the last joint
-    has no effect on a point that is thought to lie on its axis.
-
-    Parameters
-    ----------
-    candidates : GeometricParameters
-        Of which those of base and ends are fitted.
-    measured : sequence of Measurement
-        To fit.
-    fixed : collection of str
-        Parameters that stay as they are.
-
-    Returns
-    -------
-    PlacedRobot or None
-        None if neither may be off.
-
-    References
-    ----------
-    Seed book section 1.4.4.3.
-    """
+    """Fit base and tool alone (seed book, section 1.4.4.3)."""
     model = candidates.model
 
     def of_place(parameters: GeometricParameters) -> list[str]:
@@ -95,19 +65,6 @@ def placed_robot(
 
 
 def with_gravity_kept(placed: RobotModel, model: RobotModel) -> RobotModel:
-    """A robot put elsewhere, on the same floor: gravity keeps its direction in R_0.
-
-    What a base is fitted to is a measuring device, whose axes need not be plumb.
-
-    Parameters
-    ----------
-    placed, model : RobotModel
-        With the new base, and with the base that the gravity belongs to.
-
-    Returns
-    -------
-    RobotModel
-        ``placed`` with its gravity turned.
-    """
+    """Robot with another base and the gravity of the old one in R_0."""
     turned = placed.base[:3, :3] @ model.base[:3, :3].T @ model.gravity
     return placed.with_gravity(turned)

@@ -81,21 +81,7 @@ class ParameterPrior(Rebuilt):
 
 
 def estimated_with(prior: ParameterPrior, found: IdentifiableParameters) -> GeometricParameters:
-    """Parameters to estimate with a prior.
-
-    Parameters
-    ----------
-    prior : ParameterPrior
-        What is thought.
-    found : IdentifiableParameters
-        What the measurements tell.
-
-    Returns
-    -------
-    GeometricParameters
-        Those that are identifiable; and, unless truncated, those that act like combinations of
-        them and have a finite prior.
-    """
+    """Parameters to estimate with a prior."""
     if prior.truncated:
         return found.kept
     f = found.candidates.model.f
@@ -113,29 +99,7 @@ def estimated_with(prior: ParameterPrior, found: IdentifiableParameters) -> Geom
 def settled_prior(
     prior: ParameterPrior, problem: Problem, loss: Loss, rng: np.random.Generator
 ) -> Prior:
-    """The prior of the unknowns of a problem; fixtures have none.
-
-    Parameters
-    ----------
-    prior : ParameterPrior
-        What is thought.
-    problem : Problem
-        The calibration.
-    loss : Loss
-        Of the fit.
-    rng : numpy.random.Generator
-        For the folds that choose the strength.
-
-    Returns
-    -------
-    Prior
-        Of the vector [parameters, fixtures].
-
-    Raises
-    ------
-    InvalidValueError
-        Too few measurements to keep some of them aside.
-    """
+    """The prior of the unknowns of a problem; fixtures have none."""
     whole = np.concatenate([standard_deviations(prior, problem), np.full(problem.F, np.inf)])
     mean = np.zeros(len(whole))
     if prior.strength is not None:

@@ -1,4 +1,7 @@
-"""All measurements of a calibration together: one vector of unknowns, one stack of rows."""
+"""All measurements of a calibration together: one vector of unknowns, one stack of rows.
+
+Source: Seed book section 1.4.5.
+"""
 
 from __future__ import annotations
 
@@ -139,25 +142,7 @@ def problem_of(
 def as_measurements(
     measurements: Measurement | Iterable[Measurement], name: str = "measurements"
 ) -> tuple[Measurement, ...]:
-    """Measurements at the border: one or several.
-
-    Parameters
-    ----------
-    measurements : Measurement or iterable of Measurement
-        What a caller passed.
-    name : str
-        Used in error messages.
-
-    Returns
-    -------
-    tuple of Measurement
-        One or more.
-
-    Raises
-    ------
-    InvalidValueError
-        None at all, or something else.
-    """
+    """Check measurements: one or several."""
     if isinstance(measurements, Measurement):
         return (measurements,)
     found = tuple(measurements)
@@ -179,36 +164,12 @@ def _factors(
 
 
 def measured_frames(measurements: Iterable[Measurement]) -> tuple[str | int | None, ...]:
-    """Ends that measurements see, each once.
-
-    Parameters
-    ----------
-    measurements : iterable of Measurement
-        Of one robot.
-
-    Returns
-    -------
-    tuple
-        Frames; the tool (None) if they see none.
-    """
+    """Ends that measurements see, each once."""
     return tuple(dict.fromkeys(view.frame for m in measurements for view in m.views)) or (None,)
 
 
 def evaluations(problem: Problem, xi: Array) -> list[list[Evaluation]]:
-    """Poses and Psi of every view of every measurement.
-
-    Parameters
-    ----------
-    problem : Problem
-        The calibration.
-    xi : ndarray, shape (P,)
-        Deviations.
-
-    Returns
-    -------
-    list of list of Evaluation
-        For each measurement, for each view.
-    """
+    """Poses and Psi of every view of every measurement. Shapes: xi (P,)."""
     return [
         [
             Evaluation(*differential_model(problem.parameters, view.q, xi, view.frame, factor))
@@ -219,25 +180,7 @@ def evaluations(problem: Problem, xi: Array) -> list[list[Evaluation]]:
 
 
 def guessed_fixtures(problem: Problem, xi: Array) -> Array:
-    """First values of all fixtures.
-
-    Parameters
-    ----------
-    problem : Problem
-        The calibration.
-    xi : ndarray, shape (P,)
-        Deviations of the robot.
-
-    Returns
-    -------
-    ndarray, shape (F,)
-        m or rad.
-
-    Raises
-    ------
-    InvalidValueError
-        A fixture that no measurement of poses says anything about.
-    """
+    """Initial values of all fixtures. Shapes: xi (P,) -> (F,)."""
     values = np.full(problem.F, np.nan)
     for m, seen in zip(problem.measurements, evaluations(problem, xi), strict=True):
         guess = m.guess(seen)
@@ -255,22 +198,7 @@ def guessed_fixtures(problem: Problem, xi: Array) -> Array:
 
 
 def linearised(problem: Problem, xi: Array, fixtures: Array) -> list[Linearised]:
-    """Residuals and derivatives of each measurement.
-
-    Parameters
-    ----------
-    problem : Problem
-        The calibration.
-    xi : ndarray, shape (P,)
-        Deviations.
-    fixtures : ndarray, shape (F,)
-        Fixtures.
-
-    Returns
-    -------
-    list of Linearised
-        One for each measurement; ``by_fixtures`` has the measurement's own columns.
-    """
+    """Residuals and derivatives of each measurement. Shapes: xi (P,), fixtures (F,)."""
     return [
         m.linearise(seen, fixtures[problem.columns(m)])
         for m, seen in zip(problem.measurements, evaluations(problem, xi), strict=True)
@@ -280,21 +208,7 @@ def linearised(problem: Problem, xi: Array, fixtures: Array) -> list[Linearised]
 def stacked(problem: Problem, x: Array, scales: tuple[Array, ...]) -> tuple[Array, Array]:
     """Whitened rows of all measurements.
 
-    Parameters
-    ----------
-    problem : Problem
-        The calibration.
-    x : ndarray, shape (P + F,)
-        Deviations, then fixtures.
-    scales : tuple of ndarray, shapes (k,)
-        Standard deviations for each measurement that states none.
-
-    Returns
-    -------
-    residual : ndarray, shape (M,)
-        In standard deviations.
-    jacobian : ndarray, shape (M, P + F)
-        Derivatives.
+    Shapes: x (P + F,), scales (k,) -> residual (M,), jacobian (M, P + F).
     """
     P = problem.P
     residual = np.empty(problem.rows)
@@ -315,30 +229,7 @@ def stacked(problem: Problem, x: Array, scales: tuple[Array, ...]) -> tuple[Arra
 
 
 def satisfying(problem: Problem, xi: Array, fixtures: Array) -> Problem:
-    """The same problem at nearby readings at which a robot satisfies its constraints exactly.
-
-    Ranks must be judged there: with the readings of another robot the constraints are violated a
-    little, and a column that no data can tell from others seems to be independent. Each block
-    moves its own readings by the shortest step (in the norm of the joints).
-
-    Parameters
-    ----------
-    problem : Problem
-        The calibration.
-    xi : ndarray, shape (P,)
-        Deviations of the robot that shall satisfy them.
-    fixtures : ndarray, shape (F,)
-        Fixtures.
-
-    Returns
-    -------
-    Problem
-        With other readings; blocks that cannot be satisfied are left out.
-
-    References
-    ----------
-    Seed book section 1.4.5.
-    """
+    """The problem with readings moved to satisfy the constraints exactly, to judge ranks."""
     from .measurements.satisfied import satisfied_measurement
 
     moved = []

@@ -23,30 +23,7 @@ _MOST = 0.75
 def check_readings(
     model: RobotModel, measurements: Sequence[Measurement], rows: set[int]
 ) -> list[str]:
-    """Compare readings with the limits of the joints.
-
-    Joints most of whose readings are beyond their limits are refused; of single readings a note
-    is taken. Joints without limits, and those that move no measured end, are not looked at.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    measurements : sequence of Measurement
-        With readings.
-    rows : set of int
-        Rows of the table, from 1, that move the measured ends.
-
-    Returns
-    -------
-    list of str
-        Notes.
-
-    Raises
-    ------
-    InvalidValueError
-        Readings in degrees, or of other joints than they are taken for.
-    """
+    """Compare readings with the limits of the joints."""
     notes = []
     revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
     for k, m in enumerate(measurements):
@@ -79,21 +56,7 @@ def check_readings(
 def beyond_limits(model: RobotModel, q: Array, rows: set[int]) -> tuple[list[str], bool]:
     """Joints that read more than their limits allow, and whether one does so most of the time.
 
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    q : ndarray, shape (N, n)
-        Readings, rad or m.
-    rows : set of int
-        Rows of the table, from 1, of the joints that are looked at.
-
-    Returns
-    -------
-    said : list of str
-        For each such joint how many readings, by how much.
-    most : bool
-        Whether a joint is beyond its limits in most readings.
+    Shapes: q (N, n).
     """
     lower, upper = model.lower, model.upper
     room = np.maximum(_BEYOND, _PART * np.where(np.isfinite(upper - lower), upper - lower, 0.0))

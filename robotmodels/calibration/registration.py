@@ -1,4 +1,8 @@
-"""A first place of the robot in the world, where nobody knows it: by the measured positions."""
+"""A first place of the robot in the world, where nobody knows it: by the measured positions.
+
+Source: W. Kabsch, "A solution for the best rotation to relate two sets of vectors", Acta
+Crystallographica A32, 1976.
+"""
 
 from __future__ import annotations
 
@@ -21,41 +25,7 @@ _NEAR = 0.2
 def registered(
     model: RobotModel, measurements: Sequence[Measurement], base: bool, tool: bool
 ) -> RobotModel:
-    """The robot with a base and tool that bring measured and computed poses near each other.
-
-    Where the given base and tool already do, the model is returned as it is. Else the base follows
-    from the positions (the rotation that fits them best), and the tool from the poses. Only kinds
-    that measure all three coordinates are used.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The nominal robot.
-    measurements : sequence of Measurement
-        Of any kinds.
-    base, tool : bool
-        Whether each may be changed.
-
-    Returns
-    -------
-    RobotModel
-        A start for the fit.
-
-    References
-    ----------
-    W. Kabsch, "A solution for the best rotation to relate two sets of vectors", Acta
-    Crystallographica A32, 1976.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> arm = load("rx90")
-    >>> q = np.random.default_rng(0).uniform(-1, 1, (10, 6))
-    >>> there = dgm(arm.with_base(se3.translation(3.0, 0, 0) @ se3.rotation("z", 2.0)), q)
-    >>> start = registered(arm, [Pose(q, there)], base=True, tool=True)
-    >>> float(abs(dgm(start, q) - there).max()) < 1e-9
-    True
-    """
+    """Kabsch alignment of base and tool to the measured positions."""
     usable = [m for m in measurements if isinstance(m, Pose | Position) and all(m.rows[:3])]
     usable = [m for m in usable if m.frame is None]
     if not usable or not (base or tool):
@@ -89,28 +59,9 @@ def _positions(m: Pose | Position) -> Array:
 
 
 def best_motion(points: Array, targets: Array) -> Array:
-    """Motion that brings points onto targets with the least sum of squares.
+    """Least-squares rigid motion from points to targets (Kabsch).
 
-    Parameters
-    ----------
-    points, targets : ndarray, shape (N, 3)
-        In the same order, metres.
-
-    Returns
-    -------
-    ndarray, shape (4, 4)
-        A pose.
-
-    References
-    ----------
-    W. Kabsch, "A solution for the best rotation to relate two sets of vectors", Acta
-    Crystallographica A32, 1976.
-
-    Examples
-    --------
-    >>> p = np.random.default_rng(0).normal(size=(5, 3))
-    >>> best_motion(p, p + [1.0, 2.0, 3.0])[:3, 3].round(12)
-    array([1., 2., 3.])
+    Shapes: points, targets (N, 3) -> (4, 4).
     """
     a, b = points.mean(axis=0), targets.mean(axis=0)
     T = np.eye(4)

@@ -19,21 +19,7 @@ if TYPE_CHECKING:
 class MeasuredResiduals(NamedTuple):
     """Residuals of one measurement.
 
-    Attributes
-    ----------
-    measurement : Measurement
-        B blocks of k rows.
-    before, after : ndarray, shape (B, k)
-        Predicted minus measured, m or rad: of the nominal robot with base and tool fitted, and of
-        the calibrated one, each with the fixtures that suit it.
-    whitened : ndarray, shape (B, k)
-        Those after, in standard deviations.
-    p : ndarray, shape (B, 3)
-        Where the end of the first view is in the world, m; NaN without views.
-    blocks : ndarray of int, shape (B,)
-        Numbers of the blocks, counted through all measurements.
-    outlier : ndarray of bool, shape (B,)
-        Longer than noise explains.
+    Shapes: before, after, whitened (B, k); p (B, 3); blocks, outlier (B,).
     """
 
     measurement: Measurement

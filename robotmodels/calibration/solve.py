@@ -1,4 +1,7 @@
-"""One fit of given parameters to given measurements, deviations of the noise estimated along."""
+"""One fit of given parameters to given measurements, deviations of the noise estimated along.
+
+Source: Seed book section 1.4.4.3.
+"""
 
 from __future__ import annotations
 
@@ -59,18 +62,7 @@ class Solution(Rebuilt):
 
 
 def first_scales(problem: Problem) -> tuple[Array, ...]:
-    """Standard deviations to begin with: a millimetre, and its angle at the robot stretched out.
-
-    Parameters
-    ----------
-    problem : Problem
-        The calibration.
-
-    Returns
-    -------
-    tuple of ndarray
-        For each measurement, by the units of its rows.
-    """
+    """Initial standard deviations: 1 mm, and 1 mm over the reach as an angle."""
     angle = _FIRST_LENGTH / problem.parameters.skeleton.size
     return tuple(
         read_only([_FIRST_LENGTH if unit == "m" else angle for unit in m.units])
@@ -89,30 +81,7 @@ def solve(
     truncation: float | None = None,
     tolerance: float = 1e-12,
 ) -> Solution:
-    """Iterated least squares; noise that is not stated is estimated for each kind and unit.
-
-    Parameters
-    ----------
-    problem : Problem
-        Parameters and measurements.
-    start : ndarray, shape (P + F,), optional
-        Where to start; default the nominal robot and guessed fixtures.
-    scales : tuple of ndarray, optional
-        Standard deviations that are kept as they are; default: estimated.
-    from_scales : tuple of ndarray, optional
-        Where their estimation starts.
-    loss, prior, truncation, tolerance
-        As `fit_nonlinear`.
-
-    Returns
-    -------
-    Solution
-        Parameters, fixtures, noise.
-
-    References
-    ----------
-    Seed book section 1.4.4.3.
-    """
+    """Iterated least squares; noise that is not stated is estimated for each kind and unit."""
     if start is None:
         xi = np.zeros(problem.P)
         start = np.concatenate([xi, guessed_fixtures(problem, xi)])

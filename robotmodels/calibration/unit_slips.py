@@ -119,20 +119,7 @@ def _slip_of_pivot(p: Array, length: Array) -> UnitSlip | None:
 
 
 def check_units(model: RobotModel, measurements: Sequence[Measurement]) -> None:
-    """Refuse lengths in another unit than metres.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The nominal robot.
-    measurements : sequence of Measurement
-        Of any kinds; positions, lengths and known distances are looked at.
-
-    Raises
-    ------
-    InvalidValueError
-        With the unit that they are in.
-    """
+    """Refuse lengths in another unit than metres."""
     for k, m in enumerate(measurements):
         found = _slip(model, m)
         if found is not None:

@@ -61,20 +61,7 @@ def _standard_errors(R: Array) -> Array:
 
 
 def without_untold(found: IdentifiableParameters, names: list[str]) -> IdentifiableParameters:
-    """Identifiable parameters less those that noise hides.
-
-    Parameters
-    ----------
-    found : IdentifiableParameters
-        As judged without noise.
-    names : list of str
-        Which are left out.
-
-    Returns
-    -------
-    IdentifiableParameters
-        With `Reason.NOISE` for them.
-    """
+    """Identifiable parameters without the insignificant ones."""
     return replace(
         found,
         kept=found.kept.without(names),

@@ -40,17 +40,7 @@ other origins of joints). Without --out the report is printed."""
 
 
 def add_command(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Parameters
-    ----------
-    commands : argparse subparsers
-        Where to add it.
-
-    Examples
-    --------
-    >>> add_command(argparse.ArgumentParser().add_subparsers())
-    """
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "calibrate",
         usage="robotmodels calibrate --robot ROBOT --measurements FILE [FILE ...] --kind KIND "
@@ -139,31 +129,7 @@ def _add_fit(fitted: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Read, fit, and print or write.
-
-    Parameters
-    ----------
-    arguments : Namespace
-        Parsed arguments.
-
-    Returns
-    -------
-    int
-        0 if the fit has converged, else 1.
-
-    Raises
-    ------
-    RobotModelsError
-        A robot, files or options that make no sense.
-
-    Examples
-    --------
-    >>> parser = argparse.ArgumentParser()
-    >>> add_command(parser.add_subparsers())
-    >>> words = ["calibrate", "--robot", "rx90", "--measurements", "a.csv", "--kind", "position"]
-    >>> parser.parse_args(words).folds
-    5
-    """
+    """Run the command: read, fit, and print or write."""
     from ..calibration import KnownDistance, ParameterPrior, fit
 
     check_output(arguments)
@@ -202,29 +168,7 @@ def run(arguments: argparse.Namespace) -> int:
 def read(
     arguments: argparse.Namespace, model: RobotModel, files: list[str], name: str | None = None
 ) -> Measurement:
-    """The measurements of some files.
-
-    Parameters
-    ----------
-    arguments : Namespace
-        Parsed arguments.
-    model : RobotModel
-        The robot.
-    files : list of str
-        Files, or one folder.
-    name : str, optional
-        Of the measurement.
-
-    Returns
-    -------
-    Measurement
-        Metres and radians.
-
-    Raises
-    ------
-    RobotModelsError
-        As `read_measurements`.
-    """
+    """The measurements of some files."""
     from ..calibration.read import read_measurements
 
     return read_measurements(

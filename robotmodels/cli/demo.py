@@ -40,17 +40,7 @@ _UR5_POSTURE = np.array([0.3, -0.9, 1.2, 0.4, 0.8, -0.2])
 
 
 def add_command(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Parameters
-    ----------
-    commands : argparse subparsers
-        Where to add it.
-
-    Examples
-    --------
-    >>> add_command(argparse.ArgumentParser().add_subparsers())
-    """
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "demo",
         description="Take the Staubli RX-90 from its table to URDF and Pinocchio, and the UR5 "
@@ -72,18 +62,7 @@ def add_command(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Run the demonstration.
-
-    Parameters
-    ----------
-    arguments : Namespace
-        With ``out``, the folder for the files, ``real`` and ``quiet``.
-
-    Examples
-    --------
-    >>> table_poses(load("rx90"), np.zeros((2, 6))).shape
-    (2, 4, 4)
-    """
+    """Run the demonstration."""
     started = time.perf_counter()
     check_output(arguments)
     folder: Path = arguments.out
@@ -123,23 +102,7 @@ def run(arguments: argparse.Namespace) -> None:
 def table_poses(model: RobotModel, q: Array) -> Array:
     """Tool poses by the plain product of the table's factors, without Pinocchio or kernels.
 
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    q : ndarray, shape (N, n)
-        Joint variables, rad or m.
-
-    Returns
-    -------
-    ndarray, shape (N, 4, 4)
-        World poses of the tool.
-
-    Examples
-    --------
-    >>> rx90 = load("rx90")
-    >>> bool(np.allclose(table_poses(rx90, np.zeros((1, 6)))[0], dgm(rx90, [0] * 6)))
-    True
+    Shapes: q (N, n) -> (N, 4, 4).
     """
     T = np.broadcast_to(model.base, (q.shape[0], 4, 4))
     factors = link_transforms(model.table, q)

@@ -1,4 +1,7 @@
-"""The second part of the demonstration: a real robot identified from its log."""
+"""The second part of the demonstration: a real robot identified from its log.
+
+Source: Seed book sections 1.6.2 and 1.6.5.
+"""
 
 from __future__ import annotations
 
@@ -29,34 +32,7 @@ _PUBLISHED_RMSE = (6.40, 8.21, 4.13, 1.72, 2.65, 1.72)
 def identify_tx40(
     folder: Path, progress: Callable[[str], AbstractContextManager[Bar | None]]
 ) -> None:
-    """Identify the Staubli TX40 from its log, print what is found, and write files.
-
-    What an extra is missing for is said, and the rest is done.
-
-    Parameters
-    ----------
-    folder : Path
-        Where the files go; it is there.
-    progress : callable
-        Gives a bar for work of some name, or None.
-
-    Raises
-    ------
-    OSError
-        A file cannot be written.
-
-    References
-    ----------
-    Seed book sections 1.6.2 and 1.6.5.
-
-    Examples
-    --------
-    >>> from robotmodels.datasets import load_tx40
-    >>> from robotmodels.identification import fit
-    >>> data = load_tx40()
-    >>> print(comparison(data, fit(data.model, data.log)).splitlines()[-2].strip())
-    60 of 60 are within two of our deviations.
-    """
+    """Identify the Staubli TX40 from its log, print what is found, and write files."""
     from ..datasets import load_tx40
     from ..identification import check_joints, check_log, fit, synchronisation
     from ..identification.reporting.text import report_sections
@@ -94,24 +70,7 @@ def identify_tx40(
 
 
 def comparison(data: Tx40Log, result: IdentificationResult) -> str:
-    """Identified and published values side by side, and how many agree.
-
-    Parameters
-    ----------
-    data : Tx40Log
-        With the published values.
-    result : IdentificationResult
-        On the whole log, as the published one.
-
-    Returns
-    -------
-    str
-        A line for each parameter that the log shows.
-
-    Examples
-    --------
-    See `identify_tx40`.
-    """
+    """Identified and published values side by side, and how many agree."""
     from ..identification import not_seen
 
     both = [one for one in data.published if one.name in result.names]

@@ -36,17 +36,7 @@ summary.txt. Without --out the summary is printed."""
 
 
 def add_command(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Parameters
-    ----------
-    commands : argparse subparsers
-        Where to add it.
-
-    Examples
-    --------
-    >>> add_command(argparse.ArgumentParser().add_subparsers())
-    """
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "excite",
         usage="robotmodels excite --robot ROBOT [options]",
@@ -123,30 +113,7 @@ def _add_search(search: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Search, and print or write.
-
-    Parameters
-    ----------
-    arguments : Namespace
-        Parsed arguments.
-
-    Returns
-    -------
-    int
-        0 if a motion within all limits was found, else 1.
-
-    Raises
-    ------
-    RobotModelsError
-        A robot or options that make no sense.
-
-    Examples
-    --------
-    >>> parser = argparse.ArgumentParser()
-    >>> add_command(parser.add_subparsers())
-    >>> parser.parse_args(["excite", "--robot", "rx90"]).harmonics
-    5
-    """
+    """Run the command: search, and print or write."""
     from ..identification.excitation import ExcitationStatus, exciting_trajectory
 
     check_output(arguments)

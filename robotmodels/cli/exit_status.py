@@ -32,18 +32,7 @@ _SENTENCES = {
 
 
 def statuses() -> str:
-    """Every exit status with its meaning, for ``robotmodels --help``.
-
-    Returns
-    -------
-    str
-        A paragraph with a line for each.
-
-    Examples
-    --------
-    >>> print(statuses().splitlines()[1])
-      0    done
-    """
+    """Every exit status with its meaning, for ``robotmodels --help``."""
     lines = (
         textwrap.fill(f"  {one.value:<4} {one.sentence}", 78, subsequent_indent=" " * 7)
         for one in ExitStatus
@@ -52,27 +41,6 @@ def statuses() -> str:
 
 
 def ending(examples: str, not_reached: str | None = None) -> str:
-    r"""What stands at the end of the help of a command: its examples, how it may end.
-
-    Parameters
-    ----------
-    examples : str
-        Paragraphs; the first lists commands, each indented by two blanks.
-    not_reached : str, optional
-        What status 1 means for this command; without it there is no such status.
-
-    Returns
-    -------
-    str
-        Paragraphs.
-
-    Examples
-    --------
-    >>> print(ending("examples:\n  robotmodels robots"))
-    examples:
-      robotmodels robots
-    <BLANKLINE>
-    Exit status: 0 done, 2 an argument or a file is wrong.
-    """
+    """End of a command's help: examples and exit statuses."""
     middle = "" if not_reached is None else f"1 {not_reached}, "
     return f"{examples}\n\nExit status: 0 done, {middle}2 an argument or a file is wrong."

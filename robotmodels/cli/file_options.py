@@ -7,20 +7,7 @@ from typing import Any
 
 
 def add_units(files: Any) -> None:
-    """Add the options for the units of angles and lengths.
-
-    Parameters
-    ----------
-    files : argparse parser or group
-        Where to add them.
-
-    Examples
-    --------
-    >>> parser = argparse.ArgumentParser()
-    >>> add_units(parser)
-    >>> parser.parse_args(["--angles", "deg"]).angles
-    'deg'
-    """
+    """Add the options for the units of angles and lengths."""
     for option, units, of in (
         ("--angles", ("rad", "deg"), "angles"),
         ("--lengths", ("m", "mm"), "lengths, also of prismatic joints,"),
@@ -30,20 +17,7 @@ def add_units(files: Any) -> None:
 
 
 def add_delimiter(files: Any) -> None:
-    r"""Add the option for what is between cells.
-
-    Parameters
-    ----------
-    files : argparse parser or group
-        Where to add it.
-
-    Examples
-    --------
-    >>> parser = argparse.ArgumentParser()
-    >>> add_delimiter(parser)
-    >>> parser.parse_args(["--delimiter", r"\t"]).delimiter
-    '\t'
-    """
+    """Add the option for what is between cells."""
     files.add_argument("--delimiter", type=_character, metavar="CHARACTER",
                        help=r"between cells, \t for a tab (default: ; tab or , as "
                        "found)")  # fmt: skip

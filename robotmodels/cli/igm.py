@@ -30,17 +30,7 @@ examples:
 
 
 def add_command(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Parameters
-    ----------
-    commands : argparse subparsers
-        Where to add it.
-
-    Examples
-    --------
-    >>> add_command(argparse.ArgumentParser().add_subparsers())
-    """
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "igm",
         description="Inverse geometric model: print every posture that brings the robot's tool to "
@@ -91,31 +81,7 @@ def add_command(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Solve and print.
-
-    Parameters
-    ----------
-    arguments : Namespace
-        Parsed arguments.
-
-    Returns
-    -------
-    int
-        `ExitStatus.DONE` if the pose is reached, else `ExitStatus.NOT_REACHED`.
-
-    Raises
-    ------
-    RobotModelsError
-        A robot or numbers that make no sense.
-
-    Examples
-    --------
-    >>> parser = argparse.ArgumentParser()
-    >>> add_command(parser.add_subparsers())
-    >>> run(parser.parse_args(["igm", "lab_rr", "--q=0.1,0.2"]))  # doctest: +ELLIPSIS
-    lab_rr: 1 posture...
-    <ExitStatus.DONE: 0>
-    """
+    """Run the command: solve and print."""
     model = robot_of(arguments)
     mask = None if arguments.mask is None else numbers(arguments.mask, 6, "--mask")
     T = pose_of(arguments, model, mask)
@@ -140,34 +106,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def pose_of(arguments: argparse.Namespace, model: RobotModel, mask: Array | None) -> Array:
-    """The pose asked for.
-
-    Parameters
-    ----------
-    arguments : Namespace
-        With ``xyz``, ``rpy``, ``matrix``, ``q``, ``degrees``.
-    model : RobotModel
-        The robot.
-    mask : ndarray, shape (6,), or None
-        What has to be met.
-
-    Returns
-    -------
-    ndarray, shape (4, 4)
-        World pose of the tool [m].
-
-    Raises
-    ------
-    InvalidValueError
-        No pose, several, or an incomplete one.
-
-    Examples
-    --------
-    >>> from ..robots import load
-    >>> given = argparse.Namespace(xyz="1 2 3", rpy="0 0 90", matrix=None, q=None, degrees=True)
-    >>> pose_of(given, load("rx90"), None)[:3, 0]
-    array([0., 1., 0.])
-    """
+    """The pose asked for."""
     ways = ("--xyz", "--matrix", "--q")
     given = [w for w in ways if getattr(arguments, w.removeprefix("--")) is not None]
     if len(given) != 1:
@@ -195,33 +134,7 @@ def pose_of(arguments: argparse.Namespace, model: RobotModel, mask: Array | None
 def locks_of(
     words: Sequence[str], model: RobotModel, degrees: bool
 ) -> dict[int | str, float] | None:
-    """Joints that keep a value.
-
-    Parameters
-    ----------
-    words : sequence of str
-        ``JOINT=VALUE``; the joint by its name or by its number, from 1 as in the printed table.
-    model : RobotModel
-        The robot.
-    degrees : bool
-        Whether the values of revolute joints are degrees.
-
-    Returns
-    -------
-    dict, or None
-        Columns of q, from 0, and values [rad or m].
-
-    Raises
-    ------
-    InvalidValueError
-        Another form, a joint that does not exist, or one that is given twice.
-
-    Examples
-    --------
-    >>> from ..robots import load
-    >>> locks_of(["3=0.5", "joint_5=0"], load("iiwa14"), degrees=False)
-    {2: 0.5, 4: 0.0}
-    """
+    """Joints that keep a value."""
     names = list(model.table.joint_names)
     locks: dict[int | str, float] = {}
     for word in words:
@@ -241,30 +154,7 @@ def locks_of(
 
 
 def angle_of(text: str | None, degrees: bool) -> float | None:
-    """The arm angle in radians.
-
-    Parameters
-    ----------
-    text : str or None
-        What was given.
-    degrees : bool
-        Whether it is in degrees.
-
-    Returns
-    -------
-    float or None
-        Radians.
-
-    Raises
-    ------
-    InvalidValueError
-        No number.
-
-    Examples
-    --------
-    >>> angle_of("180", degrees=True)
-    3.141592653589793
-    """
+    """The arm angle in radians."""
     if text is None:
         return None
     angle = float(numbers(text, 1, "--arm-angle")[0])

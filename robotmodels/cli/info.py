@@ -25,17 +25,7 @@ examples:
 
 
 def add_command(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Parameters
-    ----------
-    commands : argparse subparsers
-        Where to add it.
-
-    Examples
-    --------
-    >>> add_command(argparse.ArgumentParser().add_subparsers())
-    """
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "info",
         description="Print the geometric table of a robot, its base and tool, joint limits, "
@@ -48,20 +38,7 @@ def add_command(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Print everything about one robot.
-
-    Parameters
-    ----------
-    arguments : Namespace
-        Parsed arguments.
-
-    Examples
-    --------
-    >>> source = dict(robot="rx90", base_link=None, tip_link=None, package_dir=[], mimic=False,
-    ...               json=False)
-    >>> run(argparse.Namespace(**source))  # doctest: +ELLIPSIS
-    rx90: 6 joints, 6 frames...
-    """
+    """Print everything about one robot."""
     model = robot_of(arguments)
     if arguments.json:
         print_json(as_json(model))
@@ -94,26 +71,7 @@ def run(arguments: argparse.Namespace) -> None:
 
 
 def as_json(model: RobotModel) -> dict[str, Any]:
-    """A robot as what `print_json` writes: the content of the text.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-
-    Returns
-    -------
-    dict
-        ``robot, table, base, tool, tip, gravity, joints, transmission, links, total_mass, frames,
-        configurations, notes``; SI units and radians, unlimited joints have infinite limits.
-        `DHTable.from_rows` takes ``table``.
-
-    Examples
-    --------
-    >>> from ..robots import load
-    >>> as_json(load("rx90"))["table"][2]["d"]
-    0.45
-    """
+    """Robot as JSON data with the content of the text."""
     table, drive = model.table, model.drive
     quantities = ("antecedent", "sigma", "mu", "gamma", "b", "beta", "alpha", "d", "theta", "r")
     known = bool(model.inertia.values.any())
@@ -151,45 +109,12 @@ def as_json(model: RobotModel) -> dict[str, Any]:
 
 
 def pose_text(pose: np.ndarray) -> str:
-    """A pose as four lines of numbers.
-
-    Parameters
-    ----------
-    pose : ndarray, shape (4, 4)
-        The pose, metres.
-
-    Returns
-    -------
-    str
-        Four lines.
-
-    Examples
-    --------
-    >>> print(pose_text(np.eye(4)).splitlines()[0])
-      1.000000   0.000000   0.000000   0.000000
-    """
+    """A pose as four lines of numbers."""
     return "\n".join("  " + "   ".join(f"{v + 0.0:8.6f}" for v in row) for row in pose.round(9))
 
 
 def joint_table(model: RobotModel) -> str:
-    """Joint limits in a box.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-
-    Returns
-    -------
-    str
-        Text of n + 4 lines.
-
-    Examples
-    --------
-    >>> from ..robots import load
-    >>> len(joint_table(load("rx90")).splitlines())
-    10
-    """
+    """Joint limits in a box."""
     table = model.table
     return boxed([
         ("joint", list(table.joint_names)),
@@ -206,24 +131,7 @@ def joint_table(model: RobotModel) -> str:
 
 
 def inertia_table(model: RobotModel) -> str:
-    """Inertial parameters in two boxes: the inertia tensor; first moments and mass.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, f frames.
-
-    Returns
-    -------
-    str
-        Text of 2 (f + 4) lines.
-
-    Examples
-    --------
-    >>> from ..robots import load
-    >>> "ZZ" in inertia_table(load("puma560"))
-    True
-    """
+    """Inertial parameters in two boxes: the inertia tensor; first moments and mass."""
     values = model.inertia.values
     columns = [(p, [f"{v:.4g}" for v in values[:, i]]) for i, p in enumerate(PARAMETERS)]
     frames = ("frame", list(model.table.names))

@@ -10,22 +10,7 @@ from typing import Any
 
 @contextlib.contextmanager
 def noticed() -> Iterator[Callable[[], bool]]:
-    """Keep interrupts that Python would print and forget, while it lasts.
-
-    The first call of a model compiles for a while, and LLVM calls back into Python meanwhile. An
-    interrupt there is lost, and what it cut off fails later as some other error.
-
-    Yields
-    ------
-    callable
-        Whether one has been lost.
-
-    Examples
-    --------
-    >>> with noticed() as lost:
-    ...     lost()
-    False
-    """
+    """Context that raises interrupts which Python would only print."""
     lost = False
     before = sys.unraisablehook
 

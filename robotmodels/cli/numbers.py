@@ -22,25 +22,7 @@ NUMBER_OPTIONS = (
 
 
 def joined(argv: Sequence[str]) -> list[str]:
-    """Put the numbers behind an option into one word, ``--q -1 1e-3`` into ``--q=-1,1e-3``.
-
-    argparse would take -1e-3 for the name of an option.
-
-    Parameters
-    ----------
-    argv : sequence of str
-        Arguments.
-
-    Returns
-    -------
-    list of str
-        Arguments.
-
-    Examples
-    --------
-    >>> joined(["igm", "rx90", "--xyz", "-1e-3", "0", "1", "--limits", "--q-ref", "home"])
-    ['igm', 'rx90', '--xyz=-1e-3,0,1', '--limits', '--q-ref', 'home']
-    """
+    """Put the numbers behind an option into one word, ``--q -1 1e-3`` into ``--q=-1,1e-3``."""
     words: list[str] = []
     rest = list(argv)
     while rest:
@@ -54,34 +36,7 @@ def joined(argv: Sequence[str]) -> list[str]:
 
 
 def numbers(text: str, count: int | Sequence[int], option: str, positive: bool = False) -> Array:
-    """Numbers of an option.
-
-    Parameters
-    ----------
-    text : str
-        Separated by commas, blanks or both; brackets, as arrays are printed, do no harm.
-    count : int or sequence of int
-        How many there may be.
-    option : str
-        Its name, for the error message.
-    positive : bool
-        Whether all have to be above zero.
-
-    Returns
-    -------
-    ndarray, shape (count,)
-        The numbers.
-
-    Raises
-    ------
-    InvalidValueError
-        Another count, something that is no finite number, or one that is not above zero.
-
-    Examples
-    --------
-    >>> numbers("1, 2 3", 3, "--xyz")
-    array([1., 2., 3.])
-    """
+    """Numbers of an option. Shapes: -> (count,)."""
     counts = (count,) if isinstance(count, int) else tuple(count)
     try:
         values = np.array([float(word) for word in _words(text)])
@@ -99,34 +54,7 @@ def numbers(text: str, count: int | Sequence[int], option: str, positive: bool =
 def joint_numbers(
     text: str | None, n: int, option: str, positive: bool = False
 ) -> Array | float | None:
-    """One number for all joints, or one for each.
-
-    Parameters
-    ----------
-    text : str or None
-        What was given, if anything was.
-    n : int
-        Joints.
-    option : str
-        Its name, for the error message.
-    positive : bool
-        Whether all have to be above zero.
-
-    Returns
-    -------
-    float, ndarray of shape (n,), or None
-        The numbers; None where nothing was given.
-
-    Raises
-    ------
-    InvalidValueError
-        Another count, something that is no finite number, or one that is not above zero.
-
-    Examples
-    --------
-    >>> joint_numbers("3", 6, "--velocity"), joint_numbers(None, 6, "--velocity")
-    (3.0, None)
-    """
+    """One number for all joints, or one for each."""
     if text is None:
         return None
     values = numbers(text, sorted({1, n}), option, positive)
@@ -134,35 +62,7 @@ def joint_numbers(
 
 
 def posture(text: str, model: RobotModel, option: str, degrees: bool) -> Array:
-    """Joint variables from numbers, or from the name of a configuration of the robot.
-
-    Parameters
-    ----------
-    text : str
-        What was given.
-    model : RobotModel
-        The robot.
-    option : str
-        Its name, for the error message.
-    degrees : bool
-        Whether the numbers of revolute joints are degrees.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Radians and metres.
-
-    Raises
-    ------
-    InvalidValueError
-        Neither n numbers nor a name.
-
-    Examples
-    --------
-    >>> from ..robots import load
-    >>> posture("180 0.5", load("planar_2r"), "--q", degrees=True).round(4)
-    array([3.1416, 0.0087])
-    """
+    """Joint variables from numbers, or from the name of a configuration of the robot."""
     named = model.configurations.get(text)
     if named is not None:
         return named
@@ -180,24 +80,7 @@ def posture(text: str, model: RobotModel, option: str, degrees: bool) -> Array:
 
 
 def revolute(model: RobotModel) -> np.ndarray:
-    """Which joints are revolute, whose variables may be in degrees.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-
-    Returns
-    -------
-    ndarray of bool, shape (n,)
-        One for each joint.
-
-    Examples
-    --------
-    >>> from ..robots import load
-    >>> revolute(load("lab_trr"))
-    array([False,  True,  True])
-    """
+    """Which joints are revolute, whose variables may be in degrees."""
     return model.table.sigma[model.table.joint_rows] == REVOLUTE
 
 

@@ -39,25 +39,7 @@ _FIRST = re.compile(r"^([a-z_]+)(?=: )")
 
 
 def in_options(message: str, options: Collection[str]) -> str:
-    """A message that names arguments of functions, in options of a command.
-
-    Parameters
-    ----------
-    message : str
-        Of an error.
-    options : collection of str
-        That the command has; arguments without one stay as they are.
-
-    Returns
-    -------
-    str
-        The message.
-
-    Examples
-    --------
-    >>> in_options("cutoff: too high; say angles='deg', or b2=3.", ["--cutoff", "--angles"])
-    '--cutoff: too high; say --angles deg, or b2=3.'
-    """
+    """Replace the argument names in a message by the options of a command."""
     for words, option in _WHOLE:
         if not option.startswith("--") or option.split()[0] in options:
             message = message.replace(words, option)

@@ -23,19 +23,7 @@ from .streams import say
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """A result in every form that a command may hand over.
-
-    Parameters
-    ----------
-    text : str
-        All of it.
-    head : str
-        What is printed of it where files have the whole.
-    data : callable
-        Gives it for `print_json`.
-    write : callable
-        Writes files into a folder that is there, and gives their names.
-    """
+    """Result of a command as text, JSON and files."""
 
     text: str
     head: str
@@ -44,45 +32,14 @@ class Report:
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:
-    """Add the option for JSON.
-
-    Parameters
-    ----------
-    parser : ArgumentParser
-        Of a command.
-
-    Examples
-    --------
-    >>> parser = argparse.ArgumentParser()
-    >>> add_json(parser)
-    >>> parser.parse_args(["--json"]).json
-    True
-    """
+    """Add the option for JSON."""
     parser.add_argument("--json", action="store_true",
                         help="print JSON in place of text; null is what is not finite or not "
                         "known")  # fmt: skip
 
 
 def add_output(parser: argparse.ArgumentParser) -> Any:
-    """Add the options of commands that work long and write files.
-
-    Parameters
-    ----------
-    parser : ArgumentParser
-        Of a command.
-
-    Returns
-    -------
-    argparse group
-        For further options of what is handed over.
-
-    Examples
-    --------
-    >>> parser = argparse.ArgumentParser()
-    >>> group = add_output(parser)
-    >>> parser.parse_args(["--out", "report"]).out.name
-    'report'
-    """
+    """Add the options of commands that work long and write files."""
     group: Any = parser.add_argument_group("what is handed over")
     group.add_argument("--out", type=Path, metavar="FOLDER",
                        help="write files into this folder (made if it is not there)")  # fmt: skip
@@ -92,20 +49,7 @@ def add_output(parser: argparse.ArgumentParser) -> Any:
 
 
 def hand_over(report: Report, arguments: argparse.Namespace) -> None:
-    """Write the files that are asked for, and print.
-
-    Parameters
-    ----------
-    report : Report
-        What there is.
-    arguments : Namespace
-        With ``out`` and ``json``, as `add_output` declares them.
-
-    Raises
-    ------
-    RobotModelsError, OSError
-        A file that cannot be written.
-    """
+    """Write the requested files, and print."""
     written: list[Path] = []
     if arguments.out is not None:
         folder = arguments.out
@@ -120,24 +64,7 @@ def hand_over(report: Report, arguments: argparse.Namespace) -> None:
 
 
 def check_output(arguments: argparse.Namespace) -> None:
-    """Refuse a folder that cannot be written before the work, not after it.
-
-    Parameters
-    ----------
-    arguments : Namespace
-        With ``out``.
-
-    Raises
-    ------
-    InvalidValueError
-        There is a file of this name.
-    OSError
-        Nothing can be written there.
-
-    Examples
-    --------
-    >>> check_output(argparse.Namespace(out=Path("new") / "report"))
-    """
+    """Refuse a folder that cannot be written before the work, not after it."""
     if arguments.out is None:
         return
     there = next(path for path in (arguments.out, *arguments.out.absolute().parents)
@@ -149,25 +76,7 @@ def check_output(arguments: argparse.Namespace) -> None:
 
 
 def with_extra(path: Path, write: Callable[[], None]) -> list[str]:
-    """Write a file that needs an optional package, or say that there will be none.
-
-    Parameters
-    ----------
-    path : Path
-        Of the file.
-    write : callable
-        Writes it.
-
-    Returns
-    -------
-    list of str
-        Its name, if it was written.
-
-    Examples
-    --------
-    >>> with_extra(Path("figures/arm.png"), lambda: None)
-    ['arm.png']
-    """
+    """Write a file that needs an optional package, or note that it is missing."""
     try:
         write()
     except MissingExtraError as error:
@@ -177,21 +86,7 @@ def with_extra(path: Path, write: Callable[[], None]) -> list[str]:
 
 
 def print_json(data: Any) -> None:
-    """Print data as JSON that any reader takes.
-
-    Parameters
-    ----------
-    data : nested dicts, lists, arrays, numbers, words
-        What is not finite becomes null.
-
-    Examples
-    --------
-    >>> print_json({"q": np.array([0.5, np.nan]), "ok": np.True_})
-    {
-      "q": [0.5, null],
-      "ok": true
-    }
-    """
+    """Print data as JSON that any reader takes."""
     # a terminal without Unicode gets escapes, which mean the same
     unicode = str(getattr(sys.stdout, "encoding", "") or "").lower().startswith("utf")
     print(_json(_plain(data), json.JSONEncoder(ensure_ascii=not unicode, allow_nan=False)))

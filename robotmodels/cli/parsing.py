@@ -15,20 +15,7 @@ _WIDEST = 100  # columns
 
 
 class Parser(argparse.ArgumentParser):
-    """Options in full only, so that new ones do not change what a script means.
-
-    Parameters
-    ----------
-    **settings
-        As `argparse.ArgumentParser`.
-
-    Examples
-    --------
-    >>> parser = Parser(prog="robotmodels")
-    >>> action = parser.add_argument("--limits", action="store_true")
-    >>> parser.parse_args(["--limits"]).limits
-    True
-    """
+    """Argument parser without abbreviated options."""
 
     def __init__(self, **settings: Any) -> None:
         settings.setdefault("formatter_class", HelpText)
@@ -36,13 +23,7 @@ class Parser(argparse.ArgumentParser):
         super().__init__(**settings)
 
     def error(self, message: str) -> NoReturn:
-        """Say in one line what is wrong, and end.
-
-        Parameters
-        ----------
-        message : str
-            What argparse has found.
-        """
+        """Print an error in one line and exit."""
         if message.startswith("argument -"):
             message = message.removeprefix("argument ")
         line = " ".join(message.split())
@@ -50,13 +31,7 @@ class Parser(argparse.ArgumentParser):
         self.exit(ExitStatus.WRONG_INPUT, f"robotmodels: {line}{end} See {self.prog} --help.\n")
 
     def refuse(self, words: Sequence[str]) -> NoReturn:
-        """Words that no option and no argument takes.
-
-        Parameters
-        ----------
-        words : sequence of str
-            What is left over.
-        """
+        """Exit with an error about unknown arguments."""
         option = words[0].partition("=")[0]
         if not option.startswith("-"):
             self.error(f"nothing takes {words[0]!r}")
@@ -65,32 +40,12 @@ class Parser(argparse.ArgumentParser):
         self.error(f"no option {option}.{meant}")
 
     def options(self) -> list[str]:
-        """The names of all options.
-
-        Returns
-        -------
-        list of str
-            ``--help`` and the others.
-        """
+        """The names of all options."""
         return [name for action in self._actions for name in action.option_strings]
 
 
 class HelpText(argparse.HelpFormatter):
-    r"""Paragraphs are filled; those with an indented line stay as they are: commands to copy.
-
-    Parameters
-    ----------
-    prog : str
-        Name of the program.
-
-    Examples
-    --------
-    >>> print(HelpText("x")._fill_text("a\nb\n\nc\n  d", 80, ""))
-    a b
-    <BLANKLINE>
-    c
-      d
-    """
+    """Help formatter that fills paragraphs, except those with an indented line."""
 
     def __init__(self, prog: str) -> None:
         width = min(shutil.get_terminal_size().columns - 2, _WIDEST)

@@ -17,36 +17,7 @@ _COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
 
 
 def as_text(model: RobotModel, T: Array, found: IGMSolutions, mask_axes: str, degrees: bool) -> str:
-    """The solutions of one pose as text.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    T : ndarray, shape (4, 4)
-        The pose asked for [m].
-    found : IGMSolutions
-        For this pose.
-    mask_axes : str
-        Axes of its mask.
-    degrees : bool
-        Whether angles are printed in degrees.
-
-    Returns
-    -------
-    str
-        Lines.
-
-    Examples
-    --------
-    >>> from ..robots import load
-    >>> from ..igm import igm
-    >>> from ..se3 import translation
-    >>> T = translation(1, 0, 0)
-    >>> found = igm(load("lab_trr"), T, mask=[1, 1, 1, 0, 0, 0])
-    >>> print(as_text(load("lab_trr"), T, found, "world", False).splitlines()[0])
-    lab_trr: 0 postures. The position is out of reach: too far. The closest posture misses it by ...
-    """
+    """The solutions of one pose as text."""
     names = model.table.joint_names
     count = int(found.count)
     lines = [
@@ -82,36 +53,7 @@ def as_text(model: RobotModel, T: Array, found: IGMSolutions, mask_axes: str, de
 
 
 def as_json(model: RobotModel, T: Array, found: IGMSolutions, degrees: bool) -> dict[str, Any]:
-    """The solutions of one pose as what `json` writes.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    T : ndarray, shape (4, 4)
-        The pose asked for [m].
-    found : IGMSolutions
-        For this pose.
-    degrees : bool
-        Whether angles are in degrees.
-
-    Returns
-    -------
-    dict
-        ``robot, joints, units, pose, reached, status, reason, method, mask, postures``, each
-        posture with ``q, branch, residual, within_limits, double, free_joints, family_joints``,
-        and ``closest`` (null where the pose is reached). Residuals are in m and rad.
-
-    Examples
-    --------
-    >>> from ..robots import load
-    >>> from ..igm import igm
-    >>> from ..kinematics import dgm
-    >>> arm = load("lab_rr")
-    >>> T = dgm(arm, [0.1, 0.2])
-    >>> as_json(arm, T, igm(arm, T), False)["reached"]
-    True
-    """
+    """Solutions of one pose as JSON data."""
     names = np.array(model.table.joint_names)
     q = _shown(model, found.q, degrees)
     postures = [

@@ -39,24 +39,7 @@ examples:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a command.
-
-    Parameters
-    ----------
-    argv : sequence of str, optional
-        Arguments; default those of the process.
-
-    Returns
-    -------
-    int
-        An `ExitStatus`.
-
-    Examples
-    --------
-    >>> main(["info", "rx90"])  # doctest: +ELLIPSIS
-    rx90: 6 joints, 6 frames...
-    0
-    """
+    """Run a command."""
     words = list(sys.argv[1:] if argv is None else argv)
     with prepared(), noticed() as interrupted:
         try:
@@ -66,26 +49,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def parser_of(command: str | None) -> tuple[Parser, Parser | None]:
-    """The parser, with all options of one command and the names of the others.
-
-    Parameters
-    ----------
-    command : str or None
-        Its name.
-
-    Returns
-    -------
-    parser : Parser
-        Of everything.
-    own : Parser or None
-        Of the command, if there is one of this name.
-
-    Examples
-    --------
-    >>> parser, own = parser_of("igm")
-    >>> "--arm-angle" in own.options()
-    True
-    """
+    """The parser, with all options of one command and the names of the others."""
     parser = Parser(
         prog="robotmodels",
         description="Kinematics, dynamics, calibration and identification of robot manipulators "

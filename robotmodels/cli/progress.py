@@ -17,15 +17,7 @@ _OFTEN = 0.05  # s
 
 @dataclass(slots=True)
 class Bar:
-    """How far the work is, drawn over the same line again and again.
-
-    Parameters
-    ----------
-    doing : str
-        What is being done.
-    stream : text stream
-        Where it is drawn.
-    """
+    """Progress bar on one line of the terminal."""
 
     doing: str
     stream: TextIO
@@ -33,27 +25,11 @@ class Bar:
     _drawn: float = -1.0
 
     def fraction(self, done: float) -> None:
-        """Draw.
-
-        Parameters
-        ----------
-        done : float
-            From 0 to 1.
-        """
+        """Draw."""
         self._draw(done, f"{100.0 * done:3.0f} %", self.doing)
 
     def steps(self, done: int, of: int, doing: str = "") -> None:
-        """Draw a number of steps.
-
-        Parameters
-        ----------
-        done : int
-            Steps.
-        of : int
-            All of them.
-        doing : str
-            What this one is.
-        """
+        """Draw a number of steps."""
         text = f"{self.doing}: {doing}" if doing else self.doing
         self._draw(done / of if of else 1.0, f"{done}/{of}", text)
 
@@ -76,20 +52,7 @@ class Bar:
 
 
 def add_quiet(parser: argparse.ArgumentParser) -> None:
-    """Add the option that leaves the bar away.
-
-    Parameters
-    ----------
-    parser : ArgumentParser
-        Of a command.
-
-    Examples
-    --------
-    >>> parser = argparse.ArgumentParser()
-    >>> add_quiet(parser)
-    >>> parser.parse_args(["--quiet"]).quiet
-    True
-    """
+    """Add the option that turns the progress bar off."""
     parser.add_argument("--quiet", action="store_true",
                         help="no progress bar (there is none either where standard error is not "
                         "a terminal)")  # fmt: skip
@@ -97,26 +60,7 @@ def add_quiet(parser: argparse.ArgumentParser) -> None:
 
 @contextlib.contextmanager
 def progress(arguments: argparse.Namespace, doing: str) -> Iterator[Bar | None]:
-    """A bar while some work lasts.
-
-    Parameters
-    ----------
-    arguments : Namespace
-        With ``quiet``.
-    doing : str
-        What is being done.
-
-    Yields
-    ------
-    Bar or None
-        None where nobody looks.
-
-    Examples
-    --------
-    >>> with progress(argparse.Namespace(quiet=True), "counting") as bar:
-    ...     bar is None
-    True
-    """
+    """Context that shows a progress bar."""
     stream = sys.stderr
     if arguments.quiet or stream is None or not stream.isatty():
         yield None

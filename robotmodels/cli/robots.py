@@ -23,17 +23,7 @@ Names that begin with erd: come from the files of example-robot-data."""
 
 
 def add_command(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Parameters
-    ----------
-    commands : argparse subparsers
-        Where to add it.
-
-    Examples
-    --------
-    >>> add_command(argparse.ArgumentParser().add_subparsers())
-    """
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "robots",
         description="List the robots that `load` and the other commands know by name.",
@@ -44,18 +34,7 @@ def add_command(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Print each name with what it stands for.
-
-    Parameters
-    ----------
-    arguments : Namespace
-        With ``json``: a list of ``name`` and ``title``.
-
-    Examples
-    --------
-    >>> run(argparse.Namespace(json=False))  # doctest: +ELLIPSIS
-    lab_rr ...
-    """
+    """Print each name with what it stands for."""
     names = robots()
     if arguments.json:
         print_json([{"name": name, "title": title(name)} for name in names])

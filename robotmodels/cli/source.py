@@ -12,22 +12,7 @@ from ..symoro import read_par
 
 
 def add_source(parser: argparse.ArgumentParser, option: bool = False) -> None:
-    """Add the argument that names a robot, and the options for URDF files.
-
-    Parameters
-    ----------
-    parser : ArgumentParser
-        Of the command.
-    option : bool
-        Whether the robot is an option, ``--robot``, of a command that takes files as well.
-
-    Examples
-    --------
-    >>> parser = argparse.ArgumentParser()
-    >>> add_source(parser)
-    >>> parser.parse_args(["rx90"]).robot
-    'rx90'
-    """
+    """Add the argument that names a robot, and the options for URDF files."""
     text = "a name of the catalogue (rx90, erd:ur5), a .urdf or a SYMORO .par file"
     if option:
         parser.add_argument("--robot", required=True, help=text)
@@ -45,30 +30,7 @@ def add_source(parser: argparse.ArgumentParser, option: bool = False) -> None:
 
 
 def robot_of(arguments: argparse.Namespace) -> RobotModel:
-    """Load what `add_source` named.
-
-    Parameters
-    ----------
-    arguments : Namespace
-        Parsed arguments.
-
-    Returns
-    -------
-    RobotModel
-        The robot.
-
-    Raises
-    ------
-    RobotModelsError
-        An unknown name, or a file that cannot be read.
-
-    Examples
-    --------
-    >>> parser = argparse.ArgumentParser()
-    >>> add_source(parser)
-    >>> robot_of(parser.parse_args(["rx90"])).n
-    6
-    """
+    """Load the robot of the command line."""
     name = arguments.robot
     suffix = Path(name).suffix.lower()
     if suffix != ".par" and Path(name).is_dir():

@@ -33,35 +33,14 @@ codecs.register_error("robotmodels-plain", _plain)
 
 
 def say(text: str) -> None:
-    """A line for the person at the terminal, beside what the command prints.
-
-    Parameters
-    ----------
-    text : str
-        Becomes one line.
-
-    Examples
-    --------
-    >>> say("nothing to do")
-    """
+    """Print a line to the terminal, outside of the command's output."""
     if sys.stderr is not None:
         print(f"robotmodels: {' '.join(text.split())}", file=sys.stderr)
 
 
 @contextlib.contextmanager
 def prepared() -> Iterator[None]:
-    """Streams that take any character, and warnings of the package as lines, while it lasts.
-
-    Yields
-    ------
-    None
-
-    Examples
-    --------
-    >>> with prepared():
-    ...     print("│")
-    │
-    """
+    """Context: streams that accept any character, warnings printed as lines."""
     if sys.stdout is None:  # closed by the shell; at exit nothing is left to be closed
         sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     streams = [s for s in (sys.stdout, sys.stderr) if isinstance(s, io.TextIOWrapper)]

@@ -30,17 +30,7 @@ order and the units of the sliders: ur5.html#q=0,-90,90,0,90,0"""
 
 
 def add_command(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Parameters
-    ----------
-    commands : argparse subparsers
-        Where to add it.
-
-    Examples
-    --------
-    >>> add_command(argparse.ArgumentParser().add_subparsers())
-    """
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "view",
         help="open a robot with joint sliders in the browser",
@@ -67,23 +57,7 @@ def add_command(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Draw, save and open.
-
-    Parameters
-    ----------
-    arguments : Namespace
-        Parsed arguments.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> parser = argparse.ArgumentParser()
-    >>> add_command(parser.add_subparsers())
-    >>> with tempfile.TemporaryDirectory() as folder:  # doctest: +ELLIPSIS
-    ...     words = ["view", "rx90", "--no-open", "--out", f"{folder}/arm.html"]
-    ...     run(parser.parse_args(words))
-    Scene of rx90 at q = [0. 0. 0. 0. 0. 0.] written to ...
-    """
+    """Run the command: draw, save and open."""
     from ..viz import jog
     from ..viz.stand_ins import with_stand_ins
 

@@ -9,35 +9,11 @@ from .._arrays import Array, read_only
 
 
 def folder(name: str) -> Traversable:
-    """Folder of a data set.
-
-    Parameters
-    ----------
-    name : str
-        Its name.
-
-    Returns
-    -------
-    Traversable
-        To be read, not written.
-    """
+    """Folder of a data set."""
     return files("robotmodels.datasets") / name
 
 
 def numbers(file: Traversable, header: int = 0) -> Array:
-    """Numbers of a file with commas between.
-
-    Parameters
-    ----------
-    file : Traversable
-        One row a line.
-    header : int
-        Lines to skip.
-
-    Returns
-    -------
-    ndarray, shape (rows, columns)
-        Read-only.
-    """
+    """Numbers of a comma-separated file. Shapes: -> (rows, columns)."""
     lines = file.read_text(encoding="utf-8").splitlines()[header:]
     return read_only([[float(entry) for entry in line.split(",")] for line in lines if line])

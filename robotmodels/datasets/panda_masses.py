@@ -1,4 +1,9 @@
-"""Masses of the Panda's links and of its hand, which the URDF of the double socket leaves out."""
+"""Masses of the Panda's links and of its hand, which the URDF of the double socket leaves out.
+
+Source: C. Gaz, M. Cognetti, A. Oliva, P. Robuffo Giordano and A. De Luca, "Dynamic identification
+of the Franka Emika Panda robot with retrieval of feasible parameters using penalty-based
+optimization", IEEE Robotics and Automation Letters 4(4), 2019.
+"""
 
 from __future__ import annotations
 
@@ -34,30 +39,7 @@ _FLANGE, _HAND_TURN = 0.107, -pi / 4.0
 
 
 def panda_masses() -> InertialParameters:
-    """Inertial parameters of a Panda with its hand, in the frames of the double socket's URDF.
-
-    Links: identified by Gaz et al. (2019), as ``common/inertial.yaml`` of frankaemika/franka_ros
-    has them (commit b2a62ff); Franka publishes none. Hand: 0.73 kg with its centre and moments, as
-    ``panda.urdf`` of example-robot-data 5.0.0 has it, added to link 7. Fingers count as part of
-    the hand.
-
-    Returns
-    -------
-    InertialParameters
-        Of seven frames. Frame 7 is ``panda_link7``, in which the hand is turned by -45 degrees
-        about z; the catalogue's ``erd:panda`` turns its frame 7 with the hand.
-
-    References
-    ----------
-    C. Gaz, M. Cognetti, A. Oliva, P. Robuffo Giordano and A. De Luca, "Dynamic identification of
-    the Franka Emika Panda robot with retrieval of feasible parameters using penalty-based
-    optimization", IEEE Robotics and Automation Letters 4(4), 2019.
-
-    Examples
-    --------
-    >>> round(float(panda_masses().mass[6]), 6)
-    1.465522
-    """
+    """Inertial parameters of a Panda with its hand, in the frames of the double socket's URDF."""
     xx, xy, xz, yy, yz, zz = np.array(_INERTIA).T
     tensors = np.moveaxis(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]), 2, 0)
     values = InertialParameters.from_com(_MASS, _COM, tensors).values.copy()

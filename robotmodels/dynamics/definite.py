@@ -18,17 +18,7 @@ _PART = 0.05  # of the largest joint of a motion: what moves less takes no part 
 def unit_diagonal(M: Array) -> tuple[Array, Array]:
     """A mass matrix in coordinates of unit diagonal, so that units and sizes do not matter.
 
-    Parameters
-    ----------
-    M : ndarray, shape (m, m)
-        Symmetric.
-
-    Returns
-    -------
-    scaled : ndarray, shape (m, m)
-        ``M / (size size^T)``; zeros where a row is zero or an entry is infinite.
-    size : ndarray, shape (m,)
-        Square roots of the diagonal, or of the largest entry of a row where that is zero.
+    Shapes: M (m, m) -> scaled (m, m), size (m,).
     """
     size = np.abs(np.diag(M))
     size = np.sqrt(np.where(size > 0.0, size, np.abs(M).max(axis=1, initial=0.0)))
@@ -49,25 +39,9 @@ def is_definite(scaled: Array) -> bool:
 def no_answer(
     model: RobotModel, M: Array, drive: bool, where: str = "", free: Array | None = None
 ) -> InertiaError | SingularMassMatrixError:
-    """The error of a mass matrix that is singular or not positive definite.
+    """Exception for a mass matrix that is singular or not positive definite.
 
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    M : ndarray, shape (m, m)
-        Its mass matrix, or that of its free coordinates.
-    drive : bool
-        Whether drives are part of it.
-    where : str
-        Which sample it is of.
-    free : ndarray, shape (n, m), optional
-        Joint velocities per free coordinate.
-
-    Returns
-    -------
-    InertiaError or SingularMassMatrixError
-        With the joints or the links at fault.
+    Shapes: M (m, m), free (n, m).
     """
     title = f"the mass matrix of {model.name!r} is"
     m = len(M)

@@ -216,18 +216,7 @@ def idm_from_base(
 
 
 def needed_parts(model: RobotModel) -> NDArray[np.int64]:
-    """Bits that tell the recursion which work a model's zero parameters save.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, f frames.
-
-    Returns
-    -------
-    ndarray of int, shape (f,)
-        See `robotmodels.kernels.base_newton_euler`.
-    """
+    """Flags of the computations that zero parameters make unnecessary."""
     from ..kernels.base_newton_euler import (
         INERTIA,
         LOADED,

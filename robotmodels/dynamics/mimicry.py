@@ -24,23 +24,7 @@ _ROUNDING = 1e-9
 
 @lru_cache(maxsize=32)
 def free_motion(transmission: Transmission) -> Array | None:
-    """Joint velocities per free coordinate, shape (n, m); None if all joints are free.
-
-    Parameters
-    ----------
-    transmission : Transmission
-        Of a robot.
-
-    Returns
-    -------
-    ndarray or None
-        ``G``, its columns of unit size, or None for a matrix that can be inverted.
-
-    Raises
-    ------
-    InvalidValueError
-        A singular matrix that is not one of mimic joints.
-    """
+    """Joint velocities per free coordinate, shape (n, m); None if all joints are free."""
     if transmission.is_invertible:
         return None
     if not transmission.is_mimicry:
@@ -58,19 +42,7 @@ def free_motion(transmission: Transmission) -> Array | None:
 def check_follows(model: RobotModel, free: Array, q: Array, v: Array) -> None:
     """Refuse positions and velocities in which mimic joints do not follow their masters.
 
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, its transmission singular.
-    free : ndarray, shape (n, m)
-        See `free_motion`.
-    q, v : ndarray, shape (..., n)
-        Positions and velocities.
-
-    Raises
-    ------
-    InvalidValueError
-        With the joint that is furthest away.
+    Shapes: free (n, m); q, v (..., n).
     """
     K = model.transmission
     offset = np.zeros(model.n) if K is None else K.offset
@@ -91,28 +63,9 @@ def check_follows(model: RobotModel, free: Array, q: Array, v: Array) -> None:
 def following_accelerations(
     model: RobotModel, free: Array, q: Array, v: Array, tau: Array, drive: bool
 ) -> Array:
-    """Accelerations of joints of which some follow others.
+    """Joint accelerations with mimic joints.
 
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-    free : ndarray, shape (n, m)
-        See `free_motion`.
-    q, v, tau : ndarray, shape (..., n)
-        Positions, velocities, and torques on the links.
-    drive : bool
-        Whether rotors are part of the mass matrix.
-
-    Returns
-    -------
-    ndarray, shape (..., n)
-        ``G a_c`` with ``G^T M G a_c = G^T (tau - h)``.
-
-    Raises
-    ------
-    SingularMassMatrixError, InertiaError
-        ``G^T M G`` is singular or not positive definite.
+    Shapes: free (n, m); q, v, tau (..., n) -> (..., n).
     """
     batch, rows = batch_rows((q, v, tau), ("q", "v", "tau"))
     N = rows[0].shape[0]

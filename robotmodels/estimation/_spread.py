@@ -27,29 +27,7 @@ def covariance(
 ) -> tuple[Array, float]:
     """Covariance of the estimate, and the standard deviation of residuals in stated ones.
 
-    The estimate is ``A^-1 (noise^2 J^T J + L) A^-1`` wide, with ``A = beta J^T J + L``, L the
-    information of the prior, beta the mean curvature of the loss and noise^2 the mean square of its
-    influence (Huber and Ronchetti, "Robust Statistics", equations 7.82 to 7.87, with the
-    correction for the number of rows per parameter). Squares have beta = 1.
-
-    Parameters
-    ----------
-    problem, weighing, point, linear
-        The fit at its end.
-    freedom : float
-        Parameters that the measurements determine.
-    sigma_known : bool
-        Whether the stated deviations hold.
-    complete : bool
-        Whether dropped directions are known to be zero (a truncated fit): otherwise parameters
-        that take part in them have infinite variance.
-
-    Returns
-    -------
-    covariance : ndarray, shape (P, P)
-        Of the parameters.
-    scale : float
-        From the sum of squares, or the scale of the loss.
+    Shapes: -> covariance (P, P).
     """
     M, P = len(point.r), problem.P
     left = M - freedom

@@ -15,28 +15,7 @@ _LEAST_CURVATURE = 0.2
 
 
 def triangle(rows: Array) -> Array:
-    """Triangular factor of long rows: of pieces, then of their triangles.
-
-    Pieces stay in the cache and are too small for LAPACK to wake threads, which on a busy machine
-    takes a hundred times longer than the work.
-
-    Parameters
-    ----------
-    rows : ndarray, shape (M, p)
-        Rows.
-
-    Returns
-    -------
-    ndarray, shape (min(M, p), p)
-        R with ``R^T R = rows^T rows``.
-
-    Examples
-    --------
-    >>> A = np.random.default_rng(0).normal(size=(3000, 3))
-    >>> R = triangle(A)
-    >>> bool(np.allclose(R.T @ R, A.T @ A))
-    True
-    """
+    """Triangular factor of many rows, by pieces. Shapes: rows (M, p) -> (min(M, p), p)."""
     M, p = rows.shape
     piece = max(250, 4 * p)
     count = M // piece
@@ -88,22 +67,7 @@ class Linear:
 def linear_problem(
     problem: Problem, weighing: Weighing, point: Point, threshold: float, rank: int | None
 ) -> Linear:
-    """Factorise the weighted rows and the prior.
-
-    Parameters
-    ----------
-    problem, weighing, point
-        What is minimised, and where.
-    threshold : float
-        Relative singular value under which a direction is dropped.
-    rank : int, optional
-        Directions to keep, where that has been decided.
-
-    Returns
-    -------
-    Linear
-        The linear problem.
-    """
+    """Factorise the weighted rows and the prior."""
     P = problem.P
     M = len(point.r)
     _, weight, slope = weighing.terms(point.length)

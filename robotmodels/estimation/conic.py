@@ -18,13 +18,7 @@ _ITERATIONS = 500
 
 
 class ConeOutcome(Enum):
-    """What the solver says.
-
-    Examples
-    --------
-    >>> ConeOutcome.SOLVED.name
-    'SOLVED'
-    """
+    """Outcome of the conic solver."""
 
     SOLVED = auto()
     INFEASIBLE = auto()
@@ -32,13 +26,7 @@ class ConeOutcome(Enum):
 
 
 class Cone(Enum):
-    """Where the slack of a constraint lies.
-
-    Examples
-    --------
-    >>> Cone.ZERO.name
-    'ZERO'
-    """
+    """Type of cone of a constraint's slack."""
 
     ZERO = auto()
     NONNEGATIVE = auto()
@@ -50,20 +38,7 @@ class Cone(Enum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Constraint:
-    """``right - rows @ x`` lies in a cone.
-
-    Parameters
-    ----------
-    cone : Cone
-        Which.
-    rows : ndarray, shape (k, p)
-        In units that make the slack of order one.
-    right : ndarray, shape (k,)
-        The same units.
-    sentences : tuple of str
-        What is said where there is no slack left: one for each row of the cones ``ZERO`` and
-        ``NONNEGATIVE``, a single one for the others.
-    """
+    """``right - rows @ x`` lies in a cone. Shapes: rows (k, p), right (k,)."""
 
     cone: Cone
     rows: Array
@@ -110,19 +85,7 @@ class Constraint:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ConeSolution:
-    """What a solver of cones returns.
-
-    Parameters
-    ----------
-    x : ndarray, shape (p,)
-        Variables; to be used only where the outcome is ``SOLVED``.
-    multipliers : tuple of ndarray, shapes (k,)
-        Of each constraint; where the outcome is ``INFEASIBLE``, those that prove it.
-    outcome : ConeOutcome
-        What the solver says.
-    ended : str
-        Status and iteration count of the solver.
-    """
+    """Result of a conic solver. Shapes: x (p,), multipliers (k,)."""
 
     x: Array
     multipliers: tuple[Array, ...]
@@ -131,23 +94,9 @@ class ConeSolution:
 
 
 def matrix_of(stacked: Array) -> Array:
-    """Symmetric matrix of its stacked upper triangle.
+    """Symmetric matrix from its stacked upper triangle, off-diagonal entries scaled by sqrt(2).
 
-    Parameters
-    ----------
-    stacked : ndarray, shape (k (k + 1) / 2,)
-        Column by column, off the diagonal times the root of 2.
-
-    Returns
-    -------
-    ndarray, shape (k, k)
-        The matrix.
-
-    Examples
-    --------
-    >>> matrix_of(np.array([1.0, 0.0, 2.0]))
-    array([[1., 0.],
-           [0., 2.]])
+    Shapes: stacked (k (k + 1) / 2,) -> (k, k).
     """
     k = round((np.sqrt(8.0 * len(stacked) + 1.0) - 1.0) / 2.0)
     columns, rows = np.tril_indices(k)
@@ -160,20 +109,7 @@ def matrix_of(stacked: Array) -> Array:
 def triangle_of(S: Array) -> Array:
     """Stacked upper triangle of symmetric matrices, the inverse of `matrix_of`.
 
-    Parameters
-    ----------
-    S : ndarray, shape (..., k, k)
-        Matrices.
-
-    Returns
-    -------
-    ndarray, shape (..., k (k + 1) / 2)
-        Column by column, off the diagonal times the root of 2.
-
-    Examples
-    --------
-    >>> triangle_of(np.eye(2))
-    array([1., 0., 1.])
+    Shapes: S (..., k, k) -> (..., k (k + 1) / 2).
     """
     columns, rows = np.tril_indices(S.shape[-1])
     return S[..., rows, columns] * np.where(rows == columns, 1.0, _ROOT)
@@ -183,46 +119,9 @@ def solve_cones(
     H: Array, g: Array, constraints: Sequence[Constraint], unit: Array, size: float = 1.0,
     fit: tuple[Array, Array] | None = None, squares: float = 1.0,
 ) -> ConeSolution:  # fmt: skip
-    """Least of ``x H x / 2 + g x + |F x - t|^2 / 2`` within constraints.
+    """Minimise ``x H x / 2 + g x + |F x - t|^2 / 2`` within conic constraints.
 
-    With a sum of squares the solver's variables are along the singular vectors of F: in units of
-    the residuals, from their least, where the squares are steep, and in natural units elsewhere. So
-    F is not squared and keeps its digits, and all numbers of the solver are of order one, however
-    well or badly the rows show the variables.
-
-    Parameters
-    ----------
-    H : ndarray, shape (p, p)
-        Positive semidefinite.
-    g : ndarray, shape (p,)
-        Linear term.
-    constraints : sequence of Constraint
-        All of them hold.
-    unit : ndarray, shape (p,)
-        Natural sizes of the variables.
-    size : float
-        How many units the variables are expected to have; the solver's numbers are of order one.
-    fit : (ndarray, ndarray), optional
-        F of shape (k, p), and t of shape (k,).
-    squares : float
-        Weight of the sum of squares; 0 where it only gives the coordinates.
-
-    Returns
-    -------
-    ConeSolution
-        Variables and multipliers of the problem as it is posed here.
-
-    Raises
-    ------
-    MissingExtraError
-        The solver is not installed.
-
-    Examples
-    --------
-    >>> floor = Constraint(Cone.NONNEGATIVE, -np.eye(1), np.array([-2.0]), ("x is at least 2",))
-    >>> found = solve_cones(np.eye(1), np.zeros(1), [floor], np.ones(1))
-    >>> float(found.x[0].round(6)), float(found.multipliers[0][0].round(6))
-    (2.0, 2.0)
+    Shapes: H (p, p); g, unit (p,).
     """
     clarabel = _clarabel()
     from scipy import sparse
@@ -273,42 +172,9 @@ def lower_bound(
     value: float, gradient: Array, x: Array, constraints: Sequence[Constraint],
     multipliers: Sequence[Array], root: Array,
 ) -> float:  # fmt: skip
-    """What a convex objective is at least within constraints, proved by multipliers.
+    """Lower bound of a convex objective within constraints, from dual multipliers.
 
-    Any multipliers that the cones allow prove a bound, those of the optimum the best: nothing of
-    the solver is trusted. With slacks s, curvature ``C = root^T root`` and what is left of the
-    stationarity, ``r = gradient + sum rows^T z``, every x' that meets the constraints has
-    ``f(x') >= f(x) - z s + r (x' - x) + |x' - x|_C^2 / 2 >= f(x) - z s - r C^-1 r / 2``.
-    The bound is tight only where C is all of the curvature: what is left in directions that are
-    curved hardly costs anything.
-
-    Parameters
-    ----------
-    value : float
-        The objective at x.
-    gradient : ndarray, shape (p,)
-        Its derivative at x.
-    x : ndarray, shape (p,)
-        Any point, best the optimum.
-    constraints : sequence of Constraint
-        All that hold.
-    multipliers : sequence of ndarray
-        Of each constraint; brought into the cone first.
-    root : ndarray, shape (k, p)
-        Of full column rank; its Gram matrix is no more than the second derivative of the objective
-        anywhere. The root itself, since squares of small singular values have no digits left.
-
-    Returns
-    -------
-    float
-        The bound.
-
-    Examples
-    --------
-    >>> floor = Constraint(Cone.NONNEGATIVE, -np.eye(1), np.array([-2.0]), ("x is at least 2",))
-    >>> x = np.array([2.0])
-    >>> lower_bound(2.0, x, x, [floor], [np.array([2.0])], np.eye(1))
-    2.0
+    Shapes: gradient, x (p,); root (k, p).
     """
     left, paid = gradient.copy(), 0.0
     for one, z in zip(constraints, multipliers, strict=True):

@@ -14,24 +14,7 @@ def correlated_pairs(
 ) -> tuple[tuple[str, str, float], ...]:
     """Pairs of estimates whose correlation is above a bound, the strongest first.
 
-    Parameters
-    ----------
-    correlation : ndarray, shape (p, p)
-        Of the estimates; NaN where one of them has no deviation.
-    names : sequence of str, length p
-        Of the estimates.
-    least : float
-        Magnitude above which a pair is named.
-
-    Returns
-    -------
-    tuple of (str, str, float)
-        Names and correlation.
-
-    Examples
-    --------
-    >>> correlated_pairs(np.array([[1.0, -0.95], [-0.95, 1.0]]), ("a", "b"), 0.9)
-    (('a', 'b', -0.95),)
+    Shapes: correlation (p, p).
     """
     first, second = np.nonzero(np.triu(np.abs(np.nan_to_num(correlation)) > least, k=1))
     pairs = [

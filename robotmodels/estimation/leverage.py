@@ -44,27 +44,7 @@ class Leverage(Rebuilt):
 
 
 def orthonormal_rows(fit: NonlinearFit) -> Array:
-    """Weighted rows of a fit in the directions that are determined.
-
-    Parameters
-    ----------
-    fit : NonlinearFit
-        A fit.
-
-    Returns
-    -------
-    ndarray, shape (M, rank)
-        With the rows of the prior they would be orthonormal: ``(rows**2).sum()`` is the number of
-        parameters that the measurements determine.
-
-    Examples
-    --------
-    >>> from robotmodels.estimation import fit_nonlinear
-    >>> A = np.random.default_rng(0).normal(size=(9, 2))
-    >>> rows = orthonormal_rows(fit_nonlinear(lambda x: (A @ x - 1.0, A), [0.0, 0.0]))
-    >>> bool(np.allclose(rows.T @ rows, np.eye(2)))
-    True
-    """
+    """Orthonormal basis of the weighted rows in the determined directions. Shapes: -> (M, rank)."""
     A = fit.jacobian * (np.sqrt(fit.weights) / fit.sigma)[:, None]
     _, information = fit.prior.rows(fit.x)
     R = np.vstack((triangle(A), np.diag(information)))

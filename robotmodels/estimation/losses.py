@@ -4,6 +4,8 @@ A measurement of k rows whose noise is Gaussian of standard deviation 1 has resi
 chi with k degrees of freedom. A loss acts on that length, so that it does not depend on the axes
 in which the rows are written. Its constant is chosen for each k so that the estimate has 95 % of
 the efficiency of least squares where there is no outlier.
+
+Source: P. J. Huber, E. M. Ronchetti, "Robust Statistics", 2nd ed., Wiley 2009, chapters 4 and 7.
 """
 
 from __future__ import annotations
@@ -45,32 +47,7 @@ class Loss(Enum):
 
 
 def loss_terms(loss: Loss, u: Array, c: Array) -> tuple[Array, Array, Array]:
-    """Loss, weight and derivative of the influence, of measurements of length u.
-
-    Parameters
-    ----------
-    loss : Loss
-        Which.
-    u : ndarray, shape (B,)
-        Lengths divided by the scale.
-    c : ndarray, shape (B,)
-        Constants, as `tuning` gives them.
-
-    Returns
-    -------
-    rho, weight, slope : ndarray, shape (B,)
-        ``rho`` is ``u^2`` for small lengths, ``weight = rho' / (2 u)``, ``slope = rho'' / 2``.
-
-    References
-    ----------
-    P. J. Huber, E. M. Ronchetti, "Robust Statistics", 2nd ed., Wiley 2009, chapters 4 and 7.
-
-    Examples
-    --------
-    >>> rho, weight, slope = loss_terms(Loss.HUBER, np.array([1.0, 4.0]), np.array([2.0, 2.0]))
-    >>> rho, weight, slope
-    (array([ 1., 12.]), array([1. , 0.5]), array([1., 0.]))
-    """
+    """Loss, weight and derivative of the influence, of measurements of length u."""
     if loss is Loss.SQUARES:
         return u * u, np.ones_like(u), np.ones_like(u)
     if loss is Loss.HUBER:
@@ -88,119 +65,27 @@ def loss_terms(loss: Loss, u: Array, c: Array) -> tuple[Array, Array, Array]:
 
 
 def tuning(loss: Loss, rows: NDArray[np.int64]) -> Array:
-    """Constants with the efficiency `EFFICIENCY` for measurements of these numbers of rows.
-
-    Parameters
-    ----------
-    loss : Loss
-        Which.
-    rows : ndarray of int, shape (B,)
-        Rows of each measurement.
-
-    Returns
-    -------
-    ndarray, shape (B,)
-        Constants, in units of the scale; those of k = 1 are the usual 1.345, 2.385 and 4.685.
-
-    Examples
-    --------
-    >>> tuning(Loss.TUKEY, np.array([1, 3])).round(3)
-    array([4.685, 5.49 ])
-    """
+    """Tuning constants of a loss for measurements of k rows at efficiency `EFFICIENCY`."""
     return _by_rows(lambda k: _constant(loss, k), rows)
 
 
 def expected_slope(loss: Loss, rows: NDArray[np.int64]) -> Array:
-    """Mean of ``(slope + (k - 1) weight) / k`` on Gaussian residuals: curvature kept by the loss.
-
-    Parameters
-    ----------
-    loss : Loss
-        Which.
-    rows : ndarray of int, shape (B,)
-        Rows of each measurement.
-
-    Returns
-    -------
-    ndarray, shape (B,)
-        Between 0 and 1; 1 for squares.
-
-    Examples
-    --------
-    >>> expected_slope(Loss.HUBER, np.array([1])).round(4)
-    array([0.8214])
-    """
+    """Mean of ``(slope + (k - 1) weight) / k`` on Gaussian residuals: the loss' curvature."""
     return _by_rows(lambda k: _moments(loss, k, _constant(loss, k))[0], rows)
 
 
 def median_length(rows: NDArray[np.int64]) -> Array:
-    """Median of chi with k degrees of freedom.
-
-    Parameters
-    ----------
-    rows : ndarray of int, shape (B,)
-        Rows of each measurement.
-
-    Returns
-    -------
-    ndarray, shape (B,)
-        Medians.
-
-    Examples
-    --------
-    >>> median_length(np.array([1, 3])).round(4)
-    array([0.6745, 1.5382])
-    """
+    """Median of chi with k degrees of freedom. Shapes: rows (B,) -> (B,)."""
     return _by_rows(lambda k: _quantile(k, 0.5), rows)
 
 
 def length_quantile(rows: NDArray[np.int64], probability: float) -> Array:
-    """Length that chi with k degrees of freedom stays under with this probability.
-
-    Parameters
-    ----------
-    rows : ndarray of int, shape (B,)
-        Rows of each measurement.
-    probability : float
-        Below 1.
-
-    Returns
-    -------
-    ndarray, shape (B,)
-        Lengths.
-
-    Examples
-    --------
-    >>> length_quantile(np.array([1, 6]), 0.95).round(4)
-    array([1.96  , 3.5485])
-    """
+    """Length that chi with k degrees of freedom stays under with this probability."""
     return _by_rows(lambda k: _quantile(k, probability), rows)
 
 
 def robust_scale(length: Array, rows: NDArray[np.int64], freedom: float) -> float:
-    """Standard deviation of rows from the median of the lengths of their measurements.
-
-    Parameters
-    ----------
-    length : ndarray, shape (B,)
-        Lengths of residuals.
-    rows : ndarray of int, shape (B,)
-        Rows of each.
-    freedom : float
-        Parameters that were fitted to them: residuals are shorter than noise.
-
-    Returns
-    -------
-    float
-        The scale; up to half of the measurements may be outliers.
-
-    Examples
-    --------
-    >>> noise = np.random.default_rng(0).normal(size=(9000, 3))
-    >>> noise[:900] += 1000.0
-    >>> round(robust_scale(np.linalg.norm(noise, axis=1), np.full(9000, 3), 0.0), 1)
-    1.1
-    """
+    """Standard deviation of rows from the median of the lengths of their measurements."""
     if not len(length):
         return 0.0
     number = float(rows.sum())

@@ -4,6 +4,8 @@ An outlier bends the fit, so that the residuals of good measurements are long as
 residual is that of the fit without the measurement. All are had from the last linearisation: with
 rows T that are orthonormal together with those of the prior, a measurement of rows T_b has the
 deleted residual ``(I - T_b T_b')^-1 r_b`` of covariance ``(I - T_b T_b')^-1``.
+
+Source: R. D. Cook, S. Weisberg, "Residuals and Influence in Regression", 1982, section 2.2.
 """
 
 from __future__ import annotations
@@ -75,38 +77,7 @@ def outlying(
 ) -> NDArray[np.int64]:
     """Measurements that noise of the scale of the others does not explain, the worst first.
 
-    The worst measurements by their deleted residuals, against the scale from the median, are taken
-    away until none is too long. Then each of them must exceed what an F distribution against those
-    that are left allows, or it is given back, the least first.
-
-    Parameters
-    ----------
-    T : ndarray, shape (M, rank)
-        Rows, measurement after measurement; orthonormal together with those of the prior.
-    r : ndarray, shape (M,)
-        Residuals, in stated standard deviations.
-    starts : ndarray of int, shape (B,)
-        First row of each measurement.
-    freedom : float
-        Parameters that the measurements determine.
-    trusted : ndarray of bool, shape (B,), optional
-        Measurements that are not judged.
-
-    Returns
-    -------
-    ndarray of int
-        Numbers of measurements, from 0 to B - 1.
-
-    References
-    ----------
-    R. D. Cook, S. Weisberg, "Residuals and Influence in Regression", 1982, section 2.2.
-
-    Examples
-    --------
-    >>> T = np.full((25, 1), 0.2)
-    >>> r = np.where(np.arange(25) == 7, 24.0, -1.0)
-    >>> outlying(T, r, np.arange(25), 1.0)
-    array([7])
+    Shapes: T (M, rank); r (M,); starts, trusted (B,).
     """
     from scipy.special import fdtri
 

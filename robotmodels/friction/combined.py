@@ -114,29 +114,7 @@ def _one(parts: tuple[Friction, ...]) -> Friction | None:
 
 
 def together(first: object, second: object) -> FrictionSum:
-    """What ``first + second`` is; sums are taken apart.
-
-    Parameters
-    ----------
-    first, second : object
-        Friction models of the same joints.
-
-    Returns
-    -------
-    FrictionSum
-        Of all parts, in order; NotImplemented if either is no friction model.
-
-    Raises
-    ------
-    ShapeError
-        Friction of other numbers of joints.
-
-    Examples
-    --------
-    >>> from robotmodels.friction import CoulombFriction, ViscousFriction
-    >>> together(ViscousFriction([1.0]), CoulombFriction([2.0])).n
-    1
-    """
+    """Sum of two friction models; nested sums are flattened."""
     parts: list[Friction] = []
     for each in (first, second):
         if isinstance(each, type) or not isinstance(each, Friction):

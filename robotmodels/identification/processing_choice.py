@@ -45,10 +45,8 @@ def processing_for(
 ) -> Processing:
     """Choose the processing; ``kinds`` equations at a time (default one for each joint).
 
-    The cutoff of the equations is the highest at which noise of the positions is predicted to bias
-    no parameter by more than `MOST_BIAS` standard errors, and the decimation leaves
-    `LEAST_EQUATIONS` equations for each parameter where the log has as many samples. What the user
-    gives is kept.
+    The cutoff is the highest that biases no parameter by more than `MOST_BIAS` standard errors,
+    the decimation leaves `LEAST_EQUATIONS` equations for each parameter where there are as many.
     """
     motion, noise = motion_of(log)
     most = max(1, int(equations_per_parameter(base, log, kinds, 1) / LEAST_EQUATIONS))

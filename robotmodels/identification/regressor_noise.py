@@ -1,4 +1,7 @@
-"""Predicted bias of least squares by noise of the positions, at any cutoff."""
+"""Predicted bias of least squares by noise of the positions, at any cutoff.
+
+Source: W. Fuller, "Measurement Error Models", 1987, section 1.1.
+"""
 
 from __future__ import annotations
 
@@ -60,16 +63,7 @@ def regressor_noise(
 
 
 def bias_ratio(given: RegressorNoise, cutoff: float) -> Array:
-    """Predicted bias by noise in the regressor over the standard error, of each parameter (b,).
-
-    With ``D`` what noise changes in the regressor ``W``, least squares (with a weak prior) are
-    biased by about ``-(W^T W)^-1 E[D^T D] b``; positions and torques pass one filter of this
-    cutoff.
-
-    References
-    ----------
-    W. Fuller, "Measurement Error Models", 1987, section 1.1.
-    """
+    """Predicted bias by noise in the regressor over the standard error, of each parameter (b,)."""
     base = given.base
     columns = {"columns": base.names, "friction": base.friction}
     signals, moved, torques = _rows(given, cutoff)

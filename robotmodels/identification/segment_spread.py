@@ -1,4 +1,8 @@
-"""Block jackknife: variation of the parameters between segments of a log."""
+"""Block jackknife: variation of the parameters between segments of a log.
+
+Source: H. Kuensch, "The jackknife and the bootstrap for general stationary observations", Annals of
+Statistics 17(3), 1989.
+"""
 
 from __future__ import annotations
 
@@ -20,19 +24,7 @@ _LARGEST_SHARE = 0.5
 def segment_inflation(
     system: Equations, reduction: Reduction, weights: Array, deviations: Array
 ) -> float:
-    """Factor, at least 1, by which standard errors grow to those of a block jackknife.
-
-    A model that leaves something out (flexibility, friction of another law) errs alike over times
-    much longer than a few equations, and differently from one motion to the next; correlations of
-    residuals do not show that. Estimates without each segment of the log in turn do. Those of a
-    single parameter would be rough, so that all have one factor: the root mean square of the ratios
-    of standard errors.
-
-    References
-    ----------
-    H. Kuensch, "The jackknife and the bootstrap for general stationary observations", Annals of
-    Statistics 17(3), 1989.
-    """
+    """Factor, at least 1, by which standard errors grow to those of a block jackknife."""
     part = looked_at(system.log, system.processing.motion)
     own = system if part is system.log else replace(system, log=part)
     total = sum(len(block) for block in own.blocks())

@@ -29,34 +29,7 @@ _SIMULATED = (Method.IV, Method.DIDIM, Method.CLOE)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MethodOptions:
-    """What single methods take beyond the equations; None is each method's own default.
-
-    Parameters
-    ----------
-    loss : Loss or str, optional
-        Of robust least squares: "huber", "cauchy" or "tukey".
-    prior : RobotModel or array_like, shape (b,), optional
-        Values that ridge draws toward: those of a robot, or numbers in the order of the parameters.
-    prior_deviations : array_like, shape (b,), optional
-        How far they may be off.
-    strength : float, optional
-        Of the prior; default 1 with deviations, else by cross-validation over segments of the log.
-    noise : float or array_like, optional
-        Of the columns, of total least squares.
-    forgetting : float, optional
-        Weight of an instant relative to the next, of recursive least squares.
-    controller : Controller, optional
-        Of the robot, for the methods that simulate it.
-    loop : ClosedLoop, optional
-        How it is simulated, instead of a controller.
-    start : array_like, shape (b,), optional
-        Parameters that methods that simulate begin with; default weighted least squares.
-    output : Output or str, optional
-        What closed-loop output error compares: "torque", "position" or "both".
-    shrinkage : bool, optional
-        Of weighted least squares: whether a weak prior shrinks the parameters; default where the
-        log determines too little.
-    """
+    """Options of the methods; None is the method's default."""
 
     loss: Loss | str | None = None
     prior: RobotModel | ArrayLike | None = None
@@ -100,29 +73,7 @@ _TAKERS = {
 def solve(
     system: Equations, reduction: Reduction, method: Method, options: MethodOptions
 ) -> Estimate:
-    """Parameters by one of the methods.
-
-    Parameters
-    ----------
-    system : Equations
-        Robot, log and choices; its columns are independent.
-    reduction : Reduction
-        Of the same equations.
-    method : Method
-        How.
-    options : MethodOptions
-        What it takes.
-
-    Returns
-    -------
-    Estimate
-        Parameters, covariance, status.
-
-    Raises
-    ------
-    InvalidValueError
-        Options of another method; too few equations.
-    """
+    """Parameters by one of the methods."""
     options.check(method)
     if method is Method.OLS:
         return ordinary(reduction)

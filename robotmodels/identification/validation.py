@@ -163,28 +163,7 @@ def no_validation(n: int) -> Validation:
 def poor_prediction(
     model: RobotModel, processing: Processing, fitted: Validation, held_out: Validation | None
 ) -> str:
-    """Which torques are predicted badly, as sentences; empty where none is.
-
-    That of a joint is poor where more than `POOR` of its filtered torque is left over, noise taken
-    off, or as much as there is. On a log kept aside that may be a small torque of a motion in which
-    the joint hardly works: it counts as the geometric mean with that of the log which was fitted.
-    That of all joints together is poor where more than `POOR` of their torques is left over; joints
-    that rest, of which no equation is, count with their torques as they are.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    processing : Processing
-        Of the errors.
-    fitted, held_out : Validation
-        On the log itself, and on the one kept aside.
-
-    Returns
-    -------
-    str
-        What it is, what it comes from, what to do.
-    """
+    """Sentences about torques that are predicted badly."""
     names = np.array(model.table.joint_names)
     sides = {"the log": fitted}
     if held_out is not None:

@@ -1,4 +1,8 @@
-"""Shrinkage by a weak prior, scaled by the measured torques."""
+"""Shrinkage by a weak prior, scaled by the measured torques.
+
+Source: C. Morris, "Parametric empirical Bayes inference", J. American Statistical Association 78,
+1983.
+"""
 
 from __future__ import annotations
 
@@ -33,9 +37,8 @@ def plausible_sizes(
 ) -> Array:
     """Standard deviations (b,) of a prior around zero, from measured q, v, a and tau (N, n).
 
-    On a random motion, each joint as fast as the fastest of its kind, a parameter of this size
-    would by itself give the torque that was measured, at the joint where it acts most. Parameters
-    that the log shows are hardly drawn by such a prior; those that it does not show stay small.
+    A parameter of this size alone gives the measured torque at the joint where it acts most, on a
+    random motion as fast as the log.
     """
     model = base.model
     slides = np.asarray(model.table.sigma[model.table.joint_rows] == PRISMATIC)
@@ -67,15 +70,7 @@ def shrunk(
     sizes: Array,
     always: bool = False,
 ) -> Estimate | None:
-    """Shrink an estimate towards zero where the log determines some parameters poorly.
-
-    The plausible sizes of parameters of one kind are scaled by a common factor, which maximises the
-    marginal likelihood (empirical Bayes). None where the log determines every parameter well.
-
-    References
-    ----------
-    C. Morris, "Parametric empirical Bayes inference", J. American Statistical Association 78, 1983.
-    """
+    """Shrink an estimate towards zero where the log determines some parameters poorly."""
     weak = np.flatnonzero(deviations > _WEAK * sizes)
     if not (weak.size or always):
         return None

@@ -52,9 +52,8 @@ def copy(A: Floats, B: Floats) -> None:
 def upper_arm(points: Floats, flat: bool, angle: float, F: Floats) -> float:
     """Line, elbow and their normal as columns of ``F (3, 3)``, in the frame of joint 4.
 
-    ``points`` are S before joint 4 and W behind it. The elbow is the foot of S on axis 4; where
-    it lies on the line (an arm in one plane, stretched or folded) the side is that of an elbow
-    bent towards ``axis 4 x line``. Returns the distance from S to W.
+    ``points`` are S before joint 4 and W behind it; returns their distance. The elbow is the foot
+    of S on axis 4; where it lies on the line, its side is that of ``axis 4 x line``.
     """
     s, w = points[0], points[1]
     c, n = cos(angle), sin(angle)

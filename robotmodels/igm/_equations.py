@@ -19,9 +19,8 @@ NONE, DOUBLE, TWO, ANY = 0, 1, 2, 3
 def type_2(X: float, Y: float, Z: float, slack: float, zero: float) -> tuple[int, float, float]:
     """Roots of ``X sin + Y cos = Z``, type 2 of Paul's method.
 
-    ``theta = atan2(X, Y) +- atan2(sqrt(X^2 + Y^2 - Z^2), Z)``. An overshoot of at most ``slack``
-    beside the amplitude is a double root (the verification decides whether it is close enough);
-    an amplitude below ``zero`` leaves the angle free, if Z agrees.
+    ``theta = atan2(X, Y) +- atan2(sqrt(X^2 + Y^2 - Z^2), Z)``. An overshoot up to ``slack`` of the
+    amplitude is a double root; an amplitude below ``zero`` leaves the angle free, if Z agrees.
     """
     rho = hypot(X, Y)
     if rho <= zero:

@@ -291,37 +291,10 @@ def brought_home(
     residual: Floats,
     least: Floats,
 ) -> None:
-    """Bring postures to the poses of an arm.
+    """Newton refinement of postures to given poses.
 
-    Parameters
-    ----------
-    targets : (N, 4, 4)
-        World poses of the tool [m].
-    axes : (N, 3, 3)
-        Axes of the components of the error, as columns.
-    q : (N, C, n)
-        Postures [rad or m], overwritten by where they arrived.
-    there : (N, C) bool
-        Which of them are there.
-    held : (N, C, n) bool
-        Joints that keep their value.
-    antecedent, ..., base_position
-        The `Chain`.
-    path, tool_rotation, tool_position
-        As for `tip_poses`.
-    mask : (6,) int64
-        1 for each component of the error that is asked for.
-    unit : (n,)
-        What a joint's step is measured in: 1 rad, or ``length`` [m]; 0 for joints off the path.
-    length : float
-        What makes metres and radians comparable [m].
-    steps : int
-        Most steps.
-    residual : (N, C)
-        Written: the larger of what is missing in metres and in radians; infinite where not there.
-    least : (N, C)
-        Written: least singular value of the Jacobian without units, of all joints of the path;
-        up to sqrt(6) times less if it is square. Zero without steps.
+    Shapes: targets (N, 4, 4); axes (N, 3, 3); q, held (N, C, n); there (N, C); mask (6,); unit (n,)
+    -> residual, least (N, C).
     """
     n = q.shape[2]
     rows = path.shape[0]

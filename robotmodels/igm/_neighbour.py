@@ -156,11 +156,8 @@ def arrivals(
 ) -> None:
     """Newton's method from every candidate ``(N, C, 6)`` of the neighbour ``near`` to arm ``D``.
 
-    ``exact (N,)`` counts the candidates that are postures of the neighbour and not only its best
-    approach; those that miss by more than ``reach`` are taken out of ``there``. Candidates are
-    overwritten by where they arrived. A branch is ``doubtful (N, C)``, and its pose in ``doubt``,
-    where it did not arrive, ``moved`` by more than ``jump``, met another branch, or ended where the
-    smallest singular value of the Jacobian is below ``small``.
+    ``exact (N,)`` counts candidates that are postures of the neighbour; candidates are overwritten.
+    ``doubtful (N, C)``: not converged, ``moved`` more than ``jump``, merged, or nearly singular.
     """
     work = workspace()
     q, u, v = np.zeros(6), np.zeros(6), np.zeros(6)

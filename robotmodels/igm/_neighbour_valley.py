@@ -63,16 +63,10 @@ def valleys(
     double: NDArray[np.bool_],
     free: Ints,
 ) -> None:
-    """Search the valleys through ``starts (N, C, 6)`` and through nearly singular postures.
+    """Continuation along nearly singular curves from ``starts (N, C, 6)`` and singular postures.
 
-    A valley is left where the Jacobian is ``valley`` times the root of the deviation from singular,
-    or where ``far`` deviations are missing; a start that moved further than the deviation on its
-    way from the neighbour (``moved (N, C)``) shows that it counts for more there.
-
-    ``tolerances`` are of the position in lengths of the arm and of the angle. A curve along which
-    every point is within them is an infinite family: of it the members at the reference are kept,
-    with the number of the freed joint (from 1) in ``free (N, 16)``. Of starts that are closer than
-    ``spread`` one is taken.
+    A curve ends at a smallest singular value of ``valley`` or an error of ``far`` deviations. One
+    within ``tolerances`` all along is a family: ``free (N, 16)`` is its joint at the reference.
     """
     work = workspace()
     rows = 2 * STRIDES + 8

@@ -94,9 +94,8 @@ def point_postures(
 ) -> int:
     """All ``x (m, 3)`` with ``M_a E_1 M_b E_2 M_c w = p``. Returns how many.
 
-    ``size`` is a length of the arm, ``slack`` the overshoot (relative) that still counts as a
-    double root; ``free[i]`` gets a bit (1, 2, 4) for each joint whose value was taken from
-    ``reference``.
+    ``size``: length of the arm; ``slack``: relative overshoot of a double root; ``free[i]`` gets a
+    bit (1, 2, 4) for each joint whose value was taken from ``reference``.
     """
     last, middle, first = sigma[2] == 0, sigma[1] == 0, sigma[0] == 0
     zero = 1e-11 * size

@@ -140,12 +140,10 @@ def regular_postures(
     code: NDArray[np.int16],
     status: NDArray[np.int8],
 ) -> int:
-    """Rows of a result by a plan: a border check, the plan, the order.
+    """Postures of poses by Paul's plan, checked and ordered.
 
-    ``labels`` gives the branch of the ways through the plan, ``joints (3, n)`` holds lower and
-    upper limits and 1 for joints that turn. ``flags (2, N, S)`` become valid and within the limits.
-    Returns the most postures of any pose, -1 - most if some poses are left to others, or IMPROPER
-    if a pose is none or too far, or a reference not finite, before anything is solved.
+    ``labels``: branches; ``joints (3, n)``: limits, and 1 for revolute; ``flags (2, N, S)``: valid,
+    within limits. Returns the most postures, -1 - most if poses are left to others, or IMPROPER.
     """
     if improper_pose(poses) >= 0:
         return IMPROPER

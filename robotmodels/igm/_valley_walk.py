@@ -104,11 +104,10 @@ def walk(
     curve: Curve,
     work: Work,
 ) -> tuple[int, int]:
-    """Walk the curve through ``origin`` both ways while the Jacobian stays nearly singular.
+    """Continuation of the curve through ``origin`` both ways while the Jacobian is nearly singular.
 
-    No further than to where more than ``far`` is missing. The points, what is missing at each, its
-    u (one sense throughout) and the joint that drives are written to ``curve``, in order; where the
-    driving joint changes the point stands twice. Returns the first and one past the last row.
+    Stops at an error above ``far``. Writes points, errors, u and the driving joint to ``curve``;
+    returns the first and one past the last row.
     """
     points, missing, us, drivers = curve
     middle = STRIDES + 2

@@ -25,9 +25,8 @@ def wrist_postures(
 ) -> int:
     """The (at most two) ``x (m, 3)`` with ``Rz(x_0) A Rz(x_1) B Rz(x_2) = M``. Returns how many.
 
-    The first angle comes from the direction of the last axis; the others are substituted back
-    from it, not found on their own: then any first angle is exact where the first and last axes
-    are aligned and it is free (``free[i] = 1``, its value taken from ``reference``).
+    The first angle comes from the last axis, the others by substitution, so that any first angle is
+    exact where it is free (``free[i] = 1``, value from ``reference``): first and last axis aligned.
     """
     m0, m1, m2 = M[0, 2], M[1, 2], M[2, 2]
     n0, n1, n2 = B[0, 2], B[1, 2], B[2, 2]

@@ -22,31 +22,7 @@ from .solver import Prepare, Solver
 
 @singledispatch
 def prepare_alike(known: Solver, chain: JointChain, prepare: Prepare) -> Solver | None:
-    """Prepare a chain the way another one was, as far as its structure is the same.
-
-    Parameters
-    ----------
-    known : Solver
-        What serves the other chain.
-    chain : JointChain
-        Joints of the same kinds with other constants between them.
-    prepare : callable
-        Chooses the family where what serves the other cannot be taken over.
-
-    Returns
-    -------
-    Solver or None
-        None if no family serves the chain.
-
-    Examples
-    --------
-    >>> from robotmodels.igm.families import prepare
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.robots import load
-    >>> known = prepare(joint_chain(load("crx10ia")))
-    >>> prepare_alike(known, joint_chain(load("crx10ia_l")), prepare).method == known.method
-    True
-    """
+    """Prepare a solver for a chain of the same structure as a prepared one."""
     return prepare(chain)
 
 

@@ -8,6 +8,9 @@ to z (sine below 1e-6) the x axis takes its place. The elbow is the foot of the 
 An arm whose shoulder, elbow and wrist lie in a plane across axis 4 has its elbow on the line when
 it is stretched or folded; the angle is then that of an elbow which would bend towards
 ``axis 4 x line``, so that the swing keeps its measure there.
+
+Source: M. Shimizu et al., "Analytical inverse kinematic computation for 7-DOF redundant
+manipulators with joint limits and its application to redundancy resolution", IEEE T-RO 24(5), 2008.
 """
 
 from __future__ import annotations
@@ -37,19 +40,7 @@ _FLAT = 1e-9  # difference in height along axis 4 below which shoulder and wrist
 class ArmAngle:
     """A seven-joint arm with spherical shoulder and wrist.
 
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    shoulder : ndarray, shape (3,)
-        Where axes 1, 2, 3 meet, in R_0 [m].
-    wrist : ndarray, shape (3,)
-        Where axes 5, 6, 7 meet, in the frame of the tool [m].
-    points : ndarray, shape (2, 3)
-        The shoulder in the frame of joint 4 before the joint turns, the wrist in that frame
-        behind the joint [m].
-    flat : bool
-        Whether shoulder and wrist are level on axis 4.
+    Shapes: shoulder, wrist (3,); points (2, 3).
     """
 
     chain: JointChain
@@ -65,33 +56,7 @@ class ArmAngle:
 
 
 def prepare_arm_angle(chain: JointChain) -> ArmAngle | None:
-    """Find shoulder, elbow and wrist of a seven-joint arm.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-
-    Returns
-    -------
-    ArmAngle or None
-        None unless the arm has seven revolute joints, the first three of whose axes meet in a
-        point off axis 4, as do the last three.
-
-    References
-    ----------
-    M. Shimizu et al., "Analytical inverse kinematic computation for 7-DOF redundant manipulators
-    with joint limits and its application to redundancy resolution", IEEE T-RO 24(5), 2008.
-
-    Examples
-    --------
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.robots import load
-    >>> prepare_arm_angle(joint_chain(load("iiwa14"))).shoulder
-    array([0.  , 0.  , 0.36])
-    >>> prepare_arm_angle(joint_chain(load("panda"))) is None
-    True
-    """
+    """Find shoulder, elbow and wrist of a seven-joint arm."""
     if chain.k != 7 or chain.sigma.any():
         return None
     D = chain.D
@@ -118,30 +83,7 @@ def prepare_arm_angle(chain: JointChain) -> ArmAngle | None:
 
 
 def arm_angle_of(solver: ArmAngle, q: ArrayLike) -> Array:
-    """Arm angle of postures.
-
-    Parameters
-    ----------
-    solver : ArmAngle
-        From `prepare_arm_angle`.
-    q : array_like, shape (..., 7)
-        Postures, rad.
-
-    Returns
-    -------
-    ndarray, shape (...)
-        Arm angles in (-pi, pi], rad; 0 for an arm folded so that its wrist is in its shoulder.
-
-    Examples
-    --------
-    An elbow that points up.
-
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.robots import load
-    >>> solver = prepare_arm_angle(joint_chain(load("iiwa14")))
-    >>> float(arm_angle_of(solver, [0, 0.5, 0, -1.5, 0, 0, 0]).round(12))
-    0.0
-    """
+    """Arm angle of postures. Shapes: q (..., 7)."""
     from ._arm_angle import arm_angles
 
     q = np.asarray(q, dtype=np.float64)
@@ -162,39 +104,7 @@ def arm_angle_postures(
 ) -> Found:
     """All postures of poses at given arm angles.
 
-    Parameters
-    ----------
-    solver : ArmAngle
-        From `prepare_arm_angle`.
-    U : array_like, shape (N, 4, 4)
-        Poses of the tool in R_0, ``U = D_0 M_1 D_1 ... M_7 D_7`` [m].
-    psi : array_like, shape (N, A) or (A,)
-        Arm angles, rad.
-    references : array_like, shape (N, 7) or (7,), optional
-        Values for joints that a singular pose leaves free at a given arm angle; zero without it.
-    tolerances : Tolerances
-        When a pose counts as met; default 1e-9 m and 1e-9 rad.
-
-    Returns
-    -------
-    Found
-        With arrays ``q (N, A, 8, 7)``, ``valid``, ``residual``, ``double``, ``family (N, A, 8)``
-        and ``free (N, A, 8, 7)``. Every row is a member of an infinite family; ``free`` names
-        joints that took a reference: joint 1 where axes 1 and 3 are aligned, joint 5 where
-        axes 5 and 7 are, joints 1 to 3 where the wrist is in the shoulder (the arm angle has no
-        meaning then). A pose that is not finite, or out of reach, has no row; an arm stretched to
-        within the position tolerance (at least 1e-9 m) is a double root.
-
-    Examples
-    --------
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.kinematics import dgm
-    >>> from robotmodels.robots import load
-    >>> solver = prepare_arm_angle(joint_chain(load("iiwa14")))
-    >>> T = dgm(load("iiwa14"), [[0.3, 0.5, 0.2, -1.4, 0.5, 0.9, 0.7]])
-    >>> found = arm_angle_postures(solver, T, [0.0, 0.5, 1.0])
-    >>> found.valid.sum(axis=-1)
-    array([[8, 8, 8]])
+    Shapes: U (N, 4, 4), psi (N, A) or (A,), references (N, 7) or (7,).
     """
     from ._arm_angle import arm_angle_rows
 

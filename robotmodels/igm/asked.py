@@ -28,21 +28,7 @@ IMPROPER = -1000
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """What decides, beside the arm, which family solves a call.
-
-    Parameters
-    ----------
-    mask : tuple of bool
-        Components ``x y z rx ry rz`` asked for.
-    in_tool_axes : bool
-        Whether they are those of the tool at the desired pose, or the world's.
-    locks : tuple of (int, float)
-        Columns of q that keep a value [rad or m], ascending.
-    by_arm_angle : bool
-        Whether arm angles are given.
-    relations : tuple of (tuple of float, float)
-        Rows of ``A`` and right sides of ``A q = b``.
-    """
+    """Mask, locks and options of a call, which select the solver."""
 
     mask: tuple[bool, ...] = WHOLE_POSE
     in_tool_axes: bool = False
@@ -52,23 +38,7 @@ class Task:
 
 
 def mask_of(mask: ArrayLike | None) -> NDArray[np.bool_]:
-    """The components asked for.
-
-    Parameters
-    ----------
-    mask : array_like, shape (6,), optional
-        Zeros and ones; None asks for all.
-
-    Returns
-    -------
-    ndarray of bool, shape (6,)
-        The components.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Not six zeros and ones, or nothing asked for.
-    """
+    """The components asked for."""
     if mask is None:
         return np.ones(6, dtype=np.bool_)
     given = isinstance(mask, np.ndarray) and mask.dtype == np.bool_
@@ -87,23 +57,7 @@ def mask_of(mask: ArrayLike | None) -> NDArray[np.bool_]:
 
 
 def poses_of(T: ArrayLike) -> Array:
-    """Poses of the tool, checked.
-
-    Parameters
-    ----------
-    T : array_like, shape (..., 4, 4)
-        World poses [m].
-
-    Returns
-    -------
-    ndarray, shape (..., 4, 4)
-        The poses, their rotations proper to rounding.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, NotARotationError
-        Not poses, or positions beyond `FARTHEST_POSITION`.
-    """
+    """Poses of the tool, checked."""
     poses = se3.as_pose(T)
     farthest = float(np.abs(poses[..., :3, 3]).max(initial=0.0))
     if farthest > FARTHEST_POSITION:
@@ -115,25 +69,7 @@ def poses_of(T: ArrayLike) -> Array:
 
 
 def above_zero(value: Any, name: str) -> float:
-    """A finite number above 0, or an error that names the argument.
-
-    Parameters
-    ----------
-    value : float
-        What was given.
-    name : str
-        Of the argument.
-
-    Returns
-    -------
-    float
-        The number.
-
-    Raises
-    ------
-    InvalidValueError
-        Not a finite number above 0.
-    """
+    """A finite number above 0, or an error that names the argument."""
     if not isinstance(value, (Real, np.number)) or isinstance(value, bool):
         raise InvalidValueError(f"{name}: expected a number, got {value!r}.")
     number = float(value)
@@ -145,25 +81,7 @@ def above_zero(value: Any, name: str) -> float:
 def locks_of(
     model: RobotModel, lock: Mapping[int | str, float] | None
 ) -> tuple[tuple[int, float], ...]:
-    """Columns and values of locked joints.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    lock : mapping, optional
-        Column of q, from 0, or name of a joint, to its value [rad or m].
-
-    Returns
-    -------
-    tuple of (int, float)
-        Ascending.
-
-    Raises
-    ------
-    InvalidValueError
-        A joint that does not exist or is named twice, or a value that is no finite number.
-    """
+    """Columns and values of locked joints."""
     if lock is None:
         return ()
     if not isinstance(lock, Mapping):
@@ -205,25 +123,7 @@ def locks_of(
 def relations_of(
     model: RobotModel, relations: tuple[ArrayLike, ArrayLike] | None
 ) -> tuple[tuple[tuple[float, ...], float], ...]:
-    """Rows of added relations between joints.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    relations : (array_like (m, n), array_like (m,)), optional
-        ``A`` and ``b`` of ``A q = b``.
-
-    Returns
-    -------
-    tuple of (tuple of float, float)
-        A row of ``A`` and its right side, for each relation.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Not a pair, or of the wrong shapes, or not finite.
-    """
+    """Rows of added relations between joints."""
     if relations is None:
         return ()
     if not isinstance(relations, tuple) or len(relations) != 2:

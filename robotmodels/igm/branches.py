@@ -25,34 +25,7 @@ SIDES = tuple(
 
 @singledispatch
 def branches(solver: Solver, found: Found) -> tuple[NDArray[np.int16], tuple[str, ...]]:
-    """Number the postures of each pose and name the numbers.
-
-    Parameters
-    ----------
-    solver : Solver
-        What found them.
-    found : Found
-        The postures.
-
-    Returns
-    -------
-    code : ndarray of int16, shape (N, S)
-        Number of the branch; -1 in rows without a posture.
-    labels : tuple of str
-        Its label. Families whose branches have no names get their rank in ascending order of the
-        joint values, "1", "2", ...
-
-    Notes
-    -----
-    Of three axes that meet: ``wrist`` is the sign of ``z_d . (z_e x z_f)``, ``shoulder`` that of
-    ``(z_a x O_aW) . z_b`` with W the meeting point, and ``shoulder * elbow`` that of the
-    determinant of the velocities of W. Of three parallel axes: ``shoulder`` and ``wrist`` are the
-    signs of the same product taken from either end, ``elbow`` says to which side the middle axis
-    stands. Seven joints with an arm angle: the triple products of the axes of shoulder and wrist,
-    and the side to which the elbow bends. A sign changes only at the singular position of that
-    name. Arms of fewer joints have the sides of the arm that virtual joints make of them. Several
-    postures of one pose with the same signs (arms with a quartic) get a number behind.
-    """
+    """Number the postures of each pose and name the numbers. Shapes: -> code (N, S)."""
     return ranked(np.zeros(found.valid.shape, np.int16), ("",), found)
 
 
@@ -92,21 +65,9 @@ def _(solver: ArmAngle, found: Found) -> tuple[NDArray[np.int16], tuple[str, ...
 def ranked(
     code: NDArray[np.int16], labels: tuple[str, ...], found: Found
 ) -> tuple[NDArray[np.int16], tuple[str, ...]]:
-    """Codes made unique within each pose by the rank of the postures that share one.
+    """Unique branch codes: postures of one code are ranked within each pose.
 
-    Parameters
-    ----------
-    code : ndarray of int16, shape (N, S)
-        Numbers of labels.
-    labels : tuple of str
-        The labels.
-    found : Found
-        The postures.
-
-    Returns
-    -------
-    code, labels
-        As `branches` gives them.
+    Shapes: code (N, S).
     """
     from ._sides import ranks
 

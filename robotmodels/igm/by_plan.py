@@ -35,21 +35,7 @@ TOLERANCES = read_only([SLACK, ZERO, SMALL, ACCEPTED])
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ByPlan:
-    """An arm whose regular poses Paul's plan solves.
-
-    Parameters
-    ----------
-    plan : PaulPlan
-        Equations and their types, and the program of them.
-    family : Solver
-        What solves poses at which a step of the plan is singular or nearly so, or that the plan
-        does not reach.
-    labels : tuple of str
-        Labels of the branches.
-    branch_of_way : ndarray of int16
-        Number of the label of each way through the plan; empty if a way is not always the same
-        branch.
-    """
+    """Arm whose regular poses are solved by Paul's plan."""
 
     plan: PaulPlan
     family: Solver
@@ -82,31 +68,7 @@ class ByPlan:
 
 
 def prepare_by_plan(model: RobotModel, family: Solver) -> ByPlan | None:
-    """Derive the plan of an arm and try it.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    family : Solver
-        What solves its whole poses.
-
-    Returns
-    -------
-    ByPlan or None
-        None if Paul's method does not give every joint, or if the plan does not give back one of
-        `TESTS` random postures. A branch that it lost would show there: each of them stands on
-        one of the branches of its pose.
-
-    Examples
-    --------
-    >>> from robotmodels.igm.families import prepare
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.robots import load
-    >>> arm = load("rx90")
-    >>> prepare_by_plan(arm, prepare(joint_chain(arm))).branch_of_way.size > 0
-    True
-    """
+    """Derive the plan of an arm and test it."""
     plan = derive_plan(model)
     if plan.program is None or plan.program.branches > 16:
         return None
@@ -139,29 +101,10 @@ def run(
     references: Array,
     tolerances: Array = TOLERANCES,
 ) -> tuple[Array, Array, NDArray[np.int64]]:
-    """Let the kernel run a plan.
+    """Run a plan by its kernel.
 
-    Parameters
-    ----------
-    plan : PaulPlan
-        A complete plan.
-    numbers : ndarray
-        The numbers of its program.
-    poses : ndarray, shape (N, 4, 4)
-        Poses [m].
-    references : ndarray, shape (N, k)
-        Reference postures [rad or m].
-    tolerances : ndarray, shape (4,)
-        See `TOLERANCES`.
-
-    Returns
-    -------
-    q : ndarray, shape (N, S, k)
-        Postures [rad or m]; what stands in rows that are not in use has no meaning.
-    residual : ndarray, shape (N, S)
-        Their errors [m, rad].
-    marks : ndarray of int, shape (N, 2 + 2 S)
-        How many there are, whether there are doubts, and the ways through the plan: see `run_plan`.
+    Shapes: poses (N, 4, 4), references (N, k), tolerances (4,) -> q (N, S, k), residual (N, S),
+    marks (N, 2 + 2 S).
     """
     from .paul._run import run_plan
 
@@ -182,20 +125,7 @@ def plan_kernel() -> Callable[..., int]:
 
 
 def numbers_for_world(plan: PaulPlan, to_base: Array) -> Array:
-    """The numbers of a plan's program for poses in the world.
-
-    Parameters
-    ----------
-    plan : PaulPlan
-        A complete plan.
-    to_base : ndarray, shape (4, 4)
-        ``Z^-1``.
-
-    Returns
-    -------
-    ndarray
-        The same numbers, the constant before the pose multiplied by ``Z^-1``.
-    """
+    """The numbers of a plan's program for poses in the world."""
     assert plan.program is not None
     numbers = np.array(plan.program.numbers)
     at = int(plan.program.plan[12])

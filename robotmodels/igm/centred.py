@@ -26,17 +26,9 @@ _ROUNDING = 4.0 * np.finfo(np.float64).eps
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Centred:
-    """Poses brought back beside the arm.
+    """Poses without the translation along end prismatic joints.
 
-    Parameters
-    ----------
-    U : ndarray, shape (N, 4, 4)
-        Poses of the tool in R_0 without what they have along the slides [m].
-    references : ndarray, shape (N, k)
-        References without it [rad or m].
-    moved : ndarray, shape (N, k)
-        What was taken off each joint [m]; 0 for all but slides at the ends, and for poses that
-        were left.
+    Shapes: U (N, 4, 4); references, moved (N, k).
     """
 
     U: Array
@@ -47,34 +39,9 @@ class Centred:
 def centred(
     chain: JointChain, U: Array, references: Array, components: Components
 ) -> Centred | None:
-    """Take off what poses have along the slides at the ends of an arm.
+    """Remove large translations along prismatic joints at the ends of an arm.
 
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    U : ndarray, shape (N, 4, 4)
-        Poses of the tool in R_0 [m].
-    references : ndarray, shape (N, k)
-        Reference postures [rad or m].
-    components : Components
-        What is asked of a pose: slides at the base need the position, those at the tool all of it.
-
-    Returns
-    -------
-    Centred or None
-        None if no pose is far along such a slide.
-
-    Examples
-    --------
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.kinematics import dgm
-    >>> from robotmodels.robots import load
-    >>> arm, q = load("lab_trr"), np.array([[1000.0, 0.2, 0.3]])
-    >>> whole = Components((True,) * 6, in_tool_axes=False)
-    >>> where = centred(joint_chain(arm), dgm(arm, q), np.zeros((1, 3)), whole)
-    >>> where.U[0, :3, 3].round(9) + 0.0
-    array([0.37152983, 0.        , 0.36438103])
+    Shapes: U (N, 4, 4), references (N, k).
     """
     slides = chain.sigma == 1
     k = chain.k
@@ -116,29 +83,9 @@ def put_back(
     components: Components,
     tolerances: Tolerances,
 ) -> Settled:
-    """Add to the slides what was taken off, and check the postures at their poses.
+    """Restore the removed translations, and check the postures at their poses.
 
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    U : ndarray, shape (N, 4, 4)
-        The poses as they are asked for [m].
-    references : ndarray, shape (N, k)
-        The references as they are given [rad or m].
-    where : Centred
-        What was taken off.
-    found : Settled
-        Postures of the poses brought back.
-    components : Components
-        What is asked of a pose.
-    tolerances : Tolerances
-        When a pose counts as met.
-
-    Returns
-    -------
-    Settled
-        The same postures. One that rounding of long slides keeps from its pose is none.
+    Shapes: U (N, 4, 4), references (N, k).
     """
     moved = where.moved[:, None]
     q, residual, valid = found.q + moved, found.residual.copy(), found.valid.copy()

@@ -26,43 +26,7 @@ def checked(
 ) -> Found:
     """Improve candidates on the chain itself, keep those that meet their pose, merge equal ones.
 
-    Parameters
-    ----------
-    chain : JointChain
-        Any number of joints.
-    U : ndarray, shape (N, 4, 4)
-        Poses of the tool in R_0 [m].
-    candidates : ndarray, shape (N, C, k)
-        Guesses, rad or m.
-    there : ndarray of bool, shape (N, C)
-        Rows that hold one.
-    tolerances : Tolerances
-        When a pose counts as met. Improving goes on below them, as far as rounding allows.
-    free : ndarray of bool, shape (N, C, k), optional
-        Joints that took a reference: improving leaves them where they are.
-    double : ndarray of bool, shape (N, C), optional
-        Candidates that are double roots. Without it those are marked that fell together here.
-    most : int, optional
-        Rows to give back for each pose; default C.
-    rough : float
-        Candidates that miss by more (m or rad) are not improved.
-
-    Returns
-    -------
-    Found
-        Packed. Fewer than six joints end at the posture that is nearest to the pose, in units of
-        the tolerances.
-
-    Examples
-    --------
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.kinematics import dgm
-    >>> from robotmodels.robots import load
-    >>> arm, q = load("lab_trr"), np.array([[[0.1, 0.2, 0.3]]])
-    >>> found = checked(joint_chain(arm), dgm(arm, q[0]), q + 1e-4, np.ones((1, 1), bool),
-    ...                 Tolerances())
-    >>> found.q[0, 0].round(9)
-    array([0.1, 0.2, 0.3])
+    Shapes: U (N, 4, 4); candidates, free (N, C, k); there, double (N, C).
     """
     from ._check import checked_postures
 

@@ -27,15 +27,7 @@ SLACK = 1e-9  # overshoot beside the length of the arm that is tried as a double
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ClosedForm:
-    """A six-joint arm with three axes that meet, or three that are parallel.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    plan : LoopPlan
-        Its loop in normal form.
-    """
+    """A six-joint arm with three axes that meet, or three that are parallel."""
 
     chain: JointChain
     plan: LoopPlan
@@ -47,15 +39,7 @@ class ClosedForm:
 
 
 def prepare_closed_form(chain: JointChain) -> ClosedForm | None:
-    """The closed form of a six-joint arm, None if it has none.
-
-    Examples
-    --------
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.robots import load
-    >>> prepare_closed_form(joint_chain(load("irb140"))).method
-    'three revolute axes that meet in a point (Pieper)'
-    """
+    """The closed form of a six-joint arm, None if it has none."""
     plan = plan_loop(chain)
     return None if plan is None else ClosedForm(chain, plan)
 
@@ -80,48 +64,7 @@ def closed_form_postures(
 ) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
     """All real postures of a six-joint arm that has a closed form.
 
-    Parameters
-    ----------
-    plan : LoopPlan
-        The loop in normal form, from `plan_loop`.
-    chain : JointChain
-        The arm the plan was made of.
-    U : array_like, shape (N, 4, 4)
-        Poses of the tool in R_0, ``U = D_0 M_1 D_1 ... M_6 D_6`` [m].
-    references : array_like, shape (N, 6) or (6,), optional
-        Values, in the order of the chain, for joints that a singular pose leaves free [rad or m].
-        Zero where they are left out.
-    slack : float
-        Overshoot beside the length of the arm that is tried as a double root.
-    accepted : float
-        Largest error of a posture [m, rad].
-
-    Returns
-    -------
-    q : ndarray, shape (N, 8, 6)
-        Postures in the order of the chain, packed, angles in (-pi, pi] [rad or m]; NaN in the rows
-        without one.
-    valid : ndarray of bool, shape (N, 8)
-        Rows that hold a posture. Each meets its pose to ``accepted`` m and rad, and to 1e-12 or so
-        away from folds, where two postures fall together.
-    free : ndarray of bool, shape (N, 8, 6)
-        Joints that the pose left free, so that the posture has infinitely many neighbours. They
-        took their reference, or the value nearest to it at which the others can follow.
-
-    Notes
-    -----
-    Postures closer than 1e-6 in every joint are returned once. A pose that is not finite has none.
-
-    Examples
-    --------
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.kinematics import dgm
-    >>> from robotmodels.robots import load
-    >>> chain = joint_chain(load("rx90"))
-    >>> T = dgm(load("rx90"), [[0.3, -0.2, 0.5, 1.0, -0.7, 0.4]])
-    >>> q, valid, free = closed_form_postures(plan_loop(chain), chain, T)
-    >>> int(valid.sum()), bool(free.any())
-    (8, False)
+    Shapes: U (N, 4, 4), references (N, 6) or (6,) -> q, free (N, 8, 6); valid (N, 8).
     """
     from ._concurrent import concurrent_postures
     from ._parallel import parallel_postures

@@ -14,15 +14,7 @@ from .motion import jacobians, tool_poses
 
 @dataclass(frozen=True, slots=True)
 class Components:
-    """Components ``x y z rx ry rz`` of the way from a pose to the desired one.
-
-    Parameters
-    ----------
-    asked : tuple of bool
-        Six.
-    in_tool_axes : bool
-        Along the axes of the tool at the desired pose, or the world's.
-    """
+    """Components ``x y z rx ry rz`` of the way from a pose to the desired one."""
 
     asked: tuple[bool, ...]
     in_tool_axes: bool
@@ -48,38 +40,9 @@ def mask_axes(chain: JointChain, U: Array, components: Components) -> Array:
 def missing_components(
     chain: JointChain, U: Array, q: Array, components: Components
 ) -> tuple[Array, Array]:
-    """What is missing of each component, in the mask's axes.
+    """Error of each component, in the mask's axes.
 
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    U : ndarray, shape (N, 4, 4)
-        Desired poses of the tool in R_0 [m].
-    q : ndarray, shape (N, k)
-        Postures, rad or m.
-    components : Components
-        What is asked.
-
-    Returns
-    -------
-    translation : ndarray, shape (N, 3)
-        Position that is missing [m].
-    rotation : ndarray, shape (N, 3)
-        ``log(R_desired R^T)`` [rad].
-
-    Examples
-    --------
-    The exercise's pose B: stretched out the position is met, the orientation is half a turn off.
-
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.robots import load
-    >>> B = np.array([[[-1, 0, 0, 0.4], [0, 1, 0, 0.2], [0, 0, -1, 0.5], [0, 0, 0, 1.0]]])
-    >>> away, turn = missing_components(
-    ...     joint_chain(load("lab_trr")), B, np.array([[0.2, 0.0, 0.0]]),
-    ...     Components((True,) * 3 + (False,) * 3, in_tool_axes=False))
-    >>> bool(np.abs(away).max() < 1e-15), (np.abs(turn) / np.pi).round(9)
-    (True, array([[0., 1., 0.]]))
+    Shapes: U (N, 4, 4), q (N, k) -> translation, rotation (N, 3).
     """
     P = tool_poses(chain, q)
     axes = mask_axes(chain, U, components)

@@ -30,19 +30,7 @@ _SINGULAR = 1e-12  # determinant below which a step of least length is taken
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Relations:
-    """``A q = b`` for some joints.
-
-    Parameters
-    ----------
-    A : ndarray, shape (m, k)
-        Coefficients.
-    b : ndarray, shape (m,) or (N, m)
-        Right sides, for all poses or for each [rad or m].
-    period : ndarray, shape (m,)
-        What may be added to a right side without change of meaning, because angles count modulo a
-        whole turn: 2 pi times the greatest common divisor of the coefficients of revolute joints
-        where these are whole numbers, else 0.
-    """
+    """``A q = b`` for some joints. Shapes: A (m, k), b (m,) or (N, m), period (m,)."""
 
     A: Array
     b: Array
@@ -64,30 +52,7 @@ class Relations:
 
 
 def relations(chain: JointChain, A: Array, b: Array) -> Relations:
-    """Relations with their periods.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    A : ndarray, shape (m, k)
-        Coefficients.
-    b : ndarray, shape (m,) or (N, m)
-        Right sides.
-
-    Returns
-    -------
-    Relations
-        For `solved_with_relations`.
-
-    Examples
-    --------
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.robots import load
-    >>> row = np.array([[1.0, 0, 1.0, 0, 0, 0, 0]])
-    >>> relations(joint_chain(load("panda")), row, np.zeros(1)).period.round(4)
-    array([6.2832])
-    """
+    """Relations with their periods. Shapes: A (m, k), b (m,) or (N, m)."""
     period = np.zeros(len(A))
     for i, row in enumerate(A[:, chain.sigma == 0]):
         used = row[row != 0.0]
@@ -97,30 +62,9 @@ def relations(chain: JointChain, A: Array, b: Array) -> Relations:
 
 
 def pose_errors(chain: JointChain, U: Array, q: Array) -> Array:
-    """What is missing of poses: translation [m] and rotation vector [rad], axes of R_0.
+    """Pose errors: translation [m] and rotation vector [rad], axes of R_0.
 
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    U : ndarray, shape (B, 4, 4)
-        Poses [m].
-    q : ndarray, shape (B, k)
-        Postures [rad or m].
-
-    Returns
-    -------
-    ndarray, shape (B, 6)
-        From the tool at q to the pose.
-
-    Examples
-    --------
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.robots import load
-    >>> chain = joint_chain(load("lab_trr"))
-    >>> U = tool_poses(chain, np.array([[0.3, 0.0, 0.0]]))
-    >>> pose_errors(chain, U, np.zeros((1, 3))).round(9)
-    array([[0. , 0.3, 0. , 0. , 0. , 0. ]])
+    Shapes: U (B, 4, 4), q (B, k) -> (B, 6).
     """
     P = tool_poses(chain, q)
     R = U[:, :3, :3] @ np.swapaxes(P[:, :3, :3], 1, 2)
@@ -136,24 +80,9 @@ def pose_errors(chain: JointChain, U: Array, q: Array) -> Array:
 def within_reach(
     chain: JointChain, wanted: Relations, q: Array, pose: NDArray[np.int64]
 ) -> NDArray[np.bool_]:
-    """Members of one-dimensional families from which a relation is not far along the family.
+    """Whether a family member is within first-order reach of a relation.
 
-    Parameters
-    ----------
-    chain : JointChain
-        One joint more than the task has components.
-    wanted : Relations
-        One.
-    q : ndarray, shape (B, k)
-        Members [rad or m].
-    pose : ndarray of int, shape (B,)
-        Their poses.
-
-    Returns
-    -------
-    ndarray of bool, shape (B,)
-        Whether the relation, to first order, holds within `REACH`; near places where it turns
-        round along the family as well.
+    Shapes: q (B, k), pose (B,) -> (B,).
     """
     J = jacobians(chain, q)
     along = np.linalg.svd(J)[2][:, -1]
@@ -168,25 +97,7 @@ def solved_with_relations(
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Newton's method from postures to postures that meet their pose and the relations.
 
-    Parameters
-    ----------
-    chain : JointChain
-        k joints.
-    U : ndarray, shape (N, 4, 4)
-        Poses [m].
-    wanted : Relations
-        k - 6 relations.
-    q : ndarray, shape (B, k)
-        Starts [rad or m].
-    pose : ndarray of int, shape (B,)
-        Their poses.
-
-    Returns
-    -------
-    q : ndarray, shape (B, k)
-        Where they ended.
-    converged : ndarray of bool, shape (B,)
-        Whether pose and relations are met.
+    Shapes: U (N, 4, 4), q (B, k), pose (B,) -> q (B, k), converged (B,).
     """
     q = q.copy()
     error = np.full(len(q), np.inf)

@@ -28,21 +28,7 @@ _SHARES = np.linspace(-1.0, 1.0, 21)  # of the reach of a held slide, tried last
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DependentJoints:
-    """An arm of which a joint only does what others can do: it takes its reference.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    held : int
-        The joint that takes the reference.
-    first : Solver
-        Of the others, with that joint at zero.
-    prepare : callable
-        Chooses the family of the others for another value, where that of the first does not serve.
-    length : float
-        A length of the arm [m].
-    """
+    """Arm with a joint whose screw always depends on the others; it is set to `q_ref`."""
 
     chain: JointChain
     held: int
@@ -59,24 +45,9 @@ class DependentJoints:
 
 
 def dependent_joint(J: Array, choose: NDArray[np.bool_]) -> int | None:
-    """The first joint that may be held without the tool losing a direction; None if all count.
+    """First joint whose column depends on the others at all postures; None if there is none.
 
-    Parameters
-    ----------
-    J : ndarray, shape (Q, a, k)
-        Jacobians at random postures, lengths in units of the arm.
-    choose : ndarray of bool, shape (k,)
-        Joints that may be held.
-
-    Returns
-    -------
-    int or None
-        Its position.
-
-    Examples
-    --------
-    >>> dependent_joint(np.array([[[1.0, 2.0, 0.0], [0.0, 0.0, 1.0]]]), np.ones(3, bool))
-    0
+    Shapes: J (Q, a, k), choose (k,).
     """
     _, values, rows = np.linalg.svd(J)
     k = J.shape[2]
@@ -94,28 +65,7 @@ def dependent_joint(J: Array, choose: NDArray[np.bool_]) -> int | None:
 
 
 def prepare_dependent(chain: JointChain, prepare: Prepare) -> DependentJoints | None:
-    """The first joint that other joints make superfluous, and a family for the others.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The arm. Joints with a negative column are virtual: they are not held.
-    prepare : callable
-        Chooses and prepares the family of the other joints.
-
-    Returns
-    -------
-    DependentJoints or None
-        None if every joint counts, or if the others are not served.
-
-    Examples
-    --------
-    >>> from robotmodels.igm.families import prepare
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.robots import load
-    >>> prepare_dependent(joint_chain(load("rx90")), prepare) is None
-    True
-    """
+    """Solver of an arm with a dependent joint, which is held."""
     length = lever(chain)
     q = random_postures(chain, 8, np.random.default_rng(3))
     held = dependent_joint(scaled(jacobians(chain, q), length), chain.columns >= 0)

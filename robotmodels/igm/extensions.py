@@ -35,22 +35,7 @@ class Triple(Enum):
 
 
 class Layout(NamedTuple):
-    """One way to place the virtual joints.
-
-    Parameters
-    ----------
-    triple : Triple
-        Which family it aims at.
-    first, real : int
-        The run of real joints that belong to the triple: where it starts (for none: the gap) and
-        how many they are.
-    behind : int
-        How many joints of the run stand before the triple's virtual ones.
-    seed : int
-        Of the directions and places that are not dictated.
-    joints : tuple of VirtualJoint
-        The virtual joints.
-    """
+    """One way to place the virtual joints."""
 
     triple: Triple
     first: int
@@ -61,20 +46,7 @@ class Layout(NamedTuple):
 
 
 def layouts(chain: JointChain, length: float) -> Iterator[Layout]:
-    """Placings that give a chain of one to five joints a closed form, in random directions.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    length : float
-        A length of it [m].
-
-    Yields
-    ------
-    Layout
-        Any number, none if no closed form can be had.
-    """
+    """Random virtual joints that give a chain of one to five joints a closed form."""
     for real in range(4):
         for first in range(chain.k + 1 if real == 0 else chain.k - real + 1):
             # with its virtual joints before, amid or behind the run
@@ -88,22 +60,7 @@ def layouts(chain: JointChain, length: float) -> Iterator[Layout]:
 
 
 def loose_layouts(chain: JointChain, length: float, sigma: int) -> Iterator[Layout]:
-    """Placings in random places and directions: no closed form is aimed at.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    length : float
-        A length of it [m].
-    sigma : int
-        Kind of the virtual joints, 0 revolute, 1 prismatic.
-
-    Yields
-    ------
-    Layout
-        With the virtual joints in each gap, in a few directions.
-    """
+    """Random virtual joints without regard to a closed form."""
     for gap in range(chain.k + 1):
         for seed in range(TRIES):
             layout = _placed(chain, length, Triple.ANY, gap, 0, sigma, seed)

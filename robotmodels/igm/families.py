@@ -22,20 +22,7 @@ from .solver import Solver
 
 
 def prepare_task(chain: JointChain, task: Task) -> Solver | None:
-    """Choose and prepare what solves a task: locked joints, then the mask, then the arm.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The arm, locked joints among its joints.
-    task : Task
-        What is asked of it.
-
-    Returns
-    -------
-    Solver or None
-        None if no family serves the arm for this task.
-    """
+    """Choose and prepare the solver of a task: locked joints, then the mask, then the arm."""
     places = {int(column): place for place, column in enumerate(chain.columns)}
     locks = {places[column]: value for column, value in task.locks if column in places}
     if locks:
@@ -59,25 +46,7 @@ def prepare_task(chain: JointChain, task: Task) -> Solver | None:
 
 
 def prepare(chain: JointChain) -> Solver | None:
-    """Choose the family of a chain and prepare it.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-
-    Returns
-    -------
-    Solver or None
-        None if no family serves it.
-
-    Examples
-    --------
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.robots import load
-    >>> prepare(joint_chain(load("ur5e"))).method
-    'three consecutive revolute axes that are parallel'
-    """
+    """Choose and prepare the solver of a chain."""
     if chain.k < 6:
         return prepare_fewer(chain, prepare)
     if chain.k > 6:

@@ -4,6 +4,8 @@ A pose asks for six components, so that an arm of fewer joints meets only some p
 with few postures. The extended arm meets all of them; its postures whose virtual joints are at
 zero are the arm's. Where the extended arm is singular and the arm is not, another extension is
 asked, whose singular postures are different ones.
+
+Source: Section 1.2.3 of the book: fewer than six degrees of freedom.
 """
 
 from __future__ import annotations
@@ -38,17 +40,7 @@ ROUGH = 1e-2  # how far virtual joints may be from zero before the posture is im
 
 
 class Extension(NamedTuple):
-    """Six joints, some of them virtual.
-
-    Parameters
-    ----------
-    solver : Solver
-        Of the extended arm.
-    places : ndarray of int, shape (k,)
-        Where the joints of the arm stand in it.
-    layout : Layout
-        How the virtual ones were placed.
-    """
+    """Six joints, some of them virtual. Shapes: places (k,)."""
 
     solver: Solver
     places: NDArray[np.int64]
@@ -57,17 +49,7 @@ class Extension(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FewerJoints:
-    """An arm of one to five joints whose postures have no free joint in general.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    ways : tuple of Extension
-        The first is used for every pose, the others in turn where doubts are left.
-    length : float
-        A length of the arm [m].
-    """
+    """Arm of one to five joints, solved with virtual joints."""
 
     chain: JointChain
     ways: tuple[Extension, ...]
@@ -81,38 +63,7 @@ class FewerJoints:
 
 
 def prepare_fewer(chain: JointChain, prepare: Prepare) -> FewerJoints | DependentJoints | None:
-    """Find extensions of an arm of one to five joints that serve it, and test them.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    prepare : callable
-        Chooses and prepares the family of an arm of six joints.
-
-    Returns
-    -------
-    FewerJoints, DependentJoints or None
-        None if the arm has no joint or more than five, or if no extension passed its test.
-
-    Notes
-    -----
-    The virtual axes go through points of real ones, so that three axes meet or are parallel; see
-    `layouts`. The extensions are ranked by their smallest singular value at random postures, and
-    have to give back the random postures of a self-test.
-
-    References
-    ----------
-    Section 1.2.3 of the book: fewer than six degrees of freedom.
-
-    Examples
-    --------
-    >>> from robotmodels.igm.families import prepare
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.robots import load
-    >>> prepare_fewer(joint_chain(load("lab_rrt")), prepare).method
-    '3 joints and 3 virtual at zero: three revolute axes that meet in a point (Pieper)'
-    """
+    """Find extensions of an arm of one to five joints that serve it, and test them."""
     if not 1 <= chain.k <= 5:
         return None
     length = lever(chain)

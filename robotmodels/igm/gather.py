@@ -15,25 +15,7 @@ MERGE = 1e-6
 
 
 def assembled(N: int, k: int, parts: Iterable[tuple[NDArray[np.int64], Found]]) -> Found:
-    """What was found for some of N poses at a time, each pose in one part.
-
-    Parameters
-    ----------
-    N, k : int
-        Poses, joints.
-    parts : iterable of (ndarray of int, Found)
-        Which poses, and their postures.
-
-    Returns
-    -------
-    Found
-        As many rows a pose as the widest part has.
-
-    Examples
-    --------
-    >>> assembled(3, 2, [(np.array([1]), nothing_found(1, 4, 2))]).q.shape
-    (3, 4, 2)
-    """
+    """Combine the postures of parts of N poses."""
     parts = list(parts)
     out = nothing_found(N, max((part.q.shape[1] for _, part in parts), default=0), k)
     for rows, part in parts:
@@ -45,29 +27,7 @@ def assembled(N: int, k: int, parts: Iterable[tuple[NDArray[np.int64], Found]]) 
 
 
 def merged(sigma: NDArray[np.int64], found: Found, within: float = MERGE) -> Found:
-    """Equal postures of a pose made one, the first of them; rows packed, the others emptied.
-
-    Parameters
-    ----------
-    sigma : ndarray of int, shape (k,)
-        0 revolute, 1 prismatic.
-    found : Found
-        Rows in any order.
-    within : float
-        Largest difference in a joint of postures that are one [rad, m].
-
-    Returns
-    -------
-    Found
-        No wider than it must be.
-
-    Examples
-    --------
-    >>> found = nothing_found(1, 3, 1)
-    >>> found.q[0, :, 0], found.valid[0] = [3.1415926, 1.0, -3.1415926], True
-    >>> merged(np.array([0]), found).q[0, :, 0].round(3)
-    array([3.142, 1.   ])
-    """
+    """Merge equal postures of each pose and pack the rows. Shapes: sigma (k,)."""
     q = np.where(found.valid[..., None], found.q, 0.0)
     gap = q[:, :, None] - q[:, None]
     turns = np.where(sigma == 0, np.round(gap / (2.0 * np.pi)), 0.0)

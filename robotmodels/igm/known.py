@@ -25,32 +25,9 @@ KEPT_TASKS = 32
 
 @dataclass(frozen=True, slots=True, eq=False)
 class KnownArm:
-    """A robot as the inverse model sees it.
+    """Cache of the solvers prepared for a robot.
 
-    Parameters
-    ----------
-    columns : ndarray of int, shape (k,)
-        Columns of q of the joints between base and tool, in their order.
-    to_base : ndarray, shape (4, 4)
-        ``Z^-1``.
-    turns : ndarray of bool, shape (n,)
-        Revolute joints.
-    never : ndarray of bool, shape (n,)
-        False: no joint counts modulo a turn within limits.
-    joints : ndarray, shape (3, n)
-        Lower and upper limits, and 1 for joints that turn.
-    plan : ByPlan or None
-        Paul's equations, where they solve the arm and every joint moves the tool.
-    numbers : ndarray or None
-        Of the plan's program, for poses in the world.
-    kernel : callable or None
-        What runs the plan.
-    instructions, branch_of_way, labels, most, method
-        Of the plan, so that a single pose need not ask for them.
-    zero : ndarray, shape (1, n)
-        The reference where none is given.
-    solvers : dict
-        What was prepared for tasks.
+    Shapes: columns (k,); to_base (4, 4); turns, never (n,); joints (3, n); zero (1, n).
     """
 
     columns: NDArray[np.int64]
@@ -75,24 +52,7 @@ _ARMS: dict[int, tuple[weakref.ref[RobotModel], KnownArm]] = {}
 
 
 def known_arm(model: RobotModel) -> KnownArm:
-    """What earlier calls prepared for a model; prepared now if there was none.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-
-    Returns
-    -------
-    KnownArm
-        Kept for as long as the model lives.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> known_arm(load("ur5")).plan.plan.complete
-    True
-    """
+    """Cached solvers of a model, created on first use."""
     key = id(model)
     entry = _ARMS.get(key)
     if entry is None or entry[0]() is not model:
@@ -102,22 +62,7 @@ def known_arm(model: RobotModel) -> KnownArm:
 
 
 def solver_for(model: RobotModel, arm: KnownArm, task: Task) -> Solver | None:
-    """The family prepared for a task, from the last call that asked for it if any.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    arm : KnownArm
-        What is known of it.
-    task : Task
-        What is asked.
-
-    Returns
-    -------
-    Solver or None
-        None if no family serves the task.
-    """
+    """Solver of a task, from the cache if possible."""
     if task not in arm.solvers:
         if len(arm.solvers) >= KEPT_TASKS:
             arm.solvers.pop(next(iter(arm.solvers)))

@@ -27,25 +27,7 @@ __all__ = [
 
 
 def motion(sigma: int, value: ArrayLike) -> Array:
-    """Motion of a joint along or about z.
-
-    Parameters
-    ----------
-    sigma : int
-        0 revolute, 1 prismatic.
-    value : array_like, shape (...)
-        rad or m.
-
-    Returns
-    -------
-    ndarray, shape (..., 4, 4)
-        ``M``.
-
-    Examples
-    --------
-    >>> motion(1, 0.5)[2, 3]
-    np.float64(0.5)
-    """
+    """Motion of a joint along or about z."""
     value = np.asarray(value, dtype=np.float64)
     M = np.zeros((*value.shape, 4, 4))
     M[..., range(4), range(4)] = 1.0
@@ -58,33 +40,7 @@ def motion(sigma: int, value: ArrayLike) -> Array:
 
 
 def locked_chain(chain: JointChain, locks: Mapping[int, float]) -> JointChain:
-    """The chain in which some joints are constants.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    locks : mapping of int to float
-        Positions in the chain, from 0, and what q is there [rad or m]. None of them leaves the
-        chain as it is.
-
-    Returns
-    -------
-    JointChain
-        The other joints.
-
-    Raises
-    ------
-    InvalidValueError
-        A position outside the chain, a value that is not finite.
-
-    Examples
-    --------
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.robots import load
-    >>> locked_chain(joint_chain(load("iiwa14")), {2: 0.0}).columns
-    array([0, 1, 3, 4, 5, 6])
-    """
+    """Chain with some joints replaced by constants."""
     for position, value in locks.items():
         if not 0 <= position < chain.k:
             raise InvalidValueError(
@@ -113,21 +69,7 @@ def locked_chain(chain: JointChain, locks: Mapping[int, float]) -> JointChain:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Locked:
-    """An arm some of whose joints keep a value.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The whole arm.
-    positions : ndarray of int, shape (m,)
-        Locked joints, ascending.
-    values : ndarray, shape (V, m)
-        Their values, one row for each value that the poses ask for [rad or m].
-    solvers : tuple of Solver
-        What serves the other joints at each row of ``values``.
-    which : ndarray of int, shape (N,) or None
-        Row of ``values`` for each pose; None with one value for all.
-    """
+    """Arm with locked joints. Shapes: positions (m,), values (V, m), which (N,)."""
 
     chain: JointChain
     positions: NDArray[np.int64]
@@ -146,45 +88,7 @@ class Locked:
 def prepare_locked(
     chain: JointChain, locks: Mapping[int, ArrayLike], prepare: Prepare
 ) -> Locked | None:
-    """Lock joints and prepare what serves the others.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    locks : mapping of int to array_like
-        Positions in the chain, from 0, and values of q [rad or m]: one number for all poses, or
-        shape (N,), one for each. Every distinct value is a chain of its own to prepare.
-    prepare : callable
-        Chooses the family of the shorter chain.
-
-    Returns
-    -------
-    Locked or None
-        None if the shorter chain has no family. Its postures are those of the whole chain; the
-        locked joints keep their value, also where a posture is improved.
-
-    Raises
-    ------
-    InvalidValueError
-        Nothing to lock, a position outside the chain, values that are not finite or of other
-        shapes.
-
-    Examples
-    --------
-    >>> from robotmodels.igm.families import prepare
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.kinematics import dgm
-    >>> from robotmodels.robots import load
-    >>> arm = load("panda")
-    >>> solver = prepare_locked(joint_chain(arm), {6: 0.7}, prepare)
-    >>> solver.method
-    'joint 7 locked; three revolute axes that meet in a point (Pieper)'
-    >>> T = dgm(arm, [[0.1, 0.2, 0.3, -1.4, 0.5, 1.6, 0.7]])
-    >>> found = postures(solver, T, np.zeros((1, 7)), Tolerances())
-    >>> found.q[0, found.valid[0], 6]
-    array([0.7, 0.7, 0.7, 0.7])
-    """
+    """Lock joints and prepare a solver of the others."""
     if not locks:
         raise InvalidValueError("locks: expected at least one joint, got none.")
     positions = read_only(sorted(locks), np.int64)
@@ -229,22 +133,7 @@ def _(solver: Locked, U: Array, references: Array, tolerances: Tolerances) -> Fo
 
 
 def stacked(parts: list[Found], rows: list[NDArray[np.int64]], N: int) -> Found:
-    """Put together what was found for different poses.
-
-    Parameters
-    ----------
-    parts : list of Found
-        At least one.
-    rows : list of ndarray of int
-        Poses of each part.
-    N : int
-        Number of poses.
-
-    Returns
-    -------
-    Found
-        As many rows for each pose as the largest part has.
-    """
+    """Combine the postures of different poses."""
     S = max(part.q.shape[1] for part in parts)
     out = nothing_found(N, S, parts[0].q.shape[2])
     for part, at in zip(parts, rows, strict=True):
@@ -264,25 +153,7 @@ def whole_postures(
 ) -> Found:
     """Postures of the whole chain from those of its other joints, checked on the whole chain.
 
-    Parameters
-    ----------
-    chain : JointChain
-        The whole arm.
-    U : ndarray, shape (N, 4, 4)
-        Poses of the tool in R_0 [m].
-    positions : ndarray of int, shape (m,)
-        Locked joints, ascending.
-    values : ndarray, shape (N, m)
-        Their values [rad or m].
-    found : Found
-        Postures of the other joints.
-    tolerances : Tolerances
-        When a pose counts as met.
-
-    Returns
-    -------
-    Found
-        Locked joints keep their value and are not marked in ``free``.
+    Shapes: U (N, 4, 4), positions (m,), values (N, m).
     """
     N, S = found.valid.shape
     rest = np.setdiff1d(np.arange(chain.k), positions)
@@ -316,32 +187,9 @@ def _survivors(
 
 
 def at_ends(chain: JointChain, U: Array, first: Array, last: Array) -> tuple[JointChain, Array]:
-    """Lock joints at the two ends of a chain by moving the poses: one chain for all values.
+    """Lock joints at the ends of a chain by moving the poses.
 
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    U : ndarray, shape (N, 4, 4)
-        Poses of the tool in R_0 [m].
-    first, last : ndarray, shape (N, a) and (N, b)
-        Values of the first a and the last b joints [rad or m].
-
-    Returns
-    -------
-    inner : JointChain
-        The joints between; R_0 and tool are the frames before and behind them.
-    U : ndarray, shape (N, 4, 4)
-        Where they have to bring the last of these frames.
-
-    Examples
-    --------
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.robots import load
-    >>> inner, U = at_ends(joint_chain(load("panda")), np.eye(4)[None], np.zeros((1, 1)),
-    ...                    np.zeros((1, 0)))
-    >>> inner.k
-    6
+    Shapes: U (N, 4, 4), first (N, a), last (N, b) -> U (N, 4, 4).
     """
     a, b = first.shape[1], last.shape[1]
     middle = slice(a, chain.k - b)

@@ -14,27 +14,9 @@ from ..model import RobotModel
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointChain:
-    """The k moving joints between base and tool, and what is constant between them.
+    """The k moving joints from base to tool and the constant transforms between them.
 
-    ``D_0 M_1(q_1) D_1 M_2(q_2) ... M_k(q_k) D_k = Z^-1 T`` with ``M`` a rotation about or a
-    translation along z; fixed frames are multiplied into the ``D``.
-
-    Parameters
-    ----------
-    columns : ndarray of int, shape (k,)
-        Column of each joint in the model's q.
-    sigma : ndarray of int, shape (k,)
-        0 revolute, 1 prismatic.
-    D : ndarray, shape (k + 1, 4, 4)
-        The constants, the tool in the last one.
-    base : ndarray, shape (4, 4)
-        ``Z``.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> joint_chain(load("rx90")).D.shape
-    (7, 4, 4)
+    Shapes: columns, sigma (k,); D (k + 1, 4, 4); base (4, 4).
     """
 
     columns: NDArray[np.int64]
@@ -49,24 +31,7 @@ class JointChain:
 
 
 def joint_chain(model: RobotModel) -> JointChain:
-    """Gather the joints that move the tool.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-
-    Returns
-    -------
-    JointChain
-        Its joints from base to tip, in order.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> joint_chain(load("lab_trr")).sigma
-    array([1, 0, 0])
-    """
+    """Gather the joints that move the tool."""
     C = constant_factors(model.table)
     chain = model.chain
     columns, sigma, D = [], [], []

@@ -19,15 +19,7 @@ MOST = 32
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ManyStarts:
-    """A six-joint arm without a closed form.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    starts : ndarray, shape (STARTS, 6)
-        The same for every pose, so that a batch gives what its poses give [rad or m].
-    """
+    """Six-joint arm solved by Newton's method from many starts. Shapes: starts (STARTS, 6)."""
 
     chain: JointChain
     starts: Array
@@ -39,15 +31,7 @@ class ManyStarts:
 
 
 def prepare_many_starts(chain: JointChain) -> ManyStarts | None:
-    """Draw the starts for an arm of six joints, None for another.
-
-    Examples
-    --------
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.robots import load
-    >>> prepare_many_starts(joint_chain(load("rx90"))).starts.shape
-    (300, 6)
-    """
+    """Draw the starts for an arm of six joints, None for another."""
     if chain.k != 6:
         return None
     return ManyStarts(chain, random_postures(chain, STARTS, np.random.default_rng(0)))

@@ -34,21 +34,7 @@ _ONTO = (se3.rotation("y", np.pi / 2), se3.rotation("x", -np.pi / 2), np.eye(4))
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MaskedArm:
-    """An arm with the freed components as virtual joints, one chain for all poses.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    components : Components
-        What is asked.
-    inner : Solver
-        Of the arm with the virtual joints.
-    places : ndarray of int, shape (k,)
-        Where the joints of the arm stand in it.
-    length : float
-        A length of the arm [m].
-    """
+    """An arm with the freed components as virtual joints, one chain for all poses."""
 
     chain: JointChain
     components: Components
@@ -64,23 +50,7 @@ class MaskedArm:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MaskedByPose:
-    """An arm whose virtual joint for a rotation about a world axis differs from pose to pose.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    components : Components
-        What is asked.
-    first : Solver
-        Of the arm with the virtual joints for some orientation.
-    places : ndarray of int, shape (k,)
-        Where the joints of the arm stand in it.
-    prepare : callable
-        Chooses the family of a chain.
-    length : float
-        A length of the arm [m].
-    """
+    """An arm whose virtual joint for a rotation about a world axis differs from pose to pose."""
 
     chain: JointChain
     components: Components
@@ -101,36 +71,7 @@ _SKEW = se3.from_rpy((0.5, -1.1, 2.3))[:3, :3]
 def prepare_masked(
     chain: JointChain, mask: tuple[bool, ...], in_tool_axes: bool, prepare: Prepare
 ) -> Solver | None:
-    """Prepare an arm for tasks that leave components of the pose free.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    mask : tuple of bool
-        Components ``x y z rx ry rz`` asked for. Rotations are components of
-        ``log(R_desired R^T)``.
-    in_tool_axes : bool
-        Whether they are along the axes of the tool at the desired pose, or the world's.
-    prepare : callable
-        Chooses and prepares the family of a chain. Chains it is handed hold the virtual joints
-        behind the real ones where that can be, with `NO_COLUMN` in their ``columns``; with more
-        than six joints the arm is redundant for the task.
-
-    Returns
-    -------
-    Solver or None
-        Its chain is the arm's. None if no family serves the longer chain.
-
-    Examples
-    --------
-    >>> from robotmodels.igm.families import prepare
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.robots import load
-    >>> point = (True, True, True, False, False, False)
-    >>> prepare_masked(joint_chain(load("lab_trr")), point, False, prepare).method
-    'freed components as virtual joints: three revolute axes that meet in a point (Pieper)'
-    """
+    """Prepare an arm for tasks that leave components of the pose free."""
     components = Components(tuple(bool(asked) for asked in mask), in_tool_axes)
     if all(components.asked):
         return _prepared(chain, prepare)

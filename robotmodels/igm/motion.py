@@ -13,54 +13,12 @@ from .loop import JointChain
 
 
 def tool_poses(chain: JointChain, q: Array) -> Array:
-    """Poses of the tool in R_0.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    q : ndarray, shape (N, k)
-        Postures, rad or m.
-
-    Returns
-    -------
-    ndarray, shape (N, 4, 4)
-        ``D_0 M_1 D_1 ... M_k D_k`` [m].
-
-    Examples
-    --------
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.robots import load
-    >>> tool_poses(joint_chain(load("lab_trr")), np.array([[0.2, 0.0, 0.0]]))[0, :3, 3].round(9)
-    array([0.4, 0.2, 0.5])
-    """
+    """Poses of the tool in R_0. Shapes: q (N, k) -> (N, 4, 4)."""
     return _walk(chain, q)[0]
 
 
 def jacobians(chain: JointChain, q: Array) -> Array:
-    """Jacobians at the tool in the axes of R_0, rows ``[v; w]``.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    q : ndarray, shape (N, k)
-        Postures, rad or m.
-
-    Returns
-    -------
-    ndarray, shape (N, 6, k)
-        m/rad and 1 for revolute joints, 1 and 0 for prismatic ones.
-
-    Examples
-    --------
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.robots import load
-    >>> jacobians(joint_chain(load("lab_trr")), np.zeros((1, 3)))[0, :3].round(9) + 0.0
-    array([[ 0. ,  0. ,  0. ],
-           [ 1. ,  0. ,  0. ],
-           [ 0. , -0.4, -0.2]])
-    """
+    """Jacobians at the tool in the axes of R_0, rows ``[v; w]``. Shapes: q (N, k) -> (N, 6, k)."""
     U, axes, origins = _walk(chain, q)
     J = np.zeros((len(q), 6, chain.k))
     for m in range(chain.k):
@@ -100,27 +58,9 @@ def scaled(J: Array, length: float) -> Array:
 
 
 def singular_rows(J: Array, relative: float) -> tuple[NDArray[np.int64], Array]:
-    """Jacobians whose smallest singular value is next to nothing.
+    """Jacobians that are singular to a relative tolerance, with their null directions.
 
-    Parameters
-    ----------
-    J : ndarray, shape (N, a, k), a >= k
-        Jacobians, lengths in units of the arm.
-    relative : float
-        Singular values beside the largest that count as zero.
-
-    Returns
-    -------
-    rows : ndarray of int, shape (m,)
-        Which.
-    directions : ndarray, shape (m, k)
-        In which the joints move and the tool does not, of length 1.
-
-    Examples
-    --------
-    >>> rows, directions = singular_rows(np.array([np.eye(2), [[1.0, 1.0], [0.0, 0.0]]]), 1e-6)
-    >>> rows, np.abs(directions).round(3)
-    (array([1]), array([[0.707, 0.707]]))
+    Shapes: J (N, a, k) -> rows (m,), directions (m, k).
     """
     k = J.shape[2]
     G = np.swapaxes(J, 1, 2) @ J

@@ -44,31 +44,7 @@ CHUNK = 1024
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Neighbour:
-    """A six-joint arm and the structured arm next to it.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    near : JointChain
-        The neighbour: the same joints, constants that have the structure. The frames of revolute
-        and prismatic joints are slid along their axes, which changes no pose.
-    plan : LoopPlan
-        Its loop in normal form.
-    offset : float
-        Farthest that an axis was moved [m].
-    tilt : float
-        Largest angle by which an axis was turned [rad].
-    unit : float
-        Length by which lengths are divided [m].
-    deviation : float
-        Largest distance of the two arms' poses at the same joint values, in units of the arm and
-        radians: the scale of what can happen near singular postures.
-    abrupt : bool
-        Whether the neighbour's closed form can end without a best approach.
-    path : ndarray, shape (17, 7, 4, 4)
-        Constants from the neighbour's to the arm's, lengths in ``unit``.
-    """
+    """Six-joint arm and its nearest arm with a closed form. Shapes: path (17, 7, 4, 4)."""
 
     chain: JointChain
     near: JointChain
@@ -90,35 +66,7 @@ class Neighbour:
 
 
 def prepare_neighbour(chain: JointChain) -> Neighbour | None:
-    """The structured arm next to a six-joint arm.
-
-    Three consecutive revolute axes are made to meet in the point nearest to them, or turned to be
-    parallel; of all arms that result the nearest is taken. A pair of axes that the closed form
-    likes to be simple (parallel, meeting or square) is made so where it nearly is.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-
-    Returns
-    -------
-    Neighbour or None
-        None if no axis triple meets within `OFFSET_TOLERANCE` (of a small arm within `SHARE` of
-        half its length) or is parallel within
-        `TILT_TOLERANCE`.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.robots import load
-    >>> arm = load("rx90")
-    >>> worn = arm.with_table(arm.table.replace(d=arm.table.d + [0, 0, 0, 0, 1e-3, 0]))
-    >>> print(prepare_neighbour(joint_chain(worn)).method)
-    three revolute axes that meet in a point (Pieper), to within 1 mm and 0 deg; solved on that \
-arm and brought home by Newton steps
-    """
+    """Nearest arm with a closed form to a six-joint arm."""
     if chain.k != 6:
         return None
     own = arm.slid(chain.D)

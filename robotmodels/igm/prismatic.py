@@ -4,6 +4,9 @@ Prismatic joints do not turn the tool. With three of them the three revolute joi
 orientation, as a wrist does, and three linear equations give the lengths. With two the four
 revolute joints have one motion to spare, and the position leaves one equation for it: what is
 missing across both directions of sliding. It is solved as a trigonometric polynomial.
+
+Source: D. L. Pieper, "The kinematics of manipulators under computer control", 1968 (three prismatic
+joints).
 """
 
 from __future__ import annotations
@@ -34,23 +37,9 @@ CHUNK = 512
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FourRevolute:
-    """How the orientation of four revolute joints is taken apart.
+    """Decomposition of the orientation of four revolute joints.
 
-    Two of them in a row, the late pair, follow from the others, the early pair, through
-    ``Rz(x) K Rz(y) = W``, where W depends on the early pair and the pose.
-
-    Parameters
-    ----------
-    joints : ndarray of int, shape (4,)
-        The revolute joints of the chain.
-    rotations : ndarray, shape (5, 3, 3)
-        Constant rotations before, between and after them.
-    late : int
-        The late pair is joints ``late`` and ``late + 1`` of the four.
-    power : int
-        Power of the denominator that makes the sampled function a polynomial.
-    degree : int
-        Degree of the trigonometric polynomial.
+    Shapes: joints (4,), rotations (5, 3, 3).
     """
 
     joints: NDArray[np.int64]
@@ -62,15 +51,7 @@ class FourRevolute:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PrismaticArm:
-    """Six joints with two or three prismatic ones.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    four : FourRevolute or None
-        The plan of an arm with two prismatic joints; None with three.
-    """
+    """Six joints with two or three prismatic ones."""
 
     chain: JointChain
     four: FourRevolute | None
@@ -84,33 +65,7 @@ class PrismaticArm:
 
 
 def prepare_prismatic(chain: JointChain) -> PrismaticArm | None:
-    """Prepare a six-joint arm with two or three prismatic joints.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-
-    Returns
-    -------
-    PrismaticArm or None
-        None for other arms, for those that cannot turn the tool at will (of three revolute axes two
-        neighbours are parallel, of four three), and for two slides that are always parallel.
-
-    References
-    ----------
-    D. L. Pieper, "The kinematics of manipulators under computer control", 1968 (three prismatic
-    joints).
-
-    Examples
-    --------
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.robots import load
-    >>> prepare_prismatic(joint_chain(load("gantry"))).method
-    'three prismatic joints: orientation first, then the lengths'
-    >>> prepare_prismatic(joint_chain(load("rx90"))) is None
-    True
-    """
+    """Prepare a six-joint arm with two or three prismatic joints."""
     slides = int(np.sum(chain.sigma == 1))
     if chain.k != 6 or slides not in (2, 3):
         return None

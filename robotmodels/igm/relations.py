@@ -6,6 +6,8 @@ locking one joint on a grid, each value solved by the family of the other six jo
 through the samples are walked. Where the relation changes sign along them, or turns round, and
 where a sample is within its reach, Newton's method on pose and relation together starts. With more
 relations it starts from random postures, which may miss some.
+
+Source: Section 1.2.3 of the book, redundant robots: additional relations.
 """
 
 from __future__ import annotations
@@ -45,21 +47,7 @@ _CHUNK = 32  # poses searched at a time
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Related:
-    """A redundant arm whose joints obey relations.
-
-    Parameters
-    ----------
-    chain : JointChain
-        k joints.
-    wanted : Relations
-        k - 6 of them.
-    sampled : int or None
-        Joint whose grid samples the families; None: random starts.
-    inner : str
-        Method of the other joints.
-    arms : LockedArms
-        Chains prepared so far.
-    """
+    """A redundant arm whose joints obey relations."""
 
     chain: JointChain
     wanted: Relations
@@ -86,53 +74,7 @@ def prepare_related(
 ) -> Solver | None:
     """Prepare a redundant arm for relations ``A q = b`` between its joints.
 
-    Parameters
-    ----------
-    chain : JointChain
-        k joints, more than six.
-    A : array_like, shape (k - 6, k)
-        Coefficients, in the order of the chain; independent rows.
-    b : array_like, shape (k - 6,)
-        Right sides [rad or m]. Where the coefficients of revolute joints in a row are whole
-        numbers, it holds modulo 2 pi times their greatest common divisor, as angles do; else it
-        holds for angles in (-pi, pi].
-    prepare : callable
-        Chooses the family of a shorter chain.
-
-    Returns
-    -------
-    Solver or None
-        `Locked` where every row names one joint: then all postures. Else `Related`. None if a
-        joint that is locked leaves no arm with a family, and for six joints or less.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        ``A`` or ``b`` of the wrong shape, not finite, or dependent rows.
-
-    Notes
-    -----
-    With one relation postures are missed only on a closed piece of a family that lies between
-    neighbouring values of the locked joint, 120 to the turn. Postures where the relation holds all
-    along a family are members of a family; some of them are given.
-
-    References
-    ----------
-    Section 1.2.3 of the book, redundant robots: additional relations.
-
-    Examples
-    --------
-    >>> from robotmodels.igm.families import prepare
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.kinematics import dgm
-    >>> from robotmodels.robots import load
-    >>> arm = load("panda")
-    >>> solver = prepare_related(joint_chain(arm), [[1, 0, 1, 0, 0, 0, 0]], [0.4], prepare)
-    >>> T = dgm(arm, [[0.1, 0.2, 0.3, -1.4, 0.5, 1.6, 0.7]])
-    >>> found = postures(solver, T, np.zeros((1, 7)), Tolerances())
-    >>> q = found.q[0, found.valid[0]]
-    >>> np.unique(np.remainder(q[:, 0] + q[:, 2], 2 * np.pi).round(9))
-    array([0.4])
+    Shapes: A (k - 6, k), b (k - 6,).
     """
     rows, right = np.array(A, dtype=np.float64), np.array(b, dtype=np.float64)
     m = chain.k - 6
@@ -156,21 +98,7 @@ def prepare_related(
 def search_related(chain: JointChain, A: Array, b: Array, prepare: Prepare) -> Related | None:
     """Prepare the search along the families, also where rows name a single joint.
 
-    Parameters
-    ----------
-    chain : JointChain
-        k joints, more than six.
-    A : ndarray, shape (k - 6, k)
-        Coefficients.
-    b : ndarray, shape (k - 6,)
-        Right sides [rad or m].
-    prepare : callable
-        Chooses the family of a shorter chain.
-
-    Returns
-    -------
-    Related or None
-        As `prepare_related`.
+    Shapes: A (k - 6, k), b (k - 6,).
     """
     wanted = relations(chain, read_only(A), read_only(b))
     arms = LockedArms(chain, prepare)

@@ -32,25 +32,7 @@ from .why import search
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Call:
-    """What one call asks, checked.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    arm : KnownArm
-        What is known of it.
-    task : Task
-        Mask, locked joints, whether arm angles are given.
-    solver : Solver or None
-        The family prepared for the task.
-    given : bool
-        Whether references were given.
-    limits : bool
-        Whether postures must lie within the joint limits.
-    tolerances : Tolerances
-        When a pose counts as met.
-    """
+    """Checked request of one call."""
 
     model: RobotModel
     arm: KnownArm
@@ -83,23 +65,9 @@ class Rows(NamedTuple):
 
 
 def rows_by_family(call: Call, poses: Array, references: Array, psi: Array | None = None) -> Rows:
-    """Postures by the family of the arm; poses without one searched for the reason.
+    """Postures by the arm's solver; poses without one get the reason by a numeric search.
 
-    Parameters
-    ----------
-    call : Call
-        What is asked.
-    poses : ndarray, shape (N, 4, 4)
-        World poses [m].
-    references : ndarray, shape (N, n)
-        Reference postures [rad or m].
-    psi : ndarray, shape (N,), optional
-        Arm angles, rad.
-
-    Returns
-    -------
-    Rows
-        What was found.
+    Shapes: poses (N, 4, 4), references (N, n), psi (N,).
     """
     model, arm, task = call.model, call.arm, call.task
     U = np.ascontiguousarray(arm.to_base @ poses)
@@ -183,27 +151,7 @@ def _settled_members(call: Call, U: Array, q: Array, references: Array) -> Settl
 def rows_by_plan(
     arm: KnownArm, poses: Array, references: Array, given: bool, limits: bool
 ) -> Rows | None:
-    """Postures by Paul's plan.
-
-    Parameters
-    ----------
-    arm : KnownArm
-        An arm with a plan.
-    poses : ndarray, shape (N, 4, 4)
-        World poses [m], not checked yet.
-    references : ndarray, shape (N, n)
-        Reference postures [rad or m], not checked yet.
-    given : bool
-        Whether the caller gave them.
-    limits : bool
-        Whether postures must lie within the joint limits.
-
-    Returns
-    -------
-    Rows or None
-        Postures; status NOT_CONVERGED where the family of the arm has to be asked. None, and
-        nothing done, if a pose is not a proper one to rounding or a reference not finite.
-    """
+    """Postures by Paul's plan. Shapes: poses (N, 4, 4), references (N, n)."""
     plan, numbers = arm.plan, arm.numbers
     assert plan is not None
     S = plan.most
@@ -221,23 +169,9 @@ def rows_by_plan(
 
 
 def rows_of_doubtful(call: Call, poses: Array, references: Array, rows: Rows) -> Rows:
-    """Ask the family of the arm where its plan was in doubt.
+    """Solve poses that Paul's plan left in doubt by the arm's other solver.
 
-    Parameters
-    ----------
-    call : Call
-        What is asked.
-    poses : ndarray, shape (N, 4, 4)
-        World poses [m].
-    references : ndarray, shape (N, n)
-        Reference postures [rad or m].
-    rows : Rows
-        From `rows_by_plan`.
-
-    Returns
-    -------
-    Rows
-        Of all poses.
+    Shapes: poses (N, 4, 4), references (N, n).
     """
     doubtful = np.flatnonzero(rows.status == IGMStatus.NOT_CONVERGED)
     part = rows_by_family(call, poses[doubtful], references[doubtful])

@@ -11,27 +11,7 @@ from .loop import JointChain
 def shortened(chain: JointChain) -> tuple[Array, float]:
     """Constants with each frame slid along its axis towards its neighbours, in units of the arm.
 
-    Sliding changes nothing (motions commute with it for revolute joints; for prismatic ones too)
-    but keeps the numbers small where a table put frames far out, at nearly parallel axes.
-
-    Parameters
-    ----------
-    chain : JointChain
-        Any number of joints.
-
-    Returns
-    -------
-    D : ndarray, shape (k + 1, 4, 4)
-        Constants of a chain with the same poses at the same joint values, lengths in ``unit``.
-    unit : float
-        About the length of the arm [m].
-
-    Examples
-    --------
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.robots import load
-    >>> round(shortened(joint_chain(load("rx90")))[1], 3)
-    0.45
+    Shapes: -> D (k + 1, 4, 4).
     """
     D, k = np.array(chain.D), chain.k
     for forward in (True, False):

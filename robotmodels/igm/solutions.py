@@ -291,25 +291,7 @@ _PUT = tuple(getattr(IGMSolutions, name).__set__ for name in _NAMES)
 
 
 def posture_distance(a: Array, b: Array, periodic: NDArray[np.bool_]) -> Array:
-    """Distance between postures; periodic joints by the shorter way round.
-
-    Parameters
-    ----------
-    a, b : ndarray, shape (..., n)
-        Postures, rad or m; they broadcast.
-    periodic : ndarray of bool, shape (n,)
-        Joints whose values count modulo a whole turn.
-
-    Returns
-    -------
-    ndarray, shape (...)
-        Square root of the summed squares (metres and radians alike).
-
-    Examples
-    --------
-    >>> float(posture_distance(np.array([3.0]), np.array([-3.0]), np.array([True])).round(4))
-    0.2832
-    """
+    """Distance between postures; periodic joints by the shorter way round."""
     way = a - b
     turn = 2.0 * np.pi
     way = np.where(periodic, way - turn * np.round(way / turn), way)

@@ -32,15 +32,7 @@ class Tolerances(NamedTuple):
 
 
 class Solver(Protocol):
-    """A family prepared for one arm.
-
-    Attributes
-    ----------
-    chain : JointChain
-        The arm: postures are in the order of its joints.
-    method : str
-        The family, in words.
-    """
+    """Solver prepared for one arm."""
 
     @property
     def chain(self) -> JointChain:
@@ -61,23 +53,7 @@ Prepare = Callable[[JointChain], "Solver | None"]
 class Found:
     """Postures of N poses, in the order of the chain, checked on the chain itself.
 
-    Parameters
-    ----------
-    q : ndarray, shape (N, S, k)
-        Postures, rad or m, angles in (-pi, pi]; NaN in rows without one. Packed: the rows of a
-        pose that are in use come first.
-    valid : ndarray of bool, shape (N, S)
-        Rows in use.
-    residual : ndarray, shape (N, S)
-        The larger of the position error in metres and the rotation angle in radians, from a
-        forward pass over the chain; NaN in rows without one.
-    double : ndarray of bool, shape (N, S)
-        Rows in which two postures fell together within 1e-6.
-    free : ndarray of bool, shape (N, S, k)
-        Joints the pose left free: they took the reference, or the nearest value at which the
-        others can follow. One for each dimension of the infinite family.
-    family : ndarray of bool, shape (N, S)
-        Rows that belong to an infinite family (also where no joint took a reference).
+    Shapes: q, free (N, S, k); valid, residual, double, family (N, S).
     """
 
     q: Array
@@ -102,22 +78,5 @@ def nothing_found(N: int, S: int, k: int) -> Found:
 
 @singledispatch
 def postures(solver: Solver, U: Array, references: Array, tolerances: Tolerances) -> Found:
-    """All postures of the poses that the family knows.
-
-    Parameters
-    ----------
-    solver : Solver
-        A prepared family.
-    U : ndarray, shape (N, 4, 4)
-        Poses of the tool in R_0, ``U = D_0 M_1 D_1 ... M_k D_k``; proper transforms [m].
-    references : ndarray, shape (N, k)
-        Values for joints that a pose leaves free [rad or m].
-    tolerances : Tolerances
-        When a pose counts as met.
-
-    Returns
-    -------
-    Found
-        The postures.
-    """
+    """All postures of poses by a prepared solver. Shapes: U (N, 4, 4), references (N, k)."""
     raise TypeError(f"no family is registered for {type(solver).__name__}")

@@ -3,6 +3,8 @@
 The six joints and the pose form a loop. Any joint can be called the first and the loop can be
 walked either way, so one solver for three axes that meet at the end of the chain also serves arms
 whose shoulder or middle axes meet, and one for three parallel axes those that are mirrored.
+
+Source: D. L. Pieper, "The kinematics of manipulators under computer control", 1968.
 """
 
 from __future__ import annotations
@@ -34,40 +36,7 @@ class Family(Enum):
 class LoopPlan:
     """A six-joint arm as a loop of normal form, ready for a solver.
 
-    ``M_0 E_0 M_1 E_1 ... M_5 E_5 = 1``, where ``E[slot]`` is ``left pose right`` with the pose (or
-    its inverse) of the last joint's frame in R_0's.
-
-    Parameters
-    ----------
-    family : Family
-        Which solver.
-    order : ndarray of int, shape (6,)
-        Joint of the chain at each place of the loop.
-    sense : float
-        1, or -1 if the loop is walked against the chain: its variables are then minus q.
-    constants : ndarray, shape (6, 4, 4)
-        ``E``, the one in ``slot`` to be filled.
-    slot : int
-        Which constant holds the pose.
-    left, right : ndarray, shape (4, 4)
-        Around the pose.
-    inverted : bool
-        Whether the pose is inverted.
-    sigma : ndarray of int, shape (6,)
-        Joint types in the order of the loop.
-    meeting : ndarray, shape (2,)
-        Concurrent axes: height of the meeting point on axes 3 and 5, metres.
-    backwards : bool
-        Concurrent axes: solve the first three joints from the other end.
-    size : float
-        A length of the arm, metres.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> plan_loop(joint_chain(load("rx90"))).family.name
-    'CONCURRENT'
+    Shapes: order, sigma (6,); constants (6, 4, 4); left, right (4, 4); meeting (2,).
     """
 
     family: Family
@@ -85,29 +54,7 @@ class LoopPlan:
 
 
 def plan_loop(chain: JointChain) -> LoopPlan | None:
-    """Find the family of a six-joint arm and the place in the loop where its solver starts.
-
-    Parameters
-    ----------
-    chain : JointChain
-        Joints and constants from base to tool.
-
-    Returns
-    -------
-    LoopPlan or None
-        None if no three axes meet or are parallel in the required way.
-
-    References
-    ----------
-    D. L. Pieper, "The kinematics of manipulators under computer control", 1968.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> plan_loop(joint_chain(load("ur5e"))).family.name
-    'PARALLEL'
-    """
+    """Find the closed form of a six-joint arm and the joint where its loop starts."""
     if chain.k != 6:
         return None
     best: tuple[int, LoopPlan] | None = None

@@ -36,17 +36,7 @@ NEAR = 1e-3  # singular postures closer than this came from one root, to half th
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SwingFilter:
-    """An arm whose position leaves no joint free: its postures either have the twist or not.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    components : Components
-        What is asked, one rotation among it.
-    inner : Solver
-        Of the arm for the asked translations alone.
-    """
+    """Arm whose position leaves no joint free; its postures are filtered by the rotation."""
 
     chain: JointChain
     components: Components
@@ -60,26 +50,7 @@ class SwingFilter:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SwingSearch:
-    """An arm with one joint more than its position needs, which the twist decides.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    components : Components
-        What is asked, one rotation among it.
-    searched : int
-        The joint whose values make the grid.
-    values : ndarray, shape (G,)
-        The grid [rad or m].
-    inner : tuple of Solver
-        Of the others for the asked translations, at each value; empty where none is left to solve.
-    length : float
-        A length of the arm [m].
-    second : SwingSearch, optional
-        The same along another joint, for poses of which nothing is found: their curves may lie
-        between the points of the grid.
-    """
+    """Arm with one joint more than its position needs, searched for the rotation."""
 
     chain: JointChain
     components: Components
@@ -98,35 +69,7 @@ class SwingSearch:
 
 
 def prepare_swing(chain: JointChain, components: Components, position: Prepare) -> Solver | None:
-    """Prepare an arm for a task that asks for one rotation.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    components : Components
-        What is asked: one rotation, any translations.
-    position : callable
-        Prepares a chain for the asked translations alone, all rotations freed.
-
-    Returns
-    -------
-    Solver or None
-        A joint that is not needed takes its reference. None if no family serves the position.
-
-    Examples
-    --------
-    A SCARA arm can only turn its tool about the vertical.
-
-    >>> from robotmodels.igm.families import prepare
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.igm.mask import prepare_masked
-    >>> from robotmodels.robots import load
-    >>> asked = (True, True, True, False, False, True)
-    >>> arm = prepare_masked(joint_chain(load("cobra_s600")), asked, False, prepare)
-    >>> arm.method[:32]
-    'roots of the twist along joint 4'
-    """
+    """Prepare an arm for a task that asks for one rotation."""
     length, k = lever(chain), chain.k
     J = _sampled_jacobians(chain, components, length)
     place, all_rows = _rank(J[:, :-1]), _rank(J)

@@ -43,24 +43,7 @@ def thorough_postures(
 ) -> Found:
     """All postures of poses that are singular or nearly so.
 
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    candidates : callable
-        Closed forms of it.
-    U : ndarray, shape (N, 4, 4)
-        Poses of the tool in R_0 [m].
-    references : ndarray, shape (N, k)
-        Reference postures [rad or m].
-    tolerances : Tolerances
-        When a pose counts as met.
-
-    Returns
-    -------
-    Found
-        Postures met to `MET`; where there is none, those within the tolerances. Of infinite
-        families several members: `settle_families` makes them one.
+    Shapes: U (N, 4, 4), references (N, k).
     """
     first = _home(chain, [candidates(U, references, OVERSHOOT)], U, tolerances)
     twice = np.flatnonzero(two_singularities(chain, first))
@@ -113,20 +96,7 @@ def _home(
 
 
 def two_singularities(chain: JointChain, found: Found) -> NDArray[np.bool_]:
-    """Poses with a posture at which two singular values are small, or with none.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    found : Found
-        Its postures.
-
-    Returns
-    -------
-    ndarray of bool, shape (N,)
-        Where two singular positions come together, or no posture says that they do not.
-    """
+    """Whether a pose has a posture with two small singular values, or no posture."""
     n, s = np.nonzero(found.valid)
     out = np.logical_not(np.any(found.valid, axis=1)).reshape(-1)
     J = jacobians(chain, found.q[n, s])

@@ -17,17 +17,7 @@ NO_COLUMN = -1
 
 
 class VirtualJoint(NamedTuple):
-    """A joint that stands at zero in every posture of the arm itself.
-
-    Parameters
-    ----------
-    gap : int
-        0 before the first joint of the chain, g behind its g-th.
-    frame : ndarray, shape (4, 4)
-        Frame of the joint, its axis along z, in that of the joint before (R_0 for gap 0).
-    sigma : int
-        0 revolute, 1 prismatic.
-    """
+    """Virtual joint, zero in every posture of the arm."""
 
     gap: int
     frame: Array
@@ -37,31 +27,7 @@ class VirtualJoint(NamedTuple):
 def with_virtual_joints(
     chain: JointChain, joints: Sequence[VirtualJoint]
 ) -> tuple[JointChain, NDArray[np.int64]]:
-    """Put virtual joints into a chain; with all of them at zero it places the tool as before.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    joints : sequence of VirtualJoint
-        In each gap in the order from base to tool.
-
-    Returns
-    -------
-    longer : JointChain
-        The chain with them; their ``columns`` are `NO_COLUMN`.
-    places : ndarray of int, shape (chain.k,)
-        Where the joints of the chain stand in it.
-
-    Examples
-    --------
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.robots import load
-    >>> slide = VirtualJoint(gap=1, frame=np.eye(4), sigma=1)
-    >>> longer, places = with_virtual_joints(joint_chain(load("lab_trr")), [slide])
-    >>> longer.sigma, places
-    (array([1, 1, 0, 0]), array([0, 2, 3]))
-    """
+    """Put virtual joints into a chain; with all of them at zero it places the tool as before."""
     columns, sigma, D, places = [], [], [], []
     for gap in range(chain.k + 1):
         if gap > 0:

@@ -21,24 +21,9 @@ SEARCH_STARTS, SEARCH_STEPS = 4, 60
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Search:
-    """What the numeric search says of poses without a posture.
+    """Result of the numeric search for poses without a posture.
 
-    Parameters
-    ----------
-    rows : ndarray of int, shape (m,)
-        The poses.
-    status : ndarray of int8, shape (m,)
-        Codes of `IGMStatus`.
-    met : ndarray of bool, shape (m,)
-        Poses that the search reached all the same.
-    residual : ndarray, shape (m,)
-        Errors of those [m, rad].
-    closest : ndarray, shape (N, n)
-        Of all poses: the posture that comes closest [rad or m]; NaN for those not asked about.
-    missing : ndarray, shape (N, 6)
-        What it misses, in the axes of the mask [m, rad].
-    family : ndarray of bool, shape (m, n)
-        Joints that move while the tool stays where the search reached it.
+    Shapes: rows, status, met, residual (m,); closest (N, n); missing (N, 6); family (m, n).
     """
 
     rows: NDArray[np.int64]
@@ -60,31 +45,9 @@ def search(
     tolerances: Tolerances,
     status: NDArray[np.int8],
 ) -> Search | None:
-    """Say why poses have no posture; the posture that comes closest, and what it misses.
+    """Status of poses without a posture, with the closest posture and its error.
 
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    task : Task
-        What is asked of it.
-    whole : bool
-        Whether to search at length, because no family looked before.
-    poses : ndarray, shape (N, 4, 4)
-        World poses [m].
-    references : ndarray, shape (N, n)
-        Where the search starts [rad or m].
-    limits : bool
-        Whether postures must lie within the joint limits.
-    tolerances : Tolerances
-        When a pose counts as met.
-    status : ndarray of int8, shape (N,)
-        What became of the poses: those NOT_CONVERGED are searched.
-
-    Returns
-    -------
-    Search or None
-        None if there is nothing to search.
+    Shapes: poses (N, 4, 4), references (N, n), status (N,).
     """
     empty = np.flatnonzero(status == IGMStatus.NOT_CONVERGED)
     if empty.size == 0:

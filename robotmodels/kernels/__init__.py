@@ -20,26 +20,8 @@ __all__ = ["Chain"]
 class Chain(NamedTuple):
     """The arrays every kernel takes: a Khalil-Kleinfinger table with its constants multiplied out.
 
-    Frames are numbered 1..f and stored at index number - 1; 0 is the base frame R_0. The motion
-    of a joint commutes with the last two factors of its row, so ``T(a(j), j) = C_j Motion(q_j)``
-    with a constant ``C_j``. Unpack it into a call: ``tip_poses(q, *chain, path, ...)``.
-
-    Attributes
-    ----------
-    antecedent : (f,) int64
-        Number of the frame each frame is attached to, smaller than its own; 0 is the base.
-    sigma : (f,) int64
-        0 revolute, 1 prismatic, 2 fixed.
-    joint : (f,) int64
-        Column of the frame's joint in q, -1 for a fixed frame.
-    rotation : (f, 3, 3)
-        Rotation of ``C_j``.
-    position : (f, 3)
-        Position of ``C_j`` [m].
-    base_rotation : (3, 3)
-        Rotation of R_0 in the world.
-    base_position : (3,)
-        Position of R_0 in the world [m].
+    Shapes: antecedent, sigma, joint (f,); rotation (f, 3, 3); position (f, 3); base_rotation
+    (3, 3); base_position (3,).
     """
 
     antecedent: NDArray[np.int64]

@@ -35,10 +35,8 @@ OUT1, OUT2, OUT3, OUT4 = (_output(ndim) for ndim in range(1, 5))
 def compiled(*signature: Any) -> Any:
     """Return the decorator that compiles a function: cached on disk, without the GIL, exact sums.
 
-    With a signature it compiles a kernel, as soon as its module is imported. Without one it marks a
-    small function inside kernels, which compiles when another needs it; Python cannot call it, and
-    so the compiler need not write the entry from Python, which is half of its work. The result is
-    typed as Any because type checkers cannot count the arguments of ``kernel(q, *chain, ...)``.
+    With a signature: a kernel, compiled at import. Without: an inner function for kernels only.
+    Typed as Any because type checkers cannot count the arguments of ``kernel(q, *chain, ...)``.
     """
     options: dict[str, Any] = {
         "cache": True,

@@ -22,9 +22,8 @@ Ten = tuple[float, float, float, float, float, float, float, float, float, float
 def wrench_columns(t: Vector, z: Vector, w: Vector, dw: Vector, U: Matrix, u: Vector) -> Ten:
     """Power on the motion of the wrenches that unit parameters need to accelerate.
 
-    In link axes, with U the matrix of `rotation_acceleration` and u the acceleration of the
-    origin, these are M: [u; 0], MX MY MZ: [U_k; e_k x u], XX..ZZ: [0; column of J dw + w x J w].
-    The entries of the last are found again in U.
+    In link axes, U of `rotation_acceleration`, u acceleration of the origin: M: [u; 0], MX MY MZ:
+    [U_k; e_k x u], XX..ZZ: [0; column of J dw + w x J w], whose entries are found again in U.
     """
     pull = transpose_times(U, t)
     turn = cross(u, z)

@@ -44,17 +44,7 @@ def accelerations(
 ) -> None:
     """Time derivatives of the twists of a tool, ``J a + dJ/dt v``.
 
-    A twist in the axes of the tool, ``R^T x``, changes by ``R^T (dx - w x x)``; the spatial one,
-    ``v - w x p``, by ``dv - dw x p - w x v``.
-
-    Parameters
-    ----------
-    q, v, a : (N, n)
-        Joint positions, velocities and accelerations [rad or m, per s, per s^2].
-    antecedent, ..., reference
-        As for `jacobians`.
-    out : (N, 6)
-        Written: linear then angular part [m/s^2, rad/s^2].
+    Shapes: q, v, a (N, n) -> out (N, 6).
     """
     base = whole_matrix(base_rotation)
     origin = whole_vector(base_position)

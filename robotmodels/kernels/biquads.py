@@ -29,21 +29,7 @@ def run_sections(sections: Floats, x: Floats) -> None:
 def forward_backward(sections, x, pad, out):
     """Filter channels forward and backward, continued by their point reflection at both ends.
 
-    Parameters
-    ----------
-    sections : (s, 5)
-        Of each its b0, b1, b2, a1, a2 (a0 = 1).
-    x : (N, c)
-        Channels.
-    pad : int
-        Samples of the continuation, less than N.
-    out : (N, c)
-        Written.
-
-    Returns
-    -------
-    int
-        Samples filtered of each channel.
+    Shapes: sections (s, 5), x (N, c) -> out (N, c).
     """
     N, channels = x.shape
     buffer = np.empty(N + 2 * pad)

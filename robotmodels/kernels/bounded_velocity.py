@@ -64,28 +64,9 @@ def complement(V: Floats, r: int, d: int) -> None:
 def dependence(
     F: Floats, f: int, p: int, side: float, k: int, E: Floats, R: Floats, r: Floats, z: Floats
 ) -> float:
-    """Write the normal of a bound as a combination of those of the active bounds and a rest.
+    """Decompose the normal of a bound into the active normals and an orthogonal rest.
 
-    The normal of a bound of joint j is its side (1 upper, -1 lower) times column j of F. E, R are
-    the orthogonal factors of the active ones, see `factorise`.
-
-    Parameters
-    ----------
-    F, f : (>= f, n), int
-        Free directions as rows.
-    p, side : int, float
-        The bound.
-    k : int
-        Number of active bounds.
-    E, R : (>= k, >= f), (>= k, >= k)
-        Orthonormal rows and the triangle with normal_i = sum_j R[j, i] E_j.
-    r, z : (>= k,), (>= f,)
-        Written: coefficients of the active normals, and the rest, orthogonal to them.
-
-    Returns
-    -------
-    float
-        Squared length of the rest.
+    Shapes: F, f (>= f, n); E (>= k, >= f); R (>= k, >= k) -> r (>= k,), z (>= f,).
     """
     for c in range(f):
         z[c] = side * F[c, p]
@@ -153,31 +134,7 @@ def nearest_inside(
 ) -> tuple[int, int, float, float]:
     """Nearest ``v = x + F^T y`` to a wish with ``lower <= v <= upper``.
 
-    Parameters
-    ----------
-    x : (n,)
-        Orthogonal to the rows of F.
-    F, f : (>= f, n), int
-        Orthonormal rows.
-    wish, lower, upper : (n,)
-        What v should be near, and its bounds.
-    v : (n,)
-        Written: the solution; if there is none, where the search ended.
-    active, sides, press : (n,) int64, (n,), (n,)
-        Written: joints of the active bounds, 1 for upper and -1 for lower ones, and how they
-        press (multipliers, not negative).
-    r, z, E, R : work
-
-    Returns
-    -------
-    k : int
-        Number of active bounds.
-    joint : int
-        -1 if v is the solution; otherwise the joint whose bound the active ones exclude.
-    side : float
-        Of that bound.
-    size : float
-        Of the velocities; rounding is relative to it.
+    Shapes: x, wish, lower, upper (n,); F, f (>= f, n) -> v, active, sides, press (n,).
     """
     n = x.shape[0]
     for j in range(n):
@@ -256,26 +213,7 @@ def largest_part(
     E: Floats,
     R: Floats,
 ) -> float:
-    """Largest s in [0, 1] with some ``v = x + s w + F^T y`` inside the bounds, and the nearest v.
-
-    Parameters
-    ----------
-    x, w : (n,)
-        Orthogonal to the rows of F.
-    F, f, wish, lower, upper : see `nearest_inside`
-    v : (n,)
-        Written: the velocities nearest to the wish among those of the largest s, never outside.
-    at : (n,) int64
-        Written: 1 and -1 for joints at their upper and lower bound.
-    stuck : (n,) int64
-        Written: 1 for joints that have to stay at their bounds because s is the largest possible.
-    base, active, sides, press, r, z, E, R : work
-
-    Returns
-    -------
-    float
-        s, or -1 where no s in [0, 1] fits.
-    """
+    """Largest s in [0, 1] with a ``v = x + s w + F^T y`` inside the bounds, and the nearest v."""
     n = x.shape[0]
     s, size, k = 1.0, 0.0, 0
     for j in range(n):

@@ -207,40 +207,8 @@ def follow_references(
 ) -> int:
     """Follow references from a state on, and write what a log has of it.
 
-    Parameters
-    ----------
-    q_ref, v_ref, feed : (N + 1, n)
-        References and fed-forward torques at the samples and at the one after the last, linear in
-        between.
-    gains : (4, n)
-        Of position, velocity and integral, and the largest torque.
-    astray : (n,)
-        Distances from the references beyond which the robot has run away.
-    hold, substeps : int
-        Steps of integration for which a torque is held; steps of a sample.
-    dt : float
-        Period of the samples [s].
-    antecedent, ..., base_position
-        The `Chain`.
-    pi, gravity : (f, 10), (3,)
-        Of the links, any real values; of the world.
-    rotor, viscous : (n, n)
-        Of the drives.
-    drives : (3, n)
-        Coulomb friction, offset, and width of the ramp of dry friction around rest.
-    coupling : (k, n)
-        Turns of the coupled motors for those of the joints.
-    coupled : (2,) or (2 k,)
-        Their Coulomb frictions, then their widths.
-    state : (5, n)
-        Read and written: q, v, integral of the error, held torque; state[4, 0] counts the steps.
-    q, v, a, tau : (N, n)
-        Written.
-
-    Returns
-    -------
-    int
-        -1, or the sample after which the robot ran away or had no positive definite mass matrix.
+    Shapes: q_ref, v_ref, feed (N + 1, n); gains (4, n); pi (f, 10); rotor, viscous (n, n); drives
+    (3, n); coupling (k, n); coupled (2,) or (2 k,); state (5, n) -> q, v, a, tau (N, n).
     """
     N, n = q.shape
     f = antecedent.shape[0]

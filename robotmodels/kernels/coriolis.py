@@ -75,16 +75,7 @@ def coriolis_matrices(
 ) -> None:
     """Christoffel-consistent Coriolis matrices: dM/dt - 2 C is skew-symmetric.
 
-    Parameters
-    ----------
-    q, v : (N, n)
-        Joint positions and velocities [rad or m, and per s].
-    antecedent, ..., base_position
-        The `Chain`.
-    pi : (f, 10)
-        XX XY XZ YY YZ ZZ MX MY MZ M of each link in its frame, any real values.
-    out : (N, n, n)
-        Written: matrices C(q, v), where C v are the Coriolis and centrifugal torques.
+    Shapes: q, v (N, n); pi (f, 10) -> out (N, n, n).
     """
     f = antecedent.shape[0]
     n = out.shape[1]

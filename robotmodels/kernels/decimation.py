@@ -14,24 +14,8 @@ _ROWS = 4
 def add_rows(rows, use, first_column, taps, step, first, centre, sums, weights):
     """Add rows to the outputs in whose windows they are, each kind by itself.
 
-    Parameters
-    ----------
-    rows : ndarray, shape (k, m, c)
-        Rows of m kinds, the first of which has the number ``first``.
-    use : ndarray of int, shape (k * m,)
-        Whether a row takes part.
-    first_column : ndarray of int, shape (m,)
-        Columns before it are zero in the rows of this kind.
-    taps : ndarray, shape (L,)
-        Symmetric weights, L odd.
-    step : int
-        Output o is centred on row ``centre + o * step``.
-    first, centre : int
-        See above.
-    sums : ndarray, shape (o, m, c)
-        Of outputs, to add to.
-    weights : ndarray, shape (o, m)
-        Of outputs: the sum of the weights so far.
+    Shapes: rows (k, m, c), use (k * m,), first_column (m,), taps (L,), sums (o, m, c), weights
+    (o, m).
     """
     half = len(taps) // 2
     k, m, columns = rows.shape

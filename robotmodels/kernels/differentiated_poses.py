@@ -91,20 +91,8 @@ def differentiated_poses(
 ) -> None:
     """World poses of a tool, and their derivatives with respect to every joint.
 
-    Parameters
-    ----------
-    q : (N, n)
-        Joint positions [rad or m].
-    antecedent, ..., base_position
-        The `Chain`.
-    path : (k,) int64
-        Numbers of the frames from the base to the tip; empty when the tip is the base.
-    tool_rotation, tool_position : (3, 3), (3,)
-        Tool in the tip frame [m].
-    poses : (N, 4, 4)
-        Written: homogeneous matrices.
-    out : (N, n, 3, 4)
-        Written: upper three rows of dT/dq_j, zero for joints that are not on the path.
+    Shapes: q (N, n), path (k,), tool_rotation (3, 3), tool_position (3,) -> poses (N, 4, 4), out
+    (N, n, 3, 4).
     """
     base, origin = whole_matrix(base_rotation), whole_vector(base_position)
     E, e = whole_matrix(tool_rotation), whole_vector(tool_position)
@@ -159,14 +147,7 @@ def differentiated_pose_rates(
 ) -> None:
     """`differentiated_poses`, and the time derivatives of the derivatives along a motion.
 
-    Parameters
-    ----------
-    q, v : (N, n)
-        Joint positions and velocities [rad or m, and per s].
-    antecedent, ..., out
-        As for `differentiated_poses`.
-    rates : (N, n, 3, 4)
-        Written: d/dt of ``out``, the sum over i of d2T/(dq_j dq_i) v_i.
+    Shapes: q, v (N, n) -> rates (N, n, 3, 4).
     """
     base, origin = whole_matrix(base_rotation), whole_vector(base_position)
     E, e = whole_matrix(tool_rotation), whole_vector(tool_position)

@@ -22,11 +22,10 @@ EPSILON = float(np.finfo(np.float64).eps)
 
 @compiled()
 def solve_definite(A: Floats, b: Floats, i: int, diagonal: Floats) -> int:
-    """Solve ``A[i] x = b[i]`` into b[i] by Cholesky: POSITIVE; else leave both, and say why not.
+    """Solve ``A[i] x = b[i]`` into b[i] by Cholesky: POSITIVE; else SINGULAR or INDEFINITE.
 
-    Spoils the lower half of A[i], which is symmetric and of unit diagonal; ``diagonal`` (n,) keeps
-    the latter. SINGULAR to rounding or INDEFINITE: what is left after a pivot of zero must then be
-    zero too in a matrix that has no negative eigenvalue.
+    A[i] has unit diagonal, kept in ``diagonal`` (n,); its lower half is overwritten. A zero pivot
+    with a non-zero rest of its column means INDEFINITE.
     """
     n = A.shape[1]
     least = 4.0 * n * EPSILON
@@ -159,27 +158,7 @@ def joint_accelerations(
 ) -> int:
     """Accelerations of the joints under given torques.
 
-    Parameters
-    ----------
-    q, v, tau : (N, n)
-        Joint positions, velocities and torques on the links [rad or m, per s, N m or N].
-    antecedent, ..., base_position
-        The `Chain`.
-    pi : (f, 10)
-        XX XY XZ YY YZ ZZ MX MY MZ M of each link in its frame, any real values.
-    gravity : (3,)
-        Acceleration of gravity in the world [m/s^2].
-    rotor : (n, n)
-        Added to the mass matrix [kg m^2 or kg].
-    out : (N, n)
-        Written: accelerations [rad/s^2 or m/s^2]; NaN in the rows of singular samples.
-
-    Returns
-    -------
-    int
-        -1 if all matrices are positive definite; the index of the first sample whose matrix is
-        singular to rounding; if there is none, -2 less the index of the first whose matrix has
-        negative eigenvalues.
+    Shapes: q, v, tau (N, n); pi (f, 10); gravity (3,); rotor (n, n) -> out (N, n).
     """
     samples, n = q.shape
     block = min(samples, BLOCK)

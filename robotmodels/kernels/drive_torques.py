@@ -11,14 +11,7 @@ def drive_torques(
 ) -> None:
     """``Ia a + Fv v + Fc sign(v) + offset``, joint by joint.
 
-    Parameters
-    ----------
-    v, a : (N, n)
-        Joint velocities and accelerations [rad/s or m/s, and per s].
-    Ia, Fv, Fc, offset : (n,)
-        Of the drives, joint side.
-    out : (N, n)
-        Written: torques [N m or N].
+    Shapes: v, a (N, n); Ia, Fv, Fc, offset (n,) -> out (N, n).
     """
     for i in range(v.shape[0]):
         for j in range(v.shape[1]):

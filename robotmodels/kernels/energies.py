@@ -44,16 +44,7 @@ def kinetic_energies(
 ) -> None:
     """Kinetic energy of the rigid links, without rotors.
 
-    Parameters
-    ----------
-    q, v : (N, n)
-        Joint positions and velocities [rad or m, and per s].
-    antecedent, ..., base_position
-        The `Chain`.
-    pi : (f, 10)
-        XX XY XZ YY YZ ZZ MX MY MZ M of each link in its frame, any real values.
-    out : (N,)
-        Written: energies [J].
+    Shapes: q, v (N, n); pi (f, 10) -> out (N,).
     """
     f = antecedent.shape[0]
     omega = np.zeros((f + 1, 3))
@@ -92,18 +83,7 @@ def potential_energies(
 ) -> None:
     """Energy of the links in the field of gravity.
 
-    Parameters
-    ----------
-    q : (N, n)
-        Joint positions [rad or m].
-    antecedent, ..., base_position
-        The `Chain`.
-    pi : (f, 10)
-        XX XY XZ YY YZ ZZ MX MY MZ M of each link in its frame, any real values.
-    gravity : (3,)
-        Acceleration of gravity in the world [m/s^2].
-    out : (N,)
-        Written: energies [J].
+    Shapes: q (N, n), pi (f, 10), gravity (3,) -> out (N,).
     """
     f = antecedent.shape[0]
     g = whole_vector(gravity)

@@ -44,18 +44,7 @@ def energy_regressors(
 ) -> None:
     """Rows h with h @ pi = kinetic + potential energy.
 
-    Parameters
-    ----------
-    q, v : (N, n)
-        Joint positions and velocities [rad or m, and per s].
-    antecedent, ..., base_position
-        The `Chain`.
-    gravity : (3,)
-        Acceleration of gravity in the world [m/s^2].
-    place : (10 f,)
-        Column of ``out`` of each parameter, by link XX XY XZ YY YZ ZZ MX MY MZ M; -1 leaves it out.
-    out : (N, 1, c)
-        Written; zero in columns that no parameter has.
+    Shapes: q, v (N, n); gravity (3,); place (10 f,) -> out (N, 1, c).
     """
     f = antecedent.shape[0]
     g = whole_vector(gravity)

@@ -139,28 +139,8 @@ def erroneous_poses(
 ) -> None:
     """Poses of one end of a robot and the generalised differential model.
 
-    Parameters
-    ----------
-    q : (N, n)
-        Joint positions as they are read [rad or m].
-    nominal : (R, 7)
-        gamma, b, beta, alpha, d, theta, r of every row [rad, m].
-    sigma, joint : (R,) int64
-        0 revolute, 1 prismatic, 2 fixed; column of the joint in q, -1 if fixed.
-    path : (k,) int64
-        Rows from the world to the end, in order.
-    before_rotation, before_position, after_rotation, after_position
-        Constant poses in front of the first row and behind the last, (3, 3) and (3,) [m].
-    deviation : (P,)
-        Values of the parameters: what is added to their elements, times the factor.
-    owner, row, element : (A,) int64
-        Each of A actions: number of the parameter, the row and which of its seven elements.
-    factor : (N, A)
-        What the deviation is multiplied by at each configuration.
-    out_pose : (N, 4, 4)
-        Written: poses in the world.
-    out_psi : (N, 6, P), or (N, 6, 0) if not wanted
-        Written: [v; w] of the end per unit of each parameter, world axes, at the end's origin.
+    Shapes: q (N, n); nominal (R, 7); sigma, joint (R,); path (k,); deviation (P,); owner, row,
+    element (A,); factor (N, A) -> out_pose (N, 4, 4), out_psi (N, 6, P).
     """
     k = path.shape[0]
     count = owner.shape[0]

@@ -50,26 +50,7 @@ def inverse_factors(
     zero: float,
     factors: Floats,
 ) -> float:
-    """Factors f by which ``y = sum f_i (u_i . b) v_i`` solves ``A y = b``.
-
-    Parameters
-    ----------
-    kind, threshold, largest, speed : int, float, float, float
-        The method.
-    sigma, inner : (>= k,)
-        Singular values of A, descending, and ``u_i . b``.
-    k : int
-        How many.
-    zero : float
-        Singular values up to this are the rounding errors of zeros: some 1e-13 of the size of A.
-    factors : (>= k,)
-        Written: 1 / sigma where the method changes nothing, less otherwise.
-
-    Returns
-    -------
-    float
-        The largest damping of any direction; 0 if nothing is damped.
-    """
+    """Factors f by which ``y = sum f_i (u_i . b) v_i`` solves ``A y = b``."""
     if k == 0:
         return 0.0
     first, last = sigma[0], sigma[k - 1]

@@ -94,22 +94,7 @@ def solve_row(
 ) -> tuple[int, float, int]:
     """Solve ``A y = b``; returns rank, largest damping and status code.
 
-    Parameters
-    ----------
-    A, b : (>= m, >= n), (>= m,)
-        Scaled equations.
-    size : float
-        Norm of the whole Jacobian, to which rounding errors are relative.
-    kind, ..., speed
-        The method, as for `inverse_factors`.
-    others : int
-        1 if there is a motion z to be taken into the null space.
-    z : (>= n,)
-        That motion; destroyed.
-    work : (>= min(m, n) + 2, >= 2 max(m, n) + 1)
-        Scratch.
-    sigma, y, part : (>= min(m, n),), (>= n,), (>= m,)
-        Written: singular values, the solution, and the part of b in the range of A.
+    Shapes: A (>= m, >= n), b (>= m,), z (>= n,).
     """
     k = min(m, n)
     decompose(A, m, n, b, 0, work, sigma)
@@ -216,26 +201,8 @@ def inverse_velocities(
 ) -> None:
     """Joint velocities of twists, with what is known of each.
 
-    Parameters
-    ----------
-    q, twist : (N, n), (N, 6)
-        Joint positions [rad or m], twists [m/s, rad/s].
-    secondary : (N, n) or (0, n)
-        Joint velocities to be taken into the null space; no rows if there are none.
-    antecedent, ..., reference
-        As for `jacobians`.
-    asked : (m,) int64
-        Rows of the twist that are asked for.
-    row_scale : (6,)
-        Factors that make rows comparable: 1 / length for linear ones.
-    column_scale : (n,)
-        ``1 / sqrt(weight)`` of each joint.
-    kind, ..., speed
-        The method, as for `inverse_factors`.
-    v, achieved, error, reachable : (N, n), (N, 6), (N, 6), (N, 6)
-        Written; rows of twists that are not asked for are zero.
-    singular_values, rank, damping, status : (N, min(m, n)), (N,), (N,), (N,)
-        Written.
+    Shapes: q (N, n), twist (N, 6), secondary (N, n) or (0, n), asked (m,) -> v (N, n); achieved,
+    error, reachable (N, 6); singular_values (N, min(m, n)); rank, damping, status (N,).
     """
     N, n = q.shape
     m, k = asked.shape[0], min(asked.shape[0], n)
@@ -314,21 +281,7 @@ def one_inverse_velocity(
     out: Floats,
     codes: Ints,
 ) -> None:
-    """`inverse_velocities` of one row, with few arguments: each array takes 0.3 us to hand over.
-
-    Parameters
-    ----------
-    whole, numbers : int64, float64
-        As `packed` makes them.
-    q, twist : (n,), (6,)
-        The row.
-    reference, kind, ..., speed
-        As for `inverse_velocities`.
-    out : (n + 18 + k + 1,)
-        Written: v, achieved, error, reachable, singular values, damping.
-    codes : (2,) int8
-        Written: status and rank.
-    """
+    """`inverse_velocities` of one row, with few arguments because each array costs 0.3 us."""
     f, steps, m = whole[0], whole[1], whole[2]
     n = q.shape[0]
     k = min(m, n)
@@ -370,18 +323,7 @@ def inverse_of_rows(
 ) -> None:
     """The same for given rows ``J v = rate``, which are comparable already.
 
-    Parameters
-    ----------
-    J, rate : (N, m, n), (N, m)
-        Equations.
-    size : (N,)
-        Norms to which rounding errors are relative.
-    column_scale, ..., speed
-        As for `inverse_velocities`.
-    v, reachable : (N, n), (N, m)
-        Written: solutions, and the part of the rates in the range.
-    singular_values, rank, damping, status
-        Written, as by `inverse_velocities`.
+    Shapes: J (N, m, n), rate (N, m), size (N,) -> v (N, n), reachable (N, m).
     """
     N, m, n = J.shape
     k = min(m, n)

@@ -14,22 +14,7 @@ __all__ = ["inverses"]
 def inverses(A: Floats, inverse: Floats, conditioning: Floats, sign: Floats) -> int:
     """Inverses by elimination with the greatest pivot of the column.
 
-    Parameters
-    ----------
-    A : (N, n, n)
-        Matrices.
-    inverse : (N, n, n)
-        Written.
-    conditioning : (N,)
-        Written: n over the product of the Frobenius norms of the matrix and its inverse, which is
-        1 for a matrix with equal singular values and goes to 0 with the least of them.
-    sign : (N,)
-        Written: of the determinant.
-
-    Returns
-    -------
-    int
-        Number of the first matrix with a pivot of zero, at which the work stops; -1 if none.
+    Shapes: A (N, n, n) -> inverse (N, n, n); conditioning, sign (N,).
     """
     N, n = A.shape[0], A.shape[1]
     work = np.empty((n, 2 * n))

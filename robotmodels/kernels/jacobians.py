@@ -54,20 +54,7 @@ def jacobians(
 ) -> None:
     """Jacobians of a tool carried by the last frame of a path.
 
-    Parameters
-    ----------
-    q : (N, n)
-        Joint positions [rad or m].
-    antecedent, ..., base_position
-        The `Chain`.
-    path : (k,) int64
-        Numbers of the frames from the base to the tip; empty when the tip is the base.
-    tool_rotation, tool_position : (3, 3), (3,)
-        Tool in the tip frame [m].
-    reference : int
-        0 world axes at the tool point, 1 the tool's own axes, 2 world axes at the world's origin.
-    out : (N, 6, n)
-        Written: Jacobians, zero in the columns of joints that are not on the path.
+    Shapes: q (N, n), path (k,), tool_rotation (3, 3), tool_position (3,) -> out (N, 6, n).
     """
     base = whole_matrix(base_rotation)
     origin = whole_vector(base_position)
@@ -121,20 +108,7 @@ def jacobian_rates(
     reference: int,
     out: Floats,
 ) -> None:
-    """Time derivatives of the entries of `jacobians`.
-
-    The axis z of a link that turns with w has the rate w x z. In the axes of a tool that turns
-    with w, d(R^T J) = R^T (dJ - w x J).
-
-    Parameters
-    ----------
-    q, v : (N, n)
-        Joint positions and velocities [rad or m, and per s].
-    antecedent, ..., reference
-        As for `jacobians`.
-    out : (N, 6, n)
-        Written: derivatives, zero in the columns of joints that are not on the path.
-    """
+    """Time derivatives of the entries of `jacobians`. Shapes: q, v (N, n) -> out (N, 6, n)."""
     base = whole_matrix(base_rotation)
     origin = whole_vector(base_position)
     E = whole_matrix(tool_rotation)

@@ -71,19 +71,7 @@ def polished_phases(
 ) -> None:
     """Durations that meet the goals, by Newton steps that change them least, each in its own size.
 
-    The steps keep the whole time, and the acceleration of every phase without jerk. They are taken
-    only while they help.
-
-    Parameters
-    ----------
-    h, jerk : (M, K)
-        Durations [s] and jerks of the phases of M motions.
-    start, goal : (M, 3)
-        Position, velocity and acceleration.
-    out : (M, K)
-        Written: durations.
-    coefficients : (M, K, 4)
-        Written: of the normalised time of each phase.
+    Shapes: h, jerk (M, K); start, goal (M, 3) -> out (M, K), coefficients (M, K, 4).
     """
     M, K = h.shape
     x, trial_x = np.empty((K + 1, 3)), np.empty((K + 1, 3))

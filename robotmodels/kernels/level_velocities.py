@@ -157,31 +157,8 @@ def level_velocities(
 ) -> None:
     """Velocities of N rows: levels stacked, level l has the rows starts[l] to starts[l + 1].
 
-    Parameters
-    ----------
-    J, rate, drift : (N, M, n), (N, M), (N, M)
-        ``J v = rate - drift`` of all levels.
-    row_weights : (M,)
-        Factors of the rows.
-    starts : (L + 1,) int64
-        First rows.
-    secondary : (N, n)
-        Joint velocities taken where the levels leave freedom.
-    lower, upper : (N, n)
-        Bounds, not read unless ``bounded``.
-    bounded : int
-        1 with bounds, 0 without.
-    joint_roots : (n,)
-        Square roots of the joints' weights.
-    method : (4,)
-        Kind, threshold, largest damping, largest speed.
-    v : (N, n)
-        Written: joint velocities.
-    scale, mixed : (N, L)
-        Written: part of the rate that is kept; 1 where it is mixed with another motion.
-    error, singular_values : (N, M)
-        Written: ``rate - drift - J v``, and singular values of the weighted rows in the freedom
-        left to each level, zeros where there are fewer than rows.
+    Shapes: J (N, M, n); rate, drift (N, M); row_weights (M,); starts (L + 1,); secondary, lower,
+    upper (N, n); method (4,) -> v (N, n); scale, mixed (N, L); error, singular_values (N, M).
     """
     N, M, n = J.shape
     L = starts.shape[0] - 1

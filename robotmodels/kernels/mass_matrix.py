@@ -30,16 +30,7 @@ def mass_matrices(
 ) -> None:
     """Mass matrices of the rigid links, without rotor inertia.
 
-    Parameters
-    ----------
-    q : (N, n)
-        Joint positions [rad or m].
-    antecedent, ..., base_position
-        The `Chain`.
-    pi : (f, 10)
-        XX XY XZ YY YZ ZZ MX MY MZ M of each link in its frame, any real values.
-    out : (N, n, n)
-        Written: symmetric matrices.
+    Shapes: q (N, n), pi (f, 10) -> out (N, n, n).
     """
     f = antecedent.shape[0]
     n = out.shape[1]

@@ -48,19 +48,7 @@ def momentum_regressors(
 ) -> None:
     """Regressors of p = A v and of C^T v - Q, without drive terms.
 
-    Parameters
-    ----------
-    q, v : (N, n)
-        Joint positions and velocities [rad or m, and per s].
-    antecedent, ..., base_position
-        The `Chain`.
-    gravity : (3,)
-        Acceleration of gravity in the world [m/s^2].
-    place : (10 f,)
-        Column of the outputs of each parameter, by link XX XY XZ YY YZ ZZ MX MY MZ M; -1 leaves it
-        out.
-    momentum, force : (N, n, c)
-        Written; zero where a link does not load a joint, and in columns that no parameter has.
+    Shapes: q, v (N, n); gravity (3,); place (10 f,) -> momentum, force (N, n, c).
     """
     f = antecedent.shape[0]
     # Pose of the links in R_0, velocities in their own axes

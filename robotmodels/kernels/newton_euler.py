@@ -46,18 +46,7 @@ def joint_torques(
 ) -> None:
     """Torques of the rigid links, without drive terms.
 
-    Parameters
-    ----------
-    q, v, a : (N, n)
-        Joint positions, velocities, accelerations [rad or m, and per s, s^2].
-    antecedent, ..., base_position
-        The `Chain`.
-    pi : (f, 10)
-        XX XY XZ YY YZ ZZ MX MY MZ M of each link in its frame, any real values.
-    gravity : (3,)
-        Acceleration of gravity in the world [m/s^2].
-    out : (N, n)
-        Written: torques [N m or N].
+    Shapes: q, v, a (N, n); pi (f, 10); gravity (3,) -> out (N, n).
     """
     f = antecedent.shape[0]
     R = np.empty((f + 1, 3, 3))

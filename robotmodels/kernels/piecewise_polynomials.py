@@ -35,22 +35,8 @@ def piecewise_derivatives(
 ) -> None:
     """Derivatives of piecewise polynomials of normalised time.
 
-    Normalised time stays within 0 and 1: the breaks of long motions are rounded to less than a
-    short piece needs, and the motion has to end where its last polynomial does.
-
-    Parameters
-    ----------
-    t : (M, N)
-        Times of each motion [s].
-    breaks, lengths : (M, c, K + 1), (M, c, K)
-        Where the pieces begin and how long they are [s]; c is 1 or n. The time of a break belongs
-        to the piece that begins there, the end to the last piece that has a length.
-    coefficients : (M, K, d + 1, n)
-        Lowest power first.
-    orders : (p,) int64
-        0 position, 1 velocity, and so on.
-    out : (p, M, N, n)
-        Written.
+    Shapes: t (M, N), breaks (M, c, K + 1), lengths (M, c, K), coefficients (M, K, d + 1, n), orders
+    (p,) -> out (p, M, N, n).
     """
     M, K, powers, n = coefficients.shape
     groups = breaks.shape[1]

@@ -54,18 +54,7 @@ def tip_poses(
 ) -> None:
     """World poses of a tool carried by the last frame of a path.
 
-    Parameters
-    ----------
-    q : (N, n)
-        Joint positions [rad or m].
-    antecedent, ..., base_position
-        The `Chain`.
-    path : (k,) int64
-        Numbers of the frames from the base to the tip; empty when the tip is the base.
-    tool_rotation, tool_position : (3, 3), (3,)
-        Tool in the tip frame [m].
-    out : (N, 4, 4)
-        Written: homogeneous matrices.
+    Shapes: q (N, n), path (k,), tool_rotation (3, 3), tool_position (3,) -> out (N, 4, 4).
     """
     base = whole_matrix(base_rotation)
     origin = whole_vector(base_position)
@@ -102,17 +91,7 @@ def link_poses(
     base_position: Floats,
     out: Floats,
 ) -> None:
-    """World poses of all frames of the table.
-
-    Parameters
-    ----------
-    q : (N, n)
-        Joint positions [rad or m].
-    antecedent, ..., base_position
-        The `Chain`.
-    out : (N, f, 4, 4)
-        Written: homogeneous matrices.
-    """
+    """World poses of all frames of the table. Shapes: q (N, n) -> out (N, f, 4, 4)."""
     f = antecedent.shape[0]
     R = np.empty((f + 1, 3, 3))
     p = np.empty((f + 1, 3))

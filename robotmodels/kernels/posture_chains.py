@@ -17,23 +17,9 @@ _NUMBERS = types.Array(types.int64, 2, "C")
 def following_postures(
     q: Floats, valid: NDArray[np.bool_], periodic: NDArray[np.bool_], near: float, out: Ints
 ) -> None:
-    """Numbers of the postures that go on.
+    """For each posture, the number of the posture of the next pose that continues it.
 
-    Postures come in the order of their branches, so that it is usually the one with the same
-    number. Where that is not near for all, all are compared, angles by their chords.
-
-    Parameters
-    ----------
-    q : (M, S, n)
-        Postures of M poses [rad or m].
-    valid : (M, S)
-        Which of them are any.
-    periodic : (n,)
-        Which joints turn.
-    near : float
-        A posture with the same number goes on where no joint steps by as much as this.
-    out : (M - 1, S)
-        Written; the own number for what is no posture.
+    Shapes: q (M, S, n), valid (M, S), periodic (n,) -> out (M - 1, S).
     """
     M, S, n = q.shape
     turn = 2.0 * np.pi

@@ -42,18 +42,7 @@ def power_regressors(
 ) -> None:
     """Rows d with d @ pi = power of the torques of the rigid links.
 
-    Parameters
-    ----------
-    q, v, a : (N, n)
-        Joint positions, velocities, accelerations [rad or m, and per s, s^2].
-    antecedent, ..., base_position
-        The `Chain`.
-    gravity : (3,)
-        Acceleration of gravity in the world [m/s^2].
-    place : (10 f,)
-        Column of ``out`` of each parameter, by link XX XY XZ YY YZ ZZ MX MY MZ M; -1 leaves it out.
-    out : (N, 1, c)
-        Written; zero in columns that no parameter has.
+    Shapes: q, v, a (N, n); gravity (3,); place (10 f,) -> out (N, 1, c).
     """
     f = antecedent.shape[0]
     w = np.zeros((f + 1, 3))

@@ -105,20 +105,7 @@ def regressor_gradients(
 ) -> None:
     """Derivatives of ``sum(weight[i] * W[i])`` by the motion of each sample i.
 
-    Parameters
-    ----------
-    q, v, a : (N, n)
-        Joint positions, velocities, accelerations [rad or m, and per s, s^2].
-    antecedent, ..., base_position
-        The `Chain`.
-    gravity : (3,)
-        Acceleration of gravity in the world [m/s^2].
-    place : (10 f,)
-        Column of ``weight`` of each parameter, as in `torque_regressors`.
-    weight : (N, n, c)
-        The matrices G.
-    of_q, of_v, of_a : (N, n)
-        The derivatives are added to them.
+    Shapes: q, v, a, of_q, of_v, of_a (N, n); gravity (3,); place (10 f,); weight (N, n, c).
     """
     f = antecedent.shape[0]
     Rs = np.empty((f, 3, 3))

@@ -32,24 +32,8 @@ def filtered(
 ) -> None:
     """Outputs of ``x_k = step x_(k-1) + present u_(k-1) + coming u_k``.
 
-    Parameters
-    ----------
-    u : (N, c)
-        Samples of c channels.
-    step : (m, m)
-        Of the state over one period.
-    present, coming : (m,)
-        Of the samples before and after it.
-    output, through : (m,), float
-        ``y_k = output x_k + through u_k``.
-    first : bool
-        Whether ``state`` is that of the first sample already.
-    state : (m, c)
-        Before the first sample; overwritten with that of the last.
-    last : (c,)
-        The sample before the first; overwritten with the last.
-    out : (N, c)
-        Written.
+    Shapes: u (N, c); step (m, m); present, coming, output, through (m,); state (m, c); last (c,) ->
+    out (N, c).
     """
     m = step.shape[0]
     new = np.empty(state.shape)

@@ -45,18 +45,7 @@ def sort_rows(B: Floats, p: int, w: int, lengths: Floats) -> None:
 def orthogonal_rows(B: Floats, p: int, d: int, w: int, lengths: Floats) -> None:
     """Turn the first p rows of B among each other until their first d entries are orthogonal.
 
-    Parameters
-    ----------
-    B : (>= p, >= w)
-        Rows ``[A | C]``, A being p x d: become ``Q [A | C]`` with Q orthogonal, row i of ``Q A``
-        being the singular value i times its right singular vector, in descending order. The w - d
-        carried columns give what is wanted of the left ones: ``C = b`` becomes ``U^T b``, the
-        identity ``U^T``.
-    p, d, w : int
-        See above; best is p <= d, else rows that should vanish keep rounding errors.
-    lengths : (>= p,)
-        Written: the singular values. Entries so small that their squares vanish (1e-160 beside
-        the largest) count as zero; the largest must be between 1e-150 and 1e150.
+    Shapes: B (>= p, >= w) -> lengths (>= p,).
     """
     for i in range(p):
         total = 0.0
@@ -118,17 +107,7 @@ def orthogonal_rows(B: Floats, p: int, d: int, w: int, lengths: Floats) -> None:
 def decompositions(A: Floats, U: Floats, S: Floats, V: Floats) -> None:
     """Singular value decompositions ``A = U diag(S) V^T``, singular values descending.
 
-    Parameters
-    ----------
-    A : (N, m, n)
-        Matrices of finite numbers.
-    U : (N, m, k)
-        Written, k = min(m, n): left singular vectors as columns. Columns of singular values that
-        are exactly zero may be zero.
-    S : (N, k)
-        Written: singular values.
-    V : (N, n, k)
-        Written: right singular vectors as columns, as ``U``.
+    Shapes: A (N, m, n) -> U (N, m, k), S (N, k), V (N, n, k).
     """
     N, m, n = A.shape
     wide = m <= n

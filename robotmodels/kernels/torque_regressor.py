@@ -46,18 +46,7 @@ def torque_regressors(
 ) -> None:
     """Regressors of the rigid links, without drive terms.
 
-    Parameters
-    ----------
-    q, v, a : (N, n)
-        Joint positions, velocities, accelerations [rad or m, and per s, s^2].
-    antecedent, ..., base_position
-        The `Chain`.
-    gravity : (3,)
-        Acceleration of gravity in the world [m/s^2].
-    place : (10 f,)
-        Column of ``out`` of each parameter, by link XX XY XZ YY YZ ZZ MX MY MZ M; -1 leaves it out.
-    out : (N, n, c)
-        Written; zero where a link does not load a joint, and in columns that no parameter has.
+    Shapes: q, v, a (N, n); gravity (3,); place (10 f,) -> out (N, n, c).
     """
     f = antecedent.shape[0]
     # Pose of the links in R_0, motion in their own axes

@@ -68,20 +68,7 @@ def _fold(A, count, w, R):
 def fold_equations(W, y, kind, rows, columns, R):
     """Fold equations ``[W y]`` of one kind into a triangular factor.
 
-    Parameters
-    ----------
-    W : ndarray, shape (k, m, b)
-        Regressor.
-    y : ndarray, shape (k, m)
-        Right side.
-    kind : int
-        Which of the m.
-    rows : ndarray of int
-        Which of the k.
-    columns : ndarray of int, shape (c,)
-        Which of the b.
-    R : ndarray, shape (c + 1, c + 1)
-        Changed to the factor of what it was and these rows.
+    Shapes: W (k, m, b), y (k, m), columns (c,), R (c + 1, c + 1).
     """
     c = len(columns)
     A = np.empty((_ROWS, c + 1))
@@ -98,15 +85,7 @@ def fold_equations(W, y, kind, rows, columns, R):
 
 @compiled(NOTHING(MATRIX, OUT2))
 def fold_rows(rows, R):
-    """Fold rows into a triangular factor.
-
-    Parameters
-    ----------
-    rows : ndarray, shape (k, p)
-        Such as another factor.
-    R : ndarray, shape (p, p)
-        Changed to the factor of what it was and these rows.
-    """
+    """Fold rows into a triangular factor. Shapes: rows (k, p), R (p, p)."""
     p = rows.shape[1]
     A = np.empty((_ROWS, p))
     w = np.empty(p)

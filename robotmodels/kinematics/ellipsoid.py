@@ -249,23 +249,7 @@ class Ellipsoid(Rebuilt):
 
 
 def in_range(values: Array | NDArray[np.int64]) -> str:
-    """Least and largest of some numbers in a few digits.
-
-    Parameters
-    ----------
-    values : ndarray
-        Any shape.
-
-    Returns
-    -------
-    str
-        One number where all are the same; ``none`` of none.
-
-    Examples
-    --------
-    >>> in_range(np.array([0.5, 0.25])), in_range(np.array(3))
-    ('0.25 to 0.5', '3')
-    """
+    """Range of numbers as text."""
     if not values.size:
         return "none"
     low, high = f"{values.min():.4g}", f"{values.max():.4g}"

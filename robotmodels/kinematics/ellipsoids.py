@@ -241,36 +241,7 @@ def _right_handed(axes: Array) -> Array:
 
 
 def joint_scale(model: RobotModel, value: ArrayLike | None, name: str, least: float) -> Array:
-    """Check what each joint does alone, the half axes of a ball of joint velocities or torques.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-    value : array_like, shape (n,), or None
-        What the caller passed; None is 1 for each.
-    name : str
-        Used in error messages.
-    least : float
-        Smallest value that is accepted.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Finite.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Another number of them; one that is below the least, infinite or NaN.
-
-    Examples
-    --------
-    >>> from robotmodels.geometry import DHTable
-    >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.3]))
-    >>> joint_scale(arm, None, "joint_velocity", 0.0)
-    array([1., 1.])
-    """
+    """Check what each joint does alone, the half axes of a ball of joint velocities or torques."""
     if value is None:
         return np.ones(model.n)
     scale = as_reals(value, name)

@@ -214,28 +214,7 @@ def static_wrench(
 
 
 def as_tolerance(value: float) -> float:
-    """Check a relative tolerance: a number in (0, 1).
-
-    Parameters
-    ----------
-    value : float
-        What the caller passed.
-
-    Returns
-    -------
-    float
-        The same.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Something else.
-
-    Examples
-    --------
-    >>> as_tolerance(1e-9)
-    1e-09
-    """
+    """Check a relative tolerance: a number in (0, 1)."""
     tolerance = float(as_exact(value, (), "tolerance"))
     if not 0 < tolerance < 1:
         raise InvalidValueError(f"tolerance: expected a number between 0 and 1, got {tolerance:g}.")

@@ -202,24 +202,7 @@ def jacobian_factors(
 
 
 def middle_frames(point: FrameOfInterest) -> tuple[int, int]:
-    """The projection and intermediate frame that the book advises: halfway along a path.
-
-    Parameters
-    ----------
-    point : FrameOfInterest
-        The frame whose Jacobian it is.
-
-    Returns
-    -------
-    int, int
-        Numbers of the frames i and j; 0 where nothing comes before.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> middle_frames(load("rx90").twin.frame(None))
-    (3, 4)
-    """
+    """The projection and intermediate frame that the book advises: halfway along a path."""
     path = [0, *(int(j) for j in point.path)]
     half = (len(path) - 1) // 2
     return path[half], path[min(half + 1, len(path) - 1)]

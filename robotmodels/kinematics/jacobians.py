@@ -150,28 +150,7 @@ def jacobian_rate(
 
 
 def reference_of(reference: str) -> tuple[pin.ReferenceFrame, int]:
-    """Pinocchio's name of a reference, and the kernels' number.
-
-    Parameters
-    ----------
-    reference : {"world_aligned", "local", "world"}
-        As in `jacobian`.
-
-    Returns
-    -------
-    pinocchio.ReferenceFrame, int
-        Both names of it.
-
-    Raises
-    ------
-    InvalidValueError
-        Another word.
-
-    Examples
-    --------
-    >>> reference_of("local")[1]
-    1
-    """
+    """Pinocchio's name of a reference, and the kernels' number."""
     try:
         return _REFERENCES[reference]
     except (KeyError, TypeError):

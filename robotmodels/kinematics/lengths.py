@@ -25,66 +25,14 @@ _KNOWN: dict[int, tuple[weakref.ref[RobotModel], dict[int, float]]] = {}
 
 
 def spread_configurations(model: RobotModel, count: int, rng: np.random.Generator) -> Array:
-    """Configurations spread over the joint ranges.
-
-    Ranges are the limits; where these are infinite, one turn, or a stroke of the robot's size.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-    count : int
-        How many.
-    rng : numpy.random.Generator
-        Where chance comes from.
-
-    Returns
-    -------
-    ndarray, shape (count, n)
-        Joint variables, rad or m.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> spread_configurations(load("rx90"), 5, np.random.default_rng(0)).shape
-    (5, 6)
-    """
+    """Configurations spread over the joint ranges. Shapes: -> (count, n)."""
     width = np.where(_kinds(model) == PRISMATIC, 2.0 * _table_size(model), tau)
     lower, upper = _finite_range(model.lower, model.upper, width)
     return lower + (upper - lower) * rng.random((count, model.n))
 
 
 def characteristic_length(model: RobotModel, frame: str | int | None = None) -> float:
-    """Reach of a frame: its greatest distance from a revolute axis that moves it.
-
-    It depends neither on where the robot stands, nor on joints that do not move the frame, nor on
-    where along its axis each frame of the table is placed, and it does not see the limits of
-    revolute joints.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-    frame : str or int, optional
-        Name or number of a frame; default the tool.
-
-    Returns
-    -------
-    float
-        Metres, rounded up to two significant digits; 1 where no axis is at a distance, as for a
-        gantry with a wrist: its rank and singular values do not depend on a length.
-
-    Raises
-    ------
-    InvalidValueError, FrameNotFoundError
-        Not a model; no such frame.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> characteristic_length(load("rx90"))
-    0.9
-    """
+    """Reach of a frame: its greatest distance from a revolute axis that moves it."""
     check_model(model)
     point = model.twin.frame(frame)
     key = id(model)
@@ -99,33 +47,7 @@ def characteristic_length(model: RobotModel, frame: str | int | None = None) -> 
 
 
 def length_of(model: RobotModel, frame: str | int | None, length: float | None) -> float:
-    """The length a caller gave, or the characteristic one.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-    frame : str or int, optional
-        Name or number of a frame; None is the tool.
-    length : float or None
-        What the caller passed, metres.
-
-    Returns
-    -------
-    float
-        Metres.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        No positive number.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> length_of(load("rx90"), None, None), length_of(load("rx90"), None, 2)
-    (0.9, 2.0)
-    """
+    """The length a caller gave, or the characteristic one."""
     if length is None:
         return characteristic_length(model, frame)
     value = float(as_exact(length, (), "length"))

@@ -116,29 +116,7 @@ def transported_wrench(wrench: ArrayLike, T: Any) -> Array:
 
 
 def weight_torque(model: RobotModel, q: Array) -> Array:
-    """Torques that hold the links against gravity.
-
-    The same as `gravity_torque` of the dynamic models, which this room may not import.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    q : ndarray, shape (..., n)
-        Joint variables, rad or m.
-
-    Returns
-    -------
-    ndarray, shape (..., n)
-        Torques (N m) or forces (N).
-
-    Examples
-    --------
-    >>> from robotmodels.geometry import DHTable
-    >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.3]))
-    >>> weight_torque(arm, np.zeros((3, 2))).shape
-    (3, 2)
-    """
+    """Torques that hold the links against gravity."""
     from ..kernels.newton_euler import joint_torques
 
     batch, (rows,) = batch_rows((q,), ("q",))

@@ -43,19 +43,7 @@ _PART, _PARTS = 20_000, 5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BadSamples:
-    """Outliers or frozen samples of one channel.
-
-    Parameters
-    ----------
-    joint : int
-        Whose.
-    channel : str
-        "q" or "tau".
-    repeats : bool
-        Whether they are frozen, each like the sample before, or outliers.
-    rows : ndarray of int
-        Of the log, ascending.
-    """
+    """Outliers or frozen samples of one channel."""
 
     joint: int
     channel: str
@@ -103,9 +91,8 @@ def _stands_out(x: Array, k: int, least: float) -> bool:
 def _stops(x: Array, other: Array, torque: bool) -> list[tuple[int, int]]:
     """First and last row of runs in which a channel repeats while the joint moves.
 
-    A position that stops does so at once, and goes on where the joint has come to meanwhile. A
-    torque that stops does so while the position goes on, below its extreme values, which a drive
-    may hold.
+    A frozen position stops at once and then jumps; a torque is frozen where the position moves on,
+    below its extreme values, at which a drive may saturate.
     """
     runs, repeated = Runs(_STUCK), 0
     for rows in chunks(len(x) - 1):
@@ -164,11 +151,10 @@ def bad_samples(log: Log) -> list[BadSamples]:
 
 
 def cleaned(log: Log) -> Log:
-    """The log without outliers and frozen samples.
+    """The log without outliers and frozen samples, both counted in its notes.
 
-    Where they are shorter than a tenth of the motion's shortest period they are interpolated, as
-    missing samples are; otherwise the log is split around them, so that what filters reach beside
-    them is left out as well. The notes count both.
+    Runs shorter than a tenth of the motion's shortest period are interpolated; at longer ones the
+    log is split, the samples within reach of filters left out.
     """
     found = bad_samples(log)
     bad = {"q": np.zeros(log.q.shape, bool), "tau": np.zeros(log.q.shape, bool)}

@@ -65,15 +65,7 @@ _SECONDS = ("header.stamp.secs", "header.stamp.sec", "header.stamp.nsecs", "head
 
 @dataclass(frozen=True, slots=True)
 class FoundTime:
-    """Columns of the time: one, or seconds and nanoseconds.
-
-    Parameters
-    ----------
-    columns : tuple of int
-        One, or two.
-    unit : TimeUnit or None
-        What the name says of the unit; None: nothing.
-    """
+    """Columns of the time: one, or seconds and nanoseconds."""
 
     columns: tuple[int, ...]
     unit: TimeUnit | None
@@ -82,32 +74,7 @@ class FoundTime:
 def find_quantity(
     table: LogTable, kind: Quantity, joints: Sequence[str] | None
 ) -> tuple[int, ...] | None:
-    """Columns of one quantity by the usual names.
-
-    Understood are, capitals aside and whatever stands before a point or a slash: q1 to q6, q_0,
-    q[0], position.0, ``field.position0`` (rostopic), ``/joint_states/position[0]`` and
-    ``/joint_states/joint_1/position`` (PlotJuggler), joint_1_position, a matrix q, and lists in a
-    column.
-
-    Parameters
-    ----------
-    table : LogTable
-        The file.
-    kind : Quantity
-        Which.
-    joints : sequence of str, optional
-        Names of the joints, in their order.
-
-    Returns
-    -------
-    tuple of int, or None
-        Numbers from 0; None if there are none.
-
-    Raises
-    ------
-    InvalidValueError
-        Several sets of columns would do, or numbers are missing between.
-    """
+    """Columns of one quantity by the usual names."""
     sets: dict[str, dict[str, int]] = {}
     for i, name in enumerate(table.names[: table.alike]):
         where = _stem_and_joint(name, kind, joints)
@@ -142,25 +109,7 @@ def find_quantity(
 
 
 def joints_of(table: LogTable, kind: Quantity, columns: Sequence[int]) -> tuple[str, ...] | None:
-    """Names of joints that the file gives to columns; None if it gives none.
-
-    A column ``name`` with a list of names, columns ``name0`` and so on (ROS), or names of joints
-    in those of the columns (PlotJuggler).
-
-    Parameters
-    ----------
-    table : LogTable
-        The file.
-    kind : Quantity
-        Of the columns.
-    columns : sequence of int
-        In the order of the joints.
-
-    Returns
-    -------
-    tuple of str, or None
-        A name for each column.
-    """
+    """Names of joints that the file gives to columns; None if it gives none."""
     listed = [i for i, name in enumerate(table.names) if _last(name) in ("name", "names")]
     for i in listed:
         names = tuple(word.strip().strip("'\"") for word in table.words(i).strip("[]()").split(","))
@@ -185,18 +134,7 @@ def joints_of(table: LogTable, kind: Quantity, columns: Sequence[int]) -> tuple[
 
 
 def find_time(table: LogTable) -> FoundTime | None:
-    """Columns of the time by the usual names.
-
-    Parameters
-    ----------
-    table : LogTable
-        The file.
-
-    Returns
-    -------
-    FoundTime or None
-        None if there is none.
-    """
+    """Columns of the time by the usual names."""
     names = [_without_unit(name)[0].lower() for name in table.names[: table.alike]]
     whole, parts = (
         [i for i, name in enumerate(names) if any(name.endswith(end) for end in ends)]

@@ -24,31 +24,7 @@ class _NoFileError(InvalidValueError, FileNotFoundError):
 
 
 def open_log_table(path: Path, kind: LogFormat | None, delimiter: str | None = None) -> LogTable:
-    """Open a file as columns.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    kind : LogFormat or None
-        None: as its suffix says.
-    delimiter : str, optional
-        Of text files; default as `open_table` finds it.
-
-    Returns
-    -------
-    LogTable
-        Columns, read when they are asked for.
-
-    Raises
-    ------
-    InvalidValueError
-        The file is not of this format, or its arrays are of different lengths.
-    MissingExtraError
-        Parquet without pyarrow.
-    OSError
-        The file cannot be opened; one that is not there is an InvalidValueError too.
-    """
+    """Open a file as columns."""
     kind = LogFormat.of(path) if kind is None else kind
     if not path.exists():
         near = get_close_matches(path.name, [each.name for each in path.parent.glob("*")])

@@ -16,26 +16,7 @@ _BESIDE = 4
 def splined(stamps: Array, values: Array, wanted: Array, source: str) -> Array:
     """Values at other times, by a cubic spline through those of a recording.
 
-    Parameters
-    ----------
-    stamps : ndarray, shape (N,)
-        Ascending, s.
-    values : ndarray, shape (N, m)
-        At these.
-    wanted : ndarray, shape (M,)
-        Between the first and the last, s.
-    source : str
-        Name of the file, for the message.
-
-    Returns
-    -------
-    ndarray, shape (M, m)
-        Finite.
-
-    Raises
-    ------
-    InvalidValueError
-        Differences between rows that are no numbers any more.
+    Shapes: stamps (N,), values (N, m), wanted (M,) -> (M, m).
     """
     from scipy.interpolate import CubicSpline
 
@@ -55,29 +36,7 @@ def splined(stamps: Array, values: Array, wanted: Array, source: str) -> Array:
 def filled(places: ArrayLike, values: Array, wanted: ArrayLike) -> Array:
     """Values at missing places, by cubics through the samples on both sides of each gap.
 
-    As many samples on either side as the gap has, at least four, are fitted by least squares, so
-    that their noise is not enlarged in the gap.
-
-    Parameters
-    ----------
-    places : array_like, shape (N,)
-        Ascending.
-    values : ndarray, shape (N, m)
-        At these.
-    wanted : array_like, shape (M,)
-        Ascending whole numbers, each between the first and the last place; those that follow each
-        other are one gap.
-
-    Returns
-    -------
-    ndarray, shape (M, m)
-        At the places wanted.
-
-    Examples
-    --------
-    >>> x = np.array([0.0, 1.0, 2.0, 5.0, 6.0, 7.0])
-    >>> filled(x, x[:, None] ** 3, [3, 4]).round(9).ravel().tolist()
-    [27.0, 64.0]
+    Shapes: places (N,), values (N, m), wanted (M,) -> (M, m).
     """
     x, at = np.asarray(places, np.float64), np.asarray(wanted, np.float64)
     found = np.empty((len(at), values.shape[1]))

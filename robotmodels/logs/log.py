@@ -273,18 +273,7 @@ class Log:
 
 
 def check_is_log(log: object) -> None:
-    """Refuse what is no log.
-
-    Parameters
-    ----------
-    log : object
-        What was given as one.
-
-    Raises
-    ------
-    InvalidValueError
-        It is something else, such as a data set that has a log.
-    """
+    """Raise unless the argument is a `Log`."""
     if isinstance(log, Log):
         return
     has = isinstance(getattr(log, "log", None), Log)

@@ -30,23 +30,7 @@ def moves(q: Array) -> Array:
 
 
 def resolution(values: Array) -> float:
-    """Step of a channel that has few values; 0 if it has none that shows.
-
-    Parameters
-    ----------
-    values : ndarray, shape (N,)
-        Samples.
-
-    Returns
-    -------
-    float
-        The step, in the unit of the values.
-
-    Examples
-    --------
-    >>> round(resolution(np.round(np.sin(np.linspace(0.0, 6.0, 1000)), 2)), 6)
-    0.01
-    """
+    """Quantisation step of a channel; 0 if none shows. Shapes: values (N,)."""
     levels = np.unique(values)
     if len(levels) < 2 or len(levels) > 0.5 * len(values):
         return 0.0

@@ -3,6 +3,8 @@
 SciPy's reader ends the process on some damaged files, which no caller can catch. Read here is what
 logs are made of: arrays of numbers, texts, structures of one element and cells; all else in a file
 is left out.
+
+Source: The MathWorks, "MAT-File Format", 2019, chapter 1: level 5.
 """
 
 from __future__ import annotations
@@ -35,30 +37,7 @@ _COMPLEX = 0x800
 
 
 def read_mat(path: Path) -> dict[str, Any]:
-    """Variables of a MAT file.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    dict of str to ndarray
-        Numbers in the shape of the file; texts and cells of texts as arrays of these; fields of
-        structures of one element under names with points, ``log.q``.
-
-    Raises
-    ------
-    InvalidValueError
-        Damaged, of another version, or larger unpacked than can be meant.
-    OSError
-        The file cannot be opened.
-
-    References
-    ----------
-    The MathWorks, "MAT-File Format", 2019, chapter 1: level 5.
-    """
+    """Variables of a MAT file."""
     data = path.read_bytes()
     if data.startswith(b"MATLAB 7.3") or data[1:4] == b"HDF":
         raise InvalidValueError(

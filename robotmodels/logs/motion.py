@@ -18,25 +18,9 @@ SHARE = 0.1
 
 
 def shortest_period(q: Array, dt: float) -> float:
-    """Period of the frequency below which velocities have 99.9 % of their power, noise taken off.
+    """Period of the frequency below which velocities have 99.9 % of their noise-free power.
 
-    Parameters
-    ----------
-    q : ndarray, shape (N, n)
-        Positions, every ``dt`` seconds.
-    dt : float
-        Seconds.
-
-    Returns
-    -------
-    float
-        Seconds, of the fastest joint; 0 where the samples are too few or nothing moves.
-
-    Examples
-    --------
-    >>> t = np.arange(0.0, 10.0, 0.01)[:, None]
-    >>> 0.4 < shortest_period(np.sin(2.0 * np.pi * 2.0 * t), 0.01) <= 0.5
-    True
+    Shapes: q (N, n).
     """
     from scipy.signal import welch
 

@@ -1,4 +1,7 @@
-"""Whether the velocities and accelerations of a log are the derivatives of its positions."""
+"""Whether the velocities and accelerations of a log are the derivatives of its positions.
+
+Source: Seed book section 1.6.2.4.
+"""
 
 from __future__ import annotations
 
@@ -19,35 +22,7 @@ _DEGREES = 180.0 / np.pi
 
 
 def rates_off(log: Log) -> list[LogFinding]:
-    """What velocities and accelerations say that the positions do not.
-
-    Joint by joint, increments of the position over 0.05 s are compared with the integral of the
-    velocity over this time, and second differences of the position over such times with the double
-    integral of the acceleration. Joints whose increments are lost in the noise of their positions
-    are left out.
-
-    Parameters
-    ----------
-    log : Log
-        What was recorded.
-
-    Returns
-    -------
-    list of LogFinding
-        Useless where they follow each other by a factor other than 1, doubtful where they do not.
-
-    References
-    ----------
-    Seed book section 1.6.2.4.
-
-    Examples
-    --------
-    >>> t = np.linspace(0.0, 10.0, 1001)[:, None]
-    >>> log = Log(0.01, q=np.sin(t), tau=np.sin(t), v=np.degrees(np.cos(t)))
-    >>> print(*rates_off(log))
-    Joint 1: its velocities are 57.3 times what its positions say, that is degrees against \
-radians; read them in the unit of the positions, or leave them out (velocities=False of read_log).
-    """
+    """Findings where velocities or accelerations contradict the positions."""
     found: list[LogFinding] = []
     for order, rate in ((1, log.v), (2, log.a)):
         if rate is not None:

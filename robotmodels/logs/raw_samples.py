@@ -41,22 +41,7 @@ Extras = dict[Quantity, Choice | Literal[False] | None]
 class RawSamples:
     """Samples as the files have them, quantities beside each other.
 
-    Parameters
-    ----------
-    t : ndarray, shape (N,), or None
-        Seconds.
-    values : ndarray, shape (N, k n)
-        NaN where nothing was measured.
-    order : tuple of Quantity
-        Which n columns are what.
-    n : int
-        Number of joints.
-    names : tuple of str or None
-        Of the joints, if the file has them.
-    refused : tuple of RefusedRows
-        Of the second file.
-    notes : tuple of str
-        What was found and done.
+    Shapes: t (N,), values (N, k n).
     """
 
     t: Array | None
@@ -74,27 +59,7 @@ def raw_samples(
     time: Column | Sequence[Column] | Literal[False] | None, unit: TimeUnit | None,
     angle: AngleUnit, currents: bool,
 ) -> RawSamples:  # fmt: skip
-    """Samples of one file, or of one of positions and one of torques.
-
-    Parameters
-    ----------
-    table, second : LogTable
-        The file, and that of the torques if it is another.
-    positions, torques, extras, names, time, unit, angle
-        As for `read_log`.
-    currents : bool
-        Whether drive gains are given, so that currents will do.
-
-    Returns
-    -------
-    RawSamples
-        In the units of the files, but for the time.
-
-    Raises
-    ------
-    InvalidValueError, ShapeError
-        As `read_log`.
-    """
+    """Samples of one file, or of one of positions and one of torques."""
     notes: list[str] = []
     t, t_columns = _time(table, time, unit, notes)
     where = _quantity(table, Quantity.POSITION, positions, names, notes, t_columns, second is None)

@@ -21,20 +21,7 @@ def most_unpacked(size: int) -> int:
 
 
 def check_unpacked(path: Path, unpacked: int) -> None:
-    """Refuse a file that is small on disk and fills the memory.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    unpacked : int
-        Bytes of what is in it.
-
-    Raises
-    ------
-    InvalidValueError
-        More than a gigabyte and more than a hundred times the file.
-    """
+    """Refuse a compressed file whose contents exceed the memory limit."""
     size = path.stat().st_size
     if unpacked > most_unpacked(size):
         raise InvalidValueError(
@@ -44,23 +31,7 @@ def check_unpacked(path: Path, unpacked: int) -> None:
 
 
 def unpacked_npz(path: Path) -> int:
-    """Bytes of the members of an NPZ file.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    int
-        As the archive says; no more than that is unpacked.
-
-    Raises
-    ------
-    zipfile.BadZipFile, ValueError
-        It is no archive of arrays, or an array says that it is larger than its member.
-    """
+    """Bytes of the members of an NPZ file."""
     from numpy.lib import format as npy
 
     total = 0
@@ -79,16 +50,5 @@ def unpacked_npz(path: Path) -> int:
 
 
 def unpacked_parquet(metadata: Any) -> int:
-    """Bytes of the columns of a Parquet file as numbers.
-
-    Parameters
-    ----------
-    metadata : pyarrow.parquet.FileMetaData
-        Of the file.
-
-    Returns
-    -------
-    int
-        Eight for each cell.
-    """
+    """Bytes of the columns of a Parquet file as numbers."""
     return 8 * int(metadata.num_rows) * int(metadata.num_columns)

@@ -11,34 +11,7 @@ SAMPLES = 100_000
 
 
 def stretches(log: Log, length: int, samples: int = SAMPLES) -> Log:
-    """A bounded part of a long log: stretches spread evenly over it.
-
-    Parameters
-    ----------
-    log : Log
-        What was recorded.
-    length : int
-        Samples of a stretch; it is no longer than ``samples``, and shorter at the end of a
-        recording.
-    samples : int
-        Of all stretches together, at most.
-
-    Returns
-    -------
-    Log
-        The log itself if it is not longer; otherwise positions and torques of the
-        stretches, each a recording of its own. Recordings shorter than half a stretch take part
-        only where there is no longer one.
-
-    Examples
-    --------
-    >>> log = Log(0.01, np.zeros((1000, 1)), np.zeros((1000, 1)))
-    >>> part = stretches(log, 50, 200)
-    >>> len(part), [rows.start for rows in part.recordings()]
-    (200, [0, 50, 100, 150])
-    >>> stretches(log, 50) is log
-    True
-    """
+    """Bounded part of a long log: evenly spread stretches."""
     if len(log) <= samples:
         return log
     length = max(1, min(length, samples))

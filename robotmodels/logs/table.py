@@ -57,28 +57,7 @@ class LogFormat(Enum):
 
 @dataclass(frozen=True, slots=True)
 class LogTable:
-    """Columns of a file.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    names : tuple of str
-        Of the columns; empty if the file has none.
-    width : int
-        Number of columns.
-    groups : mapping of str to tuple of int
-        Columns that the file has under one name: matrices of NPZ and MAT, lists of Parquet.
-    read : callable
-        Numbers of columns, shape (N, k), NaN where nothing was measured.
-    words : callable
-        What a column has in its first row, as text; empty where that is not known.
-    alike : int or None
-        How many of the first columns have as many samples as most: among them usual names are
-        looked for; None for all.
-    transposed : frozenset of str
-        Arrays that have shape (joints, samples) in the file.
-    """
+    """Columns of a file."""
 
     path: Path
     names: tuple[str, ...]
@@ -90,26 +69,7 @@ class LogTable:
     transposed: frozenset[str] = frozenset()
 
     def choice(self, given: Column | Sequence[Column], what: str) -> tuple[int, ...]:
-        """Columns that an argument names.
-
-        Parameters
-        ----------
-        given : int, str or sequence of these
-            Numbers from 0, names, the name of a matrix, or a pattern with one ``*``, for columns
-            that are numbered there: in the order of these numbers.
-        what : str
-            The argument, for messages.
-
-        Returns
-        -------
-        tuple of int
-            Numbers from 0.
-
-        Raises
-        ------
-        InvalidValueError
-            A column that is not there, twice there or twice asked for.
-        """
+        """Columns that an argument names."""
         if isinstance(given, str) and "*" in given and given not in self.names:
             return self._pattern(given, what)
         if isinstance(given, str) and given in self.groups:
@@ -131,25 +91,7 @@ class LogTable:
         return tuple(found)
 
     def number(self, column: Column, what: str) -> int:
-        """Number of one column.
-
-        Parameters
-        ----------
-        column : int or str
-            Its number, from 0, or its name.
-        what : str
-            The argument, for messages.
-
-        Returns
-        -------
-        int
-            From 0.
-
-        Raises
-        ------
-        InvalidValueError
-            There is no such column, or several.
-        """
+        """Number of one column."""
         if isinstance(column, str):
             lower = [name.lower() for name in self.names]
             exact = [i for i, name in enumerate(self.names) if name == column]

@@ -32,21 +32,7 @@ _REPEATED = 0.1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RegularRows:
-    """Samples on a regular grid.
-
-    Parameters
-    ----------
-    dt : float
-        Its period, s.
-    values : ndarray, shape (N, m)
-        Samples.
-    starts : ndarray of int
-        First rows of recordings.
-    refused : tuple of RefusedRows
-        What was left out.
-    notes : tuple of str
-        What was done.
-    """
+    """Samples on a regular grid. Shapes: values (N, m)."""
 
     dt: float
     values: Array
@@ -64,44 +50,7 @@ def regular_rows(
     largest_jitter: float = 0.5,
     joints: int | None = None,
 ) -> RegularRows:
-    """Bring samples to a regular grid, recording by recording.
-
-    Rows that lack a number, and stamps that repeat the one before, are refused. Time that goes
-    back, or on by more than ``largest_gap`` periods, starts a recording, since nothing may be
-    filtered over it; samples missing in shorter gaps are interpolated. Stamps that are off the grid
-    by less than a hundredth of a period are taken as regular; others are brought to it by cubic
-    splines.
-
-    Parameters
-    ----------
-    t : ndarray, shape (N,), or None
-        Seconds; NaN where it was not recorded. None: rows are a period apart.
-    values : ndarray, shape (N, m)
-        NaN where nothing was measured.
-    source : str
-        Name of the file, for what is said.
-    dt : float, optional
-        Period of the grid, s; needed without ``t``, else default the mean of the stamps'
-        differences, and at most 1.5 times that.
-    largest_gap : float, optional
-        In periods of the file; default a tenth of the shortest period of the motion, at least 1.5,
-        and 1.5 where stamps are far from regular.
-    largest_jitter : float
-        How much of a period the differences of stamps may be off before that is an error.
-    joints : int, optional
-        How many of the first columns are positions, which tell the motion; default all.
-
-    Returns
-    -------
-    RegularRows
-        With notes in words.
-
-    Raises
-    ------
-    InvalidValueError
-        Nothing is left, jitter is too large, stamps are too coarse, ``t`` and ``dt`` both missing,
-        a grid that is coarser than the samples.
-    """
+    """Bring samples to a regular grid, recording by recording. Shapes: t (N,), values (N, m)."""
     refused: list[RefusedRows] = []
     notes: list[str] = []
     N = len(values)

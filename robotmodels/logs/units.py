@@ -37,14 +37,7 @@ _JOINING = re.compile(r"[ .*·⋅_-]")
 class JointSide:
     """Factors of positions and torques, from the file's columns to the joints.
 
-    ``q = Q^T raw + q_0`` and ``tau = T^T raw`` for rows of samples.
-
-    Parameters
-    ----------
-    positions, torques : ndarray, shape (n, n)
-        ``Q`` and ``T``.
-    offset : ndarray, shape (n,)
-        ``q_0``.
+    Shapes: positions, torques (n, n); offset (n,).
     """
 
     positions: Array
@@ -81,25 +74,7 @@ def joint_side(
     offsets: ArrayLike | None,
     model: RobotModel | None,
 ) -> JointSide:
-    """Factors for what the arguments of `read_log` say.
-
-    Parameters
-    ----------
-    n : int
-        Number of joints.
-    angles, lengths, signs, gears, transmission, drive_gains, offsets, model
-        As for `read_log`.
-
-    Returns
-    -------
-    JointSide
-        With the signs first, then units and drive gains, gears or transmission, and offsets.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Arguments of other lengths or that contradict each other.
-    """
+    """Factors for what the arguments of `read_log` say."""
     unit = np.full(n, angles.factor)
     if gears is not None and transmission is not None:
         raise InvalidValueError(
@@ -144,22 +119,7 @@ def _each(value: ArrayLike | None, n: int, name: str, default: float) -> Array:
 
 
 def check_headers(said: Sequence[AngleUnit | None], given: AngleUnit, source: str) -> None:
-    """Refuse an argument that contradicts the header.
-
-    Parameters
-    ----------
-    said : sequence of AngleUnit or None
-        By the header's columns.
-    given : AngleUnit
-        By the argument.
-    source : str
-        Name of the file.
-
-    Raises
-    ------
-    InvalidValueError
-        They differ.
-    """
+    """Refuse an argument that contradicts the header."""
     for unit in said:
         if unit is not None and unit is not given:
             raise InvalidValueError(
@@ -169,25 +129,7 @@ def check_headers(said: Sequence[AngleUnit | None], given: AngleUnit, source: st
 
 
 def check_position_units(table: LogTable, columns: Sequence[int]) -> list[str]:
-    """Refuse positions and their derivatives in units that are not understood.
-
-    Parameters
-    ----------
-    table : LogTable
-        The file.
-    columns : sequence of int
-        Of positions, velocities, accelerations or references.
-
-    Returns
-    -------
-    list of str
-        What stands in brackets in headers and is no unit that is known, to be noted.
-
-    Raises
-    ------
-    InvalidValueError
-        A header says another unit than rad, deg, m, mm.
-    """
+    """Refuse positions and their derivatives in units that are not understood."""
     odd: dict[str, str] = {}
     for name in _names(table, columns):
         unit = unit_of(name).split("/")[0].strip()
@@ -203,27 +145,7 @@ def check_position_units(table: LogTable, columns: Sequence[int]) -> list[str]:
 
 
 def check_torque_units(table: LogTable, columns: Sequence[int], gains: bool) -> list[str]:
-    """Refuse torques in units other than N m and N, but where drive gains convert them.
-
-    Parameters
-    ----------
-    table : LogTable
-        The file.
-    columns : sequence of int
-        Of the torques.
-    gains : bool
-        Whether drive gains are given.
-
-    Returns
-    -------
-    list of str
-        What stands in brackets in headers and is no unit that is known, to be noted.
-
-    Raises
-    ------
-    InvalidValueError
-        A header says another unit.
-    """
+    """Refuse torques in units other than N m and N, but where drive gains convert them."""
     if gains:
         return []
     odd: dict[str, str] = {}

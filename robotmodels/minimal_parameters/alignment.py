@@ -25,51 +25,14 @@ _LEAST = 1e-3
 
 
 class AlignedRobot(NamedTuple):
-    """A robot whose nearly aligned axes are aligned.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The given one if no axis had to be turned.
-    notes : tuple of str
-        A sentence about axes that were taken as aligned, and one about those that nearly are; none
-        if all axes are aligned to rounding or clearly not.
-    """
+    """A robot whose nearly aligned axes are aligned."""
 
     model: RobotModel
     notes: tuple[str, ...]
 
 
 def aligned_robot(model: RobotModel, angle: float) -> AlignedRobot:
-    """Turn axes that are parallel or perpendicular but for an angle, by the least.
-
-    The axis of a joint is compared with the joint axes before it that keep their direction relative
-    to it: the last one, those that only prismatic joints separate from it, and gravity where all
-    joints before it are prismatic. So are the axes of frames that do not turn about their own z.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    angle : float
-        Angle (its sine) that is taken as none, rad.
-
-    Returns
-    -------
-    AlignedRobot
-        With the same frames, joints, lengths and parameters.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> arm = load("rx90")
-    >>> aligned_robot(arm, 1e-5).model is arm
-    True
-    >>> rounded = arm.with_table(arm.table.replace(alpha=arm.table.alpha.round(4)))
-    >>> found = aligned_robot(rounded, 1e-5).model.table.alpha
-    >>> bool(np.allclose(found, arm.table.alpha, rtol=0, atol=1e-14))
-    True
-    """
+    """Align axes that are nearly parallel or perpendicular by the least rotation."""
     chain, table = model.chain, model.table
     rows = np.stack((table.gamma, table.beta, table.alpha, table.theta))
     pairs = _Pairs(angle)

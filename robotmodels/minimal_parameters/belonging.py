@@ -15,29 +15,7 @@ _SAME = 1e-9
 
 
 def differences(model: RobotModel, other: RobotModel, drive: Drives) -> tuple[str, ...]:
-    """What gives two robots other base parameters; inertial and drive parameters do not matter.
-
-    Neither do the zeros of the joints (theta of a revolute joint, r of a prismatic one), the place
-    of the base, the tool and names.
-
-    Parameters
-    ----------
-    model, other : RobotModel
-        Two robots.
-    drive : bool or collection of DriveKind
-        Which drives are among the parameters.
-
-    Returns
-    -------
-    tuple of str
-        Empty if they have the same.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> differences(load("rx90"), load("ur5"), drive=False)[0]
-    'axis 3 has another place in frame 2'
-    """
+    """Differences of two robots that change their base parameters."""
     if model is other:
         return ()
     a, b = model.chain, other.chain

@@ -22,30 +22,9 @@ def columns_by_branches(
     model: RobotModel, factors: Sequence[Array], scale: Array, kinds: NDArray[np.int64],
     nothing: float,
 ) -> ColumnBasis | None:  # fmt: skip
-    """What `column_basis` finds in the whole regressor, from those of the paths.
+    """Column basis of the regressor of a tree from those of its paths.
 
-    Parameters
-    ----------
-    model : RobotModel
-        A tree of f frames and n joints.
-    factors : sequence of ndarray, shapes (r, p)
-        The rows of each joint, see `factors_by_kind`; every column after those of the links belongs
-        to one joint, kind by kind.
-    scale, kinds : ndarray, shape (p,)
-        As for `column_basis`.
-    nothing : float
-        As for `column_basis`.
-
-    Returns
-    -------
-    ColumnBasis or None
-        None where columns of several paths depend on each other, or what one path keeps another
-        does not: then it takes the whole.
-
-    Examples
-    --------
-    >>> columns_by_branches.__name__
-    'columns_by_branches'
+    Shapes: factors (r, p); scale, kinds (p,).
     """
     f, n, p = model.f, model.n, len(scale)
     antecedent, joint = model.chain.antecedent, model.chain.joint

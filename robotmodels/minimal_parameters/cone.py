@@ -23,23 +23,7 @@ _EVEN = 1e-12
 class ConeProblem:
     """Real bodies and drives near a prior; the variables are the standard parameters.
 
-    Parameters
-    ----------
-    base : BaseParameters
-        b of them.
-    prior : ndarray, shape (p,)
-        Standard parameters to be near to.
-    P0 : ndarray, shape (f, 4, 4)
-        Pseudo-inertias of the prior, positive definite.
-    margin : float
-        Smallest eigenvalue of the pseudo-inertias relative to these.
-    sizes : ndarray, shape (p - 10 f,), optional
-        Natural sizes of the drive and friction parameters; default those of the prior.
-
-    Examples
-    --------
-    >>> ConeProblem.__name__
-    'ConeProblem'
+    Shapes: prior (p,), P0 (f, 4, 4), sizes (p - 10 f,).
     """
 
     def __init__(

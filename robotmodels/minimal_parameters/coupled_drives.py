@@ -14,19 +14,7 @@ from .result import BaseParameters
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CoupledBlock:
-    """A symmetric matrix of the joints that motors couple, linear in standard parameters.
-
-    Of rotors ``diag(Ia) + sum Iam (w w^T - diag(w^2))`` and of viscous friction the same with Fv
-    and Fvm: twice the kinetic energy, and the lost power, are quadratic forms of them. Both must be
-    positive semidefinite.
-
-    Parameters
-    ----------
-    diagonal : ndarray of int, shape (k,)
-        Numbers of the standard parameters on the diagonal.
-    couplings : tuple of (int, ndarray)
-        Numbers of those of the coupled motors, with their matrices (k, k).
-    """
+    """A symmetric matrix of the joints that motors couple, linear in standard parameters."""
 
     diagonal: NDArray[np.int64]
     couplings: tuple[tuple[int, Array], ...]
@@ -46,15 +34,7 @@ class CoupledBlock:
     def triangle(self, unit: Array) -> Array:
         """Its upper triangle over the parameters as the solver stacks it, in units of its joints.
 
-        Parameters
-        ----------
-        unit : ndarray, shape (p,)
-            Natural sizes of the parameters.
-
-        Returns
-        -------
-        ndarray, shape (k (k + 1) / 2, p)
-            Off the diagonal times the root of 2.
+        Shapes: unit (p,) -> (k (k + 1) / 2, p).
         """
         k = len(self.diagonal)
         size = 1.0 / np.sqrt(unit[self.diagonal])
@@ -69,25 +49,7 @@ class CoupledBlock:
 
 
 def coupled_blocks(base: BaseParameters) -> tuple[CoupledBlock, ...]:
-    """Matrices that must be positive semidefinite, one for joints that couplings connect.
-
-    Parameters
-    ----------
-    base : BaseParameters
-        Whose standard parameters.
-
-    Returns
-    -------
-    tuple of CoupledBlock
-        Of rotors and of viscous friction, as far as they are among the parameters.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.minimal_parameters import base_parameters
-    >>> [block.diagonal for block in coupled_blocks(base_parameters(load("tx40")))]
-    [array([64, 65]), array([70, 71])]
-    """
+    """Matrices that must be positive semidefinite, one for joints that couplings connect."""
     motors, weights = _motors(base)
     f, n = base.model.f, base.model.n
     blocks = []
@@ -106,25 +68,7 @@ def coupled_blocks(base: BaseParameters) -> tuple[CoupledBlock, ...]:
 def dry_rows(base: BaseParameters) -> Array:
     """Rows that must not be negative so that dry friction of coupled motors takes energy.
 
-    ``Fc_j + |w_j| Fcm`` of each joint j that motor m couples: a motor's own coulomb friction below
-    zero is no more than what the joints' makes up for.
-
-    Parameters
-    ----------
-    base : BaseParameters
-        Whose p standard parameters.
-
-    Returns
-    -------
-    ndarray, shape (r, p)
-        None without coupled motors.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.minimal_parameters import base_parameters
-    >>> dry_rows(base_parameters(load("tx40"))).shape
-    (2, 81)
+    Shapes: -> (r, p).
     """
     motors, weights = _motors(base)
     f, n, p = base.model.f, base.model.n, len(base.parameter_names)
@@ -141,28 +85,7 @@ def dry_rows(base: BaseParameters) -> Array:
 
 
 def drive_sizes(base: BaseParameters, prior: Array) -> Array:
-    """Natural size of each parameter of drives and friction: its own beside others of its kind.
-
-    Parameters
-    ----------
-    base : BaseParameters
-        Whose p standard parameters.
-    prior : ndarray, shape (p,)
-        Their values.
-
-    Returns
-    -------
-    ndarray, shape (p - 10 f,)
-        Positive. What couples motors is of the kind that it couples.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.minimal_parameters import base_parameters
-    >>> base = base_parameters(load("planar_2r"), drive=("Ia",))
-    >>> drive_sizes(base, np.concatenate((np.ones(20), [4.0, 0.0])))
-    array([4.  , 0.04])
-    """
+    """Natural size of each parameter of drives and friction: its own beside others of its kind."""
     first = 10 * base.model.f
     coupling = {kind.coupling: kind.value for kind in DriveKind if kind.coupling is not None}
     letters = [name.rstrip("0123456789") for name in base.parameter_names[first:]]

@@ -36,23 +36,7 @@ _GREEK = {"G": r"\gamma", "B": r"\beta", "A": r"\alpha", "TH": r"\theta"}
 
 @dataclass(frozen=True, slots=True)
 class Term:
-    """A coefficient and the standard parameters that have it in common.
-
-    Parameters
-    ----------
-    coefficient : float
-        Its number.
-    text, latex : str
-        In symbols; empty for 1, and the number itself where it has no symbol. A sum is in brackets,
-        a sign in front belongs to it.
-    parameters : tuple of str
-        Standard parameters.
-
-    Examples
-    --------
-    >>> Term(0.25, "D2^2", "D_{2}^{2}", ("M2", "M3")).parameters
-    ('M2', 'M3')
-    """
+    """A coefficient and the standard parameters that have it in common."""
 
     coefficient: float
     text: str
@@ -62,20 +46,7 @@ class Term:
 
 @dataclass(frozen=True, slots=True)
 class Formula:
-    """One kept parameter and the terms it stands for, itself first.
-
-    Parameters
-    ----------
-    name : str
-        Its standard name.
-    terms : tuple of Term
-        In the order in which they are printed.
-
-    Examples
-    --------
-    >>> Formula("ZZ1", (Term(1.0, "", "", ("ZZ1", "Ia1")),)).is_regrouped
-    True
-    """
+    """One kept parameter and the terms it stands for, itself first."""
 
     name: str
     terms: tuple[Term, ...]
@@ -89,28 +60,7 @@ class Formula:
 def numeric_formulas(
     names: Sequence[str], kept: NDArray[np.int64], matrix: Array
 ) -> tuple[Formula, ...]:
-    """Formulas whose coefficients are numbers.
-
-    Parameters
-    ----------
-    names : sequence of str, length p
-        Standard parameters.
-    kept : ndarray of int, shape (b,)
-        Numbers of the kept ones.
-    matrix : ndarray, shape (b, p)
-        Their combinations.
-
-    Returns
-    -------
-    tuple of Formula
-        One per kept parameter.
-
-    Examples
-    --------
-    >>> found = numeric_formulas(["ZZ1", "M2"], np.array([0]), np.array([[1.0, 0.25]]))
-    >>> found[0].terms[1].text
-    '0.25'
-    """
+    """Formulas whose coefficients are numbers. Shapes: kept (b,), matrix (b, p)."""
     out = []
     for number, row in zip(kept, matrix, strict=True):
         groups: dict[tuple[float, str, str], list[int]] = {}
@@ -132,35 +82,7 @@ def symbolic_formulas(
 ) -> tuple[Formula, ...]:
     """Formulas whose coefficients are made of the symbols of the table.
 
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    drive : bool or collection of DriveKind
-        Which drive parameters are among the standard ones.
-    kept : ndarray of int, shape (b,)
-        Numbers of the kept ones.
-    matrix : ndarray, shape (b, p)
-        The same combinations in numbers: they say which terms there are.
-    names : sequence of str, length p
-        Standard parameters.
-    tolerance : float
-        Sine of an angle that counts as none.
-
-    Returns
-    -------
-    tuple of Formula
-        One per kept parameter. Coefficients that no rule gives are numbers (coupled motors, axes
-        that are only nearly parallel), and so are formulas longer than a line or two (oblique axes
-        one behind the other).
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.minimal_parameters import base_parameters
-    >>> base = base_parameters(load("rx90"))
-    >>> [(term.text, term.parameters) for term in base.formulas[0].terms]
-    [('', ('ZZ1', 'Ia1', 'YY2', 'YY3')), ('D3^2', ('M3', 'M4', 'M5', 'M6'))]
+    Shapes: kept (b,), matrix (b, p).
     """
     import sympy
 
@@ -192,22 +114,7 @@ def symbolic_formulas(
 
 @dataclass(frozen=True, slots=True)
 class Constant:
-    """A symbol of the formulas and its value.
-
-    Parameters
-    ----------
-    text, latex : str
-        The symbol.
-    value : float
-        In SI units.
-    unit : str
-        m, rad or m/s^2.
-
-    Examples
-    --------
-    >>> Constant("D3", "D_{3}", 0.45, "m").value
-    0.45
-    """
+    """A symbol of the formulas and its value."""
 
     text: str
     latex: str
@@ -216,26 +123,7 @@ class Constant:
 
 
 def constants_of(model: RobotModel, tolerance: float = EXACT) -> tuple[Constant, ...]:
-    """The symbols of a robot's formulas.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    tolerance : float
-        Angle that counts as none.
-
-    Returns
-    -------
-    tuple of Constant
-        In the order of the table; not all of them occur in the formulas.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> constants_of(load("rx90"))[0]
-    Constant(text='D3', latex='D_{3}', value=0.45, unit='m')
-    """
+    """The symbols of a robot's formulas."""
     return tuple(_rows_of_symbols(model, tolerance)[2])
 
 

@@ -24,45 +24,16 @@ _MISSED = 1e-9
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FoundColumns:
-    """Independent columns, and what a great tolerance has left out.
-
-    Parameters
-    ----------
-    basis : ColumnBasis
-        Columns that are kept, with distances relative to the longest of all: what decided.
-    neglected : tuple of str
-        Parameters that torques show, though less than the tolerance.
-    """
+    """Independent columns, and the columns that a larger tolerance leaves out."""
 
     basis: ColumnBasis
     neglected: tuple[str, ...]
 
 
 def with_clear_gap(W: Array, scale: Array, tolerance: float, basis: ColumnBasis) -> ColumnBasis:
-    """The columns with the line moved to the widest gap near the tolerance, if it is in none.
+    """Column basis with the tolerance moved to the widest gap near it.
 
-    Parameters
-    ----------
-    W : ndarray, shape (N, p)
-        The regressor, or a factor of it.
-    scale : ndarray, shape (p,)
-        Natural sizes of the parameters.
-    tolerance : float
-        Where the line is by default.
-    basis : ColumnBasis
-        What that gives.
-
-    Returns
-    -------
-    ColumnBasis
-        Another one if there is a gap within a factor of 30 of the tolerance, else the same.
-
-    Examples
-    --------
-    >>> W = np.diag([1.0, 1e-9, 3e-11, 8e-12, 1e-16])
-    >>> at_tolerance = column_basis(W, nothing=1e-11)
-    >>> len(at_tolerance.kept), len(with_clear_gap(W, np.ones(5), 1e-11, at_tolerance).kept)
-    (3, 4)
+    Shapes: W (N, p), scale (p,).
     """
     if ratio(basis) >= CLEAR:
         return basis
@@ -92,30 +63,7 @@ def ratio(basis: ColumnBasis) -> float:
 def doubts(
     names: Sequence[str], basis: ColumnBasis, tolerance: float, logged: bool
 ) -> tuple[str, ...]:
-    """A sentence where there is no clear gap, with the parameters that it concerns.
-
-    Parameters
-    ----------
-    names : sequence of str, length p
-        Standard parameters.
-    basis : ColumnBasis
-        Distances relative to the longest column.
-    tolerance : float
-        What counted as nothing.
-    logged : bool
-        Whether a richer motion could help.
-
-    Returns
-    -------
-    tuple of str
-        Empty where the gap is clear.
-
-    Examples
-    --------
-    >>> basis = column_basis(np.diag([1.0, 3e-11, 8e-12]))
-    >>> doubts(["ZZ1", "ZZ2", "ZZ3"], basis, 1e-11, True)[0][:60]
-    'No clear gap: ZZ2 is kept with 3.0e-11 of the largest torque'
-    """
+    """Warning where the rank has no clear gap, with the parameters concerned."""
     kept, other = basis.gap
     if ratio(basis) >= CLEAR:
         return ()
@@ -137,25 +85,7 @@ def doubts(
 def unseen(
     names: Sequence[str], kept: NDArray[np.int64], whole: NDArray[np.int64]
 ) -> tuple[str, ...]:
-    """A sentence where a log shows fewer parameters than motion can.
-
-    Parameters
-    ----------
-    names : sequence of str, length p
-        Standard parameters.
-    kept, whole : ndarray of int
-        What the log shows, and what random motion does.
-
-    Returns
-    -------
-    tuple of str
-        Empty where it shows all.
-
-    Examples
-    --------
-    >>> unseen(["ZZ1", "Fv1"], np.array([1]), np.array([0, 1]))
-    ('This motion shows 1 of the 2 base parameters; not kept: ZZ1.',)
-    """
+    """Warning where a log shows fewer parameters than random motion."""
     if len(kept) >= len(whole):
         return ()
     missing = np.setdiff1d(whole, kept)
@@ -166,13 +96,7 @@ def unseen(
 
 
 def miss(missed: float, tolerance: float) -> tuple[str, ...]:
-    """A sentence where torques are not kept.
-
-    Examples
-    --------
-    >>> miss(1e-14, 1e-11)
-    ()
-    """
+    """Warning where the base parameters do not reproduce the torques."""
     if missed <= max(_MISSED, CLEAR * tolerance):
         return ()
     return (

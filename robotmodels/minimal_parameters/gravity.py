@@ -13,51 +13,13 @@ EARTH = 9.81
 
 
 def weight_of(model: RobotModel, tolerance: float = EXACT) -> float:
-    """Magnitude of gravity, exactly 0 where it is none.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    tolerance : float
-        Part of the earth's gravity that counts as none.
-
-    Returns
-    -------
-    float
-        m/s^2.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> weight_of(load("rx90"))
-    9.81
-    """
+    """Magnitude of gravity, exactly 0 where it is none."""
     weight = float(np.linalg.norm(model.gravity))
     return weight if weight > tolerance * EARTH else 0.0
 
 
 def loads_of(model: RobotModel, tolerance: float = EXACT) -> list[float]:
-    """Gravity along the axis of each frame with every joint at zero; none is exactly 0.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, f frames.
-    tolerance : float
-        As for `regrouped`.
-
-    Returns
-    -------
-    list of float, length f
-        m/s^2.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> loads_of(load("cobra_s600"))[2]
-    9.81
-    """
+    """Gravity along the axis of each frame with every joint at zero; none is exactly 0."""
     weight = weight_of(model, tolerance)
     if weight == 0.0:
         return [0.0] * model.f

@@ -1,4 +1,8 @@
-"""Base parameters in numbers: independent columns of a regressor, in Khalil's order."""
+"""Base parameters in numbers: independent columns of a regressor, in Khalil's order.
+
+Source: M. Gautier, "Numerical calculation of the base inertial parameters of robots", Journal of
+Robotic Systems 8(4), 1991.
+"""
 
 from __future__ import annotations
 
@@ -47,39 +51,7 @@ def base_by_numbers(
 ) -> BaseParameters:
     """Base parameters from the columns of the regressor on random or given motion.
 
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-    drive : bool or collection of DriveKind
-        Which drive parameters are among the standard ones.
-    samples : tuple of ndarray, shapes (N, n), optional
-        Joint variables, velocities and accelerations; default random ones.
-    constraint : ndarray, shape (n, u), optional
-        Joint velocities are ``constraint`` times u free ones.
-    tolerance : float
-        Part of the largest torque that counts as nothing.
-    friction : Friction, optional
-        A linear friction model.
-    notes : tuple of str
-        Sentences for the result.
-
-    Returns
-    -------
-    BaseParameters
-        Method numeric, with its gap.
-
-    References
-    ----------
-    M. Gautier, "Numerical calculation of the base inertial parameters of robots", Journal of
-    Robotic Systems 8(4), 1991.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> base = base_by_numbers(load("rx90"), drive=True)
-    >>> len(base), base.gap[0] > 0.01, base.gap[1] < 1e-12
-    (58, True, True)
+    Shapes: samples (N, n), constraint (n, u).
     """
     kinds = drive_kinds(drive)
     found = base_columns(model, kinds, samples, constraint, tolerance, friction)
@@ -104,18 +76,7 @@ def base_columns(
     tolerance: float = NOTHING,
     friction: Friction | None = None,
 ) -> FoundColumns:
-    """Independent columns of the torque regressor; arguments as `base_by_numbers`.
-
-    The link parameters of the first frames are preferred, then Ia, Fv, Fc, offset and those of
-    friction: that is the order of `parameter_names`, and gives Khalil's choice. Only triangular
-    factors of the regressor are ever held.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> base_columns(load("planar_2r"), drive=False).basis.kept
-    array([ 5, 15, 16, 17])
-    """
+    """Independent columns of the torque regressor; arguments as `base_by_numbers`."""
     kinds = drive_kinds(drive)
     factors = torque_factors(model, kinds, samples, constraint, friction)
     scale = natural_sizes(model, kinds, friction)
@@ -159,17 +120,7 @@ def torque_factors(
     constraint: Array | None = None,
     friction: Friction | None = None,
 ) -> list[Array]:
-    """Rows of the regressor by joint (free variable), or matrices with the same products.
-
-    Torques of prismatic joints are made comparable to those of revolute ones by the size of the
-    robot. Arguments as `base_by_numbers`.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> len(torque_factors(load("planar_2r"), drive=False))
-    2
-    """
+    """Rows of the regressor by joint (free variable), or matrices with the same products."""
     size = reach(model)
     p = len(parameter_names(model, drive, friction))
     slides = model.table.sigma[model.table.joint_rows] == PRISMATIC
@@ -205,28 +156,7 @@ def _random_motion(
 
 
 def natural_sizes(model: RobotModel, drive: Drives, friction: Friction | None = None) -> Array:
-    """Parameters of a robot of this size and unit mass, with torques as its weight gives them.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    drive : bool or collection of DriveKind
-        Which drive parameters are among the standard ones.
-    friction : Friction, optional
-        A linear friction model.
-
-    Returns
-    -------
-    ndarray, shape (p,)
-        In the units of the rows of `torque_factors`.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> natural_sizes(load("rx90"), drive=False)[[0, 6, 9]].round(2)
-    array([0.81, 0.9 , 1.  ])
-    """
+    """Parameters of a robot of this size and unit mass, with torques as its weight gives them."""
     size = reach(model)
     link = [size**2] * 6 + [size] * 3 + [1.0]
     slides = model.table.sigma[model.table.joint_rows] == PRISMATIC
@@ -258,29 +188,7 @@ def missed_torque(
     samples: tuple[Array, Array, Array] | None = None,
     constraint: Array | None = None,
 ) -> float:
-    """Part of the torques of some parameters that their base parameters miss.
-
-    Looked at on a motion that has not been used and does not know the size that the robot was
-    taken to have; on a log, at some of its own samples.
-
-    Parameters
-    ----------
-    base : BaseParameters
-        What was found.
-    samples, constraint
-        As for `base_by_numbers`.
-
-    Returns
-    -------
-    float
-        Largest missed torque relative to the largest torque; 0 where there is none.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> missed_torque(base_by_numbers(load("planar_2r"), False)) < 1e-13
-    True
-    """
+    """Largest relative torque that the base parameters do not reproduce."""
     model = base.model
     rng = np.random.default_rng(1)
     if samples is None:

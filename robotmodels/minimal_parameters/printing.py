@@ -22,26 +22,7 @@ _LONGEST = 180
 
 
 def table_text(base: BaseParameters) -> str:
-    """The base parameters, their formulas, the symbols' values, and what is not determined.
-
-    Parameters
-    ----------
-    base : BaseParameters
-        What is printed.
-
-    Returns
-    -------
-    str
-        Lines: a heading and what is to be known, one formula per regrouped parameter, the constants
-        in them, the parameters that stand for themselves, those without effect, units and rank.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.minimal_parameters import base_parameters
-    >>> print(table_text(base_parameters(load("lab_rrt"), drive=False)).splitlines()[2])
-      ZZ1R = ZZ1 + YY2 + ZZ3
-    """
+    """The base parameters, their formulas, the symbols' values, and what is not determined."""
     lines = [_heading(base), *(_wrapped("", note) for note in base.notes)]
     regrouped = _shown(base)
     if regrouped:
@@ -132,25 +113,7 @@ def _wrapped(label: str, words: str) -> str:
 
 
 def table_latex(base: BaseParameters) -> str:
-    r"""The same in LaTeX: an ``align*`` of the formulas and lines of words.
-
-    Parameters
-    ----------
-    base : BaseParameters
-        What is printed.
-
-    Returns
-    -------
-    str
-        Needs amsmath.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.minimal_parameters import base_parameters
-    >>> print(base_parameters(load("planar_2r"), drive=False).latex.splitlines()[3])
-    ZZ_{1R} &= ZZ_{1} + D_{2}^{2} \, M_{2}
-    """
+    """LaTeX of the base parameters: an ``align*`` of the formulas and lines of words."""
     regrouped = [formula for formula, _ in _shown(base)]
     out = [rf"\textbf{{{escaped(_heading(base))}}}", *(escaped(note) for note in base.notes)]
     if regrouped:

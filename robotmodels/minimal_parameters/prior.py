@@ -1,4 +1,8 @@
-"""Bodies to start from where nothing is known: uniform solids along the links."""
+"""Bodies to start from where nothing is known: uniform solids along the links.
+
+Source: P. Wensing, S. Kim and J.-J. Slotine, "Linear matrix inequalities for physically consistent
+inertial parameter identification", IEEE RA-L 3(1), 2018.
+"""
 
 from __future__ import annotations
 
@@ -71,25 +75,7 @@ def uniform_bodies(
 def pseudo_inertias(bodies: InertialParameters) -> Array:
     """Pseudo-inertia matrices: positive definite for every body with extent in three directions.
 
-    Parameters
-    ----------
-    bodies : InertialParameters
-        Of f frames.
-
-    Returns
-    -------
-    ndarray, shape (f, 4, 4)
-        ``[[S, h], [h^T, m]]``, S the second moments ``tr(J)/2 - J`` (kg m^2), h the first (kg m).
-
-    References
-    ----------
-    P. Wensing, S. Kim and J.-J. Slotine, "Linear matrix inequalities for physically consistent
-    inertial parameter identification", IEEE RA-L 3(1), 2018.
-
-    Examples
-    --------
-    >>> pseudo_inertias(InertialParameters([[2, 0, 0, 2, 0, 2, 0, 0, 0, 1.0]]))[0].diagonal()
-    array([1., 1., 1., 1.])
+    Shapes: -> (f, 4, 4).
     """
     J = bodies.tensors
     P = np.zeros((bodies.f, 4, 4))
@@ -101,32 +87,7 @@ def pseudo_inertias(bodies: InertialParameters) -> Array:
 
 
 def check_definite(bodies: InertialParameters, name: str, frames: Sequence[str] = ()) -> Array:
-    """Pseudo-inertias of bodies that must all have mass and extent.
-
-    Parameters
-    ----------
-    bodies : InertialParameters
-        Of f frames.
-    name : str
-        Used in error messages.
-    frames : sequence of str, optional
-        Names of the frames, used in error messages.
-
-    Returns
-    -------
-    ndarray, shape (f, 4, 4)
-        Positive definite.
-
-    Raises
-    ------
-    InertiaError
-        A body without mass or extent, or one that is not physical.
-
-    Examples
-    --------
-    >>> check_definite(InertialParameters([[2, 0, 0, 2, 0, 2, 0, 0, 0, 1.0]]), "prior").shape
-    (1, 4, 4)
-    """
+    """Pseudo-inertias of bodies that must all have mass and extent. Shapes: -> (f, 4, 4)."""
     P = pseudo_inertias(bodies)
     values = np.linalg.eigvalsh(P)
     bad = np.flatnonzero(values[:, 0] <= 1e-12 * np.maximum(values[:, -1], 1e-300))

@@ -23,28 +23,7 @@ _DISSIPATIVE = (ViscousFriction, CoulombFriction, AsymmetricFriction, StribeckFr
 
 
 def positive_drives(base: BaseParameters) -> NDArray[np.int64]:
-    """Numbers of the standard parameters of drives that are not negative.
-
-    Rotor inertias, and frictions of the drives and of the friction model; offsets, and what couples
-    motors, may have either sign, and so may the parameters of friction models from outside.
-
-    Parameters
-    ----------
-    base : BaseParameters
-        Whose p standard parameters.
-
-    Returns
-    -------
-    ndarray of int, shape (k,)
-        Ascending.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.minimal_parameters import base_parameters
-    >>> positive_drives(base_parameters(load("planar_2r")))
-    array([20, 21, 22, 23, 24, 25])
-    """
+    """Numbers of the standard parameters of drives that are not negative. Shapes: -> (k,)."""
     f, n = base.model.f, base.model.n
     kinds = drive_kinds(base.drive)
     own = [k for k, kind in enumerate(kinds) if kind is not DriveKind.OFFSET]
@@ -54,28 +33,7 @@ def positive_drives(base: BaseParameters) -> NDArray[np.int64]:
 
 
 def drive_constraints(base: BaseParameters, unit: Array) -> tuple[Constraint, ...]:
-    """What the parameters of drives and friction must meet.
-
-    Parameters
-    ----------
-    base : BaseParameters
-        Whose p standard parameters.
-    unit : ndarray, shape (p,)
-        Their natural sizes.
-
-    Returns
-    -------
-    tuple of Constraint
-        Signs, then matrices of coupled motors.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.minimal_parameters import base_parameters
-    >>> base = base_parameters(load("tx40"))
-    >>> drive_constraints(base, np.ones(len(base.parameter_names)))[0].sentences[0]
-    'Ia1 is zero.'
-    """
+    """Constraints of drive and friction parameters. Shapes: unit (p,)."""
     p, names = len(unit), base.parameter_names
     positive = positive_drives(base)
     signs = np.zeros((len(positive), p))

@@ -37,27 +37,7 @@ class Turning(Enum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Restraint:
-    """What is left of the freedom of a link, in the axes of its frame.
-
-    Parameters
-    ----------
-    turning : Turning
-        Which rotations it can have.
-    direction : ndarray, shape (3,)
-        Unit vector of the one direction it turns about; zeros where there is none or several.
-    slides : tuple of ndarray, shapes (3,)
-        Directions of the prismatic joints before it, as long as they keep their place relative to
-        the link or to its direction of rotation (not those of a link that turns freely).
-    centre : ndarray, shape (3,), or None
-        A point of the link that no joint but a sliding one moves, metres: on the axis it turns
-        about, or the point where all axes meet; None where there is none.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> [restraint.turning.name for restraint in restraints(load("rx90"))[:3]]
-    ['NONE', 'ONE_DIRECTION', 'FREE']
-    """
+    """Possible rotations and translations of a link, in the axes of its frame."""
 
     turning: Turning
     direction: Array
@@ -77,49 +57,12 @@ _STANDING = Restraint(Turning.NONE, np.zeros(3), (), np.zeros(3))
 
 
 def parallel(a: Array, b: Array, tolerance: float = EXACT) -> bool:
-    """Whether two unit vectors have one direction, either way round.
-
-    Parameters
-    ----------
-    a, b : ndarray, shape (3,)
-        Unit vectors.
-    tolerance : float
-        Sine of an angle that counts as none.
-
-    Returns
-    -------
-    bool
-        By the sine of the angle.
-
-    Examples
-    --------
-    >>> parallel(np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, -1.0]))
-    True
-    """
+    """Whether two unit vectors have one direction, either way round."""
     return _length_of_cross(a, b) <= tolerance
 
 
 def restraints(model: RobotModel, tolerance: float = EXACT) -> tuple[Restraint, ...]:
-    """The restraint of every link, R_0 first.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, f frames.
-    tolerance : float
-        Sine of an angle, and length relative to that of the robot, that count as none.
-
-    Returns
-    -------
-    tuple of Restraint
-        f + 1 of them; number j is that of frame j.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> restraints(load("cobra_s600"))[4].turning.name
-    'ONE_DIRECTION'
-    """
+    """The restraint of every link, R_0 first."""
     chain = model.chain
     within = _Tolerance(tolerance, tolerance * reach(model))
     found = [_STANDING]
@@ -147,27 +90,7 @@ class _Tolerance:
 
 
 def reach(model: RobotModel) -> float:
-    """Reach of the table, metres; 1 where its lengths come to nothing.
-
-    Lengths that together are less than 0.1 mm are rounding, or offsets of a robot that only slides
-    or turns: no unit to measure it with.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-
-    Returns
-    -------
-    float
-        Sum of the distances between one origin and the next.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> reach(load("rx90"))
-    0.9
-    """
+    """Reach of the table, metres; 1 where its lengths come to nothing."""
     table = model.table
     lengths = float(np.sqrt(table.d**2 + table.r**2 + table.b**2).sum())
     return lengths if lengths > _LEAST else 1.0

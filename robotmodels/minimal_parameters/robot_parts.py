@@ -14,19 +14,7 @@ from .result import BaseParameters
 
 
 class RobotParts(NamedTuple):
-    """What a vector of standard parameters describes.
-
-    Parameters
-    ----------
-    inertia : InertialParameters
-        Of f links.
-    drive : DriveParameters
-        Of n joints.
-    transmission : Transmission or None
-        The model's, with the terms of coupled motors.
-    friction : ndarray, shape (k, n), or None
-        Parameters of the friction model, where the base parameters have one.
-    """
+    """Parts of a robot described by a vector of standard parameters. Shapes: friction (k, n)."""
 
     inertia: InertialParameters
     drive: DriveParameters
@@ -35,32 +23,7 @@ class RobotParts(NamedTuple):
 
 
 def robot_parts(base: BaseParameters, x: Array, drives: DriveParameters) -> RobotParts:
-    """The robot of standard parameters.
-
-    Parameters
-    ----------
-    base : BaseParameters
-        Which p standard parameters there are.
-    x : ndarray, shape (p,)
-        Their values.
-    drives : DriveParameters
-        Whose kinds are taken that are not among them.
-
-    Returns
-    -------
-    RobotParts
-        Inverse of `standard_vector`.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.minimal_parameters import base_parameters
-    >>> arm = load("rx90")
-    >>> base = base_parameters(arm)
-    >>> x = standard_vector(base, arm.inertia, arm.drive)
-    >>> robot_parts(base, x, arm.drive).inertia == arm.inertia
-    True
-    """
+    """The robot of standard parameters. Shapes: x (p,)."""
     f, n = base.model.f, base.model.n
     transmission = base.model.transmission
     kinds = drive_kinds(base.drive)
@@ -86,29 +49,6 @@ def robot_parts(base: BaseParameters, x: Array, drives: DriveParameters) -> Robo
 def standard_vector(
     base: BaseParameters, bodies: InertialParameters, drives: DriveParameters
 ) -> Array:
-    """Standard parameters of the model with other bodies and drives.
-
-    Parameters
-    ----------
-    base : BaseParameters
-        Which p standard parameters there are.
-    bodies : InertialParameters
-        Of f links.
-    drives : DriveParameters
-        Of n joints.
-
-    Returns
-    -------
-    ndarray, shape (p,)
-        What couples motors, and the friction model, are the model's.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.minimal_parameters import base_parameters
-    >>> arm = load("planar_2r")
-    >>> standard_vector(base_parameters(arm, drive=False), arm.inertia, arm.drive).shape
-    (20,)
-    """
+    """Standard parameters of the model with other bodies and drives. Shapes: -> (p,)."""
     robot = base.model.with_inertia(bodies).with_drive(drives)
     return parameter_vector(robot, base.drive, base.friction)

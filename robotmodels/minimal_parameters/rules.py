@@ -18,6 +18,9 @@ product:
   Where gravity loads it the three together are the constant ``offset_j``, which then goes instead;
 - ``Ia`` of the first revolute joint goes to its ``ZZ``, and that of the first one that is not
   parallel to it, if it is perpendicular to it.
+
+Source: W. Khalil and F. Bennis, "Comments on direct calculation of minimum set of inertial
+parameters of serial robots", IEEE T-RA 10(1), 1994.
 """
 
 from __future__ import annotations
@@ -39,22 +42,7 @@ from .restraint import EXACT, Restraint, Turning, parallel, restraints
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RowConstants:
-    """Where the joint of a row stands in the frame before it; numbers or formulas.
-
-    Parameters
-    ----------
-    rotation : ndarray, shape (3, 3)
-        Axes of frame j at ``q = 0`` in frame a(j).
-    position : ndarray, shape (3,)
-        A point of the joint's axis in frame a(j), metres: of a revolute or fixed joint the origin.
-    load : float or formula
-        Gravity along the axis with every joint at zero, m/s^2.
-
-    Examples
-    --------
-    >>> RowConstants(np.eye(3), np.zeros(3), -9.81).rotation[2, 2]
-    np.float64(1.0)
-    """
+    """Constants of a joint in the frame before it; numbers or formulas."""
 
     rotation: Array
     position: Array
@@ -68,39 +56,7 @@ def regrouped(
     drive: Drives,
     tolerance: float = EXACT,
 ) -> dict[int, Combination]:
-    """Apply the rules to all joints, from the last to the first.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, f frames, n joints; decides which rules hold.
-    rows : sequence of RowConstants
-        The numbers, or the formulas, that the coefficients are made of, row by row.
-    directions : sequence of ndarray, shapes (3,)
-        The direction of `Restraint` of each frame 1..f, as numbers or formulas.
-    drive : bool or collection of DriveKind
-        Which of ``Ia``, ``Fv``, ``Fc`` and ``offset`` are among the parameters.
-    tolerance : float
-        Sine of an angle, and length relative to that of the robot, that count as none.
-
-    Returns
-    -------
-    dict of int to Combination
-        For each parameter that stays, by its number in `parameter_names`, what it stands for.
-
-    References
-    ----------
-    Seed book section 1.5.3; W. Khalil and F. Bennis, "Comments on direct calculation of minimum set
-    of inertial parameters of serial robots", IEEE T-RA 10(1), 1994.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.minimal_parameters.rules import rows_of_numbers
-    >>> arm = load("planar_2r")
-    >>> len(regrouped(arm, *rows_of_numbers(arm), drive=False))
-    4
-    """
+    """Apply the rules to all joints, from the last to the first."""
     f, n = model.f, model.n
     kinds = drive_kinds(drive)
     starts = {kind: 10 * f + n * i for i, kind in enumerate(kinds)}
@@ -134,29 +90,7 @@ def regrouped(
 def rows_of_numbers(
     model: RobotModel, tolerance: float = EXACT
 ) -> tuple[list[RowConstants], list[Array]]:
-    """What `regrouped` takes, as numbers of the table.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, f frames.
-    tolerance : float
-        As for `regrouped`.
-
-    Returns
-    -------
-    rows : list of RowConstants
-        One per frame.
-    directions : list of ndarray, shapes (3,)
-        One per frame.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> rows, directions = rows_of_numbers(load("rx90"))
-    >>> len(rows), directions[0]
-    (6, array([0., 0., 1.]))
-    """
+    """Numeric arguments of `regrouped` from the table."""
     chain = model.chain
     rows = [
         RowConstants(R, P, load)

@@ -18,29 +18,7 @@ _NOTHING = 1e-9
 
 
 def standard_text(found: StandardParameters) -> str:
-    """A row for each parameter: prior, value and difference; each link a real body or not.
-
-    Parameters
-    ----------
-    found : StandardParameters
-        What is printed.
-
-    Returns
-    -------
-    str
-        A sentence on the status, then the table.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.minimal_parameters import base_parameters, standard_parameters
-    >>> from robotmodels.minimal_parameters import uniform_bodies
-    >>> arm = load("lab_rr")
-    >>> arm = arm.with_inertia(uniform_bodies(arm, 5.0))
-    >>> base = base_parameters(arm, drive=False)
-    >>> print(standard_text(standard_parameters(base, base.values(arm))).splitlines()[0])
-    The robot has exactly these base parameters.
-    """
+    """A row for each parameter: prior, value and difference; each link a real body or not."""
     f = found.inertia.f
     worst = float(abs(found.deviation).max(initial=0.0))
     lines = [

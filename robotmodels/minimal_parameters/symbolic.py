@@ -1,4 +1,7 @@
-"""Base parameters by Khalil's rules."""
+"""Base parameters by Khalil's rules.
+
+Source: Seed book section 1.5.3.
+"""
 
 from __future__ import annotations
 
@@ -35,41 +38,7 @@ def base_by_rules(
     friction: Friction | None = None,
     notes: tuple[str, ...] = (),
 ) -> BaseParameters:
-    """Base parameters by the rules of `robotmodels.minimal_parameters.rules`.
-
-    Rules know axes that are parallel and axes that are not. Where that depends on what counts as
-    nothing (angles of a table that was written with few digits), they hold if the torques say so;
-    otherwise the combinations are those of the torques.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    drive : bool or collection of DriveKind
-        Which drive parameters are among the standard ones. Those of coupled motors follow no
-        rule: they are looked at in numbers.
-    tolerance : float
-        Part of the largest torque, and sine of an angle, that count as nothing.
-    friction : Friction, optional
-        A linear friction model; its columns are compared with those of the same joint's drive.
-    notes : tuple of str
-        Sentences for the result.
-
-    Returns
-    -------
-    BaseParameters
-        Method symbolic.
-
-    References
-    ----------
-    Seed book section 1.5.3.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> len(base_by_rules(load("rx90"), drive=True))
-    58
-    """
+    """Base parameters by the rules of `robotmodels.minimal_parameters.rules`."""
     kinds = drive_kinds(drive)
     kept, matrix = _by_rules(model, kinds, tolerance, friction, _FINEST)
     if _is_clear(model, kinds, tolerance, kept):

@@ -22,13 +22,7 @@ _OF_CYLINDERS = {"Kc": "N/m", "Pc": "N"}
 
 
 class KeptNames(dict[str, Any]):
-    """A dictionary by standard names that takes printed ones, ``ZZ1R`` for ``ZZ1``.
-
-    Examples
-    --------
-    >>> KeptNames({"ZZ1": 2.0})["ZZ1R"]
-    2.0
-    """
+    """A dictionary by standard names that takes printed ones, ``ZZ1R`` for ``ZZ1``."""
 
     def __missing__(self, name: object) -> Any:
         if isinstance(name, str) and (plain := plain_name(name, self)) in self:
@@ -95,32 +89,7 @@ def base_values(
 ) -> BaseValues:
     """Base parameters with their values and units.
 
-    Parameters
-    ----------
-    names : tuple of str, length b
-        Of the kept standard parameters.
-    matrix : ndarray, shape (b, p)
-        What is regrouped into each.
-    sigma : ndarray of int, shape (f,)
-        Kinds of joints of the table, on which units depend.
-    values : ndarray, shape (b,)
-        Their values.
-
-    Returns
-    -------
-    BaseValues
-        In the order of the names.
-
-    Examples
-    --------
-    >>> matrix = np.array([[1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-    >>> print(base_values(("ZZ1", "MX2"), matrix, np.array([0, 0]), np.array([4.0, 0.5])))
-    ┌───────────┬───────┬────────┐
-    │ parameter │ value │   unit │
-    ├───────────┼───────┼────────┤
-    │      ZZ1R │     4 │ kg m^2 │
-    │       MX2 │   0.5 │   kg m │
-    └───────────┴───────┴────────┘
+    Shapes: matrix (b, p), sigma (f,), values (b,).
     """
     several = (matrix != 0.0).sum(axis=1) > 1
     printed = (f"{n}R" if more else n for n, more in zip(names, several, strict=True))

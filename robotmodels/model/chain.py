@@ -10,25 +10,7 @@ from ..kernels import Chain
 
 
 def multiplied_out(table: DHTable, base: Array) -> Chain:
-    """The constant factors of a table, and how its rows stand on each other.
-
-    Parameters
-    ----------
-    table : DHTable
-        f frames, n joints.
-    base : ndarray, shape (4, 4)
-        Pose of R_0 in the world.
-
-    Returns
-    -------
-    Chain
-        Read-only arrays in table order.
-
-    Examples
-    --------
-    >>> multiplied_out(DHTable(antecedent=[0], sigma=[0], r=[0.2]), np.eye(4)).position
-    array([[0. , 0. , 0.2]])
-    """
+    """The constant factors of a table, and how its rows stand on each other."""
     C = constant_factors(table)
     joint = np.full(table.f, -1, dtype=np.int64)
     joint[table.joint_rows] = np.arange(table.n)

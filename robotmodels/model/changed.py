@@ -21,15 +21,7 @@ if TYPE_CHECKING:
 
 
 class Changeable:
-    """What is made of parts and can be had with one of them changed; a model stays as it is.
-
-    Examples
-    --------
-    >>> from robotmodels.model import RobotModel
-    >>> arm = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))
-    >>> arm.with_gravity([0, 0, 0]) == arm
-    False
-    """
+    """Base of immutable models with `with_*` methods."""
 
     __slots__ = ()
 

@@ -48,15 +48,7 @@ Columns = Sequence[int] | Sequence[str] | NDArray[np.int64] | NDArray[np.bool_] 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChosenColumns:
-    """Columns of a regressor and where each standard parameter goes.
-
-    Parameters
-    ----------
-    names : tuple of str
-        Of the chosen columns, in order.
-    places : mapping of str to ndarray of int
-        By kind, the column of each parameter of that kind, -1 if it is not chosen.
-    """
+    """Columns of a regressor and where each standard parameter goes."""
 
     names: tuple[str, ...]
     places: Mapping[str, NDArray[np.int64]]
@@ -123,29 +115,7 @@ def energy_blocks(model: RobotModel, drive: Drives) -> Blocks:
 
 
 def chosen_columns(blocks: Blocks, columns: Columns | None, model: RobotModel) -> ChosenColumns:
-    """Find the columns that are asked for.
-
-    Parameters
-    ----------
-    blocks : mapping of str to tuple of str
-        All columns.
-    columns : indices, names, mask, BaseParameters or None
-        None takes all.
-    model : RobotModel
-        The robot whose columns they are.
-
-    Returns
-    -------
-    ChosenColumns
-        In the order they are asked for.
-
-    Raises
-    ------
-    InvalidValueError
-        A column that is not there, or is asked for twice; base parameters of another robot.
-    ShapeError
-        A mask of another length.
-    """
+    """Find the columns that are asked for."""
     if columns is None:
         return _all_columns(tuple(blocks.items()))
     every = tuple(name for names in blocks.values() for name in names)

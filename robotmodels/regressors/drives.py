@@ -34,21 +34,7 @@ def joint_terms(
 ) -> Iterator[tuple[str, Array]]:
     """Torque per unit of each kind of parameter that acts on its own joint.
 
-    Parameters
-    ----------
-    q, v : ndarray, shape (N, n)
-        Joint variables and velocities.
-    rotor : ndarray, shape (N, n), or None
-        What multiplies rotor inertia (accelerations); None leaves friction alone.
-    friction : LinearFriction or None
-        A friction model besides the drives.
-
-    Yields
-    ------
-    kind : str
-        Of the parameters.
-    values : ndarray, shape (N, n)
-        By joint.
+    Shapes: q, v, rotor (N, n) -> values (N, n).
     """
     if rotor is not None:
         yield "Ia", rotor
@@ -66,23 +52,7 @@ def coupled_terms(
 ) -> Iterator[tuple[str, int, Array]]:
     """Torques per unit of each parameter of the coupled motors.
 
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    v : ndarray, shape (N, n)
-        Joint velocities.
-    rotor : ndarray, shape (N, n), or None
-        What multiplies rotor inertia; None leaves friction alone.
-
-    Yields
-    ------
-    kind : str
-        Of the parameter.
-    motor : int
-        Which of the coupled motors.
-    torques : ndarray, shape (N, n)
-        On all joints.
+    Shapes: v, rotor (N, n) -> torques (N, n).
     """
     for i, (row, cross) in enumerate(couplings(model)):
         if rotor is not None:

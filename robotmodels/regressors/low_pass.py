@@ -220,15 +220,7 @@ class LowPass:
 
 
 class FilterRun:
-    """A filter in the middle of a signal of several channels; pieces follow each other.
-
-    Parameters
-    ----------
-    low_pass : LowPass
-        The filter.
-    dt : float
-        Sampling period, seconds.
-    """
+    """A filter in the middle of a signal of several channels; pieces follow each other."""
 
     def __init__(self, low_pass: LowPass, dt: float) -> None:
         self.low_pass = low_pass

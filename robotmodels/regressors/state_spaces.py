@@ -13,25 +13,7 @@ Space = tuple[Array, Array, Array, Array]
 
 
 def is_discrete(system: Any, dt: float | None) -> bool:
-    """Whether a filter is meant in discrete time.
-
-    Parameters
-    ----------
-    system : object
-        What SciPy makes of a filter.
-    dt : float or None
-        Sampling period that is given beside it.
-
-    Returns
-    -------
-    bool
-        By its type, or because there is a period.
-
-    Raises
-    ------
-    InvalidValueError
-        A continuous filter with a period; sections without one.
-    """
+    """Whether a filter is a discrete-time one."""
     from scipy import signal
 
     if isinstance(system, signal.lti) and dt is not None:
@@ -47,20 +29,7 @@ def is_discrete(system: Any, dt: float | None) -> bool:
 def continuous_space(system: Any) -> Space:
     """State-space matrices of a continuous filter.
 
-    Parameters
-    ----------
-    system : scipy.signal.lti or tuple
-        The filter.
-
-    Returns
-    -------
-    A, B, C, D : ndarray, shapes (m, m), (m, 1), (1, m), (1, 1)
-        In rad/s.
-
-    Raises
-    ------
-    InvalidValueError
-        No continuous filter of one input and one output.
+    Shapes: -> A (m, m), B (m, 1), C (1, m), D (1, 1).
     """
     from scipy import signal
 
@@ -76,27 +45,7 @@ def continuous_space(system: Any) -> Space:
 
 
 def discrete_space(given: object, dt: float | None) -> tuple[Space, float]:
-    """State-space matrices of a discrete filter, and its sampling period.
-
-    Parameters
-    ----------
-    given : scipy.signal.dlti, tuple, or ndarray of shape (k, 6)
-        The filter.
-    dt : float or None
-        Its period, seconds; None takes that of the ``dlti``.
-
-    Returns
-    -------
-    space : tuple of ndarray
-        As `continuous_space`.
-    period : float
-        Seconds.
-
-    Raises
-    ------
-    InvalidValueError
-        No discrete filter of one input and one output; no period, or two.
-    """
+    """State-space matrices of a discrete filter, and its sampling period. Shapes: given (k, 6)."""
     from scipy import signal
 
     system: Any = given

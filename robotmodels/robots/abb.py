@@ -47,19 +47,7 @@ def irb120() -> RobotModel:
     and that of link 6 (0.001 kg m^2 on the diagonal) can only be a placeholder. No torques are
     published.
 
-    Returns
-    -------
-    RobotModel
-        Six revolute joints, spherical wrist.
-
-    References
-    ----------
-    ROS-Industrial, abb, package abb_irb120_support.
-
-    Examples
-    --------
-    >>> float(irb120().table.d[3])
-    0.07
+    Source: ROS-Industrial, abb, package abb_irb120_support.
     """
     table = _irb_table(
         0.29, 0.0, 0.27, 0.07, 0.302,
@@ -101,19 +89,7 @@ def irb140() -> RobotModel:
     inertial data of that toolbox mix millimetres and metres and cover three links only, so none
     are taken over; no torques are published.
 
-    Returns
-    -------
-    RobotModel
-        Six revolute joints, spherical wrist.
-
-    References
-    ----------
-    ROS-Industrial, abb_experimental, package abb_irb140_support.
-
-    Examples
-    --------
-    >>> float(irb140().table.d[1])
-    0.07
+    Source: ROS-Industrial, abb_experimental, package abb_irb140_support.
     """
     table = _irb_table(
         0.352, 0.07, 0.36, 0.0, 0.38,
@@ -133,19 +109,7 @@ def irb6640() -> RobotModel:
     rounded there to three or four decimals, are written here in the whole degrees they stand
     for). The lengths make the 2.8 m reach of the name. No inertia or torques are published.
 
-    Returns
-    -------
-    RobotModel
-        Six revolute joints, spherical wrist.
-
-    References
-    ----------
-    ROS-Industrial, abb, package abb_irb6640_support.
-
-    Examples
-    --------
-    >>> float(irb6640().table.r[3])
-    1.392
+    Source: ROS-Industrial, abb, package abb_irb6640_support.
     """
     table = _irb_table(
         0.78, 0.32, 1.075, 0.2, 1.392,

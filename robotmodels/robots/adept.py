@@ -17,19 +17,7 @@ def cobra_s600() -> RobotModel:
     360 degrees: the ROS 2 description (the toolbox has narrower ones for the first two). No
     speeds, torques or inertia are taken over.
 
-    Returns
-    -------
-    RobotModel
-        Four joints, R R P R.
-
-    References
-    ----------
-    P. Corke and J. Haviland, Robotics Toolbox for Python 1.5.0, ``models/DH/Cobra600.py``.
-
-    Examples
-    --------
-    >>> cobra_s600().table.sigma
-    array([0, 0, 1, 0])
+    Source: P. Corke and J. Haviland, Robotics Toolbox for Python 1.5.0, ``models/DH/Cobra600.py``.
     """
     rows = columns(
         sigma=(0, 0, 1, 0),

@@ -23,24 +23,7 @@ _FOLDER = Path("share", "example-robot-data", "robots")
 
 @dataclass(frozen=True, slots=True)
 class ErdArm:
-    """Where a robot of example-robot-data is, and which part of it is meant.
-
-    Parameters
-    ----------
-    urdf : str
-        File, relative to the folder of robots.
-    base_link, tip_link : str, optional
-        Links between which the arm lies; default the whole tree.
-    srdf : str, optional
-        File with named postures, relative to the folder of robots.
-    tool : str, optional
-        Link that is the tool, where the rule of `RobotModel.from_urdf` finds another.
-
-    Examples
-    --------
-    >>> ERD_ARMS["ur5"].urdf
-    'ur_description/urdf/ur5_robot.urdf'
-    """
+    """Where a robot of example-robot-data is, and which part of it is meant."""
 
     urdf: str
     base_link: str | None = None
@@ -169,34 +152,7 @@ ERD_ARMS: dict[str, ErdArm] = {
 
 
 def load_erd(name: str) -> RobotModel:
-    """Load an arm of example-robot-data from its URDF.
-
-    Mimic joints (the second finger of a gripper, say) are independent, as in Pinocchio. Meshes
-    are looked for when the robot is drawn.
-
-    Parameters
-    ----------
-    name : str
-        One of `ERD_ARMS`, without ``erd:``.
-
-    Returns
-    -------
-    RobotModel
-        Its table extracted from the URDF, ``q`` with the URDF's sign and zero, the postures of
-        the package's SRDF file as configurations. All numbers are those of the file.
-
-    Raises
-    ------
-    RobotNotFoundError
-        The name is unknown, or the installed version has no such file.
-    MissingExtraError
-        The package's data are not installed.
-
-    Examples
-    --------
-    >>> load_erd("ur5").n
-    6
-    """
+    """Load an arm of example-robot-data from its URDF."""
     arm = ERD_ARMS.get(name)
     if arm is None:
         raise RobotNotFoundError(
@@ -227,24 +183,7 @@ def _without_branches(model: RobotModel) -> tuple[str, ...]:
 
 
 def erd_folder() -> Path:
-    """Folder of the robots of the installed example-robot-data.
-
-    Returns
-    -------
-    Path
-        ``.../share/example-robot-data/robots``. The folder two above is the package directory
-        for its ``package://`` meshes.
-
-    Raises
-    ------
-    MissingExtraError
-        No installed copy was found.
-
-    Examples
-    --------
-    >>> erd_folder().name
-    'robots'
-    """
+    """Folder of the robots of the installed example-robot-data."""
     for prefix in _prefixes():
         folder = prefix / _FOLDER
         if folder.is_dir():

@@ -22,19 +22,7 @@ def lab_rr() -> RobotModel:
     Metres, radians. ``l1 = 0.5``, ``l2 = 0.2``: the exercise leaves them as symbols; these are
     the values of its problems 1 and 2. No limits and no inertia are given.
 
-    Returns
-    -------
-    RobotModel
-        Two revolute joints, the tool at the end of the second link.
-
-    References
-    ----------
-    The exercise, eq. (4.1) to (4.5).
-
-    Examples
-    --------
-    >>> lab_rr().table.r
-    array([0.5, 0. ])
+    Source: The exercise, eq. (4.1) to (4.5).
     """
     table = DHTable.from_rows(
         columns(sigma=(0, 0), alpha=(0, -90), d=(0, 0), theta=(0, 0), r=(0.5, 0)), degrees=True
@@ -49,19 +37,7 @@ def lab_rrt() -> RobotModel:
     Metres, radians. ``l1 = 0.5`` is given; its figure 4.3 is not readable, so the layout is that
     of robot RR with a sliding last link. No limits and no inertia are given.
 
-    Returns
-    -------
-    RobotModel
-        Two revolute joints and a prismatic one along the tool's x axis.
-
-    References
-    ----------
-    The exercise, section 4.2, problem 1.
-
-    Examples
-    --------
-    >>> lab_rrt().table.sigma
-    array([0, 0, 1])
+    Source: The exercise, section 4.2, problem 1.
     """
     # z_3 is along x of the second link: x_2 turns to -z of that link, hence the 90 degrees
     table = DHTable.from_rows(
@@ -80,19 +56,7 @@ def lab_trr() -> RobotModel:
     pose B it reaches the position only, stretched out at q = (0.2, 0, 0). No limits and no
     inertia are given.
 
-    Returns
-    -------
-    RobotModel
-        A prismatic joint along y and two revolute ones about it, the tool at the end.
-
-    References
-    ----------
-    The exercise, section 4.2, problem 2 with poses A and B.
-
-    Examples
-    --------
-    >>> lab_trr().table.sigma
-    array([1, 0, 0])
+    Source: The exercise, section 4.2, problem 2 with poses A and B.
     """
     table = DHTable.from_rows(
         columns(

@@ -45,19 +45,7 @@ def crx10ia() -> RobotModel:
     make a reach of sqrt((0.54 + 0.54 + 0.16)^2 + 0.15^2) = 1.249 m, FANUC's 1249 mm (quoted
     without the data sheet at hand). Neither file has inertia or torques.
 
-    Returns
-    -------
-    RobotModel
-        Six revolute joints; axes 5 and 6 miss axis 4 by 0.15 m.
-
-    References
-    ----------
-    P. Franceschi, ros2_fanuc_interface, package crx_description.
-
-    Examples
-    --------
-    >>> float(crx10ia().table.r[4])
-    0.15
+    Source: P. Franceschi, ros2_fanuc_interface, package crx_description.
     """
     return _crx(
         "crx10ia",
@@ -76,19 +64,7 @@ def crx10ia_l() -> RobotModel:
     sqrt((0.71 + 0.54 + 0.16)^2 + 0.15^2) = 1.418 m, FANUC's 1418 mm (quoted without the data sheet
     at hand). The file has no inertia or torques.
 
-    Returns
-    -------
-    RobotModel
-        Six revolute joints; axes 5 and 6 miss axis 4 by 0.15 m.
-
-    References
-    ----------
-    ROS-Industrial, fanuc, package fanuc_crx10ia_support.
-
-    Examples
-    --------
-    >>> float(crx10ia_l().table.d[2])
-    0.71
+    Source: ROS-Industrial, fanuc, package fanuc_crx10ia_support.
     """
     return _crx(
         "crx10ia_l",

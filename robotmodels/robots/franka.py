@@ -22,21 +22,9 @@ def panda() -> RobotModel:
     identification by Gaz et al. 2019; Franka publishes none. The posture ``ready`` is the state
     ``default`` of ``panda.srdf`` of example-robot-data without its rounding.
 
-    Returns
-    -------
-    RobotModel
-        Seven revolute joints.
-
-    References
-    ----------
-    C. Gaz, M. Cognetti, A. Oliva, P. Robuffo Giordano and A. De Luca, "Dynamic identification of
-    the Franka Emika Panda robot with retrieval of feasible parameters using penalty-based
-    optimization", IEEE Robotics and Automation Letters 4(4), 2019.
-
-    Examples
-    --------
-    >>> float(panda().table.d[3])
-    0.0825
+    Source: C. Gaz, M. Cognetti, A. Oliva, P. Robuffo Giordano and A. De Luca, "Dynamic
+    identification of the Franka Emika Panda robot with retrieval of feasible parameters using
+    penalty-based optimization", IEEE Robotics and Automation Letters 4(4), 2019.
     """
     table = DHTable.from_rows(
         columns(

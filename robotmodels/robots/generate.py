@@ -14,31 +14,7 @@ from .catalogue import CATALOGUE, load
 
 
 def generate(folder: str | Path) -> list[Path]:
-    """Write one URDF file for each robot of the catalogue.
-
-    Parameters
-    ----------
-    folder : str or Path
-        Where to; made if it does not exist. URDF files of robots that are no longer in the
-        catalogue are left alone.
-
-    Returns
-    -------
-    list of Path
-        The files, named ``<robot>.urdf``.
-
-    Raises
-    ------
-    UrdfError
-        A file cannot be written.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     generate(folder)[0].name
-    'lab_rr.urdf'
-    """
+    """Write one URDF file for each robot of the catalogue."""
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     paths = []
@@ -53,25 +29,7 @@ def generate(folder: str | Path) -> list[Path]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command.
-
-    Parameters
-    ----------
-    arguments : sequence of str, optional
-        Default: those of the command line.
-
-    Returns
-    -------
-    int
-        Exit code.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     main([folder])
-    0
-    """
+    """Run the command."""
     parser = argparse.ArgumentParser(
         prog="python -m robotmodels.robots.generate", description="Write the catalogue as URDF."
     )

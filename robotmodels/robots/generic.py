@@ -16,19 +16,7 @@ def planar_2r() -> RobotModel:
     Lengths as in the model Planar2 of the Robotics Toolbox for Python 1.5.0 (a = 1, 1 m; metres
     and radians). It is no product: there are no limits and there is no inertia.
 
-    Returns
-    -------
-    RobotModel
-        Two joints, the tool at the end of the second link.
-
-    References
-    ----------
-    P. Corke and J. Haviland, Robotics Toolbox for Python 1.5.0, ``models/DH/Planar2.py``.
-
-    Examples
-    --------
-    >>> float(planar_2r().tool[0, 3])
-    1.0
+    Source: P. Corke and J. Haviland, Robotics Toolbox for Python 1.5.0, ``models/DH/Planar2.py``.
     """
     table, tool = DHTable.from_standard(columns(a=(1.0, 1.0)))
     return RobotModel.from_table(
@@ -42,19 +30,7 @@ def planar_3r() -> RobotModel:
     Lengths as in the model Planar3 of the Robotics Toolbox for Python 1.5.0 (a = 1, 1, 1 m;
     metres and radians). It is no product: there are no limits and there is no inertia.
 
-    Returns
-    -------
-    RobotModel
-        Three joints, the tool at the end of the third link.
-
-    References
-    ----------
-    P. Corke and J. Haviland, Robotics Toolbox for Python 1.5.0, ``models/DH/Planar3.py``.
-
-    Examples
-    --------
-    >>> planar_3r().n
-    3
+    Source: P. Corke and J. Haviland, Robotics Toolbox for Python 1.5.0, ``models/DH/Planar3.py``.
     """
     table, tool = DHTable.from_standard(columns(a=(1.0, 1.0, 1.0)))
     return RobotModel.from_table(table, tool=tool, name="planar_3r")
@@ -66,16 +42,6 @@ def gantry() -> RobotModel:
     It is no product: no lengths enter, and the strokes (3 m, 2 m, 1 m; metres and radians) are
     chosen for illustration. At q = 0 the tool points down; the wrist centre is at
     ``(q1, q2, -q3)``. There is no inertia.
-
-    Returns
-    -------
-    RobotModel
-        Six joints; R_0 is turned so that its z axis is the world's x axis.
-
-    Examples
-    --------
-    >>> gantry().table.sigma
-    array([1, 1, 1, 0, 0, 0])
     """
     table = DHTable.from_rows(
         columns(

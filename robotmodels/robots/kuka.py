@@ -21,19 +21,7 @@ def kr6_r900() -> RobotModel:
     KR 6 R900-2, whose forearm offset and flange are 25 and 90 mm instead of 35 and 80 mm. No
     inertia or torques are published.
 
-    Returns
-    -------
-    RobotModel
-        Six revolute joints, spherical wrist.
-
-    References
-    ----------
-    ROS-Industrial, kuka_experimental, package kuka_kr6_support.
-
-    Examples
-    --------
-    >>> float(kr6_r900().table.d[2])
-    0.455
+    Source: ROS-Industrial, kuka_experimental, package kuka_kr6_support.
     """
     table = DHTable.from_rows(
         columns(
@@ -63,19 +51,7 @@ def lwr4_plus() -> RobotModel:
     of A. De Luca, Sapienza University of Rome. The inertia in that file is a placeholder, so none
     is taken over.
 
-    Returns
-    -------
-    RobotModel
-        Seven revolute joints: spherical shoulder, elbow, spherical wrist.
-
-    References
-    ----------
-    Centro E. Piaggio, kuka-lwr, package lwr_description.
-
-    Examples
-    --------
-    >>> lwr4_plus().n
-    7
+    Source: Centro E. Piaggio, kuka-lwr, package lwr_description.
     """
     table = DHTable.from_rows(
         columns(
@@ -106,20 +82,8 @@ def iiwa14() -> RobotModel:
     of mass and inertia: ``iiwa14_description.xacro`` of the latter, which its authors exported
     from CAD (fusion2urdf; base and links weigh 29.9 kg together). KUKA publishes none.
 
-    Returns
-    -------
-    RobotModel
-        Seven revolute joints: spherical shoulder, elbow, spherical wrist.
-
-    References
-    ----------
-    M. Huber et al., "LBR-Stack: ROS 2 and Python integration of KUKA FRI for Med and IIWA
+    Source: M. Huber et al., "LBR-Stack: ROS 2 and Python integration of KUKA FRI for Med and IIWA
     robots", Journal of Open Source Software 9(103), 2024.
-
-    Examples
-    --------
-    >>> round(7.050378 + float(iiwa14().inertia.mass.sum()), 1)
-    29.9
     """
     table = DHTable.from_rows(
         columns(

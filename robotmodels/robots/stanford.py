@@ -23,22 +23,10 @@ def stanford_arm() -> RobotModel:
     The inertial data of Paul's table 6.5 are left out: the copies at hand mix units in the
     centres of mass, so there is no trustworthy source. No speeds or torques are given.
 
-    Returns
-    -------
-    RobotModel
-        Six joints, the third prismatic; spherical wrist.
-
-    References
-    ----------
-    R. P. Paul, "Modelling, trajectory calculation and servoing of a computer controlled arm",
-    Stanford AIM-177, 1972; R. P. Paul, *Robot Manipulators*, MIT Press 1981, tables 6.5, 6.6.
-    J. Dobrotin and V. Scheinman, "Design of a computer controlled manipulator for robot
-    research", IJCAI 1973.
-
-    Examples
-    --------
-    >>> stanford_arm().table.sigma
-    array([0, 0, 1, 0, 0, 0])
+    Source: R. P. Paul, "Modelling, trajectory calculation and servoing of a computer controlled
+    arm", Stanford AIM-177, 1972; R. P. Paul, *Robot Manipulators*, MIT Press 1981, tables 6.5, 6.6.
+    J. Dobrotin and V. Scheinman, "Design of a computer controlled manipulator for robot research",
+    IJCAI 1973.
     """
     rows = columns(
         sigma=(0, 0, 1, 0, 0, 0),

@@ -29,19 +29,7 @@ def rx90() -> RobotModel:
     foot). It is physical, but no property of the real robot; identify that, or replace it with
     `RobotModel.with_inertia`.
 
-    Returns
-    -------
-    RobotModel
-        Six revolute joints, spherical wrist.
-
-    References
-    ----------
-    Seed book, Table 1.1 and examples 1.1 to 1.3.
-
-    Examples
-    --------
-    >>> float(rx90().table.d[2]), float(rx90().table.r[3])
-    (0.45, 0.45)
+    Source: Seed book, Table 1.1 and examples 1.1 to 1.3.
     """
     table = DHTable.from_rows(
         columns(
@@ -100,19 +88,7 @@ def tx40() -> RobotModel:
     - Masses, centres of mass and inertia: same URDF, three decimals (that of link 6 is zero
       about its centre of mass). The identified values differ, so they are a start, no reference.
 
-    Returns
-    -------
-    RobotModel
-        Six revolute joints, spherical wrist.
-
-    References
-    ----------
-    T. Nguyen, figaroh-plus (Apache-2.0), examples/staubli_TX40.
-
-    Examples
-    --------
-    >>> tx40().transmission.coupled_motors
-    (6,)
+    Source: T. Nguyen, figaroh-plus (Apache-2.0), examples/staubli_TX40.
     """
     h = pi / 2
     table = DHTable.from_rows(

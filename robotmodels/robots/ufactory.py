@@ -35,19 +35,7 @@ def xarm5() -> RobotModel:
     Khalil-Kleinfinger table, metres, radians, kilograms. Sources: the module's docstring (data
     set xarm5_type5_HT_BR2); speed 180 degrees/s and torques as in the URDF.
 
-    Returns
-    -------
-    RobotModel
-        Five revolute joints.
-
-    References
-    ----------
-    UFACTORY, xarm_ros2, package xarm_description.
-
-    Examples
-    --------
-    >>> xarm5().n
-    5
+    Source: UFACTORY, xarm_ros2, package xarm_description.
     """
     table = DHTable.from_rows(
         columns(
@@ -90,19 +78,7 @@ def xarm6() -> RobotModel:
     Khalil-Kleinfinger table, metres, radians, kilograms. Sources: the module's docstring (data
     set xarm6_type6_HT_BR2); speed 180 degrees/s and torques as in the URDF.
 
-    Returns
-    -------
-    RobotModel
-        Six revolute joints; axis 6 misses axis 5 by 76 mm.
-
-    References
-    ----------
-    UFACTORY, xarm_ros2, package xarm_description.
-
-    Examples
-    --------
-    >>> round(float(xarm6().table.d[2]), 8)
-    0.28948661
+    Source: UFACTORY, xarm_ros2, package xarm_description.
     """
     table = DHTable.from_rows(
         columns(

@@ -29,22 +29,10 @@ def puma560() -> RobotModel:
     whenever a joint moves. Motor values are multiplied by the square of the gear ratio, Coulomb
     friction by its magnitude.
 
-    Returns
-    -------
-    RobotModel
-        Six revolute joints, spherical wrist.
-
-    References
-    ----------
-    P. I. Corke and B. Armstrong-Helouvry, "A search for consensus among model parameters reported
-    for the PUMA 560 robot", IEEE ICRA 1994, pp. 1608-1613.
-    L.-C. T. Wang and C. C. Chen, "A combined optimization method for solving the inverse
-    kinematics problem", IEEE Trans. Robotics and Automation 7(4), 1991.
-
-    Examples
-    --------
-    >>> puma560().inertia.mass
-    array([ 0.  , 17.4 ,  4.8 ,  0.82,  0.34,  0.09])
+    Source: P. I. Corke and B. Armstrong-Helouvry, "A search for consensus among model parameters
+    reported for the PUMA 560 robot", IEEE ICRA 1994, pp. 1608-1613. L.-C. T. Wang and C. C. Chen,
+    "A combined optimization method for solving the inverse kinematics problem", IEEE Trans.
+    Robotics and Automation 7(4), 1991.
     """
     rows = columns(
         d=(26.45 * 0.0254, 0, 0.15005, 0.4318, 0, 0),

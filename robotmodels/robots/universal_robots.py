@@ -73,19 +73,7 @@ def ur5() -> RobotModel:
     example-robot-data 5.0.0, whose 3.15 and 3.2 rad/s stand for 180 degrees/s. No inertia is given
     by the maker for this arm; ``erd:ur5`` has one.
 
-    Returns
-    -------
-    RobotModel
-        Six revolute joints, the second to fourth parallel.
-
-    References
-    ----------
-    Universal Robots, CB3 manual, tables B.2 to B.4.
-
-    Examples
-    --------
-    >>> ur5().tool.shape
-    (4, 4)
+    Source: Universal Robots, CB3 manual, tables B.2 to B.4.
     """
     return _ur(
         "ur5",
@@ -102,19 +90,7 @@ def ur3e() -> RobotModel:
     Metres, radians, kilograms. Table, masses and centres of mass: UR article. Inertia and limits:
     ROS 2 description (limits at commit 8ef39b3).
 
-    Returns
-    -------
-    RobotModel
-        Six revolute joints, the second to fourth parallel.
-
-    References
-    ----------
-    See the module's docstring.
-
-    Examples
-    --------
-    >>> round(float(ur3e().inertia.mass.sum()), 4)
-    8.7985
+    Source: See the module's docstring.
     """
     return _ur(
         "ur3e",
@@ -148,19 +124,7 @@ def ur5e() -> RobotModel:
     Metres, radians, kilograms. Table, masses and centres of mass: UR article. Inertia and limits:
     ROS 2 description (limits at commit 1c32d8f).
 
-    Returns
-    -------
-    RobotModel
-        Six revolute joints, the second to fourth parallel.
-
-    References
-    ----------
-    See the module's docstring.
-
-    Examples
-    --------
-    >>> ur5e().table.joint_names[2]
-    'elbow_joint'
+    Source: See the module's docstring.
     """
     return _ur(
         "ur5e",
@@ -196,19 +160,7 @@ def ur10e() -> RobotModel:
     older description rounds it to 0.117), the last centre of mass that of the ROS 2 description.
     Inertia and limits: ROS 2 description (limits at commit 8ef39b3).
 
-    Returns
-    -------
-    RobotModel
-        Six revolute joints, the second to fourth parallel.
-
-    References
-    ----------
-    See the module's docstring.
-
-    Examples
-    --------
-    >>> float(ur10e().table.r[0])
-    0.1807
+    Source: See the module's docstring.
     """
     return _ur(
         "ur10e",
@@ -244,19 +196,7 @@ def ur16e() -> RobotModel:
     mass, inertia and limits: ROS 2 description (limits at commit 8ecc89e); its centres of mass of
     the two long links are moved to the classical frames with these lengths.
 
-    Returns
-    -------
-    RobotModel
-        Six revolute joints, the second to fourth parallel.
-
-    References
-    ----------
-    See the module's docstring.
-
-    Examples
-    --------
-    >>> float(ur16e().table.d[2])
-    -0.4784
+    Source: See the module's docstring.
     """
     return _ur(
         "ur16e",

@@ -1,4 +1,7 @@
-"""Rotations as unit quaternions, scalar first, and as rotation vectors: axis times angle."""
+"""Rotations as unit quaternions, scalar first, and as rotation vectors: axis times angle.
+
+Source: S. W. Shepperd, "Quaternion from rotation matrix", J. Guidance and Control 1(3), 1978.
+"""
 
 from __future__ import annotations
 
@@ -11,23 +14,7 @@ _ROUNDING = 4 * np.finfo(np.float64).eps
 
 
 def products_of(R: Array) -> Array:
-    """Symmetric matrices ``4 Q Q^T`` of the quaternions of rotations; affine in the entries of R.
-
-    Parameters
-    ----------
-    R : ndarray, shape (..., 3, 3)
-        Rotations.
-
-    Returns
-    -------
-    ndarray, shape (..., 4, 4)
-        The products of the components of Q, times 4.
-
-    Examples
-    --------
-    >>> np.diag(products_of(np.eye(3)))
-    array([4., 0., 0., 0.])
-    """
+    """Symmetric matrices ``4 Q Q^T`` of the quaternions of rotations, affine in R."""
     P = linear_products_of(R)
     for k in range(4):
         P[..., k, k] += 1.0
@@ -35,23 +22,7 @@ def products_of(R: Array) -> Array:
 
 
 def linear_products_of(R: Array) -> Array:
-    """The part of `products_of` that is linear: what becomes of it for rates of rotations.
-
-    Parameters
-    ----------
-    R : ndarray, shape (..., 3, 3)
-        Rotations or their rates.
-
-    Returns
-    -------
-    ndarray, shape (..., 4, 4)
-        Symmetric.
-
-    Examples
-    --------
-    >>> np.diag(linear_products_of(np.eye(3)))
-    array([ 3., -1., -1., -1.])
-    """
+    """The part of `products_of` that is linear: what becomes of it for rates of rotations."""
     P = np.empty((*R.shape[:-2], 4, 4))
     x, y, z = R[..., 0, 0], R[..., 1, 1], R[..., 2, 2]
     P[..., 0, 0] = x + y + z
@@ -68,30 +39,7 @@ def linear_products_of(R: Array) -> Array:
 
 
 def quaternions_of(R: Array) -> Array:
-    """Unit quaternions of rotations, ``Q1 >= 0``.
-
-    The largest component is found first and the others from it, so that none loses digits.
-
-    Parameters
-    ----------
-    R : ndarray, shape (..., 3, 3)
-        Rotations.
-
-    Returns
-    -------
-    ndarray, shape (..., 4)
-        Scalar first. At half a turn, where Q1 is 0 or rounding, the first of the others that is
-        not is positive: the sign does not hang on the last digits of the rotation.
-
-    References
-    ----------
-    S. W. Shepperd, "Quaternion from rotation matrix", J. Guidance and Control 1(3), 1978.
-
-    Examples
-    --------
-    >>> quaternions_of(np.diag([1.0, -1.0, -1.0]))
-    array([0., 1., 0., 0.])
-    """
+    """Unit quaternions of rotations, ``Q1 >= 0``. Shapes: R (..., 3, 3) -> (..., 4)."""
     P = products_of(R)
     largest = np.diagonal(P, axis1=-2, axis2=-1).argmax(axis=-1)
     Q = np.take_along_axis(P, largest[..., None, None], axis=-2)[..., 0, :]
@@ -105,22 +53,7 @@ def quaternions_of(R: Array) -> Array:
 def axes_and_angles(Q: Array) -> tuple[Array, Array]:
     """Unit axes and angles of unit quaternions with ``Q1 >= 0``.
 
-    Parameters
-    ----------
-    Q : ndarray, shape (..., 4)
-        Quaternions.
-
-    Returns
-    -------
-    axis : ndarray, shape (..., 3)
-        Unit vectors; zero where nothing turns.
-    angle : ndarray, shape (...)
-        Rad, in [0, pi].
-
-    Examples
-    --------
-    >>> axes_and_angles(np.array([0.0, 0.0, 0.0, 1.0]))
-    (array([0., 0., 1.]), np.float64(3.141592653589793))
+    Shapes: Q (..., 4) -> axis (..., 3).
     """
     length = np.hypot(np.hypot(Q[..., 1], Q[..., 2]), Q[..., 3])
     angle = 2.0 * np.arctan2(length, Q[..., 0])
@@ -128,22 +61,6 @@ def axes_and_angles(Q: Array) -> tuple[Array, Array]:
 
 
 def rotation_vectors_of(R: Array) -> Array:
-    """Rotation vectors, unit axis times angle, of rotations; exact also near 0 and half a turn.
-
-    Parameters
-    ----------
-    R : ndarray, shape (..., 3, 3)
-        Rotations.
-
-    Returns
-    -------
-    ndarray, shape (..., 3)
-        Rad, length in [0, pi]. At half a turn the first component that is not 0 is positive.
-
-    Examples
-    --------
-    >>> rotation_vectors_of(np.diag([1.0, -1.0, -1.0])).round(4)
-    array([3.1416, 0.    , 0.    ])
-    """
+    """Rotation vectors, unit axis times angle, of rotations; exact also near 0 and half a turn."""
     axis, angle = axes_and_angles(quaternions_of(R))
     return axis * angle[..., None]

@@ -15,37 +15,9 @@ _CLOSE = 1e-7  # of the time between looks: a dip is that flat around its bottom
 def first_below(
     g: Callable[[float], float], ts: Array, values: Array, least: float, zero: float
 ) -> tuple[float, float] | None:
-    """Where a function first passes zero on the way below a level.
+    """First root of a function before it falls below a level.
 
-    The function was looked at at some instants. Where a look is lowest among its neighbours, and so
-    low that it may be below the level beside the look, its minimum is searched: a function that is
-    negative for less than the time between two looks is seen as well.
-
-    Parameters
-    ----------
-    g : callable
-        Function of the time.
-    ts : ndarray, shape (K,)
-        Ascending times of the looks, at least two.
-    values : ndarray, shape (K,)
-        Its values there.
-    least : float
-        The level, negative: what is above is a rounding error of zero.
-    zero : float
-        What is taken for zero, between the level and zero.
-
-    Returns
-    -------
-    (t, low) or None
-        The instant at which it passes zero, and a later one at which it is below the level. None
-        if it never is. A function that begins at zero or below it and falls passes at once.
-
-    Examples
-    --------
-    >>> ts = np.linspace(0.0, 4.0, 5)
-    >>> t, low = first_below(lambda s: (s - 2.4) ** 2 - 0.01, ts, (ts - 2.4) ** 2, -1e-9, 0.0)
-    >>> round(t, 9), t < low < 2.5
-    (2.3, True)
+    Shapes: ts, values (K,) -> (t, low).
     """
     last = len(ts) - 1
     for k in range(last + 1):
@@ -102,27 +74,7 @@ def _passes(g: Callable[[float], float], left: float, right: float, zero: float)
 
 
 def beyond(g: Callable[[float], float], t: float, end: float, zero: float) -> float:
-    """The first representable instant from a root on at which a function is below zero.
-
-    Parameters
-    ----------
-    g : callable
-        Function of the time.
-    t, end : float
-        The root, and a later instant at which the function is negative.
-    zero : float
-        What is taken for zero.
-
-    Returns
-    -------
-    float
-        Past a jump of the function, if it has one at the root.
-
-    Examples
-    --------
-    >>> beyond(lambda t: 1.0 - 2.0 * (t > 0.5), 0.5, 1.0, 0.0) > 0.5
-    True
-    """
+    """First representable time from a root on at which a function is negative."""
     step = float(np.spacing(max(abs(t), abs(end))))
     while t < end and g(t) >= zero:
         t = min(t + step, end)

@@ -29,23 +29,7 @@ _ROUNDING = 1e-12  # of accelerations, against those without friction
 class Mode:
     """Which parts stick and which slip: between two events it does not change.
 
-    Parameters
-    ----------
-    signs : ndarray, shape (k,)
-        Of every part: 1 and -1 slipping, 0 sticking.
-    free : ndarray, shape (n, m)
-        Basis of the joint velocities that the parts that stick leave.
-    stuck : ndarray, shape (s,)
-        Numbers of the parts that stick.
-    loose : ndarray of bool, shape (n,)
-        Joints that no part that sticks holds.
-    independent : bool
-        Whether the parts that stick are independent, so that the torques on each are known.
-
-    Examples
-    --------
-    >>> DryFriction.none(2).slipping(np.zeros(2)).sticks
-    False
+    Shapes: signs (k,), free (n, m), stuck (s,), loose (n,).
     """
 
     signs: Array
@@ -64,25 +48,7 @@ class Mode:
 class DryFriction:
     """The k parts that dry friction can hold.
 
-    Parameters
-    ----------
-    rates : ndarray, shape (k, n)
-        Velocity of every part per joint velocity.
-    lower, upper : ndarray, shape (k,)
-        Breakaway torques, all friction models together.
-    drives : ndarray, shape (k,)
-        What the drives have in them: Fc of joints, Fcm of motors.
-    joint : ndarray of int, shape (k,)
-        Joint of every part; of a motor its own joint.
-    motor : ndarray of bool, shape (k,)
-        Whether the part is the shaft of a coupled motor.
-    extra : ndarray, shape (2, n)
-        Breakaway torques of the friction model beside the drives.
-
-    Examples
-    --------
-    >>> DryFriction.none(2).count
-    0
+    Shapes: rates (k, n); lower, upper, drives, joint, motor (k,); extra (2, n).
     """
 
     rates: Array
@@ -143,27 +109,7 @@ class DryFriction:
         return np.abs(self.rates @ v) <= _AT_REST * (1.0 + np.abs(self.rates) @ np.abs(v))
 
     def decided(self, v: Array, M: Array, rest: Array) -> Mode:
-        """What the parts at rest do.
-
-        Parameters
-        ----------
-        v : ndarray, shape (n,)
-            Joint velocities.
-        M : ndarray, shape (n, n)
-            Mass matrix, positive definite.
-        rest : ndarray, shape (n,)
-            Torques on the joints without the dry friction of the parts at rest.
-
-        Returns
-        -------
-        Mode
-            Of the next moments.
-
-        Raises
-        ------
-        numpy.linalg.LinAlgError
-            The mass matrix is not positive definite.
-        """
+        """Stick or slip mode of the parts at rest. Shapes: v, rest (n,); M (n, n)."""
         signs = self.slipping(v).signs.copy()
         idle = np.flatnonzero(signs == 0.0)
         if idle.size:
@@ -172,22 +118,7 @@ class DryFriction:
         return self.mode(signs)
 
     def loosened(self, mode: Mode, M: Array, rest: Array) -> Mode:
-        """The mode after parts that stick cannot hold the joints any longer.
-
-        Parameters
-        ----------
-        mode : Mode
-            Before.
-        M : ndarray, shape (n, n)
-            Mass matrix, positive definite.
-        rest : ndarray, shape (n,)
-            Torques on the joints without the dry friction of the parts that stick.
-
-        Returns
-        -------
-        Mode
-            With one part that sticks less.
-        """
+        """Mode after a sticking part breaks away. Shapes: M (n, n), rest (n,)."""
         signs = mode.signs.copy()
         if mode.independent:
             torques = self._torques_of(mode, rest - M @ _acceleration(mode, M, rest))
@@ -200,20 +131,7 @@ class DryFriction:
         return self.mode(signs)
 
     def margin(self, mode: Mode, reaction: Array) -> float:
-        """How far the parts that stick are from breaking away, 1 in the middle and 0 there.
-
-        Parameters
-        ----------
-        mode : Mode
-            Which parts stick; at least one.
-        reaction : ndarray, shape (n,)
-            Joint torques that must hold them.
-
-        Returns
-        -------
-        float
-            The least of all parts; negative where they cannot hold.
-        """
+        """Distance of the sticking parts from breakaway: 1 in the middle, 0 at breakaway."""
         middle, half = self._box(mode.stuck)
         if mode.independent:
             torques = self._torques_of(mode, reaction)
@@ -287,29 +205,7 @@ def _acceleration(mode: Mode, M: Array, rest: Array) -> Array:
 
 
 def dry_friction(model: RobotModel, drive: bool, friction: Friction | None) -> DryFriction:
-    """What dry friction can hold: joints, and shafts of coupled motors.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    drive : bool
-        Whether its drives take part.
-    friction : Friction or None
-        A friction model beside them.
-
-    Returns
-    -------
-    DryFriction
-        Only parts whose friction jumps at rest.
-
-    Examples
-    --------
-    >>> from robotmodels.drive import DriveParameters
-    >>> from robotmodels.robots import load
-    >>> dry_friction(load("planar_2r").with_drive(DriveParameters(Fc=[0.0, 1.0])), True, None).joint
-    array([1])
-    """
+    """Parts with dry friction: joints, and shafts of coupled motors."""
     n = model.n
     drives = model.drive_matrices if drive else None
     own = np.zeros(n) if drives is None else drives.coulomb
@@ -336,22 +232,7 @@ def dry_friction(model: RobotModel, drive: bool, friction: Friction | None) -> D
 
 
 def check_dissipates(dry: DryFriction) -> None:
-    """Refuse dry friction that drives what it should hold.
-
-    Parameters
-    ----------
-    dry : DryFriction
-        Of a robot.
-
-    Raises
-    ------
-    InvalidValueError
-        Its torque against motion forward is below that backward: no equilibrium at rest.
-
-    Examples
-    --------
-    >>> check_dissipates(DryFriction.none(2))
-    """
+    """Raise for dry friction that adds energy."""
     wrong = np.flatnonzero(dry.lower > dry.upper)
     if wrong.size:
         k = int(wrong[0])

@@ -24,32 +24,7 @@ _EPSILON = float(np.finfo(np.float64).eps)
 
 
 class Forces:
-    """Accelerations and works of a robot under given laws; scratch for one simulation.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    control, wrench : callable or None
-        Laws of (t, q, v).
-    drive : bool
-        Whether the drives take part.
-    friction : Friction or None
-        A friction model beside them.
-    dry : DryFriction
-        What sticks and slips.
-    width : ndarray, shape (n,), or None
-        Velocities over which dry friction is smoothed, instead of sticking.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.simulation.dry_friction import dry_friction
-    >>> arm = load("planar_2r")
-    >>> forces = Forces(arm, None, None, True, None, dry_friction(arm, True, None), None)
-    >>> forces.derivative(0.0, np.zeros(8)).shape
-    (8,)
-    """
+    """Accelerations and works of a robot under given laws; scratch for one simulation."""
 
     def __init__(
         self,
@@ -90,13 +65,7 @@ class Forces:
         self.set_mode(dry.slipping(np.zeros(n)))  # nothing dry until a mode is decided
 
     def set_mode(self, mode: Mode) -> None:
-        """Which parts slip, in which direction, and which stick.
-
-        Parameters
-        ----------
-        mode : Mode
-            From now on.
-        """
+        """Which parts slip, in which direction, and which stick."""
         self.mode = mode
         self._dry_torque = self.dry.torque(mode.signs)
         stuck = self.dry.joint_signs(mode.signs)
@@ -106,23 +75,7 @@ class Forces:
         self._forth, self._back = stuck > 0.0, stuck < 0.0
 
     def derivative(self, t: float, y: Array) -> Array:
-        """Time derivative of positions, velocities, the three works, and of what is held.
-
-        The last one is the torque on the parts that stick, against their breakaway torques: where
-        all joints stand, nothing else would keep the steps short enough to see the torques change.
-
-        Parameters
-        ----------
-        t : float
-            Time, s.
-        y : ndarray, shape (2 n + 4,)
-            q, v, work of the control, of friction and of the tool, what was held.
-
-        Returns
-        -------
-        ndarray, shape (2 n + 4,)
-            NaN where there is no acceleration: an integrator then takes a shorter step.
-        """
+        """Time derivative of positions, velocities, the three works, and of what is held."""
         n = self.n
         y = np.ascontiguousarray(y)
         out = np.empty(2 * n + 4)
@@ -141,24 +94,7 @@ class Forces:
         return out
 
     def at(self, t: float, q: Array, v: Array) -> tuple[Array, Array, Array, Array, Array]:
-        """Everything at one instant.
-
-        Parameters
-        ----------
-        t : float
-            Time, s.
-        q, v : ndarray, shape (n,)
-            Positions and velocities, contiguous.
-
-        Returns
-        -------
-        a : ndarray, shape (n,)
-            Accelerations; NaN where the mass matrix is not positive definite.
-        tau, friction, tool : ndarray, shape (n,)
-            Torques of the control, of friction, and for the wrench.
-        reaction : ndarray, shape (n,)
-            What must hold the parts that stick; zero elsewhere.
-        """
+        """Accelerations and torques at one time."""
         self.evaluations += 1
         n, mode = self.n, self.mode
         load, tau, friction, tool = self.load(t, q, v)

@@ -22,20 +22,7 @@ _NO_KNOTS = np.empty(0)
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Values at times, linear between them.
-
-    Parameters
-    ----------
-    t : ndarray, shape (N,)
-        Ascending times, s.
-    values : ndarray, shape (N, k)
-        Values at them.
-
-    Examples
-    --------
-    >>> Table(np.array([0.0, 2.0]), np.array([[0.0], [4.0]]))(0.5, np.empty(0), np.empty(0))
-    array([1.])
-    """
+    """Values at times, linear between them. Shapes: t (N,), values (N, k)."""
 
     t: Array
     values: Array
@@ -50,18 +37,7 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Constant:
-    """The same values always.
-
-    Parameters
-    ----------
-    values : ndarray, shape (k,)
-        The values.
-
-    Examples
-    --------
-    >>> Constant(np.array([1.0]))(0.5, np.empty(0), np.empty(0))
-    array([1.])
-    """
+    """The same values always. Shapes: values (k,)."""
 
     values: Array
 
@@ -72,22 +48,7 @@ class Constant:
 
 @dataclass(frozen=True, slots=True)
 class Checked:
-    """A law of the caller's, whose answers are checked: NaN would end as steps too small.
-
-    Parameters
-    ----------
-    law : callable
-        Of (t, q, v).
-    size : int
-        Length of its answers.
-    name : str
-        Of the argument, for messages.
-
-    Examples
-    --------
-    >>> Checked(lambda t, q, v: [2.0 * t], 1, "control")(0.5, np.zeros(1), np.zeros(1))
-    array([1.])
-    """
+    """Law of the caller with checked values."""
 
     law: Law
     size: int
@@ -119,33 +80,7 @@ class Checked:
 def as_law(law: Law | ArrayLike | None, size: int, t: Array | None, name: str) -> Any:
     """A law from what the caller gave, and the times at which it has kinks.
 
-    Parameters
-    ----------
-    law : callable, array_like of shape (size,) or (N, size), or None
-        As given by the caller.
-    size : int
-        Length of its values.
-    t : ndarray, shape (N,), or None
-        Times of the rows of an array; None if the caller gave a duration only.
-    name : str
-        For messages.
-
-    Returns
-    -------
-    law : Checked, Table, Constant or None
-        To be called with (t, q, v).
-    knots : ndarray
-        Times of its kinks.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        An array of another shape, with NaN or infinity; a function of other arguments.
-
-    Examples
-    --------
-    >>> as_law([1.0, 2.0], 2, None, "control")[0].values
-    array([1., 2.])
+    Shapes: law (size,) or (N, size), t (N,).
     """
     if law is None:
         return None, _NO_KNOTS
@@ -191,30 +126,7 @@ def _check_signature(law: Any, size: int, name: str) -> None:
 
 
 def as_times(t: ArrayLike) -> tuple[float, float, Array | None]:
-    """Start, end, and the times of the samples if the caller gave them.
-
-    Parameters
-    ----------
-    t : array_like
-        A duration, or ascending times (N,).
-
-    Returns
-    -------
-    start, end : float
-        Seconds.
-    times : ndarray, shape (N,), or None
-        None for a duration.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Neither; a negative duration, times that do not ascend, NaN or infinity.
-
-    Examples
-    --------
-    >>> as_times(2.0)
-    (0.0, 2.0, None)
-    """
+    """Start, end, and the times of the samples if the caller gave them. Shapes: -> times (N,)."""
     times = as_floats(t, "t")
     if times.ndim == 0:
         if times < 0.0:
@@ -234,32 +146,7 @@ def as_times(t: ArrayLike) -> tuple[float, float, Array | None]:
 
 
 def as_state(values: ArrayLike, n: int, name: str) -> Array:
-    """One state of the joints.
-
-    Parameters
-    ----------
-    values : array_like, shape (n,)
-        As given by the caller.
-    n : int
-        Number of joints.
-    name : str
-        For messages.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        A copy.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Another shape, also a batch; NaN or infinity.
-
-    Examples
-    --------
-    >>> as_state([1, 2], 2, "q0")
-    array([1., 2.])
-    """
+    """One state of the joints."""
     array = as_vector(values, n, name)
     if array.ndim != 1:
         raise ShapeError(
@@ -270,32 +157,7 @@ def as_state(values: ArrayLike, n: int, name: str) -> Array:
 
 
 def as_positive(value: Any, name: str, infinite: bool = False) -> float:
-    """One positive number.
-
-    Parameters
-    ----------
-    value : float
-        As given by the caller.
-    name : str
-        For messages.
-    infinite : bool
-        Whether infinity is allowed.
-
-    Returns
-    -------
-    float
-        The number.
-
-    Raises
-    ------
-    InvalidValueError
-        Another value.
-
-    Examples
-    --------
-    >>> as_positive(1, "rtol")
-    1.0
-    """
+    """One positive number."""
     try:
         number = float(value)
     except (TypeError, ValueError):

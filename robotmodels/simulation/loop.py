@@ -75,25 +75,7 @@ def follow(
 ) -> Path:
     """Integrate from cut to cut and from event to event.
 
-    Parameters
-    ----------
-    forces : Forces
-        The right-hand side.
-    q, v : ndarray, shape (n,)
-        State at the first cut.
-    cuts : sequence of (float, bool)
-        Start, times at which laws have kinks, end; and whether they jump there.
-    times : ndarray or None
-        Of the samples; None takes those of the steps.
-    limits : (lower, upper) or None
-        Where the motion stops.
-    options : Options
-        How.
-
-    Returns
-    -------
-    Path
-        Samples to the end, or to where it ended before.
+    Shapes: q, v (n,); limits (lower, upper).
     """
     path = Path()
     y = np.concatenate([q, v, np.zeros(4)])

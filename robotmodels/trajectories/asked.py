@@ -23,25 +23,7 @@ _EXTREME = 1e50
 def joint_vectors(**given: Any) -> tuple[dict[str, Array], tuple[int, ...], bool]:
     """Check positions and rates given for the same joints and give them one shape.
 
-    Parameters
-    ----------
-    **given : array_like, shapes () or (..., n)
-        Named as in error messages. Numbers stand for all joints; if all are numbers, there is one
-        joint and the trajectory is scalar.
-
-    Returns
-    -------
-    arrays : dict of ndarray, shapes (R, n)
-        Broadcast, one row per motion.
-    batch : tuple of int
-        The leading axes.
-    scalar : bool
-        Whether all were numbers.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Vectors that do not fit each other, or of no joints.
+    Shapes: **given () or (..., n) -> arrays (R, n).
     """
     arrays = {name: as_floats(value, name) for name, value in given.items()}
     scalar = all(array.ndim == 0 for array in arrays.values())
@@ -57,20 +39,7 @@ def joint_vectors(**given: Any) -> tuple[dict[str, Array], tuple[int, ...], bool
 
 
 def refuse_jointless(n: int, name: str) -> None:
-    """Refuse motions of no joints, which have no duration of their own.
-
-    Parameters
-    ----------
-    n : int
-        Number of joints.
-    name : str
-        What was given, as in error messages.
-
-    Raises
-    ------
-    InvalidValueError
-        There are none.
-    """
+    """Refuse motions of no joints, which have no duration of their own."""
     if n == 0:
         raise InvalidValueError(
             f"{name}: expected positions of at least one joint, got none; a model without joints "
@@ -81,24 +50,7 @@ def refuse_jointless(n: int, name: str) -> None:
 def limits_along(limits: MotionLimits, direction: Array, names: tuple[str, ...] = ()) -> LineLimits:
     """Limits of the coordinate that several joints share.
 
-    Parameters
-    ----------
-    limits : MotionLimits
-        Of n joints, arrays of shape (n,).
-    direction : ndarray, shape (R, 1, n) or (R, n, 1)
-        Motion of the joints per unit of the coordinate: all joints in one row, or one each.
-    names : tuple of str
-        Of what moves, for messages; default the joints by their numbers.
-
-    Returns
-    -------
-    LineLimits
-        Shape (R,) or (R n,). No joint that stays limits anything.
-
-    Raises
-    ------
-    InvalidValueError
-        A limit of zero for a joint that has to move.
+    Shapes: direction (R, 1, n) or (R, n, 1).
     """
     own = direction.shape[-1] == 1 and direction.shape[-2] == limits.velocity.size
     u = direction[..., 0] if own else direction[..., 0, :]
@@ -135,25 +87,7 @@ def limits_along(limits: MotionLimits, direction: Array, names: tuple[str, ...] 
 
 
 def given_durations(duration: ArrayLike | None, batch: tuple[int, ...]) -> Array | None:
-    """Checked durations, shape (R,), one per motion.
-
-    Parameters
-    ----------
-    duration : array_like, shape () or (...), or None
-        Seconds.
-    batch : tuple of int
-        Leading axes of the motions.
-
-    Returns
-    -------
-    ndarray or None
-        As given.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Another shape, NaN, a negative time.
-    """
+    """Checked durations, shape (R,), one per motion."""
     if duration is None:
         return None
     T = as_floats(duration, "duration")
@@ -168,27 +102,7 @@ def given_durations(duration: ArrayLike | None, batch: tuple[int, ...]) -> Array
 
 
 def checked_limits(limits: MotionLimits | None, n: int, *postures: Array) -> MotionLimits | None:
-    """Limits of n joints, within which the postures are.
-
-    Parameters
-    ----------
-    limits : MotionLimits or None
-        As given.
-    n : int
-        Number of joints.
-    *postures : ndarray, shapes (R, n)
-        Positions that the motion takes, rad or m.
-
-    Returns
-    -------
-    MotionLimits or None
-        With arrays of shape (n,).
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Limits of other joints, no limits, a posture outside.
-    """
+    """Limits of n joints, within which the postures are. Shapes: *postures (R, n)."""
     if limits is None:
         return None
     if not isinstance(limits, MotionLimits):
@@ -210,22 +124,7 @@ def checked_limits(limits: MotionLimits | None, n: int, *postures: Array) -> Mot
 
 
 def refuse_short(T: Array | None, least: Array, length: Array) -> None:
-    """Refuse durations below the least feasible ones.
-
-    Parameters
-    ----------
-    T : ndarray, shape (R,), or None
-        Durations asked for, s.
-    least : ndarray, shape (R,)
-        Least durations, s.
-    length : ndarray, shape (R, ...)
-        Lengths of the motions: none may take no time.
-
-    Raises
-    ------
-    InvalidValueError
-        With the least feasible duration.
-    """
+    """Refuse durations below the least feasible ones. Shapes: T, least (R,); length (R, ...)."""
     if T is None:
         return
     short = least * (1.0 - ROUNDING) > T
@@ -240,23 +139,9 @@ def refuse_short(T: Array | None, least: Array, length: Array) -> None:
 
 
 def refuse_rates(length: Array, T: Array) -> None:
-    """Refuse durations so short that a rate of the motion is no float.
+    """Refuse durations so short that a rate of the motion overflows.
 
-    Parameters
-    ----------
-    length : ndarray, shape (R, k)
-        Lengths of the motions.
-    T : ndarray, shape (R,)
-        Durations, s.
-
-    Raises
-    ------
-    InvalidValueError
-        With the duration.
-
-    Examples
-    --------
-    >>> refuse_rates(np.ones((1, 2)), np.array([1e-9]))
+    Shapes: length (R, k), T (R,).
     """
     size = 1e3 * np.minimum(length.max(axis=-1, initial=0.0), 1e300)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -271,24 +156,7 @@ def refuse_rates(length: Array, T: Array) -> None:
 
 
 def refuse_extremes(states: dict[str, Array], limits: MotionLimits) -> None:
-    """Refuse states at the ends and limits whose powers, which tell durations, are no floats.
-
-    Parameters
-    ----------
-    states : dict of ndarray, shapes (R, n)
-        Positions, velocities and accelerations at the ends.
-    limits : MotionLimits
-        Of n joints.
-
-    Raises
-    ------
-    InvalidValueError
-        A number beyond 1e50, or a limit, velocity or acceleration below 1e-50 that is not 0.
-
-    Examples
-    --------
-    >>> refuse_extremes({"q0": np.zeros((1, 2))}, MotionLimits(1.0).for_joints(2))
-    """
+    """Refuse end states and limits whose powers overflow or underflow. Shapes: states (R, n)."""
     bounds = {
         f"limits: {name}": np.abs(getattr(limits, name))
         for name in ("velocity", "velocity_lower", "acceleration", "acceleration_lower", "jerk",

@@ -131,25 +131,7 @@ def blended_lines(
 
 
 def schedule(T: Array, blends: Callable[[Array], Array]) -> tuple[Array, Array]:
-    """Times of lines that leave room for their blends.
-
-    Parameters
-    ----------
-    T : ndarray, shape (m - 1,)
-        Least times of the lines, s.
-    blends : callable
-        Least times (m,) of the blends for given times of the lines; infinite where the lines are
-        too fast for any blend.
-
-    Returns
-    -------
-    T : ndarray, shape (m - 1,)
-        Times of the lines, increased where their halves of two blends did not fit. A line of no
-        length, which has no time of its own, is given that of the two halves: the motion stops
-        there.
-    tb : ndarray, shape (m,)
-        Times of the blends.
-    """
+    """Durations of lines that leave time for their blends."""
     still = T == 0.0
     for _ in range(500):
         tb = blends(T)

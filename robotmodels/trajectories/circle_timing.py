@@ -23,17 +23,7 @@ _MARGIN = 1.0 + 1e-13
 
 
 class CircleLimits(NamedTuple):
-    """What a motion on a circle has to keep.
-
-    Attributes
-    ----------
-    length, radius : float
-        Of the arc, m.
-    turn : float
-        Angle by which the tool turns on the way, rad, not negative.
-    velocity, acceleration, jerk : tuple of float
-        Of translation and rotation; infinity is none.
-    """
+    """Limits of a motion on a circle."""
 
     length: float
     radius: float
@@ -44,20 +34,7 @@ class CircleLimits(NamedTuple):
 
 
 def circle_law(law: TimeLaw, limits: CircleLimits) -> Pieces:
-    """The quickest motion of a law along the whole arc.
-
-    Parameters
-    ----------
-    law : TimeLaw
-        The shape.
-    limits : CircleLimits
-        Those that the law needs are finite, and none is zero.
-
-    Returns
-    -------
-    Pieces
-        Of s from 0 to 1, one row.
-    """
+    """The quickest motion of a law along the whole arc."""
     low, high, precise = np.zeros(2), np.zeros(2), 1e-15
     if law in (TimeLaw.TRAPEZOIDAL, TimeLaw.SMOOTHED_TRAPEZOIDAL):
         low, high = np.array([1e-6, 0.0]), np.array([0.5, 0.0])

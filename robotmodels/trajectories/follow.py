@@ -22,23 +22,7 @@ _NEAR = 0.05
 
 
 class Followed(NamedTuple):
-    """One posture of every pose.
-
-    Attributes
-    ----------
-    q : ndarray, shape (N, n)
-        Postures, rad or m; NaN where there is none.
-    reached : ndarray of bool, shape (N,)
-        Where there is one.
-    status : ndarray of int8, shape (N,)
-        Codes of `IGMStatus`.
-    branch : ndarray of str, shape (N,)
-        Labels.
-    missing : ndarray, shape (N, 6)
-        What the closest posture misses of a pose without one, m and rad; NaN where nobody knows.
-    reason : callable
-        What became of a pose, by its number, in a sentence.
-    """
+    """One posture of every pose. Shapes: q (N, n); reached, status, branch (N,); missing (N, 6)."""
 
     q: Array
     reached: NDArray[np.bool_]
@@ -55,26 +39,9 @@ def follow(
     start: Array | None,
     solve: Callable[[int, Array], IGMSolutions],
 ) -> Followed:
-    """Take the posture of every pose that goes on from the one before.
+    """Choose the posture of every pose that continues the one before.
 
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-    T : ndarray, shape (N, 4, 4)
-        Poses.
-    found : IGMSolutions
-        All postures of all poses.
-    start : ndarray, shape (n,), or None
-        Where the robot comes from.
-    solve : callable
-        Postures of one pose, by its number, with a reference: for poses that leave joints free,
-        which go on from the posture before.
-
-    Returns
-    -------
-    Followed
-        One posture of each pose that has any.
+    Shapes: T (N, 4, 4), start (n,).
     """
     N, n = len(T), model.n
     names = np.array((*found.labels, ""))
@@ -157,27 +124,7 @@ def follow_singly(
     solve: Callable[[int, Array | None], IGMSolutions],
     go_on: Callable[[int, Array], IGMSolutions],
 ) -> Followed:
-    """Solve pose by pose, each from the posture before: for arms with a choice of postures.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-    N : int
-        Number of poses.
-    start : ndarray, shape (n,), or None
-        Where the robot comes from.
-    solve : callable
-        Postures of one pose, by its number, with a reference or None.
-    go_on : callable
-        One posture of a pose, if it is found by steps from the posture before: quicker than all
-        postures where an arm has no closed form that keeps an arm angle.
-
-    Returns
-    -------
-    Followed
-        One posture of each pose that has any.
-    """
+    """Solve pose by pose, each from the posture before: for arms with a choice of postures."""
     revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
     q, reached = np.full((N, model.n), np.nan), np.zeros(N, np.bool_)
     status, labels, reasons = np.zeros(N, np.int8), [""] * N, [""] * N
@@ -218,24 +165,9 @@ def _missing(found: IGMSolutions) -> Array:
 def continuous(
     model: RobotModel, q: Array, reached: NDArray[np.bool_], start: Array | None
 ) -> Array:
-    """The same postures, with whole turns such that the angles go on without a break.
+    """The same postures with whole turns added for continuous angles.
 
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-    q : ndarray, shape (N, n)
-        Postures, rad or m.
-    reached : ndarray of bool, shape (N,)
-        Which rows hold one.
-    start : ndarray, shape (n,), or None
-        The first posture is brought near to it; without it the path is brought inside the joint
-        limits where whole turns can do that.
-
-    Returns
-    -------
-    ndarray, shape (N, n)
-        Angles may leave (-pi, pi].
+    Shapes: q (N, n), reached (N,), start (n,) -> (N, n).
     """
     turn = 2.0 * np.pi
     revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE

@@ -3,6 +3,8 @@
 Seed book sections 4.2.1 (fifth-order polynomial), 4.2.2 (trapezoidal velocity) and 4.2.3 (smoothed
 trapezoidal velocity). A law moves ``s`` from 0 to a distance; whatever follows it, joints on a
 straight line or a pose on a path, keeps its shape. Everything here works on rows, one per motion.
+
+Source: Khalil and Dombre, Modeling, identification and control of robots, section 13.3.
 """
 
 from __future__ import annotations
@@ -47,19 +49,7 @@ class TimeLaw(Enum):
 
 
 class LineLimits(NamedTuple):
-    """Limits along the coordinate of the law, each shape (R,); infinity is none.
-
-    Attributes
-    ----------
-    velocity : ndarray
-        Greatest ``s'``.
-    acceleration, deceleration : ndarray
-        Greatest ``s''`` and ``-s''``.
-    jerk, jerk_down : ndarray
-        Greatest ``s'''`` and ``-s'''``.
-    back : ndarray
-        Greatest ``-s'``, which motions from rest to rest never need.
-    """
+    """Limits along the coordinate of the law, each shape (R,); infinity is none."""
 
     velocity: Array
     acceleration: Array
@@ -72,12 +62,7 @@ class LineLimits(NamedTuple):
 class Pieces(NamedTuple):
     """A law as polynomials of normalised time, as in `PiecewisePolynomial`.
 
-    Attributes
-    ----------
-    durations : ndarray, shape (R, K)
-        Of the pieces, s; 0 for those that are left out.
-    coefficients : ndarray, shape (R, K, d + 1)
-        Of ``s``, lowest power first.
+    Shapes: durations (R, K), coefficients (R, K, d + 1).
     """
 
     durations: Array
@@ -85,39 +70,7 @@ class Pieces(NamedTuple):
 
 
 def law_of_limits(law: TimeLaw, distance: Array, limits: LineLimits) -> Pieces:
-    """The quickest motion of a law that keeps limits.
-
-    Parameters
-    ----------
-    law : TimeLaw
-        The shape.
-    distance : ndarray, shape (R,)
-        Lengths of the motions, not negative. No distance takes no time.
-    limits : LineLimits
-        Positive; those a law cannot keep inside the motion must be infinite.
-
-    Returns
-    -------
-    Pieces
-        Of each row.
-
-    Raises
-    ------
-    InvalidValueError
-        A limit that the law needs is missing, or one is given that no motion of it can keep;
-        a duration that no float holds.
-
-    References
-    ----------
-    Khalil and Dombre, Modeling, identification and control of robots, section 13.3.
-
-    Examples
-    --------
-    >>> one, none = np.ones(1), np.full(1, np.inf)
-    >>> limits = LineLimits(one, one, one, none, none, one)
-    >>> law_of_limits(TimeLaw.TRAPEZOIDAL, 2 * one, limits).durations
-    array([[1., 1., 1.]])
-    """
+    """The quickest motion of a law that keeps limits. Shapes: distance (R,)."""
     moves = distance > 0.0
     V, A, B, J, K, _ = (np.where(moves, limit, np.inf) for limit in limits)
     L = np.where(moves, distance, 0.0)
@@ -178,32 +131,7 @@ def _in_units(limit: Array, exponent: Any) -> Array:
 
 
 def law_of_duration(law: TimeLaw, distance: Array, duration: Array) -> Pieces:
-    """A law of a given duration, in its usual shape: ramps of one third, equal on both sides.
-
-    Parameters
-    ----------
-    law : TimeLaw
-        The shape.
-    distance : ndarray, shape (R,)
-        Lengths of the motions, not negative.
-    duration : ndarray, shape (R,)
-        Seconds.
-
-    Returns
-    -------
-    Pieces
-        Of each row.
-
-    Raises
-    ------
-    InvalidValueError
-        `TimeLaw.JERK_LIMITED`, whose shape only its limits tell.
-
-    Examples
-    --------
-    >>> law_of_duration(TimeLaw.CUBIC, np.ones(1), np.ones(1)).coefficients
-    array([[[ 0.,  0.,  3., -2.]]])
-    """
+    """A law of a given duration, in its usual shape: ramps of one third, equal on both sides."""
     L, T = distance, duration
     if law is TimeLaw.JERK_LIMITED:
         raise InvalidValueError("JERK_LIMITED has no shape without limits; give limits.")
@@ -255,22 +183,7 @@ def _quickest(law: TimeLaw, L: Array, V: Array, A: Array, B: Array, J: Array, K:
 
 
 def ramped(law: TimeLaw, L: Array, VT: Array, T: Array, up: Array, down: Array) -> Pieces:
-    """Trapezoidal laws whose ramps take given parts of the duration.
-
-    Parameters
-    ----------
-    law : TimeLaw
-        Whether the ramps are smooth.
-    L, VT, T : ndarray, shape (R,)
-        Distances, cruise velocities times durations, durations.
-    up, down : ndarray, shape (R,)
-        Parts of the duration that the ramps take.
-
-    Returns
-    -------
-    Pieces
-        Of each row.
-    """
+    """Trapezoidal laws whose ramps take given parts of the duration."""
     pieces = _three_phases(law, L, VT, up, 1.0 - up - down, down)
     return Pieces(pieces.durations * T[:, None], pieces.coefficients)
 

@@ -82,30 +82,7 @@ def path_events(
     singular_below: float,
     start: Array | None = None,
 ) -> Iterator[PathEvent]:
-    """Everything that happens on the way, in the order of the path.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-    times : ndarray, shape (N,)
-        Times, s, or NaN.
-    q, v : ndarray, shape (N, n)
-        Postures and velocities, rad or m, and per s; NaN where there is none.
-    rows : Followed
-        Which postures were taken.
-    task : Task
-        The Jacobians on the way.
-    singular_below : float
-        Conditioning that counts as singular.
-    start : ndarray, shape (n,), or None
-        Where the robot comes from.
-
-    Yields
-    ------
-    PathEvent
-        Sorted by their first pose.
-    """
+    """Events along a path, in order. Shapes: times (N,); q, v (N, n); start (n,)."""
     reached = rows.reached
     events: list[PathEvent] = []
 

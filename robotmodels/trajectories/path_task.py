@@ -14,33 +14,9 @@ from ..se3.orientation import rotation_vectors_of
 
 
 class Task:
-    """The Jacobians of what is asked of the tool, along the path.
+    """Jacobians of the task along the path.
 
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-    T : ndarray, shape (N, 4, 4)
-        Poses, m.
-    q : ndarray, shape (N, n)
-        Postures; NaN where there is none.
-    reached : ndarray of bool, shape (N,)
-        Which rows hold a posture.
-    mask : array_like, shape (6,), or None
-        Components that are asked for.
-    mask_axes : str
-        ``"world"`` or ``"tool"``.
-    columns : ndarray of int, shape (k,)
-        Columns of q of the joints that move the tool; the others stand still.
-
-    Attributes
-    ----------
-    conditioning : ndarray, shape (N,)
-        Inverse of the condition number in the Frobenius norm, 1 at best; NaN without a posture.
-    sign : ndarray, shape (N,)
-        Of the determinant where the Jacobian is square, else 0.
-    square : bool
-        Whether the posture follows from the task.
+    Shapes: T (N, 4, 4); q (N, n); reached, conditioning, sign (N,); mask (6,); columns (k,).
     """
 
     __slots__ = (

@@ -32,27 +32,7 @@ class PosePath(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FixedAxisPath:
-    """Line or circle, with a rotation about a fixed axis, both in proportion to s from 0 to 1.
-
-    Parameters
-    ----------
-    start : ndarray, shape (4, 4)
-        First pose, m.
-    last : ndarray, shape (4, 4)
-        Last pose, which is given back as it is.
-    shift : ndarray, shape (3,)
-        Along a line from the first position to the last, m; zero on a circle.
-    centre : ndarray, shape (3,)
-        Of the circle, m.
-    normal : ndarray, shape (3,)
-        Unit axis of the circle, about which the position turns.
-    sweep : float
-        Angle of the arc, rad; 0 on a line.
-    axis : ndarray, shape (3,)
-        Unit axis of the rotation of the tool, in the world.
-    turn : float
-        Angle of that rotation, rad.
-    """
+    """Line or circle, with a rotation about a fixed axis, both in proportion to s from 0 to 1."""
 
     start: Array
     last: Array
@@ -82,18 +62,7 @@ class FixedAxisPath:
         return float(np.linalg.norm(arm - self.normal * (self.normal @ arm)))
 
     def poses(self, s: Array) -> Array:
-        """World poses.
-
-        Parameters
-        ----------
-        s : ndarray, shape (N,)
-            Parameters.
-
-        Returns
-        -------
-        ndarray, shape (N, 4, 4)
-            The first and the last are those given.
-        """
+        """World poses. Shapes: s (N,) -> (N, 4, 4)."""
         T = np.zeros((s.size, 4, 4))
         T[:, :3, :3] = rotation_about(self.axis, self.turn * s) @ self.start[:3, :3]
         T[:, :3, 3] = self.start[:3, 3] + s[:, None] * self.shift
@@ -108,18 +77,7 @@ class FixedAxisPath:
         return T
 
     def rates(self, s: Array) -> tuple[Array, Array]:
-        """Twist and its derivative with respect to s.
-
-        Parameters
-        ----------
-        s : ndarray, shape (N,)
-            Parameters.
-
-        Returns
-        -------
-        twist, change : ndarray, shapes (N, 6)
-            Rows ``[v; w]``, world axes, at the tool's origin.
-        """
+        """Twist and its derivative with respect to s. Shapes: s (N,) -> twist, change (N, 6)."""
         twist, change = np.zeros((s.size, 6)), np.zeros((s.size, 6))
         twist[:, :3], twist[:, 3:] = self.shift, self.turn * self.axis
         if self.sweep:
@@ -133,22 +91,7 @@ class FixedAxisPath:
 class BlendedPoses:
     """Lines between poses, each with a rotation about a fixed axis, and blends at the poses.
 
-    In a blend the motions of the two lines overlap: the one before fades out while the one after
-    fades in, in position and orientation alike, ``R = exp(w2 f2) exp(w1 f1) R_k``. The parameter
-    is time.
-
-    Parameters
-    ----------
-    poses_at : ndarray, shape (m, 4, 4)
-        Corners, m.
-    twists : ndarray, shape (m - 1, 6)
-        Of the lines, world axes, at the tool's origin, m/s and rad/s.
-    times : ndarray, shape (m,)
-        Of the corners, s; the motion starts half a blend before the first.
-    blends : ndarray, shape (m,)
-        Durations of the blends, s.
-    smooth : bool
-        Whether the velocity fades by the smooth step instead of evenly.
+    Shapes: poses_at (m, 4, 4); twists (m - 1, 6); times, blends (m,).
     """
 
     poses_at: Array
@@ -163,18 +106,7 @@ class BlendedPoses:
         return float(self.times[-1] + 0.5 * self.blends[-1])
 
     def poses(self, s: Array) -> Array:
-        """World poses.
-
-        Parameters
-        ----------
-        s : ndarray, shape (N,)
-            Times, s.
-
-        Returns
-        -------
-        ndarray, shape (N, 4, 4)
-            The first and the last corner are met, those between are left aside by the blends.
-        """
+        """World poses. Shapes: s (N,) -> (N, 4, 4)."""
         corner, before, after, f1, f2 = self._fades(s)
         w1, a1 = axis_and_angle(before[:, 3:])
         w2, a2 = axis_and_angle(after[:, 3:])
@@ -188,18 +120,7 @@ class BlendedPoses:
         return T
 
     def rates(self, s: Array) -> tuple[Array, Array]:
-        """Twist and its derivative with respect to s.
-
-        Parameters
-        ----------
-        s : ndarray, shape (N,)
-            Times, s.
-
-        Returns
-        -------
-        twist, change : ndarray, shapes (N, 6)
-            Rows ``[v; w]``, world axes, at the tool's origin.
-        """
+        """Twist and its derivative with respect to s. Shapes: s (N,) -> twist, change (N, 6)."""
         _, before, after, f1, f2 = self._fades(s)
         w2, a2 = axis_and_angle(after[:, 3:])
         carried = before.copy()
@@ -241,47 +162,14 @@ class BlendedPoses:
 
 
 def line(T0: Array, T1: Array) -> FixedAxisPath:
-    """Straight line between two checked poses, with the shorter rotation about a fixed axis.
-
-    Parameters
-    ----------
-    T0, T1 : ndarray, shape (4, 4)
-        First and last pose, m.
-
-    Returns
-    -------
-    FixedAxisPath
-        Its parameter runs from 0 to 1.
-
-    Examples
-    --------
-    >>> line(np.eye(4), np.diag([1.0, -1.0, -1.0, 1.0])).turn
-    3.14159...
-    """
+    """Straight line between two checked poses, with the shorter rotation about a fixed axis."""
     axis, angle = _turn(T0, T1)
     zero, z = np.zeros(3), np.array([0.0, 0.0, 1.0])
     return FixedAxisPath(T0, T1, T1[:3, 3] - T0[:3, 3], zero, z, 0.0, axis, angle)
 
 
 def arc(T0: Array, T1: Array, centre: Array, normal: Array, sweep: float) -> FixedAxisPath:
-    """Circular arc between two checked poses, with the shorter rotation about a fixed axis.
-
-    Parameters
-    ----------
-    T0, T1 : ndarray, shape (4, 4)
-        First and last pose, m; their positions are those of the arc's ends.
-    centre : ndarray, shape (3,)
-        Of the circle, m.
-    normal : ndarray, shape (3,)
-        Its unit axis.
-    sweep : float
-        Angle about it, rad.
-
-    Returns
-    -------
-    FixedAxisPath
-        Its parameter runs from 0 to 1.
-    """
+    """Circular arc between two checked poses, with the shorter rotation about a fixed axis."""
     axis, angle = _turn(T0, T1)
     return FixedAxisPath(T0, T1, np.zeros(3), centre, normal, sweep, axis, angle)
 

@@ -18,30 +18,7 @@ _ROUNDING = 1e-9  # jumps smaller than this beside the largest value are put dow
 class PiecewisePolynomial:
     """Polynomials of the normalised time of each piece.
 
-    On the piece from ``breaks[k]`` to ``breaks[k + 1]``, with ``x`` from 0 to 1 over the piece,
-    ``q = sum_i coefficients[k, i] x^i``. Normalised time keeps the ends as exact as the middle.
-    Pieces may have no length.
-
-    Parameters
-    ----------
-    breaks : array_like, shape (..., c, K + 1)
-        Times, s, ascending from 0; c is 1 (all joints change pieces together) or n.
-    coefficients : array_like, shape (..., K, d + 1, n)
-        rad or m, lowest power first.
-    lengths : array_like, shape (..., c, K), optional
-        Durations of the pieces, s, where they are known to more digits than the difference of
-        their breaks has.
-
-    Raises
-    ------
-    ShapeError
-        Fields that do not fit each other.
-
-    Examples
-    --------
-    >>> ramp = PiecewisePolynomial([[0.0, 2.0]], [[[1.0], [4.0]]])
-    >>> ramp.derivatives(np.array([0.0, 1.0]), (0, 1))[1].ravel()
-    array([2., 2.])
+    Shapes: breaks (..., c, K + 1), coefficients (..., K, d + 1, n), lengths (..., c, K).
     """
 
     breaks: Array
@@ -80,20 +57,7 @@ class PiecewisePolynomial:
         return self.breaks[..., -1].max(axis=-1)
 
     def derivatives(self, t: Array, orders: tuple[int, ...]) -> list[Array]:
-        """Derivatives at times inside the motion.
-
-        Parameters
-        ----------
-        t : ndarray, shape (..., N)
-            Times of each motion, s; the leading axes are those of the motion.
-        orders : tuple of int
-            0 position, 1 velocity, and so on.
-
-        Returns
-        -------
-        list of ndarray, shapes (..., N, n)
-            One for each order. At a break the value of the piece that begins there.
-        """
+        """Derivatives at times inside the motion. Shapes: t (..., N) -> (..., N, n)."""
         from ..kernels.piecewise_polynomials import piecewise_derivatives
 
         *_, K, powers, n = self.coefficients.shape
@@ -110,18 +74,7 @@ class PiecewisePolynomial:
         return [values.reshape(*t.shape, n) for values in out]
 
     def extremes(self, order: int) -> tuple[Array, Array]:
-        """Least and greatest value of a derivative over the motion, exact on every piece.
-
-        Parameters
-        ----------
-        order : int
-            0 position, 1 velocity, and so on.
-
-        Returns
-        -------
-        lower, upper : ndarray, shapes (..., n)
-            Infinite where the derivative below jumps between two pieces.
-        """
+        """Least and greatest value of a derivative over the motion, exact on every piece."""
         h = np.swapaxes(self.lengths, -1, -2)  # (..., K, c)
         live = h > 0.0
         step = np.where(live, h, 1.0)

@@ -332,26 +332,7 @@ def _refuse_waiting(law: TimeLaw, limits: LineLimits, totals: Array) -> None:
 def stretched(
     pieces: Pieces, T: Array | None, least: Array, how: Synchronisation, laws: int
 ) -> Pieces:
-    """Stretch the laws of each motion to its duration, and let those that arrive early wait.
-
-    Parameters
-    ----------
-    pieces : Pieces
-        Of all laws.
-    T : ndarray, shape (R,), or None
-        Durations asked for, s.
-    least : ndarray, shape (R,)
-        Least durations of the motions, s.
-    how : Synchronisation
-        Whether the laws end together.
-    laws : int
-        How many each motion has.
-
-    Returns
-    -------
-    Pieces
-        With a piece more where a law waits.
-    """
+    """Stretch the laws of each motion to its duration, and let those that arrive early wait."""
     total = pieces.durations.sum(axis=-1)
     goal = np.repeat(least if T is None else T, laws)
     if T is None and how is Synchronisation.INDEPENDENT:
@@ -375,29 +356,9 @@ def assembled(
     pieces: Pieces, columns: int, start: Array, direction: Array, batch: tuple[int, ...],
     scalar: bool, T: Array | None,
 ) -> Trajectory:  # fmt: skip
-    """The trajectory of laws along directions.
+    """Trajectory from motion laws along given directions.
 
-    Parameters
-    ----------
-    pieces : Pieces
-        Of ``columns`` laws of each motion.
-    columns : int
-        1, or one for each joint.
-    start : ndarray, shape (R, n)
-        Where the motions begin, rad or m.
-    direction : ndarray, shape (R, 1, n) or (R, n, 1)
-        Motion of the joints per unit of the law.
-    batch : tuple of int
-        Leading axes.
-    scalar : bool
-        Whether positions are numbers.
-    T : ndarray, shape (R,), or None
-        Durations that were asked for, s.
-
-    Returns
-    -------
-    Trajectory
-        Of n joints.
+    Shapes: start (R, n), direction (R, 1, n) or (R, n, 1), T (R,).
     """
     R, n = start.shape
     K, powers = pieces.coefficients.shape[1:]

@@ -29,19 +29,7 @@ _KEPT = 1e-14
 def between_states(order: int, states: dict[str, Array], T: Array) -> Array:
     """Coefficients of the polynomials between two states.
 
-    Parameters
-    ----------
-    order : int
-        3, or 5 with given accelerations.
-    states : dict of ndarray, shapes (R, n) or (n,)
-        Positions ``q0, q1`` and rates ``v0, v1, a0, a1``.
-    T : ndarray, broadcasts with the states
-        Durations, s.
-
-    Returns
-    -------
-    ndarray, shape (order + 1, ...)
-        Of the normalised time, lowest power first.
+    Shapes: states (R, n) or (n,) -> (order + 1, ...).
     """
     return _powers_of_duration(order, states, np.stack((np.ones_like(T), T, T * T))).sum(axis=0)
 
@@ -67,24 +55,7 @@ def _powers_of_duration(order: int, states: dict[str, Array], of_T: Array) -> Ar
 
 
 def excess(order: int, state: dict[str, Array], T: Array, limits: MotionLimits) -> Array:
-    """By how much the worst limit is exceeded, relative, for durations.
-
-    Parameters
-    ----------
-    order : int
-        3 or 5.
-    state : dict of ndarray, shapes (n,)
-        As in `between_states`.
-    T : ndarray, shape (G,)
-        Durations, s.
-    limits : MotionLimits
-        Of n joints.
-
-    Returns
-    -------
-    ndarray, shape (G,)
-        Negative where all limits are kept with room.
-    """
+    """Relative excess over the worst limit for given durations."""
     c = np.moveaxis(between_states(order, state, T[:, None]), 0, -2)[:, None]
     motion = PiecewisePolynomial(np.stack((np.zeros_like(T), T), axis=-1)[:, None], c)
     worst = np.full(T.shape, -np.inf)
@@ -102,29 +73,7 @@ def excess(order: int, state: dict[str, Array], T: Array, limits: MotionLimits) 
 def least_duration(
     order: int, state: dict[str, Array], limits: MotionLimits, after: float = 0.0
 ) -> float | None:
-    """Least duration with which the polynomials keep the limits.
-
-    Parameters
-    ----------
-    order : int
-        3 or 5.
-    state : dict of ndarray, shapes (n,)
-        As in `between_states`.
-    limits : MotionLimits
-        Of n joints.
-    after : float
-        Only durations from here on, s.
-
-    Returns
-    -------
-    float or None
-        Seconds; 0 if nothing moves, None if no duration keeps the limits.
-
-    Raises
-    ------
-    InvalidValueError
-        Every short duration keeps the limits, so that there is no least one.
-    """
+    """Least duration with which the polynomials keep the limits."""
     D = np.abs(state["q1"] - state["q0"])
     if not (D.any() or any(state[name].any() for name in ("v0", "v1", "a0", "a1"))):
         return 0.0

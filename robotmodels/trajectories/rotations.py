@@ -13,27 +13,7 @@ from ..se3 import skew
 
 
 def rotation_about(axis: Array, angle: Array) -> Array:
-    """Rotations by an angle about a unit axis (Rodrigues' formula, seed eq. [1.9]).
-
-    Parameters
-    ----------
-    axis : ndarray, shape (..., 3)
-        Unit vectors.
-    angle : ndarray, shape (...)
-        Radians; broadcasts with the axes.
-
-    Returns
-    -------
-    ndarray, shape (..., 3, 3)
-        Rotations.
-
-    Examples
-    --------
-    >>> rotation_about(np.array([0.0, 0.0, 1.0]), np.array(np.pi / 2)).round(12)
-    array([[ 0., -1.,  0.],
-           [ 1.,  0.,  0.],
-           [ 0.,  0.,  1.]])
-    """
+    """Rotations by an angle about a unit axis (Rodrigues' formula, seed eq. [1.9])."""
     K = skew(axis)
     angle = np.asarray(angle, dtype=np.float64)[..., None, None]
     # 1 - cos by the half angle, which keeps its digits at small angles
@@ -41,25 +21,7 @@ def rotation_about(axis: Array, angle: Array) -> Array:
 
 
 def axis_and_angle(vector: Array) -> tuple[Array, Array]:
-    """Unit axis and angle of rotation vectors; the axis of no rotation is z.
-
-    Parameters
-    ----------
-    vector : ndarray, shape (..., 3)
-        Rotation vectors, rad.
-
-    Returns
-    -------
-    axis : ndarray, shape (..., 3)
-        Unit vectors.
-    angle : ndarray, shape (...)
-        Radians.
-
-    Examples
-    --------
-    >>> axis_and_angle(np.zeros(3))
-    (array([0., 0., 1.]), np.float64(0.0))
-    """
+    """Unit axis and angle of rotation vectors; the axis of no rotation is z."""
     angle = np.linalg.norm(vector, axis=-1)
     turns = (angle > 0.0)[..., None]
     axis = np.where(turns, vector / np.where(turns, angle[..., None], 1.0), (0.0, 0.0, 1.0))

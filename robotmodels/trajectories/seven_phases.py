@@ -15,17 +15,7 @@ from .._arrays import Array
 
 
 class Ramp(NamedTuple):
-    """From rest to a velocity; arrays of shape (R,).
-
-    Attributes
-    ----------
-    rise, level, fall : ndarray
-        Times of the phases of growing, constant and falling acceleration, s.
-    distance : ndarray
-        Covered on the ramp.
-    slope : ndarray
-        Derivative of the distance by the velocity.
-    """
+    """From rest to a velocity; arrays of shape (R,)."""
 
     rise: Array
     level: Array
@@ -40,20 +30,7 @@ class Ramp(NamedTuple):
 
 
 def ramp(V: Array, A: Array, up: Array, down: Array) -> Ramp:
-    """The quickest ramp from rest to a velocity.
-
-    Parameters
-    ----------
-    V, A : ndarray, shape (R,)
-        Velocity, and limit of acceleration.
-    up, down : ndarray, shape (R,)
-        Inverses of the limits of jerk upwards and downwards.
-
-    Returns
-    -------
-    Ramp
-        All zero for no velocity.
-    """
+    """The quickest ramp from rest to a velocity. Shapes: V, A, up, down (R,)."""
     bends = up + down  # time of both bends for each unit of acceleration
     with np.errstate(divide="ignore", invalid="ignore"):
         # the acceleration of a ramp that is never level
@@ -75,26 +52,7 @@ def ramp(V: Array, A: Array, up: Array, down: Array) -> Ramp:
 def seven_phases(L: Array, V: Array, A: Array, B: Array, J: Array, K: Array) -> tuple[Array, Array]:
     """Phases of the quickest motion.
 
-    Parameters
-    ----------
-    L : ndarray, shape (R,)
-        Distances, not negative.
-    V, A, B, J, K : ndarray, shape (R,)
-        Limits of velocity, acceleration, deceleration, and of jerk upwards and downwards; of the
-        last two one at least is finite.
-
-    Returns
-    -------
-    durations : ndarray, shape (R, 7)
-        Of the phases, s; 0 for those that are left out.
-    coefficients : ndarray, shape (R, 7, 4)
-        Of the normalised time of each phase, lowest power first.
-
-    Examples
-    --------
-    >>> one = np.ones(1)
-    >>> seven_phases(2.0 * one, one, one, one, one, one)[0]
-    array([[1., 0., 1., 0., 1., 0., 1.]])
+    Shapes: L, V, A, B, J, K (R,) -> durations (R, 7), coefficients (R, 7, 4).
     """
     up, down = 1.0 / J, 1.0 / K
     V = _cruise(L, V, A, B, up, down)
@@ -111,19 +69,7 @@ def seven_phases(L: Array, V: Array, A: Array, B: Array, J: Array, K: Array) -> 
 def phases(L: Array, V: Array, first: Ramp, cruise: Array, last: Ramp) -> tuple[Array, Array]:
     """Durations and coefficients of the phases of two ramps and the cruise between them.
 
-    Parameters
-    ----------
-    L, V : ndarray, shape (R,)
-        Distances and velocities of the cruise.
-    first, last : Ramp
-        From rest, and, run backwards, to rest.
-    cruise : ndarray, shape (R,)
-        Seconds.
-
-    Returns
-    -------
-    durations, coefficients : ndarray, shapes (R, 7) and (R, 7, 4)
-        As `seven_phases`.
+    Shapes: L, V, cruise (R,) -> durations (R, 7), coefficients (R, 7, 4).
     """
     h, c = np.zeros((L.size, 7)), np.zeros((L.size, 7, 4))
     h[:, :3] = np.stack((first.rise, first.level, first.fall), axis=-1)

@@ -37,41 +37,7 @@ def tool_link(parts: RobotParts) -> str | None:
 
 
 def urdf_in_place(parts: RobotParts, measured: Collection[str] = ()) -> str:
-    """Write a robot into the URDF that it was read from: origins of joints change, no more.
-
-    Links and joints are added, at the end, for a tool that is no link (``tool``), for a measured
-    link that no longer stands where the joint that moves it has its axis, and for a base that has
-    moved where the first joint of the chain is no fixed one (``world``).
-
-    Parameters
-    ----------
-    parts : RobotParts
-        Read from a URDF; its base, table, tool and the poses of its named frames may be others.
-    measured : collection of str
-        Links that stand where the named frames say, and so do the tool and named frames that are
-        not where the source has them. Every other link stays where it is in its parent link.
-
-    Returns
-    -------
-    str
-        The text, every other byte as in the source.
-
-    Raises
-    ------
-    UrdfError
-        There is no source, or it has other joints than the table.
-
-    Examples
-    --------
-    >>> from dataclasses import replace
-    >>> text = '''<robot name="one"><link name="base"/><link name="arm"/>
-    ... <joint name="turn" type="continuous"><parent link="base"/><child link="arm"/></joint>
-    ... </robot>'''
-    >>> parts = read_urdf(text)
-    >>> longer = replace(parts, table=parts.table.replace(r=[0.5]))
-    >>> print(urdf_in_place(longer).splitlines()[1])
-    <joint name="turn" type="continuous"><origin xyz="0.5 0.0 0.0" rpy="0.0 0.0 0.0"/><parent ...
-    """
+    """Write a robot into the URDF that it was read from: origins of joints change, no more."""
     if parts.source is None:
         raise UrdfError("the robot was not read from a URDF: write it with to_urdf.")
     source = parts.source

@@ -12,25 +12,7 @@ from ..errors import InvalidValueError, MeshNotFoundError
 
 @dataclass(frozen=True, slots=True)
 class MeshFinder:
-    """Where to look for meshes.
-
-    ``package://NAME/rest`` is looked for as ``NAME/rest`` in each package folder and, if a package
-    folder is itself called NAME, as ``rest`` in it; then among the folders above the URDF.
-    Relative paths start at the URDF.
-
-    Parameters
-    ----------
-    package_dirs : tuple of Path
-        Folders that hold packages. If any is given, a mesh that is not found is an error;
-        otherwise it stays unresolved until somebody wants to draw it.
-    urdf_dir : Path, optional
-        Folder of the URDF file; None for a text.
-
-    Examples
-    --------
-    >>> MeshFinder().find("package://nowhere/base.stl") is None
-    True
-    """
+    """Where to look for meshes."""
 
     package_dirs: tuple[Path, ...] = ()
     urdf_dir: Path | None = None
@@ -39,30 +21,7 @@ class MeshFinder:
     def of(
         cls, package_dirs: Iterable[str | Path] | str | Path, urdf_dir: Path | None
     ) -> MeshFinder:
-        """A finder from what a caller passes: one folder or several.
-
-        Parameters
-        ----------
-        package_dirs : path or iterable of paths
-            Folders that hold packages.
-        urdf_dir : Path or None
-            Folder of the URDF file.
-
-        Returns
-        -------
-        MeshFinder
-            The finder.
-
-        Raises
-        ------
-        InvalidValueError
-            Something that is neither a folder nor a list of folders.
-
-        Examples
-        --------
-        >>> MeshFinder.of((), None).package_dirs
-        ()
-        """
+        """A finder from what a caller passes: one folder or several."""
         if isinstance(package_dirs, (str, Path)):
             package_dirs = (package_dirs,)
         try:
@@ -73,28 +32,7 @@ class MeshFinder:
             ) from None
 
     def find(self, filename: str) -> Path | None:
-        """Locate one mesh.
-
-        Parameters
-        ----------
-        filename : str
-            As written in the URDF.
-
-        Returns
-        -------
-        Path or None
-            The file; None if it was not found and no package folder was given.
-
-        Raises
-        ------
-        MeshNotFoundError
-            Package folders were given and none holds the file.
-
-        Examples
-        --------
-        >>> MeshFinder().find("missing.stl") is None
-        True
-        """
+        """Locate one mesh."""
         candidates = self._candidates(filename)
         for path in candidates:
             if path.is_file():

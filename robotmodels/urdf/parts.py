@@ -48,22 +48,7 @@ class NamedFrame:
 
 @dataclass(frozen=True, slots=True)
 class UrdfSource:
-    """The URDF that a robot was read from.
-
-    Parameters
-    ----------
-    text : str
-        As it was read.
-    base_link, tip_link : str or None
-        The options of the reading.
-    tool_link : str
-        Link whose frame was the tool: ``tip_link``, or what stands for it.
-
-    Examples
-    --------
-    >>> UrdfSource("<robot/>", None, "flange", "flange").tool_link
-    'flange'
-    """
+    """The URDF that a robot was read from."""
 
     text: str = field(repr=False)
     base_link: str | None

@@ -22,24 +22,7 @@ class Tip(NamedTuple):
 def default_tip(
     tree: UrdfTree, joints: tuple[str, ...], antecedent: list[int], frames: tuple[NamedFrame, ...]
 ) -> Tip:
-    """The tip of a URDF that is read without ``tip_link``.
-
-    Parameters
-    ----------
-    tree : UrdfTree
-        Links and joints of the text.
-    joints : tuple of str
-        Names of the moving joints 1..f, depth first in the order of the file.
-    antecedent : list of int
-        Number of the joint before each of them, 0 for the base.
-    frames : tuple of NamedFrame
-        The links, each with the number of the joint that moves it.
-
-    Returns
-    -------
-    Tip
-        See `RobotModel.from_urdf` for the rule.
-    """
+    """The tip of a URDF that is read without ``tip_link``."""
     following: list[list[int]] = [[] for _ in range(len(joints) + 1)]
     longest, count = [0] * (len(joints) + 1), [0] * (len(joints) + 1)
     for j in range(len(joints), 0, -1):

@@ -81,34 +81,7 @@ class UrdfTree:
 
 
 def parse_urdf(text: str, meshes: MeshFinder) -> UrdfTree:
-    """Read and check a URDF text.
-
-    Parameters
-    ----------
-    text : str
-        The file's text.
-    meshes : MeshFinder
-        Looks for the mesh files it names.
-
-    Returns
-    -------
-    UrdfTree
-        Checked: one root, every link reached once, numbers finite, masses not negative, axes unit.
-
-    Raises
-    ------
-    UrdfError
-        With the element at fault and what to do.
-
-    References
-    ----------
-    The URDF specification, wiki.ros.org/urdf/XML.
-
-    Examples
-    --------
-    >>> parse_urdf("<robot name='r'><link name='a'/></robot>", MeshFinder()).root
-    'a'
-    """
+    """Read and check a URDF text."""
     robot = _element_tree(text)
     _refuse_xacro(robot)
     if robot.tag != "robot":

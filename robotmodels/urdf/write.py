@@ -107,24 +107,7 @@ def urdf_text(parts: RobotParts, visuals: bool = True) -> str:
 
 @dataclass(frozen=True, slots=True)
 class LinkNames:
-    """Names of the links and fixed joints a URDF gets besides the named frames.
-
-    Parameters
-    ----------
-    world : str
-        The root.
-    frames : tuple of str
-        Links of R_0, R_1, ..., R_f.
-    tool : str
-        The tool.
-    fixed : dict of str to str
-        Name of the fixed joint that carries a link, by the link's name.
-
-    Examples
-    --------
-    >>> LinkNames("world", ("base",), "tool", {}).tool
-    'tool'
-    """
+    """Names of the links and fixed joints a URDF gets besides the named frames."""
 
     world: str
     frames: tuple[str, ...]
@@ -133,28 +116,7 @@ class LinkNames:
 
 
 def link_names(parts: RobotParts) -> LinkNames:
-    """Choose link names that collide neither with each other nor with joints or named frames.
-
-    Parameters
-    ----------
-    parts : RobotParts
-        The robot.
-
-    Returns
-    -------
-    LinkNames
-        A named frame that coincides with one of them gives its name; else ``joint_3`` moves
-        ``link_3``, and other joints' names get ``_link`` appended.
-
-    Examples
-    --------
-    >>> from robotmodels.inertia import InertialParameters
-    >>> from robotmodels.drive import DriveParameters
-    >>> from robotmodels.geometry import DHTable
-    >>> link_names(RobotParts("one", DHTable(antecedent=[0], sigma=[0]), np.eye(4), np.eye(4), 1,
-    ...                       InertialParameters.zeros(1), DriveParameters.zeros(1))).frames
-    ('base', 'link_1')
-    """
+    """Choose link names that collide neither with each other nor with joints or named frames."""
     # the tool is called so, whatever the source called it: that is how it is found again
     has_tool = any(
         frame.name == TOOL and frame.parent == parts.tip and np.array_equal(frame.pose, parts.tool)
@@ -198,23 +160,7 @@ def link_names(parts: RobotParts) -> LinkNames:
 
 
 def holds_inertia(row: Array) -> bool:
-    """Whether a URDF (and Pinocchio) can hold ten parameters: mass positive, or no moments.
-
-    Parameters
-    ----------
-    row : ndarray, shape (10,)
-        ``XX ... M``.
-
-    Returns
-    -------
-    bool
-        False for a negative mass, and for first moments without mass.
-
-    Examples
-    --------
-    >>> holds_inertia(np.array([0, 0, 0, 0, 0, 1.0, 0.1, 0, 0, 0]))
-    False
-    """
+    """Whether a URDF (and Pinocchio) can hold ten parameters: mass positive, or no moments."""
     return bool(row[9] > 0 or (row[9] == 0 and not row[6:9].any()))
 
 

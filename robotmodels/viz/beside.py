@@ -21,38 +21,7 @@ FROM_THE_FRONT = (np.radians(-78.0), np.radians(32.0))
 
 
 def beside(model: RobotModel, q: Array, columns: int) -> tuple[list[RobotModel], list[Node]]:
-    """One robot for each posture, in rows, and their numbers.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot; the first posture stands where its base is.
-    q : ndarray, shape (N, n)
-        Postures, rad or m.
-    columns : int
-        So many stand in a row, along the world's x axis; rows follow one another against y,
-        which is how a page is read from the usual side.
-
-    Returns
-    -------
-    robots : list of N RobotModel
-        The same arm on bases so far apart that its postures do not touch.
-    numbers : list of N Node
-        "1" to "N", in front of the bases.
-
-    Raises
-    ------
-    InvalidValueError
-        ``columns`` is no whole number above 0.
-
-    Examples
-    --------
-    >>> from robotmodels.geometry import DHTable
-    >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.3]))
-    >>> robots, numbers = beside(arm, np.array([[0.0, 0.5], [0.0, -0.5], [0.1, 0.0]]), 2)
-    >>> [node.shape.text for node in numbers], robots[1].base[0, 3] > 0.3, robots[2].base[1, 3] < 0
-    (['1', '2', '3'], np.True_, np.True_)
-    """
+    """Copies of the robot, one for each posture, in rows with numbers. Shapes: q (N, n)."""
     try:
         wide = index(columns)
     except TypeError:

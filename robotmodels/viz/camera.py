@@ -48,25 +48,7 @@ class Camera:
 
 
 def default_view(points: Array) -> tuple[float, float]:
-    """Azimuth and elevation that show a robot well.
-
-    Parameters
-    ----------
-    points : ndarray, shape (k, 3)
-        That enclose it, world axes.
-
-    Returns
-    -------
-    azimuth, elevation : float
-        Of the camera seen from the robot, radians.
-
-    Examples
-    --------
-    >>> flat = np.array([[-1.0, -1.0, 0.0], [1.0, 1.0, 0.01]])
-    >>> azimuth, elevation = default_view(flat)
-    >>> elevation > 0.8
-    True
-    """
+    """Azimuth and elevation that show a robot well. Shapes: points (k, 3)."""
     x, y, z = np.ptp(points, axis=0)
     # a planar arm lies on the floor: look down on it
     elevation = radians(55.0 if z < 0.2 * max(x, y) else 18.0)
@@ -78,22 +60,7 @@ def default_view(points: Array) -> tuple[float, float]:
 def framed(points: Array, view: tuple[float, float] | None = None) -> Camera:
     """The camera from which points fill the picture.
 
-    Parameters
-    ----------
-    points : ndarray, shape (k, 3)
-        To be seen, world axes, metres.
-    view : (azimuth, elevation), optional
-        Direction to look from, radians; default `default_view`.
-
-    Returns
-    -------
-    Camera
-        Its distance is the least from which all points are in the picture.
-
-    Examples
-    --------
-    >>> framed(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]])).distance > 1.0
-    True
+    Shapes: points (k, 3), view (azimuth, elevation).
     """
     azimuth, elevation = default_view(points) if view is None else view
     back = np.array((cos(elevation) * cos(azimuth), cos(elevation) * sin(azimuth), sin(elevation)))

@@ -23,23 +23,7 @@ from .surroundings import floor_grid, workspace_box
 
 
 def as_models(model: object) -> tuple[RobotModel, ...]:
-    """One model or several, as a tuple.
-
-    Parameters
-    ----------
-    model : RobotModel or sequence of RobotModel
-        What the caller passed.
-
-    Returns
-    -------
-    tuple of RobotModel
-        At least one.
-
-    Raises
-    ------
-    InvalidValueError
-        Something else.
-    """
+    """One model or several, as a tuple."""
     models = (model,) if isinstance(model, RobotModel) else model
     if not isinstance(models, (tuple, list)) or not models:
         raise InvalidValueError(
@@ -54,29 +38,7 @@ def as_models(model: object) -> tuple[RobotModel, ...]:
 
 
 def as_many(value: Any, model: object, count: int, name: str) -> tuple[Any, ...]:
-    """One entry for each robot: the value itself for one model, its items for several.
-
-    Parameters
-    ----------
-    value : object
-        What the caller passed.
-    model : object
-        What the caller passed as model.
-    count : int
-        Number of robots.
-    name : str
-        Used in error messages.
-
-    Returns
-    -------
-    tuple
-        ``count`` entries.
-
-    Raises
-    ------
-    ShapeError
-        Several models, and not as many entries.
-    """
+    """One entry for each robot: the value itself for one model, its items for several."""
     if isinstance(model, RobotModel):
         return (value,)
     if value is None:
@@ -87,30 +49,7 @@ def as_many(value: Any, model: object, count: int, name: str) -> tuple[Any, ...]
 
 
 def as_color(value: ArrayLike, name: str = "color") -> Color:
-    """Check a colour.
-
-    Parameters
-    ----------
-    value : array_like, shape (3,) or (4,)
-        Red, green, blue and opacity (default 1) in [0, 1].
-    name : str
-        Used in error messages.
-
-    Returns
-    -------
-    tuple of 4 floats
-        The colour.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Other numbers.
-
-    Examples
-    --------
-    >>> as_color((1, 0, 0))
-    (1.0, 0.0, 0.0, 1.0)
-    """
+    """Check a colour. Shapes: value (3,) or (4,)."""
     numbers = as_floats(value, name)
     if numbers.shape not in ((3,), (4,)):
         raise ShapeError(f"{name}: expected (r, g, b) or (r, g, b, a), got shape {numbers.shape}.")
@@ -121,28 +60,7 @@ def as_color(value: ArrayLike, name: str = "color") -> Color:
 
 
 def as_opacity(value: float) -> float:
-    """Check an opacity: a number in [0, 1].
-
-    Parameters
-    ----------
-    value : float
-        What the caller passed.
-
-    Returns
-    -------
-    float
-        The same.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Something else.
-
-    Examples
-    --------
-    >>> as_opacity(0.5)
-    0.5
-    """
+    """Check an opacity: a number in [0, 1]."""
     opacity = float(as_exact(value, (), "opacity"))
     if not 0 <= opacity <= 1:
         raise InvalidValueError(f"opacity: expected a number from 0 to 1, got {opacity}.")
@@ -150,18 +68,7 @@ def as_opacity(value: float) -> float:
 
 
 def unique_names(models: Sequence[RobotModel]) -> tuple[str, ...]:
-    """A name for each robot in the scene: its own, with a number if another one has it.
-
-    Parameters
-    ----------
-    models : sequence of RobotModel
-        The robots.
-
-    Returns
-    -------
-    tuple of str
-        Without slashes.
-    """
+    """A name for each robot in the scene: its own, with a number if another one has it."""
     names: list[str] = []
     for model in models:
         name = own = model.name.replace("/", "_")
@@ -185,36 +92,7 @@ def compose(
     legend: Legend = (),
     sliders: SliderPanel | None = None,
 ) -> Scene:
-    """Put robots and what stands around them into a scene that they fill.
-
-    Parameters
-    ----------
-    title : str
-        Of the picture.
-    robots : sequence of DrawnRobot
-        The robots.
-    extra : sequence of Node
-        More to draw.
-    box : array_like, shape (6,), optional
-        Workspace box.
-    grid : bool
-        Whether the floor and the world's axes are drawn.
-    view : array_like, shape (2,), optional
-        Azimuth and elevation of the camera, radians.
-    height : int
-        Pixels in a notebook.
-    motion : Motion, optional
-        What is played.
-    legend : tuple of (str, Color)
-        What the colours stand for.
-    sliders : SliderPanel, optional
-        What the reader moves.
-
-    Returns
-    -------
-    Scene
-        The picture.
-    """
+    """Put robots and what stands around them into a scene that they fill."""
     points: Array = np.concatenate([robot.points for robot in robots])
     nodes = [node for robot in robots for node in robot.nodes]
     nodes += extra

@@ -42,22 +42,7 @@ _FORCES = (EllipsoidQuantity.FORCE, EllipsoidQuantity.MOMENT)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DrawnEllipsoids:
-    """Nodes of ellipsoids and what a scene needs to know of them.
-
-    Parameters
-    ----------
-    nodes : tuple of Node
-        Upper ones first.
-    points : ndarray, shape (k, 3)
-        That enclose them, world axes, metres.
-    legend : tuple of (str, Color)
-        The scale of each quantity.
-
-    Examples
-    --------
-    >>> DrawnEllipsoids((), np.zeros((0, 3)), ()).legend
-    ()
-    """
+    """Nodes of ellipsoids and what a scene needs to know of them. Shapes: points (k, 3)."""
 
     nodes: tuple[Node, ...]
     points: Array
@@ -65,28 +50,7 @@ class DrawnEllipsoids:
 
 
 def as_ellipsoids(value: Any) -> tuple[Ellipsoid, ...]:
-    """One ellipsoid, several, or none, as a tuple; batches are taken apart.
-
-    Parameters
-    ----------
-    value : Ellipsoid or sequence of Ellipsoid, or None
-        What the caller passed.
-
-    Returns
-    -------
-    tuple of Ellipsoid
-        Single ones.
-
-    Raises
-    ------
-    InvalidValueError
-        Something else.
-
-    Examples
-    --------
-    >>> as_ellipsoids(None)
-    ()
-    """
+    """One ellipsoid, several, or none, as a tuple; batches are taken apart."""
     if value is None:
         return ()
     given = (value,) if isinstance(value, Ellipsoid) else value
@@ -101,38 +65,7 @@ def as_ellipsoids(value: Any) -> tuple[Ellipsoid, ...]:
 def draw_ellipsoids(
     ellipsoids: Sequence[Ellipsoid], size: float, scale: float | None = None
 ) -> DrawnEllipsoids:
-    """Draw ellipsoids where their frames are.
-
-    Each is a transparent surface with its three principal ellipses and axes. A flat one is a disc,
-    a bar or a dot. One that is open, or much longer than the others, is cut; dashes beyond the cut
-    show along which axes it goes on.
-
-    Parameters
-    ----------
-    ellipsoids : sequence of Ellipsoid
-        Single ones, see `as_ellipsoids`.
-    size : float
-        Of the robot, metres.
-    scale : float, optional
-        Metres drawn per unit of every quantity; then only infinite radii are cut. Default for each
-        quantity 1, 2 or 5 times a power of ten.
-
-    Returns
-    -------
-    DrawnEllipsoids
-        Nodes, extent and legend.
-
-    Raises
-    ------
-    InvalidValueError
-        A scale that is not positive.
-
-    Examples
-    --------
-    >>> ball = Ellipsoid(EllipsoidQuantity.FORCE, np.zeros(3), np.eye(3), np.full(3, 40.0), 3)
-    >>> draw_ellipsoids([ball], 1.0).legend[0][0]
-    'force: 0.005 m drawn per N'
-    """
+    """Draw ellipsoids where their frames are."""
     given = None if scale is None else _as_scale(scale)
     nodes, points, legend = list[Node](), [np.zeros((0, 3))], list[tuple[str, Color]]()
     if ellipsoids:

@@ -44,53 +44,12 @@ class LineStyle(NamedTuple):
 
 
 def line_style(k: int) -> LineStyle:
-    """Style of line number k.
-
-    Parameters
-    ----------
-    k : int
-        From 0. The first 112 differ.
-
-    Returns
-    -------
-    LineStyle
-        Colour and dashes.
-
-    Examples
-    --------
-    >>> line_style(0).dashes, len({line_style(k) for k in range(112)})
-    ((0, ()), 112)
-    """
+    """Style of line number k."""
     return LineStyle(LINE_COLORS[k % len(LINE_COLORS)], _DASHES[k % len(_DASHES)])
 
 
 def texts(values: Any, count: int, name: str, of: str) -> list[str]:
-    """One text for each of several things.
-
-    Parameters
-    ----------
-    values : sequence of str
-        As given by the caller.
-    count : int
-        Number of things.
-    name, of : str
-        The argument and the things, for messages.
-
-    Returns
-    -------
-    list of str
-        The texts.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        No sequence of texts, or not so many.
-
-    Examples
-    --------
-    >>> texts(("a", "b"), 2, "names", "joints")
-    ['a', 'b']
-    """
+    """One text for each of several things."""
     if isinstance(values, str) or not isinstance(values, Iterable):
         raise InvalidValueError(f"{name}: expected a list of texts, got {values!r:.60}.")
     words = [str(value) for value in values]
@@ -100,32 +59,7 @@ def texts(values: Any, count: int, name: str, of: str) -> list[str]:
 
 
 def new_figure(width: float, height: float, size: ArrayLike | None = None) -> Figure:
-    """An empty figure, laid out so that nothing overlaps. No pyplot: no display, no global state.
-
-    Parameters
-    ----------
-    width, height : float
-        Inches.
-    size : array_like, shape (2,), optional
-        Width and height that the caller wants instead.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Shows itself in a notebook.
-
-    Raises
-    ------
-    MissingExtraError
-        Matplotlib is not installed.
-    ShapeError, InvalidValueError
-        A size that is not two positive numbers.
-
-    Examples
-    --------
-    >>> new_figure(3.5, 2.0).get_size_inches()
-    array([3.5, 2. ])
-    """
+    """Empty figure with a constrained layout, without pyplot and its global state."""
     given = np.array((width, height)) if size is None else as_exact(size, (2,), "size")
     if (given <= 0.0).any():
         raise InvalidValueError(f"size: expected positive inches, got {given}.")
@@ -147,27 +81,7 @@ def new_figure(width: float, height: float, size: ArrayLike | None = None) -> Fi
 
 
 def panels(figure: Figure, rows: int, columns: int = 1, **options: Any) -> Any:
-    """Axes in rows and columns, in the common style.
-
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-        An empty one.
-    rows, columns : int
-        How many.
-    **options
-        Of ``Figure.subplots``.
-
-    Returns
-    -------
-    ndarray of Axes, shape (rows, columns)
-        Empty axes.
-
-    Examples
-    --------
-    >>> panels(new_figure(3.5, 2.0), 2).shape
-    (2, 1)
-    """
+    """Axes in rows and columns, in the common style. Shapes: -> (rows, columns)."""
     grid = figure.subplots(rows, columns, squeeze=False, **options)
     for axes in grid.flat:
         styled(axes)
@@ -175,18 +89,7 @@ def panels(figure: Figure, rows: int, columns: int = 1, **options: Any) -> Any:
 
 
 def styled(axes: Axes) -> Axes:
-    """Fonts, colours and grid of axes, whatever style is set for Matplotlib as a whole.
-
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-        To be changed.
-
-    Returns
-    -------
-    Axes
-        The same.
-    """
+    """Fonts, colours and grid of axes, whatever style is set for Matplotlib as a whole."""
     axes.set_facecolor("white")
     for side, spine in axes.spines.items():
         spine.set(color=PALE, linewidth=THIN_WIDTH, visible=side in ("left", "bottom"))
@@ -203,57 +106,19 @@ def styled(axes: Axes) -> Axes:
 
 
 def wrapped(text: str, width: float) -> str:
-    """A text in lines that fit over or under a panel.
-
-    Parameters
-    ----------
-    text : str
-        The text; its own line breaks are kept.
-    width : float
-        Of the panel with its margins, inches.
-
-    Returns
-    -------
-    str
-        With more line breaks. Long words stay whole.
-
-    Examples
-    --------
-    >>> wrapped("smoothed trapezoidal", 1.1).split()
-    ['smoothed', 'trapezoidal']
-    """
+    """A text in lines that fit over or under a panel."""
     letters = max(int(0.8 * width * 72.0 / (0.55 * LABEL_SIZE)), 4)
     lines = [wrap(line, letters, break_long_words=False) or [""] for line in text.split("\n")]
     return "\n".join(part for line in lines for part in line)
 
 
 def heading(axes: Axes, text: str, width: float) -> None:
-    """A text over axes that does not reach the next ones.
-
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-        To be changed.
-    text : str
-        The text; its own line breaks are kept.
-    width : float
-        Of the panel with its margins, inches.
-    """
+    """A text over axes that does not reach the next ones."""
     axes.set_title(wrapped(text, width), size=LABEL_SIZE, color=INK)
 
 
 def legend_above(figure: Figure, handles: Sequence[Any], title: str | None = None) -> None:
-    """A legend over all panels, outside of them, in as many columns as fit; and a title over it.
-
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-        To be changed.
-    handles : sequence of Artist
-        What it explains; each has its label. Without any there is no legend.
-    title : str, optional
-        Of the figure.
-    """
+    """A legend over all panels, outside of them, in as many columns as fit; and a title over it."""
     text = {"size": LABEL_SIZE + 1.0, "color": INK}
     if not handles:
         if title is not None:
@@ -284,17 +149,7 @@ def legend_above(figure: Figure, handles: Sequence[Any], title: str | None = Non
 def limit_lines(
     axes: Axes, lower: Array, upper: Array, colors: Sequence[Color], names: Sequence[str]
 ) -> None:
-    """Dashed lines at limits in the joints' colours; grey where all joints have the same.
-
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-        To be drawn on.
-    lower, upper : ndarray, shape (n,)
-        In the unit of the axes; infinite ones are no limits.
-    colors, names : sequence, length n
-        Of the joints.
-    """
+    """Dashed lines at limits in the joints' colours; grey where all joints have the same."""
     for side, values in (("lower", lower), ("upper", upper)):
         common = bool(np.isfinite(values).all() and np.ptp(values) == 0.0)
         for j in range(1 if common else len(values)):

@@ -19,30 +19,7 @@ _CREASE = np.radians(35.0)
 
 
 def mesh_parts(mesh: Mesh) -> tuple[tuple[Triangles, Color | None], ...]:
-    """Read a mesh file: one surface for each of its colours.
-
-    A Collada file's unit is honoured and its upwards axis is not, as robot viewers have it; the
-    poses of its nodes and the scale are applied.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        With the path where it was found.
-
-    Returns
-    -------
-    tuple of (Triangles, color)
-        The colour is None where the file has none.
-
-    Raises
-    ------
-    MeshNotFoundError
-        The file was never found, or is gone.
-    UrdfError
-        It cannot be read as a mesh.
-    MissingExtraError
-        trimesh is not installed.
-    """
+    """Read a mesh file: one surface for each of its colours."""
     try:
         if mesh.path is None:
             raise FileNotFoundError(mesh.filename)

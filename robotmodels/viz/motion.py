@@ -24,24 +24,7 @@ _TOLERANCE = 5e-4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Track:
-    """The motion of one joint; between keyframes it moves in proportion to time.
-
-    Parameters
-    ----------
-    path : str
-        The node that moves.
-    prismatic : bool
-        Whether it slides along its z axis; otherwise it turns about it.
-    times : ndarray, shape (k,)
-        Seconds.
-    values : ndarray, shape (k,)
-        Metres or radians.
-
-    Examples
-    --------
-    >>> Track("robots/arm/joint_1/q", False, np.array([0.0, 1.0]), np.zeros(2)).times[-1]
-    np.float64(1.0)
-    """
+    """The motion of one joint; between keyframes it moves in proportion to time."""
 
     path: str
     prismatic: bool
@@ -82,32 +65,7 @@ class Motion:
 
 
 def sample_times(count: int, dt: float | None, fps: float | None) -> Array:
-    """Times of the samples of a motion.
-
-    Parameters
-    ----------
-    count : int
-        Number of samples.
-    dt : float, optional
-        Seconds from one sample to the next.
-    fps : float, optional
-        Samples a second, instead of ``dt``; default 30.
-
-    Returns
-    -------
-    ndarray, shape (count,)
-        Seconds, from 0.
-
-    Raises
-    ------
-    InvalidValueError
-        Both are given, or the one given is not positive.
-
-    Examples
-    --------
-    >>> sample_times(3, 0.1, None)
-    array([0. , 0.1, 0.2])
-    """
+    """Times of the samples of a motion. Shapes: -> (count,)."""
     if dt is not None and fps is not None:
         raise InvalidValueError(f"dt and fps say the same: give one of them, got {dt} and {fps}.")
     name, value = ("dt", dt) if dt is not None else ("fps", 30.0 if fps is None else fps)
@@ -119,34 +77,7 @@ def sample_times(count: int, dt: float | None, fps: float | None) -> Array:
 
 
 def as_motion_samples(value: object, n: int, name: str) -> Array:
-    """Check the postures of an animation.
-
-    Parameters
-    ----------
-    value : array_like, shape (N, n)
-        Joint variables.
-    n : int
-        Number of joints.
-    name : str
-        Used in error messages.
-
-    Returns
-    -------
-    ndarray, shape (N, n)
-        Checked.
-
-    Raises
-    ------
-    ShapeError
-        Another shape, or fewer than two samples.
-    InvalidValueError
-        NaN or infinity.
-
-    Examples
-    --------
-    >>> as_motion_samples([[0.0], [1.0]], 1, "q").shape
-    (2, 1)
-    """
+    """Check the postures of an animation. Shapes: value (N, n) -> (N, n)."""
     q = as_vector(value, n, name)  # type: ignore[arg-type]
     if q.ndim != 2 or len(q) < 2:
         raise ShapeError(
@@ -161,37 +92,7 @@ def timed_samples(
 ) -> tuple[Array, Array]:
     """The postures of an animation and their times.
 
-    Parameters
-    ----------
-    value : Trajectory, Samples, JointPath, ResolvedMotion or array_like, shape (N, n)
-        A trajectory is sampled at the frame rate. The times of the others are their own, where
-        they have some and neither ``dt`` nor ``fps`` is given.
-    n : int
-        Number of joints.
-    dt, fps : float, optional
-        As in `sample_times`.
-    name : str
-        Used in error messages.
-
-    Returns
-    -------
-    times : ndarray, shape (N,)
-        Seconds, from 0.
-    q : ndarray, shape (N, n)
-        Joint variables.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        As `as_motion_samples` and `sample_times`; what is no motion of joints; a batch of motions;
-        poses without a posture; times that do not ascend.
-
-    Examples
-    --------
-    >>> from robotmodels.trajectories import quintic
-    >>> times, q = timed_samples(quintic([0.0], [1.0], 0.95), 1, None, 10.0, "q")
-    >>> times.size, times[-1], q[-1]
-    (11, np.float64(0.95), array([1.]))
+    Shapes: value (N, n) -> times (N,), q (N, n).
     """
     if isinstance(value, Trajectory):
         return _sampled(value, n, float(sample_times(2, dt, fps)[1]), name)
@@ -241,26 +142,7 @@ def _sampled(motion: Trajectory, n: int, step: float, name: str) -> tuple[Array,
 def joint_tracks(
     model: RobotModel, q: Array, times: Array, paths: Sequence[str], size: float
 ) -> tuple[Track, ...]:
-    """Reduce a motion to keyframes, joint by joint.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    q : ndarray, shape (N, n)
-        Joint variables.
-    times : ndarray, shape (N,)
-        Seconds.
-    paths : sequence of str
-        The moving node of each joint.
-    size : float
-        Of the robot, metres: what counts as small.
-
-    Returns
-    -------
-    tuple of Track
-        One a joint.
-    """
+    """Reduce a motion to keyframes, joint by joint. Shapes: q (N, n), times (N,)."""
     tracks = []
     for i, row in enumerate(model.table.joint_rows):
         prismatic = bool(model.table.sigma[row] == PRISMATIC)
@@ -272,24 +154,7 @@ def joint_tracks(
 def keyframes(times: Array, values: Array, tolerance: float) -> NDArray[np.int64]:
     """Samples from which straight lines give back all others (Ramer, Douglas and Peucker).
 
-    Parameters
-    ----------
-    times : ndarray, shape (N,)
-        Increasing.
-    values : ndarray, shape (N, k)
-        What moves.
-    tolerance : float
-        Largest distance from the line, in the unit of the values.
-
-    Returns
-    -------
-    ndarray of int
-        Sorted sample numbers; the first and the last are among them.
-
-    Examples
-    --------
-    >>> keyframes(np.arange(5.0), np.array([[0.0], [1.0], [2.0], [1.0], [0.0]]), 1e-6)
-    array([0, 2, 4])
+    Shapes: times (N,), values (N, k).
     """
     last = len(times) - 1
     kept, waiting = {0, last}, [(0, last)]

@@ -13,20 +13,7 @@ from ..visual import Box, Color, Cylinder, Sphere
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Triangles:
-    """A surface made of triangles.
-
-    Parameters
-    ----------
-    vertices : ndarray of float32, shape (v, 3)
-        Metres.
-    faces : ndarray of int, shape (t, 3)
-        Three vertex numbers a triangle.
-
-    Examples
-    --------
-    >>> Triangles(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]])).faces.shape
-    (1, 3)
-    """
+    """A surface made of triangles. Shapes: vertices (v, 3), faces (t, 3)."""
 
     vertices: NDArray[np.float32]
     faces: NDArray[np.integer]
@@ -34,38 +21,14 @@ class Triangles:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Segments:
-    """Thin straight lines, one pixel wide.
-
-    Parameters
-    ----------
-    points : ndarray, shape (2 k, 3)
-        The two ends of each line, in metres.
-
-    Examples
-    --------
-    >>> Segments(np.zeros((2, 3))).points.shape
-    (2, 3)
-    """
+    """Thin straight lines, one pixel wide. Shapes: points (2 k, 3)."""
 
     points: Array
 
 
 @dataclass(frozen=True, slots=True)
 class Label:
-    """A text that always faces the viewer.
-
-    Parameters
-    ----------
-    text : str
-        Short: it is drawn on a square.
-    size : float
-        Edge of that square in metres.
-
-    Examples
-    --------
-    >>> Label("R1", 0.1).text
-    'R1'
-    """
+    """A text that always faces the viewer."""
 
     text: str
     size: float
@@ -76,24 +39,7 @@ Drawable = Box | Cylinder | Sphere | Triangles | Segments | Label
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Node:
-    """A named place in the scene.
-
-    Parameters
-    ----------
-    path : str
-        Names from the root down, parted by ``/``; a node moves with the node above it.
-    pose : ndarray, shape (4, 4)
-        In the node above.
-    shape : Box, Cylinder, Sphere, Triangles, Segments or Label, optional
-        What is drawn there.
-    color : tuple of 4 floats
-        Red, green, blue, opacity in [0, 1].
-
-    Examples
-    --------
-    >>> Node("robots/rx90", np.eye(4)).shape is None
-    True
-    """
+    """A named place in the scene."""
 
     path: str
     pose: Array
@@ -102,23 +48,7 @@ class Node:
 
 
 def extent(shape: Drawable) -> Array:
-    """Points that enclose a shape: the corners of its bounding box.
-
-    Parameters
-    ----------
-    shape : Box, Cylinder, Sphere, Triangles, Segments or Label
-        In its own frame.
-
-    Returns
-    -------
-    ndarray, shape (8, 3)
-        Metres.
-
-    Examples
-    --------
-    >>> extent(Sphere(0.5)).max()
-    np.float64(0.5)
-    """
+    """Points that enclose a shape: the corners of its bounding box. Shapes: -> (8, 3)."""
     match shape:
         case Box(size):
             high = 0.5 * np.array(size)
@@ -141,21 +71,6 @@ def extent(shape: Drawable) -> Array:
 def apply(T: Array, points: Array) -> Array:
     """Move points: coordinates in the frame ``T`` become coordinates outside it.
 
-    Parameters
-    ----------
-    T : ndarray, shape (..., 4, 4)
-        Poses.
-    points : ndarray, shape (k, 3)
-        Metres.
-
-    Returns
-    -------
-    ndarray, shape (..., k, 3)
-        Metres.
-
-    Examples
-    --------
-    >>> apply(np.eye(4), np.ones((1, 3)))
-    array([[1., 1., 1.]])
+    Shapes: T (..., 4, 4), points (k, 3) -> (..., k, 3).
     """
     return points @ np.swapaxes(T[..., :3, :3], -1, -2) + T[..., None, :3, 3]

@@ -128,33 +128,7 @@ def page(
     legend: Legend = (),
     sliders: SliderPanel | None = None,
 ) -> str:
-    """Write a scene as one HTML page.
-
-    Parameters
-    ----------
-    title : str
-        Of the page.
-    nodes : iterable of Node
-        What is drawn; upper nodes first.
-    camera : Camera
-        Where to look from.
-    motion : Motion or None
-        What is played.
-    legend : tuple of (str, Color)
-        What the colours stand for.
-    sliders : SliderPanel, optional
-        What the reader moves.
-
-    Returns
-    -------
-    str
-        HTML; the same scene gives the same text.
-
-    Raises
-    ------
-    MissingExtraError
-        meshcat is not installed.
-    """
+    """Write a scene as one HTML page."""
     store = _ArrayStore()
     commands = list(_stage(camera))
     for node in nodes:

@@ -54,30 +54,7 @@ Legend = tuple[tuple[str, Color], ...]
 
 
 def as_legend(texts: Any, colors: Sequence[Color | None]) -> Legend:
-    """Texts beside the colours they explain.
-
-    Parameters
-    ----------
-    texts : sequence of str, or None
-        What the caller passed.
-    colors : sequence of Color or None
-        What is to be explained; None where a robot keeps its own colours.
-
-    Returns
-    -------
-    tuple of (str, Color)
-        Empty without texts.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Not one text for each colour.
-
-    Examples
-    --------
-    >>> as_legend(["elbow up"], [PALETTE[0]])
-    (('elbow up', (0.0, 0.45, 0.7, 1.0)),)
-    """
+    """Texts beside the colours they explain."""
     if texts is None:
         return ()
     if isinstance(texts, str) or not hasattr(texts, "__len__") or not hasattr(texts, "__iter__"):

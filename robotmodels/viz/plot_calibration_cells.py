@@ -37,20 +37,7 @@ class Cell:
 
 
 def fill_cells(figure: Figure, cells: list[Cell], tallest: float | None, above: float) -> None:
-    """Place every box so that it fills its cell, headings over them.
-
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-        Without a layout engine.
-    cells : list of Cell
-        Two columns of them.
-    tallest : float or None
-        Greatest height of a row, inches: the figure becomes as low as its rows allow. None keeps
-        the size of the figure, its rows alike.
-    above : float
-        What is kept free over the first row, inches.
-    """
+    """Place every box so that it fills its cell, headings over them."""
     dpi, rows = figure.dpi, 1 + max(cell.row for cell in cells)
     if tallest is not None:
         heights = np.full(rows, tallest)
@@ -137,25 +124,9 @@ def _names_beside_numbers(axes: Any, dpi: float) -> bool:
 
 
 def far_apart(points: Array, distance: float) -> NDArray[np.int64]:
-    """Number of the group of each point: groups are farther from each other than a distance.
+    """Group number of each point; groups are separated by more than a distance.
 
-    Parameters
-    ----------
-    points : ndarray, shape (N, 3)
-        Points.
-    distance : float
-        Beside the longest edge of their box; from 0.02.
-
-    Returns
-    -------
-    ndarray of int, shape (N,)
-        From 0, in the order of the first points. Points that share a cube of a small part of the
-        distance count as one.
-
-    Examples
-    --------
-    >>> far_apart(np.array([[0.0, 0, 0], [1, 0, 0], [0.01, 0, 0]]), 0.25)
-    array([0, 1, 0])
+    Shapes: points (N, 3) -> (N,).
     """
     extent = float(np.ptp(points, axis=0).max())
     if extent == 0.0:

@@ -36,23 +36,7 @@ _RING, _OVER_RINGS = 6.0, 5.0
 
 
 def as_result(result: Any) -> CalibrationResult:
-    """Check what a figure of a calibration is asked of.
-
-    Parameters
-    ----------
-    result : CalibrationResult
-        What the caller passed.
-
-    Returns
-    -------
-    CalibrationResult
-        The same.
-
-    Raises
-    ------
-    InvalidValueError
-        Something else.
-    """
+    """Check that the argument is a calibration result."""
     if not isinstance(result, CalibrationResult):
         raise InvalidValueError(
             f"result: expected a CalibrationResult of calibration.fit, got {type(result).__name__}."
@@ -61,23 +45,7 @@ def as_result(result: Any) -> CalibrationResult:
 
 
 def shown_unit(unit: str) -> Unit:
-    """Unit in which residuals are drawn: millimetres, degrees.
-
-    Parameters
-    ----------
-    unit : str
-        ``"m"`` or ``"rad"``.
-
-    Returns
-    -------
-    Unit
-        Millimetre or degree.
-
-    Examples
-    --------
-    >>> shown_unit("m").value
-    'mm'
-    """
+    """Unit in which residuals are drawn: millimetres, degrees."""
     return Unit.MILLIMETRE if unit == "m" else Unit.DEGREE
 
 

@@ -19,29 +19,7 @@ if TYPE_CHECKING:
 def correlation_figure(
     correlation: Array, names: Sequence[str], title: str | None, size: ArrayLike | None
 ) -> Figure:
-    """A square for each pair, dark where they are hardly told apart.
-
-    Parameters
-    ----------
-    correlation : ndarray, shape (k, k)
-        From -1 to 1.
-    names : sequence of str, length k
-        As many stand at the sides as there is room for.
-    title : str or None
-        Over the figure.
-    size : array_like, shape (2,), or None
-        Width and height, inches.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Two axes, the second is the scale.
-
-    Examples
-    --------
-    >>> correlation_figure(np.eye(2), ["a", "b"], None, None).axes[1].get_ylabel()
-    'correlation'
-    """
+    """Figure of a correlation matrix. Shapes: correlation (k, k), size (2,)."""
     side = float(np.clip(1.3 + 0.155 * len(names), 3.5, PAGE))
     figure = new_figure(side + 0.6, side, size)
     axes = panels(figure, 1)[0, 0]

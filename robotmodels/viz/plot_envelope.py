@@ -10,27 +10,7 @@ from .._arrays import Array
 def envelope(t: Array, y: Array, step: int) -> tuple[Array, Array]:
     """The least and the greatest of every so many samples, in the order in which they come.
 
-    Parameters
-    ----------
-    t : ndarray, shape (N,)
-        Times.
-    y : ndarray, shape (N, m)
-        Samples.
-    step : int
-        Samples for a pair of points; up to 2 keeps all.
-
-    Returns
-    -------
-    t : ndarray, shape (k, m)
-        Times of the points of each column.
-    y : ndarray, shape (k, m)
-        Their values.
-
-    Examples
-    --------
-    >>> y = np.array([0.0, 5.0, 1.0, -2.0, 0.0, 3.0])[:, None]
-    >>> envelope(np.arange(6.0), y, 3)[1].ravel()
-    array([ 0.,  5., -2.,  3.])
+    Shapes: t (N,), y (N, m) -> t, y (k, m).
     """
     N, m = y.shape
     if step <= 2 or not N:

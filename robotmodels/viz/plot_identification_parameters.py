@@ -124,18 +124,7 @@ def plot_identification_parameters(
 
 
 def effects(result: IdentificationResult) -> Array:
-    """Root mean square that a unit of each parameter has, relative to that of the measured side.
-
-    Parameters
-    ----------
-    result : IdentificationResult
-        The identification; residuals of its joints are weighted by their deviations.
-
-    Returns
-    -------
-    ndarray, shape (b,)
-        Per SI unit of the parameter.
-    """
+    """Root mean square that a unit of each parameter has, relative to that of the measured side."""
     sigma = result.estimate.sigma
     top = float(sigma.max(initial=0.0))
     weights = 1.0 / np.maximum(sigma, 1e-9 * top) if top > 0.0 else np.ones(len(sigma))

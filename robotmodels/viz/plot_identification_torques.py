@@ -32,14 +32,7 @@ _MEASURED, _PREDICTED, _LEFT = line_style(3).color, line_style(0).color, line_st
 class DrawnTorques:
     """Envelopes of a log's torques, NaN between recordings.
 
-    Parameters
-    ----------
-    measured, predicted, left : tuple of ndarray, shapes (k, n)
-        Times and values; left is measured less predicted.
-    slow_t : ndarray, shape (g,)
-        Times of groups of samples.
-    slow : ndarray of bool, shape (g, n)
-        Whether the joint is in its dead band most of the group.
+    Shapes: measured, predicted, left (k, n); slow_t (g,); slow (g, n).
     """
 
     measured: tuple[Array, Array]
@@ -50,23 +43,7 @@ class DrawnTorques:
 
 
 def as_identification(result: Any) -> IdentificationResult:
-    """Check what a figure of an identification is asked of.
-
-    Parameters
-    ----------
-    result : IdentificationResult
-        What the caller passed.
-
-    Returns
-    -------
-    IdentificationResult
-        The same.
-
-    Raises
-    ------
-    InvalidValueError
-        Something else; a result without parameters, whose simulated robot ran away.
-    """
+    """Check that the argument is an identification result."""
     if not isinstance(result, IdentificationResult):
         raise InvalidValueError(
             "result: expected an IdentificationResult of identification.fit, got "
@@ -77,20 +54,7 @@ def as_identification(result: Any) -> IdentificationResult:
 
 
 def check_test(result: IdentificationResult, test: Any) -> None:
-    """Refuse what is no log of the robot.
-
-    Parameters
-    ----------
-    result : IdentificationResult
-        The identification.
-    test : Log or None
-        What the caller passed.
-
-    Raises
-    ------
-    InvalidValueError, ShapeError
-        No log; one of other joints.
-    """
+    """Raise unless the test is a log of the robot."""
     if test is None:
         return
     if not isinstance(test, Log):
@@ -190,20 +154,7 @@ def plot_identification_torques(
 
 
 def drawn_torques(result: IdentificationResult, log: Log) -> DrawnTorques:
-    """Torques of a log piece by piece, in as many points as a figure shows.
-
-    Parameters
-    ----------
-    result : IdentificationResult
-        The identification.
-    log : Log
-        Of the robot.
-
-    Returns
-    -------
-    DrawnTorques
-        Envelopes.
-    """
+    """Torques of a log piece by piece, in as many points as a figure shows."""
     chosen = result.system.processing
     step = max(1, len(log) // _POINTS)
     parts: list[list[tuple[Array, Array]]] = [[], [], []]

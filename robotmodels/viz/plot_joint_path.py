@@ -204,18 +204,5 @@ def _trace(axes: Axes, kind: PathEventKind, start: float, stop: float) -> None:
 
 
 def span(event: PathEvent, timed: bool) -> tuple[float, float]:
-    """Where an event is on the axis of a figure.
-
-    Parameters
-    ----------
-    event : PathEvent
-        The event.
-    timed : bool
-        Whether the axis is one of times instead of numbers of poses.
-
-    Returns
-    -------
-    start, stop : float
-        s, or numbers of poses.
-    """
+    """Extent of an event along the axis of a figure."""
     return (event.start, event.stop) if timed else (float(event.first), float(event.last))

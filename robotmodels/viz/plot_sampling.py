@@ -21,16 +21,7 @@ _BEFORE = 1e-9  # of the duration: where the value before a jump is read
 class Drawn:
     """Positions and derivatives of n joints at the times of a figure.
 
-    Parameters
-    ----------
-    t : ndarray, shape (N,)
-        Times, s.
-    values : ndarray, shape (4, N, n)
-        Position, velocity, acceleration, jerk in SI units.
-    breaks : tuple of ndarray
-        Times at which pieces meet: one array for all joints, one for each, or none.
-    duration : float
-        Seconds.
+    Shapes: t (N,), values (4, N, n).
     """
 
     t: Array
@@ -45,31 +36,7 @@ class Drawn:
 
 
 def drawn(trajectory: Any, name: str = "trajectory") -> Drawn:
-    """What is drawn of a trajectory or of its samples.
-
-    Parameters
-    ----------
-    trajectory : Trajectory or Samples
-        One motion; samples are drawn as they are.
-    name : str
-        Used in error messages.
-
-    Returns
-    -------
-    Drawn
-        Times, values and breaks.
-
-    Raises
-    ------
-    InvalidValueError
-        Neither of the two; a batch of motions; no samples.
-
-    Examples
-    --------
-    >>> from robotmodels.trajectories import bang_bang
-    >>> drawn(bang_bang([0.0, 0.0], [1.0, 2.0], duration=2.0)).breaks
-    (array([0., 1., 2.]),)
-    """
+    """Samples of a trajectory to draw."""
     if isinstance(trajectory, Samples):
         return _of_samples(trajectory, name)
     if isinstance(trajectory, PoseTrajectory):

@@ -167,10 +167,8 @@ def _map(figure: Figure, axes: Axes, grid: SingularityMap, degrees: bool) -> Non
 def _crossings(z: Array) -> list[Array]:
     """Arrays whose contours at zero, from above, are the zeros of one with exact zeros.
 
-    A contour that meets values that are zero themselves turns its corners askew and sees zeros
-    from one side only. So a zero between values of different signs takes the side of a neighbour,
-    at a distance too small to be seen; those that are touched from below, or end the map, are
-    left to an array of their own with the sign changed.
+    A zero between values of different signs takes a neighbour's side; zeros touched from below, or
+    at the edge, go to an array of their own with the sign changed.
     """
     z = z.copy()
     for axis in (0, 1):

@@ -138,19 +138,7 @@ def plot_trajectory(
 
 
 def draw_line(axes: Axes, t: Array, y: Array, style: Any, label: str) -> None:
-    """One joint's line.
-
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-        To be drawn on.
-    t, y : ndarray, shape (N,)
-        Times and values in the unit of the axes.
-    style : LineStyle
-        How it looks.
-    label : str
-        For the legend.
-    """
+    """One joint's line. Shapes: t, y (N,)."""
     axes.plot(
         t,
         y,
@@ -164,15 +152,7 @@ def draw_line(axes: Axes, t: Array, y: Array, style: Any, label: str) -> None:
 
 
 def break_lines(axes: Axes, motion: Drawn) -> None:
-    """Thin lines at the times at which pieces meet, without the two ends.
-
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-        To be drawn on.
-    motion : Drawn
-        All of whose joints change pieces together.
-    """
+    """Thin lines at the times at which pieces meet, without the two ends."""
     for time in motion.breaks[0][1:-1]:
         axes.axvline(
             time, color=PALE, linewidth=THIN_WIDTH, linestyle="-", zorder=1.2, label="_break"
@@ -188,25 +168,7 @@ def draw_limits(
     unit: Unit,
     names: Sequence[str],
 ) -> None:
-    """Limits of a quantity, and what lies beyond them.
-
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-        To be drawn on.
-    motion : Drawn
-        The motion.
-    order : int
-        0 position, 1 velocity, 2 acceleration, 3 jerk.
-    joints : sequence of int
-        Those of this unit.
-    limits : MotionLimits
-        Of n joints.
-    unit : Unit
-        Of the axes.
-    names : sequence of str, length n
-        Of the joints.
-    """
+    """Limits of a quantity, and what lies beyond them."""
     lower, upper = (
         (limits.lower, limits.upper),
         (limits.velocity_lower, limits.velocity),
@@ -239,18 +201,7 @@ def draw_limits(
 
 
 def limit_handles(figure: Figure) -> list[Any]:
-    """What a legend says of the limits that were drawn.
-
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-        With its panels.
-
-    Returns
-    -------
-    list of Artist
-        Empty without limits.
-    """
+    """Legend entries of the limits that were drawn."""
     from matplotlib.lines import Line2D
 
     labels = [str(line.get_label()) for axes in figure.axes for line in axes.get_lines()]
@@ -267,25 +218,7 @@ def limit_handles(figure: Figure) -> list[Any]:
 
 
 def as_limits(limits: MotionLimits | None, n: int) -> MotionLimits | None:
-    """Limits of n joints, checked.
-
-    Parameters
-    ----------
-    limits : MotionLimits or None
-        As given by the caller.
-    n : int
-        Number of joints.
-
-    Returns
-    -------
-    MotionLimits or None
-        One for each joint.
-
-    Raises
-    ------
-    InvalidValueError, ShapeError
-        No limits, or of another number of joints.
-    """
+    """Limits of n joints, checked."""
     if limits is None:
         return None
     if not isinstance(limits, MotionLimits):
@@ -294,28 +227,7 @@ def as_limits(limits: MotionLimits | None, n: int) -> MotionLimits | None:
 
 
 def as_orders(orders: Sequence[int]) -> list[int]:
-    """Which quantities are drawn, checked.
-
-    Parameters
-    ----------
-    orders : sequence of int
-        As given by the caller.
-
-    Returns
-    -------
-    list of int
-        From 0 to 3, each once.
-
-    Raises
-    ------
-    InvalidValueError
-        None, others, or one twice.
-
-    Examples
-    --------
-    >>> as_orders((1, 2))
-    [1, 2]
-    """
+    """Which quantities are drawn, checked."""
     try:
         shown = [index(order) for order in orders]
     except TypeError:

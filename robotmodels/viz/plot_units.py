@@ -54,32 +54,7 @@ class Unit(Enum):
 
 
 def joint_names(names: Sequence[str] | None, n: int, model: RobotModel | None = None) -> list[str]:
-    """Names of joints for a legend.
-
-    Parameters
-    ----------
-    names : sequence of str, length n, or None
-        As given by the caller.
-    n : int
-        Number of joints.
-    model : RobotModel, optional
-        Whose names are used otherwise.
-
-    Returns
-    -------
-    list of str
-        Without names and model ``joint 1`` to ``joint n``.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Not one text for each joint; a model of another number of joints.
-
-    Examples
-    --------
-    >>> joint_names(None, 2)
-    ['joint 1', 'joint 2']
-    """
+    """Names of joints for a legend."""
     if model is not None:
         _check_model(model, n)
     if names is not None:
@@ -94,33 +69,7 @@ def joint_units(
     n: int,
     model: RobotModel | None = None,
 ) -> list[Unit]:
-    """Units of joints for their axes.
-
-    Parameters
-    ----------
-    units : Unit or str, or sequence of them, length n, or None
-        As given by the caller, also by their symbols; one stands for all joints.
-    n : int
-        Number of joints.
-    model : RobotModel, optional
-        Whose joint types tell them otherwise: rad or m.
-
-    Returns
-    -------
-    list of Unit
-        Without units and model `Unit.UNSTATED`.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        An unknown unit; not one for each joint; degrees for a prismatic joint of the model or
-        metres for a revolute one; a model of another number of joints.
-
-    Examples
-    --------
-    >>> joint_units(["deg", "mm"], 2)
-    [<Unit.DEGREE: 'deg'>, <Unit.MILLIMETRE: 'mm'>]
-    """
+    """Units of joints for their axes."""
     lengths = None
     if model is not None:
         _check_model(model, n)
@@ -145,28 +94,7 @@ def joint_units(
 
 
 def as_unit(unit: Unit | str) -> Unit:
-    """A unit from itself or its symbol.
-
-    Parameters
-    ----------
-    unit : Unit or str
-        As given by the caller.
-
-    Returns
-    -------
-    Unit
-        The unit.
-
-    Raises
-    ------
-    InvalidValueError
-        No unit of a joint.
-
-    Examples
-    --------
-    >>> as_unit("mm")
-    <Unit.MILLIMETRE: 'mm'>
-    """
+    """A unit from itself or its symbol."""
     try:
         return Unit(unit)
     except ValueError:

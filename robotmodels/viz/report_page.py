@@ -52,35 +52,7 @@ def write_report(
     sections: Iterable[ReportSection],
     figures: Iterable[tuple[Callable[[], Figure], str]],
 ) -> None:
-    """Write a report with its figures into one file that needs no network.
-
-    Parameters
-    ----------
-    path : str or Path
-        The HTML file.
-    title : str
-        Of the page.
-    sections : iterable of ReportSection
-        Sentences and tables.
-    figures : iterable of (callable, str)
-        What draws each figure, and what is written under it. Where a figure has nothing to draw
-        (an InvalidValueError), its reason stands in its place.
-
-    Raises
-    ------
-    MissingExtraError
-        Matplotlib is not installed.
-    OSError
-        The file cannot be written.
-
-    Examples
-    --------
-    >>> from tempfile import TemporaryDirectory
-    >>> with TemporaryDirectory() as folder:
-    ...     write_report(Path(folder) / "a.html", "A", [ReportSection("Outcome", ("Good.",))], [])
-    ...     "<p>Good.</p>" in (Path(folder) / "a.html").read_text(encoding="utf-8")
-    True
-    """
+    """Write a report with its figures into one file that needs no network."""
     parts = [f"<h1>{escape(title)}</h1>"]
     parts += [_section(section) for section in sections]
     drawn = [_figure(draw, caption) for draw, caption in figures]

@@ -22,26 +22,7 @@ _AXIS_NAMES = ("x", "y", "z")
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What is drawn of a robot.
-
-    Parameters
-    ----------
-    frames : bool
-        The axes of every frame R_j.
-    names : bool
-        The names of those frames.
-    tool : bool
-        The axes of the tool.
-    meshes : bool
-        The shapes of the source URDF where there are any; otherwise a skeleton.
-    opacity : float
-        In [0, 1].
-
-    Examples
-    --------
-    >>> Look().tool
-    True
-    """
+    """Parts and colours of a robot to draw."""
 
     frames: bool = False
     names: bool = False
@@ -52,26 +33,7 @@ class Look:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DrawnRobot:
-    """The nodes of a robot and what a scene needs to know of them.
-
-    Parameters
-    ----------
-    nodes : tuple of Node
-        Upper ones first.
-    points : ndarray, shape (k, 3)
-        That enclose it, world axes, metres.
-    moving : tuple of str
-        The node of each joint's motion, in the (first) posture.
-    size : float
-        A length that says how large it is, metres.
-    frames : tuple of str
-        The node that moves with each frame R_0, R_1, ... R_f, in the (first) posture.
-
-    Examples
-    --------
-    >>> DrawnRobot((), np.zeros((0, 3)), (), 1.0).size
-    1.0
-    """
+    """The nodes of a robot and what a scene needs to know of them. Shapes: points (k, 3)."""
 
     nodes: tuple[Node, ...]
     points: Array
@@ -100,36 +62,7 @@ def draw_robot(
     colors: Sequence[Color | None],
     seen: Array | None = None,
 ) -> DrawnRobot:
-    """Draw a robot in one or several postures.
-
-    Below ``root`` (pose Z) each frame is a node with the constant part of its factor T(a(j), j);
-    a node ``q`` in it holds the motion of the joint, so that an animation moves it alone.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    q : ndarray, shape (N, n)
-        Postures; with more than one each is below a node ``posture_k``.
-    root : str
-        Path of the robot.
-    look : Look
-        What is drawn.
-    colors : sequence of N colors or None
-        Of the links, posture by posture; None keeps their own.
-    seen : ndarray, shape (M, n), optional
-        Postures that the picture must hold; default those drawn.
-
-    Returns
-    -------
-    DrawnRobot
-        Nodes and extent.
-
-    Raises
-    ------
-    MeshNotFoundError, UrdfError
-        A mesh of the source URDF is missing or cannot be read.
-    """
+    """Draw a robot in one or several postures. Shapes: q (N, n), seen (M, n)."""
     table = _limited(model.table, q if seen is None else seen)
     size = characteristic_length(table, model.tool)
     pieces = _pieces(model, table, look, size)

@@ -22,30 +22,7 @@ _COUPLED = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Slider:
-    """A joint in the panel.
-
-    Parameters
-    ----------
-    name : str
-        Of the joint.
-    path : str
-        The node that moves.
-    prismatic : bool
-        Whether it slides along its z axis, in metres; otherwise it turns about it, in radians.
-    passive : bool
-        Whether no motor moves it (mu = 0 in the table).
-    lower, upper : float
-        Its limits; infinite where it has none.
-    ends : (float, float)
-        Of the slider: the limits, or -pi to pi, -1 m to 1 m where there are none.
-    follows : tuple of str
-        The joints that a joint without a slider of its own moves with; empty for all others.
-
-    Examples
-    --------
-    >>> Slider("joint_1", "robots/arm/joint_1/q", False, False, -1.0, 1.0, (-1.0, 1.0), ()).ends
-    (-1.0, 1.0)
-    """
+    """Slider of a joint in the panel."""
 
     name: str
     path: str
@@ -59,22 +36,7 @@ class Slider:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Target:
-    """A frame whose pose the panel can show.
-
-    Parameters
-    ----------
-    name : str
-        Of the frame.
-    path : str
-        The node it is fixed to.
-    pose : ndarray, shape (4, 4)
-        In that node.
-
-    Examples
-    --------
-    >>> Target("tool", "robots/arm/joint_1/q", np.eye(4)).name
-    'tool'
-    """
+    """A frame whose pose the panel can show."""
 
     name: str
     path: str
@@ -85,26 +47,7 @@ class Target:
 class SliderPanel:
     """Sliders of a robot: n joints move as ``q = C x + q_0``, x are the r independent ones.
 
-    Parameters
-    ----------
-    joints : tuple of Slider
-        All n joints, in the order of the table.
-    independent : ndarray of int, shape (r,)
-        Which of them have a slider.
-    matrix, offset : ndarray, shape (n, r) and (n,)
-        ``C`` and ``q_0``.
-    start : ndarray, shape (r,)
-        Where the sliders are at first, rad or m.
-    postures : tuple of (str, ndarray)
-        Named configurations and their x.
-    targets : tuple of Target
-        Frames whose pose can be shown; the first one is shown at first.
-
-    Examples
-    --------
-    >>> none = np.zeros(0)
-    >>> SliderPanel((), none.astype(int), np.zeros((0, 0)), none, none, (), ()).independent.size
-    0
+    Shapes: independent, start (r,); matrix (n, r); offset (n,).
     """
 
     joints: tuple[Slider, ...]
@@ -124,24 +67,7 @@ class SliderPanel:
 def slider_panel(
     model: RobotModel, q: Array, moving: Sequence[str], frames: Sequence[str]
 ) -> SliderPanel:
-    """The sliders of a robot.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    q : ndarray, shape (n,)
-        Where it is at first, of `coupled_posture`.
-    moving : sequence of n str
-        The node of each joint's motion.
-    frames : sequence of f + 1 str
-        The node that moves with each frame of the table; the first one is the base.
-
-    Returns
-    -------
-    SliderPanel
-        Sliders, named configurations and frames.
-    """
+    """The sliders of a robot."""
     independent, matrix, offset = coupling(model)
     postures = []
     for name, posture in model.configurations.items():
@@ -163,36 +89,7 @@ def slider_panel(
 
 
 def coupled_posture(model: RobotModel, q: Array | None) -> Array:
-    """Where the robot is at first.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    q : ndarray, shape (n,), optional
-        What the caller asked for; by default the independent joints are at zero.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Radians or metres.
-
-    Raises
-    ------
-    InvalidValueError
-        Coupled joints of ``q`` are not where their coupling has them.
-
-    Examples
-    --------
-    >>> from robotmodels.drive import Transmission
-    >>> from robotmodels.geometry import DHTable
-    >>> arm = RobotModel.from_table(
-    ...     DHTable(antecedent=[0, 1], sigma=[0, 0]),
-    ...     transmission=Transmission([[1, 0], [-2, 0]], [0, 0.1]),
-    ... )
-    >>> coupled_posture(arm, None)
-    array([0. , 0.1])
-    """
+    """Initial posture of the sliders."""
     independent, matrix, offset = coupling(model)
     asked = model.configurations["zero"] if q is None else q
     coupled = matrix @ asked[independent] + offset
@@ -210,34 +107,7 @@ def coupled_posture(model: RobotModel, q: Array | None) -> Array:
 def coupling(model: RobotModel) -> tuple[NDArray[np.int64], Array, Array]:
     """Which joints are independent, and how the others follow them.
 
-    A transmission that can be inverted leaves all joints independent, however their motors are
-    coupled. Where it cannot (a joint mimics others), ``q - q_0`` is in the range of K, which a
-    choice of as many joints as its rank describes: ``q - q_0 = K K_i^+ (q_i - q_0i)``.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-
-    Returns
-    -------
-    independent : ndarray of int, shape (r,)
-        Joints, in the order of the table.
-    matrix : ndarray, shape (n, r)
-        ``C`` of ``q = C q_i + offset``.
-    offset : ndarray, shape (n,)
-        Radians or metres.
-
-    Examples
-    --------
-    >>> from robotmodels.drive import Transmission
-    >>> from robotmodels.geometry import DHTable
-    >>> arm = RobotModel.from_table(
-    ...     DHTable(antecedent=[0, 1], sigma=[0, 0]), transmission=Transmission([[1, 0], [-2, 0]])
-    ... )
-    >>> independent, matrix, offset = coupling(arm)
-    >>> independent, matrix.ravel()
-    (array([0]), array([ 1., -2.]))
+    Shapes: -> independent (r,), matrix (n, r), offset (n,).
     """
     n = model.n
     if model.transmission is None:

@@ -178,20 +178,7 @@ SCRIPT = """(function () {
 
 
 def panel_html(title: str, panel: SliderPanel) -> str:
-    """The panel beside the picture.
-
-    Parameters
-    ----------
-    title : str
-        Name of the robot.
-    panel : SliderPanel
-        Its sliders.
-
-    Returns
-    -------
-    str
-        HTML of one element.
-    """
+    """The panel beside the picture."""
     rows = [
         _leader(joint, k) if (k := _place(panel, i)) is not None else _follower(joint)
         for i, joint in enumerate(panel.joints)

@@ -9,27 +9,7 @@ from ..visual import Mesh, Visual, skeleton
 
 
 def with_stand_ins(model: RobotModel) -> tuple[RobotModel, tuple[str, ...]]:
-    """The robot with a skeleton for the links whose mesh files are missing.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-
-    Returns
-    -------
-    model : RobotModel
-        Itself if all meshes are there, otherwise one with other shapes.
-    missing : tuple of str
-        The mesh files that were not found, as the URDF names them.
-
-    Examples
-    --------
-    >>> from robotmodels.geometry import DHTable
-    >>> arm = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))
-    >>> with_stand_ins(arm)[1]
-    ()
-    """
+    """Robot with skeletons in place of missing mesh files."""
     lost = [v for v in model.visuals if isinstance(v.shape, Mesh) and not _is_there(v.shape)]
     if not lost:
         return model, ()

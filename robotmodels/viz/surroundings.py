@@ -23,20 +23,7 @@ _SIDES = 8
 def floor_grid(points: Array) -> list[Node]:
     """A grid on the world's plane z = 0 below a robot, and the axes of the world.
 
-    Parameters
-    ----------
-    points : ndarray, shape (k, 3)
-        That enclose the robot, world axes, metres.
-
-    Returns
-    -------
-    list of Node
-        Grid and axes; a cell is 1, 2 or 5 times a power of ten, in metres.
-
-    Examples
-    --------
-    >>> floor_grid(np.array([[-1.0, -1.0, 0.0], [1.0, 1.0, 1.0]]))[0].path
-    'grid'
+    Shapes: points (k, 3).
     """
     low, high = points.min(axis=0), points.max(axis=0)
     cell = _round_length(float((high - low).max()) / 8.0)
@@ -55,31 +42,7 @@ def floor_grid(points: Array) -> list[Node]:
 
 
 def workspace_box(box: ArrayLike) -> tuple[list[Node], Array]:
-    """A transparent box with its edges.
-
-    Parameters
-    ----------
-    box : array_like, shape (6,)
-        ``xmin, xmax, ymin, ymax, zmin, zmax`` in world axes, metres.
-
-    Returns
-    -------
-    nodes : list of Node
-        Faces and edges.
-    corners : ndarray, shape (8, 3)
-        Metres.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Not six numbers, or a lower end that is not below the upper one.
-
-    Examples
-    --------
-    >>> nodes, corners = workspace_box([0, 1, 0, 1, 0, 0.5])
-    >>> corners[:, 2].max()
-    np.float64(0.5)
-    """
+    """A transparent box with its edges. Shapes: box (6,) -> corners (8, 3)."""
     ends = as_exact(box, (6,), "box").reshape(3, 2)
     for name, (low, high) in zip("xyz", ends, strict=True):
         if low >= high:
@@ -104,22 +67,7 @@ def workspace_box(box: ArrayLike) -> tuple[list[Node], Array]:
 def path_tube(points: Array, radius: float) -> Triangles | None:
     """A thin tube along a path: a line of a viewer is one pixel wide, which is hard to see.
 
-    Parameters
-    ----------
-    points : ndarray, shape (k, 3)
-        Metres.
-    radius : float
-        Metres.
-
-    Returns
-    -------
-    Triangles or None
-        None if the path does not leave its first point.
-
-    Examples
-    --------
-    >>> path_tube(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), 0.01).vertices.shape
-    (16, 3)
+    Shapes: points (k, 3).
     """
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     points = points[np.r_[True, steps > 1e-9]]
@@ -150,27 +98,7 @@ def path_tube(points: Array, radius: float) -> Triangles | None:
 
 
 def path_node(name: str, points: Array, size: float) -> list[Node]:
-    """The path of a tool as a node.
-
-    Parameters
-    ----------
-    name : str
-        Of the robot.
-    points : ndarray, shape (k, 3)
-        World axes, metres.
-    size : float
-        Of the robot, metres.
-
-    Returns
-    -------
-    list of Node
-        One, or none if the tool does not move.
-
-    Examples
-    --------
-    >>> path_node("arm", np.zeros((4, 3)), 1.0)
-    []
-    """
+    """The path of a tool as a node. Shapes: points (k, 3)."""
     tube = path_tube(points, 0.005 * size)
     return [] if tube is None else [Node(f"paths/{name}", np.eye(4), tube, _PATH_COLOR)]
 

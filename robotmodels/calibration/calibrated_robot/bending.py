@@ -192,28 +192,7 @@ class Bending(Rebuilt):
 
 
 def bends(parameters: GeometricParameters, entry: GeometricParameter) -> bool:
-    """Whether a parameter is a compliance that does not add to the variable of its own joint.
-
-    Parameters
-    ----------
-    parameters : GeometricParameters
-        Parameters of the robot.
-    entry : GeometricParameter
-        One of them.
-
-    Returns
-    -------
-    bool
-        True: it belongs to `Bending`. False: to the table or to `JointErrors`.
-
-    Examples
-    --------
-    >>> from robotmodels.calibration import candidate_parameters
-    >>> from robotmodels.robots import load
-    >>> parameters = candidate_parameters(load("erd:ur10"), compliance="links")
-    >>> [e.name for e in parameters.entries if bends(parameters, e)][:4]
-    ['compliance_gamma0', 'compliance_beta0', 'compliance_alpha0', 'compliance_beta2']
-    """
+    """Whether a parameter is a compliance that does not add to the variable of its own joint."""
     if entry.law is not ErrorLaw.COMPLIANCE:
         return False
     own = entry.element is _OWN[int(parameters.skeleton.sigma[entry.row])]
@@ -221,34 +200,9 @@ def bends(parameters: GeometricParameters, entry: GeometricParameter) -> bool:
 
 
 def bending_of(parameters: GeometricParameters, elements: Array, deviation: ArrayLike) -> Bending:
-    """The part of some deviations that bends links or tilts the mount.
+    """The corrections that bend links or tilt the mount.
 
-    Parameters
-    ----------
-    parameters : GeometricParameters
-        P parameters.
-    elements : ndarray, shape (R, 7)
-        The extended table with the constant deviations.
-    deviation : array_like, shape (P,)
-        Values of the parameters.
-
-    Returns
-    -------
-    Bending
-        Without what is zero.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Not P finite numbers.
-
-    References
-    ----------
-    Seed book section 1.4.2.
-
-    Examples
-    --------
-    See `Bending`.
+    Shapes: elements (R, 7), deviation (P,).
     """
     xi = as_exact(deviation, (len(parameters),), "deviation")
     found = [

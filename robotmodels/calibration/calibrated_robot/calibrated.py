@@ -268,22 +268,7 @@ def calibrated_model(parameters: GeometricParameters, deviation: ArrayLike) -> C
 def with_moved_tool(
     model: RobotModel, tool: Array, poses: Mapping[str, Array] = MappingProxyType({})
 ) -> RobotModel:
-    """The same robot whose tool stands elsewhere, and with it the link that the tool is.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    tool : ndarray, shape (4, 4)
-        Pose of the tool in the tip frame, metres.
-    poses : mapping of str to ndarray, shape (4, 4)
-        Poses of other named frames, in the frames that they are fixed to.
-
-    Returns
-    -------
-    RobotModel
-        With another tool and other named frames.
-    """
+    """The same robot whose tool stands elsewhere, and with it the link that the tool is."""
     link = tool_link(model.parts)
     poses = {**({} if link is None else {link: tool}), **poses}
     frames = (replace(named, pose=poses.get(named.name, named.pose)) for named in model.frames)
@@ -291,31 +276,7 @@ def with_moved_tool(
 
 
 def as_calibrated(robot: Any) -> CalibratedRobot:
-    """A calibrated robot at the border: itself, or that of the result of a fit.
-
-    Parameters
-    ----------
-    robot : CalibratedRobot or CalibrationResult
-        What a caller passed.
-
-    Returns
-    -------
-    CalibratedRobot
-        The robot.
-
-    Raises
-    ------
-    InvalidValueError
-        Something else.
-
-    Examples
-    --------
-    >>> as_calibrated(3)
-    Traceback (most recent call last):
-    ...
-    robotmodels.errors.InvalidValueError: robot: expected a CalibratedRobot or a CalibrationResult,
-    got int; make one with fit(...) or calibrated_model(parameters, deviation).
-    """
+    """Calibrated robot from itself or from the result of a fit."""
     found = getattr(robot, "robot", robot)
     if not isinstance(found, CalibratedRobot):
         raise InvalidValueError(

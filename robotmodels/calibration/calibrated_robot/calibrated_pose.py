@@ -54,35 +54,7 @@ def calibrated_pose(robot: CalibratedRobot, q_read: ArrayLike, frame: Frame = No
 
 
 def tip_of(robot: CalibratedRobot, frame: Frame = None) -> tuple[NDArray[np.int64], Array]:
-    """Where a frame hangs in the extended table.
-
-    Parameters
-    ----------
-    robot : CalibratedRobot
-        The robot.
-    frame : str, int or None
-        A measured end or any frame of the model; None is the tool.
-
-    Returns
-    -------
-    path : ndarray of int, shape (k,)
-        Rows from the world: to the end, or to the frame of the table that carries the frame.
-    after : ndarray, shape (4, 4)
-        Constant pose behind the last of them, metres.
-
-    Raises
-    ------
-    FrameNotFoundError
-        An unknown frame.
-
-    Examples
-    --------
-    >>> from robotmodels.calibration import calibrated_model, candidate_parameters
-    >>> from robotmodels.robots import load
-    >>> parameters = candidate_parameters(load("rx90"))
-    >>> tip_of(calibrated_model(parameters, np.zeros(len(parameters))), 2)[0]
-    array([0, 1, 2])
-    """
+    """Path of a frame in the extended table, and its constant pose behind the path's end."""
     skeleton, end = robot.parameters.skeleton, robot.end(frame)
     if end is not None:
         return robot.bending.path_to(end.row), skeleton.after[end.row - 1 - robot.model.f]

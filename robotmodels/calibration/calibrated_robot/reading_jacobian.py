@@ -60,46 +60,18 @@ def reading_jacobian(robot: CalibratedRobot, q_read: ArrayLike) -> Array:
 
 
 def missing_of_pose(T: Array, wanted: Array) -> Array:
-    """What poses miss of the wanted ones.
+    """Pose errors: translation (m) and rotation vector (rad) from each pose to the wanted one.
 
-    Parameters
-    ----------
-    T, wanted : ndarray, shape (N, 4, 4)
-        World poses, metres.
-
-    Returns
-    -------
-    ndarray, shape (N, 6)
-        Translation (m) and ``log(R_wanted R^T)`` (rad), world axes.
-
-    Examples
-    --------
-    >>> missing_of_pose(np.eye(4)[None], np.eye(4)[None])
-    array([[0., 0., 0., 0., 0., 0.]])
+    Shapes: T, wanted (N, 4, 4) -> (N, 6).
     """
     turn = wanted[:, :3, :3] @ T[:, :3, :3].swapaxes(-1, -2)
     return np.concatenate([wanted[:, :3, 3] - T[:, :3, 3], rotation_vectors_of(turn)], axis=1)
 
 
 def missing_slope(J: Array, phi: Array) -> Array:
-    """Minus the derivative of `missing_of_pose` where the rotation ``phi`` is missing.
+    """Minus the derivative of `missing_of_pose` at a rotation error ``phi``.
 
-    Parameters
-    ----------
-    J : ndarray, shape (N, 6, n)
-        Jacobian, world axes.
-    phi : ndarray, shape (N, 3)
-        Missing rotation, rad.
-
-    Returns
-    -------
-    ndarray, shape (N, 6, n)
-        J with its angular rows turned and stretched as the rotation vector is.
-
-    Examples
-    --------
-    >>> bool((missing_slope(np.eye(6)[None], np.zeros((1, 3))) == np.eye(6)).all())
-    True
+    Shapes: J (N, 6, n), phi (N, 3) -> (N, 6, n).
     """
     t = np.linalg.norm(phi, axis=1)
     half = 0.5 * np.where(t < 1e-3, 1.0, t)

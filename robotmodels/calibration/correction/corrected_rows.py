@@ -23,20 +23,7 @@ MERGE = 1e-6
 
 
 def same_as(postures: Postures, robot: CalibratedRobot) -> NDArray[np.bool_]:
-    """Which candidates arrived where an earlier one did.
-
-    Parameters
-    ----------
-    postures : Postures
-        C candidates of N poses.
-    robot : CalibratedRobot
-        The robot.
-
-    Returns
-    -------
-    ndarray of bool, shape (N, C, C)
-        Element (., c, k): whether candidate c is where the earlier k is.
-    """
+    """Whether a candidate converged to the same posture as an earlier one. Shapes: -> (N, C, C)."""
     turns = robot.model.table.sigma[robot.model.table.joint_rows] == REVOLUTE
     N, C = postures.met.shape
     # joint by joint: few are left after the first
@@ -70,33 +57,10 @@ def put_together(
     closest: Array,
     missing: Array,
 ) -> CorrectedSolutions:
-    """The result of a call of `corrected_igm`.
+    """Merge the candidates of all poses into the result of `corrected_igm`.
 
-    Parameters
-    ----------
-    robot : CalibratedRobot
-        The robot.
-    batch : tuple of int
-        Leading axes of the result.
-    starts : IGMSolutions
-        Postures of the nominal robot, C for each of N poses.
-    first, more : Postures
-        Where they arrived; others.
-    nominal : ndarray, shape (N, C, n)
-        What they were, rad or m.
-    targets, references : ndarray, shapes (N, 4, 4) and (N, n)
-        Poses, and reference readings.
-    given, limits : bool
-        Whether the references were given; whether readings must lie within the limits.
-    home : Home
-        The task.
-    status, closest, missing : ndarray, shapes (N,), (N, n) and (N, 6)
-        For poses without a solution, as in `IGMSolutions`.
-
-    Returns
-    -------
-    CorrectedSolutions
-        Readings, and what became of the nominal postures.
+    Shapes: nominal (N, C, n); targets (N, 4, 4); references, closest (N, n); status (N,); missing
+    (N, 6).
     """
     model, n, N = robot.model, robot.model.n, len(targets)
     C = first.q.shape[1]

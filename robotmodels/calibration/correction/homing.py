@@ -26,20 +26,9 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Postures:
-    """Candidates of N poses: where they arrived, their readings, what is left.
+    """Candidate postures of N poses with their readings and residuals.
 
-    Parameters
-    ----------
-    q, reading : ndarray, shape (N, C, n)
-        Variables of the calibrated table and readings, rad or m.
-    met : ndarray of bool, shape (N, C)
-        Whether the pose is met.
-    residual, least : ndarray, shape (N, C)
-        What is missing, and the least singular value of the Jacobian without units.
-    double : ndarray of bool, shape (N, C)
-        Double roots.
-    free, family : ndarray of bool, shape (N, C, n)
-        As in `IGMSolutions`.
+    Shapes: q, reading, free, family (N, C, n); met, residual, least, double (N, C).
     """
 
     q: Array
@@ -89,21 +78,7 @@ class Postures:
 
 
 class Home:
-    """Newton's method for one robot and task.
-
-    Parameters
-    ----------
-    robot : CalibratedRobot
-        The robot.
-    mask : ndarray of bool, shape (6,)
-        Components that are asked for.
-    in_tool_axes : bool
-        Components along the axes of the tool at its target.
-    locked : list of int
-        Columns of q whose readings are given.
-    tolerance : float
-        Metres and radians.
-    """
+    """Newton refinement of postures for one robot and task."""
 
     def __init__(
         self,
@@ -134,25 +109,9 @@ class Home:
     def bring(
         self, targets: Array, starts: Array, there: Flags, held: Flags, wanted: Array
     ) -> Postures:
-        """Bring candidates home.
+        """Refine candidates by Newton's method until they meet their poses.
 
-        Parameters
-        ----------
-        targets : ndarray, shape (N, 4, 4)
-            World poses, metres.
-        starts : ndarray, shape (N, C, n)
-            Candidates, variables of the calibrated table, rad or m.
-        there : ndarray of bool, shape (N, C)
-            Which of them are there.
-        held : ndarray of bool, shape (N, C, n)
-            Joints that keep a reading.
-        wanted : ndarray, shape (N, C, n)
-            The readings of held joints, rad or m.
-
-        Returns
-        -------
-        Postures
-            Where they arrived.
+        Shapes: targets (N, 4, 4); starts, held, wanted (N, C, n); there (N, C).
         """
         axes = self.axes_of(targets)
         found = self._rigid(targets, axes, starts, there, held, wanted)
@@ -173,21 +132,9 @@ class Home:
         )
 
     def aimed(self, targets: Array, tried: Postures, rows: NDArray[np.int64]) -> Array:
-        """Targets for the inverse model of the table, which knows of no bending.
+        """Targets for the inverse model of the table without bending.
 
-        Parameters
-        ----------
-        targets : ndarray, shape (M, 4, 4)
-            World poses, metres.
-        tried : Postures
-            Of N poses.
-        rows : ndarray of int, shape (M,)
-            Which of them these are.
-
-        Returns
-        -------
-        ndarray, shape (M, 4, 4)
-            Moved back by what bends at the posture that came nearest, where there is one.
+        Shapes: targets (M, 4, 4), rows (M,) -> (M, 4, 4).
         """
         if self.robot.bending.is_zero or not tried.met.shape[1]:
             return targets
@@ -202,21 +149,10 @@ class Home:
     def settled(
         self, targets: Array, reading: Array, residual: Array, rows: Flags, held: Flags
     ) -> tuple[Array, Array]:
-        """Bent postures whose readings were changed a little, brought home again.
+        """Refine postures again after a small change of readings under bending.
 
-        Parameters
-        ----------
-        targets, reading, residual : ndarray, shapes (N, 4, 4), (N, C, n) and (N, C)
-            World poses (m), readings (rad or m), what was missing before the change.
-        rows : ndarray of bool, shape (N, C)
-            Those that count.
-        held : ndarray of bool, shape (N, C, n)
-            Joints that keep their readings.
-
-        Returns
-        -------
-        reading, residual : ndarray, shapes (N, C, n) and (N, C)
-            As they are then.
+        Shapes: targets (N, 4, 4); reading, held (N, C, n); residual, rows (N, C) -> reading
+        (N, C, n), residual (N, C).
         """
         pose, candidate = np.nonzero(rows)
         task = self.task(targets[pose], held[pose, candidate])
@@ -274,11 +210,9 @@ class Home:
     def _bent(
         self, targets: Array, axes: Array, found: Postures, there: Flags, held: Flags, wanted: Array
     ) -> Postures:
-        """Targets are moved back by what bends at the posture, until that stays as it is.
+        """Fixed-point iteration of targets moved back by the bending at the posture.
 
-        Bending changes little from posture to posture, so that each round leaves a small part of
-        the error. Where it does not, near singular postures, Newton's method with exact slopes
-        takes over.
+        Where it does not converge, near singular postures, Newton's method takes over.
         """
         pose, candidate = np.nonzero(there & found.readable)
         goals, held, wanted = targets[pose], held[pose, candidate], wanted[pose, candidate]

@@ -23,24 +23,9 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Task:
-    """What is asked of M postures of a calibrated robot.
+    """Targets, mask and held joints of M postures of a calibrated robot.
 
-    Parameters
-    ----------
-    robot : CalibratedRobot
-        The robot, n joints.
-    targets : ndarray, shape (M, 4, 4)
-        World poses of the tool, metres.
-    axes : ndarray, shape (M, 3, 3)
-        Axes of the components.
-    mask : ndarray of bool, shape (6,)
-        Components asked for.
-    held : ndarray of bool, shape (M, n)
-        Joints that keep their readings.
-    unit : ndarray, shape (n,)
-        What steps of the joints are measured in.
-    length : float
-        Metres that count as a radian.
+    Shapes: targets (M, 4, 4), axes (M, 3, 3), mask (6,), held (M, n), unit (n,).
     """
 
     robot: CalibratedRobot
@@ -69,22 +54,9 @@ def sizes(errors: Array, mask: Flags) -> Array:
 
 
 def moved_back(robot: CalibratedRobot, targets: Array, reading: Array) -> Array:
-    """Targets for the table without bending that the bent robot would meet.
+    """Targets at which the table without bending has the errors of the bent robot.
 
-    Parameters
-    ----------
-    robot : CalibratedRobot
-        The robot.
-    targets : ndarray, shape (M, 4, 4)
-        World poses, metres.
-    reading : ndarray, shape (M, n)
-        Postures at which it bends, rad or m.
-
-    Returns
-    -------
-    ndarray, shape (M, 4, 4)
-        The same translation and rotation are missing of them without bending as of the targets
-        with it, so that any components of the error may be asked for.
+    Shapes: targets (M, 4, 4), reading (M, n) -> (M, 4, 4).
     """
     rigid = dgm(robot.model, robot.joint_errors.actual(reading))
     bent = calibrated_pose(robot, reading)
@@ -97,19 +69,9 @@ def moved_back(robot: CalibratedRobot, targets: Array, reading: Array) -> Array:
 
 
 def settled_readings(task: Task, reading: Array) -> Array:
-    """Newton's method in the readings, with slopes that know of errors of joints and bending.
+    """Newton's method in the readings, with exact derivatives of joint errors and bending.
 
-    Parameters
-    ----------
-    task : Task
-        M postures.
-    reading : ndarray, shape (M, n)
-        Where it starts, rad or m.
-
-    Returns
-    -------
-    ndarray, shape (M, n)
-        The best it came to: the shortest steps are taken, those that do not help are halved.
+    Shapes: reading (M, n) -> (M, n).
     """
     best = reading.copy()
     error = sizes(reading_errors(task, best), task.mask)

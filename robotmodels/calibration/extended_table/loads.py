@@ -1,4 +1,7 @@
-"""What gravity does to an element of the table: the load that a compliance is multiplied by."""
+"""What gravity does to an element of the table: the load that a compliance is multiplied by.
+
+Source: Seed book section 1.5.1.1 (potential energy).
+"""
 
 from __future__ import annotations
 
@@ -18,36 +21,7 @@ def gravity_loads(
 ) -> Array:
     """Forces of gravity along elements: moments about rotations, forces along translations.
 
-    For the element of a joint it is minus its gravity torque. For others it is what bends a link
-    or tilts the mount.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-        The extended table; masses are those of its model.
-    q : ndarray, shape (N, n)
-        Joint variables, rad or m.
-    elements : sequence of (int, Element, int)
-        K of them: row, element, and the row whose bodies, with all behind it, are the load.
-
-    Returns
-    -------
-    ndarray, shape (N, K)
-        ``-dU/d element``, N m or N.
-
-    References
-    ----------
-    Seed book section 1.5.1.1 (potential energy).
-
-    Examples
-    --------
-    >>> from robotmodels.dynamics import gravity_torque
-    >>> from robotmodels.robots import load
-    >>> arm, q = load("erd:ur10"), np.full((1, 6), 0.3)
-    >>> from robotmodels.calibration import skeleton_of
-    >>> load_of_2 = gravity_loads(skeleton_of(arm), q, [(2, Element.THETA, 2)])
-    >>> bool(np.isclose(load_of_2[0, 0], -gravity_torque(arm, q)[0, 1]))
-    True
+    Shapes: q (N, n) -> (N, K).
     """
     model = skeleton.model
     T = link_poses(model, q)

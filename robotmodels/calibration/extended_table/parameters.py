@@ -310,21 +310,5 @@ _LAWS = {
 
 
 def as_names(names: str | Iterable[str]) -> tuple[str, ...]:
-    """Names at the border: one or several.
-
-    Parameters
-    ----------
-    names : str or iterable of str
-        What a caller passed; a text is one name.
-
-    Returns
-    -------
-    tuple of str
-        Names.
-
-    Examples
-    --------
-    >>> as_names("r4")
-    ('r4',)
-    """
+    """Check names: one or several."""
     return (names,) if isinstance(names, str) else tuple(names)

@@ -310,20 +310,7 @@ def _without_fixtures(W: Array, fixtures: int) -> Array:
 def all_deviations(
     candidates: GeometricParameters, kept: GeometricParameters, deviation: Array
 ) -> Array:
-    """Deviations of all candidates, zero for those that were not estimated.
-
-    Parameters
-    ----------
-    candidates, kept : GeometricParameters
-        All, and those that were estimated.
-    deviation : ndarray, shape (number kept,)
-        Their values.
-
-    Returns
-    -------
-    ndarray, shape (number of candidates,)
-        In the order of the candidates.
-    """
+    """Corrections of all candidates, zero for those that were not estimated."""
     values = np.zeros(len(candidates))
     values[candidates.index(kept.names)] = deviation
     return values

@@ -23,20 +23,7 @@ _TINY = 1e-300
 
 
 def needs_a_length(problem: Problem, known: Iterable[str]) -> bool:
-    """Whether the scale has to come from a parameter that is known.
-
-    Parameters
-    ----------
-    problem : Problem
-        The calibration.
-    known : iterable of str
-        Names of parameters that stay as they are.
-
-    Returns
-    -------
-    bool
-        False where lengths are measured, do not matter, or are all known.
-    """
+    """Whether the scale has to come from a parameter that is known."""
     if all(unit == "rad" for m in problem.measurements for unit in m.units):
         return False  # orientations do not see lengths at all
     p, known = problem.parameters, set(known)
@@ -52,28 +39,7 @@ def needs_a_length(problem: Problem, known: Iterable[str]) -> bool:
 
 
 def check_scale(problem: Problem, W: Array, fixed: Sequence[str], named: Sequence[str]) -> None:
-    """Refuse measurements whose satisfaction leaves the size of the robot open.
-
-    The robot is free to shrink if changes that the measurements do not see can bring all distances
-    between postures nearer to zero in the same proportion. A length that is regrouped into others
-    does not prevent it: the others shrink all the same.
-
-    Parameters
-    ----------
-    problem : Problem
-        At readings that satisfy the constraints.
-    W : ndarray, shape (M, F + P)
-        Derivatives by fixtures and all candidates, there.
-    fixed : sequence of str
-        Parameters that stay as they are, the named among them.
-    named : sequence of str
-        Those that are to give the scale.
-
-    Raises
-    ------
-    InvalidValueError
-        Nothing gives the scale, or what was named does not; with the names that would.
-    """
+    """Refuse measurements that do not determine the scale of the robot. Shapes: W (M, F + P)."""
     p, F = problem.parameters, problem.F
     least = _ZERO * problem.parameters.skeleton.size
     lengths = [

@@ -127,38 +127,7 @@ def drawn_measurement(
     frame: Frame = None,
     deviation: Array | None = None,
 ) -> Measurement:
-    """Enough of a kind of measurement to tell whatever that kind can tell.
-
-    Parameters
-    ----------
-    candidates : GeometricParameters
-        P parameters.
-    kind : Kind
-        What is measured.
-    rng : numpy.random.Generator
-        Where chance comes from.
-    frame : str, int or None
-        The end.
-    deviation : ndarray, shape (P,), optional
-        Of the robot that measures; default the nominal one.
-
-    Returns
-    -------
-    Measurement
-        Free of noise.
-
-    Raises
-    ------
-    InvalidValueError
-        No contact that the robot reaches in two postures.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> candidates = candidate_parameters(load("rx90"))
-    >>> drawn_measurement(candidates, Kind.POSITION, np.random.default_rng(0)).blocks
-    88
-    """
+    """Random noise-free measurements, enough to identify all that the kind can identify."""
     groups, postures = 20 + 2 * len(candidates), kind.postures
     if kind.is_contact:
         groups, postures = _CONTACTS, _POSTURES[kind]

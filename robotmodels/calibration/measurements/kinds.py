@@ -63,31 +63,7 @@ _POSTURES = {Kind.FRAME_CONTACT: 2, Kind.POINT_CONTACT: 4, Kind.PLANE_CONTACT: 6
 
 
 def as_kind(value: Any, name: str = "kind") -> Kind:
-    """A kind given as a member of `Kind`, by its name, or as the class of its measurements.
-
-    Parameters
-    ----------
-    value : Kind, str or class
-        Such as ``Kind.POSE``, ``"pose"`` or ``Pose``.
-    name : str
-        Used in error messages.
-
-    Returns
-    -------
-    Kind
-        The member.
-
-    Raises
-    ------
-    InvalidValueError
-        Something else.
-
-    Examples
-    --------
-    >>> from robotmodels.calibration import PointContact
-    >>> as_kind(PointContact)
-    <Kind.POINT_CONTACT: 'the same point touched in several postures'>
-    """
+    """A kind given as a member of `Kind`, by its name, or as the class of its measurements."""
     if isinstance(value, type) and issubclass(value, Measurement):
         words = "".join(f"_{c}" if c.isupper() else c for c in value.__name__).strip("_")
         if words.upper() in Kind.__members__:
@@ -100,15 +76,7 @@ def as_kind(value: Any, name: str = "kind") -> Kind:
 
 
 class Groups(NamedTuple):
-    """Configurations and what belongs together.
-
-    Attributes
-    ----------
-    q : ndarray, shape (N, n)
-        Rows of a group follow each other.
-    label : ndarray of int, shape (N,)
-        Number of the group of each row, from 0.
-    """
+    """Configurations with the group number of each. Shapes: q (N, n), label (N,)."""
 
     q: Array
     label: NDArray[np.int64]
@@ -120,18 +88,7 @@ class Groups(NamedTuple):
 
 
 def groups_of(q: Array) -> Groups:
-    """Groups of the same size.
-
-    Parameters
-    ----------
-    q : ndarray, shape (G, m, n)
-        m postures of each group.
-
-    Returns
-    -------
-    Groups
-        The same as rows.
-    """
+    """Groups of the same size. Shapes: q (G, m, n)."""
     G, size, n = q.shape
     return Groups(q.reshape(-1, n), np.repeat(np.arange(G), size))
 
@@ -211,28 +168,7 @@ def measurement_of(
     deviation: Array | None = None,
     sigma: Array | float | None = None,
 ) -> Measurement:
-    """What a robot without noise would measure there.
-
-    Parameters
-    ----------
-    parameters : GeometricParameters
-        Of the robot.
-    kind : Kind
-        What is measured.
-    groups : Groups
-        Where.
-    frame : str, int or None
-        The end.
-    deviation : ndarray, shape (P,), optional
-        Of the robot; default the nominal one.
-    sigma : float or ndarray, shape (k,), optional
-        Standard deviations of the rows.
-
-    Returns
-    -------
-    Measurement
-        Residuals are zero for this robot.
-    """
+    """Noise-free measurement of a robot at given configurations."""
     q, label = groups
     T = differential_model(parameters, q, deviation, frame).T
     more: dict[str, Any] = {"sigma": sigma, "frame": frame}

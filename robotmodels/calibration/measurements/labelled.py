@@ -73,27 +73,7 @@ class Labelled(Measurement):
 
 
 def as_labels(given: Labels | None, blocks: int, name: str) -> tuple[str, ...]:
-    """Labels at the border of a kind of measurement.
-
-    Parameters
-    ----------
-    given : sequence of int or str, length B, optional
-        None: all have the label 0.
-    blocks : int
-        Number of blocks B.
-    name : str
-        Used in error messages.
-
-    Returns
-    -------
-    tuple of str
-        A label for each block.
-
-    Raises
-    ------
-    ShapeError
-        Another number of labels.
-    """
+    """Check the labels of a measurement."""
     if given is None:
         return ("0",) * blocks
     if isinstance(given, str) or np.ndim(given) != 1 or len(given) != blocks:
@@ -108,29 +88,7 @@ def as_known(
     thing: str,
     checked: Callable[[Any, str], Array],
 ) -> Mapping[str, Array]:
-    """What is known of labelled things, at the border of a kind of measurement.
-
-    Parameters
-    ----------
-    given : mapping of label to value, optional
-        None: nothing is known.
-    labels : sequence of str
-        Labels of the blocks.
-    thing : str
-        Such as ``"plane"``, used in error messages.
-    checked : callable
-        ``checked(value, name)`` gives a read-only array or raises.
-
-    Returns
-    -------
-    mapping of str to ndarray
-        Read-only.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        No mapping, a label without blocks, or as ``checked``.
-    """
+    """Check the known values of labelled objects."""
     if given is not None and not isinstance(given, Mapping):
         raise InvalidValueError(
             f"known: expected a mapping of labels to values, such as {{0: ...}}, got "

@@ -12,41 +12,12 @@ from .measurement import Fixture
 
 
 def as_point(value: Any, name: str) -> Array:
-    """A known point at the border of a kind of measurement.
-
-    Parameters
-    ----------
-    value : array_like, shape (3,)
-        Metres.
-    name : str
-        Used in error messages.
-
-    Returns
-    -------
-    ndarray, shape (3,)
-        Read-only.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Another shape, NaN.
-    """
+    """Check a known point."""
     return read_only(as_exact(value, (3,), name))
 
 
 def point_fixtures(kind: Labelled) -> tuple[Fixture, ...]:
-    """Coordinates of the unknown points of a kind of measurement.
-
-    Parameters
-    ----------
-    kind : Labelled
-        Whose labels.
-
-    Returns
-    -------
-    tuple of Fixture
-        ``name:label.x`` and so on, label by label.
-    """
+    """Coordinates of the unknown points of a kind of measurement."""
     return tuple(
         Fixture(f"{kind.name}:{label}.{axis}", "m") for label in kind.unknown for axis in "xyz"
     )
@@ -55,19 +26,7 @@ def point_fixtures(kind: Labelled) -> tuple[Fixture, ...]:
 def labelled_points(kind: Labelled, values: Array) -> tuple[Array, Array]:
     """Point of the label of each block.
 
-    Parameters
-    ----------
-    kind : Labelled
-        Whose labels; what it knows are points of shape (3,).
-    values : ndarray, shape (F,)
-        Of `point_fixtures`, metres.
-
-    Returns
-    -------
-    points : ndarray, shape (B, 3)
-        Metres.
-    derivative : ndarray, shape (B, 3, F)
-        By the values.
+    Shapes: values (F,) -> points (B, 3), derivative (B, 3, F).
     """
     place = {**dict(zip(kind.unknown, values.reshape(-1, 3), strict=True)), **kind.known}
     derivative = np.zeros((kind.blocks, 3, len(values)))
@@ -80,17 +39,7 @@ def labelled_points(kind: Labelled, values: Array) -> tuple[Array, Array]:
 def known_points(kind: Labelled) -> tuple[Array, Array]:
     """Places from which a robot can be dilated without leaving the known points.
 
-    Parameters
-    ----------
-    kind : Labelled
-        What it knows are points of shape (3,).
-
-    Returns
-    -------
-    A : ndarray, shape (m, 3)
-        As `Measurement.dilation_centres`.
-    b : ndarray, shape (m,)
-        Metres.
+    Shapes: -> A (m, 3), b (m,).
     """
     places = list(kind.known.values())
     return np.tile(np.eye(3), (len(places), 1)), np.array(places).reshape(-1)

@@ -18,43 +18,12 @@ _NAMES = ("x", "y", "z", "rx", "ry", "rz")
 
 
 def as_known_pose(value: Any, name: str) -> Array:
-    """A known pose at the border of a kind of measurement.
-
-    Parameters
-    ----------
-    value : pose, shape (4, 4)
-        Metres.
-    name : str
-        Used in error messages.
-
-    Returns
-    -------
-    ndarray, shape (4, 4)
-        Read-only.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, NotARotationError
-        Another shape, NaN, no pose.
-    """
+    """Check a known pose."""
     return read_only(se3.as_single_pose(value, name))
 
 
 def pose_fixtures(kind: Labelled, asked: tuple[int, ...]) -> tuple[Fixture, ...]:
-    """Unknowns of the poses of a kind of measurement.
-
-    Parameters
-    ----------
-    kind : Labelled
-        Whose labels.
-    asked : tuple of int
-        Which of the six numbers matter.
-
-    Returns
-    -------
-    tuple of Fixture
-        ``name:label.x`` and so on, label by label.
-    """
+    """Unknowns of the poses of a kind of measurement."""
     return tuple(
         Fixture(f"{kind.name}:{label}.{_NAMES[k]}", "m" if k < 3 else "rad")
         for label in kind.unknown
@@ -65,27 +34,7 @@ def pose_fixtures(kind: Labelled, asked: tuple[int, ...]) -> tuple[Fixture, ...]
 def labelled_poses(
     kind: Labelled, asked: tuple[int, ...], values: Array, parameters: int
 ) -> Evaluation:
-    """Pose of the label of each block.
-
-    The orientation is a rotation vector. It is regular up to a whole turn, and a first guess is
-    at most half a turn long, so no reference orientation need be kept.
-
-    Parameters
-    ----------
-    kind : Labelled
-        Whose labels; what it knows are poses of shape (4, 4).
-    asked : tuple of int
-        Which of the six numbers matter; the others are 0.
-    values : ndarray, shape (F,)
-        Of `pose_fixtures`.
-    parameters : int
-        Number P of unknowns before the fixtures.
-
-    Returns
-    -------
-    Evaluation
-        Poses (B, 4, 4) and derivatives (B, 6, P + F).
-    """
+    """Pose of the label of each block. Shapes: values (F,)."""
     unknown, count = kind.unknown, len(asked)
     six = np.zeros((len(unknown), 6))
     six[:, asked] = values.reshape(len(unknown), count)
@@ -103,22 +52,7 @@ def labelled_poses(
 
 
 def guessed_poses(kind: Labelled, asked: tuple[int, ...], T: Array) -> Array:
-    """Mean pose of each unknown label.
-
-    Parameters
-    ----------
-    kind : Labelled
-        Whose labels.
-    asked : tuple of int
-        Which of the six numbers matter.
-    T : ndarray, shape (B, 4, 4)
-        What each block says.
-
-    Returns
-    -------
-    ndarray, shape (F,)
-        In the order of `pose_fixtures`.
-    """
+    """Mean pose of each unknown label. Shapes: T (B, 4, 4) -> (F,)."""
     from scipy.spatial.transform import Rotation
 
     found = np.zeros((len(kind.unknown), 6))

@@ -1,4 +1,7 @@
-"""Touched things that too few blocks share: their own unknowns take all that these say."""
+"""Touched things that too few blocks share: their own unknowns take all that these say.
+
+Source: Seed book section 1.4.5.
+"""
 
 from __future__ import annotations
 
@@ -10,19 +13,7 @@ from .measurement import Measurement
 
 
 class LonelyLabel(NamedTuple):
-    """A point, plane, pose or the like of which nothing is left for the robot.
-
-    Attributes
-    ----------
-    label : str
-        As in the names of its fixtures, ``point:0``.
-    rows : int
-        Residual rows in which it takes part.
-    unknowns : int
-        Its own.
-    blocks : int
-        Blocks in which it takes part.
-    """
+    """Label whose measurements determine only its own unknowns."""
 
     label: str
     rows: int
@@ -39,30 +30,7 @@ class LonelyLabel(NamedTuple):
 
 
 def lonely_labels(measurements: Iterable[Measurement]) -> tuple[LonelyLabel, ...]:
-    """Labels whose rows, in all measurements together, are not more than their own unknowns.
-
-    Parameters
-    ----------
-    measurements : iterable of Measurement
-        Of one robot.
-
-    Returns
-    -------
-    tuple of LonelyLabel
-        Each prints as a sentence that says what to do.
-
-    References
-    ----------
-    Seed book section 1.4.5.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from robotmodels.calibration import PointContact
-    >>> [lonely] = lonely_labels([PointContact(np.zeros((3, 6)), ["a", "a", "b"])])
-    >>> lonely.label, lonely.rows, lonely.unknowns
-    ('point:b', 3, 3)
-    """
+    """Labels with no more rows, over all measurements, than unknowns of their own."""
     unknowns: dict[str, set[str]] = {}
     rows: dict[str, int] = {}
     blocks: dict[str, int] = {}

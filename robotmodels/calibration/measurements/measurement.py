@@ -20,29 +20,16 @@ from ..extended_table.skeleton import Frame
 
 
 class View(NamedTuple):
-    """Poses that a measurement needs: an end and the configurations.
-
-    Attributes
-    ----------
-    frame : str, int or None
-        The end; None is the tool.
-    q : ndarray, shape (N, n)
-        Readings of the joints, rad or m.
-    """
+    """Poses that a measurement needs: an end and the configurations. Shapes: q (N, n)."""
 
     frame: Frame
     q: Array
 
 
 class Evaluation(NamedTuple):
-    """What the robot says about a view.
+    """Poses of a view and their derivatives by the parameters.
 
-    Attributes
-    ----------
-    T : ndarray, shape (N, 4, 4)
-        World poses, metres.
-    psi : ndarray, shape (N, 6, P)
-        ``[v; w]`` per unit of each parameter, world axes, at the end's origin.
+    Shapes: T (N, 4, 4), psi (N, 6, P).
     """
 
     T: Array
@@ -50,15 +37,7 @@ class Evaluation(NamedTuple):
 
 
 class Fixture(NamedTuple):
-    """One unknown number that is not the robot's; equal names are the same unknown.
-
-    Attributes
-    ----------
-    name : str
-        Such as ``contact:0.x``.
-    unit : str
-        ``"m"`` or ``"rad"``.
-    """
+    """Unknown that is not a robot parameter; equal names are the same unknown."""
 
     name: str
     unit: str
@@ -67,14 +46,7 @@ class Fixture(NamedTuple):
 class Linearised(NamedTuple):
     """Residuals of a kind and their derivatives.
 
-    Attributes
-    ----------
-    residual : ndarray, shape (B, k)
-        Predicted minus measured, m or rad, one row of k for each of B blocks.
-    by_parameters : ndarray, shape (B, k, P)
-        By the parameters of the robot.
-    by_fixtures : ndarray, shape (B, k, F)
-        By the unknown fixtures.
+    Shapes: residual (B, k), by_parameters (B, k, P), by_fixtures (B, k, F).
     """
 
     residual: Array

@@ -15,37 +15,13 @@ from .rotation_vectors import inverse_left_jacobians, rotation_errors
 
 
 def widened(pose: Evaluation, columns: int) -> Evaluation:
-    """The same poses with further unknowns that do not move them.
-
-    Parameters
-    ----------
-    pose : Evaluation
-        Poses, C unknowns.
-    columns : int
-        How many more.
-
-    Returns
-    -------
-    Evaluation
-        C + columns unknowns.
-    """
+    """Append zero columns for unknowns that do not move the poses."""
     T, psi = pose
     return Evaluation(T, np.concatenate([psi, np.zeros((*psi.shape[:2], columns))], axis=-1))
 
 
 def product(a: Evaluation, b: Evaluation) -> Evaluation:
-    """``T_a T_b``.
-
-    Parameters
-    ----------
-    a, b : Evaluation
-        Of the same unknowns.
-
-    Returns
-    -------
-    Evaluation
-        Axes of a.
-    """
+    """``T_a T_b``."""
     R = a.T[:, :3, :3]
     arm = (R @ b.T[:, :3, 3:])[..., 0]
     psi = np.empty_like(a.psi)
@@ -55,18 +31,7 @@ def product(a: Evaluation, b: Evaluation) -> Evaluation:
 
 
 def relative(a: Evaluation, b: Evaluation) -> Evaluation:
-    """``T_a^-1 T_b``: pose of b seen in a.
-
-    Parameters
-    ----------
-    a, b : Evaluation
-        Of the same unknowns.
-
-    Returns
-    -------
-    Evaluation
-        Axes of the end a.
-    """
+    """``T_a^-1 T_b``: pose of b seen in a."""
     Rt = a.T[:, :3, :3].swapaxes(-1, -2)
     apart = b.T[:, :3, 3] - a.T[:, :3, 3]
     T = np.tile(np.eye(4), (len(Rt), 1, 1))
@@ -81,17 +46,7 @@ def relative(a: Evaluation, b: Evaluation) -> Evaluation:
 def difference(a: Evaluation, b: Evaluation) -> tuple[Array, Array]:
     """Position of a less that of b, and the rotation vector that turns b to a.
 
-    Parameters
-    ----------
-    a, b : Evaluation
-        Of the same unknowns.
-
-    Returns
-    -------
-    residual : ndarray, shape (N, 6)
-        ``[p_a - p_b; log(R_a R_b^T)]``, m and rad.
-    jacobian : ndarray, shape (N, 6, C)
-        Its derivative.
+    Shapes: -> residual (N, 6), jacobian (N, 6, C).
     """
     u = rotation_errors(a.T[:, :3, :3], b.T[:, :3, :3])
     residual = np.hstack([a.T[:, :3, 3] - b.T[:, :3, 3], u])
@@ -102,18 +57,5 @@ def difference(a: Evaluation, b: Evaluation) -> tuple[Array, Array]:
 
 
 def motionless(T: Array, columns: int) -> Evaluation:
-    """Poses that are known.
-
-    Parameters
-    ----------
-    T : ndarray, shape (N, 4, 4)
-        Poses.
-    columns : int
-        Number of unknowns.
-
-    Returns
-    -------
-    Evaluation
-        With derivatives zero.
-    """
+    """Known poses, with zero derivatives. Shapes: T (N, 4, 4)."""
     return Evaluation(T, np.zeros((len(T), 6, columns)))

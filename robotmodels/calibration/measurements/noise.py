@@ -13,26 +13,9 @@ from .measurement import Measurement
 def as_noise(
     sigma: ArrayLike | None, covariance: ArrayLike | None, blocks: int, k: int
 ) -> tuple[Array | None, Array | None]:
-    """Standard deviations or covariances at the border of a kind of measurement.
+    """Check standard deviations or covariances of a measurement.
 
-    Parameters
-    ----------
-    sigma : array_like, shape (), (k,) or (B, k), optional
-        Standard deviations of the rows of a block, m or rad.
-    covariance : array_like, shape (k, k) or (B, k, k), optional
-        Instead: covariance of the rows of a block.
-    blocks, k : int
-        Number of blocks, rows of a block.
-
-    Returns
-    -------
-    tuple of ndarray or None
-        Sigma of shape (B, k), covariance of shape (B, k, k); at most one is not None.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Both given; not positive (definite); shapes that do not fit.
+    Shapes: covariance (k, k) or (B, k, k).
     """
     if sigma is not None and covariance is not None:
         raise InvalidValueError("Give sigma or covariance, not both.")
@@ -66,20 +49,7 @@ def as_noise(
 def part_of_noise(
     measurement: Measurement, blocks: NDArray[np.int64]
 ) -> tuple[Array | None, Array | None]:
-    """Sigma and covariance of some of the blocks.
-
-    Parameters
-    ----------
-    measurement : Measurement
-        The whole.
-    blocks : ndarray of int
-        Which blocks.
-
-    Returns
-    -------
-    tuple of ndarray or None
-        As the fields of the measurement.
-    """
+    """Sigma and covariance of some of the blocks."""
     sigma, covariance = measurement.sigma, measurement.covariance
     return (
         None if sigma is None else sigma[blocks],
@@ -88,21 +58,9 @@ def part_of_noise(
 
 
 def whitened(measurement: Measurement, rows: Array, scale: Array) -> Array:
-    """Rows divided by their standard deviations, correlations taken out.
+    """Rows whitened by their standard deviations or covariances.
 
-    Parameters
-    ----------
-    measurement : Measurement
-        Whose noise.
-    rows : ndarray, shape (B, k) or (B, k, m)
-        Residuals or derivatives.
-    scale : ndarray, shape (k,)
-        Standard deviations to use where the measurement states none, m or rad.
-
-    Returns
-    -------
-    ndarray, the shape of rows
-        In standard deviations.
+    Shapes: rows (B, k) or (B, k, m), scale (k,).
     """
     extra = (...,) + (None,) * (rows.ndim - 2)
     if measurement.covariance is not None:

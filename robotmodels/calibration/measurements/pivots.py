@@ -12,27 +12,9 @@ _STEPS = 20
 
 
 def pivot_of(p: Array, length: Array, offset: bool) -> Array:
-    """Point from which positions are as far as was measured, by least squares.
+    """Least-squares centre of positions at measured distances.
 
-    Parameters
-    ----------
-    p : ndarray, shape (N, 3)
-        Positions, metres.
-    length : ndarray, shape (N,)
-        Their distances from the point, metres.
-    offset : bool
-        Whether an unknown constant is in the lengths.
-
-    Returns
-    -------
-    ndarray, shape (3,)
-        Metres. If the positions lie in a plane, the lower of the two points that are possible.
-
-    Examples
-    --------
-    >>> p = np.array([[1.0, 0, 0], [0, 2.0, 0], [0, 0, 3.0], [-1.0, -1.0, 0]])
-    >>> pivot_of(p, np.linalg.norm(p - 0.2, axis=1), False).round(9)
-    array([0.2, 0.2, 0.2])
+    Shapes: p (N, 3), length (N,) -> (3,).
     """
     mean = p.mean(axis=0)
     x = p - mean

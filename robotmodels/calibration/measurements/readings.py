@@ -14,25 +14,7 @@ from ...errors import InvalidValueError, ShapeError
 
 
 def as_readings(value: ArrayLike, name: str = "q") -> Array:
-    """Readings of joints at the border of a kind of measurement.
-
-    Parameters
-    ----------
-    value : array_like, shape (N, n)
-        rad or m.
-    name : str
-        Used in error messages.
-
-    Returns
-    -------
-    ndarray, shape (N, n)
-        Read-only.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Not a matrix, no rows, NaN.
-    """
+    """Check the joint readings of a measurement. Shapes: value (N, n) -> (N, n)."""
     q = as_floats(value, name)
     if q.ndim != 2:
         raise ShapeError(
@@ -46,22 +28,7 @@ def as_readings(value: ArrayLike, name: str = "q") -> Array:
 def same_number_of_readings(q: Array, q_other: ArrayLike) -> Array:
     """Readings at the other of two configurations, as many as at the first.
 
-    Parameters
-    ----------
-    q : ndarray, shape (N, n)
-        At the first.
-    q_other : array_like, shape (N, n)
-        At the other, rad or m.
-
-    Returns
-    -------
-    ndarray, shape (N, n)
-        Read-only.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Another shape, NaN.
+    Shapes: q, q_other (N, n) -> (N, n).
     """
     other = as_readings(q_other, "q_other")
     if other.shape != q.shape:
@@ -70,25 +37,7 @@ def same_number_of_readings(q: Array, q_other: ArrayLike) -> Array:
 
 
 def as_rows(rows: Sequence[int | bool], count: int) -> tuple[bool, ...]:
-    """Which rows of a block are measured, at the border of a kind of measurement.
-
-    Parameters
-    ----------
-    rows : sequence of 0 or 1
-        One for each.
-    count : int
-        How many there are.
-
-    Returns
-    -------
-    tuple of bool
-        At least one is True.
-
-    Raises
-    ------
-    InvalidValueError
-        Another number of them, something else than 0 and 1, none asked.
-    """
+    """Check which rows of a block are measured."""
     asked = tuple(rows)
     if len(asked) != count or any(r not in (0, 1) for r in asked) or not any(asked):
         raise InvalidValueError(
@@ -98,25 +47,7 @@ def as_rows(rows: Sequence[int | bool], count: int) -> tuple[bool, ...]:
 
 
 def as_measured_poses(T: Any, blocks: int) -> Array:
-    """Measured poses at the border of a kind of measurement.
-
-    Parameters
-    ----------
-    T : array_like, shape (B, 4, 4)
-        Metres.
-    blocks : int
-        Number of blocks B.
-
-    Returns
-    -------
-    ndarray, shape (B, 4, 4)
-        Read-only.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, NotARotationError
-        Another number of them, NaN, no poses.
-    """
+    """Check measured poses. Shapes: T (B, 4, 4) -> (B, 4, 4)."""
     poses = se3.as_pose(T, "T")
     if poses.shape != (blocks, 4, 4):
         raise ShapeError(
@@ -126,27 +57,7 @@ def as_measured_poses(T: Any, blocks: int) -> Array:
 
 
 def as_values(values: ArrayLike, blocks: int, name: str) -> Array:
-    """A measured number for each block, at the border of a kind of measurement.
-
-    Parameters
-    ----------
-    values : array_like, shape (B,) or ()
-        One number holds for all.
-    blocks : int
-        Number of blocks B.
-    name : str
-        Used in error messages.
-
-    Returns
-    -------
-    ndarray, shape (B,)
-        Read-only.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Another number of them, NaN.
-    """
+    """Check the measured number of each block. Shapes: values (B,) or () -> (B,)."""
     numbers = as_floats(values, name)
     if numbers.shape not in ((), (blocks,)):
         raise ShapeError(

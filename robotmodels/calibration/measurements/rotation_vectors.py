@@ -1,4 +1,7 @@
-"""Rotation vectors of small rotations, and how they change."""
+"""Rotation vectors of small rotations, and how they change.
+
+Source: T. D. Barfoot, State Estimation for Robotics, Cambridge 2017, eq. (7.76).
+"""
 
 from __future__ import annotations
 
@@ -11,15 +14,7 @@ from ...se3 import skew
 def rotation_errors(R: Array, R_measured: Array) -> Array:
     """Rotation vectors that turn measured rotations into predicted ones, world axes.
 
-    Parameters
-    ----------
-    R, R_measured : ndarray, shape (N, 3, 3)
-        Predicted and measured.
-
-    Returns
-    -------
-    ndarray, shape (N, 3)
-        ``log(R R_measured^T)``, rad.
+    Shapes: R, R_measured (N, 3, 3) -> (N, 3).
     """
     from scipy.spatial.transform import Rotation
 
@@ -31,21 +26,9 @@ def rotation_errors(R: Array, R_measured: Array) -> Array:
 
 
 def inverse_left_jacobians(u: Array) -> Array:
-    """Derivative of a rotation vector by a turn in front: ``d u = J^-1 w``.
+    """Inverse left Jacobians of rotation vectors: ``d u = J^-1 w``.
 
-    Parameters
-    ----------
-    u : ndarray, shape (N, 3)
-        Rotation vectors, rad, shorter than a turn.
-
-    Returns
-    -------
-    ndarray, shape (N, 3, 3)
-        Inverse left Jacobians of SO(3).
-
-    References
-    ----------
-    T. D. Barfoot, State Estimation for Robotics, Cambridge 2017, eq. (7.76).
+    Shapes: u (N, 3) -> (N, 3, 3).
     """
     angle = np.linalg.norm(u, axis=-1)[:, None, None]
     K = skew(u)
@@ -58,18 +41,7 @@ def inverse_left_jacobians(u: Array) -> Array:
 
 
 def left_jacobians(u: Array) -> Array:
-    """Turn in front that a change of a rotation vector makes: ``w = J d u``.
-
-    Parameters
-    ----------
-    u : ndarray, shape (N, 3)
-        Rotation vectors, rad.
-
-    Returns
-    -------
-    ndarray, shape (N, 3, 3)
-        Left Jacobians of SO(3).
-    """
+    """Left Jacobians of rotation vectors: ``w = J d u``. Shapes: u (N, 3) -> (N, 3, 3)."""
     angle = np.linalg.norm(u, axis=-1)[:, None, None]
     K = skew(u)
     small = angle < 1e-4
@@ -80,54 +52,21 @@ def left_jacobians(u: Array) -> Array:
 
 
 def rotations_of(u: Array) -> Array:
-    """Rotation matrices of rotation vectors.
-
-    Parameters
-    ----------
-    u : ndarray, shape (N, 3)
-        Rotation vectors, rad.
-
-    Returns
-    -------
-    ndarray, shape (N, 3, 3)
-        ``exp(u)``.
-    """
+    """Rotation matrices of rotation vectors. Shapes: u (N, 3) -> (N, 3, 3)."""
     from scipy.spatial.transform import Rotation
 
     return Rotation.from_rotvec(u).as_matrix() if len(u) else np.zeros((0, 3, 3))
 
 
 def mean_rotation(R: Array) -> Array:
-    """The rotation next to the mean of rotation matrices.
-
-    Parameters
-    ----------
-    R : ndarray, shape (N, 3, 3)
-        One or more.
-
-    Returns
-    -------
-    ndarray, shape (3, 3)
-        Of all rotations that with the smallest sum of squared differences.
-    """
+    """Rotation nearest to the mean of rotation matrices. Shapes: R (N, 3, 3) -> (3, 3)."""
     U, _, Vt = np.linalg.svd(R.sum(axis=0))
     U[:, 2] *= np.sign(np.linalg.det(U @ Vt))
     return U @ Vt
 
 
 def tilt_of(direction: Array) -> Array:
-    """Rotation vector without part along z that turns z to a direction.
-
-    Parameters
-    ----------
-    direction : ndarray, shape (3,)
-        Of length 1, not opposite to z.
-
-    Returns
-    -------
-    ndarray, shape (2,)
-        Its x and y, rad.
-    """
+    """Rotation vector without part along z that turns z to a direction."""
     x, y, z = direction
     sine = float(np.hypot(x, y))
     angle = np.arctan2(sine, z)
@@ -137,20 +76,7 @@ def tilt_of(direction: Array) -> Array:
 def tilted_axes(tilt: Array) -> tuple[Array, Array]:
     """Axes turned by rotation vectors without part along z, and how they change.
 
-    A line or plane has no sense of direction: of its two unit vectors one is not below the plane
-    xy, and is described by two numbers without any singularity near it.
-
-    Parameters
-    ----------
-    tilt : ndarray, shape (N, 2)
-        x and y of the rotation vectors, rad, shorter than a turn.
-
-    Returns
-    -------
-    R : ndarray, shape (N, 3, 3)
-        The axes are its columns.
-    derivative : ndarray, shape (N, 3, 3, 2)
-        ``derivative[:, :, k]`` is that of column k.
+    Shapes: tilt (N, 2) -> R (N, 3, 3), derivative (N, 3, 3, 2).
     """
     u = np.column_stack([tilt, np.zeros(len(tilt))])
     R = rotations_of(u)
@@ -160,17 +86,6 @@ def tilted_axes(tilt: Array) -> tuple[Array, Array]:
 
 
 def unit_vector(direction: Array) -> Array:
-    """A direction at length 1; one that has it already stays as it is to the last digit.
-
-    Parameters
-    ----------
-    direction : ndarray, shape (3,)
-        Not zero.
-
-    Returns
-    -------
-    ndarray, shape (3,)
-        Of length 1.
-    """
+    """A direction at length 1; one that has it already stays as it is to the last digit."""
     length = float(np.linalg.norm(direction))
     return direction if abs(length - 1.0) < 1e-15 else direction / length

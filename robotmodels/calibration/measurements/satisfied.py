@@ -23,37 +23,7 @@ _FURTHEST = 0.3
 def satisfied_measurement(
     parameters: GeometricParameters, measurement: Measurement, xi: Array, fixtures: Array
 ) -> Measurement | None:
-    """The measurement at nearby readings at which its residuals vanish.
-
-    Parameters
-    ----------
-    parameters : GeometricParameters
-        Of the robot.
-    measurement : Measurement
-        A contact.
-    xi : ndarray, shape (P,)
-        Deviations.
-    fixtures : ndarray, shape (F,)
-        Of this measurement.
-
-    Returns
-    -------
-    Measurement or None
-        With other readings, without the blocks that no nearby reading satisfies; None if there
-        are no others.
-
-    Examples
-    --------
-    >>> from robotmodels.calibration import PointContact, candidate_parameters
-    >>> from robotmodels.robots import load
-    >>> rng = np.random.default_rng(0)
-    >>> near = np.array([0.1, -1.0, 1.2, 0.3, 0.8, 0.2]) + 0.02 * rng.normal(size=(5, 6))
-    >>> candidates, touched = candidate_parameters(load("rx90")), PointContact(near)
-    >>> there = differential_model(candidates, near).T[:, :3, 3].mean(axis=0)
-    >>> moved = satisfied_measurement(candidates, touched, np.zeros(len(candidates)), there)
-    >>> float(np.ptp(differential_model(candidates, moved.q).T[:, :3, 3], axis=0).max()) < 1e-12
-    True
-    """
+    """The measurement with readings moved by the least step to zero residuals."""
     if not measurement.views:
         return measurement
     motions = _joint_motions(parameters.skeleton)

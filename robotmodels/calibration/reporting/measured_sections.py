@@ -40,18 +40,7 @@ def measured_section(result: CalibrationResult) -> ReportSection:
 
 
 def files_sentence(measurement: Measurement) -> str:
-    """Files that a measurement was read from; empty if it was not.
-
-    Parameters
-    ----------
-    measurement : Measurement
-        Of any kind.
-
-    Returns
-    -------
-    str
-        Names and numbers of rows.
-    """
+    """Files that a measurement was read from; empty if it was not."""
     files = ", ".join(str(file) for file in measurement.files)
     return f"Read for {measurement.name}: {files}." if files else ""
 

@@ -57,22 +57,7 @@ def report_text(result: CalibrationResult) -> str:
 
 
 def report_sections(result: CalibrationResult) -> tuple[ReportSection, ...]:
-    """What the text and the page of a report say.
-
-    Parameters
-    ----------
-    result : CalibrationResult
-        Of `fit`.
-
-    Returns
-    -------
-    tuple of ReportSection
-        In the order in which they are read.
-
-    Examples
-    --------
-    See `report_text`.
-    """
+    """Sections of a report, for text and page."""
     parts = (
         _outcome(result), _notes(result), measured_section(result), error_section(result),
         noise_section(result), parameter_section(result), place_section(result),
@@ -165,30 +150,7 @@ def _rms(values: Array) -> float:
 def strong_correlations(
     result: CalibrationResult, least: float = _STRONG
 ) -> list[tuple[str, str, float]]:
-    """Pairs of parameters whose estimates are strongly correlated, the strongest first.
-
-    Parameters
-    ----------
-    result : CalibrationResult
-        Of `fit`.
-    least : float
-        Size of the correlation from which a pair is listed.
-
-    Returns
-    -------
-    list of (str, str, float)
-        Names and correlation.
-
-    Examples
-    --------
-    >>> import robotmodels as rm
-    >>> import robotmodels.calibration as calibration
-    >>> arm = rm.load("rx90")
-    >>> q = np.random.default_rng(0).uniform(-1.5, 1.5, (40, 6))
-    >>> result = calibration.fit(arm, calibration.Pose(q, rm.dgm(arm, q)), folds=0, held_out=0.0)
-    >>> all(abs(c) > 0.5 for *_, c in strong_correlations(result, 0.5))
-    True
-    """
+    """Pairs of parameters whose estimates are strongly correlated, the strongest first."""
     return list(correlated_pairs(result.correlation, result.names, least))
 
 

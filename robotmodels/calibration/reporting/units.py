@@ -4,67 +4,17 @@ from __future__ import annotations
 
 
 def millimetres(value: float) -> str:
-    """A length as text in millimetres: to a tenth of a micrometre.
-
-    Parameters
-    ----------
-    value : float
-        Metres.
-
-    Returns
-    -------
-    str
-        Millimetres; a dash for NaN.
-
-    Examples
-    --------
-    >>> millimetres(0.00123456), millimetres(float("nan"))
-    ('1.2346', '-')
-    """
+    """A length as text in millimetres: to a tenth of a micrometre."""
     return _fixed(1e3 * value)
 
 
 def degrees(value: float) -> str:
-    """An angle as text in degrees, to a tenth of a thousandth.
-
-    Parameters
-    ----------
-    value : float
-        Radians.
-
-    Returns
-    -------
-    str
-        Degrees; a dash for NaN.
-
-    Examples
-    --------
-    >>> degrees(3.141592653589793)
-    '180.0000'
-    """
+    """An angle as text in degrees, to a tenth of a thousandth."""
     return _fixed(57.29577951308232 * value)
 
 
 def in_unit(value: float, unit: str) -> str:
-    """A number of a unit as it is printed: m as mm, rad as deg, others as they are.
-
-    Parameters
-    ----------
-    value : float
-        SI.
-    unit : str
-        ``"m"``, ``"rad"`` or another.
-
-    Returns
-    -------
-    str
-        Text.
-
-    Examples
-    --------
-    >>> in_unit(0.001, "m"), in_unit(2.5e-5, "rad/N m")
-    ('1.0000', '2.500e-05')
-    """
+    """A number of a unit as it is printed: m as mm, rad as deg, others as they are."""
     if unit == "m":
         return millimetres(value)
     if unit == "rad":
@@ -73,23 +23,7 @@ def in_unit(value: float, unit: str) -> str:
 
 
 def printed_unit(unit: str) -> str:
-    """Name of the unit that `in_unit` prints.
-
-    Parameters
-    ----------
-    unit : str
-        SI.
-
-    Returns
-    -------
-    str
-        ``mm`` for m, ``deg`` for rad.
-
-    Examples
-    --------
-    >>> printed_unit("m"), printed_unit("rad"), printed_unit("1")
-    ('mm', 'deg', '1')
-    """
+    """Name of the unit that `in_unit` prints."""
     return {"m": "mm", "rad": "deg"}.get(unit, unit)
 
 

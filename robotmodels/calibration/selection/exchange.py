@@ -2,6 +2,10 @@
 
 Candidate i brings rows ``R_i`` (k, p), and a set has the information ``M = sum R_i^T R_i``, whose
 eigenvalues are the squares of the singular values of the identification matrix.
+
+Source: V. V. Fedorov, "Theory of optimal experiments", Academic Press 1972; R. D. Cook, C. J.
+Nachtsheim, Technometrics 22(3), 1980 (member by member); T. J. Mitchell, "An algorithm for the
+construction of D-optimal experimental designs", Technometrics 16(2), 1974.
 """
 
 from __future__ import annotations
@@ -23,19 +27,9 @@ _CHUNK = 4096
 
 
 def index_of(information: Array, criterion: Criterion) -> Array:
-    """A criterion of information matrices, up to what all sets of one size share.
+    """Observability criterion of information matrices, up to a constant.
 
-    Parameters
-    ----------
-    information : ndarray, shape (..., p, p)
-        Of scaled columns.
-    criterion : Criterion
-        Which.
-
-    Returns
-    -------
-    ndarray, shape (...)
-        Larger is better; logarithms, so that products do not overflow.
+    Shapes: information (..., p, p).
     """
     if criterion is Criterion.O1:
         sign, value = np.linalg.slogdet(information)
@@ -52,21 +46,9 @@ def index_of(information: Array, criterion: Criterion) -> Array:
 
 
 def added(base: Array, rows: Array, criterion: Criterion) -> Array:
-    """The criterion of one information matrix with each of some candidates added to it.
+    """Criterion of an information matrix after adding each candidate.
 
-    Parameters
-    ----------
-    base : ndarray, shape (p, p)
-        Positive definite.
-    rows : ndarray, shape (N, k, p)
-        Of the candidates.
-    criterion : Criterion
-        Which.
-
-    Returns
-    -------
-    ndarray, shape (N,)
-        As `index_of`.
+    Shapes: base (p, p), rows (N, k, p) -> (N,).
     """
     N, k, p = rows.shape
     if criterion is Criterion.O1 and k < p:
@@ -83,22 +65,7 @@ def added(base: Array, rows: Array, criterion: Criterion) -> Array:
 
 
 def greedy(rows: Array, count: int, criterion: Criterion) -> NDArray[np.int64]:
-    """One candidate after the other, each the best beside those before.
-
-    Parameters
-    ----------
-    rows : ndarray, shape (N, k, p)
-        Of the candidates, scaled.
-    count : int
-        How many, at most N.
-    criterion : Criterion
-        Which.
-
-    Returns
-    -------
-    ndarray of int, shape (count,)
-        Different candidates.
-    """
+    """Greedy forward selection of candidates. Shapes: rows (N, k, p) -> (count,)."""
     M = _floor(rows)
     left = np.ones(len(rows), dtype=bool)
     chosen = []
@@ -121,34 +88,9 @@ def exchanged(
     progress: Progress | None = None,
     fixed: int = 0,
 ) -> NDArray[np.int64]:
-    """Exchange members of a set for others as long as one exchange makes it better.
+    """Exchange algorithm: swap members while the criterion improves.
 
-    Each member is taken out in turn and the best candidate put in its place; what is returned
-    cannot be made better by any single exchange (it is a local optimum of Fedorov's).
-
-    Parameters
-    ----------
-    rows : ndarray, shape (N, k, p)
-        Of the candidates, scaled.
-    start : ndarray of int, shape (count,)
-        Different candidates.
-    criterion : Criterion
-        Which.
-    progress : callable, optional
-        Called with (members looked at, at most so many).
-    fixed : int
-        So many of the first members stay.
-
-    Returns
-    -------
-    ndarray of int, shape (count,)
-        Different candidates, never worse than the start.
-
-    References
-    ----------
-    V. V. Fedorov, "Theory of optimal experiments", Academic Press 1972; R. D. Cook,
-    C. J. Nachtsheim, Technometrics 22(3), 1980 (member by member); T. J. Mitchell, "An algorithm
-    for the construction of D-optimal experimental designs", Technometrics 16(2), 1974.
+    Shapes: rows (N, k, p), start (count,) -> (count,).
     """
     chosen = np.array(start, dtype=np.int64)
     floor = _floor(rows)
@@ -178,23 +120,9 @@ def exchanged(
 
 
 def nested(rows: Array, chosen: NDArray[np.int64], criterion: Criterion) -> NDArray[np.int64]:
-    """Order a set so that its first members are good sets themselves.
+    """Order a set so that its leading subsets are good sets.
 
-    The member that is missed least is put last, then the next.
-
-    Parameters
-    ----------
-    rows : ndarray, shape (N, k, p)
-        Of the candidates, scaled.
-    chosen : ndarray of int, shape (count,)
-        The set.
-    criterion : Criterion
-        Which.
-
-    Returns
-    -------
-    ndarray of int, shape (count,)
-        The same members in another order.
+    Shapes: rows (N, k, p), chosen (count,) -> (count,).
     """
     floor = _floor(rows)
     members, last = [int(c) for c in chosen], []

@@ -29,31 +29,9 @@ def group_rows(
     sigma: ArrayLike | None = None,
     frame: Frame = None,
 ) -> Array:
-    """Rows of each group in standard deviations, its own unknown fixtures eliminated.
+    """Whitened rows of each group with its own fixtures eliminated.
 
-    Parameters
-    ----------
-    parameters : GeometricParameters
-        P parameters.
-    kind : Kind
-        What is measured.
-    q : ndarray, shape (G, m, n)
-        Configurations of G groups.
-    sigma : float or array_like, shape (k,), optional
-        Standard deviations of the rows of a measurement, m or rad; default 0.1 mm, and for angles
-        what turns the end by as much at the robot's reach.
-    frame : str, int or None
-        The end.
-
-    Returns
-    -------
-    ndarray, shape (G, k', P)
-        k' rows without the fixtures' part: the information on the parameters is the same.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Not as many standard deviations as rows, or not positive.
+    Shapes: q (G, m, n), sigma (k,) -> (G, k', P).
     """
     parts = []
     none = np.zeros(len(parameters))

@@ -29,29 +29,9 @@ def moved_configurations(
     model: RobotModel,
     progress: Progress | None = None,
 ) -> Array:
-    """Local optimisation: each configuration in turn, the others held.
+    """Coordinate-wise local optimisation of the configurations.
 
-    Parameters
-    ----------
-    groups : ndarray, shape (count, m, n)
-        Configurations.
-    rows : ndarray, shape (count, k, p)
-        Their scaled rows.
-    criterion : Criterion
-        What shall grow.
-    rows_of : callable
-        Scaled rows of configurations.
-    inside : callable
-        Which configurations are allowed.
-    model : RobotModel
-        For its limits; joints without limits move freely.
-    progress : callable, optional
-        Called with (done, total).
-
-    Returns
-    -------
-    ndarray, shape (count, m, n)
-        Never worse than the given ones, and allowed.
+    Shapes: groups (count, m, n), rows (count, k, p) -> (count, m, n).
     """
     from scipy.optimize import minimize
 

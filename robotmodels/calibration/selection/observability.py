@@ -166,20 +166,7 @@ def observability(
 
 
 def of_singular_values(s: Array, configurations: int) -> Observability:
-    """The indices of given singular values.
-
-    Parameters
-    ----------
-    s : ndarray, shape (L,)
-        From the largest; zero for what is not seen.
-    configurations : int
-        m.
-
-    Returns
-    -------
-    Observability
-        All zero where the smallest singular value is.
-    """
+    """Observability indices of given singular values. Shapes: s (L,)."""
     first, last = float(s[0]), float(s[-1])
     seen = last > 0.0
     return Observability(

@@ -21,25 +21,7 @@ _MOST = 64
 
 
 def prior(arguments: argparse.Namespace, model: RobotModel) -> InertialParameters | None:
-    """The bodies of ``--prior``: of another robot, or uniform ones of a mass.
-
-    Parameters
-    ----------
-    arguments : Namespace
-        With ``prior``.
-    model : RobotModel
-        The robot that is identified.
-
-    Returns
-    -------
-    InertialParameters or None
-        None without the option.
-
-    Raises
-    ------
-    RobotModelsError
-        An unknown robot, or one with another number of links.
-    """
+    """Prior inertial parameters of ``--prior``: another robot's, or uniform bodies."""
     if arguments.prior is None:
         return None
     from ...minimal_parameters import uniform_bodies
@@ -58,23 +40,7 @@ def prior(arguments: argparse.Namespace, model: RobotModel) -> InertialParameter
 
 
 def essential(text: str | None) -> bool | float | str:
-    """The rule of ``--essential``: a ratio, a name, or none.
-
-    Parameters
-    ----------
-    text : str or None
-        What was given.
-
-    Returns
-    -------
-    bool, float or str
-        As `fit` takes it.
-
-    Examples
-    --------
-    >>> essential("20"), essential("aic"), essential(None)
-    (20.0, 'aic', False)
-    """
+    """The rule of ``--essential``: a ratio, a name, or none."""
     if text is None:
         return False
     try:
@@ -84,25 +50,7 @@ def essential(text: str | None) -> bool | float | str:
 
 
 def controller(arguments: argparse.Namespace, model: RobotModel) -> Controller | None:
-    """The controller of ``--kp`` and ``--kd``.
-
-    Parameters
-    ----------
-    arguments : Namespace
-        With ``kp`` and ``kd``.
-    model : RobotModel
-        The robot.
-
-    Returns
-    -------
-    Controller or None
-        None without the options.
-
-    Raises
-    ------
-    InvalidValueError
-        One without the other, or no gains.
-    """
+    """The controller of ``--kp`` and ``--kd``."""
     if arguments.kp is None and arguments.kd is None:
         return None
     if arguments.kp is None or arguments.kd is None:
@@ -116,29 +64,7 @@ def controller(arguments: argparse.Namespace, model: RobotModel) -> Controller |
 
 
 def workers(count: int) -> AbstractContextManager[Executor | None]:
-    """Processes that share the work.
-
-    Parameters
-    ----------
-    count : int
-        How many.
-
-    Returns
-    -------
-    context manager
-        Of an executor, or of None for this process alone.
-
-    Raises
-    ------
-    InvalidValueError
-        None, or too many.
-
-    Examples
-    --------
-    >>> with workers(1) as executor:
-    ...     executor is None
-    True
-    """
+    """Processes that share the work."""
     if not 1 <= count <= _MOST:
         raise InvalidValueError(f"--workers: expected 1 to {_MOST}, got {count}.")
     if count == 1:

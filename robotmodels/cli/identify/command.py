@@ -30,17 +30,7 @@ identified.urdf (a robot of real bodies and drives). Without --out the report is
 
 
 def add_command(commands: Any) -> None:
-    """Add the command to the parser.
-
-    Parameters
-    ----------
-    commands : argparse subparsers
-        Where to add it.
-
-    Examples
-    --------
-    >>> add_command(argparse.ArgumentParser().add_subparsers())
-    """
+    """Add the command to the parser."""
     parser = commands.add_parser(
         "identify",
         usage="robotmodels identify --robot ROBOT --log FILE [FILE ...] [options]",
@@ -55,31 +45,7 @@ def add_command(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Read, fit, and print or write.
-
-    Parameters
-    ----------
-    arguments : Namespace
-        Parsed arguments.
-
-    Returns
-    -------
-    int
-        `ExitStatus.DONE`, or `ExitStatus.NOT_REACHED` if the method has not converged or
-        the prediction is poor.
-
-    Raises
-    ------
-    RobotModelsError
-        A robot, files or options that make no sense.
-
-    Examples
-    --------
-    >>> parser = argparse.ArgumentParser()
-    >>> add_command(parser.add_subparsers())
-    >>> parser.parse_args(["identify", "--robot", "tx40", "--log", "a.csv"]).method
-    'wls'
-    """
+    """Run the command: read, fit, and print or write."""
     from ...identification import EstimateStatus, fit
 
     check_output(arguments)

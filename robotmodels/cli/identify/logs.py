@@ -15,27 +15,7 @@ if TYPE_CHECKING:
 
 
 def logs(arguments: argparse.Namespace, model: RobotModel) -> tuple[Log, Log | None]:
-    """The log that is fitted and the one that is kept aside.
-
-    Parameters
-    ----------
-    arguments : Namespace
-        Parsed arguments.
-    model : RobotModel
-        The robot.
-
-    Returns
-    -------
-    log : Log
-        For the fit.
-    test : Log or None
-        Kept aside.
-
-    Raises
-    ------
-    RobotModelsError
-        As `read_log`; several ways to keep motion aside.
-    """
+    """The log to fit and the held-out log."""
     from ...identification.preparation.synchronisation import synchronisation
     from ...logs import with_delay
 

@@ -16,21 +16,7 @@ LOSSES = ("huber", "cauchy", "tukey")
 
 
 def add_options(parser: Any) -> None:
-    """Add the options for logs, for motion that is kept aside, and for the fit.
-
-    Parameters
-    ----------
-    parser : ArgumentParser
-        Of the command.
-
-    Examples
-    --------
-    >>> import argparse
-    >>> parser = argparse.ArgumentParser()
-    >>> add_options(parser)
-    >>> parser.parse_args(["--log", "a.csv"]).method
-    'wls'
-    """
+    """Add the options for logs, held-out motion and the fit."""
     _add_files(parser.add_argument_group("the logs"))
     _add_test(parser.add_argument_group("motion that is kept aside, one of"))
     _add_fit(parser.add_argument_group("the fit"))

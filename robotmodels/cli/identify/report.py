@@ -15,22 +15,7 @@ if TYPE_CHECKING:
 
 
 def report(result: IdentificationResult, test: Log | None, robot: ConsistentFit | None) -> Report:
-    """An identification in every form.
-
-    Parameters
-    ----------
-    result : IdentificationResult
-        Of the fit.
-    test : Log or None
-        Kept aside, for the figures.
-    robot : ConsistentFit or None
-        What the URDF is made of; none without it.
-
-    Returns
-    -------
-    Report
-        Text, data and files.
-    """
+    """An identification in every form."""
     from ...identification.reporting.result_data import result_data
     from ...identification.reporting.text import report_text
     from ...identification.reporting.write import write_result
@@ -56,27 +41,7 @@ def report(result: IdentificationResult, test: Log | None, robot: ConsistentFit 
 def real_bodies(
     result: IdentificationResult, prior: InertialParameters | None, asked: bool
 ) -> ConsistentFit | None:
-    """The robot of real bodies; where it was not asked for, what is missing for it is only said.
-
-    Parameters
-    ----------
-    result : IdentificationResult
-        Of the fit.
-    prior : InertialParameters or None
-        What decides what the torques do not; None takes the robot's own inertia.
-    asked : bool
-        Whether it was asked for by name.
-
-    Returns
-    -------
-    ConsistentFit or None
-        None where it cannot be had.
-
-    Raises
-    ------
-    RobotModelsError
-        It was asked for and cannot be had.
-    """
+    """Physically consistent robot; unless requested, a failure is only reported."""
     from ...identification.consistency.identified_robot import consistent_robot, prior_bodies
     from ...identification.consistency.result import ConsistentStatus
 

@@ -23,13 +23,7 @@ _KEPT = 64_000_000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GivenEquations(Equations):
-    """Equations of a robot with blocks of their own.
-
-    Parameters
-    ----------
-    source : callable
-        Makes the blocks, in order.
-    """
+    """Equations with blocks from another source, such as simulated signals."""
 
     source: Callable[[], Iterator[Block]] = lambda: iter(())
 
@@ -39,20 +33,7 @@ class GivenEquations(Equations):
 
 
 def given(system: Equations, source: Callable[[], Iterator[Block]]) -> GivenEquations:
-    """Equations of a system with other blocks.
-
-    Parameters
-    ----------
-    system : Equations
-        Robot, log and choices.
-    source : callable
-        Makes the blocks.
-
-    Returns
-    -------
-    GivenEquations
-        With the system's names.
-    """
+    """Replace the blocks of a system of equations."""
     return GivenEquations(
         system.base, system.names, system.log, system.processing, system.form, source
     )
@@ -61,30 +42,7 @@ def given(system: Equations, source: Callable[[], Iterator[Block]]) -> GivenEqua
 def simulated_blocks(
     system: Equations, loop: ClosedLoop, values: Array
 ) -> Iterator[tuple[Piece, Block]]:
-    """Regressor of the simulated robot's motion beside the torque that was measured.
-
-    Parameters
-    ----------
-    system : Equations
-        Robot, log and choices.
-    loop : ClosedLoop
-        How it is simulated.
-    values : ndarray, shape (b,)
-        Its parameters.
-
-    Yields
-    ------
-    piece : Piece
-        In order.
-    block : Block
-        Both sides through the same decimation, at the times of the measured equations; ``use`` and
-        ``v`` are those of the simulated motion.
-
-    Raises
-    ------
-    RanAwayError
-        The robot does not follow.
-    """
+    """Regressor of the simulated robot's motion beside the torque that was measured."""
     for piece, found in simulated_signals(system, loop, values):
         first = max(piece.start - system.processing.reach, piece.low)
         tau = np.array(system.log.tau[first : first + len(found)])
@@ -93,18 +51,7 @@ def simulated_blocks(
 
 
 def measured_blocks(system: Equations) -> Callable[[Piece], Block]:
-    """The measured equations of a piece, kept if all of them together are small.
-
-    Parameters
-    ----------
-    system : Equations
-        The equations.
-
-    Returns
-    -------
-    callable
-        From `Piece` to `Block`.
-    """
+    """The measured equations of a piece, kept if all of them together are small."""
     n, b = system.model.n, len(system.names)
     size = 8 * n * (b + 1) * (len(system.log) // system.processing.decimation + 1)
     if size > _KEPT:
@@ -114,20 +61,7 @@ def measured_blocks(system: Equations) -> Callable[[Piece], Block]:
 
 
 def reduced(system: Equations, blocks: Iterator[Block]) -> Reduction:
-    """Reduction of blocks, in the fixed tree of `reduce_equations`.
-
-    Parameters
-    ----------
-    system : Equations
-        Whose names they have.
-    blocks : iterator of Block
-        In order.
-
-    Returns
-    -------
-    Reduction
-        Of all.
-    """
+    """Reduction of blocks, in the fixed tree of `reduce_equations`."""
     found = merged_tree((block_reduction(system.names, block) for block in blocks), merge)
     if found is None:
         raise ValueError("blocks: none.")
@@ -137,25 +71,9 @@ def reduced(system: Equations, blocks: Iterator[Block]) -> Reduction:
 def sandwich(
     system: GivenEquations, values: Array, weights: Array, inverse: Array, lags: int | None
 ) -> CorrelatedCovariance:
-    """Covariance that holds for correlated residuals, where the inverse need not be symmetric.
+    """Sandwich covariance for correlated residuals; the inverse need not be symmetric.
 
-    Parameters
-    ----------
-    system : GivenEquations
-        Blocks whose W are instruments (or the regressor) and ``y - W @ values`` residuals.
-    values : ndarray, shape (b,)
-        Parameters.
-    weights : ndarray, shape (m,)
-        Of each kind.
-    inverse : ndarray, shape (b, b)
-        ``d values / d scores``.
-    lags : int or None
-        As for `correlated_covariance`.
-
-    Returns
-    -------
-    CorrelatedCovariance
-        Of the parameters.
+    Shapes: values (b,), weights (m,), inverse (b, b).
     """
 
     def turned() -> Iterator[Block]:

@@ -168,17 +168,7 @@ def tuned_controller(
 def inverse_masses(robot: RobotModel, q: Array) -> Array | None:
     """Inverses of the mass matrices, rotors included, or None where one is not definite.
 
-    Parameters
-    ----------
-    robot : RobotModel
-        The robot.
-    q : ndarray, shape (N, n)
-        Postures, of which 200 are taken.
-
-    Returns
-    -------
-    ndarray, shape (k, n, n), or None
-        Per kg m^2 or kg.
+    Shapes: q (N, n) -> (k, n, n).
     """
     from ...kernels.mass_matrix import mass_matrices
 

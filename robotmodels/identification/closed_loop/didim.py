@@ -33,18 +33,7 @@ _SINGULAR = 1e10
 class DidimStep:
     """Weighted least squares on the regressor of one simulation.
 
-    Parameters
-    ----------
-    values, deviations : ndarray, shape (b,)
-        Parameters, and their deviations if residuals were white.
-    inverse : ndarray, shape (b, b)
-        Of the information.
-    sigma, weights, next_weights : ndarray, shape (m,)
-        Deviations of the residuals, the weights, and those that follow from the former.
-    condition : float
-        Of the regressor, with columns of length one.
-    cost : float
-        0: a fixed point is looked for.
+    Shapes: values, deviations (b,); inverse (b, b); sigma, weights, next_weights (m,).
     """
 
     values: Array
@@ -190,22 +179,7 @@ def _quicker(system: Equations, values: Array, loop: ClosedLoop) -> ClosedLoop:
 
 
 def weighted_step(found: Reduction, values: Array, weights: Array | None) -> DidimStep:
-    """Weighted least squares on the equations of one simulation.
-
-    Parameters
-    ----------
-    found : Reduction
-        Of the equations of a simulation.
-    values : ndarray, shape (b,)
-        Those that were simulated.
-    weights : ndarray, shape (m,), or None
-        Of each kind; None for those of the residuals of the values.
-
-    Returns
-    -------
-    DidimStep
-        The parameters that follow.
-    """
+    """Weighted least squares on the equations of one simulation."""
     check_shown(found)
     if weights is None:
         weights = weights_of(deviations_of(found, values), found)

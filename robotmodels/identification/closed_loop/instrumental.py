@@ -28,18 +28,7 @@ _WEAK = 0.3
 class InstrumentStep:
     """Sums of one simulation, and the parameters that follow from them.
 
-    Parameters
-    ----------
-    values, deviations : ndarray, shape (b,)
-        Parameters, and their deviations if residuals were white.
-    inverse : ndarray, shape (b, b)
-        ``(Z^T S W)^-1``.
-    sigma, weights : ndarray, shape (n,)
-        Deviations of the residuals of the parameters before, and the weights.
-    condition, strength : float
-        Of ``Z^T S W`` with columns of length one; smallest canonical correlation of Z and W.
-    cost : float
-        0: nothing is minimised.
+    Shapes: values, deviations (b,); inverse (b, b); sigma, weights (n,).
     """
 
     values: Array
@@ -224,38 +213,14 @@ def _lifted(X: Array) -> Array:
 
 
 def first_values(reduction: Reduction, start: ArrayLike | None) -> Array:
-    """Parameters to begin with: those given, or weighted least squares.
-
-    Parameters
-    ----------
-    reduction : Reduction
-        Of the measured equations.
-    start : array_like, shape (b,), or None
-        What was asked.
-
-    Returns
-    -------
-    ndarray, shape (b,)
-        Values.
-    """
+    """Initial parameters: those given, or weighted least squares. Shapes: start (b,) -> (b,)."""
     if start is None:
         return weighted(reduction).values
     return as_exact(start, (len(reduction.names),), "start")
 
 
 def torque_sizes(reduction: Reduction) -> Array:
-    """Value of each parameter whose torque alone would be as large as that measured.
-
-    Parameters
-    ----------
-    reduction : Reduction
-        Of the measured equations.
-
-    Returns
-    -------
-    ndarray, shape (b,)
-        Units of parameters differ by decades; this makes them alike.
-    """
+    """Value of each parameter whose torque alone would be as large as that measured."""
     whole = np.vstack(reduction.factors)
     length = np.linalg.norm(whole[:, :-1], axis=0)
     torque = max(float(np.linalg.norm(whole[:, -1])), 1e-300)
@@ -265,24 +230,7 @@ def torque_sizes(reduction: Reduction) -> Array:
 def ran_away(
     method: Method, system: Equations, loop: ClosedLoop | None, iterations: int = 0
 ) -> SimulatedEstimate:
-    """The estimate without values of a robot that cannot be simulated.
-
-    Parameters
-    ----------
-    method : Method
-        Which one asked.
-    system : Equations
-        Robot and log.
-    loop : ClosedLoop or None
-        How it was to be simulated.
-    iterations : int
-        After which it ran away.
-
-    Returns
-    -------
-    SimulatedEstimate
-        Status UNSTABLE; its numbers are NaN.
-    """
+    """Estimate with NaN values for a robot whose simulation diverged."""
     b, n = len(system.names), system.model.n
     why = "its mass matrix is not positive definite" if loop is None else "it runs away"
     whose = f"parameters after {iterations} iterations" if iterations else "first parameters"

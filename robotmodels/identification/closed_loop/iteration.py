@@ -1,4 +1,8 @@
-"""Iterations that end when the parameters stand still, or the simulated robot runs away."""
+"""Iterations that end when the parameters stand still, or the simulated robot runs away.
+
+Source: H. Walker and P. Ni, "Anderson acceleration for fixed-point iterations", SIAM J. Numerical
+Analysis 49(4), 2011.
+"""
 
 from __future__ import annotations
 
@@ -56,19 +60,7 @@ S = TypeVar("S", bound=Step)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Iterated(Generic[S]):
-    """How an iteration ended.
-
-    Parameters
-    ----------
-    values : ndarray, shape (b,)
-        Parameters.
-    last : Step or None
-        The last simulation; None where there was none that did not run away.
-    status : EstimateStatus
-        What became of it.
-    iterations : int
-        Simulations of the robot, those that were halved not counted.
-    """
+    """Result of an iteration: values and status. Shapes: values (b,)."""
 
     values: Array
     last: S | None
@@ -84,36 +76,7 @@ def iterated(
     slack: float = 0.0,
     memory: int = 0,
 ) -> Iterated[S]:
-    """Simulate and solve until the parameters stand still.
-
-    A step after which the simulated robot runs away, or the cost grows, is halved.
-
-    Parameters
-    ----------
-    start : ndarray, shape (b,)
-        Parameters to begin with.
-    advance : callable
-        The `Step` of a simulation with given parameters; raises `RanAwayError`.
-    size : ndarray, shape (b,)
-        Value of each parameter whose torque alone would be as large as that measured.
-    most : int
-        Iterations.
-    slack : float
-        By which the cost may grow.
-    memory : int
-        Steps before, which are mixed with the last one so that a fixed point is reached sooner
-        where the simulated motion depends on the parameters.
-
-    Returns
-    -------
-    Iterated
-        Values and status.
-
-    References
-    ----------
-    H. Walker and P. Ni, "Anderson acceleration for fixed-point iterations", SIAM J. Numerical
-    Analysis 49(4), 2011.
-    """
+    """Fixed-point iteration: simulate and solve until the parameters converge."""
     values = start
     past: list[tuple[Array, Array]] = []
     try:
@@ -158,24 +121,7 @@ def reweighted(
     slack: float = 0.0,
     memory: int = 0,
 ) -> Iterated[S]:
-    """Iterate with fixed weights, then anew with those of the residuals that were left.
-
-    Weights that follow every step could make the outputs of one joint, once they happen to fit,
-    outweigh all others before the parameters are right.
-
-    Parameters
-    ----------
-    start, size, most, slack, memory
-        As for `iterated`; ``most`` holds for all iterations together.
-    advance : callable
-        The `Step` of a simulation with given parameters and weights; None for those of its own
-        errors.
-
-    Returns
-    -------
-    Iterated
-        Values and status.
-    """
+    """Iterate with fixed weights, then again with weights from the residuals."""
     weights: Array | None = None
 
     def fixed(values: Array) -> S:

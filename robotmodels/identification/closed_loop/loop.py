@@ -1,4 +1,8 @@
-"""The closed loop that is simulated: controller, width of dry friction at rest, what ends it."""
+"""The closed loop that is simulated: controller, width of dry friction at rest, what ends it.
+
+Source: A. Janot, P.-O. Vandanjon and M. Gautier, "A generic instrumental variable approach for
+industrial robot identification", IEEE T-CST 22(1), 2014, section III.
+"""
 
 from __future__ import annotations
 
@@ -72,41 +76,7 @@ def closed_loop(
     width: ArrayLike | None = None,
     substeps: int | None = None,
 ) -> ClosedLoop | None:
-    """The closed loop of a log: its own controller, or one that is tuned to follow closely.
-
-    Parameters
-    ----------
-    system : Equations
-        Robot, log and choices.
-    values : array_like, shape (b,)
-        Parameters to begin with; a controller that is tuned and the width depend on them.
-    controller : Controller, optional
-        That of the robot; default proportional and derivative gains for ``bandwidth`` with the
-        torques of ``values`` fed forward.
-    bandwidth : float, optional
-        Hz, of a controller that is tuned; default ten times the frequency of the motion.
-    width : array_like, scalar or shape (n,), optional
-        rad/s or m/s; default the dead band, and no less than a step of integration can follow.
-    substeps : int, optional
-        Steps of integration for a sample of the log; default as many as viscous friction asks for
-        stability and the width of dry friction for the dead band, 64 at most.
-
-    Returns
-    -------
-    ClosedLoop or None
-        None where the mass matrix of the values is not positive definite.
-
-    Raises
-    ------
-    InvalidValueError, ShapeError
-        A controller of another robot, or whose period is no multiple or part of that of the log;
-        parameters of a friction model; equations that are not those of torques.
-
-    References
-    ----------
-    A. Janot, P.-O. Vandanjon and M. Gautier, "A generic instrumental variable approach for
-    industrial robot identification", IEEE T-CST 22(1), 2014, section III.
-    """
+    """The closed loop of a log: its own controller, or one that is tuned to follow closely."""
     log, n = system.log, system.model.n
     if system.form is not EquationForm.TORQUE:
         raise InvalidValueError(
@@ -161,20 +131,7 @@ def closed_loop(
 
 
 def robot_of(system: Equations, values: ArrayLike) -> RobotModel:
-    """The robot whose equations hold: base parameters on its links and drives, nothing else.
-
-    Parameters
-    ----------
-    system : Equations
-        Robot and parameters.
-    values : array_like, shape (b,)
-        Of ``system.names``.
-
-    Returns
-    -------
-    RobotModel
-        As `base_model`, without the drive parameters that the equations leave out.
-    """
+    """Robot of the base parameters alone. Shapes: values (b,)."""
     base, model = system.base, system.model
     found = dict(zip(system.names, as_exact(values, (len(system.names),), "values"), strict=True))
     whole = np.array([found.get(name, 0.0) for name in base.names])
@@ -190,22 +147,7 @@ def robot_of(system: Equations, values: ArrayLike) -> RobotModel:
 
 
 def steps_of(controller: Controller, dt: float, substeps: int) -> tuple[int, int]:
-    """Steps of integration of a sample, and of a period of the controller.
-
-    Parameters
-    ----------
-    controller : Controller
-        With its period.
-    dt : float
-        Period of the log, seconds.
-    substeps : int
-        Steps of a sample at least.
-
-    Returns
-    -------
-    substeps, hold : int
-        Such that the controller acts at steps.
-    """
+    """Numbers of integration steps per sample and per controller period."""
     if not isinstance(substeps, (int, np.integer)) or substeps < 1:
         raise InvalidValueError(f"substeps: expected a whole number from 1, got {substeps!r}.")
     period = dt if controller.period is None else controller.period

@@ -16,15 +16,7 @@ from ..preparation.signals import Piece, piece_signals
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Targets:
-    """Rows of what is followed, and the one after them.
-
-    Parameters
-    ----------
-    q, v : ndarray, shape (N + 1, n)
-        Positions (rad or m) and velocities.
-    feed : ndarray, shape (N + 1, n)
-        Torques that are fed forward, N m or N.
-    """
+    """References of N samples and of the sample behind them. Shapes: q, v, feed (N + 1, n)."""
 
     q: Array
     v: Array
@@ -40,29 +32,7 @@ def references(
     feed_forward: RobotModel | None,
     width: Array,
 ) -> Targets:
-    """References of some rows of a recording.
-
-    Parameters
-    ----------
-    log : Log
-        The log; without references its filtered positions are taken.
-    processing : Processing
-        The choices.
-    piece : Piece
-        One of the recording.
-    first, last : int
-        Rows, the last one left out; the row after it is added, or that before it again where the
-        recording ends.
-    feed_forward : RobotModel or None
-        Whose torques are fed forward.
-    width : ndarray, shape (n,)
-        Over which its dry friction rises.
-
-    Returns
-    -------
-    Targets
-        Of ``last - first + 1`` rows.
-    """
+    """References for rows of a recording."""
     if log.q_ref is None:
         stop = min(last + 1, piece.high)
         rows = Piece(first, stop, piece.low, piece.high, piece.begin, piece.end)
@@ -113,16 +83,6 @@ def _fed(robot: RobotModel | None, q: Array, v: Array, a: Array, width: Array) -
 def direction(v: Array, width: Array) -> Array:
     """Direction of dry friction: linear over the width on either side of rest, then the sign.
 
-    Parameters
-    ----------
-    v : ndarray, shape (N, n)
-        Velocities.
-    width : ndarray, shape (n,)
-        rad/s or m/s.
-
-    Returns
-    -------
-    ndarray, shape (N, n)
-        From -1 to 1.
+    Shapes: v (N, n), width (n,) -> (N, n).
     """
     return np.where(np.abs(v) > width, np.sign(v), v / np.where(width > 0.0, width, 1.0))

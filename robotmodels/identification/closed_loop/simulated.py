@@ -29,19 +29,7 @@ class RanAwayError(Exception):
 
 @dataclass(slots=True, eq=False)
 class MovingRobot:
-    """A controlled robot on its way through a recording.
-
-    Parameters
-    ----------
-    robot : RobotModel
-        Its links and drives, which may be those of base parameters.
-    loop : ClosedLoop
-        How it is simulated.
-    dt : float
-        Period of the samples, seconds.
-    state : ndarray, shape (5, n)
-        As the kernel has it; nothing before the first step.
-    """
+    """Closed-loop simulation along a recording. Shapes: state (5, n)."""
 
     robot: RobotModel
     loop: ClosedLoop
@@ -49,22 +37,9 @@ class MovingRobot:
     state: Array | None = None
 
     def advance(self, q_ref: Array, v_ref: Array, feed: Array) -> tuple[Array, Array, Array, Array]:
-        """Follow references by N samples.
+        """Simulate N samples along the references.
 
-        Parameters
-        ----------
-        q_ref, v_ref, feed : ndarray, shape (N + 1, n)
-            References, and torques fed forward.
-
-        Returns
-        -------
-        q, v, a, tau : ndarray, shape (N, n)
-            What it did.
-
-        Raises
-        ------
-        RanAwayError
-            It did not follow.
+        Shapes: q_ref, v_ref, feed (N + 1, n) -> q, v, a, tau (N, n).
         """
         from ...kernels.closed_loop import follow_references
 
@@ -98,32 +73,7 @@ class MovingRobot:
 def simulated_signals(
     system: Equations, loop: ClosedLoop, values: Array, asked: Asked | None = None
 ) -> Iterator[tuple[Piece, Signals]]:
-    """Signals of the simulated robot for each piece of the log and the windows at its ends.
-
-    Parameters
-    ----------
-    system : Equations
-        Robot, log and choices.
-    loop : ClosedLoop
-        How it is simulated.
-    values : ndarray, shape (b,)
-        Its parameters.
-    asked : callable, optional
-        Makes the references, as `asked_of` does, for several robots that follow the same.
-
-    Yields
-    ------
-    piece : Piece
-        In order.
-    found : Signals
-        Exact positions, velocities, accelerations and torques of the simulation; they are not
-        filtered, since there is no noise in them.
-
-    Raises
-    ------
-    RanAwayError
-        The robot does not follow.
-    """
+    """Signals of the simulated robot for each piece of the log and the windows at its ends."""
     log, choices = system.log, system.processing
     follow = asked_of(system, loop) if asked is None else asked
     robot = robot_of(system, values)
@@ -153,20 +103,7 @@ def simulated_signals(
 
 
 def asked_of(system: Equations, loop: ClosedLoop) -> Asked:
-    """References of rows of a piece; the last ones that were made are kept.
-
-    Parameters
-    ----------
-    system : Equations
-        Robot, log and choices.
-    loop : ClosedLoop
-        How it is simulated.
-
-    Returns
-    -------
-    callable
-        Of the piece, and the first row and the one after the last.
-    """
+    """Function that gives the references of rows of a piece, with a cache of the last ones."""
     last: tuple[tuple[int, int], Targets] | None = None
 
     def made(piece: Piece, first: int, stop: int) -> Targets:
@@ -181,27 +118,7 @@ def asked_of(system: Equations, loop: ClosedLoop) -> Asked:
 
 
 def steps_for(robot: RobotModel, loop: ClosedLoop, log: Log) -> ClosedLoop:
-    """The loop with as many steps as these parameters ask for: inertia may have become small.
-
-    Parameters
-    ----------
-    robot : RobotModel
-        Whose friction is to be followed.
-    loop : ClosedLoop
-        With the steps of the first parameters.
-    log : Log
-        Postures and period.
-
-    Returns
-    -------
-    ClosedLoop
-        The same, or with a multiple of its steps.
-
-    Raises
-    ------
-    RanAwayError
-        More steps than are made, or a mass matrix that is not positive definite.
-    """
+    """Closed loop with enough integration steps for these parameters."""
     found = stiffness(robot, log.q)
     if found is None:
         raise RanAwayError
@@ -214,21 +131,9 @@ def steps_for(robot: RobotModel, loop: ClosedLoop, log: Log) -> ClosedLoop:
 
 
 def simulated_use(system: Equations, loop: ClosedLoop, v: Array) -> NDArray[np.bool_]:
-    """Where dry friction of the simulated robot is that of the equations.
+    """Whether dry friction of the simulation equals that of the equations: not near rest.
 
-    Parameters
-    ----------
-    system : Equations
-        Robot and choices.
-    loop : ClosedLoop
-        With the width of dry friction at rest.
-    v : ndarray, shape (k, n)
-        Velocities.
-
-    Returns
-    -------
-    ndarray of bool, shape (k, n)
-        Not where the joint, or a motor that it shares with others, is near rest.
+    Shapes: v (k, n) -> (k, n).
     """
     band = np.maximum(system.processing.dead_band, loop.width)
     use = ~(np.abs(v) < band)

@@ -1,4 +1,8 @@
-"""How fast friction stops a robot, which bounds the steps of an explicit integration."""
+"""How fast friction stops a robot, which bounds the steps of an explicit integration.
+
+Source: E. Hairer and G. Wanner, "Solving Ordinary Differential Equations II", section IV.2
+(stability of explicit Runge-Kutta methods).
+"""
 
 from __future__ import annotations
 
@@ -18,19 +22,7 @@ _STABLE = 2.78
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stiffness(Rebuilt):
-    """Rates at which friction stops a robot, the worst of some postures. Read-only.
-
-    Parameters
-    ----------
-    names : tuple of str
-        Of the joints.
-    viscous : float
-        Largest eigenvalue of ``M^-1 Fv``, 1/s.
-    joint_viscous : ndarray, shape (n,)
-        ``(M^-1)_jj Fv_jj``, 1/s: which joint it is.
-    dry : ndarray, shape (n,)
-        Deceleration by dry friction, rad/s^2 or m/s^2.
-    """
+    """Largest rates of friction over some postures, for the integration step. Read-only."""
 
     names: tuple[str, ...]
     viscous: float
@@ -79,25 +71,7 @@ class Stiffness(Rebuilt):
 
 
 def stiffness(robot: RobotModel, q: Array) -> Stiffness | None:
-    """Rates at which the friction of a robot's drives stops it.
-
-    Parameters
-    ----------
-    robot : RobotModel
-        With its drives.
-    q : ndarray, shape (N, n)
-        Postures, of which some are looked at.
-
-    Returns
-    -------
-    Stiffness or None
-        None where a mass matrix is not positive definite.
-
-    References
-    ----------
-    E. Hairer and G. Wanner, "Solving Ordinary Differential Equations II", section IV.2 (stability
-    of explicit Runge-Kutta methods).
-    """
+    """Largest rates of the drives' friction over some postures. Shapes: q (N, n)."""
     inverse = inverse_masses(robot, q)
     if inverse is None:
         return None
@@ -115,21 +89,9 @@ def stiffness(robot: RobotModel, q: Array) -> Stiffness | None:
 
 
 def least_width(robot: RobotModel, q: Array, step: float) -> Array:
-    """Width below which a joint that comes to rest would be thrown across it in one step.
+    """Least regularisation velocity of dry friction for a given integration step.
 
-    Parameters
-    ----------
-    robot : RobotModel
-        With its drives.
-    q : ndarray, shape (N, n)
-        Postures.
-    step : float
-        Of the integration, seconds.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        rad/s or m/s; 0 for joints without dry friction, or without a definite mass matrix.
+    Shapes: q (N, n) -> (n,).
     """
     found = stiffness(robot, q)
     return np.zeros(robot.n) if found is None else found.width(step)

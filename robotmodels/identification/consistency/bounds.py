@@ -154,31 +154,7 @@ def mass_constraints(
 ) -> list[Constraint]:
     """Bounds on the masses of links and on their sum.
 
-    Parameters
-    ----------
-    f : int
-        Number of links.
-    unit : ndarray, shape (p,)
-        Natural sizes of the standard parameters.
-    mass_bounds : array_like, shape (f, 2), or None
-        Least and greatest mass of each link, kg; infinite for none, equal where it is known.
-    total_mass : float, or array_like of shape (2,), or None
-        Mass of all links together, known or between two values, kg.
-
-    Returns
-    -------
-    list of Constraint
-        One for each bound.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Wrong shapes, NaN, bounds the wrong way round, or greatest masses that are not positive.
-
-    Examples
-    --------
-    >>> [one.sentences[0] for one in mass_constraints(1, np.ones(10), [[1.0, np.inf]], 3.0)]
-    ['The mass of link 1 is at its lower bound, 1 kg.', 'The mass of all links is known, 3 kg.']
+    Shapes: unit (p,), mass_bounds (f, 2), total_mass (2,).
     """
     found: list[Constraint] = []
     if mass_bounds is not None:
@@ -207,33 +183,7 @@ def mass_constraints(
 
 
 def centre_constraints(f: int, unit: Array, bounds: Sequence[CentreBound]) -> list[Constraint]:
-    """Bounds on the centres of mass.
-
-    Parameters
-    ----------
-    f : int
-        Number of links.
-    unit : ndarray, shape (p,)
-        Natural sizes of the standard parameters.
-    bounds : sequence of CentreBox or CentreEllipsoid
-        Any number for a link.
-
-    Returns
-    -------
-    list of Constraint
-        One for each side of a box, one for an ellipsoid.
-
-    Raises
-    ------
-    InvalidValueError
-        Something else, or a link that there is not.
-
-    Examples
-    --------
-    >>> box = CentreBox(1, [0, -np.inf, 0], [0.3, np.inf, 0])
-    >>> len(centre_constraints(1, np.ones(10), [box]))
-    3
-    """
+    """Bounds on the centres of mass. Shapes: unit (p,)."""
     found: list[Constraint] = []
     for bound in bounds:
         if not isinstance(bound, (CentreBox, CentreEllipsoid)):

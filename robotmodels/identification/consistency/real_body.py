@@ -1,4 +1,8 @@
-"""The real body whose ten parameters fit equations best."""
+"""The real body whose ten parameters fit equations best.
+
+Source: P. Wensing, S. Kim and J.-J. Slotine, "Linear matrix inequalities for physically consistent
+inertial parameter identification", IEEE RA-L 3(1), 2018, (7).
+"""
 
 from __future__ import annotations
 
@@ -18,29 +22,9 @@ _RADIUS = 0.1
 
 
 def nearest_body(F: Array, t: Array) -> Array | None:
-    """Ten parameters of a real body with the least ``|F x - t|``.
+    """Physically consistent inertial parameters with the least ``|F x - t|``.
 
-    Parameters
-    ----------
-    F : ndarray, shape (k, 10)
-        Columns of ``XX XY XZ YY YZ ZZ MX MY MZ M``.
-    t : ndarray, shape (k,)
-        Right side.
-
-    Returns
-    -------
-    ndarray, shape (10,), or None
-        Their pseudo-inertia is positive definite; None where the solver finds none.
-
-    Raises
-    ------
-    MissingExtraError
-        Clarabel is not installed.
-
-    References
-    ----------
-    P. Wensing, S. Kim and J.-J. Slotine, "Linear matrix inequalities for physically consistent
-    inertial parameter identification", IEEE RA-L 3(1), 2018, (7).
+    Shapes: F (k, 10), t (k,) -> (10,).
     """
     free = np.linalg.lstsq(F / _units(1.0), t, rcond=1e-12)[0]
     mass = max(float(np.abs(free).max(initial=0.0)), 1e-6)

@@ -236,22 +236,5 @@ class ConsistentFit(Rebuilt):
 
 
 def largest_violation(slacks: list[Array]) -> float:
-    """Most by which slacks are negative.
-
-    Parameters
-    ----------
-    slacks : list of ndarray
-        Of each constraint.
-
-    Returns
-    -------
-    float
-        Zero or more.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> largest_violation([np.array([0.5, -0.25])])
-    0.25
-    """
+    """Largest violation of the constraints."""
     return max(0.0, -min((float(s.min()) for s in slacks if s.size), default=0.0))

@@ -20,22 +20,7 @@ is seen with less is rounding, and left to the prior."""
 class TorqueSquares(Rebuilt):
     """``|R M x - y|^2 + rest = |F x - t|^2 + least`` for every x.
 
-    Parameters
-    ----------
-    fit : ndarray, shape (k, p)
-        F; k is the rank of R.
-    target : ndarray, shape (k,)
-        t.
-    same : ndarray, shape (k, p)
-        Rows of order one with the same row space: the least is reached where ``same @ x = level``.
-    level : ndarray, shape (k,)
-        What they are there.
-    best : ndarray, shape (b,)
-        Least-squares base parameters, the shortest in natural units where R does not determine all.
-    least : float
-        Sum of squares that no parameters take away.
-    nothing : float
-        Sum of squares that is rounding.
+    Shapes: fit, same (k, p); target, level (k,); best (b,).
     """
 
     fit: Array
@@ -56,36 +41,7 @@ def torque_squares(
 ) -> TorqueSquares:
     """Squares of the torques' residuals from the triangular factor of an identification.
 
-    Parameters
-    ----------
-    base : BaseParameters
-        b of p standard parameters.
-    R : array_like, shape (r, b)
-        Factor of the weighted regressor, or the regressor itself.
-    y : array_like, shape (r,)
-        Its right side.
-    rest : float
-        Squares that are not in them.
-    unit : ndarray, shape (p,)
-        Natural sizes of the standard parameters.
-
-    Returns
-    -------
-    TorqueSquares
-        Scaled by columns, so that units do not matter.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Wrong shapes, NaN, no information at all, or a negative rest.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.minimal_parameters import base_parameters
-    >>> base = base_parameters(load("planar_2r"), drive=False)
-    >>> torque_squares(base, np.eye(4), np.ones(4), 2.0, np.ones(20)).least
-    2.0
+    Shapes: R (r, b), y (r,), unit (p,).
     """
     factor, right = checked_factor(base, R, y, rest)
     scale = 1.0 / np.sqrt(((base.matrix * unit) ** 2).sum(axis=1))
@@ -110,25 +66,7 @@ def torque_squares(
 def checked_factor(
     base: BaseParameters, R: ArrayLike, y: ArrayLike, rest: float
 ) -> tuple[Array, Array]:
-    """A weighted system that says something, as arrays.
-
-    Parameters
-    ----------
-    base, R, y, rest
-        As for `torque_squares`.
-
-    Returns
-    -------
-    R : ndarray, shape (r, b)
-        Factor.
-    y : ndarray, shape (r,)
-        Right side.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Wrong shapes, NaN, no information at all, or a negative rest.
-    """
+    """Check a weighted system of equations. Shapes: -> R (r, b), y (r,)."""
     factor = as_core(R, (len(base),), "R")
     if factor.ndim != 2:
         raise ShapeError(

@@ -20,34 +20,7 @@ _NOTHING = 1e-2
 def sizes_of_drives(base: BaseParameters, prior: Array, R: Array, y: Array) -> Array:
     """Natural sizes of drive and friction parameters: the prior's, else those of the data.
 
-    A kind that the prior lacks (friction of a model that has none) is given the size of its
-    least-squares values, so that a fit does not depend on the units of torques or on whether the
-    robot is small or large.
-
-    Parameters
-    ----------
-    base : BaseParameters
-        b of p standard parameters.
-    prior : ndarray, shape (p,)
-        Their values.
-    R : ndarray, shape (r, b)
-        Factor of the weighted regressor.
-    y : ndarray, shape (r,)
-        Its right side.
-
-    Returns
-    -------
-    ndarray, shape (p - 10 f,)
-        Positive.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.minimal_parameters import base_parameters
-    >>> base = base_parameters(load("planar_2r"), drive=("Fv",))
-    >>> small = 1e-3 * np.array([1.0, 1.0, 1.0, 1.0, 2.0, 2.0])
-    >>> sizes_of_drives(base, np.zeros(22), np.eye(6), small).round(9).tolist()
-    [0.002, 0.002]
+    Shapes: prior (p,), R (r, b), y (r,) -> (p - 10 f,).
     """
     first = 10 * base.model.f
     sizes = drive_sizes(base, prior)

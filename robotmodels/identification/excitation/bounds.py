@@ -89,33 +89,7 @@ def excitation_limits(
 def excitation_torques(
     model: RobotModel, torque_limits: ArrayLike | None
 ) -> tuple[Array, tuple[str, ...]]:
-    """Greatest torques, infinite where there is no limit.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-    torque_limits : array_like, shape () or (n,), optional
-        N m or N; default those of the table, if the model has the masses to tell torques.
-
-    Returns
-    -------
-    limits : ndarray, shape (n,)
-        Positive.
-    notes : tuple of str
-        That limits of the table cannot be kept, for want of masses.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Another number; NaN or numbers that are not positive; limits for a robot without masses.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> excitation_torques(load("planar_2r"), None)[0]
-    array([inf, inf])
-    """
+    """Greatest torques, infinite where there is no limit."""
     massive = bool(np.any(model.inertia.values))
     if torque_limits is None:
         effort = np.asarray(model.table.effort, dtype=float)

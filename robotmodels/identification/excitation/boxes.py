@@ -117,50 +117,12 @@ class WorkspaceBox(Rebuilt):
 
 
 def frames_of(box: WorkspaceBox) -> tuple[str | int | None, ...]:
-    """The frames as `dgm` takes them.
-
-    Parameters
-    ----------
-    box : WorkspaceBox
-        The box.
-
-    Returns
-    -------
-    tuple
-        None for the tool.
-
-    Examples
-    --------
-    >>> frames_of(WorkspaceBox([0, 0, 0], [1, 1, 1]))
-    (None,)
-    """
+    """The frames as `dgm` takes them."""
     return box.frames or (None,)
 
 
 def clearances(model: RobotModel, box: WorkspaceBox, q: Array) -> Array:
-    """Clearance of every frame of a box.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-    box : WorkspaceBox
-        The box.
-    q : ndarray, shape (N, n)
-        Postures.
-
-    Returns
-    -------
-    ndarray, shape (N, frames)
-        Metres.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> box = WorkspaceBox([-np.inf, -np.inf, 0.0], [np.inf] * 3, "joint_3")
-    >>> clearances(load("rx90"), box, np.zeros((1, 6))).shape
-    (1, 1)
-    """
+    """Clearance of every frame of a box. Shapes: q (N, n) -> (N, frames)."""
     values = [box.clearance(dgm(model, q, frame)[..., :3, 3]) for frame in frames_of(box)]
     return np.stack(values, axis=-1)
 
@@ -168,19 +130,7 @@ def clearances(model: RobotModel, box: WorkspaceBox, q: Array) -> Array:
 def box_slacks(model: RobotModel, box: WorkspaceBox, q: Array) -> list[tuple[Array, Array]]:
     """Smooth slacks of every frame of a box, and how they change with the joints.
 
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-    box : WorkspaceBox
-        The box.
-    q : ndarray, shape (N, n)
-        Postures.
-
-    Returns
-    -------
-    list of (ndarray, ndarray), shapes (N, F) and (N, F, n)
-        Values in metres and derivatives, a pair for each frame.
+    Shapes: q (N, n).
     """
     pairs = []
     for frame in frames_of(box):

@@ -76,30 +76,7 @@ def _slope(S: Array, power: int) -> tuple[float, Array]:
 def smooth_condition(W: Array, power: float) -> tuple[float, Array]:
     """Smooth upper bound of the logarithm of a condition number, and its gradient.
 
-    The largest singular value is replaced by the p-norm of all, and the smallest by that of their
-    inverses. The bound is at most ``log(b) / p * 2`` above the logarithm, and unlike it has a
-    gradient where singular values meet, as the smallest do at an optimum. Both are traces of powers
-    of the Gram matrix and of its inverse: products of small matrices on one thread.
-
-    Parameters
-    ----------
-    W : ndarray, shape (N, b)
-        N >= b.
-    power : float
-        p, an even number: half of it is the power of the Gram matrix.
-
-    Returns
-    -------
-    value : float
-        ``log |s|_p + log |1 / s|_p``.
-    gradient : ndarray, shape (N, b)
-        With respect to W.
-
-    Examples
-    --------
-    >>> value, gradient = smooth_condition(np.diag([4.0, 1.0]), 50.0)
-    >>> round(float(np.exp(value)), 6), gradient.diagonal()
-    (4.0, array([ 0.25, -1.  ]))
+    Shapes: W (N, b) -> gradient (N, b).
     """
     R, inverse = _inverted(W)
     half = round(power / 2.0)
@@ -111,25 +88,7 @@ def smooth_condition(W: Array, power: float) -> tuple[float, Array]:
 def log_volume(W: Array) -> tuple[float, Array]:
     """Minus the mean logarithm of the singular values, and its gradient.
 
-    It is ``-log det(W^T W) / (2 b)``.
-
-    Parameters
-    ----------
-    W : ndarray, shape (N, b)
-        N >= b.
-
-    Returns
-    -------
-    value : float
-        Smaller is better.
-    gradient : ndarray, shape (N, b)
-        With respect to W.
-
-    Examples
-    --------
-    >>> value, gradient = log_volume(np.diag([np.e, np.e]))
-    >>> value, bool(np.allclose(gradient, -0.5 / np.e * np.eye(2)))
-    (-1.0, True)
+    Shapes: W (N, b) -> gradient (N, b).
     """
     R, inverse = _inverted(W)
     b = W.shape[1]

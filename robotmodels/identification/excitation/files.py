@@ -22,13 +22,7 @@ _FORMAT = "robotmodels exciting trajectory 1"
 
 
 class TrajectoryFile(Enum):
-    """What a trajectory is written as.
-
-    Examples
-    --------
-    >>> TrajectoryFile(".npz").name
-    'NPZ'
-    """
+    """File format of a trajectory."""
 
     CSV = ".csv"
     NPZ = ".npz"
@@ -223,18 +217,7 @@ def read_coefficients(path: str | Path) -> Trajectory:
 
 
 def excitation_data(found: ExcitingTrajectory) -> dict[str, Any]:
-    """The result in plain numbers and texts.
-
-    Parameters
-    ----------
-    found : ExcitingTrajectory
-        The motion.
-
-    Returns
-    -------
-    dict
-        For JSON; infinite numbers are null.
-    """
+    """The result in plain numbers and texts."""
     limits, basis = found.limits, found.basis
     of = limits.motion.limits
     return {

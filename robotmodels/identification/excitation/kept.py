@@ -87,20 +87,7 @@ class ExcitationLimits(Rebuilt):
 
 
 def limits_kept(problem: ExcitationProblem, trajectory: Trajectory) -> ExcitationLimits:
-    """Compare a motion with all limits of a problem.
-
-    Parameters
-    ----------
-    problem : ExcitationProblem
-        With robot and limits.
-    trajectory : Trajectory
-        Of its joints.
-
-    Returns
-    -------
-    ExcitationLimits
-        Extremes and limits.
-    """
+    """Extremes of a motion beside all limits of a problem."""
     model = problem.model
     times = np.linspace(0.0, problem.basis.duration, _DENSE * len(problem.t) + 1)
     q, v, a = trajectory.motion.derivatives(times, (0, 1, 2))

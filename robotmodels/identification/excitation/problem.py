@@ -22,48 +22,14 @@ _BOX = 0.25  # metres that count in a box like half the range of a joint
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """How far the smooth problem is from the one that is meant.
-
-    Parameters
-    ----------
-    power : float
-        Of the smooth condition number.
-    penalty : float
-        Weight of what lies beyond the limits.
-    """
+    """Smoothing and penalty of one stage of the search."""
 
     power: float
     penalty: float
 
 
 class ExcitationProblem:
-    """Criterion of a motion and what it costs to break limits, over the motion's coefficients.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-    basis : MotionBasis
-        Functions that motions are made of, P of them.
-    base : BaseParameters
-        Whose regressor is judged, b columns.
-    criterion : ExcitationCriterion
-        What is judged.
-    limits : MotionLimits
-        Finite.
-    torque_limits : ndarray, shape (n,)
-        Infinite where there is none.
-    boxes : sequence of WorkspaceBox
-        Of the workspace.
-    samples : int
-        Times over the motion.
-    sigma : ndarray, shape (n,)
-        By which the rows of each joint are divided.
-    scale : ndarray, shape (b,)
-        By which columns are multiplied.
-    margin : float
-        Part of the limits that is kept free, for what happens between samples.
-    """
+    """Criterion and limit penalties as a function of a motion's coefficients."""
 
     def __init__(
         self,
@@ -122,22 +88,7 @@ class ExcitationProblem:
         return value, gradient.reshape(n, N, b).transpose(1, 0, 2) * (self.weight / np.sqrt(N))
 
     def value(self, x: Array, stage: Stage) -> tuple[float, Array]:
-        """Criterion and penalties of coefficients.
-
-        Parameters
-        ----------
-        x : ndarray, shape (P n,)
-            In units that take a joint to its limits.
-        stage : Stage
-            Of the smooth problem.
-
-        Returns
-        -------
-        value : float
-            Without a unit.
-        gradient : ndarray, shape (P n,)
-            Its derivatives.
-        """
+        """Criterion and penalties of coefficients. Shapes: x (P n,) -> gradient (P n,)."""
         motion = self.motion(x)
         q, v, a = motion[:3]
         W = self.regressor.matrix(q, v, a)

@@ -61,22 +61,7 @@ class ExcitationQuality:
 
 
 def quality(problem: ExcitationProblem, trajectory: Trajectory, times: Array) -> ExcitationQuality:
-    """Quality of a motion at some times.
-
-    Parameters
-    ----------
-    problem : ExcitationProblem
-        With robot, base parameters and weights.
-    trajectory : Trajectory
-        Of its joints.
-    times : ndarray, shape (N,)
-        Samples, s.
-
-    Returns
-    -------
-    ExcitationQuality
-        Condition numbers and determinant.
-    """
+    """Quality of a motion at some times. Shapes: times (N,)."""
     q, v, a = trajectory.motion.derivatives(times, (0, 1, 2))
     base = problem.base
     W = StackedRegressor(problem.model, base.names, base.drive).matrix(q, v, a)

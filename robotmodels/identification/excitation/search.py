@@ -62,35 +62,9 @@ def improved(
     evaluations: int | None,
     stage_done: Callable[[int], None],
 ) -> tuple[Array, Array, Array, ExcitationStatus]:
-    """Coefficients with a smaller criterion, from one start.
+    """Minimise the criterion from one start.
 
-    Quasi-Newton steps (SciPy's BFGS) on the criterion with squares of what lies beyond the limits
-    less a margin; at last the motion is shrunk, if that is needed to keep them.
-
-    Parameters
-    ----------
-    problem : ExcitationProblem
-        What is to be made small.
-    X : ndarray, shape (P, n)
-        Coefficients of the start.
-    iterations : int
-        Most of each stage.
-    evaluations : int, optional
-        Most of all stages together, each of which may use what those before have left; no bound
-        by default.
-    stage_done : callable
-        Of the number of stages that are done.
-
-    Returns
-    -------
-    coefficients : ndarray, shape (P, n)
-        Of the end.
-    history : ndarray, shape (K,)
-        Smooth criterion at the iterations.
-    stages : ndarray, shape (S,)
-        Iterations of each stage.
-    status : ExcitationStatus
-        How it ended.
+    Shapes: X (P, n) -> coefficients (P, n), history (K,), stages (S,).
     """
     from scipy.optimize import minimize
 

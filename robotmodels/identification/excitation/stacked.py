@@ -15,29 +15,7 @@ from ...regressors.torque import fill_torques
 
 
 class StackedRegressor:
-    """Chosen columns of the torque regressor over samples, with the derivative of what uses them.
-
-    Dry friction jumps where a velocity changes its sign, and has no gradient there. While a motion
-    is sought ``sign(v)`` is ``tanh(v / width)``; a result is always judged with the sign.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-    names : sequence of str
-        The c columns.
-    drive : bool or collection of DriveKind or str
-        Which drives have columns.
-    width : ndarray, shape (n,), optional
-        Velocities of the smooth sign, rad/s or m/s; default the sign itself.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> regressor = StackedRegressor(load("planar_2r"), ("ZZ1", "Fv1"), True)
-    >>> regressor.matrix(np.zeros((1, 2)), np.ones((1, 2)), np.full((1, 2), 3.0))[0, 0]
-    array([3., 1.])
-    """
+    """Selected torque regressor columns over samples, with derivatives by the motion."""
 
     __slots__ = ("chosen", "model", "width")
 
@@ -49,18 +27,7 @@ class StackedRegressor:
         self.width = width
 
     def matrix(self, q: Array, v: Array, a: Array) -> Array:
-        """The columns, shape (N, n, c).
-
-        Parameters
-        ----------
-        q, v, a : ndarray, shape (N, n)
-            The motion.
-
-        Returns
-        -------
-        ndarray, shape (N, n, c)
-            A block for each sample.
-        """
+        """The columns, shape (N, n, c)."""
         W = np.empty((len(q), self.model.n, self.chosen.count))
         fill_torques(self.model, self.chosen, None, (q, v, a), W)
         if self.width is None:
@@ -72,19 +39,9 @@ class StackedRegressor:
         return W
 
     def pulled_back(self, q: Array, v: Array, a: Array, G: Array) -> tuple[Array, Array, Array]:
-        """Derivatives of ``sum(G * matrix(q, v, a))`` by the motion.
+        """Gradient of ``sum(G * matrix(q, v, a))`` by q, v and a.
 
-        Parameters
-        ----------
-        q, v, a : ndarray, shape (N, n)
-            The motion.
-        G : ndarray, shape (N, n, c)
-            What each entry of the matrix counts.
-
-        Returns
-        -------
-        of_q, of_v, of_a : ndarray, shapes (N, n)
-            The derivatives; that of a sign is 0.
+        Shapes: q, v, a (N, n); G (N, n, c) -> of_q, of_v, of_a (N, n).
         """
         from ...kernels.regressor_gradient import regressor_gradients
 

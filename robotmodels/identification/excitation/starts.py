@@ -18,23 +18,7 @@ _FACTORS = (
 
 
 def random_motion(problem: ExcitationProblem, rng: np.random.Generator) -> Array:
-    """Random coefficients; each joint goes as far as its own limits let it.
-
-    Torques and boxes then shrink the motion of all joints about its middle, which is a posture that
-    both allow where one is found among 400.
-
-    Parameters
-    ----------
-    problem : ExcitationProblem
-        With limits.
-    rng : Generator
-        Chance.
-
-    Returns
-    -------
-    ndarray, shape (P, n)
-        Coefficients.
-    """
+    """Random motion within each joint's own limits. Shapes: -> (P, n)."""
     low, high, half = problem.bounds[0]
     middle = _middle(problem, 0.5 * (low + high), half, rng)
     X = problem.units * rng.standard_normal(problem.units.shape)
@@ -53,20 +37,7 @@ def random_motion(problem: ExcitationProblem, rng: np.random.Generator) -> Array
 
 
 def within_limits(problem: ExcitationProblem, X: Array) -> Array | None:
-    """The motion, shrunk about its middle as far as the limits need it.
-
-    Parameters
-    ----------
-    problem : ExcitationProblem
-        With limits.
-    X : ndarray, shape (P, n)
-        Coefficients.
-
-    Returns
-    -------
-    ndarray, shape (P, n), or None
-        Coefficients; None if even a twentieth of the motion breaks a limit.
-    """
+    """Motion scaled about its mean to keep the limits. Shapes: X (P, n) -> (P, n)."""
     still = problem.basis.centred(_means(problem, X))
 
     def kept(k: int) -> bool:

@@ -1,4 +1,8 @@
-"""Equations of the energy: what the torques do between instants, without accelerations."""
+"""Equations of the energy: what the torques do between instants, without accelerations.
+
+Source: M. Gautier and W. Khalil, "On the identification of the inertial parameters of robots", IEEE
+CDC 1988.
+"""
 
 from __future__ import annotations
 
@@ -20,33 +24,7 @@ SHORT = 3
 
 
 def energy_block(system: Equations, piece: Piece) -> Block:
-    """Equations of the energy of a piece of the log.
-
-    The energy that links and rotors gain over a stretch of ``decimation`` samples is a difference
-    of two instants. What friction and offsets take, and the work of the measured torques, are
-    integrated by one rule of the sixth order, so that jumps of dry friction are the same on both
-    sides. The last stretch of a recording may be shorter.
-
-    A stretch is left out where all joints stay in their dead bands: that of one joint alone does
-    no harm, since the work of its friction goes to zero with its velocity.
-
-    Parameters
-    ----------
-    system : Equations
-        Robot, parameters, log and choices.
-    piece : Piece
-        Which rows.
-
-    Returns
-    -------
-    Block
-        ``integral of tau . v`` over each stretch, J, and its regressor; one kind.
-
-    References
-    ----------
-    Seed book sections 1.5.1.2 and 1.6.3; M. Gautier and W. Khalil, "On the identification of the
-    inertial parameters of robots", IEEE CDC 1988.
-    """
+    """Equations of the energy of a piece of the log (seed book, sections 1.5.1.2 and 1.6.3)."""
     from ..equations import Block
 
     log, processing, base = system.log, system.processing, system.base

@@ -1,4 +1,7 @@
-"""Equations of the momentum form through a low-pass: joint torques without accelerations."""
+"""Equations of the momentum form through a low-pass: joint torques without accelerations.
+
+Source: J.-J. Slotine and W. Li, "On the adaptive control of robot manipulators", IJRR 6(3), 1987.
+"""
 
 from __future__ import annotations
 
@@ -23,31 +26,7 @@ SHORT = len(_WEIGHTS)
 
 
 def filtered_block(system: Equations, piece: Piece) -> Block:
-    """Equations of the momentum form of a piece of the log.
-
-    ``tau = dP/dt - S``, where P and S need positions and velocities alone. Central differences of
-    P and the decimation's low-pass are linear and without delay, so that together they are the
-    derivative of the low-pass; torques go through the same low-pass. What differences cut off
-    goes with the sixth power of the sampling period. A filter that runs on from the start of the
-    recording (`filtered_regressor`) would join the pieces and delay the times.
-
-    Parameters
-    ----------
-    system : Equations
-        Robot, parameters, log and choices.
-    piece : Piece
-        Which rows.
-
-    Returns
-    -------
-    Block
-        As that of the torques; equations begin and end three samples inside a recording.
-
-    References
-    ----------
-    Seed book section 1.6.2; J.-J. Slotine and W. Li, "On the adaptive control of robot
-    manipulators", IJRR 6(3), 1987.
-    """
+    """Equations of the momentum form of a piece of the log (seed book, section 1.6.2)."""
     from ..equations import Block
 
     processing = system.processing

@@ -1,4 +1,7 @@
-"""Equations of the power: that of all joint torques together, one equation at each time."""
+"""Equations of the power: that of all joint torques together, one equation at each time.
+
+Source: M. Gautier, "Dynamic identification of robots with power model", IEEE ICRA 1997.
+"""
 
 from __future__ import annotations
 
@@ -17,29 +20,7 @@ if TYPE_CHECKING:
 
 
 def power_block(system: Equations, piece: Piece) -> Block:
-    """Equations of the power of a piece of the log.
-
-    The power of a joint's friction goes to zero with its velocity, whatever its direction. So an
-    equation is left out only where all joints are in their dead bands.
-
-    Parameters
-    ----------
-    system : Equations
-        Robot, parameters, log and choices.
-    piece : Piece
-        Which rows.
-
-    Returns
-    -------
-    Block
-        ``tau . v`` and its regressor through the same low-pass, one of ``decimation`` samples
-        kept; one kind.
-
-    References
-    ----------
-    Seed book section 1.6.3; M. Gautier, "Dynamic identification of robots with power model", IEEE
-    ICRA 1997.
-    """
+    """Equations of the power of a piece of the log (seed book, section 1.6.3)."""
     from ..equations import Block
 
     processing = system.processing

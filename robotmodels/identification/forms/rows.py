@@ -27,25 +27,7 @@ log: new W ``(k, m, c)``, measured side ``(k, m)`` and which take part ``(k, m)`
 
 
 def formed_block(system: Equations, piece: Piece, form: RowForm) -> Block:
-    """Equations of a piece whose rows are formed at the rate of the log.
-
-    What is not linear in velocities and torques, such as a friction curve, does not pass through a
-    low-pass unchanged; so it is made of the samples and then thinned out with them.
-
-    Parameters
-    ----------
-    system : Equations
-        Robot, parameters, log and choices; of torques.
-    piece : Piece
-        Which rows.
-    form : callable
-        See `RowForm`.
-
-    Returns
-    -------
-    Block
-        As that of `Equations.block`, with the rows of the form.
-    """
+    """Equations of a piece whose rows are formed at the rate of the log."""
     assert system.form is EquationForm.TORQUE
     processing = system.processing
     found = piece_signals(system.log, processing, piece, processing.reach)
@@ -73,18 +55,7 @@ def formed_block(system: Equations, piece: Piece, form: RowForm) -> Block:
 
 
 def combined(side: Array) -> RowForm:
-    """The form of combinations of joints, such as the motors.
-
-    Parameters
-    ----------
-    side : ndarray, shape (m, n)
-        A row for each combination.
-
-    Returns
-    -------
-    RowForm
-        An equation takes part where all joints in it slide.
-    """
+    """The form of combinations of joints, such as the motors. Shapes: side (m, n)."""
     needed = (side != 0.0).astype(np.int64)
 
     def form(W: Array, tau: Array, v: Array, use: NDArray[np.bool_]) -> Rows:

@@ -24,41 +24,13 @@ _LEAST = 0.5
 
 
 def torque_block(system: Equations, piece: Piece) -> Block:
-    """Equations of a piece of the log.
-
-    Parameters
-    ----------
-    system : Equations
-        Robot, parameters, log and choices.
-    piece : Piece
-        Which rows.
-
-    Returns
-    -------
-    Block
-        Regressor and torque through the same low-pass, one of ``decimation`` samples kept.
-    """
+    """Equations of a piece of the log."""
     found = piece_signals(system.log, system.processing, piece, system.processing.reach)
     return signals_block(system, piece, found)
 
 
 def signals_block(system: Equations, piece: Piece, found: Signals) -> Block:
-    """Equations of signals that are given, such as simulated ones, at the times of a piece.
-
-    Parameters
-    ----------
-    system : Equations
-        Robot, parameters and choices.
-    piece : Piece
-        Which rows.
-    found : Signals
-        Of the piece and the reach of the decimation's window on either side.
-
-    Returns
-    -------
-    Block
-        As `torque_block`.
-    """
+    """Equations of signals that are given, such as simulated ones, at the times of a piece."""
     from ..equations import Block
 
     step = system.processing.decimation
@@ -115,28 +87,9 @@ class _Thinned:
 
 
 def decimated(rows: Iterator[Array], step: int, centre: int, count: int, width: int) -> Array:
-    """Rows through the decimation's low-pass, one of ``step`` kept.
+    """Decimation: low-pass filter, then one of ``step`` rows.
 
-    Windows that reach over the ends are made of the rows that are there, with weights that add to
-    one: equations may be added with any weights.
-
-    Parameters
-    ----------
-    rows : iterator of ndarray, shapes (k, width)
-        Rows, chunk by chunk.
-    step : int
-        Rows for one that is kept.
-    centre : int
-        Number of the row that the first window is centred on.
-    count : int
-        Rows kept.
-    width : int
-        Of the rows.
-
-    Returns
-    -------
-    ndarray, shape (count, width)
-        The rows kept.
+    Shapes: rows (k, width) -> (count, width).
     """
     thinned = _Thinned(count, (1, width), step, centre)
     for chunk in rows:

@@ -24,20 +24,9 @@ multiply c parameters of each joint."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OwnEquations:
-    """Equations with c columns more, which in the rows of a joint belong to parameters of its own.
+    """Equations with c extra columns whose parameters differ from joint to joint.
 
-    Parameters
-    ----------
-    system : Equations
-        b parameters of the robot.
-    columns : callable
-        See `OwnColumns`.
-    count : int
-        c.
-    shift : ndarray, shape (n, c), optional
-        These multiples of the columns are added to the measured side.
-    spread : bool
-        Whether blocks have a column for each joint's parameters, b + n c, or b + c.
+    Shapes: shift (n, c).
     """
 
     system: Equations
@@ -76,22 +65,7 @@ def spread_columns(own: Array) -> Array:
 
 
 def chosen_factors(reduction: Reduction, b: int, which: NDArray[np.int64]) -> Reduction:
-    """Equations in which each joint has some of its own columns, at places of their own.
-
-    Parameters
-    ----------
-    reduction : Reduction
-        Of `OwnEquations.reduced`.
-    b : int
-        Parameters of the robot.
-    which : ndarray of int, shape (n, d)
-        Which of its own columns each joint takes, -1 for none.
-
-    Returns
-    -------
-    Reduction
-        In b + n d parameters.
-    """
+    """Reduced equations with selected extra columns for each joint. Shapes: which (n, d)."""
     n, d = which.shape
     names = tuple(str(k) for k in range(b + n * d))
     factors = []
@@ -107,17 +81,7 @@ def chosen_factors(reduction: Reduction, b: int, which: NDArray[np.int64]) -> Re
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fitted:
-    """Weighted least squares of chosen equations.
-
-    Parameters
-    ----------
-    values : ndarray, shape (p,)
-        Parameters, 0 for columns that are zero.
-    inverse : ndarray, shape (p, p)
-        Of the information.
-    sums : ndarray, shape (n,)
-        Squared residuals of each joint, (N m)^2 or N^2.
-    """
+    """Estimate from `fitted`. Shapes: values (p,), inverse (p, p), sums (n,)."""
 
     values: Array
     inverse: Array
@@ -125,20 +89,7 @@ class Fitted:
 
 
 def fitted(reduction: Reduction, sigma: Array) -> Fitted:
-    """Weighted least squares; columns without effect get 0.
-
-    Parameters
-    ----------
-    reduction : Reduction
-        Of p parameters.
-    sigma : ndarray, shape (n,)
-        Deviations of the joints' residuals.
-
-    Returns
-    -------
-    Fitted
-        Parameters and residuals.
-    """
+    """Weighted least squares; columns without effect get 0."""
     rows = np.vstack([F / s for F, s in zip(reduction.factors, sigma, strict=True)])
     W, y = rows[:, :-1], rows[:, -1]
     there = np.flatnonzero(W.any(axis=0))

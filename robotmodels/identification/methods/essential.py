@@ -195,35 +195,7 @@ def essential(
 
 
 def with_columns(reduction: Reduction, names: tuple[str, ...]) -> Reduction:
-    """The reduction of the same equations in fewer parameters, the others being zero.
-
-    Parameters
-    ----------
-    reduction : Reduction
-        Of more parameters.
-    names : tuple of str
-        Some of them.
-
-    Returns
-    -------
-    Reduction
-        Their columns.
-
-    Raises
-    ------
-    InvalidValueError
-        A name that is not there.
-
-    Examples
-    --------
-    >>> rng = np.random.default_rng(0)
-    >>> A = rng.normal(size=(900, 2))
-    >>> y = A @ [2.0, 0.0]
-    >>> R = np.linalg.qr(np.column_stack((A, y)), mode="r")
-    >>> reduction = Reduction(("XX1", "XY1"), (R,), np.array([900]), np.array([0]))
-    >>> with_columns(reduction, ("XY1",)).factors[0].shape
-    (3, 2)
-    """
+    """The reduction of the same equations in fewer parameters, the others being zero."""
     missing = [name for name in names if name not in reduction.names]
     if missing:
         raise InvalidValueError(f"names: {', '.join(missing)} are not parameters here.")

@@ -195,23 +195,9 @@ def _with_weights(reduction: Reduction, method: Method, most: int) -> Estimate:
 
 
 def solved(reduction: Reduction, weights: Array | None) -> tuple[Array, Array, float]:
-    """Parameters, the inverse of the information matrix, and the sum of squares that is left.
+    """Least-squares parameters, inverse information matrix and residual sum of squares.
 
-    Parameters
-    ----------
-    reduction : Reduction
-        Of the equations.
-    weights : ndarray, shape (m,), or None
-        Of each kind.
-
-    Returns
-    -------
-    values : ndarray, shape (b,)
-        Parameters.
-    inverse : ndarray, shape (b, b)
-        ``(R^T R)^-1``.
-    rest : float
-        Sum of squared weighted residuals.
+    Shapes: weights (m,) -> values (b,), inverse (b, b).
     """
     from scipy.linalg import solve_triangular
 
@@ -223,21 +209,9 @@ def solved(reduction: Reduction, weights: Array | None) -> tuple[Array, Array, f
 
 
 def shares(reduction: Reduction, weights: Array | None, inverse: Array) -> Array:
-    """How many of the parameters each kind of equations has determined; they add to all.
+    """Sum of leverages of each kind of equations; their total is the number of parameters.
 
-    Parameters
-    ----------
-    reduction : Reduction
-        Of the equations.
-    weights : ndarray, shape (m,), or None
-        Of each kind; None for 1.
-    inverse : ndarray, shape (b, b)
-        Of the information matrix with these weights.
-
-    Returns
-    -------
-    ndarray, shape (m,)
-        Sums of the leverages.
+    Shapes: weights (m,), inverse (b, b) -> (m,).
     """
     w = np.ones(len(reduction.factors)) if weights is None else weights
     parts = (R[:, :-1] * weight for R, weight in zip(reduction.factors, w, strict=True))
@@ -245,23 +219,7 @@ def shares(reduction: Reduction, weights: Array | None, inverse: Array) -> Array
 
 
 def deviations_of(reduction: Reduction, values: Array, taken: Array | None = None) -> Array:
-    """Deviation of the residuals of each kind.
-
-    Parameters
-    ----------
-    reduction : Reduction
-        Of the equations.
-    values : ndarray, shape (b,)
-        Parameters.
-    taken : ndarray, shape (m,), optional
-        Parameters that each kind has determined, of `shares`; default in equal shares of the rows.
-
-    Returns
-    -------
-    ndarray, shape (m,)
-        N m or N; that of all kinds together where a kind has hardly more equations than it has
-        determined parameters; 0 for a kind without equations.
-    """
+    """Residual standard deviation of each kind of equations."""
     sums, counts = reduction.sums(values), reduction.counts
     if taken is None:
         return np.sqrt(sums / np.maximum(counts * (1.0 - len(values) / reduction.rows), 1e-300))
@@ -274,20 +232,7 @@ def deviations_of(reduction: Reduction, values: Array, taken: Array | None = Non
 
 
 def too_few(reduction: Reduction, taken: Array) -> NDArray[np.bool_]:
-    """Which kinds have hardly more equations than parameters that they determine.
-
-    Parameters
-    ----------
-    reduction : Reduction
-        Of the equations.
-    taken : ndarray, shape (m,)
-        Of `shares`.
-
-    Returns
-    -------
-    ndarray of bool, shape (m,)
-        Those whose residuals tell nothing of their noise.
-    """
+    """Kinds of equations with too few residual degrees of freedom to estimate their noise."""
     return (reduction.counts > 0) & (reduction.counts - taken < _LEFT)
 
 
@@ -302,20 +247,7 @@ def few_notes(reduction: Reduction, taken: Array) -> tuple[str, ...]:
 
 
 def weights_of(sigma: Array, reduction: Reduction) -> Array:
-    """Weights of deviations; residuals that are rounding count alike.
-
-    Parameters
-    ----------
-    sigma : ndarray, shape (m,)
-        Deviations.
-    reduction : Reduction
-        Of the equations.
-
-    Returns
-    -------
-    ndarray, shape (m,)
-        ``1 / sigma``.
-    """
+    """Weights 1 / standard deviation, with a floor at rounding. Shapes: sigma (m,) -> (m,)."""
     if not any(R[:, -1].any() for R in reduction.factors):
         return np.ones(len(reduction.factors))
     size = np.array([np.linalg.norm(R[:, -1]) for R in reduction.factors])
@@ -325,20 +257,7 @@ def weights_of(sigma: Array, reduction: Reduction) -> Array:
 
 
 def used_weights(method: Method, reduction: Reduction) -> Array:
-    """Weights with which one of these methods has solved the equations.
-
-    Parameters
-    ----------
-    method : Method
-        Ordinary, weighted or iteratively re-weighted least squares.
-    reduction : Reduction
-        Of the equations.
-
-    Returns
-    -------
-    ndarray, shape (m,)
-        One for ordinary least squares.
-    """
+    """Weights with which one of these methods has solved the equations. Shapes: -> (m,)."""
     if method is Method.OLS:
         return np.ones(len(reduction.factors))
     before = ordinary(reduction) if method is Method.WLS else reweighted(reduction)

@@ -15,24 +15,7 @@ _LOW, _HIGH = -80, 60
 
 
 class Lengths:
-    """How many residuals of each kind have which length.
-
-    Counts add up, so that the result depends neither on the order nor on the number of blocks,
-    and a log of any length needs the same memory; sorting would need all residuals at a time.
-
-    Parameters
-    ----------
-    kinds : int
-        Kinds of equations.
-
-    Examples
-    --------
-    >>> lengths = Lengths(1)
-    >>> noise = np.random.default_rng(0).normal(size=(100000, 1))
-    >>> lengths.add(np.abs(3.0 * noise), np.ones(noise.shape, dtype=bool))
-    >>> lengths.deviations().round(1)
-    array([3.])
-    """
+    """Histogram of residual lengths of each kind of equations."""
 
     def __init__(self, kinds: int) -> None:
         self.counts = np.zeros((kinds, (_HIGH - _LOW) * _OCTAVE + 1), dtype=np.int64)

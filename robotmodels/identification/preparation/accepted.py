@@ -15,31 +15,7 @@ from .joint_checks import check_joints
 def accepted_log(
     log: Log, model: RobotModel, name: str, friction: Friction | None = None
 ) -> tuple[Log, tuple[str, ...]]:
-    """Check and clean a log; raise if it is unusable.
-
-    Parameters
-    ----------
-    log : Log
-        What was recorded.
-    model : RobotModel
-        The robot.
-    name : str
-        Of the argument, for messages.
-    friction : Friction, optional
-        The friction model of the fit, as for `check_joints`.
-
-    Returns
-    -------
-    log : Log
-        Without outliers and frozen samples, which are interpolated or left out.
-    sentences : tuple of str
-        What is doubtful.
-
-    Raises
-    ------
-    InvalidValueError
-        What makes a fit meaningless, each finding with what to do.
-    """
+    """Check and clean a log; raise if it is unusable."""
     log, found = _cleaned(log, model)
     if not any(finding.severity is Severity.USELESS for finding in found):
         found = (*found, *check_joints(log, model, friction))
@@ -49,29 +25,7 @@ def accepted_log(
 def accepted_test(
     log: Log, test: Log, model: RobotModel, checked: bool
 ) -> tuple[Log, tuple[str, ...]]:
-    """Check and clean the test log, which must match the fitted one.
-
-    Parameters
-    ----------
-    log, test : Log
-        The log that is fitted, as given, and the one kept aside.
-    model : RobotModel
-        The robot.
-    checked : bool
-        Whether its channels are looked at.
-
-    Returns
-    -------
-    test : Log
-        Without outliers and frozen samples.
-    sentences : tuple of str
-        What is doubtful.
-
-    Raises
-    ------
-    InvalidValueError
-        Another number of joints or period, rows of the log that is fitted, useless channels.
-    """
+    """Check and clean the test log, which must match the fitted one."""
     if test.n != model.n:
         raise InvalidValueError(f"test: expected a log of {model.n} joints, got {test.n}.")
     if abs(test.dt - log.dt) > 1e-6 * log.dt:

@@ -30,14 +30,7 @@ _SMOOTH = ("Ia", "Fv", "offset")
 class FilteredSamples:
     """A log through a zero-phase filter, and its thinned rows.
 
-    Parameters
-    ----------
-    q, v, a, tau : ndarray, shape (N, n)
-        Positions, their derivatives, torques; not filtered in recordings that are too short.
-    places : ndarray of int, shape (T,)
-        Thinned rows, away from the ends of recordings.
-    cutoff : float
-        Hz.
+    Shapes: q, v, a, tau (N, n); places (T,).
     """
 
     q: Array
@@ -52,14 +45,7 @@ class FilteredSamples:
 class ThinRows:
     """Equations of one joint at a time, from filtered and thinned samples.
 
-    Parameters
-    ----------
-    bases : tuple of ndarray, each shape (N_j, r_j)
-        Orthonormal bases of what the columns of joint j span.
-    places : tuple of ndarray of int, each shape (N_j,)
-        Rows of the log.
-    tau : ndarray, shape (rows of the log, n)
-        Filtered torques.
+    Shapes: bases (N_j, r_j), places (N_j,), tau (rows of the log, n).
     """
 
     bases: tuple[Array, ...]
@@ -68,32 +54,7 @@ class ThinRows:
 
 
 def filtered_samples(log: Log, cutoff: float, margin: int, most: int = _MOST) -> FilteredSamples:
-    """Filter and differentiate a log, and thin out its rows.
-
-    Positions and torques pass the same zero-phase filter, so that what is left of the one fits what
-    is left of the other.
-
-    Parameters
-    ----------
-    log : Log
-        What was recorded.
-    cutoff : float
-        Hz.
-    margin : int
-        Rows left out at both ends of each recording, besides what the filter needs.
-    most : int
-        Thinned rows at most.
-
-    Returns
-    -------
-    FilteredSamples
-        Of the whole log, with the numbers of the thinned rows.
-
-    Raises
-    ------
-    InvalidValueError
-        No recording is long enough.
-    """
+    """Filter and differentiate a log, and thin out its rows."""
     step = max(1, int(1.0 / (_PER_CUTOFF * cutoff * log.dt)))
     settled = margin + int(np.ceil(1.0 / (cutoff * log.dt)))
     v, a, q = np.zeros_like(log.q), np.zeros_like(log.q), np.zeros_like(log.q)
@@ -119,32 +80,7 @@ def filtered_samples(log: Log, cutoff: float, margin: int, most: int = _MOST) ->
 
 
 def thin_rows(log: Log, model: RobotModel, cutoff: float, margin: int) -> ThinRows:
-    """Equations of each joint, without those near its standstill.
-
-    Near standstill the sign of the velocity, which friction follows, is lost in the filter: these
-    rows are left out.
-
-    Parameters
-    ----------
-    log : Log
-        What was recorded.
-    model : RobotModel
-        Of its joints.
-    cutoff : float
-        Hz.
-    margin : int
-        Rows left out at both ends of each recording.
-
-    Returns
-    -------
-    ThinRows
-        Joint by joint.
-
-    Raises
-    ------
-    InvalidValueError
-        No recording is long enough, or a joint has no rows.
-    """
+    """Equations of each joint, without those near its standstill."""
     x = filtered_samples(log, cutoff, margin)
     places = x.places
     near = int(np.ceil(0.25 / (cutoff * log.dt)))
@@ -182,20 +118,7 @@ def _rows_by_joint(
 
 
 def looked_at(log: Log, cutoff: float) -> Log:
-    """Of a log of more than 1e5 samples so many, in up to 20 stretches spread evenly over it.
-
-    Parameters
-    ----------
-    log : Log
-        What was recorded.
-    cutoff : float
-        Hz; stretches are much longer than what a filter of this cutoff needs.
-
-    Returns
-    -------
-    Log
-        A short log itself.
-    """
+    """Subset of a long log: at most 1e5 samples in up to 20 evenly spread stretches."""
     length = max(SAMPLES // _STRETCHES, int(_PERIODS / (cutoff * log.dt)))
     return stretches(log, length, max(SAMPLES, length))
 

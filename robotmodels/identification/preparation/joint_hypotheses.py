@@ -1,4 +1,8 @@
-"""Signs, order and unit of joints: hypotheses judged by the equations of all joints at once."""
+"""Signs, order and unit of joints: hypotheses judged by the equations of all joints at once.
+
+Source: Q. H. Vuong, "Likelihood ratio tests for model selection and non-nested hypotheses",
+Econometrica 57(2), 1989.
+"""
 
 from __future__ import annotations
 
@@ -44,15 +48,7 @@ _LIMITED = (0, 3, 5, 9)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointSamples:
-    """Filtered samples at which all joints' equations are compared.
-
-    Parameters
-    ----------
-    q, v, a, tau : ndarray, shape (T, n)
-        Positions, their derivatives, torques.
-    cutoff : float
-        Hz, of the filter.
-    """
+    """Filtered samples at which all joints' equations are compared. Shapes: q, v, a, tau (T, n)."""
 
     q: Array
     v: Array
@@ -77,20 +73,9 @@ class JointSamples:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hypothesis:
-    """Another reading of a log, and how well it fits.
+    """Hypothesis of flipped or swapped joints, and how well it fits.
 
-    Parameters
-    ----------
-    joints : tuple of int
-        Flipped (one), swapped (two), or all.
-    position, torque : ndarray, shape (n, n)
-        ``q' = position @ q``, ``tau' = torque @ tau``.
-    certain : bool
-        Whether it fits so much better that no error of the model explains it.
-    left, given : float
-        Parts of the variance of the torques concerned that are left, read so and as given.
-    significance : float
-        Mean difference of the log-likelihoods over its standard error.
+    Shapes: position, torque (n, n).
     """
 
     joints: tuple[int, ...]
@@ -117,22 +102,7 @@ class Hypothesis:
 def better_hypotheses(
     samples: JointSamples, model: RobotModel, position_dependent: Friction | None = None
 ) -> tuple[Hypothesis, ...]:
-    """Readings that fit significantly better than the log as given, the best first.
-
-    Every hypothesis has the same parameters: those of links, rotors, friction and offsets, with
-    second moments of mass, masses, rotor inertias and friction coefficients not negative, and an
-    elasticity at each joint for what the model lacks (and ``position_dependent``, a gravity
-    compensator). Each joint is weighted by its own residual variance. The difference of the
-    log-likelihoods has a standard error from blocks of time, which holds for residuals correlated
-    within a block.
-
-    Returned with the best are those that fit as well.
-
-    References
-    ----------
-    Q. H. Vuong, "Likelihood ratio tests for model selection and non-nested hypotheses",
-    Econometrica 57(2), 1989.
-    """
+    """Joint hypotheses that fit significantly better than the log as given, best first."""
     unit = np.eye(model.n)
     many = _reversals(samples.v) >= _CYCLES
     given = _Fit(samples, model, unit, position_dependent)

@@ -51,9 +51,7 @@ def noise_levels(log: Log) -> NoiseLevels:
 def noise_draw(q: Array, dt: float, levels: NoiseLevels, rng: np.random.Generator) -> Array:
     """Draw noise like that of positions q (N, n): white, or the quantisation error of an encoder.
 
-    Quantisation error is white only where the encoder passes many steps between two samples; in
-    slow motion most of its power is at low frequencies. So the smoothed positions are quantised
-    once more, with a random offset of the steps.
+    The latter is coloured in slow motion: smoothed positions are quantised with random offsets.
     """
     found = levels.deviation * rng.normal(size=q.shape)
     coarse = np.flatnonzero(levels.step > 0.0)

@@ -59,17 +59,7 @@ class Signals(Rebuilt):
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """Rows of a log that are worked on at a time.
-
-    Parameters
-    ----------
-    start, stop : int
-        Rows whose equations it makes.
-    low, high : int
-        Rows between which they may look: the recording without its edges.
-    begin, end : int
-        Rows of the recording.
-    """
+    """Range of log rows processed together."""
 
     start: int
     stop: int
@@ -113,20 +103,7 @@ def signals(log: Log, processing: Processing) -> Signals:
 
 
 def pieces(log: Log, processing: Processing) -> Iterator[Piece]:
-    """The pieces of a log, always the same ones.
-
-    Parameters
-    ----------
-    log : Log
-        The log.
-    processing : Processing
-        The choices.
-
-    Yields
-    ------
-    Piece
-        In order; their length is a multiple of the decimation.
-    """
+    """The pieces of a log, always the same ones."""
     step = processing.decimation
     size = max(1, min(PIECE // step, _INSTANTS)) * step
     for part in log.recordings():
@@ -136,24 +113,7 @@ def pieces(log: Log, processing: Processing) -> Iterator[Piece]:
 
 
 def piece_signals(log: Log, processing: Processing, piece: Piece, reach: int) -> Signals:
-    """Signals of a piece and of so many rows on either side of it, as far as there are any.
-
-    Parameters
-    ----------
-    log : Log
-        The log.
-    processing : Processing
-        The choices.
-    piece : Piece
-        Which rows.
-    reach : int
-        Rows more on either side; velocities of the guard beside dead bands come with them.
-
-    Returns
-    -------
-    Signals
-        The first row is ``max(piece.start - reach, piece.low)``.
-    """
+    """Signals of a piece and of so many rows on either side of it, as far as there are any."""
     first, last, begin, end = _looked_at(log, processing, piece, reach)
     guard = processing.guard
     if begin < 0 or end > len(log):
@@ -181,24 +141,7 @@ def piece_signals(log: Log, processing: Processing, piece: Piece, reach: int) ->
 
 
 def piece_alone(log: Log, processing: Processing, piece: Piece) -> tuple[Log, Piece]:
-    """The rows that the equations of a piece are made of, as a log of their own.
-
-    Parameters
-    ----------
-    log : Log
-        The log.
-    processing : Processing
-        The choices.
-    piece : Piece
-        Which rows.
-
-    Returns
-    -------
-    Log
-        Views of positions, velocities, accelerations and torques, without what was said of them.
-    Piece
-        The same piece in it; its recording may begin and end outside.
-    """
+    """Slice of a log for the equations of one piece."""
     _, _, begin, end = _looked_at(log, processing, piece, processing.reach + _BESIDE)
     rows = slice(begin, end)
     v, a = (None if x is None else x[rows] for x in (log.v, log.a))

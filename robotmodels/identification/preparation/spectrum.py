@@ -1,4 +1,8 @@
-"""Power spectra of logs."""
+"""Power spectra of logs.
+
+Source: P. D. Welch, "The use of fast Fourier transform for the estimation of power spectra", IEEE
+Trans. Audio and Electroacoustics 15(2), 1967.
+"""
 
 from __future__ import annotations
 
@@ -10,35 +14,7 @@ from ..._arrays import Array
 def power_density(x: Array, rate: float, length: int) -> tuple[Array, Array]:
     """Power spectral density by Welch's method: Hann windows that overlap by half.
 
-    Each window's mean is taken off.
-
-    Parameters
-    ----------
-    x : ndarray, shape (N, c)
-        Channels, at least two samples.
-    rate : float
-        Samples per second.
-    length : int
-        Samples of a window, from 2 to N.
-
-    Returns
-    -------
-    f : ndarray, shape (length // 2 + 1,)
-        Hz.
-    P : ndarray, shape (length // 2 + 1, c)
-        Squares of the unit of x, per Hz.
-
-    References
-    ----------
-    P. D. Welch, "The use of fast Fourier transform for the estimation of power spectra", IEEE
-    Trans. Audio and Electroacoustics 15(2), 1967.
-
-    Examples
-    --------
-    >>> f, P = power_density(np.sin(2.0 * np.pi * 5.0 * np.arange(0.0, 20.0, 0.01))[:, None],
-    ...                      100.0, 400)
-    >>> float(f[P[:, 0].argmax()]), round(float(P.sum() * f[1]), 3)
-    (5.0, 0.5)
+    Shapes: x (N, c) -> f (length // 2 + 1,), P (length // 2 + 1, c).
     """
     window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(length) / length)
     step = length - length // 2

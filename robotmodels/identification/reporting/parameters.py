@@ -27,98 +27,33 @@ _NOTHING = 1e-9
 def intervals(estimate: Estimate) -> Array:
     """Intervals that hold the truth with 95 % probability, each parameter by itself.
 
-    Parameters
-    ----------
-    estimate : Estimate
-        Parameters with their deviations.
-
-    Returns
-    -------
-    ndarray, shape (b, 2)
-        Lower and upper ends, of the normal distribution.
-
-    Examples
-    --------
-    >>> from robotmodels.identification.methods.estimate import Method
-    >>> found = Estimate(Method.OLS, ("Fv1",), [1.0], [[0.25]], [1.0])
-    >>> intervals(found).round(2)
-    array([[0.02, 1.98]])
+    Shapes: -> (b, 2).
     """
     return estimate.values[:, None] + np.outer(estimate.deviations, (-_NORMAL, _NORMAL))
 
 
 def parameter_units(result: IdentificationResult) -> tuple[str, ...]:
-    """Units of the identified parameters.
-
-    Parameters
-    ----------
-    result : IdentificationResult
-        Of `fit`.
-
-    Returns
-    -------
-    tuple of str, length b
-        Such as ``"kg m^2"``.
-    """
+    """Units of the identified parameters."""
     table = result.base.value_table(result.whole())
     units = dict(zip(table.names, table.units, strict=True))
     return tuple(units[name] for name in result.names)
 
 
 def effort_units(model: RobotModel) -> tuple[str, ...]:
-    """Units of the joints' torques or forces.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-
-    Returns
-    -------
-    tuple of str, length n
-        ``"N m"`` or ``"N"``.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> effort_units(load("planar_2r"))
-    ('N m', 'N m')
-    """
+    """Units of the joints' torques or forces."""
     sigma = model.table.sigma[model.table.joint_rows]
     return tuple("N" if kind == PRISMATIC else "N m" for kind in sigma.tolist())
 
 
 def kind_names(result: IdentificationResult) -> tuple[str, ...]:
-    """What the kinds of equations are called: joints, or the whole robot.
-
-    Parameters
-    ----------
-    result : IdentificationResult
-        Of `fit`.
-
-    Returns
-    -------
-    tuple of str, length m
-        Names.
-    """
+    """Names of the kinds of equations: joints, or the whole robot."""
     if result.system.form.by_joint:
         return tuple(result.model.table.joint_names)
     return ("whole robot",)
 
 
 def kind_units(result: IdentificationResult) -> tuple[str, ...]:
-    """Units of the residuals of the kinds of equations.
-
-    Parameters
-    ----------
-    result : IdentificationResult
-        Of `fit`.
-
-    Returns
-    -------
-    tuple of str, length m
-        ``"N m"`` or ``"N"`` of joints, else ``"W"`` or ``"J"``.
-    """
+    """Units of the residuals of the kinds of equations."""
     form = result.system.form
     if form.by_joint:
         return effort_units(result.model)
@@ -126,31 +61,7 @@ def kind_units(result: IdentificationResult) -> tuple[str, ...]:
 
 
 def stands_for(base: BaseParameters, name: str, width: int = _WIDTH) -> str:
-    """What is regrouped into a base parameter, as far as it fits.
-
-    Parameters
-    ----------
-    base : BaseParameters
-        Of the robot.
-    name : str
-        One of its names.
-    width : int
-        Letters.
-
-    Returns
-    -------
-    str
-        A sum, which ends in dots with the number of terms that are not shown; the name alone where
-        nothing is regrouped.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.minimal_parameters import base_parameters
-    >>> base = base_parameters(load("planar_2r"))
-    >>> stands_for(base, "ZZ1"), stands_for(base, "MX2")
-    ('ZZ1 + M2 + Ia1', 'MX2')
-    """
+    """Standard parameters regrouped into a base parameter, as a text of limited width."""
     row = base.matrix[base.names.index(name)]
     names = base.parameter_names
     own = names.index(name)
@@ -170,18 +81,7 @@ def stands_for(base: BaseParameters, name: str, width: int = _WIDTH) -> str:
 
 
 def parameter_tables(result: IdentificationResult) -> list[ReportTable]:
-    """A table of the parameters of each unit.
-
-    Parameters
-    ----------
-    result : IdentificationResult
-        Of `fit`.
-
-    Returns
-    -------
-    list of ReportTable
-        Name, what it stands for, value, deviation, relative deviation, interval.
-    """
+    """A table of the parameters of each unit."""
     estimate, base = result.estimate, result.base
     ends = intervals(estimate)
     units = parameter_units(result)
@@ -205,25 +105,7 @@ def parameter_tables(result: IdentificationResult) -> list[ReportTable]:
 
 
 def number(value: float, digits: int = 4) -> str:
-    """A number as text.
-
-    Parameters
-    ----------
-    value : float
-        Any.
-    digits : int
-        Significant ones.
-
-    Returns
-    -------
-    str
-        A dash for NaN.
-
-    Examples
-    --------
-    >>> number(1.23456), number(-3e-7, 2), number(float("nan"))
-    ('1.235', '-3e-07', '-')
-    """
+    """A number as text."""
     if value != value:
         return "-"
     text = f"{value:.{digits}g}"
@@ -232,23 +114,7 @@ def number(value: float, digits: int = 4) -> str:
 
 
 def percent(ratio: float) -> str:
-    """A ratio as text in per cent.
-
-    Parameters
-    ----------
-    ratio : float
-        Not negative.
-
-    Returns
-    -------
-    str
-        Two digits; a dash for NaN.
-
-    Examples
-    --------
-    >>> percent(0.0123), percent(0.5), percent(50.0), percent(float("nan"))
-    ('1.2 %', '50 %', '> 999 %', '-')
-    """
+    """A ratio as text in per cent."""
     if ratio != ratio:
         return "-"
     if ratio >= 9.995:

@@ -1,4 +1,7 @@
-"""An identification as plain lists, numbers and words: what its JSON file holds."""
+"""An identification as plain lists, numbers and words: what its JSON file holds.
+
+Source: Seed book section 1.6.5.
+"""
 
 from __future__ import annotations
 
@@ -32,29 +35,7 @@ _PACKAGES = ("robotmodels", "numpy", "scipy", "numba", "pin")
 
 
 def result_data(result: IdentificationResult, robot: ConsistentFit | None = None) -> dict[str, Any]:
-    """An identification as plain lists, numbers and words, as `write_result` writes it.
-
-    Parameters
-    ----------
-    result : IdentificationResult
-        Of `fit`.
-    robot : ConsistentFit, optional
-        Of `consistent_robot`.
-
-    Returns
-    -------
-    dict
-        SI units; None for what is not finite.
-
-    Raises
-    ------
-    InvalidValueError
-        The simulated robot ran away: there are no parameters.
-
-    References
-    ----------
-    Seed book section 1.6.5.
-    """
+    """An identification as plain lists, numbers and words, as `write_result` writes it."""
     estimate, base = result.estimate, result.base
     check_values(estimate)
     ends, units, factor = intervals(estimate), parameter_units(result), understatement(result)
@@ -123,25 +104,7 @@ def result_data(result: IdentificationResult, robot: ConsistentFit | None = None
 
 
 def option_data(options: MethodOptions) -> dict[str, Any]:
-    """What a method was given beyond the equations, ready for JSON.
-
-    Parameters
-    ----------
-    options : MethodOptions
-        Of the fit.
-
-    Returns
-    -------
-    dict
-        Those that were given, by name: numbers, lists, words; a robot by its name, a controller by
-        its fields.
-
-    Examples
-    --------
-    >>> from robotmodels.identification.solving import MethodOptions
-    >>> option_data(MethodOptions(loss="tukey", strength=2.0))
-    {'loss': 'tukey', 'strength': 2.0}
-    """
+    """Options of a method, as JSON data."""
     given = ((f.name, getattr(options, f.name)) for f in fields(options))
     return {name: _option(value) for name, value in given if value is not None}
 
@@ -160,25 +123,7 @@ def _option(value: Any) -> Any:
 
 
 def log_data(log: Log) -> dict[str, Any]:
-    """What a log was made of, with hashes by which the same data are known again.
-
-    Parameters
-    ----------
-    log : Log
-        The log.
-
-    Returns
-    -------
-    dict
-        ``sha256`` is of the bytes of q and tau as they were used: 64-bit numbers, little end
-        first, row by row, q before tau.
-
-    Examples
-    --------
-    >>> found = log_data(Log(0.01, np.zeros((100, 2)), np.zeros((100, 2))))
-    >>> found["sha256"] == hashlib.sha256(bytes(2 * 100 * 2 * 8)).hexdigest()
-    True
-    """
+    """Origin of a log, with hashes of its data."""
     return {
         "samples": len(log), "joints": list(log.names), "dt": log.dt, "duration": log.duration,
         "starts": log.starts.tolist(), "delay": log.delay, "sha256": _hash(log),

@@ -63,24 +63,7 @@ def report_text(result: IdentificationResult, robot: ConsistentFit | None = None
 def report_sections(
     result: IdentificationResult, robot: ConsistentFit | None = None
 ) -> tuple[ReportSection, ...]:
-    """What the text and the page of a report say.
-
-    Parameters
-    ----------
-    result : IdentificationResult
-        Of `fit`.
-    robot : ConsistentFit, optional
-        Of `consistent_robot`.
-
-    Returns
-    -------
-    tuple of ReportSection
-        In the order in which they are read.
-
-    Examples
-    --------
-    See `report_text`.
-    """
+    """Sections of a report, for text and page."""
     if result.estimate.status is EstimateStatus.UNSTABLE:
         rest = data_section(result), processing_section(result), _notes(result)
         return without_values(result), *(part for part in rest if part is not None)

@@ -50,16 +50,7 @@ class _Store:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class KeptEquations(Equations):
-    """Equations whose first blocks are kept from one pass to the next.
-
-    What is made of them with another log or other choices makes its own blocks; a copy that is
-    pickled, and `plain`, keep nothing.
-
-    Parameters
-    ----------
-    store : object
-        What is kept, of `kept_equations`.
-    """
+    """Equations with a cache of their first blocks."""
 
     store: Any = None
 
@@ -79,49 +70,11 @@ class KeptEquations(Equations):
 
 
 def kept_equations(system: Equations, most: int = KEPT_BYTES) -> KeptEquations:
-    """The same equations, made once as far as memory allows.
-
-    Parameters
-    ----------
-    system : Equations
-        Robot, parameters, log and choices.
-    most : int
-        Bytes of the blocks that are kept; those of later pieces are made again in each pass.
-
-    Returns
-    -------
-    KeptEquations
-        With nothing kept yet; fewer columns (``with_names``) are served by the same blocks.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from robotmodels.identification import Log, choose_processing, equations
-    >>> from robotmodels.minimal_parameters import base_parameters
-    >>> from robotmodels.robots import load
-    >>> t = np.arange(0.0, 10.0, 0.01)[:, None]
-    >>> log = Log(0.01, np.sin(t * [1.0, 2.0]), np.cos(t * [1.0, 2.0]))
-    >>> system = equations(base_parameters(load("planar_2r")), log, choose_processing(log))
-    >>> kept = kept_equations(system)
-    >>> first, again = next(kept.blocks()), next(kept.blocks())
-    >>> first is again, bool((first.W == next(system.blocks()).W).all())
-    (True, True)
-    """
+    """Equations with a cache of blocks, as far as memory allows."""
     own = plain(system)
     return KeptEquations(own.base, own.names, own.log, own.processing, own.form, _Store(own, most))
 
 
 def plain(system: Equations) -> Equations:
-    """The same equations with nothing kept.
-
-    Parameters
-    ----------
-    system : Equations
-        That may keep blocks.
-
-    Returns
-    -------
-    Equations
-        That makes them when it is asked.
-    """
+    """Equations without a cache of blocks."""
     return Equations(system.base, system.names, system.log, system.processing, system.form)

@@ -32,31 +32,7 @@ def piece_reductions(
     window: int | None,
     logs: int | None,
 ) -> Iterator[Reduction]:
-    """Reduction of each piece of each log, in order.
-
-    Parameters
-    ----------
-    systems : iterable of Equations
-        Taken from it one at a time.
-    executor : Executor or None
-        Who computes.
-    progress : callable or None
-        Called with the fraction done.
-    window : int or None
-        Pieces at a time, default twice the processors and 2.
-    logs : int or None
-        How many there are, where that is known.
-
-    Yields
-    ------
-    Reduction
-        Of one piece.
-
-    Raises
-    ------
-    InvalidValueError
-        A window below 1.
-    """
+    """Reduction of each piece of each log, in order."""
     if executor is None:
         tasks = _tasks(systems, _reduced_here, logs)
         found = ((function(*given), done) for function, given, done in tasks)
@@ -74,29 +50,7 @@ def piece_reductions(
 def in_order(
     tasks: Iterable[Task[T]], executor: Executor, window: int | None = None
 ) -> Iterator[tuple[T, float | None]]:
-    """Results of tasks in their order, of which no more than ``window`` are submitted at a time.
-
-    Parameters
-    ----------
-    tasks : iterable of (callable, arguments, fraction)
-        Taken from it as there is room.
-    executor : Executor
-        Who does them.
-    window : int, optional
-        Default twice the processors and 2.
-
-    Yields
-    ------
-    result : object
-        Of the task.
-    fraction : float or None
-        As the task has it.
-
-    Raises
-    ------
-    InvalidValueError
-        A window below 1.
-    """
+    """Results of tasks in their order, of which no more than ``window`` are submitted at a time."""
     most = 2 * (os.cpu_count() or 1) + 2 if window is None else window
     if most < 1:
         raise InvalidValueError(f"window: expected at least one piece at a time, got {window}.")

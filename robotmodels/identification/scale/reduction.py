@@ -162,20 +162,7 @@ def reduce_equations(
 
 
 def block_reduction(names: tuple[str, ...], block: Block) -> Reduction:
-    """Factors of one block.
-
-    Parameters
-    ----------
-    names : tuple of str
-        Its parameters.
-    block : Block
-        Equations.
-
-    Returns
-    -------
-    Reduction
-        Of this block alone.
-    """
+    """Factors of one block."""
     from ...kernels.triangles import fold_equations
 
     W, y = np.ascontiguousarray(block.W), np.ascontiguousarray(block.y)
@@ -191,23 +178,7 @@ def block_reduction(names: tuple[str, ...], block: Block) -> Reduction:
 
 
 def merge(first: Reduction, second: Reduction) -> Reduction:
-    """The reduction of both.
-
-    Parameters
-    ----------
-    first, second : Reduction
-        Of the same parameters and kinds.
-
-    Returns
-    -------
-    Reduction
-        Of all their equations.
-
-    Raises
-    ------
-    InvalidValueError
-        They have different ones.
-    """
+    """Merge two reductions."""
     if first.names != second.names or len(first.factors) != len(second.factors):
         raise InvalidValueError(
             f"system: expected logs of the same parameters and kinds of equations, got "

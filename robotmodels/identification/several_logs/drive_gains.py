@@ -162,30 +162,7 @@ def identify_drive_gains(
 
 
 def motor_side(model: RobotModel) -> Array:
-    """What turns torques of the joints into those of the motors, on the joint side.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-
-    Returns
-    -------
-    ndarray, shape (n, n)
-        ``K^T`` of the transmission with 1 for each motor's own joint; identity without one.
-
-    Raises
-    ------
-    InvalidValueError
-        A transmission that cannot be inverted.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> motor_side(load("tx40"))[4:, 4:]
-    array([[ 1., -1.],
-           [ 0.,  1.]])
-    """
+    """Matrix from joint torques to motor torques, on the joint side. Shapes: -> (n, n)."""
     if model.transmission is None:
         return np.eye(model.n)
     if not model.transmission.is_invertible:
@@ -268,17 +245,7 @@ def _gains(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GainEquations:
-    """The equations made linear about a solution, with currents without noise as columns.
-
-    Parameters
-    ----------
-    logs : SeveralLogs
-        In c + 1 exact columns, the known one last.
-    known : ndarray, shape (c + 1,)
-        The unknowns, and 1.
-    gains : ndarray, shape (n,)
-        Of the motors.
-    """
+    """Equations linearised about a solution, with noise-free currents as columns."""
 
     logs: SeveralLogs
     known: Array

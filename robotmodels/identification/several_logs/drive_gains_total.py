@@ -1,4 +1,10 @@
-"""Scaled total least squares for drive gains: some columns are exact, the others are measured."""
+"""Scaled total least squares for drive gains: some columns are exact, the others are measured.
+
+Source: M. Gautier and S. Briot, "Global identification of joint drive gains and dynamic parameters
+of robots", ASME J. Dynamic Systems, Measurement and Control 136(5), 2014, section 3; S. Van Huffel
+and J. Vandewalle, "The total least squares problem", SIAM, 1991, sections 3.5 and 3.6 (exact
+columns, scaled columns).
+"""
 
 from __future__ import annotations
 
@@ -17,19 +23,7 @@ _ITERATIONS = 30
 class TotalSolution(Rebuilt):
     """Solution of ``E x + known - diag(currents) g = 0``. Read-only.
 
-    Parameters
-    ----------
-    x : ndarray, shape (c,)
-        Unknowns of the exact columns.
-    gains : ndarray, shape (n,)
-        Of the columns of currents.
-    singular_values : ndarray, shape (n,)
-        Descending, in units of the noise: one for each gain and its direction; the last is that of
-        the solution and near 1, the others tell how far any other solution is from the data.
-    inverse : ndarray, shape (c + n, c + n)
-        Of the information matrix of ``(x, gains)``, the noise of the currents taken off.
-    weights : ndarray, shape (n,)
-        What the equations of each motor were multiplied by.
+    Shapes: x (c,); gains, singular_values, weights (n,); inverse (c + n, c + n).
     """
 
     x: Array
@@ -46,17 +40,7 @@ class TotalSolution(Rebuilt):
 def homogeneous_factor(reduction: Reduction, weights: Array) -> Array:
     """Triangular factor of the exact columns and, after them, one of currents for each motor.
 
-    Parameters
-    ----------
-    reduction : Reduction
-        In c exact columns.
-    weights : ndarray, shape (n,)
-        Of the motors' equations.
-
-    Returns
-    -------
-    ndarray, shape (r, c + n)
-        r is at most c + n.
+    Shapes: weights (n,) -> (r, c + n).
     """
     n, c = len(reduction.factors), len(reduction.names)
     parts = []
@@ -70,33 +54,7 @@ def homogeneous_factor(reduction: Reduction, weights: Array) -> Array:
 
 
 def total_least_squares(reduction: Reduction, noise: Array) -> TotalSolution:
-    """Total least squares with exact columns first, the last of which is known.
-
-    The exact columns are eliminated by orthogonal transformation; those of the currents are scaled
-    to the length of their noise, so that the smallest singular value is that of noise in all
-    directions and its vector is consistent. The vector is scaled so that the known column has the
-    coefficient 1. The equations of a motor are weighted by the deviation of their torque, gain
-    times noise, by iteration.
-
-    Parameters
-    ----------
-    reduction : Reduction
-        In c + 1 independent exact columns, the known one last; the measured side are the currents.
-    noise : ndarray, shape (n,)
-        Deviations of the currents.
-
-    Returns
-    -------
-    TotalSolution
-        Of c unknowns and n gains; not finite where the known column has no part in it.
-
-    References
-    ----------
-    M. Gautier and S. Briot, "Global identification of joint drive gains and dynamic parameters of
-    robots", ASME J. Dynamic Systems, Measurement and Control 136(5), 2014, section 3; S. Van Huffel
-    and J. Vandewalle, "The total least squares problem", SIAM, 1991, sections 3.5 and 3.6 (exact
-    columns, scaled columns).
-    """
+    """Total least squares with exact columns first, the last of which is known."""
     from scipy.linalg import solve_triangular
 
     n, c = len(noise), len(reduction.names) - 1
@@ -135,25 +93,7 @@ def _information_inverse(R: Array, scale: Array) -> Array:
 
 
 def known_side(reduction: Reduction, noise: Array) -> TotalSolution:
-    """Weighted least squares with the known column on the right side.
-
-    The currents are columns of the regressor then, and their noise draws the gains toward zero, by
-    about (noise / current)^2 of what the other columns leave of the current.
-
-    Parameters
-    ----------
-    reduction, noise
-        As for `total_least_squares`.
-
-    Returns
-    -------
-    TotalSolution
-        The same fields; its singular values are those of `total_least_squares`.
-
-    References
-    ----------
-    M. Gautier and S. Briot, ASME J. Dynamic Systems, Measurement and Control 136(5), 2014, (22).
-    """
+    """Weighted least squares with the known column on the right side."""
     n, c = len(noise), len(reduction.names) - 1
     keep = [*range(c), *range(c + 1, c + 1 + n)]
     weights = 1.0 / noise

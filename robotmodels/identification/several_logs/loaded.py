@@ -1,4 +1,8 @@
-"""Equations of several logs in common unknowns: the robot's, and those of the loads it carried."""
+"""Equations of several logs in common unknowns: the robot's, and those of the loads it carried.
+
+Source: W. Khalil, M. Gautier and P. Lemoine, "Identification of the payload inertial parameters of
+industrial manipulators", IEEE ICRA 2007, (8)-(12).
+"""
 
 from __future__ import annotations
 
@@ -26,25 +30,7 @@ _LEAST_NOISE = 1e-8
 class MappedEquations(Rebuilt):
     """Equations of one log whose base parameters are a linear map of common unknowns.
 
-    A body on a link adds to the standard parameters of that link, so that it adds a linear map of
-    its own ten parameters to the base parameters: no regressor of the load is needed, and what is
-    reduced once in base parameters serves every choice of unknowns.
-
-    Parameters
-    ----------
-    system : Equations
-        Of one log, in b base parameters.
-    matrix : ndarray, shape (b, c)
-        Base parameters of the robot with what it carries, from c common unknowns.
-    names : tuple of str
-        Of the unknowns.
-    side : ndarray, shape (n, n), optional
-        Combinations of the joints' equations, such as those of the motors; default none.
-
-    References
-    ----------
-    W. Khalil, M. Gautier and P. Lemoine, "Identification of the payload inertial parameters of
-    industrial manipulators", IEEE ICRA 2007, (8)-(12).
+    Shapes: matrix (b, c), side (n, n).
     """
 
     system: Equations
@@ -70,13 +56,7 @@ class MappedEquations(Rebuilt):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SeveralLogs(Rebuilt):
-    """Equations of several logs in the same unknowns, one log after the other.
-
-    Parameters
-    ----------
-    parts : tuple of MappedEquations
-        With the same names.
-    """
+    """Equations of several logs in the same unknowns, one log after the other."""
 
     parts: tuple[MappedEquations, ...]
 
@@ -92,22 +72,7 @@ class SeveralLogs(Rebuilt):
 
 
 def side_block(system: Equations, piece: Piece, side: Array | None) -> Block:
-    """Equations of a piece, or combinations of the joints' equations.
-
-    Parameters
-    ----------
-    system : Equations
-        Of one log.
-    piece : Piece
-        Which rows.
-    side : ndarray, shape (n, n), or None
-        A row for each combination; None takes the joints.
-
-    Returns
-    -------
-    Block
-        A combination takes part where all joints in it do.
-    """
+    """Equations of a piece, or combinations of the joints' equations. Shapes: side (n, n)."""
     if side is None or np.array_equal(side, np.eye(len(side))):
         return system.block(piece)
     return formed_block(system, piece, combined(side))
@@ -116,22 +81,7 @@ def side_block(system: Equations, piece: Piece, side: Array | None) -> Block:
 def reduced_side(
     system: Equations, side: Array | None = None, executor: Executor | None = None
 ) -> Reduction:
-    """Factors of one log in all its base parameters.
-
-    Parameters
-    ----------
-    system : Equations
-        Of one log.
-    side : ndarray, shape (n, n), optional
-        As for `side_block`.
-    executor : concurrent.futures.Executor, optional
-        Who computes the pieces.
-
-    Returns
-    -------
-    Reduction
-        In the parameters of ``system``.
-    """
+    """Factors of one log in all its base parameters. Shapes: side (n, n)."""
     parts = system.pieces()
     if executor is None:
         leaves = (_leaf(system, piece, side) for piece in parts)
@@ -150,22 +100,7 @@ def _leaf(system: Equations, piece: Piece, side: Array | None) -> Reduction:
 def mapped_reduction(
     reductions: Sequence[Reduction], matrices: Sequence[Array], names: tuple[str, ...]
 ) -> Reduction:
-    """Factors of several logs in common unknowns.
-
-    Parameters
-    ----------
-    reductions : sequence of Reduction
-        Of each log, in its b base parameters.
-    matrices : sequence of ndarray, shapes (b, c)
-        Base parameters from the unknowns, of each log.
-    names : tuple of str
-        Of the c unknowns.
-
-    Returns
-    -------
-    Reduction
-        Of all logs together.
-    """
+    """Factors of several logs in common unknowns. Shapes: matrices (b, c)."""
     parts = []
     for reduction, matrix in zip(reductions, matrices, strict=True):
         factors = tuple(
@@ -180,22 +115,7 @@ def mapped_reduction(
 
 
 def residual_noise(reduction: Reduction) -> Array:
-    """Deviation of the noise of each kind of equations, from its own equations alone.
-
-    The current of a motor is linear in the parameters of the robot divided by its gain, whatever
-    the gain, so that its residuals tell the noise without any gain being known.
-
-    Parameters
-    ----------
-    reduction : Reduction
-        Of all logs.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        At least 1e-8 of the root mean square of the measured side, so that exact data has weights;
-        1 where that is zero.
-    """
+    """Noise standard deviation of each kind, from its own equations alone."""
     found = np.ones(len(reduction.factors))
     for m, F in enumerate(reduction.factors):
         size = np.linalg.norm(F[:, -1])
@@ -217,32 +137,9 @@ def column_lengths(R: Array) -> Array:
 
 
 def payload_columns(base: BaseParameters, frame: str | int | None) -> Array:
-    """What the ten parameters of a body on a frame add to base parameters.
+    """Base parameter columns of the ten inertial parameters of a body on a frame.
 
-    Parameters
-    ----------
-    base : BaseParameters
-        Of the robot, b of them.
-    frame : str, int or None
-        Carries the body, whose parameters are about its origin and in its axes; None is the tool.
-
-    Returns
-    -------
-    ndarray, shape (b, 10)
-        A column for each of ``XX XY XZ YY YZ ZZ MX MY MZ M``.
-
-    Raises
-    ------
-    InvalidValueError
-        A frame of the base, whose bodies load no joint.
-
-    Examples
-    --------
-    >>> from robotmodels.minimal_parameters import base_parameters
-    >>> from robotmodels.robots import load
-    >>> base = base_parameters(load("planar_2r"), drive=False)
-    >>> base.names, payload_columns(base, None)[:, 9]  # a mass at the end of two links of 1 m
-    (('ZZ1', 'ZZ2', 'MX2', 'MY2'), array([1., 1., 1., 0.]))
+    Shapes: -> (b, 10).
     """
     place = base.model.twin.frame(frame)
     if place.parent == 0:

@@ -40,24 +40,7 @@ _EXACT = 1e-13
 class PayloadProblem:
     """Reduced equations of a robot with and without a load.
 
-    Parameters
-    ----------
-    base : BaseParameters
-        Of the robot.
-    frame : str, int or None
-        Carries the load.
-    names : tuple of str
-        Of the c unknowns: the robot's, those that the loaded log has of its own, the load's ten.
-    basis : ColumnBasis
-        Which of them the logs tell, k of them.
-    parts : tuple of MappedEquations
-        Of each log, in these k.
-    reduction : Reduction
-        Of all logs, in these k.
-    sigma : ndarray, shape (n,)
-        Deviation of the residuals of each joint.
-    prior : ndarray, shape (r, k + 1)
-        What is known of the robot before, as equations of unit noise; r is 0 without.
+    Shapes: sigma (n,), prior (r, k + 1).
     """
 
     base: BaseParameters
@@ -72,21 +55,7 @@ class PayloadProblem:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solution:
-    """The k unknowns.
-
-    Parameters
-    ----------
-    values : ndarray, shape (k,)
-        SI units.
-    covariance : ndarray, shape (k, k)
-        Of them, without regard to what real bodies are.
-    sigma : ndarray, shape (n,)
-        Deviation of the residuals of each joint.
-    cost : float
-        Part by which real bodies raise the weighted sum of squares.
-    solved : bool
-        Whether a real body was found where one was asked for.
-    """
+    """Estimate of the k unknowns. Shapes: values (k,), covariance (k, k), sigma (n,)."""
 
     values: Array
     covariance: Array
@@ -100,18 +69,7 @@ def payload_problem(
     frame: str | int | None, own: tuple[str, ...], processing: Processing | None,
     executor: Executor | None,
 ) -> PayloadProblem:  # fmt: skip
-    """Equations of the loaded log together with what is known of the robot without load.
-
-    Parameters
-    ----------
-    base, loaded, reference, frame, own, processing, executor
-        See `identify_payload`.
-
-    Returns
-    -------
-    PayloadProblem
-        Reduced.
-    """
+    """Equations of the loaded log together with what is known of the robot without load."""
     known = reference if isinstance(reference, IdentificationResult) else None
     robot = base.names if known is None else known.names
     kinds = {name: name.rstrip("0123456789") for name in robot}
@@ -192,20 +150,7 @@ def _prior(known: IdentificationResult, k: int) -> Array:
 
 
 def solve_payload(problem: PayloadProblem, consistent: bool) -> Solution:
-    """Robot and load together, by weighted least squares.
-
-    Parameters
-    ----------
-    problem : PayloadProblem
-        Reduced equations.
-    consistent : bool
-        Whether the load is held to real bodies.
-
-    Returns
-    -------
-    Solution
-        With the covariance of correlated residuals.
-    """
+    """Joint estimate of robot and load by weighted least squares."""
     reduction, prior = problem.reduction, problem.prior
     weighted = [F / s for F, s in zip(reduction.factors, problem.sigma, strict=True)]
     rows = np.vstack((*weighted, prior))

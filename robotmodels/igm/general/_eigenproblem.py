@@ -51,10 +51,8 @@ def widen(
 ) -> None:
     """One of the twelve equations: one in joints 3, 4 times factor m = 0, 1 of joint nu.
 
-    Revolute nu: times cos(h), sin(h) with h its half angle, in (cos h, sin h, cos 3h, sin 3h).
-    Prismatic nu: times 1, r in (1, r, r^2, r^3). Joint nu is joint 3, or joint 4 if ``swapped``.
-    The nine coefficients are read at ``E[row, at]``, the twelve written at ``out[line, start]``,
-    over nu, then mu.
+    Factors: cos(h), sin(h) of the half angle if revolute, 1, r if prismatic. nu is joint 3, or 4 if
+    ``swapped``. Reads nine coefficients at ``E[row, at]``, writes twelve at ``out[line, start]``.
     """
     step_nu, step_mu = (1, 3) if swapped else (3, 1)
     for mu in range(3):
@@ -104,22 +102,8 @@ def assemble(
 ) -> None:
     """Reduce poses to eigenproblems of size 16.
 
-    Parameters
-    ----------
-    kinds : (6,)
-        0 revolute, 1 prismatic, in the order of the loop; joints 2 and 5 are revolute.
-    links : (6, 4, 4)
-        Constants after each joint.
-    closing : int
-        Which of them is replaced by the pose's ``closings (N, 4, 4)``.
-    swapped : int
-        0: joint 3 is nu and joint 4 mu; 1: the other way round.
-    M : (N, 16, 16), output
-        Eigenvalues tan((angle of joint 2 - ``angle``) / 2). Zero where no matrix was found.
-    P, Q, order : (N, 14, 27), (N, 8, 8), (N, 8), outputs
-        The equations after the elimination, for the way back.
-    angle, quality : (N,), outputs
-        The reference angle; how far from dependent the eliminated columns were (0 to 1).
+    Shapes: kinds (6,); links (6, 4, 4); M (N, 16, 16); P (N, 14, 27); Q (N, 8, 8); order (N, 8);
+    angle, quality (N,).
     """
     kind_nu = kinds[4] if swapped else kinds[3]
     G = np.empty((6, 4, 4))

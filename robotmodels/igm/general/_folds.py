@@ -72,9 +72,8 @@ def partners(
 ) -> None:
     """Find the other root of pairs that nearly merged, and flag those that did.
 
-    Near a fold the error along the null direction v of the Jacobian is ``s sigma + s^2 h / 2``
-    with sigma the smallest singular value (left vector u) and h = u . d(J v)/ds. The partner of a
-    posture is at ``s = -2 sigma / h``.
+    Along the null direction v the error is ``s sigma + s^2 h / 2``, sigma the smallest singular
+    value (left vector u), h = u . d(J v)/ds, so the partner is at ``s = -2 sigma / h``.
     """
     u, v, q, start = np.empty(6), np.empty(6), np.empty(6), np.empty(6)
     work = workspace()

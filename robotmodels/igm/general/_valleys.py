@@ -150,12 +150,10 @@ def follow_valleys(
     found: Floats,
     count: Ints,
 ) -> None:
-    """Search along valleys for postures that Newton's method does not tell apart.
+    """Continuation along nearly singular curves for postures that Newton's method merges.
 
-    Beside a pose with an infinite family of postures the Jacobian is nearly singular all along the
-    former family, and the few postures that are left lie on it. From ``starts (N, S, 6)`` the
-    valley is followed along the null direction; a posture is where what is missing along the
-    left null vector changes sign.
+    From ``starts (N, S, 6)`` along the null direction; a posture is where the error along the left
+    null vector changes sign.
     """
     u, v, before, behind = np.empty(6), np.empty(6), np.empty(6), np.empty(6)
     q, origin, trial, aside = np.empty(6), np.empty(6), np.empty(6), np.empty(6)

@@ -15,15 +15,7 @@ from .solver import GeneralSolver
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GeneralArm:
-    """A six-joint arm that the elimination serves well.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    solver : GeneralSolver
-        The representations that were chosen for it.
-    """
+    """Six-joint arm solved by elimination (Raghavan-Roth)."""
 
     chain: JointChain
     solver: GeneralSolver

@@ -18,36 +18,7 @@ def general_postures(
 ) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
     """All real postures of a six-joint arm.
 
-    Parameters
-    ----------
-    solver : GeneralSolver
-        From `prepare_general`.
-    U : array_like, shape (N, 4, 4)
-        Poses of the tool in the base, ``U = D_0 M_1 D_1 ... M_6 D_6`` [m].
-
-    Returns
-    -------
-    q : ndarray, shape (N, 16, 6)
-        Postures, packed, angles in (-pi, pi] [rad or m]; NaN in the rows without one.
-    valid : ndarray of bool, shape (N, 16)
-        Rows that hold a posture. Each meets its pose to 1e-13 m and rad, beside infinite families
-        to 1e-12.
-    double : ndarray of bool, shape (N, 16)
-        Rows that hold two merged postures: less than 1e-6 apart, or so near that the pose is met
-        everywhere between them and only one is found.
-
-    Examples
-    --------
-    >>> from robotmodels.igm.general import prepare_general
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.kinematics import dgm
-    >>> from robotmodels.robots import load
-    >>> model = load("crx10ia")
-    >>> solver = prepare_general(joint_chain(model))
-    >>> T = dgm(model, [[0.3, -0.2, 0.5, 1.0, -0.7, 0.4]])
-    >>> q, valid, double = general_postures(solver, T)
-    >>> int(valid.sum()) % 2, bool(double.any())
-    (0, False)
+    Shapes: U (N, 4, 4) -> q (N, 16, 6); valid, double (N, 16).
     """
     goals = np.array(U, dtype=np.float64, order="C")
     goals[:, :3, 3] /= solver.unit
@@ -71,37 +42,7 @@ def on_infinite_family(
 ) -> NDArray[np.bool_]:
     """Whether postures belong to an infinite family: the arm moves and the tool does not.
 
-    There `general_postures` returns some members of the family, as many as it came upon.
-
-    Parameters
-    ----------
-    solver : GeneralSolver
-        From `prepare_general`.
-    q : ndarray, shape (N, 16, 6)
-        Postures from `general_postures` [rad or m].
-    valid : ndarray of bool, shape (N, 16)
-        Rows that hold one.
-
-    Returns
-    -------
-    ndarray of bool, shape (N, 16)
-        Rows at which the Jacobian is singular and, to first order, stays so along its null
-        direction.
-
-    Examples
-    --------
-    Joint 3 of the CRX at -90 degrees brings four of its axes together.
-
-    >>> from robotmodels.igm.general import prepare_general
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.kinematics import dgm
-    >>> from robotmodels.robots import load
-    >>> model = load("crx10ia")
-    >>> solver = prepare_general(joint_chain(model))
-    >>> T = dgm(model, [[0.3, -0.2, -np.pi / 2, 1.0, -0.7, 0.4]])
-    >>> q, valid, _ = general_postures(solver, T)
-    >>> bool(on_infinite_family(solver, q, valid).any())
-    True
+    Shapes: q (N, 16, 6), valid (N, 16) -> (N, 16).
     """
     from ._folds import flat_singularities
 

@@ -19,32 +19,7 @@ WAYS = 12  # representations kept
 def prepare_general(
     chain: JointChain, tests: int = 48, rng: np.random.Generator | int | None = 0
 ) -> GeneralSolver | None:
-    """Choose the best representations of a six-joint arm and test them on random postures.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    tests : int
-        Random postures of the self-test.
-    rng : Generator or int
-        Source of the random postures.
-
-    Returns
-    -------
-    GeneralSolver or None
-        None where the method does not apply: other than six joints, more than one of them
-        prismatic (the equations are dependent with two), or an arm without any posture found.
-
-    Examples
-    --------
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.robots import load
-    >>> prepare_general(joint_chain(load("crx10ia"))).misses
-    0
-    >>> prepare_general(joint_chain(load("lab_rrt"))) is None
-    True
-    """
+    """Choose the best representations of a six-joint arm and test them on random postures."""
     if chain.k != 6 or int(np.sum(chain.sigma == 1)) > 1:
         return None
     rng = np.random.default_rng(rng)

@@ -20,21 +20,7 @@ from ..._arrays import Array, read_only
 class Representation:
     """One of the 24 ways to write the loop of six joints for the elimination.
 
-    Parameters
-    ----------
-    joints : ndarray of int, shape (6,)
-        Joint of the arm at each place of the loop: two that are eliminated linearly, one that
-        gives the eigenvalues, two in the eigenvectors, one that drops out.
-    kinds : ndarray of int, shape (6,)
-        Their types, 0 revolute, 1 prismatic.
-    direction : int
-        1 from the base to the tool, -1 the other way round.
-    links : ndarray, shape (6, 4, 4)
-        Constants after each joint, lengths in `GeneralSolver.unit`.
-    closing : int
-        Place of the link that closes the loop through the pose.
-    swapped : bool
-        Whether the fifth joint of the loop takes the half angles, instead of the fourth.
+    Shapes: joints, kinds (6,); links (6, 4, 4).
     """
 
     joints: NDArray[np.int64]

@@ -106,11 +106,9 @@ def solve(solver: GeneralSolver, goals: Array) -> Gathered:
 
 
 def _look_beside(solver: GeneralSolver, goals: Array, found: Gathered) -> None:
-    """Add what starts from poses aside, from valleys and from anywhere lead to.
+    """Add postures found from neighbouring poses, nearly singular curves and random starts.
 
-    Where roots merge the equations lose digits, or all meaning; a little aside they do not. A pair
-    that is complex on one side of a fold is real on the other, so both are tried. Beside an
-    infinite family what is found aside leads into a valley to be searched.
+    Elimination loses digits where roots merge, not at poses beside: both sides of a fold are tried.
     """
     from ._folds import partners
     from ._roots import bring_home

@@ -13,30 +13,9 @@ from .representation import Representation
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GeneralSolver:
-    """What `general_postures` needs to know of an arm, and how well the method suits it.
+    """Prepared elimination of a six-joint arm with the results of its self-test.
 
-    Parameters
-    ----------
-    sigma : ndarray of int, shape (6,)
-        0 revolute, 1 prismatic.
-    D : ndarray, shape (7, 4, 4)
-        Constants of the chain, lengths in ``unit``.
-    unit : float
-        Length by which lengths are divided [m].
-    representations : tuple of Representation
-        The first is used for every pose, the others in turn where doubts are left.
-    conditioning : float
-        How far rounding had moved the roots of the first representation before they were
-        polished, 90 of 100 in the self-test [rad]. 1e-11 or so for a general arm.
-    tested : int
-        Poses of the self-test.
-    doubts : int
-        How many of them the first representation did not settle alone. Few for a general arm;
-        most for one with a spherical wrist or three parallel axes.
-    misses : int
-        How many did not give back the posture they came from.
-    odd : int
-        How many had an odd number of postures, which a missing one explains.
+    Shapes: sigma (6,), D (7, 4, 4).
     """
 
     sigma: NDArray[np.int64]

@@ -131,10 +131,8 @@ def descend(
 ) -> tuple[float, float]:
     """Levenberg-Marquardt from the posture q in ``work``, which it improves.
 
-    Within the tolerances it goes on while a step takes away most of the error, so that what is
-    returned is as good as rounding allows where the pose can be met exactly. It gives up where
-    steps stop paying: where after five of them more than ``patience`` of the cost is left. The
-    error e in ``work`` is that of the posture it ends with; its sizes are returned.
+    Ends when a step no longer reduces the error, or when more than ``patience`` of the cost is left
+    after five steps. ``work`` holds the final error e; its sizes are returned.
     """
     q, trial, e, J, H, g, step, held, z, o = work
     lower, upper = bounds

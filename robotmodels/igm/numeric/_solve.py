@@ -132,49 +132,10 @@ def solve_poses(
     family: Flags,
     status: Codes,
 ) -> None:
-    """One posture a pose, or the closest one and why there is none.
+    """Numeric inverse: one posture per pose, or the closest posture and the reason.
 
-    Parameters
-    ----------
-    targets : (N, 4, 4)
-        World poses of the tool [m].
-    first : (N, n)
-        The first starts, and where joints without effect stay [rad or m].
-    given : int
-        1 if ``first`` is a start, 0 if it only holds joints without effect and mid-ranges.
-    starts : (K, n)
-        Further starts, K >= 1, the same for all targets [rad or m].
-    poses : (K, 4, 4)
-        World poses of the tool at these starts [m].
-    antecedent, ..., base_position
-        The `Chain`.
-    path, tool_rotation, tool_position
-        As for `tip_poses`.
-    lower, upper : (n,)
-        Joint limits [rad or m].
-    boxed : int
-        1: inside the limits only.
-    mask : (6,) int64
-        1 for each component of the error that is asked for.
-    tool_axes : int
-        1: components in the axes of the tool at its target, 0: in world axes.
-    length, reach : float
-        What makes metres and radians comparable, and what the tool's distance from the origin
-        of the first frame of the path never exceeds [m]; infinite if that is not known.
-    tolerance : (2,)
-        Position [m] and orientation [rad].
-    restarts, iterations : int
-        Starts beside the given one, at most K; steps from each start.
-    closest, postures : (N, n)
-        Written: the posture the search ended with; the same where it is a solution, else NaN.
-    error, residual : (N, 6), (N,)
-        Written: what that posture misses, and the larger of the sizes that were asked for.
-    valid, inside : (N,) bool
-        Written: whether it is a solution, and one inside the limits.
-    family : (N, n) bool
-        Written: joints that move in the infinite family it belongs to.
-    status : (N,) int8
-        Written: codes of `IGMStatus`.
+    Shapes: targets (N, 4, 4), first (N, n), starts (K, n), poses (K, 4, 4) -> closest, postures,
+    family (N, n); error (N, 6); residual, valid, inside, status (N,).
     """
     n = starts.shape[1]
     k = path.shape[0]

@@ -106,9 +106,8 @@ def two_angles(
 ) -> tuple[int, int]:
     """``W1 Cj + W2 Sj = X Ci + Y Si + Z1, sense (W1 Sj - W2 Cj) = X Si - Y Ci + Z2``.
 
-    Squared and added they are of type 2 in i: ``B1 Si + B2 Ci = B3`` with
-    ``B1 = 2 (Z1 Y + Z2 X)``, ``B2 = 2 (Z1 X - Z2 Y)`` and
-    ``B3 = W1^2 + W2^2 - X^2 - Y^2 - Z1^2 - Z2^2``; then j is of type 3.
+    Type 2 in i: ``B1 Si + B2 Ci = B3``, ``B1 = 2 (Z1 Y + Z2 X)``, ``B2 = 2 (Z1 X - Z2 Y)``,
+    ``B3 = W1^2 + W2^2 - X^2 - Y^2 - Z1^2 - Z2^2``; then type 3 in j.
     """
     W = W1 * W1 + W2 * W2
     # half of B1, B2, B3

@@ -203,13 +203,10 @@ def run_plan(
     residuals: Floats,
     marks: Ints,
 ) -> None:
-    """Postures of every pose; `paul_postures` says what is returned.
+    """Postures of every pose by a `Program`; see `paul_postures`.
 
-    ``plan`` and ``numbers`` are a `Program` in two arrays. ``tolerances``: overshoot beside the
-    amplitude that counts as a double root, amplitudes that are zero and that are small beside
-    their usual size, largest error accepted [m, rad]. Row n of ``marks (N, 2 + 2 S)``: number of
-    postures, flags of the pose, and of each posture the bits of free unknowns and of the branches
-    taken.
+    ``tolerances``: overshoot of a double root, zero and small amplitudes, largest error [m, rad].
+    ``marks (N, 2 + 2 S)``: count, flags of the pose, bits of free unknowns and of branches.
     """
     k, m, at_steps, at_starts = int(plan[0]), int(plan[1]), int(plan[2]), int(plan[3])
     at_operations, at_results, at_sigma = int(plan[4]), int(plan[5]), int(plan[6])

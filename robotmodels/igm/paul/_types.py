@@ -24,11 +24,10 @@ _TAN_EIGHTH = 0.41421356237309503  # tan(pi / 8)
 
 @compiled()
 def atan2(y: float, x: float) -> float:
-    """The angle of (x, y), to two units in the last place.
+    """The angle of (x, y), to two units in the last place, without branches (vector code).
 
-    Without branches, so that a loop over lanes becomes vector code: some five times quicker than
-    the library's. The tangent below 22.5 degrees is left of three foldings; of that the arc is an
-    odd polynomial whose coefficients are a Chebyshev fit of ``(atan(u) / u - 1) / u^2``.
+    Three foldings leave a tangent below 22.5 degrees; then an odd polynomial, a Chebyshev fit of
+    ``(atan(u) / u - 1) / u^2``.
     """
     a, b = abs(x), abs(y)
     low = b if b < a else a
@@ -128,11 +127,10 @@ def type_2(
     o: int,
     lane: int,
 ) -> tuple[int, int]:
-    """``X S + Y C = Z``.
+    """``X S + Y C = Z``, example 1.3 of the book with its misprint corrected.
 
     ``S = (X Z + e Y sqrt(X^2 + Y^2 - Z^2)) / (X^2 + Y^2)`` and
-    ``C = (Y Z - e X sqrt(X^2 + Y^2 - Z^2)) / (X^2 + Y^2)`` with e = +-1, the book's example 1.3
-    with its misprint put right.
+    ``C = (Y Z - e X sqrt(X^2 + Y^2 - Z^2)) / (X^2 + Y^2)`` with e = +-1.
     """
     square = X * X + Y * Y
     rho = sqrt(square)

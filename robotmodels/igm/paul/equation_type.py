@@ -1,4 +1,8 @@
-"""The types of equations that Paul's method comes down to."""
+"""The types of equations that Paul's method comes down to.
+
+Source: W. Khalil, E. Dombre, *Modeling, Identification and Control of Robots*, section 4.4 and
+appendix 1, for the types.
+"""
 
 from __future__ import annotations
 
@@ -6,18 +10,7 @@ from enum import Enum
 
 
 class EquationType(Enum):
-    """Types of equations, numbered as in the literature; two more that lead to a polynomial.
-
-    References
-    ----------
-    W. Khalil, E. Dombre, *Modeling, Identification and Control of Robots*, section 4.4 and
-    appendix 1, for the types.
-
-    Examples
-    --------
-    >>> EquationType.TYPE_2.formula
-    'X S + Y C = Z'
-    """
+    """Types of equations, numbered as in the literature; two more that lead to a polynomial."""
 
     formula: str
     code: int

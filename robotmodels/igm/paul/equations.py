@@ -21,12 +21,10 @@ POSE_NAMES = (("s", "n", "a", "P"), ("x", "y", "z"))
 
 @dataclass(frozen=True, slots=True)
 class Split:
-    """A way to write the matrix equation of the arm.
+    """Matrix equation ``(0Ts)^-1 U0 (pTk)^-1 = sTp``: joints up to s and after p go with the pose.
 
-    ``(0Ts)^-1 U0 (pTk)^-1 = sTp``: the first s joints and those after p stand with the pose.
-    ``tool`` says whether a tool that belongs to the chain stays with the joints; ``twist`` that the
-    constant before joint s + 1 stands with the pose as well; ``inverse`` that both sides are
-    inverted.
+    ``tool``: the tool stays with the joints; ``twist``: the constant before joint s + 1 goes with
+    the pose; ``inverse``: both sides are inverted.
     """
 
     s: int

@@ -17,34 +17,7 @@ from .wording import Wording
 
 @dataclass(frozen=True, slots=True)
 class ExplainedStep:
-    """One step of the derivation.
-
-    Parameters
-    ----------
-    joints : tuple of str
-        What it gives: ``("θ2", "θ3")``; a sum of angles as ``"θ2 + θ3 + θ4"``.
-    type : EquationType
-        Its type.
-    matrix_equation : str
-        The multiplication, such as ``"1T0 U0 = 1T6"``.
-    equations : tuple of str
-        Its elements that are used, each an equation.
-    formulas : tuple of str
-        The solution.
-    undetermined : str
-        Where the step has no single answer and what is done there; may be empty.
-    branches : int
-        Most solutions.
-    text, latex : str
-        All of it for people.
-
-    Examples
-    --------
-    >>> from robotmodels.igm.paul import explain_igm
-    >>> from robotmodels.robots import load
-    >>> explain_igm(load("lab_rr")).steps[1].formulas
-    ('θ2 = atan2(RL1 - Pz, C1*Px + S1*Py)',)
-    """
+    """One step of the derivation."""
 
     joints: tuple[str, ...]
     type: EquationType

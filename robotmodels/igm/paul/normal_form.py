@@ -37,21 +37,9 @@ class Row:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NormalForm:
-    """A chain as rows.
+    """Rows of a chain in normal form.
 
-    Parameters
-    ----------
-    rows : tuple of Row
-        The joints from base to tip.
-    before, after : ndarray, shape (4, 4)
-        ``U0 = before pose after`` is what the rows reach.
-    tool : ndarray, shape (4, 4)
-        What follows the last row on the side of the rows; the identity for six joints and more,
-        whose tool is in ``after``.
-    lever : ndarray, shape (3,)
-        The tool's origin seen from the end of the rows, metres.
-    exact : ndarray, shape (k, 4, 4)
-        The constants before each joint without any rounding to structure.
+    Shapes: before, after, tool (4, 4); lever (3,); exact (k, 4, 4).
     """
 
     rows: tuple[Row, ...]

@@ -1,4 +1,7 @@
-"""The plan of an arm: which equation of which type gives which joint."""
+"""The plan of an arm: which equation of which type gives which joint.
+
+Source: Seed book section 1.2.3.2, eq. [1.14] to [1.17]; the exercise, steps I to IX.
+"""
 
 from __future__ import annotations
 
@@ -17,21 +20,7 @@ from .program import Program, lowered
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Step:
-    """One step of a plan.
-
-    Parameters
-    ----------
-    type : EquationType
-        What is solved.
-    unknowns : tuple of int
-        Numbers of the one or two unknowns, in the order of the type's formula.
-    coefficients : tuple
-        Expressions, in the order of the formula.
-    splits : tuple of Split
-        The matrix equation of each equation.
-    elements : tuple of (int, int)
-        Row and column of each equation in it; column 3 is the position.
-    """
+    """One step of a plan."""
 
     type: EquationType
     unknowns: tuple[int, ...]
@@ -42,34 +31,7 @@ class Step:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PaulPlan:
-    """What Paul's method finds for an arm: steps, and the program that a kernel runs.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The joints and constants it was derived from.
-    form : NormalForm
-        The same as rows.
-    steps : tuple of Step
-        In the order in which they are solved.
-    solved : tuple of int
-        Joints that the steps give, counted from 0 along the chain, in order.
-    remaining : tuple of int
-        Joints that no equation of the catalogue gives.
-    arm : Arm
-        The matrices and expressions, for those who print them.
-    program : Program or None
-        What the kernel runs; None if joints remain.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> plan = derive_plan(load("rx90"))
-    >>> [step.type.title for step in plan.steps]
-    ['type 2 with Z = 0', 'type 6', 'type 2 with Z = 0', 'type 3 with ...', 'type 3 with ...']
-    >>> plan.complete, plan.most_postures
-    (True, 8)
-    """
+    """Plan of Paul's method: steps, and the program for the kernel."""
 
     chain: JointChain
     form: NormalForm
@@ -94,34 +56,7 @@ class PaulPlan:
 
 
 def derive_plan(model: RobotModel) -> PaulPlan:
-    """Derive, by pre- and post-multiplication, which equation gives which joint.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, any number of joints.
-
-    Returns
-    -------
-    PaulPlan
-        Always one; where no equation of the catalogue is left it stops, and ``remaining`` has the
-        joints that are not found.
-
-    Raises
-    ------
-    InvalidValueError
-        No joint moves the tool.
-
-    References
-    ----------
-    Seed book section 1.2.3.2, eq. [1.14] to [1.17]; the exercise, steps I to IX.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> derive_plan(load("crx10ia")).remaining
-    (0, 1, 2, 3, 4, 5)
-    """
+    """Derive, by pre- and post-multiplication, which equation gives which joint."""
     chain = joint_chain(model)
     if chain.k == 0:
         raise InvalidValueError("model: no joint moves its tool; there is nothing to solve.")

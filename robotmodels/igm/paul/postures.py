@@ -1,4 +1,7 @@
-"""All postures of poses by a plan."""
+"""All postures of poses by a plan.
+
+Source: Seed book section 1.2.3.2.
+"""
 
 from __future__ import annotations
 
@@ -28,32 +31,7 @@ CHUNK = 4096
 class PaulPostures:
     """Postures of N poses, S rows for each, k joints in the order of the chain. Read-only.
 
-    Parameters
-    ----------
-    q : ndarray, shape (N, S, k)
-        Postures, packed, angles in (-pi, pi] [rad or m]; NaN in the rows without one.
-    valid : ndarray of bool, shape (N, S)
-        Rows that hold a posture.
-    residual : ndarray, shape (N, S)
-        The larger of the position error [m] and the rotation angle [rad]; NaN without posture.
-    free : ndarray of bool, shape (N, S, k)
-        Joints that the pose left free; they took their reference.
-    path : ndarray of int, shape (N, S)
-        Solutions taken: two bits for each step, the first step in the lowest. -1 without posture,
-        and for delicate poses, whose rows are made new.
-    delicate : ndarray of bool, shape (N,)
-        Poses at or near a singularity of a step (small amplitude, double root, free joint): what
-        is returned is right, but postures may be missing.
-
-    Examples
-    --------
-    >>> from robotmodels.igm.paul import derive_plan, paul_postures
-    >>> from robotmodels.kinematics import dgm
-    >>> from robotmodels.robots import load
-    >>> arm = load("ur5e")
-    >>> found = paul_postures(derive_plan(arm), dgm(arm, [[0.1, -1.2, 1.3, 0.4, 0.5, 0.6]]))
-    >>> int(found.valid.sum()), bool(found.delicate[0])
-    (8, False)
+    Shapes: q, free (N, S, k); valid, residual, path (N, S); delicate (N,).
     """
 
     q: Array
@@ -77,43 +55,7 @@ def paul_postures(
 ) -> PaulPostures:
     """All postures that a complete plan finds for poses, checked on the table.
 
-    Parameters
-    ----------
-    plan : PaulPlan
-        A complete plan, from `derive_plan`.
-    U : array_like, shape (N, 4, 4)
-        Poses of the tool in R_0, ``Z^-1 T`` [m].
-    references : array_like, shape (N, k) or (k,), optional
-        Values, in the order of the chain, for joints that a pose leaves free [rad or m]; default 0.
-    position_tolerance, orientation_tolerance : float
-        When a pose counts as met [m, rad]. With wider tolerances than 1e-9 candidates are moved
-        to the posture nearest to the pose before it is decided.
-
-    Returns
-    -------
-    PaulPostures
-        Postures closer than 1e-6 in every joint are returned once. A pose that is not finite has
-        none.
-
-    Raises
-    ------
-    InvalidValueError
-        The plan is not complete.
-    ShapeError
-        Poses or references of the wrong shape.
-
-    References
-    ----------
-    Seed book section 1.2.3.2.
-
-    Examples
-    --------
-    >>> from robotmodels.igm.paul import derive_plan, paul_postures
-    >>> from robotmodels.robots import load
-    >>> pose_a = [[0, 0, -1, 0.1414], [0, 1, 0, -0.3], [1, 0, 0, 0.8414], [0, 0, 0, 1]]
-    >>> plan = derive_plan(load("lab_trr"))
-    >>> paul_postures(plan, [pose_a], position_tolerance=1e-4).q.round(3)
-    array([[[-0.3  , -0.785, -0.785]]])
+    Shapes: U (N, 4, 4), references (N, k) or (k,).
     """
     from ._run import run_plan
 

@@ -30,22 +30,7 @@ STEP = 24
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Program:
-    """A plan for the kernel, in two arrays because every array costs time at a call.
-
-    Parameters
-    ----------
-    plan : ndarray of uint32
-        Thirteen numbers of the head (joints, steps, where the parts stand), then the steps (24
-        numbers each), the first operation of each level, the operations (registers d, a, b, c, e),
-        the registers of the results (joint variables; the twelve elements by columns of one side
-        of the matrix equation; of the other), and the joint types.
-    numbers : ndarray
-        The factors f, g of the operations, the initial registers (the constants), a row of signs
-        and an offset for the reference of each unknown, ``before`` and ``after`` (3x4), the lever,
-        and the usual size of the amplitude of each step.
-    branches : int
-        Most postures.
-    """
+    """Plan for the kernel, packed into two arrays."""
 
     plan: NDArray[np.uint32]
     numbers: Array

@@ -10,26 +10,7 @@ from .locked_arms import LockedArms
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Redundant:
-    """An arm with more joints than its task needs.
-
-    Parameters
-    ----------
-    chain : JointChain
-        The arm, virtual joints among its joints.
-    order : tuple of int
-        Joints that take the reference, ascending.
-    sampled : tuple of int
-        Joints by which members of a family are found: the same if the arm without them has a
-        family of its own.
-    last : tuple of int
-        The last joints that may be set, by which members are found as well: what stands at the
-        reference may leave few poses in reach, a wrist leaves most. Empty where they are the same
-        or have no family without them.
-    inner : str
-        Method of the joints that are left.
-    arms : LockedArms
-        Chains prepared so far.
-    """
+    """An arm with more joints than its task needs."""
 
     chain: JointChain
     order: tuple[int, ...]

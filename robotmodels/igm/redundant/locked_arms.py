@@ -25,21 +25,7 @@ class LockedArms:
         self._lock = Lock()
 
     def solver(self, positions: tuple[int, ...], values: tuple[float, ...]) -> Solver | None:
-        """What serves the other joints, None if nothing does.
-
-        Parameters
-        ----------
-        positions : tuple of int
-            Locked joints, ascending.
-        values : tuple of float
-            Their values; left out (empty) when they are the first or the last joints of the
-            chain, whose values only move the poses.
-
-        Returns
-        -------
-        Solver or None
-            Of the chain without them.
-        """
+        """Solver of the chain with these joints locked; None if there is none."""
         key = (*positions, *values)
         with self._lock:
             if key in self._known:
@@ -71,25 +57,7 @@ def locked_postures(
 ) -> Found:
     """Postures of the whole arm with joints locked at values that differ from pose to pose.
 
-    Parameters
-    ----------
-    arms : LockedArms
-        The arm.
-    positions : tuple of int
-        Locked joints, ascending.
-    values : ndarray, shape (N, m)
-        Their values [rad or m].
-    U : ndarray, shape (N, 4, 4)
-        Poses of the tool in R_0 [m].
-    references : ndarray, shape (N, k)
-        For joints that a pose leaves free [rad or m].
-    tolerances : Tolerances
-        When a pose counts as met.
-
-    Returns
-    -------
-    Found
-        Nothing for poses whose values leave an arm without a family.
+    Shapes: values (N, m), U (N, 4, 4), references (N, k).
     """
     N, chain = U.shape[0], arms.chain
     rest = np.setdiff1d(np.arange(chain.k), positions)
@@ -113,25 +81,7 @@ def locked_postures(
 
 
 def at_an_end(positions: tuple[int, ...], k: int) -> bool:
-    """Whether joints are the first or the last of a chain.
-
-    Parameters
-    ----------
-    positions : tuple of int
-        Joints, ascending.
-    k : int
-        Joints of the chain.
-
-    Returns
-    -------
-    bool
-        If so, their values only move the poses.
-
-    Examples
-    --------
-    >>> at_an_end((0, 1), 8), at_an_end((6,), 7), at_an_end((1, 2), 8)
-    (True, True, False)
-    """
+    """Whether joints are the first or the last of a chain."""
     m = len(positions)
     return positions in (tuple(range(m)), tuple(range(k - m, k)))
 

@@ -27,25 +27,9 @@ _SAME = 1e-7  # values of free joints closer than this are one [rad, m]
 def members(
     solver: Redundant, U: Array, references: Array, tolerances: Tolerances
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Postures of each pose wherever they stand on its infinite family.
+    """Sampled members of the infinite family of each pose.
 
-    Parameters
-    ----------
-    solver : Redundant
-        The arm.
-    U : ndarray, shape (N, 4, 4)
-        Poses of the tool in R_0 [m].
-    references : ndarray, shape (N, k)
-        For joints that are free besides [rad or m].
-    tolerances : Tolerances
-        When a pose counts as met.
-
-    Returns
-    -------
-    q : ndarray, shape (N, C, k)
-        Postures at many values of the joints ``solver.sampled`` and ``solver.last`` [rad or m].
-    valid : ndarray of bool, shape (N, C)
-        Rows in use.
+    Shapes: U (N, 4, 4), references (N, k) -> q (N, C, k), valid (N, C).
     """
     N, k = U.shape[0], solver.chain.k
     parts = []

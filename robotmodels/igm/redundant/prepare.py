@@ -24,39 +24,7 @@ _MOVES = 1e-6  # part of a null space below which a joint stands still
 def prepare_redundant(
     chain: JointChain, prepare: Prepare, lockable: Sequence[int] | None = None
 ) -> Solver | None:
-    """Choose the joints of a redundant arm that take their reference, and prepare the others.
-
-    Parameters
-    ----------
-    chain : JointChain
-        More than six joints.
-    prepare : callable
-        Chooses the family of a shorter chain.
-    lockable : sequence of int, optional
-        Positions of joints that may take their reference. Default: those with a column, which
-        virtual joints have not.
-
-    Returns
-    -------
-    Solver or None
-        `ArmAngle` for an arm with spherical shoulder and wrist, else `Redundant`. None if there
-        are six joints or less, if virtual joints alone make the arm redundant, or if no choice of
-        locked joints leaves an arm with a family.
-
-    Notes
-    -----
-    Which joints move is asked at random postures: it is the same at almost all. Postures of a pose
-    without one at the reference come from a walk along the families found on a grid; a piece of a
-    family that lies between its points altogether is not seen.
-
-    Examples
-    --------
-    >>> from robotmodels.igm.families import prepare
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.robots import load
-    >>> prepare_redundant(joint_chain(load("panda")), prepare).order
-    (0,)
-    """
+    """Prepare a redundant arm: choose the joints set to `q_ref`, and a solver of the others."""
     if chain.k <= 6:
         return None
     real = np.flatnonzero(chain.columns >= 0) if lockable is None else np.unique(lockable)

@@ -57,9 +57,8 @@ def decomposed(
 ) -> int:
     """``J V = W`` with orthogonal columns of lengths s, for the f joints that are not held.
 
-    ``V (k, f)`` is orthonormal, zero in the rows of held joints; the lengths fall. Columns are
-    turned against each other until all are square (Hestenes 1958), which finds a small singular
-    value and its direction to full accuracy. Returns f.
+    One-sided Jacobi (Hestenes 1958): small singular values to full accuracy. ``V (k, f)`` is
+    orthonormal, zero in rows of held joints; the lengths descend. Returns f.
     """
     k = sigma.size
     P, axes, J = np.empty((3, 4)), np.empty((k, 6)), np.empty((6, k))

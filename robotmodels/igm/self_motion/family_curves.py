@@ -43,15 +43,7 @@ class Waiting:
 
 @dataclass(slots=True)
 class Family:
-    """What is known of the families of one pose.
-
-    Parameters
-    ----------
-    sigma, D, U : ndarray
-        Joint types (k,), constants (k + 1, 4, 4), pose (4, 4).
-    references : ndarray, shape (k,)
-        Values the joints should take.
-    """
+    """Infinite families of one pose. Shapes: references (k,)."""
 
     sigma: NDArray[np.int64]
     D: Array
@@ -104,21 +96,7 @@ class Family:
 
 
 def settled_members(family: Family, q: Array) -> list[tuple[Waiting, bool]]:
-    """Postures at which all that can be is at its reference, on the families through q.
-
-    Parameters
-    ----------
-    family : Family
-        The pose; remembers what was walked from other postures.
-    q : ndarray, shape (k,)
-        A member of a family, or an isolated posture, which is then given back.
-
-    Returns
-    -------
-    list of (Waiting, bool)
-        Postures and whether each is a double root of what is left with its joints held. Those that
-        an earlier call gave are not repeated.
-    """
+    """Family members through q with free joints at their reference values. Shapes: q (k,)."""
     from ._correction import MET, on_fold
     from ._directions import PROBE
 

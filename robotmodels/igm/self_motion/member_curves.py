@@ -20,50 +20,14 @@ APART = 0.02
 
 
 class MemberCurve(NamedTuple):
-    """A piece of a curve.
-
-    Parameters
-    ----------
-    points : ndarray, shape (M, k)
-        Postures in their order [rad or m]; angles go on beyond whole turns.
-    tangents : ndarray, shape (M, k)
-        Unit directions, lengths in units of the arm.
-    """
+    """A piece of a curve. Shapes: points, tangents (M, k)."""
 
     points: Array
     tangents: Array
 
 
 def curves_through(chain: JointChain, U: Array, q: Array, most: int = 64) -> list[MemberCurve]:
-    """Walk the curves on which members of a family lie, each once.
-
-    Parameters
-    ----------
-    chain : JointChain
-        One joint more than the task has components.
-    U : ndarray, shape (4, 4)
-        The pose [m].
-    q : ndarray, shape (B, k)
-        Postures that meet it [rad or m].
-    most : int
-        Curves that are walked.
-
-    Returns
-    -------
-    list of MemberCurve
-        A curve that does not close comes in two pieces.
-
-    Examples
-    --------
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.igm.motion import tool_poses
-    >>> from robotmodels.robots import load
-    >>> chain, q = joint_chain(load("panda")), np.array([[0.1, 0.2, 0.3, -1.4, 0.5, 1.6, 0.7]])
-    >>> curve = curves_through(chain, tool_poses(chain, q)[0], q)[0]
-    >>> U = tool_poses(chain, curve.points)
-    >>> bool(np.abs(U - U[0]).max() < 1e-10)
-    True
-    """
+    """Continuation along the curves of a family, each once. Shapes: U (4, 4), q (B, k)."""
     from ._directions import walked
 
     D, unit = shortened(chain)

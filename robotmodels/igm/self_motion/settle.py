@@ -27,13 +27,7 @@ _Kind = TypeVar("_Kind", bound=np.generic)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Settled(Found):
-    """Postures with the families settled.
-
-    Parameters
-    ----------
-    moving : ndarray of bool, shape (N, S, k)
-        Joints that move along the family, the free ones among them.
-    """
+    """Postures with the reference members of infinite families. Shapes: moving (N, S, k)."""
 
     moving: NDArray[np.bool_]
 
@@ -45,51 +39,9 @@ def settle_families(
     references: Array,
     tolerances: Tolerances,
 ) -> Settled:
-    """Take from every infinite family the postures at the reference values of its first joints.
+    """Members of every infinite family with its first joints at their reference values.
 
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    U : ndarray, shape (N, 4, 4)
-        Poses of the tool in R_0 [m].
-    found : Found
-        Postures; work is done where ``found.family`` is True. Families whose free joints are the
-        first that move are left as they are.
-    references : ndarray, shape (N, k)
-        Values for joints that a pose leaves free [rad or m].
-    tolerances : Tolerances
-        When a pose counts as met.
-
-    Returns
-    -------
-    Settled
-        Postures packed, ``family`` False where the arm cannot move after all. Rows that came from
-        the same family are one. S grows where a family has more postures than it had rows.
-
-    Notes
-    -----
-    Families are walked all round on the chain itself. They are found where the Jacobian is singular
-    to 1e-6 (lengths in units of the arm) and a step of 0.02 along its null space leads to postures
-    that meet the pose to 1e-11.
-
-    Examples
-    --------
-    The wrist of an RX-90 is aligned: joints 4 and 6 turn against each other, joint 4 takes 0.3.
-
-    >>> from robotmodels.igm.families import prepare
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.igm.solver import postures
-    >>> from robotmodels.kinematics import dgm
-    >>> from robotmodels.robots import load
-    >>> arm = load("rx90")
-    >>> chain, U = joint_chain(arm), dgm(arm, [[0.3, 1.0, 0.5, 0.0, 0.0, 0.8]])
-    >>> references, tolerances = np.full((1, 6), 0.3), Tolerances()
-    >>> found = postures(prepare(chain), U, references, tolerances)
-    >>> settled = settle_families(chain, U, found, references, tolerances)
-    >>> row = int(np.flatnonzero(settled.family[0])[0])
-    >>> settled.moving[0, row].astype(int), settled.free[0, row].astype(int)
-    (array([0, 0, 0, 1, 0, 1]), array([0, 0, 0, 1, 0, 0]))
+    Shapes: U (N, 4, 4), references (N, k).
     """
     N, S, k = found.q.shape
     chosen = np.flatnonzero(np.any(found.family & found.valid, axis=1))
@@ -103,37 +55,9 @@ def settle_families(
 def singular_postures(
     chain: JointChain, found: Found
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Double roots, and members of infinite families, by the Jacobian of each posture.
+    """Flags of double roots and of members of infinite families, from the Jacobians.
 
-    Parameters
-    ----------
-    chain : JointChain
-        The arm.
-    found : Found
-        Its postures.
-
-    Returns
-    -------
-    double : ndarray of bool, shape (N, S)
-        Rows whose Jacobian has a singular value below 1e-6 (lengths in units of the arm) though the
-        arm cannot move: two postures or more fell together.
-    member : ndarray of bool, shape (N, S)
-        Rows of infinite families, whether the solver knew it or not. A stretched elbow, which
-        rounding bends by 1e-8, can hide that the wrist behind it is aligned.
-
-    Examples
-    --------
-    >>> from robotmodels.igm.families import prepare
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.igm.solver import postures
-    >>> from robotmodels.kinematics import dgm
-    >>> from robotmodels.robots import load
-    >>> arm = load("rx90")
-    >>> chain, U = joint_chain(arm), dgm(arm, [[0.3, 0.4, -np.pi / 2, 0.1, 0.2, 0.8]])
-    >>> found = postures(prepare(chain), U, np.zeros((1, 6)), Tolerances())
-    >>> double, member = singular_postures(chain, found)
-    >>> bool(np.all(double == found.valid)), bool(member.any())  # stretched elbow
-    (True, False)
+    Shapes: -> double, member (N, S).
     """
     from ._members import singular_postures as singular
 
@@ -149,16 +73,7 @@ def singular_postures(
 
 
 def double_roots(chain: JointChain, found: Found) -> NDArray[np.bool_]:
-    """Postures at which two or more fell together, shape (N, S): see `singular_postures`.
-
-    Examples
-    --------
-    >>> from robotmodels.igm.loop import joint_chain
-    >>> from robotmodels.igm.solver import nothing_found
-    >>> from robotmodels.robots import load
-    >>> bool(double_roots(joint_chain(load("rx90")), nothing_found(1, 8, 6)).any())
-    False
-    """
+    """Flags (N, S) of double roots, see `singular_postures`."""
     return singular_postures(chain, found)[0]
 
 

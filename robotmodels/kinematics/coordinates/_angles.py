@@ -23,28 +23,7 @@ LOCKED = 8 * np.finfo(np.float64).eps
 
 @dataclass(frozen=True, slots=True)
 class AngleSequence:
-    """Three successive rotations, the first about z.
-
-    Parameters
-    ----------
-    fixed : int
-        Column of the rotation that the third angle leaves alone: its axis.
-    about_x : bool
-        The second rotation is about x; otherwise about y.
-    level : bool
-        The second angle is measured from the horizontal: c = -sin; otherwise from z: c = cos.
-    sine, cosine : int
-        Columns whose components along e are the sine and the cosine of the third angle.
-    sign : float
-        Of that sine.
-    backwards : bool
-        The angles are listed from the last to the first.
-
-    Examples
-    --------
-    >>> ANGLE_SEQUENCES[OrientationKind.EULER].about_x
-    True
-    """
+    """Three successive rotations, the first about z."""
 
     fixed: int
     about_x: bool
@@ -64,66 +43,21 @@ ANGLE_SEQUENCES = {
 
 
 def horizontal(sequence: AngleSequence, phi: Array) -> tuple[Array, Array]:
-    """Components x and y of the unit vector p; those of e = z x p are (-py, px).
-
-    Parameters
-    ----------
-    sequence : AngleSequence
-        Which rotations.
-    phi : ndarray, shape (...)
-        First angle, rad.
-
-    Returns
-    -------
-    px, py : ndarray, shape (...)
-        The vector.
-    """
+    """Components x and y of the unit vector p; those of e = z x p are (-py, px)."""
     if sequence.about_x:
         return np.sin(phi), -np.cos(phi)
     return np.cos(phi), np.sin(phi)
 
 
 def inclination(sequence: AngleSequence, theta: Array) -> tuple[Array, Array]:
-    """Sine s and cosine c of the angle from z to g; ds/dtheta = c and dc/dtheta = -s.
-
-    Parameters
-    ----------
-    sequence : AngleSequence
-        Which rotations.
-    theta : ndarray, shape (...)
-        Second angle, rad.
-
-    Returns
-    -------
-    s, c : ndarray, shape (...)
-        The sine is 0 where the sequence is singular, negative on its other solution.
-    """
+    """Sine s and cosine c of the angle from z to g; ds/dtheta = c and dc/dtheta = -s."""
     if sequence.level:
         return np.cos(theta), -np.sin(theta)
     return np.sin(theta), np.cos(theta)
 
 
 def angles_of(sequence: AngleSequence, R: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """The three angles of rotations, and where the first is free.
-
-    The third angle is found by back-substitution of the first, so that the three give the rotation
-    back to rounding also at and near gimbal lock. At gimbal lock the first angle is 0.
-
-    Parameters
-    ----------
-    sequence : AngleSequence
-        Which rotations.
-    R : ndarray, shape (..., 3, 3)
-        Rotations.
-
-    Returns
-    -------
-    angles : ndarray, shape (..., 3)
-        Rad, in the order of the rotations: the outer two in (-pi, pi], the second in [0, pi] or,
-        measured from the horizontal, [-pi/2, pi/2].
-    locked : ndarray of bool, shape (...)
-        Gimbal lock: only the sum or the difference of the outer two is determined.
-    """
+    """The three angles of rotations, and where the first is free."""
     gx, gy, gz = (R[..., row, sequence.fixed] for row in range(3))
     s = np.hypot(gx, gy)
     locked = s <= LOCKED
@@ -138,42 +72,14 @@ def angles_of(sequence: AngleSequence, R: Array) -> tuple[Array, NDArray[np.bool
 
 
 def third_angle(sequence: AngleSequence, R: Array, phi: Array) -> Array:
-    """Third angle that belongs to a first one, in (-pi, pi].
-
-    Parameters
-    ----------
-    sequence : AngleSequence
-        Which rotations.
-    R : ndarray, shape (..., 3, 3)
-        Rotations.
-    phi : ndarray, shape (...)
-        First angle, rad.
-
-    Returns
-    -------
-    ndarray, shape (...)
-        Rad.
-    """
+    """Third angle that belongs to a first one, in (-pi, pi]."""
     px, py = horizontal(sequence, phi)
     sine, cosine = (px * R[..., 1, k] - py * R[..., 0, k] for k in (sequence.sine, sequence.cosine))
     return _half_open(np.arctan2(sequence.sign * sine, cosine))
 
 
 def rotation_of_angles(sequence: AngleSequence, angles: Array) -> Array:
-    """Rotations that three angles give.
-
-    Parameters
-    ----------
-    sequence : AngleSequence
-        Which rotations.
-    angles : ndarray, shape (..., 3)
-        Rad, in the order of the rotations.
-
-    Returns
-    -------
-    ndarray, shape (..., 3, 3)
-        Rotations.
-    """
+    """Rotations that three angles give."""
     px, py = horizontal(sequence, angles[..., 0])
     s, c = inclination(sequence, angles[..., 1])
     sine, cosine = sequence.sign * np.sin(angles[..., 2]), np.cos(angles[..., 2])
@@ -192,25 +98,7 @@ def rotation_of_angles(sequence: AngleSequence, angles: Array) -> Array:
 def angles_near(
     sequence: AngleSequence, R: Array, angles: Array, locked: NDArray[np.bool_], near: Array
 ) -> Array:
-    """The angles of the same rotations that are nearest to given ones.
-
-    Parameters
-    ----------
-    sequence : AngleSequence
-        Which rotations.
-    R : ndarray, shape (..., 3, 3)
-        Rotations.
-    angles, locked : ndarray, shapes (..., 3) and (...)
-        As `angles_of` gives them.
-    near : ndarray, shape (..., 3)
-        Rad, in the order of the rotations; broadcasts with the others.
-
-    Returns
-    -------
-    ndarray, shape (..., 3)
-        One of the two solutions plus whole turns. At gimbal lock the first angle is that of
-        ``near`` and the third takes what is left.
-    """
+    """The angles of the same rotations that are nearest to given ones."""
     first = at_lock(sequence, R, angles, locked, near[..., 0])
     second = first + other_solution(sequence, first)
     first = first + whole_turns(near - first)
@@ -222,24 +110,7 @@ def angles_near(
 def at_lock(
     sequence: AngleSequence, R: Array, angles: Array, locked: NDArray[np.bool_], phi: Array
 ) -> Array:
-    """The angles with the first one given where it is free.
-
-    Parameters
-    ----------
-    sequence : AngleSequence
-        Which rotations.
-    R : ndarray, shape (..., 3, 3)
-        Rotations.
-    angles, locked : ndarray, shapes (..., 3) and (...)
-        As `angles_of` gives them.
-    phi : ndarray, shape (...)
-        First angle at gimbal lock, rad.
-
-    Returns
-    -------
-    ndarray, shape (..., 3)
-        Rad.
-    """
+    """Angles with a given first angle at gimbal lock."""
     if not locked.any():
         return angles
     chosen = np.stack(
@@ -249,57 +120,21 @@ def at_lock(
 
 
 def other_solution(sequence: AngleSequence, angles: Array) -> Array:
-    """What leads from one solution to the other one of the same rotation.
-
-    Parameters
-    ----------
-    sequence : AngleSequence
-        Which rotations.
-    angles : ndarray, shape (..., 3)
-        Rad, in the order of the rotations.
-
-    Returns
-    -------
-    ndarray, shape (..., 3)
-        To add: half a turn on the outer two, and the mirrored second angle.
-    """
+    """Difference of the two angle triples of the same rotation."""
     step = np.full(angles.shape, pi)
     step[..., 1] = (pi if sequence.level else 0.0) - 2.0 * angles[..., 1]
     return step
 
 
 def whole_turns(angle: Array) -> Array:
-    """The multiples of 2 pi nearest to angles.
-
-    Parameters
-    ----------
-    angle : ndarray
-        Rad.
-
-    Returns
-    -------
-    ndarray
-        Rad.
-    """
+    """The multiples of 2 pi nearest to angles."""
     return 2.0 * pi * np.rint(angle / (2.0 * pi))
 
 
 def continuous_angles(sequence: AngleSequence, R: Array, near: Array | None) -> Array:
     """Angles of a sequence of rotations, each nearest to those before it.
 
-    Parameters
-    ----------
-    sequence : AngleSequence
-        Which rotations.
-    R : ndarray, shape (N, 3, 3)
-        Rotations in their order.
-    near : ndarray, shape (3,), or None
-        What the first is near to; without it the first is as `angles_of` gives it.
-
-    Returns
-    -------
-    ndarray, shape (N, 3)
-        Rad, in the order of the rotations.
+    Shapes: R (N, 3, 3), near (3,) -> (N, 3).
     """
     angles, locked = angles_of(sequence, R)
     if not len(angles):

@@ -24,21 +24,7 @@ from .kinds import OrientationKind
 def orientation_differential(kind: OrientationKind, y: Array, R: Array, R_j: Array) -> Array:
     """Derivatives of the coordinates of an orientation.
 
-    Parameters
-    ----------
-    kind : OrientationKind
-        How the orientation is written.
-    y : ndarray, shape (N, 1, k)
-        The coordinates; which of several solutions is meant.
-    R : ndarray, shape (N, 1, 3, 3)
-        The rotations, entries of the pose.
-    R_j : ndarray, shape (N, n, 3, 3)
-        Their derivatives in n directions.
-
-    Returns
-    -------
-    ndarray, shape (N, n, k)
-        dy in these directions; of no meaning where the representation is singular.
+    Shapes: y (N, 1, k), R (N, 1, 3, 3), R_j (N, n, 3, 3) -> (N, n, k).
     """
     if kind in ANGLE_SEQUENCES:
         return in_order(kind, _angles(ANGLE_SEQUENCES[kind], in_order(kind, y), R, R_j))
@@ -55,19 +41,7 @@ def orientation_differential_rate(
 ) -> Array:
     """Time derivatives of `orientation_differential` along a motion.
 
-    Parameters
-    ----------
-    kind, y, R, R_j
-        As for `orientation_differential`.
-    R_t : ndarray, shape (N, 1, 3, 3)
-        Time derivatives of the rotations.
-    R_jt : ndarray, shape (N, n, 3, 3)
-        Time derivatives of ``R_j``.
-
-    Returns
-    -------
-    ndarray, shape (N, n, k)
-        d/dt of dy.
+    Shapes: R_t (N, 1, 3, 3), R_jt (N, n, 3, 3) -> (N, n, k).
     """
     if kind in ANGLE_SEQUENCES:
         sequence = ANGLE_SEQUENCES[kind]

@@ -30,20 +30,7 @@ can be promised.
 
 
 def singular_coordinates(y: Array, kind: OrientationKind) -> NDArray[np.bool_]:
-    """Whether orientations are at a singularity of their representation.
-
-    Parameters
-    ----------
-    y : ndarray, shape (..., k)
-        Orientation part of the coordinates.
-    kind : OrientationKind
-        How the orientation is written.
-
-    Returns
-    -------
-    ndarray of bool, shape (...)
-        As `is_representation_singular`.
-    """
+    """Whether orientations are at a singularity of their representation. Shapes: y (..., k)."""
     if kind in ANGLE_SEQUENCES:
         s, _ = inclination(ANGLE_SEQUENCES[kind], y[..., 1])
         return np.asarray(np.abs(s) <= SINGULAR)
@@ -56,17 +43,7 @@ def singular_coordinates(y: Array, kind: OrientationKind) -> NDArray[np.bool_]:
 def orientation_rates(y: Array, kind: OrientationKind) -> Array:
     """Matrices from the angular velocity in world axes to the rates of an orientation.
 
-    Parameters
-    ----------
-    y : ndarray, shape (..., k)
-        Orientation part of the coordinates.
-    kind : OrientationKind
-        How the orientation is written.
-
-    Returns
-    -------
-    ndarray, shape (..., k, 3)
-        NaN where the representation is singular.
+    Shapes: y (..., k) -> (..., k, 3).
     """
     if kind in ANGLE_SEQUENCES:
         return _reordered(kind, _angle_rates(ANGLE_SEQUENCES[kind], in_order(kind, y)))
@@ -83,19 +60,7 @@ def orientation_rates(y: Array, kind: OrientationKind) -> Array:
 def orientation_rates_rate(y: Array, w: Array, kind: OrientationKind) -> Array:
     """Time derivatives of `orientation_rates` along a motion.
 
-    Parameters
-    ----------
-    y : ndarray, shape (..., k)
-        Orientation part of the coordinates.
-    w : ndarray, shape (..., 3)
-        Angular velocity in world axes, rad/s.
-    kind : OrientationKind
-        How the orientation is written.
-
-    Returns
-    -------
-    ndarray, shape (..., k, 3)
-        NaN where the representation is singular.
+    Shapes: y (..., k), w (..., 3) -> (..., k, 3).
     """
     if kind in ANGLE_SEQUENCES:
         return _reordered(kind, _angle_rates_rate(ANGLE_SEQUENCES[kind], in_order(kind, y), w))
@@ -110,17 +75,7 @@ def orientation_rates_rate(y: Array, w: Array, kind: OrientationKind) -> Array:
 def angular_velocity(y: Array, kind: OrientationKind) -> Array:
     """Matrices from the rates of an orientation to the angular velocity in world axes.
 
-    Parameters
-    ----------
-    y : ndarray, shape (..., k)
-        Orientation part of the coordinates.
-    kind : OrientationKind
-        How the orientation is written.
-
-    Returns
-    -------
-    ndarray, shape (..., 3, k)
-        Left inverses of `orientation_rates`.
+    Shapes: y (..., k) -> (..., 3, k).
     """
     if kind in ANGLE_SEQUENCES:
         return in_order(kind, _angle_axes(ANGLE_SEQUENCES[kind], in_order(kind, y)))

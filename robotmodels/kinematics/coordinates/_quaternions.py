@@ -14,15 +14,7 @@ from ._angles import whole_turns
 def quaternions_near(Q: Array, near: Array) -> Array:
     """Of each quaternion and its opposite, the one nearer to a given one.
 
-    Parameters
-    ----------
-    Q, near : ndarray, shape (..., 4)
-        Quaternions; they broadcast.
-
-    Returns
-    -------
-    ndarray, shape (..., 4)
-        The same rotations.
+    Shapes: Q, near (..., 4) -> (..., 4).
     """
     opposite = (Q * near).sum(axis=-1, keepdims=True) < 0.0
     return np.where(opposite, -Q, Q + np.zeros_like(near))
@@ -31,17 +23,7 @@ def quaternions_near(Q: Array, near: Array) -> Array:
 def continuous_quaternions(Q: Array, near: Array | None) -> Array:
     """Quaternions of a sequence, each on the side of the one before it.
 
-    Parameters
-    ----------
-    Q : ndarray, shape (N, 4)
-        Quaternions in their order.
-    near : ndarray, shape (4,), or None
-        What the first is near to.
-
-    Returns
-    -------
-    ndarray, shape (N, 4)
-        The same rotations.
+    Shapes: Q (N, 4), near (4,) -> (N, 4).
     """
     before = np.concatenate([Q[:1] if near is None else near[None], Q[:-1]])
     signs = np.where((Q * before[: len(Q)]).sum(axis=-1) < 0.0, -1.0, 1.0)
@@ -49,18 +31,7 @@ def continuous_quaternions(Q: Array, near: Array | None) -> Array:
 
 
 def rotation_of_quaternions(Q: Array) -> Array:
-    """Rotations of unit quaternions.
-
-    Parameters
-    ----------
-    Q : ndarray, shape (..., 4)
-        Unit length, scalar first.
-
-    Returns
-    -------
-    ndarray, shape (..., 3, 3)
-        Rotations.
-    """
+    """Rotations of unit quaternions. Shapes: Q (..., 4) -> (..., 3, 3)."""
     w, x, y, z = (Q[..., k] for k in range(4))
     R = np.empty((*Q.shape[:-1], 3, 3))
     R[..., 0, 0] = 1.0 - 2.0 * (y * y + z * z)
@@ -73,21 +44,7 @@ def rotation_of_quaternions(Q: Array) -> Array:
 
 
 def vectors_near(R: Array, near: Array) -> Array:
-    """The rotation vectors of the same rotations that are nearest to given ones.
-
-    Parameters
-    ----------
-    R : ndarray, shape (..., 3, 3)
-        Rotations.
-    near : ndarray, shape (..., 3)
-        Rad; broadcasts with the rotations.
-
-    Returns
-    -------
-    ndarray, shape (..., 3)
-        Rad: the axis times the angle plus whole turns. Where nothing turns, whole turns about the
-        axis of ``near``.
-    """
+    """The rotation vectors of the same rotations that are nearest to given ones."""
     axis, angle = axes_and_angles(quaternions_of(R))
     length = np.linalg.norm(near, axis=-1)
     direction = near / np.where(length > 0.0, length, 1.0)[..., None]
@@ -100,17 +57,7 @@ def vectors_near(R: Array, near: Array) -> Array:
 def continuous_vectors(R: Array, near: Array | None) -> Array:
     """Rotation vectors of a sequence, each nearest to the one before it.
 
-    Parameters
-    ----------
-    R : ndarray, shape (N, 3, 3)
-        Rotations in their order.
-    near : ndarray, shape (3,), or None
-        What the first is near to.
-
-    Returns
-    -------
-    ndarray, shape (N, 3)
-        Rad.
+    Shapes: R (N, 3, 3), near (3,) -> (N, 3).
     """
     axis, angle = axes_and_angles(quaternions_of(R))
     before, turned = np.zeros(3), 0.0
@@ -128,18 +75,7 @@ def continuous_vectors(R: Array, near: Array | None) -> Array:
 
 
 def quaternions_of_vectors(vectors: Array) -> Array:
-    """Unit quaternions of rotation vectors of any length.
-
-    Parameters
-    ----------
-    vectors : ndarray, shape (..., 3)
-        Rad.
-
-    Returns
-    -------
-    ndarray, shape (..., 4)
-        Scalar first; ``Q1 = cos(angle / 2)`` is negative beyond half a turn.
-    """
+    """Unit quaternions of rotation vectors of any length. Shapes: vectors (..., 3) -> (..., 4)."""
     angle = np.linalg.norm(vectors, axis=-1, keepdims=True)
     # np.sinc(t) is sin(pi t) / (pi t)
     return np.concatenate(

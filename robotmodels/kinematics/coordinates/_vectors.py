@@ -34,23 +34,7 @@ _SECOND = [(-1) ** k / factorial(2 * k + 3) for k in range(13)]
 
 
 def left_factors(t: Array) -> tuple[Array, Array]:
-    """Factors ``a = (1 - cos) / angle^2`` and ``b = (angle - sin) / angle^3``.
-
-    Parameters
-    ----------
-    t : ndarray, shape (...)
-        Angle squared, rad^2.
-
-    Returns
-    -------
-    a, b : ndarray, shape (...)
-        1/2 and 1/6 at 0.
-
-    Examples
-    --------
-    >>> left_factors(np.array(0.0))[0]
-    np.float64(0.5)
-    """
+    """Factors ``a = (1 - cos) / angle^2`` and ``b = (angle - sin) / angle^3``."""
     angle = np.sqrt(t)
     a = 0.5 * np.sinc(angle / (2.0 * np.pi)) ** 2
     small, safe = _split(t)
@@ -59,23 +43,7 @@ def left_factors(t: Array) -> tuple[Array, Array]:
 
 
 def inverse_left_factor(t: Array) -> Array:
-    """Factor ``gamma = (1 - (angle / 2) cot(angle / 2)) / angle^2``.
-
-    Parameters
-    ----------
-    t : ndarray, shape (...)
-        Angle squared, rad^2.
-
-    Returns
-    -------
-    ndarray, shape (...)
-        1/12 at 0, 1/pi^2 at half a turn; without bound at whole turns other than none.
-
-    Examples
-    --------
-    >>> inverse_left_factor(np.array(0.0)) * 12
-    np.float64(1.0)
-    """
+    """Factor ``gamma = (1 - (angle / 2) cot(angle / 2)) / angle^2``."""
     small, safe = _split(t)
     half = 0.5 * np.sqrt(safe)
     with np.errstate(divide="ignore"):
@@ -84,23 +52,7 @@ def inverse_left_factor(t: Array) -> Array:
 
 
 def inverse_left_factor_slope(t: Array) -> Array:
-    """Derivative of `inverse_left_factor` with respect to t.
-
-    Parameters
-    ----------
-    t : ndarray, shape (...)
-        Angle squared, rad^2.
-
-    Returns
-    -------
-    ndarray, shape (...)
-        1/720 at 0.
-
-    Examples
-    --------
-    >>> inverse_left_factor_slope(np.array(0.0)) * 720
-    np.float64(1.0)
-    """
+    """Derivative of `inverse_left_factor` with respect to t."""
     small, safe = _split(t)
     half = 0.5 * np.sqrt(safe)
     with np.errstate(divide="ignore"):

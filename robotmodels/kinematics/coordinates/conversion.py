@@ -142,19 +142,7 @@ def pose_from_coordinates(x: ArrayLike, kind: str | OrientationKind) -> Array:
 def coordinates_of_poses(T: Array, kind: OrientationKind, near: Array | None) -> Array:
     """`operational_coordinates` of what has been checked.
 
-    Parameters
-    ----------
-    T : ndarray, shape (..., 4, 4)
-        Proper poses.
-    kind : OrientationKind
-        How the orientation is written.
-    near : ndarray, shape (..., m), or None
-        As `near_coordinates` returns it.
-
-    Returns
-    -------
-    ndarray, shape (..., m)
-        The coordinates.
+    Shapes: T (..., 4, 4), near (..., m) -> (..., m).
     """
     R, p = T[..., :3, :3], T[..., :3, 3]
     y = None if near is None else in_order(kind, near[..., 3:])
@@ -178,27 +166,7 @@ def coordinates_of_poses(T: Array, kind: OrientationKind, near: Array | None) ->
 
 
 def as_coordinates(x: ArrayLike, kind: OrientationKind, name: str) -> Array:
-    """Finite coordinates of a kind.
-
-    Parameters
-    ----------
-    x : array_like, shape (..., m)
-        Numbers.
-    kind : OrientationKind
-        Which they are.
-    name : str
-        Used in error messages.
-
-    Returns
-    -------
-    ndarray, shape (..., m)
-        Checked.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Another length of the last axis, with the names of the coordinates; NaN or infinity.
-    """
+    """Finite coordinates of a kind. Shapes: x (..., m) -> (..., m)."""
     try:
         return as_vector(x, kind.dimension, name)
     except ShapeError as error:
@@ -212,24 +180,7 @@ def near_coordinates(
 ) -> Array | None:
     """Checked coordinates to be near to, whose leading axes broadcast with those of a batch.
 
-    Parameters
-    ----------
-    near : array_like, shape (..., m), or None
-        What the caller gave.
-    kind : OrientationKind
-        Which coordinates.
-    batch : tuple of int
-        Leading axes of the poses.
-
-    Returns
-    -------
-    ndarray, shape (..., m), or None
-        Checked.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        As `as_coordinates`; leading axes that do not broadcast.
+    Shapes: near (..., m) -> (..., m).
     """
     if near is None:
         return None
@@ -247,17 +198,7 @@ def near_coordinates(
 def in_order(kind: OrientationKind, orientation: Array) -> Array:
     """Three angles from the order in which they are listed to that of the rotations, or back.
 
-    Parameters
-    ----------
-    kind : OrientationKind
-        How the orientation is written.
-    orientation : ndarray, shape (..., k)
-        The orientation, without the position.
-
-    Returns
-    -------
-    ndarray, shape (..., k)
-        Itself, or reversed where the kind lists its angles backwards.
+    Shapes: orientation (..., k) -> (..., k).
     """
     sequence = ANGLE_SEQUENCES.get(kind)
     return orientation[..., ::-1] if sequence and sequence.backwards else orientation
@@ -266,17 +207,7 @@ def in_order(kind: OrientationKind, orientation: Array) -> Array:
 def columns_of(R: Array, kind: OrientationKind) -> Array:
     """The columns s, n, a of matrices, or n and a, one behind the other.
 
-    Parameters
-    ----------
-    R : ndarray, shape (..., 3, 3)
-        Rotations, or derivatives of rotations.
-    kind : OrientationKind
-        Direction cosines or two axes.
-
-    Returns
-    -------
-    ndarray, shape (..., 9) or (..., 6)
-        The columns.
+    Shapes: R (..., 3, 3) -> (..., 9) or (..., 6).
     """
     first = 0 if kind is OrientationKind.DIRECTION_COSINES else 1
     columns = np.swapaxes(R, -1, -2)[..., first:, :]

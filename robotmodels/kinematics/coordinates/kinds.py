@@ -94,28 +94,7 @@ _SHORT_WORDS = {
 
 
 def orientation_kind(kind: str) -> OrientationKind:
-    """The kind that a word means.
-
-    Parameters
-    ----------
-    kind : OrientationKind or str
-        A member or its word; ``-``, ``_``, spaces and capitals make no difference.
-
-    Returns
-    -------
-    OrientationKind
-        The member.
-
-    Raises
-    ------
-    InvalidValueError
-        Another word, or no word at all; the message lists them.
-
-    Examples
-    --------
-    >>> orientation_kind("Direction cosines")
-    <OrientationKind.DIRECTION_COSINES: 'direction_cosines'>
-    """
+    """Kind of orientation coordinates from its name."""
     if isinstance(kind, OrientationKind):
         return kind
     if isinstance(kind, str):

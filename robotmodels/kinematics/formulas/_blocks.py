@@ -1,4 +1,7 @@
-"""Square blocks on the diagonal of a matrix with many zeros, rows and columns rearranged."""
+"""Square blocks on the diagonal of a matrix with many zeros, rows and columns rearranged.
+
+Source: A. L. Dulmage and N. S. Mendelsohn, "Coverings of bipartite graphs", 1958.
+"""
 
 from __future__ import annotations
 
@@ -17,27 +20,7 @@ class Block:
 
 
 def triangular_blocks(filled: NDArray[np.bool_]) -> tuple[Block, ...] | None:
-    """The finest block triangular form of a square matrix.
-
-    Parameters
-    ----------
-    filled : ndarray of bool, shape (k, k)
-        Where entries are not zero.
-
-    Returns
-    -------
-    tuple of Block, or None
-        None if the determinant is zero whatever the entries.
-
-    References
-    ----------
-    A. L. Dulmage and N. S. Mendelsohn, "Coverings of bipartite graphs", 1958.
-
-    Examples
-    --------
-    >>> [b.columns for b in triangular_blocks(np.array([[1, 1, 1], [0, 1, 1], [0, 1, 1]]) > 0)]
-    [(0,), (1, 2)]
-    """
+    """The finest block triangular form of a square matrix. Shapes: filled (k, k)."""
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components, maximum_bipartite_matching
 

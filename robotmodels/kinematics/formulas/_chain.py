@@ -25,21 +25,7 @@ Step = tuple[Rows, list[Poly]]
 
 
 class SymbolicChain:
-    """Nodes are the world, R_0, the frames of the table and the frame of interest.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    point : FrameOfInterest
-        The frame whose Jacobian it is, the node ``TOOL``.
-    others : sequence of int
-        Frames of the table that may be asked for as well.
-    symbols : mapping of str to str, optional
-        Other names of symbols.
-    with_ends : bool
-        Whether base and tool get symbols.
-    """
+    """Symbolic chain of the world, R_0, the frames of the table and the frame of interest."""
 
     def __init__(
         self,

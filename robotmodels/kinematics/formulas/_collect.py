@@ -19,20 +19,7 @@ _Terms = dict[tuple[_Part, ...], Poly]
 
 
 def formula(p: Poly, chain: SymbolicChain) -> Any:
-    """The shortest of several ways to write a polynomial.
-
-    Parameters
-    ----------
-    p : PolyElement
-        Of the chain's ring.
-    chain : SymbolicChain
-        The robot.
-
-    Returns
-    -------
-    sympy.Expr
-        In the symbols of the chain's notation.
-    """
+    """The shortest of several ways to write a polynomial."""
     import sympy
 
     if not p:

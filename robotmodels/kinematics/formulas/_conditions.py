@@ -20,25 +20,7 @@ def families(
     chain: SymbolicChain,
     impossible: Callable[[frozenset[Any]], bool],
 ) -> list[frozenset[Any]] | None:
-    """Smallest sets of factors such that every minor is zero where those of a set are.
-
-    A minor is a product: one of its factors must vanish. Where sines, cosines and strokes vanish
-    already, the others are shorter: ``C2*C3*S4 - S2*C4`` is zero at S2 = 0 if C3 or S4 is.
-
-    Parameters
-    ----------
-    minors : sequence of sequences of keys
-        The factors of each minor; one without factors is a constant and never vanishes.
-    chain : SymbolicChain
-        The robot.
-    impossible : callable
-        Whether the factors of a set cannot vanish together.
-
-    Returns
-    -------
-    list of frozenset, or None
-        None if there are too many to be followed.
-    """
+    """Smallest sets of factors such that every minor is zero where those of a set are."""
     cases: list[frozenset[Any]] = [frozenset()]
     reduced = _Reduced(chain)
     for minor in sorted(minors, key=lambda factors: sum(_length(p) for p in factors)):

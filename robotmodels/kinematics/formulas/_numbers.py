@@ -13,17 +13,7 @@ from ...symbolic_dgm._numbers import number_of
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FormulaNumbers:
-    """What gives the symbols of some formulas their values.
-
-    Parameters
-    ----------
-    variables : tuple of sympy.Symbol, length n
-        Joint variables in table order.
-    abbreviations : tuple of (sympy.Symbol, sympy.Expr)
-        Each uses only what comes before.
-    constants : tuple of (sympy.Symbol, float)
-        Metres and radians.
-    """
+    """Values of the symbols of formulas."""
 
     variables: tuple[Any, ...]
     abbreviations: tuple[tuple[Any, Any], ...]

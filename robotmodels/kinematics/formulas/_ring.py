@@ -19,15 +19,7 @@ Poly = Any
 
 
 class TrigRing:
-    """The ring of one explanation.
-
-    Parameters
-    ----------
-    plain : sequence of sympy.Symbol
-        Constants and strokes of prismatic joints.
-    pairs : sequence of (sympy.Symbol, sympy.Symbol)
-        Cosine and sine of the same angle.
-    """
+    """The ring of one explanation."""
 
     def __init__(self, plain: Sequence[Any], pairs: Sequence[tuple[Any, Any]]) -> None:
         import sympy

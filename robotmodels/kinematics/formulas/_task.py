@@ -37,21 +37,7 @@ class Minor:
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """What has to be computed.
-
-    Parameters
-    ----------
-    words : str
-        Which rows count.
-    minors : tuple of Minor
-        One if the matrix is square.
-    square : bool
-        Whether it is.
-    full_rank : bool
-        Whether it has full rank somewhere.
-    position_only : bool
-        Whether it is the position Jacobian.
-    """
+    """Minors that decide about the rank of a task."""
 
     words: str
     minors: tuple[Minor, ...]
@@ -110,20 +96,7 @@ def nonzero_rows(filled: Pattern) -> tuple[int, ...]:
 
 
 def task_of(patterns: Patterns, count: int) -> Task:
-    """Choose what decides about the rank of the motion of a frame by some joints.
-
-    Parameters
-    ----------
-    patterns : Patterns
-        Of its third matrix.
-    count : int
-        How many joints move it.
-
-    Returns
-    -------
-    Task
-        With the minors that vanish together where rank is lost.
-    """
+    """Choose the minors that decide about the rank of a frame's motion."""
     columns = range(count)
     rank = patterns.rank
     if patterns.position_only:

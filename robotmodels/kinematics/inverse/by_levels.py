@@ -37,42 +37,7 @@ def solved_by_levels(
     reference: int,
     extra: Array | None,
 ) -> IKMSolution:
-    """The inverse kinematic model with tasks or limits.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    request : Request
-        What is asked.
-    known, scaling : KnownFrame, Scaling
-        Its frame, rows and factors.
-    reference : int
-        The kernels' number of the reference.
-    extra : ndarray, shape (..., n), or None
-        Motion wanted beside the tasks.
-
-    Returns
-    -------
-    IKMSolution
-        Joint velocities or accelerations.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Arguments that do not broadcast, tasks or limits that are none.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.kinematics.inverse.ikm import ikm
-    >>> from robotmodels.kinematics.inverse.joint_task import JointTask
-    >>> arm = load("iiwa14")
-    >>> found = ikm(arm, [0.1, 0.5, 0.2, 1.0, 0.3, 0.8, 0.1], [0.1, 0, 0, 0, 0, 0],
-    ...             tasks=[JointTask([0.0], joints=(2,))])
-    >>> found.reason(), bool(abs(found.v[2]) < 1e-12)
-    ('The motion is met.', True)
-    """
+    """The inverse kinematic model with tasks or limits."""
     given = {"q": request.q, request.rate_name: request.rate, "v": request.v, "secondary": extra}
     given = {name: part for name, part in given.items() if part is not None}
     batch = batch_shape(tuple(given.values()), tuple(given))

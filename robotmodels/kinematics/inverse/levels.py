@@ -1,6 +1,9 @@
 """Joint velocities that serve several tasks in strict order, within bounds.
 
 Seed book section 1.3.2.4. The same equations serve accelerations: `Level` has a ``drift``.
+
+Source: B. Siciliano and J.-J. Slotine 1991; the solution is the dual method of D. Goldfarb and A.
+Idnani 1983; J. Baillieul 1985 (extended Jacobian).
 """
 
 from __future__ import annotations
@@ -23,33 +26,7 @@ __all__ = ["Level", "LevelVelocities", "level_velocities", "stacked"]
 class Level:
     """What one priority level asks of the joint velocities: ``J v = rate - drift``, row by row.
 
-    Parameters
-    ----------
-    J : array_like, shape (N, m, n)
-        Jacobians of the level's task, N configurations of n joints.
-    rate : array_like, shape (N, m)
-        Velocities asked of the task; its accelerations, where the unknowns are accelerations.
-    drift : array_like, shape (N, m), optional
-        What the task does anyway: ``dJ/dt v`` where the unknowns are accelerations. Default zero.
-    weights : array_like, shape (m,), optional
-        Factors that make the rows comparable, such as ``1 / length`` on rows of metres beside rows
-        of radians. Singular values, damping and least errors are those of the weighted rows.
-        Default ones.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Shapes that do not fit each other, numbers that are not finite, weights that are not
-        positive.
-
-    References
-    ----------
-    Seed book section 1.3.2.4; B. Siciliano and J.-J. Slotine 1991.
-
-    Examples
-    --------
-    >>> Level(J=[[[1.0, 1.0, 0.0]]], rate=[[0.5]]).m
-    1
+    Shapes: J (N, m, n); rate, drift (N, m); weights (m,).
     """
 
     J: Array
@@ -85,27 +62,7 @@ class Level:
 class LevelVelocities:
     """Joint velocities of `level_velocities`, N rows.
 
-    Parameters
-    ----------
-    v : ndarray, shape (N, n)
-        Joint velocities, rad/s or m/s (accelerations, where the unknowns are accelerations).
-    scale : ndarray, shape (N, L)
-        Part of the rate that each level keeps under the bounds, 1 without bounds.
-    limited : ndarray of bool, shape (N, n)
-        Joints that are at a bound.
-    mixed : ndarray of bool, shape (N, L)
-        Levels of which no part fits the bounds in its own direction: ``scale`` is then the way
-        from what the joints do without the level to what it asks, see `level_velocities`.
-    error : tuple of ndarray, shapes (N, m_l)
-        ``rate - drift - J v`` of each level, in its own units.
-    singular_values : tuple of ndarray, shapes (N, m_l)
-        Of each level's weighted Jacobian in the freedom that the levels above leave, descending.
-
-    Examples
-    --------
-    >>> found = level_velocities([Level(J=[[[1.0, 1.0, 0.0]]], rate=[[0.5]])])
-    >>> found.v, found.error[0]
-    (array([[0.25, 0.25, 0.  ]]), array([[0.]]))
+    Shapes: v, limited (N, n); scale, mixed (N, L); error, singular_values (N, m_l).
     """
 
     v: Array
@@ -126,60 +83,7 @@ def level_velocities(
 ) -> LevelVelocities:
     """Joint velocities that serve levels of tasks in strict order, within bounds.
 
-    Each level is met as well as the method does it in the freedom that the levels above leave; it
-    never changes what they do (``J v`` of a higher level is the same with and without it, but for
-    rounding). What is left after the last level takes the joint velocities nearest to
-    ``secondary``.
-
-    With bounds, a level keeps the direction of its rate: it is met for ``scale * rate`` with the
-    largest scale in [0, 1] that the bounds allow, exactly; joints that thereby have to stay at
-    their bounds are no freedom of lower levels any more. Of all such velocities the result is the
-    one nearest to ``secondary``. Bounds that exclude zero, or a drift, may leave no part of the
-    rate alone possible: then ``mixed`` is set, and ``scale`` is the way from the least motion
-    that does without the level to what it asks. The bounds hold without exception.
-
-    Parameters
-    ----------
-    levels : sequence of Level
-        First has priority. All have the same N and n.
-    secondary : array_like, shape (N, n) or (n,), optional
-        Joint velocities wanted beside the levels. Default zero: the least motion.
-    lower, upper : array_like, shape (N, n) or (n,), optional
-        Bounds of v, infinite where there are none. Both or neither.
-    joint_weights : array_like, shape (n,), optional
-        "Least" and "nearest" are in the norm ``sqrt(sum(joint_weights v^2))``. Default ones.
-    method : PseudoInverse, FilteredInverse or DampedInverse, optional
-        What to do in weak directions; default `DampedInverse`.
-
-    Returns
-    -------
-    LevelVelocities
-        ``v``, ``scale``, ``limited``, ``mixed``, ``error``, ``singular_values``.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Levels of different sizes, neither a level nor bounds, one bound without the other, a lower
-        bound above the upper one, weights that are not positive.
-
-    References
-    ----------
-    Seed book section 1.3.2.4. Priorities: B. Siciliano and J.-J. Slotine 1991, P. Baerlocher and
-    R. Boulic 1998. Bounds: F. Flacco, A. De Luca and O. Khatib 2015 state the problem; the
-    solution is the dual method of D. Goldfarb and A. Idnani 1983.
-
-    Examples
-    --------
-    Three joints share a motion; where the first may not give its part, the others do.
-
-    >>> task = Level(J=[[[1.0, 1.0, 1.0]]], rate=[[3.0]])
-    >>> level_velocities([task]).v
-    array([[1., 1., 1.]])
-    >>> level_velocities([task], lower=[-1.0] * 3, upper=[0.5, 2.0, 2.0]).v
-    array([[0.5 , 1.25, 1.25]])
-    >>> found = level_velocities([task], lower=[-1.0] * 3, upper=[0.5] * 3)
-    >>> found.v, found.scale, found.error[0]
-    (array([[0.5, 0.5, 0.5]]), array([[0.5]]), array([[1.5]]))
+    Shapes: secondary, lower, upper (N, n) or (n,); joint_weights (n,).
     """
     from ...kernels.level_velocities import level_velocities as kernel
 
@@ -217,33 +121,7 @@ def level_velocities(
 
 
 def stacked(levels: Sequence[Level]) -> Level:
-    """One level of the rows of several: tasks of the same priority (augmentation).
-
-    Parameters
-    ----------
-    levels : sequence of Level
-        At least one; all with the same N and n.
-
-    Returns
-    -------
-    Level
-        Their rows, in order.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        None, or levels of different sizes.
-
-    References
-    ----------
-    Seed book section 1.3.2.4; J. Baillieul 1985 (extended Jacobian).
-
-    Examples
-    --------
-    >>> one = Level(J=[[[1.0, 0.0]]], rate=[[0.5]])
-    >>> stacked([one, Level(J=[[[0.0, 2.0]]], rate=[[1.0]], weights=[3.0])]).weights
-    array([1., 3.])
-    """
+    """One level of the rows of several: tasks of the same priority (augmentation)."""
     if len(levels) == 1:
         return levels[0]
     if not levels:

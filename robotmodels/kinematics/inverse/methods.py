@@ -216,28 +216,7 @@ InverseMethod = PseudoInverse | FilteredInverse | DampedInverse
 
 
 def as_method(method: InverseMethod | None) -> InverseMethod:
-    """The method asked for; None is `DampedInverse` with its defaults.
-
-    Parameters
-    ----------
-    method : PseudoInverse, FilteredInverse, DampedInverse or None
-        What was given.
-
-    Returns
-    -------
-    PseudoInverse, FilteredInverse or DampedInverse
-        The method.
-
-    Raises
-    ------
-    InvalidValueError
-        Anything else.
-
-    Examples
-    --------
-    >>> as_method(None).largest
-    0.0021
-    """
+    """The method asked for; None is `DampedInverse` with its defaults."""
     if method is None:
         return _DEFAULT
     if not isinstance(method, InverseMethod):

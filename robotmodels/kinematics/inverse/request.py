@@ -19,29 +19,10 @@ if TYPE_CHECKING:
 
 @runtime_checkable
 class HasGradient(Protocol):
-    """A criterion: anything with a gradient, its gain and sign included.
-
-    Examples
-    --------
-    >>> isinstance(3.0, HasGradient)
-    False
-    """
+    """A criterion: anything with a gradient, its gain and sign included."""
 
     def gradient(self, model: RobotModel, q: ArrayLike) -> Array:
-        """Joint velocities that improve the criterion, shape (..., n).
-
-        Parameters
-        ----------
-        model : RobotModel
-            The robot.
-        q : array_like, shape (..., n)
-            Joint variables, rad or m.
-
-        Returns
-        -------
-        ndarray, shape (..., n)
-            Joint velocities.
-        """
+        """Joint velocities that improve the criterion, shape (..., n)."""
         ...
 
 
@@ -49,24 +30,7 @@ Secondary: TypeAlias = "ArrayLike | HasGradient | Sequence[ArrayLike | HasGradie
 
 
 class Request(NamedTuple):
-    """Arguments of a call, ``q``, ``rate`` and ``v`` checked.
-
-    Parameters
-    ----------
-    q : ndarray, shape (..., n)
-        Joint variables.
-    rate : ndarray, shape (..., 6)
-        Twists, or their time derivatives.
-    v : ndarray, shape (..., n), or None
-        Joint velocities where accelerations are asked for.
-    frame, reference, mask, method, joint_weights, length, secondary, augmented, tasks, limits
-        As in `ikm`.
-
-    Examples
-    --------
-    >>> Request._fields[:3]
-    ('q', 'rate', 'v')
-    """
+    """Arguments of a call, ``q``, ``rate`` and ``v`` checked."""
 
     q: Array
     rate: Array
@@ -89,34 +53,7 @@ class Request(NamedTuple):
 
 
 def secondary_motion(model: RobotModel, q: Array, secondary: Secondary) -> Array:
-    """Joint motion wanted beside the task: an array, a gradient, or the sum of several.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-    q : ndarray, shape (..., n)
-        Joint variables.
-    secondary : array_like, criterion or sequence of them
-        As in `ikm`.
-
-    Returns
-    -------
-    ndarray, shape (..., n)
-        Its leading axes broadcast against those of q.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Arrays, or gradients, of the wrong shape, with NaN or infinity.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from robotmodels.robots import load
-    >>> secondary_motion(load("lab_rr"), np.zeros(2), [0.1, 0.2])
-    array([0.1, 0.2])
-    """
+    """Joint motion wanted beside the task: an array, a gradient, or the sum of several."""
     if isinstance(secondary, type):
         raise InvalidValueError(
             f"secondary: expected an array or a criterion, got the class {secondary.__name__}; a "

@@ -23,21 +23,7 @@ WHOLE_TWIST = read_only(np.ones(6), np.bool_)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scaling(Rebuilt):
-    """Rows asked for, and the factors of rows and columns.
-
-    Parameters
-    ----------
-    mask : ndarray of bool, shape (6,)
-        Rows of the twist that are asked for.
-    asked : ndarray of int, shape (m,)
-        Their numbers.
-    rows : ndarray, shape (6,)
-        ``1 / length`` for the linear rows, 1 for the angular ones.
-    weights : ndarray, shape (n,)
-        Of the joints.
-    columns : ndarray, shape (n,)
-        ``1 / sqrt(weights)``.
-    """
+    """Rows asked for, and the factors of rows and columns."""
 
     mask: NDArray[np.bool_]
     asked: NDArray[np.int64]
@@ -48,21 +34,7 @@ class Scaling(Rebuilt):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class KnownFrame(Rebuilt):
-    """What is kept of a frame of a robot between calls.
-
-    Parameters
-    ----------
-    point : FrameOfInterest
-        The frame.
-    length : float
-        Characteristic length, m.
-    usual : Scaling
-        For calls with nothing but a twist.
-    whole, numbers : ndarray
-        What the kernel of a single such call takes.
-    ranks : dict
-        Ranks that the robot has in general, by the rows asked for.
-    """
+    """Cached scaling and ranks of a robot's frame."""
 
     point: FrameOfInterest
     length: float
@@ -78,31 +50,7 @@ _KNOWN: dict[int, tuple[weakref.ref[RobotModel], dict[str | int | None, KnownFra
 
 
 def known_frame(model: RobotModel, frame: str | int | None) -> KnownFrame:
-    """What earlier calls prepared for a frame; prepared now if there was none.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    frame : str, int or None
-        Name or number of a frame; None is the tool.
-
-    Returns
-    -------
-    KnownFrame
-        Kept for as long as the model lives.
-
-    Raises
-    ------
-    FrameNotFoundError
-        No such frame.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> known_frame(load("rx90"), None).length
-    0.9
-    """
+    """Cached data of a frame, created on first use."""
     key = id(model)
     entry = _KNOWN.get(key)
     if entry is None or entry[0]() is not model:
@@ -134,39 +82,7 @@ def scaling_of(
     joint_weights: ArrayLike | None,
     length: float | None,
 ) -> Scaling:
-    """Rows and factors of a call.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-    known : KnownFrame
-        The frame.
-    mask : array_like, shape (6,), optional
-        Ones for the rows that are asked for.
-    joint_weights : array_like, shape (n,), optional
-        Positive.
-    length : float, optional
-        Metres.
-
-    Returns
-    -------
-    Scaling
-        Of the call.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Arguments of the wrong shape; a mask of other numbers or that asks for nothing; weights or
-        a length that are not positive.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> arm = load("rx90")
-    >>> scaling_of(arm, known_frame(arm, None), [1, 1, 1, 0, 0, 0], None, 0.5).rows
-    array([2., 2., 2., 1., 1., 1.])
-    """
+    """Rows and factors of a call."""
     if mask is None and joint_weights is None and length is None:
         return known.usual
     if length is None:
@@ -186,32 +102,7 @@ def scaling_of(
 
 
 def general_rank(model: RobotModel, known: KnownFrame, scaling: Scaling, reference: int) -> int:
-    """Rank that the rows asked for have at nearly all configurations.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    known : KnownFrame
-        The frame.
-    scaling : Scaling
-        The rows.
-    reference : int
-        The kernels' number of the reference.
-
-    Returns
-    -------
-    int
-        The largest of some configurations drawn once.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> arm = load("lab_rr")
-    >>> known = known_frame(arm, None)
-    >>> general_rank(arm, known, known.usual, 0)
-    2
-    """
+    """Rank that the rows asked for have at nearly all configurations."""
     key = (reference, *map(int, scaling.asked))
     if key not in known.ranks:
         from ...kernels.jacobians import jacobians

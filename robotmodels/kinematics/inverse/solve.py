@@ -26,32 +26,7 @@ _SINGULAR, _TOO_FEW = int(IKMStatus.SINGULAR), int(IKMStatus.TOO_FEW_JOINTS)
 
 
 def solved(model: RobotModel, request: Request) -> IKMSolution:
-    """The inverse kinematic model, of the first or the second order.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    request : Request
-        What is asked.
-
-    Returns
-    -------
-    IKMSolution
-        Joint velocities or accelerations.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, FrameNotFoundError
-        As `ikm`.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> from robotmodels.kinematics.inverse.ikm import ikm
-    >>> ikm(load("rx90"), [[0.1, 0.2, 1.3, 0.4, 0.5, 0.6]] * 3, [0.1, 0, 0, 0, 0, 0]).v.shape
-    (3, 6)
-    """
+    """The inverse kinematic model, of the first or the second order."""
     reference = reference_of(request.reference)[1]
     known = known_frame(model, request.frame)
     scaling = scaling_of(model, known, request.mask, request.joint_weights, request.length)
@@ -115,34 +90,7 @@ def solved_alone(
     reference: str,
     method: InverseMethod | None,
 ) -> IKMSolution:
-    """One row with nothing but a twist, in as few steps as can be.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-    q, twist : ndarray, shapes (n,), (6,)
-        Joint variables and twist.
-    frame, reference, method
-        As in `ikm`.
-
-    Returns
-    -------
-    IKMSolution
-        Of a single row.
-
-    Raises
-    ------
-    InvalidValueError, FrameNotFoundError
-        As `ikm`.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> arm = load("rx90")
-    >>> solved_alone(arm, np.full(6, 0.5), np.zeros(6), None, "local", None).reason()
-    'The motion is met.'
-    """
+    """Fast path for a single twist without further options."""
     number = reference_of(reference)[1]
     known = known_frame(model, frame)
     n = q.size
@@ -165,31 +113,7 @@ def solved_alone(
 
 
 def drift_rows(model: RobotModel, known: KnownFrame, q: Array, v: Array, reference: int) -> Array:
-    """What the frame's twist changes by without joint accelerations, ``dJ/dt v``.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-    known : KnownFrame
-        The frame.
-    q, v : ndarray, shape (N, n)
-        Joint variables and velocities.
-    reference : int
-        The kernels' number of the reference.
-
-    Returns
-    -------
-    ndarray, shape (N, 6)
-        m/s^2 and rad/s^2.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> arm = load("lab_rr")
-    >>> drift_rows(arm, known_frame(arm, None), np.zeros((1, 2)), np.ones((1, 2)), 0).shape
-    (1, 6)
-    """
+    """Velocity-dependent acceleration of the frame, ``dJ/dt v``. Shapes: q, v (N, n) -> (N, 6)."""
     from ...kernels.accelerations import accelerations
 
     out = np.empty((q.shape[0], 6))
@@ -208,28 +132,7 @@ def tell_structure(
     rank: NDArray[np.int8],
     added: int = 0,
 ) -> None:
-    """Tell robots that never produce all rows asked for from singular positions of others.
-
-    Parameters
-    ----------
-    model, known, scaling, reference
-        The request.
-    status : ndarray of int8, shape (N,)
-        Changed in place, from SINGULAR to TOO_FEW_JOINTS where the rank is what it always is.
-    rank : ndarray of int8, shape (N,)
-        Ranks at the configurations.
-    added : int
-        Rows of tasks that augment the twist, each of which may add one to the rank.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> arm, status, rank = load("lab_rr"), np.array([2], np.int8), np.array([2], np.int8)
-    >>> known = known_frame(arm, None)
-    >>> tell_structure(arm, known, known.usual, 0, status, rank)
-    >>> status
-    array([3], dtype=int8)
-    """
+    """Set TOO_FEW_JOINTS instead of SINGULAR where the rank is always deficient."""
     if status.size == 1 and status.item() != _SINGULAR:
         return
     lacking = status == _SINGULAR
@@ -239,24 +142,7 @@ def tell_structure(
 
 
 def check_size(rate: Array, name: str) -> None:
-    """Refuse rates whose squares would overflow.
-
-    Parameters
-    ----------
-    rate : ndarray, shape (..., 6)
-        Twists or accelerations.
-    name : str
-        Used in error messages.
-
-    Raises
-    ------
-    InvalidValueError
-        An entry beyond 1e100.
-
-    Examples
-    --------
-    >>> check_size(np.array([0.1, 0.0, 0.0, 0.0, 0.0, 0.2]), "twist")
-    """
+    """Refuse rates whose squares would overflow."""
     largest = max(map(abs, rate.tolist())) if rate.ndim == 1 else np.abs(rate).max(initial=0.0)
     if largest > _LARGEST:
         raise InvalidValueError(
@@ -267,22 +153,7 @@ def check_size(rate: Array, name: str) -> None:
 def frozen(array: NDArray[Any], batch: tuple[int, ...]) -> NDArray[Any]:
     """Rows of a result in the shape of the call, read-only.
 
-    Parameters
-    ----------
-    array : ndarray, shape (N, ...)
-        Rows, which nobody else writes to.
-    batch : tuple of int
-        Leading axes of the call.
-
-    Returns
-    -------
-    ndarray, shape (*batch, ...)
-        A view.
-
-    Examples
-    --------
-    >>> frozen(np.zeros((6, 4)), (2, 3)).shape
-    (2, 3, 4)
+    Shapes: array (N, ...) -> (*batch, ...).
     """
     array = array.reshape((*batch, *array.shape[1:]))
     array.setflags(write=False)

@@ -70,30 +70,7 @@ def rows_of(
 ) -> tuple[tuple[int, ...], Array, Array]:
     """Configurations and velocities as rows, with the leading axes that they had.
 
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-    q, v : array_like, shape (..., n)
-        Joint variables (rad or m) and velocities; without velocities zeros.
-
-    Returns
-    -------
-    batch : tuple of int
-        The leading axes.
-    q, v : ndarray, shape (N, n)
-        Rows.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        A wrong length, different shapes, NaN or infinity.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> rows_of(load("rx90"), [0.0] * 6)[1].shape
-    (1, 6)
+    Shapes: q, v (..., n) -> q, v (N, n).
     """
     check_model(model)
     q = as_vector(q, model.n, "q")
@@ -111,32 +88,7 @@ def rows_of(
 
 
 def rates_of_rows(rate: Array, batch: tuple[int, ...], m: int) -> Array:
-    """Rates of a task at the rows of `rows_of`.
-
-    Parameters
-    ----------
-    rate : ndarray, shape (..., m)
-        Of the task.
-    batch : tuple of int
-        Leading axes of the configurations.
-    m : int
-        Number of components.
-
-    Returns
-    -------
-    ndarray, shape (N, m)
-        One row for each configuration.
-
-    Raises
-    ------
-    ShapeError
-        The leading axes do not broadcast to those of the configurations.
-
-    Examples
-    --------
-    >>> rates_of_rows(np.array([1.0, 2.0]), (2,), 2)
-    array([[1., 2.], [1., 2.]])
-    """
+    """Rates of a task at the rows of `rows_of`. Shapes: rate (..., m) -> (N, m)."""
     try:
         return np.broadcast_to(rate, (*batch, m)).reshape(int(np.prod(batch, dtype=np.int64)), m)
     except ValueError:
@@ -147,33 +99,7 @@ def rates_of_rows(rate: Array, batch: tuple[int, ...], m: int) -> Array:
 
 
 def task_length(model: RobotModel, frame: str | int | None, length: float | None) -> float:
-    """The length that makes metres comparable with radians in a task.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    frame : str, int or None
-        The frame that moves.
-    length : float or None
-        What the task was given; None takes the robot's.
-
-    Returns
-    -------
-    float
-        Metres.
-
-    Raises
-    ------
-    InvalidValueError
-        A length that is not positive.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> task_length(load("rx90"), None, None)
-    0.9
-    """
+    """The length that makes metres comparable with radians in a task."""
     from ..lengths import characteristic_length
 
     if length is None:

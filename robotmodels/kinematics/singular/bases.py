@@ -15,28 +15,7 @@ _MOST_CHOICES = 2000
 def sparse_basis(vectors: Array, tolerance: float = 1e-9) -> Array:
     """Basis of a row space with many zeros, each vector normalised to its largest entry.
 
-    Every choice of k pivots gives a basis in reduced echelon form; of those whose pivots are well
-    conditioned, the one with the most zeros is taken. It depends on the subspace alone, not on
-    the basis it is given by.
-
-    Parameters
-    ----------
-    vectors : ndarray, shape (k, m)
-        Independent rows.
-    tolerance : float
-        Entries below this fraction of the largest of their row count as zeros.
-
-    Returns
-    -------
-    ndarray, shape (k, m)
-        Rows whose entry of largest magnitude is 1 (the first of equals); zeros of rounding size
-        are exact.
-
-    Examples
-    --------
-    >>> sparse_basis(np.array([[1.0, 1.0, 0.0], [1.0, -1.0, 1e-17]]))
-    array([[1., 0., 0.],
-           [0., 1., 0.]])
+    Shapes: vectors (k, m) -> (k, m).
     """
     k = vectors.shape[0]
     if k == 0:
@@ -60,25 +39,7 @@ def sparse_basis(vectors: Array, tolerance: float = 1e-9) -> Array:
 
 
 def normalised(vector: Array, rounding: float = 1e-13) -> Array:
-    """A vector divided by its entry of largest magnitude, its rounding errors set to zero.
-
-    Parameters
-    ----------
-    vector : ndarray, shape (m,)
-        Not zero.
-    rounding : float
-        Entries below this fraction of the largest become 0.
-
-    Returns
-    -------
-    ndarray, shape (m,)
-        The first of its largest entries is 1.
-
-    Examples
-    --------
-    >>> normalised(np.array([0.0, -2.0, 1e-16]))
-    array([-0.,  1.,  0.])
-    """
+    """A vector divided by its entry of largest magnitude, its rounding errors set to zero."""
     size = np.abs(vector)
     pivot = int(np.argmax(size > (1.0 - 1e-9) * size.max()))
     row = vector / vector[pivot]

@@ -51,38 +51,7 @@ def workspace_side(
 ) -> tuple[WorkspaceSide, Array | None]:
     """Whether lost directions end at a boundary.
 
-    Parameters
-    ----------
-    task : SingularTask
-        Of a robot of n joints.
-    q : ndarray, shape (n,)
-        Configuration, rad or m.
-    lost : ndarray, shape (m, p)
-        Orthonormal lost directions, without units.
-    null : ndarray, shape (n, k)
-        Orthonormal null space in joint units.
-    motions : tuple of SelfMotion
-        Those of `self_motions`.
-    missing : ndarray, shape (m, s)
-        Orthonormal directions that no configuration has, without units.
-    order : int
-        Order of the singularity.
-
-    Returns
-    -------
-    side : WorkspaceSide
-        Boundary if one direction was found that opens to one side only.
-    open_side : ndarray, shape (m,), or None
-        That direction, towards the open side.
-
-    Examples
-    --------
-    >>> from robotmodels.kinematics.singular.task import singular_task
-    >>> from robotmodels.robots import load
-    >>> task = singular_task(load("planar_2r"), mask=[1, 1, 0, 0, 0, 0])
-    >>> u, v = np.array([[1.0], [0.0]]), np.array([[1.0], [-2.0]]) / 5**0.5
-    >>> workspace_side(task, np.zeros(2), u, v, (), np.zeros((2, 0)), 1)
-    (<WorkspaceSide.BOUNDARY: 2>, array([-1.,  0.]))
+    Shapes: q (n,), lost (m, p), null (n, k), missing (m, s) -> open_side (m,).
     """
     if lost.shape[1] == 0:
         return WorkspaceSide.REGULAR, None

@@ -31,21 +31,7 @@ _NOTHING_SPECIAL = "axes and points show nothing special, but the columns become
 
 @dataclass(frozen=True, slots=True)
 class Cause:
-    """A singular set at or near a configuration, and what happens in the arm all over it.
-
-    Parameters
-    ----------
-    events : tuple of (SingularityKind, str)
-        As many as the set makes conditions on the joints, or more where it has several names; a
-        sentence for each.
-    codimension : int
-        How many conditions the set makes.
-    weak : float
-        Singular value over the largest that the distance from the set makes, to the first order;
-        0 on the set.
-    known : bool
-        Whether events make all the conditions: without them the distance is a rough one.
-    """
+    """Singular set at or near a configuration, and the geometric conditions that hold on it."""
 
     events: tuple[tuple[SingularityKind, str], ...]
     codimension: int
@@ -54,56 +40,13 @@ class Cause:
 
 
 def arm_geometry(task: SingularTask) -> ArmGeometry:
-    """Axes and points of the arm that a task is about.
-
-    Parameters
-    ----------
-    task : SingularTask
-        The robot, the frame, and what counts.
-
-    Returns
-    -------
-    ArmGeometry
-        With the events that may happen.
-
-    Examples
-    --------
-    >>> from robotmodels.kinematics.singular.task import singular_task
-    >>> from robotmodels.robots import load
-    >>> arm_geometry(singular_task(load("rx90"))).point
-    'the wrist centre'
-    """
+    """Axes and points of the arm that a task is about."""
     numbers = [int(row) + 1 for row in task.model.table.joint_rows[task.moving]]
     return ArmGeometry(task.model, task.frame, numbers, not task.mask[3:].any())
 
 
 def causes_at(task: SingularTask, q: Array, dimension: int, arm: ArmGeometry) -> tuple[Cause, ...]:
-    """Singular sets at or near a configuration, the nearest first.
-
-    Parameters
-    ----------
-    task : SingularTask
-        What is asked about.
-    q : ndarray, shape (n,)
-        Configuration, rad or m.
-    dimension : int
-        M of the task.
-    arm : ArmGeometry
-        Of the task.
-
-    Returns
-    -------
-    tuple of Cause
-        Of each set that was found once; none if there is none around.
-
-    Examples
-    --------
-    >>> from robotmodels.kinematics.singular.task import singular_task
-    >>> from robotmodels.robots import load
-    >>> task, q = singular_task(load("rx90")), np.array([0.1, 0.2, 0.3, 0.4, 0.0, 0.6])
-    >>> causes_at(task, q, 6, arm_geometry(task))[0].events
-    ((<SingularityKind.WRIST: 'wrist'>, 'axes 4 and 6 are aligned'),)
-    """
+    """Singular sets at or near a configuration, the nearest first."""
     n = len(q)
     home, free = q / task.joint_scale, np.full(n, np.inf)
     space = SearchSpace(task, dimension, task.joint_scale, home, -free, free)

@@ -127,34 +127,7 @@ def report_of(
     point: int | None = None,
     arm: ArmGeometry | None = None,
 ) -> SingularityReport:
-    """`classify_singularity` of a task whose dimension is known.
-
-    Parameters
-    ----------
-    task : SingularTask
-        What is asked about.
-    q : ndarray, shape (n,)
-        Configuration, rad or m.
-    whole : OperationalDimension
-        Of the same task.
-    tolerance, near, axes, point
-        As `classify_singularity`.
-    arm : ArmGeometry, optional
-        Of the task, if it is known.
-
-    Returns
-    -------
-    SingularityReport
-        The report.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> arm = load("rx90")
-    >>> task, whole = singular_task(arm), operational_dimension(arm)
-    >>> report_of(task, np.zeros(6), whole, 1e-9, 1e-2).order
-    1
-    """
+    """`classify_singularity` of a task whose dimension is known."""
     M = whole.dimension
     sigma, lost, null, missing, zero = _spaces(task, q, whole, tolerance)
     top = float(sigma.max(initial=0.0))
@@ -211,33 +184,7 @@ def names_of(
     tolerance: float,
     arm: ArmGeometry | None = None,
 ) -> tuple[tuple[SingularityKind | None, str], ...]:
-    """Only the names of a singular configuration, without the rest of its report.
-
-    Parameters
-    ----------
-    task : SingularTask
-        What is asked about.
-    q : ndarray, shape (n,)
-        Configuration, rad or m.
-    whole : OperationalDimension
-        Of the same task.
-    tolerance : float
-        As `classify_singularity`.
-    arm : ArmGeometry, optional
-        Of the task, if it is known.
-
-    Returns
-    -------
-    tuple of (SingularityKind or None, str)
-        As `kinds_in_words`; empty where the configuration is regular.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> arm = load("rx90")
-    >>> names_of(singular_task(arm), np.zeros(6), operational_dimension(arm), 1e-9)
-    ((<SingularityKind.WRIST: 'wrist'>, 'wrist: the axes of joints 4 and 6 are aligned'),)
-    """
+    """Only the names of a singular configuration, without the rest of its report."""
     _, lost, null, _, zero = _spaces(task, q, whole, tolerance)
     if not lost.shape[1]:
         return ()

@@ -52,19 +52,7 @@ class Event:
 
 
 class ArmGeometry:
-    """The joints that move a frame, and the point whose place matters.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    frame : str, int or None
-        The frame whose motion it is.
-    numbers : list of int
-        Frames of the joints that move it, from the base.
-    position_only : bool
-        Whether only its position is asked for.
-    """
+    """The joints that move a frame, and the point of interest."""
 
     def __init__(
         self, model: RobotModel, frame: str | int | None, numbers: list[int], position_only: bool

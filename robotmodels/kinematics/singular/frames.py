@@ -103,25 +103,7 @@ class LostDirections(Rebuilt):
 def lost_in_task_axes(task: SingularTask, lost: Array) -> LostDirections:
     """Lost directions in the axes of the task (the world's, or the frame's own), at its origin.
 
-    Parameters
-    ----------
-    task : SingularTask
-        What is asked about.
-    lost : ndarray, shape (m, p)
-        Orthonormal, without units, in the components of the task.
-
-    Returns
-    -------
-    LostDirections
-        At the origin of the frame.
-
-    Examples
-    --------
-    >>> from robotmodels.kinematics.singular.task import singular_task
-    >>> from robotmodels.robots import load
-    >>> task = singular_task(load("planar_2r"), mask=[1, 1, 0, 0, 0, 0])
-    >>> lost_in_task_axes(task, np.array([[1.0], [0.0]])).combinations
-    ('vx',)
+    Shapes: lost (m, p).
     """
     axes = None if task.mask_axes == "tool" else WORLD
     return _expressed(task, _wide(task, lost).T, axes, None, 1e-9)
@@ -138,45 +120,7 @@ def simplest_frame(
 ) -> LostDirections:
     """Lost directions in the axes and at the point where they have the most zeros.
 
-    Axes and points are those of R_0, of the frames from the base to the frame that is asked
-    about, and of that frame itself. Among equals the same frame for both comes first, then what
-    is nearest to the frame. Where only some components of the motion count, the
-    point stays; where these are not whole vectors, so do the axes.
-
-    Parameters
-    ----------
-    task : SingularTask
-        What is asked about.
-    q : ndarray, shape (n,)
-        Configuration, rad or m.
-    lost : ndarray, shape (m, p)
-        Orthonormal lost directions, without units.
-    missing : ndarray, shape (m, s)
-        Orthonormal directions that no configuration has.
-    zero : float
-        Components below this fraction of the largest count as zeros.
-    axes, point : int, optional
-        Number of the frame to take, instead of looking for the simplest.
-
-    Returns
-    -------
-    LostDirections
-        The simplest that was found.
-
-    Raises
-    ------
-    FrameNotFoundError, InvalidValueError
-        As `check_frames`.
-
-    Examples
-    --------
-    >>> from robotmodels.kinematics.singular.task import singular_task, task_jacobians
-    >>> from robotmodels.robots import load
-    >>> task, q = singular_task(load("rx90")), np.array([0.1, 0.2, -np.pi / 2, 0.4, 0.5, 0.6])
-    >>> lost = np.linalg.svd(task_jacobians(task, q))[0][:, 5:]
-    >>> found = simplest_frame(task, q, lost, np.zeros((6, 0)), 1e-9)
-    >>> found.where, found.combinations
-    ('axes of R4, at the origin of R4', ('vz',))
+    Shapes: q (n,), lost (m, p), missing (m, s).
     """
     model = task.model
     tool = dgm(model, q, task.frame)
@@ -211,28 +155,7 @@ def simplest_frame(
 
 
 def check_frames(task: SingularTask, axes: int | None, point: int | None) -> None:
-    """Refuse frames in which lost directions cannot be given.
-
-    Parameters
-    ----------
-    task : SingularTask
-        What is asked about.
-    axes, point : int or None
-        Numbers of frames.
-
-    Raises
-    ------
-    FrameNotFoundError
-        A number that is neither 0 nor on the way to the frame.
-    InvalidValueError
-        Axes or a point, where the components that count do not turn or move to them.
-
-    Examples
-    --------
-    >>> from robotmodels.kinematics.singular.task import singular_task
-    >>> from robotmodels.robots import load
-    >>> check_frames(singular_task(load("rx90")), 4, 4)
-    """
+    """Refuse frames in which lost directions cannot be given."""
     known = [0, *(int(j) for j in task.model.twin.frame(task.frame).path)]
     for asked in (axes, point):
         if asked is not None and asked not in known:
@@ -253,48 +176,14 @@ def check_frames(task: SingularTask, axes: int | None, point: int | None) -> Non
 
 
 def frame_words(frame: str | int | None) -> str:
-    """What a frame is called in a sentence.
-
-    Parameters
-    ----------
-    frame : str, int or None
-        As it was asked for; None is the tool.
-
-    Returns
-    -------
-    str
-        For instance ``the tool`` or ``R3``.
-
-    Examples
-    --------
-    >>> frame_words(None), frame_words(3), frame_words("flange")
-    ('the tool', 'R3', "frame 'flange'")
-    """
+    """Name of a frame in a sentence."""
     if frame is None:
         return "the tool"
     return f"frame {frame!r}" if isinstance(frame, str) else f"R{frame}"
 
 
 def combination_text(row: Array, names: tuple[str, ...]) -> str:
-    """A linear combination in words.
-
-    Parameters
-    ----------
-    row : ndarray, shape (m,)
-        Coefficients.
-    names : tuple of str, length m
-        What they multiply.
-
-    Returns
-    -------
-    str
-        For instance ``vx - 0.5 wz``; what is below 1e-9 is left out.
-
-    Examples
-    --------
-    >>> combination_text(np.array([1.0, 0.0, -0.5]), ("a", "b", "c"))
-    'a - 0.5 c'
-    """
+    """A linear combination in words. Shapes: row (m,)."""
     text = ""
     for value, name in zip(row, names, strict=True):
         if abs(value) < 1e-9:

@@ -76,33 +76,7 @@ def self_motions(
 ) -> tuple[SelfMotion, ...]:
     """Basis of the null space with few joints in each vector, and what each is worth.
 
-    Parameters
-    ----------
-    task : SingularTask
-        Of a robot of n joints.
-    q : ndarray, shape (n,)
-        Configuration, rad or m.
-    lost : ndarray, shape (m, p)
-        Orthonormal, ``J^T lost = 0``.
-    null : ndarray, shape (n, k)
-        Orthonormal, ``J null = 0``, in joint units.
-    zero : float
-        Fraction below which a joint does not take part.
-
-    Returns
-    -------
-    tuple of SelfMotion
-        k of them. Two are chosen so that those the second order allows stand alone; of three and
-        more a combination may be finite where none of them is.
-
-    Examples
-    --------
-    >>> from robotmodels.kinematics.singular.task import singular_task
-    >>> from robotmodels.robots import load
-    >>> task, q = singular_task(load("rx90")), np.array([0.1, 0.2, 0.3, 0.4, 0.0, 0.6])
-    >>> U, _, Vt = np.linalg.svd(task_jacobians(task, q))
-    >>> [m.joints for m in self_motions(task, q, U[:, 5:], Vt[5:].T, 1e-9)]
-    [(4, 6)]
+    Shapes: q (n,), lost (m, p), null (n, k).
     """
     basis = sparse_basis(null.T, zero)
     forms = second_order_forms(task, q, lost, null)
@@ -136,28 +110,7 @@ def self_motions(
 def second_order_forms(task: SingularTask, q: Array, lost: Array, null: Array) -> Array:
     """Quadratic forms ``u^T (dJ/dt) v`` on the null space.
 
-    Parameters
-    ----------
-    task : SingularTask
-        Of a robot of n joints.
-    q : ndarray, shape (n,)
-        Configuration, rad or m.
-    lost, null : ndarray, shapes (m, p) and (n, k)
-        Bases of the left and right null spaces of the Jacobian without units.
-
-    Returns
-    -------
-    ndarray, shape (p, k, k)
-        Symmetric; ``c^T F[a] c`` for the velocity ``null @ c``.
-
-    Examples
-    --------
-    >>> from robotmodels.kinematics.singular.task import singular_task
-    >>> from robotmodels.robots import load
-    >>> task = singular_task(load("planar_2r"), mask=[1, 1, 0, 0, 0, 0])
-    >>> u, v = np.array([[1.0], [0.0]]), np.array([[1.0], [-2.0]])
-    >>> second_order_forms(task, np.zeros(2), u, v).round(12)
-    array([[[-1.]]])
+    Shapes: q (n,), lost (m, p), null (n, k) -> (p, k, k).
     """
     derivatives = task_derivatives(task, q)
     forms = np.einsum("ma,imj,ib,jc->abc", lost, derivatives, null, null)
@@ -174,35 +127,7 @@ def _begins(task: SingularTask, q: Array, unit: Array, step: float, rank: int) -
 def moved_on(
     task: SingularTask, home: Array, q: Array, unit: Array, step: float, rank: int | None = None
 ) -> Array | None:
-    """The configuration a step away along a direction, with the frame where it was at home.
-
-    Parameters
-    ----------
-    task : SingularTask
-        Of a robot of n joints.
-    home, q : ndarray, shape (n,)
-        Where the frame's pose is taken from, and where the step starts, rad or m.
-    unit : ndarray, shape (n,)
-        Direction in joint units.
-    step : float
-        Length of the step along it.
-    rank : int, optional
-        Rank of the Jacobian at ``home``, for a start where it is about to drop.
-
-    Returns
-    -------
-    ndarray, shape (n,), or None
-        The configuration; None if none was found.
-
-    Examples
-    --------
-    >>> from robotmodels.kinematics.singular.task import singular_task
-    >>> from robotmodels.robots import load
-    >>> q = np.array([0.1, 0.2, 0.3, 0.4, 0.0, 0.6])
-    >>> along = np.array([0, 0, 0, 1, 0, -1]) / 2**0.5
-    >>> moved_on(singular_task(load("rx90")), q, q, along, 0.1) - q
-    array([ 0. , 0. , 0. , 0.0707, 0. , -0.0707])
-    """
+    """Configuration a step along a direction that keeps the frame's pose."""
     goal = dgm(task.model, home, task.frame)
     there = q + step * unit * task.joint_scale
     for _ in range(20):

@@ -300,28 +300,7 @@ def operational_dimension(
 
 
 def task_rank(task: SingularTask, q: Array, tolerance: float) -> JacobianRank:
-    """Ranks of a task at configurations.
-
-    Parameters
-    ----------
-    task : SingularTask
-        What is asked about.
-    q : ndarray, shape (..., n)
-        Joint variables, rad or m.
-    tolerance : float
-        Relative to the largest singular value.
-
-    Returns
-    -------
-    JacobianRank
-        Rank, singular values and gap of each.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> task_rank(singular_task(load("rx90")), np.zeros((2, 6)), 1e-9).rank
-    array([5, 5])
-    """
+    """Ranks of a task at configurations."""
     sigma = as_floats(np.linalg.svd(task_jacobians(task, q), compute_uv=False), "sigma")
     rank = (sigma > tolerance * sigma[..., :1]).sum(axis=-1)
     return JacobianRank(

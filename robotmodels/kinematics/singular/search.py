@@ -25,29 +25,7 @@ _DIFFERENCE = 1e-5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SearchSpace:
-    """Joints in units of distance, and the set that is looked for.
-
-    Parameters
-    ----------
-    task : SingularTask
-        m components of a robot of n joints.
-    dimension : int
-        M: the set is where the rank is below it.
-    unit : ndarray, shape (n,)
-        Radians or metres of one unit of distance.
-    home : ndarray, shape (n,)
-        Where distances are measured from, in these units.
-    lower, upper : ndarray, shape (n,)
-        Limits, maybe infinite, in these units.
-
-    Examples
-    --------
-    >>> from robotmodels.kinematics.singular.task import singular_task
-    >>> from robotmodels.robots import load
-    >>> free = np.full(6, np.inf)
-    >>> SearchSpace(singular_task(load("rx90")), 6, np.ones(6), np.zeros(6), -free, free).dimension
-    6
-    """
+    """Search space: scaled joints and the singular set."""
 
     task: SingularTask
     dimension: int
@@ -61,28 +39,7 @@ class SearchSpace:
 class FoundPoints:
     """Where a search ended. N points.
 
-    Parameters
-    ----------
-    x : ndarray, shape (N, n)
-        Points in units of distance.
-    weakest : ndarray, shape (N,)
-        The M-th singular value over the first.
-    tangential : ndarray, shape (N,)
-        What the way back to the start has along the set, in units of distance; limits that hold
-        a joint are counted as normals.
-    slope : ndarray, shape (N,)
-        Size of the gradients along ``escape``, per unit of distance; 0 where sets cross.
-    codimension : ndarray of int, shape (N,)
-        Independent normals of the set.
-    escape : ndarray, shape (N, n)
-        Unit normal: towards the start, where it is not on the set.
-    held : ndarray of bool, shape (N, n)
-        Joints held by a limit.
-
-    Examples
-    --------
-    >>> FoundPoints(*(np.zeros((0, 6)),) * 7).x.shape
-    (0, 6)
+    Shapes: x, escape, held (N, n); weakest, tangential, slope, codimension (N,).
     """
 
     x: Array
@@ -95,30 +52,7 @@ class FoundPoints:
 
 
 def nearest_points(space: SearchSpace, starts: Array) -> FoundPoints:
-    """Points of the singular set that are nearest to home, locally.
-
-    Parameters
-    ----------
-    space : SearchSpace
-        What is looked for.
-    starts : ndarray, shape (N, n)
-        Where to start, in units of distance.
-
-    Returns
-    -------
-    FoundPoints
-        One for each start, in their order: some may not have come to the set, or not be
-        stationary on it.
-
-    Examples
-    --------
-    >>> from robotmodels.kinematics.singular.task import singular_task
-    >>> from robotmodels.robots import load
-    >>> home, free = np.array([0.1, 0.2, 0.3, 0.4, 0.2, 0.6]), np.full(6, np.inf)
-    >>> space = SearchSpace(singular_task(load("rx90")), 6, np.ones(6), home, -free, free)
-    >>> (nearest_points(space, home[None]).x - home).round(9) + 0.0
-    array([[ 0. ,  0. ,  0. ,  0. , -0.2,  0. ]])
-    """
+    """Points of the singular set locally nearest to a configuration. Shapes: starts (N, n)."""
     x = to_set(space, starts, 60)
     good = on_set(space, x)[1] < 1e-9
     if good.any():
@@ -141,31 +75,7 @@ def nearest_points(space: SearchSpace, starts: Array) -> FoundPoints:
 
 
 def slope_along(space: SearchSpace, x: Array, direction: Array) -> float:
-    """Growth of the M-th singular value from a point of the set, per unit of distance.
-
-    Parameters
-    ----------
-    space : SearchSpace
-        What was looked for.
-    x : ndarray, shape (n,)
-        Point of the set, in units of distance.
-    direction : ndarray, shape (n,)
-        Unit vector in the same units.
-
-    Returns
-    -------
-    float
-        Also where more than one singular value vanishes.
-
-    Examples
-    --------
-    >>> from robotmodels.kinematics.singular.task import singular_task
-    >>> from robotmodels.robots import load
-    >>> task = singular_task(load("planar_2r"), mask=[1, 1, 0, 0, 0, 0])
-    >>> space = SearchSpace(task, 2, np.ones(2), np.zeros(2), np.zeros(2), np.zeros(2))
-    >>> round(slope_along(space, np.zeros(2), np.array([0.0, 1.0])), 4)
-    0.2236
-    """
+    """Growth of the M-th singular value from a point of the set, per unit of distance."""
     U, sigma, Vt = np.linalg.svd(task_jacobians(space.task, x * space.unit), full_matrices=True)
     rank = int((sigma > 1e-8 * sigma[:1]).sum())
     rates = task_derivatives(space.task, x * space.unit)
@@ -175,17 +85,7 @@ def slope_along(space: SearchSpace, x: Array, direction: Array) -> float:
 
 
 def on_set(space: SearchSpace, x: Array) -> tuple[Array, Array, Array]:
-    """Blocks S (N, e), weakest singular values (N,), and gradients G (N, e, n).
-
-    Examples
-    --------
-    >>> from robotmodels.kinematics.singular.task import singular_task
-    >>> from robotmodels.robots import load
-    >>> free = np.full(6, np.inf)
-    >>> space = SearchSpace(singular_task(load("rx90")), 6, np.ones(6), np.zeros(6), -free, free)
-    >>> on_set(space, np.array([[0.1, 0.2, 0.3, 0.4, 0.0, 0.6]]))[1] < 1e-15
-    array([ True])
-    """
+    """Blocks S (N, e), weakest singular values (N,), and gradients G (N, e, n)."""
     task, M, q = space.task, space.dimension, x * space.unit
     U, sigma, Vt = np.linalg.svd(task_jacobians(task, q), full_matrices=True)
     U, V = U[:, :, M - 1 :], Vt[:, M - 1 :]
@@ -201,13 +101,7 @@ def on_set(space: SearchSpace, x: Array) -> tuple[Array, Array, Array]:
 
 
 def normals_of(G: Array) -> tuple[Array, NDArray[np.int64]]:
-    """Orthonormal rows (N, e, n) spanning those of G, zero beyond their number (N,).
-
-    Examples
-    --------
-    >>> normals_of(np.array([[[0.0, 2.0, 0.0]]]))[1]
-    array([1])
-    """
+    """Orthonormal rows (N, e, n) spanning those of G, zero beyond their number (N,)."""
     _, size, Vt = np.linalg.svd(G, full_matrices=False)
     counts = size > _WEAK * np.maximum(size[:, :1], 1e-12)
     return Vt * counts[..., None], counts.sum(axis=1)
@@ -224,17 +118,7 @@ def _step(S: Array, G: Array) -> Array:
 
 
 def to_set(space: SearchSpace, x: Array, steps: int) -> Array:
-    """Newton's iteration to the set, inside the limits: points (N, n) after some steps.
-
-    Examples
-    --------
-    >>> from robotmodels.kinematics.singular.task import singular_task
-    >>> from robotmodels.robots import load
-    >>> home, free = np.array([0.1, 0.2, 0.3, 0.4, 0.2, 0.6]), np.full(6, np.inf)
-    >>> space = SearchSpace(singular_task(load("rx90")), 6, np.ones(6), home, -free, free)
-    >>> abs(to_set(space, home[None], 60)[0, 4]) < 1e-12
-    np.True_
-    """
+    """Newton's iteration to the set, inside the limits: points (N, n) after some steps."""
     x = np.clip(x, space.lower, space.upper)
     for _ in range(steps):
         S, weakest, G = on_set(space, x)

@@ -16,31 +16,9 @@ from .task import SingularTask, generator_of
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ArmStructure:
-    """What is always so in an arm: where its last axes meet, which axes are parallel.
+    """Permanent structure of an arm: wrist centre and parallel axes.
 
-    Parameters
-    ----------
-    joints : ndarray of int, shape (k,)
-        Numbers of the frames of the joints that move the frame asked about, from the base.
-    revolute : ndarray of bool, shape (k,)
-        Which of them turn.
-    centre : ndarray, shape (3,), or None
-        Point where the last three axes meet, in the frame of the last but one joint, metres.
-    last_two : ndarray, shape (3,), or None
-        Point where the last two axes meet, in the same frame, metres.
-    shoulder : ndarray, shape (3,), or None
-        Point where the first three axes meet, in the frame of the second joint, metres.
-    parallel : ndarray of bool, shape (k, k)
-        Pairs of axes that are parallel at all configurations.
-    size : float
-        A length of the arm, metres.
-
-    Examples
-    --------
-    >>> from robotmodels.kinematics.singular.task import singular_task
-    >>> from robotmodels.robots import load
-    >>> arm_structure(singular_task(load("rx90"))).centre
-    array([0., 0., 0.])
+    Shapes: joints, revolute (k,); centre, last_two, shoulder (3,); parallel (k, k).
     """
 
     joints: NDArray[np.int64]
@@ -53,25 +31,7 @@ class ArmStructure:
 
 
 def arm_structure(task: SingularTask) -> ArmStructure:
-    """Look for what is always so, at a few random configurations.
-
-    Parameters
-    ----------
-    task : SingularTask
-        The robot and the frame.
-
-    Returns
-    -------
-    ArmStructure
-        Wrist centre and parallel axes.
-
-    Examples
-    --------
-    >>> from robotmodels.kinematics.singular.task import singular_task
-    >>> from robotmodels.robots import load
-    >>> arm_structure(singular_task(load("ur5"))).parallel[1]
-    array([False,  True,  True,  True, False, False])
-    """
+    """Find the permanent structure of an arm at a few random configurations."""
     model = task.model
     joints = model.table.joint_rows[task.moving] + 1
     revolute = model.table.sigma[joints - 1] == REVOLUTE
@@ -90,24 +50,7 @@ def arm_structure(task: SingularTask) -> ArmStructure:
 
 
 def sines(z: Array) -> Array:
-    """Sines of the angles between axes.
-
-    Parameters
-    ----------
-    z : ndarray, shape (k, 3)
-        Unit vectors.
-
-    Returns
-    -------
-    ndarray, shape (k, k)
-        Of each pair.
-
-    Examples
-    --------
-    >>> sines(np.eye(3)[:2])
-    array([[0., 1.],
-           [1., 0.]])
-    """
+    """Sines of the angles between axes. Shapes: z (k, 3) -> (k, k)."""
     return np.linalg.norm(np.cross(z[:, None], z[None, :]), axis=-1)
 
 

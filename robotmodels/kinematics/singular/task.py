@@ -32,33 +32,7 @@ _SEED = 20
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SingularTask:
-    """A frame of a robot and the components of its motion that count, with their scales.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-    frame : str, int or None
-        The frame; None is the tool.
-    mask : ndarray of bool, shape (6,)
-        Which of ``vx vy vz wx wy wz`` count.
-    mask_axes : {"world", "tool"}
-        Axes of the components: the world's or the frame's own, both at the frame's origin.
-    length : float
-        Characteristic length L, metres.
-    moving : ndarray of bool, shape (n,)
-        Joints between the base and the frame; the others never move it.
-    row_scale : ndarray, shape (m,)
-        ``1/L`` for linear rows, 1 for angular rows, of the m components that count.
-    joint_scale : ndarray, shape (n,)
-        Joint units: 1 rad, or L metres.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> singular_task(load("rx90")).length
-    0.9
-    """
+    """A frame of a robot and the components of its motion that count, with their scales."""
 
     model: RobotModel
     frame: str | int | None
@@ -87,38 +61,7 @@ def singular_task(
     mask_axes: MaskAxes = "world",
     length: float | None = None,
 ) -> SingularTask:
-    """Check what is asked about and settle its units.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-    frame : str or int, optional
-        Name or number of a frame; default the tool.
-    mask : array_like, shape (6,), optional
-        Ones for the components ``vx vy vz wx wy wz`` that count; default all.
-    mask_axes : {"world", "tool"}
-        Axes of the components.
-    length : float, optional
-        Characteristic length, metres; default `characteristic_length`.
-
-    Returns
-    -------
-    SingularTask
-        The task.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, FrameNotFoundError
-        A mask that is not six zeros and ones or is empty; axes or a length that cannot be; no
-        such frame.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> singular_task(load("planar_2r"), mask=[1, 1, 1, 0, 0, 0]).rows
-    3
-    """
+    """Check the frame and the components of a task and scale their units."""
     check_model(model)
     path = model.twin.frame(frame).path
     if mask_axes not in _REFERENCES:
@@ -149,30 +92,7 @@ def singular_task(
 
 
 def position_decides(model: RobotModel, frame: str | int | None = None) -> bool:
-    """Whether the position of a frame alone is what its joints are for.
-
-    So it is where at most three joints move it, and its position has in general as many freedoms
-    as they are: two links in a plane, or the arm of a robot without its wrist. Their singular
-    positions are then those of the position; the whole twist would hardly ever lose a freedom.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    frame : str or int, optional
-        Name or number of a frame; default the tool.
-
-    Returns
-    -------
-    bool
-        False for a frame that no joint moves.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> [position_decides(load(name)) for name in ("planar_2r", "planar_3r", "rx90")]
-    [True, False, False]
-    """
+    """Whether the joints of a frame determine its position only (at most three joints)."""
     check_model(model)
     path = model.twin.frame(frame).path
     columns = np.isin(model.table.joint_rows + 1, path)
@@ -188,53 +108,14 @@ def position_decides(model: RobotModel, frame: str | int | None = None) -> bool:
 def deciding_mask(
     model: RobotModel, frame: str | int | None, mask: ArrayLike | None
 ) -> ArrayLike | None:
-    """The mask that was given, or that of the position where `position_decides`.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    frame : str or int, optional
-        Name or number of a frame; None is the tool.
-    mask : array_like or None
-        What the caller passed: it wins.
-
-    Returns
-    -------
-    array_like or None
-        None for the whole twist.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> deciding_mask(load("planar_2r"), None, None), deciding_mask(load("rx90"), None, None)
-    ((1, 1, 1, 0, 0, 0), None)
-    """
+    """The mask that was given, or that of the position where `position_decides`."""
     if mask is None and position_decides(model, frame):
         return (1, 1, 1, 0, 0, 0)
     return mask
 
 
 def counting_lines(mask: NDArray[np.bool_], frame: str) -> list[str]:
-    """A line about what counts, where it is not the whole twist.
-
-    Parameters
-    ----------
-    mask : ndarray of bool, shape (6,)
-        Components that count.
-    frame : str
-        What the frame is called.
-
-    Returns
-    -------
-    list of str
-        One line, or none.
-
-    Examples
-    --------
-    >>> counting_lines(np.array([True, True, True, False, False, False]), "the tool")
-    ['What counts is the position of the tool (vx, vy, vz)']
-    """
+    """Line that names the components of the task, where it is not the whole twist."""
     if mask.all():
         return []
     names = ", ".join(n for n, on in zip(_COMPONENTS, mask, strict=True) if on)
@@ -247,28 +128,7 @@ def counting_lines(mask: NDArray[np.bool_], frame: str) -> list[str]:
 
 
 def task_jacobians(task: SingularTask, q: Array) -> Array:
-    """Jacobians of a task without units.
-
-    Parameters
-    ----------
-    task : SingularTask
-        m components of a robot of n joints.
-    q : ndarray, shape (..., n)
-        Joint variables, rad or m.
-
-    Returns
-    -------
-    ndarray, shape (..., m, n)
-        Rows divided and columns multiplied by their scales.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> task = singular_task(load("planar_2r"), mask=[1, 1, 0, 0, 0, 0])
-    >>> task_jacobians(task, np.zeros(2))
-    array([[0. , 0. ],
-           [1. , 0.5]])
-    """
+    """Jacobians of a task without units. Shapes: q (..., n) -> (..., m, n)."""
     J = jacobian(task.model, q, task.frame, _REFERENCES[task.mask_axes])
     return J[..., task.mask, :] * (task.row_scale[:, None] * task.joint_scale)
 
@@ -276,25 +136,7 @@ def task_jacobians(task: SingularTask, q: Array) -> Array:
 def task_derivatives(task: SingularTask, q: Array) -> Array:
     """Derivatives of `task_jacobians` with respect to the joints, in joint units.
 
-    Parameters
-    ----------
-    task : SingularTask
-        m components of a robot of n joints.
-    q : ndarray, shape (..., n)
-        Joint variables, rad or m.
-
-    Returns
-    -------
-    ndarray, shape (..., n, m, n)
-        Entry ``[..., i, :, :]`` is the derivative of the Jacobian along joint i.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> task = singular_task(load("planar_2r"), mask=[1, 1, 0, 0, 0, 0])
-    >>> task_derivatives(task, np.zeros(2))[1]
-    array([[-0.5, -0.5],
-           [ 0. ,  0. ]])
+    Shapes: q (..., n) -> (..., n, m, n).
     """
     along = np.diag(task.joint_scale)
     reference = _REFERENCES[task.mask_axes]
@@ -303,30 +145,7 @@ def task_derivatives(task: SingularTask, q: Array) -> Array:
 
 
 def above_zero(value: float, name: str) -> float:
-    """A finite number above zero, such as a tolerance.
-
-    Parameters
-    ----------
-    value : float
-        The number.
-    name : str
-        Used in error messages.
-
-    Returns
-    -------
-    float
-        The number.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Anything else.
-
-    Examples
-    --------
-    >>> above_zero(1, "tolerance")
-    1.0
-    """
+    """A finite number above zero, such as a tolerance."""
     number = float(as_exact(value, (), name))
     if not (number > 0.0 and isfinite(number)):
         raise InvalidValueError(f"{name}: expected a finite number above 0, got {value!r}.")
@@ -334,32 +153,7 @@ def above_zero(value: float, name: str) -> float:
 
 
 def whole_number(value: int, name: str, least: int) -> int:
-    """A whole number that is not too small, such as a count.
-
-    Parameters
-    ----------
-    value : int
-        The number.
-    name : str
-        Used in error messages.
-    least : int
-        The least that is allowed.
-
-    Returns
-    -------
-    int
-        The number.
-
-    Raises
-    ------
-    InvalidValueError
-        Anything else.
-
-    Examples
-    --------
-    >>> whole_number(3, "samples", 1)
-    3
-    """
+    """A whole number that is not too small, such as a count."""
     try:
         number = index(value)
     except TypeError:
@@ -372,28 +166,7 @@ def whole_number(value: int, name: str, least: int) -> int:
 
 
 def generator_of(rng: np.random.Generator | int | None) -> np.random.Generator:
-    """A generator: itself, of a seed, or of a fixed seed.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator or int, optional
-        Generator or seed.
-
-    Returns
-    -------
-    numpy.random.Generator
-        The generator.
-
-    Raises
-    ------
-    InvalidValueError
-        Anything else.
-
-    Examples
-    --------
-    >>> int(generator_of(1).integers(10)) == int(generator_of(1).integers(10))
-    True
-    """
+    """A generator: itself, of a seed, or of a fixed seed."""
     if isinstance(rng, np.random.Generator):
         return rng
     return np.random.default_rng(_SEED if rng is None else whole_number(rng, "rng", 0))

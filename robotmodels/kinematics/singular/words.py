@@ -30,34 +30,7 @@ def kinds_in_words(
 ) -> tuple[tuple[SingularityKind | None, str], ...]:
     """Names of what makes a configuration singular, each with a sentence.
 
-    Parameters
-    ----------
-    task : SingularTask
-        The robot and the frame.
-    q : ndarray, shape (n,)
-        Configuration, rad or m.
-    structure : ArmStructure
-        What is always so.
-    motions : tuple of SelfMotion
-        Self-motions at q.
-    wrenches : ndarray, shape (p, 6)
-        Lost directions as wrenches, in world axes at the frame's origin.
-    redundancy : int
-        Self-motions that are there at every configuration.
-    zero : float
-        Sines and lengths over the size of the arm below this are zero.
-
-    Returns
-    -------
-    tuple of (SingularityKind or None, str)
-        Each once; None for a remark about axes that happen to be aligned.
-
-    Examples
-    --------
-    >>> from robotmodels.kinematics.singular.classification import classify_singularity
-    >>> from robotmodels.robots import load
-    >>> classify_singularity(load("rx90"), [0.1, 0.2, 0.3, 0.4, 0.0, 0.6]).words
-    ('wrist: the axes of joints 4 and 6 are aligned',)
+    Shapes: q (n,), wrenches (p, 6).
     """
     scene = _Scene(task, q, structure, zero)
     if redundancy:

@@ -59,30 +59,7 @@ class Criterion(Protocol):
 
 
 def checked_positive(value: ArrayLike, name: str) -> float:
-    """A positive finite number.
-
-    Parameters
-    ----------
-    value : float
-        What was given.
-    name : str
-        Used in the message.
-
-    Returns
-    -------
-    float
-        The number.
-
-    Raises
-    ------
-    InvalidValueError
-        Anything else.
-
-    Examples
-    --------
-    >>> checked_positive(2, "gain")
-    2.0
-    """
+    """A positive finite number."""
     number = as_reals(value, name)
     if number.ndim or not 0.0 < number < np.inf:
         raise InvalidValueError(f"{name}: expected a positive number, got {value!r}.")

@@ -69,30 +69,7 @@ class JointLimitCriterion(Rebuilt):
 
 
 def checked_limit(value: ArrayLike, name: str) -> Array:
-    """A limit given to a criterion: a number or a vector, maybe infinite.
-
-    Parameters
-    ----------
-    value : array_like
-        What was given.
-    name : str
-        Used in the message.
-
-    Returns
-    -------
-    ndarray, shape () or (n,)
-        Read-only.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        No vector, or NaN.
-
-    Examples
-    --------
-    >>> checked_limit([1, np.inf], "upper")
-    array([ 1., inf])
-    """
+    """A limit given to a criterion: a number or a vector, maybe infinite."""
     array = as_reals(value, name)
     if array.ndim > 1:
         raise ShapeError(f"{name}: expected shape (n,) or a number, got {array.shape}.")
@@ -102,31 +79,7 @@ def checked_limit(value: ArrayLike, name: str) -> Array:
 
 
 def ranges(model: RobotModel, lower: Array | None, upper: Array | None) -> tuple[Array, Array]:
-    """Middles of the joints' ranges and the inverses of their widths, 0 where there is no range.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, n joints.
-    lower, upper : ndarray, shape (n,) or (), or None
-        Limits; None takes the robot's.
-
-    Returns
-    -------
-    middle, inverse : ndarray, shape (n,)
-        rad or m, and per rad or per m.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Limits of another number of joints, or a lower one above the upper one.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> ranges(load("planar_2r"), np.array([-1.0, -np.inf]), np.array([3.0, 2.0]))
-    (array([1., 0.]), array([0.25, 0.  ]))
-    """
+    """Middles of the joints' ranges and the inverses of their widths, 0 where there is no range."""
     check_model(model)
     low = model.lower if lower is None else lower
     high = model.upper if upper is None else upper
