@@ -141,12 +141,9 @@ def standard_deviations(prior: ParameterPrior, problem: Problem) -> Array:
 
 
 def widened(prior: ParameterPrior, solution: Solution) -> ParameterPrior:
-    """The prior with larger lengths or angles, where the corrections found contradict it.
-
-    The mean square of the corrections relative to the prior, over as many parameters as the
-    measurements determine, is the factor that maximises the evidence (D. J. C. MacKay, "Bayesian
-    interpolation", Neural Computation 4, 1992).
-    """
+    """The prior with larger lengths or angles, where the corrections found contradict it."""
+    # the factor maximises the evidence: D. J. C. MacKay, "Bayesian interpolation", Neural
+    # Computation 4, 1992
     problem, fit = solution.problem, solution.fit
     f = problem.parameters.model.f
     size = fit.prior.deviation / np.sqrt(fit.prior.strength)

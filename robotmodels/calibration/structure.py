@@ -1,4 +1,12 @@
-"""A test whether residuals still depend on the posture: structure that no parameter takes."""
+"""A test whether residuals still depend on the posture: structure that no parameter takes.
+
+Residuals are taken orthogonal to all columns of the geometry, so that a prior has no say. Each test
+compares the square of their projection on some columns with those after the signs of whole postures
+were drawn at random, which independent noise of any size allows.
+
+Source: C. F. J. Wu, "Jackknife, bootstrap and other resampling methods in regression analysis", The
+Annals of Statistics 14, 1986.
+"""
 
 from __future__ import annotations
 
@@ -69,13 +77,7 @@ class Structure(NamedTuple):
 
 
 def structure_of(solution: Solution, found: IdentifiableParameters) -> Structure | None:
-    """Test residuals for terms that the fit did not include, and for any smooth joint error.
-
-    The residuals are taken orthogonal to all columns of the geometry, so that a prior has no say.
-    Each test compares the square of their projection on some columns with those after the signs
-    of whole postures were drawn at random, which independent noise of any size allows (C. F. J.
-    Wu, The Annals of Statistics 14, 1986). None if they may be noise, or are too few.
-    """
+    """Test residuals for terms that a fit did not include; None if they may be noise."""
     whole, is_complete = _all_parameters(solution, found)
     problem = problem_of(whole, solution.problem.measurements)
     fit, size = solution.fit, whole.skeleton.size

@@ -19,13 +19,10 @@ _TINY, _SINGULAR = 1e-300, 1e-13
 
 
 def untold_by(solution: Solution, start: Array) -> list[str]:
-    """Parameters that the measurements and the prior do not tell from nothing, at their noise.
-
-    The standard errors are those of the linear model, the larger of two: where the fit started, as
-    a fit that ran away along such a parameter finds it well told there; and where it ended, as the
-    constraints that are violated at the start seem to tell more than they do. The least told
-    parameter is left out first, as it may hide others.
-    """
+    """Parameters that the measurements and the prior do not tell from nothing, at their noise."""
+    # Standard errors are the larger of two: where the fit started, as a fit that ran away along a
+    # parameter finds it well told there; and where it ended, as constraints that are violated at
+    # the start seem to tell more than they do. The least told goes first: it may hide others.
     problem, prior = solution.problem, solution.fit.prior
     reach = problem.parameters.skeleton.size
     limit = np.full(problem.P + problem.F, np.inf)
