@@ -66,7 +66,7 @@ def fit(
     couplings: Iterable[tuple[int, int]] = (),
     compliance: Compliance | str = Compliance.NONE,
     eccentricity: bool = False,
-    loss: Loss | str = Loss.SQUARES,
+    loss: Loss | str | None = None,
     prior: ParameterPrior | None = _PRIOR,
     truncation: float | None = None,
     folds: int = 5,
@@ -96,8 +96,8 @@ def fit(
         need one of ``known_lengths``.
     base, tool, gains, couplings, compliance, eccentricity
         As `candidate_parameters`.
-    loss : Loss or str
-        ``"squares"``, or against outliers ``"huber"``, ``"cauchy"``, ``"tukey"``.
+    loss : Loss or str, optional
+        ``"squares"`` (the default), or against outliers ``"huber"``, ``"cauchy"``, ``"tukey"``.
     prior : ParameterPrior, optional
         How large the deviations are thought to be: the estimate is then the maximum a posteriori,
         and parameters that noise hides stay where they are. None for none.
@@ -146,7 +146,7 @@ def fit(
     aside = _measurements_aside(held_out)
     if folds and folds < 2:
         raise InvalidValueError(f"folds: expected 2 or more, or 0 for none, got {folds}.")
-    loss = chosen(Loss, loss, "loss")
+    loss = Loss.SQUARES if loss is None else chosen(Loss, loss, "loss")
     chance = np.random.default_rng(_SEED if rng is None else rng)
     frames = measured_frames((*measured, *aside))
     given = names = None
