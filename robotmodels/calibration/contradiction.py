@@ -1,4 +1,4 @@
-"""Known distances that the other measurements contradict, and outliers beside known distances."""
+"""Consistency of known distances with the other measurements."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from .measurements import KnownDistance
 from .solve import Solution, solve
 
 _DOUBTFUL, _CONTRADICTED = 2.0, 3.0
-"""Standard errors from which a distance is predicted by a fit without it, and is contradicted."""
+"""Residual from which a distance is checked by a fit without it, and difference from which it is
+reported, standard errors."""
 _COMMON = 0.5
-"""Part of the residuals that may be common to all postures at a point: what no parameter takes does
-not average out."""
+"""Part of the residuals assumed systematic, so that averaging over postures does not reduce it."""
 _ALONE = 1e-8
-"""Share of a row that is not fitted by itself, under which nothing else predicts it."""
+"""1 - leverage of a row below which no other row predicts it."""
 
 
 class Contradiction(NamedTuple):
-    """A known distance, and what a fit without it predicts."""
+    """A known distance and its prediction by a fit without it."""
 
     block: int
     """Its number among all blocks."""
@@ -42,11 +42,11 @@ class Contradiction(NamedTuple):
 
     @property
     def errors(self) -> float:
-        """Standard errors that both are apart."""
+        """Difference in standard errors."""
         return abs(self.others - self.measurement.length) / math.hypot(self.sigma, self.doubt)
 
     def sentence(self) -> str:
-        """What was stated, what the others say, and what to look for."""
+        """The note about it."""
         m, doubt = self.measurement, 1e3 * self.doubt
         digits = max(0, 1 - math.floor(math.log10(max(doubt, 1e-6))))
         prior = np.isfinite(self.without.fit.prior.deviation).any()
@@ -62,7 +62,7 @@ class Contradiction(NamedTuple):
 def contradictions(
     solution: Solution, size_is_known: bool, truncation: float | None = None
 ) -> list[Contradiction]:
-    """Known distances that fits without them do not confirm, the worst first."""
+    """Known distances that differ from the fit without them, the worst first."""
     problem, fit = solution.problem, solution.fit
     measurements = problem.measurements
     if not any(isinstance(m, KnownDistance) for m in measurements):

@@ -1,4 +1,4 @@
-"""Measurements parted for validation: what belongs together is kept aside together."""
+"""Partition of measurements into folds for cross-validation."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from .measurements import Labelled, Measurement, length_is_known, lonely_labels
 _NEAR = 0.2
 """Extent of one place, relative to the size of the robot."""
 _FEWEST = 3
-"""Places from which one can be left out: a fit to one alone says little of another."""
+"""Smallest number of places for leaving places out."""
 
 Numbers = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 
 class Part(NamedTuple):
-    """Masks of the blocks to predict and of those to fit, shape (B,); some may be in neither."""
+    """Masks of the validation and the training blocks, shape (B,); a block may be in neither."""
 
     aside: Mask
     kept: Mask
 
 
 class Dealing(NamedTuple):
-    """Parts to keep aside in turn: so many whole places, runs of postures; what they miss."""
+    """Folds, number of places left out, whether runs of postures are left out, and a note."""
 
     parts: tuple[Part, ...]
     places: int
@@ -42,7 +42,7 @@ class Dealing(NamedTuple):
 
     @property
     def manner(self) -> str:
-        """What is kept aside, in words."""
+        """Description for the report."""
         runs = "runs of successive postures, those next to a run left out of the fit as well,"
         whole = f"whole places ({self.places})"
         if self.places and self.runs:
@@ -100,7 +100,7 @@ def dealt_blocks(
 
 
 def _postures(seen: Sequence[Measurement]) -> Numbers:
-    """Number of the posture of each block: equal for equal readings, of all measurements."""
+    """Posture index of each block; equal readings have the same index."""
     found: dict[bytes, int] = {}
     numbers = []
     for m in seen:
@@ -111,7 +111,7 @@ def _postures(seen: Sequence[Measurement]) -> Numbers:
 
 
 def _things(seen: Sequence[Measurement]) -> Numbers:
-    """Number of what each block is of: a label, a measurement with unknowns, or none of these."""
+    """Index of the touched or seen object of each block."""
     found: dict[tuple[str, ...], int] = {}
     numbers = []
     for m in seen:
@@ -126,7 +126,7 @@ def _things(seen: Sequence[Measurement]) -> Numbers:
 def _places(
     model: RobotModel, seen: Sequence[Measurement], posture: Numbers, thing: Numbers, near: float
 ) -> Numbers:
-    """Place of each block: of labelled things at which the end stays; -1 for others."""
+    """Place index of each block, -1 for blocks without a place."""
     place = np.full(len(posture), -1, dtype=np.int64)
     p = np.concatenate([dgm(model, m.views[0].q, m.views[0].frame)[:, :3, 3] for m in seen])
     lonely = {one.label for one in lonely_labels(seen)}
@@ -162,7 +162,7 @@ def _places(
 def _dealt_places(
     measurements: Sequence[Measurement], place: Numbers, folds: int, rng: np.random.Generator
 ) -> Numbers:
-    """Fold of each block by its place, the smallest without which a length is still known."""
+    """Fold of each block by its place; folds are balanced and each keeps a known length in its fit."""
     fold = np.full(len(place), -1, dtype=np.int64)
     length = length_is_known(measurements)
     for one in rng.permutation(np.unique(place[place >= 0])):
@@ -177,7 +177,7 @@ def _dealt_places(
 
 
 def parted(measurements: Sequence[Measurement], kept: Mask) -> list[tuple[int, Measurement]]:
-    """Some of the blocks, with known distances of what they touch; and of which measurement."""
+    """Measurements restricted to some blocks, with their indices."""
     parts: list[tuple[int, Measurement]] = []
     first = 0
     for k, m in enumerate(measurements):

@@ -1,4 +1,4 @@
-"""Whether there are more rows than unknowns, and how many measurements are missing."""
+"""Check that there are more rows than unknowns."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from .problem import guessed_fixtures, problem_of
 
 _SEED = 17
 _ROWS = 4
-"""Rows for each unknown that tell what more measurements of the same kinds would tell."""
+"""Rows per unknown in the simulated larger data set."""
 _STILL = 0.02
-"""Range of the readings of a joint below which it is not meant to move, rad or m."""
+"""Range of readings below which a joint counts as fixed, rad or m."""
 
 
 def check_enough(
@@ -50,7 +50,7 @@ def _told_by_more(
     found: IdentifiableParameters, measured: Sequence[Measurement], known_lengths: Iterable[str],
     known: Iterable[str], dependent: float,
 ) -> int:  # fmt: skip
-    """Number of parameters that the same kinds of measurement tell in many postures."""
+    """Number of identifiable parameters with many random configurations of the same measurements."""
     candidates = found.candidates
     rng = np.random.default_rng(_SEED)
     seen = [view.q for m in measured for view in m.views]

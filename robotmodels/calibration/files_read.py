@@ -1,4 +1,4 @@
-"""Files that measurements were read from: whether they hold the same, and how many rows."""
+"""Files of a measurement: names, row counts and consistency."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _ROWS = 3
 
 
 class FileRows(NamedTuple):
-    """A file that was read."""
+    """Name and number of rows of a file."""
 
     name: str
     rows: int
@@ -53,10 +53,7 @@ def check_columns(tables: Sequence[CsvTable]) -> None:
 def check_contents(
     tables: Sequence[CsvTable], readings: Sequence[Array], model: RobotModel, frame: Frame
 ) -> None:
-    """Refuse files whose columns hold something else than the readings that other files hold.
-
-    Shapes: readings (N, n).
-    """
+    """Refuse files whose columns are not joint readings. Shapes: readings (N, n)."""
     rows = set(model.twin.frame(frame).path.tolist())
     other: dict[str, str] = {}
     for t, q in zip(tables, readings, strict=True):

@@ -43,14 +43,14 @@ from .structure import structure_of
 from .untold import untold_by, without_untold
 
 Progress = Callable[[int, int, str], None]
-"""Called with the number of fits done, of all, and what is being done."""
+"""Called with the number of finished fits, their total, and the current task."""
 
 _PRIOR = ParameterPrior()
 _SEED = 1
 _TRIES = 4
-"""Fits until noise hides no parameter any more."""
+"""Largest number of fits for the choice of parameters and of the prior's width."""
 _TOLD_APART = 1e-4
-"""Sine of the angle between columns below which noise hides a parameter behind others."""
+"""Sine of the angle below which a column counts as dependent."""
 
 
 def fit(

@@ -1,4 +1,4 @@
-"""Joints whose readings are asked for, where some of them do not move the tool."""
+"""Text on the joints that readings must contain."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from ..model import RobotModel
 
 
 def joints_that_count(model: RobotModel) -> str:
-    """Which joints count, and how fingers and other branches are left out; empty if all count."""
+    """Sentence on the expected joints; empty if all move the tool."""
     moving = set(model.twin.frame(None).path.tolist())
     names = model.table.joint_names
     idle = [

@@ -1,4 +1,4 @@
-"""The term to try next where residuals have structure, found by fits that include it."""
+"""Fits with additional error terms, compared by cross-validation."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .structure import Structure, TermFamily, structure_of
 _SURE = 3.0
 """Standard errors by which the mean square of errors on data kept aside must fall."""
 _GAIN = 0.02
-"""Part by which it must fall."""
+"""Smallest relative decrease of the mean square."""
 _ROUGH = 1e-6
 
 
@@ -33,9 +33,9 @@ class Trial(NamedTuple):
     gain: float
     """Part by which their mean square falls."""
     helps: bool
-    """Whether it falls by more than chance explains."""
+    """Whether the decrease is significant."""
     explains_all: bool
-    """Whether the residuals with it may be independent."""
+    """Whether the residuals of this fit show no structure."""
 
 
 def trials_of(
@@ -49,10 +49,10 @@ def trials_of(
     without: AsideErrors,
     done: Callable[[], None],
 ) -> list[Trial]:
-    """Fit with each family that residuals resemble, and again without each part; best gain first.
+    """Fits with each indicated family, validated on the same folds; largest gain first.
 
-    ``identify`` gives those of some candidates that the measurements tell; ``before`` are errors of
-    the nominal robot at all blocks, ``without`` those of the parts without the family.
+    ``identify`` gives the identifiable ones of some candidates; ``before`` are errors of the
+    nominal robot at all blocks, ``without`` those of the folds without the family.
     """
     solution = refit.solution
     problem, old = solution.problem, solution.problem.parameters
@@ -78,7 +78,7 @@ def trials_of(
 
 
 def _gain(before: BlockErrors, after: BlockErrors) -> tuple[float, bool]:
-    """Part by which the mean square falls, units by their rms before; whether for certain."""
+    """Relative decrease of the mean square (units scaled by their rms before); whether significant."""
     scale = [before.summary(unit).rms for unit in ("m", "rad")]
     was, now = (
         np.nansum([(e / s) ** 2 for e, s in zip(errors, scale, strict=True) if s > 0.0], axis=0)
@@ -94,7 +94,7 @@ def _gain(before: BlockErrors, after: BlockErrors) -> tuple[float, bool]:
 def note_of_structure(
     structure: Structure, trials: Sequence[Trial], without: AsideErrors | None
 ) -> str:
-    """Say that residuals have structure, and which of the terms tried is the one to try next."""
+    """Note on residual structure and the recommended term."""
     p = f"(p = {structure.p:.2g})"
     text = [
         f"Not geometry: residuals depend on the posture {p} in a way that no parameter of the "

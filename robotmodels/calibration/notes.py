@@ -1,4 +1,4 @@
-"""What is strange about measurements, in sentences: what to repair, and what to measure next."""
+"""Notes on measurements and fits."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far another tool could be off after a calibration: predicted from the covariance."""
+"""Predicted error of another tool after a calibration."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _POSTURES = 200
 """Largest number of the measured postures that a prediction is made for."""
 _SINGULAR = 1e-13
 _LEAST_LENGTH = 0.1
-"""Length of the tool in sizes of the robot, where the present tool is shorter."""
+"""Smallest length of the tool, relative to the size of the robot."""
 
 
 class PredictedError(NamedTuple):
@@ -136,7 +136,7 @@ def other_tool_error(
 
 
 def _posterior(result: CalibrationResult) -> tuple[GeometricParameters, Array, Array]:
-    """Candidates that are not known, a factor F of their covariance F F^T, and their values."""
+    """Unknown candidates, a factor F of their covariance F F^T, and their corrections."""
     found, solution = result.identifiable, result.solution
     fit, estimated = solution.fit, solution.problem.parameters
     f = estimated.model.f

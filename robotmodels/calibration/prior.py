@@ -1,4 +1,4 @@
-"""How large the deviations of a robot are thought to be before anything is measured."""
+"""Gaussian prior of the geometric corrections."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .solve import Solution, solve
 
 _FOLDS = 5
 _CONTRADICTED = 1.5
-"""Corrections relative to the prior, root mean square, from which it is widened."""
+"""Rms of corrections over their prior standard deviations from which the prior is widened."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -131,7 +131,7 @@ _STRENGTHS = np.logspace(-3.0, 3.0, 13)
 
 
 def standard_deviations(prior: ParameterPrior, problem: Problem) -> Array:
-    """What a prior gives to the P parameters of a problem, shape (P,); infinite for none."""
+    """Prior standard deviations of the parameters, shape (P,); infinite without prior."""
     parameters = problem.parameters
     f = parameters.model.f
     return np.array([
@@ -141,7 +141,7 @@ def standard_deviations(prior: ParameterPrior, problem: Problem) -> Array:
 
 
 def widened(prior: ParameterPrior, solution: Solution) -> ParameterPrior:
-    """The prior with larger lengths or angles, where the corrections found contradict it."""
+    """Prior widened by maximum evidence where the corrections contradict it."""
     # the factor maximises the evidence: D. J. C. MacKay, "Bayesian interpolation", Neural
     # Computation 4, 1992
     problem, fit = solution.problem, solution.fit
@@ -163,7 +163,7 @@ def widened(prior: ParameterPrior, solution: Solution) -> ParameterPrior:
 
 
 def note_of_prior(given: ParameterPrior | None, used: ParameterPrior | None) -> tuple[str, ...]:
-    """A sentence where the prior of a fit is not the one that was given."""
+    """Note if the prior was widened."""
     if given is None or used is None or given is used:
         return ()
     changes = [
@@ -178,7 +178,7 @@ def note_of_prior(given: ParameterPrior | None, used: ParameterPrior | None) -> 
 
 
 def largest_factors(problem: Problem) -> Array:
-    """What each of P parameters is multiplied by at most (1, readings, loads), shape (P,)."""
+    """Largest factor (1, reading or load) of each parameter, shape (P,)."""
     largest = np.zeros(problem.P)
     for views in problem.factors:
         for factors in views:

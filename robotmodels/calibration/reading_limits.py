@@ -1,4 +1,4 @@
-"""Readings of joints beyond what they can be: degrees, another order, sign or zero."""
+"""Check of joint readings against the joint limits."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from ..model import RobotModel
 from .measurements import Measurement
 
 _TURNS = 30.0
-"""Reading of a revolute joint beyond which degrees are more likely, rad."""
+"""Largest plausible reading of a revolute joint, rad; beyond it, degrees are assumed."""
 _BEYOND, _PART = 0.02, 0.02
-"""What a reading may be beyond a limit, rad or m, or part of the range if that is more."""
+"""Tolerance beyond a limit, rad or m, or relative to the range."""
 _MOST = 0.75
-"""Part of the readings of a joint beyond its limits that no zero or wear explains."""
+"""Fraction of readings beyond the limits from which they are refused."""
 
 
 def check_readings(
@@ -54,10 +54,7 @@ def check_readings(
 
 
 def beyond_limits(model: RobotModel, q: Array, rows: set[int]) -> tuple[list[str], bool]:
-    """Joints that read more than their limits allow, and whether one does so most of the time.
-
-    Shapes: q (N, n).
-    """
+    """Sentences on joints beyond their limits, and whether a joint mostly is. Shapes: q (N, n)."""
     lower, upper = model.lower, model.upper
     room = np.maximum(_BEYOND, _PART * np.where(np.isfinite(upper - lower), upper - lower, 0.0))
     checked = (upper > lower) & [row + 1 in rows for row in model.table.joint_rows]

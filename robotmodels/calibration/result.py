@@ -18,7 +18,8 @@ from .other_tool import PredictedError, other_tool_error
 from .solve import Solution
 
 _SAYS_LITTLE = 0.7
-"""Standard error relative to the prior's from which the measurements say little of a parameter."""
+"""Standard error relative to the prior's from which a parameter is determined mainly by the prior.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -133,7 +134,7 @@ class CalibrationResult(Rebuilt):
 
     @property
     def other_tool(self) -> PredictedError:
-        """How far another tool could be off where this one was measured, see `other_tool_error`."""
+        """Predicted error of another tool in the measured postures, see `other_tool_error`."""
         return other_tool_error(self)
 
     @property

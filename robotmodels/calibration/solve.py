@@ -1,4 +1,4 @@
-"""One fit of given parameters to given measurements, deviations of the noise estimated along.
+"""Fit of given parameters, with noise estimation.
 
 Source: Seed book section 1.4.4.3.
 """
@@ -18,10 +18,10 @@ from .problem import Problem, guessed_fixtures, stacked
 _FIRST_LENGTH = 1e-3
 """Standard deviation of lengths before it has been estimated, m."""
 _LITTLE = 0.05
-"""Noise that the estimation begins with beside a prior, relative to that without one."""
+"""Initial noise beside a prior, relative to the initial noise without one."""
 _ROUNDS = 10
 _LENT = 50.0
-"""Rows of all measurements of a kind that each of them estimates its noise with, beside its own."""
+"""Pseudo-rows by which noise estimates of one kind are drawn to their common value."""
 _SETTLED = 1e-3
 _NOTHING = 1e-13
 _ROUGH = 1e-6
@@ -81,7 +81,9 @@ def solve(
     truncation: float | None = None,
     tolerance: float = 1e-12,
 ) -> Solution:
-    """Iterated least squares; noise that is not stated is estimated for each kind and unit."""
+    """Iteratively reweighted nonlinear least squares; unstated noise is estimated for each kind and
+    unit.
+    """
     if start is None:
         xi = np.zeros(problem.P)
         start = np.concatenate([xi, guessed_fixtures(problem, xi)])
@@ -142,7 +144,8 @@ def _is_exact(problem: Problem, scales: tuple[Array, ...]) -> bool:
 def _estimated_scales(
     problem: Problem, fit: NonlinearFit, scales: tuple[Array, ...]
 ) -> tuple[Array, ...]:
-    """Noise of each measurement and unit from its residuals, freedom shared by leverage.
+    """Noise of each measurement and unit (residual variance by leverage), shrunk to the common
+    value of its kind.
 
     Measurements of one kind lend each other some rows: one of few rows says little of its noise.
     """

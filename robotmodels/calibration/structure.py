@@ -31,20 +31,20 @@ from .problem import Problem, evaluations, problem_of, stacked
 from .solve import Solution
 
 _DOUBT = 0.01
-"""Probability, of all tests together, under which residuals have structure."""
+"""Significance level of all tests together."""
 _HINT = 0.05
-"""Probability under which a family of terms is worth a fit."""
+"""Significance level at which a family is tried."""
 _FLIPS = 999
 _FEWEST = 20
-"""Postures, and rows more than unknowns, below which nothing is tested."""
+"""Smallest numbers of postures and of residual degrees of freedom for the test."""
 _ROUNDING = 1e-8
-"""Residuals, in sizes of the robot or rad, of data that are exact."""
+"""Largest residuals of exact data, relative to the robot's size, or rad."""
 _DEPENDENT = 1e-4
 """Sine of the angle to the columns of the fit below which a column is one of them."""
 
 
 class TermFamily(NamedTuple):
-    """Terms that a fit may include: how they are called, the option of `fit`, their laws."""
+    """Error terms: name, option of `fit`, error laws."""
 
     word: str
     option: str
@@ -65,19 +65,19 @@ class Structure(NamedTuple):
     """Residuals that depend on the posture, and the families of terms that they resemble."""
 
     p: float
-    """Probability of residuals as much alike if the measurements are independent."""
+    """p-value of the combined test (Bonferroni)."""
     parameters: GeometricParameters
     """Those of the fit, the others of the table, and those of all families."""
     hinted: tuple[TermFamily, ...]
     """Families that the fit did not include and that the residuals resemble."""
     others: tuple[TermFamily, ...]
-    """Families that it did not include either and that they do not resemble."""
+    """Families not included and not indicated."""
     is_complete: bool
     """Whether the test allows for every parameter of the table, base and tool."""
 
 
 def structure_of(solution: Solution, found: IdentifiableParameters) -> Structure | None:
-    """Test residuals for terms that a fit did not include; None if they may be noise."""
+    """Lack-of-fit test of a solution; None if the residuals may be noise."""
     whole, is_complete = _all_parameters(solution, found)
     problem = problem_of(whole, solution.problem.measurements)
     fit, size = solution.fit, whole.skeleton.size
@@ -181,7 +181,7 @@ def _basis(columns: Array, least: float) -> Array:
 
 
 def _smooth_columns(problem: Problem, deviation: Array, solution: Solution) -> list[Array]:
-    """For each joint, rows by an error of it that is a product of harmonics of two joints."""
+    """Jacobian columns of smooth position errors of each joint."""
     parameters = problem.parameters
     own = [
         (k, e.row) for k, e in enumerate(parameters.entries)

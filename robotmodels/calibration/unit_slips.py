@@ -1,4 +1,4 @@
-"""Lengths in another unit than they were taken for: compared with what the nominal robot says."""
+"""Check of length units against the nominal robot."""
 
 from __future__ import annotations
 
@@ -37,37 +37,38 @@ _SLIPS = {
 }  # fmt: skip
 _SLIPS |= {(taken, unit): 1.0 / factor for (unit, taken), factor in _SLIPS.items()}
 _NEAR = 0.15
-"""Part by which a ratio may differ from a factor: nominal robots and tools are better known."""
+"""Relative tolerance of a unit factor."""
 _ALIKE = 0.3
-"""Part of measured lengths that scaled nominal ones may leave, to be of the same movements."""
+"""Largest relative residual of measured against scaled nominal lengths."""
 _FAR = 3.0
-"""Scatter of nominal points beyond which a known distance is not theirs."""
+"""Difference of a known distance, in scatters of the nominal points, from which units are checked.
+"""
 _SPREAD = 50.0
-"""Reaches of the robot that no measured length is."""
+"""Implausible measured spread, relative to the robot's reach."""
 _STILL = 200.0
-"""Ratio of nominal to measured movements beyond which nothing was seen to move."""
+"""Ratio of nominal to measured spread from which the measured point counts as fixed."""
 _FEW = 7
-"""Lengths from a pivot that tell its place and their unit."""
+"""Smallest number of lengths for the check of a pivot."""
 
 
 class UnitSlip(NamedTuple):
-    """A ratio of measured to nominal lengths that a unit explains."""
+    """Ratio of measured to nominal lengths explained by a unit."""
 
     unit: str
-    """What the numbers are."""
+    """Actual unit."""
     taken: str
-    """What they were taken for."""
+    """Assumed unit."""
     ratio: float
 
     def sentence(self, stated: str = "metres") -> str:
-        """What the numbers look like, where they should be in a unit."""
+        """Text of the message."""
         text = f"{self.ratio:.3g} times what the robot's nominal geometry gives"
         slip = "" if self.taken == stated else f" taken for {self.taken}"
         return f"{text}; these look like {self.unit}{slip}"
 
     @property
     def factor(self) -> float:
-        """What the numbers are to be multiplied by."""
+        """Factor that corrects the numbers."""
         return 1.0 / _SLIPS[self.unit, self.taken]
 
 
@@ -81,7 +82,7 @@ def slip_of(ratio: float, near: float = _NEAR) -> UnitSlip | None:
 
 
 def slip_of_positions(nominal: Array, measured: Array) -> UnitSlip | None:
-    """By the similarity that brings nominal positions (N, 3) onto measured ones."""
+    """Unit error of positions, by a similarity fit. Shapes: nominal, measured (N, 3)."""
     if len(nominal) < 3:
         return None
     T = best_motion(nominal, measured)
@@ -192,7 +193,7 @@ def _touched(model: RobotModel, measurements: Sequence[Measurement]) -> dict[str
 
 
 def _check_distance(m: KnownDistance, one: Array, other: Array) -> None:
-    """Compare with the nominal robot, whose points scatter about those that it touches."""
+    """Refuse a known distance in another unit."""
     apart = float(np.linalg.norm(one.mean(axis=0) - other.mean(axis=0)))
     spread = np.concatenate([one - one.mean(axis=0), other - other.mean(axis=0)])
     scatter = float(np.sqrt((spread**2).sum(axis=1).mean()))

@@ -1,4 +1,4 @@
-"""Parameters whose effect is smaller than the noise, although it is there."""
+"""Parameters that noise hides."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from .problem import stacked
 from .solve import Solution
 
 LARGEST_LENGTH, LARGEST_ANGLE = 0.01, 0.02
-"""Standard errors that say nothing of a parameter: in sizes of the robot, and rad. Errors that
-depend on the reading or the load are compared by what they move at most."""
+"""Standard errors above which a parameter is not estimated: relative to the robot's size, and rad
+(of the largest effect)."""
 _TINY, _SINGULAR = 1e-300, 1e-13
 
 
 def untold_by(solution: Solution, start: Array) -> list[str]:
-    """Parameters that the measurements and the prior do not tell from nothing, at their noise."""
+    """Names of insignificant parameters, given noise and prior."""
     # Standard errors are the larger of two: where the fit started, as a fit that ran away along a
     # parameter finds it well told there; and where it ended, as constraints that are violated at
     # the start seem to tell more than they do. The least told goes first: it may hide others.

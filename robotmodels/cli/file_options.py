@@ -17,7 +17,7 @@ def add_units(files: Any) -> None:
 
 
 def add_delimiter(files: Any) -> None:
-    """Add the option for what is between cells."""
+    """Add the option of the delimiter."""
     files.add_argument("--delimiter", type=_character, metavar="CHARACTER",
                        help=r"between cells, \t for a tab (default: ; tab or , as "
                        "found)")  # fmt: skip

@@ -34,7 +34,7 @@ def add_command(commands: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Print each name with what it stands for."""
+    """Print each name with its robot."""
     names = robots()
     if arguments.json:
         print_json([{"name": name, "title": title(name)} for name in names])

@@ -75,7 +75,7 @@ def prepare_dependent(chain: JointChain, prepare: Prepare) -> DependentJoints | 
 
 
 def prepare_held(chain: JointChain, held: int, prepare: Prepare) -> DependentJoints | None:
-    """A joint that takes its reference, and a family for the others; None if they have none."""
+    """Solver with joint ``held`` at its reference; None if the other joints have no solver."""
     first = prepare(held_chain(chain, held, 0.0))
     if first is None:
         return None

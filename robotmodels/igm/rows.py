@@ -65,7 +65,8 @@ class Rows(NamedTuple):
 
 
 def rows_by_family(call: Call, poses: Array, references: Array, psi: Array | None = None) -> Rows:
-    """Postures by the arm's solver; poses without one get the reason by a numeric search.
+    """IK solutions by the arm's solver; a numeric search gives the status of poses without
+    solutions.
 
     Shapes: poses (N, 4, 4), references (N, n), psi (N,).
     """

@@ -241,7 +241,7 @@ def _right_handed(axes: Array) -> Array:
 
 
 def joint_scale(model: RobotModel, value: ArrayLike | None, name: str, least: float) -> Array:
-    """Check what each joint does alone, the half axes of a ball of joint velocities or torques."""
+    """Check the joint weights of an ellipsoid, shape (n,)."""
     if value is None:
         return np.ones(model.n)
     scale = as_reals(value, name)

@@ -18,7 +18,7 @@ SHARE = 0.1
 
 
 def shortest_period(q: Array, dt: float) -> float:
-    """Period of the frequency below which velocities have 99.9 % of their noise-free power.
+    """Shortest period of the motion: 99.9 % of the velocity power is below its frequency.
 
     Shapes: q (N, n).
     """

@@ -46,7 +46,7 @@ class Term:
 
 @dataclass(frozen=True, slots=True)
 class Formula:
-    """One kept parameter and the terms it stands for, itself first."""
+    """A base parameter and its grouped terms."""
 
     name: str
     terms: tuple[Term, ...]

@@ -87,7 +87,7 @@ def pseudo_inertias(bodies: InertialParameters) -> Array:
 
 
 def check_definite(bodies: InertialParameters, name: str, frames: Sequence[str] = ()) -> Array:
-    """Pseudo-inertias of bodies that must all have mass and extent. Shapes: -> (f, 4, 4)."""
+    """Pseudo-inertias of bodies; refuse bodies without mass or extent. Shapes: -> (f, 4, 4)."""
     P = pseudo_inertias(bodies)
     values = np.linalg.eigvalsh(P)
     bad = np.flatnonzero(values[:, 0] <= 1e-12 * np.maximum(values[:, -1], 1e-300))

@@ -57,7 +57,7 @@ _STANDING = Restraint(Turning.NONE, np.zeros(3), (), np.zeros(3))
 
 
 def parallel(a: Array, b: Array, tolerance: float = EXACT) -> bool:
-    """Whether two unit vectors have one direction, either way round."""
+    """Whether two unit vectors are parallel."""
     return _length_of_cross(a, b) <= tolerance
 
 

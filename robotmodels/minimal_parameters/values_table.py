@@ -22,7 +22,7 @@ _OF_CYLINDERS = {"Kc": "N/m", "Pc": "N"}
 
 
 class KeptNames(dict[str, Any]):
-    """A dictionary by standard names that takes printed ones, ``ZZ1R`` for ``ZZ1``."""
+    """Dictionary by parameter names that also accepts printed names (``ZZ1R``)."""
 
     def __missing__(self, name: object) -> Any:
         if isinstance(name, str) and (plain := plain_name(name, self)) in self:

@@ -10,7 +10,7 @@ from ..kernels import Chain
 
 
 def multiplied_out(table: DHTable, base: Array) -> Chain:
-    """The constant factors of a table, and how its rows stand on each other."""
+    """Arrays of a table for the kernels: structure and constant transforms."""
     C = constant_factors(table)
     joint = np.full(table.f, -1, dtype=np.int64)
     joint[table.joint_rows] = np.arange(table.n)

@@ -22,7 +22,7 @@ def products_of(R: Array) -> Array:
 
 
 def linear_products_of(R: Array) -> Array:
-    """The part of `products_of` that is linear: what becomes of it for rates of rotations."""
+    """Linear part of `products_of`, for angular velocities."""
     P = np.empty((*R.shape[:-2], 4, 4))
     x, y, z = R[..., 0, 0], R[..., 1, 1], R[..., 2, 2]
     P[..., 0, 0] = x + y + z

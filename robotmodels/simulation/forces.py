@@ -75,7 +75,7 @@ class Forces:
         self._forth, self._back = stuck > 0.0, stuck < 0.0
 
     def derivative(self, t: float, y: Array) -> Array:
-        """Time derivative of positions, velocities, the three works, and of what is held."""
+        """Time derivative of the state: positions, velocities, works, dry-friction reaction."""
         n = self.n
         y = np.ascontiguousarray(y)
         out = np.empty(2 * n + 4)

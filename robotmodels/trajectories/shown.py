@@ -20,13 +20,13 @@ def least_shown(value: float, digits: int = 12) -> str:
 
 
 def most_shown(value: float, digits: int = 12) -> str:
-    """A greatest value in few digits, not above it."""
+    """Upper bound as text, rounded down."""
     down = Context(prec=digits, rounding=ROUND_FLOOR).create_decimal(float(value))
     return f"{float(down):.{digits}g}"
 
 
 def counted(number: int, one: str) -> str:
-    """A number of things, with the plural of regular words."""
+    """Number with its noun."""
     return f"{number} {one}" if number == 1 else f"{number} {one}s"
 
 

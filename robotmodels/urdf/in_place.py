@@ -1,4 +1,4 @@
-"""The text of a URDF with other numbers: the robot as it is now, with its own links and joints."""
+"""URDF text with changed joint origins."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _TAG = re.compile(rb"""<(?:[^>"']|"[^"]*"|'[^']*')*>""")
 
 
 def tool_link(parts: RobotParts) -> str | None:
-    """The link of the source that the tool is; None if the tool is no link, or without source."""
+    """Source link of the tool; None without a link or a source."""
     at_tool = [
         frame.name
         for frame in parts.frames
@@ -37,7 +37,7 @@ def tool_link(parts: RobotParts) -> str | None:
 
 
 def urdf_in_place(parts: RobotParts, measured: Collection[str] = ()) -> str:
-    """Write a robot into the URDF that it was read from: origins of joints change, no more."""
+    """URDF text of a robot in its source: only joint origins change."""
     if parts.source is None:
         raise UrdfError("the robot was not read from a URDF: write it with to_urdf.")
     source = parts.source
@@ -103,7 +103,7 @@ def _differ(a: Array, b: Array) -> bool:
 
 
 def _carrier_of_tool(parts: RobotParts, links: dict[str, NamedFrame]) -> str:
-    """The link that carries the tool: the one that was the tool, or what moves the tool."""
+    """Link to which the tool is fixed."""
     assert parts.source is not None
     was = links[parts.source.tool_link]
     if was.parent == parts.tip:
@@ -123,7 +123,7 @@ def _joints_to(tree: UrdfTree, root: str, links: Iterable[str]) -> set[str]:
 
 
 class _Edited:
-    """A URDF text, and what is to change in it."""
+    """A URDF text with pending edits."""
 
     def __init__(self, text: str, tree: UrdfTree) -> None:
         self._data = text.lstrip("\ufeff \t\r\n").encode("utf-8")
@@ -135,7 +135,7 @@ class _Edited:
         self._find_tags()
 
     def _find_tags(self) -> None:
-        """Where each joint has its own start tag and those of its elements."""
+        """Find the positions of the tags of each joint."""
         parser, open_tags = expat.ParserCreate("utf-8"), list[str]()
         joint = ""
 
@@ -157,7 +157,7 @@ class _Edited:
         parser.Parse(self._data, True)
 
     def place(self, joint: str, pose: Array) -> None:
-        """Give a joint another origin."""
+        """Set the origin of a joint."""
         tags, new = self._tags[joint], origin_element(pose).encode()
         if "origin" in tags:
             first, last = tags["origin"]
@@ -168,13 +168,13 @@ class _Edited:
         self._changes.append((first, last, new))
 
     def hang(self, joint: str, link: str) -> None:
-        """Give a joint another child."""
+        """Set the child link of a joint."""
         first, last = self._tags[joint]["child"]
         close = "/>" if self._data[first:last].endswith(b"/>") else ">"
         self._changes.append((first, last, f'<child link="{escape(link)}"{close}'.encode()))
 
     def add_link(self, name: str) -> str:
-        """Add a link without mass; its name."""
+        """Add a massless link and return its name."""
         name = self._free(name)
         self._added.append(f'  <link name="{escape(name)}"/>')
         return name
@@ -190,7 +190,7 @@ class _Edited:
         return name
 
     def written(self) -> str:
-        """The text with all changes."""
+        """Edited text."""
         data, end = self._data, self._end
         lines = "".join(f"{line}\n" for line in self._added)
         gap = "\n" if lines and not data[:end].endswith(b"\n") else ""

@@ -268,7 +268,7 @@ def calibrated_model(parameters: GeometricParameters, deviation: ArrayLike) -> C
 def with_moved_tool(
     model: RobotModel, tool: Array, poses: Mapping[str, Array] = MappingProxyType({})
 ) -> RobotModel:
-    """The same robot whose tool stands elsewhere, and with it the link that the tool is."""
+    """Model with another tool pose, applied also to the tool's URDF link."""
     link = tool_link(model.parts)
     poses = {**({} if link is None else {link: tool}), **poses}
     frames = (replace(named, pose=poses.get(named.name, named.pose)) for named in model.frames)
@@ -292,7 +292,7 @@ def _same(a: Frame, b: Frame) -> bool:
 
 
 def _tool_names(model: RobotModel) -> tuple[str | None, ...]:
-    """Frames that are the tool: None, its name, and the link of a URDF that it is."""
+    """Names of the tool: None, its frame, and its URDF link."""
     return None, model.twin.names.tool, tool_link(model.parts)
 
 

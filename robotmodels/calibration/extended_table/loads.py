@@ -1,4 +1,4 @@
-"""What gravity does to an element of the table: the load that a compliance is multiplied by.
+"""Gravity load on each element of the table.
 
 Source: Seed book section 1.5.1.1 (potential energy).
 """

@@ -310,5 +310,5 @@ _LAWS = {
 
 
 def as_names(names: str | Iterable[str]) -> tuple[str, ...]:
-    """Check names: one or several."""
+    """Names as a tuple, from a single name or several."""
     return (names,) if isinstance(names, str) else tuple(names)

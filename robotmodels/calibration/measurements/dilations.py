@@ -1,4 +1,4 @@
-"""Whether measurements know a length: what is still satisfied when the robot shrinks to a point.
+"""Whether measurements determine the scale.
 
 Source: Seed book section 1.4.5.
 """

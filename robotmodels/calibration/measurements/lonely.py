@@ -1,4 +1,4 @@
-"""Touched things that too few blocks share: their own unknowns take all that these say.
+"""Labels with too few blocks to determine more than their own unknowns.
 
 Source: Seed book section 1.4.5.
 """

@@ -103,7 +103,7 @@ class Measurement(ABC):
 
     @property
     def is_constraint(self) -> bool:
-        """Whether what is measured is that something is touched or linked.
+        """Whether the measurement is a contact or another constraint.
 
         Ranks are then judged at readings that satisfy the constraint exactly.
         """
@@ -117,11 +117,11 @@ class Measurement(ABC):
     @property
     @abstractmethod
     def sees_base(self) -> bool:
-        """Whether the place of the robot in the world matters."""
+        """Whether the base pose matters."""
 
     @property
     def dilation_centres(self) -> tuple[Array, Array]:
-        """``A c = b``, shapes (m, 3) and (m,): where what is known in the world lets c be.
+        """Linear conditions ``A c = b`` on centres of dilation, shapes (m, 3) and (m,).
 
         A contact is still satisfied when robot and base are dilated from a place c, as long as
         the points, lines and planes that are known contain c.

@@ -86,6 +86,6 @@ def tilted_axes(tilt: Array) -> tuple[Array, Array]:
 
 
 def unit_vector(direction: Array) -> Array:
-    """A direction at length 1; one that has it already stays as it is to the last digit."""
+    """Normalise a direction; unit vectors are returned unchanged."""
     length = float(np.linalg.norm(direction))
     return direction if abs(length - 1.0) < 1e-15 else direction / length

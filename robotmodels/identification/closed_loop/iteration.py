@@ -1,4 +1,4 @@
-"""Iterations that end when the parameters stand still, or the simulated robot runs away.
+"""Iterations until the parameters converge or the simulation diverges.
 
 Source: H. Walker and P. Ni, "Anderson acceleration for fixed-point iterations", SIAM J. Numerical
 Analysis 49(4), 2011.

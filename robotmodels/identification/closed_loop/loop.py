@@ -1,4 +1,4 @@
-"""The closed loop that is simulated: controller, width of dry friction at rest, what ends it.
+"""Simulated closed loop: controller, dry-friction width, end conditions.
 
 Source: A. Janot, P.-O. Vandanjon and M. Gautier, "A generic instrumental variable approach for
 industrial robot identification", IEEE T-CST 22(1), 2014, section III.

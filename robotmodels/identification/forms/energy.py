@@ -1,4 +1,4 @@
-"""Equations of the energy: what the torques do between instants, without accelerations.
+"""Energy equations over intervals, without accelerations.
 
 Source: M. Gautier and W. Khalil, "On the identification of the inertial parameters of robots", IEEE
 CDC 1988.

@@ -1,4 +1,4 @@
-"""Equations of the power: that of all joint torques together, one equation at each time.
+"""Power equation: all joint torques together at each sample.
 
 Source: M. Gautier, "Dynamic identification of robots with power model", IEEE ICRA 1997.
 """
