@@ -135,10 +135,12 @@ def test_a_wrong_distance_is_contradicted_by_the_lengths_of_the_table(seed):
     assert touched.blocks not in right.solution.fit.outliers
     wrong = fit(arm.nominal, [touched, between(0.051)], prior=ParameterPrior(), **ALONE)
     (note,) = said_of_distances(wrong)
-    assert "point:0 to point:1: stated 51 mm, but the other measurements and the prior say" in note
-    said, doubt = (float(x) for x in note.split(" say ")[1].split(" mm")[0].split(" +- "))
+    assert (
+        "point:0 to point:1: stated 51 mm, but the other measurements and the prior predict" in note
+    )
+    said, doubt = (float(x) for x in note.split(" predict ")[1].split(" mm")[0].split(" +- "))
     assert abs(said - 50.0) < 4.0 * doubt < 2.0
-    assert "standard errors apart" in note
+    assert "standard errors)" in note
     assert wrong.solution.fit.outliers.tolist()[0] == touched.blocks
     assert "stated 51 mm" in wrong.report()
 

@@ -91,7 +91,7 @@ def note(result):
 
 def named(text):
     """The term to try next and the errors without and with it, m; None if there is none."""
-    found = re.search(r"Try ([a-z ]+) next\. .*?: \1 from ([\d.]+) to ([\d.]+) mm", text)
+    found = re.search(r"Try ([a-z ]+) next\. .*?: \1 \(.*?\) from ([\d.]+) to ([\d.]+) mm", text)
     return found and (found[1], 1e-3 * float(found[2]), 1e-3 * float(found[3]))
 
 
@@ -155,7 +155,7 @@ def test_without_masses_they_are_asked_for():
         text = note(fitted(seed, "compliance", False)[2])
         assert "Not geometry" in text
         assert "Give the model masses (with_inertia) to try joint compliance." in text
-        assert 'compliance="joints"' not in text
+        assert "compliance='joints'" not in text
 
 
 def test_poses():
@@ -189,7 +189,7 @@ def test_contacts():
 def test_parameters_left_out_may_be_the_cause():
     few = [f"theta{k}" for k in range(2, 6)]
     text = note(contacts("none", folds=0, parameters=[*few, "r4"]))
-    assert text.startswith("Residuals depend on the posture")
+    assert text.startswith("The residuals depend on the posture")
     assert "left out may be the cause" in text
     scene = Scene(0)  # lengths are measured: the test allows for all of the table
     assert not note(fit(scene.arm, scene.measured(60), parameters=few, folds=0, held_out=0))
@@ -257,13 +257,13 @@ def test_fits_are_tried_only_where_there_is_structure():
 def test_without_folds_nothing_is_tried():
     scene, measured, _ = fitted(0, "compliance")
     text = note(fit(scene.arm, measured, folds=0))
-    assert 'resemble joint compliance (compliance="joints")' in text
-    assert "fit with folds" in text
+    assert "Joint compliance (compliance='joints')" in text
+    assert "a fit with folds compares" in text
     assert named(text) is None
 
 
 def test_the_report_says_it():
     text = " ".join(report_text(fitted(0, "compliance")[2]).split())
-    assert "Not geometry: residuals depend on the posture" in text
+    assert "Not geometry: the residuals depend on the posture" in text
     assert "Try joint compliance next." in text
     assert "Standard errors assume independent residuals and are too short." in text

@@ -52,10 +52,10 @@ class Contradiction(NamedTuple):
         prior = np.isfinite(self.without.fit.prior.deviation).any()
         return (
             f"{m.name} {m.point} to {m.other}: stated {1e3 * m.length:.6g} mm, but the other "
-            f"measurements{' and the prior' if prior else ''} say {1e3 * self.others:.{digits}f} "
-            f"+- {doubt:.{digits}f} mm ({self.errors:.0f} standard errors apart). See whether the "
-            "length is right, between these two points, and known to its sigma of "
-            f"{1e3 * self.sigma:.2g} mm."
+            f"measurements{' and the prior' if prior else ''} predict "
+            f"{1e3 * self.others:.{digits}f} +- {doubt:.{digits}f} mm (a difference of "
+            f"{self.errors:.0f} standard errors). Check the length, its two points, and its "
+            f"standard deviation of {1e3 * self.sigma:.2g} mm."
         )
 
 

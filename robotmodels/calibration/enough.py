@@ -34,8 +34,8 @@ def check_enough(
     P, F = _told_by_more(found, measured, known_lengths, known, dependent), problem.F
     if not P:
         raise InvalidValueError(
-            "These measurements tell none of the parameters. See identifiable_parameters, and "
-            "measure with all joints spread over their ranges."
+            "No parameter is identifiable from these measurements. See identifiable_parameters, "
+            "and measure with all joints spread over their ranges."
         )
     rows = max(len(m.axes) for m in measured if m.views)
     missing = max(1, -(-(P + F + 1 - problem.rows) // rows))
@@ -50,7 +50,7 @@ def _told_by_more(
     found: IdentifiableParameters, measured: Sequence[Measurement], known_lengths: Iterable[str],
     known: Iterable[str], dependent: float,
 ) -> int:  # fmt: skip
-    """Number of identifiable parameters with many random configurations of the same measurements."""
+    """Number of identifiable parameters with many random configurations."""
     candidates = found.candidates
     rng = np.random.default_rng(_SEED)
     seen = [view.q for m in measured for view in m.views]

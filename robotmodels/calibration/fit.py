@@ -248,7 +248,7 @@ def fit(
         notes=(
             *notes_of_gain(before, validation, kept_aside),
             *notes,
-            *dict.fromkeys(p.dealing.note for p in (*parts, *share_aside) if p.dealing.note),
+            *dict.fromkeys(p.partition.note for p in (*parts, *share_aside) if p.partition.note),
             *note_of_prior(prior, used),
             *(c.sentence() for c in contradicted),
             *notes_after(solution, identifiable, again),

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from .._arrays import Array, Rebuilt
 from ..estimation import Prior, fit_nonlinear
 from ..model import RobotModel
-from .dealing import Dealing, Part, dealt_blocks, parted
 from .errors_seen import BlockErrors, block_errors
 from .extended_table.parameters import GeometricParameters
 from .measurements import Measurement
+from .partition import Part, Partition, parted, partition_blocks
 from .problem import Problem, guessed_fixtures, problem_of, stacked
 from .solve import Solution, first_scales, solve
 
@@ -30,7 +30,7 @@ class Split(NamedTuple):
     aside: tuple[Measurement, ...]
     numbers: tuple[int, ...]
     blocks: NDArray[np.int64]
-    dealing: Dealing
+    partition: Partition
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,7 +46,7 @@ class AsideErrors(Rebuilt):
         without these blocks, each with the fixtures that suit it best.
     folds : int
         Number of fits.
-    dealing : Dealing or None
+    partition : Partition or None
         How the blocks were chosen; None if the caller did.
     """
 
@@ -54,22 +54,22 @@ class AsideErrors(Rebuilt):
     before: BlockErrors
     after: BlockErrors
     folds: int
-    dealing: Dealing | None = None
+    partition: Partition | None = None
 
 
 def splits(
     model: RobotModel, measurements: Sequence[Measurement], folds: int, rng: np.random.Generator
 ) -> list[Split]:
     """Parts that are kept aside in turn, at most ``folds``: whole places, or runs of postures."""
-    dealing = dealt_blocks(model, measurements, folds, rng)
-    return [_split(measurements, dealing, part) for part in dealing.parts]
+    partition = partition_blocks(model, measurements, folds, rng)
+    return [_split(measurements, partition, part) for part in partition.parts]
 
 
-def _split(measurements: Sequence[Measurement], dealing: Dealing, part: Part) -> Split:
+def _split(measurements: Sequence[Measurement], partition: Partition, part: Part) -> Split:
     kept = parted(measurements, part.kept)
     return Split(
         tuple(m for _, m in kept), tuple(m for _, m in parted(measurements, part.aside) if m.views),
-        tuple(k for k, _ in kept), np.flatnonzero(part.aside), dealing,
+        tuple(k for k, _ in kept), np.flatnonzero(part.aside), partition,
     )  # fmt: skip
 
 
@@ -108,7 +108,7 @@ def errors_of_splits(
         np.concatenate([e.position for e in found]), np.concatenate([e.angle for e in found])
     )
     there = BlockErrors(before.position[blocks], before.angle[blocks])
-    return AsideErrors(blocks, there, after, len(parts), parts[0].dealing)
+    return AsideErrors(blocks, there, after, len(parts), parts[0].partition)
 
 
 def errors_of_others(refit: Refit, aside: Sequence[Measurement]) -> AsideErrors:

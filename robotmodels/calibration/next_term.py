@@ -16,7 +16,7 @@ from .prior import ParameterPrior, estimated_with
 from .problem import problem_of
 from .reporting.units import in_unit, printed_unit
 from .solve import solve
-from .structure import Structure, TermFamily, structure_of
+from .structure import LEAST_P, Structure, TermFamily, structure_of
 
 _SURE = 3.0
 """Standard errors by which the mean square of errors on data kept aside must fall."""
@@ -78,7 +78,7 @@ def trials_of(
 
 
 def _gain(before: BlockErrors, after: BlockErrors) -> tuple[float, bool]:
-    """Relative decrease of the mean square (units scaled by their rms before); whether significant."""
+    """Relative decrease of the mean square, units by their rms; whether it is significant."""
     scale = [before.summary(unit).rms for unit in ("m", "rad")]
     was, now = (
         np.nansum([(e / s) ** 2 for e, s in zip(errors, scale, strict=True) if s > 0.0], axis=0)
@@ -95,25 +95,25 @@ def note_of_structure(
     structure: Structure, trials: Sequence[Trial], without: AsideErrors | None
 ) -> str:
     """Note on residual structure and the recommended term."""
-    p = f"(p = {structure.p:.2g})"
+    p = f"p {'<=' if structure.p <= LEAST_P else '='} {structure.p:.2g}"
     text = [
-        f"Not geometry: residuals depend on the posture {p} in a way that no parameter of the "
-        "table takes."
+        f"Not geometry: the residuals depend on the posture ({p}), and no parameter of the table "
+        "explains it."
         if structure.is_complete
-        else f"Residuals depend on the posture {p} in a way that no estimated parameter takes; "
+        else f"The residuals depend on the posture ({p}), and no estimated parameter explains it; "
         "parameters of the table that were left out may be the cause."
     ]
     text.append("Standard errors assume independent residuals and are too short.")
     helpful = [trial for trial in trials if trial.helps]
     if without is not None and helpful:
-        found = [
-            f"{trial.family.word} from {_change(without.after, trial.after)} "
-            f"(fit(..., {trial.family.option}))"
+        first, *more = [
+            f"{trial.family.word} ({trial.family.option}) from "
+            f"{_change(without.after, trial.after)}"
             for trial in helpful
         ]
         text.append(
-            f"Try {helpful[0].family.word} next. On data kept aside it changes the rms error: "
-            f"{'; '.join(found)}."
+            f"Try {helpful[0].family.word} next. Rms error on data kept aside: {first}"
+            f"{''.join('; ' + other for other in more)}."
         )
     doubtful = [
         f"{trial.family.word} ({_change(without.after, trial.after)})"
@@ -121,24 +121,35 @@ def note_of_structure(
         if without is not None and not trial.helps
     ]
     if doubtful:
-        text.append(f"Tried, without a certain gain on data kept aside: {', '.join(doubtful)}.")
+        text.append(
+            "Tried, with a change of less than three standard errors on data kept aside: "
+            f"{', '.join(doubtful)}."
+        )
     if without is None and structure.hinted:
         terms = [f"{family.word} ({family.option})" for family in structure.hinted]
-        text.append(f"They resemble {' or '.join(terms)}: fit with folds, which tries them.")
+        text.append(f"{_sentence(' or '.join(terms))} may explain it; a fit with folds compares.")
     if structure.others:
         words = " or ".join(family.word for family in structure.others)
-        text.append(f"They do not resemble {words}.")
+        text.append(f"{_sentence(words)} would not explain it.")
     if not structure.parameters.model.inertia.values.any():
         text.append("Give the model masses (with_inertia) to try joint compliance.")
     if helpful and not helpful[0].explains_all:
         text.append(f"With {helpful[0].family.word} they still depend on the posture.")
     is_explained = helpful and helpful[0].explains_all
-    if (trials or not structure.hinted) and not is_explained:
+    may_help = any(trial.gain > _GAIN for trial in trials)
+    if may_help and not helpful:
+        text.append("More postures would decide between them.")
+    if (trials or not structure.hinted) and not is_explained and (helpful or not may_help):
         text.append(
             "Backlash, friction, drift or bending links may be the cause: approach every posture "
             "from the same side, and repeat some measurements at the end."
         )
     return " ".join(text)
+
+
+def _sentence(words: str) -> str:
+    """Words with a capital first letter."""
+    return words[:1].upper() + words[1:]
 
 
 def _change(before: BlockErrors, after: BlockErrors) -> str:

@@ -58,8 +58,8 @@ def notes_before(problem: Problem) -> tuple[str, ...]:
             unit = "rad" if revolute[j] else "m"
             notes.append(
                 f"Joint {j + 1} ({model.table.joint_names[j]}) moves by {np.ptp(reading):.2g} "
-                f"{unit} only: what it carries is hardly told from what carries it. Measure with "
-                "that joint spread over its range."
+                f"{unit} only: the frames before and after it can hardly be distinguished. Measure "
+                "with that joint spread over its range."
             )
     return tuple(notes)
 

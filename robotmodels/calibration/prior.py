@@ -10,14 +10,16 @@ import numpy as np
 from .._arrays import Array, Rebuilt, as_reals
 from ..errors import InvalidValueError
 from ..estimation import Loss, Prior, select_strength
-from .dealing import dealt_blocks
 from .extended_table.elements import ErrorLaw
 from .extended_table.parameters import GeometricParameter, GeometricParameters
 from .identifiability.identifiable import IdentifiableParameters, Reason
+from .partition import partition_blocks
 from .problem import Problem, guessed_fixtures, stacked
 from .solve import Solution, solve
 
 _FOLDS = 5
+_ANOTHER_ROBOT = 3.0
+"""Increase of the prior's angles from which zeros or signs of joints may be wrong."""
 _CONTRADICTED = 1.5
 """Rms of corrections over their prior standard deviations from which the prior is widened."""
 
@@ -116,9 +118,9 @@ def settled_prior(
     seen = np.repeat([bool(m.views) for m in problem.measurements],
                      [m.blocks for m in problem.measurements])  # fmt: skip
     model, measurements = problem.parameters.model, problem.measurements
-    dealing = dealt_blocks(model, measurements, _FOLDS, rng, whole_places=False)
-    masks = np.zeros((len(dealing.parts), len(seen)), dtype=bool)
-    masks[:, seen] = [part.aside for part in dealing.parts]
+    partition = partition_blocks(model, measurements, _FOLDS, rng, whole_places=False)
+    masks = np.zeros((len(partition.parts), len(seen)), dtype=bool)
+    masks[:, seen] = [part.aside for part in partition.parts]
     masks = masks[:, block]
     tried = select_strength(
         lambda x: stacked(problem, x, scales), start, whole_prior, masks,
@@ -166,14 +168,16 @@ def note_of_prior(given: ParameterPrior | None, used: ParameterPrior | None) -> 
     """Note if the prior was widened."""
     if given is None or used is None or given is used:
         return ()
+    angle = used.angle / given.angle
+    check = " Check the zeros and signs of the joints." if angle > _ANOTHER_ROBOT else ""
     changes = [
         f"of {name}s from {getattr(given, name):.2g} to {getattr(used, name):.2g} {unit}"
         for name, unit in (("length", "m"), ("angle", "rad"))
         if getattr(given, name) != getattr(used, name)
     ]
     return (
-        "The corrections are larger than the prior expects, so its standard deviations were "
-        f"raised: {' and '.join(changes)}. See whether zeros and signs of joints are right.",
+        "The corrections are larger than the prior allows, so its standard deviations were "
+        f"increased: {' and '.join(changes)}.{check}",
     )
 
 

@@ -81,9 +81,7 @@ def solve(
     truncation: float | None = None,
     tolerance: float = 1e-12,
 ) -> Solution:
-    """Iteratively reweighted nonlinear least squares; unstated noise is estimated for each kind and
-    unit.
-    """
+    """Iteratively reweighted nonlinear least squares; unstated noise is estimated."""
     if start is None:
         xi = np.zeros(problem.P)
         start = np.concatenate([xi, guessed_fixtures(problem, xi)])
@@ -144,11 +142,7 @@ def _is_exact(problem: Problem, scales: tuple[Array, ...]) -> bool:
 def _estimated_scales(
     problem: Problem, fit: NonlinearFit, scales: tuple[Array, ...]
 ) -> tuple[Array, ...]:
-    """Noise of each measurement and unit (residual variance by leverage), shrunk to the common
-    value of its kind.
-
-    Measurements of one kind lend each other some rows: one of few rows says little of its noise.
-    """
+    """Noise of each measurement and unit, shrunk to the common value of its kind."""
     leverage, size = _leverage(fit), problem.parameters.skeleton.size
     found: dict[tuple[type, str], list[tuple[int, float, float]]] = {}
     first = 0

@@ -35,6 +35,8 @@ _DOUBT = 0.01
 _HINT = 0.05
 """Significance level at which a family is tried."""
 _FLIPS = 999
+LEAST_P = 4.0 / (1 + _FLIPS)
+"""Smallest p-value that four tests with so many draws of signs can give."""
 _FEWEST = 20
 """Smallest numbers of postures and of residual degrees of freedom for the test."""
 _ROUNDING = 1e-8
@@ -52,7 +54,7 @@ class TermFamily(NamedTuple):
 
 
 FAMILIES = (
-    TermFamily("joint compliance", 'compliance="joints"', (ErrorLaw.COMPLIANCE,)),
+    TermFamily("joint compliance", "compliance='joints'", (ErrorLaw.COMPLIANCE,)),
     TermFamily(
         "gear eccentricity", "eccentricity=True",
         (ErrorLaw.SINE, ErrorLaw.COSINE, ErrorLaw.SINE_2, ErrorLaw.COSINE_2),

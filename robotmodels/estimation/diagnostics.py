@@ -324,7 +324,7 @@ def _independence(fit: NonlinearFit) -> ResidualTest:
     correlation = float(a @ b / scale)
     p = float(erfc(abs(correlation) * np.sqrt(len(a) / 2)))
     text = (
-        "Nothing speaks against independent measurements."
+        "Successive measurements are not correlated."
         if not p < _DOUBT
         else f"Successive measurements are correlated ({correlation:.2f}): there is a drift or a "
         "missing effect, and the stated deviations of the parameters are too small."

@@ -65,8 +65,7 @@ class Rows(NamedTuple):
 
 
 def rows_by_family(call: Call, poses: Array, references: Array, psi: Array | None = None) -> Rows:
-    """IK solutions by the arm's solver; a numeric search gives the status of poses without
-    solutions.
+    """IK solutions by the arm's solver; a numeric search says why poses have none.
 
     Shapes: poses (N, 4, 4), references (N, n), psi (N,).
     """

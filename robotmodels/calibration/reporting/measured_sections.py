@@ -93,9 +93,9 @@ def error_section(result: CalibrationResult) -> ReportSection:
         "seen (before it: base and tool fitted to all of them).",
     ]
     for kept in (aside, result.held_out):
-        if kept is not None and kept.dealing is not None:
+        if kept is not None and kept.partition is not None:
             name = "Held out" if kept is result.held_out else f"{kept.folds} folds"
-            sentences.append(f"{name}: {kept.dealing.manner} kept aside.")
+            sentences.append(f"{name}: {kept.partition.manner} kept aside.")
     if aside is None and result.held_out is None:
         sentences.append(
             "No measurements were kept aside: how the robot errs elsewhere is not known."

@@ -45,10 +45,7 @@ def parameter_section(result: CalibrationResult) -> ReportSection:
             headings = (head, "start", "deviation", "value", "std", "std/dev", "95 % from", "to")
             body.append(table_of(headings, rows))
     if result.held_by_prior:
-        body.append(
-            f"Held near the start by the prior, as the measurements say little of them: "
-            f"{', '.join(result.held_by_prior)}."
-        )
+        body.append(f"Determined mainly by the prior: {', '.join(result.held_by_prior)}.")
     if result.fixtures:
         body.append(
             f"Fixtures: {len(result.fixtures)} coordinates of "

@@ -75,11 +75,12 @@ def _outcome(result: CalibrationResult) -> ReportSection:
         + (" With a prior." if np.isfinite(fit.prior.deviation).any() else " Without a prior.")
         + (f" {len(fit.dropped)} directions were left out." if len(fit.dropped) else ""),
     ]
+    own = result.held_out  # measurements that the user kept aside come first, then all folds
+    aside = own if own is not None and own.partition is None else result.cross_validation or own
     for unit, text in (("m", millimetres), ("rad", degrees)):
         before, after = result.before.summary(unit), result.after.summary(unit)
         if not after.blocks:
             continue
-        aside = result.held_out or result.cross_validation
         found = f"Rms {'position' if unit == 'm' else 'angle'} error {text(before.rms)}"
         found += f" -> {text(after.rms)} {printed_unit(unit)}"
         if aside is not None and aside.after.summary(unit).blocks:
@@ -88,9 +89,10 @@ def _outcome(result: CalibrationResult) -> ReportSection:
         sentences.append(found + ".")
     tool = result.other_tool
     sentences.append(
-        f"Another tool of known pose, its point {1e3 * tool.length:.0f} mm from the last frame, is "
-        f"off by about {1e3 * tool.rms:.2g} mm and {np.rad2deg(tool.angle):.2g} deg where this one "
-        f"was measured (predicted; on the nominal robot {1e3 * tool.nominal:.2g} mm)."
+        f"Predicted standard error of another tool (its pose on the flange known, its point "
+        f"{1e3 * tool.length:.0f} mm from the last frame) in the measured postures: "
+        f"{1e3 * tool.rms:.2g} mm and {np.rad2deg(tool.angle):.2g} deg; with the nominal robot "
+        f"{1e3 * tool.nominal:.2g} mm."
     )
     return ReportSection("Outcome", tuple(sentences))
 

@@ -32,7 +32,7 @@ class Part(NamedTuple):
     kept: Mask
 
 
-class Dealing(NamedTuple):
+class Partition(NamedTuple):
     """Folds, number of places left out, whether runs of postures are left out, and a note."""
 
     parts: tuple[Part, ...]
@@ -50,17 +50,17 @@ class Dealing(NamedTuple):
         return whole if self.places else runs
 
 
-def dealt_blocks(
+def partition_blocks(
     model: RobotModel,
     measurements: Sequence[Measurement],
     folds: int,
     rng: np.random.Generator,
     whole_places: bool = True,
-) -> Dealing:
+) -> Partition:
     """Part measurements by whole places or by runs of postures, equal readings always together."""
     seen = [m for m in measurements if m.views]
     if not seen:
-        return Dealing((), 0, False, "")
+        return Partition((), 0, False, "")
     posture, thing = _postures(seen), _things(seen)
     fold = np.full(len(posture), -1, dtype=np.int64)
     near = _NEAR * characteristic_length(model)
@@ -96,7 +96,7 @@ def dealt_blocks(
     fold[~whole] = of_posture[posture[~whole]]
     used = [k for k in range(folds) if (fold == k).any()]
     parts = tuple(Part(fold == k, (fold != k) & ~next_to[k]) for k in used)
-    return Dealing(parts, places, runs, note)
+    return Partition(parts, places, runs, note)
 
 
 def _postures(seen: Sequence[Measurement]) -> Numbers:
@@ -162,7 +162,7 @@ def _places(
 def _dealt_places(
     measurements: Sequence[Measurement], place: Numbers, folds: int, rng: np.random.Generator
 ) -> Numbers:
-    """Fold of each block by its place; folds are balanced and each keeps a known length in its fit."""
+    """Fold of each block by its place; each fold leaves a known length in its fit."""
     fold = np.full(len(place), -1, dtype=np.int64)
     length = length_is_known(measurements)
     for one in rng.permutation(np.unique(place[place >= 0])):
