@@ -435,7 +435,7 @@ def test_millimetres_and_metres_give_the_same_answer(states_noise):
     metres = fit(s.nominal, Pose(s.q, T, **options[0]), **ALONE)
     millimetres = fit(
         s.nominal.with_table(large).with_tool(tool), Pose(s.q, big, **options[1]),
-        prior=ParameterPrior(length=unit * ParameterPrior().length), **ALONE,
+        prior=ParameterPrior(length=unit * 1e-3), **ALONE,
     )  # fmt: skip
     assert millimetres.names == metres.names
     scale = np.where(np.array(metres.units) == "m", unit, 1.0)

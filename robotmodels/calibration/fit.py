@@ -35,19 +35,19 @@ from .measurements import Measurement
 from .next_term import note_of_structure, trials_of
 from .notes import notes_after, notes_before, notes_of_gain
 from .placing import placed_robot
-from .prior import ParameterPrior, estimated_with, note_of_prior, settled_prior, widened
+from .prior import ParameterPrior, estimated_with, note_of_prior, settled_prior, sized, widened
 from .problem import as_measurements, guessed_fixtures, measured_frames, problem_of
 from .result import CalibrationResult
 from .solve import solve
 from .structure import structure_of
-from .untold import untold_by, without_untold
+from .untold import untold_by, with_gained, without_untold
 
 Progress = Callable[[int, int, str], None]
 """Called with the number of finished fits, their total, and the current task."""
 
 _PRIOR = ParameterPrior()
 _SEED = 1
-_TRIES = 4
+_TRIES = 6
 """Largest number of fits for the choice of parameters and of the prior's width."""
 _TOLD_APART = 1e-4
 """Sine of the angle below which a column counts as dependent."""
@@ -182,11 +182,23 @@ def fit(
         candidates, measured, known_lengths, known, dependent=_TOLD_APART
     )
     check_enough(identifiable, measured, known_lengths, known, _TOLD_APART)
+    if prior is not None:
+        prior = sized(prior, candidates.skeleton.size)
     prior_of, used = None, prior
+
+    def identifiable_there(some: GeometricParameters) -> IdentifiableParameters:
+        return identifiable_on(
+            some, measured, known_lengths, (*known, *identifiable.of_reason(Reason.NOISE)),
+            deviation=all_deviations(some, estimated, solution.deviation),
+            fixtures=solution.fixtures, dependent=_TOLD_APART,
+        )  # fmt: skip
+
     for _ in range(_TRIES):
         if used is not None:
             prior_of = partial(settled_prior, used, loss=loss, rng=chance)
-        estimated = identifiable.kept if used is None else estimated_with(used, identifiable)
+        estimated = (
+            identifiable.kept if used is None else estimated_with(used, identifiable, measured)
+        )
         problem = problem_of(estimated, measured)
         gaussian = None if prior_of is None else prior_of(problem)
         zero = np.zeros(problem.P)
@@ -194,9 +206,13 @@ def fit(
         solution = solve(problem, start, loss=loss, prior=gaussian, truncation=truncation)
         wider = None if used is None else widened(used, solution)
         untold = [] if truncation else untold_by(solution, start)
-        if not untold and wider is used:
+        preferred = candidates.preferring(estimated.names)
+        again = identifiable_there(preferred)
+        # columns that depend on others at the nominal robot may not at the solution
+        gained = set(again.names) - set(estimated.names) if used is not None else set()
+        if not untold and not gained and wider is used:
             break
-        used, identifiable = wider, without_untold(identifiable, untold)
+        used, identifiable = wider, with_gained(without_untold(identifiable, untold), gained)
     size_is_known = bool(known_lengths) or prior is not None
     contradicted = contradictions(solution, size_is_known, truncation)
     solution = judged(solution, contradicted)
@@ -215,16 +231,6 @@ def fit(
     fits_to_try = len(structure.hinted) * (1 + len(parts)) if structure and parts else 0
     step = _Steps(progress, 1 + len(parts) + len(share_aside) + fits_to_try)
     step("all measurements")
-    preferred = candidates.preferring(estimated.names)
-
-    def identifiable_there(some: GeometricParameters) -> IdentifiableParameters:
-        return identifiable_on(
-            some, measured, known_lengths, (*known, *identifiable.of_reason(Reason.NOISE)),
-            deviation=all_deviations(some, estimated, solution.deviation),
-            fixtures=solution.fixtures, dependent=_TOLD_APART,
-        )  # fmt: skip
-
-    again = identifiable_there(preferred)
     refit = Refit(solution, prior_of, truncation)
     validation = kept_aside = None
     if parts:

@@ -34,7 +34,7 @@ class Trial(NamedTuple):
     """Part by which their mean square falls."""
     helps: bool
     """Whether the decrease is significant."""
-    explains_all: bool
+    explains_all: bool = False
     """Whether the residuals of this fit show no structure."""
 
 
@@ -60,7 +60,7 @@ def trials_of(
     for family in structure.hinted:
         new = [e for e in structure.parameters.entries if e.law in family.laws]
         told = identify(replace(candidates, entries=(*candidates.entries, *new)))
-        kept = told.kept if prior is None else estimated_with(prior, told)
+        kept = told.kept if prior is None else estimated_with(prior, told, problem.measurements)
         added = [e for e in new if e.name in kept.names]
         wider = problem_of(replace(old, entries=(*old.entries, *added)), problem.measurements)
         start = np.concatenate([solution.deviation, np.zeros(len(added)), solution.fixtures])
@@ -72,9 +72,17 @@ def trials_of(
         done()
         again = replace(refit, solution=found)
         after = errors_of_splits(again, parts, before, done).after
-        explains_all = structure_of(found, told) is None
-        trials.append(Trial(family, after, *_gain(without.after, after), explains_all))
-    return sorted(trials, key=lambda trial: -trial.gain)
+        trials.append((Trial(family, after, *_gain(without.after, after)), found, told))
+    trials.sort(key=lambda trial: -trial[0].gain)
+    for k, (trial, found, told) in enumerate(trials):
+        if trial.helps:  # the best of those that help
+            trials[k] = (
+                trial._replace(explains_all=structure_of(found, told) is None),
+                found,
+                told,
+            )
+            break
+    return [trial for trial, *_ in trials]
 
 
 def _gain(before: BlockErrors, after: BlockErrors) -> tuple[float, bool]:

@@ -154,7 +154,7 @@ def _posterior(result: CalibrationResult) -> tuple[GeometricParameters, Array, A
     deviation = all_deviations(parameters, estimated, solution.deviation)
     _, J = stacked(problem, np.concatenate([deviation, solution.fixtures]), solution.scales)
     if not fit.sigma_known:
-        J = J / fit.scale
+        J = J / max(fit.scale, 1.0)  # below 1 the data are exact
     weighted = np.sqrt(fit.weights)[:, None] * J
     information = np.zeros(J.shape[1])
     information[: problem.P] = 1.0 / standard_deviations(ParameterPrior(), problem)

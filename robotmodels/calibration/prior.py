@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -12,14 +12,20 @@ from ..errors import InvalidValueError
 from ..estimation import Loss, Prior, select_strength
 from .extended_table.elements import ErrorLaw
 from .extended_table.parameters import GeometricParameter, GeometricParameters
-from .identifiability.identifiable import IdentifiableParameters, Reason
+from .identifiability.identifiable import IdentifiableParameters
+from .measurements import Measurement
 from .partition import partition_blocks
-from .problem import Problem, guessed_fixtures, stacked
+from .problem import Problem, guessed_fixtures, problem_of, stacked
 from .solve import Solution, solve
 
 _FOLDS = 5
 _ANOTHER_ROBOT = 3.0
 """Increase of the prior's angles from which zeros or signs of joints may be wrong."""
+_LENGTH = 1e-3
+"""Prior standard deviation of lengths of robots of 1 m and more, m."""
+_COSTLY = 3.0
+"""Corrections of others in their prior standard deviations, per one of a regrouped parameter, from
+which the regrouped parameter is estimated as well."""
 _CONTRADICTED = 1.5
 """Rms of corrections over their prior standard deviations from which the prior is widened."""
 
@@ -31,8 +37,9 @@ class ParameterPrior(Rebuilt):
     Parameters
     ----------
     length, angle : float
-        Standard deviation of constant deviations of lengths (m) and angles (rad) of the table;
-        infinite where nothing is known. Base and tools have no prior, unless they are named.
+        Standard deviations of constant corrections of lengths (m) and angles (rad) of the table;
+        infinite for no prior. The length is by default 1 mm, or a thousandth of a robot that is
+        smaller than 1 m. Base and tools have no prior, unless they are named.
     gain, compliance, eccentricity : float, optional
         Of gains and couplings (1, or the ratio of the units), of compliances (rad or m per N m or
         N), and of errors in sine and cosine (rad). By default such an error may move its joint as
@@ -42,8 +49,9 @@ class ParameterPrior(Rebuilt):
     strength : float or None
         Factor on the information; None chooses it by cross-validation.
     truncated : bool
-        Whether parameters that act like combinations of others stay as they are (the default), or
-        share the error with them, each as its standard deviation allows.
+        Whether parameters that act like combinations of others stay nominal (the default, unless
+        the others would have to change by far more than their prior allows), or share corrections
+        with them.
 
     Raises
     ------
@@ -60,7 +68,7 @@ class ParameterPrior(Rebuilt):
     1.0
     """
 
-    length: float = 1e-3
+    length: float | None = None
     angle: float = 5e-3
     gain: float | None = None
     compliance: float | None = None
@@ -82,20 +90,22 @@ class ParameterPrior(Rebuilt):
                 )
 
 
-def estimated_with(prior: ParameterPrior, found: IdentifiableParameters) -> GeometricParameters:
-    """Parameters to estimate with a prior."""
-    if prior.truncated:
-        return found.kept
-    f = found.candidates.model.f
-    return found.candidates.subset(
-        entry.name
-        for entry in found.candidates.entries
-        if entry.name in found.names
-        or (
-            found.reasons.get(entry.name) is Reason.REGROUPED
-            and np.isfinite(prior.named.get(entry.name, _size(prior, entry, f, 1.0)))
+def estimated_with(
+    prior: ParameterPrior, found: IdentifiableParameters, measured: Sequence[Measurement]
+) -> GeometricParameters:
+    """Identifiable parameters, and regrouped ones that share corrections with them."""
+    candidates = found.candidates
+    size = standard_deviations(prior, problem_of(candidates, measured))
+    sizes = dict(zip(candidates.names, size, strict=True))
+    shared = {
+        name for name, terms in found.regrouped_into.items()
+        if np.isfinite(sizes[name]) and (
+            not prior.truncated
+            # others would have to move much further than their prior allows, to take its part
+            or any(abs(c) * sizes[name] > _COSTLY * sizes[other] for other, c in terms.items())
         )
-    )
+    }  # fmt: skip
+    return candidates.subset(n for n in candidates.names if n in shared or n in found.names)
 
 
 def settled_prior(
@@ -135,11 +145,19 @@ _STRENGTHS = np.logspace(-3.0, 3.0, 13)
 def standard_deviations(prior: ParameterPrior, problem: Problem) -> Array:
     """Prior standard deviations of the parameters, shape (P,); infinite without prior."""
     parameters = problem.parameters
+    prior = sized(prior, parameters.skeleton.size)
     f = parameters.model.f
     return np.array([
-        prior.named.get(e.name, _size(prior, e, f, size))
-        for e, size in zip(parameters.entries, largest_factors(problem), strict=True)
+        prior.named.get(e.name, _size(prior, e, f, largest))
+        for e, largest in zip(parameters.entries, largest_factors(problem), strict=True)
     ])  # fmt: skip
+
+
+def sized(prior: ParameterPrior, size: float) -> ParameterPrior:
+    """The prior with a number for lengths: a thousandth of the robot's size, at most 1 mm."""
+    if prior.length is not None:
+        return prior
+    return replace(prior, length=_LENGTH * min(1.0, size))
 
 
 def widened(prior: ParameterPrior, solution: Solution) -> ParameterPrior:
@@ -191,11 +209,11 @@ def largest_factors(problem: Problem) -> Array:
 
 
 def _size(prior: ParameterPrior, entry: GeometricParameter, f: int, largest: float) -> float:
-    constant = prior.length if entry.element.is_length else prior.angle
+    constant = float(prior.length or np.inf) if entry.element.is_length else prior.angle
     if entry.law is ErrorLaw.CONSTANT:
         return constant if 0 < entry.row <= f else np.inf
     given = {ErrorLaw.GAIN: prior.gain, ErrorLaw.COMPLIANCE: prior.compliance}
-    size = given.get(entry.law, prior.eccentricity)
-    if size is not None:
-        return size
+    own = given.get(entry.law, prior.eccentricity)
+    if own is not None:
+        return own
     return constant / largest if largest > 0.0 else np.inf

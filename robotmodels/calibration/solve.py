@@ -63,9 +63,10 @@ class Solution(Rebuilt):
 
 def first_scales(problem: Problem) -> tuple[Array, ...]:
     """Initial standard deviations: 1 mm, and 1 mm over the reach as an angle."""
-    angle = _FIRST_LENGTH / problem.parameters.skeleton.size
+    size = problem.parameters.skeleton.size
+    length = _FIRST_LENGTH * min(1.0, size)
     return tuple(
-        read_only([_FIRST_LENGTH if unit == "m" else angle for unit in m.units])
+        read_only([length if unit == "m" else length / size for unit in m.units])
         for m in problem.measurements
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -61,7 +62,18 @@ def without_untold(found: IdentifiableParameters, names: list[str]) -> Identifia
     """Identifiable parameters without the insignificant ones."""
     return replace(
         found,
-        kept=found.kept.without(names),
+        kept=found.kept.without(name for name in names if name in found.names),
         reasons={**found.reasons, **dict.fromkeys(names, Reason.NOISE)},
         regrouping={k: v for k, v in found.regrouping.items() if k not in names},
+    )
+
+
+def with_gained(found: IdentifiableParameters, names: Collection[str]) -> IdentifiableParameters:
+    """Identifiable parameters with others that only the solution makes identifiable."""
+    kept = [n for n in found.candidates.names if n in found.names or n in names]
+    return replace(
+        found,
+        kept=found.candidates.subset(kept),
+        reasons={name: why for name, why in found.reasons.items() if name not in names},
+        regrouping={**found.regrouping, **{name: {name: 1.0} for name in names}},
     )
