@@ -13,6 +13,8 @@ from robotmodels.calibration import (
     ParameterPrior,
     PointContact,
     Position,
+    Reason,
+    RelativePose,
     candidate_parameters,
     differential_model,
     fit,
@@ -237,3 +239,89 @@ def test_measurements_of_one_kind_lend_each_other_their_noise():
     good, bad = fit(arm, [seen(200, 1e-4), seen(200, 1e-3)], **ALONE).solution.scales
     assert good[0] < 4e-4
     assert bad[0] > 8e-4
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_nearly_parallel_axes_do_not_drive_lengths_away(seed):
+    """A small error of beta is not carried by centimetres of others that nothing measures."""
+    rng = np.random.default_rng(seed)
+    arm = rm.load("rx90")
+    table = arm.table
+    alpha, d = table.alpha.copy(), table.d.copy()
+    alpha[5], d[5] = 0.03, 0.3
+    arm = arm.with_table(
+        dataclasses.replace(table, alpha=alpha, d=d, r=np.array([0, 0.1, 0.1, 0.45, 0.1, 0.1]))
+    ).with_tool(rm.se3.translation(0.05, 0.02, 0.15))
+    p = candidate_parameters(arm)
+    size = np.array([1e-3 if e.element.is_length else 4e-3 for e in p.entries])
+    real = rm.calibration.calibrated_model(p, size * rng.normal(size=len(p))).model
+    q, other = rng.uniform(-2.0, 2.0, (2, 60, 6))
+    relative = np.linalg.inv(rm.dgm(real, q)) @ rm.dgm(real, other)
+    relative[:, :3, 3] += 1e-4 * rng.normal(size=(60, 3))
+    result = fit(arm, RelativePose(q, other, relative), **ALONE)
+    tool = rm.se3.translation(-0.1, 0.12, 0.05)
+
+    def apart(model):
+        said, there = (rm.dgm(m.with_tool(tool), q)[:, :3, 3] for m in (model, real))
+        Z = best_motion(said, there)
+        return np.linalg.norm(said @ Z[:3, :3].T + Z[:3, 3] - there, axis=1).mean()
+
+    shared = fit(
+        arm, RelativePose(q, other, relative), prior=ParameterPrior(truncated=False), **ALONE
+    )
+    assert apart(result.model) < 0.6 * apart(arm)
+    assert apart(result.model) < 1.1 * apart(shared.model)
+    assert np.abs(result.deviation[np.array(result.units) == "m"]).max() < 0.01
+
+
+def test_exact_data_leave_another_tool_in_doubt():
+    """Positions of one point say little of another tool, however exact they are."""
+    rng = np.random.default_rng(1)
+    arm = rm.load("rx90").with_tool(rm.se3.translation(0.05, 0.02, 0.15))
+    q = rng.uniform(-2.0, 2.0, (40, 6))
+    p = rm.dgm(arm, q)[:, :3, 3]
+    exact, noisy = (
+        fit(arm, Position(q, p + noise * rng.normal(size=p.shape)), **ALONE).other_tool.rms
+        for noise in (0.0, 1e-7)
+    )
+    assert exact == pytest.approx(noisy, rel=0.05)
+
+
+def test_the_prior_of_lengths_is_that_of_a_small_robot():
+    """An arm of 5 cm has errors of some hundredths of a millimetre, and so has another tool."""
+    rng = np.random.default_rng(2)
+    arm = rm.load("rx90")
+    table = dataclasses.replace(arm.table, d=0.05 * arm.table.d, r=0.05 * arm.table.r)
+    arm = arm.with_table(table).with_tool(rm.se3.translation(0.0025, 0.001, 0.01))
+    q = rng.uniform(-2.0, 2.0, (60, 6))
+    p = rm.dgm(arm, q)[:, :3, 3] + 1e-5 * rng.normal(size=(60, 3))
+    result = fit(arm, Position(q, p), **ALONE)
+    sizes = result.solution.fit.prior.deviation[: len(result.names)]
+    lengths = [e.element.is_length and 0 < e.row <= 6 for e in result.parameters.entries]
+    assert sizes[lengths] == pytest.approx(1e-3 * result.parameters.skeleton.size)
+    assert result.other_tool.rms < 1e-4
+
+
+def test_regrouped_parameters_that_noise_hides_are_left_out():
+    arm = rm.load("rx90")
+    rng = np.random.default_rng(1)
+    q = rng.uniform(-2, 2, (60, 6))
+    seen = rm.dgm(arm, q)[:, :3, 3] + 5e-5 * rng.normal(size=(60, 3))
+    wide = ParameterPrior(length=0.5, angle=0.5, truncated=False)
+    result = fit(arm, Position(q, seen), prior=wide, **ALONE)
+    hidden = result.identifiable.of_reason(Reason.NOISE)
+    assert "theta4" in hidden
+    assert not set(hidden) & set(result.names)
+
+
+def test_what_only_the_solution_tells_joins_the_fit():
+    """Axes that meet at the nominal robot and not at the real one make more identifiable."""
+    rng = np.random.default_rng(4)
+    arm = rm.load("rx90").with_tool(rm.se3.translation(0.05, 0.02, 0.15))
+    table = arm.table
+    real = arm.with_table(dataclasses.replace(table, alpha=table.alpha + 0.03 * rng.normal(size=6)))
+    q = rng.uniform(-2.0, 2.0, (80, 6))
+    p = rm.dgm(real, q)[:, :3, 3] + 1e-5 * rng.normal(size=(80, 3))
+    result = fit(arm, Position(q, p), **ALONE)
+    assert set(result.again.names) <= set(result.names)
+    assert result.after.summary("m").rms < 3e-5

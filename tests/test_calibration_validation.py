@@ -134,7 +134,7 @@ def test_too_few_places_are_named(count):
     found = fit(arm.nominal, measured, prior=PRIOR)
     [note] = [note for note in found.notes if note.startswith("Measured at")]
     assert note.startswith(f"Measured at {count} place{'s' * (count > 1)} only")
-    assert "another place may err more" in note
+    assert "may be larger at another place" in note
     assert found.cross_validation.folds == 5
     # positions elsewhere are other places
     both = fit(arm.nominal, [*measured, arm.seen(arm.postures(30))], prior=PRIOR, held_out=0)

@@ -74,8 +74,8 @@ def partition_blocks(
     elif count and (place >= 0).all():
         note = (
             f"Measured at {count} place{'s'[: count > 1]} only: the errors on data kept aside are "
-            "of other postures there, and another place may err more. Measure at three places or "
-            f"more, over {near:.2g} m apart."
+            "of other postures there, and may be larger at another place. Measure at three or "
+            f"more places, over {near:.2g} m apart."
         )
     places, runs = len(np.unique(place[fold >= 0])), False
     of_posture = np.full(int(posture.max()) + 1, -1, dtype=np.int64)
