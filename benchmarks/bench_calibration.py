@@ -10,7 +10,9 @@ the clock's beside it. Peers run in environments of their own (`pip install figa
 their entries are left out and that is said. Real data: see `calibration_data.py`; both tools keep
 the same rows aside. Results are written after every part. `--quick` measures the smallest and the
 largest set once, and of the real data panda_1 alone, without the ways whose prior is chosen by
-cross-validation, and beside one way of FIGAROH's.
+cross-validation, and beside one way of FIGAROH's. With `--parts` the other parts, and the rows of
+peers whose Python is not named, stay as they were kept; the head says at which commit and on which
+machine each part was measured.
 """
 
 from __future__ import annotations
@@ -199,6 +201,15 @@ def panda_rows(ways: tuple[str, ...], robots: tuple[str, ...]) -> list[Row]:
     return rows
 
 
+def commit() -> str:
+    """The last commit of the package that is measured."""
+    said = subprocess.run(
+        ["git", "log", "-1", "--format=%h", "--", str(Path(rm.__file__).parent)],
+        capture_output=True, text=True, check=False, cwd=Path(__file__).parent,
+    )  # fmt: skip
+    return said.stdout.strip() or "unknown"
+
+
 def report(about: dict[str, str], speed: list[Row], camera: list[Row], sockets: list[Row]) -> str:
     """The results as Markdown."""
     lines = [
@@ -298,10 +309,20 @@ def main() -> None:
     for rows, part in ((speed, "speed"), (camera, "camera"), (sockets, "double_socket")):
         if part not in given.parts:
             rows += old[part]
-    if given.parts != PARTS:
-        about["parts"] = f"measured now: {', '.join(given.parts)}; the rest earlier"
+            about[part] = old["machine"].get(part, "measured earlier")
+        else:
+            about[part] = f"package of commit {commit()}, {about['cpu']}, load {about['load']}"
+    peers = ("FIGAROH", figaroh), ("pybotics", pybotics)
+    unnamed = tuple(name for name, python in peers if old and not python)
+    if unnamed:
+        about |= {name.lower(): old["machine"].get(name.lower(), "left out") for name in unnamed}
+        about["rows of peers"] = (
+            f"{', '.join(unnamed)}: measured earlier; their ratios are to ours of that run"
+        )
     if "speed" in given.parts:
         speed += speed_rows(sizes, 1 if quick else given.rounds, figaroh, pybotics)
+        speed += [r for r in old.get("speed", []) if str(r["name"]).startswith(unnamed)]
+        speed.sort(key=lambda r: r["work"])
         keep_all()
     if "double_socket" in given.parts:
         for robot in robots:
@@ -309,6 +330,7 @@ def main() -> None:
             keep_all()
     if "camera" in given.parts:
         camera += camera_rows(tuple(ways), figaroh)
+        camera += [r for r in old.get("camera", []) if str(r["name"]).startswith(unnamed)]
         keep_all()
     print(report(about, speed, camera, sockets))
 

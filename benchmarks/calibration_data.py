@@ -23,12 +23,14 @@ BOARD = 0.45
 """Distance of the board in front of the camera, m: found on these data, not by the source."""
 CAMERA_PRIOR = ParameterPrior(length=1e-4, angle=3e-3)
 CAMERA_WAYS: dict[str, tuple[str, dict]] = {
-    "poses, 30 parameters": ("pose", {}),
+    "poses, no prior": ("pose", {"prior": None}),
+    "poses, default prior": ("pose", {}),
     "poses, prior 0.1 mm and 3 mrad": ("pose", {"prior": CAMERA_PRIOR}),
     "poses, default prior, strength by cross-validation": (
         "pose", {"prior": ParameterPrior(strength=None)},
     ),
-    "board seen by the camera, 24 parameters": ("board", {}),
+    "board seen by the camera, no prior": ("board", {"prior": None}),
+    "board, default prior": ("board", {}),
     "board, prior 0.1 mm and 3 mrad": ("board", {"prior": CAMERA_PRIOR}),
     "board, the same prior, strength by cross-validation": (
         "board", {"prior": replace(CAMERA_PRIOR, strength=None)},
@@ -100,8 +102,10 @@ SOCKETS = 1e-4
 """Standard deviation of the sockets' distance, m: they were printed."""
 PANDA_PRIOR = ParameterPrior(length=3e-4, angle=6e-3, compliance=6e-5, eccentricity=1e-4)
 PANDA_WAYS: dict[str, dict] = {
-    "table": {},
-    "table, Cauchy": {"loss": "cauchy"},
+    "table, no prior": {"prior": None},
+    "table, default": {},
+    "table, default prior, Cauchy": {"loss": "cauchy"},
+    "uniform compliance, default prior": {"compliance": "uniform"},
     "isotropic compliance, prior": {"compliance": "isotropic", "prior": PANDA_PRIOR},
     "isotropic compliance, prior, Cauchy": {
         "compliance": "isotropic", "prior": PANDA_PRIOR, "loss": "cauchy",
