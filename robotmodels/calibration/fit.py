@@ -99,8 +99,9 @@ def fit(
     loss : Loss or str, optional
         ``"squares"`` (the default), or against outliers ``"huber"``, ``"cauchy"``, ``"tukey"``.
     prior : ParameterPrior, optional
-        How large the deviations are thought to be: the estimate is then the maximum a posteriori,
-        and parameters that noise hides stay where they are. None for none.
+        How large the corrections are expected to be, so that the estimate is the maximum a
+        posteriori; default `ParameterPrior()`. Corrections that contradict it widen it, and a note
+        says so. None for none: parameters that noise hides still stay where they are.
     truncation : float, optional
         Directions whose singular value relative to the largest is smaller are left out.
     folds : int

@@ -39,7 +39,8 @@ class ParameterPrior(Rebuilt):
     length, angle : float
         Standard deviations of constant corrections of lengths (m) and angles (rad) of the table;
         infinite for no prior. The length is by default 1 mm, or a thousandth of a robot that is
-        smaller than 1 m. Base and tools have no prior, unless they are named.
+        smaller than 1 m. `fit` increases them where the corrections contradict them. Base and
+        tools have no prior, unless they are named.
     gain, compliance, eccentricity : float, optional
         Of gains and couplings (1, or the ratio of the units), of compliances (rad or m per N m or
         N), and of errors in sine and cosine (rad). By default such an error may move its joint as

@@ -119,11 +119,12 @@ def _add_fit(fitted: Any) -> None:
                         "are expected, or none (default: 1e-3 5e-3)")  # fmt: skip
     fitted.add_argument(
         "--folds", type=int, default=5,
-        help="of the cross-validation, 0 for none (default: %(default)s)",
+        help="largest number of folds: whole places or runs of postures; 0 for none (default: "
+        "%(default)s)",
     )  # fmt: skip
     fitted.add_argument("--held-out", type=float, default=0.2, metavar="SHARE",
-                        help="share of the measurements that one more fit is tested on, 0 for none "
-                        "(default: %(default)s)")  # fmt: skip
+                        help="share of the places or postures that one more fit is tested on, 0 "
+                        "for none (default: %(default)s)")  # fmt: skip
     fitted.add_argument("--test", nargs="+", metavar="FILE",
                         help="files of measurements that only test the result")  # fmt: skip
 
