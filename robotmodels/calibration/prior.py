@@ -23,10 +23,10 @@ _ANOTHER_ROBOT = 3.0
 """Increase of the prior's angles from which zeros or signs of joints may be wrong."""
 _LENGTH = 1e-3
 """Prior standard deviation of lengths of robots of 1 m and more, m."""
-_COSTLY = 3.0
+_SHARED = 0.1
 """Corrections of others in their prior standard deviations, per one of a regrouped parameter, from
-which the regrouped parameter is estimated as well."""
-_CONTRADICTED = 1.5
+which the regrouped parameter shares corrections with them."""
+_CONTRADICTED = 2.5
 """Rms of corrections over their prior standard deviations from which the prior is widened."""
 
 
@@ -50,9 +50,8 @@ class ParameterPrior(Rebuilt):
     strength : float or None
         Factor on the information; None chooses it by cross-validation.
     truncated : bool
-        Whether parameters that act like combinations of others stay nominal (the default, unless
-        the others would have to change by far more than their prior allows), or share corrections
-        with them.
+        Whether parameters that base and tool can replace stay nominal (the default), or share
+        corrections with them as parameters do that act like combinations of others of the table.
 
     Raises
     ------
@@ -102,8 +101,8 @@ def estimated_with(
         name for name, terms in found.regrouped_into.items()
         if np.isfinite(sizes[name]) and (
             not prior.truncated
-            # others would have to move much further than their prior allows, to take its part
-            or any(abs(c) * sizes[name] > _COSTLY * sizes[other] for other, c in terms.items())
+            # those without a prior, base and tool, take its part at no cost
+            or any(abs(c) * sizes[name] > _SHARED * sizes[other] for other, c in terms.items())
         )
     }  # fmt: skip
     return candidates.subset(n for n in candidates.names if n in shared or n in found.names)
