@@ -767,7 +767,7 @@ def test_a_joint_that_does_not_move_is_named(scene):
     q[:, 2] = 0.7
     result = fit(scene.nominal, Pose(q, rm.dgm(scene.real, q)), **ALONE)
     assert any("Joint 3" in note for note in result.notes)
-    assert len(result.names) < 30
+    assert result.identifiable.count < 30
     fresh = scene.fresh.copy()
     fresh[:, 2] = 0.7
     assert np.abs(rm.dgm(result.model, fresh) - rm.dgm(scene.real, fresh)).max() < EXACT
