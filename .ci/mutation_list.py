@@ -526,7 +526,7 @@ MUTATIONS = [
         "tests/test_calibration_mistakes.py -k limits"),
     Mutation("calibration: validation", "sockets beside each other are places of their own",
         "region = fcluster(", 'near, "distance"', '0.0, "distance"',
-        "tests/test_calibration_validation.py -k sockets"),
+        "tests/test_calibration_validation.py -k sockets", compiled=True),
     Mutation("calibration: validation", "rows of one posture go to several folds",
         "distinct = dict.fromkeys(", 'found.setdefault(b"".join(distinct), len(found))',
         "len(numbers)",
