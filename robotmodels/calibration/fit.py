@@ -11,7 +11,7 @@ from .._choices import chosen
 from ..errors import InvalidValueError
 from ..estimation import Loss
 from ..model import RobotModel, check_model
-from .contradiction import contradictions, judged
+from .contradiction import contradictions
 from .enough import check_enough
 from .errors_seen import block_errors
 from .extended_table.candidates import candidate_parameters
@@ -31,9 +31,10 @@ from .identifiability.identifiable import (
     all_deviations,
     identifiable_on,
 )
-from .measurements import Measurement
+from .measurements import KnownDistance, Measurement
 from .next_term import note_of_structure, trials_of
 from .notes import notes_after, notes_before, notes_of_gain
+from .outliers import judged
 from .placing import placed_robot
 from .prior import ParameterPrior, estimated_with, note_of_prior, settled_prior, sized, widened
 from .problem import as_measurements, guessed_fixtures, measured_frames, problem_of
@@ -215,8 +216,8 @@ def fit(
             break
         used, identifiable = wider, with_gained(without_untold(identifiable, untold), gained)
     size_is_known = bool(known_lengths) or prior is not None
-    contradicted = contradictions(solution, size_is_known, truncation)
-    solution = judged(solution, contradicted)
+    contradicted = contradictions(solution, prior, size_is_known, truncation)
+    solution = judged(solution, contradicted, prior, truncation)
     structure = structure_of(solution, identifiable)
     blocks = sum(m.blocks for m in measured if m.views)
     parts: list[Split] = []
@@ -256,7 +257,7 @@ def fit(
             *notes_of_gain(before, validation, kept_aside),
             *notes,
             *dict.fromkeys(p.partition.note for p in (*parts, *share_aside) if p.partition.note),
-            *note_of_prior(prior, used),
+            *note_of_prior(prior, used, any(isinstance(m, KnownDistance) for m in measured)),
             *(c.sentence() for c in contradicted),
             *notes_after(solution, identifiable, again),
         ),

@@ -26,6 +26,8 @@ _LENGTH = 1e-3
 _SHARED = 0.1
 """Corrections of others in their prior standard deviations, per one of a regrouped parameter, from
 which the regrouped parameter shares corrections with them."""
+_TRIES = 4
+"""Largest number of fits for the prior's width."""
 _CONTRADICTED = 2.5
 """Rms of corrections over their prior standard deviations from which the prior is widened."""
 
@@ -182,12 +184,43 @@ def widened(prior: ParameterPrior, solution: Solution) -> ParameterPrior:
     return replace(prior, **found) if found else prior
 
 
-def note_of_prior(given: ParameterPrior | None, used: ParameterPrior | None) -> tuple[str, ...]:
-    """Note if the prior was widened."""
+def refitted(
+    prior: ParameterPrior | None,
+    problem: Problem,
+    like: Solution,
+    start: Array,
+    scales: tuple[Array, ...],
+    truncation: float | None,
+) -> Solution:
+    """Fit of part of the measurements, the prior as given and widened only where they require it.
+
+    Shapes: start (P + F,) of ``problem``; scales, one for each of its measurements.
+    """
+    loss, gaussian = like.fit.loss, Prior.none(problem.P + problem.F)
+    for _ in range(_TRIES):
+        if prior is not None:
+            sizes = np.full(problem.P + problem.F, np.inf)
+            sizes[: problem.P] = standard_deviations(prior, problem)
+            gaussian = Prior(np.zeros(len(sizes)), sizes, like.fit.prior.strength)
+        solution = solve(
+            problem, start, from_scales=scales, loss=loss, prior=gaussian, truncation=truncation
+        )
+        wider = None if prior is None else widened(prior, solution)
+        if wider is prior:
+            break
+        prior, start, scales = wider, solution.fit.x, solution.scales
+    return solution
+
+
+def note_of_prior(
+    given: ParameterPrior | None, used: ParameterPrior | None, distances: bool
+) -> tuple[str, ...]:
+    """Note if the prior was widened; ``distances``: whether some are known."""
     if given is None or used is None or given is used:
         return ()
     angle = used.angle / given.angle
     check = " Check the zeros and signs of the joints." if angle > _ANOTHER_ROBOT else ""
+    check += " Check the known distances." if distances and used.length > given.length else ""
     changes = [
         f"of {name}s from {getattr(given, name):.2g} to {getattr(used, name):.2g} {unit}"
         for name, unit in (("length", "m"), ("angle", "rad"))

@@ -45,6 +45,11 @@ class Leverage(Rebuilt):
 
 def orthonormal_rows(fit: NonlinearFit) -> Array:
     """Orthonormal basis of the weighted rows in the determined directions. Shapes: -> (M, rank)."""
+    return fit.jacobian * (np.sqrt(fit.weights) / fit.sigma)[:, None] @ basis_of_rows(fit)
+
+
+def basis_of_rows(fit: NonlinearFit) -> Array:
+    """Factor that makes the weighted rows orthonormal. Shapes: -> (P, rank)."""
     A = fit.jacobian * (np.sqrt(fit.weights) / fit.sigma)[:, None]
     _, information = fit.prior.rows(fit.x)
     R = np.vstack((triangle(A), np.diag(information)))
@@ -52,7 +57,7 @@ def orthonormal_rows(fit: NonlinearFit) -> Array:
     columns[columns == 0] = 1.0
     _, s, V = np.linalg.svd(R / columns, full_matrices=False)
     s, V = s[: fit.rank], V[: fit.rank]
-    return A @ ((V / s[:, None]).T / columns[:, None])
+    return (V / s[:, None]).T / columns[:, None]
 
 
 def leverage(fit: NonlinearFit) -> Leverage:

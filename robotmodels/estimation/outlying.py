@@ -74,10 +74,11 @@ def outlying(
     starts: NDArray[np.int64],
     freedom: float,
     trusted: NDArray[np.bool_] | None = None,
+    removed: NDArray[np.int64] | None = None,
 ) -> NDArray[np.int64]:
     """Measurements that noise of the scale of the others does not explain, the worst first.
 
-    Shapes: T (M, rank); r (M,); starts, trusted (B,).
+    Shapes: T (M, rank); r (M,); starts, trusted (B,). T and r are of a fit without ``removed``.
     """
     from scipy.special import fdtri
 
@@ -85,7 +86,8 @@ def outlying(
     everything = np.arange(len(starts))
     chance = FALSE_OUTLIERS / max(len(starts), 1)
     judged = np.ones(len(starts), dtype=bool) if trusted is None else ~trusted
-    removed = everything[:0]
+    removed = everything[:0] if removed is None else removed
+    reduced.kept[removed] = False
     while len(removed) < len(starts) // 2:
         kept = everything[reduced.kept & judged]
         square, rows = reduced.squares(kept)
