@@ -1,9 +1,8 @@
-"""Files of a measurement: names, row counts and consistency."""
+"""Files of a measurement: their rows and consistency."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from ..csv_table import CsvTable
 from ..errors import InvalidValueError
 from ..model import RobotModel
 from .extended_table.skeleton import Frame
+from .measurements.measurement import FileRow
 from .reading_limits import beyond_limits
 
 _UNIT = 1e-3
@@ -20,20 +20,14 @@ _ROWS = 3
 """Rows of unit length that are no chance."""
 
 
-class FileRows(NamedTuple):
-    """Name and number of rows of a file."""
-
-    name: str
-    rows: int
-
-    def __str__(self) -> str:
-        return f"{self.name} ({self.rows} rows)"
-
-
-def files_read(tables: Sequence[CsvTable], rows: Sequence[int]) -> tuple[FileRows, ...]:
-    """Names with their folders, and numbers of rows."""
+def rows_read(tables: Sequence[CsvTable], counts: Sequence[int]) -> tuple[FileRow, ...]:
+    """Every row of the files, by the name of its file with the folder."""
     names = [f"{t.path.resolve().parent.name}/{t.path.name}" for t in tables]
-    return tuple(FileRows(name, count) for name, count in zip(names, rows, strict=True))
+    return tuple(
+        FileRow(name, row + 1)
+        for name, count in zip(names, counts, strict=True)
+        for row in range(count)
+    )
 
 
 def check_columns(tables: Sequence[CsvTable]) -> None:
@@ -46,7 +40,7 @@ def check_columns(tables: Sequence[CsvTable]) -> None:
         listed = "; ".join(f"{', '.join(names)}: {columns}" for columns, names in kinds.items())
         raise InvalidValueError(
             f"path: the files of {tables[0].path.parent} do not have the same columns ({listed}). "
-            "Say which are to be read: pattern=... (--pattern), or name the files."
+            "Select the files by pattern='*.csv', or name them."
         )
 
 
@@ -67,7 +61,7 @@ def check_contents(
             f"path: of {', '.join(t.path.name for t in tables)} some do not look like readings of "
             f"the joints of {model.name}: "
             + "; ".join(f"{name} ({why})" for name, why in other.items())
-            + ". Say which are to be read: pattern=... (--pattern), or name the files."
+            + ". Select the files by pattern='*.csv', or name them."
         )
 
 

@@ -33,7 +33,7 @@ from .identifiability.identifiable import (
 )
 from .measurements import KnownDistance, Measurement
 from .next_term import note_of_structure, trials_of
-from .notes import notes_after, notes_before, notes_of_gain
+from .notes import is_implausible, notes_after, notes_before, notes_of_errors
 from .outliers import judged
 from .placing import placed_robot
 from .prior import ParameterPrior, estimated_with, note_of_prior, settled_prior, sized, widened
@@ -218,7 +218,7 @@ def fit(
     size_is_known = bool(known_lengths) or prior is not None
     contradicted = contradictions(solution, prior, size_is_known, truncation)
     solution = judged(solution, contradicted, prior, truncation)
-    structure = structure_of(solution, identifiable)
+    structure = None if is_implausible(solution) else structure_of(solution, identifiable)
     blocks = sum(m.blocks for m in measured if m.views)
     parts: list[Split] = []
     share_aside: list[Split] = []
@@ -254,7 +254,7 @@ def fit(
         after=block_errors(problem, solution.deviation, solution.fixtures),
         cross_validation=validation, held_out=kept_aside,
         notes=(
-            *notes_of_gain(before, validation, kept_aside),
+            *notes_of_errors(solution, validation, kept_aside),
             *notes,
             *dict.fromkeys(p.partition.note for p in (*parts, *share_aside) if p.partition.note),
             *note_of_prior(prior, used, any(isinstance(m, KnownDistance) for m in measured)),

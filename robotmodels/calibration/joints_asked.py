@@ -18,5 +18,5 @@ def joints_that_count(model: RobotModel) -> str:
         return ""
     return (
         f" All {model.n} joints of the model count: {', '.join(names)}. {', '.join(idle)} do not "
-        "move the tool; read the robot with tip_link=... (--tip-link) to leave them out."
+        "move the tool. Read the robot with tip_link='LINK' to leave them out."
     )

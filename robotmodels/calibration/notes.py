@@ -7,13 +7,14 @@ import numpy as np
 from .._arrays import Array
 from ..estimation import FitStatus
 from ..geometry import REVOLUTE
-from .errors_seen import BlockErrors
 from .extended_table.elements import ErrorLaw
 from .folds import AsideErrors
 from .identifiability.identifiable import IdentifiableParameters
 from .measurements import Pose, Position, lonely_labels
+from .measurements.measurement import origin_of
 from .problem import Problem, measured_frames
 from .reading_limits import check_readings
+from .reporting.units import in_unit, printed_unit
 from .solve import Solution
 from .unit_slips import check_units
 
@@ -26,6 +27,7 @@ _UNLIKELY = 0.02
 _OTHER_LENGTH, _OTHER_ANGLE = 0.1, 0.35
 """Deviations beyond which it is another robot, in sizes of the robot and rad."""
 _NO_GAIN = 0.98
+_LISTED = 10
 _FEW = 0.5
 _CONFUSED = 50.0
 """Standard deviation, in that of the parameter if it were alone, beyond which others hide it."""
@@ -76,19 +78,17 @@ def notes_after(
     gained = [name for name in again.names if name not in before.names]
     if lost or gained:
         notes.append(
-            "At the solution the identifiable parameters differ from those at the nominal robot"
-            + (f"; no longer: {', '.join(lost)}" if lost else "")
-            + (f"; also: {', '.join(gained)}" if gained else "")
-            + ". Estimates of these are doubtful."
+            "At the solution the identifiable parameters differ from those at the nominal robot."
+            + (f" No longer: {', '.join(lost)}; their estimates are doubtful." if lost else "")
+            + (f" Also: {', '.join(gained)}; these were not estimated." if gained else "")
         )
     hidden = _hidden(solution)
-    no_prior = not np.isfinite(fit.prior.deviation).any()
     if hidden:
         notes.append(
-            f"{', '.join(hidden)}: told from each other by little more than noise (their standard "
-            f"deviations are over {_CONFUSED:g} times what they were if the others were known). "
+            f"{', '.join(hidden)}: nearly indistinguishable (standard errors over {_CONFUSED:g} "
+            "times those with the other parameters known). "
             "Choose configurations with select_configurations, leave one of them out (known=...), "
-            f"or give a prior{'' if no_prior else ' of its own (named=...)'}."
+            f"or give a prior{' of its own (named=...)' if _has_prior(solution) else ''}."
         )
     first = 0
     for m in problem.measurements:
@@ -119,9 +119,57 @@ def notes_after(
             "standard deviations are uncertain and intervals too short. Measure more "
             "configurations."
         )
-    length = problem.parameters.skeleton.size
-    for m, scale in zip(problem.measurements, solution.scales, strict=True):
-        if m.sigma is None and m.covariance is None and not fit.sigma_known:
+    if len(fit.outliers):
+        one = len(fit.outliers) == 1
+        rows = [row for m in problem.measurements for row in origin_of(m) or [None] * m.blocks]
+        numbers = ", ".join(
+            f"{b + 1}" + (f" in {rows[b]}" if rows[b] else "") for b in fit.outliers[:_LISTED]
+        )
+        more = " and others" if len(fit.outliers) > _LISTED else ""
+        notes.append(
+            f"{len(fit.outliers)} of {problem.blocks} measurements "
+            f"{'is an outlier (number' if one else 'are outliers (numbers'} {numbers}{more}, "
+            f"counted from 1): {'its' if one else 'their'} residuals are larger than noise "
+            "explains."
+        )
+    return tuple(notes)
+
+
+def notes_of_errors(
+    solution: Solution, validation: AsideErrors | None, held_out: AsideErrors | None
+) -> tuple[str, ...]:
+    """Notes that come first: implausible residuals, and no gain on data kept aside."""
+    notes = _implausible(solution)
+    found = []
+    for unit, word in (("m", "position"), ("rad", "angle")):
+        changes = []
+        for aside, name in ((validation, "cross-validation"), (held_out, "held out")):
+            if aside is None:
+                continue
+            after, was = aside.after.summary(unit), aside.before.summary(unit)
+            if after.blocks and was.blocks and after.rms > _NO_GAIN * was.rms:
+                changes.append(f"{name} {in_unit(was.rms, unit)} to {in_unit(after.rms, unit)}")
+        if changes:
+            found.append(f"{word} error ({', '.join(changes)} {printed_unit(unit)}, rms)")
+    if found:
+        notes.append(
+            f"Calibration does not lower the {' and the '.join(found)} on data kept aside. The "
+            "noise or the number of measurements does not carry this many parameters: fewer "
+            f"parameters, a {'narrower ' if _has_prior(solution) else ''}prior, or more data."
+        )
+    return tuple(notes)
+
+
+def is_implausible(solution: Solution) -> bool:
+    """Whether the residuals are larger than those of any measurement of this robot."""
+    return bool(_implausible(solution))
+
+
+def _implausible(solution: Solution) -> list[str]:
+    """Notes on measurements whose estimated noise is larger than that of any measurement."""
+    length, notes = solution.problem.parameters.skeleton.size, []
+    for m, scale in zip(solution.problem.measurements, solution.scales, strict=True):
+        if m.sigma is None and m.covariance is None and not solution.fit.sigma_known:
             size = max(
                 (s / (length if unit == "m" else 1.0))
                 for s, unit in zip(scale, m.units, strict=True)
@@ -132,33 +180,11 @@ def notes_after(
                     "radian). Look for readings that do not belong to their measurements, joints "
                     "in another order, a wrong frame or units."
                 )
-    if len(fit.outliers):
-        numbers = ", ".join(str(int(b) + 1) for b in fit.outliers[:10])
-        more = " and others" if len(fit.outliers) > 10 else ""
-        notes.append(
-            f"{len(fit.outliers)} of {problem.blocks} measurements are longer than noise explains "
-            f"(numbers {numbers}{more}, counted from 1)."
-        )
-    return tuple(notes)
+    return notes
 
 
-def notes_of_gain(
-    before: BlockErrors, validation: AsideErrors | None, held_out: AsideErrors | None
-) -> tuple[str, ...]:
-    """Note whether the fit reduces the errors of data that were not fitted."""
-    notes = []
-    for aside, what in ((validation, "cross-validation"), (held_out, "data kept aside")):
-        if aside is None:
-            continue
-        for unit, word in (("m", "position"), ("rad", "angle")):
-            after, was = aside.after.summary(unit), aside.before.summary(unit)
-            if after.blocks and before.summary(unit).blocks and after.rms > _NO_GAIN * was.rms:
-                notes.append(
-                    f"Calibration does not lower the {word} error in {what}: {was.rms:.4g} to "
-                    f"{after.rms:.4g} {unit} (rms). The noise or the number of measurements does "
-                    "not carry this many parameters: fewer parameters, a prior, or more data."
-                )
-    return tuple(notes)
+def _has_prior(solution: Solution) -> bool:
+    return bool(np.isfinite(solution.fit.prior.deviation).any())
 
 
 def _unlikely_deviations(solution: Solution) -> list[str]:
@@ -182,19 +208,24 @@ def _unlikely_deviations(solution: Solution) -> list[str]:
 
 
 def _hidden(solution: Solution) -> list[str]:
-    """Parameters whose estimates hang on those of others."""
-    fit, problem = solution.fit, solution.problem
+    """Parameters of the table whose estimates depend on each other, or one and its partner."""
+    fit, parameters = solution.fit, solution.problem.parameters
     if not np.isfinite(fit.covariance).all():
         return []
     alone = np.linalg.norm(fit.jacobian * np.sqrt(fit.weights)[:, None], axis=0)
     scale = 1.0 if fit.sigma_known else fit.scale
     inflation = fit.deviations * alone / max(scale, 1e-300)
     has_prior = np.isfinite(fit.prior.deviation)  # it says what the data do not
-    return [
-        name
-        for k, name in enumerate(problem.parameters.names)
-        if inflation[k] > _CONFUSED and not has_prior[k]
-    ]
+    found = [
+        k for k, entry in enumerate(parameters.entries)
+        if inflation[k] > _CONFUSED and not has_prior[k] and 0 < entry.row <= parameters.model.f
+    ]  # fmt: skip
+    if len(found) == 1 and len(parameters) > 1:
+        P = len(parameters)
+        correlation = np.abs(fit.covariance[found[0], :P]) / fit.deviations[:P]
+        correlation[found[0]] = -np.inf
+        found.append(int(np.argmax(correlation)))
+    return [parameters.names[k] for k in found]
 
 
 def _same_names(problem: Problem) -> list[str]:

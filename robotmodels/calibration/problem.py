@@ -16,7 +16,7 @@ from ..errors import InvalidValueError, ShapeError
 from .extended_table.differential import differential_model
 from .extended_table.parameters import GeometricParameters
 from .joints_asked import joints_that_count
-from .measurements import Evaluation, Fixture, Linearised, Measurement
+from .measurements import Evaluation, Fixture, Linearised, Measurement, PointContact
 from .measurements.noise import whitened
 
 
@@ -189,10 +189,15 @@ def guessed_fixtures(problem: Problem, xi: Array) -> Array:
             new = np.isnan(values[at])
             values[at[new]] = guess[new]
     if np.isnan(values).any():
-        names = [f.name for f, v in zip(problem.fixtures, values, strict=True) if np.isnan(v)]
+        pairs = zip(problem.fixtures, values, strict=True)
+        names = dict.fromkeys(f.name.rsplit(".", 1)[0] for f, v in pairs if np.isnan(v))
+        touched = dict.fromkeys(
+            f.name.rsplit(".", 1)[0]
+            for m in problem.measurements if isinstance(m, PointContact) for f in m.fixtures
+        )  # fmt: skip
         raise InvalidValueError(
-            f"No measurement says where {', '.join(names)} is: name a point that is touched "
-            "(PointContact), as its name and label with a colon between."
+            f"No measurement touches {', '.join(names)}. Touched points: "
+            f"{', '.join(touched) or 'none'}."
         )
     return values
 

@@ -20,7 +20,7 @@ from ..kinematics.coordinates.kinds import orientation_kind
 from ..model import RobotModel, check_model
 from .extended_table.skeleton import Frame
 from .file_kinds import CONTACTS, FileKind, as_file_kind
-from .files_read import check_columns, check_contents, files_read
+from .files_read import check_columns, check_contents, rows_read
 from .joints_asked import joints_that_count
 from .measurements import Distance, Measurement, Pose, Position, RelativePose
 from .measurements.measurement import of_files
@@ -188,7 +188,7 @@ def read_measurements(
             return Distance(q, measured, pivot=_labels(tables, label, q), **more)
         return CONTACTS[kind](q, _labels(tables, label, q), **more)
 
-    return of_files(measurement(), files_read(tables, counts))
+    return of_files(measurement(), rows_read(tables, counts))
 
 
 def _check_arguments(
@@ -367,5 +367,7 @@ def _check_lengths(
         return
     stated = "metres" if unit is LengthUnit.METRE else "millimetres"
     symbol = {"metres": "m", "millimetres": "mm"}.get(slip.unit)
-    advice = f"Say lengths={symbol!r}." if symbol and slip.taken == stated else "Convert them."
+    advice = f"Multiply them by {slip.factor:.4g}."
+    if symbol and slip.taken == stated:
+        advice = f"Say lengths={symbol!r}."
     raise InvalidValueError(f"{file}: positions are {slip.sentence(stated)}. {advice}")

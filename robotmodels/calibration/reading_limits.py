@@ -16,15 +16,18 @@ _TURNS = 30.0
 """Largest plausible reading of a revolute joint, rad; beyond it, degrees are assumed."""
 _BEYOND, _PART = 0.02, 0.02
 """Tolerance beyond a limit, rad or m, or relative to the range."""
-_MOST = 0.75
-"""Fraction of readings beyond the limits from which they are refused."""
+_MOST, _MANY = 0.75, 0.25
+"""Fraction of readings beyond the limits from which one joint is refused, and from which two joints
+are, or one whose readings are far beyond."""
+_FAR = 0.5
+"""Median distance beyond the limits that is far, rad."""
 
 
 def check_readings(
     model: RobotModel, measurements: Sequence[Measurement], rows: set[int]
 ) -> list[str]:
     """Compare readings with the limits of the joints."""
-    notes = []
+    wheres: dict[str, list[str]] = {}
     revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
     for k, m in enumerate(measurements):
         where = f"measurements[{k}] ({m.name})"
@@ -46,26 +49,35 @@ def check_readings(
                 "others: model.with_table(model.table.replace(lower=..., upper=...))."
             )
         if said:
-            notes.append(
-                f"{where}: readings beyond the limits of the joints: {'; '.join(said)}. See "
-                "whether sign, zero and unit of these readings are those of the model."
-            )
-    return notes
+            wheres.setdefault("; ".join(said), []).append(where)
+    if not wheres:
+        return []
+    listed = "; ".join(f"{', '.join(where)}: {said}" for said, where in wheres.items())
+    return [
+        f"Readings beyond the limits of the joints: {listed}. See whether sign, zero and unit of "
+        "these readings are those of the model."
+    ]
 
 
 def beyond_limits(model: RobotModel, q: Array, rows: set[int]) -> tuple[list[str], bool]:
-    """Sentences on joints beyond their limits, and whether a joint mostly is. Shapes: q (N, n)."""
+    """Sentences on joints beyond their limits, and whether to refuse them. Shapes: q (N, n)."""
     lower, upper = model.lower, model.upper
     room = np.maximum(_BEYOND, _PART * np.where(np.isfinite(upper - lower), upper - lower, 0.0))
     checked = (upper > lower) & [row + 1 in rows for row in model.table.joint_rows]
     over = np.where(checked, np.maximum(lower - q, q - upper) - room, -np.inf)
     number = (over > 0.0).sum(axis=0)
+    many = number > _MANY * len(q)
+    far = np.zeros(len(many), dtype=bool)
     said = []
     for j in np.flatnonzero(number):
-        unit = "rad" if model.table.sigma[model.table.joint_rows[j]] == REVOLUTE else "m"
+        is_revolute = model.table.sigma[model.table.joint_rows[j]] == REVOLUTE
+        unit = "rad" if is_revolute else "m"
+        beyond = over[over[:, j] > 0.0, j] + room[j]
+        far[j] = is_revolute and float(np.median(beyond)) > _FAR
         said.append(
             f"joint {j + 1} ({model.table.joint_names[j]}) in {number[j]} of {len(q)} readings, by "
-            f"up to {over[:, j].max() + room[j]:.3g} {unit} (reads {q[:, j].min():.4g} to "
+            f"up to {beyond.max():.3g} {unit} (reads {q[:, j].min():.4g} to "
             f"{q[:, j].max():.4g}, limits {lower[j]:.4g} to {upper[j]:.4g})"
         )
-    return said, bool((number > _MOST * len(q)).any())
+    most = (number > _MOST * len(q)) | (many & far)
+    return said, bool(most.any() or many.sum() >= 2)

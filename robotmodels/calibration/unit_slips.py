@@ -36,6 +36,11 @@ _SLIPS = {
     )
 }  # fmt: skip
 _SLIPS |= {(taken, unit): 1.0 / factor for (unit, taken), factor in _SLIPS.items()}
+_TENFOLD = {
+    ("millimetres", "centimetres"): "ten times too long: a slip of a decimal, or mm for cm",
+    ("centimetres", "millimetres"): "ten times too short: a slip of a decimal, or cm for mm",
+}
+"""Sentences on a known distance that is ten times too long or too short."""
 _NEAR = 0.15
 """Relative tolerance of a unit factor."""
 _ALIKE = 0.3
@@ -62,9 +67,10 @@ class UnitSlip(NamedTuple):
 
     def sentence(self, stated: str = "metres") -> str:
         """Text of the message."""
-        text = f"{self.ratio:.3g} times what the robot's nominal geometry gives"
-        slip = "" if self.taken == stated else f" taken for {self.taken}"
-        return f"{text}; these look like {self.unit}{slip}"
+        text = f"{self.ratio:.4g} times what the robot's nominal geometry gives"
+        if self.taken == stated:
+            return f"{text}; these look like {self.unit}"
+        return f"{text}, as if {self.unit} had been converted as {self.taken}"
 
     @property
     def factor(self) -> float:
@@ -204,6 +210,7 @@ def _check_distance(m: KnownDistance, one: Array, other: Array) -> None:
     slip = slip_of(m.length / max(apart, 1e-12), near)
     if slip is not None:
         raise InvalidValueError(
-            f"{m.name} {m.point} to {m.other}: {m.length:.6g} m is {slip.sentence()}. The nominal "
-            f"robot gives {apart:.3g} m. Pass metres: {slip.factor * m.length:.5g}."
+            f"{m.name} {m.point} to {m.other}: {m.length:.6g} m is "
+            f"{_TENFOLD.get((slip.unit, slip.taken)) or slip.sentence()}. The nominal robot gives "
+            f"{apart:.4g} m. Pass metres: {slip.factor * m.length:.5g}."
         )

@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import argparse
+import re
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .._arrays import Array
+from ..errors import InvalidValueError
 from ..model import RobotModel
 from .columns import column, columns
 from .exit_status import ExitStatus, ending
 from .file_options import add_delimiter, add_units
 from .numbers import numbers
+from .option_words import in_options
 from .output import Report, add_output, check_output, hand_over, with_extra
 from .progress import progress
 from .source import add_source, robot_of
 
 if TYPE_CHECKING:
-    from ..calibration import CalibrationResult, Measurement
+    from ..calibration import CalibrationResult, Measurement, ParameterPrior
 
 _KINDS = (
     "position", "pose", "orientation", "distance", "relative-pose", "point-contact",
@@ -53,7 +57,7 @@ def add_command(commands: Any) -> None:
     _add_files(parser.add_argument_group("the measurements"))
     _add_fit(parser.add_argument_group("the fit"))
     add_output(parser)
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, options=parser.options)
 
 
 def _add_files(files: Any) -> None:
@@ -114,7 +118,7 @@ def _add_fit(fitted: Any) -> None:
         "--loss", choices=_LOSSES, default="squares",
         help="all but the first against outliers (default: %(default)s)",
     )  # fmt: skip
-    fitted.add_argument("--prior", metavar="NUMBERS",
+    fitted.add_argument("--prior", metavar="LENGTH ANGLE|none",
                         help="standard deviations of the table's lengths (m) and angles (rad) that "
                         "are expected, or none (default: 1e-3 5e-3)")  # fmt: skip
     fitted.add_argument(
@@ -145,23 +149,26 @@ def run(arguments: argparse.Namespace) -> int:
         for a, b, length in arguments.known_distance
     ]  # fmt: skip
     prior: ParameterPrior | None = ParameterPrior()
-    if arguments.prior == "none":
-        prior = None
-    elif arguments.prior is not None:
-        length, angle = numbers(arguments.prior, 2, "--prior", positive=True)
-        prior = ParameterPrior(length=float(length), angle=float(angle))
-    aside = arguments.held_out
+    if arguments.prior is not None:
+        prior = _prior(arguments.prior)
+    aside: Measurement | float = arguments.held_out
     if arguments.test is not None:
         aside = read(arguments, model, arguments.test, name="test")
-    with progress(arguments, "fits") as bar:
-        result = fit(
-            model, [measured, *known], parameters=arguments.parameters, known=arguments.known,
-            known_lengths=arguments.known_lengths, base=not arguments.fixed_base,
-            tool=not arguments.fixed_tool, gains=arguments.gains,
-            eccentricity=arguments.eccentricity, compliance=arguments.compliance,
-            loss=arguments.loss, prior=prior, folds=arguments.folds, held_out=aside,
-            progress=bar and bar.steps,
-        )  # fmt: skip
+    try:
+        with progress(arguments, "fits") as bar:
+            result = fit(
+                model, [measured, *known], parameters=arguments.parameters, known=arguments.known,
+                known_lengths=arguments.known_lengths, base=not arguments.fixed_base,
+                tool=not arguments.fixed_tool, gains=arguments.gains,
+                eccentricity=arguments.eccentricity, compliance=arguments.compliance,
+                loss=arguments.loss, prior=prior, folds=arguments.folds, held_out=aside,
+                progress=bar and bar.steps,
+            )  # fmt: skip
+    except InvalidValueError as error:
+        raise InvalidValueError(_with_labels(str(error), measured)) from error
+    options = arguments.options()
+    notes = [in_options(_with_labels(note, measured), options) for note in result.notes]
+    result = replace(result, notes=tuple(notes))
     hand_over(_report(result, aside), arguments)
     return ExitStatus.DONE if result.solution.fit.converged else ExitStatus.NOT_REACHED
 
@@ -188,7 +195,7 @@ def _report(result: CalibrationResult, aside: Measurement | float) -> Report:
     from ..calibration.reporting.measured_sections import files_sentence
     from ..calibration.reporting.write import result_data, write_result
 
-    tested = "" if isinstance(aside, float) else f"\n{files_sentence(aside)}\n"
+    tested = "" if isinstance(aside, float | int) else f"\n{files_sentence(aside)}\n"
     text = result.report() + tested
 
     def write(folder: Path) -> list[str]:
@@ -204,6 +211,26 @@ def _report(result: CalibrationResult, aside: Measurement | float) -> Report:
     head += "\n".join(files_sentence(m) for m in result.solution.problem.measurements if m.files)
     head += tested
     return Report(text.rstrip(), head.rstrip(), lambda: result_data(result), write)
+
+
+def _with_labels(message: str, measured: Measurement) -> str:
+    """A message with points by their labels alone, as --known-distance names them."""
+    return re.sub(rf"(?<![\w-]){re.escape(measured.name)}:(?=\S)", "", message)
+
+
+def _prior(text: str) -> ParameterPrior | None:
+    """Standard deviations of lengths and angles, or none."""
+    from ..calibration import ParameterPrior
+
+    if text.strip().lower() == "none":
+        return None
+    try:
+        length, angle = numbers(text, 2, "--prior", positive=True)
+    except InvalidValueError:
+        raise InvalidValueError(
+            f"--prior: expected two positive numbers (m, rad) or none, got {text!r}."
+        ) from None
+    return ParameterPrior(length=float(length), angle=float(angle))
 
 
 def _sigma(text: str | None) -> float | Array | None:

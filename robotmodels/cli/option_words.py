@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Collection
 
 _WHOLE = (
@@ -21,6 +22,14 @@ _WHOLE = (
     ("A URDF file is read with RobotModel.from_urdf(path).", "Or give a .urdf or .par file."),
     ("use RobotModel.from_urdf(path, base_link, tip_link)",
      "give its path, with --base-link and --tip-link"),
+    ("give it others: model.with_table(model.table.replace(lower=..., upper=...))",
+     "change them in its URDF"),
+    ("Measure a distance (KnownDistance, Distance)", "Give a distance (--known-distance)"),
+    ("prior=None", "--prior none"),
+    ("Choose configurations with select_configurations", "Measure other postures"),
+    (" (named=...)", " (in Python: named=...)"),
+    ("Give the model masses (with_inertia)", "Give the URDF of the robot masses (<inertial>)"),
+    ("Pass metres: multiply by", "See --lengths, or multiply the lengths by"),
 )  # fmt: skip
 """Words of the package, and the option that says the same."""
 _OTHER_NAMES = {
@@ -33,8 +42,10 @@ _OTHER_NAMES = {
 }
 """Arguments whose option has another name."""
 _ARGUMENT = re.compile(
-    r"(?<![\w-])([a-z_]+)=(?:\[\.\.\.\]|\(\.\.\.\)|'([^']*)'|([0-9]+(?:\.[0-9]+)?))?"
+    r"(?<![\w-])([a-z_]+)="
+    r"(?:\[\.{3}\]|\(\.{3}\)|\.{3}|True|\(([^()]*)\)|'([^']*)'|([0-9]+(?:\.[0-9]+)?))?"
 )
+_LENGTH = re.compile(r"Pass metres: ([0-9.e+-]*[0-9])")
 _FIRST = re.compile(r"^([a-z_]+)(?=: )")
 
 
@@ -49,11 +60,20 @@ def in_options(message: str, options: Collection[str]) -> str:
         return next((option for option in candidates if option in options), None)
 
     def with_value(match: re.Match[str]) -> str:
-        name, word, number = match.groups()
-        option, value = option_of(name), word or number
+        name, words, word, number = match.groups()
+        option = option_of(name)
         if option is None:
             return match.group()
-        return f"{option} {value}" if value else option
+        values = [shlex.quote(word)] if word else [number] if number else []
+        values += [each.strip(" '") for each in (words or "").split(",") if each.strip(" '")]
+        return " ".join([option, *values])
 
+    if "--lengths" in options:
+        message = _LENGTH.sub(
+            lambda match: (
+                f"Write {match[1]} without --lengths mm, or {1e3 * float(match[1]):.5g} with it"
+            ),
+            message,
+        )
     message = _ARGUMENT.sub(with_value, message)
     return _FIRST.sub(lambda match: option_of(match[1]) or match[1], message)

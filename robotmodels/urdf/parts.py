@@ -51,9 +51,13 @@ class UrdfSource:
     """The URDF that a robot was read from."""
 
     text: str = field(repr=False)
+    """The file's text."""
     base_link: str | None
+    """Link given as the base; None for the root."""
     tip_link: str | None
+    """Link given as the tip; None if it was chosen by the reader."""
     tool_link: str
+    """Link whose frame is the tool."""
 
 
 @dataclass(frozen=True, slots=True)

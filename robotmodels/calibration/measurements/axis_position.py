@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..._arrays import Array, as_exact, read_only
 from ...errors import InvalidValueError
 from ..extended_table.skeleton import Frame
-from .measurement import Evaluation, Fixture, Linearised, Measurement, View
+from .measurement import Evaluation, Fixture, Linearised, Measurement, View, remade
 from .noise import as_noise, part_of_noise
 from .readings import as_readings, as_values
 from .rotation_vectors import rotations_of, tilt_of, tilted_axes, unit_vector
@@ -174,13 +174,18 @@ class AxisPosition(Measurement):
     def with_configurations(self, configurations: Sequence[Array]) -> Self:
         """The same readings of the gauge at others of the joints."""
         (q,) = configurations
-        return replace(self, q=q)
+        return remade(self, q=q)
 
     def subset(self, blocks: NDArray[np.int64]) -> Self:
         """Some of the readings."""
         sigma, covariance = part_of_noise(self, blocks)
-        return replace(
-            self, q=self.q[blocks], value=self.value[blocks], sigma=sigma, covariance=covariance
+        return remade(
+            self,
+            blocks,
+            q=self.q[blocks],
+            value=self.value[blocks],
+            sigma=sigma,
+            covariance=covariance,
         )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -13,7 +13,7 @@ from ..._arrays import Array
 from ..extended_table.skeleton import Frame
 from .labelled import Labelled, Labels, as_known, as_labels
 from .labelled_poses import as_known_pose, guessed_poses, labelled_poses, pose_fixtures
-from .measurement import POSE_AXES, POSE_UNITS, Evaluation, Fixture, Linearised, View
+from .measurement import POSE_AXES, POSE_UNITS, Evaluation, Fixture, Linearised, View, remade
 from .moving_poses import difference, motionless, relative, widened
 from .noise import as_noise, part_of_noise
 from .readings import as_measured_poses, as_readings, as_rows
@@ -169,13 +169,13 @@ class CameraPose(Labelled):
     def with_configurations(self, configurations: Sequence[Array]) -> Self:
         """The same poses at other readings."""
         (q,) = configurations
-        return replace(self, q=q)
+        return remade(self, q=q)
 
     def subset(self, blocks: NDArray[np.int64]) -> Self:
         """Some of the poses."""
         sigma, covariance = part_of_noise(self, blocks)
         board = tuple(self.board[b] for b in blocks)
-        return replace(
-            self, q=self.q[blocks], T=self.T[blocks], board=board, known=self.known_of(board),
-            sigma=sigma, covariance=covariance,
+        return remade(
+            self, blocks, q=self.q[blocks], T=self.T[blocks], board=board,
+            known=self.known_of(board), sigma=sigma, covariance=covariance,
         )  # fmt: skip

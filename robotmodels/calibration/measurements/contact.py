@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -13,7 +12,7 @@ from ..._arrays import Array
 from ..extended_table.skeleton import Frame
 from .dilations import have_common_place
 from .labelled import Labelled, Labels, as_known, as_labels
-from .measurement import View
+from .measurement import View, remade
 from .noise import as_noise, part_of_noise
 from .readings import as_readings
 
@@ -85,7 +84,7 @@ class Contact(Labelled):
     def with_configurations(self, configurations: Sequence[Array]) -> Self:
         """The same contacts at other readings."""
         (q,) = configurations
-        return replace(self, q=q)  # type: ignore[type-var]
+        return remade(self, q=q)
 
     def subset(self, blocks: NDArray[np.int64]) -> Self:
         """Some of the configurations."""
@@ -95,4 +94,4 @@ class Contact(Labelled):
             "q": self.q[blocks], self._met: label, "known": self.known_of(label), "sigma": sigma,
             "covariance": covariance,
         }  # fmt: skip
-        return replace(self, **changed)  # type: ignore[type-var]
+        return remade(self, blocks, **changed)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -14,7 +14,7 @@ from ...errors import InvalidValueError
 from ..extended_table.skeleton import Frame
 from .labelled import Labelled, Labels, as_known, as_labels
 from .labelled_points import as_point, known_points, labelled_points, point_fixtures
-from .measurement import Evaluation, Fixture, Linearised, View
+from .measurement import Evaluation, Fixture, Linearised, View, remade
 from .noise import as_noise, part_of_noise
 from .pivots import pivot_of
 from .readings import as_readings, as_values, same_number_of_readings
@@ -226,16 +226,17 @@ class Distance(Labelled):
         """The same lengths at other readings."""
         if self.q_other is None:
             (q,) = configurations
-            return replace(self, q=q)
+            return remade(self, q=q)
         q, q_other = configurations
-        return replace(self, q=q, q_other=q_other)
+        return remade(self, q=q, q_other=q_other)
 
     def subset(self, blocks: NDArray[np.int64]) -> Self:
         """Some of the lengths."""
         sigma, covariance = part_of_noise(self, blocks)
         pivot = None if self.pivot is None else tuple(self.pivot[b] for b in blocks)
-        return replace(
+        return remade(
             self,
+            blocks,
             q=self.q[blocks],
             length=self.length[blocks],
             q_other=None if self.q_other is None else self.q_other[blocks],

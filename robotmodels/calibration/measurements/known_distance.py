@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..._arrays import Array, as_floats
 from ...errors import InvalidValueError
-from .measurement import Evaluation, Fixture, Linearised, Measurement, View
+from .measurement import Evaluation, Fixture, Linearised, Measurement, View, remade
 from .noise import as_noise, part_of_noise
 
 
@@ -132,4 +132,4 @@ class KnownDistance(Measurement):
     def subset(self, blocks: NDArray[np.int64]) -> Self:
         """Itself."""
         sigma, covariance = part_of_noise(self, blocks)
-        return replace(self, sigma=sigma, covariance=covariance)
+        return remade(self, blocks, sigma=sigma, covariance=covariance)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -21,7 +21,7 @@ from .labelled_poses import (
     labelled_poses,
     pose_fixtures,
 )
-from .measurement import POSE_AXES, POSE_UNITS, Evaluation, Fixture, Linearised, View
+from .measurement import POSE_AXES, POSE_UNITS, Evaluation, Fixture, Linearised, View, remade
 from .moving_poses import difference, product, relative, widened
 from .noise import as_noise, part_of_noise
 from .readings import as_readings
@@ -182,16 +182,16 @@ class LinkedFrames(Labelled):
         """
         q, other = configurations
         if np.array_equal(q, other):
-            return replace(self, q=q)
+            return remade(self, q=q)
         moved, moved_other = q != self.q, other != self.q
         both = 0.5 * (q + other)
-        return replace(self, q=np.where(moved & moved_other, both, np.where(moved, q, other)))
+        return remade(self, q=np.where(moved & moved_other, both, np.where(moved, q, other)))
 
     def subset(self, blocks: NDArray[np.int64]) -> Self:
         """Some of the configurations."""
         sigma, covariance = part_of_noise(self, blocks)
         link = tuple(self.link[b] for b in blocks)
-        return replace(
-            self, q=self.q[blocks], link=link, known=self.known_of(link), sigma=sigma,
+        return remade(
+            self, blocks, q=self.q[blocks], link=link, known=self.known_of(link), sigma=sigma,
             covariance=covariance,
         )  # fmt: skip

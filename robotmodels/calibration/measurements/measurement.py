@@ -8,9 +8,10 @@ block for each measurement, of a fixed number of rows.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import fields
-from typing import Any, NamedTuple, Self
+from dataclasses import fields, replace
+from typing import Any, NamedTuple, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,19 +55,41 @@ class Linearised(NamedTuple):
     by_fixtures: Array
 
 
+class FileRows(NamedTuple):
+    """Name and number of rows of a file."""
+
+    name: str
+    rows: int
+
+    def __str__(self) -> str:
+        return f"{self.name} ({self.rows} rows)"
+
+
+class FileRow(NamedTuple):
+    """Row of a file, counted from 1 without the header."""
+
+    name: str
+    row: int
+
+    def __str__(self) -> str:
+        return f"{self.name} row {self.row}"
+
+
 class Measurement(ABC):
     """Base of the kinds of measurement; frozen dataclasses with B blocks of k rows."""
 
-    __slots__ = ("_files",)
+    __slots__ = ("_origin",)
 
     name: str
     sigma: Array | None
     covariance: Array | None
 
     @property
-    def files(self) -> tuple[Any, ...]:
+    def files(self) -> tuple[FileRows, ...]:
         """Files that it was read from, with their numbers of rows; none if it was not."""
-        return getattr(self, "_files", ())
+        return tuple(
+            FileRows(*item) for item in Counter(row.name for row in origin_of(self)).items()
+        )
 
     @property
     def _arguments(self) -> tuple[Any, ...]:
@@ -74,7 +97,7 @@ class Measurement(ABC):
         return tuple(getattr(self, f.name) for f in fields(self) if f.init)  # type: ignore[arg-type]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _made_again, (type(self), self._arguments, self.files)
+        return _made_again, (type(self), self._arguments, origin_of(self))
 
     @property
     @abstractmethod
@@ -153,15 +176,34 @@ class Measurement(ABC):
         """Only some of the blocks."""
 
 
-def of_files(measurement: Measurement, files: tuple[Any, ...]) -> Measurement:
-    """The same measurement with the files that it was read from."""
+def origin_of(measurement: Measurement) -> tuple[FileRow, ...]:
+    """Row of a file that each block was read from; empty if it was not read."""
+    return getattr(measurement, "_origin", ())
+
+
+def of_files(measurement: Measurement, origin: tuple[FileRow, ...]) -> Measurement:
+    """The same measurement with the rows of files that its blocks were read from."""
     kind, arguments, _ = measurement.__reduce__()[1]
-    return _made_again(kind, arguments, files)
+    return _made_again(kind, arguments, origin)
 
 
-def _made_again(kind: Callable[..., Any], arguments: tuple[Any, ...], files: Any) -> Any:
+_M = TypeVar("_M", bound=Measurement)
+
+
+def remade(measurement: _M, blocks: NDArray[np.int64] | None = None, /, **changes: Any) -> _M:
+    """The same measurement, or some of its blocks, with other fields and the files it is of."""
+    made, origin = replace(measurement, **changes), origin_of(measurement)  # type: ignore[type-var]
+    if origin and blocks is not None:
+        origin = tuple(origin[b] for b in np.arange(len(origin))[blocks])
+    object.__setattr__(made, "_origin", origin)
+    return made
+
+
+def _made_again(
+    kind: Callable[..., Any], arguments: tuple[Any, ...], origin: tuple[FileRow, ...]
+) -> Any:
     made = kind(*arguments)
-    object.__setattr__(made, "_files", files)
+    object.__setattr__(made, "_origin", origin)
     return made
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..._arrays import Array, as_core
 from ...errors import ShapeError
 from ..extended_table.skeleton import Frame
-from .measurement import POSE_AXES, POSE_UNITS, Evaluation, Linearised, Measurement, View
+from .measurement import POSE_AXES, POSE_UNITS, Evaluation, Linearised, Measurement, View, remade
 from .noise import as_noise, part_of_noise
 from .readings import as_measured_poses, as_readings, as_rows
 from .rotation_vectors import inverse_left_jacobians, rotation_errors
@@ -175,9 +175,11 @@ class Pose(Measurement):
     def with_configurations(self, configurations: Sequence[Array]) -> Self:
         """The same poses at other readings."""
         (q,) = configurations
-        return replace(self, q=q)
+        return remade(self, q=q)
 
     def subset(self, blocks: NDArray[np.int64]) -> Self:
         """Some of the poses."""
         sigma, covariance = part_of_noise(self, blocks)
-        return replace(self, q=self.q[blocks], T=self.T[blocks], sigma=sigma, covariance=covariance)
+        return remade(
+            self, blocks, q=self.q[blocks], T=self.T[blocks], sigma=sigma, covariance=covariance
+        )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..._arrays import Array, as_exact, read_only
 from ..extended_table.skeleton import Frame
-from .measurement import Evaluation, Linearised, Measurement, View
+from .measurement import Evaluation, Linearised, Measurement, View, remade
 from .noise import as_noise, part_of_noise
 from .readings import as_readings, as_rows
 
@@ -127,9 +127,11 @@ class Position(Measurement):
     def with_configurations(self, configurations: Sequence[Array]) -> Self:
         """The same positions at other readings."""
         (q,) = configurations
-        return replace(self, q=q)
+        return remade(self, q=q)
 
     def subset(self, blocks: NDArray[np.int64]) -> Self:
         """Some of the positions."""
         sigma, covariance = part_of_noise(self, blocks)
-        return replace(self, q=self.q[blocks], p=self.p[blocks], sigma=sigma, covariance=covariance)
+        return remade(
+            self, blocks, q=self.q[blocks], p=self.p[blocks], sigma=sigma, covariance=covariance
+        )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..._arrays import Array
 from ...errors import InvalidValueError
 from ..extended_table.skeleton import Frame
-from .measurement import POSE_AXES, POSE_UNITS, Evaluation, Linearised, Measurement, View
+from .measurement import POSE_AXES, POSE_UNITS, Evaluation, Linearised, Measurement, View, remade
 from .moving_poses import difference, motionless, relative
 from .noise import as_noise, part_of_noise
 from .readings import as_measured_poses, as_readings, as_rows, same_number_of_readings
@@ -175,12 +175,12 @@ class RelativePose(Measurement):
     def with_configurations(self, configurations: Sequence[Array]) -> Self:
         """The same pairs at other readings."""
         q, q_other = configurations
-        return replace(self, q=q, q_other=q_other)
+        return remade(self, q=q, q_other=q_other)
 
     def subset(self, blocks: NDArray[np.int64]) -> Self:
         """Some of the pairs."""
         sigma, covariance = part_of_noise(self, blocks)
-        return replace(
-            self, q=self.q[blocks], q_other=self.q_other[blocks], T=self.T[blocks], sigma=sigma,
-            covariance=covariance,
+        return remade(
+            self, blocks, q=self.q[blocks], q_other=self.q_other[blocks], T=self.T[blocks],
+            sigma=sigma, covariance=covariance,
         )  # fmt: skip

@@ -12,6 +12,7 @@ from ...model import RobotModel
 from ...table_text import ReportSection, ReportTable, table_of
 from ..errors_seen import BlockErrors
 from ..measurements import Measurement
+from ..measurements.measurement import origin_of
 from .units import degrees, in_unit, millimetres, printed_unit
 
 if TYPE_CHECKING:
@@ -141,7 +142,7 @@ def noise_section(result: CalibrationResult) -> ReportSection:
 
 
 def outlier_section(result: CalibrationResult) -> ReportSection | None:
-    """Measurements that are longer than noise explains."""
+    """Measurements whose residuals are larger than noise explains."""
     fit, measurements = result.solution.fit, result.solution.problem.measurements
     if not len(fit.outliers):
         return None
@@ -157,16 +158,17 @@ def outlier_section(result: CalibrationResult) -> ReportSection | None:
         if seen[block]:
             p, angle = float(result.after.position[at]), float(result.after.angle[at])
             lengths = (millimetres(p), degrees(angle))
-        rows.append((str(int(block)), m.name, str(int(inside[block]) + 1), *lengths,
-                     f"{weight:.2g}"))  # fmt: skip
+        at, origin = int(inside[block]), origin_of(m)
+        where = (origin[at].name, str(origin[at].row)) if origin else (m.name, str(at + 1))
+        rows.append((str(int(block) + 1), *where, *lengths, f"{weight:.2g}"))
     more = (
         f" The worst {_OUTLIERS} of {len(fit.outliers)}:" if len(fit.outliers) > _OUTLIERS else ""
     )
     return ReportSection(
         "Outliers",
         (
-            "Measurements that are longer than noise explains; they stay in the fit with their "
-            f"weights.{more}",
-            table_of(("block", "measurement", "row", "mm", "deg", "weight"), rows),
+            "Measurements whose residuals are larger than noise explains; they stay in the fit "
+            f"with their weights. Numbers and rows count from 1.{more}",
+            table_of(("number", "measurement or file", "row", "mm", "deg", "weight"), rows),
         ),
     )

@@ -11,6 +11,7 @@ from ...estimation import fit_diagnostics
 from ...estimation.correlation import correlated_pairs
 from ...table_text import ReportSection, ReportTable, table_of
 from ..folds import suited_fixtures
+from ..notes import is_implausible
 from ..problem import stacked
 from .measured_sections import error_section, measured_section, noise_section, outlier_section
 from .parameter_sections import left_out_section, parameter_section, place_section
@@ -87,13 +88,14 @@ def _outcome(result: CalibrationResult) -> ReportSection:
             found += f"; on data kept aside {text(aside.after.summary(unit).rms)}"
             found += f" {printed_unit(unit)}"
         sentences.append(found + ".")
-    tool = result.other_tool
-    sentences.append(
-        f"Predicted standard error of another tool (its pose on the flange known, its point "
-        f"{1e3 * tool.length:.0f} mm from the last frame) in the measured postures: "
-        f"{1e3 * tool.rms:.2g} mm and {np.rad2deg(tool.angle):.2g} deg; with the nominal robot "
-        f"{1e3 * tool.nominal:.2g} mm."
-    )
+    if not is_implausible(result.solution):
+        tool = result.other_tool
+        sentences.append(
+            f"Predicted standard error of another tool (its pose on the flange known, its point "
+            f"{1e3 * tool.length:.0f} mm from the last frame) in the measured postures: "
+            f"{1e3 * tool.rms:.2g} mm and {np.rad2deg(tool.angle):.2g} deg; with the nominal robot "
+            f"{1e3 * tool.nominal:.2g} mm."
+        )
     return ReportSection("Outcome", tuple(sentences))
 
 

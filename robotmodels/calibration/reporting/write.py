@@ -225,13 +225,12 @@ def calibrated_urdf(robot: CalibratedRobot) -> str:
     links are the calibrated ones. All links, joints, meshes, masses, limits and comments stay;
     what is fixed to a link moves with it.
 
-    - Base: the link that is the world (``base_link``, else the root) stays where it is. A fixed
-      joint that begins the chain takes the new place. Without one a new root ``world`` carries
-      the robot, or, if ``base_link`` was named, the first moving joint takes it.
-    - Tool: a tool of `RobotModel.with_tool` that is no link becomes a new link ``tool``, and the
-      tip link stays where it is. If the tool is a link that a joint moves, and its axis no longer
-      passes as it did, a new link carries it: all of it, its shapes too. To keep them where they
-      are, give the measured point by `RobotModel.with_tool`.
+    - Base: the first joint of the chain, if it is fixed, takes the new origin. Without a fixed
+      first joint, a new root link ``world`` is added; if ``base_link`` was given, the origin of
+      the first moving joint changes instead.
+    - Tool: a tool without a link (`RobotModel.with_tool`) becomes a new link ``tool``; the tip
+      link is unchanged. If the tool link is the child of a moving joint whose axis changes
+      relative to it, a new link is inserted between them, and its meshes move with it.
 
     A robot without such a source (a table) is written by `to_urdf`.
 
