@@ -241,12 +241,17 @@ def test_a_joint_that_stays_still_is_not_counted_as_missing():
 
 FACTORS = [
     (1000.0, "these look like millimetres"), (100.0, "these look like centimetres"),
-    (1 / 0.0254, "these look like inches"), (25.4, "look like millimetres taken for inches"),
-    (10.0, "look like millimetres taken for centimetres"),
-    (0.1, "look like centimetres taken for millimetres"),
-    (1 / 25.4, "look like inches taken for millimetres"),
-    (1e-3, "look like metres taken for millimetres"),
+    (1 / 0.0254, "these look like inches"),
+    (25.4, "as if millimetres had been converted as inches"),
+    (10.0, "as if millimetres had been converted as centimetres"),
+    (0.1, "as if centimetres had been converted as millimetres"),
+    (1 / 25.4, "as if inches had been converted as millimetres"),
+    (1e-3, "as if metres had been converted as millimetres"),
 ]  # fmt: skip
+TENFOLD = [
+    (10.0, "0.5 m is ten times too long: a slip of a decimal, or mm for cm"),
+    (0.1, "0.005 m is ten times too short: a slip of a decimal, or cm for mm"),
+]
 
 
 def seen_by(kind, arm, q, factor):
@@ -296,7 +301,7 @@ def test_right_lengths_are_never_blamed_on_units(kind):
 
 
 @pytest.mark.parametrize("prior", [None, ParameterPrior()])
-@pytest.mark.parametrize(("factor", "sentence"), FACTORS[:3] + FACTORS[4:6])
+@pytest.mark.parametrize(("factor", "sentence"), FACTORS[:3] + TENFOLD)
 def test_the_unit_of_a_known_distance_is_named(factor, sentence, prior):
     for seed in (0, 3, 9):
         arm, touched = contacts(seed)
@@ -319,9 +324,12 @@ def test_the_unit_of_a_known_distance_of_a_real_arm_is_named(robot):
 @pytest.mark.parametrize(
     ("factor", "lengths", "advice"),
     [
-        (1e3, "m", "millimetres. Say lengths='mm'"), (1.0, "mm", "metres. Say lengths='m'"),
-        (1e2, "m", "centimetres. Convert"), (1e2, "mm", "centimetres. Convert"),
-        (1 / 0.0254, "mm", "inches. Convert"), (1e4, "m", None),
+        (1e3, "m", "like millimetres. Say lengths='mm'"),
+        (1.0, "mm", "like metres. Say lengths='m'"),
+        (1e2, "m", "like centimetres. Multiply them by 0.01"),
+        (1e2, "mm", "as if centimetres had been converted as millimetres. Multiply them by 10"),
+        (1 / 0.0254, "mm", "as if inches had been converted as millimetres. Multiply them by 25.4"),
+        (1e4, "m", None),
         (1e3, "mm", None), (1.0, "m", None),
     ],
 )  # fmt: skip
@@ -334,7 +342,7 @@ def test_the_unit_of_a_file_is_named(tmp_path, factor, lengths, advice):
     if advice is None and factor < 1e4:
         assert read_measurements(file, "position", arm.nominal, lengths=lengths).blocks == 20
         return
-    with pytest.raises(InvalidValueError, match=f"look like {advice or 'millimetres'}"):
+    with pytest.raises(InvalidValueError, match=advice or "look like millimetres"):
         read_measurements(file, "position", arm.nominal, lengths=lengths)
 
 
@@ -416,7 +424,7 @@ def test_a_folder_that_also_holds_poses_is_not_read_as_readings(socket, limits):
         model = model.with_table(model.table.replace(lower=-far, upper=far))
     with pytest.raises(InvalidValueError, match="do not look like readings") as caught:
         read_measurements(folder, "point_contact", model)
-    for said in ("hole_0.csv, hole_0_pose.csv", "hole_1_pose.csv (", "pattern=..."):
+    for said in ("hole_0.csv, hole_0_pose.csv", "hole_1_pose.csv (", "pattern='*.csv'"):
         assert said in str(caught.value)
     assert "hole_1.csv (" not in str(caught.value)
     found = read_measurements(folder, "point_contact", model, pattern="hole_?.csv")

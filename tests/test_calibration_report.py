@@ -109,8 +109,8 @@ def test_lengths_are_in_millimetres_and_angles_in_degrees(poses):
 def test_outliers_are_listed_with_their_rows(poses):
     (table,) = tables(poses, "Outliers")
     rows = cells(table)
-    assert {int(block) for block in rows} == set(OUTLIERS)
-    name, row, size, _, weight = rows[str(OUTLIERS[0])]
+    assert {int(number) - 1 for number in rows} == set(OUTLIERS)
+    name, row, size, _, weight = rows[str(OUTLIERS[0] + 1)]
     assert (name, row) == ("tracker", str(OUTLIERS[0] + 1))
     assert float(size) > 20.0
     assert float(weight) == 0.0

@@ -428,7 +428,7 @@ def test_calibrate_takes_known_distances_and_files_that_only_test(run, tmp_path)
         (["--angles", "deg", "--lengths", "mm", "--columns", "x", "y", "w"], "no column 'w'"),
         (["--angles", "deg", "--lengths", "mm", "--parameters", "d9"], "'d9' is not a parameter"),
         (["--angles", "deg", "--lengths", "mm", "--sigma", "-1"], "--sigma: expected positive"),
-        (["--angles", "deg", "--lengths", "mm", "--prior", "1"], "--prior: expected 2"),
+        (["--angles", "deg", "--lengths", "mm", "--prior", "1"], "--prior: expected two positive"),
         (["--robot", "rx91"], "rx90"),
         (["--measurements", "missing.csv"], "missing.csv"),
     ],

@@ -123,8 +123,8 @@ def _add_fit(fitted: Any) -> None:
                         "are expected, or none (default: 1e-3 5e-3)")  # fmt: skip
     fitted.add_argument(
         "--folds", type=int, default=5,
-        help="largest number of folds: whole places or runs of postures; 0 for none (default: "
-        "%(default)s)",
+        help="largest number of folds: whole places or runs of postures; 0 for none "
+        "(default: %(default)s)",
     )  # fmt: skip
     fitted.add_argument("--held-out", type=float, default=0.2, metavar="SHARE",
                         help="share of the places or postures that one more fit is tested on, 0 "

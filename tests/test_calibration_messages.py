@@ -1,0 +1,329 @@
+"""Notes and messages of calibration: each names its cause, and the next step of its reader."""
+
+import re
+import sys
+
+import numpy as np
+import pytest
+from test_calibration_mistakes import ALONE, LOWER, UPPER, Arm, between, contacts, limited
+
+import robotmodels as rm
+from robotmodels.calibration import ParameterPrior, PointContact, Pose, Position, fit
+from robotmodels.calibration.files_read import check_columns, check_contents
+from robotmodels.calibration.measurements import AxisPosition, Distance, RelativePose
+from robotmodels.calibration.read import read_measurements
+from robotmodels.cli import main
+from robotmodels.cli.option_words import in_options
+from robotmodels.cli.program import parser_of
+from robotmodels.csv_table import open_table
+from robotmodels.datasets import panda_double_socket
+from robotmodels.errors import InvalidValueError, RobotModelsError
+
+# --- limits of joints -----------------------------------------------------------------------------
+
+
+def beyond(q, joint, count, by):
+    """Readings of which some of a joint are beyond its upper limit."""
+    q = q.copy()
+    q[:count, joint] = UPPER[joint] + by
+    return q
+
+
+@pytest.mark.parametrize(
+    ("changes", "refused"),
+    [
+        ([(3, 11, 0.1), (5, 11, 0.1)], True),  # two joints in more than a quarter
+        ([(3, 11, 0.1), (5, 10, 0.1)], False),
+        ([(3, 11, 0.6)], True),  # one joint in more than a quarter, far beyond
+        ([(3, 11, 0.4)], False),
+        ([(3, 10, 0.6)], False),
+    ],
+)
+def test_readings_are_refused_by_their_number_and_their_distance_from_the_limits(changes, refused):
+    for seed in range(3):
+        arm = Arm(seed)
+        q = arm.rng.uniform(LOWER, UPPER, (40, 6))
+        p = arm.positions(q)
+        for change in changes:
+            q = beyond(q, *change)
+        model = limited(arm, LOWER, UPPER)
+        measured = Position(q, p)
+        if refused:
+            with pytest.raises(InvalidValueError, match=r"joint 4 .* in 11 of 40 readings"):
+                fit(model, measured, progress=lambda *_: pytest.fail("a fit"), **ALONE)
+        else:
+            assert any("beyond the limits" in n for n in fit(model, measured, **ALONE).notes)
+
+
+def test_the_columns_of_a_real_arm_in_reverse_are_refused():
+    data = panda_double_socket()
+    one, other = data.places["front"]
+    q, labels = np.concatenate([one, other]), [0] * len(one) + [1] * len(other)
+    fit(data.model, [PointContact(q, labels), between(data.distance)], **ALONE)
+    message = r"joint 2 .* in 43 of 62 .* joint 6 .* in 44 of 62"
+    with pytest.raises(InvalidValueError, match=message):
+        fit(data.model, [PointContact(q[:, ::-1], labels), between(data.distance)], **ALONE)
+
+
+def test_readings_of_several_measurements_beyond_the_limits_are_one_note():
+    arm = Arm(0)
+    q = beyond(arm.rng.uniform(LOWER, UPPER, (40, 6)), 1, 1, 0.3)
+    p = arm.positions(q)
+    measured = [Position(q, p, name="a"), Position(q, p, name="b"), Position(q[1:], p[1:])]
+    other = Position(beyond(q, 2, 2, 0.2), p, name="c")
+    result = fit(limited(arm, LOWER, UPPER), [*measured, other], **ALONE)
+    (note,) = (n for n in result.notes if "beyond the limits" in n)
+    assert "measurements[0] (a), measurements[1] (b): joint 2" in note
+    assert re.search(r"measurements\[3\] \(c\): joint 2 [^;]*\); joint 3 ", note)
+    assert "measurements[2]" not in note
+
+
+# --- implausible residuals ------------------------------------------------------------------------
+
+
+def test_implausible_residuals_are_the_first_note_and_end_the_search_for_their_cause():
+    for seed in range(3):
+        arm = Arm(seed)
+        q = arm.readings(40)
+        p = arm.positions(q)
+        wrong, right = fit(arm.nominal, Position(q, p[::-1])), fit(arm.nominal, Position(q, p))
+        assert re.match(r"position: what is left is \d+ % of the robot's size", wrong.notes[0])
+        assert not any("depend on the posture" in note for note in wrong.notes)
+        assert "another tool" not in wrong.report()
+        assert not any("what is left" in note for note in right.notes)
+        assert "Predicted standard error of another tool" in right.report()
+
+
+# --- parameters -----------------------------------------------------------------------------------
+
+NEARLY = (
+    "nearly indistinguishable (standard errors over 50 times those with the other parameters known)"
+)
+
+
+@pytest.mark.parametrize(("seed", "prior"), [(0, None), (9, ParameterPrior())])
+def test_a_coordinate_of_the_tool_alone_is_not_called_indistinguishable(seed, prior):
+    arm, touched = contacts(seed)
+    result = fit(arm.nominal, [touched, between(0.05)], prior=prior, **ALONE)
+    assert not any("indistinguishable" in note for note in result.notes)
+
+
+def test_a_parameter_is_indistinguishable_from_another_one():
+    arm = Arm(3)
+    q = arm.readings(40)
+    q[:, 2] = 0.3 + 0.1 * arm.rng.normal(size=40)
+    result = fit(arm.nominal, Position(q, arm.positions(q)), prior=None, **ALONE)
+    (note,) = (n for n in result.notes if "indistinguishable" in n)
+    assert note.startswith(f"theta3, theta4: {NEARLY}")
+    k, other = result.names.index("theta3"), result.names.index("theta4")
+    among = np.abs(result.correlation[k])
+    among[k] = 0.0
+    assert among.argmax() == other
+
+
+def test_parameters_identifiable_at_the_solution_alone_have_no_doubtful_estimate():
+    arm = Arm(0)
+    q = arm.readings(40)
+    q[:, 2] = 0.3 + 0.01 * arm.rng.normal(size=40)
+    result = fit(arm.nominal, Position(q, arm.positions(q)), prior=None, **ALONE)
+    (note,) = (n for n in result.notes if n.startswith("At the solution"))
+    assert note.endswith("Also: theta5; these were not estimated.")
+    assert "theta5" not in result.names
+    assert "doubtful" not in note
+
+
+# --- data kept aside ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("prior", "advice"), [(None, "a prior"), (ParameterPrior(), "a narrower")])
+def test_no_gain_is_one_note_in_the_units_of_the_report(prior, advice):
+    arm = rm.load("rx90")
+    rng = np.random.default_rng(3)
+    q = rng.uniform(-2, 2, (14, 6))
+    T = rm.dgm(arm, q)
+    T[:, :3, 3] += 2e-3 * rng.normal(size=(14, 3))
+    result = fit(arm, Pose(q, T), prior=prior)
+    (note,) = (n for n in result.notes if "does not lower" in n)
+    assert f"fewer parameters, {advice}" in note
+    words = r"position error \(cross-validation ([\d.]+) to ([\d.]+), held out .* mm, rms\)"
+    was, after = (float(number) for number in re.search(words, note).groups())
+    assert was == pytest.approx(1e3 * result.cross_validation.before.summary("m").rms, abs=1e-4)
+    assert after == pytest.approx(1e3 * result.cross_validation.after.summary("m").rms, abs=1e-4)
+
+
+# --- files ----------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def places(tmp_path_factory):
+    """Two sockets at two places of a real arm: its URDF and four files, one with a bad row."""
+    data = panda_double_socket()
+    folder = tmp_path_factory.mktemp("places")
+    urdf = folder / "panda.urdf"
+    urdf.write_text(rm.model.to_urdf(data.model))
+    files = []
+    for place in ("front", "right"):
+        (folder / place).mkdir()
+        for hole, q in enumerate(data.places[place]):
+            bad = q.copy()
+            bad[7, 3] += 0.04 * (place == "front" and hole == 1)
+            files.append(folder / place / f"hole_{hole}.csv")
+            np.savetxt(files[-1], bad, delimiter=",", header=",".join(f"q{j}" for j in range(1, 8)),
+                       comments="")  # fmt: skip
+    return data, urdf, files
+
+
+def test_outliers_name_their_files_and_rows(places):
+    data, _, files = places
+    measured = read_measurements(files[:2], "point_contact", data.model)
+    k = len(data.places["front"][0]) + 7
+    for found, block in ((measured, k), (measured.subset(np.r_[k, :30, 40:60]), 0)):
+        known = between(data.distance)
+        known = rm.calibration.KnownDistance("point:hole_0", "point:hole_1", known.length)
+        result = fit(data.model, [found, known], **ALONE)
+        assert result.solution.fit.outliers[0] == block
+        (note,) = (n for n in result.notes if "outlier" in n)
+        assert f"{block + 1} in front/hole_1.csv row 8" in note
+        assert note.endswith("residuals are larger than noise explains.")
+        text = result.report()
+        table = text[text.index("\nOutliers\n") :]
+        assert re.search(rf"│ +{block + 1} │ +front/hole_1\.csv │ +8 │", table)
+
+
+def test_parts_of_measurements_keep_their_files(places):
+    data, _, files = places
+    whole = read_measurements(files[:2], "point_contact", data.model)
+    count = len(data.places["front"][0])
+    assert [str(f) for f in whole.subset(np.arange(count - 2, count + 5)).files] == [
+        "front/hole_0.csv (2 rows)", "front/hole_1.csv (5 rows)",
+    ]  # fmt: skip
+    assert whole.with_configurations([whole.q + 0.1]).files == whole.files
+    assert whole.subset(np.arange(count)).with_configurations([whole.q[:count]]).files == (
+        whole.files[0],
+    )
+
+
+def test_every_kind_keeps_its_files(tmp_path):
+    arm = Arm(0)
+    q = arm.readings(6)
+    T = rm.dgm(arm.real, q)
+    np.savetxt(tmp_path / "a.csv", q, delimiter=",")
+    read = read_measurements(tmp_path / "a.csv", "point_contact", arm.nominal)
+    kinds = [
+        Pose(q, T), Position(q, T[:, :3, 3]), PointContact(q), Distance(q, np.ones(6)),
+        Distance(q, np.ones(6), q[::-1]), RelativePose(q, q[::-1], T),
+        rm.calibration.FrameContact(q), rm.calibration.PlaneContact(q),
+    ]  # fmt: skip
+    assert AxisPosition  # a gauge's readings are not read from files
+    for kind in kinds:
+        object.__setattr__(kind, "_origin", read._origin)
+        views = [view.q for view in kind.views]
+        assert kind.with_configurations(views).files == read.files
+        assert [f.rows for f in kind.subset(np.array([1, 4])).files] == [2]
+
+
+# --- the command line -----------------------------------------------------------------------------
+
+CALIBRATE = parser_of("calibrate")[1].options()
+GARBLED = re.compile(r"--[a-z-]+(\.\S|\(|=|\.\.)")
+
+
+def run(places, capsys, *words, of=2):
+    """Status, output and error of calibrate on contacts with the first files."""
+    _, urdf, files = places
+    given = [
+        "calibrate", "--robot", urdf, "--measurements", *files[:of], "--kind", "point-contact",
+        "--folds", "0", "--held-out", "0", *words,
+    ]  # fmt: skip
+    code = main([str(word) for word in given])
+    out, err = capsys.readouterr()
+    assert not GARBLED.search(out + err)
+    return code, " ".join(out.split()), err
+
+
+def messages(places, tmp_path):
+    """Messages and notes of the package that name its arguments."""
+    data, _, files = places
+    q = np.loadtxt(files[0], delimiter=",", skiprows=1)
+    np.savetxt(tmp_path / "wide.csv", np.hstack([q, q]), delimiter=",")
+    np.savetxt(tmp_path / "poses.csv", np.tile([0, 0, 0, 1.0, 0, 0, 0], (9, 1)), delimiter=",")
+    wide, poses = open_table(tmp_path / "wide.csv", None), open_table(tmp_path / "poses.csv", None)
+    right = open_table(files[0], None)
+    arm, touched = contacts(0)
+    readings = [q, np.tile([0, 0, 0, 1.0, 0, 0, 0], (9, 1))]
+    for call in (
+        lambda: check_columns([right, wide]),
+        lambda: check_contents([right, poses], readings, data.model, None),
+        lambda: fit(arm.nominal, touched, **ALONE),
+        lambda: fit(data.model, PointContact(q[:, ::-1] + 9.0), **ALONE),
+        lambda: fit(arm.nominal, [touched, between(5e-5)], **ALONE),
+    ):
+        with pytest.raises(RobotModelsError) as caught:
+            call()
+        yield str(caught.value)
+    yield "Read the robot with tip_link='LINK' to leave them out."
+    yield "Name them: known_lengths=('d3', 'r4')."
+    yield "joint compliance (compliance='joints'); gains of the readings (gains=True), prior=None."
+    yield "leave one of them out (known=...), or give a prior of its own (named=...)."
+    yield "Give the model masses (with_inertia) to try joint compliance."
+
+
+def test_messages_name_options_and_their_values(places, tmp_path):
+    said = [in_options(message, CALIBRATE) for message in messages(places, tmp_path)]
+    for message in said:
+        assert not GARBLED.search(message), message
+    text = "\n".join(said)
+    for words in (
+        "Select the files by --pattern '*.csv', or name them.", "change them in its URDF.",
+        "Read the robot with --tip-link LINK to leave", "Name them: --known-lengths d3 r4.",
+        "(--compliance joints)", "(--gains), --prior none.", "out (--known), or",
+        "(in Python: named=...)", "Give the URDF of the robot masses (<inertial>)",
+        "Write 0.05 without --lengths mm, or 50 with it.", "Give a distance (--known-distance)",
+    ):  # fmt: skip
+        assert words in text
+    assert re.search(r"whose length is known: --known-lengths [a-z]\d\. ", text)
+
+
+def test_a_known_distance_in_another_unit_on_the_command_line(places, capsys):
+    words = ("--lengths", "mm", "--known-distance", "hole_0", "hole_1")
+    code, _, err = run(places, capsys, *words, "0.05")
+    assert code == 2
+    assert "known distance hole_0 to hole_1" in err
+    assert "as if metres had been converted as millimetres" in err
+    assert "Write 0.05 without --lengths mm, or 50 with it." in err
+    code, out, _ = run(places, capsys, *words, "50", "--prior", "NONE")
+    assert code == 0
+    assert "Without a prior." in out
+    code, _, err = run(places, capsys, *words, "50", "--prior", "1e-3")
+    assert (code, err) == (
+        2, "robotmodels: --prior: expected two positive numbers (m, rad) or none, got '1e-3'.\n",
+    )  # fmt: skip
+
+
+def test_unknown_points_are_listed_once_with_those_that_are_touched(places, capsys):
+    code, _, err = run(places, capsys, "--known-distance", "hole_0", "hole_1", "0.05", of=4)
+    assert code == 2
+    assert (
+        "No measurement touches hole_0, hole_1. Touched points: front/hole_0, front/hole_1, "
+        "right/hole_0, right/hole_1." in err
+    )
+    arm, touched = contacts(0)
+    message = r"touches point:7\. Touched points: point:0, point:1\.$"
+    with pytest.raises(InvalidValueError, match=message):
+        fit(arm.nominal, [touched, between(0.05, 7)], **ALONE)
+
+
+def test_notes_of_a_printed_report_name_options(places, capsys, monkeypatch):
+    note = "Try joint compliance (compliance='joints'); Give the model masses (with_inertia)."
+    monkeypatch.setattr(sys.modules[fit.__module__], "notes_after", lambda *_: (note,))
+    code, out, _ = run(places, capsys, "--known-distance", "hole_0", "hole_1", "0.05")
+    assert code == 0
+    assert "Try joint compliance (--compliance joints); Give the URDF of the robot masses" in out
+
+
+def test_help_of_the_shares_and_folds(capsys):
+    assert main(["calibrate", "--help"]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert "--prior LENGTH ANGLE|none" in text
+    assert "largest number of folds: whole places or runs of postures; 0 for none" in text
+    assert "share of the places or postures that one more fit is tested on" in text
