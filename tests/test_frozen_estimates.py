@@ -7,7 +7,17 @@ of the same files are compared by `python tests/oracles/make_estimates.py --chec
 import frozen_estimates
 import numpy as np
 import pytest
-from frozen_estimates import COMPUTED, FOLDER, QUICK, differences, frozen, plain, read, summary
+from frozen_estimates import (
+    COMPUTED,
+    FOLDER,
+    METHODS,
+    QUICK,
+    differences,
+    frozen,
+    plain,
+    read,
+    summary,
+)
 
 
 @pytest.mark.parametrize(
@@ -25,12 +35,17 @@ def test_every_case_is_frozen():
     assert sum(path.stat().st_size for path in FOLDER.glob("frozen_*.json")) < 600_000
 
 
-def test_frozen_methods_are_unbiased_and_their_intervals_hold_the_truth():
-    # 51 logs, 58 parameters
-    for found in summary(read("frozen_study")["cases"]).values():
-        assert 0.93 < found["inside"] < 0.97
-        assert 0.9 < found["rms"] < 1.1
-        assert found["bias"] < 4.5  # by chance, once in 2500 times
+def test_frozen_intervals_hold_the_truth_over_51_logs():
+    found = summary(read("frozen_study")["cases"])
+    assert list(found) == list(METHODS)
+    for method, seen in found.items():
+        assert seen["logs"] == seen["solved"] == 51
+        # intervals of shrunk parameters are those of the prior, which is wider than their errors
+        assert 0.92 < seen["inside"] / (51 * 58) < (0.99 if "shrunk" in method else 0.97)
+        assert 0.75 < seen["rms"] < 1.1
+        # by chance, the largest mean of 58 is below 0.5 of a standard error; dry friction at rest
+        # is not that of the simulated log, which biases DIDIM a little more
+        assert seen["bias"] < (0.7 if method == "didim" else 0.5)
 
 
 @pytest.mark.parametrize("word", ["values", "standard_errors", "held_out", "status", "names"])
