@@ -371,6 +371,7 @@ class Study:
             "standard_errors": [float(f"{x:.5g}") for x in kept["standard_errors"]],
         }  # fmt: skip
 
+
 LOGS = 51
 """Of the closed loop; six more follow the references exactly."""
 

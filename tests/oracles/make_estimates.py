@@ -26,7 +26,7 @@ def write(part: str, cases: dict) -> None:
     """A file with a line for each case."""
     source = f"robotmodels itself: python tests/oracles/make_estimates.py {part}"
     lines = [f"{json.dumps(name)}: {json.dumps(case)}" for name, case in cases.items()]
-    text = '{"source": %s, "cases": {\n%s\n}}\n' % (json.dumps(source), ",\n".join(lines))
+    text = f'{{"source": {json.dumps(source)}, "cases": {{\n' + ",\n".join(lines) + "\n}}\n"
     (fe.FOLDER / f"frozen_{part}.json").write_text(text, encoding="utf-8")
 
 
