@@ -12,6 +12,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+from frozen_kinds import KINDS, measured, simulated_ur10, touched
 
 import robotmodels as rm
 from robotmodels import calibration, identification
@@ -197,8 +198,9 @@ PANDA = {
     "panda compliance": {"compliance": "isotropic"},
     "panda links": {"compliance": "links", "eccentricity": True},
 }
+RX90 = {f"rx90 {kind}": kind for kind in KINDS}
 CALIBRATION = tuple(
-    f"{work}, {prior}" for work in ("ur10", "camera", "board", *PANDA) for prior in PRIORS
+    f"{work}, {prior}" for work in ("ur10", "camera", "board", *PANDA, *RX90) for prior in PRIORS
 )
 
 
@@ -210,6 +212,9 @@ def calibrated(case: str) -> dict:
         nominal, q, T = simulated_ur10()
         kept = calibration.Pose(q[:150], T[:150])
         options["held_out"] = calibration.Pose(q[150:], T[150:])
+    elif work in RX90:
+        nominal, kept, its = measured(RX90[work])
+        options |= {"held_out": 0, **its}
     elif work in ("camera", "board"):
         data = rm.datasets.ur10_camera()
         nominal, (q, T) = data.model, data.measured
@@ -228,34 +233,6 @@ def calibrated(case: str) -> dict:
         others = [touched(data, place)[0] for place in data.places if place != "front"]
         options |= {"held_out": others} if front else {"folds": 5, "held_out": 0}
     return words_of_calibration(calibration.fit(nominal, kept, **options))
-
-
-def simulated_ur10():
-    """Nominal UR10, readings and noisy poses of one that is off in all columns, base and tool."""
-    rng = np.random.default_rng(1)
-    nominal = rm.datasets.ur10_camera().model
-    table = nominal.table
-    parallel = np.abs(np.sin(table.alpha)) < 1e-6
-    off = {"alpha": 2e-3, "d": 1e-3, "theta": 2e-3, "r": 1e-3, "beta": 2e-3 * parallel}
-    columns = {k: getattr(table, k) + size * rng.normal(size=table.f) for k, size in off.items()}
-    real = nominal.with_table(table.replace(**columns))
-    real = real.with_base(rm.se3.from_rpy([0.03, -0.02, 0.05], [0.05, -0.03, 0.02]) @ real.base)
-    real = real.with_tool(real.tool @ rm.se3.from_rpy([0.2, -0.1, 0.3], [0.05, -0.03, 0.12]))
-    q = rng.uniform(-2.5, 2.5, (200, nominal.n))
-    noise = [rm.se3.from_rpy(*(1e-4 * rng.normal(size=(2, 3)))) for _ in q]
-    T = rm.dgm(real, q)
-    turned = T @ noise
-    turned[:, :3, 3] = T[:, :3, 3] + np.array(noise)[:, :3, 3]
-    return nominal, q, turned
-
-
-def touched(data, place: str) -> list:
-    """Readings in both sockets of a place, and their distance."""
-    q = data.places[place]
-    labels = [f"{place}{hole}" for hole, rows in enumerate(q) for _ in rows]
-    contact = calibration.PointContact(np.concatenate(q), labels)
-    ends = (f"point:{place}0", f"point:{place}1")
-    return [contact, calibration.KnownDistance(*ends, data.distance)]
 
 
 # --- base parameters ------------------------------------------------------------------------------
@@ -367,8 +344,8 @@ class Study:
         assert kept["names"] == self.base.names
         error = np.array(kept["values"]) - self.truth
         return {
-            "status": kept["status"], "errors": [float(f"{x:.5g}") for x in error],
-            "standard_errors": [float(f"{x:.5g}") for x in kept["standard_errors"]],
+            "status": kept["status"], "errors": [float(f"{x:.4g}") for x in error],
+            "standard_errors": [float(f"{x:.4g}") for x in kept["standard_errors"]],
         }  # fmt: skip
 
 
