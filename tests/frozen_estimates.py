@@ -1,6 +1,6 @@
 """Estimates that are frozen in `oracles/frozen_*.json`: the cases, and what is kept of a result.
 
-The first three functions are the only ones that read attributes of results and pass options of
+The first five functions are the only ones that read attributes of results and pass options of
 methods: where a name or a signature of the package changes, change it there.
 """
 
@@ -68,6 +68,11 @@ def words_of_consistency(fit, result) -> dict:
         "status": fit.status.name, "price": fit.price, "distance": fit.distance,
         "physical": bool(fit.inertia.is_physical.all()),
     }  # fmt: skip
+
+
+def says_biased(result) -> bool:
+    """Verdict of the Durbin-Wu-Hausman test on a fit by instrumental variables."""
+    return bool(identification.hausman_test(result.system, result.estimate).biased)
 
 
 # --- files ----------------------------------------------------------------------------------------
@@ -334,8 +339,7 @@ class Study:
             result = identified(self.arm, own, name, **some, **its)
             found[method] = self.judged(result)
             if method == "iv":
-                verdict = identification.hausman_test(result.system, result.estimate)
-                found["biased"] = bool(verdict.biased)
+                found["biased"] = says_biased(result)
         return found
 
     def judged(self, result) -> dict:
