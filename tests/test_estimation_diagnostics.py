@@ -7,6 +7,7 @@ from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.estimation import (
     Loss,
     Prior,
+    StrengthSelection,
     confidence_intervals,
     fit_diagnostics,
     fit_nonlinear,
@@ -44,6 +45,27 @@ def test_statistics_are_the_textbook_ones():
     from scipy.stats import t
 
     assert np.allclose(confidence_intervals(fit)[:, 1] - fit.x, t.ppf(0.975, 236) * s)
+
+
+@pytest.mark.parametrize("sigma", [0.08, 0.09, 0.11, 0.13])
+def test_sizes_of_residuals_are_judged_from_both_sides_and_deviations_have_no_sign(sigma):
+    from scipy.stats import chi2
+
+    A, y, _, _ = linear()
+    fit = fit_nonlinear(lambda x: (A @ x + y, A), np.zeros(4), sigma=sigma)
+    found = fit_diagnostics(fit)
+    assert (fit.x < 0.0).all()
+    assert np.allclose(found.relative_deviations, -fit.deviations / fit.x)
+    squares = float(np.sum((fit.residuals / sigma) ** 2))
+    tail = min(chi2.cdf(squares, 236), chi2.sf(squares, 236))
+    assert np.isclose(found.chi_squared.p, 2.0 * tail)
+
+
+def test_the_cautious_strength_is_the_strongest_within_a_standard_error_of_the_best():
+    errors = 1.0 + np.array([[0.5, 0.7], [0.0, 0.0], [0.1, -0.05], [0.2, -0.05], [0.3, 0.3]])
+    found = StrengthSelection(np.logspace(-2, 2, 5), errors)
+    assert found.strength == 0.1
+    assert found.cautious == 10.0
 
 
 @pytest.mark.parametrize("size", [1, 3])
@@ -123,6 +145,7 @@ def test_folds_keep_groups_together():
     assert not np.array_equal(masks, k_folds(group, 5, rng=4))
     assert leave_one_group_out(group).shape == (23, 300)
     assert held_out([1, 2], 0.01, rng=0).sum() == 1
+    assert held_out(range(20), 0.3, rng=0).sum() == 6
     for k in (1, 24, True, 2.0):
         with pytest.raises(InvalidValueError, match="folds"):
             k_folds(group, k, rng=0)

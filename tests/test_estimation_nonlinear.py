@@ -168,6 +168,16 @@ def test_blocks_of_three_rows_have_covered_intervals_too():
     assert 0.92 <= inside / 200 <= 0.97
 
 
+def test_the_median_of_residuals_counts_what_parameters_take():
+    rng = np.random.default_rng(2)
+    scales = []
+    for _ in range(100):
+        A = rng.normal(size=(40, 20))
+        e = rng.normal(size=40)
+        scales.append(fit_nonlinear(lambda x: (A @ x - e, A), np.zeros(20), loss="huber").scale)
+    assert 0.9 < np.median(scales) < 1.1
+
+
 def test_known_deviation_is_taken_as_stated():
     arm = Arm(1)
     free, known = arm.fit(sigma=1e-5), arm.fit(sigma=1e-5, sigma_known=True)
@@ -187,6 +197,12 @@ def test_prior_is_the_maximum_a_posteriori():
     assert np.allclose(fit.x, expected, rtol=1e-10)
     assert np.allclose(fit.covariance, np.linalg.inv(information))
     assert 0 < fit.freedom < 8
+    # noise that is estimated counts for the measurements alone
+    free = fit_nonlinear(lambda x: (A @ x - y, A), np.zeros(12), prior=prior)
+    back = np.linalg.inv(information)
+    middle = free.scale**2 * A.T @ A + np.diag(3.0 / prior.deviation**2)
+    assert not 0.9 < free.scale < 1.1
+    assert np.allclose(free.covariance, back @ middle @ back)
     robust = fit_nonlinear(
         lambda x: (A @ x - y, A), np.zeros(12), prior=prior, sigma_known=True, loss="huber"
     )

@@ -11,6 +11,7 @@ from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.logs import (
     FindingKind,
     Log,
+    RefusedRows,
     Severity,
     check_log,
     join_logs,
@@ -189,6 +190,7 @@ def test_torques_are_moved_in_every_recording(delay):
     np.testing.assert_allclose(moved.tau[: kept[0]][inner], expected[inner], atol=1e-6)
     assert "delay were taken out" in moved.notes[-1]
     assert moved.v.shape == moved.q.shape
+    assert with_delay(moved, delay).delay == 2.0 * delay
 
 
 def test_delays_that_leave_nothing_are_refused():
@@ -228,6 +230,9 @@ def test_joined_logs_keep_what_all_have():
     assert log.notes[0] == "a"
     assert "1 of 2 logs" in log.notes[1]
     assert join_logs([a, a]).v.shape == (4000, 2)
+    lost = [RefusedRows(name, (3,), "no number") for name in "ab"]
+    refused = [smooth_log(N=100, refused=[rows]) for rows in lost]
+    assert list(join_logs(refused).refused) == lost
     with pytest.raises(InvalidValueError, match="delay were taken out"):
         join_logs([a, with_delay(a, 0.02)])
     with pytest.raises(ShapeError, match="joints"):

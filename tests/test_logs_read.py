@@ -281,6 +281,19 @@ def test_joints_of_ros_are_put_in_the_order_asked_for(tmp_path):
             read_log(tmp_path / name, joints=["j1", "j2", "j9"])
 
 
+def test_torques_whose_joints_stand_in_another_order_are_put_in_that_of_the_positions(tmp_path):
+    _, q, tau = ros_lines("lists")
+    names, order = ("j1", "j2", "j3"), [1, 2, 0]
+    head = ["time", *(f"position/{j}" for j in names), *(f"effort/{names[k]}" for k in order)]
+    rows = np.column_stack((DT * np.arange(len(q)), q, tau[:, order])).tolist()
+    lines = [",".join(head), *(",".join(map(repr, row)) for row in rows)]
+    (tmp_path / "log.csv").write_text("\n".join(lines) + "\n")
+    log = read_log(tmp_path / "log.csv")
+    assert log.names == names
+    assert np.array_equal(log.q, q)
+    assert np.array_equal(log.tau, tau)
+
+
 def test_units_gears_signs_gains_and_offsets(file):
     _, q, tau = samples()
     log = read_log(
