@@ -139,6 +139,16 @@ def test_uniform_bodies():
     one = rm.RobotModel.from_table(rm.DHTable(antecedent=[0], sigma=[0]))
     ball = uniform_bodies(one, 2.0, radius=0.1)
     assert ball.values[0, [0, 3, 5, 9]] == pytest.approx([0.008, 0.008, 0.008, 2.0])
+    # a bar of length 2 along x with a ball at its joint; the last link is a ball
+    two = rm.RobotModel.from_table(rm.DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0.0, 2.0]))
+    r, length = 0.3, 2.0
+    bar, ball = np.pi * r**2 * length, 4.0 / 3.0 * np.pi * r**3
+    found = uniform_bodies(two, bar + 2.0 * ball, radius=r).values
+    assert found[:, 9] == pytest.approx([bar + ball, ball])
+    assert found[0, 6:9] == pytest.approx([0.5 * length * bar, 0.0, 0.0])
+    along = 0.5 * bar * r**2 + 0.4 * ball * r**2
+    across = bar * (r**2 / 4.0 + length**2 / 3.0) + 0.4 * ball * r**2
+    assert found[0, :6] == pytest.approx([along, 0.0, 0.0, across, 0.0, across])
     with pytest.raises(InvalidValueError, match="mass: expected a positive"):
         uniform_bodies(model, 0.0)
     with pytest.raises(InvalidValueError, match="radius"):
