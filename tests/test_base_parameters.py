@@ -724,6 +724,9 @@ def test_values_have_names_and_units(rng):
     assert cells["ZZ1R"] == (f"{table['ZZ1']:.6g}", "kg m^2")
     assert [cells[k][1] for k in ("Fv1", "Fv3", "Fc1", "Fc3")] == ["N m s/rad", "N s/m", "N m", "N"]
     assert cells["M3R"][1] == "kg"
+    said = " ".join(str(base).split())
+    assert "; Ia kg m^2, Fv N m s/rad, Fc N m;" in said
+    assert "; of prismatic joints Ia kg, Fv N s/m, Fc N " in said + " "
     again = base.value_table(base.values(model))
     assert dict(again) == dict(table)
     assert not pickle.loads(pickle.dumps(again)).numbers.flags.writeable

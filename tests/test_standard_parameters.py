@@ -121,6 +121,7 @@ def test_base_parameters_of_no_robot(rng):
     assert found.status is PhysicalStatus.NEAREST
     assert "nearest" in found.status.value
     assert abs(found.deviation).max() > 0.5
+    assert np.allclose(base.values(found.of(model)) - values, found.deviation, atol=1e-9)
     assert found.inertia.is_physical.all()
     # with the weights of a regressor it is the torques that are nearest
     W = base.reduce(rm.torque_regressor(model, *rng.normal(size=(3, 40, 2)))).reshape(-1, len(base))
