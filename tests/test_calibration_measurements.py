@@ -35,6 +35,7 @@ from robotmodels.errors import InvalidValueError, NotARotationError, ShapeError
 
 B = 12
 LABELS = ["u", "v", "w"] * 4
+SIGMA = np.linspace(1.0, 2.0, 3 * B).reshape(B, 3)
 
 
 def poses(rng, count):
@@ -74,7 +75,7 @@ def all_kinds(rng, n, ends):
         "dead_path": Distance(q, rng.normal(size=B), pivot=LABELS, offset=True, frame=e),
         "dead_pair": Distance(q, rng.normal(size=B), q_other, offset=True, frame=e),
         "frame": FrameContact(q, LABELS, {"w": random_pose(rng)}, frame=e),
-        "point": PointContact(q, LABELS, {"w": [0.1, 0.2, 0.3]}, frame=e, sigma=np.ones((B, 3))),
+        "point": PointContact(q, LABELS, {"w": [0.1, 0.2, 0.3]}, frame=e, sigma=SIGMA),
         "plane": PlaneContact(q, LABELS, {"u": [*unit(rng), 0.4]}, frame=f, sigma=1e-4),
         "relative": RelativePose(q, q_other, poses(rng, B), frame=e),
         "relative_position": RelativePose(q, q_other, poses(rng, B), [1, 1, 1, 0, 0, 0], frame=e),
