@@ -24,6 +24,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import textwrap
 import threading
 import time
 from collections import Counter
@@ -215,9 +216,11 @@ class Trial:
         return {0: SURVIVED, 1: KILLED}.get(code, BROKEN), by
 
 
-def page(outcomes: list[Outcome]) -> str:
-    """The list as a table."""
+def page(outcomes: list[Outcome], minutes: float, jobs: int) -> str:
+    """The list as a table, with the number of faults of each room and the time of the run."""
     killed = sum(o.verdict == KILLED for o in outcomes)
+    rooms = Counter(o.mutation.room.split(":")[0] for o in outcomes)
+    counts = ", ".join(f"{room} {count}" for room, count in sorted(rooms.items()))
     lines = [
         "# Faults that were tried",
         "",
@@ -225,7 +228,10 @@ def page(outcomes: list[Outcome]) -> str:
         "fail. Written by `python .ci/mutations.py`; the changes themselves, text by text, are in",
         "`.ci/mutation_list.py`.",
         "",
-        f"{len(outcomes)} faults, {killed} found.",
+        f"{len(outcomes)} faults, {killed} found, in {minutes:.0f} minutes ({jobs} at a time, "
+        f"{sum(o.seconds for o in outcomes) / 60.0:.0f} minutes one after the other).",
+        "",
+        *textwrap.wrap(f"By room: {counts}.", 100),
         "",
         "| room | fault | outcome | first test that fails |",
         "|---|---|---|---|",
@@ -279,10 +285,12 @@ def main() -> int:
         folders = [Path(temporary, str(job)) for job in range(max(1, given.jobs))]
         for folder in folders:
             copied(folder)
+        start = time.monotonic()
         outcomes = Trial(folders, chosen).outcomes()
+        minutes = (time.monotonic() - start) / 60.0
     target = given.write or (CHECKOUT / "tests" / "mutations.md" if whole else None)
     if target:
-        target.write_text(page(outcomes), encoding="utf-8")
+        target.write_text(page(outcomes, minutes, len(folders)), encoding="utf-8")
     bad = [o for o in outcomes if o.verdict != KILLED]
     print(f"{len(outcomes) - len(bad)} of {len(outcomes)} faults were found")
     return 1 if bad else 0
