@@ -296,6 +296,19 @@ def test_subsets_and_copies_keep_everything(kind):
         np.testing.assert_array_equal(m.groups, [0, 1, 2] * 4)
 
 
+def test_whitened_rows_have_the_length_that_a_covariance_gives_them(rng):
+    A = rng.normal(size=(B, 3, 3))
+    C = A @ A.swapaxes(-1, -2) + np.eye(3)
+    q, r, psi = np.zeros((B, 6)), rng.normal(size=(B, 3)), rng.normal(size=(B, 3, 5))
+    m = Position(q, np.zeros((B, 3)), covariance=C)
+    inverse = np.linalg.inv(C)
+    rows, slopes = (whitened(m, x, np.ones(3)) for x in (r, psi))
+    np.testing.assert_allclose((rows**2).sum(axis=1), np.einsum("bi,bij,bj->b", r, inverse, r))
+    np.testing.assert_allclose(
+        np.einsum("bip,bi->bp", slopes, rows), np.einsum("bip,bij,bj->bp", psi, inverse, r)
+    )
+
+
 def test_the_same_name_and_label_is_the_same_unknown():
     q = np.zeros((4, 6))
     arm = candidate_parameters(rm.load("rx90"))
