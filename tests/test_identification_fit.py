@@ -156,6 +156,23 @@ def test_covariance_of_correlated_residuals():
     assert np.sqrt(np.mean(np.square(white))) > 1.6
 
 
+@pytest.mark.parametrize("method", ["robust", "tls", "sequential", "recursive"])
+def test_correlated_residuals_enlarge_standard_errors_of_every_method_alike(method):
+    rng = np.random.default_rng(1)
+    clean = clean_log(ROBOTS["serial"], rng, samples=2000)
+    e = rng.normal(size=(2004, clean.n))
+    e = sum(e[k : k + 2000] for k in range(5)) / 5.0
+    log = Log(clean.dt, clean.q, clean.tau + 0.1 * e, clean.v, clean.a)
+    choices = choose_processing(clean, decimation=1, dead_band=0.0, filtered=False)
+    found, plain = (
+        fit(ROBOTS["serial"], log, way, processing=choices, **more)
+        for way, more in ((method, {}), ("wls", {"shrinkage": False}))
+    )
+    ratio = plain.deviations / plain.white
+    assert np.median(ratio) > 1.6
+    assert np.allclose(found.deviations / found.white, ratio, rtol=0.02)
+
+
 def test_covariance_does_not_depend_on_pieces(monkeypatch):
     model = ROBOTS["serial"]
     rng = np.random.default_rng(8)
