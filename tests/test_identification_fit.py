@@ -292,10 +292,10 @@ def test_friction_models_rise_over_the_dead_band():
     for kind, row in zip(gears.kinds, gears.parameters, strict=True):
         terms[f"{kind}1"], terms[f"{kind}2"] = row
     beta = np.array([terms[name] for name in base.names])
-    v = np.array([[-0.1, 0.0], [0.0, 0.0], [0.1, 0.0]])
-    zero = np.zeros((3, 2))
+    v = np.array([[-0.1, 0.0], [-0.05, 0.0], [0.0, 0.0], [0.05, 0.0], [0.1, 0.0]])
+    zero = np.zeros((5, 2))
     tau = predicted_torque(base, base.names, beta, zero, v, zero, 0.1)
-    assert tau[:, 0] == pytest.approx([-4.1, -1.0, 2.1])
+    assert tau[:, 0] == pytest.approx([-4.1, -2.55, -1.0, 0.55, 2.1])
 
 
 # --- what a log does not tell ------------------------------------------------------------------
