@@ -149,6 +149,20 @@ def test_a_recording_of_edges_alone_has_no_rows():
     assert all(piece.start >= 1_750 for piece in pieces(log, chosen))
 
 
+def test_dead_bands_are_as_wide_as_noise_of_the_velocities_asks(rng):
+    """Four standard deviations of white noise of the positions after filter and derivative."""
+    t = np.arange(0.0, 20.0, DT)[:, None]
+    q, level = np.sin(2.0 * np.pi * 0.5 * t), 2e-3
+    clean, noisy = (
+        choose_processing(Log(DT, x, np.zeros_like(q)), cutoff=20.0)
+        for x in (q, q + level * rng.normal(size=q.shape))
+    )
+    assert clean.dead_band[0] == pytest.approx(0.003 * np.pi, rel=0.05)
+    density = level**2 * 2.0 * DT  # one-sided, of white noise
+    spread = np.sqrt(density * (2.0 * np.pi) ** 2 * 20.0**3 / 3.0)
+    assert noisy.dead_band[0] == pytest.approx(4.0 * spread, rel=0.1)
+
+
 def test_samples_in_the_dead_band_take_no_part():
     log, _ = moved()
     base = base_parameters(rm.load("rx90"), drive=("Fv", "Fc"))
