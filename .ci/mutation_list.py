@@ -747,7 +747,7 @@ MUTATIONS = [
         "def move(self, blocks", "self.r -= sign *", "self.r += sign *",
         "tests/test_calibration_mistakes.py -k outliers_under_squares"),
     Mutation("calibration: measurements", "a known distance is predicted from the other side",
-        "def contradictions(", "m.length + float(", "m.length - float(",
+        "def contradictions(", "mean * (1.0 - s)", "mean * (1.0 + s)",
         "tests/test_calibration_mistakes.py -k contradicted_by_the_lengths"),
     Mutation("calibration: measurements", "as many rows as unknowns are enough",
         "def check_enough(", "P + F + 1 - problem.rows", "P + F - problem.rows",

@@ -80,6 +80,32 @@ def test_the_bad_rows_alone_are_outliers_under_squares(bad, prior):
     assert sum(listing == wrong for listing, wrong in found) >= 17
 
 
+@pytest.mark.parametrize("kind", ["pose", "contact"])
+def test_the_bad_row_alone_is_an_outlier_among_poses_and_contacts(kind):
+    hits = alone = 0
+    for seed in REACHED:
+        if kind == "pose":
+            arm = Arm(seed)
+            q = arm.readings(40)
+            T = rm.dgm(arm.real, q)
+            T[:, :3, 3] += 1e-4 * arm.rng.normal(size=(40, 3))
+            turns = [rm.se3.from_rpy(rpy) for rpy in 2e-4 * arm.rng.normal(size=(40, 3))]
+            T[:, :3, :3] @= np.array(turns)[:, :3, :3]
+            T[7, :3, 3] += 0.02 * np.array([0.6, 0.0, 0.8])
+            measured = [Pose(q, T)]
+        else:
+            arm, touched = contacts(seed)
+            q = touched.q.copy()
+            slip = rm.jacobian(arm.real, q[7])[:3]
+            q[7] += np.linalg.pinv(slip, rcond=0.1) @ [0.012, 0.0, 0.016]
+            measured = [PointContact(q, touched.label), between(0.05)]
+        found = fit(arm.nominal, measured, **ALONE).solution.fit.outliers.tolist()
+        hits += 7 in found
+        alone += found == [7]
+    assert hits == len(REACHED)
+    assert alone >= len(REACHED) - 1
+
+
 def test_without_a_bad_row_one_fit_in_twenty_lists_an_outlier():
     listings = [listed(Arm(seed), 0)[0] for seed in range(100, 220)]
     assert 1 <= sum(bool(listing) for listing in listings) <= 12
@@ -168,6 +194,69 @@ def test_the_wrong_one_of_two_distances_is_named(seed):
     assert "one of these" in note
     assert "point:0 to point:1" in note
     assert "point:0 to point:2" in note
+
+
+def three_places(seed):
+    """Contacts of a random arm with two points at each of three places."""
+    arm = Arm(seed)
+    q, labels = [], []
+    while len(q) < 3:
+        place = 0.8 * rm.dgm(arm.real, arm.readings(1))[0, :3, 3]
+        there, at = touching(arm, [place, place + np.array([0.0, 0.03, 0.04])], 12)
+        if len(there) == 24:
+            labels += [2 * len(q) + k for k in at]
+            q.append(there)
+    return arm, PointContact(np.concatenate(q), labels)
+
+
+def known_at(lengths):
+    return [
+        KnownDistance(f"point:{2 * k}", f"point:{2 * k + 1}", length)
+        for k, length in enumerate(lengths)
+    ]
+
+
+def notes_of_distances(result):
+    return [n for n in result.notes if "known distance" in n and "prior allows" not in n]
+
+
+@pytest.mark.parametrize("seed", [0, 3, 7])
+def test_one_wrong_length_at_every_place_and_at_one_place_are_told_apart(seed):
+    arm, touched = three_places(seed)
+    assert not notes_of_distances(fit(arm.nominal, [touched, *known_at([0.05] * 3)], **ALONE))
+    for length in (0.049, 0.051, 0.055):
+        every = fit(arm.nominal, [touched, *known_at([length] * 3)], **ALONE)
+        (note,) = notes_of_distances(every)
+        assert note.startswith(f"3 known distances of {1e3 * length:g} mm: the other measurements")
+        said, doubt = (float(x) for x in note.split(" predict ")[1].split(" mm")[0].split(" +- "))
+        assert abs(said - 50.0) < 4.0 * doubt < 1.5
+        one = fit(arm.nominal, [touched, *known_at([0.05, length, 0.05])], **ALONE)
+        (note,) = notes_of_distances(one)
+        assert f"point:2 to point:3: stated {1e3 * length:g} mm" in note
+        assert touched.blocks + 1 in one.solution.fit.outliers
+        assert touched.blocks not in one.solution.fit.outliers
+
+
+@pytest.mark.parametrize("robot", ["panda_1", "panda_2"])
+def test_a_real_arm_contradicts_a_length_that_is_wrong_at_every_place(robot):
+    data = panda_double_socket(robot)
+    touched = [
+        PointContact(np.concatenate(pair), [0] * len(pair[0]) + [1] * len(pair[1]), name=place)
+        for place, pair in data.places.items()
+    ]
+
+    def said(length):
+        known = [KnownDistance(f"{p}:0", f"{p}:1", length) for p in data.places]
+        return fit(data.model, [*touched, *known], **ALONE)
+
+    assert not notes_of_distances(said(data.distance))
+    wrong = said(data.distance + 1e-3)
+    (note,) = notes_of_distances(wrong)
+    # the prior of lengths was widened to suit them
+    (widened,) = (n for n in wrong.notes if "prior allows" in n)
+    assert ("of lengths" in widened) == widened.endswith("Check the known distances.")
+    assert robot != "panda_1" or "of lengths" in widened
+    assert note.startswith(f"{len(touched)} known distances of 51 mm")
 
 
 def test_a_real_arm_contradicts_51_for_50():
