@@ -27,12 +27,10 @@ def judged(
     given: ParameterPrior | None,
     truncation: float | None,
 ) -> Solution:
-    """The fit with its outliers; known distances are none unless they are contradicted.
-
-    Contacts leave the scale open, so that they shrink to nothing in a fit without the distance
-    that alone gives it. An outlier bends the noise, the widths of the prior and the weights of a
-    fit, so that all are judged again by a fit without those listed.
-    """
+    """The fit with its outliers; known distances are none unless they are contradicted."""
+    # Contacts leave the scale open, so that they shrink to nothing in a fit without the distance
+    # that alone gives it. An outlier bends the noise, the widths of the prior and the weights of a
+    # fit, so that all are judged again by a fit without those listed.
     problem, fit = solution.problem, solution.fit
     if fit.loss is not Loss.SQUARES:
         return solution

@@ -220,7 +220,11 @@ def note_of_prior(
         return ()
     angle = used.angle / given.angle
     check = " Check the zeros and signs of the joints." if angle > _ANOTHER_ROBOT else ""
-    check += " Check the known distances." if distances and used.length > given.length else ""
+    check += (
+        " Check the known distances."
+        if distances and (used.length or 0.0) > (given.length or 0.0)
+        else ""
+    )
     changes = [
         f"of {name}s from {getattr(given, name):.2g} to {getattr(used, name):.2g} {unit}"
         for name, unit in (("length", "m"), ("angle", "rad"))
