@@ -8,9 +8,24 @@ import pytest
 from test_calibration_mistakes import ALONE, LOWER, UPPER, Arm, between, contacts, limited
 
 import robotmodels as rm
-from robotmodels.calibration import ParameterPrior, PointContact, Pose, Position, fit
+from robotmodels.calibration import (
+    KnownDistance,
+    ParameterPrior,
+    PointContact,
+    Pose,
+    Position,
+    fit,
+)
 from robotmodels.calibration.files_read import check_columns, check_contents
-from robotmodels.calibration.measurements import AxisPosition, Distance, RelativePose
+from robotmodels.calibration.measurements import (
+    AxisPosition,
+    CameraPose,
+    Distance,
+    FrameContact,
+    LinkedFrames,
+    PlaneContact,
+    RelativePose,
+)
 from robotmodels.calibration.read import read_measurements
 from robotmodels.cli import main
 from robotmodels.cli.option_words import in_options
@@ -178,8 +193,7 @@ def test_outliers_name_their_files_and_rows(places):
     measured = read_measurements(files[:2], "point_contact", data.model)
     k = len(data.places["front"][0]) + 7
     for found, block in ((measured, k), (measured.subset(np.r_[k, :30, 40:60]), 0)):
-        known = between(data.distance)
-        known = rm.calibration.KnownDistance("point:hole_0", "point:hole_1", known.length)
+        known = KnownDistance("point:hole_0", "point:hole_1", data.distance)
         result = fit(data.model, [found, known], **ALONE)
         assert result.solution.fit.outliers[0] == block
         (note,) = (n for n in result.notes if "outlier" in n)
@@ -212,9 +226,9 @@ def test_every_kind_keeps_its_files(tmp_path):
     kinds = [
         Pose(q, T), Position(q, T[:, :3, 3]), PointContact(q), Distance(q, np.ones(6)),
         Distance(q, np.ones(6), q[::-1]), RelativePose(q, q[::-1], T),
-        rm.calibration.FrameContact(q), rm.calibration.PlaneContact(q),
+        FrameContact(q), PlaneContact(q), CameraPose(q, T), LinkedFrames(q, 6, 5),
+        AxisPosition(q, np.arange(6.0), [0, 0, 1]),
     ]  # fmt: skip
-    assert AxisPosition  # a gauge's readings are not read from files
     for kind in kinds:
         object.__setattr__(kind, "_origin", read._origin)
         views = [view.q for view in kind.views]
