@@ -741,7 +741,7 @@ MUTATIONS = [
         "def _posture_of_rows(", "or (k, b)", "and (k, b)",
         "tests/test_calibration_next_term.py -k posture_share"),
     Mutation("calibration: structure of residuals", "the term with the least gain is the first",
-        "def trials_of(", "-trial.gain", "trial.gain",
+        "def trials_of(", "-trial[0].gain", "trial[0].gain",
         "tests/test_calibration_next_term.py -k named_first"),
     Mutation("calibration: measurements", "residuals move the wrong way without a measurement",
         "def move(self, blocks", "self.r -= sign *", "self.r += sign *",

@@ -16,11 +16,9 @@ _TURNS = 30.0
 """Largest plausible reading of a revolute joint, rad; beyond it, degrees are assumed."""
 _BEYOND, _PART = 0.02, 0.02
 """Tolerance beyond a limit, rad or m, or relative to the range."""
-_MOST, _MANY = 0.75, 0.25
-"""Fraction of readings beyond the limits from which one joint is refused, and from which two joints
-are, or one whose readings are far beyond."""
-_FAR = 0.5
-"""Median distance beyond the limits that is far, rad."""
+_MOST = 0.6
+"""Fraction of the readings of a joint beyond its limits from which they are refused: more than that
+of a symmetric range where a limit is at zero, as in simulated data that ignore limits."""
 
 
 def check_readings(
@@ -66,18 +64,14 @@ def beyond_limits(model: RobotModel, q: Array, rows: set[int]) -> tuple[list[str
     checked = (upper > lower) & [row + 1 in rows for row in model.table.joint_rows]
     over = np.where(checked, np.maximum(lower - q, q - upper) - room, -np.inf)
     number = (over > 0.0).sum(axis=0)
-    many = number > _MANY * len(q)
-    far = np.zeros(len(many), dtype=bool)
     said = []
     for j in np.flatnonzero(number):
         is_revolute = model.table.sigma[model.table.joint_rows[j]] == REVOLUTE
         unit = "rad" if is_revolute else "m"
         beyond = over[over[:, j] > 0.0, j] + room[j]
-        far[j] = is_revolute and float(np.median(beyond)) > _FAR
         said.append(
             f"joint {j + 1} ({model.table.joint_names[j]}) in {number[j]} of {len(q)} readings, by "
             f"up to {beyond.max():.3g} {unit} (reads {q[:, j].min():.4g} to "
             f"{q[:, j].max():.4g}, limits {lower[j]:.4g} to {upper[j]:.4g})"
         )
-    most = (number > _MOST * len(q)) | (many & far)
-    return said, bool(most.any() or many.sum() >= 2)
+    return said, bool((number > _MOST * len(q)).any())
