@@ -84,6 +84,15 @@ def test_influence_is_that_of_leaving_a_measurement_out(size):
     assert np.isclose(found.leverage.sum(), fit.freedom)
 
 
+def test_shares_of_measurements_are_those_that_the_prior_leaves():
+    A, _, _, linearise = linear(M=30)
+    prior = Prior(np.zeros(4), np.full(4, 0.2))
+    fit = fit_nonlinear(linearise, np.zeros(4), prior=prior, sigma_known=True)
+    hat = A @ np.linalg.inv(A.T @ A + 25.0 * np.eye(4)) @ A.T
+    assert np.allclose(leverage(fit).leverage, np.diag(hat))
+    assert np.isclose(fit.freedom, np.trace(hat))
+
+
 def test_measurement_that_alone_determines_something_is_infinitely_influential():
     A = np.array([[1.0, 0.0], [1.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     fit = fit_nonlinear(lambda x: (A @ x - [1.0, 2.0, 3.5, 4.0], A), np.zeros(2))
