@@ -835,21 +835,17 @@ MUTATIONS = [
         "lengths between two positions: the second moves with the first",
         "class Distance(Labelled):", "psi = psi - evaluations[1].psi[:, :3]",
         "psi = psi + evaluations[1].psi[:, :3]",
-        ("tests/test_calibration_measurements.py -k"
-         " derivatives_by_parameters_and_fixtures_are_those_of_finite_differences")),
+        "tests/test_calibration_measurements.py -k (finite_differences and 2-pair)"),
     Mutation("calibration: measured kinds", "an unknown offset of lengths is taken off",
         "class Distance(Labelled):", "residual = residual + fixtures[F + self.groups]",
         "residual = residual - fixtures[F + self.groups]",
-        ("tests/test_calibration_measurements.py -k"
-         " derivatives_by_parameters_and_fixtures_are_those_of_finite_differences")),
+        "tests/test_calibration_measurements.py -k (finite_differences and 2-dead_path)"),
     Mutation("calibration: measured kinds", "planes: the offset has the sign of the normal",
         "class PlaneContact(Contact):", "- offset)[:, None], normal", "+ offset)[:, None], normal",
-        ("tests/test_calibration_measurements.py -k"
-         " derivatives_by_parameters_and_fixtures_are_those_of_finite_differences")),
+        "tests/test_calibration_measurements.py -k (finite_differences and 2-plane)"),
     Mutation("calibration: measured kinds", "a laser's tilt moves the line the other way",
         "class LaserLine(Contact):", "p, by_tilt[:, :, :2])", "-p, by_tilt[:, :, :2])",
-        ("tests/test_calibration_measurements.py -k"
-         " derivatives_by_parameters_and_fixtures_are_those_of_finite_differences")),
+        "tests/test_calibration_measurements.py -k (finite_differences and 2-line)"),
     Mutation("calibration: measured kinds", "the board is seen from the world",
         "class CameraPose(Labelled):", "difference(relative(camera, board), motionless",
         "difference(relative(board, camera), motionless",
@@ -858,13 +854,11 @@ MUTATIONS = [
     Mutation("calibration: rotations", "rotation vectors change as if they were small",
         "def inverse_left_jacobians(", "np.eye(3) - 0.5 * K + c * (K @ K)",
         "np.eye(3) + 0.0 * (K + c * (K @ K))",
-        ("tests/test_calibration_measurements.py -k"
-         " derivatives_by_parameters_and_fixtures_are_those_of_finite_differences")),
+        "tests/test_calibration_measurements.py -k (finite_differences and 2-pose)"),
     Mutation("calibration: moving poses", "a turn of the first pose does not carry the second",
         "def product(a: Evaluation", "- skew(arm) @ a.psi[:, 3:]",
         "- 0.0 * skew(arm) @ a.psi[:, 3:]",
-        ("tests/test_calibration_measurements.py -k"
-         " derivatives_by_parameters_and_fixtures_are_those_of_finite_differences")),
+        "tests/test_calibration_measurements.py -k (finite_differences and 2-linked)"),
     Mutation("calibration: gravity loads", "elements carry what is before them",
         "def _carried(skeleton",
         "carried[row].append(body)\n            row = int(skeleton.antecedent[row])",
