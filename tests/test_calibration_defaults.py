@@ -139,6 +139,7 @@ def test_the_headline_says_how_far_another_tool_could_be_off(panda):
     outcome = result.report().split("Notes")[0]
     words = " ".join(outcome.split())
     assert f"in the measured postures: {1e3 * found.rms:.2g} mm" in words
+    assert "Prior standard deviations of the table: 1 mm, 5 mrad." in words
     assert f"another tool about {found.rms:.2g} m" in repr(result)
     # a longer tool, and postures elsewhere, are further off
     assert other_tool_error(result, length=2.0 * found.length).rms > found.rms

@@ -10,6 +10,7 @@ from ..._arrays import Array
 from ...estimation import fit_diagnostics
 from ...estimation.correlation import correlated_pairs
 from ...table_text import ReportSection, ReportTable, table_of
+from ..extended_table.elements import ErrorLaw
 from ..folds import suited_fixtures
 from ..notes import is_implausible
 from ..problem import stacked
@@ -73,7 +74,7 @@ def _outcome(result: CalibrationResult) -> ReportSection:
         result.status.sentence,
         f"{problem.P} parameters and {problem.F} coordinates of fixtures from {problem.rows} rows "
         f"of {problem.blocks} measurements; loss {fit.loss.name.lower()}, {fit.iterations} steps."
-        + (" With a prior." if np.isfinite(fit.prior.deviation).any() else " Without a prior.")
+        + _prior_text(result)
         + (f" {len(fit.dropped)} directions were left out." if len(fit.dropped) else ""),
     ]
     own = result.held_out  # measurements that the user kept aside come first, then all folds
@@ -97,6 +98,19 @@ def _outcome(result: CalibrationResult) -> ReportSection:
             f"{1e3 * tool.nominal:.2g} mm."
         )
     return ReportSection("Outcome", tuple(sentences))
+
+
+def _prior_text(result: CalibrationResult) -> str:
+    """Prior standard deviations of the table's lengths and angles, as used."""
+    prior, f = result.solution.fit.prior, result.nominal.f
+    used = {}
+    for entry, size in zip(result.parameters.entries, prior.deviation, strict=False):
+        if np.isfinite(size) and 0 < entry.row <= f and entry.law is ErrorLaw.CONSTANT:
+            used.setdefault(entry.element.is_length, size / np.sqrt(prior.strength))
+    texts = [f"{1e3 * used[k]:.3g} {'mm' if k else 'mrad'}" for k in (True, False) if k in used]
+    if texts:
+        return f" Prior standard deviations of the table: {', '.join(texts)}."
+    return " With a prior." if np.isfinite(prior.deviation).any() else " Without a prior."
 
 
 def _trust(result: CalibrationResult) -> ReportSection:
