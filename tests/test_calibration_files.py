@@ -128,7 +128,7 @@ def test_millimetres_and_degrees_give_the_same_as_metres_and_radians(tmp_path):
         ((1.0, 1.0), {"lengths": "inch"}, "lengths: expected 'm' or 'mm', got 'inch'"),
     ],
 )
-def test_a_slip_of_units_is_named_with_the_argument_that_repairs_it(
+def test_a_unit_error_of_units_is_named_with_the_argument_that_repairs_it(
     tmp_path, scale, options, message
 ):
     rows = rows_of(scale[0] * Q, scale[1] * T[:, :3, 3])

@@ -511,7 +511,7 @@ def test_a_folder_that_also_holds_poses_is_not_read_as_readings(socket, limits):
     if not limits:
         far = np.full(model.n, np.inf)
         model = model.with_table(model.table.replace(lower=-far, upper=far))
-    with pytest.raises(InvalidValueError, match="do not look like readings") as caught:
+    with pytest.raises(InvalidValueError, match="these are not readings of the joints") as caught:
         read_measurements(folder, "point_contact", model)
     for said in ("hole_0.csv, hole_0_pose.csv", "hole_1_pose.csv (", "pattern='*.csv'"):
         assert said in str(caught.value)

@@ -53,13 +53,13 @@ def check_contents(
     for t, q in zip(tables, readings, strict=True):
         said, most = beyond_limits(model, q, rows)
         if _has_quaternions(q):
-            other[t.path.name] = "four columns are unit quaternions: poses?"
+            other[t.path.name] = "four columns are unit quaternions: poses"
         elif most:
             other[t.path.name] = f"beyond limits: {said[0]}"
     if other and len(other) < len(tables):
         raise InvalidValueError(
-            f"path: of {', '.join(t.path.name for t in tables)} some do not look like readings of "
-            f"the joints of {model.name}: "
+            f"path: among {', '.join(t.path.name for t in tables)}, these are not readings of the "
+            f"joints of {model.name}: "
             + "; ".join(f"{name} ({why})" for name, why in other.items())
             + ". Select the files by pattern='*.csv', or name them."
         )

@@ -31,6 +31,7 @@ from .identifiability.identifiable import (
     all_deviations,
     identifiable_on,
 )
+from .insignificant import insignificant_parameters, with_gained, without_insignificant
 from .measurements import KnownDistance, Measurement
 from .next_term import note_of_structure, trials_of
 from .notes import is_implausible, notes_after, notes_before, notes_of_errors
@@ -41,7 +42,6 @@ from .problem import as_measurements, guessed_fixtures, measured_frames, problem
 from .result import CalibrationResult
 from .solve import solve
 from .structure import structure_of
-from .untold import untold_by, with_gained, without_untold
 
 Progress = Callable[[int, int, str], None]
 """Called with the number of finished fits, their total, and the current task."""
@@ -207,14 +207,17 @@ def fit(
         start = np.concatenate([zero, guessed_fixtures(problem, zero)])
         solution = solve(problem, start, loss=loss, prior=gaussian, truncation=truncation)
         wider = None if used is None else widened(used, solution)
-        untold = [] if truncation else untold_by(solution, start)
+        insignificant = [] if truncation else insignificant_parameters(solution, start)
         preferred = candidates.preferring(estimated.names)
         again = identifiable_there(preferred)
         # columns that depend on others at the nominal robot may not at the solution
         gained = set(again.names) - set(estimated.names) if used is not None else set()
-        if not untold and not gained and wider is used:
+        if not insignificant and not gained and wider is used:
             break
-        used, identifiable = wider, with_gained(without_untold(identifiable, untold), gained)
+        used, identifiable = (
+            wider,
+            with_gained(without_insignificant(identifiable, insignificant), gained),
+        )
     size_is_known = bool(known_lengths) or prior is not None
     contradicted = contradictions(solution, prior, size_is_known, truncation)
     solution = judged(solution, contradicted, prior, truncation)
@@ -230,7 +233,7 @@ def fit(
         share_aside = splits(model, measured, max(round(1.0 / share), 2), chance)[:1]
     if (folds or share) and blocks >= 2 * folds and not (parts or share_aside):
         notes = (*notes, "Nothing can be kept aside: each thing is measured in one posture alone.")
-    fits_to_try = len(structure.hinted) * (1 + len(parts)) if structure and parts else 0
+    fits_to_try = len(structure.indicated) * (1 + len(parts)) if structure and parts else 0
     step = _Steps(progress, 1 + len(parts) + len(share_aside) + fits_to_try)
     step("all measurements")
     refit = Refit(solution, prior_of, truncation)

@@ -15,7 +15,7 @@ from .identifiability.identifiable import IdentifiableParameters
 from .prior import ParameterPrior, estimated_with
 from .problem import problem_of
 from .reporting.units import in_unit, printed_unit
-from .solve import solve
+from .solve import Solution, solve
 from .structure import LEAST_P, Structure, TermFamily, structure_of
 
 _SURE = 3.0
@@ -31,7 +31,7 @@ class Trial(NamedTuple):
     family: TermFamily
     after: BlockErrors
     gain: float
-    """Part by which their mean square falls."""
+    """Relative decrease of their mean square."""
     helps: bool
     """Whether the decrease is significant."""
     explains_all: bool = False
@@ -56,8 +56,9 @@ def trials_of(
     """
     solution = refit.solution
     problem, old = solution.problem, solution.problem.parameters
-    trials = []
-    for family in structure.hinted:
+    trials: list[Trial] = []
+    fits: dict[TermFamily, tuple[Solution, IdentifiableParameters]] = {}
+    for family in structure.indicated:
         new = [e for e in structure.parameters.entries if e.law in family.laws]
         told = identify(replace(candidates, entries=(*candidates.entries, *new)))
         kept = told.kept if prior is None else estimated_with(prior, told, problem.measurements)
@@ -72,17 +73,16 @@ def trials_of(
         done()
         again = replace(refit, solution=found)
         after = errors_of_splits(again, parts, before, done).after
-        trials.append((Trial(family, after, *_gain(without.after, after)), found, told))
-    trials.sort(key=lambda trial: -trial[0].gain)
-    for k, (trial, found, told) in enumerate(trials):
-        if trial.helps:  # the best of those that help
-            trials[k] = (
-                trial._replace(explains_all=structure_of(found, told) is None),
-                found,
-                told,
-            )
-            break
-    return [trial for trial, *_ in trials]
+        trials.append(Trial(family, after, *_gain(without.after, after)))
+        fits[family] = found, told
+    trials.sort(key=lambda trial: -trial.gain)
+    best = next((trial.family for trial in trials if trial.helps), None)
+    return [
+        trial._replace(explains_all=structure_of(*fits[trial.family]) is None)
+        if trial.family == best
+        else trial
+        for trial in trials
+    ]
 
 
 def _gain(before: BlockErrors, after: BlockErrors) -> tuple[float, bool]:
@@ -133,8 +133,8 @@ def note_of_structure(
             "Tried, with a change of less than three standard errors on data kept aside: "
             f"{', '.join(doubtful)}."
         )
-    if without is None and structure.hinted:
-        terms = [f"{family.word} ({family.option})" for family in structure.hinted]
+    if without is None and structure.indicated:
+        terms = [f"{family.word} ({family.option})" for family in structure.indicated]
         text.append(f"{_sentence(' or '.join(terms))} may explain it; a fit with folds compares.")
     if structure.others:
         words = " or ".join(family.word for family in structure.others)
@@ -147,7 +147,7 @@ def note_of_structure(
     may_help = any(trial.gain > _GAIN for trial in trials)
     if may_help and not helpful:
         text.append("More postures would decide between them.")
-    if (trials or not structure.hinted) and not is_explained and (helpful or not may_help):
+    if (trials or not structure.indicated) and not is_explained and (helpful or not may_help):
         text.append(
             "Backlash, friction, drift or bending links may be the cause: approach every posture "
             "from the same side, and repeat some measurements at the end."

@@ -10,13 +10,13 @@ from ..geometry import REVOLUTE
 from .extended_table.elements import ErrorLaw
 from .folds import AsideErrors
 from .identifiability.identifiable import IdentifiableParameters
+from .length_units import check_units
 from .measurements import Pose, Position, lonely_labels
 from .measurements.measurement import origin_of
 from .problem import Problem, measured_frames
 from .reading_limits import check_readings
 from .reporting.units import in_unit, printed_unit
 from .solve import Solution
-from .unit_slips import check_units
 
 _HARDLY = 0.02
 """Standard deviation of a joint's readings below which it hardly moves, rad or m."""
@@ -108,8 +108,8 @@ def notes_after(
         ):
             notes.append(
                 f"{m.name}: residuals are {1.0 / size:.3g} times smaller than the stated standard "
-                "deviations. Look for a slip of units in sigma; the deviations of the parameters "
-                "hang on it."
+                "deviations. Look for a slip of units in sigma; the standard errors of the "
+                "parameters depend on it."
             )
     notes += _unlikely_deviations(solution)
     spare, unknowns = problem.rows - problem.P - problem.F, problem.P + problem.F
@@ -154,7 +154,7 @@ def notes_of_errors(
     if found:
         notes.append(
             f"Calibration does not lower the {' and the '.join(found)} on data kept aside. The "
-            "noise or the number of measurements does not carry this many parameters: fewer "
+            "noise or the number of measurements does not support this many parameters: fewer "
             f"parameters, a {'narrower ' if _has_prior(solution) else ''}prior, or more data."
         )
     return tuple(notes)
@@ -203,7 +203,7 @@ def _unlikely_deviations(solution: Solution) -> list[str]:
     return [
         f"{', '.join(far)}: deviations that no robot has. Look for a slip of units (mm for m, "
         "degrees for rad), joints in another order or with another sign or zero, rotations the "
-        "other way round; or these parameters are not told by the data."
+        "other way round; or the data do not determine these parameters."
     ]
 
 

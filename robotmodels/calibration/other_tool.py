@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from .. import se3
 from .._arrays import Array, as_vector
 from ..errors import InvalidValueError
+from ..estimation.leverage import inverse_factor
 from ..se3 import skew
 from .calibrated_robot.calibrated import CalibratedRobot
 from .extended_table.differential import differential_model
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 
 _POSTURES = 200
 """Largest number of the measured postures that a prediction is made for."""
-_SINGULAR = 1e-13
 _LEAST_LENGTH = 0.1
 """Smallest length of the tool, relative to the size of the robot."""
 
@@ -60,12 +60,11 @@ class PredictedError(NamedTuple):
 def other_tool_error(
     result: CalibrationResult, q: ArrayLike | None = None, length: float | None = None
 ) -> PredictedError:
-    """Predict how far another tool could be off, one whose pose on the flange is known.
+    """Predicted error of another tool whose pose on the flange is known.
 
-    Parameters that measurements with one tool do not determine may change without moving that
-    tool, but they move another one. Each parameter of the table has the covariance of the fit, and
-    those that were not estimated have the standard deviations of the prior. Where the measurements
-    do not see where the robot stands, the base is fitted to the error.
+    Corrections that do not move the measured tool can move another. The covariance of the fit, and
+    the default prior of parameters that were not estimated, are propagated to other tools. If the
+    measurements do not determine the base, a rigid motion is fitted to the error.
 
     Parameters
     ----------
@@ -160,15 +159,9 @@ def _posterior(result: CalibrationResult) -> tuple[GeometricParameters, Array, A
     information[: problem.P] = 1.0 / standard_deviations(ParameterPrior(), problem)
     at = parameters.index(estimated.names)
     information[at] = np.sqrt(fit.prior.strength) / fit.prior.deviation[: len(at)]
-    R = np.linalg.qr(np.vstack([weighted, np.diag(information)]), mode="r")
-    size = np.linalg.norm(R, axis=0)
-    size[size == 0.0] = 1.0
-    # what nothing determines (a tool that is not measured) moves no other tool
-    return (
-        parameters,
-        (np.linalg.pinv(R / size, rcond=_SINGULAR) / size[:, None])[: problem.P],
-        deviation,
-    )
+    R = np.asarray(np.linalg.qr(np.vstack([weighted, np.diag(information)]), mode="r"))
+    # directions without information (a tool that is not measured) move no other tool
+    return parameters, inverse_factor(R)[: problem.P], deviation
 
 
 def _moved(

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from .._arrays import Array, Rebuilt
 from ..errors import InvalidValueError, ShapeError
+from .expected_joints import expected_joints_text
 from .extended_table.differential import differential_model
 from .extended_table.parameters import GeometricParameters
-from .joints_asked import joints_that_count
 from .measurements import Evaluation, Fixture, Linearised, Measurement, PointContact
 from .measurements.noise import whitened
 
@@ -127,7 +127,7 @@ def problem_of(
             if view.q.shape[1] != n:
                 raise ShapeError(
                     f"measurements[{k}] ({m.name}): expected readings of {n} joints, shape "
-                    f"(N, {n}), got {view.q.shape}.{joints_that_count(parameters.model)}"
+                    f"(N, {n}), got {view.q.shape}.{expected_joints_text(parameters.model)}"
                 )
         for fixture in m.fixtures:
             if fixtures.setdefault(fixture.name, fixture).unit != fixture.unit:

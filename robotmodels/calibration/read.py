@@ -18,13 +18,13 @@ from ..geometry import REVOLUTE
 from ..kinematics import OrientationKind, dgm, pose_from_coordinates
 from ..kinematics.coordinates.kinds import orientation_kind
 from ..model import RobotModel, check_model
+from .expected_joints import expected_joints_text
 from .extended_table.skeleton import Frame
 from .file_kinds import CONTACTS, FileKind, as_file_kind
 from .files_read import check_columns, check_contents, rows_read
-from .joints_asked import joints_that_count
+from .length_units import unit_error_of_positions, unit_error_of_spread
 from .measurements import Distance, Measurement, Pose, Position, RelativePose
 from .measurements.measurement import of_files
-from .unit_slips import slip_of_positions, slip_of_spread
 
 _POSITION_NAMES = ("x", "y", "z")
 _QUATERNION_NAMES = ("qw", "qx", "qy", "qz")
@@ -259,12 +259,12 @@ def _joint_columns(
         if isinstance(given, str) or len(given) != n:
             raise InvalidValueError(
                 f"{what}: expected a column for each of the {n} joints, got {given!r:.80}."
-                f"{joints_that_count(model)}"
+                f"{expected_joints_text(model)}"
             )
         return tuple(table.number(column, what) for column in given)
     names = model.table.joint_names
     advice = f"Give them as {what}=[...], a name or number (from 0) for each of the {n} joints."
-    advice += joints_that_count(model)
+    advice += expected_joints_text(model)
     if what == "other_joints":
         raise InvalidValueError(f"other_joints: two ends need two readings. {advice}")
     if table.names:
@@ -362,7 +362,7 @@ def _check_lengths(
     # squares of what is farther apart than this are no numbers
     nominal, p = dgm(model, np.clip(q, -1e3, 1e3), frame)[:, :3, 3], np.clip(p, -1e150, 1e150)
     spread = float(np.linalg.norm(np.ptp(p, axis=0)))
-    slip = slip_of_positions(nominal, p) or slip_of_spread(model, frame, spread)
+    slip = unit_error_of_positions(nominal, p) or unit_error_of_spread(model, frame, spread)
     if slip is None:
         return
     stated = "metres" if unit is LengthUnit.METRE else "millimetres"

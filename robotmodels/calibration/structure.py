@@ -70,7 +70,7 @@ class Structure(NamedTuple):
     """p-value of the combined test (Bonferroni)."""
     parameters: GeometricParameters
     """Those of the fit, the others of the table, and those of all families."""
-    hinted: tuple[TermFamily, ...]
+    indicated: tuple[TermFamily, ...]
     """Families that the fit did not include and that the residuals resemble."""
     others: tuple[TermFamily, ...]
     """Families not included and not indicated."""
@@ -132,9 +132,9 @@ def structure_of(solution: Solution, found: IdentifiableParameters) -> Structure
     if p >= _DOUBT:
         return None
     best = sorted(odds, key=lambda family: odds[family])
-    hinted = tuple(family for family in best if odds[family] < _HINT)
-    others = tuple(family for family in best if family not in hinted)
-    return Structure(p, whole, hinted, others, is_complete)
+    indicated = tuple(family for family in best if odds[family] < _HINT)
+    others = tuple(family for family in best if family not in indicated)
+    return Structure(p, whole, indicated, others, is_complete)
 
 
 def _all_parameters(

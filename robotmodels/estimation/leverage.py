@@ -11,6 +11,9 @@ from .._arrays import Array, Rebuilt, read_only
 from ._step import triangle
 from .nonlinear_fit import NonlinearFit
 
+_SINGULAR = 1e-13
+"""Relative singular value below which a direction is not determined."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Leverage(Rebuilt):
@@ -58,6 +61,13 @@ def basis_of_rows(fit: NonlinearFit) -> Array:
     _, s, V = np.linalg.svd(R / columns, full_matrices=False)
     s, V = s[: fit.rank], V[: fit.rank]
     return (V / s[:, None]).T / columns[:, None]
+
+
+def inverse_factor(R: Array) -> Array:
+    """Factor F of the inverse F F^T of R^T R, in determined directions: R (M, P) -> (P, M)."""
+    size = np.linalg.norm(R, axis=0)
+    size[size == 0.0] = 1.0
+    return np.asarray(np.linalg.pinv(R / size, rcond=_SINGULAR) / size[:, None])
 
 
 def leverage(fit: NonlinearFit) -> Leverage:

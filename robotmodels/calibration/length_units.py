@@ -56,7 +56,7 @@ _FEW = 7
 """Smallest number of lengths for the check of a pivot."""
 
 
-class UnitSlip(NamedTuple):
+class UnitError(NamedTuple):
     """Ratio of measured to nominal lengths explained by a unit."""
 
     unit: str
@@ -78,39 +78,39 @@ class UnitSlip(NamedTuple):
         return 1.0 / _SLIPS[self.unit, self.taken]
 
 
-def slip_of(ratio: float, near: float = _NEAR) -> UnitSlip | None:
+def unit_error_of(ratio: float, near: float = _NEAR) -> UnitError | None:
     """The slip of units whose factor is near a ratio of measured to nominal lengths."""
     if not 0.0 < ratio < np.inf:
         return None
     pair = min(_SLIPS, key=lambda key: abs(log(ratio / _SLIPS[key])))
     close = abs(log(ratio / _SLIPS[pair])) < log(1.0 + near)
-    return UnitSlip(*pair, ratio) if close else None
+    return UnitError(*pair, ratio) if close else None
 
 
-def slip_of_positions(nominal: Array, measured: Array) -> UnitSlip | None:
+def unit_error_of_positions(nominal: Array, measured: Array) -> UnitError | None:
     """Unit error of positions, by a similarity fit. Shapes: nominal, measured (N, 3)."""
     if len(nominal) < 3:
         return None
     T = best_motion(nominal, measured)
     turned = (nominal - nominal.mean(axis=0)) @ T[:3, :3].T
-    return slip_of_lengths(turned.ravel(), (measured - measured.mean(axis=0)).ravel())
+    return unit_error_of_lengths(turned.ravel(), (measured - measured.mean(axis=0)).ravel())
 
 
-def slip_of_lengths(nominal: Array, measured: Array) -> UnitSlip | None:
+def unit_error_of_lengths(nominal: Array, measured: Array) -> UnitError | None:
     """By the ratio of lengths (N,), where they are of the same movements."""
     size = float(nominal @ nominal)
     ratio = float(nominal @ measured) / size if size > 0.0 else 0.0
     left = float(np.linalg.norm(measured - ratio * nominal))
-    return slip_of(ratio) if left < _ALIKE * float(np.linalg.norm(measured)) else None
+    return unit_error_of(ratio) if left < _ALIKE * float(np.linalg.norm(measured)) else None
 
 
-def slip_of_spread(model: RobotModel, frame: Frame, spread: float) -> UnitSlip | None:
+def unit_error_of_spread(model: RobotModel, frame: Frame, spread: float) -> UnitError | None:
     """By the reach of the robot, where measured lengths do not follow the nominal ones."""
     ratio = spread / characteristic_length(model, frame)
-    return UnitSlip("millimetres", "metres", ratio) if ratio > _SPREAD else None
+    return UnitError("millimetres", "metres", ratio) if ratio > _SPREAD else None
 
 
-def _slip_of_pivot(p: Array, length: Array) -> UnitSlip | None:
+def _unit_error_of_pivot(p: Array, length: Array) -> UnitError | None:
     """By ``|p - c|^2 = s length^2``, which is linear in c, c.c and s."""
     if len(p) < _FEW:
         return None
@@ -122,7 +122,7 @@ def _slip_of_pivot(p: Array, length: Array) -> UnitSlip | None:
     left = np.linalg.norm(A @ found - square)
     if left > _ALIKE * np.linalg.norm(square - square.mean()) or found[-1] <= 0.0:
         return None
-    return slip_of(float(length.max() / np.sqrt(found[-1])))
+    return unit_error_of(float(length.max() / np.sqrt(found[-1])))
 
 
 def check_units(model: RobotModel, measurements: Sequence[Measurement]) -> None:
@@ -143,34 +143,36 @@ def check_units(model: RobotModel, measurements: Sequence[Measurement]) -> None:
             _check_distance(m, points[m.point], points[m.other])
 
 
-def _slip(model: RobotModel, m: Measurement) -> tuple[str, UnitSlip] | None:
+def _slip(model: RobotModel, m: Measurement) -> tuple[str, UnitError] | None:
     """What is measured and its slip of units, if there is one."""
     slip = None
     if isinstance(m, Pose | Position) and all(m.rows[:3]):
         p = m.T[:, :3, 3] if isinstance(m, Pose) else m.p
-        what, slip = "positions", slip_of_positions(dgm(model, m.q, m.frame)[:, :3, 3], p)
-        slip = slip or slip_of_spread(model, m.frame, float(np.linalg.norm(np.ptp(p, axis=0))))
+        what, slip = "positions", unit_error_of_positions(dgm(model, m.q, m.frame)[:, :3, 3], p)
+        slip = slip or unit_error_of_spread(
+            model, m.frame, float(np.linalg.norm(np.ptp(p, axis=0)))
+        )
     elif isinstance(m, CameraPose) and all(m.rows):
         what = "positions of the boards"
         camera, seen = dgm(model, m.q, m.frame)[:, :3, 3], se3.inverse(m.T)[:, :3, 3]
         for group in range(len(m.labels)):
             of = m.groups == group
-            slip = slip or slip_of_positions(camera[of], seen[of])
+            slip = slip or unit_error_of_positions(camera[of], seen[of])
     elif isinstance(m, RelativePose) and all(m.rows[:3]):
         what = "displacements"
         moved = se3.inverse(dgm(model, m.q, m.frame)) @ dgm(model, m.q_other, m.frame)
-        slip = slip_of_lengths(moved[:, :3, 3].ravel(), m.T[:, :3, 3].ravel())
+        slip = unit_error_of_lengths(moved[:, :3, 3].ravel(), m.T[:, :3, 3].ravel())
     elif isinstance(m, Distance) and not m.offset:
         what = "lengths"
         p = dgm(model, m.q, m.frame)[:, :3, 3]
         if m.q_other is not None:
             apart = p - dgm(model, m.q_other, m.frame)[:, :3, 3]
-            slip = slip_of_lengths(np.linalg.norm(apart, axis=1), m.length)
+            slip = unit_error_of_lengths(np.linalg.norm(apart, axis=1), m.length)
         else:
             for group in range(len(m.labels)):
                 of = m.groups == group
-                slip = slip or _slip_of_pivot(p[of], m.length[of])
-        slip = slip or slip_of_spread(model, m.frame, float(np.median(m.length)))
+                slip = slip or _unit_error_of_pivot(p[of], m.length[of])
+        slip = slip or unit_error_of_spread(model, m.frame, float(np.median(m.length)))
     return None if slip is None else (what, slip)
 
 
@@ -207,7 +209,7 @@ def _check_distance(m: KnownDistance, one: Array, other: Array) -> None:
         return
     # halfway to the next factor, that of inches, if the nominal robot knows no better
     near = min(_NEAR + scatter / max(apart, 1e-12), exp(0.5 * log(39.37 / 25.4)) - 1.0)
-    slip = slip_of(m.length / max(apart, 1e-12), near)
+    slip = unit_error_of(m.length / max(apart, 1e-12), near)
     if slip is not None:
         raise InvalidValueError(
             f"{m.name} {m.point} to {m.other}: {m.length:.6g} m is "

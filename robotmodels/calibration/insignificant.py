@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from .._arrays import Array
+from ..estimation.leverage import inverse_factor
 from .identifiability.identifiable import IdentifiableParameters, Reason
 from .prior import largest_factors
 from .problem import stacked
@@ -16,14 +17,14 @@ from .solve import Solution
 LARGEST_LENGTH, LARGEST_ANGLE = 0.01, 0.02
 """Standard errors above which a parameter is not estimated: relative to the robot's size, and rad
 (of the largest effect)."""
-_TINY, _SINGULAR = 1e-300, 1e-13
+_TINY = 1e-300
 
 
-def untold_by(solution: Solution, start: Array) -> list[str]:
+def insignificant_parameters(solution: Solution, start: Array) -> list[str]:
     """Names of insignificant parameters, given noise and prior."""
-    # Standard errors are the larger of two: where the fit started, as a fit that ran away along a
-    # parameter finds it well told there; and where it ended, as constraints that are violated at
-    # the start seem to tell more than they do. The least told goes first: it may hide others.
+    # The larger standard error of start and solution counts: a fit may have diverged along a
+    # parameter, and constraints violated at the start seem to hold information. The worst is
+    # removed first, as it may hide others.
     problem, prior = solution.problem, solution.fit.prior
     reach = problem.parameters.skeleton.size
     limit = np.full(problem.P + problem.F, np.inf)
@@ -41,7 +42,7 @@ def untold_by(solution: Solution, start: Array) -> list[str]:
     kept = list(range(len(limit)))
     left_out: list[str] = []
     while kept:
-        ratios = [_standard_errors(R[:, kept]) / limit[kept] for R in factors]
+        ratios = [np.linalg.norm(inverse_factor(R[:, kept]), axis=1) / limit[kept] for R in factors]
         ratio = np.maximum(*ratios)
         worst = int(np.argmax(ratio))
         if ratio[worst] <= 1.0:
@@ -50,15 +51,9 @@ def untold_by(solution: Solution, start: Array) -> list[str]:
     return left_out
 
 
-def _standard_errors(R: Array) -> Array:
-    """Square roots of the diagonal of the inverse of R^T R, for any columns of a factor."""
-    length = np.linalg.norm(R, axis=0)
-    length[length == 0.0] = 1.0
-    inverse = np.linalg.pinv(R / length, rcond=_SINGULAR)
-    return np.linalg.norm(inverse, axis=1) / length
-
-
-def without_untold(found: IdentifiableParameters, names: list[str]) -> IdentifiableParameters:
+def without_insignificant(
+    found: IdentifiableParameters, names: list[str]
+) -> IdentifiableParameters:
     """Identifiable parameters without the insignificant ones."""
     return replace(
         found,

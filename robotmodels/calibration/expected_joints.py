@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..model import RobotModel
 
 
-def joints_that_count(model: RobotModel) -> str:
+def expected_joints_text(model: RobotModel) -> str:
     """Sentence on the expected joints; empty if all move the tool."""
     moving = set(model.twin.frame(None).path.tolist())
     names = model.table.joint_names
