@@ -37,6 +37,24 @@ def _rebuilt(kind: type, values: tuple[Any, ...]) -> Any:
     return kind(*values)
 
 
+class Value(Rebuilt):
+    """Base of frozen dataclasses that are equal if their fields are, arrays included."""
+
+    __slots__ = ()
+
+    def __eq__(self, other: object) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        return all(same_value(a, b) for a, b in zip(self._values, other._values, strict=True))  # type: ignore[attr-defined]
+
+    def __hash__(self) -> int:
+        return value_hash(type(self).__name__, *self._values)
+
+    @property
+    def _values(self) -> tuple[Any, ...]:
+        return tuple(getattr(self, f.name) for f in fields(self))  # type: ignore[arg-type]
+
+
 def same_value(a: object, b: object) -> bool:
     """Equality of fields that may be arrays: same shape and same numbers."""
     if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):

@@ -1,9 +1,9 @@
 """Independent columns of a matrix: which are kept, and how the others follow from them.
 
 Columns are taken in an order of preference, and a column is kept if it is not a combination of
-those kept before it. So a dependent column is regrouped into columns that come earlier. Columns
-that hardly act wait until those that do have been looked at: what is regrouped into a column that
-hardly acts has a coefficient as large as the column is small, and rounding with it.
+those kept before it. So a dependent column is regrouped into columns that come earlier. Short
+columns are considered after the others: coefficients on a short column are large, and amplify
+rounding.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from .._arrays import Array, Rebuilt, as_floats, read_only
 from ..errors import InvalidValueError, ShapeError
 
 NOTHING = 1e-11
-"""Length relative to the longest column, below which a column or what is left of it is nothing."""
+"""Rank tolerance: residual column norm relative to the largest."""
 _LEVELS = (1e-4, 1e-8)
-"""Lengths of what is left of a column, relative to the longest, below which it waits."""
+"""Residual column norms, relative to the largest, below which a column is postponed."""
 _ROUNDING = 1e-14
 _TALL = 4
-"""Rows a column beyond which a triangular factor is worth its while."""
+"""Rows per column above which a triangular factor is computed first."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ColumnBasis(Rebuilt):
-    """Columns that span all, and the combinations that give the others. Read-only.
+    """Independent columns of a matrix, and the others as their combinations. Read-only.
 
     Parameters
     ----------
@@ -39,9 +39,9 @@ class ColumnBasis(Rebuilt):
         ``W = W[:, kept] @ coefficients``: the parameters of the kept columns that give the same
         product as all parameters are ``coefficients @ parameters``.
     distance : ndarray, shape (p,)
-        Length of what is left of each column without its projection on those kept before it,
-        relative to the longest column of its kind: small for a column that nearly depends on
-        others and for one that is nearly empty.
+        Residual norm of each column after projection on those kept before it, relative to the
+        longest column of its kind: small for a column that nearly depends on others and for one
+        that is nearly empty.
 
     Examples
     --------
@@ -74,7 +74,7 @@ class ColumnBasis(Rebuilt):
 
     @property
     def dependent(self) -> NDArray[np.int64]:
-        """Numbers of the columns that follow from the kept ones, those without effect left out."""
+        """Numbers of the dependent columns that have an effect."""
         others = np.ones(len(self.distance), dtype=bool)
         others[self.kept] = others[self.empty] = False
         return np.flatnonzero(others)
@@ -100,34 +100,33 @@ def column_basis(
 ) -> ColumnBasis:
     """Choose independent columns in an order of preference.
 
-    A column is kept if what is left of it, without its projection on the columns kept before, is
-    longer than ``nothing``. Lengths are in the units that ``scale`` gives, relative to the longest
-    column: whatever is not kept changes no product by more than that part of the largest.
+    A column is kept if its residual after projection on the columns kept before is longer than
+    ``nothing``. Lengths are in the units that ``scale`` gives, relative to the longest column: the
+    error of any product is at most that part of the largest.
 
-    Columns of which less than 1e-4 (then 1e-8) is left are looked at after the others, whatever
-    their place in the order, so that coefficients stay below 1e4 and rounding does.
+    Columns with residuals below 1e-4 (then 1e-8) are considered after the others, whatever their
+    place in the order, so that coefficients and their rounding errors stay bounded.
 
     Parameters
     ----------
     W : array_like, shape (N, p)
         The matrix, or the triangular factor of it: only ``W^T W`` matters.
     order : array_like of int, shape (p,), optional
-        Columns from the most to the least preferred; default as they stand.
+        Columns from the most to the least preferred; default their order in the matrix.
     scale : array_like, shape (p,), optional
         Natural size of the parameter of each column, so that ``W * scale`` has comparable columns;
         default 1.
     nothing : float
-        Length relative to the longest column, below which what is left of a column is nothing, and
-        coefficients are.
+        Rank tolerance relative to the longest column; also that of coefficients.
     kinds : array_like of int, shape (p,), optional
         Columns of one number are compared with each other in `ColumnBasis.gap`; default all.
     longest : float, optional
-        What lengths are relative to; default that of the longest column of ``W * scale``.
+        Reference length; default that of the longest column of ``W * scale``.
 
     Returns
     -------
     ColumnBasis
-        Kept columns and combinations; coefficients that nothing depends on are exactly zero.
+        Kept columns and combinations; coefficients below the tolerance are exactly zero.
 
     Raises
     ------
@@ -172,7 +171,7 @@ def column_basis(
 def _kept_columns(
     U: Array, order: NDArray[np.int64], nothing: float
 ) -> tuple[NDArray[np.int64], Array, Array]:
-    """Orthogonalised columns: which are kept, all columns in the basis, what is left of them."""
+    """Orthogonalisation: kept columns, all columns in their basis, residual norms."""
     p = U.shape[1]
     Q = np.empty((min(U.shape), U.shape[0]))
     parts = np.zeros((len(Q), p))
@@ -183,9 +182,8 @@ def _kept_columns(
         waiting: list[int] = []
         for k in order.tolist():
             basis = Q[: len(kept)]
-            for _ in range(2):  # once more for the digits that the first projection has cancelled
-                # these products are too small to be shared between threads of BLAS, which would
-                # wait for each other longer than they work
+            for _ in range(2):  # second projection against cancellation
+                # einsum: in BLAS, thread synchronisation would dominate these small products
                 part = np.einsum("ij,j->i", basis, rest[k])
                 rest[k] -= np.einsum("i,ij->j", part, basis)
                 parts[: len(kept), k] += part
@@ -210,20 +208,20 @@ def _combinations(parts: Array, kept: NDArray[np.int64], left: Array, nothing: f
     for i in range(b - 1, -1, -1):
         known = np.einsum("j,jk->k", triangle[i, i + 1 :], whole[i + 1 :])
         whole[i] = (parts[i] - known) / triangle[i, i]
-    found: Array = whole.copy()
-    # rounding of a column is magnified in the coefficient of a kept one of which little is left
+    coefficients: Array = whole.copy()
+    # rounding is magnified in coefficients of kept columns with small residuals
     slight = _ROUNDING / left[kept]
-    found[np.abs(found) <= np.minimum(slight, nothing)[:, None]] = 0.0
-    fewer = np.abs(found) <= np.maximum(slight, nothing)[:, None]
-    for k in np.flatnonzero((fewer & (found != 0.0)).any(axis=0)):
-        # the others make up for what is left out, if they can
+    coefficients[np.abs(coefficients) <= np.minimum(slight, nothing)[:, None]] = 0.0
+    fewer = np.abs(coefficients) <= np.maximum(slight, nothing)[:, None]
+    for k in np.flatnonzero((fewer & (coefficients != 0.0)).any(axis=0)):
+        # least-squares compensation by the other columns
         terms = np.flatnonzero(~fewer[:, k])
         again = np.linalg.lstsq(triangle[:, terms], parts[:, k], rcond=None)[0]
         if np.linalg.norm(parts[:, k] - triangle[:, terms] @ again) <= nothing:
-            found[:, k] = 0.0
-            found[terms, k] = again
-    found[:, kept] = np.eye(b)
-    return found
+            coefficients[:, k] = 0.0
+            coefficients[terms, k] = again
+    coefficients[:, kept] = np.eye(b)
+    return coefficients
 
 
 def _permutation(order: ArrayLike, p: int) -> NDArray[np.int64]:

@@ -1,4 +1,4 @@
-"""Estimates that data hardly tell apart: pairs with strong correlation."""
+"""Strongly correlated pairs of estimates."""
 
 from __future__ import annotations
 

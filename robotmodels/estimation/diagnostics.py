@@ -1,35 +1,32 @@
-"""What a fit says of itself: deviations, correlations, condition, tests of the residuals."""
+"""Diagnostics of a fit: correlations, condition, leverage, Cook's distance, residual tests."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .._arrays import Array, Rebuilt, as_exact, read_only
+from .._arrays import Array, Rebuilt, read_only
 from ..errors import InvalidValueError
-from ._problem import Linearise
-from ._step import triangle
-from .leverage import Leverage, leverage
-from .nonlinear_fit import NonlinearFit
+from .nonlinear import NonlinearFit
+from .outlying import blocks_by_size
 
-_DOUBT = 0.01
-"""Probability under which a test speaks against its assumption."""
+_LEVEL = 0.01
 
 
 @dataclass(frozen=True, slots=True)
 class ResidualTest:
-    """A test of the residuals.
+    """A statistical test of the residuals.
 
     Parameters
     ----------
     statistic : float
-        Of the test; NaN where there are too few rows.
+        Test statistic; NaN where there are too few rows.
     p : float
         Probability of so extreme a statistic if the assumption holds.
     sentence : str
-        What it means.
+        Conclusion.
     """
 
     statistic: float
@@ -38,8 +35,8 @@ class ResidualTest:
 
     @property
     def passed(self) -> bool:
-        """Whether nothing speaks against the assumption (also where there are too few rows)."""
-        return not self.p < _DOUBT
+        """Whether the assumption is not rejected (also where there are too few rows)."""
+        return not self.p < _LEVEL
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,65 +45,36 @@ class FitDiagnostics(Rebuilt):
 
     Parameters
     ----------
-    variance : float
-        Of the residuals, in squares of their stated deviations: ``scale^2``.
-    deviations : ndarray, shape (P,)
-        Standard deviations of the parameters.
-    relative_deviations : ndarray, shape (P,)
-        Relative to the parameters; infinite for a parameter that is 0.
+    relative_standard_errors : ndarray, shape (P,)
+        Standard errors relative to the parameters; infinite for a parameter that is 0.
     correlation : ndarray, shape (P, P)
-        Of the estimates; NaN for parameters without a finite deviation.
+        Correlation of the estimates; NaN for parameters without a finite standard error.
     condition : float
-        Of the weighted Jacobian with the prior, in the units that it has.
-    condition_scaled : float
-        Of the same with columns of length 1.
+        Condition number of the weighted Jacobian with the prior, columns scaled to length 1.
     chi_squared, normality, independence : ResidualTest
-        Size of the residuals against the stated deviations, their distribution, their order.
-    leverage : Leverage
-        What each measurement says.
+        Size of the residuals relative to sigma, their distribution, correlation of successive ones.
+    leverage : ndarray, shape (B,)
+        Effective number of parameters that each measurement determines, ordered by its number;
+        their sum is `NonlinearFit.freedom`. Weights of a robust loss are taken as they are.
+    influence : ndarray, shape (B,)
+        Cook's distance: square of the change of the estimate without the measurement, relative to
+        its covariance and the number of parameters; infinite where something is determined by this
+        measurement alone.
     """
 
-    variance: float
-    deviations: Array
-    relative_deviations: Array
+    relative_standard_errors: Array
     correlation: Array
     condition: float
-    condition_scaled: float
     chi_squared: ResidualTest
     normality: ResidualTest
     independence: ResidualTest
-    leverage: Leverage
+    leverage: Array
+    influence: Array
 
     def __post_init__(self) -> None:
-        for name in ("deviations", "relative_deviations", "correlation"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Linearity(Rebuilt):
-    """How far linear steps can be trusted. Read-only.
-
-    Parameters
-    ----------
-    ratios : ndarray, shape (n,)
-        Actual decrease relative to that predicted, of the steps whose decrease is above rounding.
-    curvature : ndarray, shape (P,)
-        Change of each column of the Jacobian from the start to the estimate, relative to its
-        length at the estimate.
-    missed : float
-        Part of the decrease of the sum that the first linear step does not predict.
-    sentence : str
-        What it means.
-    """
-
-    ratios: Array
-    curvature: Array
-    missed: float
-    sentence: str
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "ratios", read_only(self.ratios))
-        object.__setattr__(self, "curvature", read_only(self.curvature))
+        for name in (f.name for f in fields(self)):
+            if isinstance(value := getattr(self, name), np.ndarray):
+                object.__setattr__(self, name, read_only(value))
 
 
 def fit_diagnostics(fit: NonlinearFit) -> FitDiagnostics:
@@ -120,54 +88,42 @@ def fit_diagnostics(fit: NonlinearFit) -> FitDiagnostics:
     Returns
     -------
     FitDiagnostics
-        Deviations, correlations, condition, tests and leverage.
+        Standard errors, correlations, condition, tests, leverage and influence.
 
     References
     ----------
-    Seed book section 1.4.4.3; N. R. Draper, H. Smith, "Applied Regression Analysis", 1998.
+    Seed book section 1.4.4.3; N. R. Draper, H. Smith, "Applied Regression Analysis", 1998;
+    R. D. Cook, S. Weisberg, "Residuals and Influence in Regression", 1982, section 3.
 
     Examples
     --------
     >>> from robotmodels.estimation import fit_nonlinear
-    >>> rng = np.random.default_rng(0)
-    >>> A = rng.normal(size=(200, 2))
-    >>> y = A @ [1.0, 2.0] + 0.1 * rng.normal(size=200)
-    >>> found = fit_diagnostics(fit_nonlinear(lambda x: (A @ x - y, A), [0.0, 0.0], sigma=0.1))
-    >>> found.chi_squared.passed, found.normality.passed, found.independence.passed
-    (True, True, True)
+    >>> t = np.array([0.0, 0.1, 0.2, 0.3, 5.0])
+    >>> A = np.column_stack((np.ones(5), t))
+    >>> fit = fit_nonlinear(lambda x: (A @ x - [0.0, 0.2, 0.1, 0.3, 9.0], A), [0.0, 0.0])
+    >>> diagnostics = fit_diagnostics(fit)
+    >>> int(diagnostics.influence.argmax()), round(float(diagnostics.leverage.sum()), 9)
+    (4, 2.0)
     """
-    deviations = fit.deviations
+    error = fit.standard_errors
     with np.errstate(invalid="ignore", divide="ignore"):
-        correlation = fit.covariance / np.outer(deviations, deviations)
-        relative = np.where(fit.x != 0, deviations / np.abs(fit.x), np.inf)
-    correlation[~np.isfinite(correlation)] = np.nan
-    A = fit.jacobian * (np.sqrt(fit.weights) / fit.sigma)[:, None]
-    _, information = fit.prior.rows(fit.x)
-    s = np.linalg.svd(np.vstack((triangle(A), np.diag(information))), compute_uv=False)
-    s = np.append(np.asarray(s, dtype=np.float64), np.zeros(len(fit.x) - len(s)))
-    return FitDiagnostics(
-        variance=fit.scale**2,
-        deviations=deviations,
-        relative_deviations=relative,
-        correlation=correlation,
-        condition=_condition(s),
-        condition_scaled=_condition(fit.singular_values),
-        chi_squared=_chi_squared(fit),
-        normality=_normality(fit),
-        independence=_independence(fit),
-        leverage=leverage(fit),
-    )
+        correlation = fit.covariance / np.outer(error, error)
+        correlation[~np.isfinite(correlation)] = np.nan
+        relative = np.where(fit.x != 0, error / np.abs(fit.x), np.inf)
+        condition = float(fit.singular_values[0] / fit.singular_values[-1])
+    tests = _chi_squared(fit), _normality(fit), _independence(fit)
+    return FitDiagnostics(relative, correlation, condition, *tests, *_influence(fit))
 
 
 def confidence_intervals(fit: NonlinearFit, level: float = 0.95) -> Array:
-    """Intervals that contain the truth with a given probability, each parameter by itself.
+    """Confidence intervals of single parameters.
 
     Parameters
     ----------
     fit : NonlinearFit
         A fit.
     level : float
-        Probability, between 0 and 1.
+        Probability that an interval contains the truth, between 0 and 1.
 
     Returns
     -------
@@ -178,7 +134,7 @@ def confidence_intervals(fit: NonlinearFit, level: float = 0.95) -> Array:
     Raises
     ------
     InvalidValueError
-        A level that is no probability.
+        A level that is not a probability.
 
     Examples
     --------
@@ -193,146 +149,87 @@ def confidence_intervals(fit: NonlinearFit, level: float = 0.95) -> Array:
     if not 0 < level < 1:
         raise InvalidValueError(f"level: expected a probability between 0 and 1, got {level!r}.")
     tail = (1 + level) / 2
-    if fit.sigma_known:
-        wide = float(ndtri(tail))
-    else:
-        wide = float(stdtrit(fit.freedom_left, tail)) if fit.freedom_left > 0 else np.nan
-    return fit.x[:, None] + wide * fit.deviations[:, None] * np.array([-1.0, 1.0])
+    wide = ndtri(tail) if fit.sigma_known else stdtrit(max(fit.freedom_left, 0.0), tail)
+    return fit.x[:, None] + wide * fit.standard_errors[:, None] * np.array([-1.0, 1.0])
 
 
-def linearity(fit: NonlinearFit, linearise: Linearise) -> Linearity:
-    """Compare what linear steps predicted with what happened.
-
-    Parameters
-    ----------
-    fit : NonlinearFit
-        A fit.
-    linearise : callable
-        The function that was fitted; called once, at ``fit.x0``.
-
-    Returns
-    -------
-    Linearity
-        Ratios, change of the Jacobian and a sentence.
-
-    Examples
-    --------
-    >>> from robotmodels.estimation import fit_nonlinear
-    >>> A = np.random.default_rng(0).normal(size=(9, 2))
-    >>> linear = lambda x: (A @ x - 1.0, A)
-    >>> found = linearity(fit_nonlinear(linear, [0.0, 0.0]), linear)
-    >>> bool(abs(found.ratios[0] - 1) < 1e-12), float(found.curvature.max())
-    (True, 0.0)
-    """
-    M, P = fit.jacobian.shape
-    J0 = as_exact(linearise(fit.x0.copy())[1], (M, P), "jacobian")
-    now = np.linalg.norm(fit.jacobian / fit.sigma[:, None], axis=0)
-    change = np.linalg.norm((fit.jacobian - J0) / fit.sigma[:, None], axis=0)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        curvature = np.where(change > 0, change / now, 0.0)
-    total, predicted, actual = fit.steps[:, 0], fit.steps[:, 1], fit.steps[:, 2]
-    seen = predicted > 1e-10 * total
-    ratios = actual[seen] / predicted[seen]
-    whole = float(actual[seen].sum())
-    first = float(actual[seen][0]) if len(ratios) else 0.0
-    missed = 1 - first / whole if whole > 0 else 0.0
-    return Linearity(ratios, curvature, missed, _linearity_sentence(ratios, curvature))
-
-
-def _linearity_sentence(ratios: Array, curvature: Array) -> str:
-    largest = float(curvature.max(initial=0.0))
-    last = float(ratios[-1]) if len(ratios) else 1.0
-    change = f"the Jacobian changes by at most {100 * largest:.2g} % on the way"
-    if abs(last - 1) > 0.1:
-        return (
-            f"The last visible step lowered the sum by {last:.2g} of what it predicted, and "
-            f"{change}: the statistics, which are linear, are doubtful."
-        )
-    if largest > 0.3:
-        return (
-            f"Steps predict what happens at the end, but {change}: one linear step is not enough."
-        )
-    return f"Steps predict what happens, and {change}: the linear statistics hold."
-
-
-def _condition(s: Array) -> float:
-    smallest = float(s[-1])
-    return float(s[0]) / smallest if smallest > 0 else float("inf")
+def _influence(fit: NonlinearFit) -> tuple[Array, Array]:
+    """Leverage and Cook's distance of each measurement, shapes (B,)."""
+    T, r = fit.orthonormal_rows, fit.whitened * np.sqrt(fit.weights)
+    _, place = np.unique(fit.block, return_inverse=True)
+    leverage, influence = np.zeros((2, int(place.max(initial=-1)) + 1))
+    noise = 1.0 if fit.sigma_known else max(fit.scale**2, np.finfo(float).tiny)
+    for which, rows in blocks_by_size(place):
+        own, axes = np.linalg.eigh(T[rows] @ T[rows].swapaxes(1, 2))
+        along = (axes.swapaxes(1, 2) @ r[rows][..., None])[..., 0]
+        alone = 1 - own <= 1e-10
+        change = np.where(alone, 0.0, along / np.where(alone, 1.0, 1 - own))
+        moved = (change**2 * np.maximum(own, 0.0)).sum(axis=1) / noise / max(fit.rank, 1)
+        leverage[which] = own.sum(axis=1)
+        influence[which] = np.where(alone.any(axis=1), np.inf, moved)
+    return leverage, influence
 
 
 def _chi_squared(fit: NonlinearFit) -> ResidualTest:
+    """Chi-squared test, two-sided: whether residuals are as large as stated."""
     from scipy.special import chdtr, chdtrc
 
-    statistic = float(fit.whitened @ fit.whitened)
-    left = fit.freedom_left
+    statistic, left = float(fit.whitened @ fit.whitened), fit.freedom_left
     if left <= 0:
-        return ResidualTest(statistic, np.nan, "No row is left over: nothing can be tested.")
+        return ResidualTest(
+            statistic, np.nan, "There are no degrees of freedom: nothing can be tested."
+        )
     ratio = np.sqrt(statistic / left)
+    text = f"Residuals are only {ratio:.3g} of the stated standard deviations, which are too large."
     p = min(1.0, 2 * min(float(chdtr(left, statistic)), float(chdtrc(left, statistic))))
-    if not p < _DOUBT:
-        text = f"Residuals are as large as stated ({ratio:.3g} of the stated deviations)."
+    if not p < _LEVEL:
+        text = f"Residuals are as large as stated ({ratio:.3g} of the stated standard deviations)."
     elif ratio > 1:
         text = (
             f"Residuals are {ratio:.3g} times as large as stated: the model lacks something, there "
-            "are outliers, or the stated deviations are too small."
+            "are outliers, or the stated standard deviations are too small."
         )
-    else:
-        text = f"Residuals are only {ratio:.3g} of the stated deviations, which are too large."
     return ResidualTest(statistic, p, text)
 
 
-def _usual(fit: NonlinearFit) -> NDArray[np.bool_]:
-    """Rows of the measurements that are not listed as outliers."""
-    return ~np.isin(fit.block, fit.outliers)
-
-
 def _normality(fit: NonlinearFit) -> ResidualTest:
-    z = fit.whitened[_usual(fit)]
+    """Test of D'Agostino and Pearson: whether residuals without outliers are Gaussian."""
+    z = fit.whitened[~np.isin(fit.block, fit.outliers)]
     if len(z) < 20 or not z.std() > 0:
-        return ResidualTest(np.nan, np.nan, "Too few rows (20 are needed) to judge a distribution.")
+        return ResidualTest(
+            np.nan, np.nan, "Too few rows (20 are needed) to test the distribution."
+        )
     from scipy.stats import normaltest
 
-    found = normaltest(z)
-    p = float(found.pvalue)
-    text = (
-        "Nothing speaks against Gaussian residuals."
-        if not p < _DOUBT
-        else "Residuals are not Gaussian: look for outliers left, mixed accuracies or a bad model."
-    )
-    return ResidualTest(float(found.statistic), p, text)
+    statistic, p = map(float, normaltest(z))
+    text = "Gaussian residuals are not rejected."
+    if p < _LEVEL:
+        text = "Residuals are not Gaussian: check for outliers, mixed accuracies or a wrong model."
+    return ResidualTest(statistic, p, text)
 
 
 def _independence(fit: NonlinearFit) -> ResidualTest:
-    """Correlation of rows of successive measurements, in the order of the rows."""
+    """Test of lag-1 correlation of successive measurements of equal size."""
     from scipy.special import erfc
 
-    usual = _usual(fit)
-    z, block = fit.whitened[usual], fit.block[usual]
-    first = (
-        np.flatnonzero(np.concatenate(([True], np.diff(block) != 0))) if len(z) else np.arange(0)
-    )
-    size = np.diff(np.concatenate((first, [len(z)])))
-    pairs = np.flatnonzero(size[:-1] == size[1:]) if len(size) > 1 else np.arange(0)
-    left = np.repeat(first[pairs], size[pairs]) + _within(size[pairs])
-    right = left + np.repeat(size[pairs], size[pairs])
-    if len(left) < 20:
-        return ResidualTest(np.nan, np.nan, "Too few rows (20 pairs are needed) to judge an order.")
-    a, b = z[left], z[right]
-    scale = np.sqrt((a @ a) * (b @ b))
+    usual = ~np.isin(fit.block, fit.outliers)
+    ends = np.flatnonzero(np.diff(fit.block[usual])) + 1
+    both = pairwise(np.split(fit.whitened[usual], ends))
+    pairs = [(a, b) for a, b in both if len(a) == len(b)]
+    a, b = np.concatenate([np.zeros((2, 0)), *pairs], axis=1)
+    if len(a) < 20:
+        return ResidualTest(
+            np.nan, np.nan, "Too few rows (20 pairs are needed) to test independence."
+        )
+    scale = float(np.sqrt((a @ a) * (b @ b)))
     if not scale > 0:
-        return ResidualTest(np.nan, np.nan, "There are no residuals whose order could be judged.")
-    correlation = float(a @ b / scale)
+        return ResidualTest(np.nan, np.nan, "There are no residuals to test.")
+    correlation = float(a @ b) / scale
     p = float(erfc(abs(correlation) * np.sqrt(len(a) / 2)))
-    text = (
-        "Successive measurements are not correlated."
-        if not p < _DOUBT
-        else f"Successive measurements are correlated ({correlation:.2f}): there is a drift or a "
-        "missing effect, and the stated deviations of the parameters are too small."
-    )
+    text = "Successive measurements are not correlated."
+    if p < _LEVEL:
+        text = (
+            f"Successive measurements are correlated ({correlation:.2f}): there is a drift or a "
+            "missing effect, and the stated standard errors are too small."
+        )
     return ResidualTest(correlation, p, text)
-
-
-def _within(size: NDArray[np.int64]) -> NDArray[np.int64]:
-    """0, 1, ... for each of several runs."""
-    ends = np.cumsum(size)
-    return np.arange(int(ends[-1]) if len(ends) else 0) - np.repeat(ends - size, size)

@@ -13,24 +13,24 @@ from ..errors import InvalidValueError, ShapeError
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prior(Rebuilt):
-    """What is known of the parameters before the measurements. Read-only.
+    """Gaussian prior of parameters. Read-only.
 
-    Adds the rows ``sqrt(strength) (x - mean) / deviation`` to the fit, in units of the stated
-    standard deviations of the measurements. No loss acts on them.
+    Adds the rows ``sqrt(strength) (x - mean) / sigma`` to the fit, in units of the stated standard
+    deviations of the measurements. No loss acts on them.
 
     Parameters
     ----------
     mean : array_like, shape (P,)
         Expected values, in the units of the parameters.
-    deviation : array_like, shape (P,)
-        Standard deviations, positive; infinite where nothing is known.
+    sigma : array_like, shape (P,)
+        Standard deviations, positive; infinite for no information.
     strength : float
-        Factor on the information: 1 takes the deviations as they stand, 0 ignores them.
+        Factor on the information: 1 uses sigma unchanged, 0 ignores it.
 
     Raises
     ------
     ShapeError, InvalidValueError
-        Lengths that differ, NaN, deviations that are not positive, a negative strength.
+        Lengths that differ, NaN, a sigma that is not positive, a negative strength.
 
     Examples
     --------
@@ -40,33 +40,29 @@ class Prior(Rebuilt):
     """
 
     mean: Array
-    deviation: Array
+    sigma: Array
     strength: float = 1.0
 
     def __post_init__(self) -> None:
-        mean = read_only(as_floats(self.mean, "mean"))
-        deviation = read_only(as_reals(self.deviation, "deviation"))
-        if mean.ndim != 1 or deviation.shape != mean.shape:
+        object.__setattr__(self, "mean", read_only(as_floats(self.mean, "mean")))
+        object.__setattr__(self, "sigma", read_only(as_reals(self.sigma, "sigma")))
+        object.__setattr__(self, "strength", float(self.strength))
+        if self.mean.ndim != 1 or self.sigma.shape != self.mean.shape:
             raise ShapeError(
-                f"Prior: expected mean and deviation of one shape (P,), got {mean.shape} and "
-                f"{deviation.shape}."
+                f"Prior: expected mean and sigma of one shape (P,), got {self.mean.shape} and "
+                f"{self.sigma.shape}."
             )
-        if not (deviation > 0).all():
+        if not (self.sigma > 0).all():
             raise InvalidValueError(
                 "Prior: expected positive standard deviations (infinite for none), got "
-                f"{deviation[~(deviation > 0)][0]}; leave a parameter that is known exactly out of "
-                "the fit."
+                f"{self.sigma.min()}; leave a parameter that is known exactly out of the fit."
             )
-        strength = float(self.strength)
-        if not (np.isfinite(strength) and strength >= 0):
+        if not (np.isfinite(self.strength) and self.strength >= 0):
             raise InvalidValueError(f"Prior: expected a strength from 0, got {self.strength!r}.")
-        object.__setattr__(self, "mean", mean)
-        object.__setattr__(self, "deviation", deviation)
-        object.__setattr__(self, "strength", strength)
 
     @classmethod
     def none(cls, parameters: int) -> Prior:
-        """The prior that knows nothing of so many parameters."""
+        """Prior without information on P parameters."""
         return cls(np.zeros(parameters), np.full(parameters, np.inf))
 
     def with_strength(self, strength: float) -> Prior:
@@ -84,7 +80,7 @@ class Prior(Rebuilt):
         Returns
         -------
         value, slope : ndarray, shape (P,)
-            Zero where nothing is known.
+            Zero without information.
         """
-        slope = np.sqrt(self.strength) / self.deviation
+        slope = np.sqrt(self.strength) / self.sigma
         return (np.asarray(x, dtype=np.float64) - self.mean) * slope, slope
