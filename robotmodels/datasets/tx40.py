@@ -11,7 +11,8 @@ from importlib.resources.abc import Traversable
 import numpy as np
 
 from .._arrays import Array, Rebuilt, read_only
-from ..logs import Log, LogSource
+from ..logs import Log
+from ..logs.log import LogSource
 from ..model import RobotModel
 from ..robots import load
 from ._files import folder

@@ -1,22 +1,17 @@
-"""Logs of robots: what was recorded, read from files, checked and brought to SI on the joint side.
+"""Logs of robots: read from files, converted to SI on the joint side, and checked.
 
 Seed book sections 1.6.2.4 and 1.6.2.5.
 """
 
 from .checks import check_log
 from .findings import FindingKind, LogFinding, Severity
-from .joining import join_logs, with_delay
-from .log import Log, LogSource, RefusedRows
+from .log import Log, join_logs, with_delay
 from .read import read_log
-from .table import LogFormat
 
 __all__ = [
     "FindingKind",
     "Log",
     "LogFinding",
-    "LogFormat",
-    "LogSource",
-    "RefusedRows",
     "Severity",
     "check_log",
     "join_logs",

@@ -1,4 +1,4 @@
-"""What a check of a log found, in words."""
+"""Findings of the checks of a log."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .log import Log
 
 
 class Severity(Enum):
-    """How bad a finding is; the value says what follows.
+    """Severity of a finding; the value states the consequence.
 
     Examples
     --------
@@ -23,7 +23,7 @@ class Severity(Enum):
 
 
 class FindingKind(Enum):
-    """What may be wrong with a log; the value says it in words.
+    """Kind of a finding; the value describes it.
 
     Examples
     --------
@@ -31,47 +31,43 @@ class FindingKind(Enum):
     'a channel repeats its value'
     """
 
-    WRONG_JOINT_COUNT = "its joints are not as many as the model's"
+    WRONG_JOINT_COUNT = "log and model have different numbers of joints"
     WRONG_JOINT_ORDER = "its joints are the model's in another order"
-    IMPLAUSIBLE_PERIOD = "its sampling period is that of no recorder of a robot"
+    IMPLAUSIBLE_PERIOD = "the sampling period is too long for a robot"
     POSITIONS_IN_DEGREES = "positions look like degrees"
     MOTOR_SIDE_POSITIONS = "positions look like those of motors"
     OUTSIDE_LIMITS = "positions are outside the limits"
-    TOO_FAST = "velocities are above the limits"
-    RATES_OFF_POSITIONS = "velocities or accelerations do not follow from the positions"
+    RATES_OFF_POSITIONS = "velocities or accelerations are not the derivatives of the positions"
     TORQUE_ABOVE_LIMITS = "torques are above the limits"
-    TORQUE_BELOW_USE = "torques are too small to be torques of the joints"
     TORQUE_OFF_INERTIA = "torques differ in size from those of the model's inertia"
     CONSTANT_POSITION = "a joint does not move"
     CONSTANT_TORQUE = "a torque is constant"
     NOTHING_MOVES = "nothing moves"
     SATURATED = "torques stay at their extreme values"
-    QUANTISED = "positions have coarse steps"
     STUCK = "a channel repeats its value"
     SPIKES = "single samples are outliers"
     JUMP = "positions jump"
-    TOO_SHORT = "it is short for what is to be found"
-    SLOWER_THAN_LOG = "a joint does not come back in the time of the log"
-    NOT_EXCITING = "its motion does not show all parameters"
+    TOO_SHORT = "the log is too short for the parameters"
+    NOT_EXCITING = "the motion does not excite all parameters"
     SWAPPED_JOINTS = "joints look swapped"
     WRONG_SIGN = "a sign looks wrong"
-    OUT_OF_STEP = "positions and torques are out of step"
+    OUT_OF_STEP = "positions and torques are not synchronous"
 
 
 @dataclass(frozen=True, slots=True)
 class LogFinding:
-    """One thing that is wrong or strange.
+    """A finding of a check of a log; it prints as its sentence.
 
     Parameters
     ----------
     kind : FindingKind
-        What.
+        Its kind.
     severity : Severity
-        How bad.
+        Its severity.
     joints : tuple of str
-        Where; empty if it is of the whole log.
+        Joints it concerns; empty if it concerns the whole log.
     sentence : str
-        With numbers, and what to do.
+        With numbers and the remedy.
 
     Examples
     --------
@@ -88,9 +84,11 @@ class LogFinding:
         return self.sentence
 
 
-def add_of_joint(
-    found: list[LogFinding], kind: FindingKind, severity: Severity, log: Log, j: int, words: str
-) -> None:
-    """Add what is wrong with joint ``j``, named in the sentence."""
-    name = log.names[j]
-    found.append(LogFinding(kind, severity, (name,), f"Joint {name}: {words}"))
+Finding = tuple[FindingKind, Severity, str]
+"""Finding about a joint, before its name is added to the sentence."""
+
+
+def in_words(log: Log, j: int, finding: Finding) -> LogFinding:
+    """A finding about joint ``j``, named in the sentence."""
+    kind, severity, words = finding
+    return LogFinding(kind, severity, (log.names[j],), f"Joint {log.names[j]}: {words}")

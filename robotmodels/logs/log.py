@@ -1,36 +1,27 @@
-"""What was recorded: positions and torques of the joints over time."""
+"""Recorded positions and torques of the joints over time; logs joined, and torques shifted."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import LARGEST, Array, as_bounded, as_floats
+from .._arrays import LARGEST, Array, Rebuilt, as_bounded, as_floats
 from ..errors import InvalidValueError, ShapeError
 
-_LEAST = 1e-50
-"""Of the largest sample of a channel that is not zero: its square is a float."""
-_LONGEST = 1e12
-"""Period, s; the shortest is its inverse."""
+ARRAYS = ("q", "tau", "v", "a", "q_ref", "v_ref")
+_SMALLEST, _LONGEST = 1e-50, 1e12
+"""Least magnitude of the largest sample of a nonzero channel; longest sampling period, s."""
+_SAME, _WHOLE = 1e-4, 1e-6
+"""Tolerances: relative difference of sampling periods, distance from whole samples."""
 
 
 @dataclass(frozen=True, slots=True)
 class RefusedRows:
-    """Rows of a source that are not in the log, and why.
-
-    Parameters
-    ----------
-    source : str
-        File or array they come from.
-    rows : tuple of int
-        Their numbers in it, from 0.
-    reason : str
-        A sentence.
-    """
+    """Rows of a source, by their numbers from 0, that are not in the log, and why."""
 
     source: str
     rows: tuple[int, ...]
@@ -39,17 +30,7 @@ class RefusedRows:
 
 @dataclass(frozen=True, slots=True)
 class LogSource:
-    """A file or array that a log was made of.
-
-    Parameters
-    ----------
-    name : str
-        Name of the file, or "arrays".
-    sha256 : str
-        Of its bytes, in hexadecimal digits.
-    rows : int
-        Samples that the log has of it.
-    """
+    """A file that a log was read from, or "arrays", with the number of its samples in the log."""
 
     name: str
     sha256: str
@@ -57,7 +38,7 @@ class LogSource:
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)
-class Log:
+class Log(Rebuilt):
     """Regularly sampled positions and torques of n joints, on the joint side, in SI units.
 
     Parameters
@@ -67,23 +48,23 @@ class Log:
     q : array_like, shape (N, n)
         Joint variables, rad or m. Arrays of float64, memory maps among them, are not copied.
     tau : array_like, shape (N, n)
-        Joint torques, N m or N; motor currents where drive gains are to be found.
+        Joint torques, N m or N; motor currents where drive gains are to be identified.
     v, a : array_like, shape (N, n), optional
-        Velocities and accelerations, where they are known better than by differences of q.
+        Velocities and accelerations, where they are more accurate than differences of q.
     q_ref, v_ref : array_like, shape (N, n), optional
-        What the controller was asked to follow, for methods that simulate it.
+        References of the controller, for methods that simulate it.
     starts : array_like of int, shape (S,), optional
         First rows of recordings that are not joined in time, ascending from 0; default one.
     names : sequence of str, optional
-        Of the joints, default "1" to "n".
+        Names of the joints, default "1" to "n".
     delay : float
-        Seconds that the torque lags behind the positions, already taken out or 0; for the report.
+        Delay of the torque behind the positions that was removed, seconds; for the report.
     sources : sequence of LogSource, optional
-        What it was made of.
+        Files: ``name, sha256, rows`` of each.
     refused : sequence of RefusedRows, optional
-        What was left out.
+        Rows that were left out: ``source, rows, reason``.
     notes : sequence of str, optional
-        What is strange.
+        Sentences about the reading of the files.
 
     Raises
     ------
@@ -136,26 +117,19 @@ class Log:
         if period.ndim != 0 or not period > 0.0:
             raise InvalidValueError(f"dt: expected the sampling period in seconds, got {dt!r:.60}.")
         as_bounded(period, "dt", _LONGEST, 1.0 / _LONGEST)
-        object.__setattr__(self, "dt", float(period))
-        positions = _rows(q, "q")
-        given: dict[str, Any] = {"tau": tau, "v": v, "a": a, "q_ref": q_ref, "v_ref": v_ref}
-        object.__setattr__(self, "q", positions)
-        for name, value in given.items():
-            array = None if value is None and name != "tau" else _rows(value, name)
-            if array is not None and array.shape != positions.shape:
-                raise ShapeError(
-                    f"{name}: expected shape {positions.shape} as q has it, got {array.shape}."
-                )
-            object.__setattr__(self, name, array)
-        object.__setattr__(self, "starts", _starts(starts, len(positions)))
-        n = positions.shape[1]
-        words = tuple(str(k + 1) for k in range(n)) if names is None else tuple(map(str, names))
+        values: dict[str, Any] = {"q": _samples(q, "q", None)}
+        N, n = values["q"].shape
+        for name, given in zip(ARRAYS[1:], (tau, v, a, q_ref, v_ref), strict=True):
+            missing = given is None and name != "tau"
+            values[name] = None if missing else _samples(given, name, (N, n))
+        words = tuple(map(str, range(1, n + 1) if names is None else names))
         if len(words) != n:
             raise ShapeError(f"names: expected {n} names of joints, got {len(words)}.")
-        object.__setattr__(self, "names", words)
-        object.__setattr__(self, "delay", float(delay))
-        for name, value in (("sources", sources), ("refused", refused), ("notes", notes)):
-            object.__setattr__(self, name, tuple(value))
+        values |= {"dt": float(period), "starts": _starts(starts, N), "names": words}
+        values |= {"delay": float(delay), "sources": tuple(sources)}
+        values |= {"refused": tuple(refused), "notes": tuple(notes)}
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
 
     @property
     def n(self) -> int:
@@ -179,7 +153,7 @@ class Log:
             yield slice(start, end)
 
     def rows(self, start: int, stop: int) -> Log:
-        """Some rows of it; what was said of the whole stays.
+        """Part of the log, with its sources, refused rows and notes; also ``log[start:stop]``.
 
         Parameters
         ----------
@@ -194,66 +168,30 @@ class Log:
         Raises
         ------
         InvalidValueError
-            No row is in this range, or it goes beyond the log.
+            The range is empty or exceeds the log.
 
         Examples
         --------
         >>> len(Log(0.01, np.zeros((100, 1)), np.zeros((100, 1))).rows(10, 30))
         20
         """
-        beyond = [row for row in (start, stop) if not -len(self) <= row <= len(self)]
-        if beyond:
+        N = len(self)
+        first, last, _ = slice(start, stop).indices(N)
+        if not (first < last and -N <= start <= N and -N <= stop <= N):
             raise InvalidValueError(
-                f"rows: asked for {start} to {stop}, the log has {len(self)} rows (0 to {len(self)}"
-                "); give a range within it."
-            )
-        first, last, _ = slice(start, stop).indices(len(self))
-        if first >= last:
-            raise InvalidValueError(
-                f"rows: none from {start} to {stop}; the log has {len(self)} rows."
+                f"rows: expected a range within the log, got {start} to {stop}; it has {N} rows."
             )
         inner = self.starts[(self.starts > first) & (self.starts < last)] - first
-        part: dict[str, Any] = {
-            name: None if (array := getattr(self, name)) is None else array[first:last]
-            for name in ("q", "tau", "v", "a", "q_ref", "v_ref")
-        }
-        return Log(
-            self.dt, **part, starts=(0, *inner.tolist()), names=self.names, delay=self.delay,
-            sources=self.sources, refused=self.refused, notes=self.notes,
-        )  # fmt: skip
+        return selected(self, slice(first, last), (0, *inner.tolist()))
+
+    __iter__ = None  # a log is no sequence of samples
 
     def __getitem__(self, part: slice) -> Log:
-        """Rows ``log[start:stop]``, as `rows` gives them.
-
-        Parameters
-        ----------
-        part : slice
-            Without a step: a thinned log is made by a filter, see ``decimation`` of a fit.
-
-        Returns
-        -------
-        Log
-            Views of the same arrays.
-
-        Raises
-        ------
-        InvalidValueError
-            Not a slice of following rows within the log.
-
-        Examples
-        --------
-        >>> len(Log(0.01, np.zeros((100, 1)), np.zeros((100, 1)))[10:30])
-        20
-        """
-        if not isinstance(part, slice):
+        """Rows ``log[start:stop]``; no steps, since decimation needs a filter."""
+        if not isinstance(part, slice) or part.step not in (None, 1):
             raise InvalidValueError(
-                f"log[...]: expected rows as log[start:stop], got {part!r:.60}; single samples are "
-                "in its arrays, such as log.q[k]."
-            )
-        if part.step not in (None, 1):
-            raise InvalidValueError(
-                f"log[...]: expected following rows, got a step of {part.step!r:.20}; leaving out "
-                "samples without a filter folds what is fast into what is slow."
+                f"log[...]: expected log[start:stop], got {part!r:.60}; single samples are in its "
+                "arrays (log.q[k]), and decimation needs a filter (processing= of a fit)."
             )
         start = 0 if part.start is None else part.start
         return self.rows(start, len(self) if part.stop is None else part.stop)
@@ -268,8 +206,11 @@ class Log:
             f"{self.duration:.3g} s{runs}>"
         )
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), tuple(getattr(self, field.name) for field in fields(self))
+
+def selected(log: Log, rows: slice | NDArray[np.int64], starts: Any, **changes: Any) -> Log:
+    """Some rows of a log, with new starts of recordings and other changed fields."""
+    parts = {name: x[rows] for name in ARRAYS if (x := getattr(log, name)) is not None}
+    return replace(log, **(parts | {"starts": starts} | changes))
 
 
 def check_is_log(log: object) -> None:
@@ -281,15 +222,16 @@ def check_is_log(log: object) -> None:
     raise InvalidValueError(f"log: expected a Log, got {type(log).__name__}; {advice}.")
 
 
-def _rows(value: ArrayLike | None, name: str) -> Array:
+def _samples(value: ArrayLike | None, name: str, shape: tuple[int, ...] | None) -> Array:
     if value is None:
         raise InvalidValueError(f"{name}: expected samples of shape (N, n), got None.")
-    array = as_bounded(value, name, LARGEST, _LEAST)
-    if array.ndim != 2:
-        raise ShapeError(f"{name}: expected samples of shape (N, n), got {array.shape}.")
-    if not array.shape[0]:
+    view = as_bounded(value, name, LARGEST, _SMALLEST).view()
+    if view.ndim != 2:
+        raise ShapeError(f"{name}: expected samples of shape (N, n), got {view.shape}.")
+    if not len(view):
         raise InvalidValueError(f"{name}: the log is empty; expected at least one sample.")
-    view = array.view()
+    if shape is not None and view.shape != shape:
+        raise ShapeError(f"{name}: expected shape {shape} as q has it, got {view.shape}.")
     view.flags.writeable = False
     return view
 
@@ -304,3 +246,157 @@ def _starts(starts: ArrayLike, N: int) -> NDArray[np.int64]:
     array = values.astype(np.int64)
     array.flags.writeable = False
     return array
+
+
+def join_logs(logs: Iterable[Log]) -> Log:
+    """Join several logs as separate recordings of one log.
+
+    Velocities, accelerations and references are kept only if all logs have them.
+
+    Parameters
+    ----------
+    logs : iterable of Log
+        Logs with the same joints and the same sampling period (to one part in ten thousand).
+
+    Returns
+    -------
+    Log
+        With the sources, refused rows and notes of all.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        None given; joints, periods or delays that differ.
+
+    Examples
+    --------
+    >>> one = Log(0.01, np.zeros((100, 1)), np.zeros((100, 1)))
+    >>> join_logs([one, one])
+    <Log: 200 samples of 1 joints at 100 Hz, 2 s in 2 recordings>
+    """
+    each = tuple(logs)
+    if not each:
+        raise InvalidValueError("logs: expected at least one, got none.")
+    first = each[0]
+    for k, log in enumerate(each[1:], 1):
+        if log.names != first.names:
+            raise ShapeError(
+                f"logs: number {k} is of the joints {', '.join(log.names)}, the first of "
+                f"{', '.join(first.names)}."
+            )
+        if abs(log.dt - first.dt) > _SAME * first.dt or log.delay != first.delay:
+            raise InvalidValueError(
+                f"logs: number {k} is sampled every {log.dt:.9g} s and had a delay of "
+                f"{log.delay:g} s, the first every {first.dt:.9g} s and {first.delay:g} s; read "
+                "them with the same dt=, which interpolates, and use with_delay on all."
+            )
+    notes = [note for log in each for note in log.notes]
+    arrays: dict[str, Array] = {}
+    for name in ARRAYS:
+        parts = [x for log in each if (x := getattr(log, name)) is not None]
+        if len(parts) == len(each):
+            arrays[name] = np.concatenate(parts)
+        elif parts:
+            notes.append(f"{name} was left out: {len(parts)} of {len(each)} joined logs have it.")
+    lengths = [len(log) for log in each]
+    offsets = np.cumsum([0, *lengths[:-1]])
+    return Log(
+        float(np.average([log.dt for log in each], weights=lengths)),
+        **arrays,
+        starts=np.concatenate([log.starts + o for log, o in zip(each, offsets, strict=True)]),
+        names=first.names,
+        delay=first.delay,
+        sources=[source for log in each for source in log.sources],
+        refused=[rows for log in each for rows in log.refused],
+        notes=notes,
+    )
+
+
+def with_delay(log: Log, delay: float) -> Log:
+    """The log with its torques shifted back in time, so that they belong to their positions.
+
+    ``tau(t)`` becomes ``tau(t + delay)``: whole numbers of samples by shifting rows, others by
+    cubic splines. Rows at the ends of recordings that have no torque any more are cut.
+
+    Parameters
+    ----------
+    log : Log
+        The recorded log.
+    delay : float
+        Delay of its torques behind its positions, seconds (`identification.synchronisation`);
+        negative if they precede them.
+
+    Returns
+    -------
+    Log
+        Shorter; `Log.delay` is the sum of all removed delays, and a note states how.
+
+    Raises
+    ------
+    InvalidValueError
+        The delay is as long as every recording, or no number.
+
+    References
+    ----------
+    Seed book section 1.6.2.4.
+
+    Examples
+    --------
+    >>> log = Log(0.001, np.zeros((5, 1)), [[0.0], [0.0], [1.0], [2.0], [3.0]])
+    >>> with_delay(log, 0.002).tau.ravel()
+    array([1., 2., 3.])
+    """
+    check_is_log(log)
+    value = as_floats(delay, "delay")
+    if value.ndim:
+        raise InvalidValueError(f"delay: expected one number of seconds, got {delay!r:.60}.")
+    seconds = float(value)
+    if seconds == 0.0:
+        return log
+    shift = seconds / log.dt
+    whole = abs(shift - round(shift)) < _WHOLE
+    shift = float(round(shift)) if whole else shift
+    cut = int(np.ceil(abs(shift)))
+    kept, torques, starts, dropped = [], [], [0], []
+    for rows in log.recordings():
+        count = rows.stop - rows.start - cut
+        if count < 2:
+            dropped += range(rows.start, rows.stop)
+            continue
+        places = np.arange(count) + (cut if shift < 0.0 else 0)
+        kept.append(rows.start + places)
+        torques.append(_at(log.tau[rows], places + shift))
+        starts.append(starts[-1] + count)
+    if not kept:
+        raise InvalidValueError(
+            f"delay: {seconds:g} s are {abs(shift):g} samples, no recording is longer."
+        )
+    refused, notes = list(log.refused), list(log.notes)
+    if dropped:
+        refused.append(
+            RefusedRows("log", tuple(dropped), "its recording is shorter than the delay")
+        )
+        notes.append(f"{len(dropped)} rows of recordings shorter than the delay were left out.")
+    how = "by whole samples" if whole else "by cubic splines"
+    notes.append(
+        f"{seconds:.6g} s of delay were removed from the torques ({shift:.4g} samples, {how}; "
+        f"{cut} rows of each recording cut)."
+    )
+    return selected(
+        log,
+        np.concatenate(kept),
+        starts[:-1],
+        tau=np.concatenate(torques),
+        delay=log.delay + seconds,
+        refused=refused,
+        notes=notes,
+    )
+
+
+def _at(tau: Array, places: Array) -> Array:
+    """Torques at fractional row numbers."""
+    if np.array_equal(places, np.round(places)):
+        return tau[places.astype(np.int64)]
+    from scipy.interpolate import CubicSpline
+
+    return CubicSpline(np.arange(len(tau)), tau)(places)

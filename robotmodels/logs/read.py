@@ -1,40 +1,37 @@
-"""Logs from files: columns by name or number, units by argument, all that is left out said."""
+"""Reader of log files: columns by name or number, units by argument, notes on omissions."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import as_floats
-from .._choices import chosen
 from ..csv_table import Column
 from ..drive import Transmission
 from ..errors import InvalidValueError, ShapeError
 from ..file_units import AngleUnit, LengthUnit, TimeUnit, as_file_unit
 from ..model import RobotModel, check_model
-from .finding_columns import (
-    Quantity,
-)
-from .formats import open_log_table
-from .joining import join_logs
-from .log import Log, LogSource
-from .raw_samples import EXTRA, Choice, Extras, raw_samples
-from .table import LogFormat
+from .columns import Quantity
+from .log import Log, LogSource, join_logs
+from .samples import Request, read_samples
+from .tables import Choice, LogTable, open_log_table, table_of
 from .time_base import regular_rows
 from .units import joint_side
 
-Paths = str | Path | Iterable[str | Path]
+Source = str | Path | Mapping[str, Any]
 _SHORTEST, _LONGEST = 1e-6, 10.0
+"""Sampling periods of files, s."""
 
 
 def read_log(
-    path: Paths,
+    path: Source | Iterable[Source],
     *,
-    torques_from: Paths | None = None,
+    torques_from: Source | Iterable[Source] | None = None,
     positions: Choice | None = None,
     torques: Choice | None = None,
     velocities: Choice | Literal[False] | None = None,
@@ -55,15 +52,14 @@ def read_log(
     model: RobotModel | None = None,
     largest_gap: float | None = None,
     largest_jitter: float = 0.5,
-    format: LogFormat | str | None = None,  # noqa: A002 - what it is called everywhere
     delimiter: str | None = None,
 ) -> Log:
-    r"""Read positions and torques of joints from CSV, NPZ, Parquet, MAT or a table made by ROS.
+    r"""Read positions and torques of joints from CSV, NPZ, Parquet, MAT, ROS tables or arrays.
 
     Columns are given by name, by number (from 0), as the name of a matrix, or by a pattern
     (``"pos_*"``). Those that are not given are found by the usual names (q1 to qn, tau1 to taun,
-    position, effort, ...), which a note says. Understood of ROS are what ``rostopic echo -p``
-    prints (``%time``, ``field.position0``), PlotJuggler's CSV
+    position, effort, ...), which a note states. Of ROS these are read: the output of ``rostopic
+    echo -p`` (``%time``, ``field.position0``), PlotJuggler's CSV
     (``/joint_states/joint_1/position``, ``/joint_states/position[0]``), and tables with
     ``header.stamp.secs``, ``header.stamp.nsecs``, ``name`` and lists in cells or numbered columns.
 
@@ -73,12 +69,13 @@ def read_log(
 
     Parameters
     ----------
-    path : str, Path or iterable of these
-        One file or several, each of which is a recording of its own: nothing is filtered over
-        where one ends.
+    path : str, Path, mapping of columns, or iterable of these
+        One file (or dictionary of arrays, or data frame) or several, each of which is a recording
+        of its own. ``.npz``, ``.parquet`` and ``.mat`` files are read as such, others as text. A
+        damaged MAT file may end the process, in SciPy's reader.
     torques_from : same as path, optional
-        Files that have the torques, one for each of ``path``. With times in both they are joined
-        by time (cubic splines between the rows), without by row.
+        Files of the torques, one for each of ``path``: joined by time (cubic splines between the
+        rows) where both have times, by row otherwise.
     positions, torques : column, name, pattern or sequence of columns, optional
         Of each joint.
     velocities, accelerations, position_references, velocity_references : same, or False, optional
@@ -86,53 +83,48 @@ def read_log(
     time : column, two columns (seconds, nanoseconds) or False, optional
         Default found by the usual names; False: none, rows are ``dt`` apart.
     dt : float, optional
-        Sampling period, s; needed without times. With times the log is interpolated to it, and it
-        may be at most 1.5 times the file's: nothing is left out without a filter.
+        Sampling period, s; needed without times. With times the log is interpolated to it; it may
+        be at most 1.5 times the file's, since decimation needs a filter.
     times : TimeUnit or {"s", "ms", "us", "ns"}, optional
-        Default what the header says, seconds if nothing.
+        Default the unit of the header, or seconds.
     angles : AngleUnit or {"rad", "deg"}
         Unit of positions and their derivatives.
     lengths : LengthUnit or {"m", "mm"}
-        Of prismatic joints, as the model has them; with gears or a transmission motors turn, and
-        the unit of all is ``angles``.
+        Unit of the model's prismatic joints; ``angles`` with gears or a transmission.
     signs : array_like, shape (n,), optional
-        1 or -1: joints that the controller counts the other way, positions and torques.
+        1 or -1, for positions and torques.
     gears : float or array_like, shape (n,), optional
-        The file has motor angles and motor torques: turns of the motor for one of the joint.
+        Turns of the motor for one of the joint, where the file has motor angles and torques.
     transmission : Transmission, optional
         The same with couplings, such as ``model.transmission``.
     drive_gains : float or array_like, shape (n,), optional
-        The torque columns are currents: N m of torque for one unit of the file (motor side where
-        there are gears). Needed for columns found as currents.
+        N m of torque for one unit of the torque columns (motor side where there are gears); needed
+        for columns found as currents.
     offsets : float or array_like, shape (n,), optional
         Added to positions, rad or m of the joints.
     joints : sequence of str, optional
         Names of the joints, in order; default the model's, or those of the file.
     model : RobotModel, optional
-        Says how many joints there are, their names and kinds.
+        Gives the number of joints, their names and kinds.
     largest_gap : float, optional
-        Periods; samples missing in shorter gaps are interpolated, longer ones split the log.
-        Default a tenth of the shortest period of the motion, that of the frequency below which
-        velocities have 99.9 % of their power.
+        In periods; samples missing in shorter gaps are interpolated, longer gaps split the log.
+        Default a tenth of the shortest period of the motion.
     largest_jitter : float
-        Periods; differences of stamps that are further off are an error.
-    format : LogFormat or str, optional
-        "csv", "npz", "parquet" or "mat"; default by the suffix.
+        In periods; differences of stamps that deviate more are an error.
     delimiter : str, optional
-        Of text files; default found.
+        Delimiter of text files; default detected.
 
     Returns
     -------
     Log
-        Joint side, rad or m, N m or N. `Log.refused` lists what was left out, `Log.notes` what was
-        found and done, `Log.sources` files and their SHA-256.
+        Joint side, rad or m, N m or N. `Log.refused` lists the rows left out, `Log.notes` the
+        columns found and the corrections, `Log.sources` the files and their SHA-256.
 
     Raises
     ------
     InvalidValueError, ShapeError
-        Columns that are missing or that several could be, cells that are no numbers (with line),
-        a time base that cannot be made regular, units that are not understood, arguments that
-        contradict each other.
+        Columns that are missing or ambiguous, cells that are not numbers (with line), a time base
+        that cannot be made regular, units that are not known, arguments that contradict each other.
     FileNotFoundError
         There is no such file; it is an InvalidValueError too.
     MissingExtraError
@@ -153,9 +145,9 @@ def read_log(
     """
     if model is not None:
         check_model(model)
-    kind = None if format is None else chosen(LogFormat, format, "format")
-    files = _files(path, "path")
-    others = (None,) * len(files) if torques_from is None else _files(torques_from, "torques_from")
+    files = _sources(path, "path")
+    others = (None,) * len(files)
+    others = others if torques_from is None else _sources(torques_from, "torques_from")
     if len(others) != len(files):
         raise InvalidValueError(
             f"torques_from: expected a file for each of the {len(files)} of path, got "
@@ -167,85 +159,93 @@ def read_log(
     length = as_file_unit(LengthUnit, lengths, "lengths")
     unit = None if times is None else as_file_unit(TimeUnit, times, "times")
     names = _names(joints, model)
-    given = (velocities, accelerations, position_references, velocity_references)
-    extras: Extras = dict(zip(EXTRA, given, strict=True))
+    choices = {
+        Quantity.POSITION: positions,
+        Quantity.TORQUE: torques,
+        Quantity.VELOCITY: velocities,
+        Quantity.ACCELERATION: accelerations,
+        Quantity.POSITION_REFERENCE: position_references,
+        Quantity.VELOCITY_REFERENCE: velocity_references,
+    }
+    request = Request(choices, names, time, unit, angle, drive_gains is not None)
     logs = []
-    for file, other in zip(files, others, strict=True):
-        table = open_log_table(file, kind, delimiter)
-        second = None if other is None else open_log_table(other, kind, delimiter)
-        raw = raw_samples(
-            table, second, positions, torques, extras, names, time, unit, angle,
-            drive_gains is not None,
-        )  # fmt: skip
-        n = raw.n
-        side = joint_side(
-            n, angles=angle, lengths=length, signs=signs, gears=gears, transmission=transmission,
-            drive_gains=drive_gains, offsets=offsets, model=model,
-        )  # fmt: skip
-        rows = regular_rows(raw.t, raw.values, file.name, dt, largest_gap, largest_jitter, n)
+    for each in zip(files, others, strict=True):
+        table = _table(each[0], delimiter)
+        second = None if each[1] is None else _table(each[1], delimiter)
+        raw = read_samples(table, second, request)
+        n = raw.blocks[Quantity.POSITION].shape[1]
+        of_q, of_tau, offset = joint_side(
+            n, angle, length, signs, gears, transmission, drive_gains, offsets, model
+        )
+        columns, name = np.concatenate(list(raw.blocks.values()), axis=1), table.path.name
+        rows = regular_rows(raw.t, columns, name, dt, largest_gap, largest_jitter, n)
         if raw.t is not None and not _SHORTEST <= rows.dt <= _LONGEST:
             raise InvalidValueError(
-                f"{file}: rows would be {rows.dt:.4g} s apart; say times='ms', 'us' or 'ns' if "
-                "the column of times is not in seconds."
+                f"{table.path}: rows would be {rows.dt:.4g} s apart; give times='ms', 'us' or 'ns' "
+                "if the column of times is not in seconds."
             )
-        blocks = {
-            quantity: rows.values[:, n * k : n * (k + 1)] for k, quantity in enumerate(raw.order)
-        }
-        more: dict[str, Any] = {}
-        for quantity, name in zip(EXTRA, ("v", "a", "q_ref", "v_ref"), strict=True):
-            if quantity in blocks:
-                place = side.q if quantity is Quantity.POSITION_REFERENCE else side.rate
-                more[name] = place(blocks[quantity])
-        sources = [LogSource(file.name, _sha256(file), len(rows.values))]
-        if other is not None:
-            sources.append(LogSource(other.name, _sha256(other), len(rows.values)))
+        arrays: dict[str, Any] = {}
+        blocks = np.split(rows.values, len(raw.blocks), axis=1)
+        with np.errstate(over="ignore", invalid="ignore"):  # Log raises for infinite numbers
+            for quantity, block in zip(raw.blocks, blocks, strict=True):
+                values = block @ (of_tau if quantity is Quantity.TORQUE else of_q)
+                moved = quantity in (Quantity.POSITION, Quantity.POSITION_REFERENCE)
+                arrays[quantity.field] = values + offset if moved else values
         notes = [*raw.notes, *rows.notes]
-        if model is not None and gears is None and transmission is None:
-            _say_transmission(model, notes)
-        logs.append(
-            Log(
-                rows.dt, side.q(blocks[Quantity.POSITION]), side.tau(blocks[Quantity.TORQUE]),
-                starts=rows.starts, names=names or raw.names, sources=sources,
-                refused=[*raw.refused, *rows.refused], notes=notes, **more,
+        coupled = model is not None and model.transmission and not model.transmission.is_mimicry
+        if model is not None and coupled and gears is None and transmission is None:
+            notes.append(
+                f"{model.name} has a transmission, but positions and torques were read as those of "
+                "the joints; give transmission=model.transmission if they are those of the motors."
             )
-        )  # fmt: skip
+        log = Log(
+            rows.dt,
+            **arrays,
+            starts=rows.starts,
+            names=raw.names,
+            sources=[_source(one, columns, len(rows.values)) for one in each if one is not None],
+            refused=rows.refused,
+            notes=notes,
+        )
+        logs.append(log)
     return logs[0] if len(logs) == 1 else join_logs(logs)
 
 
-def _files(path: Paths, what: str) -> tuple[Path, ...]:
-    files = (Path(path),) if isinstance(path, str | Path) else tuple(Path(each) for each in path)
-    if not files:
+def _sources(given: Any, what: str) -> tuple[Source, ...]:
+    one = isinstance(given, str | Path | Mapping) or hasattr(given, "columns")
+    sources: Any = [given] if one else given
+    if not (given_sources := tuple(sources)):
         raise InvalidValueError(f"{what}: expected a file or several, got none.")
-    for file in files:
-        if file.is_dir():
-            raise InvalidValueError(
-                f"{what}: {file} is a folder; give its files, such as sorted(Path(...).glob("
-                "'*.csv'))."
-            )
-    return files
+    return given_sources
+
+
+def _table(source: Source, delimiter: str | None) -> LogTable:
+    if not isinstance(source, str | Path):
+        return table_of(Path("arrays"), {str(name): source[name] for name in source})
+    path = Path(source)
+    if path.is_dir():
+        raise InvalidValueError(
+            f"path: {path} is a folder; give its files, such as sorted(Path(...).glob('*.csv'))."
+        )
+    return open_log_table(path, delimiter)
 
 
 def _names(joints: Sequence[str] | None, model: RobotModel | None) -> tuple[str, ...] | None:
-    own = None if model is None else model.table.joint_names
+    default = None if model is None else model.table.joint_names
     if joints is None:
-        return own
+        return default
     names = tuple(map(str, joints))
-    if own is not None and len(names) != len(own):
+    if default is not None and len(names) != len(default):
         raise ShapeError(
-            f"joints: {len(names)} names were given; the model has the {len(own)} joints "
-            f"{', '.join(own)}."
+            f"joints: {len(names)} names were given; the model has the {len(default)} joints "
+            f"{', '.join(default)}."
         )
     return names
 
 
-def _say_transmission(model: RobotModel, notes: list[str]) -> None:
-    if model.transmission is not None and not model.transmission.is_mimicry:
-        notes.append(
-            f"{model.name} has a transmission, but positions and torques were read as those of "
-            "the joints; say transmission=model.transmission if they are those of the motors."
-        )
-
-
-def _sha256(file: Path) -> str:
-    with file.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
+def _source(given: Source, values: np.ndarray, rows: int) -> LogSource:
+    """A source with the SHA-256 of its file, or of the samples that a mapping gave."""
+    if not isinstance(given, str | Path):
+        return LogSource("arrays", hashlib.sha256(values.tobytes()).hexdigest(), rows)
+    with Path(given).open("rb") as stream:
+        return LogSource(Path(given).name, hashlib.file_digest(stream, "sha256").hexdigest(), rows)

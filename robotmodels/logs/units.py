@@ -1,10 +1,9 @@
-"""From what a file has to SI on the joint side."""
+"""Units of headers, and the conversion of a file's columns to SI on the joint side."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,56 +14,22 @@ from ..errors import InvalidValueError, ShapeError
 from ..file_units import AngleUnit, LengthUnit
 from ..geometry import PRISMATIC
 from ..model import RobotModel
-from .finding_columns import unit_of
-from .table import LogTable
+from .columns import Quantity, split_unit
+from .tables import LogTable
 
-_ANGLES = ("rad", "deg", "°", "degree", "degrees", "m", "mm")
-_OTHER_ANGLES = (
-    "grad", "gon", "mrad", "urad", "turn", "turns", "rev", "revs", "rpm", "arcmin", "arcsec", "min",
-    "count", "counts", "inc", "incs", "tick", "ticks", "pulse", "pulses", "step", "steps", "cm",
-    "um", "in", "inch", "ft", "km",
-)  # fmt: skip
-_TORQUES = ("nm", "n", "n/m")
-_OTHER_TORQUES = (
-    "mnm", "cnm", "knm", "unm", "kn", "mn", "ncm", "nmm", "kgm", "kgfm", "kgcm", "kgfcm", "lbft",
-    "lbfft", "ftlb", "ftlbf", "lbin", "lbfin", "inlb", "inlbf", "ozin", "ozfin", "a", "ma", "arms",
-    "amp", "amps", "ampere", "v", "mv", "%", "percent", "permille", "permil", "count", "counts",
-)  # fmt: skip
+_ANGLES = {"rad": "rad", "deg": "deg", "°": "deg", "degree": "deg", "degrees": "deg"}
+_OTHER_POSITIONS = re.compile(
+    r"grad|gon|mrad|urad|(turn|rev|count|tick|pulse|step)s?|rpm|arcmin|arcsec|incs?|[cuk]m|in|ft"
+)
+_OTHER_TORQUES = re.compile(
+    r"[mcku]nm|[kmc]n|n[cm]m|kgf?c?m|lbf?(ft|in)|(ft|in)lbf?|ozf?in|m?a|arms|amps?|ampere|m?v|%|"
+    r"percent|counts?"
+)
 _JOINING = re.compile(r"[ .*·⋅_-]")
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class JointSide:
-    """Factors of positions and torques, from the file's columns to the joints.
-
-    Shapes: positions, torques (n, n); offset (n,).
-    """
-
-    positions: Array
-    torques: Array
-    offset: Array
-
-    def q(self, raw: Array) -> Array:
-        """Positions of the joints, shape (N, n)."""
-        return _times(raw, self.positions) + self.offset
-
-    def rate(self, raw: Array) -> Array:
-        """Their derivatives."""
-        return _times(raw, self.positions)
-
-    def tau(self, raw: Array) -> Array:
-        """Torques of the joints, shape (N, n)."""
-        return _times(raw, self.torques)
-
-
-def _times(raw: Array, matrix: Array) -> Array:
-    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused by the log
-        return raw @ matrix
 
 
 def joint_side(
     n: int,
-    *,
     angles: AngleUnit,
     lengths: LengthUnit,
     signs: ArrayLike | None,
@@ -73,20 +38,20 @@ def joint_side(
     drive_gains: ArrayLike | None,
     offsets: ArrayLike | None,
     model: RobotModel | None,
-) -> JointSide:
-    """Factors for what the arguments of `read_log` say."""
+) -> tuple[Array, Array, Array]:
+    """Matrices (n, n) from the columns of positions and torques to the joints, and an offset."""
     unit = np.full(n, angles.factor)
     if gears is not None and transmission is not None:
         raise InvalidValueError(
-            "gears, transmission: give one of them; a transmission has the gear ratios in it."
+            "gears, transmission: give one of them; a transmission includes the gear ratios."
         )
     if gears is None and transmission is None and model is not None:
         prismatic = model.table.sigma[model.table.joint_rows] == PRISMATIC
         unit[prismatic] = lengths.factor
-    turn = _each(signs, n, "signs", 1.0)
-    if (np.abs(turn) != 1.0).any():
+    sign = _each(signs, n, "signs", 1.0)
+    if (np.abs(sign) != 1.0).any():
         raise InvalidValueError(f"signs: expected 1 or -1 for each of the {n} joints, got {signs}.")
-    gain = turn * _each(drive_gains, n, "drive_gains", 1.0)
+    gain = sign * _each(drive_gains, n, "drive_gains", 1.0)
     ratio = _each(gears, n, "gears", 1.0)
     for name, value in (("drive_gains", gain), ("gears", ratio)):
         if not value.all():
@@ -100,15 +65,12 @@ def joint_side(
             )
         if not transmission.is_invertible:
             raise InvalidValueError(
-                "transmission: joints mimic others, so that torques of motors do not tell those "
-                "of the joints; take the model of the free joints."
+                "transmission: joints mimic others, so that motor torques do not determine those "
+                "of the joints; give the model of the independent joints."
             )
         K, zero = transmission.matrix, transmission.offset
-    return JointSide(
-        (turn * unit)[:, None] * K.T,
-        gain[:, None] * np.linalg.inv(K),
-        zero + _each(offsets, n, "offsets", 0.0),
-    )
+    offset = zero + _each(offsets, n, "offsets", 0.0)
+    return (sign * unit)[:, None] * K.T, gain[:, None] * np.linalg.inv(K), offset
 
 
 def _each(value: ArrayLike | None, n: int, name: str, default: float) -> Array:
@@ -118,55 +80,28 @@ def _each(value: ArrayLike | None, n: int, name: str, default: float) -> Array:
     return np.full(n, float(array)) if array.ndim == 0 else as_exact(array, (n,), name)
 
 
-def check_headers(said: Sequence[AngleUnit | None], given: AngleUnit, source: str) -> None:
-    """Refuse an argument that contradicts the header."""
-    for unit in said:
-        if unit is not None and unit is not given:
+def check_units(
+    table: LogTable, columns: Sequence[int], kind: Quantity, angle: AngleUnit, gains: bool
+) -> None:
+    """Raise for units of headers that contradict the arguments or are not supported."""
+    torques = kind in (Quantity.TORQUE, Quantity.CURRENT)
+    for name in [table.names[i] for i in columns if table.names]:
+        unit = split_unit(name)[1]
+        where = f"{table.path}: the column {name!r} is in {unit!r}"
+        if torques and not gains and _OTHER_TORQUES.fullmatch(_JOINING.sub("", unit)):
             raise InvalidValueError(
-                f"{source}: the header says {unit.value!r}, the argument angles={given.value!r}; "
-                f"say angles={unit.value!r}, or name the right columns."
+                f"{where}, not in N m; give drive_gains=, the N m (N for prismatic joints) for one "
+                "unit of it."
             )
-
-
-def check_position_units(table: LogTable, columns: Sequence[int]) -> list[str]:
-    """Refuse positions and their derivatives in units that are not understood."""
-    odd: dict[str, str] = {}
-    for name in _names(table, columns):
-        unit = unit_of(name).split("/")[0].strip()
-        if unit in _OTHER_ANGLES:
+        plain = unit.split("/")[0].strip()
+        if not torques and _OTHER_POSITIONS.fullmatch(plain):
             raise InvalidValueError(
-                f"{table.path}: the column {name!r} is in {unit!r}, which is not read; write it in "
-                "rad or deg (m or mm for prismatic joints), or give gears= where it is a constant "
-                "factor and the brackets are taken out of the header."
+                f"{where}, which is not read; write it in rad or deg (m or mm for prismatic "
+                "joints), or remove the unit from the header and give its factor by gears=."
             )
-        if unit and unit not in _ANGLES:
-            odd.setdefault(unit, name)
-    return [_odd(table, unit, name, "angles=") for unit, name in odd.items()]
-
-
-def check_torque_units(table: LogTable, columns: Sequence[int], gains: bool) -> list[str]:
-    """Refuse torques in units other than N m and N, but where drive gains convert them."""
-    if gains:
-        return []
-    odd: dict[str, str] = {}
-    for name in _names(table, columns):
-        unit = _JOINING.sub("", unit_of(name))
-        if unit in _OTHER_TORQUES:
+        header = _ANGLES.get(plain, angle.value)
+        if not torques and header != angle.value:
             raise InvalidValueError(
-                f"{table.path}: the column {name!r} is in {unit_of(name)!r}, not in N m; say "
-                "drive_gains=, the N m (N for prismatic joints) for one unit of it."
+                f"{where}, the argument is angles={angle.value!r}; give angles={header!r}, or the "
+                "right columns."
             )
-        if unit and unit not in _TORQUES:
-            odd.setdefault(unit_of(name), name)
-    return [_odd(table, unit, name, "drive_gains=") for unit, name in odd.items()]
-
-
-def _names(table: LogTable, columns: Sequence[int]) -> list[str]:
-    return [table.names[i] for i in columns if table.names]
-
-
-def _odd(table: LogTable, unit: str, name: str, option: str) -> str:
-    return (
-        f"{table.path.name}: {unit!r} in the header {name!r} is no unit that is known and was left "
-        f"aside; see {option} if it is one."
-    )
