@@ -1,18 +1,12 @@
 """Drive chains: rotor inertia, friction and offset of the joints, and the transmission."""
 
-from .kinds import DriveKind, Drives, DriveWord, check_all_or_none, drive_kinds
-from .matrices import DriveMatrices, drive_matrices
-from .parameters import DriveParameters
+from .matrices import DriveMatrices as DriveMatrices
+from .matrices import drive_matrices as drive_matrices
+from .parameters import DriveKind, DriveParameters
+from .parameters import Drives as Drives
+from .parameters import DriveWord as DriveWord
+from .parameters import check_all_or_none as check_all_or_none
+from .parameters import drive_kinds as drive_kinds
 from .transmission import Transmission
 
-__all__ = [
-    "DriveKind",
-    "DriveMatrices",
-    "DriveParameters",
-    "DriveWord",
-    "Drives",
-    "Transmission",
-    "check_all_or_none",
-    "drive_kinds",
-    "drive_matrices",
-]
+__all__ = ["DriveKind", "DriveParameters", "Transmission"]

@@ -1,4 +1,4 @@
-"""The drive terms of all joints together, coupled motors included, ready for many samples."""
+"""Drive terms of all joints as matrices, coupled motors included."""
 
 from __future__ import annotations
 
@@ -13,60 +13,23 @@ from .transmission import Transmission
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DriveMatrices:
-    """Drive terms of all joints together, coupled motors included.
+    """Drive terms of n joints and k coupled motors, see `Transmission` for the formula.
 
-    ``tau_drive = rotor a + viscous v + Fc sign(v) + W^T (Fcm sign(W v)) + offset``
-
-    Parameters
-    ----------
-    rotor, viscous : ndarray, shape (n, n)
-        Symmetric; diagonal unless motors are coupled.
-    coulomb, offset : ndarray, shape (n,)
-        Of the joints.
-    coupling : ndarray, shape (k, n)
-        ``W``, a row for each coupled motor.
-    coupled_coulomb : ndarray, shape (k,)
-        ``Fcm`` of the coupled motors.
-    rows : tuple of (Ia, Fv, Fc, offset)
-        The same numbers joint by joint; empty if motors are coupled.
-
-    Examples
-    --------
-    >>> drive_matrices(DriveParameters(Ia=[1.0, 2.0]), None).rotor
-    array([[1., 0.],
-           [0., 2.]])
+    ``rotor a + viscous v + Fc sign(v) + W^T (Fcm sign(W v)) + offset``
     """
 
-    rotor: Array
+    rotor: Array  # (n, n), symmetric; diagonal unless motors are coupled
     viscous: Array
-    coulomb: Array
+    coulomb: Array  # (n,)
     offset: Array
-    coupling: Array
-    coupled_coulomb: Array
-    rows: tuple[tuple[float, float, float, float], ...]
+    coupling: Array  # W (k, n), a row for each coupled motor
+    coupled_coulomb: Array  # (k,)
+    rows: tuple[tuple[float, float, float, float], ...]  # Ia, Fv, Fc, offset if none is coupled
 
     def torque(self, v: Array, a: Array | None) -> Array:
-        """Torque the drives take up.
-
-        Parameters
-        ----------
-        v : ndarray, shape (..., n)
-            Joint velocities.
-        a : ndarray, shape (..., n), or None
-            Joint accelerations; None leaves the rotor term out.
-
-        Returns
-        -------
-        ndarray, shape (..., n)
-            N m or N.
-
-        Examples
-        --------
-        >>> drive_matrices(DriveParameters(Fc=[2.0]), None).torque(np.array([-1.0]), None)
-        array([-2.])
-        """
+        """Torque of the drives at v, a (..., n); None for a leaves the rotor term out."""
         if self.rows and a is not None and v.ndim == a.ndim == 1:
-            # one sample of uncoupled drives: plain floats take a third of small arrays' time
+            # one sample of uncoupled drives: floats are three times faster than small arrays
             return np.array([
                 Ia * acc + Fv * vel + offset + (Fc if vel > 0.0 else -Fc if vel < 0.0 else 0.0)
                 for (Ia, Fv, Fc, offset), vel, acc in zip(
@@ -95,27 +58,7 @@ class DriveMatrices:
 
 
 def drive_matrices(drive: DriveParameters, transmission: Transmission | None) -> DriveMatrices:
-    """Gather drive and coupling terms, see `Transmission` for the formula.
-
-    Parameters
-    ----------
-    drive : DriveParameters
-        Of the n joints.
-    transmission : Transmission or None
-        With the terms of coupled motors.
-
-    Returns
-    -------
-    DriveMatrices
-        Ready to be applied to many samples.
-
-    Examples
-    --------
-    >>> wrist = Transmission([[1, 0], [-1, 1]], Iam=[0, 0.1])
-    >>> drive_matrices(DriveParameters.zeros(2), wrist).rotor
-    array([[0. , 0.1],
-           [0.1, 0. ]])
-    """
+    """Gather the drive terms of n joints with those of coupled motors."""
     rotor, viscous = np.diag(drive.Ia), np.diag(drive.Fv)
     coupling, coulomb = np.zeros((0, drive.n)), np.zeros(0)
     if transmission is not None and transmission.coupled_motors:

@@ -1,25 +1,78 @@
-"""Drive parameters of the joints: rotor inertia, friction and offset.
+"""Drive parameters of the joints and their kinds: rotor inertia, friction and offset.
 
 Seed book sections 1.5.1.4 (friction) and 1.5.1.5 (rotor inertia).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import Any, Self
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import Enum
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import LARGEST, Array, as_bounded, read_only, same_value, value_hash
-from ..errors import InertiaError, ShapeError
+from .._arrays import LARGEST, Array, Value, as_bounded, read_only
+from .._choices import chosen
+from ..errors import InertiaError, InvalidValueError, ShapeError
+
+
+class DriveKind(Enum):
+    """One kind of drive parameters; those of coupled motors belong to the kind that they couple.
+
+    Examples
+    --------
+    >>> DriveKind.IA.value, DriveKind.IA.coupling
+    ('Ia', 'Iam')
+    """
+
+    IA = "Ia"
+    FV = "Fv"
+    FC = "Fc"
+    OFFSET = "offset"
+
+    @property
+    def coupling(self) -> str | None:
+        """Name of the coupling term of this kind; offsets have none."""
+        return None if self is DriveKind.OFFSET else f"{self.value}m"
+
+
+DriveWord = Literal["Ia", "Fv", "Fc", "offset"]
+Drives = bool | DriveKind | DriveWord | Iterable[DriveKind | DriveWord]
+"""All drive parameters, none, or those of some kinds."""
+
+
+def drive_kinds(drive: Drives) -> tuple[DriveKind, ...]:
+    """The requested kinds of drive parameters, in the order of the columns."""
+    if isinstance(drive, (bool, np.bool_)):
+        return tuple(DriveKind) if drive else ()
+    if isinstance(drive, (DriveKind, str)):
+        drive = (drive,)
+    if not isinstance(drive, Iterable):
+        raise InvalidValueError(
+            "drive: expected True, False, or kinds of drive parameters such as ('Ia', 'Fv'), got "
+            f"{drive!r:.60}."
+        )
+    requested = {chosen(DriveKind, kind, "drive") for kind in drive}
+    return tuple(kind for kind in DriveKind if kind in requested)
+
+
+def check_all_or_none(drive: object) -> bool:
+    """Raise for kinds of drives where only True or False is supported."""
+    if isinstance(drive, (bool, np.bool_)):
+        return bool(drive)
+    raise InvalidValueError(
+        f"drive: expected True or False here, got {drive!r:.60}; kinds of drive parameters are for "
+        "regressors and base parameters, and model.with_drive(...) removes single terms."
+    )
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)
-class DriveParameters:
-    """Drive terms of each joint, seen from the joint side.
+class DriveParameters(Value):
+    """Drive parameters of each joint, on the joint side.
 
-    ``tau_drive = Ia * a + Fv * v + Fc * sign(v) + offset``. Any real values are legal.
+    ``tau_drive = Ia * a + Fv * v + Fc * sign(v) + offset``. Any real values are allowed.
 
     Parameters
     ----------
@@ -31,7 +84,7 @@ class DriveParameters:
     Fc : array_like, shape (n,), optional
         Coulomb friction, N m or N.
     offset : array_like, shape (n,), optional
-        Constant torque or force, N m or N. What is left out is zero; give at least one.
+        Constant torque or force, N m or N. Those left out are zero; give at least one.
 
     Raises
     ------
@@ -73,23 +126,7 @@ class DriveParameters:
 
     @classmethod
     def zeros(cls, n: int) -> Self:
-        """Drives without inertia, friction or offset.
-
-        Parameters
-        ----------
-        n : int
-            Number of joints.
-
-        Returns
-        -------
-        DriveParameters
-            All zero.
-
-        Examples
-        --------
-        >>> DriveParameters.zeros(2).n
-        2
-        """
+        """Drives of n joints without inertia, friction or offset."""
         return cls(Ia=np.zeros(n))
 
     @property
@@ -101,14 +138,3 @@ class DriveParameters:
     def is_zero(self) -> bool:
         """Whether every parameter is zero."""
         return not (self.Ia.any() or self.Fv.any() or self.Fc.any() or self.offset.any())
-
-    def __reduce__(self) -> tuple[Any, ...]:  # rebuilt, so that a copy is read-only as well
-        return type(self), tuple(getattr(self, f.name) for f in fields(self))
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, DriveParameters):
-            return NotImplemented
-        return all(same_value(getattr(self, f.name), getattr(other, f.name)) for f in fields(self))
-
-    def __hash__(self) -> int:
-        return value_hash(self.Ia, self.Fv, self.Fc, self.offset)

@@ -1,17 +1,21 @@
 """Inverse and direct dynamic models and their parts.
 
 Seed book section 1.5. One sample goes through Pinocchio, a batch through the compiled recursions
-in table order; so does every model that Pinocchio cannot hold (first moments without mass,
+in table order; so does every model that Pinocchio does not support (first moments without mass,
 negative mass, as in sets of base parameters).
 """
 
-from .coriolis import christoffel_blocks, coriolis_matrix
 from .direct import ddm
-from .energies import kinetic_energy, potential_energy
 from .from_base import base_model, idm_from_base
-from .gravity import gravity_torque
 from .inverse import idm
-from .mass import mass_matrix
+from .parts import (
+    christoffel_blocks,
+    coriolis_matrix,
+    gravity_torque,
+    kinetic_energy,
+    mass_matrix,
+    potential_energy,
+)
 from .payload import with_payload, without_payload
 
 __all__ = [

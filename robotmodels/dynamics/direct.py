@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_vector, batch_rows, batch_shape
@@ -11,16 +10,10 @@ from ..drive import check_all_or_none
 from ..friction import Friction, check_friction
 from ..friction.protocols import torque_at
 from ..model import RobotModel, check_model
-from .definite import (
-    is_definite,
-    no_answer,
-    sample_error,
-    unit_diagonal,
-    warn_of_negative_mass,
-)
-from .mass import mass_matrix
+from .inverse import wrench_torque
+from .mass_errors import mass_matrix_error, warn_of_negative_mass
 from .mimicry import check_follows, following_accelerations, free_motion
-from .wrench import wrench_torque
+from .parts import mass_matrix
 
 
 def ddm(
@@ -35,9 +28,8 @@ def ddm(
     """Direct dynamic model: joint accelerations under given torques, the inverse of `idm`.
 
     Also called forward dynamics. Where joints mimic others (a transmission ``q = K q_c + q_0``
-    with a singular K), the joints follow: with G the columns of K that are not zero, ``a = G a_c``
-    and ``G^T M G a_c = G^T (tau - C v - g - ...)``. What counts of the torques is then ``K^T tau``
-    (`Transmission.to_motor_torque`), which is that of ``idm(model, q, v, a)``.
+    with a singular K), they follow: with G the columns of K that are not zero, ``a = G a_c``,
+    ``G^T M G a_c = G^T (tau - C v - g - ...)``, and ``K^T tau`` is that of ``idm(model, q, v, a)``.
 
     Parameters
     ----------
@@ -45,13 +37,8 @@ def ddm(
         The robot, n joints.
     q, v, tau : array_like, shape (..., n)
         Joint variables (rad or m), velocities and torques; the leading axes broadcast.
-    wrench : array_like, shape (..., 6), optional
-        What the tool exerts on the environment, see `idm`.
-    drive : bool
-        Whether rotor inertia, friction and offsets of the model's drives are included.
-    friction : Friction, optional
-        A friction model that acts besides the Fv, Fc and offset of the drives, see
-        `robotmodels.friction`; ``model.with_drive(...)`` takes those away.
+    wrench, drive, friction
+        As for `idm`.
 
     Returns
     -------
@@ -61,9 +48,9 @@ def ddm(
     Raises
     ------
     SingularMassMatrixError
-        The mass matrix cannot be inverted: joints that move no inertia, which are named.
+        The mass matrix cannot be inverted; the joints that move no inertia are named.
     InertiaError
-        The mass matrix is not positive definite; the links that no body is are named.
+        The mass matrix is not positive definite; the links that are not physical are named.
     ShapeError, InvalidValueError
         Arguments of the wrong length, or with NaN or infinity; a singular transmission that is
         not one of mimic joints; mimic joints that do not follow in ``q`` or ``v``.
@@ -107,23 +94,18 @@ def ddm(
         out = following_accelerations(model, free, q, v, tau, drive)
         warn_of_negative_mass(model)
         return out
-    twin = model.twin
-    if n and q.ndim == v.ndim == tau.ndim == 1 and twin.serves_dynamics:
-        to_pin = twin.to_pin
-        h = twin.from_pin(pin.nonLinearEffects(twin.model, twin.data(), to_pin(q), to_pin(v)))
-        M = mass_matrix(model, q, drive)
-        scaled, size = unit_diagonal(M)  # as the kernel does
-        if not is_definite(scaled):
-            raise no_answer(model, M, drive)
-        return np.asarray(np.linalg.solve(scaled, (tau - h) / size) / size, np.float64)
     from ..kernels.direct_dynamics import joint_accelerations
 
     batch, rows = batch_rows((q, v, tau), ("q", "v", "tau"))
     out = np.empty(rows[0].shape)
     rotor = np.zeros((n, n)) if drives is None else np.ascontiguousarray(drives.rotor)
     pi, gravity = model.inertia.values, model.gravity
-    found = joint_accelerations(*rows, *model.chain, pi, gravity, rotor, out)
-    if found != -1:
-        raise sample_error(model, rows[0], drive, found if found >= 0 else -2 - found, bool(batch))
+    failed = joint_accelerations(*rows, *model.chain, pi, gravity, rotor, out)
+    if failed != -1:  # the number of a sample, or its -2 - number if the matrix is indefinite
+        sample = failed if failed >= 0 else -2 - failed
+        with np.errstate(over="ignore", invalid="ignore"):
+            M = mass_matrix(model, rows[0][sample], drive)
+        where = f" (first in sample {sample} of {len(out)})" if batch else ""
+        raise mass_matrix_error(model, M, drive, where)
     warn_of_negative_mass(model)
     return out.reshape(*batch, n)

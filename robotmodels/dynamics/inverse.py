@@ -1,17 +1,19 @@
-"""Inverse dynamic model, with everything that loads the joints."""
+"""Inverse dynamic model, and its parts by gravity and by a wrench of the tool."""
 
 from __future__ import annotations
 
+import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_vector, batch_shape
+from .._arrays import Array, as_vector, batch_rows, batch_shape
 from ..drive import check_all_or_none
 from ..friction import Friction, check_friction
 from ..friction.protocols import torque_at
 from ..model import RobotModel, check_model
-from .rigid import rigid_torques
-from .wrench import wrench_torque
+
+_CHUNK = 1024  # Jacobians per piece, for the processor's cache
+_WORLD_ALIGNED = 0  # frame code of the kernels
 
 
 def idm(
@@ -29,9 +31,8 @@ def idm(
 
     ``tau = M(q) a + C(q, v) v + g(q) + J^T wrench + Ia a + Fv v + Fc sign(v) + offset + friction``
 
-    It is linear in the inertial parameters and takes any of them, base parameters as well as a mass
-    that came out negative; whether links are real bodies, `InertialParameters.is_physical` tells,
-    and `ddm` and `simulate` name those that are not. An empty batch gives an empty result.
+    It is linear in the inertial parameters; base parameters and negative masses are allowed, too.
+    An empty batch gives an empty result.
 
     Parameters
     ----------
@@ -46,7 +47,7 @@ def idm(
         Whether rotor inertia, friction and offsets of the model's drives are included.
     friction : Friction, optional
         A friction model that acts besides the Fv, Fc and offset of the drives, see
-        `robotmodels.friction`; ``model.with_drive(...)`` takes those away.
+        `robotmodels.friction`; ``model.with_drive(...)`` removes those.
 
     Returns
     -------
@@ -64,7 +65,6 @@ def idm(
 
     Examples
     --------
-    >>> import numpy as np
     >>> from robotmodels.geometry import DHTable
     >>> from robotmodels.inertia import InertialParameters
     >>> link = InertialParameters.from_com([2.0], [[0.1, 0, 0]], [np.zeros((3, 3))])
@@ -96,3 +96,36 @@ def idm(
     if friction is not None:
         tau = tau + torque_at(friction, v, q)
     return tau
+
+
+def rigid_torques(model: RobotModel, q: Array, v: Array, a: Array) -> Array:
+    """Torques of the rigid bodies under gravity, by the compiled recursion."""
+    from ..kernels.newton_euler import joint_torques
+
+    batch, rows = batch_rows((q, v, a), ("q", "v", "a"))
+    out = np.empty(rows[0].shape)
+    joint_torques(*rows, *model.chain, model.inertia.values, model.gravity, out)
+    return out.reshape(*batch, model.n)
+
+
+def wrench_torque(model: RobotModel, q: Array, w: Array) -> Array:
+    """``J^T w``: joint torques (..., n) of a wrench (..., 6) that the tool exerts."""
+    twin = model.twin
+    tool = twin.frame(None)
+    if q.ndim == w.ndim == 1 and twin.serves_poses:
+        J = pin.computeFrameJacobian(
+            twin.model, twin.data(), twin.to_pin(q), tool.pin_id, pin.LOCAL_WORLD_ALIGNED
+        )
+        return twin.from_pin(w @ J.reshape(6, model.n))
+    from ..kernels.jacobians import jacobians
+
+    batch, rows = batch_rows((q, w), ("q", "wrench"))
+    tau = np.empty(rows[0].shape)
+    J = np.empty((min(_CHUNK, rows[0].shape[0]), 6, model.n))
+    for start in range(0, rows[0].shape[0], _CHUNK):
+        piece = slice(start, start + _CHUNK)
+        configurations = rows[0][piece]
+        k = configurations.shape[0]
+        jacobians(configurations, *model.chain, *tool.kernel_arguments, _WORLD_ALIGNED, J[:k])
+        np.einsum("ki,kij->kj", rows[1][piece], J[:k], out=tau[piece])
+    return tau.reshape(*batch, model.n)

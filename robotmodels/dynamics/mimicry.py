@@ -1,7 +1,7 @@
 """Direct dynamics of robots whose joints mimic others: ``q = K q_c + q_0`` with a singular K.
 
-With G the columns of K that are not zero, ``v = G v_c``, and what holds the joints together does
-no work: ``G^T (M G a_c + h - tau) = 0`` (seed book section 1.2.1, last note, and 1.5.1).
+With G the columns of K that are not zero, ``v = G v_c``, and the forces of the constraint do no
+work: ``G^T (M G a_c + h - tau) = 0`` (seed book section 1.2.1, last note, and 1.5.1).
 """
 
 from __future__ import annotations
@@ -14,11 +14,10 @@ from .._arrays import Array, batch_rows
 from ..drive import Transmission
 from ..errors import InvalidValueError
 from ..model import RobotModel
-from .definite import is_definite, no_answer, unit_diagonal
-from .mass import mass_matrix
-from .rigid import rigid_torques
+from .inverse import rigid_torques
+from .mass_errors import mass_matrix_error, rounding, unit_sizes
+from .parts import mass_matrix
 
-_CHUNK = 1024  # mass matrices held at a time
 _ROUNDING = 1e-9
 
 
@@ -31,16 +30,16 @@ def free_motion(transmission: Transmission) -> Array | None:
         n, rank = transmission.n, transmission.rank
         raise InvalidValueError(
             f"transmission: the coupling matrix K is singular, it has rank {rank} of {n}, so that "
-            "motor torques do not determine how the joints move. Correct it, or take it away: "
-            "model.with_transmission(None). Joints that mimic others are rows of a matrix whose "
-            "columns of their own motors are zero, as RobotModel.from_urdf(..., mimic=True) makes."
+            "motor torques do not determine the motion. Correct it, or remove it with "
+            "model.with_transmission(None). For mimic joints, the columns of their motors are "
+            "zero, as RobotModel.from_urdf(..., mimic=True) makes them."
         )
     G = transmission.free
     return G / np.linalg.norm(G, axis=0)
 
 
 def check_follows(model: RobotModel, free: Array, q: Array, v: Array) -> None:
-    """Refuse positions and velocities in which mimic joints do not follow their masters.
+    """Raise for positions and velocities in which mimic joints do not follow their masters.
 
     Shapes: free (n, m); q, v (..., n).
     """
@@ -67,18 +66,14 @@ def following_accelerations(
 
     Shapes: free (n, m); q, v, tau (..., n) -> (..., n).
     """
-    batch, rows = batch_rows((q, v, tau), ("q", "v", "tau"))
-    N = rows[0].shape[0]
-    out = np.empty((N, model.n))
-    for start in range(0, N, _CHUNK):
-        piece = slice(start, start + _CHUNK)
-        x, dx, load = (array[piece] for array in rows)
-        rest = (load - rigid_torques(model, x, dx, np.zeros_like(x))) @ free
-        A = free.T @ mass_matrix(model, x, drive) @ free
-        for i, matrix in enumerate(A):
-            scaled, size = unit_diagonal(matrix)
-            if not is_definite(scaled):
-                where = f" (first in sample {start + i} of {N})" if batch else ""
-                raise no_answer(model, matrix, drive, where, free)
-            out[start + i] = free @ (np.linalg.solve(scaled, rest[i] / size) / size)
-    return out.reshape(*batch, model.n)
+    batch, (q, v, tau) = batch_rows((q, v, tau), ("q", "v", "tau"))
+    rest = (tau - rigid_torques(model, q, v, np.zeros_like(q))) @ free
+    M = free.T @ mass_matrix(model, q, drive) @ free
+    size = unit_sizes(M)
+    scaled = M / (size[:, :, None] * size[:, None, :])
+    definite = np.linalg.eigvalsh(scaled)[:, 0] > rounding(free.shape[1])
+    for i in np.flatnonzero(~definite)[:1]:
+        where = f" (first in sample {i} of {len(q)})" if batch else ""
+        raise mass_matrix_error(model, M[i], drive, where, free)
+    a_c = np.linalg.solve(scaled, (rest / size)[..., None])[..., 0] / size
+    return (a_c @ free.T).reshape(*batch, model.n)

@@ -1,4 +1,4 @@
-"""A payload on a robot: one more body on the link that carries it."""
+"""Payload of a robot: an additional body on a link."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_exact, as_floats
 from ..errors import InertiaError, InvalidValueError, ShapeError
 from ..inertia import InertialParameters, InertiaWarning
+from ..inertia.consistency import pseudo_inertia
 from ..model import RobotModel, check_model
 
 
@@ -20,10 +21,9 @@ def with_payload(
     inertia: ArrayLike | None = None,
     frame: str | int | None = None,
 ) -> RobotModel:
-    """The robot with a body more, rigidly fixed to one of its frames.
+    """Robot with an additional body rigidly fixed to one of its frames.
 
-    Models are values: the robot without payload stays as it is, so that a payload elsewhere is
-    another call with it. From a robot with payload, `without_payload` takes it off again.
+    Models are values: the given robot is not changed. `without_payload` removes it again.
 
     Parameters
     ----------
@@ -47,12 +47,9 @@ def with_payload(
 
     Raises
     ------
-    InertiaError
-        No body has this mass and inertia.
-    InvalidValueError
-        The frame is the base's, whose bodies load no joint; NaN or infinity.
-    FrameNotFoundError, ShapeError
-        No such frame; arguments of the wrong shape.
+    InertiaError, InvalidValueError, FrameNotFoundError, ShapeError
+        The payload is not physical; the frame is the base's, whose bodies load no joint, or there
+        is no such frame; NaN or infinity; arguments of the wrong shape.
 
     References
     ----------
@@ -78,10 +75,10 @@ def without_payload(
     inertia: ArrayLike | None = None,
     frame: str | int | None = None,
 ) -> RobotModel:
-    """The robot with a body less: undoes `with_payload` with the same arguments.
+    """The robot without a body: undoes `with_payload` with the same arguments.
 
-    The body is subtracted from the link that carries it; what remains of a parameter below the
-    rounding of the subtraction becomes zero.
+    The body is subtracted from the link that carries it; parameters below the rounding of
+    the subtraction become zero.
 
     Parameters
     ----------
@@ -95,19 +92,10 @@ def without_payload(
     RobotModel
         A new model.
 
-    Raises
-    ------
-    InertiaError, InvalidValueError, FrameNotFoundError, ShapeError
-        As `with_payload`.
-
     Warns
     -----
     InertiaWarning
-        What remains is no body, though the link was one: the payload was not part of it.
-
-    References
-    ----------
-    Seed book section 1.5.1.
+        The remaining link is not physical though the link was: the payload was not part of it.
 
     Examples
     --------
@@ -136,48 +124,27 @@ def _with_body(
             f"frame: {frame!r} is fixed to the base, where a body loads no joint; give a frame of "
             "a link."
         )
-    body = _body(mass, com, inertia)
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = place.rotation, place.position
-    row = InertialParameters(body[None]).moved(pose[None]).values[0]
+    row = InertialParameters(_body(mass, com, inertia)[None]).moved(pose[None]).values[0]
     values = model.inertia.values.copy()
     old = values[place.parent - 1]
     new = old + sign * row
     if sign < 0.0:
         rounding = 4.0 * np.finfo(np.float64).eps * (np.abs(old) + np.abs(row))
         new[np.abs(new) <= rounding] = 0.0
-        _report_what_remains(model, place.parent, old, new, float(rounding.max()))
+        before, after = (np.linalg.eigvalsh(pseudo_inertia(link))[0] for link in (old, new))
+        if after < -16.0 * rounding.max() <= before:
+            problems = InertialParameters(new[None]).consistency().links[0].problems
+            warnings.warn(
+                f"link {place.parent} ({model.table.names[place.parent - 1]}) of {model.name!r} is "
+                f"not physical without this payload: {'; '.join(problems)}. Was the payload part "
+                "of the link, with this mass, centre of mass and frame?",
+                InertiaWarning,
+                stacklevel=3,
+            )
     values[place.parent - 1] = new
     return model.with_inertia(InertialParameters(values))
-
-
-def _report_what_remains(
-    model: RobotModel, link: int, old: Array, new: Array, rounding: float
-) -> None:
-    """Warn the caller of `without_payload` if a body less leaves no body."""
-    least = -16.0 * rounding
-    if _least_density(new) >= least or _least_density(old) < least:
-        return
-    found = InertialParameters(new[None]).consistency().links[0]
-    why = "; ".join(found.problems) or "the pseudo-inertia has a negative eigenvalue"
-    warnings.warn(
-        f"link {link} ({model.table.names[link - 1]}) of {model.name!r} is not physical without "
-        f"this payload: {why}. Was the payload part of the link, with this mass, centre of mass "
-        "and frame?",
-        InertiaWarning,
-        stacklevel=4,
-    )
-
-
-def _least_density(row: Array) -> float:
-    """Smallest eigenvalue of the pseudo-inertia of ten parameters; not negative for a body."""
-    XX, XY, XZ, YY, YZ, ZZ = row[:6]
-    tensor = np.array([[XX, XY, XZ], [XY, YY, YZ], [XZ, YZ, ZZ]])
-    pseudo = np.empty((4, 4))
-    pseudo[:3, :3] = 0.5 * np.trace(tensor) * np.eye(3) - tensor
-    pseudo[:3, 3] = pseudo[3, :3] = row[6:9]
-    pseudo[3, 3] = row[9]
-    return float(np.linalg.eigvalsh(pseudo)[0])
 
 
 def _body(mass: float, com: ArrayLike, inertia: ArrayLike | None) -> Array:
@@ -189,14 +156,14 @@ def _body(mass: float, com: ArrayLike, inertia: ArrayLike | None) -> Array:
     if m < 0.0:
         raise InertiaError(
             f"mass: a payload's mass cannot be negative, got {float(m)} kg; without_payload(...) "
-            "takes a body off."
+            "removes a body."
         )
     if m == 0.0 and not tensor.any():
         return np.zeros(10)
     body = InertialParameters.from_com(m[None], point[None], tensor[None])
-    # about the centre of mass, where what is wrong with it is not hidden by the mass far away
+    # about the centre of mass, where a distant mass does not hide errors of the tensor
     central = InertialParameters.from_com(m[None], np.zeros((1, 3)), tensor[None])
     report = central.consistency()
     if not report.is_physical:
-        raise InertiaError(f"No body is this payload: {'; '.join(report.links[0].problems)}.")
+        raise InertiaError(f"This payload is not physical: {'; '.join(report.links[0].problems)}.")
     return body.values[0]

@@ -1,17 +1,22 @@
-"""Friction models of the joints, beside the viscous and Coulomb terms of `DriveParameters`.
+"""Friction models of the joints, in addition to the viscous and Coulomb terms of `DriveParameters`.
 
 Seed book section 1.5.1.4. A model is a value with ``.torque(v)``; where the torque is linear in
 the parameters, ``.basis(v)`` gives the columns that multiply them, for identification. Gravity
-compensators join them: their torque depends on positions, ``.torque(v, q)``.
+compensators have the same interface; their torque depends on positions, ``.torque(v, q)``.
 """
 
-from .asymmetric import AsymmetricFriction
-from .combined import FrictionSum
 from .compensator import GravityCompensator
-from .load import LoadFriction
-from .plain import CoulombFriction, TorqueOffset, ViscousFriction
-from .protocols import Friction, LinearFriction, check_friction, check_linear
-from .stribeck import StribeckFriction
+from .models import (
+    AsymmetricFriction,
+    CoulombFriction,
+    LoadFriction,
+    StribeckFriction,
+    TorqueOffset,
+    ViscousFriction,
+)
+from .protocols import Friction, FrictionSum, LinearFriction
+from .protocols import check_friction as check_friction
+from .protocols import check_linear as check_linear
 
 __all__ = [
     "AsymmetricFriction",
@@ -24,6 +29,4 @@ __all__ = [
     "StribeckFriction",
     "TorqueOffset",
     "ViscousFriction",
-    "check_friction",
-    "check_linear",
 ]

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, as_floats, as_vector, read_only
 from ..errors import InvalidValueError, ShapeError
-from .joint import JointFriction
+from .models import JointFriction
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)
@@ -28,17 +28,16 @@ class GravityCompensator(JointFriction):
     Without geometry it is a Fourier series of the angle:
     ``tau = Gs sin(q) + Gc cos(q) + Gss sin(2 q) + Gcc cos(2 q)``.
 
-    Unlike friction it depends on positions and takes no energy; its torque is needed also at rest.
-    Where gravity turns a link as a compensator does, base parameters regroup ``Kc``, ``Gs`` and
-    ``Gc`` into first moments of the link: only their sum is seen.
+    Unlike friction it depends on positions and dissipates no energy. Where gravity turns a link as
+    a compensator does, base parameters regroup ``Kc``, ``Gs`` and ``Gc`` into first moments of the
+    link: only their sum is identifiable.
 
     Parameters
     ----------
     n : int
         Number of joints of the robot.
     joints : int or array_like of int, shape (k,)
-        Numbers 1..n of the revolute joints that have one; the others have parameters without
-        effect.
+        Numbers 1..n of the revolute joints that have one; parameters of the others have no effect.
     a, b, phi : array_like, scalar or shape (k,), optional
         Geometry of each: distances in metres, positive, and angle in rad; all three or none.
     values : array_like, shape (m,) or (m, k), optional
@@ -48,7 +47,7 @@ class GravityCompensator(JointFriction):
     Raises
     ------
     ShapeError, InvalidValueError
-        Joints that are not there or given twice; a part of the geometry; distances that are not
+        Joints that do not exist or are given twice; a part of the geometry; distances that are not
         positive; values of another shape; NaN or infinity.
 
     References
@@ -118,13 +117,7 @@ class GravityCompensator(JointFriction):
         return self._of_all(self.values)
 
     def basis(self, v: ArrayLike, q: ArrayLike | None = None) -> Array:
-        """Torque per unit of each parameter of its joint, shape (..., m, n).
-
-        Parameters
-        ----------
-        v, q : array_like, shape (..., n)
-            Joint velocities, which do not matter but for their number, and joint variables.
-        """
+        """Torque per unit of each parameter of its joint at states (..., n), shape (..., m, n)."""
         if q is None:
             raise InvalidValueError(
                 "q: the torque of a gravity compensator depends on the joint variables; give them "
@@ -141,23 +134,7 @@ class GravityCompensator(JointFriction):
         return self._of_all(np.stack([slope, rate], -2))
 
     def torque(self, v: ArrayLike, q: ArrayLike | None = None) -> Array:
-        """Torque that the joints need against the compensators.
-
-        Parameters
-        ----------
-        v, q : array_like, shape (..., n)
-            Joint velocities, which do not matter but for their number, and joint variables, rad.
-
-        Returns
-        -------
-        ndarray, shape (..., n)
-            N m.
-
-        Raises
-        ------
-        InvalidValueError, ShapeError
-            No ``q``; wrong length; NaN or infinity.
-        """
+        """Joint torque that balances the compensators at states (..., n)."""
         return (self.basis(v, q) * self.parameters).sum(axis=-2)
 
     def _of_all(self, columns: Array) -> Array:

@@ -1,8 +1,9 @@
-"""What a friction model is, and the checks at the border."""
+"""The interface of friction models, the sum of several models, and checks of arguments."""
 
 from __future__ import annotations
 
-from typing import Protocol, cast, runtime_checkable
+from dataclasses import dataclass
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,13 +11,13 @@ from numpy.typing import ArrayLike
 from .._arrays import Array
 from ..errors import InvalidValueError, ShapeError
 
-_SLOWEST = 5e-324  # the smallest velocity that has a sign
-_NOTHING = 1e-300  # what viscous friction takes at it
+_SLOWEST = 5e-324  # rad/s or m/s: smallest positive velocity
+_ROUNDING = 1e-300  # viscous torque at this velocity
 
 
 @runtime_checkable
 class Friction(Protocol):
-    """What `idm` and `ddm` need of a friction model; models of your own may have just this.
+    """A friction model for `idm` and `ddm`; a user's model needs only these members.
 
     A model whose torque depends on positions too has ``needs_position = True`` beside, and takes
     them as a second argument: ``torque(v, q)``, ``basis(v, q)``.
@@ -34,7 +35,7 @@ class Friction(Protocol):
 
 @runtime_checkable
 class LinearFriction(Friction, Protocol):
-    """A friction model that is linear in its parameters: what regressors need."""
+    """A friction model that is linear in its parameters, for regressors."""
 
     @property
     def kinds(self) -> tuple[str, ...]:
@@ -51,12 +52,100 @@ class LinearFriction(Friction, Protocol):
         ...
 
 
-class _AtPosition(Protocol):
-    """What a model with ``needs_position`` has."""
+@dataclass(frozen=True, slots=True)
+class FrictionSum:
+    """Several friction models that act together; ``a + b`` of two friction models is one.
 
-    def torque(self, v: ArrayLike, q: ArrayLike | None) -> Array: ...
+    Parameters
+    ----------
+    parts : tuple of Friction
+        Models of the same joints, at least one.
 
-    def basis(self, v: ArrayLike, q: ArrayLike | None) -> Array: ...
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Numbers of joints that differ; no part; an object that is not a friction model.
+
+    Examples
+    --------
+    >>> from robotmodels.friction import CoulombFriction, ViscousFriction
+    >>> both = ViscousFriction([1.0]) + CoulombFriction([2.0])
+    >>> both.torque([3.0]), both.kinds
+    (array([5.]), ('Fv', 'Fc'))
+    """
+
+    parts: tuple[Friction, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "parts", tuple(self.parts))
+        if not self.parts:
+            raise InvalidValueError("parts: expected at least one friction model.")
+        for part in self.parts:
+            check_friction(part, getattr(self.parts[0], "n", 0), "parts")
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return self.parts[0].n
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Names of a joint's parameters."""
+        return tuple(kind for part in self._linear for kind in part.kinds)
+
+    @property
+    def parameters(self) -> Array:
+        """Their values, shape (k, n)."""
+        return np.concatenate([part.parameters for part in self._linear])
+
+    @property
+    def breakaway(self) -> Array:
+        """Torques between which a joint at rest sticks, shape (2, n): lower, upper."""
+        by_velocity, _ = by_dependence(self)
+        return np.zeros((2, self.n)) if by_velocity is None else breakaway_torques(by_velocity)
+
+    @property
+    def needs_position(self) -> bool:
+        """Whether a part of it depends on positions."""
+        return any(needs_position(part) for part in self.parts)
+
+    def basis(self, v: ArrayLike, q: ArrayLike | None = None) -> Array:
+        """Torque per unit of each parameter, see `LinearFriction`."""
+        return np.concatenate([basis_at(part, v, q) for part in self._linear], axis=-2)
+
+    def torque(self, v: ArrayLike, q: ArrayLike | None = None) -> Array:
+        """Torque that the joints need to overcome friction, shape (..., n)."""
+        return np.sum([torque_at(part, v, q) for part in self.parts], axis=0)
+
+    def __add__(self, other: object) -> FrictionSum:
+        return together(self, other)
+
+    def __radd__(self, other: object) -> FrictionSum:
+        return together(other, self)
+
+    @property
+    def _linear(self) -> tuple[LinearFriction, ...]:
+        return tuple(check_linear(part) for part in self.parts)
+
+
+def together(first: object, second: object) -> FrictionSum:
+    """Sum of two friction models; nested sums are flattened."""
+    parts: list[Friction] = []
+    for each in (first, second):
+        if isinstance(each, type) or not isinstance(each, Friction):
+            return NotImplemented
+        parts += each.parts if isinstance(each, FrictionSum) else (each,)
+    return FrictionSum(tuple(parts))
+
+
+def by_dependence(friction: Friction | None) -> tuple[Friction | None, Friction | None]:
+    """The parts of a model that depend on velocities alone, and those that need positions."""
+    if friction is None:
+        return None, None
+    parts = friction.parts if isinstance(friction, FrictionSum) else (friction,)
+    groups = [tuple(p for p in parts if needs_position(p) is placed) for placed in (False, True)]
+    first, second = (FrictionSum(g) if len(g) > 1 else next(iter(g), None) for g in groups)
+    return first, second
 
 
 def needs_position(friction: Friction) -> bool:
@@ -66,54 +155,26 @@ def needs_position(friction: Friction) -> bool:
 
 def torque_at(friction: Friction, v: ArrayLike, q: ArrayLike | None) -> Array:
     """Torque of any friction model at velocities and positions (..., n)."""
-    if needs_position(friction):
-        return cast(_AtPosition, friction).torque(v, q)
-    return friction.torque(v)
+    torque: Any = friction.torque
+    return torque(v, q) if needs_position(friction) else torque(v)
 
 
 def basis_at(friction: LinearFriction, v: ArrayLike, q: ArrayLike | None) -> Array:
     """Torque per unit of each parameter (..., k, n) of any model at velocities and positions."""
-    if needs_position(friction):
-        return cast(_AtPosition, friction).basis(v, q)
-    return friction.basis(v)
+    basis: Any = friction.basis
+    return basis(v, q) if needs_position(friction) else basis(v)
 
 
 def breakaway_torques(friction: Friction) -> Array:
-    """Limits of the torque from below and above zero velocity, sorted; what needs q has none."""
+    """Limits of the torque below and above zero velocity, sorted; zero for models that need q."""
     if needs_position(friction):
         return np.zeros((2, friction.n))
     limits = [friction.torque(np.full(friction.n, s * _SLOWEST)) for s in (-1.0, 1.0)]
-    return np.sort(np.where(np.abs(limits) < _NOTHING, 0.0, limits), axis=0)
+    return np.sort(np.where(np.abs(limits) < _ROUNDING, 0.0, limits), axis=0)
 
 
 def check_friction(friction: object, n: int, name: str = "friction") -> Friction:
-    """Refuse what is no friction model of n joints.
-
-    Parameters
-    ----------
-    friction : object
-        A friction model.
-    n : int
-        Number of joints.
-    name : str
-        Used in error messages.
-
-    Returns
-    -------
-    Friction
-        The same.
-
-    Raises
-    ------
-    InvalidValueError, ShapeError
-        No friction model; one of another number of joints.
-
-    Examples
-    --------
-    >>> from robotmodels.friction import ViscousFriction
-    >>> check_friction(ViscousFriction([1.0]), 1).n
-    1
-    """
+    """Raise unless the object is a friction model of n joints."""
     if isinstance(friction, type) or not isinstance(friction, Friction):
         got = friction.__name__ if isinstance(friction, type) else type(friction).__name__
         raise InvalidValueError(
@@ -126,29 +187,7 @@ def check_friction(friction: object, n: int, name: str = "friction") -> Friction
 
 
 def check_linear(friction: Friction) -> LinearFriction:
-    """Refuse a friction model that regressors have no columns of.
-
-    Parameters
-    ----------
-    friction : Friction
-        A friction model.
-
-    Returns
-    -------
-    LinearFriction
-        The same.
-
-    Raises
-    ------
-    InvalidValueError
-        It is not linear in parameters.
-
-    Examples
-    --------
-    >>> from robotmodels.friction import ViscousFriction
-    >>> check_linear(ViscousFriction([1.0])).kinds
-    ('Fv',)
-    """
+    """Raise for a friction model without regressor columns."""
     if not isinstance(friction, LinearFriction):
         raise InvalidValueError(
             f"friction: {type(friction).__name__} is not linear in parameters (no kinds, "

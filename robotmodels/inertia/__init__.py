@@ -1,4 +1,4 @@
-"""Inertial parameters of the links, and whether a real body can have them."""
+"""Inertial parameters of the links, and their physical consistency."""
 
 from .consistency import ConsistencyReport, InertiaWarning, LinkFinding
 from .parameters import PARAMETERS, InertialParameters

@@ -1,4 +1,4 @@
-"""Whether a real body can have ten inertial parameters, and if not, why.
+"""Physical consistency of the inertial parameters of links.
 
 P. M. Wensing, S. Kim and J.-J. E. Slotine, "Linear matrix inequalities for physically consistent
 inertial parameter identification", IEEE RA-L 3(1), 2018, section III.
@@ -18,44 +18,27 @@ _ROUNDING = 1e-12
 
 
 class InertiaWarning(RobotModelsWarning):
-    """A link has inertial parameters that no body has."""
+    """A link has inertial parameters that are not physically consistent."""
 
 
 @dataclass(frozen=True, slots=True)
 class LinkFinding:
-    """What the consistency check found for one link.
+    """Result of the consistency check of one link.
 
     Parameters
     ----------
     link : int
         Frame number.
-    mass : float
-        Kilograms.
-    principal_moments : tuple of float
-        About the centre of mass, ascending, kg m^2 (about the origin when the mass is zero).
-    triangle_gap : float
-        Sum of the two smaller principal moments less the largest; negative fails.
-    smallest_eigenvalue : float
-        Of the 4x4 pseudo-inertia matrix, relative to its trace.
     problems : tuple of str
-        One sentence each; empty if a real body can have these parameters.
-
-    Examples
-    --------
-    >>> LinkFinding(1, 2.0, (0.1, 0.1, 0.1), 0.1, 0.05, ()).is_physical
-    True
+        One sentence each; empty if the parameters are physically consistent.
     """
 
     link: int
-    mass: float
-    principal_moments: tuple[float, float, float]
-    triangle_gap: float
-    smallest_eigenvalue: float
     problems: tuple[str, ...]
 
     @property
     def is_physical(self) -> bool:
-        """Whether nothing was found against the link."""
+        """Whether the parameters are physically consistent."""
         return not self.problems
 
     def __str__(self) -> str:
@@ -65,18 +48,12 @@ class LinkFinding:
 
 @dataclass(frozen=True, slots=True)
 class ConsistencyReport:
-    """Physical consistency of a set of inertial parameters, link by link.
+    """Physical consistency of a set of inertial parameters.
 
     Parameters
     ----------
     links : tuple of LinkFinding
         In table order.
-
-    Examples
-    --------
-    >>> from robotmodels.inertia import InertialParameters
-    >>> InertialParameters.zeros(1).consistency().is_physical
-    False
     """
 
     links: tuple[LinkFinding, ...]
@@ -88,7 +65,7 @@ class ConsistencyReport:
 
     @property
     def not_physical(self) -> str:
-        """What is wrong with which link, in one sentence; empty if nothing is."""
+        """The problems of all links in one sentence; empty if there are none."""
         return "; ".join(
             f"link {link.link}: {', '.join(link.problems)}" for link in self.links if link.problems
         )
@@ -97,40 +74,45 @@ class ConsistencyReport:
         return "\n".join(map(str, self.links))
 
 
+def pseudo_inertia(row: Array) -> Array:
+    """Pseudo-inertia matrix (4, 4) of ten parameters; positive semidefinite for a body."""
+    tensor = row[[[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
+    pseudo = np.empty((4, 4))
+    pseudo[:3, :3] = 0.5 * np.trace(tensor) * np.eye(3) - tensor
+    pseudo[:3, 3] = pseudo[3, :3] = row[6:9]
+    pseudo[3, 3] = row[9]
+    return pseudo
+
+
 def link_finding(j: int, row: Array) -> LinkFinding:
     """Check the ten parameters of the link in row j of the table, from 0."""
-    # the findings are those of the row divided by its largest entry: nothing overflows
     largest = float(np.abs(row).max()) or 1.0
-    XX, XY, XZ, YY, YZ, ZZ, MX, MY, MZ, M = (float(v) for v in row / largest)
-    tensor = np.array([[XX, XY, XZ], [XY, YY, YZ], [XZ, YZ, ZZ]])
-    h = np.array([MX, MY, MZ])
+    scaled = row / largest  # scaled against overflow
+    tensor, h, M = scaled[[[0, 1, 2], [1, 3, 4], [2, 4, 5]]], scaled[6:9], float(scaled[9])
     problems = []
-    tensor_c = tensor
+    central = tensor
     if M > 0:
         with np.errstate(over="ignore", invalid="ignore"):
             S = se3.skew(h / np.sqrt(M))
-            tensor_c = tensor + S @ S
-        if not np.isfinite(tensor_c).all():
-            tensor_c = tensor
-            problems.append("hardly any mass for its first moments")
+            central = tensor + S @ S
+        if not np.isfinite(central).all():
+            central = tensor
+            problems.append("too little mass for its first moments")
     elif M < 0:
         problems.append(f"negative mass {row[9]:g} kg")
     else:
         problems.append("first moments without mass" if h.any() else "no mass")
-    moments = np.linalg.eigvalsh(tensor_c)
-    scale = max(float(np.abs(moments).max()), float(np.abs(tensor).max()))
+    moments = np.linalg.eigvalsh(central)
+    rounding = _ROUNDING * max(float(np.abs(moments).max()), float(np.abs(tensor).max()))
     gap = float(moments[0] + moments[1] - moments[2])
-    if moments[0] < -_ROUNDING * scale:
+    if moments[0] < -rounding:
         problems.append(f"a principal moment is {moments[0] * largest:.3g} kg m^2")
-    if gap < -_ROUNDING * scale:
+    if gap < -rounding:
         problems.append(f"triangle inequality fails by {-gap * largest:.3g} kg m^2")
-    pseudo = np.empty((4, 4))
-    pseudo[:3, :3] = 0.5 * np.trace(tensor) * np.eye(3) - tensor
-    pseudo[:3, 3] = pseudo[3, :3] = h
-    pseudo[3, 3] = M
-    trace = float(np.abs(np.diag(pseudo)).sum())
-    smallest = float(np.linalg.eigvalsh(pseudo)[0] / trace) if trace else 0.0
-    if smallest < -_ROUNDING and not problems:
-        problems.append(f"the pseudo-inertia has the eigenvalue {smallest:.3g} of its trace")
-    a, b, c = (float(v) * largest for v in moments)
-    return LinkFinding(j + 1, float(row[9]), (a, b, c), gap * largest, smallest, tuple(problems))
+    pseudo = pseudo_inertia(scaled)
+    smallest, trace = np.linalg.eigvalsh(pseudo)[0], np.abs(np.diag(pseudo)).sum()
+    if smallest < -_ROUNDING * trace and not problems:
+        problems.append(
+            f"an eigenvalue of the pseudo-inertia is {smallest / trace:.3g} of its trace"
+        )
+    return LinkFinding(j + 1, tuple(problems))

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .. import se3
-from .._arrays import LARGEST, Array, as_bounded, as_core, read_only, same_value, value_hash
+from .._arrays import LARGEST, Array, Value, as_bounded, as_core, read_only
 from ..errors import InertiaError, ShapeError
 from ..geometry import DHTable
 from .consistency import ConsistencyReport, link_finding
@@ -24,12 +24,12 @@ PARAMETERS = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
 
 
 @dataclass(frozen=True, slots=True, init=False, eq=False)
-class InertialParameters:
+class InertialParameters(Value):
     """Standard inertial parameters of every frame.
 
-    Any real values are legal: base parameters have first moments with zero mass, identified ones
-    may not be physical. `is_physical` and `consistency` say whether a real body could have them;
-    ``print`` shows them as a table, and under it what is wrong with which link.
+    Any real values are allowed: base parameters have first moments with zero mass, identified ones
+    may not be physical. `is_physical` and `consistency` check the physical consistency;
+    ``print`` shows them as a table with the problems of the links below.
 
     Parameters
     ----------
@@ -66,49 +66,15 @@ class InertialParameters:
 
     @classmethod
     def zeros(cls, f: int) -> Self:
-        """Parameters of ``f`` links without any inertia.
-
-        Parameters
-        ----------
-        f : int
-            Number of frames.
-
-        Returns
-        -------
-        InertialParameters
-            All zero.
-
-        Examples
-        --------
-        >>> InertialParameters.zeros(2).f
-        2
-        """
+        """Parameters of ``f`` links without any inertia."""
         return cls(np.zeros((f, 10)))
 
     @classmethod
     def from_com(cls, mass: ArrayLike, com: ArrayLike, inertia: ArrayLike) -> Self:
-        """Parameters from masses, centres of mass and inertia about the centres of mass.
+        """Parameters from masses (f,), centres of mass (f, 3) and central tensors (f, 3, 3).
 
-        Parameters
-        ----------
-        mass : array_like, shape (f,)
-            Kilograms, not negative.
-        com : array_like, shape (f, 3)
-            Centre of mass in frame R_j, metres.
-        inertia : array_like, shape (f, 3, 3)
-            Symmetric inertia tensor about the centre of mass in the axes of R_j, kg m^2.
-
-        Returns
-        -------
-        InertialParameters
-            The same bodies about the frame origins (Huygens-Steiner).
-
-        Raises
-        ------
-        InertiaError
-            A negative mass, or a tensor that is not symmetric.
-        ShapeError, InvalidValueError
-            Shapes that do not fit each other; NaN or infinity.
+        All in the frames R_j, in kg, m and kg m^2. A negative mass and a tensor that is not
+        symmetric are an `InertiaError`.
 
         Examples
         --------
@@ -131,8 +97,8 @@ class InertialParameters:
                 f"Link {j + 1}: a mass cannot be negative, got {mass[j]} kg. Identified sets that "
                 "are not physical are given as InertialParameters(values)."
             )
-        if (np.abs(tensor - np.swapaxes(tensor, 1, 2)).max(initial=0.0)
-                > 1e-9 * np.abs(tensor).max(initial=0.0)):  # fmt: skip
+        skewness = np.abs(tensor - np.swapaxes(tensor, 1, 2)).max(initial=0.0)
+        if skewness > 1e-9 * np.abs(tensor).max(initial=0.0):
             raise InertiaError(
                 "inertia: a tensor must be symmetric; check the products of inertia."
             )
@@ -151,37 +117,8 @@ class InertialParameters:
     ) -> Self:
         """Parameters published in classical (distal) link frames, moved to this table's frames.
 
-        The classical frame of link j is ``R_j Trans(x, a_j) Rot(x, alpha_j)``.
-
-        Parameters
-        ----------
-        rows : iterable of mappings
-            The classical table, as for `DHTable.from_standard`.
-        mass : array_like, shape (f,)
-            Kilograms.
-        com : array_like, shape (f, 3)
-            Centres of mass in the classical frames, metres.
-        inertia : array_like, shape (f, 3, 3)
-            About the centres of mass, in the axes of the classical frames, kg m^2.
-        degrees : bool
-            Whether the angles of ``rows`` are in degrees.
-
-        Returns
-        -------
-        InertialParameters
-            About the origins and in the axes of the Khalil-Kleinfinger frames.
-
-        Raises
-        ------
-        InertiaError, ShapeError, InvalidValueError, TableError
-            As `from_com` and `DHTable.from_standard`.
-
-        Examples
-        --------
-        >>> rows = [{"a": 0.4}]
-        >>> tip = InertialParameters.from_standard(rows, [1.0], [[0, 0, 0]], [np.zeros((3, 3))])
-        >>> tip.first_moments
-        array([[0.4, 0. , 0. ]])
+        The classical frame of link j is ``R_j Trans(x, a_j) Rot(x, alpha_j)``, its table ``rows``
+        as for `DHTable.from_standard`; masses, centres and tensors as for `from_com`, in it.
         """
         rows = list(rows)
         com, tensor = as_core(com, (3,), "com"), as_core(inertia, (3, 3), "inertia")
@@ -219,27 +156,11 @@ class InertialParameters:
 
     @property
     def is_physical(self) -> NDArray[np.bool_]:
-        """Whether a real body has these parameters, shape (f,): see `consistency`."""
+        """Physical consistency of each link, shape (f,): see `consistency`."""
         return np.array([finding.is_physical for finding in self.consistency().links], dtype=bool)
 
     def consistency(self) -> ConsistencyReport:
-        """Check each link: mass, moments, triangle inequality, pseudo-inertia.
-
-        Returns
-        -------
-        ConsistencyReport
-            One finding per link; print it.
-
-        References
-        ----------
-        P. M. Wensing, S. Kim and J.-J. E. Slotine, "Linear matrix inequalities for physically
-        consistent inertial parameter identification", IEEE RA-L 3(1), 2018, section III.
-
-        Examples
-        --------
-        >>> print(InertialParameters([[1, 0, 0, 0.1, 0, 0.1, 0, 0, 0, 2.0]]).consistency())
-        link 1: not physical: triangle inequality fails by 0.8 kg m^2
-        """
+        """Check each link: mass, moments, triangle inequality, pseudo-inertia; print the report."""
         return ConsistencyReport(tuple(link_finding(j, row) for j, row in enumerate(self.values)))
 
     def __str__(self) -> str:
@@ -259,27 +180,9 @@ class InertialParameters:
         return "\n".join(lines)
 
     def moved(self, T: ArrayLike) -> Self:
-        """The same bodies described in other frames.
+        """The same bodies in other frames; T (f, 4, 4) are the poses of the present ones in them.
 
-        Parameters
-        ----------
-        T : array_like, shape (f, 4, 4)
-            Pose of the present frame of each body in its new frame.
-
-        Returns
-        -------
-        InertialParameters
-            About the new origins, in the new axes; linear in the values, so M = 0 is allowed.
-
-        Raises
-        ------
-        ShapeError, NotARotationError
-            Not one pose per frame.
-
-        Examples
-        --------
-        >>> InertialParameters([[0] * 9 + [2.0]]).moved([se3.translation(0.1, 0, 0)]).first_moments
-        array([[0.2, 0. , 0. ]])
+        Linear in the values, so that M = 0 is allowed.
         """
         X = se3.as_pose(T, "T")
         if X.shape != (self.f, 4, 4):
@@ -290,17 +193,6 @@ class InertialParameters:
         m = self.mass[:, None]
         tensor = R @ self.tensors @ np.swapaxes(R, 1, 2) - (P @ H + H @ P) - m[:, :, None] * (P @ P)
         return type(self)(_vectors(tensor, h + m * p, self.mass))
-
-    def __reduce__(self) -> tuple[Any, ...]:  # rebuilt, so that a copy is read-only as well
-        return type(self), (self.values,)
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, InertialParameters):
-            return NotImplemented
-        return same_value(self.values, other.values)
-
-    def __hash__(self) -> int:
-        return value_hash(self.values)
 
 
 def _vectors(tensor: Array, first: Array, mass: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Which columns a regressor has, and which of them are asked for."""
+"""The columns of regressors, and the choice among them."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from ..inertia import PARAMETERS
 from ..model import RobotModel
 
 LINKS = "links"
+_NONE = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
 
 Blocks = Mapping[str, tuple[str, ...]]
 """Names of the columns, by kind: the ten of each link, then one kind of the drives at a time."""
@@ -26,7 +27,7 @@ Blocks = Mapping[str, tuple[str, ...]]
 
 @runtime_checkable
 class KeptColumns(Protocol):
-    """What is asked of base parameters; `BaseParameters` has it."""
+    """Interface of base parameters that choose columns, see `BaseParameters`."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -35,11 +36,11 @@ class KeptColumns(Protocol):
 
     @property
     def kept(self) -> NDArray[np.int64]:
-        """Their numbers."""
+        """Numbers of the kept standard parameters."""
         ...
 
     def check(self, model: RobotModel) -> None:
-        """Refuse a robot that they do not belong to."""
+        """Raise for a robot of another structure."""
         ...
 
 
@@ -48,10 +49,11 @@ Columns = Sequence[int] | Sequence[str] | NDArray[np.int64] | NDArray[np.bool_] 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChosenColumns:
-    """Columns of a regressor and where each standard parameter goes."""
+    """Columns of a regressor: column of each parameter by kind, and the chosen parameters."""
 
     names: tuple[str, ...]
     places: Mapping[str, NDArray[np.int64]]
+    used: Mapping[str, tuple[NDArray[np.int64], NDArray[np.int64]]]
 
     @property
     def count(self) -> int:
@@ -62,13 +64,17 @@ class ChosenColumns:
         """Column of one parameter of a kind, -1 if it is not chosen."""
         return int(self.places[kind][number]) if kind in self.places else -1
 
+    def parameters(self, kind: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Numbers of the chosen parameters of a kind, and their columns."""
+        return self.used.get(kind, _NONE)
+
     def has(self, *kinds: str) -> bool:
         """Whether any column of these kinds is chosen."""
-        return any((self.places[kind] >= 0).any() for kind in kinds if kind in self.places)
+        return any(self.parameters(kind)[0].size for kind in kinds)
 
 
 def coupled_motors(model: RobotModel) -> tuple[int, ...]:
-    """Numbers of the motors that more than one joint turns."""
+    """Numbers of the coupled motors (turned by more than one joint)."""
     return () if model.transmission is None else model.transmission.coupled_motors
 
 
@@ -78,7 +84,7 @@ def friction_of(model: RobotModel, friction: Friction | None) -> LinearFriction 
 
 
 def standard_blocks(model: RobotModel, drive: Drives, friction: Friction | None) -> Blocks:
-    """Columns of the torque and of what is derived from it."""
+    """Columns of the torque, the power and the momentum."""
     kinds = drive_kinds(drive)
     frames = tuple((model.table.joint_rows + 1).tolist())
     blocks = dict(_named_blocks(model.f, frames, coupled_motors(model), tuple(kinds)))
@@ -88,7 +94,7 @@ def standard_blocks(model: RobotModel, drive: Drives, friction: Friction | None)
                 rest = tuple(k.value for k in kinds if k.value not in linear.kinds)
                 raise InvalidValueError(
                     f"friction: there are {kind} columns already, of the drives or of another part "
-                    "of the friction model; leave out what repeats them, of the drives with "
+                    "of the friction model; leave out the repeated ones, of the drives with "
                     f"drive={rest}."
                 )
             blocks[kind] = tuple(f"{kind}{j}" for j in frames)
@@ -99,7 +105,7 @@ def standard_blocks(model: RobotModel, drive: Drives, friction: Friction | None)
 def _named_blocks(
     f: int, frames: tuple[int, ...], motors: tuple[int, ...], kinds: tuple[DriveKind, ...]
 ) -> Blocks:
-    """Names without friction models: robots of one structure share them, call after call."""
+    """Names without friction models, cached by structure."""
     blocks = {LINKS: tuple(f"{p}{j}" for j in range(1, f + 1) for p in PARAMETERS)}
     blocks |= {kind.value: tuple(f"{kind.value}{j}" for j in frames) for kind in kinds}
     if motors:
@@ -115,7 +121,7 @@ def energy_blocks(model: RobotModel, drive: Drives) -> Blocks:
 
 
 def chosen_columns(blocks: Blocks, columns: Columns | None, model: RobotModel) -> ChosenColumns:
-    """Find the columns that are asked for."""
+    """The requested columns."""
     if columns is None:
         return _all_columns(tuple(blocks.items()))
     every = tuple(name for names in blocks.values() for name in names)
@@ -123,37 +129,31 @@ def chosen_columns(blocks: Blocks, columns: Columns | None, model: RobotModel) -
         columns.check(model)
     chosen = np.array(_numbers(every, columns), dtype=np.int64).reshape(-1)
     if np.unique(chosen).size != chosen.size:
-        raise InvalidValueError("columns: a column is asked for twice; give each once.")
+        raise InvalidValueError("columns: a column is given twice; give each once.")
     place = np.full(len(every), -1, dtype=np.int64)
     place[chosen] = np.arange(chosen.size)
-    return ChosenColumns(tuple(every[k] for k in chosen), _placed(place, blocks))
+    return _chosen(tuple(every[k] for k in chosen), place, blocks)
 
 
 @lru_cache(maxsize=64)
 def _all_columns(blocks: tuple[tuple[str, tuple[str, ...]], ...]) -> ChosenColumns:
     every = tuple(name for _, names in blocks for name in names)
-    return ChosenColumns(every, _placed(np.arange(len(every)), dict(blocks)))
+    return _chosen(every, np.arange(len(every)), dict(blocks))
 
 
-def _placed(place: NDArray[np.int64], blocks: Blocks) -> Mapping[str, NDArray[np.int64]]:
-    """The column of each parameter, kind by kind; read-only, since calls share them."""
-    ends = np.cumsum([len(names) for names in blocks.values()])[:-1]
+def _chosen(names: tuple[str, ...], place: NDArray[np.int64], blocks: Blocks) -> ChosenColumns:
+    """Column of each parameter by kind; read-only (cached)."""
+    ends = np.cumsum([len(kind) for kind in blocks.values()])[:-1]
     pieces = (read_only(piece, np.int64) for piece in np.split(place, ends))
-    return dict(zip(blocks, pieces, strict=True))
+    places = dict(zip(blocks, pieces, strict=True))
+    numbers = {kind: np.flatnonzero(place >= 0) for kind, place in places.items()}
+    return ChosenColumns(names, places, {k: (at, places[k][at]) for k, at in numbers.items()})
 
 
 def _numbers(every: tuple[str, ...], columns: Columns) -> list[int]:
+    """Numbers of the columns among the names of all."""
     if isinstance(columns, KeptColumns):
-        missing = [name for name in columns.names if name not in every]
-        if missing:
-            few = ", ".join(missing[:6]) + (", ..." if len(missing) > 6 else "")
-            raise InvalidValueError(
-                f"columns: of these base parameters, {len(missing)} have no column here: {few}. "
-                "Friction and offsets have none in an energy, for which base parameters with "
-                "drive=('Ia',) or without drives are made; elsewhere ask for the same drives and "
-                "friction as they have."
-            )
-        return [_number(every, name) for name in columns.names]
+        columns = columns.names
     if isinstance(columns, str) or not isinstance(columns, (Sequence, np.ndarray)):
         raise InvalidValueError(
             "columns: expected numbers or names of columns, or base parameters, got "
@@ -167,22 +167,23 @@ def _numbers(every: tuple[str, ...], columns: Columns) -> list[int]:
 
 
 def plain_name(name: str, known: Container[str]) -> str:
-    """The standard name of a parameter that is given as it is printed, ``ZZ1R`` for ``ZZ1``."""
+    """Standard name of a parameter given by its printed name, ``ZZ1R`` for ``ZZ1``."""
     return name[:-1] if name not in known and name[-1:] == "R" and name[:-1] in known else name
 
 
 def _number(every: tuple[str, ...], column: object) -> int:
+    """Number of one column that is given by its number or name."""
     if isinstance(column, str):
         name = plain_name(column, every)
-        if name not in every:
-            near = nearest_names(column, every)
-            raise InvalidValueError(
-                f"columns: there is no column {column!r} here"
-                + (f"; the nearest are {', '.join(near)}." if near else ".")
-                + " Friction and offsets have none in an energy, and drives those of the kinds"
-                " that drive= asks for."
-            )
-        return every.index(name)
+        if name in every:
+            return every.index(name)
+        near = ", ".join(nearest_names(column, every))
+        raise InvalidValueError(
+            f"columns: there is no column {column!r} here"
+            f"{f'; the nearest are {near}' if near else ''}. Drives have columns of the kinds that "
+            "drive= asks for; friction and offsets have none in an energy, for which base "
+            "parameters with drive=('Ia',) or without drives are made."
+        )
     if isinstance(column, (bool, np.bool_)) or not isinstance(column, (int, np.integer)):
         raise InvalidValueError(f"columns: expected numbers or names, got {column!r:.80}.")
     if not 0 <= column < len(every):

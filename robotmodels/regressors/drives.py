@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import lru_cache
 
 import numpy as np
@@ -14,120 +14,66 @@ from ..friction.protocols import basis_at
 from ..model import RobotModel
 from .columns import ChosenColumns
 
+Terms = Iterable[tuple[str, "Array | list[Array]"]]
+"""Torques (N, n) per unit of each kind of parameter; of coupled motors, a list with one for each.
+Parameters of joints act on one joint, those of coupled motors on several."""
+
 
 def couplings(model: RobotModel) -> list[tuple[Array, Array]]:
-    """Of each coupled motor, its turns ``w`` per joint (n,) and ``w w^T`` without diagonal."""
-    if model.transmission is None:
-        return []
-    return _couplings(model.transmission)
+    """Turns ``w`` (n,) of each coupled motor per joint, and ``w w^T`` without its diagonal."""
+    return [] if model.transmission is None else _couplings(model.transmission)
 
 
-@lru_cache(maxsize=16)  # asked for each chunk of a log
+@lru_cache(maxsize=16)  # cached: used for each piece of a log
 def _couplings(transmission: Transmission) -> list[tuple[Array, Array]]:
     weights = transmission.weights
     rows = [weights[m - 1] for m in transmission.coupled_motors]
     return [(read_only(w), read_only(np.outer(w, w) - np.diag(w**2))) for w in rows]
 
 
-def joint_terms(
-    q: Array, v: Array, rotor: Array | None, friction: LinearFriction | None
-) -> Iterator[tuple[str, Array]]:
-    """Torque per unit of each kind of parameter that acts on its own joint.
+def rotor_terms(model: RobotModel, a: Array) -> Terms:
+    """Torques of unit rotors at accelerations (N, n); at velocities, their momenta."""
+    yield "Ia", a
+    yield "Iam", [a @ cross for _, cross in couplings(model)]
 
-    Shapes: q, v, rotor (N, n) -> values (N, n).
-    """
-    if rotor is not None:
-        yield "Ia", rotor
+
+def friction_terms(
+    model: RobotModel, q: Array, v: Array, friction: LinearFriction | None
+) -> Iterator[tuple[str, Array | list[Array]]]:
+    """Torques of unit friction parameters and offsets at states (N, n)."""
     yield "Fv", v
     yield "Fc", np.sign(v)
     yield "offset", np.ones_like(v)
+    motors = couplings(model)
+    yield "Fvm", [v @ cross for _, cross in motors]
+    yield "Fcm", [np.sign(v @ row)[:, None] * row for row, _ in motors]
     if friction is not None:
-        basis = basis_at(friction, v, q)
-        for k, kind in enumerate(friction.kinds):
-            yield kind, basis[:, k]
+        yield from zip(friction.kinds, np.moveaxis(basis_at(friction, v, q), -2, 0), strict=True)
 
 
-def coupled_terms(
-    model: RobotModel, v: Array, rotor: Array | None
-) -> Iterator[tuple[str, int, Array]]:
-    """Torques per unit of each parameter of the coupled motors.
-
-    Shapes: v, rotor (N, n) -> torques (N, n).
-    """
-    for i, (row, cross) in enumerate(couplings(model)):
-        if rotor is not None:
-            yield "Iam", i, rotor @ cross
-        yield "Fvm", i, v @ cross
-        yield "Fcm", i, np.sign(v @ row)[:, None] * row
-
-
-def add_torques(
-    model: RobotModel,
-    chosen: ChosenColumns,
-    q: Array,
-    v: Array,
-    rotor: Array | None,
-    friction: LinearFriction | None,
-    sign: float,
-    W: Array,
-) -> None:
-    """Write drive and friction columns of a torque, times a sign, into ``W (N, n, c)``."""
-    for kind, values in joint_terms(q, v, rotor, friction):
-        joints, columns = _wanted(chosen, kind)
-        if joints.size:
-            W[:, joints, columns] = sign * values[:, joints]
-    if chosen.has("Iam", "Fvm", "Fcm"):
-        for kind, motor, torques in coupled_terms(model, v, rotor):
-            if (column := chosen.column(kind, motor)) >= 0:
-                W[:, :, column] = sign * torques
+def add_torques(chosen: ChosenColumns, terms: Terms, W: Array, sign: float = 1.0) -> None:
+    """Write the torques of unit parameters, times a sign, into ``W (N, n, c)``."""
+    for kind, values in terms:
+        if isinstance(values, list):
+            for motor, torque in enumerate(values):
+                if (column := chosen.column(kind, motor)) >= 0:
+                    W[:, :, column] = sign * torque
+        else:
+            joints, columns = chosen.parameters(kind)
+            if joints.size:
+                W[:, joints, columns] = sign * values[:, joints]
 
 
 def add_powers(
-    model: RobotModel,
-    chosen: ChosenColumns,
-    q: Array,
-    v: Array,
-    rotor: Array,
-    friction: LinearFriction | None,
-    rows: Array,
+    chosen: ChosenColumns, terms: Terms, v: Array, rows: Array, factor: float = 1.0
 ) -> None:
-    """Write the power of drive and friction columns into ``rows (N, c)``."""
-    for kind, values in joint_terms(q, v, rotor, friction):
-        joints, columns = _wanted(chosen, kind)
-        if joints.size:
-            rows[:, columns] = values[:, joints] * v[:, joints]
-    if chosen.has("Iam", "Fvm", "Fcm"):
-        for kind, motor, torques in coupled_terms(model, v, rotor):
-            if (column := chosen.column(kind, motor)) >= 0:
-                rows[:, column] = (torques * v).sum(axis=1)
-
-
-def add_rotor_momenta(model: RobotModel, chosen: ChosenColumns, v: Array, W: Array) -> None:
-    """Write the momenta of unit rotors into ``W (N, n, c)``."""
-    joints, columns = _wanted(chosen, "Ia")
-    if joints.size:
-        W[:, joints, columns] = v[:, joints]
-    if chosen.has("Iam"):
-        for i, (_, cross) in enumerate(couplings(model)):
-            if (column := chosen.places["Iam"][i]) >= 0:
-                W[:, :, column] = v @ cross
-
-
-def add_rotor_energies(model: RobotModel, chosen: ChosenColumns, v: Array, rows: Array) -> None:
-    """Write the energies of unit rotors into ``rows (N, c)``."""
-    joints, columns = _wanted(chosen, "Ia")
-    if joints.size:
-        rows[:, columns] = 0.5 * v[:, joints] ** 2
-    if chosen.has("Iam"):
-        for i, (_, cross) in enumerate(couplings(model)):
-            if (column := chosen.places["Iam"][i]) >= 0:
-                rows[:, column] = 0.5 * ((v @ cross) * v).sum(axis=1)
-
-
-def _wanted(chosen: ChosenColumns, kind: str) -> tuple[np.ndarray, np.ndarray]:
-    """Joints whose parameter of this kind has a column, and these columns."""
-    place = chosen.places.get(kind)
-    if place is None:
-        place = np.empty(0, dtype=np.int64)
-    joints = np.flatnonzero(place >= 0)
-    return joints, place[joints]
+    """Write the powers of unit parameters at velocities, times a factor, into ``rows (N, c)``."""
+    for kind, values in terms:
+        if isinstance(values, list):
+            for motor, torque in enumerate(values):
+                if (column := chosen.column(kind, motor)) >= 0:
+                    rows[:, column] = factor * (torque * v).sum(axis=1)
+        else:
+            joints, columns = chosen.parameters(kind)
+            if joints.size:
+                rows[:, columns] = factor * values[:, joints] * v[:, joints]

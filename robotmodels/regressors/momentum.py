@@ -1,24 +1,25 @@
-"""Momentum regressors: identification without accelerations."""
+"""Momentum and filtered regressors: identification without accelerations."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_vector, batch_rows
+from .._arrays import Array, as_core, as_floats, as_vector
 from ..drive import Drives
+from ..errors import InvalidValueError, ShapeError
 from ..friction import Friction, LinearFriction
 from ..model import RobotModel, check_model
-from .chunks import check_log, check_size, pieces
-from .columns import LINKS, ChosenColumns, Columns, chosen_columns, friction_of, standard_blocks
-from .drives import add_rotor_momenta, add_torques
+from .chunks import FORMS, Form, check_log, evaluate
+from .columns import LINKS, ChosenColumns, Columns
+from .drives import add_torques, friction_terms, rotor_terms
 
 
 class MomentumRegressors(NamedTuple):
-    """Regressors of the generalised momentum and of what changes it besides the torques.
+    """Regressors of the generalised momentum and of the forces that change it besides the torques.
 
     Attributes
     ----------
@@ -43,8 +44,8 @@ def momentum_regressor(
     """Regressors P and S of the momentum form ``dp/dt = tau + C^T v - Q - friction``.
 
     With ``p = P @ parameters`` the torque is ``tau = (dP/dt - S) @ parameters``: filtered or
-    integrated, it needs no accelerations. ``C^T v`` is ``dA/dt v - C v``, the slope of the kinetic
-    energy over the configuration.
+    integrated, it needs no accelerations. ``C^T v`` is ``dA/dt v - C v``, the gradient of the
+    kinetic energy by the configuration.
 
     Parameters
     ----------
@@ -52,11 +53,7 @@ def momentum_regressor(
         The robot, f frames and n joints.
     q, v : array_like, shape (..., n)
         Joint variables (rad or m) and velocities; the leading axes broadcast.
-        An empty batch gives an empty result.
-    drive : bool or collection of DriveKind or str
-        Which drive parameters have columns: all, none, or kinds such as ``("Ia", "Fv", "Fc")``;
-        what couples motors goes with its kind.
-    columns, friction
+    drive, columns, friction
         As for `torque_regressor`.
 
     Returns
@@ -87,75 +84,118 @@ def momentum_regressor(
     >>> P, S
     (array([[3., 0.]]), array([[ 0., -3.]]))
     """
-    check_model(model)
-    n = model.n
-    batch, rows = batch_rows((as_vector(q, n, "q"), as_vector(v, n, "v")), ("q", "v"))
-    chosen = chosen_columns(standard_blocks(model, drive, friction), columns, model)
-    P, S = np.empty((2, rows[0].shape[0], n, chosen.count))
-    fill_momenta(model, chosen, friction_of(model, friction), rows, P, S)
-    shape = (*batch, n, chosen.count)
-    return MomentumRegressors(P.reshape(shape), S.reshape(shape))
+    return evaluate(FORMS[momentum_regressor], model, (q, v), drive, columns, friction)
 
 
-def momentum_regressor_chunks(
+def filtered_regressor(
     model: RobotModel,
+    dt: float,
     q: ArrayLike,
     v: ArrayLike,
+    low_pass: ArrayLike,
     drive: Drives = True,
-    size: int = 128,
     columns: Columns | None = None,
     friction: Friction | None = None,
-) -> Iterator[tuple[slice, MomentumRegressors]]:
-    """The momentum regressors of many samples, a piece at a time in two reused buffers.
+) -> Array:
+    """Torque regressor through a low-pass filter, from positions and velocities alone.
+
+    The momentum form between samples, ``(P_k - P_{k-1}) / dt - (S_k + S_{k-1}) / 2``, through the
+    filter. `filtered_torque` brings measured torques through the same one, so that
+    ``filtered_torque(tau, low_pass) = W @ parameters`` up to the square of the sampling period.
 
     Parameters
     ----------
     model : RobotModel
-        The robot, n joints.
+        The robot, f frames and n joints.
+    dt : float
+        Sampling period, seconds.
     q, v : array_like, shape (N, n)
-        Joint variables (rad or m) and velocities.
-    drive : bool or collection of DriveKind or str
-        Which drive parameters have columns: all, none, or kinds such as ``("Ia", "Fv", "Fc")``;
-        what couples motors goes with its kind.
-    size : int
-        Samples in a piece.
-    columns, friction
+        Joint variables (rad or m) and velocities, regularly sampled.
+    low_pass : array_like, shape (k, 6)
+        Second-order sections of a stable filter for this period, such as
+        ``scipy.signal.butter(4, cutoff, fs=1 / dt, output="sos")``.
+    drive, columns, friction
         As for `torque_regressor`.
 
-    Yields
-    ------
-    rows : slice
-        Which samples the piece is for.
-    regressors : MomentumRegressors
-        Arrays of shape (k, n, p). The next piece overwrites them.
+    Returns
+    -------
+    ndarray, shape (N, n, p)
+        Columns as `parameter_names`; the first sample is zero.
 
     Raises
     ------
     ShapeError, InvalidValueError
-        As `momentum_regressor`, ``size`` below 1, or a log without samples.
+        As `torque_regressor`; a period that is not positive; sections of another shape, or of a
+        filter that is not stable; a log without samples.
 
     References
     ----------
-    Seed book section 1.6.3.
+    Seed book section 1.6.2; J.-J. Slotine and W. Li, "On the adaptive control of robot
+    manipulators", IJRR 6(3), 1987.
 
     Examples
     --------
     >>> from robotmodels.geometry import DHTable
+    >>> from scipy.signal import butter
     >>> one = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))
-    >>> samples = np.zeros((1000, 1))
-    >>> [P.shape for _, (P, S) in momentum_regressor_chunks(one, samples, samples, size=600)]
-    [(600, 1, 14), (400, 1, 14)]
+    >>> t = np.linspace(0.0, 5.0, 501)[:, None]
+    >>> low_pass = butter(1, 1.0, fs=100.0, output="sos")
+    >>> W = filtered_regressor(one, 0.01, t**2, 2 * t, low_pass, columns=["ZZ1"])
+    >>> round(float(W[-1, 0, 0]), 6)
+    2.0
     """
     check_model(model)
-    check_size(size)
-    n = model.n
-    _, rows = batch_rows((as_vector(q, n, "q"), as_vector(v, n, "v")), ("q", "v"))
-    check_log(rows[0].shape[0])
-    chosen = chosen_columns(standard_blocks(model, drive, friction), columns, model)
-    return _stream(model, chosen, friction_of(model, friction), rows, size)
+    sections = _sections(low_pass)
+    period = as_floats(dt, "dt")
+    if period.ndim != 0 or not period > 0.0:
+        raise InvalidValueError(f"dt: expected the sampling period in seconds, got {dt!r:.80}.")
+    q, v = as_vector(q, model.n, "q"), as_vector(v, model.n, "v")
+    if q.ndim != 2 or q.shape != v.shape:
+        raise ShapeError(
+            f"q, v: expected samples of shape (N, {model.n}) both, got {q.shape} and {v.shape}."
+        )
+    check_log(len(q), "q, v")
+    P, S = momentum_regressor(model, q, v, drive, columns, friction)
+    return _filtered(sections, np.diff(P, axis=0) / period - 0.5 * (S[1:] + S[:-1]))
 
 
-def fill_momenta(
+def filtered_torque(tau: ArrayLike, low_pass: ArrayLike) -> Array:
+    """Measured torques through the filter of `filtered_regressor`.
+
+    Parameters
+    ----------
+    tau : array_like, shape (N, ...)
+        Torques (N m or N) along the first axis, regularly sampled.
+    low_pass : array_like, shape (k, 6)
+        The second-order sections.
+
+    Returns
+    -------
+    ndarray, shape (N, ...)
+        Means of neighbouring samples, filtered from rest; the first is zero.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        No samples, NaN; sections as for `filtered_regressor`.
+
+    References
+    ----------
+    Seed book section 1.6.2.
+
+    Examples
+    --------
+    >>> filtered_torque([2.0, 4.0, 6.0], [[1.0, 0, 0, 1.0, 0, 0]])
+    array([0., 3., 5.])
+    """
+    sections, signal = _sections(low_pass), as_floats(tau, "tau")
+    if signal.ndim < 1:
+        raise ShapeError("tau: expected samples along the first axis, got one number.")
+    check_log(len(signal), "tau")
+    return _filtered(sections, 0.5 * (signal[1:] + signal[:-1]))
+
+
+def _fill_momenta(
     model: RobotModel,
     chosen: ChosenColumns,
     friction: LinearFriction | None,
@@ -166,21 +206,33 @@ def fill_momenta(
     """Write the chosen columns of the samples ``(q, v)`` into ``P`` and ``S (N, n, c)``."""
     from ..kernels.momentum_regressor import momentum_regressors
 
-    momentum_regressors(*rows, *model.chain, model.gravity, chosen.places[LINKS], P, S)
-    add_rotor_momenta(model, chosen, rows[1], P)
-    add_torques(model, chosen, rows[0], rows[1], None, friction, -1.0, S)
+    q, v = rows
+    momentum_regressors(q, v, *model.chain, model.gravity, chosen.places[LINKS], P, S)
+    add_torques(chosen, rotor_terms(model, v), P)
+    add_torques(chosen, friction_terms(model, q, v, friction), S, -1.0)
 
 
-def _stream(
-    model: RobotModel,
-    chosen: ChosenColumns,
-    friction: LinearFriction | None,
-    rows: Sequence[Array],
-    size: int,
-) -> Iterator[tuple[slice, MomentumRegressors]]:
-    N = rows[0].shape[0]
-    P, S = np.empty((2, min(size, N), model.n, chosen.count))
-    for piece in pieces(N, P.shape[0]):
-        k = piece.stop - piece.start
-        fill_momenta(model, chosen, friction, [array[piece] for array in rows], P[:k], S[:k])
-        yield piece, MomentumRegressors(P[:k], S[:k])
+FORMS[momentum_regressor] = Form(_fill_momenta, "qv", arrays=2, result=MomentumRegressors)
+
+
+def _sections(low_pass: ArrayLike) -> Array:
+    """Second-order sections (k, 6) of a stable filter."""
+    sections = as_core(low_pass, (6,), "low_pass")
+    if sections.ndim != 2 or not len(sections) or not sections[:, 3].all():
+        raise ShapeError(
+            "low_pass: expected second-order sections (k, 6) such as scipy.signal.butter(4, "
+            f"cutoff, fs=1 / dt, output='sos'), got shape {sections.shape}."
+        )
+    sections = sections / sections[:, 3:4]
+    largest = max(np.abs(np.roots(row)).max(initial=0.0) for row in sections[:, 3:])
+    if largest >= 1.0:
+        raise InvalidValueError(f"low_pass: the filter is not stable, |pole| = {largest:.6g}.")
+    return sections
+
+
+def _filtered(sections: Array, between: Array) -> Array:
+    """Filter values between samples (N - 1, ...) from rest, after a first value of zero."""
+    from scipy.signal import sosfilt
+
+    start = np.zeros((1, *between.shape[1:]))
+    return np.asarray(sosfilt(sections, np.concatenate((start, between)), axis=0), np.float64)

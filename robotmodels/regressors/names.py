@@ -1,4 +1,9 @@
-"""The standard parameters: their names in the order of the regressors' columns, their values."""
+"""The standard parameters: their names in the order of the regressors' columns, their values.
+
+References
+----------
+Seed book sections 1.5.1.2 and 1.5.2.1.
+"""
 
 from __future__ import annotations
 
@@ -8,14 +13,7 @@ from .._arrays import Array
 from ..drive import Drives, drive_kinds
 from ..friction import Friction
 from ..model import RobotModel, check_model
-from .columns import (
-    Columns,
-    chosen_columns,
-    coupled_motors,
-    energy_blocks,
-    friction_of,
-    standard_blocks,
-)
+from .columns import Columns, chosen_columns, energy_blocks, friction_of, standard_blocks
 
 
 def parameter_names(
@@ -24,36 +22,18 @@ def parameter_names(
     friction: Friction | None = None,
     columns: Columns | None = None,
 ) -> tuple[str, ...]:
-    """Names of the standard parameters, in the order of the regressor's columns.
+    """Names of the standard parameters, in the order of the columns of `torque_regressor`.
 
     Parameters
     ----------
-    model : RobotModel
-        The robot, f frames and n joints.
-    drive : bool or collection of DriveKind or str
-        Which drive parameters are included: all, none, or kinds such as ``("Ia", "Fv", "Fc")``;
-        what couples motors goes with its kind.
-    friction : Friction, optional
-        A friction model that is linear in its parameters, see `robotmodels.friction`.
-    columns : indices, names or BaseParameters, optional
-        A choice of them, as for `torque_regressor`.
+    model, drive, friction, columns
+        As for `torque_regressor`.
 
     Returns
     -------
     tuple of str
         ``XX1 XY1 ... M1 XX2 ...``, then all ``Ia``, all ``Fv``, all ``Fc``, all ``offset``,
-        numbered by frame; ``Iam``, ``Fvm``, ``Fcm`` of coupled motors; those of the friction model
-        at the end.
-
-    Raises
-    ------
-    InvalidValueError
-        Friction that is not linear, or whose names the drives have already; columns that are not
-        there.
-
-    References
-    ----------
-    Seed book section 1.5.2.1.
+        numbered by frame; ``Iam``, ``Fvm``, ``Fcm`` of coupled motors; those of the friction model.
 
     Examples
     --------
@@ -69,30 +49,17 @@ def parameter_names(
 def energy_parameter_names(
     model: RobotModel, drive: Drives = True, columns: Columns | None = None
 ) -> tuple[str, ...]:
-    """Names of the parameters that store energy, in the order of `energy_regressor`.
+    """Names of the parameters that store energy, in the order of the columns of `energy_regressor`.
 
     Parameters
     ----------
-    model : RobotModel
-        The robot, f frames and n joints.
-    drive : bool or collection of DriveKind or str
-        Whether the rotors are included, as for `energy_regressor`.
-    columns : indices, names or BaseParameters, optional
-        A choice of them.
+    model, drive, columns
+        As for `energy_regressor`.
 
     Returns
     -------
     tuple of str
         Those of the links, then all ``Ia``, then the ``Iam`` of coupled motors.
-
-    Raises
-    ------
-    InvalidValueError
-        Columns that are not there.
-
-    References
-    ----------
-    Seed book section 1.5.1.2.
 
     Examples
     --------
@@ -108,31 +75,17 @@ def energy_parameter_names(
 def parameter_vector(
     model: RobotModel, drive: Drives = True, friction: Friction | None = None
 ) -> Array:
-    """The model's own standard parameters, in the order of `parameter_names`.
+    """The model's own standard parameters: ``torque_regressor(...) @ parameter_vector(...)``.
 
     Parameters
     ----------
-    model : RobotModel
-        The robot.
-    drive : bool or collection of DriveKind or str
-        Which drive parameters are included: all, none, or kinds such as ``("Ia", "Fv", "Fc")``;
-        what couples motors goes with its kind.
-    friction : Friction, optional
-        A friction model that is linear in its parameters.
+    model, drive, friction
+        As for `torque_regressor`.
 
     Returns
     -------
     ndarray, shape (p,)
-        Values such that ``torque_regressor(...) @ parameter_vector(...)`` is the torque.
-
-    Raises
-    ------
-    InvalidValueError, ShapeError
-        Friction that is not linear, or of another number of joints.
-
-    References
-    ----------
-    Seed book section 1.5.2.1.
+        In the order of `parameter_names`.
 
     Examples
     --------
@@ -145,7 +98,7 @@ def parameter_vector(
     kinds = drive_kinds(drive)
     values += [getattr(model.drive, kind.value) for kind in kinds]
     if model.transmission is not None:
-        motors = np.array(coupled_motors(model), dtype=np.int64) - 1
+        motors = np.array(model.transmission.coupled_motors, dtype=np.int64) - 1
         terms = (kind.coupling for kind in kinds if kind.coupling is not None)
         values += [getattr(model.transmission, term)[motors] for term in terms]
     if (linear := friction_of(model, friction)) is not None:

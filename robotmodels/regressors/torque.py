@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_vector, batch_rows
+from .._arrays import Array
 from ..drive import Drives
 from ..friction import Friction, LinearFriction
-from ..model import RobotModel, check_model
-from .chunks import check_log, check_size, stream
-from .columns import LINKS, ChosenColumns, Columns, chosen_columns, friction_of, standard_blocks
-from .drives import add_torques
+from ..model import RobotModel
+from .chunks import FORMS, Form, chunked, evaluate
+from .columns import LINKS, ChosenColumns, Columns
+from .drives import add_torques, friction_terms, rotor_terms
 
 
 def torque_regressor(
@@ -38,8 +36,8 @@ def torque_regressor(
         Joint variables (rad or m), velocities and accelerations; the leading axes broadcast.
         An empty batch gives an empty result.
     drive : bool or collection of DriveKind or str
-        Which drive parameters have columns: all, none, or kinds such as ``("Ia", "Fv", "Fc")``;
-        what couples motors goes with its kind.
+        Drive parameters with columns: all, none, or kinds such as ``("Ia", "Fv", "Fc")``;
+        couplings of motors belong to their kinds.
     columns : indices, names, mask or BaseParameters, optional
         A choice of the columns, which alone are computed; default all. Base parameters choose the
         columns that they keep.
@@ -55,7 +53,7 @@ def torque_regressor(
     Raises
     ------
     ShapeError, InvalidValueError
-        Arguments of the wrong length, or with NaN or infinity; columns that are not there;
+        Arguments of the wrong length, or with NaN or infinity; columns that do not exist;
         friction that is not linear.
 
     See Also
@@ -75,14 +73,7 @@ def torque_regressor(
     >>> torque_regressor(one, [0.0], [3.0], [2.0], columns=["ZZ1", "Fv1"])
     array([[2., 3.]])
     """
-    check_model(model)
-    n = model.n
-    arrays = as_vector(q, n, "q"), as_vector(v, n, "v"), as_vector(a, n, "a")
-    batch, rows = batch_rows(arrays, ("q", "v", "a"))
-    chosen = chosen_columns(standard_blocks(model, drive, friction), columns, model)
-    W = np.empty((rows[0].shape[0], n, chosen.count))
-    fill_torques(model, chosen, friction_of(model, friction), rows, W)
-    return W.reshape(*batch, n, chosen.count)
+    return evaluate(FORMS[torque_regressor], model, (q, v, a), drive, columns, friction)
 
 
 def torque_regressor_chunks(
@@ -95,28 +86,19 @@ def torque_regressor_chunks(
     columns: Columns | None = None,
     friction: Friction | None = None,
 ) -> Iterator[tuple[slice, Array]]:
-    """The torque regressor of many samples, a piece at a time in one reused buffer.
-
-    Memory does not grow with the number of samples, and a piece stays in the processor's cache.
+    """The torque regressor of a long log, piece by piece: `chunked` of `torque_regressor`.
 
     Parameters
     ----------
-    model : RobotModel
-        The robot, n joints.
-    q, v, a : array_like, shape (N, n)
-        Joint variables (rad or m), velocities and accelerations.
-    drive : bool or collection of DriveKind or str
-        Which drive parameters have columns: all, none, or kinds such as ``("Ia", "Fv", "Fc")``;
-        what couples motors goes with its kind.
+    model, q, v, a, drive, columns, friction
+        As for `torque_regressor`; q, v, a of shape (N, n), in rad or m, per s and per s^2.
     size : int
         Samples in a piece.
-    columns, friction
-        As for `torque_regressor`.
 
     Yields
     ------
     rows : slice
-        Which samples the piece is for.
+        Samples of the piece.
     W : ndarray, shape (k, n, p)
         Their regressor. The next piece overwrites it: use or copy it before going on.
 
@@ -131,21 +113,16 @@ def torque_regressor_chunks(
 
     Examples
     --------
+    >>> import numpy as np
     >>> from robotmodels.geometry import DHTable
     >>> one = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))
     >>> samples = np.zeros((1000, 1))
     >>> [W.shape[0] for _, W in torque_regressor_chunks(one, samples, samples, samples, size=400)]
     [400, 400, 200]
     """
-    check_model(model)
-    check_size(size)
-    n = model.n
-    arrays = as_vector(q, n, "q"), as_vector(v, n, "v"), as_vector(a, n, "a")
-    _, rows = batch_rows(arrays, ("q", "v", "a"))
-    check_log(rows[0].shape[0], "q, v, a")
-    chosen = chosen_columns(standard_blocks(model, drive, friction), columns, model)
-    fill = partial(fill_torques, model, chosen, friction_of(model, friction))
-    return stream(fill, rows, size, (n, chosen.count))
+    return chunked(
+        torque_regressor, model, q, v, a, size=size, drive=drive, columns=columns, friction=friction
+    )
 
 
 def fill_torques(
@@ -158,6 +135,10 @@ def fill_torques(
     """Write the chosen columns of the samples ``(q, v, a)`` into ``W (N, n, c)``."""
     from ..kernels.torque_regressor import torque_regressors
 
-    torque_regressors(*rows, *model.chain, model.gravity, chosen.places[LINKS], W)
     q, v, a = rows
-    add_torques(model, chosen, q, v, a, friction, 1.0, W)
+    torque_regressors(q, v, a, *model.chain, model.gravity, chosen.places[LINKS], W)
+    add_torques(chosen, rotor_terms(model, a), W)
+    add_torques(chosen, friction_terms(model, q, v, friction), W)
+
+
+FORMS[torque_regressor] = Form(fill_torques, "qva")

@@ -1,0 +1,268 @@
+"""Parts of the dynamic model: masses, Coriolis and centrifugal torques, gravity, energies.
+
+Leading axes are batch axes and broadcast; arguments of the wrong length, or with NaN or infinity,
+raise `ShapeError` and `InvalidValueError`.
+
+References
+----------
+Seed book sections 1.5.1.1 to 1.5.1.3 and 1.5.1.5; S. Echeandia and P. M. Wensing, "Numerical
+methods to compute the Coriolis matrix and Christoffel symbols for rigid-body systems", ASME JCND
+16(9), 2021.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from .._arrays import Array, as_vector, batch_rows
+from ..drive import check_all_or_none
+from ..model import RobotModel, check_model
+from .inverse import rigid_torques
+
+
+def mass_matrix(model: RobotModel, q: ArrayLike, drive: bool = True) -> Array:
+    """Joint-space inertia matrix M(q), also called A(q) or generalised inertia.
+
+    Parameters
+    ----------
+    model, q
+        The robot of n joints, and joint variables of shape (..., n), rad or m.
+    drive : bool
+        Whether rotor inertia (and that of coupled motors) is included.
+
+    Returns
+    -------
+    ndarray, shape (..., n, n)
+        Symmetric, kg m^2 (kg m, kg for prismatic joints).
+
+    Examples
+    --------
+    >>> from robotmodels.geometry import DHTable
+    >>> from robotmodels.inertia import InertialParameters
+    >>> link = InertialParameters.from_com([2.0], [[0.1, 0, 0]], [np.zeros((3, 3))])
+    >>> mass_matrix(RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]), link), [0.0])
+    array([[0.02]])
+    """
+    check_model(model)
+    check_all_or_none(drive)
+    q = as_vector(q, model.n, "q")
+    twin = model.twin
+    if q.ndim == 1 and twin.serves_dynamics:
+        upper = pin.crba(twin.model, twin.data(), twin.to_pin(q))
+        M = np.where(_upper_triangle(model.n), upper, upper.T)
+        if not twin.in_table_order:
+            M = M[np.ix_(twin.order, twin.order)]
+    else:
+        from ..kernels.mass_matrix import mass_matrices
+
+        batch, (rows,) = batch_rows((q,), ("q",))
+        M = np.empty((rows.shape[0], model.n, model.n))
+        mass_matrices(rows, *model.chain, model.inertia.values, M)
+        M = M.reshape(*batch, model.n, model.n)
+    if drive and (drives := model.drive_matrices) is not None:
+        M = M + drives.rotor
+    return M
+
+
+def coriolis_matrix(model: RobotModel, q: ArrayLike, v: ArrayLike) -> Array:
+    """Matrix C(q, v) of Christoffel symbols; ``dM/dt - 2 C`` is skew-symmetric.
+
+    Parameters
+    ----------
+    model, q, v
+        The robot of n joints, and joint variables (rad or m) and velocities of shape (..., n).
+
+    Returns
+    -------
+    ndarray, shape (..., n, n)
+        ``C v`` are the Coriolis and centrifugal torques.
+
+    Examples
+    --------
+    >>> from robotmodels.geometry import DHTable
+    >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.3]))
+    >>> coriolis_matrix(arm, [0.0, 0.0], [1.0, 1.0]).shape
+    (2, 2)
+    """
+    check_model(model)
+    q, v = as_vector(q, model.n, "q"), as_vector(v, model.n, "v")
+    twin = model.twin
+    if q.ndim == v.ndim == 1 and twin.serves_dynamics:
+        C = pin.computeCoriolisMatrix(twin.model, twin.data(), twin.to_pin(q), twin.to_pin(v))
+        return np.array(C if twin.in_table_order else C[np.ix_(twin.order, twin.order)], order="C")
+    from ..kernels.coriolis import coriolis_matrices
+
+    batch, rows = batch_rows((q, v), ("q", "v"))
+    out = np.empty((rows[0].shape[0], model.n, model.n))
+    coriolis_matrices(*rows, *model.chain, model.inertia.values, out)
+    return out.reshape(*batch, model.n, model.n)
+
+
+def christoffel_blocks(model: RobotModel, q: ArrayLike) -> tuple[Array, Array]:
+    """Blocks B and C of the book: ``C(q, v) v = B [v v] + C [v^2]``.
+
+    With the Christoffel symbols ``c_{i,jk}`` of the mass matrix, ``B_{i,jk} = 2 c_{i,jk}`` and
+    ``C_{ij} = c_{i,jj}``.
+
+    Parameters
+    ----------
+    model, q
+        The robot of n joints, and joint variables of shape (..., n), rad or m.
+
+    Returns
+    -------
+    B : ndarray, shape (..., n, n (n - 1) / 2)
+        Coefficients of the products ``v_j v_k``, j < k in lexical order (``numpy.triu_indices(n,
+        1)``).
+    C : ndarray, shape (..., n, n)
+        Coefficients of the squares.
+
+    Examples
+    --------
+    >>> from robotmodels.geometry import DHTable
+    >>> from robotmodels.inertia import InertialParameters
+    >>> links = InertialParameters.from_com([1, 1], [[0.1, 0, 0]] * 2, [np.zeros((3, 3))] * 2)
+    >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.5]), links)
+    >>> B, C = christoffel_blocks(arm, [0.0, np.pi / 2])
+    >>> B.round(12), C.round(12)
+    (array([[-0.1], [ 0. ]]), array([[ 0.  , -0.05], [ 0.05,  0.  ]]))
+    """
+    check_model(model)
+    n = model.n
+    batch, (rows,) = batch_rows((as_vector(q, n, "q"),), ("q",))
+    from ..kernels.coriolis import coriolis_matrices
+
+    # C(q, v) is linear in v and made of Christoffel symbols: column k of them is C(q, e_k)
+    symbols = np.empty((n, rows.shape[0], n, n))
+    for k in range(n):
+        unit = np.zeros_like(rows)
+        unit[:, k] = 1.0
+        coriolis_matrices(rows, unit, *model.chain, model.inertia.values, symbols[k])
+    j, k = np.triu_indices(n, 1)
+    B = 2.0 * np.moveaxis(symbols[k, :, :, j], 0, -1)
+    C = np.einsum("jkij->kij", symbols)
+    return (
+        np.ascontiguousarray(B).reshape(*batch, n, j.size),
+        np.ascontiguousarray(C).reshape(*batch, n, n),
+    )
+
+
+def gravity_torque(model: RobotModel, q: ArrayLike) -> Array:
+    """Gravity torques Q(q), also ``gravload``.
+
+    Parameters
+    ----------
+    model, q
+        The robot of n joints, and joint variables of shape (..., n), rad or m.
+
+    Returns
+    -------
+    ndarray, shape (..., n)
+        Torques (N m) or forces (N).
+
+    Examples
+    --------
+    >>> from robotmodels.geometry import DHTable
+    >>> arm = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 0.3]))
+    >>> gravity_torque(arm, [0.0, 0.0])
+    array([0., 0.])
+    """
+    check_model(model)
+    q = as_vector(q, model.n, "q")
+    twin = model.twin
+    if q.ndim == 1 and twin.serves_dynamics:
+        g = pin.computeGeneralizedGravity(twin.model, twin.data(), twin.to_pin(q))
+        return twin.from_pin(g)
+    zero = np.zeros(model.n)
+    return rigid_torques(model, q, zero, zero)
+
+
+def kinetic_energy(model: RobotModel, q: ArrayLike, v: ArrayLike, drive: bool = True) -> Array:
+    """Kinetic energy ``v^T M v / 2``.
+
+    Parameters
+    ----------
+    model, q, v
+        The robot of n joints, and joint variables (rad or m) and velocities of shape (..., n).
+    drive : bool
+        Whether rotor inertia (and that of coupled motors) is included.
+
+    Returns
+    -------
+    ndarray, shape (...)
+        Joules.
+
+    Examples
+    --------
+    >>> from robotmodels.geometry import DHTable
+    >>> from robotmodels.drive import DriveParameters
+    >>> drive = DriveParameters(Ia=[0.5])
+    >>> one = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]), drive=drive)
+    >>> float(kinetic_energy(one, [0.0], [2.0]))
+    1.0
+    """
+    check_model(model)
+    check_all_or_none(drive)
+    q, v = as_vector(q, model.n, "q"), as_vector(v, model.n, "v")
+    twin = model.twin
+    if q.ndim == v.ndim == 1 and twin.serves_dynamics:
+        energy = np.float64(
+            pin.computeKineticEnergy(twin.model, twin.data(), twin.to_pin(q), twin.to_pin(v))
+        )
+    else:
+        from ..kernels.energies import kinetic_energies
+
+        batch, rows = batch_rows((q, v), ("q", "v"))
+        energy = np.empty(rows[0].shape[0])
+        kinetic_energies(*rows, *model.chain, model.inertia.values, energy)
+        energy = energy.reshape(batch)
+    if drive and (drives := model.drive_matrices) is not None:
+        energy = energy + 0.5 * np.einsum("...i,ij,...j->...", v, drives.rotor, v)
+    return np.asarray(energy)
+
+
+def potential_energy(model: RobotModel, q: ArrayLike) -> Array:
+    """Potential energy in the gravity field, zero for masses at the world's origin.
+
+    Parameters
+    ----------
+    model, q
+        The robot of n joints, and joint variables of shape (..., n), rad or m.
+
+    Returns
+    -------
+    ndarray, shape (...)
+        Joules.
+
+    Examples
+    --------
+    >>> from robotmodels.geometry import DHTable
+    >>> from robotmodels.inertia import InertialParameters
+    >>> slide = InertialParameters.from_com([2.0], [[0, 0, 0]], [np.zeros((3, 3))])
+    >>> lift = RobotModel.from_table(DHTable(antecedent=[0], sigma=[1]), slide)
+    >>> round(float(potential_energy(lift, [0.5])), 12)
+    9.81
+    """
+    check_model(model)
+    q = as_vector(q, model.n, "q")
+    twin = model.twin
+    # Pinocchio leaves out bodies that are fixed to the base
+    if q.ndim == 1 and twin.serves_dynamics and twin.base_is_massless:
+        return np.asarray(
+            pin.computePotentialEnergy(twin.model, twin.data(), twin.to_pin(q)), dtype=np.float64
+        )
+    from ..kernels.energies import potential_energies
+
+    batch, (rows,) = batch_rows((q,), ("q",))
+    energy = np.empty(rows.shape[0])
+    potential_energies(rows, *model.chain, model.inertia.values, model.gravity, energy)
+    return energy.reshape(batch)
+
+
+@lru_cache
+def _upper_triangle(n: int) -> NDArray[np.bool_]:
+    return np.triu(np.ones((n, n), dtype=bool))

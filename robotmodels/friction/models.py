@@ -1,0 +1,273 @@
+"""Friction models whose parameters are arrays of one number for each joint.
+
+``torque(v)`` is the torque that the joints need to overcome friction; dry friction is zero at
+rest. ``basis(v)`` is the torque per unit of each parameter, in the order of ``kinds``;
+``breakaway`` the torques (2, n) between which a joint at rest sticks.
+
+Parameters
+----------
+Fv, Fc, ... : array_like, shape (n,)
+    Viscous friction in N m s/rad (N s/m for slides), dry friction and offsets in N m (N).
+v : array_like, shape (..., n)
+    Joint velocities, rad/s or m/s.
+
+Returns
+-------
+ndarray, shape (..., n) or (..., k, n)
+    Torques in N m or N, or torques per unit of each of the k parameters.
+
+Raises
+------
+ShapeError, InvalidValueError
+    Lengths that differ; NaN or infinity.
+
+References
+----------
+Seed book section 1.5.1.4; B. Armstrong-Helouvry, P. Dupont and C. Canudas de Wit, "A survey of
+models, analysis tools and compensation methods for the control of machines with friction",
+Automatica 30(7), 1994, section 2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._arrays import Array, Rebuilt, Value, as_floats, as_vector, read_only
+from ..errors import InvalidValueError, ShapeError
+from .protocols import FrictionSum, breakaway_torques, together
+
+
+@dataclass(frozen=True, slots=True, init=False, eq=False)
+class JointFriction(Value):
+    """Base: parameters of shape (n,) that the fields name; a subclass adds `_terms`."""
+
+    kinds: ClassVar[tuple[str, ...]] = ()
+
+    def _set(self, **given: ArrayLike) -> None:
+        values = {name: as_floats(value, name) for name, value in given.items()}
+        shape = next(iter(values.values())).shape
+        if len(shape) != 1 or any(array.shape != shape for array in values.values()):
+            shapes = ", ".join(f"{name} {array.shape}" for name, array in values.items())
+            raise ShapeError(f"Friction parameters are all of shape (n,), got {shapes}.")
+        for name, array in values.items():
+            object.__setattr__(self, name, read_only(array))
+
+    @property
+    def parameters(self) -> Array:
+        """Values of the parameters that the torque is linear in, shape (k, n)."""
+        return np.stack([getattr(self, kind) for kind in self.kinds])
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return getattr(self, fields(self)[0].name).size
+
+    @property
+    def breakaway(self) -> Array:
+        """Torques between which a joint at rest sticks, shape (2, n): lower, upper."""
+        return breakaway_torques(self)
+
+    def _terms(self, v: Array) -> tuple[Array, ...]:
+        """Torque (..., n) per unit of each parameter of its joint."""
+        raise NotImplementedError
+
+    def basis(self, v: ArrayLike) -> Array:
+        """Torque per unit of each parameter of its joint, shape (..., k, n)."""
+        return np.stack(self._terms(as_vector(v, self.n, "v")), axis=-2)
+
+    def torque(self, v: ArrayLike) -> Array:
+        """Torque that the joints need to overcome friction, shape (..., n)."""
+        return (self.basis(v) * self.parameters).sum(axis=-2)
+
+    def __add__(self, other: object) -> FrictionSum:
+        return together(self, other)
+
+    def __radd__(self, other: object) -> FrictionSum:
+        return together(other, self)
+
+
+@dataclass(frozen=True, slots=True, init=False, eq=False)
+class ViscousFriction(JointFriction):
+    """Viscous friction, ``tau = Fv v``.
+
+    Examples
+    --------
+    >>> ViscousFriction([2.0]).torque([-0.5])
+    array([-1.])
+    """
+
+    kinds: ClassVar[tuple[str, ...]] = ("Fv",)
+    Fv: Array
+
+    def __init__(self, Fv: ArrayLike) -> None:
+        self._set(Fv=Fv)
+
+    def _terms(self, v: Array) -> tuple[Array, ...]:
+        return (v,)
+
+
+@dataclass(frozen=True, slots=True, init=False, eq=False)
+class CoulombFriction(JointFriction):
+    """Coulomb (dry) friction, ``tau = Fc sign(v)``.
+
+    Examples
+    --------
+    >>> CoulombFriction([2.0]).torque([[-0.5], [0.0], [3.0]]).ravel()
+    array([-2.,  0.,  2.])
+    """
+
+    kinds: ClassVar[tuple[str, ...]] = ("Fc",)
+    Fc: Array
+
+    def __init__(self, Fc: ArrayLike) -> None:
+        self._set(Fc=Fc)
+
+    def _terms(self, v: Array) -> tuple[Array, ...]:
+        return (np.sign(v),)
+
+
+@dataclass(frozen=True, slots=True, init=False, eq=False)
+class TorqueOffset(JointFriction):
+    """Constant torque, as of friction that differs by direction or of an amplifier.
+
+    Examples
+    --------
+    >>> TorqueOffset([2.0]).torque([-0.5])
+    array([2.])
+    """
+
+    kinds: ClassVar[tuple[str, ...]] = ("offset",)
+    offset: Array
+
+    def __init__(self, offset: ArrayLike) -> None:
+        self._set(offset=offset)
+
+    def _terms(self, v: Array) -> tuple[Array, ...]:
+        return (np.ones_like(v),)
+
+
+@dataclass(frozen=True, slots=True, init=False, eq=False)
+class AsymmetricFriction(JointFriction):
+    """Coulomb and viscous friction that differ by direction.
+
+    ``tau = Fvp v + Fcp`` for v > 0, ``tau = Fvn v - Fcn`` for v < 0: positive numbers dissipate in
+    both directions.
+
+    Examples
+    --------
+    >>> gears = AsymmetricFriction(Fvp=[1.0], Fcp=[2.0], Fvn=[3.0], Fcn=[4.0])
+    >>> gears.torque([[1.0], [-1.0]]).ravel()
+    array([ 3., -7.])
+    """
+
+    kinds: ClassVar[tuple[str, ...]] = ("Fvp", "Fcp", "Fvn", "Fcn")
+    Fvp: Array
+    Fcp: Array
+    Fvn: Array
+    Fcn: Array
+
+    def __init__(self, Fvp: ArrayLike, Fcp: ArrayLike, Fvn: ArrayLike, Fcn: ArrayLike) -> None:
+        self._set(Fvp=Fvp, Fcp=Fcp, Fvn=Fvn, Fcn=Fcn)
+
+    def _terms(self, v: Array) -> tuple[Array, ...]:
+        forth, back = np.maximum(v, 0.0), np.minimum(v, 0.0)
+        return forth, np.sign(forth), back, np.sign(back)
+
+
+@dataclass(frozen=True, slots=True, init=False, eq=False)
+class StribeckFriction(JointFriction):
+    """Stribeck friction: decreases from the static value with the velocity.
+
+    ``tau = Fv v + (Fc + (Fs - Fc) exp(-|v / vs|^exponent)) sign(v)``, linear in Fv, Fc and Fs for
+    given ``vs`` and ``exponent``.
+
+    Parameters
+    ----------
+    Fv, Fc, Fs : array_like, shape (n,)
+        Viscous, Coulomb and static friction, ``Fv >= 0`` and ``Fs >= Fc >= 0``.
+    vs : array_like, shape (n,)
+        Stribeck velocity, positive, rad/s or m/s.
+    exponent : array_like, shape (n,), optional
+        Positive, default 2 for every joint.
+
+    Examples
+    --------
+    >>> slide = StribeckFriction(Fv=[0.0], Fc=[1.0], Fs=[1.5], vs=[0.01])
+    >>> slide.torque([[1e-9], [1.0]]).ravel()
+    array([1.5, 1. ])
+    """
+
+    kinds: ClassVar[tuple[str, ...]] = ("Fv", "Fc", "Fs")
+    Fv: Array
+    Fc: Array
+    Fs: Array
+    vs: Array
+    exponent: Array
+
+    def __init__(
+        self,
+        Fv: ArrayLike,
+        Fc: ArrayLike,
+        Fs: ArrayLike,
+        vs: ArrayLike,
+        exponent: ArrayLike | None = None,
+    ) -> None:
+        power = np.full(np.shape(vs), 2.0) if exponent is None else exponent
+        self._set(Fv=Fv, Fc=Fc, Fs=Fs, vs=vs, exponent=power)
+        for name in ("vs", "exponent"):
+            if ((values := getattr(self, name)) <= 0.0).any():
+                raise InvalidValueError(f"{name}: expected positive numbers, got {values.min()}.")
+        for name in ("Fv", "Fc"):
+            for j in np.flatnonzero(getattr(self, name) < 0.0)[:1]:
+                raise InvalidValueError(
+                    f"{name}: friction of joint {j + 1} is negative ({getattr(self, name)[j]:g}) "
+                    "and would drive it; take ViscousFriction or CoulombFriction for any numbers."
+                )
+        for j in np.flatnonzero(self.Fs < self.Fc)[:1]:
+            raise InvalidValueError(
+                f"Fs: static friction of joint {j + 1} ({self.Fs[j]:g}) is less than its Coulomb "
+                f"friction Fc ({self.Fc[j]:g}); exchange them if they are in the wrong order."
+            )
+
+    def _terms(self, v: Array) -> tuple[Array, ...]:
+        with np.errstate(over="ignore", under="ignore"):  # zero far above vs
+            fallen = np.exp(-((np.abs(v) / self.vs) ** self.exponent))
+        sign = np.sign(v)
+        return v, (1.0 - fallen) * sign, fallen * sign
+
+
+@dataclass(frozen=True, slots=True, init=False, eq=False)
+class LoadFriction(Rebuilt):
+    """Load-dependent dry friction of gears, ``tau = Fl |load| sign(v)``.
+
+    The load is the torque that the gears carry. It depends on positions and accelerations, so that
+    this is not a `Friction`. P. Hamon, M. Gautier and P. Garrec, "Dynamic identification of robots
+    with a dry friction model depending on load and velocity", IEEE/RSJ IROS 2010, (9).
+
+    Examples
+    --------
+    >>> LoadFriction([0.1]).under_load([[-2.0], [3.0]], [[50.0], [-40.0]]).ravel()
+    array([-5.,  4.])
+    """
+
+    Fl: Array
+
+    def __init__(self, Fl: ArrayLike) -> None:
+        values = as_floats(Fl, "Fl")
+        if values.ndim != 1:
+            raise ShapeError(f"Fl: expected one number for each joint, got shape {values.shape}.")
+        object.__setattr__(self, "Fl", read_only(values))
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return self.Fl.size
+
+    def under_load(self, v: ArrayLike, load: ArrayLike) -> Array:
+        """Torque that the joints need to overcome friction at velocities and loads (..., n)."""
+        carried = np.abs(as_vector(load, self.n, "load"))
+        return self.Fl * carried * np.sign(as_vector(v, self.n, "v"))
