@@ -1,4 +1,4 @@
-"""Simulation: the motion that follows from torques, and what the torques of a motion are made of.
+"""Simulation: the motion under given torques, and the parts of the torques of a motion.
 
 Seed book sections 1.5 and 1.5.1. `simulate` integrates the direct dynamic model with SciPy's
 adaptive integrators; dry friction sticks and slips at events. Nothing of SciPy is imported before
@@ -6,9 +6,14 @@ the first call.
 """
 
 from .dynamics_map import DynamicsMap, dynamics_map
-from .result import Simulation
+from .result import (
+    Integrator,
+    Simulation,
+    SimulationEvent,
+    SimulationEventKind,
+    SimulationStatus,
+)
 from .simulate import simulate
-from .status import Integrator, SimulationEvent, SimulationEventKind, SimulationStatus
 from .torque_parts import TorqueParts, simulated_torque_parts, torque_parts
 
 __all__ = [

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
-from operator import index
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_exact, as_vector, read_only
+from .._arrays import Array, Rebuilt, as_exact, as_vector, read_only
 from ..dynamics import gravity_torque, mass_matrix
 from ..errors import InvalidValueError, ShapeError
 from ..geometry import PRISMATIC
@@ -18,8 +17,8 @@ from ..model import RobotModel, check_model
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class DynamicsMap:
-    """Mass matrix and gravity torques over a grid of configurations; drawn by ``viz``.
+class DynamicsMap(Rebuilt):
+    """Mass matrix and gravity torques over a grid of configurations. Read-only.
 
     Parameters
     ----------
@@ -57,17 +56,13 @@ class DynamicsMap:
 
     @property
     def coupling(self) -> Array:
-        """How strongly joints move each other, from -1 to 1, shape (..., n, n).
+        """Inertial coupling ``M_ij / sqrt(M_ii M_jj)``, from -1 to 1, shape (..., n, n).
 
-        ``M_ij / sqrt(M_ii M_jj)``, which does not depend on units: 0 where the acceleration of one
-        joint takes no torque of the other, NaN where a joint moves no inertia.
+        It does not depend on units; NaN where a joint moves no inertia.
         """
         diagonal = np.einsum("...ii->...i", self.mass)
         size = np.sqrt(np.where(diagonal > 0.0, diagonal, np.nan))
         return self.mass / (size[..., :, None] * size[..., None, :])
-
-    def __reduce__(self) -> tuple[Any, ...]:  # rebuilt, so that a copy is read-only as well
-        return type(self), tuple(getattr(self, field.name) for field in fields(self))
 
 
 def dynamics_map(
@@ -78,7 +73,7 @@ def dynamics_map(
     samples: int | Sequence[int] | None = None,
     drive: bool = True,
 ) -> DynamicsMap:
-    """Mass matrix and gravity torques while one or two joints go through a range.
+    """Mass matrix and gravity torques over a range of one or two joints.
 
     Parameters
     ----------
@@ -118,12 +113,17 @@ def dynamics_map(
     ((3, 4, 6, 6), (3, 4, 6))
     """
     check_model(model)
-    chosen = _joints(joints, model.n)
-    k = len(chosen)
-    base = np.zeros(model.n) if q is None else as_exact(q, (model.n,), "q")
-    if ranges is None:
-        ends = np.array([_range(model, j) for j in chosen])
-    else:
+    chosen = np.atleast_1d(np.asarray(joints))
+    k, n = chosen.size, model.n
+    if chosen.dtype.kind not in "iu" or chosen.ndim != 1 or len(set(chosen.tolist())) != k or k > 2:
+        raise InvalidValueError(
+            f"joints: expected one or two different joints, got {joints!r:.60}."
+        )
+    if not k or chosen.min() < 0 or chosen.max() >= n:
+        raise InvalidValueError(f"joints: expected numbers from 0 to {n - 1}, got {joints!r:.60}.")
+    base = np.zeros(n) if q is None else as_exact(q, (n,), "q")
+    ends = np.array([_range(model, j) for j in chosen])
+    if ranges is not None:
         ends = as_vector(ranges, 2, "ranges")
         if ends.shape not in ((k, 2), (2,) if k == 1 else (k, 2)):
             raise ShapeError(f"ranges: expected shape ({k}, 2), got {ends.shape}.")
@@ -132,32 +132,15 @@ def dynamics_map(
         raise InvalidValueError(f"ranges: expected ascending ends, got {ends.tolist()}.")
     counts = _samples(samples, k)
     values = [np.linspace(a, b, count) for (a, b), count in zip(ends, counts, strict=True)]
-    grid = np.empty((*counts, model.n))
-    grid[:] = base
+    grid = np.broadcast_to(base, (*counts, n)).copy()
     for j, column in zip(chosen, np.meshgrid(*values, indexing="ij"), strict=True):
         grid[..., j] = column
-    return DynamicsMap(
-        model, chosen, tuple(values), base, mass_matrix(model, grid, drive),
-        gravity_torque(model, grid),
-    )  # fmt: skip
-
-
-def _joints(joints: Any, n: int) -> tuple[int, ...]:
-    try:
-        given = [joints] if np.ndim(joints) == 0 else list(joints)
-        chosen = tuple(index(j) for j in given)
-    except TypeError:
-        chosen = ()
-    if not 1 <= len(chosen) <= 2 or len(set(chosen)) < len(chosen):
-        raise InvalidValueError(
-            f"joints: expected one or two different joints, got {joints!r:.60}."
-        )
-    if min(chosen) < 0 or max(chosen) >= n:
-        raise InvalidValueError(f"joints: expected numbers from 0 to {n - 1}, got {joints!r:.60}.")
-    return chosen
+    mass, gravity = mass_matrix(model, grid, drive), gravity_torque(model, grid)
+    return DynamicsMap(model, tuple(chosen.tolist()), tuple(values), base, mass, gravity)
 
 
 def _range(model: RobotModel, j: int) -> tuple[float, float]:
+    """Limits of a joint, or a whole turn (a metre) where it has none."""
     lower, upper = float(model.lower[j]), float(model.upper[j])
     if np.isfinite(lower) and np.isfinite(upper) and lower < upper:
         return lower, upper
@@ -165,13 +148,8 @@ def _range(model: RobotModel, j: int) -> tuple[float, float]:
     return (0.0, 1.0) if prismatic else (-np.pi, np.pi)
 
 
-def _samples(samples: Any, k: int) -> tuple[int, ...]:
-    given: Any = (181 if k == 1 else 61) if samples is None else samples
-    try:
-        counts = tuple(index(x) for x in ([given] * k if np.ndim(given) == 0 else given))
-    except TypeError:
-        counts = ()
-    if len(counts) != k or min(counts) < 2:
-        many = "a whole number" if k == 1 else f"{k} whole numbers"
-        raise InvalidValueError(f"samples: expected {many} from 2, got {samples!r:.60}.")
-    return counts
+def _samples(samples: Any, k: int) -> list[int]:
+    counts = np.asarray((181 if k == 1 else 61) if samples is None else samples)
+    if counts.dtype.kind not in "iu" or counts.shape not in ((), (k,)) or counts.min() < 2:
+        raise InvalidValueError(f"samples: expected {k} whole numbers from 2, got {samples!r:.60}.")
+    return np.broadcast_to(counts, (k,)).tolist()

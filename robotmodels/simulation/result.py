@@ -1,24 +1,109 @@
-"""What a simulation returns: the motion, what loads it, and its balance of energy."""
+"""Result of a simulation: motion, loads, energy balance, events and status."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any
+from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import Array
+from .._arrays import Array, Rebuilt
+from .._outcomes import Outcome
 from ..model import RobotModel
-from .status import SimulationEvent, SimulationStatus
 
-_RESTS = 1e-6  # of the potential energy: an arm that moves less of it is taken to be at rest
-_LEAST = 1e-9  # J: drifts are measured against no less
+_RESTS = 1e-6  # least scale of drifts, relative to the potential energy
+_LEAST = 1e-9  # J: least scale of drifts
+
+
+class SimulationStatus(Outcome):
+    """Outcome of a simulation; fits int8. The motion until then is given for every status.
+
+    Examples
+    --------
+    >>> SimulationStatus.FINISHED.sentence
+    'The motion was followed to its end.'
+    """
+
+    FINISHED = 0, "The motion was followed to its end."
+    LIMIT_REACHED = 1, "A joint reached one of its limits, where the motion was to be stopped."
+    NOT_CONVERGED = 2, "The allowed evaluations of the model were used up before the end."
+    STEP_TOO_SMALL = (
+        3,
+        "The steps became too small to go on: the motion grows without bound, or the torques jump.",
+    )
+    SINGULAR = 4, "The mass matrix became singular: the accelerations are not unique."
+    CHATTERING = 5, "Joints stick and slip again at the same instant without end."
+
+
+class Integrator(Enum):
+    """Integrators of SciPy.
+
+    ``DOP853`` and ``RK45`` are explicit Runge-Kutta methods of order 8 and 5; ``RADAU`` (order 5)
+    and ``BDF`` (order 1 to 5) are implicit, for stiff models: springs in the control, narrow
+    smoothing of dry friction, large viscous friction on small inertia.
+
+    Examples
+    --------
+    >>> Integrator("Radau")
+    <Integrator.RADAU: 'Radau'>
+    """
+
+    DOP853 = "DOP853"
+    RK45 = "RK45"
+    RADAU = "Radau"
+    BDF = "BDF"
+
+
+class SimulationEventKind(Outcome):
+    """Kinds of events of a simulation.
+
+    Examples
+    --------
+    >>> SimulationEventKind.STUCK.sentence
+    'comes to rest and sticks'
+    """
+
+    STUCK = 0, "comes to rest and sticks"
+    BROKE_AWAY = 1, "breaks away"
+    REVERSED = 2, "reverses without sticking"
+    LIMIT = 3, "reaches a limit"
+
+
+@dataclass(frozen=True, slots=True)
+class SimulationEvent:
+    """Event of a joint or a motor shaft.
+
+    Parameters
+    ----------
+    kind : SimulationEventKind
+        Kind.
+    t : float
+        Time, s.
+    joint : int
+        Column of q, from 0; for a coupled motor, the motor's joint.
+    motor : bool
+        Whether it concerns the shaft of a motor that several joints turn, see `Transmission`.
+
+    Examples
+    --------
+    >>> print(SimulationEvent(SimulationEventKind.STUCK, 0.25, 1))
+    0.25 s: joint 2 comes to rest and sticks
+    """
+
+    kind: SimulationEventKind
+    t: float
+    joint: int
+    motor: bool = False
+
+    def __str__(self) -> str:
+        what = "the shaft of motor" if self.motor else "joint"
+        return f"{self.t:.6g} s: {what} {self.joint + 1} {self.kind.sentence}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Simulation:
-    """A motion that follows from torques, with everything that is needed to check it.
+class Simulation(Rebuilt):
+    """Simulated motion of a robot. Read-only.
 
     At every sample ``M a + C v + g + offset + friction + J^T wrench = tau``.
 
@@ -33,23 +118,23 @@ class Simulation:
     tau : ndarray, shape (N, n)
         Torques of the control, N m or N.
     friction : ndarray, shape (N, n)
-        Torques that friction takes up, viscous and dry together, without the drives' offsets. Of a
-        joint that sticks it is what holds it.
+        Torques of viscous and dry friction, without the drives' offsets; for a joint that sticks,
+        the reaction that holds it.
     sticking : ndarray of bool, shape (N, n)
         Joints that dry friction holds at rest.
     kinetic, potential : ndarray, shape (N,)
         Energies, J; rotors included.
     control_work, friction_work, wrench_work : ndarray, shape (N,)
-        Work since the start that the control did, that friction and the drives' offsets took, and
-        that the tool did on the environment, J.
+        Work since the start, J: of the control, on friction and the drives' offsets, and of the
+        tool on the environment.
     drive : bool
         Whether the model's drives took part.
     events : tuple of SimulationEvent
         Stick, slip and limits, in the order of time.
     status : SimulationStatus
-        How it ended.
+        Why it ended.
     evaluations : int
-        How often the model was evaluated.
+        Number of evaluations of the model.
     steps : int
         Steps of the integrator.
 
@@ -104,12 +189,12 @@ class Simulation:
 
     @property
     def energy(self) -> Array:
-        """Kinetic and potential energy together, J, shape (N,)."""
+        """Kinetic plus potential energy, J, shape (N,)."""
         return self.kinetic + self.potential
 
     @property
     def drift(self) -> Array:
-        """What the balance of energy has lost (-) or won (+) since the start, J, shape (N,).
+        """Error of the energy balance since the start, J, shape (N,).
 
         ``kinetic + potential - control work + friction work + wrench work``, less its value at
         the start: zero but for the errors of the integration.
@@ -119,26 +204,17 @@ class Simulation:
 
     @property
     def energy_turnover(self) -> float:
-        """Largest amount of energy that was moved, J.
-
-        The largest of the kinetic energy, the change of the potential energy and the works of
-        control, friction and tool, at any sample.
-        """
-        parts = (
-            np.abs(self.kinetic), np.abs(self.potential - self.potential[0]),
-            np.abs(self.control_work), np.abs(self.friction_work), np.abs(self.wrench_work),
-        )  # fmt: skip
-        return max(float(part.max()) for part in parts)
+        """Largest of kinetic energy, change of potential energy and works at any sample, J."""
+        works = self.control_work, self.friction_work, self.wrench_work
+        parts = self.kinetic, self.potential - self.potential[0], *works
+        return max(float(np.abs(part).max()) for part in parts)
 
     @property
     def relative_drift(self) -> float:
-        """Largest drift, relative to the energy that was moved.
+        """Largest drift, relative to the energy turnover.
 
-        Its scale is `energy_turnover`, but at least a millionth of the largest potential energy
-        (where the arm hardly moves, the drift is a rounding error of that energy) and at least
-        1e-9 J (a thousand times the default absolute tolerance of a step). An arm that stays at
-        rest has so a relative drift of zero, or next to it, and not the ratio of two rounding
-        errors.
+        The turnover counts at least a millionth of the largest potential energy and 1e-9 J, so
+        that the value of an arm at rest is not the ratio of two rounding errors.
         """
         floor = max(_RESTS * float(np.abs(self.potential).max()), _LEAST)
         return float(np.abs(self.drift).max()) / max(self.energy_turnover, floor)
@@ -148,23 +224,14 @@ class Simulation:
         """Total drift per second of simulated time, W."""
         return float(self.drift[-1]) / self.duration if self.duration > 0.0 else 0.0
 
-    def __reduce__(self) -> tuple[Any, ...]:  # rebuilt, so that a copy is read-only as well
-        return type(self), tuple(getattr(self, field.name) for field in fields(self))
-
     def __str__(self) -> str:
         lines = [
-            f"{self.model.name}: {self.duration:.6g} s in {_counted(self.steps, 'step')}, "
-            f"{_counted(self.evaluations, 'evaluation')} of the model",
+            f"{self.model.name}: {self.duration:.6g} s, steps: {self.steps}, evaluations of the "
+            f"model: {self.evaluations}",
             self.reason,
             f"energy drift {self.drift[-1]:.2g} J, {self.drift_rate:.2g} W, "
-            f"{self.relative_drift:.2g} of the energy moved",
+            f"{self.relative_drift:.2g} of the energy turnover",
+            *map(str, self.events[:10]),
         ]
-        shown = self.events[:10]
-        lines += [str(event) for event in shown]
-        if len(self.events) > len(shown):
-            lines.append(f"and {_counted(len(self.events) - len(shown), 'more event')}")
-        return "\n".join(lines)
-
-
-def _counted(number: int, what: str) -> str:
-    return f"{number} {what}" if number == 1 else f"{number} {what}s"
+        more = len(self.events) - 10
+        return "\n".join([*lines, f"more events: {more}"] if more > 0 else lines)

@@ -4,24 +4,22 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from operator import index
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_floats
+from .._arrays import Array, as_exact, as_floats, as_reals, as_vector
+from .._choices import chosen
 from ..drive import check_all_or_none
 from ..dynamics import ddm, kinetic_energy, mass_matrix, potential_energy
 from ..errors import InertiaError, InvalidValueError, ShapeError
 from ..friction import Friction, check_friction
 from ..model import RobotModel, check_model
-from .dry_friction import DryFriction, check_dissipates, dry_friction
-from .forces import Forces
-from .inputs import Law, as_law, as_positive, as_state, as_times
-from .loop import Options, follow
-from .result import Simulation
-from .status import Integrator
+from .dry_friction import check_dissipates, dry_friction
+from .integration import Integration, Options
+from .motion import Law, Motion
+from .result import Integrator, Simulation
 
 _LOG = logging.getLogger(__name__)
 _FINEST = 100 * float(np.finfo(np.float64).eps)
@@ -31,9 +29,9 @@ def simulate(
     model: RobotModel,
     q0: ArrayLike,
     v0: ArrayLike,
-    control: Law | ArrayLike | None = None,
+    control: Callable[..., ArrayLike] | ArrayLike | None = None,
     t: ArrayLike = 1.0,
-    wrench: Law | ArrayLike | None = None,
+    wrench: Callable[..., ArrayLike] | ArrayLike | None = None,
     *,
     drive: bool = True,
     friction: Friction | None = None,
@@ -47,13 +45,13 @@ def simulate(
     max_evaluations: int | None = None,
     progress: bool | Callable[[float], None] = False,
 ) -> Simulation:
-    """Motion of a robot under torques: the direct dynamic model integrated over time.
+    """Simulate a robot under torques: integrate the direct dynamic model over time.
 
     The integrator takes steps as large as the tolerances allow. Dry friction (Fc of the drives, Fcm
     of coupled motors, jumps at rest of a friction model) is exact: a part that comes to rest is
     held as long as the torque on it stays within its breakaway torques (by 1e-9 of them), and each
     change is an event at which the integration starts anew. Energies and works are integrated
-    along, so that the drift of their balance tells the error of the integration.
+    along: the drift of their balance measures the error of the integration.
 
     Parameters
     ----------
@@ -65,26 +63,25 @@ def simulate(
         Torques, N m or N: a function of (t, q, v), constant ones, or rows for the N times ``t``,
         linear between them. Default none: the arm falls freely.
     t : array_like
-        A duration in seconds, the samples then being the steps of the integrator; or ascending
-        times (N,) of the samples, the first one the start.
+        A duration in seconds, with samples at the steps of the integrator; or ascending times (N,)
+        of the samples, the first one the start.
     wrench : callable, or array_like of shape (6,) or (N, 6), optional
-        What the tool exerts on the environment, see `idm`; given as ``control``.
+        Wrench of the tool on the environment, see `idm`; given as ``control``.
     drive : bool
         Whether rotor inertia, friction and offsets of the model's drives take part.
     friction : Friction, optional
-        A friction model that acts besides them, see `robotmodels.friction`. Each joint's torque
-        depends on its own velocity.
+        A friction model in addition, see `robotmodels.friction`. Each joint's torque depends on its
+        own velocity.
     smoothing : array_like, scalar or shape (n,), optional
-        Velocities w (rad/s or m/s) of a simpler model without events: ``tanh(v / w)`` in the place
-        of ``sign(v)``. Joints then creep where they should stick, and narrow widths are stiff
-        (take ``method="Radau"``).
+        Velocities w (rad/s or m/s) of a simpler model without events: ``tanh(v / w)`` instead of
+        ``sign(v)``. Joints then creep where they should stick, and narrow widths are stiff (take
+        ``method="Radau"``).
     stop_at_limits : bool
-        Whether the simulation ends where a joint reaches a limit of its table; joints with infinite
-        limits go on. Otherwise limits are not looked at.
+        Whether the simulation ends where a joint reaches a finite limit of its table. Otherwise
+        limits are ignored.
     breaks : array_like, shape (K,)
         Times at which ``control`` or ``wrench`` jump, such as the instants of a sampled controller:
-        the integration starts anew there. A law's value at a break belongs to the time after it;
-        breaks before the start and after the end do not matter.
+        the integration starts anew there. The value at a break belongs to the time after it.
     method : Integrator or str
         Explicit ``DOP853`` (default) and ``RK45``, implicit ``Radau`` and ``BDF``.
     rtol, atol : float
@@ -92,29 +89,25 @@ def simulate(
     max_step : float
         Longest step, s, for laws with short pulses that are no ``breaks``.
     max_evaluations : int, optional
-        The simulation ends, with a status that says so, when the model has been evaluated so often.
-        Default 100 000, and 10 000 for each second and 200 for each break or row of ``control``:
-        free motion of an arm needs about 1000 a second, torques in a wrong unit (joints at
-        thousands of turns a second) end within seconds instead of hours.
+        Evaluations of the model after which the simulation ends with a status. Default 100 000, and
+        10 000 for each second and 200 for each break or row of ``control``; free motion of an arm
+        needs about 1000 a second.
     progress : bool or callable
         A function of the fraction done, called for about every hundredth; True logs it.
 
     Returns
     -------
     Simulation
-        The motion, its loads and energies, and a status that says how it ended.
+        The motion, its loads and energies, and the status.
 
     Raises
     ------
-    SingularMassMatrixError
-        A joint moves no inertia at the start.
-    InertiaError
-        The mass matrix is not positive definite at the start; the links that no body is are named.
+    SingularMassMatrixError, InertiaError
+        A mass matrix that is singular or not positive definite at the start.
     ShapeError, InvalidValueError
         Arguments or answers of ``control`` and ``wrench`` of the wrong shape, with NaN or infinity;
-        laws that do not take (t, q, v); a start outside the limits, or limits asked for that no
-        joint has; a start so fast that its energy is
-        no finite number; dry friction that is negative; joints that mimic others.
+        a start outside the limits, or so fast that its energy is not finite; limits requested that
+        no joint has; negative dry friction; joints that mimic others.
 
     References
     ----------
@@ -131,76 +124,139 @@ def simulate(
     check_model(model)
     check_all_or_none(drive)
     n = model.n
-    q, v = as_state(q0, n, "q0"), as_state(v0, n, "v0")
-    start, end, times = as_times(t)
-    law, knots = as_law(control, n, times, "control")
-    tool, tool_knots = as_law(wrench, 6, times, "wrench")
+    q, v = _state(q0, n, "q0"), _state(v0, n, "v0")
+    start, end, times = _times(t)
+    law, knots = _law(control, n, times, "control")
+    tool, tool_knots = _law(wrench, 6, times, "wrench")
     if friction is not None:
         check_friction(friction, n)
-    width = _width(smoothing, n)
-    cuts = _cuts(start, end, as_floats(breaks, "breaks"), np.r_[knots, tool_knots])
+    width = None if smoothing is None else _positive(smoothing, "smoothing", (n,))
+    if (jumps := as_floats(breaks, "breaks")).ndim != 1:
+        raise ShapeError(f"breaks: expected times of shape (K,), got {jumps.shape}.")
+    inside = sorted(x for x in {*jumps, *knots, *tool_knots} if start < x < end)
+    cuts = [(float(x), x in jumps) for x in (start, *inside, end)]
+    if max_evaluations is None:  # default: a few seconds of computing time
+        max_evaluations = int(min(100_000 + 1e4 * (end - start) + 200 * len(cuts), 2**62))
     options = Options(
-        _method(method),
-        _tolerance(rtol),
-        as_positive(atol, "atol"),
-        as_positive(max_step, "max_step", infinite=True),
-        _usual_count(end - start, len(cuts))
-        if max_evaluations is None
-        else _count(max_evaluations),
-        _progress(progress),
+        chosen(Integrator, method, "method"),
+        float(_positive(rtol, "rtol", least=_FINEST)),
+        float(_positive(atol, "atol")),
+        float(_positive(max_step, "max_step")),
+        int(_positive(max_evaluations, "max_evaluations", least=1)),
+        (lambda done: _LOG.info("simulated %.0f %%", 100.0 * done))
+        if progress is True
+        else progress or None,
     )
     limits = _limits(model, q) if stop_at_limits else None
-    _check_start(model, q, v, drive)
     dry = dry_friction(model, drive, friction)
     if width is None:
         check_dissipates(dry)
-        _check_definite(model, q, drive, dry)
-    forces = Forces(model, law, tool, drive, friction, dry, width)
-    with np.errstate(over="ignore", invalid="ignore"):  # a motion without bound ends as a status
-        path = follow(forces, q, v, cuts, times, limits, options)
-    columns = [np.array(column) for column in zip(*path.rows, strict=True)]
-    positions, velocities, accelerations, torques, taken, held, works = columns
+    _check_start(model, q, v, drive, width is None and dry.lower.size > 0)
+    motion = Motion(model, law, tool, drive, friction, dry, width)
+    run = Integration(motion, times, limits, options)
+    with np.errstate(over="ignore", invalid="ignore"):  # an unbounded motion is a status
+        run.follow(q, v, cuts)
+    q, v, a, tau, taken, held, works = (np.array(x) for x in zip(*run.rows, strict=True))
     return Simulation(
         model=model,
-        t=np.array(path.t),
-        q=positions,
-        v=velocities,
-        a=accelerations,
-        tau=torques,
+        t=np.array(run.t),
+        q=q,
+        v=v,
+        a=a,
+        tau=tau,
         friction=taken,
         sticking=held,
-        kinetic=kinetic_energy(model, positions, velocities, drive),
-        potential=potential_energy(model, positions),
+        kinetic=kinetic_energy(model, q, v, drive),
+        potential=potential_energy(model, q),
         control_work=works[:, 0].copy(),
         friction_work=works[:, 1].copy(),
         wrench_work=works[:, 2].copy(),
         drive=bool(drive),
-        events=tuple(path.events),
-        status=path.status,
-        evaluations=forces.evaluations,
-        steps=path.steps,
+        events=tuple(run.events),
+        status=run.status,
+        evaluations=motion.evaluations,
+        steps=run.steps,
     )
 
 
-def _cuts(start: float, end: float, breaks: Array, knots: Array) -> list[tuple[float, bool]]:
-    """Start, jumps and kinks inside, end; and whether laws jump there."""
-    if breaks.ndim != 1:
-        raise ShapeError(f"breaks: expected times of shape (K,), got {breaks.shape}.")
-    jumps = set(breaks.tolist())
-    inside = sorted(x for x in jumps | set(knots.tolist()) if start < x < end)
-    return [(x, x in jumps) for x in (start, *inside, end)]
+def _law(law: Any, size: int, t: Array | None, name: str) -> tuple[Law | None, Array]:
+    """Function (t, q, v) -> (size,) of a function, constant values or rows; times of its kinks."""
+    none = np.empty(0)
+    if law is None:
+        return None, none
+    if callable(law):
+        return _checked(law, size, name), none
+    values = as_floats(law, name).copy()
+    if values.shape == (size,):
+        return lambda time, q, v: values, none
+    if t is None or values.shape != (len(t), size):
+        rows = " (rows need the times t)" if t is None else f" or ({len(t)}, {size})"
+        raise ShapeError(
+            f"{name}: expected a function {name}(t, q, v) -> ({size},), or an array of shape "
+            f"({size},){rows}, got shape {values.shape}."
+        )
+    columns = list(values.T.copy())
+    return lambda time, q, v: np.array([np.interp(time, t, x) for x in columns]), t[1:-1]
+
+
+def _checked(law: Callable[..., Any], size: int, name: str) -> Law:
+    """User function with checks of its values."""
+
+    def value(t: float, q: Array, v: Array) -> Array:
+        try:
+            answer = law(t, q.copy(), v.copy())
+        except Exception as error:
+            error.add_note(f"Raised by {name}(t, q, v) at t = {t:.9g} s.")
+            raise
+        return as_exact(answer, (size,), f"{name}(t, q, v) at t = {t:.9g} s")
+
+    return value
+
+
+def _times(t: ArrayLike) -> tuple[float, float, Array | None]:
+    """Start, end, and the times of the samples if the caller gave them. Shapes: -> times (N,)."""
+    times = as_floats(t, "t")
+    if times.ndim == 0 and times >= 0.0:
+        return 0.0, float(times), None
+    if times.ndim != 1 or not times.size:
+        raise ShapeError(
+            f"t: expected a duration from 0, or times of shape (N,), N from 1, got {t!r:.60}."
+        )
+    for k in np.flatnonzero(times[1:] <= times[:-1])[:1]:
+        raise InvalidValueError(
+            f"t: expected ascending times, got {times[k]} s and then {times[k + 1]} s at [{k + 1}]."
+        )
+    return float(times[0]), float(times[-1]), times.copy()
+
+
+def _state(values: ArrayLike, n: int, name: str) -> Array:
+    array = as_vector(values, n, name)
+    if array.ndim != 1:
+        raise ShapeError(
+            f"{name}: expected one state of shape ({n},), got {array.shape}; simulate several "
+            "one after the other."
+        )
+    return array.copy()
+
+
+def _positive(value: Any, name: str, shape: tuple[int, ...] = (), least: float = 1e-300) -> Array:
+    """One positive number, or an array of this shape; infinity is allowed."""
+    array = as_reals(value, name)
+    if array.shape not in ((), shape):
+        raise ShapeError(f"{name}: expected one number or shape {shape}, got {array.shape}.")
+    if not (array >= least).all():
+        raise InvalidValueError(f"{name}: expected at least {least:.2g}, got {value!r:.60}.")
+    return np.broadcast_to(array, shape).copy()
 
 
 def _limits(model: RobotModel, q: Array) -> tuple[Array, Array]:
     lower, upper = model.lower, model.upper
     if lower.size and not (np.isfinite(lower) | np.isfinite(upper)).any():
         raise InvalidValueError(
-            f"stop_at_limits: no joint of {model.name!r} has a finite limit, so that nothing would "
-            "stop; give the table lower= and upper=, or leave stop_at_limits out."
+            f"stop_at_limits: no joint of {model.name!r} has a finite limit; give the table "
+            "lower= and upper=, or leave stop_at_limits out."
         )
-    out = np.flatnonzero((q < lower) | (q > upper))
-    if out.size:
-        j = int(out[0])
+    for j in np.flatnonzero((q < lower) | (q > upper))[:1]:
         raise InvalidValueError(
             f"q0: joint {j + 1} starts at {q[j]:.6g}, outside its limits [{lower[j]:.6g}, "
             f"{upper[j]:.6g}]; start inside, or leave stop_at_limits out."
@@ -208,93 +264,26 @@ def _limits(model: RobotModel, q: Array) -> tuple[Array, Array]:
     return lower, upper
 
 
-def _check_start(model: RobotModel, q: Array, v: Array, drive: bool) -> None:
-    """Refuse what has no one finite acceleration to begin with."""
+def _check_start(model: RobotModel, q: Array, v: Array, drive: bool, dry: bool) -> None:
+    """Raise for a start without unique finite accelerations."""
     with np.errstate(over="ignore", invalid="ignore"):
-        # names joints without inertia, links of no body and singular couplings
+        # its errors name joints without inertia, unphysical links and singular couplings
         a = ddm(model, q, v, np.zeros(model.n), drive=drive)
         finite = np.isfinite(a).all() and np.isfinite(kinetic_energy(model, q, v, drive))
     if model.transmission is not None and not model.transmission.is_invertible:
         raise InvalidValueError(
-            f"model: {model.name!r} has joints that mimic others, which simulate does not follow: "
-            "its joints would come apart. Integrate ddm, which keeps them together, or simulate "
-            "independent joints with model.with_transmission(None)."
+            f"model: {model.name!r} has joints that mimic others, which simulate does not support: "
+            "their coupling would not hold. Integrate ddm, or simulate independent joints with "
+            "model.with_transmission(None)."
         )
     if not finite:
         raise InvalidValueError(
-            f"v0: the accelerations or the energy of velocities up to {np.abs(v).max():.3g} are no "
-            "finite numbers; start slower."
+            f"v0: the accelerations or the energy of velocities up to {np.abs(v).max():.3g} are "
+            "not finite; start slower."
         )
-
-
-def _width(smoothing: ArrayLike | None, n: int) -> Array | None:
-    if smoothing is None:
-        return None
-    width = as_floats(smoothing, "smoothing")
-    if width.shape not in ((), (n,)):
-        raise ShapeError(f"smoothing: expected one velocity, or shape ({n},), got {width.shape}.")
-    if (width <= 0.0).any():
-        raise InvalidValueError(
-            f"smoothing: expected positive velocities, got {width.min()}; leave it out for dry "
-            "friction that sticks."
-        )
-    return np.broadcast_to(width, (n,)).copy()
-
-
-def _check_definite(model: RobotModel, q: Array, drive: bool, dry: DryFriction) -> None:
-    if not dry.count:
-        return
-    try:
-        np.linalg.cholesky(mass_matrix(model, q, drive))
-    except np.linalg.LinAlgError:
+    if dry and not np.linalg.eigvalsh(mass_matrix(model, q, drive))[0] > 0.0:
         raise InertiaError(
             f"the mass matrix of {model.name!r} is not positive definite at q0, so that it is not "
             "defined which joints dry friction holds. Repair the inertial parameters "
-            "(InertialParameters.consistency()), or give a smoothing width."
-        ) from None
-
-
-def _method(method: Any) -> Integrator:
-    try:
-        return Integrator(method)
-    except ValueError:
-        known = ", ".join(repr(each.value) for each in Integrator)
-        raise InvalidValueError(f"method: expected one of {known}, got {method!r:.60}.") from None
-
-
-def _tolerance(rtol: Any) -> float:
-    value = as_positive(rtol, "rtol")
-    if value < _FINEST:
-        raise InvalidValueError(
-            f"rtol: steps cannot be told to be better than {_FINEST:.2g} (rounding), got {value}."
+            "(InertialParameters.consistency()), or give smoothing=."
         )
-    return value
-
-
-def _usual_count(duration: float, cuts: int) -> int:
-    """Evaluations that ordinary motion does not need, of a few seconds of computing time."""
-    return int(min(100_000 + 1e4 * duration + 200 * cuts, 2**62))
-
-
-def _count(value: Any) -> int:
-    try:
-        number = index(value)
-    except TypeError:
-        number = 0
-    if isinstance(value, bool) or number < 1:
-        raise InvalidValueError(
-            f"max_evaluations: expected a whole number from 1, got {value!r:.60}."
-        )
-    return number
-
-
-def _progress(progress: Any) -> Any:
-    if progress is False or progress is None:
-        return None
-    if progress is True:
-        return lambda done: _LOG.info("simulated %.0f %%", 100.0 * done)
-    if callable(progress):
-        return progress
-    raise InvalidValueError(
-        f"progress: expected a flag or a function of the fraction done, got {progress!r:.60}."
-    )

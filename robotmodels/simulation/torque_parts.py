@@ -1,14 +1,13 @@
-"""The torques of a motion, split into what they are for."""
+"""Decomposition of the torques of a motion into inertia, Coriolis, gravity, friction and wrench."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_vector, batch_shape, read_only
+from .._arrays import Array, Rebuilt, as_vector, batch_shape, read_only
 from ..drive import check_all_or_none
 from ..dynamics import gravity_torque, idm
 from ..errors import InvalidValueError
@@ -19,8 +18,8 @@ from .result import Simulation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TorqueParts:
-    """Joint torques of a motion by their causes; together they are the torques of `idm`.
+class TorqueParts(Rebuilt):
+    """Parts of the joint torques of a motion; their sum is the torque of `idm`. Read-only.
 
     Parameters
     ----------
@@ -58,9 +57,6 @@ class TorqueParts:
         """Sum of all parts, shape (..., n)."""
         return self.inertia + self.coriolis + self.gravity + self.friction + self.wrench
 
-    def __reduce__(self) -> tuple[Any, ...]:  # rebuilt, so that a copy is read-only as well
-        return type(self), tuple(getattr(self, field.name) for field in fields(self))
-
 
 def torque_parts(
     model: RobotModel,
@@ -78,11 +74,10 @@ def torque_parts(
     model : RobotModel
         The robot, n joints.
     q, v, a : array_like, shape (..., n)
-        Joint variables (rad or m), velocities and accelerations; the leading axes broadcast. At
-        least one sample: unlike `idm`, which maps an empty batch to an empty one, this tells about
-        a motion.
+        Joint variables (rad or m), velocities and accelerations of at least one sample; the
+        leading axes broadcast.
     wrench : array_like, shape (..., 6), optional
-        What the tool exerts on the environment, see `idm`.
+        Wrench of the tool on the environment, see `idm`.
     drive : bool
         Whether rotor inertia, friction and offsets of the model's drives are included.
     friction : Friction, optional
@@ -123,7 +118,7 @@ def torque_parts(
     q, v, a = (np.broadcast_to(x, (*batch, n)) for x in (q, v, a))
     still = np.zeros((*batch, n))
     gravity = gravity_torque(model, q)
-    # each from a call of its own, so that none loses digits beside a larger one
+    # separate calls, so that no part loses digits to a larger one
     weightless = model.with_gravity(np.zeros(3))
     inertia = idm(weightless, q, still, a, drive=False)
     coriolis = idm(weightless, q, v, still, drive=False)
@@ -141,22 +136,22 @@ def torque_parts(
 
 
 def simulated_torque_parts(simulation: Simulation) -> TorqueParts:
-    """Split the torques of a simulated motion, with the friction that held joints at rest.
+    """Split the torques of a simulated motion, including friction of sticking joints.
 
     Parameters
     ----------
     simulation : Simulation
-        Of N samples.
+        Result of `simulate`, N samples.
 
     Returns
     -------
     TorqueParts
-        Arrays (N, n); the total are the torques of the control.
+        Arrays (N, n); the total is the torque of the control.
 
     Raises
     ------
     InvalidValueError
-        No simulation.
+        Not a simulation.
 
     References
     ----------
@@ -171,18 +166,14 @@ def simulated_torque_parts(simulation: Simulation) -> TorqueParts:
     True
     """
     if not isinstance(simulation, Simulation):
-        raise InvalidValueError(
-            f"simulation: expected a Simulation, as simulate(...) gives it, got "
-            f"{type(simulation).__name__}."
-        )
+        got = type(simulation).__name__
+        raise InvalidValueError(f"simulation: expected the result of simulate(...), got {got}.")
     model = simulation.model
     parts = torque_parts(model, simulation.q, simulation.v, simulation.a, drive=simulation.drive)
     offset = model.drive.offset if simulation.drive else np.zeros(model.n)
     friction = simulation.friction + offset
-    rigid = parts.inertia + parts.coriolis + parts.gravity
-    # what the tool exerts was a law of time: it is what is left
-    left = simulation.tau - rigid - friction
-    sizes = [simulation.tau, parts.inertia, parts.coriolis, parts.gravity, friction]
-    size = np.sum([np.abs(part) for part in sizes], axis=0)
-    left[np.abs(left) <= 1e-9 * size] = 0.0
-    return TorqueParts(parts.inertia, parts.coriolis, parts.gravity, friction, left)
+    rest = parts.inertia, parts.coriolis, parts.gravity, friction
+    # the tool's torque was a law of time: the remainder, but for rounding
+    tool = simulation.tau - np.sum(rest, axis=0)
+    tool[np.abs(tool) <= 1e-9 * np.sum(np.abs([simulation.tau, *rest]), axis=0)] = 0.0
+    return TorqueParts(*rest, tool)

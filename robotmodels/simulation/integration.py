@@ -1,0 +1,309 @@
+"""Event-driven integration: steps of SciPy's integrators, and event location in each step.
+
+`solve_ivp` looks for events at the ends of its steps only, and gives no partial result when a
+budget is used up; here each step is searched between its ends as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from math import nextafter
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .._arrays import Array
+from ..errors import RobotModelsError
+from .dry_friction import Mode
+from .motion import Motion
+from .result import Integrator, SimulationEvent, SimulationEventKind, SimulationStatus
+
+_LOOKS = 8  # number of evaluations of the event functions per step
+_FLAT = 1e-7  # relative to the time between looks: accuracy of a minimum
+_SLACK = 1e-9  # relative to the breakaway torque: ignored excess
+_ROUNDING = 1e-13
+_SAME_INSTANT = 64 * float(np.finfo(np.float64).eps)
+
+
+class Options(NamedTuple):
+    """Settings of the integration."""
+
+    method: Integrator
+    rtol: float
+    atol: float
+    max_step: float
+    max_evaluations: int
+    progress: Callable[[float], None] | None
+
+
+class Event(NamedTuple):
+    """An event: a part at rest, a joint at a limit (>= 0), or a breakaway (both -1)."""
+
+    t: float
+    part: int = -1
+    limit: int = -1
+
+
+class Integration:
+    """One simulation: its state, mode, samples and events."""
+
+    def __init__(
+        self,
+        motion: Motion,
+        times: Array | None,
+        limits: tuple[Array, Array] | None,
+        options: Options,
+    ) -> None:
+        self.motion, self.dry, self.times, self.options = motion, motion.dry, times, options
+        n = motion.n
+        # limits as rows of G y + c, which is negative beyond them
+        G, c = np.zeros((2 * n, 2 * n)), np.full(2 * n, np.inf)
+        G[:n, :n], G[n:, :n] = -np.eye(n), np.eye(n)
+        if limits is not None:
+            c = np.concatenate([limits[1], -limits[0]])
+        self._limits = np.flatnonzero(np.isfinite(c))
+        self._G, self._c = G[self._limits], c[self._limits]
+        self.t: list[float] = []
+        self.rows: list[tuple[Array, ...]] = []
+        self.events: list[SimulationEvent] = []
+        self.status = SimulationStatus.FINISHED
+        self.steps, self._repeats, self._last_event, self._reported = 0, 0, -np.inf, 0.0
+        self._step: float | None = None
+
+    def follow(self, q: Array, v: Array, cuts: Sequence[tuple[float, bool]]) -> None:
+        """Integrate between times at which laws have kinks or (True) jumps. Shapes: q, v (n,)."""
+        t, y = cuts[0][0], np.concatenate([q, v, np.zeros(4)])
+        self._start, self._end = t, cuts[-1][0]
+        for (begin, jumped), (end, jumps) in pairwise(cuts):
+            if self.status:
+                break
+            # laws are evaluated before a jump only, until it is reached
+            self.motion.latest = max(nextafter(end, begin), begin) if jumps else np.inf
+            if not self.t:
+                y = self._decide(t, y, first=True)
+                self._sample(t, y)
+            elif jumped:
+                y = self._decide(t, y)
+            while t < end and not self.status:
+                t, y, event = self._smooth(t, y, end)
+                if event is not None:
+                    y = self._change(t, y, event)
+        if t > self.t[-1]:
+            self._sample(t, y)
+
+    def _smooth(self, t: float, y: Array, bound: float) -> tuple[float, Array, Event | None]:
+        """Integrate without changes of mode, to a time, an event or a failure."""
+        import scipy.integrate
+
+        options, motion = self.options, self.motion
+        make: Any = getattr(scipy.integrate, options.method.value)
+        first = None if self._step is None else min(self._step, bound - t)
+        watched = bool(self.dry.lower.size or self._limits.size)
+        try:
+            solver = make(motion.derivative, t, y, bound, rtol=options.rtol, atol=options.atol,
+                          max_step=options.max_step, first_step=first)  # fmt: skip
+            failed = not np.isfinite(solver.h_abs)
+            while solver.status == "running" and not failed:
+                if motion.evaluations >= options.max_evaluations:
+                    self.status = SimulationStatus.NOT_CONVERGED
+                    break
+                before = float(solver.h_abs)
+                solver.step()
+                if solver.status == "failed":
+                    failed = True
+                    break
+                motion.singular = False
+                self.steps += 1
+                old, t, y = t, float(solver.t), solver.y
+                # the last step was shortened by the bound, the next need not be
+                self._step = max(before, float(solver.h_abs))
+                dense: Any = solver.dense_output() if watched or self._next <= t else None
+                event = self._first_event(old, t, dense) if watched else None
+                if event is not None:
+                    t, y, self._step = event.t, dense(event.t), None
+                while (time := self._next) <= t:
+                    self._sample(time, y if time == t else dense(time))
+                if self.times is None and t > self.t[-1]:
+                    self._sample(t, y)
+                self._report(t)
+                if event is not None:
+                    return t, np.array(y), event
+        except ValueError as error:
+            # NaN in the matrices of an implicit integrator; laws add notes to errors
+            if isinstance(error, RobotModelsError) or hasattr(error, "__notes__"):
+                raise
+            failed = True
+        if failed:
+            singular = motion.singular
+            self.status = SimulationStatus.SINGULAR if singular else SimulationStatus.STEP_TOO_SMALL
+        return t, np.array(y), None
+
+    @property
+    def _next(self) -> float:
+        """Time of the next sample that was requested."""
+        if self.times is None or len(self.t) == len(self.times):
+            return np.inf
+        return float(self.times[len(self.t)])
+
+    def _sample(self, t: float, y: Array) -> None:
+        n, motion = self.motion.n, self.motion
+        q, v = y[:n].copy(), y[n : 2 * n].copy()
+        at = motion.at(t, q, v)
+        held = motion.joint_signs == 0.0
+        self.t.append(t)
+        self.rows.append(
+            (q, v, at.a, at.tau.copy(), at.friction, held, y[2 * n : 2 * n + 3].copy())
+        )
+
+    def _report(self, t: float) -> None:
+        done = (t - self._start) / (self._end - self._start)
+        if self.options.progress is not None and (done >= self._reported + 0.01 or done >= 1.0):
+            self._reported = done
+            self.options.progress(done)
+
+    def _first_event(self, t_old: float, t_new: float, dense: Any) -> Event | None:
+        """The first event inside a step: speeds and limits are linear in y, margins are not."""
+        n, mode = self.motion.n, self.motion.mode
+        ts = np.linspace(t_old, t_new, _LOOKS + 1)
+        slip = np.flatnonzero(mode.signs)
+        speeds = self.dry.rates[slip] * mode.signs[slip, None]
+        G = np.concatenate([np.hstack([np.zeros((slip.size, n)), speeds]), self._G])
+        c = np.concatenate([np.zeros(slip.size), self._c])
+        Y = dense(ts)[: 2 * n]
+        values = G @ Y + c[:, None]
+        least = -_ROUNDING * (1.0 + (np.abs(G) @ np.abs(Y)).max(axis=1, initial=0.0))
+        event: Event | None = None
+        for i in np.flatnonzero(values.min(axis=1) - np.ptp(values, axis=1) < least).tolist():
+
+            def distance(s: float, i: int = i) -> float:
+                return float(G[i] @ dense(s)[: 2 * n] + c[i])
+
+            root = first_below(distance, ts, values[i], float(least[i]))
+            if root is not None and (event is None or root[0] < event.t):
+                limit = int(self._limits[i - slip.size]) % n if i >= slip.size else -1
+                event = Event(root[0], -1 if limit >= 0 else int(slip[i]), limit)
+        if mode.stuck.size:
+            # torques after the first event belong to another mode
+            seen = ts if event is None else ts[: max(int(np.searchsorted(ts, event.t)) + 1, 2)]
+
+            def margin(s: float) -> float:
+                y = np.ascontiguousarray(dense(s))
+                reaction = self.motion.at(s, y[:n], y[n : 2 * n]).reaction
+                return self.dry.margin(mode, reaction)
+
+            values = np.array([margin(float(s)) for s in seen])
+            root = first_below(margin, seen, values, -_SLACK, -_ROUNDING)
+            if root is not None:
+                # past the root, so that a jump of the torques is included
+                t = first_negative(margin, *root, -_ROUNDING)
+                event = Event(t) if event is None or t < event.t else event
+        return event
+
+    def _change(self, t: float, y: Array, event: Event) -> Array:
+        """State after an event, which changes the mode or ends the simulation."""
+        if event.limit >= 0:
+            self.events.append(SimulationEvent(SimulationEventKind.LIMIT, t, event.limit))
+            self.status = SimulationStatus.LIMIT_REACHED
+            return y
+        near = t - self._last_event <= _SAME_INSTANT * max(abs(t), self._end - self._start)
+        self._repeats, self._last_event = self._repeats + 1 if near else 0, t
+        n, mode = self.motion.n, self.motion.mode
+        if self._repeats > 10 + 4 * self.dry.lower.size:
+            self.status = SimulationStatus.CHATTERING
+        elif event.part >= 0:
+            signs = mode.signs.copy()
+            signs[event.part] = 0.0
+            return self._decide(t, _at_rest(y, self.dry.mode(signs)))
+        else:
+            try:
+                balance = self.motion.balance(t, y[:n].copy(), y[n : 2 * n].copy())
+                self._set(t, self.dry.loosened(mode, *balance))
+            except np.linalg.LinAlgError:
+                self.status = SimulationStatus.SINGULAR
+        return y
+
+    def _decide(self, t: float, y: Array, first: bool = False) -> Array:
+        """State with the mode that follows from the torques at this instant."""
+        if not self.dry.lower.size:
+            return y
+        n, old = self.motion.n, self.motion.mode
+        q, v = y[:n].copy(), y[n : 2 * n].copy()
+        self.motion.set_mode(self.dry.mode(self.dry.signs(v)))  # no dry friction at rest
+        try:
+            mode = self.dry.decided(v, *self.motion.balance(t, q, v))
+        except np.linalg.LinAlgError:
+            self.status, mode = SimulationStatus.SINGULAR, old
+        self.motion.set_mode(old)
+        self._set(t, mode, record=not first)
+        return _at_rest(y, mode)
+
+    def _set(self, t: float, mode: Mode, record: bool = True) -> None:
+        """Set a mode, and record the changes as events."""
+        kinds, old = SimulationEventKind, self.motion.mode.signs
+        for i in np.flatnonzero(old != mode.signs) if record else ():
+            kind = kinds.STUCK if mode.signs[i] == 0.0 else kinds.REVERSED
+            kind = kinds.BROKE_AWAY if old[i] == 0.0 else kind
+            joint, motor = int(self.dry.joint[i]), bool(self.dry.motor[i])
+            self.events.append(SimulationEvent(kind, t, joint, motor))
+        self.motion.set_mode(mode)
+
+
+def _at_rest(y: Array, mode: Mode) -> Array:
+    """State whose sticking parts are exactly at rest."""
+    n, y = len(mode.free), y.copy()
+    if mode.stuck.size:
+        y[n : 2 * n] = mode.free @ (mode.free.T @ y[n : 2 * n])
+    return y
+
+
+def first_below(
+    g: Callable[[float], float], ts: Array, values: Array, least: float, zero: float = 0.0
+) -> tuple[float, float] | None:
+    """Last root of a function before its first value below a level, and a time below it.
+
+    Shapes: ts, values (K,), of smooth functions with up to one minimum between looks.
+    """
+    from scipy.optimize import fminbound
+
+    for k, value in enumerate(values):
+        low, beside = float(ts[k]), slice(max(k - 1, 0), k + 2)
+        if k == 0 or value >= least:
+            # lower bound between looks: the difference of adjacent values
+            depth = float(np.ptp(values[max(k - 2, 0) : k + 3]))
+            if not least <= value == values[beside].min() or value - depth >= least:
+                continue
+            left, *_, right = ts[beside].tolist()
+            low = float(np.asarray(fminbound(g, left, right, xtol=_FLAT * (right - left))))
+            if g(low) >= least:
+                continue
+        return _root(g, float(ts[max(int(np.searchsorted(ts, low)) - 1, 0)]), low, zero), low
+    return None
+
+
+def _root(g: Callable[[float], float], left: float, low: float, zero: float) -> float:
+    """Where a function passes zero before `low`, or the left end if it is not above zero there."""
+    from scipy.optimize import brentq
+
+    def above(t: float) -> float:
+        return g(t) - zero
+
+    high = low
+    # after an event it starts at zero and may increase before it decreases
+    for x in (left, *(left + (low - left) * 0.5**k for k in range(1, 41))):
+        if above(x) > 0.0:
+            if above(high) >= 0.0:
+                return high
+            root: Any = brentq(above, x, high, xtol=1e-15 * max(1.0, abs(low)))
+            return float(root)
+        high = x if x > left else high
+    return left
+
+
+def first_negative(g: Callable[[float], float], t: float, end: float, zero: float) -> float:
+    """First representable time at or after a root at which a function is negative."""
+    step = float(np.spacing(max(abs(t), abs(end))))
+    while t < end and g(t) >= zero:
+        t = min(t + step, end)
+        step *= 2.0
+    return t
