@@ -1,21 +1,27 @@
-"""Base inertial parameters: the fewest that give the same torques, by rules and by numbers.
+"""Base inertial parameters (the minimal set), by symbolic rules and numerically.
 
 Seed book section 1.5.3.
 """
 
+from .bodies import uniform_bodies
+from .bounds import CenterOfMassBox, CenterOfMassEllipsoid
+from .consistent import fit_consistent, standard_parameters
 from .find import base_parameters
-from .prior import uniform_bodies
+from .physical import PhysicalStatus
 from .result import BaseMethod, BaseParameters
-from .standard import PhysicalStatus, StandardParameters, standard_parameters
+from .standard import StandardParameters
 from .values_table import BaseValues
 
 __all__ = [
     "BaseMethod",
     "BaseParameters",
     "BaseValues",
+    "CenterOfMassBox",
+    "CenterOfMassEllipsoid",
     "PhysicalStatus",
     "StandardParameters",
     "base_parameters",
+    "fit_consistent",
     "standard_parameters",
     "uniform_bodies",
 ]

@@ -1,4 +1,4 @@
-"""Axes that are aligned but for a small angle, and the robot with these axes aligned."""
+"""Alignment of nearly parallel or perpendicular axes."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from ..geometry import FIXED, REVOLUTE
 from ..model import RobotModel
 
 ALIGNED = 1e-5
-"""Angle in radians up to which axes count as aligned; a right angle "1.5708" is 3.7e-6 off."""
-_ROUNDING, _NEAR = 1e-13, 1e-4
-_GREATEST = 1e-2  # of a tolerance
-_LONGEST_LIST = 4
-_STEPS = 6
-_LEAST = 1e-3
-"""Part of the largest below which a singular value of the derivatives of an axis is none."""
+"""Default alignment tolerance, rad; a right angle written as 1.5708 has an error of 3.7e-6."""
+_ROUNDING, _NEAR, _GREATEST = 1e-13, 1e-4, 1e-2
+"""Angles, rad: rounding, largest angle of a noted pair, and largest tolerance."""
+_LISTED, _STEPS = 4, 6
+"""Pairs listed in a note, and Newton steps."""
+_RANK = 1e-3
+"""Rank tolerance of the derivatives of an axis: relative singular value."""
 
 
 class AlignedRobot(NamedTuple):
-    """A robot whose nearly aligned axes are aligned."""
+    """Robot with aligned axes, and the pairs concerned."""
 
     model: RobotModel
     notes: tuple[str, ...]
@@ -47,7 +47,7 @@ def aligned_robot(model: RobotModel, angle: float) -> AlignedRobot:
         known = len(pairs.taken)
         z = pairs.aligned(name, R[:, 2], around)
         if z is not None:
-            if not _turn_axis(row, z):  # beta and alpha both near a right angle: no small change
+            if not _turn_axis(row, z):  # beta and alpha both near a right angle: no small rotation
                 pairs.apart += pairs.taken[known:]
                 del pairs.taken[known:]
             R = _rotation(*row)
@@ -73,25 +73,26 @@ def aligned_robot(model: RobotModel, angle: float) -> AlignedRobot:
 
 @dataclass
 class _Pairs:
-    """Pairs of directions that are nearly aligned, with the angle that they are off."""
+    """Pairs of nearly aligned directions, with their angular errors."""
 
     angle: float
     taken: list[tuple[float, str]] = field(default_factory=list)
     apart: list[tuple[float, str]] = field(default_factory=list)
 
     def aligned(self, name: str, u: Array, others: dict[str, Array]) -> Array | None:
-        """The nearest unit vector that is aligned with the others; None if it is the same."""
+        """Nearest unit vector aligned with the others; None if unchanged."""
         turned = False
         across: list[Array] = []
         along: list[Array] = []
         for other, e in others.items():
             cosine, sine = float(u @ e), float(np.linalg.norm(np.cross(u, e)))
-            for word, off, found in (
-                ("parallel", sine, along), ("perpendicular", abs(cosine), across)
-            ):  # fmt: skip
+            for word, off, directions in (
+                ("parallel", sine, along),
+                ("perpendicular", abs(cosine), across),
+            ):
                 pair = off, f"{name} and {other} {word} but for {off:.1e} rad"
                 if off <= self.angle:
-                    found.append(copysign(1.0, cosine) * e)
+                    directions.append(copysign(1.0, cosine) * e)
                     if off > _ROUNDING:
                         self.taken.append(pair)
                         turned = True
@@ -101,12 +102,12 @@ class _Pairs:
             return None
         if along:
             return along[0]
-        u = u - np.linalg.pinv(across, rcond=_LEAST) @ (across @ u)
+        u = u - np.linalg.pinv(across, rcond=_RANK) @ (across @ u)
         return u / np.linalg.norm(u)
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """A sentence about the pairs taken as aligned, and one about those that are not."""
+        """Sentences about the pairs treated as aligned, and the other nearly aligned ones."""
         out = []
         if self.taken:
             out.append(f"Treated as aligned: {_listed(self.taken)}.")
@@ -121,18 +122,18 @@ class _Pairs:
 
 
 def _turn_axis(row: Array, z: Array) -> bool:
-    """Change gamma, beta and alpha of a row by the least, so that its axis is z."""
+    """Smallest change of gamma, beta and alpha of a row such that its axis is z."""
     given = row.copy()
     for _ in range(_STEPS):
         gamma, beta, alpha, _ = row
         about_z, both = se3.rotation("z", gamma)[:3, :3], _rotation(gamma, beta, alpha)
         axes = np.stack(([0.0, 0.0, 1.0], about_z[:, 1], both[:, 0]))
         slopes = np.cross(axes, both[:, 2]).T
-        row[:3] += np.linalg.lstsq(slopes, z - both[:, 2], rcond=_LEAST)[0]
-    found = np.linalg.norm(z - _rotation(*row)[:, 2]) < _ROUNDING
-    if not found:
+        row[:3] += np.linalg.lstsq(slopes, z - both[:, 2], rcond=_RANK)[0]
+    aligned = np.linalg.norm(z - _rotation(*row)[:, 2]) < _ROUNDING
+    if not aligned:
         row[:] = given
-    return bool(found)
+    return bool(aligned)
 
 
 def _rotation(gamma: float, beta: float, alpha: float, theta: float = 0.0) -> Array:
@@ -141,8 +142,8 @@ def _rotation(gamma: float, beta: float, alpha: float, theta: float = 0.0) -> Ar
     return reduce(np.matmul, [se3.rotation(axis, float(angle))[:3, :3] for axis, angle in turns])
 
 
-def _listed(found: list[tuple[float, str]]) -> str:
-    found = sorted(found, key=lambda item: -item[0])
-    words = "; ".join(sentence for _, sentence in found[:_LONGEST_LIST])
-    more = len(found) - _LONGEST_LIST
+def _listed(pairs: list[tuple[float, str]]) -> str:
+    pairs = sorted(pairs, key=lambda item: -item[0])
+    words = "; ".join(sentence for _, sentence in pairs[:_LISTED])
+    more = len(pairs) - _LISTED
     return words + (f"; and {more} more" if more > 0 else "")

@@ -1,4 +1,4 @@
-"""What a base parameter stands for, term by term: coefficients in symbols of the table.
+"""Formulas of base parameters: regrouped terms with coefficients in symbols of the table.
 
 The rules are the same that give the numbers (`rules`), run on symbols: ``Dj``, ``RLj``, ``BLj`` for
 d, r, b of row j, cosines and sines of the angles that are no multiple of 30 or 45 degrees.
@@ -7,7 +7,7 @@ d, r, b of row j, cosines and sines of the angles that are no multiple of 30 or 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import pi
@@ -21,22 +21,21 @@ from ..drive import Drives
 from ..geometry import PRISMATIC, REVOLUTE
 from ..model import RobotModel
 from ..symbolic_dgm._angles import exact_turns
-from .gravity import loads_of
-from .restraint import EXACT, Turning, reach, restraints
+from .motion_span import EXACT, RotationRank, loads_of, motion_spans, reach
 from .rules import RowConstants, regrouped, rows_of_numbers
 
 _LONGEST = 40
-"""Operations in a coefficient beyond which its number tells more."""
+"""Largest number of operations in a printed symbolic coefficient."""
 
 _SHOWN = 1e-6
-"""Relative difference of a coefficient from its rule that the printed digits do not show."""
+"""Tolerance of a coefficient relative to its rule, below the printed digits."""
 
 _GREEK = {"G": r"\gamma", "B": r"\beta", "A": r"\alpha", "TH": r"\theta"}
 
 
 @dataclass(frozen=True, slots=True)
 class Term:
-    """A coefficient and the standard parameters that have it in common."""
+    """A coefficient and the standard parameters that share it."""
 
     coefficient: float
     text: str
@@ -53,7 +52,7 @@ class Formula:
 
     @property
     def is_regrouped(self) -> bool:
-        """Whether it stands for more than itself: then it is printed with an R."""
+        """Whether other parameters are regrouped into it; its name is printed with an R."""
         return sum(len(term.parameters) for term in self.terms) > 1
 
 
@@ -61,15 +60,7 @@ def numeric_formulas(
     names: Sequence[str], kept: NDArray[np.int64], matrix: Array
 ) -> tuple[Formula, ...]:
     """Formulas whose coefficients are numbers. Shapes: kept (b,), matrix (b, p)."""
-    out = []
-    for number, row in zip(kept, matrix, strict=True):
-        groups: dict[tuple[float, str, str], list[int]] = {}
-        for k in np.flatnonzero(row):
-            value = float(row[k])
-            shown, text = _number_text(value)
-            groups.setdefault((shown, text, text), []).append(int(k))
-        out.append(_formula(names, int(number), groups))
-    return tuple(out)
+    return _formulas(names, kept, matrix, {})
 
 
 def symbolic_formulas(
@@ -80,35 +71,49 @@ def symbolic_formulas(
     names: Sequence[str],
     tolerance: float = EXACT,
 ) -> tuple[Formula, ...]:
-    """Formulas whose coefficients are made of the symbols of the table.
+    """Formulas whose coefficients are made of the symbols of the table, where these are short.
 
     Shapes: kept (b,), matrix (b, p).
     """
     import sympy
 
     rows, directions, _ = _rows_of_symbols(model, tolerance)
-    found = regrouped(model, rows, directions, drive, tolerance)
+    terms = regrouped(model, rows, directions, drive, tolerance)
     ruled = regrouped(model, *rows_of_numbers(model, tolerance), drive, tolerance)
     printed: dict[Any, tuple[str, str]] = {}
+    texts: dict[tuple[int, int], tuple[str, str]] = {}
+    for number, row in zip(kept.tolist(), matrix, strict=True):
+        symbols, rule = terms.get(number, {}), ruled.get(number, {})
+        for k in np.flatnonzero(row).tolist():
+            formula = sympy.sympify(symbols.get(k, 0))
+            off = abs(rule.get(k, 0) - row[k]) > _SHOWN * abs(row[k])
+            if formula != 0 and not off and sympy.count_ops(formula) <= _LONGEST:
+                if formula not in printed:
+                    printed[formula] = _printed(formula)
+                texts[number, k] = printed[formula]
+    return _formulas(names, kept, matrix, texts)
+
+
+def _formulas(
+    names: Sequence[str],
+    kept: NDArray[np.int64],
+    matrix: Array,
+    texts: Mapping[tuple[int, int], tuple[str, str]],
+) -> tuple[Formula, ...]:
+    """Terms grouped by their coefficients, with texts for some of them, else numbers."""
     out = []
-    for number, row in zip(kept, matrix, strict=True):
-        symbols, rule = found.get(int(number), {}), ruled.get(int(number), {})
+    for number, row in zip(kept.tolist(), matrix, strict=True):
         groups: dict[tuple[float, str, str], list[int]] = {}
-        for k in np.flatnonzero(row):
-            value = float(row[k])
-            formula = sympy.sympify(symbols.get(int(k), 0))
-            off = abs(rule.get(int(k), 0) - value) > _SHOWN * abs(value)
-            if formula == 0 or off or sympy.count_ops(formula) > _LONGEST:
-                shown, text = _number_text(value)
-                groups.setdefault((shown, text, text), []).append(int(k))
-                continue
-            if formula not in printed:
-                printed[formula] = _printed(formula)
-            text, latex = printed[formula]
-            # terms of one symbol are one, also where rounding of the table sets them apart
-            same = next((key for key in groups if key[1:] == (text, latex)), None)
-            groups.setdefault(same or (value, text, latex), []).append(int(k))
-        out.append(_formula(names, int(number), groups))
+        for k in np.flatnonzero(row).tolist():
+            if (number, k) in texts:
+                text, latex = texts[number, k]
+                # one term per symbol, despite rounding of the table
+                same = next((key for key in groups if key[1:] == (text, latex)), None)
+                groups.setdefault(same or (float(row[k]), text, latex), []).append(k)
+            else:
+                shown, text = _number_text(float(row[k]))
+                groups.setdefault((shown, text, text), []).append(k)
+        out.append(_formula(names, number, groups))
     return tuple(out)
 
 
@@ -130,16 +135,16 @@ def constants_of(model: RobotModel, tolerance: float = EXACT) -> tuple[Constant,
 def _rows_of_symbols(
     model: RobotModel, tolerance: float
 ) -> tuple[list[RowConstants], list[Array], list[Constant]]:
-    """What `regrouped` takes, as formulas; motion of the joint itself is left out."""
+    """Arguments of `regrouped` as formulas, without the motion of the joint."""
     import sympy
 
-    table, found = model.table, restraints(model, tolerance)
+    table, spans = model.table, motion_spans(model, tolerance)
     symbols = _Symbols(tolerance, tolerance * reach(model))
     rows: list[RowConstants] = []
     directions: list[Array] = []
     weight = float(np.linalg.norm(model.gravity))
     for j, load in enumerate(loads_of(model, tolerance), start=1):
-        own, sigma = found[j], table.sigma[j - 1]
+        own, sigma = spans[j], table.sigma[j - 1]
         T = symbols.turned(2, table.gamma, "G", j) @ symbols.shifted(2, table.b, "BL", j)
         T = T @ symbols.turned(1, table.beta, "B", j) @ symbols.turned(0, table.alpha, "A", j)
         T = T @ symbols.shifted(0, table.d, "D", j)
@@ -151,7 +156,7 @@ def _rows_of_symbols(
         if sigma == PRISMATIC and load and abs(abs(load) - weight) <= tolerance * weight:
             pull = symbols.gravity(weight) * (1 if load > 0 else -1)
         rows.append(RowConstants(T[:3, :3], T[:3, 3], pull))
-        if sigma == REVOLUTE or own.turning is not Turning.ONE_DIRECTION:
+        if sigma == REVOLUTE or own.rotations is not RotationRank.ONE:
             e = np.array([sympy.Integer(round(float(c))) for c in own.direction], dtype=object)
         else:
             e = directions[table.antecedent[j - 1] - 1] @ T[:3, :3]
@@ -160,7 +165,7 @@ def _rows_of_symbols(
 
 
 class _Symbols:
-    """Elementary motions as matrices of symbols; values that are exact stay numbers."""
+    """Elementary motions as symbolic matrices; exact values remain numbers."""
 
     def __init__(self, angle: float, length: float) -> None:
         self.angle, self.length = angle, length
@@ -220,7 +225,7 @@ def _turns(angle: float, tolerance: float) -> Fraction | None:
 def _formula(
     names: Sequence[str], number: int, groups: dict[tuple[float, str, str], list[int]]
 ) -> Formula:
-    """Itself first, then what has the coefficient 1, then the rest by frame."""
+    """Order of terms: the parameter, those with the coefficient 1, the others by frame."""
 
     def order(k: int) -> tuple[int, int]:
         frame = int("".join(c for c in names[k] if c.isdigit()))

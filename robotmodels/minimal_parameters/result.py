@@ -1,9 +1,9 @@
-"""What `base_parameters` returns: the parameters that are kept and what each stands for."""
+"""Base parameters: kept parameters and the standard parameters regrouped into them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import Enum
 from functools import cached_property
 from types import MappingProxyType
@@ -16,18 +16,19 @@ from ..drive import Drives, drive_kinds
 from ..errors import InvalidValueError, ShapeError
 from ..estimation.columns import NOTHING
 from ..friction import Friction
+from ..geometry import PRISMATIC
 from ..latex_text import markdown
 from ..model import RobotModel, check_model
 from ..regressors import energy_parameter_names, parameter_names, parameter_vector
 from .alignment import aligned_robot
-from .belonging import differences
-from .formulas import Formula, numeric_formulas, symbolic_formulas
-from .printing import table_latex, table_text
+from .formulas import Formula, constants_of, numeric_formulas, symbolic_formulas
+from .printing import BaseTable, table_latex, table_text
+from .same_structure import structure_differences
 from .values_table import BaseValues, KeptNames, base_values
 
 
 class BaseMethod(Enum):
-    """How base parameters were found.
+    """Method that determined base parameters.
 
     Examples
     --------
@@ -41,7 +42,7 @@ class BaseMethod(Enum):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BaseParameters:
-    """The fewest inertial (and drive) parameters that give the same torques. Read-only, picklable.
+    """Minimal set of inertial (and drive) parameters of a robot. Read-only, picklable.
 
     Also called minimal, identifiable or barycentric parameters.
 
@@ -50,33 +51,32 @@ class BaseParameters:
     model : RobotModel
         The robot.
     drive : bool or collection of DriveKind or str
-        Which kinds of its drive parameters are among the p standard parameters; kept as a tuple of
+        Kinds of drive parameters among the p standard parameters; stored as a tuple of
         `DriveKind`, empty where there are none.
     kept : ndarray of int, shape (b,)
-        Which of them are kept, by number.
+        Numbers of the kept standard parameters.
     matrix : ndarray, shape (b, p)
         ``beta = matrix @ pi``: base parameters from standard parameters.
     method : BaseMethod
-        How they were found.
+        Method that determined them.
     gap : (float, float), optional
-        Of the numeric method: the least that a kept column has beyond those kept before it, and the
-        most that one has which is not kept, as parts of the longest column of all (parameters in
-        natural units, those of a robot of this size and unit mass). It is what decides: what is
-        below the tolerance is not kept. Far apart, the rank is beyond doubt; where they are not,
-        `notes` says which parameters are in doubt.
+        Rank gap of the numeric method: smallest residual norm of a kept column and largest of a
+        dropped one, relative to the longest column (parameters in natural units, those of a robot
+        of this size and unit mass); the tolerance is between. If the gap is small, `notes` names
+        the uncertain parameters.
     friction : Friction, optional
         A linear friction model whose parameters come after those of the drives.
     tolerance : float
-        Part of the largest torque that counts as nothing.
+        Part of the largest torque that counts as zero.
     notes : tuple of str
-        What is to be known of the result, in sentences: axes that are aligned only nearly, joints
-        that are constrained, a rank that is in doubt, a motion that shows little.
+        Findings: nearly aligned axes, constrained joints, an uncertain rank, a motion with little
+        excitation.
     neglected : tuple of str
-        Parameters that torques show, but with less than the tolerance, or only by the angles of
-        axes that were taken as aligned.
+        Parameters whose effect on the torques is below the tolerance, or only due to the angles of
+        axes treated as aligned.
     missed : float, optional
-        Largest torque that they miss on a motion that was not used to find them, as part of the
-        largest; of logged motion on its own samples. None where rules alone gave them.
+        Largest torque error on an independent motion, relative to the largest torque; for logged
+        motion on the same samples. None for symbolic rules alone.
     angle : float
         Angle in rad up to which axes were taken as parallel or perpendicular.
 
@@ -88,7 +88,7 @@ class BaseParameters:
     Notes
     -----
     Two results are compared in the torque, ``reduce(W) @ matrix``, and not by their matrices: where
-    a kept column hardly acts, its row of the matrix may be moved by much and no torque shows it.
+    a kept column has little effect, its row of the matrix may change much.
 
     Examples
     --------
@@ -137,42 +137,38 @@ class BaseParameters:
 
     @cached_property
     def no_effect(self) -> tuple[str, ...]:
-        """Standard parameters that no torque shows."""
+        """Standard parameters without effect on the torques."""
         shown = {*self.neglected}
         names = np.array(self.parameter_names)[~self.matrix.any(axis=0)].tolist()
         return tuple(name for name in names if name not in shown)
 
     @cached_property
     def alone(self) -> tuple[str, ...]:
-        """Standard parameters that are determined one by one."""
+        """Standard parameters that are identifiable one by one."""
         single = (self.matrix != 0).sum(axis=1) == 1
         return tuple(self.parameter_names[k] for k in self.kept[single])
 
     @cached_property
     def in_combination(self) -> tuple[str, ...]:
-        """Standard parameters that are determined only together with others."""
+        """Standard parameters that are identifiable only together with others."""
         apart = {*self.no_effect, *self.neglected, *self.alone}
         return tuple(name for name in self.parameter_names if name not in apart)
 
     @cached_property
     def regrouping(self) -> Mapping[str, Mapping[str, float]]:
-        """Of each kept parameter, the coefficients of all that it stands for, itself included.
-
-        By its standard name, ``ZZ1``, or as it is printed, ``ZZ1R``.
-        """
+        """Coefficients of standard parameters in each kept one, by name (``ZZ1`` or ``ZZ1R``)."""
         names = self.parameter_names
-        found = KeptNames(
+        coefficients = KeptNames(
             (name, MappingProxyType({names[k]: float(row[k]) for k in np.flatnonzero(row)}))
             for name, row in zip(self.names, self.matrix, strict=True)
         )
-        return MappingProxyType(found)
+        return MappingProxyType(coefficients)
 
     @cached_property
     def null_space(self) -> Array:
-        """Changes of the standard parameters that no torque shows, shape (p, p - b).
+        """Changes of the standard parameters without an effect on torques, shape (p, p - b).
 
-        One column for each parameter that is not kept: it changes by 1, and the kept ones make up
-        for it.
+        A column for each parameter that is not kept: it changes by 1, the kept ones compensate.
         """
         p = len(self.parameter_names)
         others = np.setdiff1d(np.arange(p), self.kept)
@@ -182,31 +178,7 @@ class BaseParameters:
         return read_only(changes)
 
     def reduce(self, W: ArrayLike) -> Array:
-        """The columns of a regressor that belong to the base parameters.
-
-        Parameters
-        ----------
-        W : array_like, shape (..., p)
-            Regressor with a column for each standard parameter, such as `torque_regressor` of
-            the same ``drive``.
-
-        Returns
-        -------
-        ndarray, shape (..., b)
-            ``reduce(W) @ values(model)`` equals ``W @ parameter_vector(model)``.
-
-        Raises
-        ------
-        ShapeError
-            Another number of columns.
-
-        Examples
-        --------
-        >>> from robotmodels.robots import load
-        >>> from robotmodels.minimal_parameters import base_parameters
-        >>> base_parameters(load("planar_2r"), drive=False).reduce(np.ones((5, 2, 20))).shape
-        (5, 2, 4)
-        """
+        """Columns (..., b) of a regressor (..., p) that belong to the base parameters."""
         W = as_floats(W, "W")
         p = len(self.parameter_names)
         if W.ndim < 1 or W.shape[-1] != p:
@@ -219,14 +191,13 @@ class BaseParameters:
         return np.ascontiguousarray(W[..., self.kept])
 
     def _energy_hint(self, columns: int) -> str:
-        """What is missing where a regressor has the columns of an energy."""
+        """Advice where a regressor has the columns of an energy."""
         energy = energy_parameter_names(self.model, self.drive)
-        if columns not in (len(energy), len(energy_parameter_names(self.model))):
-            return ""
         kinds = dict.fromkeys(
             name.rstrip("0123456789") for name in self.parameter_names if name not in energy
         )
-        if not kinds:
+        sizes = len(energy), len(energy_parameter_names(self.model))
+        if columns not in sizes or not kinds:
             return ""
         return (
             f" An energy has no columns of {', '.join(kinds)}: reduce it by base parameters without"
@@ -234,61 +205,12 @@ class BaseParameters:
         )
 
     def values(self, model: RobotModel) -> Array:
-        """Base parameters of a model's own standard parameters.
-
-        Parameters
-        ----------
-        model : RobotModel
-            A robot of the same structure.
-
-        Returns
-        -------
-        ndarray, shape (b,)
-            ``matrix @ parameter_vector(model)``.
-
-        Raises
-        ------
-        InvalidValueError
-            A robot with other base parameters: another structure, geometry, gravity or coupling.
-
-        Examples
-        --------
-        >>> from robotmodels.robots import load
-        >>> from robotmodels.minimal_parameters import base_parameters
-        >>> arm = load("planar_2r")
-        >>> base_parameters(arm).values(arm).shape
-        (9,)
-        """
+        """Base parameters (b,) of a model's standard parameters; raises for other structures."""
         self.check(model)
         return self.matrix @ parameter_vector(model, self.drive, self.friction)
 
     def value_table(self, values: RobotModel | ArrayLike) -> BaseValues:
-        """Names, values and units side by side.
-
-        Parameters
-        ----------
-        values : RobotModel or array_like, shape (b,)
-            A robot of the same structure, or values such as identified ones.
-
-        Returns
-        -------
-        BaseValues
-            A mapping of names to values that prints as a table.
-
-        Raises
-        ------
-        InvalidValueError, ShapeError
-            A robot with other base parameters; another number of values; NaN.
-
-        Examples
-        --------
-        >>> from robotmodels.robots import load
-        >>> from robotmodels.minimal_parameters import base_parameters
-        >>> arm = load("planar_2r")
-        >>> table = base_parameters(arm, drive=False).value_table([4.0, 1.0, 0.5, 0.0])
-        >>> table["ZZ1"], table["ZZ1R"]
-        (4.0, 4.0)
-        """
+        """Names, values and units side by side, of a robot or of values (b,)."""
         if isinstance(values, RobotModel):
             numbers = self.values(values)
         else:
@@ -296,67 +218,30 @@ class BaseParameters:
         return base_values(self.names, self.matrix, self.model.table.sigma, numbers)
 
     def belongs_to(self, model: RobotModel) -> bool:
-        """Whether a robot has these base parameters, with values of its own.
+        """Whether a robot has the same geometry, gravity in the base and coupled motors.
 
-        Parameters
-        ----------
-        model : RobotModel
-            A robot; its inertial and drive parameters, zeros of the joints, tool and names do not
-            matter.
-
-        Returns
-        -------
-        bool
-            Same frames and constants of the table, same gravity in the base, same coupled motors.
-
-        Examples
-        --------
-        >>> from robotmodels.robots import load
-        >>> from robotmodels.minimal_parameters import base_parameters
-        >>> base_parameters(load("rx90")).belongs_to(load("puma560"))
-        False
+        Inertial and drive parameters, zeros of the joints, tool and names do not matter.
         """
         check_model(model)
-        return not differences(self.model, model, self.drive)
+        return not structure_differences(self.model, model, self.drive)
 
     def check(self, model: RobotModel) -> None:
-        """Refuse a robot that has other base parameters.
-
-        Parameters
-        ----------
-        model : RobotModel
-            A robot.
-
-        Raises
-        ------
-        InvalidValueError
-            It does not have these base parameters, see `belongs_to`.
-
-        Examples
-        --------
-        >>> from robotmodels.robots import load
-        >>> from robotmodels.minimal_parameters import base_parameters
-        >>> base_parameters(load("rx90")).check(load("rx90"))
-        """
+        """Raise for a robot with other base parameters, see `belongs_to`."""
         check_model(model)
-        if found := differences(self.model, model, self.drive):
+        if differences := structure_differences(self.model, model, self.drive):
             raise InvalidValueError(
                 f"model: these are base parameters of {self.model.name!r}, and {model.name!r} has "
-                f"others: {'; '.join(found)}. Ask for those of the model itself."
+                f"others: {'; '.join(differences)}. Compute those of the model itself."
             )
 
     @cached_property
     def formulas(self) -> tuple[Formula, ...]:
-        """What each kept parameter stands for, term by term.
-
-        Of the symbolic method with the coefficients in symbols of the table, else in numbers.
-        """
-        if self.method is BaseMethod.SYMBOLIC:
-            model = aligned_robot(self.model, self.angle).model
-            return symbolic_formulas(
-                model, self.drive, self.kept, self.matrix, self.parameter_names, self.tolerance
-            )
-        return self.numbers
+        """The terms of each kept parameter; coefficients in symbols of the table, or in numbers."""
+        if self.method is BaseMethod.NUMERIC:
+            return self.numbers
+        model = aligned_robot(self.model, self.angle).model
+        names = self.parameter_names
+        return symbolic_formulas(model, self.drive, self.kept, self.matrix, names, self.tolerance)
 
     @cached_property
     def numbers(self) -> tuple[Formula, ...]:
@@ -366,12 +251,55 @@ class BaseParameters:
     @cached_property
     def text(self) -> str:
         """The table of the book, as text."""
-        return table_text(self)
+        return table_text(self._table)
 
     @cached_property
     def latex(self) -> str:
         """The same in LaTeX."""
-        return table_latex(self)
+        return table_latex(self._table)
+
+    @cached_property
+    def _table(self) -> BaseTable:
+        """Content of the table of the book."""
+        constants, rank, neglected = (), "", max(self.tolerance, self.angle)
+        if self.method is BaseMethod.SYMBOLIC:
+            model = aligned_robot(self.model, self.angle).model
+            constants = constants_of(model, self.tolerance)
+        if self.gap is not None:
+            rank = (
+                f"Rank {len(self)}: of the longest column, the least kept one has {self.gap[0]:.1e}"
+                f" beyond the others, what is not kept at most {self.gap[1]:.1e}."
+            )
+        return BaseTable(
+            f"{self.model.name}: {len(self)} base parameters of {len(self.parameter_names)} "
+            f"standard ones ({self.method.value})",
+            self.notes,
+            tuple(zip(self.formulas, self.numbers, strict=True)),
+            constants,
+            (
+                ("Alone, as they are", self.alone),
+                ("Without effect", self.no_effect),
+                (f"Neglected, about {neglected:.0e} of the largest torque or less", self.neglected),
+            ),
+            self._units(),
+            rank,
+        )
+
+    def _units(self) -> str:
+        """Units of the kinds of parameters that there are."""
+        slides = self.model.table.sigma[self.model.table.joint_rows] == PRISMATIC
+        units = ["XX to ZZ kg m^2, MX to MZ kg m, M kg"]
+        kinds = {kind.value for kind in drive_kinds(self.drive)}
+        forces = " and ".join(kind for kind in ("Fc", "offset") if kind in kinds)
+        for joints, mark, (inertia, viscous, force) in (
+            (~slides, "", ("kg m^2", "N m s/rad", "N m")),
+            (slides, "of prismatic joints ", ("kg", "N s/m", "N")),
+        ):
+            parts = [f"Ia {inertia}"] * ("Ia" in kinds) + [f"Fv {viscous}"] * ("Fv" in kinds)
+            parts += [f"{forces} {force}"] * bool(forces)
+            if joints.any() and parts:
+                units.append(mark + ", ".join(parts))
+        return "; ".join(units)
 
     def _repr_markdown_(self) -> str:
         return markdown(self.latex)
@@ -386,7 +314,4 @@ class BaseParameters:
         )
 
     def __reduce__(self) -> tuple[object, ...]:  # rebuilt, so that its arrays are read-only again
-        return type(self), (
-            self.model, self.drive, self.kept, self.matrix, self.method, self.gap, self.friction,
-            self.tolerance, self.notes, self.neglected, self.missed, self.angle,
-        )  # fmt: skip
+        return type(self), tuple(getattr(self, field.name) for field in fields(self))

@@ -1,4 +1,4 @@
-"""Base parameters by name: lookups that take printed names as well, and a table of values."""
+"""Base parameters by standard or printed name, and a table of values."""
 
 from __future__ import annotations
 
@@ -29,9 +29,7 @@ class KeptNames(dict[str, Any]):
             return self[plain]
         near = nearest_names(str(name), tuple(self))
         hint = f" Did you mean {', '.join(near)}?" if near else ""
-        raise KeyError(
-            f"No base parameter {name!r}.{hint} What is regrouped or without effect has none."
-        )
+        raise KeyError(f"No base parameter {name!r}.{hint} It may be regrouped or without effect.")
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -51,8 +49,8 @@ class BaseValues(Rebuilt, Mapping[str, float]):
 
     Examples
     --------
-    >>> found = BaseValues(("ZZ1",), ("ZZ1R",), [2.0], ("kg m^2",))
-    >>> found["ZZ1"], len(found)
+    >>> table = BaseValues(("ZZ1",), ("ZZ1R",), [2.0], ("kg m^2",))
+    >>> table["ZZ1"], len(table)
     (2.0, 1)
     """
 
@@ -74,11 +72,13 @@ class BaseValues(Rebuilt, Mapping[str, float]):
         return len(self.names)
 
     def __str__(self) -> str:
-        return boxed([
-            ("parameter", list(self.printed)),
-            ("value", [f"{x:.6g}" for x in self.numbers.tolist()]),
-            ("unit", list(self.units)),
-        ])  # fmt: skip
+        return boxed(
+            [
+                ("parameter", list(self.printed)),
+                ("value", [f"{x:.6g}" for x in self.numbers.tolist()]),
+                ("unit", list(self.units)),
+            ]
+        )
 
     def __repr__(self) -> str:
         return f"<BaseValues: {len(self)} base parameters>"

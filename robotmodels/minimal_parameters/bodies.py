@@ -1,4 +1,4 @@
-"""Bodies to start from where nothing is known: uniform solids along the links.
+"""Uniform bodies along the links, pseudo-inertia matrices, and the check of a prior.
 
 Source: P. Wensing, S. Kim and J.-J. Slotine, "Linear matrix inequalities for physically consistent
 inertial parameter identification", IEEE RA-L 3(1), 2018.
@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._arrays import Array
 from ..errors import InertiaError, InvalidValueError
@@ -17,13 +18,15 @@ from ..model import RobotModel, check_model
 from ..se3 import skew
 
 _SLENDERNESS = 0.08
-"""Radius of the solids relative to the reach of the robot."""
+"""Default radius of the bars, part of the summed lengths of the robot."""
+_SINGULAR = 1e-12
+"""Singularity tolerance of a pseudo-inertia: smallest eigenvalue relative to the largest."""
 
 
 def uniform_bodies(
     model: RobotModel, mass: float, radius: float | None = None
 ) -> InertialParameters:
-    """Uniform solids along the links: a prior for the parameters that no torque shows.
+    """Uniform solids along the links: a prior for parameters without effect on the torques.
 
     Each link is a round bar with spherical ends from the origin of its frame to those of the
     frames it carries, and to the tool at the tip; a sphere where it has no length. All have one
@@ -36,12 +39,12 @@ def uniform_bodies(
     mass : float
         Mass of all moving links together, kg.
     radius : float, optional
-        Of the bars, metres; default 0.08 of the summed lengths of the robot.
+        Radius of the bars, metres; default 0.08 of the summed lengths of the robot.
 
     Returns
     -------
     InertialParameters
-        Of f frames, physical.
+        Physical parameters of f frames.
 
     Raises
     ------
@@ -57,26 +60,21 @@ def uniform_bodies(
     """
     check_model(model)
     chain = model.chain
-    reach = float(np.linalg.norm(chain.position, axis=1).sum()) + float(
-        np.linalg.norm(model.tool[:3, 3])
-    )
-    thick = _SLENDERNESS * (reach if reach > 0 else 1.0) if radius is None else float(radius)
-    for name, value in (("mass", mass), ("radius", thick)):
-        if not (np.isfinite(value) and value > 0):
-            raise InvalidValueError(f"{name}: expected a positive number, got {value}.")
     ends: list[list[Array]] = [[] for _ in range(model.f + 1)]
     for k in range(model.f):
         ends[int(chain.antecedent[k])].append(chain.position[k])
     ends[model.tip].append(np.asarray(model.tool[:3, 3]))
+    reach = np.linalg.norm(chain.position, axis=1).sum() + np.linalg.norm(model.tool[:3, 3])
+    thick = _SLENDERNESS * float(reach or 1.0) if radius is None else float(radius)
+    for name, value in (("mass", mass), ("radius", thick)):
+        if not (np.isfinite(value) and value > 0):
+            raise InvalidValueError(f"{name}: expected a positive number, got {value}.")
     values = np.array([_solid(ends[j], thick) for j in range(1, model.f + 1)])
     return InertialParameters(values * (mass / values[:, 9].sum()))
 
 
 def pseudo_inertias(bodies: InertialParameters) -> Array:
-    """Pseudo-inertia matrices: positive definite for every body with extent in three directions.
-
-    Shapes: -> (f, 4, 4).
-    """
+    """Pseudo-inertia matrices, positive definite for bodies with extent. Shapes: -> (f, 4, 4)."""
     J = bodies.tensors
     P = np.zeros((bodies.f, 4, 4))
     half = 0.5 * np.trace(J, axis1=1, axis2=2)
@@ -87,33 +85,36 @@ def pseudo_inertias(bodies: InertialParameters) -> Array:
 
 
 def check_definite(bodies: InertialParameters, name: str, frames: Sequence[str] = ()) -> Array:
-    """Pseudo-inertias of bodies; refuse bodies without mass or extent. Shapes: -> (f, 4, 4)."""
+    """Pseudo-inertias of bodies; raise for bodies without mass or extent. Shapes: -> (f, 4, 4)."""
     P = pseudo_inertias(bodies)
-    values = np.linalg.eigvalsh(P)
-    bad = np.flatnonzero(values[:, 0] <= 1e-12 * np.maximum(values[:, -1], 1e-300))
+    bad = np.flatnonzero(~has_extent(bodies))
     if bad.size:
         j = int(bad[0])
         link = f"link {j + 1}" + (f" ({frames[j]})" if len(frames) > j else "")
         more = f" So are {bad.size - 1} more." if bad.size > 1 else ""
         raise InertiaError(
-            f"{name}: {link} is no body with mass and extent in three directions: "
-            f"{_wrong(bodies, j)}.{more} Pass "
+            f"{name}: {link} is not a body with mass and extent in three directions: "
+            f"{_defect(bodies, j)}.{more} Pass "
             f"{name}=uniform_bodies(model, mass=...), or a CAD model of every link."
         )
     return P
 
 
-def _wrong(bodies: InertialParameters, j: int) -> str:
-    """What is wrong with a link, in words."""
+def has_extent(bodies: InertialParameters) -> NDArray[np.bool_]:
+    """Whether bodies have mass and extent in three directions. Shapes: -> (f,) bool."""
+    values = np.linalg.eigvalsh(pseudo_inertias(bodies))
+    return values[:, 0] > _SINGULAR * np.maximum(values[:, -1], 1e-300)
+
+
+def _defect(bodies: InertialParameters, j: int) -> str:
+    """Sentence on the property that makes a link unphysical."""
     mass = float(bodies.mass[j])
-    if mass < 0:
-        return f"its mass is negative, {mass:.4g} kg"
-    if mass == 0:
-        return "its mass is zero"
+    if mass <= 0:
+        return f"its mass is negative, {mass:.4g} kg" if mass < 0 else "its mass is zero"
     S = skew(bodies.first_moments[j] / mass)
     moments = np.linalg.eigvalsh(bodies.tensors[j] + mass * S @ S)
     shown = ", ".join(f"{x:.4g}" for x in moments)
-    slight = 1e-12 * float(np.abs(moments).max())
+    slight = _SINGULAR * float(np.abs(moments).max())
     if moments[0] < -slight:
         return f"a moment of inertia about its centre of mass is negative ({shown} kg m^2)"
     if moments[0] + moments[1] < moments[2] - slight:
@@ -126,18 +127,16 @@ def _wrong(bodies: InertialParameters, j: int) -> str:
 
 def _solid(ends: list[Array], radius: float) -> Array:
     """Ten parameters of bars from the origin to the ends, density 1."""
-    total = np.zeros(10)
-    bars = [end for end in ends if np.linalg.norm(end) > 0]
     ball = 4.0 / 3.0 * np.pi * radius**3
-    total += _body(ball, np.zeros(3), 0.4 * ball * radius**2 * np.eye(3))
-    for end in bars:
+    total = _body(ball, np.zeros(3), 0.4 * ball * radius**2 * np.eye(3))
+    for end in ends:
         length = float(np.linalg.norm(end))
-        u = end / length
-        mass = np.pi * radius**2 * length
-        along = np.outer(u, u)
-        across = mass * (3.0 * radius**2 + length**2) / 12.0
-        central = 0.5 * mass * radius**2 * along + across * (np.eye(3) - along)
-        total += _body(mass, 0.5 * end, central)
+        if length > 0:
+            mass, u = np.pi * radius**2 * length, end / length
+            along = np.outer(u, u)
+            across = mass * (3.0 * radius**2 + length**2) / 12.0
+            central = 0.5 * mass * radius**2 * along + across * (np.eye(3) - along)
+            total += _body(mass, 0.5 * end, central)
     return total
 
 
