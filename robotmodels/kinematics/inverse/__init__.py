@@ -3,6 +3,7 @@
 Seed book section 1.3.2.
 """
 
+from ...obstacles import Plane, Sphere
 from .bounds import JointBounds
 from .criteria import (
     Criterion,
@@ -10,9 +11,7 @@ from .criteria import (
     ManipulabilityCriterion,
     NearLimitCriterion,
     ObstacleCriterion,
-    Plane,
     PostureCriterion,
-    Sphere,
 )
 from .distance_task import DistanceTask
 from .function_task import FunctionTask

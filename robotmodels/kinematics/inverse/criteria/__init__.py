@@ -6,7 +6,6 @@ from .manipulability import ManipulabilityCriterion
 from .near_limits import NearLimitCriterion
 from .obstacles import ObstacleCriterion
 from .posture import PostureCriterion
-from .shapes import Plane, Sphere
 
 __all__ = [
     "Criterion",
@@ -14,7 +13,5 @@ __all__ = [
     "ManipulabilityCriterion",
     "NearLimitCriterion",
     "ObstacleCriterion",
-    "Plane",
     "PostureCriterion",
-    "Sphere",
 ]

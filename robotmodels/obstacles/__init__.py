@@ -1,0 +1,9 @@
+"""Obstacles in the workspace and the clearance of a robot from them.
+
+Links are straight segments between the origins of frames, with a radius.
+"""
+
+from .clearance import clearance
+from .shapes import Box, Capsule, Plane, Sphere
+
+__all__ = ["Box", "Capsule", "Plane", "Sphere", "clearance"]
