@@ -1,4 +1,4 @@
-"""Methods and forms side by side on the same log."""
+"""Comparison of methods and forms on the same log."""
 
 from __future__ import annotations
 
@@ -17,29 +17,16 @@ from ..errors import InvalidValueError, RobotModelsWarning
 from ..logs import Log
 from ..model import RobotModel
 from ..table_text import boxed
-from .equations import EquationForm
 from .fit import fit
-from .methods.estimate import Method
+from .forms import EquationForm
+from .method_names import method_of
+from .methods.base import Method
 from .result import IdentificationResult
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ComparedFit:
-    """One method on one form of the equations.
-
-    Parameters
-    ----------
-    method : Method
-        How the equations were solved.
-    form : EquationForm
-        What they balance.
-    result : IdentificationResult or None
-        What it gave; None where it was refused.
-    seconds : float
-        Time it took.
-    refused : str
-        Why it was refused; empty where it was not.
-    """
+    """Fit by one method and form of equations; result None and the reason where it was refused."""
 
     method: Method
     form: EquationForm
@@ -50,128 +37,75 @@ class ComparedFit:
     @property
     def label(self) -> str:
         """Short name of method and form."""
-        own = self.method.name.lower()
-        return own if self.form is EquationForm.TORQUE else f"{own}, {self.form.name.lower()}"
-
-    @property
-    def residual(self) -> float:
-        """Residual torque relative to the torque, both filtered; NaN where refused."""
-        if self.result is None:
-            return np.nan
-        parts = self.result.fitted.filtered_relative
-        parts = parts[np.isfinite(parts)]
-        return float(np.sqrt(np.mean(parts**2))) if len(parts) else np.nan
+        name = self.method.name
+        return name if self.form is EquationForm.TORQUE else f"{name}, {self.form.name.lower()}"
 
     @property
     def rmse(self) -> Array | None:
-        """Error of predicted torques by joint, on the log kept aside if there is one, N m or N."""
+        """Error of predicted torques by joint, on the held-out log if there is one, N m or N."""
         if self.result is None:
             return None
-        held = self.result.held_out
-        return (self.result.fitted if held is None else held).rmse
+        return (self.result.validation.held_out or self.result.validation.in_sample).rmse
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class MethodComparison:
-    """What methods and forms make of the same log; prints as two tables.
-
-    Parameters
-    ----------
-    fits : tuple of ComparedFit
-        In the order asked for; those refused among them.
-    held_out : bool
-        Whether errors of predicted torques are on a log that was kept aside.
-    """
+    """Fits of one log by several methods and forms; prints as two tables."""
 
     fits: tuple[ComparedFit, ...]
     held_out: bool
 
-    def __len__(self) -> int:
-        return len(self.fits)
-
     @property
     def names(self) -> tuple[str, ...]:
         """Parameters that any of the fits has identified, p of them."""
-        found: dict[str, None] = {}
-        for row in self.fits:
-            if row.result is not None:
-                found |= dict.fromkeys(row.result.names)
-        return tuple(found)
+        return tuple(dict.fromkeys(n for row in self.fits if row.result for n in row.result.names))
 
     @property
     def values(self) -> Array:
-        """Their values by each fit, shape (rows, p); NaN where one has not identified it."""
+        """Their values by each fit, shape (rows, p); NaN where it has not identified them."""
         return self._gathered("values")
 
     @property
-    def deviations(self) -> Array:
-        """Their standard deviations by each fit, shape (rows, p)."""
-        return self._gathered("deviations")
+    def standard_errors(self) -> Array:
+        """Their standard errors by each fit, shape (rows, p)."""
+        return self._gathered("standard_errors")
 
     @property
     def fit_table(self) -> str:
-        """A row for each fit: how it ended, errors, deviations, condition, time."""
-        done = [row.result for row in self.fits]
-        n = next(result.model.n for result in done if result is not None)
-        word = "held-out" if self.held_out else "own"
-        errors = [row.rmse for row in self.fits]
-        columns = [
-            ("method", [row.label for row in self.fits]),
-            (
-                "status",
-                [
-                    "refused" if r is None else r.estimate.status.name.lower().replace("_", " ")
-                    for r in done
-                ],
-            ),
-            ("parameters", ["" if r is None else str(len(r.names)) for r in done]),
-            ("residual %", [_number(100.0 * row.residual) for row in self.fits]),
-        ]
-        for j in range(n):
-            cells = ["" if e is None else _number(float(e[j])) for e in errors]
-            columns.append((f"{word} RMSE {j + 1}", cells))
-        worst = ["" if r is None else _worst(r) for r in done]
-        columns += [
-            ("largest deviation %", worst),
-            ("condition", ["" if r is None else _number(r.condition) for r in done]),
-            ("scaled", ["" if r is None else _number(r.condition_scaled) for r in done]),
-            ("seconds", [_number(row.seconds) for row in self.fits]),
-        ]
+        """A row for each fit: status, errors, standard errors, condition, time."""
+        cells = [_fit_cells(row, "held-out" if self.held_out else "own") for row in self.fits]
+        heads = next(row for row in cells if len(row) > 3)
+        columns = [(head, [row.get(head, "") for row in cells]) for head in heads]
         refused = [f"{row.label}: {row.refused}" for row in self.fits if row.refused]
         return "\n".join([boxed(columns), *refused])
 
     @property
     def parameter_table(self) -> str:
-        """A row for each parameter: its value and standard deviation by each fit."""
+        """A row for each parameter: its value and standard error by each fit."""
         columns: list[tuple[str, list[str]]] = [("parameter", list(self.names))]
-        values, deviations = self.values, self.deviations
-        for k, row in enumerate(self.fits):
+        for row, values, errors in zip(self.fits, self.values, self.standard_errors, strict=True):
             if row.result is not None:
-                pairs = zip(values[k].tolist(), deviations[k].tolist(), strict=True)
-                columns.append((row.label, [_with_deviation(x, s) for x, s in pairs]))
+                pairs = zip(values.tolist(), errors.tolist(), strict=True)
+                columns.append((row.label, [_with_error(x, s) for x, s in pairs]))
         return boxed(columns)
 
     def _gathered(self, field: str) -> Array:
-        place = {name: k for k, name in enumerate(self.names)}
-        found = np.full((len(self.fits), len(place)), np.nan)
+        table = np.full((len(self.fits), len(self.names)), np.nan)
         for i, row in enumerate(self.fits):
             if row.result is not None:
-                found[i, [place[name] for name in row.result.names]] = getattr(row.result, field)
-        return found
+                columns = [self.names.index(name) for name in row.result.names]
+                table[i, columns] = getattr(row.result, field)
+        return table
 
     def __str__(self) -> str:
         return f"{self.fit_table}\n{self.parameter_table}"
-
-    def __repr__(self) -> str:
-        words = ", ".join(row.label for row in self.fits)
-        return f"<MethodComparison of {len(self.fits)} fits: {words}>"
 
 
 def compare_methods(
     model: RobotModel,
     log: Log,
-    methods: Iterable[Method | str] = (Method.OLS, Method.WLS, Method.IRLS),
-    forms: Iterable[EquationForm | str] = (EquationForm.TORQUE,),
+    methods: Iterable[Method | str] = ("ols", "wls", "irls"),
+    forms: Iterable[EquationForm | str] = ("torque",),
     test: Log | None = None,
     progress: Callable[[float], None] | None = None,
     **options: Any,
@@ -185,26 +119,27 @@ def compare_methods(
     log : Log
         The log, the same for all.
     methods : iterable of Method or str
-        How the equations are solved.
+        Methods that solve the equations.
     forms : iterable of EquationForm or str
-        What they balance; each method with each form.
+        Forms of the equations; each method with each form.
     test : Log, optional
-        Kept aside; errors of predicted torques are then on it.
+        Held out; errors of predicted torques are then on it.
     progress : callable, optional
         Called with the fraction done.
     **options
-        Whatever else `fit` takes, the same for all.
+        Other arguments of `fit`, the same for all.
 
     Returns
     -------
     MethodComparison
         Prints as tables; a combination that does not exist, such as joint by joint with a power,
-        is listed with the reason.
+        is listed with the reason. ``.fits`` has ``label, result, seconds, rmse`` of each;
+        ``.names, .values, .standard_errors`` (rows, p) are the parameters side by side.
 
     Raises
     ------
     InvalidValueError, ShapeError
-        No method or form; what no combination takes.
+        No method or form; options that no combination takes.
 
     References
     ----------
@@ -219,18 +154,14 @@ def compare_methods(
     >>> model, t, w = load("rx90"), 0.01 * np.arange(600)[:, None], np.linspace(1.0, 5.0, 6)
     >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
     >>> log = Log(0.01, q, idm(model, q, v, a), v, a)
-    >>> found = compare_methods(
+    >>> comparison = compare_methods(
     ...     model, log, ("ols", "wls"), ("torque", "filtered"), drive=False, checked=False
     ... )
-    >>> [row.label for row in found.fits]
+    >>> [row.label for row in comparison.fits]
     ['ols', 'wls', 'ols, filtered', 'wls, filtered']
     """
-    pairs = list(
-        product(
-            [chosen(EquationForm, form, "forms") for form in forms],
-            [chosen(Method, method, "methods") for method in methods],
-        )
-    )
+    every_form = [chosen(EquationForm, form, "forms") for form in forms]
+    pairs = list(product(every_form, [method_of(method) for method in methods]))
     if not pairs:
         raise InvalidValueError("methods, forms: expected at least one of each, got none.")
     rows: list[ComparedFit] = []
@@ -252,24 +183,36 @@ def compare_methods(
     return MethodComparison(tuple(rows), test is not None)
 
 
-def _worst(result: IdentificationResult) -> str:
-    """Largest relative deviation and whose it is."""
-    relative = result.relative_deviations
+def _fit_cells(row: ComparedFit, word: str) -> dict[str, str]:
+    """Columns of the table of fits for one of them."""
+    if (result := row.result) is None or row.rmse is None:
+        return {"method": row.label, "status": "refused", "seconds": _number(row.seconds)}
+    parts = result.validation.in_sample.filtered_relative
+    parts = parts[np.isfinite(parts)]
+    residual = 100.0 * np.sqrt(np.mean(parts**2)) if len(parts) else np.nan
+    relative = result.relative_errors
     k = int(np.argmax(relative))
-    if np.isnan(relative[k]):
-        return "-"
-    return f"{_number(100.0 * float(relative[k]))} ({result.names[k]})"
+    worst = "-" if np.isnan(relative[k]) else f"{100.0 * relative[k]:.3g} ({result.names[k]})"
+    return {
+        "method": row.label,
+        "status": result.status.name.lower().replace("_", " "),
+        "parameters": str(len(result.names)),
+        "residual %": _number(residual),
+        **{f"{word} RMSE {j + 1}": _number(e) for j, e in enumerate(row.rmse.tolist())},
+        "largest standard error %": worst,
+        "condition": _number(result.condition),
+        "scaled": _number(result.scaled_condition),
+        "seconds": _number(row.seconds),
+    }
 
 
 def _number(value: float) -> str:
     return "-" if np.isnan(value) else f"{value:.3g}"
 
 
-def _with_deviation(value: float, deviation: float) -> str:
-    """A value to the second digit of its deviation."""
-    if np.isnan(value):
-        return "-"
-    if not (np.isfinite(deviation) and deviation > 0.0):
-        return f"{value:.4g} ± {deviation:.2g}"
-    digits = max(0, 1 - int(np.floor(np.log10(deviation))))
-    return f"{value:.{digits}f} ± {deviation:.{digits}f}"
+def _with_error(value: float, error: float) -> str:
+    """A value to the second digit of its standard error."""
+    if np.isnan(value) or not 0.0 < error < np.inf:
+        return "-" if np.isnan(value) else f"{value:.4g} ± {error:.2g}"
+    digits = max(0, 1 - int(np.floor(np.log10(error))))
+    return f"{value:.{digits}f} ± {error:.{digits}f}"

@@ -1,95 +1,59 @@
-"""The linear equations of an identification: blocks of regressor and measured torque."""
+"""Linear equations of an identification: blocks of regressor and measured torque."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from enum import Enum
-from typing import Self
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .._arrays import Array
+from ..drive import Drives
 from ..errors import InvalidValueError
+from ..friction import Friction
 from ..logs import Log
-from ..minimal_parameters import BaseParameters
+from ..minimal_parameters import BaseParameters, base_parameters
 from ..model import RobotModel
-from .preparation.processing import Processing
-from .preparation.signals import Piece, pieces
+from .forms import FORMS, Block, EquationForm
+from .signals import Piece, Processing, pieces
+
+_KEPT_BYTES = 2**26
+"""Largest size of the block cache, bytes; other blocks are recomputed."""
 
 
-class EquationForm(Enum):
-    """What the equations balance.
+@dataclass(slots=True)
+class _Cache:
+    """Blocks of the first pieces of a log, in all columns of the equations they were made of."""
 
-    Examples
-    --------
-    >>> EquationForm.TORQUE.name
-    'TORQUE'
-    """
+    whole: Equations
+    blocks: dict[Piece, Block] = field(default_factory=dict)
+    size: int = 0
 
-    TORQUE = "torques of the joints"
-    """The inverse dynamic model: one equation for each joint; needs accelerations."""
-    FILTERED = "rates of the momenta of the joints"
-    """The momentum form through a low-pass: one for each joint, without accelerations."""
-    POWER = "power of all joints together"
-    """One equation at each time; needs accelerations."""
-    ENERGY = "energy of the robot between instants"
-    """One equation for each stretch of time, without accelerations."""
+    def serves(self, system: Equations) -> bool:
+        """Whether equations are these in some of the columns, and not of another log or form."""
+        whole, base = self.whole, system.base
+        return (
+            system.log is whole.log
+            and system.processing is whole.processing
+            and system.form is whole.form
+            and base.model is whole.base.model
+            and base.friction is whole.base.friction
+        )
 
-    @property
-    def by_joint(self) -> bool:
-        """Whether each joint has equations of its own."""
-        return self in (EquationForm.TORQUE, EquationForm.FILTERED)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Block:
-    """Some equations: ``W @ parameters = y``, of m kinds (the joints) at k times.
-
-    Parameters
-    ----------
-    t : ndarray, shape (k,)
-        Times in the log, seconds; of a stretch its middle.
-    W : ndarray, shape (k, m, b)
-        Regressor.
-    y : ndarray, shape (k, m)
-        Measured side: N m or N; W of a power, J of an energy.
-    use : ndarray of bool, shape (k, m)
-        Which equations take part: not those in a dead band.
-    v : ndarray, shape (k, n)
-        Velocities, rad/s or m/s, filtered alike; of a stretch their mean.
-    """
-
-    t: Array
-    W: Array
-    y: Array
-    use: NDArray[np.bool_]
-    v: Array
-
-    def __len__(self) -> int:
-        return len(self.t)
+    def keep(self, piece: Piece, block: Block) -> None:
+        """Store a block if the cache has room."""
+        size = sum(x.nbytes for x in (block.t, block.W, block.y, block.use, block.v))
+        if self.size + size <= _KEPT_BYTES:
+            self.size += size
+            self.blocks[piece] = block
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Equations:
-    """One data object for every method: a robot, its parameters, a log, and how it is processed.
+    """Equations of a log in b parameters of a robot, made piece by piece; `cached` keeps blocks.
 
-    Blocks are made when they are asked for, piece by piece, so that memory does not grow with the
-    log.
-
-    Parameters
-    ----------
-    base : BaseParameters
-        Of the robot, with its drive kinds and friction model.
-    names : tuple of str
-        Those of its parameters that have columns, b of them.
-    log : Log
-        The log.
-    processing : Processing
-        The choices.
-    form : EquationForm
-        What is balanced.
+    ``names`` are the base parameters that have columns, ``form`` is the quantity that is
+    balanced.
     """
 
     base: BaseParameters
@@ -97,6 +61,7 @@ class Equations:
     log: Log
     processing: Processing
     form: EquationForm = EquationForm.TORQUE
+    cache: Any = None
 
     @property
     def model(self) -> RobotModel:
@@ -104,67 +69,71 @@ class Equations:
         return self.base.model
 
     @property
-    def kinds(self) -> int:
-        """Equations at one time: the joints, or one for the whole robot."""
+    def groups(self) -> int:
+        """Equations at one instant: the number of joints, or 1 for the whole robot."""
         return self.model.n if self.form.by_joint else 1
 
-    def with_names(self, names: tuple[str, ...]) -> Self:
+    def with_names(self, names: tuple[str, ...], base: BaseParameters | None = None) -> Equations:
         """The same equations in fewer parameters."""
-        return replace(self, names=names)
+        return replace(self, names=names, base=self.base if base is None else base)
+
+    def with_log(self, log: Log) -> Equations:
+        """Equations of another log with the same processing."""
+        return replace(self, log=log, cache=None)
+
+    def cached(self) -> Equations:
+        """The same equations with a cache of blocks."""
+        return replace(self, cache=_Cache(self.uncached()))
+
+    def uncached(self) -> Equations:
+        """The same equations without a cache."""
+        return replace(self, cache=None)
 
     def pieces(self) -> list[Piece]:
-        """Pieces of the log, always the same ones."""
+        """Fixed pieces of the log."""
         return list(pieces(self.log, self.processing))
 
     def block(self, piece: Piece) -> Block:
-        """Equations of one piece.
-
-        Parameters
-        ----------
-        piece : Piece
-            One of `pieces`.
-
-        Returns
-        -------
-        Block
-            With k = (rows of the piece) / decimation, rounded up; forms that need samples on
-            either side have a few less at the ends of a recording.
-        """
-        from .forms.energy import energy_block
-        from .forms.filtered import filtered_block
-        from .forms.power import power_block
-        from .forms.torque import torque_block
-
-        if self.form is EquationForm.FILTERED:
-            return filtered_block(self, piece)
-        if self.form is EquationForm.POWER:
-            return power_block(self, piece)
-        if self.form is EquationForm.ENERGY:
-            return energy_block(self, piece)
-        return torque_block(self, piece)
+        """Equations of a piece; read-only."""
+        if self.cache is None or not self.cache.serves(self):
+            return FORMS[self.form](self, piece)
+        block = self.cache.blocks.get(piece)
+        if block is None:
+            block = FORMS[self.form](self.cache.whole, piece)
+            self.cache.keep(piece, block)
+        names = self.cache.whole.names
+        if self.names == names:
+            return block
+        columns = [names.index(name) for name in self.names]
+        return replace(block, W=np.take(block.W, columns, axis=2))
 
     def blocks(self) -> Iterator[Block]:
         """Equations of the whole log, piece by piece."""
         for piece in self.pieces():
             yield self.block(piece)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Equations, (self.base, self.names, self.log, self.processing, self.form)
+
 
 def equations(
-    base: BaseParameters, log: Log, processing: Processing,
+    base: BaseParameters,
+    log: Log,
+    processing: Processing,
     form: EquationForm = EquationForm.TORQUE,
-) -> Equations:  # fmt: skip
+) -> Equations:
     """Equations of a log for a robot.
 
     Parameters
     ----------
     base : BaseParameters
-        Of the robot.
+        Base parameters of the robot.
     log : Log
-        Of as many joints.
+        Log with the joints of the robot.
     processing : Processing
-        The choices, of `choose_processing`.
+        Processing, such as that of `choose_processing`.
     form : EquationForm
-        What is balanced.
+        Quantity that is balanced.
 
     Returns
     -------
@@ -176,21 +145,18 @@ def equations(
     InvalidValueError
         A log of another number of joints.
 
+    References
+    ----------
+    Seed book section 1.6.2.
+
     Examples
     --------
+    >>> from robotmodels.datasets import example_log
     >>> from robotmodels.identification import choose_processing
-    >>> from robotmodels.dynamics import idm
-    >>> from robotmodels.minimal_parameters import uniform_bodies
-    >>> from robotmodels.robots import load
-    >>> arm = load("planar_2r").with_gravity((0.0, -9.81, 0.0))
-    >>> arm = arm.with_inertia(uniform_bodies(arm, 5.0))
-    >>> t, w = 0.005 * np.arange(4000)[:, None], np.array([2.0, 3.1])
-    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
-    >>> log = Log(0.005, q, idm(arm, q, v, a) + 2.0 * v)
     >>> from robotmodels.minimal_parameters import base_parameters
+    >>> arm, log = example_log()
     >>> base = base_parameters(arm, drive=("Fv",))
-    >>> system = equations(base, log, choose_processing(log))
-    >>> block = next(system.blocks())
+    >>> block = next(equations(base, log, choose_processing(log)).blocks())
     >>> block.W.shape[1:], block.y.shape[1:] == (2,)
     ((2, 8), True)
     """
@@ -200,3 +166,17 @@ def equations(
             "the columns of the robot's joints, in its order."
         )
     return Equations(base, base.names, log, processing, form)
+
+
+def parameters_of(
+    model: RobotModel, base: BaseParameters | None, drive: Drives, friction: Friction | None = None
+) -> BaseParameters:
+    """The given base parameters of the robot, or those with drives and friction."""
+    if base is None:
+        return base_parameters(model, drive=drive, friction=friction)
+    if not isinstance(base, BaseParameters):
+        raise InvalidValueError(
+            f"base: expected base_parameters(model), got {type(base).__name__}."
+        )
+    base.check(model)
+    return base

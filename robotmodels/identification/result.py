@@ -1,4 +1,4 @@
-"""What an identification gives: parameters with deviations, and what is needed to judge them."""
+"""Result of an identification: parameters, standard errors and their validation."""
 
 from __future__ import annotations
 
@@ -7,16 +7,40 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Rebuilt
+from .._arrays import Array, Rebuilt, read_only
+from ..errors import InvalidValueError, nearest_names
+from ..estimation.estimate import Estimate, EstimateStatus
+from ..estimation.factor import TriangularFactors
 from ..logs import Log
+from ..logs.log import check_is_log
 from ..minimal_parameters import BaseParameters
 from ..model import RobotModel
+from ..regressors.columns import plain_name
 from .equations import Equations
-from .methods.estimate import Estimate, EstimateStatus, check_values
-from .prediction import predicted_torque
-from .scale.reduction import Reduction
-from .solving import MethodOptions
-from .validation import Validation, validate
+from .methods.base import Method, check_solved
+from .torques import parameter_torque
+from .validation import Errors, Validation, prediction_errors
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FitDetails(Rebuilt):
+    """Facts about the equations and the covariance of an identification. Read-only.
+
+    Shapes: iid_standard_errors (b,) for white residuals; friction_ramp (n,), rad/s or m/s, within
+    which dry friction is linear. Rank gap: least kept and largest dropped part.
+    """
+
+    iid_standard_errors: Array
+    correlation_lags: int
+    rank_gap: tuple[float, float]
+    unidentifiable: tuple[str, ...]
+    dropped: tuple[str, ...]
+    essential_rule: str
+    friction_ramp: Array
+
+    def __post_init__(self) -> None:
+        for name in ("iid_standard_errors", "friction_ramp"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -25,69 +49,43 @@ class IdentificationResult(Rebuilt):
 
     Parameters
     ----------
-    system : Equations
+    equations : Equations
         Robot, base parameters, log and every choice of the processing.
-    reduction : Reduction
-        The equations in the identified parameters, reduced.
+    factors : TriangularFactors
+        Triangular factors of the equations in the identified parameters.
+    method : Method
+        The method with its options.
     estimate : Estimate
-        Parameters and their covariance, by the method asked for.
-    white : ndarray, shape (b,)
-        Deviations that would hold if residuals were white: what is usually published.
-    lags : int
-        Equations over which the covariance takes correlation into account; 0 for none.
-    gap : (float, float)
-        Smallest part of its own of a column that was kept, and largest of one that was not, on the
-        log's own regressor.
-    unseen : tuple of str
-        Base parameters of the robot that the log does not tell from others.
-    not_essential : tuple of str
-        Base parameters that were left out since their relative deviations say they are not seen.
-    condition, condition_scaled : float
-        Of the regressor, as it is and with columns of length one.
-    fitted : Validation
-        Errors on the log itself.
-    held_out : Validation or None
-        On the log that was kept aside.
-    options : MethodOptions
-        What the method was given beyond the equations.
-    ramp : ndarray, shape (n,)
-        Velocities (rad/s or m/s) over which dry friction rises where torques are predicted.
-    essential_rule : str
-        By which parameters were left out; empty where all were kept.
+        Parameters and their covariance.
+    validation : Validation
+        Errors of the predicted torques.
+    details : FitDetails
+        Facts about the equations and the covariance.
     notes : tuple of str
-        What is strange, and what to do.
+        Findings and advice.
 
     References
     ----------
     Seed book section 1.6.
     """
 
-    system: Equations
-    reduction: Reduction
+    equations: Equations
+    factors: TriangularFactors
+    method: Method
     estimate: Estimate
-    white: Array
-    lags: int
-    gap: tuple[float, float]
-    unseen: tuple[str, ...]
-    not_essential: tuple[str, ...]
-    condition: float
-    condition_scaled: float
-    fitted: Validation
-    held_out: Validation | None
-    options: MethodOptions
-    ramp: Array
-    essential_rule: str
+    validation: Validation
+    details: FitDetails
     notes: tuple[str, ...]
 
     @property
     def model(self) -> RobotModel:
-        """The robot that was given."""
-        return self.system.model
+        """The given robot."""
+        return self.equations.model
 
     @property
     def base(self) -> BaseParameters:
-        """Base parameters that the log tells."""
-        return self.system.base
+        """Base parameters, with the unidentifiable ones regrouped."""
+        return self.equations.base
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -100,134 +98,166 @@ class IdentificationResult(Rebuilt):
         return self.estimate.values
 
     @property
-    def deviations(self) -> Array:
-        """Their standard deviations, corrected for correlated residuals, shape (b,)."""
-        return self.estimate.deviations
+    def standard_errors(self) -> Array:
+        """Their standard errors, corrected for correlated residuals, shape (b,)."""
+        return self.estimate.standard_errors
 
     @property
-    def relative_deviations(self) -> Array:
-        """Relative to the values, shape (b,)."""
-        return self.estimate.relative_deviations
+    def relative_errors(self) -> Array:
+        """Relative standard errors, shape (b,)."""
+        return self.estimate.relative_errors
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance of the values, shape (b, b)."""
+        return self.estimate.covariance
+
+    @property
+    def status(self) -> EstimateStatus:
+        """Outcome of the identification."""
+        return self.estimate.status
+
+    def reason(self) -> str:
+        """Sentence of the status."""
+        return self.status.sentence
 
     def value(self, name: str) -> float:
-        """Value of one parameter, by its name such as ``"ZZ1"`` or ``"ZZ1R"``.
-
-        Parameters
-        ----------
-        name : str
-            One of `names`.
-
-        Returns
-        -------
-        float
-            SI units.
-        """
+        """Value of one parameter in SI units, by its name such as ``"ZZ1"`` or ``"ZZ1R"``."""
         return float(self.values[self._number(name)])
 
-    def deviation(self, name: str) -> float:
-        """Standard deviation of one parameter.
+    def standard_error(self, name: str) -> float:
+        """Standard error of one parameter in SI units."""
+        return float(self.standard_errors[self._number(name)])
 
-        Parameters
-        ----------
-        name : str
-            One of `names`.
-
-        Returns
-        -------
-        float
-            SI units.
-        """
-        return float(self.deviations[self._number(name)])
-
-    def predict(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
-        """Torques that the identified robot needs.
-
-        Parameters
-        ----------
-        q, v, a : array_like, shape (..., n)
-            Joint variables (rad or m), velocities and accelerations.
-
-        Returns
-        -------
-        ndarray, shape (..., n)
-            N m or N; dry friction rises linearly over `ramp`.
-
-        Raises
-        ------
-        InvalidValueError
-            The simulated robot ran away: there are no parameters.
-        """
-        check_values(self.estimate)
-        return predicted_torque(self.base, self.names, self.values, q, v, a, self.ramp)
-
-    def validate(self, log: Log) -> Validation:
-        """Errors of the predicted torques on another log, processed alike.
-
-        Parameters
-        ----------
-        log : Log
-            Of the same robot.
-
-        Returns
-        -------
-        Validation
-            By joint.
-
-        Raises
-        ------
-        InvalidValueError
-            The simulated robot ran away: there are no parameters.
-        """
-        check_values(self.estimate)
-        return validate(
-            self.base, self.names, self.values, log, self.system.processing, ramp=self.ramp
-        )
-
-    def report(self) -> str:
-        """One page that a person reads: data, choices, parameters, errors, verdict.
-
-        Returns
-        -------
-        str
-            Of at most 100 columns.
-        """
-        from .reporting.text import report_text
-
-        return report_text(self)
-
-    def whole(self) -> Array:
-        """Values of all base parameters, those that are not essential as zero.
-
-        Returns
-        -------
-        ndarray, shape (len(base),)
-            In the order of ``base.names``.
-        """
-        found = np.zeros(len(self.base))
+    @property
+    def base_values(self) -> Array:
+        """Values of all base parameters, dropped ones zero, shape (len(base),)."""
         place = {name: k for k, name in enumerate(self.base.names)}
-        for name, value in zip(self.names, self.values, strict=True):
-            found[place[name]] = value
-        return found
+        values = np.zeros(len(self.base))
+        values[[place[name] for name in self.names]] = self.values
+        return values
+
+    @property
+    def condition(self) -> float:
+        """Condition number of the regressor."""
+        return float(np.linalg.cond(self.factors.stacked()[0]))
+
+    @property
+    def scaled_condition(self) -> float:
+        """Condition number of the regressor with columns of length one."""
+        R, _, _ = self.factors.stacked()
+        return float(np.linalg.cond(R / np.linalg.norm(R, axis=0)))
 
     def _number(self, name: str) -> int:
-        from ..errors import InvalidValueError, nearest_names
-        from ..regressors.columns import plain_name
-
         plain = plain_name(name, self.names)
         if plain not in self.names:
             near = ", ".join(nearest_names(name, self.names)) or "none"
             raise InvalidValueError(
-                f"name: {name!r} was not identified; near it: {near}. `names` lists what was, "
-                "`unseen` and `not_essential` what was not."
+                f"name: {name!r} was not identified; near it: {near}. `names` lists the identified "
+                "parameters, `details.unidentifiable` and `details.dropped` the others."
             )
         return self.names.index(plain)
 
     def __repr__(self) -> str:
-        if self.estimate.status is EstimateStatus.UNSTABLE:
-            return f"<IdentificationResult of {self.model.name!r}: {self.estimate.status.sentence}>"
-        error = 100.0 * float(np.sqrt(np.nanmean(self.fitted.filtered_relative**2)))
+        if self.status is EstimateStatus.UNSTABLE:
+            return f"<IdentificationResult of {self.model.name!r}: {self.reason()}>"
+        relative = self.validation.in_sample.filtered_relative
         return (
             f"<IdentificationResult of {self.model.name!r}: {len(self.names)} parameters by "
-            f"{self.estimate.method.value}, {self.reduction.rows} equations, residual "
-            f"{error:.2g} % of the torque>"
+            f"{self.method.title}, {self.factors.rows} equations, residual "
+            f"{100.0 * float(np.sqrt(np.nanmean(relative**2))):.2g} % of the torque>"
         )
+
+
+def check_is_result(result: object) -> None:
+    """Raise unless it is a result of `fit`."""
+    if not isinstance(result, IdentificationResult):
+        raise InvalidValueError(
+            "result: expected an IdentificationResult of identification.fit, got "
+            f"{type(result).__name__}."
+        )
+
+
+def check_result(result: IdentificationResult) -> None:
+    """Raise unless it is a result of `fit` with parameters."""
+    check_is_result(result)
+    check_solved(result.estimate)
+
+
+def predicted_torque(
+    result: IdentificationResult, q: ArrayLike, v: ArrayLike, a: ArrayLike
+) -> Array:
+    """Torques predicted by the identified parameters (inverse dynamics).
+
+    Parameters
+    ----------
+    result : IdentificationResult
+        Result of `fit`.
+    q, v, a : array_like, shape (..., n)
+        Joint variables (rad or m), velocities and accelerations.
+
+    Returns
+    -------
+    ndarray, shape (..., n)
+        N m or N. Near zero velocity dry friction is linear, within `FitDetails.friction_ramp`.
+
+    Raises
+    ------
+    InvalidValueError, ShapeError
+        A result without parameters; arrays that do not fit, NaN.
+
+    References
+    ----------
+    Seed book sections 1.5.1.4 and 1.6.5.
+
+    Examples
+    --------
+    >>> from robotmodels.datasets import example_log
+    >>> from robotmodels.identification import fit
+    >>> arm, log = example_log()
+    >>> result = fit(arm, log, drive=("Fv",))
+    >>> predicted_torque(result, [0.0, 0.0], [1.0, 0.0], [0.0, 0.0]).round(2)
+    array([46.74, 10.11])
+    """
+    check_result(result)
+    ramp = result.details.friction_ramp
+    return parameter_torque(result.base, result.names, result.values, q, v, a, ramp)
+
+
+def validate(result: IdentificationResult, log: Log) -> Errors:
+    """Errors of the predicted torques on another log of the robot, with the same processing.
+
+    Parameters
+    ----------
+    result : IdentificationResult
+        Result of `fit`.
+    log : Log
+        Log that was not fitted.
+
+    Returns
+    -------
+    Errors
+        Errors by joint.
+
+    Raises
+    ------
+    InvalidValueError
+        A result without parameters; a log that is too short.
+
+    References
+    ----------
+    Seed book section 1.6.5.
+
+    Examples
+    --------
+    >>> from robotmodels.datasets import example_log
+    >>> from robotmodels.identification import fit
+    >>> arm, log = example_log()
+    >>> result = fit(arm, log.rows(0, 2500), drive=("Fv",))
+    >>> bool((validate(result, log.rows(2500, 4000)).relative < 1e-2).all())
+    True
+    """
+    check_result(result)
+    check_is_log(log)
+    other = result.equations.with_log(log)
+    return prediction_errors(other, result.values, result.details.friction_ramp)[0]

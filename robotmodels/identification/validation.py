@@ -1,4 +1,4 @@
-"""How well parameters predict the torques of a log."""
+"""Errors of predicted torques on a log."""
 
 from __future__ import annotations
 
@@ -7,25 +7,23 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from .._arrays import Array, Rebuilt, read_only
+from ..dynamics import idm
 from ..errors import InvalidValueError
-from ..logs import Log
-from ..minimal_parameters import BaseParameters
 from ..model import RobotModel
-from .equations import EquationForm, Equations
-from .prediction import predicted_torque
-from .preparation.filters import decimation_window
-from .preparation.processing import Processing
-from .preparation.signals import piece_signals, pieces
-from .reporting.parameters import percent
+from ..table_text import percent_text
+from .equations import Equations
+from .forms import EquationForm
+from .signals import Processing, decimation_window, piece_signals
+from .torques import parameter_torque
 
 POOR = 0.3
-"""Part of the torque that is left over, above which a prediction is bad."""
+"""Unexplained share of the torque (root mean square) above which a prediction is poor."""
 _NOISE = 2.0
-"""Noise is not always white: how much more of its square may be at low frequencies."""
+"""Allowance for coloured noise: factor on the white-noise power."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Validation(Rebuilt):
+class Errors(Rebuilt):
     """Errors of predicted torques, by joint. Read-only.
 
     Parameters
@@ -33,20 +31,20 @@ class Validation(Rebuilt):
     rmse : ndarray, shape (n,)
         Root mean square of measured less predicted torque at the rate of the log, N m or N.
     relative : ndarray, shape (n,)
-        Its part of the root mean square of the measured torque.
+        The same relative to the measured torque.
     bias : ndarray, shape (n,)
         Mean of measured less predicted torque, N m or N.
     filtered_rmse : ndarray, shape (n,)
         Root mean square of the residuals of the equations, in which both sides are filtered and
         dead bands left out; NaN for a joint without equations.
     filtered_relative : ndarray, shape (n,)
-        Its part of the filtered torque.
+        The same relative to the filtered torque.
     correlation : ndarray, shape (n,)
-        Of successive residuals of the equations.
+        Correlation of successive residuals of the equations.
     noise : ndarray, shape (n,)
-        Root mean square of the part of the errors that is white, from their second differences.
+        Root mean square of the white part of the errors, from their second differences.
     samples : int
-        Of the log, edges left out.
+        Number of samples, without the edges of recordings.
     """
 
     rmse: Array
@@ -63,115 +61,115 @@ class Validation(Rebuilt):
             object.__setattr__(self, field.name, read_only(getattr(self, field.name)))
 
 
-def validate(
-    base: BaseParameters,
-    names: tuple[str, ...],
-    values: Array,
-    log: Log,
-    processing: Processing,
-    system: Equations | None = None,
-    ramp: Array | None = None,
-) -> Validation:
-    """Compare predicted torques with those of a log, which may be another one.
+@dataclass(frozen=True, slots=True)
+class Validation:
+    """Errors of the predicted torques of an identification.
 
     Parameters
     ----------
-    base : BaseParameters
-        Of the robot.
-    names : tuple of str
-        The b parameters that were identified.
-    values : ndarray, shape (b,)
-        Their values.
-    log : Log
-        The log.
-    processing : Processing
-        How positions become velocities and accelerations.
-    system : Equations, optional
-        The equations of these torques, where they have been made; others are not used.
-    ramp : ndarray, shape (n,), optional
-        Velocities over which dry friction rises, rad/s or m/s; default the dead bands.
-
-    Returns
-    -------
-    Validation
-        Errors by joint.
-
-    References
-    ----------
-    Seed book section 1.6.5.
-
-    Examples
-    --------
-    >>> from robotmodels.identification import choose_processing, fit
-    >>> from robotmodels.dynamics import idm
-    >>> from robotmodels.minimal_parameters import uniform_bodies
-    >>> from robotmodels.robots import load
-    >>> arm = load("planar_2r").with_gravity((0.0, -9.81, 0.0))
-    >>> arm = arm.with_inertia(uniform_bodies(arm, 5.0))
-    >>> t, w = 0.005 * np.arange(4000)[:, None], np.array([2.0, 3.1])
-    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
-    >>> log = Log(0.005, q, idm(arm, q, v, a) + 2.0 * v)
-    >>> found = fit(arm, log, drive=("Fv",))
-    >>> errors = validate(found.base, found.names, found.values, log, choose_processing(log))
-    >>> bool((errors.relative < 1e-3).all()), errors.samples > 3000
-    (True, True)
+    in_sample : Errors
+        On the log that was fitted.
+    held_out : Errors or None
+        On the log given as ``test``.
+    nominal : Errors or None
+        Errors of the given robot on the fitted log, without equations (NaN in these
+        fields); None for a robot without masses.
+    folds : None
+        None: neighbouring samples of a log are correlated, so that its parts are not independent;
+        give ``test``.
     """
-    if system is None or system.form is not EquationForm.TORQUE or system.names != names:
-        system = Equations(base, names, log, processing)
-    n = log.n
-    widths = processing.dead_band if ramp is None else ramp
-    squares, sums, whole = np.zeros(n), np.zeros(n), np.zeros(n)
-    samples = 0
-    kept, filtered, taken = np.zeros(n), np.zeros(n), np.zeros(n)
-    products, rough, steps = np.zeros(n), np.zeros(n), 0
+
+    in_sample: Errors
+    held_out: Errors | None = None
+    nominal: Errors | None = None
+    folds: None = None
+
+
+class _Sums:
+    """Running sums of torque errors e (N, n)."""
+
+    def __init__(self, n: int) -> None:
+        self.squares, self.sums, self.torque, self.rough = np.zeros((4, n))
+        self.samples = self.steps = 0
+
+    def add(self, e: Array, tau: Array) -> None:
+        """Add successive samples."""
+        self.squares += (e * e).sum(axis=0)
+        self.sums += e.sum(axis=0)
+        self.torque += (tau**2).sum(axis=0)
+        self.rough += (np.diff(e, 2, axis=0) ** 2).sum(axis=0)
+        self.samples += len(e)
+        self.steps += max(len(e) - 2, 0)
+
+    def errors(self, filtered: tuple[Array, Array, Array] | None = None) -> Errors:
+        """Errors, including those of the equations if given."""
+        none = np.full(len(self.sums), np.nan)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return Errors(
+                np.sqrt(self.squares / self.samples),
+                np.sqrt(self.squares / self.torque),
+                self.sums / self.samples,
+                *((none, none, none) if filtered is None else filtered),
+                np.sqrt(self.rough / (6.0 * max(self.steps, 1))),
+                self.samples,
+            )
+
+
+def prediction_errors(
+    system: Equations, values: Array, ramp: Array, nominal: bool = False
+) -> tuple[Errors, Errors | None]:
+    """Errors of values (b,) on the log of equations, and of the given robot.
+
+    Dry friction is linear within the velocities ``ramp`` (n,).
+    """
+    if system.form is not EquationForm.TORQUE:
+        system = Equations(system.base, system.names, system.log, system.processing)
+    log, n = system.log, system.log.n
+    known = nominal and bool(system.model.inertia.values.any())
+    own, given = _Sums(n), _Sums(n)
+    kept, torque, taken, products = np.zeros((4, n))
     last = np.zeros((0, n))
-    for piece in pieces(log, processing):
-        found = piece_signals(log, processing, piece, 0)
-        e = found.tau - predicted_torque(base, names, values, found.q, found.v, found.a, widths)
-        squares += (e * e).sum(axis=0)
-        sums += e.sum(axis=0)
-        whole += (found.tau**2).sum(axis=0)
-        samples += len(e)
-        rough += (np.diff(e, 2, axis=0) ** 2).sum(axis=0)
-        steps += max(len(e) - 2, 0)
+    for piece in system.pieces():
+        x = piece_signals(log, system.processing, piece, 0)
+        predicted = parameter_torque(system.base, system.names, values, x.q, x.v, x.a, ramp)
+        own.add(x.tau - predicted, x.tau)
+        if known:
+            given.add(x.tau - idm(system.model, x.q, x.v, x.a), x.tau)
         block = system.block(piece)
         r = np.where(block.use, block.y - block.W @ values, 0.0)
         kept += (r * r).sum(axis=0)
-        filtered += np.where(block.use, block.y**2, 0.0).sum(axis=0)
+        torque += np.where(block.use, block.y**2, 0.0).sum(axis=0)
         taken += block.use.sum(axis=0)
         chain = np.vstack((last, r))
         products += (chain[1:] * chain[:-1]).sum(axis=0)
         last = r[-1:]
-    if not samples:
+    if not own.samples:
         raise InvalidValueError(
-            f"log: none of its recordings is longer than the {2 * processing.edges} samples that "
-            "are cut at both ends; give a longer one, or shorter edges=."
+            f"log: none of its recordings is longer than the {2 * system.processing.edges} samples "
+            "that are cut at both ends; give a longer one, or shorter edges (processing=)."
         )
     with np.errstate(divide="ignore", invalid="ignore"):
-        return Validation(
-            np.sqrt(squares / samples), np.sqrt(squares / whole), sums / samples,
-            np.sqrt(kept / taken), np.sqrt(kept / filtered), products / kept,
-            np.sqrt(rough / (6.0 * max(steps, 1))), samples,
-        )  # fmt: skip
+        filtered = np.sqrt(kept / taken), np.sqrt(kept / torque), products / kept
+    return own.errors(filtered), given.errors() if known else None
 
 
-def no_validation(n: int) -> Validation:
-    """The errors of an estimate without values."""
-    return Validation(*np.full((7, n), np.nan), samples=0)
+def no_errors(n: int) -> Errors:
+    """Errors of an estimate without values: NaN."""
+    return Errors(*np.full((7, n), np.nan), samples=0)
 
 
 def poor_prediction(
-    model: RobotModel, processing: Processing, fitted: Validation, held_out: Validation | None
+    model: RobotModel, processing: Processing, in_sample: Errors, held_out: Errors | None
 ) -> str:
-    """Sentences about torques that are predicted badly."""
+    """Sentence about poorly predicted torques, empty if there are none."""
     names = np.array(model.table.joint_names)
-    sides = {"the log": fitted}
+    sides = {"the log": in_sample}
     if held_out is not None:
-        sides["the log kept aside"] = held_out
+        sides["the held-out log"] = held_out
     gain = float((decimation_window(processing.decimation) ** 2).sum())
     slides = model.table.sigma[model.table.joint_rows] == 1
     usual = None
-    found: list[str] = []
+    sentences: list[str] = []
     beyond = np.zeros(model.n, dtype=bool)
     for log, side in sides.items():
         rests = np.isnan(side.filtered_relative)
@@ -184,25 +182,25 @@ def poor_prediction(
         worse = ~rests & (left > torque)
         poor = worse | ~rests & (left > POOR**2 * np.sqrt(torque * np.maximum(torque, usual)))
         beyond |= worse
-        named = [f"{names[j]} ({percent(part[j])})" for j in np.flatnonzero(poor)]
+        named = [f"{names[j]} ({percent_text(part[j])})" for j in np.flatnonzero(poor)]
         total = np.where(rests, left, error)
-        kinds = [kind for kind in (known & slides, known & ~slides) if kind.any()]  # N and N m
-        whole = max((total[kind].sum() / torque[kind].sum() for kind in kinds), default=0.0)
+        units = [unit for unit in (known & slides, known & ~slides) if unit.any()]  # N and N m
+        whole = max((total[unit].sum() / torque[unit].sum() for unit in units), default=0.0)
         if whole > POOR**2:
-            named.append(f"all joints together ({percent(np.sqrt(whole))})")
+            named.append(f"all joints together ({percent_text(np.sqrt(whole))})")
         if named:
-            found.append(f"on {log}: {', '.join(named)}")
-    if not found:
+            sentences.append(f"on {log}: {', '.join(named)}")
+    if not sentences:
         return ""
-    text = f"Poor prediction. Unexplained part of the torque {'; '.join(found)}"
+    text = f"Poor prediction. Unexplained part of the torque {'; '.join(sentences)}"
     if beyond.any():
         text += f"; worse than predicting zero torque: {', '.join(names[beyond])}"
     why = (
-        "The parameters do not carry over to that motion: use a log that excites these joints "
-        "more, or fewer parameters (essential=True)."
-        if found[0].startswith("on the log kept aside")
-        else "The order of the joints, signs, zeros, units, the sampling period or the model may "
-        "be wrong, the log too short or too noisy, or the method or form unsuitable (compare "
-        "method 'wls' and form 'torque')."
+        "The parameters do not generalise to that motion: use a log that excites these joints "
+        "more, or fewer parameters (essential=True in the method)."
+        if sentences[0].startswith("on the held-out log")
+        else "The order of the joints, signs, zeros, units, the sampling period, the model or the "
+        "direction of its gravity may be wrong, the log too short or too noisy, or the method or "
+        "form unsuitable (compare method 'wls' and form 'torque')."
     )
     return f"{text}. {why} Do not use the parameters until the cause is known."

@@ -12,24 +12,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
+from ..estimation.estimate import Estimate
+from ..estimation.factor import TriangularFactors
+from ..estimation.linear import first_weights, ridge
 from ..geometry import PRISMATIC
 from ..minimal_parameters import BaseParameters
 from ..regressors import torque_regressor
-from .methods.estimate import Estimate
-from .methods.least_squares import ordinary, weights_of
-from .methods.ridge import ridge
-from .scale.reduction import Reduction
 
 _WEAK = 0.15
-"""Standard error of a parameter, in plausible sizes, from which a prior matters."""
+"""Least standard error, relative to the plausible size, of a poorly determined parameter."""
 _NAMED = 8
 _ALIKE = (("M", "MX", "MY", "MZ"), ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "Ia", "Iam"))
-"""Kinds whose sizes have a common factor; every other kind has its own."""
+"""Parameter kinds with a common scale; every other kind has a separate scale."""
 _SCALES = np.logspace(-2.5, 1.5, 17)
 _ROUNDS = 3
 _SAMPLES = 200
 _LEAST = 0.01
-"""Least torque of a joint that is taken into account, relative to the largest of its kind."""
+"""Least torque of a considered joint, relative to the largest of the same unit."""
 
 
 def plausible_sizes(
@@ -37,8 +36,8 @@ def plausible_sizes(
 ) -> Array:
     """Standard deviations (b,) of a prior around zero, from measured q, v, a and tau (N, n).
 
-    A parameter of this size alone gives the measured torque at the joint where it acts most, on a
-    random motion as fast as the log.
+    A parameter of this size alone gives the measured torque at the joint with its largest effect,
+    on a random motion as fast as the log.
     """
     model = base.model
     slides = np.asarray(model.table.sigma[model.table.joint_rows] == PRISMATIC)
@@ -63,7 +62,7 @@ def plausible_sizes(
 
 
 def shrunk(
-    reduction: Reduction,
+    factors: TriangularFactors,
     estimate: Estimate,
     deviations: Array,
     inflation: Array,
@@ -75,14 +74,14 @@ def shrunk(
     if not (weak.size or always):
         return None
     correlated = max(1.0, float(np.median(inflation)))
-    R, y, _ = reduction.stacked(weights_of(ordinary(reduction).sigma, reduction) / correlated)
-    likely = _likely_sizes(R, y, sizes, _groups(reduction.names))
-    found = ridge(reduction, None, likely, correlated**2)
+    R, y, _ = factors.stacked(first_weights(factors) / correlated)
+    likely = _likely_sizes(R, y, sizes, _groups(factors.names))
+    shrunk_values = ridge(factors, None, likely, correlated**2)
     order = weak[np.argsort(-(deviations / sizes)[weak])]
-    names = ", ".join(reduction.names[k] for k in order[:_NAMED])
+    names = ", ".join(factors.names[k] for k in order[:_NAMED])
     more = f" and {len(order) - _NAMED} others" if len(order) > _NAMED else ""
     few = (
-        f"{len(weak)} of {len(reduction.names)} parameters ({names}{more}) are poorly determined "
+        f"{len(weak)} of {len(factors.names)} parameters ({names}{more}) are poorly determined "
         "by the log (standard errors above 15 % of their plausible sizes)"
         if weak.size
         else "there are few equations for each parameter, or it was requested"
@@ -90,20 +89,18 @@ def shrunk(
     note = (
         f"Shrinkage: {few}. All parameters were estimated with a weak prior around zero, which "
         "hardly changes well-determined ones; the standard errors assume this prior. "
-        "shrinkage=False switches it off; a more exciting motion makes it unnecessary."
+        "Wls(shrinkage=False) switches it off; a more exciting motion makes it unnecessary."
     )
-    return replace(
-        found, method=estimate.method, status=estimate.status, notes=(*estimate.notes, note)
-    )
+    return replace(shrunk_values, status=estimate.status, notes=(*estimate.notes, note))
 
 
 def _groups(names: tuple[str, ...]) -> NDArray[np.int64]:
     """Group number of each parameter; parameters of one kind share a group."""
     kinds = [name.rstrip("0123456789") for name in names]
     alike = {kind: group for group in _ALIKE for kind in group}
-    found = [alike.get(kind, (kind,)) for kind in kinds]
-    order = {group: k for k, group in enumerate(dict.fromkeys(found))}
-    return np.array([order[group] for group in found])
+    groups = [alike.get(kind, (kind,)) for kind in kinds]
+    order = {group: k for k, group in enumerate(dict.fromkeys(groups))}
+    return np.array([order[group] for group in groups])
 
 
 def _likely_sizes(R: Array, y: Array, sizes: Array, groups: NDArray[np.int64]) -> Array:

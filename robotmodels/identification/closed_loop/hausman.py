@@ -10,42 +10,24 @@ from numpy.typing import NDArray
 
 from ..._arrays import Array, Rebuilt, read_only
 from ...errors import InvalidValueError
-from ..correlated import correlated_covariance
+from ...estimation.covariance import correlated_covariance
+from ...estimation.estimate import Estimate
+from ...estimation.factor import reduced
+from ...estimation.linear import group_leverage, solved
 from ..equations import Block, Equations
-from ..methods.least_squares import shares, solved
-from .blocks import given, reduced, simulated_blocks
-from .estimate import SimulatedEstimate
-from .instrumental import instrument_step, torque_sizes
-from .simulated import RanAwayError
+from .instrumental import instrument_step, paired
+from .method import GivenBlocks, torque_sizes
+from .simulation import ClosedLoopSimulator, SimulationDivergedError
 
 _EFFECT = 0.5
-"""Standard errors of least squares that a bias must exceed."""
-_KEPT = 256_000_000
-"""Bytes of blocks that are kept; of longer logs they are simulated again."""
+"""Least relevant bias, in standard errors of least squares."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HausmanResult(Rebuilt):
-    """Bias of least squares, parameter by parameter, and whether it matters. Read-only.
+    """Result of the Durbin-Wu-Hausman test: bias of least squares by parameter. Read-only.
 
-    Parameters
-    ----------
-    names : tuple of str
-        The b parameters.
-    effect : ndarray, shape (b,)
-        Least squares less instrumental variables, SI units; NaN where the robot could not be
-        simulated.
-    standard_errors : ndarray, shape (b,)
-        Of the effect.
-    least_squares_errors : ndarray, shape (b,)
-        Standard errors of least squares, by which an effect is judged.
-    parameter_p : ndarray, shape (b,)
-        Probability of such an effect if the bias is half a standard error of least squares, times
-        the number of parameters (Bonferroni), 1 at most.
-    lags : int
-        Equations over which correlation of the residuals was taken into account.
-    level : float
-        Of the verdict: probability that it names any parameter wrongly.
+    Shapes: effect, standard_errors, least_squares_errors, parameter_p (b,).
     """
 
     names: tuple[str, ...]
@@ -62,7 +44,7 @@ class HausmanResult(Rebuilt):
 
     @property
     def p(self) -> float:
-        """Least of the parameters' probabilities; NaN where nothing was tested."""
+        """Smallest p-value of the parameters; NaN without a test."""
         return float(self.parameter_p.min())
 
     @property
@@ -77,7 +59,7 @@ class HausmanResult(Rebuilt):
 
     @property
     def sentence(self) -> str:
-        """What a person reads."""
+        """Outcome of the test as a sentence."""
         if np.isnan(self.p):
             return "Whether least squares are biased was not tested: the robot was not simulated."
         if not self.biased:
@@ -90,28 +72,25 @@ class HausmanResult(Rebuilt):
         named = ", ".join(f"{self.names[k]} ({size[k]:.2g})" for k in order)
         return (
             f"Least squares are biased (Durbin-Wu-Hausman, p = {self.p:.2g}). Bias in standard "
-            f"errors: {named}. Use a lower cutoff= or instrumental variables."
+            f"errors: {named}. Use a lower cutoff (processing=) or instrumental variables."
         )
 
 
 def hausman_test(
-    system: Equations, estimate: SimulatedEstimate, level: float = 0.05, lags: int | None = None
+    system: Equations, estimate: Estimate, level: float = 0.05, lags: int | None = None
 ) -> HausmanResult:
     """Durbin-Wu-Hausman test: whether least squares and instrumental variables differ too much.
 
     Noise of the positions is in the regressor and biases least squares; instrumental variables are
-    consistent. Any noise does so a little, and many equations show it: the test is whether the
-    difference of a parameter exceeds half a standard error of least squares. The variance of the
-    difference is that of V_IV - V_LS, for residuals of least squares that are correlated in time
-    and between joints.
+    consistent. The test is whether the difference of a parameter exceeds half a standard error of
+    least squares; its variance holds for residuals that are correlated in time and between joints.
 
     Parameters
     ----------
     system : Equations
         The equations that least squares would solve.
-    estimate : SimulatedEstimate
-        Of `instrumental` on these equations: its parameters, its deviations for the weights, and
-        the simulation that gives the instruments.
+    estimate : Estimate
+        Estimate of `Instrumental` on these equations, with the simulation of the instruments.
     level : float
         Probability of a false alarm, all parameters together.
     lags : int, optional
@@ -120,16 +99,12 @@ def hausman_test(
     Returns
     -------
     HausmanResult
-        Differences, their standard errors and probabilities, and a sentence.
+        Differences, standard errors, p-values, and a sentence.
 
     Raises
     ------
     InvalidValueError
         A level that is not between 0 and 1; an estimate of other parameters.
-
-    See Also
-    --------
-    fit : ``result = fit(model, log, "iv")`` has both, ``result.system`` and ``result.estimate``.
 
     References
     ----------
@@ -140,76 +115,62 @@ def hausman_test(
 
     Examples
     --------
-    >>> from robotmodels.identification import (
-    ...     Log,
-    ...     choose_processing,
-    ...     equations,
-    ...     instrumental,
-    ...     reduce_equations,
-    ... )
-    >>> from robotmodels.dynamics import idm
+    >>> import robotmodels as rm
+    >>> from robotmodels.identification import Log, fit
     >>> from robotmodels.minimal_parameters import uniform_bodies
-    >>> from robotmodels.robots import load
-    >>> arm = load("planar_2r").with_gravity((0.0, -9.81, 0.0))
+    >>> arm = rm.load("planar_2r").with_gravity((0.0, -9.81, 0.0))
     >>> arm = arm.with_inertia(uniform_bodies(arm, 5.0))
     >>> t, w = 0.005 * np.arange(4000)[:, None], np.array([2.0, 3.1])
     >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
-    >>> log = Log(0.005, q, idm(arm, q, v, a) + 2.0 * v)
-    >>> from robotmodels.minimal_parameters import base_parameters
-    >>> base = base_parameters(arm, drive=("Fv",))
-    >>> system = equations(base, log, choose_processing(log))
-    >>> found = instrumental(system, reduce_equations(system))
-    >>> 0.0 <= hausman_test(system, found).p <= 1.0
+    >>> result = fit(arm, Log(0.005, q, rm.idm(arm, q, v, a) + 2.0 * v), "iv")
+    >>> 0.0 <= hausman_test(result.equations, result.estimate).p <= 1.0
     True
     """
     if not 0.0 < level < 1.0:
         raise InvalidValueError(f"level: expected a number between 0 and 1, got {level!r}.")
     if estimate.names != system.names:
         raise InvalidValueError(
-            "estimate: it is of other parameters than these equations; estimate them by "
-            "instrumental(system, ...) first."
+            "estimate: it has other parameters than these equations; estimate them by "
+            "Instrumental().solve(system, ...) first."
         )
-    b, loop, values = len(system.names), estimate.loop, estimate.values
+    b, loop, values = len(system.names), estimate.details.loop, estimate.values
     none = np.full(b, np.nan)
-    nothing = HausmanResult(system.names, none, none, none, none, 0, level)
-    if loop is None or not np.isfinite(estimate.deviations).all():
-        return nothing
-
-    def pairs() -> Iterator[tuple[Array, Block]]:
-        for piece, block in simulated_blocks(system, loop, values):
-            own = system.block(piece)
-            yield block.W, replace(own, use=own.use & block.use)
-
-    rows = len(system.log) // system.processing.decimation + 1
+    untested = HausmanResult(system.names, none, none, none, none, 0, level)
+    if loop is None or not np.isfinite(estimate.standard_errors).all():
+        return untested
+    simulator = ClosedLoopSimulator(system, loop)
     try:
-        kept = list(pairs()) if 16 * rows * system.model.n * b <= _KEPT else None
-        both = pairs if kept is None else lambda: iter(kept)
-        squares = reduced(system, (own for _, own in both()))
-    except RanAwayError:  # the last step of an estimate that did not converge
-        return nothing
-    step = instrument_step(squares, values, both(), torque_sizes(squares))
-    found, inverse, _ = solved(squares, step.weights)
+        signals = simulator.signals(values)
+    except SimulationDivergedError:  # the last step of an estimate that did not converge
+        return untested
+    pairs = paired(simulator)
+    factors = reduced(system.names, (block for _, block in pairs(signals)))
+    step = instrument_step(factors, values, pairs(signals), torque_sizes(factors))
+    ls_values, inverse, _ = solved(factors, step.weights)
 
     def residuals() -> Iterator[Block]:
-        """Scores of the difference and of least squares."""
-        for Z, own in both():
-            least = own.W @ inverse
+        """Scores of the difference of the estimates and of least squares."""
+        for Z, block in pairs(signals):
+            least = block.W @ inverse
             W = np.concatenate((least - Z @ step.inverse.T, least), axis=2)
-            yield replace(own, W=W, y=own.y - own.W @ found)
+            yield replace(block, W=W, y=block.y - block.W @ ls_values)
 
     spread = correlated_covariance(
-        given(system, residuals), np.zeros(2 * b), step.weights, np.eye(2 * b), lags,
-        shares(squares, step.weights, inverse),
-    )  # fmt: skip
+        GivenBlocks(residuals),
+        np.zeros(2 * b),
+        step.weights,
+        np.eye(2 * b),
+        lags,
+        group_leverage(factors, step.weights, inverse),
+    )
     errors, least = np.sqrt(np.maximum(np.diag(spread.covariance), 0.0)).reshape(2, b)
-    return HausmanResult(
-        system.names, found - values, errors, least, _chances(found - values, errors, least),
-        spread.lags, level,
-    )  # fmt: skip
+    effect = ls_values - values
+    p = _probabilities(effect, errors, least)
+    return HausmanResult(system.names, effect, errors, least, p, spread.lags, level)
 
 
-def _chances(effect: Array, errors: Array, least: Array) -> Array:
-    """Probabilities of effects where the bias is as large as is allowed, for any of so many."""
+def _probabilities(effect: Array, errors: Array, least: Array) -> Array:
+    """p-value of each effect under the largest allowed bias, with Bonferroni's correction."""
     from scipy.stats import norm
 
     safe = np.maximum(errors, np.finfo(float).tiny)

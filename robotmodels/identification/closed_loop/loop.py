@@ -1,12 +1,14 @@
-"""Simulated closed loop: controller, dry-friction width, end conditions.
+"""Settings of a simulated closed loop: controller, dry friction near rest, integration steps.
 
-Source: A. Janot, P.-O. Vandanjon and M. Gautier, "A generic instrumental variable approach for
-industrial robot identification", IEEE T-CST 22(1), 2014, section III.
+Sources: A. Janot, P.-O. Vandanjon and M. Gautier, "A generic instrumental variable approach for
+industrial robot identification", IEEE T-CST 22(1), 2014, section III; E. Hairer and G. Wanner,
+"Solving Ordinary Differential Equations II", section IV.2 (stability of explicit integration).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,54 +19,90 @@ from ...dynamics import base_model
 from ...errors import InvalidValueError, ShapeError
 from ...model import RobotModel
 from ..equations import EquationForm, Equations
-from .controller import Controller, tuned_controller
-from .stiffness import least_width as least_width
-from .stiffness import stiffness
+from .controller import Controller, inverse_masses, tuned_controller
 
 _FASTER = 10.0
-"""Bandwidth of a controller that is not known, in frequencies of the motion."""
+"""Bandwidth of an assumed controller relative to the motion frequency."""
 _NEAR = 0.5
-"""rad or m: errors of position below which no robot has run away."""
+"""Least tracking limit, rad or m."""
 _SLOW = 0.05
-"""Part of a joint's fast velocities that its width at rest need not fall below."""
+"""Target friction regularisation velocity relative to a joint's fast velocities."""
+_STEP, _STABLE = 1.5, 2.78
+"""Integration step in time constants of friction: target, and stability bound of RK4. Regularised
+dry friction adds 1."""
 MOST = 64
-"""Steps of integration of a sample that are chosen at most."""
-_LOOKED = 2000
-"""Samples of the log at which velocities are looked at."""
+"""Largest default number of integration steps per sample."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ClosedLoop(Rebuilt):
-    """How a controlled robot is simulated. Read-only.
+    """Settings of the simulation of a controlled robot. Read-only.
 
     Parameters
     ----------
     controller : Controller
-        What moves the robot.
+        Controller of the robot.
     width : ndarray, shape (n,)
-        Velocities around rest, rad/s or m/s, over which dry friction rises linearly; beyond it is
-        that of the equations.
-    astray : ndarray, shape (n,)
-        Distances from the references, rad or m, beyond which the robot has run away.
+        Regularisation velocities, rad/s or m/s, below which dry friction is linear.
+    tracking_limit : ndarray, shape (n,)
+        Distances from the references, rad or m, beyond which the simulation has diverged.
     hold, substeps : int
         Steps of integration over which a torque is held; steps of a sample of the log.
     referenced : bool
-        Whether references are those of the log; otherwise its filtered positions are followed.
+        Whether the log has references; otherwise its filtered positions are followed.
     notes : tuple of str
-        What to know.
+        Remarks for the user.
     """
 
     controller: Controller
     width: Array
-    astray: Array
+    tracking_limit: Array
     hold: int
     substeps: int
     referenced: bool
-    notes: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for name in ("width", "astray"):
+        for name in ("width", "tracking_limit"):
             object.__setattr__(self, name, read_only(getattr(self, name)))
+
+
+class FrictionRates(NamedTuple):
+    """Largest rates of friction: viscous (1/s), its joint, dry (rad/s^2 or m/s^2) (n,)."""
+
+    viscous: float
+    joint: int
+    dry: Array
+
+    def steps(self, dt: float, goal: Array | float = 0.0) -> int:
+        """Integration steps of a sample for stability, and for widths up to the target (0: any)."""
+        parts = np.where(np.greater(goal, 0.0), goal, np.inf)
+        # tolerance: a width chosen for one step gives one step
+        most = max(dt * self.viscous / _STEP, float((dt * self.dry / parts).max(initial=0.0)))
+        return max(1, int(np.ceil(most * (1.0 - 1e-9))))
+
+    def stable(self, step: float) -> bool:
+        """Whether the integration of viscous friction is stable with this step."""
+        return step * self.viscous < _STABLE
+
+
+def friction_rates(robot: RobotModel, q: Array) -> FrictionRates | None:
+    """Largest rates of the drives' friction over some postures (N, n); None without a valid M."""
+    inverse = inverse_masses(robot, q)
+    if inverse is None:
+        return None
+    n, drives = robot.n, robot.drive_matrices
+    if drives is None:
+        return FrictionRates(0.0, 0, np.zeros(n))
+    mobility = np.diagonal(inverse, axis1=1, axis2=2).max(axis=0)
+    viscous = float(np.abs(np.linalg.eigvals(inverse @ drives.viscous)).max(initial=0.0))
+    joint = int(np.argmax(mobility * np.abs(np.diagonal(drives.viscous))))
+    dry = np.abs(drives.coulomb) * mobility
+    if robot.transmission is not None:
+        for k, m in enumerate(robot.transmission.coupled_motors):
+            w = drives.coupling[k]
+            dry[m - 1] += abs(drives.coupled_coulomb[k]) * float((inverse @ w @ w).max())
+    return FrictionRates(viscous, joint, dry)
 
 
 def closed_loop(
@@ -72,77 +110,88 @@ def closed_loop(
     values: ArrayLike,
     controller: Controller | None = None,
     *,
-    bandwidth: float | None = None,
     width: ArrayLike | None = None,
     substeps: int | None = None,
 ) -> ClosedLoop | None:
-    """The closed loop of a log: its own controller, or one that is tuned to follow closely."""
-    log, n = system.log, system.model.n
-    if system.form is not EquationForm.TORQUE:
-        raise InvalidValueError(
-            f"form: closed loops are simulated for {EquationForm.TORQUE.value}, got "
-            f"{system.form.value}."
-        )
-    if system.base.friction is not None:
-        raise InvalidValueError(
-            f"friction: the simulated robot has the friction of its drives (Fv, Fc, offset), not "
-            f"{type(system.base.friction).__name__}; take least squares for it."
-        )
-    if system.model.transmission is not None and not system.model.transmission.is_invertible:
-        raise InvalidValueError(
-            "model: joints that mimic others are not simulated with a controller; take least "
-            "squares for this robot."
-        )
+    """Closed loop of a log, with its controller or a tuned one; None without a valid mass matrix.
+
+    Shapes: values (b,), width scalar or (n,).
+    """
+    log, n, processing = system.log, system.model.n, system.processing
+    _check_supported(system)
     robot = robot_of(system, values)
-    stiff = stiffness(robot, log.q)
-    if stiff is None:
+    rates = friction_rates(robot, log.q)
+    if rates is None:
         return None
-    given = None if width is None else _checked_width(width, n)
     notes: list[str] = []
     if controller is None:
-        asked = _FASTER * system.processing.motion if bandwidth is None else bandwidth
-        controller = tuned_controller(robot, log.q, asked, period=log.dt)
-        found = float((controller.kp / controller.kd).max() / np.pi)
+        bandwidth = _FASTER * processing.motion
+        controller = tuned_controller(robot, log.q, bandwidth, period=log.dt)
+        bandwidth = float((controller.kp / controller.kd).max() / np.pi)
         notes.append(
-            f"The controller is not known: the simulated one has a bandwidth of {found:.3g} Hz and "
-            "feeds the torques of the first values forward."
+            f"The controller is unknown: the assumed one has a bandwidth of {bandwidth:.3g} Hz "
+            "and feeds the torques of the first values forward."
         )
-    elif bandwidth is not None:
-        raise InvalidValueError("bandwidth: it is for a controller that is not given.")
     if controller.n != n:
         raise ShapeError(f"controller: expected {n} joints, got {controller.n}.")
-    referenced = log.q_ref is not None
-    if not referenced:
+    targets = log.q if log.q_ref is None else log.q_ref
+    if log.q_ref is None:
         notes.append(
             "The log has no references: the simulated robot follows the filtered measured "
-            "positions, so that what noise the filter leaves is in its references."
+            "positions, so that the noise that passes the filter is in its references."
         )
-    goal = _goal(system) if given is None else given
-    needed = stiff.steps(log.dt, goal)
+    given = None if width is None else as_floats(width, "width")
+    if given is not None and (given.shape not in ((), (n,)) or (given < 0.0).any()):
+        raise ShapeError(f"width: expected one velocity or shape ({n},), none negative.")
+    goal = _goal(system, targets) if given is None else np.broadcast_to(given, (n,))
+    needed = rates.steps(log.dt, goal)
     parts, hold = steps_of(controller, log.dt, min(needed, MOST) if substeps is None else substeps)
-    if (parts < needed and substeps is None) or not stiff.stable(log.dt / parts):
-        notes.append(stiff.sentence(log.dt, parts, goal))
+    step = log.dt / parts
+    rest = step * rates.dry
+    if (parts < needed and substeps is None) or not rates.stable(step):
+        over = rest / np.where(goal > 0.0, goal, np.inf)
+        joint = int(over.argmax()) if rates.stable(step) else rates.joint
+        effect = f"dry friction is linear up to {rest[joint]:.2g} rad/s or m/s"
+        effect = effect if rates.stable(step) else "the simulation is not stable"
+        notes.append(
+            f"{robot.table.joint_names[joint]} is stiff: friction stops it too fast for {parts} "
+            f"steps of a sample of {log.dt:.3g} s, so that {effect}; give substeps= of "
+            "closed_loop, or use least squares."
+        )
     if given is None:
-        rest = stiff.width(log.dt / parts)
-        given = np.where(rest > 0.0, np.maximum(system.processing.dead_band, rest), 0.0)
-    targets = log.q if log.q_ref is None else log.q_ref
-    reach = np.maximum(np.ptp(targets, axis=0), _NEAR)
-    return ClosedLoop(controller, given, reach, hold, parts, referenced, tuple(notes))
+        given = np.where(rest > 0.0, np.maximum(processing.dead_band, rest), 0.0)
+    limit, wide = np.maximum(np.ptp(targets, axis=0), _NEAR), np.broadcast_to(given, (n,))
+    return ClosedLoop(controller, wide, limit, hold, parts, log.q_ref is not None, tuple(notes))
+
+
+def _check_supported(system: Equations) -> None:
+    """Raise for equations whose robot cannot be simulated with a controller."""
+    K, friction = system.model.transmission, system.base.friction
+    problem = ""
+    if system.form is not EquationForm.TORQUE:
+        problem = f"form: expected {EquationForm.TORQUE.value}, got {system.form.value}"
+    elif friction is not None:
+        problem = f"friction: expected that of the drives alone, got {type(friction).__name__}"
+    elif K is not None and not K.is_invertible:
+        problem = "model: expected independent joints, got joints that mimic others"
+    if problem:
+        raise InvalidValueError(
+            f"{problem}. Other closed loops are not simulated; use least squares."
+        )
 
 
 def robot_of(system: Equations, values: ArrayLike) -> RobotModel:
-    """Robot of the base parameters alone. Shapes: values (b,)."""
+    """Robot model with base parameters as standard parameters. Shapes: values (b,)."""
     base, model = system.base, system.model
-    found = dict(zip(system.names, as_exact(values, (len(system.names),), "values"), strict=True))
-    whole = np.array([found.get(name, 0.0) for name in base.names])
-    robot = base_model(model, base, whole)
+    known = dict(zip(system.names, as_exact(values, (len(system.names),), "values"), strict=True))
+    robot = base_model(model, base, np.array([known.get(name, 0.0) for name in base.names]))
     kinds = drive_kinds(base.drive)
-    own = {kind.value: getattr(robot.drive, kind.value) for kind in kinds}
-    robot = robot.with_drive(DriveParameters(**{"Ia": np.zeros(model.n), **own}))
+    terms = {kind.value: getattr(robot.drive, kind.value) for kind in kinds}
+    robot = robot.with_drive(DriveParameters(**{"Ia": np.zeros(model.n), **terms}))
     if (K := robot.transmission) is not None:
         names = [kind.coupling for kind in kinds if kind.coupling is not None]
-        terms = {name: getattr(K, name) for name in names}
-        robot = robot.with_transmission(Transmission(K.matrix, K.offset, **terms))
+        coupled = {name: getattr(K, name) for name in names}
+        robot = robot.with_transmission(Transmission(K.matrix, K.offset, **coupled))
     return robot
 
 
@@ -163,21 +212,11 @@ def steps_of(controller: Controller, dt: float, substeps: int) -> tuple[int, int
     )
 
 
-def _checked_width(width: ArrayLike, n: int) -> Array:
-    chosen = as_floats(width, "width")
-    if chosen.shape not in ((), (n,)) or (chosen < 0.0).any():
-        raise ShapeError(f"width: expected one velocity or shape ({n},), none negative.")
-    return np.broadcast_to(chosen, (n,))
-
-
-def _goal(system: Equations) -> Array:
-    """Widths of dry friction that lose few equations: the dead band, or a part of the speed."""
+def _goal(system: Equations, targets: Array) -> Array:
+    """Default friction regularisation velocities: dead band, or a part of the speed."""
     log, motion = system.log, system.processing.motion
     stride = max(1, min(int(0.1 / max(motion * log.dt, 1e-9)), len(log) - 1))
-    rows = np.arange(0, len(log) - stride, max(1, len(log) // _LOOKED))
-    if not rows.size:
-        return system.processing.dead_band
-    targets = log.q if log.q_ref is None else log.q_ref
-    speeds = np.abs(targets[rows + stride] - targets[rows]) / (stride * log.dt)
-    # the few that lie across two recordings do not count
-    return np.maximum(system.processing.dead_band, _SLOW * np.percentile(speeds, 95, axis=0))
+    speeds = np.abs(targets[stride:] - targets[:-stride]) / (stride * log.dt)
+    # differences across two recordings are negligible
+    fast = np.percentile(speeds[:: max(1, len(log) // 2000)], 95, axis=0)
+    return np.maximum(system.processing.dead_band, _SLOW * fast)

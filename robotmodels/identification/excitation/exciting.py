@@ -4,31 +4,26 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..._arrays import Array, as_floats
-from ..._choices import chosen
 from ...drive import Drives
 from ...errors import InvalidValueError, ShapeError
 from ...minimal_parameters import BaseParameters, base_parameters
 from ...model import RobotModel, check_model
 from ...trajectories import MotionLimits
-from .basis import MotionBasis, MotionKind
-from .bounds import excitation_limits, excitation_torques
-from .boxes import WorkspaceBox, clearances
-from .criterion import ExcitationCriterion
-from .kept import limits_kept
-from .problem import ExcitationProblem
-from .quality import quality
+from . import search
+from .limits import WorkspaceBox, box_distances, excitation_limits, excitation_torques
+from .motions import KINDS, MotionBasis
+from .objective import CRITERIA, ExcitationProblem
 from .result import ExcitationStart, ExcitationStatus, ExcitingTrajectory
-from .search import ITERATIONS, STAGES, gain_of_twice, improved, shared_budget
-from .starts import random_motion
 
 _LOG = logging.getLogger(__name__)
-_DENSE = 5  # times as many samples judge the result as were used in the search
+_DENSE = 5  # samples for the final quality, times those of the search
 
 Progress = Callable[[int, int], None]
 
@@ -39,8 +34,8 @@ def exciting_trajectory(
     duration: float = 10.0,
     harmonics: int = 5,
     points: int | None = None,
-    kind: MotionKind | str = MotionKind.FOURIER,
-    criterion: ExcitationCriterion | str = ExcitationCriterion.CONDITION,
+    kind: str = "fourier",
+    criterion: str = "condition",
     drive: Drives = ("Ia", "Fv", "Fc"),
     base: BaseParameters | None = None,
     limits: MotionLimits | None = None,
@@ -57,80 +52,73 @@ def exciting_trajectory(
     rng: np.random.Generator | int | None = None,
     progress: bool | Progress = False,
 ) -> ExcitingTrajectory:
-    """A motion that shows the base parameters of a robot as well as its limits allow.
+    """Optimal exciting trajectory for the identification of the base parameters.
 
-    Random motions within the limits are made, the best of them are improved by quasi-Newton steps
+    Random motions within the limits are drawn, the best of them are improved by quasi-Newton steps
     with analytic gradients, and the best result is kept. Positions, velocities and accelerations
-    keep their limits everywhere, torques and boxes on a fine grid with an allowance for what lies
-    between (see `ExcitationLimits`).
+    keep their limits everywhere, torques and boxes on a fine grid with an allowance for the
+    extremes between its samples.
 
     Parameters
     ----------
     model : RobotModel
         The robot, n joints.
     duration : float
-        Of one period, s. The motion ends where it begins, so that it can be repeated.
-    harmonics : int
-        Of a Fourier series, at least 2.
-    points : int, optional
-        Of a spline, equally far in time, at least 3; default ``2 harmonics``.
-    kind : MotionKind or str
-        ``"fourier"`` or ``"spline"``.
-    criterion : ExcitationCriterion or str
-        ``"condition"`` number of the base regressor stacked over samples, or ``"log_det"``, the
-        volume of the confidence ellipsoid.
+        Duration of one period, s. The motion is periodic.
+    harmonics, points : int
+        Harmonics of a Fourier series, at least 2; points of a spline, at least 3, default
+        ``2 harmonics``.
+    kind : {"fourier", "spline"}
+        A finite Fourier series, or a closed quintic spline through points at equal times.
+    criterion : {"condition", "log_det"}
+        Condition number of the base regressor stacked over samples, or the volume of the
+        confidence ellipsoid.
     drive : bool or collection of DriveKind or str
-        Which drive parameters are among those to be identified.
+        Kinds of drive parameters that are to be identified.
     base : BaseParameters, optional
-        Which are to be identified; default those of the model with ``drive``.
+        Parameters to be identified; default those of the model with ``drive``.
     limits : MotionLimits, optional
-        Of position, velocity, acceleration and jerk; default the table's. What has no limit there
-        gets one, see `excitation_limits`; `ExcitingTrajectory.notes` says which.
+        Limits of position, velocity, acceleration and jerk; default the table's. Missing ones are
+        assumed, see `excitation_limits`; ``notes`` names them.
     torque_limits : array_like, shape () or (n,), optional
         N m or N, for the model's own parameters; default the table's, where the model has masses.
     boxes : WorkspaceBox or sequence of WorkspaceBox
-        Where frames stay inside, or keep out of.
+        Boxes that frames stay inside or outside.
     sigma : array_like, shape () or (n,), optional
         Standard deviations of the torques' noise, by which rows are divided; default 1.
     scale : array_like, shape (b,), optional
-        Sizes of the base parameters that are expected, which multiply columns; default 1, the
-        unscaled condition number. Zeros are refused.
+        Expected sizes of the base parameters, not 0, which multiply columns; default 1.
     samples : int, optional
-        Times in a period that the search looks at; default 20 for each harmonic, or 10 for each
-        point.
+        Samples in a period; default 20 for each harmonic, or 10 for each point.
     margin : float
-        Part of the limits that the search keeps free for what lies between samples.
+        Share of the limits reserved for extremes between samples.
     rest : bool
-        Whether a Fourier series begins and ends with zero velocity and acceleration, by two linear
-        equations for the coefficients of each joint. Splines always do.
-    starts : int, optional
-        How many of the random motions are improved; default 8, fewer for robots whose evaluations
-        are so long that the budget has no more. Twice as many are twice the budget; the notes say
-        how much they would bring.
-    baseline : int, optional
-        How many random motions are made, at least ``starts``; default 100, or fewer likewise.
+        Whether velocity and acceleration vanish at the ends of a Fourier series, as of a spline.
+    starts, baseline : int, optional
+        Numbers of random motions that are improved and drawn; default 8 and 100, fewer for robots
+        whose evaluations exceed the budget. The notes estimate the benefit of twice the starts.
     iterations : int, optional
         Largest number of iterations of each of the four stages of a start; a stage ends earlier
-        where the criterion falls by less than 1 % over 25 of them. Without it, 200 and a budget of
+        where the criterion falls by less than 1 % over 25 of them. Default 200 and a budget of
         evaluations (about 10 s of a processor for 8 starts). The budget counts multiplications, so
         that searches repeat exactly.
     rng : Generator or int, optional
-        Chance, or its seed; default another one each time.
+        Random generator, or its seed; default a fresh one.
     progress : bool or callable
         A function of (done, total) stages; True logs them.
 
     Returns
     -------
     ExcitingTrajectory
-        The motion, its quality beside the random ones, and a status. Where no motion keeps every
-        limit the status is ``INFEASIBLE``, and ``limits.violations()`` says which are broken.
+        The motion, its quality and that of the random ones, and a status. Where no motion is within
+        all limits the status is ``INFEASIBLE``, and ``limits.violations()`` lists the broken ones.
 
     Raises
     ------
     ShapeError, InvalidValueError
-        Arguments that make no sense; too few samples for the parameters; friction in ``base``.
+        Arguments out of range; too few samples for the parameters; friction in ``base``.
     FrameNotFoundError
-        A box for a frame that is not there.
+        A box for an unknown frame.
 
     References
     ----------
@@ -141,167 +129,151 @@ def exciting_trajectory(
     Examples
     --------
     >>> from robotmodels.robots import load
-    >>> found = exciting_trajectory(
+    >>> result = exciting_trajectory(
     ...     load("planar_2r"), harmonics=3, starts=1, baseline=5, iterations=20, rng=0
     ... )
-    >>> found.limits.kept, bool(found.condition < found.baseline_conditions[0])
+    >>> result.limits.kept, bool(result.condition < result.baseline_conditions[0])
     (True, True)
     """
     check_model(model)
-    basis = MotionBasis(
-        way := chosen(MotionKind, kind, "kind"),
-        _positive(duration, "duration"),
-        order := _order(way, harmonics, points),
-        bool(rest),
-    )
-    aim = chosen(ExcitationCriterion, criterion, "criterion")
+    kind, criterion = _word(kind, KINDS, "kind"), _word(criterion, CRITERIA, "criterion")
+    if kind == "fourier" and points is not None:
+        raise InvalidValueError("points: a Fourier series has none; use harmonics=.")
+    order = _whole(harmonics, "harmonics") if points is None else _whole(points, "points")
+    if kind == "spline" and points is None:
+        order *= 2
+    basis = MotionBasis(kind, float(_sizes(duration, 1, "duration")[0]), order, bool(rest))
     base = _checked_base(model, base, drive)
-    if not len(base):
-        raise InvalidValueError(
-            f"{model.name} has no base parameters: nothing of it is to be excited."
-        )
     bounds, notes = excitation_limits(model, limits)
     torques, torque_notes = excitation_torques(model, torque_limits)
-    each = 20 if way is MotionKind.FOURIER else 10
-    samples = max(each * order, 60) if samples is None else _whole(samples, "samples")
+    default = max((20 if kind == "fourier" else 10) * order, 60)
+    samples = default if samples is None else _whole(samples, "samples")
     if samples * model.n < len(base) or samples < 2 * order + 1:
         raise InvalidValueError(
-            f"samples: {samples} times do not show {len(base)} base parameters and {order} "
+            f"samples: {samples} times are too few for {len(base)} base parameters and {order} "
             "harmonics or points; take more."
         )
     if not 0.0 <= margin < 0.5:
         raise InvalidValueError(f"margin: expected a part from 0 to below 0.5, got {margin!r:.40}.")
+    scale = _sizes(1.0 if scale is None else scale, len(base), "scale")
+    weight = scale / _sizes(1.0 if sigma is None else sigma, model.n, "sigma")[:, None]
+    given = _boxes(model, boxes)
     problem = ExcitationProblem(
-        model, basis, base, aim, bounds, torques, _boxes(model, boxes), samples,
-        _sizes(sigma, model.n, "sigma"), _sizes(scale, len(base), "scale"), float(margin),
-    )  # fmt: skip
-    times = basis.duration / (_DENSE * samples) * np.arange(_DENSE * samples, dtype=np.float64)
-    count, evaluations, pool = shared_budget(problem)
+        model, basis, base, criterion, bounds, torques, given, samples, weight, float(margin)
+    )
+    count, evaluations, pool = search.shared_budget(problem)
     count = count if starts is None else _whole(starts, "starts")
     pool = pool if baseline is None else _whole(baseline, "baseline")
-    most, allowed = (
-        (ITERATIONS, evaluations)
-        if iterations is None
-        else (_whole(iterations, "iterations"), None)
-    )
-    chance = np.random.default_rng(rng)
-    drawn = [random_motion(problem, chance) for _ in range(max(pool, count))]
-    judged = [quality(problem, basis.trajectory(X), times) for X in drawn]
-    kept = [limits_kept(problem, basis.trajectory(X)).kept for X in drawn]
-    # those within the limits first
-    best = sorted(range(len(drawn)), key=lambda k: (not kept[k], judged[k].of(aim)))[:count]
-    report = _progress(progress)
+    budget = (search.ITERATIONS, evaluations)
+    if iterations is not None:
+        budget = (_whole(iterations, "iterations"), None)
+    report, stages, total = _progress(progress), len(search.STAGES), count * len(search.STAGES)
+    generator = np.random.default_rng(rng)
+    times = basis.duration / (_DENSE * samples) * np.arange(_DENSE * samples, dtype=np.float64)
+
+    drawn = [search.random_motion(problem, generator) for _ in range(max(pool, count))]
+    before = [search.quality(problem, basis.trajectory(X), times) for X in drawn]
+    kept = [search.limits_kept(problem, basis.trajectory(X)).kept for X in drawn]
+    # feasible motions first
+    best = sorted(range(len(drawn)), key=lambda k: (not kept[k], before[k].of(criterion)))[:count]
     done: list[ExcitationStart] = []
     ends: list[Array] = []
     for s, k in enumerate(best):
-
-        def stage_done(stages: int, s: int = s) -> None:
-            report(s * len(STAGES) + stages, count * len(STAGES))
-
-        X, history, stages, status = improved(problem, drawn[k], most, allowed, stage_done)
-        after = quality(problem, basis.trajectory(X), times)
-        if kept[k] and (
-            status is ExcitationStatus.INFEASIBLE or after.of(aim) > judged[k].of(aim)
-        ):  # the start itself is better than what became of it
-            X, after = drawn[k], judged[k]
-            status = ExcitationStatus.LIMIT_OF_ITERATIONS
-        done.append(ExcitationStart(judged[k], after, history, stages, status))
+        X, history, counts, status = search.improved(
+            problem, drawn[k], *budget, lambda stage, b=s * stages: report(b + stage, total)
+        )
+        after = search.quality(problem, basis.trajectory(X), times)
+        worse = after.of(criterion) > before[k].of(criterion)
+        if kept[k] and (worse or status is ExcitationStatus.INFEASIBLE):  # the start was better
+            X, after, status = drawn[k], before[k], ExcitationStatus.LIMIT_OF_ITERATIONS
+        done.append(ExcitationStart(before[k], after, history, counts, status))
         ends.append(X)
-    first = min(
-        range(len(done)),
-        key=lambda k: (done[k].status is ExcitationStatus.INFEASIBLE, done[k].after.of(aim)),
-    )
-    trajectory = basis.trajectory(ends[first])
-    random = tuple(one for one, ok in zip(judged, kept, strict=True) if ok)
+    first = min(range(len(done)), key=lambda k: done[k].rank(criterion))
+    X, trajectory = ends[first], basis.trajectory(ends[first])
+    extremes = search.limits_kept(problem, trajectory)
+    random = tuple(quality for quality, ok in zip(before, kept, strict=True) if ok)
     if len(random) < len(drawn):
-        notes = (
-            *notes,
+        notes += (
             f"{len(drawn) - len(random)} of {len(drawn)} random motions do not keep the limits and "
             "are left out of the comparison.",
         )
+    notes += (*torque_notes, *_advice(done, criterion))
     return ExcitingTrajectory(
-        trajectory, model, base, aim, done[first].after, limits_kept(problem, trajectory),
-        tuple(done), random, basis, ends[first], done[first].status,
-        (*notes, *torque_notes, *_advice(done[first].status), *_more(done, aim)),
-    )  # fmt: skip
+        trajectory, model, base, criterion, extremes, tuple(done), random, basis, X, notes
+    )
 
 
-def _advice(status: ExcitationStatus) -> tuple[str, ...]:
-    if status is ExcitationStatus.INFEASIBLE:
+def _advice(done: Sequence[ExcitationStart], criterion: str) -> tuple[str, ...]:
+    """Sentences about broken limits, or the benefit of a greater budget by the spread of starts."""
+    kept = [start for start in done if start.status is not ExcitationStatus.INFEASIBLE]
+    if not kept:
         return (
             "Widen the limits that are named as broken, give the motion more time (duration), or "
-            "more starts; a robot that cannot hold its own weight needs larger torque_limits.",
+            "more starts; a robot that cannot carry its weight needs larger torque_limits.",
         )
-    return ()
-
-
-def _more(done: Sequence[ExcitationStart], aim: ExcitationCriterion) -> tuple[str, ...]:
-    """How much a greater budget would bring, by the spread of the starts and their last steps."""
-    kept = [one for one in done if one.status is not ExcitationStatus.INFEASIBLE]
-    if not kept:
-        return ()
-    values = np.array([one.after.of(aim) for one in kept])
-    if aim is ExcitationCriterion.CONDITION:
-        gain = f"lower the condition number by about {100.0 * gain_of_twice(np.log(values)):.2g} %"
-    else:
-        gain = f"raise the log det by about {gain_of_twice(values):.2g}"
-    found = []
-    if len(values) == 1:
-        found.append("With one start the benefit of more starts cannot be estimated; use starts=2.")
-    else:
-        ends = values if aim is ExcitationCriterion.CONDITION else -values
-        found.append(
-            f"Doubling the number of starts (starts={2 * len(done)}) is expected to {gain}; the "
-            f"{len(values)} starts ended between {ends.min():.4g} and {ends.max():.4g}."
-        )
+    values = np.array([start.after.of(criterion) for start in kept])
     best = kept[int(values.argmin())]
+    if criterion == "condition":
+        gain = 100.0 * search.gain_of_twice(np.log(values))
+        benefit = f"lower the condition number by about {gain:.2g} %"
+    else:
+        benefit = f"raise the log det by about {search.gain_of_twice(values):.2g}"
+        values = -values
+    if len(values) == 1:
+        notes = ["With one start the benefit of more starts cannot be estimated; use starts=2."]
+    else:
+        notes = [
+            f"Doubling the number of starts (starts={2 * len(done)}) is expected to {benefit}; the "
+            f"{len(values)} starts ended between {values.min():.4g} and {values.max():.4g}."
+        ]
     last = best.history[len(best.history) - int(best.stages[-1]) :]
     if best.status is ExcitationStatus.LIMIT_OF_ITERATIONS and len(last) > 1:
         fall = 100.0 * (1.0 - np.exp(min(0.0, last[-1] - last[len(last) // 2])))
-        found.append(
+        notes.append(
             f"In the second half of the last stage the criterion still fell by {fall:.2g} %; more "
             f"iterations (iterations={2 * max(int(best.stages.max()), 1)}) would lower it further."
         )
-    return tuple(found)
+    return tuple(notes)
 
 
 def _checked_base(model: RobotModel, base: BaseParameters | None, drive: Drives) -> BaseParameters:
-    if base is None:
-        return base_parameters(model, drive=drive)
-    if not isinstance(base, BaseParameters):
+    """Base parameters of the model, at least one, without friction models."""
+    base = base_parameters(model, drive=drive) if base is None else base
+    if not isinstance(base, BaseParameters) or base.friction is not None:
         raise InvalidValueError(
-            f"base: expected base parameters of the model, got {type(base).__name__}."
+            "base: expected base parameters of the model without friction=, which has no gradient "
+            "here; identify the parameters of other friction models on the same motion."
         )
     base.check(model)
-    if base.friction is not None:
+    if not len(base):
         raise InvalidValueError(
-            "base: friction besides that of the drives has no gradient here; make base parameters "
-            "without friction= for the motion, and identify its parameters on the same motion."
+            f"{model.name} has no base parameters: there is nothing to identify."
         )
     return base
 
 
-def _order(kind: MotionKind, harmonics: Any, points: Any) -> int:
-    if kind is MotionKind.FOURIER:
-        if points is not None:
-            raise InvalidValueError("points: a Fourier series has none; take harmonics=.")
-        return _whole(harmonics, "harmonics")
-    return 2 * _whole(harmonics, "harmonics") if points is None else _whole(points, "points")
-
-
-def _boxes(
-    model: RobotModel, boxes: WorkspaceBox | Sequence[WorkspaceBox]
-) -> tuple[WorkspaceBox, ...]:
+def _boxes(model: RobotModel, boxes: Any) -> tuple[WorkspaceBox, ...]:
+    """Boxes as a tuple, their frames known to the model."""
     given = (boxes,) if isinstance(boxes, WorkspaceBox) else tuple(boxes)
     for box in given:
         if not isinstance(box, WorkspaceBox):
             raise InvalidValueError(f"boxes: expected WorkspaceBox, got {type(box).__name__}.")
-        clearances(model, box, np.zeros((1, model.n)))  # refuses frames that are not there
+        box_distances(model, box, np.zeros((1, model.n)))
     return given
 
 
-def _sizes(value: ArrayLike | None, n: int, name: str) -> Array:
-    given = as_floats(1.0 if value is None else value, name)
+def _word(value: Any, words: Any, name: str) -> str:
+    """Check of an option name; case and - or _ are ignored."""
+    word = value.strip().lower().replace("-", "_") if isinstance(value, str) else value
+    if not isinstance(word, str) or word not in words:
+        known = ", ".join(map(repr, words))
+        raise InvalidValueError(f"{name}: expected one of {known}, got {value!r:.80}.")
+    return word
+
+
+def _sizes(value: ArrayLike, n: int, name: str) -> Array:
+    """Positive numbers (n,)."""
+    given = as_floats(value, name)
     if given.shape not in ((), (n,)):
         raise ShapeError(f"{name}: expected shape ({n},), got {given.shape}.")
     if not (given > 0.0).all():
@@ -309,16 +281,8 @@ def _sizes(value: ArrayLike | None, n: int, name: str) -> Array:
     return np.full(n, given)
 
 
-def _positive(value: Any, name: str) -> float:
-    number = as_floats(value, name)
-    if number.ndim or number <= 0.0:
-        raise InvalidValueError(
-            f"{name}: expected a positive number of seconds, got {value!r:.40}."
-        )
-    return float(number)
-
-
 def _whole(value: Any, name: str) -> int:
+    """A whole number from 1."""
     try:
         number = int(value)
     except (TypeError, ValueError, OverflowError):
@@ -329,12 +293,13 @@ def _whole(value: Any, name: str) -> int:
 
 
 def _progress(progress: Any) -> Callable[[int, int], Any]:
-    if progress is False or progress is None:
-        return lambda done, total: None
-    if progress is True:
-        return lambda done, total: _LOG.info("%d of %d stages are done", done, total)
+    """A function of (done, total)."""
     if callable(progress):
         return progress
-    raise InvalidValueError(
-        f"progress: expected a flag or a function of (done, total), got {progress!r:.60}."
-    )
+    if progress is True:
+        return partial(_LOG.info, "%d of %d stages are done")
+    if progress:
+        raise InvalidValueError(
+            f"progress: expected a flag or a function of (done, total), got {progress!r:.60}."
+        )
+    return lambda done, total: None

@@ -1,4 +1,4 @@
-"""What a search for an exciting trajectory returns."""
+"""Results of a search for an exciting trajectory."""
 
 from __future__ import annotations
 
@@ -10,21 +10,12 @@ from ..._arrays import Array, Rebuilt, read_only
 from ..._outcomes import Outcome
 from ...minimal_parameters import BaseParameters
 from ...model import RobotModel
-from ...trajectories import Trajectory
-from .basis import MotionBasis
-from .criterion import ExcitationCriterion
-from .kept import ExcitationLimits
-from .quality import ExcitationQuality
+from ...trajectories import LimitsReport, Trajectory
+from .motions import KINDS, MotionBasis
 
 
 class ExcitationStatus(Outcome):
-    """How a search ended.
-
-    Examples
-    --------
-    >>> ExcitationStatus(0).sentence
-    'The criterion fell by less than 1 % over the last 25 iterations, or not at all.'
-    """
+    """Outcome of a search."""
 
     CONVERGED = 0, "The criterion fell by less than 1 % over the last 25 iterations, or not at all."
     LIMIT_OF_ITERATIONS = (
@@ -34,21 +25,64 @@ class ExcitationStatus(Outcome):
     INFEASIBLE = 2, "No motion was found that keeps every limit."
 
 
+@dataclass(frozen=True, slots=True)
+class ExcitationQuality:
+    """Condition numbers of a stacked base regressor, with the exact sign of dry friction.
+
+    The condition numbers are in SI units, with columns of length 1, and weighted by the noise of
+    the joints and the sizes of the parameters; ``log_det`` is that of the weighted ``W^T W / N``.
+    """
+
+    condition: float
+    scaled_condition: float
+    weighted_condition: float
+    log_det: float
+
+    def of(self, criterion: str) -> float:
+        """Value that the criterion minimises."""
+        return self.weighted_condition if criterion == "condition" else -self.log_det
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ExcitationLimits(Rebuilt):
+    """Extremes of a motion, and the limits.
+
+    Exact for positions, velocities and accelerations (``motion``); torques (n,) in N m or N and
+    clearances of the boxes (B,) in m with an allowance for extremes between samples.
+    """
+
+    motion: LimitsReport
+    torque_limits: Array
+    torque: Array
+    clearance: Array
+
+    def __post_init__(self) -> None:
+        for name in ("torque_limits", "torque", "clearance"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    @property
+    def kept(self) -> bool:
+        """Whether all limits are kept."""
+        return not self.violations()
+
+    def violations(self) -> tuple[str, ...]:
+        """The limits that are not kept, one sentence each."""
+        torques = [
+            f"joint {j + 1}: torque {self.torque[j]:.6g}, allowed {self.torque_limits[j]:.6g}"
+            for j in np.flatnonzero(self.torque > self.torque_limits)
+        ]
+        boxes = [
+            f"box {k + 1}: a frame is {-self.clearance[k]:.4g} m beyond it"
+            for k in np.flatnonzero(self.clearance < 0.0)
+        ]
+        return (*self.motion.violations(), *torques, *boxes)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class ExcitationStart(Rebuilt):
-    """One start of the search.
+    """One start: its random motion and the improved one, and the smooth criterion (K,) in between.
 
-    Parameters
-    ----------
-    before, after : ExcitationQuality
-        Of the random motion and of what it became.
-    history : ndarray, shape (K,)
-        Smooth criterion over the iterations; each of its stages has one of its own, so that it may
-        jump between them.
-    stages : ndarray, shape (S,)
-        Iterations of each stage.
-    status : ExcitationStatus
-        How it ended.
+    ``stages`` are the iterations of each stage; between them the criterion may jump.
     """
 
     before: ExcitationQuality
@@ -61,10 +95,14 @@ class ExcitationStart(Rebuilt):
         object.__setattr__(self, "history", read_only(self.history))
         object.__setattr__(self, "stages", read_only(self.stages, np.int64))
 
+    def rank(self, criterion: str) -> tuple[bool, float]:
+        """Sort key; the best start has the smallest."""
+        return self.status is ExcitationStatus.INFEASIBLE, self.after.of(criterion)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ExcitingTrajectory(Rebuilt):
-    """A motion that shows a robot's base parameters, and how it was judged.
+    """Exciting trajectory for the identification of base parameters, with its quality and limits.
 
     Parameters
     ----------
@@ -73,42 +111,52 @@ class ExcitingTrajectory(Rebuilt):
     model : RobotModel
         The robot.
     base : BaseParameters
-        Which the motion is for.
-    criterion : ExcitationCriterion
-        What was made small.
-    quality : ExcitationQuality
-        Of the trajectory.
+        The parameters to be identified.
+    criterion : str
+        ``"condition"`` or ``"log_det"``, which was minimised.
     limits : ExcitationLimits
-        What it asks of the robot, beside what is allowed.
+        Extremes and limits: ``kept``, ``violations()``, ``motion``, ``torque``,
+        ``torque_limits``, ``clearance``.
     starts : tuple of ExcitationStart
-        Every start, in the order they were made.
+        Every start: ``before``, ``after``, ``history``, ``stages``, ``status``.
     baseline : tuple of ExcitationQuality
         Random motions that keep the same limits.
     basis : MotionBasis
-        Functions that the motion is made of.
+        Functions that the motion is made of: ``kind``, ``duration``, ``order``, ``rest``.
     coefficients : ndarray, shape (P, n)
         Their coefficients.
-    status : ExcitationStatus
-        Of the best start.
     notes : tuple of str
-        What is to be known besides, in sentences.
+        Limits that were assumed, and the expected benefit of more starts or iterations.
     """
 
     trajectory: Trajectory
     model: RobotModel
     base: BaseParameters
-    criterion: ExcitationCriterion
-    quality: ExcitationQuality
+    criterion: str
     limits: ExcitationLimits
     starts: tuple[ExcitationStart, ...]
     baseline: tuple[ExcitationQuality, ...]
     basis: MotionBasis
     coefficients: Array
-    status: ExcitationStatus
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "coefficients", read_only(self.coefficients))
+
+    @property
+    def best(self) -> ExcitationStart:
+        """The start that became the trajectory."""
+        return min(self.starts, key=lambda start: start.rank(self.criterion))
+
+    @property
+    def status(self) -> ExcitationStatus:
+        """Outcome of the best start: ``CONVERGED``, ``LIMIT_OF_ITERATIONS`` or ``INFEASIBLE``."""
+        return self.best.status
+
+    @property
+    def quality(self) -> ExcitationQuality:
+        """Condition numbers and log det of the trajectory."""
+        return self.best.after
 
     @property
     def condition(self) -> float:
@@ -128,12 +176,12 @@ class ExcitingTrajectory(Rebuilt):
     @property
     def baseline_conditions(self) -> Array:
         """Condition numbers of the random motions, ascending."""
-        return np.sort([one.condition for one in self.baseline])
+        return np.sort([quality.condition for quality in self.baseline])
 
     def __str__(self) -> str:
         random = self.baseline_conditions
         lines = [
-            f"Exciting trajectory of {self.model.name}: {self.basis.kind.value}, "
+            f"Exciting trajectory of {self.model.name}: {KINDS[self.basis.kind]}, "
             f"{self.basis.duration:g} s, {len(self.base)} base parameters",
             f"  {self.status.sentence}",
             f"  condition number     {self.condition:10.4g}",
@@ -147,16 +195,15 @@ class ExcitingTrajectory(Rebuilt):
             )
         after = ", ".join(f"{start.after.condition:.4g}" for start in self.starts)
         lines.append(f"  condition numbers of the {len(self.starts)} starts: {after}")
-        broken = self.limits.violations()
-        if broken:
+        if broken := self.limits.violations():
             lines += ["  limits that are not kept:", *(f"    {line}" for line in broken)]
         else:
             lines.append("  every limit is kept")
-        lines += [f"  {note}" for note in self.notes]
-        return "\n".join(lines)
+        return "\n".join([*lines, *(f"  {note}" for note in self.notes)])
 
     def __repr__(self) -> str:
+        status = self.status.name.lower().replace("_", " ")
         return (
             f"<ExcitingTrajectory of {self.model.name!r}: condition number {self.condition:.4g}, "
-            f"{self.status.name.lower().replace('_', ' ')}>"
+            f"{status}>"
         )

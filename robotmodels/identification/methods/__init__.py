@@ -1,1 +1,1 @@
-"""Methods that solve the equations, on one data object."""
+"""Methods of identification: small frozen objects that solve equations."""

@@ -1,0 +1,233 @@
+"""Checks before a fit: signs, order and units of the joints, excitation, delay.
+
+Seed book sections 1.6.2.1 to 1.6.2.4.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from .._arrays import Array
+from ..dynamics import idm
+from ..errors import InvalidValueError
+from ..friction import Friction
+from ..friction.protocols import by_dependence
+from ..logs import FindingKind, Log, LogFinding, Severity, check_log
+from ..logs.bad_samples import cleaned
+from ..logs.log import check_is_log
+from ..minimal_parameters import base_parameters
+from ..model import RobotModel
+from ..regressors import torque_regressor
+from .delay import (
+    SynchronisationStatus,
+    check_log_and_model,
+    default_cutoff,
+    filtered_samples,
+    representative_part,
+    synchronisation,
+)
+from .joint_hypotheses import BOTH, LogCorrection, better_hypotheses
+
+
+def accepted_log(
+    log: Log, model: RobotModel, name: str, friction: Friction | None = None
+) -> tuple[Log, tuple[str, ...]]:
+    """Check and clean a log, with sentences on the findings; raise if it is unusable."""
+    log, findings = _cleaned(log, model)
+    if not any(finding.severity is Severity.USELESS for finding in findings):
+        findings = (*findings, *check_joints(log, model, friction))
+    return log, _sentences(findings, name)
+
+
+def accepted_test(
+    log: Log, test: Log, model: RobotModel, checked: bool
+) -> tuple[Log, tuple[str, ...]]:
+    """Check and clean the test log, which must match the fitted one."""
+    check_is_log(test)
+    if test.n != model.n:
+        raise InvalidValueError(f"test: expected a log of {model.n} joints, got {test.n}.")
+    if abs(test.dt - log.dt) > 1e-6 * log.dt:
+        raise InvalidValueError(
+            f"test: expected the sampling period of the log ({log.dt:g} s), since it is processed "
+            f"in the same way, got {test.dt:g} s; read it with dt={log.dt:g}, or call "
+            "validate(result, log)."
+        )
+    if np.shares_memory(log.q, test.q):
+        raise InvalidValueError(
+            "test: it has rows of the log that is fitted, so that it is no test; give rows "
+            "that are not fitted."
+        )
+    if not checked:
+        return test, ()
+    test, findings = _cleaned(test, model)
+    return test, tuple(f"Of the held-out log: {each}" for each in _sentences(findings, "test"))
+
+
+def _cleaned(log: Log, model: RobotModel) -> tuple[Log, tuple[LogFinding, ...]]:
+    findings = check_log(log, model)
+    bad = any(finding.kind in (FindingKind.STUCK, FindingKind.SPIKES) for finding in findings)
+    return cleaned(log) if bad else log, findings
+
+
+def _sentences(findings: tuple[LogFinding, ...], name: str) -> tuple[str, ...]:
+    useless = [str(finding) for finding in findings if finding.severity is Severity.USELESS]
+    if useless:
+        advice = "(checked=False uses the log unchanged.)"
+        raise InvalidValueError(f"{name}: {' '.join(useless)} {advice}")
+    return tuple(str(finding) for finding in findings)
+
+
+def check_joints(
+    log: Log, model: RobotModel, friction: Friction | None = None
+) -> tuple[LogFinding, ...]:
+    """Findings on signs, order and units of the joints of a log, from their equations."""
+    check_log_and_model(log, model)
+    cutoff = default_cutoff(log)
+    part = representative_part(log, cutoff)
+    findings: list[LogFinding] = []
+    try:
+        x = filtered_samples(part, cutoff, 2, 300)
+        samples = np.stack([signal[x.rows] for signal in (x.q, x.v, x.a, x.tau)])
+        compensators = by_dependence(friction)[1]
+        _signs_and_order(part, model, samples, cutoff, compensators, findings)
+        _torque_sizes(part, model, samples, findings)
+        _excitation(model, samples, findings)
+        _delay(part, model, findings)
+    except InvalidValueError as error:  # too short or at rest
+        words = f"Signs, order, excitation or delay were not checked: {error}"
+        findings.append(LogFinding(FindingKind.TOO_SHORT, Severity.DOUBTFUL, (), words))
+    if part is not log:
+        extent = f" (From {len(part)} of {len(log)} samples.)"
+        findings = [replace(finding, sentence=finding.sentence + extent) for finding in findings]
+    return tuple(findings)
+
+
+def _signs_and_order(
+    log: Log,
+    model: RobotModel,
+    samples: Array,
+    cutoff: float,
+    compensators: Friction | None,
+    findings: list[LogFinding],
+) -> None:
+    """Report wrong signs, swapped joints and degrees, the most likely first."""
+    for _ in range(log.n):
+        likely = better_hypotheses(samples, model, cutoff, compensators)
+        if not likely:
+            return
+        best, others = likely[0], likely[1:]
+        kind, words, advice = _description(best.correction, log)
+        if others:
+            alike = "; ".join(_description(other.correction, log)[1] for other in others)
+            advice = f"{advice} Equally likely: {alike}."
+        sentence = (
+            f"{words[0].upper()}{words[1:]}: with this correction the equations of all joints "
+            f"leave {100.0 * best.left:.2g} % of the variance of the affected torques unexplained "
+            f"instead of {100.0 * best.given:.2g} % ({best.significance:.0f} standard errors). "
+            f"{advice}"
+        )
+        severity = Severity.USELESS if best.certain else Severity.DOUBTFUL
+        names = tuple(log.names[j] for j in best.correction.joints)
+        findings.append(LogFinding(kind, severity, names, sentence))
+        if not best.certain:
+            return
+        samples = best.correction.of(samples)
+
+
+def _description(correction: LogCorrection, log: Log) -> tuple[FindingKind, str, str]:
+    """Kind, name and advice of a hypothesis."""
+    names, columns = [log.names[j] for j in correction.joints], correction.columns
+    kind, advice = FindingKind.WRONG_SIGN, "Use negative drive_gains= of read_log."
+    if correction.kind == "degrees":
+        kind, words = FindingKind.POSITIONS_IN_DEGREES, "positions look like degrees"
+        advice = (
+            "Read the log with angles='deg', or with gears= or transmission= if they are motor "
+            "angles."
+        )
+    elif correction.kind == "swap":
+        kind = FindingKind.SWAPPED_JOINTS
+        words = f"joints {names[0]} and {names[1]} look swapped in {columns}"
+        advice = "Check the order of the columns (positions=, torques= of read_log)."
+    elif len(names) > 1:
+        words = "the torques of all joints have the wrong sign"
+    elif columns == BOTH:
+        words = f"joint {names[0]} looks flipped (wrong sign of position and torque)"
+        advice = "Give it -1 in signs= of read_log."
+    else:
+        words = f"the {columns[:-1]} of joint {names[0]} has the wrong sign"
+        advice = (
+            "Use signs= of read_log to reverse position and torque together, or negative "
+            "drive_gains= to reverse the torque alone."
+        )
+    return kind, words, advice
+
+
+def _torque_sizes(log: Log, model: RobotModel, samples: Array, findings: list[LogFinding]) -> None:
+    """Report joints whose torques differ in size from those of the model's inertia, if it has any.
+
+    Joints whose torque the inertia does not explain are skipped.
+    """
+    if model.inertia is None or not (model.inertia.values[:, 9] > 0.0).any():
+        return
+    q, v, a, tau = samples
+    predicted, gains = idm(model, q, v, a, drive=False), {}
+    for j in range(log.n):
+        friction = np.column_stack([v[:, j], np.sign(v[:, j]), a[:, j], np.ones(len(v))])
+        both = np.column_stack([predicted[:, j], tau[:, j]])
+        (xx, xy), (_, yy) = np.cov((both - friction @ np.linalg.lstsq(friction, both)[0]).T)
+        if xy > 0.0 and xy**2 > 0.5 * xx * yy:
+            gains[j] = float(xy / xx)
+    # inertias of catalogues are wrong by less than a factor of 20
+    large = {j: f"{gain:.3g} times" for j, gain in gains.items() if gain > 20.0}
+    small = {j: f"1/{1.0 / gain:.3g}" for j, gain in gains.items() if gain < 1.0 / 20.0}
+    units = "in another unit: check units, drive_gains= and gears= of read_log."
+    if all(1.0 / 3.0 < gains[j] / 1e3 < 3.0 for j in large):
+        units = "in mN m: use drive_gains=0.001."
+    some = " or in kN m" if len(small) == len(gains) > 1 else " at these joints only"
+    motors = f"motor torques{some}: see gears=, transmission= and drive_gains= of read_log."
+    for off, size, advice in ((large, "larger", units), (small, "smaller", motors)):
+        if off:
+            names = tuple(log.names[j] for j in off)
+            listed = ", ".join(f"{log.names[j]}: {factor}" for j, factor in off.items())
+            sentence = (
+                f"Torques without friction are much {size} than those computed from the model's "
+                f"inertia ({listed}); they may be {advice}"
+            )
+            kind = FindingKind.TORQUE_OFF_INERTIA
+            findings.append(LogFinding(kind, Severity.DOUBTFUL, names, sentence))
+
+
+def _excitation(model: RobotModel, samples: Array, findings: list[LogFinding]) -> None:
+    """Report a motion on which the regressor has less than full rank."""
+    base = base_parameters(model, drive=True)
+    W = torque_regressor(model, *samples[:3], columns=base.names)
+    R = np.asarray(np.linalg.qr(W.reshape(-1, len(base)), mode="r"))
+    size = np.sqrt((R**2).sum(axis=0))
+    kept = size > 1e-9 * size.max(initial=0.0)
+    rank = int(np.linalg.matrix_rank(R[:, kept] / size[kept], rtol=1e-6)) if kept.any() else 0
+    if rank < len(base):
+        sentence = (
+            f"The motion excites {rank} of {len(base)} base parameters; the others are not "
+            "identifiable. Record a motion that excites them (exciting_trajectory), or "
+            "identify the joints that move."
+        )
+        findings.append(LogFinding(FindingKind.NOT_EXCITING, Severity.DOUBTFUL, (), sentence))
+
+
+def _delay(log: Log, model: RobotModel, findings: list[LogFinding]) -> None:
+    """Report a delay between torques and positions."""
+    estimate = synchronisation(log, model)
+    if estimate.status is SynchronisationStatus.AT_THE_END:
+        sentence = (
+            f"The torques fit the positions best {1e3 * abs(estimate.delay):.0f} ms "
+            f"{'late' if estimate.delay > 0.0 else 'early'}, the largest delay tried: "
+            "the delay is larger, or they belong to different motions. Extend the range by "
+            "synchronisation(log, model, within=...), and remove the delay by with_delay."
+        )
+    elif estimate.is_out_of_step:
+        sentence = f"{estimate} Remove it by with_delay(log, {estimate.delay:.3g})."
+    else:
+        return
+    findings.append(LogFinding(FindingKind.OUT_OF_STEP, Severity.DOUBTFUL, (), sentence))

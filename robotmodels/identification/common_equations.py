@@ -1,0 +1,162 @@
+"""Equations of one or several logs in common unknowns: parameters of the robot and of its loads.
+
+Source: W. Khalil, M. Gautier and P. Lemoine, "Identification of the payload inertial parameters of
+industrial manipulators", IEEE ICRA 2007, (8)-(12).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import Array, Rebuilt, read_only
+from .._outcomes import Outcome
+from ..errors import InvalidValueError, nearest_names
+from ..estimation.factor import TriangularFactors, reduced
+from ..logs import Log
+from ..logs.log import check_is_log
+from ..minimal_parameters import BaseParameters
+from ..regressors.columns import plain_name
+from ..table_text import boxed
+from .equations import Block, Equations, equations
+from .forms import RowForm, formed_block
+from .processing import checked_processing, choose_processing
+from .signals import Piece, Processing
+
+UNIDENTIFIABLE = 1e-7
+"""Rank tolerance: residual column norm relative to the largest."""
+_ROUNDING = 1e-8
+"""Smallest standard deviation of residuals, relative to the measured side."""
+
+Task = tuple[Equations, Piece, Array | None, RowForm | None]
+
+
+def equations_of(
+    base: BaseParameters, logs: Sequence[Log], processing: Processing | None
+) -> tuple[Equations, ...]:
+    """Equations of logs with common processing, by default chosen for the first log."""
+    for log in logs:
+        check_is_log(log)
+    given = checked_processing(processing, logs[0])
+    choices = given if isinstance(given, Processing) else choose_processing(logs[0], **given)
+    if any(abs(log.dt - choices.dt) > 1e-9 * choices.dt for log in logs):
+        slowest = max(log.dt for log in logs)
+        raise InvalidValueError(
+            "log: the logs have different sampling periods; read all with read_log(..., "
+            f"dt={slowest:g})."
+        )
+    return tuple(equations(base, log, choices) for log in logs)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CommonEquations:
+    """Equations of several logs: rows formed at the rate of the log, then mapped to p unknowns.
+
+    Shapes: maps (columns of the rows, p), None for the identity.
+    """
+
+    systems: tuple[Equations, ...]
+    names: tuple[str, ...]
+    maps: tuple[Array | None, ...]
+    form: RowForm | None = None
+
+    def blocks(self) -> Iterator[Block]:
+        """Equations of all logs in the common unknowns, piece by piece."""
+        return (_block(task) for task in self._tasks())
+
+    def reduced(self, executor: Executor | None = None) -> TriangularFactors:
+        """Triangular factors of all logs."""
+        run = map if executor is None else executor.map
+        return reduced(self.names, run(_block, self._tasks()))
+
+    def columns(self, kept: NDArray[np.int64]) -> CommonEquations:
+        """The same equations in some of the unknowns."""
+        maps = tuple(None if M is None else M[:, kept] for M in self.maps)
+        return replace(self, names=tuple(self.names[k] for k in kept), maps=maps)
+
+    def _tasks(self) -> Iterator[Task]:
+        for system, matrix in zip(self.systems, self.maps, strict=True):
+            for piece in system.pieces():
+                yield system, piece, matrix, self.form
+
+
+def _block(task: Task) -> Block:
+    system, piece, matrix, form = task
+    block = system.block(piece) if form is None else formed_block(system, piece, form)
+    return block if matrix is None else replace(block, W=block.W @ matrix)
+
+
+def residual_noise(factors: TriangularFactors) -> Array:
+    """Standard deviation of the residuals of each kind, from its equations alone, shape (m,)."""
+    noise = np.ones(len(factors.factors))
+    for m, F in enumerate(factors.factors):
+        size = float(np.linalg.norm(F[:, -1]))
+        count = max(int(factors.counts[m]), 1)
+        if not size > 0.0:
+            continue
+        U, s, _ = np.linalg.svd(F[:, :-1] / column_lengths(F[:, :-1]), full_matrices=False)
+        U = U[:, s > 1e-12 * s.max(initial=0.0)]
+        rest = float(np.linalg.norm(F[:, -1] - U @ (U.T @ F[:, -1])))
+        left = max(count - U.shape[1], 1)
+        noise[m] = max(rest / np.sqrt(left), _ROUNDING * size / np.sqrt(count))
+    return noise
+
+
+def column_lengths(R: Array) -> Array:
+    """Lengths of columns, 1 for those that are zero."""
+    lengths = np.linalg.norm(R, axis=0)
+    return np.where(lengths > 0.0, lengths, 1.0)
+
+
+class NamedEstimate(Rebuilt):
+    """Base of results with names, values, covariance and status; read-only."""
+
+    __slots__ = ()
+    names: tuple[str, ...]
+    values: Array
+    covariance: Array
+    status: Outcome
+
+    def __post_init__(self) -> None:
+        for name in self.__slots__:
+            value = getattr(self, name)
+            if isinstance(value, np.ndarray):
+                object.__setattr__(self, name, read_only(value))
+
+    @property
+    def standard_errors(self) -> Array:
+        """Standard errors of the values, corrected for correlated residuals."""
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+
+    def value(self, name: str) -> float:
+        """Value of one parameter, SI units."""
+        return float(self.values[self._place(name)])
+
+    def standard_error(self, name: str) -> float:
+        """Standard error of one parameter, SI units."""
+        return float(self.standard_errors[self._place(name)])
+
+    def reason(self) -> str:
+        """The status as a sentence."""
+        return self.status.sentence
+
+    def __str__(self) -> str:
+        if not np.isfinite(self.values).all():
+            return self.reason()
+        numbers = (("value", self.values, ".4g"), ("standard error", self.standard_errors, ".2g"))
+        columns = [(head, [format(x, digits) for x in row]) for head, row, digits in numbers]
+        return f"{boxed([('parameter', list(self.names)), *columns])}\n{self.reason()}"
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {len(self.names)} parameters, {self.status.name}>"
+
+    def _place(self, name: str) -> int:
+        name = plain_name(name, self.names)
+        if name not in self.names:
+            near = ", ".join(nearest_names(name, self.names)) or "none"
+            raise InvalidValueError(f"name: {name!r} was not identified; near it: {near}.")
+        return self.names.index(name)

@@ -1,0 +1,310 @@
+"""Delay between positions and torques of a log, and the filtered samples that determine it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import Array, Rebuilt, as_floats
+from .._outcomes import Outcome
+from ..errors import InvalidValueError, ShapeError
+from ..logs import Log
+from ..logs.log import check_is_log
+from ..logs.stretches import SAMPLES, stretches
+from ..model import RobotModel, check_model
+from ..regressors import torque_regressor
+from .signals import central_differences, zero_phase
+
+SMOOTH_DRIVE = ("Ia", "Fv", "offset")
+"""Drive parameters whose columns are continuous at velocity reversals."""
+
+
+class SynchronisationStatus(Outcome):
+    """Outcome of the delay estimation."""
+
+    FOUND = 0, "The torques fit the positions best at one delay."
+    AT_THE_END = (
+        1,
+        "The torques fit best at an end of the delays tried; extend the range (within=), and check "
+        "whether positions and torques are of the same motion.",
+    )
+    FLAT = (
+        2,
+        "The torques fit equally well at every delay tried; the motion is too slow to "
+        "determine the delay.",
+    )
+
+    @property
+    def is_success(self) -> bool:
+        """Whether the delay is determined."""
+        return self is SynchronisationStatus.FOUND
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Synchronisation(Rebuilt):
+    """Delays (s) of the torques behind the positions, of all joints and of each.
+
+    Shapes: joint_delays, joint_standard_errors (n,), NaN where not determined; delays tried and
+    their relative residuals (S,); dt is the sampling period.
+    """
+
+    status: SynchronisationStatus
+    delay: float
+    standard_error: float
+    joint_delays: Array
+    joint_standard_errors: Array
+    delays: Array
+    residuals: Array
+    dt: float
+
+    @property
+    def is_out_of_step(self) -> bool:
+        """Whether the delay is significant, and more than a tenth of a sample."""
+        significant = abs(self.delay) > max(4.0 * self.standard_error, 0.1 * self.dt)
+        return bool(self.status.is_success and significant)
+
+    def __str__(self) -> str:
+        if not self.status.is_success:
+            return self.status.sentence
+        joints = ", ".join(f"{1e3 * delay:.2f}" for delay in self.joint_delays)
+        return (
+            f"The torques lag {1e3 * self.delay:.3f} ms behind the positions "
+            f"({self.delay / self.dt:.2f} samples; standard error "
+            f"{1e3 * self.standard_error:.3f} ms); joint by joint {joints} ms."
+        )
+
+
+def synchronisation(
+    log: Log, model: RobotModel, *, cutoff: float | None = None, within: float | None = None
+) -> Synchronisation:
+    """Estimate the delay of the torques of a log behind its positions.
+
+    For each delay the torques are shifted back, and the residual of the dynamic model with free
+    parameters is computed; the minimum over the delays is interpolated, to well below a sample.
+    Inertia and friction of the model are not used. Logs of more than 1e5 samples are represented by
+    up to 20 stretches spread evenly over them. A motion that excites few parameters is sufficient.
+    The model is rigid: the log of the TX40 shows no significant delay at cutoffs of 10 to 20 Hz,
+    and torques 2.5 ms early at 40 Hz and more, which is flexibility and not a delay of the
+    recording.
+
+    Parameters
+    ----------
+    log : Log
+        Positions and torques.
+    model : RobotModel
+        The robot.
+    cutoff : float, optional
+        Cutoff of positions and torques, Hz; default 15, or a tenth of the sampling rate
+        if that is less.
+    within : float, optional
+        Largest delay that is tried, in both directions, s; default 0.02 or five samples if that is
+        more.
+
+    Returns
+    -------
+    Synchronisation
+        The delay; `robotmodels.logs.with_delay` removes it from the log.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        The model has other joints; the log is too short for the filter and the delays.
+
+    References
+    ----------
+    Seed book section 1.6.2.4.
+
+    Examples
+    --------
+    >>> from robotmodels.geometry import DHTable
+    >>> one = RobotModel.from_table(DHTable(antecedent=[0], sigma=[0]))
+    >>> t = np.arange(0.0, 4.0, 0.001)[:, None]
+    >>> q = np.sin(3.0 * t) + np.sin(7.0 * t)
+    >>> late = t - 0.004
+    >>> tau = -9.0 * np.sin(3.0 * late) - 49.0 * np.sin(7.0 * late)
+    >>> estimate = synchronisation(Log(0.001, q, tau), one)
+    >>> abs(estimate.delay - 0.004) < 1e-4
+    True
+    """
+    check_log_and_model(log, model)
+    fc = default_cutoff(log) if cutoff is None else float(as_floats(cutoff, "cutoff"))
+    if not 0.0 < fc < 0.5 / log.dt:
+        raise InvalidValueError(
+            f"cutoff: expected a frequency between 0 and {0.5 / log.dt:g} Hz, got {fc:g}."
+        )
+    span = max(0.02, 5.0 * log.dt) if within is None else float(as_floats(within, "within"))
+    if not span >= log.dt:
+        raise InvalidValueError(
+            f"within: expected at least a sampling period ({log.dt:g} s), got {span:g}."
+        )
+    # filtered torques change little over a step, so that a spline interpolates their residuals
+    step = 0.1 / fc / np.pi
+    count = int(np.ceil(span / step))
+    delays: Array = np.asarray(step * np.arange(-count, count + 1), np.float64)
+    margin = int(np.ceil((delays[-1] + 2.0 * step) / log.dt)) + 2
+    joints = _joint_equations(
+        filtered_samples(representative_part(log, min(fc, 1.0 / span)), fc, margin), model
+    )
+    if not joints:
+        raise InvalidValueError(
+            "log: no joint has enough samples in motion to compare torques with; see check_log."
+        )
+    curves, power = np.full((log.n, len(delays)), np.nan), 0.0
+    for j, joint in joints.items():
+        squares = (joint.residuals(delays) ** 2).sum(axis=0)
+        rows, rank = joint.basis.shape
+        size = float((joint.tau[joint.rows] ** 2).sum())
+        variance = max(squares.min() / (rows - rank), 1e-24 * size / rows, 1e-300)
+        curves[j], power = squares / variance, power + size / variance
+    total = np.nansum(curves, axis=0)
+    delay, standard_error = _minimum(list(joints.values()), delays, total)
+    joint_delays, joint_standard_errors = np.full(log.n, np.nan), np.full(log.n, np.nan)
+    for j, joint in joints.items():
+        at, error = _minimum([joint], delays, curves[j])
+        if np.isfinite(error):
+            joint_delays[j], joint_standard_errors[j] = at, error
+    relative = np.sqrt(total / power)
+    if delay in (delays[0], delays[-1]):
+        status = SynchronisationStatus.AT_THE_END
+    elif standard_error < span and float(np.ptp(relative)) > 1e-6:
+        status = SynchronisationStatus.FOUND
+    else:  # as for a single sine, whose phase is equally well explained by friction
+        status = SynchronisationStatus.FLAT
+    return Synchronisation(
+        status, delay, standard_error, joint_delays, joint_standard_errors, delays, relative, log.dt
+    )
+
+
+def check_log_and_model(log: Log, model: RobotModel) -> None:
+    """Raise unless these are a log and a model of as many joints."""
+    check_is_log(log)
+    check_model(model)
+    if model.n != log.n:
+        raise ShapeError(f"log: {log.n} joints, the model {model.name} has {model.n}.")
+
+
+def default_cutoff(log: Log) -> float:
+    """Default cutoff in Hz; above 15 Hz joint flexibility and friction lag bias the delay."""
+    return min(15.0, 0.1 / log.dt)
+
+
+def representative_part(log: Log, cutoff: float) -> Log:
+    """Subset of a long log: at most 1e5 samples in up to 20 evenly spread stretches."""
+    length = max(SAMPLES // 20, int(50.0 / (cutoff * log.dt)))
+    return stretches(log, length, max(SAMPLES, length))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FilteredSamples:
+    """Zero-phase filtered signals of a log (N, n), and the numbers of a sparse subset of rows."""
+
+    log: Log
+    cutoff: float
+    q: Array
+    v: Array
+    a: Array
+    tau: Array
+    rows: NDArray[np.int64]
+
+
+def filtered_samples(log: Log, cutoff: float, margin: int, most: int = 6000) -> FilteredSamples:
+    """Filter and differentiate a log; its rows are at least ``margin`` away from all ends."""
+    step = max(1, int(0.4 / (cutoff * log.dt)))  # filtered signals contain no more
+    margin += int(np.ceil(1.0 / (cutoff * log.dt)))
+    q, v, a, tau = (np.zeros(log.q.shape) for _ in range(4))
+    kept = []
+    for part in log.recordings():
+        if part.stop - part.start <= 2 * margin + step:
+            continue
+        q[part], tau[part] = (zero_phase(x[part], cutoff, log.dt) for x in (log.q, log.tau))
+        v[part] = central_differences(q[part], log.dt)
+        a[part] = central_differences(v[part], log.dt)
+        kept.append(np.arange(part.start + margin, part.stop - margin, step))
+    if not kept:
+        raise InvalidValueError(
+            f"log: no recording is longer than {2 * margin + step} samples, which the filter at "
+            f"{cutoff:g} Hz and the delays that are tried need; give a higher cutoff or try fewer."
+        )
+    rows = np.concatenate(kept)
+    if len(rows) > most:
+        rows = rows[np.linspace(0, len(rows) - 1, most).round().astype(int)]
+    return FilteredSamples(log, cutoff, q, v, a, tau, rows)
+
+
+def motor_speeds(model: RobotModel) -> Array:
+    """Weights (n + k, n) of the joint velocities and of k coupled motor velocities."""
+    if model.transmission is None:
+        return np.eye(model.n)
+    motors = np.array(model.transmission.coupled_motors, dtype=int) - 1
+    return np.concatenate([np.eye(model.n), model.transmission.weights[motors]])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _JointEquations:
+    """Torque of a joint (N,), rows in motion, and their orthonormal regressor."""
+
+    tau: Array
+    dt: float
+    rows: NDArray[np.int64]
+    basis: Array
+
+    def residuals(self, delays: Array) -> Array:
+        """Torques shifted by the delays, less their projection on the regressor (rows, S)."""
+        from scipy.ndimage import map_coordinates
+
+        y = map_coordinates(self.tau, [self.rows[:, None] + delays / self.dt])
+        return y - self.basis @ (self.basis.T @ y)
+
+
+def _joint_equations(x: FilteredSamples, model: RobotModel) -> dict[int, _JointEquations]:
+    """Equations of the joints that have enough samples in motion."""
+    weights, dt = motor_speeds(model), x.log.dt
+    speed = x.v @ weights.T
+    steps, largest = np.sign(speed), np.abs(speed).max(axis=0)
+    moving = np.abs(speed[x.rows]) > 0.02 * largest
+    near = int(np.ceil(0.25 / (x.cutoff * dt)))  # around a reversal
+    for side in (-near, near):
+        moving &= steps[np.clip(x.rows + side, 0, len(steps) - 1)] == steps[x.rows]
+    # dry friction of a joint that never moves is constant
+    usable = ~(~(moving | (largest < 1e-9)) @ (weights != 0.0))
+    for part in x.log.recordings():  # the filter spreads steps as in the torques
+        steps[part] = zero_phase(steps[part], x.cutoff, dt)
+    W = torque_regressor(model, x.q[x.rows], x.v[x.rows], x.a[x.rows], drive=SMOOTH_DRIVE)
+    equations = {}
+    for j in range(x.log.n):
+        rows = x.rows[usable[:, j]]
+        A = np.concatenate([W[usable[:, j], j], steps[rows] * weights[:, j]], axis=1)
+        size = np.sqrt((A**2).sum(axis=0))
+        U, s, _ = np.linalg.svd(A / np.where(size > 0.0, size, 1.0), full_matrices=False)
+        basis = np.ascontiguousarray(U[:, s > 1e-9 * s.max(initial=0.0)])
+        if len(rows) > basis.shape[1] + 10:
+            equations[j] = _JointEquations(x.tau[:, j], dt, rows, basis)
+    return equations
+
+
+def _minimum(joints: list[_JointEquations], delays: Array, curve: Array) -> tuple[float, float]:
+    """Delay at the minimum of a curve of residuals, and its standard error; infinite at an end."""
+    from scipy.interpolate import CubicSpline
+
+    best = int(np.argmin(curve))
+    if best in (0, len(delays) - 1):
+        return float(delays[best]), float("inf")
+    spline = CubicSpline(delays, curve)
+    roots = spline.derivative().roots(extrapolate=False)
+    candidates = np.append(roots[np.isfinite(roots)], delays[best])
+    at = float(candidates[np.argmin(spline(candidates))])
+    inflation = np.mean([_inflation(joint.residuals(np.array([at]))[:, 0]) for joint in joints])
+    return at, float(np.sqrt(2.0 * inflation / max(float(spline(at, 2)), 1e-300)))
+
+
+def _inflation(r: Array) -> float:
+    """Variance inflation by autocorrelation of residuals, 1 + 2 sum(rho_k)."""
+    power, inflation = max(float(r @ r), 1e-300), 1.0
+    for k in range(1, min(25, len(r) // 4)):
+        rho = float(r[:-k] @ r[k:]) / power
+        if rho < 0.05:
+            break
+        inflation += 2.0 * rho
+    return inflation

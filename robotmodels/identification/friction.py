@@ -1,0 +1,431 @@
+"""Friction curves that are not linear in their parameters: Stribeck friction, friction by load.
+
+Both are fitted together with the base parameters and drives: least squares by a trust region, on
+triangular factors of the columns and residuals at each point, tests of each joint's curve after.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import Array, as_floats
+from .._outcomes import Outcome
+from ..errors import InvalidValueError
+from ..estimation import column_basis
+from ..estimation.covariance import correlated_covariance
+from ..estimation.factor import TriangularFactors
+from ..friction import LoadFriction, StribeckFriction
+from ..inertia import PARAMETERS
+from ..logs import Log
+from ..minimal_parameters import BaseParameters
+from ..model import RobotModel, check_model
+from .common_equations import (
+    UNIDENTIFIABLE,
+    CommonEquations,
+    NamedEstimate,
+    column_lengths,
+    equations_of,
+    residual_noise,
+)
+from .equations import Equations, parameters_of
+from .forms import FormedRows
+from .reduction import reduce_equations
+from .signals import Processing
+
+_KINDS = {"stribeck": ("drop", "vs"), "load": ("Fl",)}
+_Curve = Callable[[Array, Array, Array, Array], tuple[Array, Array, Array]]
+"""From W (k, n, b), velocities, b parameters and curve parameters (n, c): W with the slopes of the
+torque, columns of the curve parameters (k, n, c), torque of the curve (k, n)."""
+_GRID = 16
+"""Stribeck velocities that are tried first, for each joint and exponent."""
+_SOLVER: dict[str, Any] = {
+    "x_scale": "jac",
+    "xtol": 1e-9,
+    "ftol": 1e-11,
+    "gtol": None,
+    "max_nfev": 60,
+}
+_SIGNIFICANT = 1e-3
+"""Significance level of a friction curve."""
+_DEPENDENT = 1e-10
+"""Rank tolerance: singular value relative to the largest."""
+_LOAD_START = 0.1
+"""Second start of load-dependent friction, relative: its absolute values may have two minima."""
+
+
+class FrictionStatus(Outcome):
+    """Outcome of a fit of friction curves."""
+
+    SOLVED = 0, "The significant friction curves fit the log best."
+    INSIGNIFICANT = 1, "No joint has significant friction beyond viscous and Coulomb friction."
+    NOT_CONVERGED = 2, "The iterations ended before the parameters settled; use them with care."
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class FrictionFit(NamedEstimate):
+    """Base parameters and friction curves; see `fit_friction`."""
+
+    base: BaseParameters
+    names: tuple[str, ...]
+    values: Array
+    covariance: Array
+    p_value: Array
+    exponent: Array
+    sigma: Array
+    status: FrictionStatus
+
+    @property
+    def curve(self) -> str:
+        """Friction curve: "stribeck" or "load"."""
+        return "stribeck" if self.exponent.size else "load"
+
+    @property
+    def significant(self) -> NDArray[np.bool_]:
+        """Joints whose curve is significant, shape (n,)."""
+        return (self.p_value < _SIGNIFICANT) & (self._by_joint(_KINDS[self.curve][0]) > 0.0)
+
+    @property
+    def friction(self) -> StribeckFriction | LoadFriction:
+        """The friction of all joints, without Stribeck's curve where it is not significant."""
+        if self.curve == "load":
+            return LoadFriction(self._by_joint("Fl"))
+        significant = self.significant
+        # negative by noise: zero
+        Fc, drop, Fv = (np.maximum(self._by_joint(kind), 0.0) for kind in ("Fc", "drop", "Fv"))
+        Fs = Fc + drop
+        vs = np.where(significant, self._by_joint("vs"), 1.0)
+        return StribeckFriction(Fv, Fc, Fs, vs, self.exponent)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Joints whose curve is not significant."""
+        size = self._by_joint(_KINDS[self.curve][0])
+        return tuple(
+            f"This friction is not significant at joint {j + 1} ("
+            + ("its curve is negative)." if size[j] <= 0.0 else f"p = {self.p_value[j]:.2g}).")
+            for j in np.flatnonzero(~self.significant)
+        )
+
+    def _by_joint(self, kind: str) -> Array:
+        values = dict(zip(self.names, self.values.tolist(), strict=True))
+        return np.array([values.get(f"{kind}{j}", 0.0) for j in _frames(self.base)])
+
+
+def fit_friction(
+    model: RobotModel,
+    log: Log,
+    curve: Literal["stribeck", "load"] = "stribeck",
+    *,
+    exponents: Sequence[float] = (2.0,),
+    base: BaseParameters | None = None,
+    processing: Processing | None = None,
+) -> FrictionFit:
+    """Fit Stribeck friction or load-dependent friction with base parameters and drives.
+
+    Stribeck friction adds ``drop exp(-|v / vs|^exponent) sign(v)`` to viscous and Coulomb friction,
+    ``drop = Fs - Fc``; load-dependent friction adds ``Fl |load| sign(v)``, where the load is the
+    torque of the links' identified parameters (the measured torque would bring its noise into the
+    columns). A rotor inertia regrouped into a link is part of the load.
+
+    Parameters
+    ----------
+    model : RobotModel
+        The robot.
+    log : Log
+        Its log: with slow motion outside of the dead band for Stribeck friction, with different
+        loads for load-dependent friction.
+    curve : {"stribeck", "load"}
+        The friction.
+    exponents : sequence of float
+        Exponents of Stribeck's curve that are tried, such as ``(1.0, 2.0)``.
+    base : BaseParameters, optional
+        With Coulomb friction; default all drive parameters.
+    processing : Processing, optional
+        Default the choice for the log.
+
+    Returns
+    -------
+    FrictionFit
+        ``.names, .values, .standard_errors, .covariance`` of the identifiable base parameters and
+        of ``Fl`` of each joint, or of ``drop`` and ``vs`` where the curve is significant, with the
+        number of the frame (``.value("vs2")``); ``.friction`` for simulation; ``.significant`` and
+        ``.p_value`` (chi-squared tests), ``.exponent`` and ``.sigma`` (residual standard deviation)
+        of each joint; ``.status``, ``.notes``.
+
+    Raises
+    ------
+    InvalidValueError
+        Another curve; exponents that are not positive; a log of other joints; no Coulomb friction
+        in ``base``.
+
+    References
+    ----------
+    Seed book section 1.5.1.4; B. Armstrong-Helouvry, P. Dupont and C. Canudas de Wit, Automatica
+    30(7), 1994, section 2; P. Hamon, M. Gautier and P. Garrec, "Dynamic identification of robots
+    with a dry friction model depending on load and velocity", IEEE/RSJ IROS 2010, section III.
+
+    Examples
+    --------
+    >>> from robotmodels.dynamics import idm
+    >>> from robotmodels.robots import load
+    >>> arm, t, w = load("rx90"), 0.01 * np.arange(2000)[:, None], np.linspace(1.0, 5.0, 6)
+    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
+    >>> dry = np.sign(v) * (1.0 + np.exp(-((v / 0.3) ** 2)))
+    >>> result = fit_friction(arm, Log(0.01, q, idm(arm, q, v, a) + dry, v, a))
+    >>> result.status.name, round(result.value("drop2"), 2), round(result.value("vs2"), 2)
+    ('SOLVED', 1.0, 0.3)
+    """
+    check_model(model)
+    if curve not in _KINDS:
+        raise InvalidValueError(f"curve: expected 'stribeck' or 'load', got {curve!r:.60}.")
+    powers = as_floats(exponents, "exponents").reshape(-1)
+    if not powers.size or (powers <= 0.0).any():
+        raise InvalidValueError(f"exponents: expected positive numbers, got {exponents!r:.60}.")
+    base = parameters_of(model, base, True)
+    if not any(name.rstrip("0123456789") == "Fc" for name in base.names):
+        raise InvalidValueError(
+            "base: expected Fc among its parameters, to which the friction is added; ask for "
+            "base_parameters(model, drive=True)."
+        )
+    (system,) = equations_of(base, (log,), processing)
+    factors = reduce_equations(system)
+    identifiable = column_basis(factors.stacked()[0], nothing=UNIDENTIFIABLE).kept
+    curves = len(_KINDS[curve]) * model.n
+    if factors.rows <= len(identifiable) + curves:
+        raise InvalidValueError(
+            f"log: {factors.rows} equations are too few for {len(identifiable)} parameters and "
+            f"{curves} of the curves; give a longer log, or a smaller decimation (processing=)."
+        )
+    system = system.with_names(tuple(base.names[k] for k in identifiable))
+    return _fit_load(system) if curve == "load" else _fit_stribeck(system, powers)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Point:
+    """A point of the fit: b parameters and c of each joint's curve, of which some are free.
+
+    Shapes: x (b + n c,), free (f,) numbers of its entries, limits (2, b + n c).
+    """
+
+    system: Equations
+    curve: _Curve
+    x: Array
+    free: NDArray[np.int64]
+    limits: Array
+
+    @property
+    def first(self) -> NDArray[np.int64]:
+        """Entries of the first curve parameter of each joint, shape (n,)."""
+        return np.linspace(
+            len(self.system.names), len(self.x), self.system.model.n, False, dtype=int
+        )
+
+    def at(self, part: Array) -> _Point:
+        """The point with other values of the free parameters."""
+        x = self.x.copy()
+        x[self.free] = part
+        return replace(self, x=x)
+
+    def tangents(self) -> CommonEquations:
+        """Columns of the free parameters, and the residuals as the measured side."""
+        b = len(self.system.names)
+        theta, curves = self.x[:b], self.x[b:].reshape(self.system.model.n, -1)
+
+        def form(W: Array, tau: Array, v: Array, use: NDArray[np.bool_]) -> FormedRows:
+            changed, columns, torque = self.curve(W, v, theta, curves)
+            whole = np.concatenate((changed, _by_joint(columns)), axis=2)
+            return np.take(whole, self.free, axis=2), tau - W @ theta - torque, use
+
+        return CommonEquations((self.system,), tuple(map(str, self.free)), (None,), form)
+
+    def linear(self, weights: Array | None = None) -> tuple[TriangularFactors, Array, Array, Array]:
+        """Reduced tangents, weights, and the rows ``R step = e`` of all joints together."""
+        factors = self.tangents().reduced()
+        weights = 1.0 / residual_noise(factors) if weights is None else weights
+        R, e, rest = factors.stacked(weights)
+        return factors, weights, np.vstack((R, 0.0 * R[:1])), np.append(e, np.sqrt(rest))
+
+    def stepped(self, columns: NDArray[np.bool_]) -> _Point:
+        """One Gauss-Newton step of some of the parameters, all of which are free."""
+        _, _, R, e = self.linear()
+        x = self.x.copy()
+        x[columns] += _least_squares(R[:, columns], e)
+        return self.at(x)
+
+    def fitted(self) -> tuple[_Point, bool]:
+        """Least squares of the free parameters that are independent, with this point's weights."""
+        from scipy.optimize import least_squares
+
+        _, weights, R, _ = self.linear()
+        basis = column_basis(R / column_lengths(R), nothing=UNIDENTIFIABLE)
+        point = replace(self, free=self.free[basis.kept])
+
+        @lru_cache(maxsize=1)
+        def at(part: bytes) -> tuple[Array, Array]:
+            # rows up to a rotation, which no step of a trust region depends on
+            _, _, R, e = point.at(np.frombuffer(part)).linear(weights)
+            return e, -R
+
+        solution = least_squares(
+            lambda x: at(x.tobytes())[0],
+            point.x[point.free],
+            bounds=tuple(point.limits[:, point.free]),
+            **{**_SOLVER, "jac": lambda x: at(x.tobytes())[1]},
+        )
+        return point.at(solution.x), solution.status > 0
+
+    def tested(self, p_value: Array) -> tuple[_Point, Array]:
+        """The point without insignificant curves, and the covariance; p-values are written."""
+        from scipy.stats import chi2
+
+        _, weights, R, _ = self.linear()
+        size = column_lengths(R)
+        half = np.linalg.pinv(R / size, rcond=_DEPENDENT) / size[:, None]
+        none, inverse = np.zeros(len(self.free)), half @ half.T
+        covariance = correlated_covariance(self.tangents(), none, weights, inverse).covariance
+        variance = np.maximum(np.diag(covariance), np.diag(inverse))  # not below rounding
+        x, free = self.x.copy(), self.free
+        c = (len(x) - self.first[0]) // len(self.first)
+        for j, first in enumerate(self.first):
+            columns = np.arange(first, first + c)
+            if np.isin(columns, self.free).all():
+                k = np.searchsorted(self.free, first)
+                square = x[first] ** 2 / variance[k] if R[:, k].any() else 0.0
+                p_value[j] = chi2.sf(square, c)
+            # without a curve its velocity is undetermined
+            if c > 1 and (p_value[j] >= _SIGNIFICANT or x[first] <= 0.0):
+                x[first] = 0.0
+                free = np.setdiff1d(free, columns)
+        return replace(self, x=x, free=free), covariance
+
+
+def _point(system: Equations, curve: _Curve, curves: Array) -> _Point:
+    """A point with free parameters, those of the curves given. Shapes: curves (n, c)."""
+    x = np.append(np.zeros(len(system.names)), curves)
+    limits = np.full((2, len(x)), [[-np.inf], [np.inf]])
+    return _Point(system, curve, x, np.arange(len(x)), limits)
+
+
+def _stribeck(exponent: Array) -> _Curve:
+    """Stribeck friction by the drop and vs of each joint."""
+
+    def curve(W: Array, v: Array, theta: Array, x: Array) -> tuple[Array, Array, Array]:
+        (drop, vs), (column, ratio) = x.T, _decay(v, x[:, 1], exponent)
+        torque = drop * column
+        return W, np.stack((column, torque * ratio * exponent / vs), axis=2), torque
+
+    return curve
+
+
+def _by_load(links: NDArray[np.bool_]) -> _Curve:
+    """Load-dependent friction by the load part of each joint. Shapes: links (b,)."""
+
+    def curve(W: Array, v: Array, theta: Array, x: Array) -> tuple[Array, Array, Array]:
+        load = W @ np.where(links, theta, 0.0)
+        column = np.abs(load) * np.sign(v)
+        share = x[:, 0] * np.sign(load) * np.sign(v)
+        changed = W + share[:, :, None] * np.where(links, W, 0.0)
+        return changed, column[:, :, None], x[:, 0] * column
+
+    return curve
+
+
+def _decay(v: Array, vs: Array, exponent: Array) -> tuple[Array, Array]:
+    """Stribeck's curve ``exp(-r) sign(v)`` and ``r = |v / vs|^exponent``."""
+    with np.errstate(over="ignore", under="ignore"):
+        ratio = np.minimum((np.abs(v) / vs) ** exponent, 700.0)
+        return np.exp(-ratio) * np.sign(v), ratio
+
+
+def _fit_stribeck(system: Equations, powers: Array) -> FrictionFit:
+    """Best Stribeck curve of each joint on a grid of velocities and exponents, then refined."""
+    n, b, log = system.model.n, len(system.names), system.log
+    speed = np.abs(np.diff(log.q, axis=0)) / log.dt if log.v is None else np.abs(log.v)
+    fast = np.maximum(np.percentile(speed, 95.0, axis=0), 1e-12)
+    high = 0.5 * fast
+    low = np.minimum(np.maximum(system.processing.dead_band, 1e-3 * fast), 0.5 * high)
+    grid = low[:, None] * (high / low)[:, None] ** np.linspace(0.0, 1.0, _GRID)
+    vs, exponent = np.tile(grid, len(powers)), np.repeat(powers, _GRID)
+    c = vs.shape[1]
+
+    def all_curves(W: Array, v: Array, theta: Array, x: Array) -> tuple[Array, Array, Array]:
+        return W, _decay(v[:, :, None], vs, exponent)[0], 0.0 * v
+
+    _, _, R, y = _point(system, all_curves, np.zeros((n, c))).linear()
+    best = np.full(n, -1)
+    for j in (*range(n), *range(n)):  # a second time, with the curves of the other joints
+        others = [b + c * i + k for i, k in enumerate(best) if i != j and k >= 0]
+        fixed, tried = R[:, [*range(b), *others]], R[:, b + c * j : b + c * (j + 1)]
+        right = np.column_stack((tried, y))
+        right -= fixed @ _least_squares(fixed, right)
+        gain = (right[:, -1] @ right[:, :-1]) / column_lengths(right[:, :-1])
+        best[j] = int(np.argmax(np.abs(gain)))
+    curves = np.column_stack((np.zeros(n), vs[range(n), best]))
+    point = _point(system, _stribeck(exponent[best]), curves)
+    point.limits[:, b + 1 :: 2] = 0.1 * low, 4.0 * high
+    linear = np.full(len(point.x), True)
+    linear[b + 1 :: 2] = False
+    point, p_value = point.stepped(linear), np.ones(n)
+    start, _ = point.tested(p_value)  # the velocity of a zero curve is undetermined
+    return _search(start, p_value, exponent[best])[1]
+
+
+def _fit_load(system: Equations) -> FrictionFit:
+    """Better fit of two starts: without and with load-dependent friction."""
+    n, b = system.model.n, len(system.names)
+    links = np.array([name.rstrip("0123456789") in PARAMETERS for name in system.names])
+    linear = np.arange(b + n) < b
+    point = _point(system, _by_load(links), np.zeros((n, 1))).stepped(linear)
+    other = point.at(np.where(linear, point.x, _LOAD_START))
+    for _ in range(3):  # the other parameters are adapted first
+        other = other.stepped(linear)
+    starts = (point, other)
+    fits = [_search(start, np.ones(n), np.zeros(0)) for start in starts]
+    return min(fits, key=lambda fit: fit[0])[1]
+
+
+def _search(point: _Point, p_value: Array, exponent: Array) -> tuple[float, FrictionFit]:
+    """Best fit from a start, and minus its log-likelihood."""
+    rounds = 0
+    while True:
+        rounds, (found, converged) = rounds + 1, point.fitted()
+        # a curve that compensated an error of another joint's curve becomes insignificant
+        point, covariance = found.tested(p_value)
+        if len(point.free) == len(found.free) and rounds > 1:
+            break
+    factors, _, _, _ = point.linear()
+    sigma = np.sqrt(factors.sums(np.zeros(len(point.free))) / np.maximum(factors.counts, 1))
+    system, base = point.system, point.system.base
+    kinds = _KINDS["stribeck" if exponent.size else "load"]
+    names = [*system.names, *(f"{kind}{j}" for j in _frames(base) for kind in kinds)]
+    names, values = tuple(names[k] for k in point.free), point.x[point.free]
+    status = FrictionStatus.SOLVED if converged else FrictionStatus.NOT_CONVERGED
+    fit = FrictionFit(base, names, values, covariance, p_value, exponent, sigma, status)
+    if not fit.significant.any():
+        fit = replace(fit, status=FrictionStatus.INSIGNIFICANT)
+    return float(factors.counts @ np.log(np.maximum(sigma, 1e-150))), fit
+
+
+def _by_joint(columns: Array) -> Array:
+    """Block-diagonal arrangement of columns (k, n, c) as (k, n, n c)."""
+    k, n, c = columns.shape
+    wide = np.zeros((k, n, n, c))
+    wide[:, range(n), range(n)] = columns
+    return wide.reshape(k, n, n * c)
+
+
+def _least_squares(R: Array, right: Array) -> Array:
+    size = column_lengths(R)
+    solution = np.linalg.lstsq(R / size, right, rcond=_DEPENDENT)[0]
+    return (solution.T / size).T
+
+
+def _frames(base: BaseParameters) -> list[int]:
+    """Numbers of the frames of the joints."""
+    return [int(row) + 1 for row in base.model.table.joint_rows]

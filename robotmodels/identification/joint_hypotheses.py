@@ -1,0 +1,202 @@
+"""Signs, order and unit of joints: hypotheses compared by the equations of all joints at once.
+
+Source: Q. H. Vuong, "Likelihood ratio tests for model selection and non-nested hypotheses",
+Econometrica 57(2), 1989.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from .._arrays import Array
+from ..friction import Friction
+from ..geometry import PRISMATIC
+from ..model import RobotModel
+from ..regressors import torque_regressor
+from .delay import SMOOTH_DRIVE, motor_speeds
+
+_LIKELY, _CERTAIN = np.log(2.0), np.log(3.0)
+"""Least mean log ratio of residual variances of a doubtful and of a certain hypothesis; smaller
+ratios are explained by errors of the model."""
+_SIGNIFICANT = 4.0
+"""Least mean difference of log-likelihoods, in standard errors."""
+_REVERSALS = 6
+"""Least number of reversals of a joint for a certain hypothesis."""
+_FLOOR = 1e-6
+"""Least residual variance relative to the torque; smaller ones are equal."""
+POSITIONS, TORQUES, BOTH = "positions", "torques", "positions and torques"
+
+
+class LogCorrection(NamedTuple):
+    """Correction of a log by matrices (n, n): "sign" or "swap" of joints, "degrees"."""
+
+    kind: str
+    columns: str
+    joints: tuple[int, ...]
+    position: Array
+    torque: Array
+
+    def of(self, samples: Array) -> Array:
+        """Samples of q, v, a and tau, shape (4, T, n), after this correction."""
+        return np.concatenate([samples[:3] @ self.position.T, samples[3:] @ self.torque.T])
+
+
+class Hypothesis(NamedTuple):
+    """A correction that fits better, the residual variance with and without it, and its test."""
+
+    correction: LogCorrection
+    certain: bool
+    gain: float
+    left: float
+    given: float
+    significance: float
+
+
+def better_hypotheses(
+    samples: Array, model: RobotModel, cutoff: float, compensators: Friction | None = None
+) -> tuple[Hypothesis, ...]:
+    """Corrections of samples (4, T, n) that fit significantly better, best first."""
+    tau = samples[3]
+    fast = [x[np.abs(x) > 0.05 * np.abs(x).max(initial=0.0)] for x in samples[1].T]
+    reversals = max(int((np.diff(np.sign(x)) != 0.0).sum()) for x in fast)
+    given = _equations(model, samples, cutoff, compensators)
+    likelihood, share = given.fit(tau)
+    hypotheses: list[Hypothesis] = []
+    for group in _corrections(model, samples[0]):
+        equations = given
+        if group[0].columns != TORQUES:
+            equations = _equations(model, group[0].of(samples), cutoff, compensators)
+        for correction in group:
+            torques, count = tau @ correction.torque.T, min(len(correction.joints), 2)
+            # a fit without sign constraints is at least as good, and quicker
+            if _gain(equations.fit(torques, False, share)[1], share) < count * _LIKELY:
+                continue
+            better, part = equations.fit(torques)
+            gain, significance = _gain(part, share), _significance(better - likelihood)
+            left, before = (float(x[list(correction.joints)].mean()) for x in (part, share))
+            # better fits of other joints are no evidence for this correction
+            if gain >= count * _LIKELY and significance > _SIGNIFICANT and left < before:
+                enough = reversals >= _REVERSALS and left < 0.5 * before
+                certain = gain >= count * _CERTAIN and enough
+                hypotheses.append(Hypothesis(correction, certain, gain, left, before, significance))
+    hypotheses.sort(key=lambda hypothesis: -hypothesis.gain)
+    return tuple(h for h in hypotheses if h.gain > hypotheses[0].gain - _LIKELY)
+
+
+def _gain(share: Array, base: Array) -> float:
+    """Logarithm of the ratio of the products of the residual variances of all joints."""
+    return float(np.log(base).sum() - np.log(share).sum())
+
+
+def _significance(difference: Array) -> float:
+    """Mean of differences over its standard error; 20 blocks of time are treated as independent."""
+    blocks = np.array_split(difference, min(20, len(difference)))
+    means = np.array([block.mean() for block in blocks])
+    error = means.std(ddof=1) / np.sqrt(len(means)) if len(means) > 1 else np.inf
+    return float(means.mean() / max(error, 1e-300))
+
+
+def _corrections(model: RobotModel, q: Array) -> Iterator[list[LogCorrection]]:
+    """Signs, swaps and degrees; corrections of a list have the same positions."""
+    n = model.n
+    unit = np.eye(n)
+    changes: list[tuple[str, tuple[int, ...], Array]] = [
+        ("sign", (j,), unit - 2.0 * np.diag(unit[j])) for j in range(n)
+    ]
+    for i, j in combinations(range(n), 2):
+        order = np.arange(n)
+        order[[i, j]] = j, i
+        changes.append(("swap", (i, j), unit[order]))
+    every = [LogCorrection("sign", TORQUES, tuple(range(n)), unit, -unit)] if n > 1 else []
+    yield [
+        LogCorrection(kind, TORQUES, joints, unit, change) for kind, joints, change in changes
+    ] + every
+    for kind, joints, change in changes:
+        yield [
+            LogCorrection(kind, POSITIONS, joints, change, unit),
+            LogCorrection(kind, BOTH, joints, change, change),
+        ]
+    turning = model.table.sigma[model.table.joint_rows] != PRISMATIC
+    if (np.abs(q[:, turning]) > 2.0 * np.pi).any():
+        degrees = np.diag(np.where(turning, np.pi / 180.0, 1.0))
+        joints = tuple(np.flatnonzero(turning).tolist())
+        yield [LogCorrection("degrees", POSITIONS, joints, degrees, unit)]
+
+
+class _Equations(NamedTuple):
+    """Regressors (n, T, p) and their Gram matrices; the first ``free`` parameters have any sign."""
+
+    W: Array
+    grams: Array
+    free: int
+
+    def fit(
+        self, tau: Array, constrained: bool = True, share: Array | float = 1.0
+    ) -> tuple[Array, Array]:
+        """Weighted least squares of torques (T, n), from initial residual variances.
+
+        Returns the log-likelihood of each sample (T,) and the variance left of each torque (n,).
+        """
+        moments = np.einsum("jtp,tj->jp", self.W, tau)
+        sizes = np.maximum(tau.var(axis=0), 1e-290)
+        free = self.free if constrained else self.W.shape[2]
+        e, variances = tau, share * sizes
+        for _ in range(4 if constrained else 2):
+            weights = 1.0 / np.maximum(variances, _FLOOR * sizes)
+            gram = np.einsum("j,jpq->pq", weights, self.grams)
+            e = tau - (self.W @ _solved(gram, weights @ moments, free)).T
+            variances = np.maximum((e**2).mean(axis=0), _FLOOR * sizes)
+        likelihood = -0.5 * (np.log(variances) + e**2 / variances).sum(axis=1)
+        return likelihood, variances / sizes
+
+
+def _solved(A: Array, b: Array, free: int) -> Array:
+    """Solution of normal equations; unknowns from number ``free`` on are not negative."""
+    from scipy.linalg import cholesky, solve_triangular
+    from scipy.optimize import nnls
+
+    scale = np.sqrt(np.diag(A))
+    R = cholesky(A / np.outer(scale, scale) + 1e-10 * np.eye(len(A)), check_finite=False)
+    c = solve_triangular(R, b / scale, trans=1, check_finite=False)
+    x = np.zeros(len(A))
+    if free < len(A):
+        x[free:] = nnls(R[free:, free:], c[free:])[0]
+    if free:
+        rest = c[:free] - R[:free, free:] @ x[free:]
+        x[:free] = solve_triangular(R[:free, :free], rest, check_finite=False)
+    return x / scale
+
+
+def _equations(
+    model: RobotModel, samples: Array, cutoff: float, compensators: Friction | None
+) -> _Equations:
+    """Equations of all joints; masses, second moments, rotors and friction are not negative."""
+    q, v, a = samples[:3]
+    n, links = model.n, 10 * model.table.f
+    W = torque_regressor(model, q, v, a, drive=SMOOTH_DRIVE, friction=compensators)
+    bodies = W[:, :, :links].reshape(len(q), n, -1, 10)
+    XX, YY, ZZ = (bodies[..., k].copy() for k in (0, 3, 5))
+    # XX = Lyy + Lzz and so on: second moments Lxx, Lyy, Lzz of a body are not negative
+    bodies[..., 0], bodies[..., 3], bodies[..., 5] = YY + ZZ, XX + ZZ, XX + YY
+    # corrections change velocities sample by sample: the step of dry friction at a reversal is not
+    # filtered but drawn out over a quarter of a period of the cutoff
+    weights = motor_speeds(model)
+    speed, rate = v @ weights.T, a @ weights.T
+    near = 0.25 / cutoff * np.sqrt((rate**2).mean(axis=0))
+    steps = speed / np.where(near > 0.0, np.hypot(speed, near), 1.0)
+    elastic = (q - q.mean(axis=0))[:, :, None] * np.eye(n)
+    rows = np.concatenate([W, steps[:, None] * weights.T, elastic], axis=2)
+    limited = np.zeros(rows.shape[2], dtype=bool)
+    limited[:links] = np.isin(np.arange(links) % 10, (0, 3, 5, 9))
+    limited[links : links + 2 * n] = True
+    limited[W.shape[2] : W.shape[2] + n] = True
+    size = np.sqrt(np.einsum("tjp,tjp->p", rows, rows))
+    seen = np.flatnonzero(size > 1e-9 * size.max(initial=0.0))
+    order = seen[np.argsort(limited[seen], kind="stable")]
+    scaled = np.ascontiguousarray((rows[:, :, order] / size[order]).transpose(1, 0, 2))
+    grams = scaled.transpose(0, 2, 1) @ scaled
+    return _Equations(scaled, grams, int((~limited[order]).sum()))

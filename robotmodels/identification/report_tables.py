@@ -1,0 +1,226 @@
+"""Tables of the report on an identification: data, processing, errors, parameters."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._arrays import Array
+from ..estimation.estimate import Estimate
+from ..geometry import PRISMATIC
+from ..logs import Log
+from ..minimal_parameters import BaseParameters
+from ..model import RobotModel
+from ..table_text import ReportSection, ReportTable, number_text, percent_text, table_of
+from .forms import EquationForm
+from .result import IdentificationResult
+from .validation import Errors
+from .weak_parameters import WEAK
+
+_NORMAL = 1.959964
+_WIDTH = 29
+"""Columns of text for the standard parameters of a base parameter."""
+_ROUNDING = 1e-9
+
+
+def effort_units(model: RobotModel) -> tuple[str, ...]:
+    """Units of the joints' torques or forces."""
+    sigma = model.table.sigma[model.table.joint_rows]
+    return tuple("N" if kind == PRISMATIC else "N m" for kind in sigma.tolist())
+
+
+def group_names(result: IdentificationResult) -> tuple[str, ...]:
+    """Names of the groups of equations: joints, or the whole robot."""
+    by_joint = result.equations.form.by_joint
+    return tuple(result.model.table.joint_names) if by_joint else ("whole robot",)
+
+
+def group_units(result: IdentificationResult) -> tuple[str, ...]:
+    """Units of the residuals of the groups of equations."""
+    form = result.equations.form
+    if form.by_joint:
+        return effort_units(result.model)
+    return ("W",) if form is EquationForm.POWER else ("J",)
+
+
+def parameter_units(result: IdentificationResult) -> tuple[str, ...]:
+    """Units of the identified parameters."""
+    table = result.base.value_table(result.base_values)
+    units = dict(zip(table.names, table.units, strict=True))
+    return tuple(units[name] for name in result.names)
+
+
+def intervals(estimate: Estimate) -> Array:
+    """Intervals (b, 2) that contain each true value with 95 % probability."""
+    return estimate.values[:, None] + np.outer(estimate.standard_errors, (-_NORMAL, _NORMAL))
+
+
+def standard_error_ratio(result: IdentificationResult) -> Array:
+    """Ratio of standard errors to those for white residuals (b,); NaN where these are 0."""
+    white = result.details.iid_standard_errors
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(white > 0.0, result.standard_errors / white, np.nan)
+
+
+def data_section(result: IdentificationResult) -> ReportSection:
+    """Section on the log: samples, sources, refused rows, ranges of the joints."""
+    log, runs = result.equations.log, len(result.equations.log.starts)
+    body: list[str | ReportTable] = [
+        f"{len(log)} samples of {log.n} joints at {1.0 / log.dt:.6g} Hz, {log.duration:.4g} s"
+        + (f" in {runs} recordings." if runs > 1 else ".")
+    ]
+    if log.delay:
+        body.append(f"A delay of the torques of {1e3 * log.delay:.4g} ms was removed.")
+    if log.sources:
+        rows = [(source.name, str(source.rows), source.sha256[:16]) for source in log.sources]
+        body.append(table_of(("source", "samples", "SHA-256 begins"), rows))
+    body += [_refused(log), _ranges(result)]
+    return ReportSection("Data", tuple(body))
+
+
+def _refused(log: Log) -> str:
+    if not log.refused:
+        return "No rows were refused."
+    total = sum(len(part.rows) for part in log.refused)
+    parts = [
+        f"{part.source}: {len(part.rows)} (rows {part.rows[0]} to {part.rows[-1]}), "
+        f"{part.reason.rstrip('.')}"
+        for part in log.refused
+    ]
+    return f"{total} rows were refused. {'; '.join(parts)}."
+
+
+def _ranges(result: IdentificationResult) -> ReportTable:
+    log, factors = result.equations.log, result.factors
+    rms = np.sqrt(np.einsum("ij,ij->j", log.tau, log.tau) / len(log))
+    largest = np.maximum(log.tau.max(axis=0), -log.tau.min(axis=0))
+    counted = len(factors.counts) == log.n
+    rows = []
+    for j, (name, unit) in enumerate(
+        zip(result.model.table.joint_names, effort_units(result.model), strict=True)
+    ):
+        numbers = (log.q[:, j].min(), log.q[:, j].max(), rms[j], largest[j])
+        low, high, size, top = (f"{x:.4g}" for x in numbers)
+        cells = [name, "m" if unit == "N" else "rad", low, high, unit, size, top]
+        if counted:
+            cells += [str(int(factors.counts[j])), str(int(factors.left_out[j]))]
+        rows.append(tuple(cells))
+    headings = ["joint", "unit", "from", "to", "unit", "rms torque", "largest"]
+    headings += ["equations", "in dead band"] if counted else []
+    return table_of(tuple(headings), rows)
+
+
+def processing_section(result: IdentificationResult) -> ReportSection:
+    """Section on filters, decimation and dead bands, with the reasons."""
+    chosen = result.equations.processing
+    filtered, decimated = "none", "none"
+    if chosen.cutoff is not None:
+        filtered = f"{chosen.cutoff:.4g} Hz (-3 dB), zero phase, order {chosen.order} twice"
+    if chosen.torque_cutoff is not None:
+        decimated = (
+            f"one of {chosen.decimation}, low-pass at {chosen.torque_cutoff:.4g} Hz, "
+            f"{chosen.rate:.4g} Hz after it"
+        )
+    units = ("m/s" if unit == "N" else "rad/s" for unit in effort_units(result.model))
+    joints = zip(result.model.table.joint_names, chosen.dead_band.tolist(), units, strict=True)
+    bands = ", ".join(f"{name} {width:.2g} {unit}" for name, width, unit in joints)
+    lines = (
+        f"* Low-pass of the positions: {filtered}.",
+        f"* Derivatives: central differences of order {chosen.accuracy}.",
+        f"* Decimation of regressor and torque: {decimated}.",
+        f"* Dead band of the velocities: {bands}.",
+        f"* Cut at both ends of each recording: {chosen.edges} samples "
+        f"({chosen.edges * chosen.dt:.3g} s).",
+        "Why: " + " ".join(chosen.notes),
+    )
+    return ReportSection("Processing", lines)
+
+
+def errors_section(result: IdentificationResult) -> ReportSection:
+    """Section on the errors of predicted torques."""
+    body: list[str | ReportTable] = [
+        "Measured less predicted torque at the rate of the log: root mean square, relative to that "
+        "of the measured torque, mean. Filtered: the residuals of the equations, dead bands left "
+        "out. All: root mean square of the relative errors.",
+        _error_table(result, result.validation.in_sample, "on the log"),
+    ]
+    test = result.validation.held_out
+    if test is None:
+        body.append("There is no held-out log.")
+    else:
+        body.append(f"Held out: {test.samples} samples that were not fitted.")
+        body.append(_error_table(result, test, "held out"))
+    return ReportSection("Errors", tuple(body))
+
+
+def _error_table(result: IdentificationResult, errors: Errors, name: str) -> ReportTable:
+    rows = [
+        (
+            joint,
+            unit,
+            number_text(errors.rmse[j], 3),
+            percent_text(errors.relative[j]),
+            number_text(errors.bias[j], 2),
+            number_text(errors.filtered_rmse[j], 3),
+            percent_text(errors.filtered_relative[j]),
+        )
+        for j, (joint, unit) in enumerate(
+            zip(result.model.table.joint_names, effort_units(result.model), strict=True)
+        )
+    ]
+    whole = [_root_mean_square(x) for x in (errors.relative, errors.filtered_relative)]
+    rows.append(("all", "", "", whole[0], "", "", whole[1]))
+    return table_of((name, "unit", "RMSE", "relative", "mean", "filtered", "relative"), rows)
+
+
+def _root_mean_square(values: Array) -> str:
+    finite = values[np.isfinite(values)]
+    return percent_text(float(np.sqrt(np.mean(finite**2)))) if finite.size else "-"
+
+
+def parameters_section(result: IdentificationResult) -> ReportSection:
+    """A table of the parameters of each unit."""
+    estimate, base = result.estimate, result.base
+    units, ends = parameter_units(result), intervals(estimate)
+    regrouped = dict(zip(base.names, (base.matrix != 0.0).sum(axis=1) > 1, strict=True))
+    body: list[str | ReportTable] = [
+        "Each base parameter with those regrouped into it (factors are metres, or their squares; "
+        f"`base.regrouping` has all). A star marks relative standard errors above {100 * WEAK:.0f} "
+        "%. Frames are numbered as in the robot's table."
+    ]
+    for unit in dict.fromkeys(units):
+        rows = []
+        for k in (k for k, other in enumerate(units) if other == unit):
+            name, relative = result.names[k], float(estimate.relative_errors[k])
+            rows.append(
+                (
+                    f"{name}R" if regrouped[name] else name,
+                    regrouped_text(base, name),
+                    number_text(estimate.values[k]),
+                    number_text(estimate.standard_errors[k], 2),
+                    f"{percent_text(relative)}{'*' if relative > WEAK else ''}",
+                    number_text(ends[k, 0]),
+                    number_text(ends[k, 1]),
+                )
+            )
+        headings = (unit, "stands for", "value", "std err", "rel.", "95 % from", "to")
+        body.append(table_of(headings, rows))
+    return ReportSection("Parameters", tuple(body))
+
+
+def regrouped_text(base: BaseParameters, name: str, width: int = _WIDTH) -> str:
+    """Standard parameters regrouped into a base parameter, as a text of limited width."""
+    row, names = base.matrix[base.names.index(name)], base.parameter_names
+    kept = names.index(name)
+    size = float(np.abs(row).max())
+    words = []
+    for k in [kept, *(k for k in np.flatnonzero(np.abs(row) > _ROUNDING * size) if k != kept)]:
+        c = float(row[k])
+        factor = "" if abs(abs(c) - 1.0) < _ROUNDING else f"{abs(c):.3g} "
+        words.append(("- " if c < 0.0 else "+ ") + factor + names[k])
+    text = ""
+    for shown in range(len(words), 0, -1):
+        text = " ".join(words[:shown]).removeprefix("+ ")
+        text += "" if shown == len(words) else f" ... {len(words) - shown} more"
+        if len(text) <= width:
+            break
+    return text

@@ -1,0 +1,109 @@
+"""Tests of the residuals of an identification: white in time, and normal.
+
+Source: G. Ljung and G. Box, Biometrika 65, 1978; D. Stoffer and C. Toloi, Statistics & Probability
+Letters 13, 1992 (gaps); I. Lobato and C. Velasco, Econometric Theory 20, 2004 (normality of
+correlated series).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import Array, Rebuilt, read_only
+from .equations import Equations
+
+_LAGS = 40
+SIGNIFICANCE = 0.01
+"""Significance level of the residual tests."""
+_FEW = 20
+"""Least number of equations for the residual tests."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ResidualDiagnostics(Rebuilt):
+    """Statistics of the residuals of m groups of equations over L lags. Read-only.
+
+    Shapes: counts, mean, std, skewness, kurtosis (less 3 of a normal distribution) (m,);
+    autocorrelation and its 95 % bounds if white (m, L + 1); p-values (m,), NaN if not tested.
+    """
+
+    counts: NDArray[np.int64]
+    mean: Array
+    std: Array
+    autocorrelation: Array
+    bounds: Array
+    skewness: Array
+    kurtosis: Array
+    white_p: Array
+    normal_p: Array
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            kind = np.int64 if field.name == "counts" else float
+            object.__setattr__(self, field.name, read_only(getattr(self, field.name), kind))
+
+    @property
+    def lags(self) -> int:
+        """Number of lags."""
+        return self.autocorrelation.shape[1] - 1
+
+
+def residual_diagnostics(system: Equations, values: Array) -> ResidualDiagnostics:
+    """Statistics of the residuals of equations at values (b,).
+
+    Equations in a dead band and the ends of recordings are gaps, which no pair of residuals spans.
+    """
+    from scipy.special import chdtrc
+
+    residuals, use, instants = _series(system, values)
+    lags = max(1, min(_LAGS, instants // 4))
+    counts = use.sum(axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        mean = residuals.sum(axis=0) / counts
+        e = np.where(use, residuals - mean, 0.0)
+        std = np.sqrt((e**2).sum(axis=0) / counts)
+        e = e / np.where(std > 0.0, std, np.nan)
+        pairs = np.array([(use[k:] & use[: len(use) - k]).sum(axis=0) for k in range(lags + 1)]).T
+        products = np.array([(e[k:] * e[: len(e) - k]).sum(axis=0) for k in range(lags + 1)]).T
+        rho = products / pairs
+        bounds = 1.959964 / np.sqrt(pairs)
+        bounds[:, 0] = 0.0
+        skewness = (e**3).sum(axis=0) / counts
+        kurtosis = (e**4).sum(axis=0) / counts - 3.0
+        Q = (counts + 2.0) / counts * np.nansum(pairs[:, 1:] * rho[:, 1:] ** 2, axis=1)
+        # variances of the moments of a correlated series
+        r = np.nan_to_num(rho[:, 1:])
+        F3 = np.maximum(1.0 + 2.0 * (r**3).sum(axis=1), 0.1)
+        F4 = 1.0 + 2.0 * (r**4).sum(axis=1)
+        G = counts * (skewness**2 / (6.0 * F3) + kurtosis**2 / (24.0 * F4))
+    enough = (counts >= _FEW) & (std > 0.0)
+    return ResidualDiagnostics(
+        counts,
+        mean,
+        std,
+        rho,
+        bounds,
+        skewness,
+        kurtosis,
+        np.where(enough, chdtrc(lags, Q), np.nan),
+        np.where(enough, chdtrc(2, G), np.nan),
+    )
+
+
+def _series(system: Equations, values: Array) -> tuple[Array, NDArray[np.bool_], int]:
+    """Residuals (N, m), zero in gaps; mask of equations (N, m); number of instants."""
+    residuals, use, begin, instants = [], [], None, 0
+    gap = np.zeros((_LAGS, system.groups))
+    for piece in system.pieces():
+        block = system.block(piece)
+        if begin not in (None, piece.begin):
+            residuals.append(gap)
+            use.append(gap > 0.0)
+        begin = piece.begin
+        instants += len(block)
+        residuals.append(np.where(block.use, block.y - block.W @ values, 0.0))
+        use.append(block.use)
+    return np.concatenate(residuals), np.concatenate(use), instants

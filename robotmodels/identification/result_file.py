@@ -1,0 +1,248 @@
+"""Files of an identification: JSON with every option, or a URDF of a consistent robot."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+from dataclasses import asdict, fields, is_dataclass
+from enum import Enum
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..drive import drive_kinds
+from ..errors import InvalidValueError
+from ..logs import Log
+from ..model import RobotModel, to_urdf
+from .consistent import consistent_robot
+from .report_tables import group_names, intervals, parameter_units, standard_error_ratio
+from .residuals import residual_diagnostics
+from .result import IdentificationResult, check_result
+from .weak_parameters import correlated_estimates, negative_parameters, weak_parameters
+
+if TYPE_CHECKING:
+    from ..minimal_parameters import StandardParameters
+
+FORMAT = 2
+"""Version of the format, increased when the meaning of an entry changes."""
+_ROWS = 1 << 16
+_PACKAGES = ("robotmodels", "numpy", "scipy", "numba", "pin")
+
+
+def write_result(
+    result: IdentificationResult, path: str | Path, robot: StandardParameters | None = None
+) -> None:
+    """Write an identification to a file whose suffix gives the format.
+
+    ``.json`` contains SI units (null where not finite) and the facts that repeat the fit: hashes of
+    the data, options, versions. ``.urdf`` contains a physically consistent robot.
+
+    Parameters
+    ----------
+    result : IdentificationResult
+        Result of `fit`.
+    path : str or Path
+        A file named ``.json`` or ``.urdf``.
+    robot : StandardParameters, optional
+        Result of `consistent_robot`; without it a URDF is that of the consistent robot nearest to
+        the model's inertia.
+
+    Raises
+    ------
+    InvalidValueError
+        Another suffix; no consistent robot was found; a result without parameters.
+    UrdfError
+        As `to_urdf`.
+    InertiaError, MissingExtraError
+        As `consistent_robot`.
+    OSError
+        The file cannot be written.
+
+    Warns
+    -----
+    UrdfWarning
+        Properties that URDF cannot represent.
+
+    References
+    ----------
+    Seed book section 1.6.5.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from robotmodels.datasets import example_log
+    >>> from robotmodels.identification import fit
+    >>> arm, log = example_log()
+    >>> with TemporaryDirectory() as folder:
+    ...     write_result(fit(arm, log, drive=("Fv",)), Path(folder) / "arm.json")
+    ...     data = json.loads((Path(folder) / "arm.json").read_text(encoding="utf-8"))
+    >>> data["chapter"], len(data["parameters"])
+    ('identification', 8)
+    """
+    check_result(result)
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix == ".urdf":
+        consistent = consistent_robot(result) if robot is None else robot
+        text = to_urdf(consistent.of(result.model))
+    elif suffix == ".json":
+        text = json.dumps(result_data(result, robot), indent=2, ensure_ascii=False) + "\n"
+    else:
+        raise InvalidValueError(f"path: expected a file named .json or .urdf, got {path.name!r}.")
+    path.write_text(text, encoding="utf-8")
+
+
+def result_data(
+    result: IdentificationResult, robot: StandardParameters | None = None
+) -> dict[str, Any]:
+    """Content of the JSON file: lists, numbers and text."""
+    check_result(result)
+    base, estimate, details = result.base, result.estimate, result.details
+    names, units, ends = group_names(result), parameter_units(result), intervals(estimate)
+    ratio, diagnostics = (
+        standard_error_ratio(result),
+        residual_diagnostics(result.equations, result.values),
+    )
+    validation = result.validation
+    data = {
+        "format": FORMAT,
+        "chapter": "identification",
+        "robot": result.model.name,
+        "status": {"name": result.status.name, "sentence": result.reason()},
+        "method": {
+            "name": result.method.name,
+            "title": result.method.title,
+            "options": result.method.options(),
+            "iterations": estimate.iterations,
+            "correlation_lags": details.correlation_lags,
+            "notes": estimate.notes,
+            "essential": details.essential_rule,
+            "form": result.equations.form.name,
+            "drive": [kind.value for kind in drive_kinds(base.drive)],
+            "friction": None if base.friction is None else repr(base.friction),
+        },
+        "data": log_data(result.equations.log),
+        "processing": _choices(result),
+        "parameters": [
+            {
+                "name": name,
+                "unit": units[k],
+                "value": result.values[k],
+                "standard_error": result.standard_errors[k],
+                "relative_error": result.relative_errors[k],
+                "interval_95": ends[k],
+                "iid_standard_error": details.iid_standard_errors[k],
+                "standard_error_ratio": ratio[k],
+                "stands_for": dict(base.regrouping[name]),
+            }
+            for k, name in enumerate(result.names)
+        ],
+        "covariance": estimate.covariance,
+        "sigma": estimate.sigma,
+        "unidentifiable": details.unidentifiable,
+        "dropped": details.dropped,
+        "relative_error_above_30_percent": weak_parameters(estimate),
+        "negative": [one.name for one in negative_parameters(base, estimate)],
+        "correlated": correlated_estimates(estimate),
+        "condition": result.condition,
+        "scaled_condition": result.scaled_condition,
+        "rank_gap": details.rank_gap,
+        "equations": [
+            {"of": name, "used": int(used), "in_dead_band": int(left)}
+            for name, used, left in zip(
+                names, result.factors.counts, result.factors.left_out, strict=True
+            )
+        ],
+        "residuals": [
+            {"of": name}
+            | {field.name: getattr(diagnostics, field.name)[j] for field in fields(diagnostics)}
+            for j, name in enumerate(names)
+        ],
+        "errors": {
+            "joints": result.model.table.joint_names,
+            "in_sample": validation.in_sample,
+            "held_out": validation.held_out,
+            "nominal": validation.nominal,
+        },
+        "consistent": None if robot is None else _robot(robot),
+        "versions": _versions(),
+        "notes": result.notes,
+    }
+    return plain(data)
+
+
+def log_data(log: Log) -> dict[str, Any]:
+    """Origin of a log, with hashes of its data."""
+    return {
+        "samples": len(log),
+        "joints": log.names,
+        "dt": log.dt,
+        "duration": log.duration,
+        "starts": log.starts,
+        "delay": log.delay,
+        "sha256": _hash(log),
+        "sources": log.sources,
+        "refused": log.refused,
+        "measured": [
+            name for name in ("v", "a", "q_ref", "v_ref") if getattr(log, name) is not None
+        ],
+        "notes": log.notes,
+    }
+
+
+def plain(value: Any) -> Any:
+    """Conversion to JSON data: lists, numbers (null where not finite), text and mappings."""
+    if isinstance(value, Enum):
+        return value.name.lower()
+    if isinstance(value, RobotModel):
+        return value.name
+    if is_dataclass(value) and not isinstance(value, type):
+        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+    if isinstance(value, dict):
+        return {str(key): plain(part) for key, part in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [plain(part) for part in value]
+    if isinstance(value, float | np.floating):
+        return float(value) if np.isfinite(value) else None
+    return int(value) if isinstance(value, np.integer) else value
+
+
+def _hash(log: Log) -> str:
+    total = hashlib.sha256()
+    for array in (log.q, log.tau):
+        for first in range(0, len(log), _ROWS):
+            total.update(np.ascontiguousarray(array[first : first + _ROWS], dtype="<f8").tobytes())
+    return total.hexdigest()
+
+
+def _choices(result: IdentificationResult) -> dict[str, Any]:
+    chosen = result.equations.processing
+    return asdict(chosen) | {"torque_cutoff": chosen.torque_cutoff}
+
+
+def _robot(robot: StandardParameters) -> dict[str, Any]:
+    return {
+        "status": {"name": robot.status.name, "sentence": robot.status.sentence},
+        "price_percent": robot.price,
+        "distance": robot.distance,
+        "gap": robot.fit.gap,
+        "active": robot.fit.active,
+        "stopped": robot.fit.stopped,
+        "standard": dict(zip(robot.names, robot.values, strict=True)),
+        "base": dict(zip(robot.base.names, robot.base_values, strict=True)),
+    }
+
+
+def _versions() -> dict[str, str]:
+    versions = {"python": platform.python_version()}
+    for name in _PACKAGES:
+        try:
+            versions[name] = version(name)
+        except PackageNotFoundError:  # such as a source tree that was never installed
+            versions[name] = "unknown"
+    return versions

@@ -1,1 +1,0 @@
-"""Equations reduced in pieces, by one or many workers, with the same bits."""

@@ -1,1 +1,0 @@
-"""Logs with and without a load: drive gains and payloads."""
