@@ -47,7 +47,7 @@ from .robots import load, robots
 from .urdf import NamedFrame
 
 if TYPE_CHECKING:
-    from . import calibration, datasets, identification, simulation, trajectories, viz
+    from . import calibration, datasets, identification, obstacles, simulation, trajectories, viz
     from .igm.paul import InverseModelExplanation, explain_igm
     from .kinematics import (
         DampedInverse,
@@ -87,7 +87,7 @@ if TYPE_CHECKING:
     from .symbolic_dgm import DirectModelExplanation, explain_dgm
     from .symoro import read_par
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = [
     "BaseParameters",
@@ -156,6 +156,7 @@ __all__ = [
     "mass_matrix",
     "momentum_regressor",
     "nearest_singularity",
+    "obstacles",
     "operational_coordinates",
     "operational_dimension",
     "parameter_names",
@@ -246,7 +247,8 @@ def __getattr__(name: str) -> Any:
     """Import rooms, pictures and derivations when they are first asked for."""
     with _OPENING:
         if name in (
-            "calibration", "datasets", "identification", "simulation", "trajectories", "viz",
+            "calibration", "datasets", "identification", "obstacles", "simulation", "trajectories",
+            "viz",
         ):  # fmt: skip
             return importlib.import_module(f".{name}", __name__)
         if name in _ROOM_OF:

@@ -18,7 +18,7 @@ Column = int | str
 
 _COMMENT = "#"
 _LONGEST = 2**20
-"""Letters of a line; a longer one is no row of a table (it has no line ends, say)."""
+"""Letters of a line; a longer one is no row of a table, but a file without line ends."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +32,7 @@ class CsvTable:
     first: int
 
     def find(self, names: Sequence[str]) -> tuple[int, ...] | None:
-        """Numbers of columns by their names, capitals aside; None if one is missing."""
+        """Numbers of columns by their names, whatever their capitals; None if one is missing."""
         lower = [name.lower() for name in self.names]
         wanted = [name.lower() for name in names]
         if any(lower.count(name) != 1 for name in wanted):
@@ -41,30 +41,7 @@ class CsvTable:
 
     def number(self, column: Column, what: str) -> int:
         """Number of a column."""
-        if isinstance(column, str):
-            found = self.find([column])
-            if found is not None:
-                return found[0]
-            if not self.names:
-                raise InvalidValueError(
-                    f"{what}: {self.path} has no header, so that {column!r} says nothing; give "
-                    f"numbers of columns, from 0 to {self.width - 1}."
-                )
-            if [name.lower() for name in self.names].count(column.lower()) > 1:
-                raise InvalidValueError(
-                    f"{what}: {self.path} has several columns {column!r}; give their numbers, "
-                    "from 0."
-                )
-            near = ", ".join(nearest_names(column, self.names)) or "none"
-            raise InvalidValueError(
-                f"{what}: {self.path} has no column {column!r}; near it: {near}. Its columns: "
-                f"{', '.join(self.names)}."
-            )
-        if not -self.width <= column < self.width:
-            raise InvalidValueError(
-                f"{what}: {self.path} has columns 0 to {self.width - 1}, got {column}."
-            )
-        return column % self.width
+        return column_number(self.path, self.names, self.width, column, what)
 
     def numbers(self, columns: Sequence[int]) -> Array:
         """Columns of numbers. Shapes: -> (N, number of columns)."""
@@ -80,7 +57,7 @@ class CsvTable:
 
     def _loaded(self, columns: Sequence[int]) -> Array:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # no data: said by the callers
+            warnings.simplefilter("ignore", UserWarning)  # no data: the callers raise
             values = np.loadtxt(
                 self.path, delimiter=self.delimiter, skiprows=self.first, quotechar='"',
                 usecols=list(columns), comments=_COMMENT, ndmin=2, encoding="utf-8-sig",
@@ -94,7 +71,7 @@ class CsvTable:
         return values
 
     def numbers_with_gaps(self, columns: Sequence[int]) -> Array:
-        """Columns of numbers, NaN where a cell is empty, infinite or not a number by its own word.
+        """Columns of numbers, NaN where a cell is empty, infinite or not a number.
 
         Shapes: -> (N, number of columns).
         """
@@ -192,6 +169,36 @@ class CsvTable:
         )
 
 
+def column_number(path: Path, names: Sequence[str], width: int, column: Column, what: str) -> int:
+    """Number of a column given by its number or its name; capitals matter only between equals."""
+    if isinstance(column, str):
+        found = [i for i, name in enumerate(names) if name == column]
+        found = found or [i for i, name in enumerate(names) if name.lower() == column.lower()]
+        if len(found) == 1:
+            return found[0]
+        if not names:
+            raise InvalidValueError(
+                f"{what}: {path} has no header, so that {column!r} names none; give numbers of "
+                f"columns, from 0 to {width - 1}."
+            )
+        if found:
+            raise InvalidValueError(
+                f"{what}: {path} has several columns {column!r}; give their numbers, from 0."
+            )
+        near = ", ".join(nearest_names(column, names)) or "none"
+        raise InvalidValueError(
+            f"{what}: {path} has no column {column!r}; near it: {near}. Its columns: "
+            f"{', '.join(names)}."
+        )
+    if isinstance(column, bool) or not isinstance(column, int):
+        raise InvalidValueError(
+            f"{what}: expected numbers or names of columns, got {column!r:.60}."
+        )
+    if not -width <= column < width:
+        raise InvalidValueError(f"{what}: {path} has columns 0 to {width - 1}, got {column}.")
+    return column % width
+
+
 def cells_of(line: str, delimiter: str | None) -> list[str]:
     """Cells of a line without blanks and quotation marks around them."""
     if delimiter is not None and '"' in line and line.count('"') % 2 == 0:
@@ -217,7 +224,7 @@ def open_table(path: str | Path, delimiter: str | None = None) -> CsvTable:
         delimiter = next((mark for mark in (";", "\t", ",") if mark in text), None)
     cells = cells_of(text, delimiter)
     # labels of a file without a header are words too, but most of its cells are numbers
-    header = 2 * sum(not _is_number(cell) for cell in cells) > len(cells)
+    header = 2 * sum(not is_number(cell) for cell in cells) > len(cells)
     return CsvTable(
         path, tuple(cells) if header else (), delimiter, len(cells), number - 1 + header
     )
@@ -251,7 +258,8 @@ def _has_quotes(path: Path) -> bool:
         return any(b'"' in part for part in iter(lambda: file.read(_LONGEST), b""))
 
 
-def _is_number(cell: str) -> bool:
+def is_number(cell: str) -> bool:
+    """Whether a cell is empty or a number."""
     try:
         float(cell or "0")  # an empty cell is a gap in the data, not a name
     except ValueError:

@@ -88,3 +88,21 @@ class ReportSection(NamedTuple):
             for part in self.body
         ]
         return "\n".join([self.title, "-" * len(self.title), *parts])
+
+
+def number_text(value: float, digits: int = 4) -> str:
+    """A number with significant digits; a dash for NaN."""
+    if value != value:
+        return "-"
+    text = f"{value:.{digits}g}"
+    # zeros after the point that are not digits take more room than a power of ten
+    return f"{value:.{digits - 1}e}" if value and abs(value) < 1e-4 and "e" not in text else text
+
+
+def percent_text(ratio: float) -> str:
+    """A ratio in per cent; a dash for NaN."""
+    if ratio != ratio:
+        return "-"
+    if ratio >= 9.995:
+        return "> 999 %"
+    return f"{100.0 * ratio:.2g} %" if ratio < 0.995 else f"{100.0 * ratio:.0f} %"

@@ -1,6 +1,7 @@
 """Geometric calibration: from measurements, or from the robot touching things (section 1.4)."""
 
 from ..file_units import AngleUnit, LengthUnit
+from ..obstacles import Box, Sphere
 from .calibrated_robot.bending import Bending
 from .calibrated_robot.calibrated import CalibratedEnd, CalibratedRobot, calibrated_model
 from .calibrated_robot.calibrated_pose import calibrated_pose
@@ -53,7 +54,6 @@ from .reporting.write import calibrated_urdf, result_data, write_result
 from .residuals import measured_residuals
 from .result import CalibrationResult
 from .selection.observability import Criterion, Observability, observability
-from .selection.obstacles import Box, HalfSpace, Sphere, clearance
 from .selection.select import select_configurations
 from .selection.selected import SelectedConfigurations
 from .solve import Solution
@@ -83,7 +83,6 @@ __all__ = [
     "FrameContact",
     "GeometricParameter",
     "GeometricParameters",
-    "HalfSpace",
     "IdentifiabilityChange",
     "IdentifiableParameters",
     "JointErrors",
@@ -116,7 +115,6 @@ __all__ = [
     "calibrated_pose",
     "calibrated_urdf",
     "candidate_parameters",
-    "clearance",
     "corrected_igm",
     "differential_model",
     "drawn_groups",

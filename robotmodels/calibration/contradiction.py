@@ -15,7 +15,6 @@ from typing import NamedTuple
 import numpy as np
 
 from .._arrays import Array
-from ..estimation.leverage import basis_of_rows
 from .errors_seen import block_errors
 from .identifiability.scale import needs_a_length
 from .measurements import KnownDistance
@@ -128,7 +127,7 @@ def contradictions(
         found.append(
             Contradiction(
                 tuple(int(firsts[numbers[k]]) for k in group), tuple(known[k] for k in group), own,
-                mean * (1.0 - s), doubt, bool(np.isfinite(solution.fit.prior.deviation).any()),
+                mean * (1.0 - s), doubt, bool(np.isfinite(solution.fit.prior.sigma).any()),
                 tuple(_named(known[groups[k][0]]) for k in others),
             )
         )  # fmt: skip
@@ -187,7 +186,7 @@ def _evidence(
     x = fit.x if without is None else _of_satisfied(without)
     distances = replace(solution.problem, measurements=tuple(known), factors=((),) * len(known))
     residual, jacobian = stacked(distances, x, tuple(scales))
-    T = jacobian @ basis_of_rows(fit)
+    T = jacobian @ fit.basis
     if without is None:
         M, v = np.eye(len(known)) - T @ T.T, -residual
     else:
@@ -231,9 +230,8 @@ def _of_satisfied(solution: Solution) -> Array:
     exact = satisfying(solution.problem, solution.deviation, solution.fixtures)
     if exact.rows != solution.problem.rows:
         return fit.x
-    basis = basis_of_rows(fit)
     change = stacked(exact, fit.x, solution.scales)[1] - fit.jacobian
-    return fit.x - basis @ (basis.T @ (change.T @ fit.residuals))
+    return fit.x - fit.basis @ (fit.basis.T @ (change.T @ fit.residuals))
 
 
 def _sigma(m: KnownDistance, scale: Array) -> float:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from .._arrays import Array
-from ..estimation.leverage import inverse_factor
+from ..estimation.linearised import inverse_factor
 from .identifiability.identifiable import IdentifiableParameters, Reason
 from .prior import largest_factors
 from .problem import stacked
@@ -32,7 +32,7 @@ def insignificant_parameters(solution: Solution, start: Array) -> list[str]:
         LARGEST_LENGTH * reach if entry.element.is_length else LARGEST_ANGLE
         for entry in problem.parameters.entries
     ] / np.maximum(largest_factors(problem), _TINY)
-    information = np.diag(np.sqrt(prior.strength) / prior.deviation)
+    information = np.diag(np.sqrt(prior.strength) / prior.sigma)
     factors = [
         np.asarray(
             np.linalg.qr(np.vstack([stacked(problem, x, solution.scales)[1], information]))[1]

@@ -184,7 +184,7 @@ def _implausible(solution: Solution) -> list[str]:
 
 
 def _has_prior(solution: Solution) -> bool:
-    return bool(np.isfinite(solution.fit.prior.deviation).any())
+    return bool(np.isfinite(solution.fit.prior.sigma).any())
 
 
 def _unlikely_deviations(solution: Solution) -> list[str]:
@@ -214,15 +214,15 @@ def _hidden(solution: Solution) -> list[str]:
         return []
     alone = np.linalg.norm(fit.jacobian * np.sqrt(fit.weights)[:, None], axis=0)
     scale = 1.0 if fit.sigma_known else fit.scale
-    inflation = fit.deviations * alone / max(scale, 1e-300)
-    has_prior = np.isfinite(fit.prior.deviation)  # it says what the data do not
+    inflation = fit.standard_errors * alone / max(scale, 1e-300)
+    has_prior = np.isfinite(fit.prior.sigma)  # it says what the data do not
     found = [
         k for k, entry in enumerate(parameters.entries)
         if inflation[k] > _CONFUSED and not has_prior[k] and 0 < entry.row <= parameters.model.f
     ]  # fmt: skip
     if len(found) == 1 and len(parameters) > 1:
         P = len(parameters)
-        correlation = np.abs(fit.covariance[found[0], :P]) / fit.deviations[:P]
+        correlation = np.abs(fit.covariance[found[0], :P]) / fit.standard_errors[:P]
         correlation[found[0]] = -np.inf
         found.append(int(np.argmax(correlation)))
     return [parameters.names[k] for k in found]

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from .. import se3
 from .._arrays import Array, as_vector
 from ..errors import InvalidValueError
-from ..estimation.leverage import inverse_factor
+from ..estimation.linearised import inverse_factor
 from ..se3 import skew
 from .calibrated_robot.calibrated import CalibratedRobot
 from .extended_table.differential import differential_model
@@ -158,7 +158,7 @@ def _posterior(result: CalibrationResult) -> tuple[GeometricParameters, Array, A
     information = np.zeros(J.shape[1])
     information[: problem.P] = 1.0 / standard_deviations(ParameterPrior(), problem)
     at = parameters.index(estimated.names)
-    information[at] = np.sqrt(fit.prior.strength) / fit.prior.deviation[: len(at)]
+    information[at] = np.sqrt(fit.prior.strength) / fit.prior.sigma[: len(at)]
     R = np.asarray(np.linalg.qr(np.vstack([weighted, np.diag(information)]), mode="r"))
     # directions without information (a tool that is not measured) move no other tool
     return parameters, inverse_factor(R)[: problem.P], deviation

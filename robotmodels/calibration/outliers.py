@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from .._arrays import Array
 from ..estimation import Loss
-from ..estimation.leverage import basis_of_rows, orthonormal_rows
 from ..estimation.outlying import outlying
 from .contradiction import Contradiction
 from .folds import fixtures_by_name
@@ -36,18 +35,17 @@ def judged(
         return solution
     blocks = [m.blocks for m in problem.measurements]
     trusted = np.repeat([not m.views for m in problem.measurements], blocks)
-    starts = np.searchsorted(fit.block, np.arange(problem.blocks))
     wrong = np.array([b for c in contradicted for b in c.blocks], dtype=np.int64)
     outliers = wrong if len(wrong) else fit.outliers
     if trusted.any() and not len(wrong):
-        rows = orthonormal_rows(fit)
-        outliers = outlying(rows, fit.whitened, starts, fit.freedom, trusted)
+        rows = fit.orthonormal_rows
+        outliers = outlying(rows, fit.whitened, fit.block, fit.freedom, trusted)
     for _ in range(_REFITS):
         found = _without(solution, outliers, given, truncation) if len(outliers) else None
         if found is None:
             break
         before = outliers
-        outliers = outlying(*found[:2], starts, found[2], trusted, before)
+        outliers = outlying(*found[:2], fit.block, found[2], trusted, before)
         outliers = np.concatenate([wrong, outliers[~np.isin(outliers, wrong)]])
         if set(outliers) == set(before):
             break
@@ -83,4 +81,4 @@ def _without(
     residual, jacobian = stacked(problem, x, tuple(scales))
     place = {f.name: k for k, f in enumerate(problem.fixtures)}
     order = [*range(problem.P), *(problem.P + place[f.name] for f in rest.fixtures)]
-    return jacobian[:, order] @ basis_of_rows(found.fit), residual, found.fit.freedom
+    return jacobian[:, order] @ found.fit.basis, residual, found.fit.freedom

@@ -9,7 +9,8 @@ import numpy as np
 
 from .._arrays import Array, Rebuilt, as_reals
 from ..errors import InvalidValueError
-from ..estimation import Loss, Prior, select_strength
+from ..estimation import Loss, Prior
+from ..estimation.strength import select_strength
 from .extended_table.elements import ErrorLaw
 from .extended_table.parameters import GeometricParameter, GeometricParameters
 from .identifiability.identifiable import IdentifiableParameters
@@ -135,9 +136,8 @@ def settled_prior(
     masks[:, seen] = [part.aside for part in partition.parts]
     masks = masks[:, block]
     tried = select_strength(
-        lambda x: stacked(problem, x, scales), start, whole_prior, masks,
-        strengths=_STRENGTHS, block=block, loss=loss,
-    )  # fmt: skip
+        lambda x: stacked(problem, x, scales), start, whole_prior, masks, _STRENGTHS, block, loss
+    )
     return whole_prior.with_strength(tried.strength)
 
 
@@ -168,7 +168,7 @@ def widened(prior: ParameterPrior, solution: Solution) -> ParameterPrior:
     # Computation 4, 1992
     problem, fit = solution.problem, solution.fit
     f = problem.parameters.model.f
-    size = fit.prior.deviation / np.sqrt(fit.prior.strength)
+    size = fit.prior.sigma / np.sqrt(fit.prior.strength)
     found = {}
     for name, is_length in (("length", True), ("angle", False)):
         of_kind = [

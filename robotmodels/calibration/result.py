@@ -142,7 +142,7 @@ class CalibrationResult(Rebuilt):
         """Parameters that the measurements say little of: they stay near where they were."""
         told = (
             self.standard_deviation
-            < _SAYS_LITTLE * self.solution.fit.prior.deviation[: len(self.names)]
+            < _SAYS_LITTLE * self.solution.fit.prior.sigma[: len(self.names)]
         )
         return tuple(name for name, is_told in zip(self.names, told, strict=True) if not is_told)
 

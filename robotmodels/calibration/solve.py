@@ -23,7 +23,6 @@ _ROUNDS = 10
 _LENT = 50.0
 """Pseudo-rows by which noise estimates of one kind are drawn to their common value."""
 _SETTLED = 1e-3
-_NOTHING = 1e-13
 _ROUGH = 1e-6
 """Tolerance of the steps while the noise is still being estimated."""
 _EXACT = 1e-9
@@ -144,7 +143,8 @@ def _estimated_scales(
     problem: Problem, fit: NonlinearFit, scales: tuple[Array, ...]
 ) -> tuple[Array, ...]:
     """Noise of each measurement and unit, shrunk to the common value of its kind."""
-    leverage, size = _leverage(fit), problem.parameters.skeleton.size
+    leverage = (fit.orthonormal_rows**2).sum(axis=1)
+    size = problem.parameters.skeleton.size
     found: dict[tuple[type, str], list[tuple[int, float, float]]] = {}
     first = 0
     for k, (m, scale) in enumerate(zip(problem.measurements, scales, strict=True)):
@@ -177,15 +177,3 @@ def _estimated_scales(
             of_unit = [u == unit for u in problem.measurements[k].units]
             new[k][of_unit] = max(own, _floor(unit, size))
     return tuple(read_only(scale) for scale in new)
-
-
-def _leverage(fit: NonlinearFit) -> Array:
-    """Share of a degree of freedom that each row has taken, shape (M,)."""
-    J = fit.jacobian * np.sqrt(fit.weights)[:, None]
-    information = np.sqrt(fit.prior.strength) / fit.prior.deviation
-    length = np.sqrt((J * J).sum(axis=0) + information**2)
-    length[length == 0.0] = 1.0
-    J = J / length
-    values, vectors = np.linalg.eigh(J.T @ J + np.diag((information / length) ** 2))
-    told = values > _NOTHING * values[-1]
-    return ((J @ (vectors[:, told] / np.sqrt(values[told]))) ** 2).sum(axis=1)

@@ -1,4 +1,4 @@
-"""The second part of the demonstration: a real robot identified from its log.
+"""Second part of the demonstration: identification of a robot from its log.
 
 Source: Seed book sections 1.6.2 and 1.6.5.
 """
@@ -21,30 +21,32 @@ if TYPE_CHECKING:
     from contextlib import AbstractContextManager
 
     from ..datasets import Tx40Log
-    from ..identification import ConsistentFit, IdentificationResult, Log
+    from ..identification import IdentificationResult, Log
+    from ..minimal_parameters import StandardParameters
     from .progress import Bar
 
 _TERMINAL = 88  # columns, as the headings of the demonstration
 _PUBLISHED_RMSE = (6.40, 8.21, 4.13, 1.72, 2.65, 1.72)
-"""N m: of the published fits the best one on each joint, on the rows that are kept aside."""
+"""N m: errors of the best published fit for each joint, on the held-out rows."""
 
 
 def identify_tx40(
     folder: Path, progress: Callable[[str], AbstractContextManager[Bar | None]]
 ) -> None:
-    """Identify the Staubli TX40 from its log, print what is found, and write files."""
+    """Identify the Staubli TX40 from its log, print the result, and write files."""
     from ..datasets import load_tx40
-    from ..identification import check_joints, check_log, fit, synchronisation
-    from ..identification.reporting.text import report_sections
+    from ..identification import check_log, fit, synchronisation
+    from ..identification.checks import check_joints
+    from ..identification.report import report_sections
 
     data = load_tx40()
     model, log = data.model, data.log
     print(log)
     _print(f"{data.source}; {data.licence}")
-    print("Looking at it (compiles the first time on this machine only) ...", flush=True)
+    print("Checking it (compiles the first time on this machine only) ...", flush=True)
     started = time.perf_counter()
-    found = (*check_log(log, model), *check_joints(log, model))
-    _print("\n".join(map(str, found)) or "Nothing strange is found in the log.")
+    findings = (*check_log(log, model), *check_joints(log, model))
+    _print("\n".join(map(str, findings)) or "The checks of the log found nothing.")
     _print(str(synchronisation(log, model)))
     with progress("the whole log") as bar:
         whole = fit(model, log, progress=bar and bar.fraction)
@@ -59,7 +61,7 @@ def identify_tx40(
     print(f"\nFitted on samples {data.training.start} to {data.training.stop} ({seconds:.1f} s, "
           f"with all checks); torques of samples {data.held_out.start}\nto {data.held_out.stop} as "
           "predicted, root mean square error in N m, unfiltered:")  # fmt: skip
-    held_out = trained.held_out
+    held_out = trained.validation.held_out
     assert held_out is not None  # a test was given
     for word, row in (("here", held_out.rmse), ("published, best", np.array(_PUBLISHED_RMSE))):
         print(f"  {word:16s}" + "".join(f"{error:8.2f}" for error in row))
@@ -71,48 +73,48 @@ def identify_tx40(
 
 def comparison(data: Tx40Log, result: IdentificationResult) -> str:
     """Identified and published values side by side, and how many agree."""
-    from ..identification import not_seen
+    from ..identification.weak_parameters import weak_parameters
 
     both = [one for one in data.published if one.name in result.names]
-    weak = not_seen(result.estimate)
-    lines = ["Weighted least squares, SI units, with standard deviations: here they hold for",
+    weak = weak_parameters(result.estimate)
+    lines = ["Weighted least squares, SI units, with standard errors: here they hold for",
              "residuals that are correlated in time, the published ones for white residuals.",
              f"{'':10s}{'here':>10s}{'':10s}{'published':>12s}"]  # fmt: skip
     for one in both:
         if one.name not in weak:
-            x, s = result.value(one.name), result.deviation(one.name)
+            x, s = result.value(one.name), result.standard_error(one.name)
             lines.append(f"  {one.name:8s}{x:10.4f} +-{s:7.4f}{one.wls:12.4f} "
                          f"+-{one.wls_deviation:7.4f}")  # fmt: skip
     off: Array = np.array([abs(result.value(one.name) - one.wls) for one in both])
-    ours: Array = np.array([result.deviation(one.name) for one in both])
-    theirs: Array = np.array([one.wls_deviation for one in both])
+    estimated: Array = np.array([result.standard_error(one.name) for one in both])
+    published: Array = np.array([one.wls_deviation for one in both])
     unlisted = sum(one.name in weak for one in both)
     return "\n".join([
         *lines,
-        f"  and {unlisted} whose relative deviation is above 30 %.",
-        f"{np.sum(off <= 2.0 * ours)} of {len(both)} are within two of our deviations.",
-        f"{np.sum(off <= 2.0 * theirs)} of {len(both)} are within two of the published deviations.",
+        f"  and {unlisted} whose relative standard error is above 30 %.",
+        f"{np.sum(off <= 2.0 * estimated)} of {len(both)} are within two of our standard errors.",
+        f"{np.sum(off <= 2.0 * published)} of {len(both)} are within two published ones.",
     ])  # fmt: skip
 
 
-def _real_bodies(result: IdentificationResult) -> ConsistentFit | None:
+def _real_bodies(result: IdentificationResult) -> StandardParameters | None:
     from ..identification import consistent_robot
 
     try:
         robot = consistent_robot(result)
     except MissingExtraError as error:
-        _print(f"No robot of real bodies, no URDF: {error}")
+        _print(f"No physically consistent robot, no URDF: {error}")
         return None
-    print(f"Real bodies and drives: residuals {robot.price:.2f} % above least squares")
+    print(f"Physical bodies and drives: residuals {robot.price:.2f} % above least squares")
     return robot
 
 
-def _write(result: IdentificationResult, robot: ConsistentFit | None, folder: Path) -> None:
-    from ..identification import report_text, write_result
+def _write(result: IdentificationResult, robot: StandardParameters | None, folder: Path) -> None:
+    from ..identification import report, write_result
 
-    report = folder / "tx40-report.txt"
-    report.write_text(report_text(result, robot), encoding="utf-8")
-    print(f"Report: {report.resolve()}")
+    text = folder / "tx40-report.txt"
+    text.write_text(report(result, robot), encoding="utf-8")
+    print(f"Report: {text.resolve()}")
     numbers = folder / "tx40-result.json"
     write_result(result, numbers, robot)
     print(f"Result for programs: {numbers.resolve()}")
@@ -127,7 +129,7 @@ def _write(result: IdentificationResult, robot: ConsistentFit | None, folder: Pa
 
 
 def _draw(
-    result: IdentificationResult, test: Log, robot: ConsistentFit | None, folder: Path
+    result: IdentificationResult, test: Log, robot: StandardParameters | None, folder: Path
 ) -> None:
     from ..viz import identification_html
 

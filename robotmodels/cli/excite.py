@@ -1,4 +1,4 @@
-"""``robotmodels excite``: a motion that shows the base parameters of a robot."""
+"""``robotmodels excite``: an exciting trajectory for the base parameters of a robot."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ..trajectories import MotionLimits
 
 _RATE = 1000.0
-"""Samples per second of a file, unless asked otherwise."""
+"""Default sampling rate of a file, Hz."""
 
 _EXAMPLES = """\
 examples:
@@ -41,7 +41,7 @@ def add_command(commands: Any) -> None:
         "excite",
         usage="robotmodels excite --robot ROBOT [options]",
         description="Exciting trajectory: a periodic motion within the limits of a robot on which "
-        "its base parameters are seen best, with analytic gradients from several starts.",
+        "its base parameters are identified best, with analytic gradients from several starts.",
         epilog=ending(_EXAMPLES, "no motion within all limits was found"),
     )
     add_source(parser, option=True)
@@ -95,7 +95,7 @@ def _add_limits(limits: Any) -> None:
 
 def _add_search(search: Any) -> None:
     search.add_argument("--criterion", choices=("condition", "log-det"), default="condition",
-                        help="what is made small (default: %(default)s)")  # fmt: skip
+                        help="criterion that is minimised (default: %(default)s)")  # fmt: skip
     search.add_argument("--sigma", metavar="NUMBERS",
                         help="standard deviations of the torques, N m or N: one, or one for each "
                         "joint")  # fmt: skip
@@ -106,15 +106,15 @@ def _add_search(search: Any) -> None:
                         help="random motions, of which the best are improved "
                         "(default: 100, or as many as the budget has)")  # fmt: skip
     search.add_argument("--iterations", type=int,
-                        help="most of each stage of a start "
+                        help="largest number for each stage of a start "
                         "(default: what the budget has)")  # fmt: skip
     search.add_argument("--seed", type=int, default=0,
-                        help="of chance (default: %(default)s)")  # fmt: skip
+                        help="of the random generator (default: %(default)s)")  # fmt: skip
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command: search, and print or write."""
-    from ..identification.excitation import ExcitationStatus, exciting_trajectory
+    from ..identification.excitation import exciting_trajectory
 
     check_output(arguments)
     model = robot_of(arguments)
@@ -133,16 +133,16 @@ def run(arguments: argparse.Namespace) -> int:
             rng=arguments.seed, progress=False if bar is None else bar.steps,
         )  # fmt: skip
     hand_over(_report(found, arguments), arguments)
-    infeasible = found.status is ExcitationStatus.INFEASIBLE
+    infeasible = found.status.name == "INFEASIBLE"
     return ExitStatus.NOT_REACHED if infeasible else ExitStatus.DONE
 
 
 def _check_file(arguments: argparse.Namespace) -> None:
-    """Refuse what cannot be asked of the file with the samples."""
+    """Raise for options that the sample file does not support."""
     for option in ("rate", "format", "degrees"):
         if arguments.out is None and getattr(arguments, option) not in (None, False):
             raise InvalidValueError(
-                f"--{option}: says what the file of --out is like; give --out, or leave it out."
+                f"--{option}: describes the file of --out; give --out, or leave it out."
             )
     if arguments.degrees and arguments.format == "yaml":
         raise InvalidValueError("--degrees: ROS reads radians; leave it out with --format yaml.")
@@ -151,7 +151,7 @@ def _check_file(arguments: argparse.Namespace) -> None:
 
 
 def _report(found: ExcitingTrajectory, arguments: argparse.Namespace) -> Report:
-    from ..identification.excitation import write_coefficients, write_trajectory
+    from ..identification.excitation import write_trajectory
     from ..identification.excitation.files import excitation_data
 
     text = str(found)
@@ -162,7 +162,7 @@ def _report(found: ExcitingTrajectory, arguments: argparse.Namespace) -> Report:
         names = [f"trajectory.{arguments.format or 'csv'}", "trajectory.json", "summary.txt"]
         rate = _RATE if arguments.rate is None else arguments.rate
         write_trajectory(found, folder / names[0], rate, degrees=arguments.degrees)
-        write_coefficients(found, folder / "trajectory.json")
+        write_trajectory(found, folder / "trajectory.json")
         (folder / "summary.txt").write_text(f"{text}\n", encoding="utf-8")
         picture = folder / "trajectory.png"
         return names + with_extra(picture, lambda: plot_excitation(found).savefig(picture))
@@ -171,7 +171,7 @@ def _report(found: ExcitingTrajectory, arguments: argparse.Namespace) -> Report:
 
 
 def _limits(arguments: argparse.Namespace, model: Any) -> MotionLimits | None:
-    """Limits of the table with those of the options in their place."""
+    """Limits of the table, replaced by those of the options."""
     from dataclasses import replace
 
     from ..trajectories import MotionLimits
@@ -198,9 +198,9 @@ def _boxes(arguments: argparse.Namespace) -> list[WorkspaceBox]:
                                   ("--keep-out", arguments.keep_out, False)):  # fmt: skip
         for text in given:
             try:  # infinity means that there is no face
-                corners = [float(word) for word in text.replace(",", " ").split()]
+                corners = np.array([float(word) for word in text.replace(",", " ").split()])
             except ValueError:
-                corners = []
+                corners = np.array([])
             if len(corners) != 6:
                 raise InvalidValueError(f"{option}: expected six numbers in m, got {text!r}.")
             try:

@@ -15,7 +15,7 @@ NUMBER_OPTIONS = (
     "--q", "--q-ref", "--xyz", "--rpy", "--matrix", "--mask", "--tolerance", "--arm-angle",
     "--sigma", "--prior", "--velocity", "--acceleration", "--torque-limits", "--box", "--keep-out",
     "--gears", "--drive-gains", "--signs", "--offsets", "--dead-band", "--kp", "--kd", "--delay",
-    "--dt", "--cutoff", "--edges", "--strength", "--noise", "--forgetting", "--test-share",
+    "--dt", "--cutoff", "--edges", "--test-share",
     "--held-out", "--duration", "--rate",
 )  # fmt: skip
 """Options that take numbers, which may be negative."""

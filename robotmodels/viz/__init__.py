@@ -21,8 +21,8 @@ from .plot_ellipsoids import plot_ellipsoids
 from .plot_excitation import plot_excitation
 from .plot_identification_parameters import (
     plot_identification_correlations,
-    plot_identification_deviations,
     plot_identification_parameters,
+    plot_identification_standard_errors,
 )
 from .plot_identification_processing import plot_processing
 from .plot_identification_residuals import plot_identification_residuals
@@ -57,7 +57,7 @@ __all__ = [
     "plot_energy",
     "plot_excitation",
     "plot_identification_correlations",
-    "plot_identification_deviations",
+    "plot_identification_standard_errors",
     "plot_identification_parameters",
     "plot_identification_residuals",
     "plot_identification_torques",

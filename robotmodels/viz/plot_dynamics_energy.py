@@ -9,8 +9,7 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array
 from ..errors import InvalidValueError
-from ..simulation.result import Simulation
-from ..simulation.status import SimulationEventKind
+from ..simulation.result import Simulation, SimulationEventKind
 from .figures import (
     COLUMN,
     LIMIT_DASHES,

@@ -10,11 +10,8 @@ from numpy.typing import ArrayLike
 from ..dynamics import idm
 from ..errors import InvalidValueError
 from ..geometry import PRISMATIC
-from ..identification.excitation import (
-    ExcitationCriterion,
-    ExcitationStatus,
-    ExcitingTrajectory,
-)
+from ..identification.excitation import ExcitingTrajectory
+from ..identification.excitation.result import ExcitationStatus
 from .figures import (
     LIMIT_DASHES,
     LIMIT_WIDTH,
@@ -155,7 +152,7 @@ def _draw_torques(
 def _draw_search(axes: Axes, found: ExcitingTrajectory) -> None:
     """The smooth criterion over the iterations; the best start in front."""
     best = _best(found)
-    ratio = found.criterion is ExcitationCriterion.CONDITION
+    ratio = found.criterion == "condition"
     for k, start in enumerate(found.starts):
         # penalties of limits that cannot be kept go beyond all numbers
         values = np.exp(np.minimum(start.history, _MOST)) if ratio else start.history
@@ -176,7 +173,7 @@ def _draw_search(axes: Axes, found: ExcitingTrajectory) -> None:
 
 def _draw_baseline(axes: Axes, found: ExcitingTrajectory) -> None:
     """The criterion of random motions and of the starts, before and after."""
-    ratio = found.criterion is ExcitationCriterion.CONDITION
+    ratio = found.criterion == "condition"
     groups = (
         ("random", found.baseline, PALE),
         ("starts", tuple(start.before for start in found.starts), line_style(1).color),
@@ -216,10 +213,4 @@ def _numbers(axes: Axes) -> None:
 
 def _best(found: ExcitingTrajectory) -> int:
     """Number of the start that the trajectory came from."""
-    return min(
-        range(len(found.starts)),
-        key=lambda k: (
-            found.starts[k].status is ExcitationStatus.INFEASIBLE,
-            found.starts[k].after.of(found.criterion),
-        ),
-    )
+    return min(range(len(found.starts)), key=lambda k: found.starts[k].rank(found.criterion))

@@ -1,4 +1,4 @@
-"""What an identification found, parameter by parameter: effects, deviations, correlations."""
+"""Identified parameters: effects on the torques, standard errors, correlations."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array
-from ..identification.reporting.weak_parameters import NOT_SEEN
 from ..identification.result import IdentificationResult
+from ..identification.weak_parameters import WEAK
 from .figures import (
     LIMIT_DASHES,
     LIMIT_WIDTH,
@@ -33,22 +33,22 @@ _SEEN, _UNSEEN = line_style(0).color, line_style(1).color
 _NORMAL = 1.959964
 _IN_A_ROW = 48
 _SPAN = 30.0
-"""Ratio of the largest effect to the median one from which the scale is not linear."""
+"""Ratio of the largest to the median effect above which the scale is not linear."""
 
 
 def plot_identification_parameters(
     result: IdentificationResult, *, title: str | None = None, size: ArrayLike | None = None
 ) -> Figure:
-    """Parameters with their 95 % intervals, as what each of them contributes to the torques.
+    """Parameters with their 95 % intervals, as contributions to the torques.
 
-    Values of different units compare by their effect: the root mean square of what the parameter
-    alone makes of the torques of the log, relative to that of the torques, with its sign. An
-    interval over zero says that the log does not show the parameter.
+    Values of different units compare by their effect: the root mean square torque of the parameter
+    alone on the log, relative to the measured torques, with its sign. An interval that contains
+    zero: the parameter is not significant.
 
     Parameters
     ----------
     result : IdentificationResult
-        Of `identification.fit`.
+        Result of `identification.fit`.
     title : str, optional
         Over the figure.
     size : array_like, shape (2,), optional
@@ -72,25 +72,21 @@ def plot_identification_parameters(
 
     Examples
     --------
-    >>> import robotmodels as rm
-    >>> from robotmodels.identification import Log, fit
-    >>> from robotmodels.minimal_parameters import uniform_bodies
-    >>> arm, t = rm.load("planar_2r"), np.arange(0.0, 20.0, 0.01)[:, None]
-    >>> arm, w = arm.with_inertia(uniform_bodies(arm, 5.0)), np.array([1.0, 1.7])
-    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -w * w * np.sin(w * t)
-    >>> result = fit(arm, Log(0.01, q, rm.idm(arm, q, v, a)), decimation=1)
+    >>> from robotmodels.datasets import example_log
+    >>> from robotmodels.identification import fit
+    >>> result = fit(*example_log())
     >>> [axes.get_title() for axes in plot_identification_parameters(result).axes]
     ['bodies', 'drives and friction']
     """
-    found = as_identification(result)
-    effect = effects(found)
-    value, wide = effect * found.values, _NORMAL * effect * found.deviations
-    unseen = found.relative_deviations > NOT_SEEN
-    body = np.array([name.rstrip("0123456789") in _BODY_KINDS for name in found.names])
+    identification = as_identification(result)
+    effect = effects(identification)
+    value, wide = effect * identification.values, _NORMAL * effect * identification.standard_errors
+    unseen = identification.relative_errors > WEAK
+    body = np.array([name.rstrip("0123456789") in _BODY_KINDS for name in identification.names])
     groups = [
-        (word, np.flatnonzero(own))
-        for word, own in (("bodies", body), ("drives and friction", ~body))
-        if own.any()
+        (word, np.flatnonzero(group))
+        for word, group in (("bodies", body), ("drives and friction", ~body))
+        if group.any()
     ]
     most = max(len(some) for _, some in groups)
     figure = new_figure(PAGE, 1.0 + 0.155 * max(most, 8), size)
@@ -99,8 +95,13 @@ def plot_identification_parameters(
         axes.axvline(0.0, color=PALE, linewidth=0.9, zorder=1.2)
         y = np.arange(len(some))
         for mask, color, marker, label in (
-            (~unseen[some], _SEEN, "o", "seen"),
-            (unseen[some], _UNSEEN, "s", f"not seen (deviation above {100 * NOT_SEEN:.0f} %)"),
+            (~unseen[some], _SEEN, "o", "determined"),
+            (
+                unseen[some],
+                _UNSEEN,
+                "s",
+                f"standard error above {100 * WEAK:.0f} %",
+            ),
         ):
             if mask.any():
                 k = some[mask]
@@ -109,7 +110,7 @@ def plot_identification_parameters(
                     markersize=3.2, elinewidth=1.1, capsize=1.8, label=label,
                 )  # fmt: skip
         _scale(axes, 100.0 * (np.abs(value[some]) + wide[some]), len(groups))
-        axes.set_yticks(y, [found.names[k] for k in some], size=SMALL_SIZE, color=INK)
+        axes.set_yticks(y, [identification.names[k] for k in some], size=SMALL_SIZE, color=INK)
         axes.set_ylim(len(some) - 0.4, -0.6)
         axes.grid(False, axis="y")
         axes.set_xlabel("effect on the torques (%)")
@@ -124,19 +125,19 @@ def plot_identification_parameters(
 
 
 def effects(result: IdentificationResult) -> Array:
-    """Root mean square that a unit of each parameter has, relative to that of the measured side."""
+    """Root mean square of each column, relative to the measured side."""
     sigma = result.estimate.sigma
     top = float(sigma.max(initial=0.0))
     weights = 1.0 / np.maximum(sigma, 1e-9 * top) if top > 0.0 else np.ones(len(sigma))
     columns, whole = np.zeros(len(result.names)), 0.0
-    for R, w in zip(result.reduction.factors, weights, strict=True):
+    for R, w in zip(result.factors.factors, weights, strict=True):
         columns += w * w * (R[:, :-1] ** 2).sum(axis=0)
         whole += w * w * float((R[:, -1] ** 2).sum())
     return np.sqrt(columns / whole) if whole > 0.0 else np.zeros(len(columns))
 
 
 def _scale(axes: Any, sizes: Array, count: int) -> None:
-    """Linear, or linear around zero and of powers beyond where few are far larger than most."""
+    """Linear scale, or symmetric logarithmic scale where few effects are much larger."""
     most, usual = float(sizes.max(initial=0.0)), float(np.median(sizes)) if sizes.size else 0.0
     if not usual or most < _SPAN * usual:
         axes.margins(x=0.06)
@@ -154,15 +155,15 @@ def _scale(axes: Any, sizes: Array, count: int) -> None:
     axes.set_xlim(-1.4 * most, 1.4 * most)
 
 
-def plot_identification_deviations(
+def plot_identification_standard_errors(
     result: IdentificationResult, *, title: str | None = None, size: ArrayLike | None = None
 ) -> Figure:
-    """Relative standard deviations, the largest first: what the log shows, and what it does not.
+    """Relative standard errors of the parameters, the largest first.
 
     Parameters
     ----------
     result : IdentificationResult
-        Of `identification.fit`.
+        Result of `identification.fit`.
     title : str, optional
         Over the figure.
     size : array_like, shape (2,), optional
@@ -171,8 +172,8 @@ def plot_identification_deviations(
     Returns
     -------
     matplotlib.figure.Figure
-        Bars take the correlation of residuals into account; lines on them do not, as is usually
-        published. Dashed: 30 %, above which a parameter counts as not seen.
+        Bars: corrected for correlated residuals; lines: for white residuals, as usually published.
+        Dashed: 30 %, above which a parameter is poorly determined.
 
     Raises
     ------
@@ -187,20 +188,16 @@ def plot_identification_deviations(
 
     Examples
     --------
-    >>> import robotmodels as rm
-    >>> from robotmodels.identification import Log, fit
-    >>> from robotmodels.minimal_parameters import uniform_bodies
-    >>> arm, t = rm.load("planar_2r"), np.arange(0.0, 20.0, 0.01)[:, None]
-    >>> arm, w = arm.with_inertia(uniform_bodies(arm, 5.0)), np.array([1.0, 1.7])
-    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -w * w * np.sin(w * t)
-    >>> result = fit(arm, Log(0.01, q, rm.idm(arm, q, v, a)), decimation=1)
-    >>> plot_identification_deviations(result).axes[0].get_ylabel()
-    'relative deviation (%)'
+    >>> from robotmodels.datasets import example_log
+    >>> from robotmodels.identification import fit
+    >>> result = fit(*example_log())
+    >>> plot_identification_standard_errors(result).axes[0].get_ylabel()
+    'relative standard error (%)'
     """
-    found = as_identification(result)
-    relative = 100.0 * found.relative_deviations
+    identification = as_identification(result)
+    relative = 100.0 * identification.relative_errors
     with np.errstate(divide="ignore", invalid="ignore"):
-        white = 100.0 * found.white / np.abs(found.values)
+        white = 100.0 * identification.details.iid_standard_errors / np.abs(identification.values)
     order = np.argsort(-relative, kind="stable")
     count = len(order)
     rows = max(1, -(-count // _IN_A_ROW))
@@ -208,30 +205,32 @@ def plot_identification_deviations(
     figure = new_figure(PAGE, 0.7 + 1.8 * rows, size)
     grid = panels(figure, rows, 1, sharey=True)
     finite = relative[np.isfinite(relative) & (relative > 0.0)]
-    low = float(finite.min(initial=100.0 * NOT_SEEN)) / 2.0
-    high = 1.3 * float(finite.max(initial=100.0 * NOT_SEEN))
+    low = float(finite.min(initial=100.0 * WEAK)) / 2.0
+    high = 1.3 * float(finite.max(initial=100.0 * WEAK))
     for row, axes in enumerate(grid[:, 0]):
         some = order[row * each : (row + 1) * each]
         x = np.arange(len(some))
-        # a value of zero has no relative deviation: its bar goes to the top
+        # a value of zero has an infinite relative standard error: full bar
         height = np.where(np.isfinite(relative[some]), relative[some], high)
-        unseen = relative[some] > 100.0 * NOT_SEEN
+        unseen = relative[some] > 100.0 * WEAK
         for mask, color, label in (
-            (~unseen, _SEEN, "seen"), (unseen, _UNSEEN, "not seen"),
+            (~unseen, _SEEN, "determined"), (unseen, _UNSEEN, "poorly determined"),
         ):  # fmt: skip
             axes.bar(x[mask], np.maximum(height[mask], low) - low, bottom=low, width=0.7,
                      color=color, label=label)  # fmt: skip
         axes.hlines(white[some], x - 0.42, x + 0.42, color=INK, linewidth=1.1,
                     label="if residuals were white")  # fmt: skip
-        axes.axhline(100.0 * NOT_SEEN, color=INK, linewidth=LIMIT_WIDTH, linestyle=LIMIT_DASHES,
+        axes.axhline(100.0 * WEAK, color=INK, linewidth=LIMIT_WIDTH, linestyle=LIMIT_DASHES,
                      label="_limit")  # fmt: skip
         axes.set_yscale("log")
         axes.set_ylim(low, high)
         plain_decades(axes.yaxis, 6)
         axes.set_xlim(-0.8, each - 0.2)
-        axes.set_xticks(x, [found.names[k] for k in some], rotation=90, size=SMALL_SIZE, color=INK)
+        axes.set_xticks(
+            x, [identification.names[k] for k in some], rotation=90, size=SMALL_SIZE, color=INK
+        )
         axes.grid(False, axis="x")
-        axes.set_ylabel("relative deviation (%)")
+        axes.set_ylabel("relative standard error (%)")
     handles = {}
     for axes in grid[:, 0]:
         for container in axes.containers:
@@ -246,12 +245,12 @@ def plot_identification_deviations(
 def plot_identification_correlations(
     result: IdentificationResult, *, title: str | None = None, size: ArrayLike | None = None
 ) -> Figure:
-    """Correlations of the estimates: pairs that the log hardly tells apart are dark.
+    """Correlations of the estimates; strongly correlated pairs are dark.
 
     Parameters
     ----------
     result : IdentificationResult
-        Of `identification.fit`.
+        Result of `identification.fit`.
     title : str, optional
         Over the figure.
     size : array_like, shape (2,), optional
@@ -275,15 +274,13 @@ def plot_identification_correlations(
 
     Examples
     --------
-    >>> import robotmodels as rm
-    >>> from robotmodels.identification import Log, fit
-    >>> from robotmodels.minimal_parameters import uniform_bodies
-    >>> arm, t = rm.load("planar_2r"), np.arange(0.0, 20.0, 0.01)[:, None]
-    >>> arm, w = arm.with_inertia(uniform_bodies(arm, 5.0)), np.array([1.0, 1.7])
-    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -w * w * np.sin(w * t)
-    >>> result = fit(arm, Log(0.01, q, rm.idm(arm, q, v, a)), decimation=1)
+    >>> from robotmodels.datasets import example_log
+    >>> from robotmodels.identification import fit
+    >>> result = fit(*example_log())
     >>> plot_identification_correlations(result).axes[1].get_ylabel()
     'correlation'
     """
-    found = as_identification(result)
-    return correlation_figure(found.estimate.correlation, found.names, title, size)
+    identification = as_identification(result)
+    return correlation_figure(
+        identification.estimate.correlation, identification.names, title, size
+    )

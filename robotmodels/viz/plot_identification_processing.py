@@ -1,4 +1,4 @@
-"""Spectra of a log before and after its processing, and the reasons for the choice of it."""
+"""Spectra of a log before and after its processing, and the criteria of its choice."""
 
 from __future__ import annotations
 
@@ -10,16 +10,15 @@ from numpy.typing import ArrayLike
 from .._arrays import Array
 from ..errors import InvalidValueError, ShapeError
 from ..identification.equations import Equations
-from ..identification.preparation.filters import decimation_window, zero_phase
-from ..identification.preparation.processing import Processing
-from ..identification.processing_choice import (
+from ..identification.position_noise import predicted_bias
+from ..identification.processing import (
     LEAST_EQUATIONS,
     MOST_BIAS,
     decimation_for,
     equations_per_parameter,
 )
-from ..identification.regressor_noise import bias_ratio, regressor_noise
 from ..identification.result import IdentificationResult
+from ..identification.signals import Processing, decimation_window, zero_phase
 from ..logs import Log
 from ..model import RobotModel
 from .figures import LIMIT_DASHES, PAGE, SMALL_SIZE, legend_above, line_style, new_figure, panels
@@ -34,16 +33,16 @@ if TYPE_CHECKING:
 _BEFORE, _AFTER, _CURVE = line_style(1).color, line_style(0).color, line_style(4).color
 _POSITIONS, _TORQUES, _BOUNDS = (0, (6.0, 1.3, 1.3, 1.3)), (0, (1.3, 1.8)), (0, (2.2, 2.2))
 _LONGEST = 1 << 18
-"""Samples of the longest recording that spectra are made of, at most."""
+"""Largest number of samples for spectra."""
 _SEGMENTS = 2
 _KAISER = 18.0
-"""Of the window: noise is more than six decades below the motion, which must not leak over it."""
+"""Window of the spectra; its leakage is below the noise, six decades below the motion."""
 _BINS = 240
 _CUTOFFS, _WIDTH, _HIGHEST = 16, 10.0, 0.4
 """Cutoffs at which the effect of the noise is predicted; highest of them, in cutoffs of the
 equations and in sampling rates."""
 _LEAST_BIAS = 1e-6
-"""Standard errors; a smaller bias is drawn at the lower edge of its panel."""
+"""Least drawn bias, in standard errors."""
 
 
 def plot_processing(
@@ -54,12 +53,12 @@ def plot_processing(
     title: str | None = None,
     size: ArrayLike | None = None,
 ) -> Figure:
-    """Spectra of positions and torques before and after their processing, and why it was chosen.
+    """Spectra of positions and torques before and after processing, and the criteria of its choice.
 
     Parameters
     ----------
     log : Log or IdentificationResult
-        The log; or a result of `identification.fit`, which holds its log, processing and robot.
+        The log; or a result of `identification.fit`, which contains its log, processing and robot.
     processing : Processing, optional
         The choices for a log, of `identification.choose_processing`.
     model : RobotModel, optional
@@ -74,13 +73,13 @@ def plot_processing(
     matplotlib.figure.Figure
         A row for each joint: densities of position and torque, with the frequency of the motion,
         the cutoff of the positions (of their filter), the cutoff of regressor and torques (of the
-        decimation) and the noise of the positions. What is right of a panel's cutoff, on grey, is
-        cut; its root mean square stands over the panel, of torques also relative to theirs.
-        Densities are averaged over bins of equal width on the logarithmic axis.
+        decimation) and the noise of the positions. The grey part above the cutoff is removed; the
+        title gives its root mean square, for torques also relative. Densities are averaged over
+        bins of equal width on the logarithmic axis.
 
-        Of a result, a last row shows why these: the largest bias of a parameter that noise of the
-        positions is predicted to cause, in standard errors of the parameter, against the lower of
-        both cutoffs; and the equations for each parameter (edges and dead bands not taken off)
+        For a result, a last row shows the criteria: the largest bias of a parameter that noise of
+        the positions is predicted to cause, in standard errors of the parameter, against the lower
+        of both cutoffs; and the equations for each parameter (edges and dead bands not subtracted)
         against that of regressor and torques. Dots mark the choice, dashed lines its bounds. A bias
         below 1e-6 is drawn at the lower edge.
 
@@ -176,9 +175,9 @@ def _given(
     if isinstance(log, IdentificationResult):
         if processing is not None or model is not None:
             raise InvalidValueError(
-                "processing, model: the result holds them; leave them out, or give its log."
+                "processing, model: the result contains them; leave them out, or give its log."
             )
-        return log.system.log, log.system.processing, log.model, log.system
+        return log.equations.log, log.equations.processing, log.model, log.equations
     if not isinstance(log, Log):
         raise InvalidValueError(
             f"log: expected a Log or an IdentificationResult, got {type(log).__name__}."
@@ -218,18 +217,18 @@ def _reasons(row: Any, system: Equations) -> None:
     lower = min(processing.cutoff or top, thinned)
     lowest, highest = min(processing.motion, lower), max(min(_WIDTH * lower, top), thinned)
     f = np.union1d(np.geomspace(lowest, highest, _CUTOFFS), (lower, thinned))
-    noise = regressor_noise(base, log, lowest, highest)
-    ratios = [bias_ratio(noise, x) for x in f]
+    bias = predicted_bias(base, log, lowest, highest)
+    ratios = [bias(x) for x in f]
     biases = np.array([ratio.max(initial=0.0) for ratio in ratios])
-    here = ratios[int(np.searchsorted(f, lower))]
-    worst = int(np.argmax(here))
+    chosen = ratios[int(np.searchsorted(f, lower))]
+    worst = int(np.argmax(chosen))
     counts = [
-        equations_per_parameter(base, log, system.kinds, decimation_for(x, log.dt)) for x in f
+        equations_per_parameter(base, log, system.groups, decimation_for(x, log.dt)) for x in f
     ]
-    count = equations_per_parameter(base, log, system.kinds, processing.decimation)
+    count = equations_per_parameter(base, log, system.groups, processing.decimation)
     drawn = (
         # without noise there is no bias, and logarithmic axes have no place for it
-        (np.where(biases > 0.0, biases, np.nan), lower, max(here[worst], _LEAST_BIAS), MOST_BIAS),
+        (np.where(biases > 0.0, biases, np.nan), lower, max(chosen[worst], _LEAST_BIAS), MOST_BIAS),
         (np.array(counts), thinned, count, LEAST_EQUATIONS),
     )
     bounds = f"bounds: {MOST_BIAS:g} standard errors, {LEAST_EQUATIONS} equations"
@@ -246,12 +245,12 @@ def _reasons(row: Any, system: Equations) -> None:
     row[1].set_xlabel("cutoff of regressor and torques (Hz)")
     row[0].set_ylabel("bias /\nstandard error")
     row[1].set_ylabel("equations /\nparameter")
-    _over(row[0], f"bias by noise: {here[worst]:.2g} standard errors ({base.names[worst]})")
+    _over(row[0], f"bias by noise: {chosen[worst]:.2g} standard errors ({base.names[worst]})")
     _over(row[1], f"about {count:.3g} equations for each parameter")
 
 
 def _thinned(tau: Array, step: int) -> Array:
-    """Through the decimation's low-pass, at the rate of the log."""
+    """Signals through the decimation's low-pass, at the rate of the log."""
     if step == 1:
         return tau
     from scipy.signal import fftconvolve
@@ -262,7 +261,7 @@ def _thinned(tau: Array, step: int) -> Array:
 
 
 def _inner(N: int, processing: Processing) -> slice:
-    """Rows far enough from the ends, as far as enough are left."""
+    """Rows without the filter transients at the ends, where enough remain."""
     cut = min(processing.edges, N // 4)
     return slice(cut, N - cut)
 
@@ -286,13 +285,13 @@ def _density(x: Array, dt: float) -> tuple[Array, Array]:
 
 
 def _floor(f: Array, density: Array, nyquist: float) -> float:
-    """Density of the noise: the usual one at the frequencies that no motion has."""
+    """Noise density: median over frequencies without motion."""
     high = (f > 0.5 * nyquist) & (f < 0.9 * nyquist)
     return float(np.median(density[high])) if high.any() else 0.0
 
 
 def _limit(axes: Any, before: Array, after: Array) -> None:
-    """Not so far down that rounding is all there is to see."""
+    """Lower limit of the axis, above rounding."""
     top = float(max(before.max(initial=0.0), after.max(initial=0.0)))
     if top <= 0.0:
         axes.set_ylim(1e-12, 1.0)

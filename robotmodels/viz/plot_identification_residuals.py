@@ -1,8 +1,7 @@
-"""Residuals of an identification: over time beside their deviation, and their autocorrelation."""
+"""Residuals of an identification: over time with their standard deviation, and autocorrelation."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,8 +9,8 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array
 from ..identification.equations import Equations
-from ..identification.reporting.parameters import kind_names, kind_units
-from ..identification.reporting.residuals import residual_diagnostics
+from ..identification.report_tables import group_names, group_units
+from ..identification.residuals import residual_diagnostics
 from ..identification.result import IdentificationResult
 from ..logs import Log
 from .figures import PAGE, SMALL_SIZE, THIN_WIDTH, legend_above, line_style, new_figure, panels
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _MOST = 4000
-"""Residuals that are drawn as points; beyond, only the farthest of a group."""
+"""Largest number of drawn residuals; above, only the largest of each group."""
 
 
 def plot_identification_residuals(
@@ -32,15 +31,14 @@ def plot_identification_residuals(
     title: str | None = None,
     size: ArrayLike | None = None,
 ) -> Figure:
-    """Residuals of the equations with two deviations on both sides, and their autocorrelation.
+    """Residuals of the equations with two standard deviations, and their autocorrelation.
 
     Parameters
     ----------
     result : IdentificationResult
-        Of `identification.fit`.
+        Result of `identification.fit`.
     test : Log, optional
-        Draw the residuals of this log, which was kept aside, instead of those of its own; the
-        deviation is that of the fit.
+        Held-out log, whose residuals are drawn instead; the standard deviation is that of the fit.
     title : str, optional
         Over the figure.
     size : array_like, shape (2,), optional
@@ -49,8 +47,7 @@ def plot_identification_residuals(
     Returns
     -------
     matplotlib.figure.Figure
-        A row for each kind of equations; on the right 95 % of the correlations of white residuals
-        are within the band.
+        A row for each kind of equations; on the right the 95 % band of white residuals.
 
     Raises
     ------
@@ -65,32 +62,28 @@ def plot_identification_residuals(
 
     Examples
     --------
-    >>> import robotmodels as rm
+    >>> from robotmodels.datasets import example_log
     >>> from robotmodels.identification import fit
-    >>> from robotmodels.minimal_parameters import uniform_bodies
-    >>> arm, t = rm.load("planar_2r"), np.arange(0.0, 20.0, 0.01)[:, None]
-    >>> arm, w = arm.with_inertia(uniform_bodies(arm, 5.0)), np.array([1.0, 1.7])
-    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -w * w * np.sin(w * t)
-    >>> result = fit(arm, Log(0.01, q, rm.idm(arm, q, v, a)), decimation=1)
+    >>> result = fit(*example_log())
     >>> plot_identification_residuals(result).axes[0].get_ylabel()
     'residual (N m)'
     """
-    found = as_identification(result)
-    check_test(found, test)
-    system = found.system if test is None else replace(found.system, log=test)
-    names, units = kind_names(found), kind_units(found)
+    identification = as_identification(result)
+    check_test(identification, test)
+    system = identification.equations if test is None else identification.equations.with_log(test)
+    names, units = group_names(identification), group_units(identification)
     m = len(names)
-    t, e, far = _residuals(system, found.values, found.estimate.sigma)
-    correlation = residual_diagnostics(system, found.values)
-    lag = np.arange(1, correlation.lags + 1) / found.system.processing.rate
+    t, e, far = _residuals(system, identification.values, identification.estimate.sigma)
+    correlation = residual_diagnostics(system, identification.values)
+    lag = np.arange(1, correlation.lags + 1) / identification.equations.processing.rate
     figure = new_figure(PAGE, 0.9 + 1.1 * m, size)
     grid = panels(figure, m, 2, sharex="col", width_ratios=[2.2, 1.0])
     color = line_style(0).color
     for j in range(m):
         left, right = grid[j]
-        sigma = float(found.estimate.sigma[j])
+        sigma = float(identification.estimate.sigma[j])
         left.axhspan(-2.0 * sigma, 2.0 * sigma, color=BAND, linewidth=0.0, zorder=0.5,
-                     label="two deviations; 95 % of white residuals")  # fmt: skip
+                     label="two standard deviations; 95 % of white residuals")  # fmt: skip
         left.axhline(0.0, color=PALE, linewidth=THIN_WIDTH, zorder=1.2, label="_zero")
         left.plot(t, e[:, j], linestyle="", marker="o", markersize=1.4, color=color,
                   markeredgewidth=0.0, label="residual; its autocorrelation")  # fmt: skip
@@ -113,13 +106,13 @@ def plot_identification_residuals(
 
 
 def _residuals(system: Equations, values: Array, sigma: Array) -> tuple[Array, Array, Array]:
-    """Times and residuals, NaN where an equation does not take part, and the part that is far.
+    """Times and residuals (NaN where excluded), and the share of large ones.
 
-    Of many, the farthest of each group.
+    If there are many, the largest of each group.
     """
     count = len(system.log) / system.processing.decimation
     step = max(1, int(np.ceil(count / _MOST)))
-    far, all_of = np.zeros(system.kinds), np.zeros(system.kinds)
+    far, all_of = np.zeros(system.groups), np.zeros(system.groups)
     times, rows = [], []
     for block in system.blocks():
         e = np.where(block.use, block.y - block.W @ values, np.nan)
@@ -130,4 +123,4 @@ def _residuals(system: Equations, values: Array, sigma: Array) -> tuple[Array, A
             times.append(block.t[start])
             rows.append(e[start + group.argmax(axis=0), np.arange(e.shape[1])])
     with np.errstate(invalid="ignore"):
-        return np.array(times), np.array(rows).reshape(-1, system.kinds), far / all_of
+        return np.array(times), np.array(rows).reshape(-1, system.groups), far / all_of

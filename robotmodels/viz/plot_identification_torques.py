@@ -1,4 +1,4 @@
-"""Measured and predicted torques of an identification, on its log and on one kept aside."""
+"""Measured and predicted torques of an identification, in sample and held out."""
 
 from __future__ import annotations
 
@@ -10,11 +10,9 @@ from numpy.typing import ArrayLike
 
 from .._arrays import Array
 from ..errors import InvalidValueError, ShapeError
-from ..identification.methods.estimate import check_values
-from ..identification.prediction import predicted_torque
-from ..identification.preparation.signals import piece_signals, pieces
-from ..identification.reporting.parameters import effort_units
-from ..identification.result import IdentificationResult
+from ..identification.report_tables import effort_units
+from ..identification.result import IdentificationResult, check_result, predicted_torque, validate
+from ..identification.signals import piece_signals, pieces
 from ..logs import Log
 from .figures import PAGE, SMALL_SIZE, THIN_WIDTH, legend_above, line_style, new_figure, panels
 from .palette import BAND, INK, PALE
@@ -24,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _POINTS = 700
-"""Groups of samples over the length of a log."""
+"""Largest number of sample groups over a log."""
 _MEASURED, _PREDICTED, _LEFT = line_style(3).color, line_style(0).color, line_style(1).color
 
 
@@ -44,12 +42,7 @@ class DrawnTorques:
 
 def as_identification(result: Any) -> IdentificationResult:
     """Check that the argument is an identification result."""
-    if not isinstance(result, IdentificationResult):
-        raise InvalidValueError(
-            "result: expected an IdentificationResult of identification.fit, got "
-            f"{type(result).__name__}."
-        )
-    check_values(result.estimate)
+    check_result(result)
     return result
 
 
@@ -70,17 +63,17 @@ def plot_identification_torques(
     title: str | None = None,
     size: ArrayLike | None = None,
 ) -> Figure:
-    """Measured and predicted torques over time, and what is left, a row for each joint.
+    """Measured and predicted torques over time and their difference, a row for each joint.
 
-    Samples are drawn as envelopes, so that peaks of long logs stay. Grey stretches are in the dead
-    band, whose equations did not take part.
+    Samples are drawn as envelopes, so that peaks of long logs remain visible. Grey stretches are in
+    the dead band, whose equations are excluded.
 
     Parameters
     ----------
     result : IdentificationResult
-        Of `identification.fit`.
+        Result of `identification.fit`.
     test : Log, optional
-        Kept aside: drawn in a column of its own, in the same scale.
+        Held-out log: drawn in a second column, in the same scale.
     title : str, optional
         Over the figure.
     size : array_like, shape (2,), optional
@@ -89,7 +82,7 @@ def plot_identification_torques(
     Returns
     -------
     matplotlib.figure.Figure
-        The error relative to the measured torque stands over each panel.
+        The title of each panel gives the error relative to the measured torque.
 
     Raises
     ------
@@ -104,30 +97,26 @@ def plot_identification_torques(
 
     Examples
     --------
-    >>> import robotmodels as rm
+    >>> from robotmodels.datasets import example_log
     >>> from robotmodels.identification import fit
-    >>> from robotmodels.minimal_parameters import uniform_bodies
-    >>> arm, t = rm.load("planar_2r"), np.arange(0.0, 20.0, 0.01)[:, None]
-    >>> arm, w = arm.with_inertia(uniform_bodies(arm, 5.0)), np.array([1.0, 1.7])
-    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -w * w * np.sin(w * t)
-    >>> result = fit(arm, Log(0.01, q, rm.idm(arm, q, v, a)), decimation=1)
+    >>> result = fit(*example_log())
     >>> [axes.get_ylabel() for axes in plot_identification_torques(result).axes]
     ['torque (N m)', 'torque (N m)']
     """
-    found = as_identification(result)
-    check_test(found, test)
-    sides = [("fitted", found.system.log, found.fitted)]
+    identification = as_identification(result)
+    check_test(identification, test)
+    sides = [("fitted", identification.equations.log, identification.validation.in_sample)]
     if test is not None:
-        sides.append(("kept aside", test, found.validate(test)))
-    n, units = found.model.n, effort_units(found.model)
+        sides.append(("held out", test, validate(identification, test)))
+    n, units = identification.model.n, effort_units(identification.model)
     figure = new_figure(PAGE, 0.9 + 1.15 * n, size)
     grid = panels(
         figure, n, len(sides), sharex="col", sharey="row",
         width_ratios=[max(log.duration, 0.25 * sides[0][1].duration) for _, log, _ in sides],
     )  # fmt: skip
     for column, (word, log, errors) in enumerate(sides):
-        drawn = drawn_torques(found, log)
-        for j, name in enumerate(found.model.table.joint_names):
+        drawn = drawn_torques(identification, log)
+        for j, name in enumerate(identification.model.table.joint_names):
             axes = grid[j, column]
             axes.fill_between(
                 drawn.slow_t, 0.0, 1.0, where=drawn.slow[:, j].astype(bool).tolist(), step="mid",
@@ -154,27 +143,27 @@ def plot_identification_torques(
 
 
 def drawn_torques(result: IdentificationResult, log: Log) -> DrawnTorques:
-    """Torques of a log piece by piece, in as many points as a figure shows."""
-    chosen = result.system.processing
+    """Envelopes of the torques of a log, piece by piece."""
+    chosen = result.equations.processing
     step = max(1, len(log) // _POINTS)
     parts: list[list[tuple[Array, Array]]] = [[], [], []]
     slow_t, slow = [], []
     gap = np.full((1, log.n), np.nan)
     begin = None
     for piece in pieces(log, chosen):
-        found = piece_signals(log, chosen, piece, 0)
-        tau = predicted_torque(
-            result.base, result.names, result.values, found.q, found.v, found.a, chosen.dead_band
-        )
-        for part, y in zip(parts, (found.tau, tau, found.tau - tau), strict=True):
+        signals = piece_signals(log, chosen, piece, 0)
+        tau = predicted_torque(result, signals.q, signals.v, signals.a)
+        for part, y in zip(parts, (signals.tau, tau, signals.tau - tau), strict=True):
             if begin is not None and piece.begin != begin:
                 part.append((gap, gap))
-            part.append(envelope(found.t, y, step))
+            part.append(envelope(signals.t, y, step))
         begin = piece.begin
-        starts = np.arange(0, len(found), step)
-        inside = np.add.reduceat((np.abs(found.v) < chosen.dead_band).astype(float), starts, axis=0)
-        counts = np.diff(np.append(starts, len(found)))
-        slow_t.append(found.t[starts] + 0.5 * (counts - 1) * log.dt)
+        starts = np.arange(0, len(signals), step)
+        inside = np.add.reduceat(
+            (np.abs(signals.v) < chosen.dead_band).astype(float), starts, axis=0
+        )
+        counts = np.diff(np.append(starts, len(signals)))
+        slow_t.append(signals.t[starts] + 0.5 * (counts - 1) * log.dt)
         slow.append(inside > 0.5 * counts[:, None])
     measured, predicted, left = (
         (np.concatenate([t for t, _ in part]), np.concatenate([y for _, y in part]))

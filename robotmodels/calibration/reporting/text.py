@@ -104,13 +104,13 @@ def _prior_text(result: CalibrationResult) -> str:
     """Prior standard deviations of the table's lengths and angles, as used."""
     prior, f = result.solution.fit.prior, result.nominal.f
     used = {}
-    for entry, size in zip(result.parameters.entries, prior.deviation, strict=False):
+    for entry, size in zip(result.parameters.entries, prior.sigma, strict=False):
         if np.isfinite(size) and 0 < entry.row <= f and entry.law is ErrorLaw.CONSTANT:
             used.setdefault(entry.element.is_length, size / np.sqrt(prior.strength))
     texts = [f"{1e3 * used[k]:.3g} {'mm' if k else 'mrad'}" for k in (True, False) if k in used]
     if texts:
         return f" Prior standard deviations of the table: {', '.join(texts)}."
-    return " With a prior." if np.isfinite(prior.deviation).any() else " Without a prior."
+    return " With a prior." if np.isfinite(prior.sigma).any() else " Without a prior."
 
 
 def _trust(result: CalibrationResult) -> ReportSection:

@@ -124,7 +124,7 @@ def result_data(result: CalibrationResult) -> dict[str, Any]:
     fit, problem = result.solution.fit, result.solution.problem
     interval = confidence_intervals(fit)
     start = result.parameters.nominal
-    fixture_std = fit.deviations[problem.P :]
+    fixture_std = fit.standard_errors[problem.P :]
     return {
         "format": _FORMAT,
         "robot": result.nominal.name,

@@ -15,6 +15,8 @@ from ..._arrays import Array, as_floats
 from ..._choices import chosen
 from ...errors import InvalidValueError, ShapeError
 from ...model import RobotModel, check_model
+from ...obstacles.clearance import checked_obstacles, clearance, links
+from ...obstacles.shapes import Obstacle
 from ..extended_table.candidates import candidate_parameters
 from ..extended_table.parameters import GeometricParameters
 from ..extended_table.skeleton import Frame
@@ -24,7 +26,6 @@ from ..measurements.kinds import Groups, Kind, as_kind, drawn_groups, groups_of,
 from .exchange import Progress, exchanged, greedy, index_of, nested
 from .group_rows import group_rows
 from .observability import Criterion, Observability, of_singular_values
-from .obstacles import Obstacle, clearance
 from .selected import SelectedConfigurations
 
 _LOG = logging.getLogger(__name__)
@@ -62,9 +63,9 @@ def select_configurations(
     For contacts the candidates are groups of postures that meet exactly on the nominal robot, each
     group with its own unknown point, pose or plane, and whole groups are exchanged.
 
-    Configurations stay within the joint limits. Obstacles are tested against straight rods
-    between the origins of the frames (see `clearance`), not against the robot's real bodies, and
-    paths between configurations are not looked at.
+    Configurations stay within the joint limits. Obstacles are tested against straight links
+    between the origins of the frames (see `obstacles.clearance`), not against the robot's real
+    bodies, and paths between configurations are not tested.
 
     Parameters
     ----------
@@ -92,9 +93,9 @@ def select_configurations(
     postures : int, optional
         Postures of a contact; default by the kind.
     obstacles : iterable of Obstacle
-        Sphere, Box, HalfSpace.
+        Sphere, Box, Plane, Capsule of `obstacles`.
     radius : float
-        Of the rods that stand for links, metres.
+        Of the links, metres.
     optimise : bool
         Whether the chosen configurations are moved afterwards, within limits and clear of
         obstacles, as long as that helps. Not for contacts.
@@ -147,7 +148,7 @@ def select_configurations(
     else:
         looked_at = candidate_parameters(model, (frame,))
         looked_at = looked_at if parameters is None else looked_at.subset(parameters)
-    space = _Space(model, frame, tuple(obstacles), radius)
+    space = _Space(model, frame, checked_obstacles(obstacles), radius)
     size = kind.postures if postures is None else _whole(postures, "postures")
     if candidates is None:
         pool, numbers, notes = _drawn(looked_at, kind, _whole(drawn, "drawn"), size, rng, space)
@@ -206,7 +207,8 @@ class _Space:
     def clear(self, q: Array) -> NDArray[np.bool_]:
         if not self.obstacles:
             return np.ones(len(q), dtype=bool)
-        far = clearance(self.model, q, self.obstacles, self.radius, self.frame)
+        segments = links(self.model, self.frame)
+        far = clearance(self.model, q, self.obstacles, self.radius, segments=segments)
         return np.asarray((far > 0.0).all(axis=1))
 
     def inside(self, q: Array) -> NDArray[np.bool_]:

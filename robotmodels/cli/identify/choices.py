@@ -1,4 +1,4 @@
-"""What the options of ``robotmodels identify`` choose for the fit."""
+"""Choices for the fit from the options of ``robotmodels identify``."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..source import robot_of
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from ...identification import Controller
+    from ...identification.methods.base import Method
     from ...inertia import InertialParameters
 
 _MOST = 64
@@ -39,32 +39,37 @@ def prior(arguments: argparse.Namespace, model: RobotModel) -> InertialParameter
     return uniform_bodies(model, mass)
 
 
-def essential(text: str | None) -> bool | float | str:
-    """The rule of ``--essential``: a ratio, a name, or none."""
-    if text is None:
-        return False
-    try:
-        return float(text)
-    except ValueError:
-        return text
+def method_of_options(arguments: argparse.Namespace, model: RobotModel) -> Method:
+    """The method of ``--method``; gains of ``--kp`` and ``--kd`` are for simulating methods."""
+    from dataclasses import replace
 
+    import numpy as np
 
-def controller(arguments: argparse.Namespace, model: RobotModel) -> Controller | None:
-    """The controller of ``--kp`` and ``--kd``."""
-    if arguments.kp is None and arguments.kd is None:
-        return None
-    if arguments.kp is None or arguments.kd is None:
+    from ...identification import Controller, Ridge
+    from ...identification.method_names import method_of
+
+    method = method_of(arguments.method)
+    if isinstance(method, Ridge) and method.prior is None:
+        method = replace(method, prior=model)
+    gains = [arguments.kp, arguments.kd]
+    if gains == [None, None]:
+        return method
+    if None in gains:
         raise InvalidValueError("--kp, --kd: a controller has both gains; give the other as well.")
-    from ...identification import Controller
-
+    if not hasattr(method, "controller"):
+        raise InvalidValueError(
+            f"--kp, --kd: the method {method.name!r} does not simulate the robot; they are for iv, "
+            "didim and cloe."
+        )
     kp, kd = (
-        joint_numbers(getattr(arguments, name), model.n, f"--{name}") for name in ("kp", "kd")
+        np.broadcast_to(np.asarray(joint_numbers(gain, model.n, "--kp, --kd")), (model.n,))
+        for gain in gains
     )
-    return Controller(kp, kd)  # type: ignore[arg-type]  # both were given
+    return replace(method, controller=Controller(kp, kd))
 
 
 def workers(count: int) -> AbstractContextManager[Executor | None]:
-    """Processes that share the work."""
+    """Worker processes."""
     if not 1 <= count <= _MOST:
         raise InvalidValueError(f"--workers: expected 1 to {_MOST}, got {count}.")
     if count == 1:

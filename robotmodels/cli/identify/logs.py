@@ -1,4 +1,4 @@
-"""The logs of ``robotmodels identify``: read, shifted, cut into what is fitted and what tests."""
+"""Logs of ``robotmodels identify``: reading, delay, split into fitted and held-out parts."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ from ..columns import column, columns
 from ..numbers import joint_numbers, numbers
 
 if TYPE_CHECKING:
-    from ...identification import Log, Synchronisation
+    from ...identification import Log
+    from ...identification.delay import Synchronisation
 
 
 def logs(arguments: argparse.Namespace, model: RobotModel) -> tuple[Log, Log | None]:
     """The log to fit and the held-out log."""
-    from ...identification.preparation.synchronisation import synchronisation
+    from ...identification.delay import synchronisation
     from ...logs import with_delay
 
     ways = (arguments.test, arguments.test_rows, arguments.test_share)
@@ -40,17 +41,19 @@ def logs(arguments: argparse.Namespace, model: RobotModel) -> tuple[Log, Log | N
         first, last = _range(arguments.rows, len(whole), "--rows")
     if arguments.test_rows is not None:
         if arguments.rows is None:
-            raise InvalidValueError("--test-rows: say with --rows which rows are fitted.")
+            raise InvalidValueError("--test-rows: give the fitted rows by --rows.")
         start, stop = _range(arguments.test_rows, len(whole), "--test-rows")
         if max(first, start) < min(last, stop):
             raise InvalidValueError(
-                f"--test-rows: rows {start} to {stop} are not kept aside where {first} to {last} "
+                f"--test-rows: rows {start} to {stop} are not held out where {first} to {last} "
                 "are fitted; give rows that do not overlap."
             )
         other = whole.rows(start, stop)
     elif (share := arguments.test_share) is not None:
         if not 0.0 < share < 1.0:
-            raise InvalidValueError(f"--test-share: expected a part of 1, got {share:g}.")
+            raise InvalidValueError(
+                f"--test-share: expected a share between 0 and 1, got {share:g}."
+            )
         middle = first + round((1.0 - share) * (last - first))
         other = whole.rows(middle, last)
         last = middle
@@ -68,21 +71,22 @@ def _range(rows: list[int], N: int, option: str) -> tuple[int, int]:
     return start, stop
 
 
-def _estimated_delay(found: Synchronisation) -> float:
-    """The delay, where there is one that means something."""
-    from ...identification import SynchronisationStatus
+def _estimated_delay(estimate: Synchronisation) -> float:
+    """Estimated delay, if it is determined."""
+    from ...identification.delay import SynchronisationStatus
 
-    if found.status is SynchronisationStatus.AT_THE_END:
+    if estimate.status is SynchronisationStatus.AT_THE_END:
         raise InvalidValueError(
-            f"--delay auto: the torques fit best at an end of the delays that were tried "
-            f"({1e3 * found.delays[0]:.0f} to {1e3 * found.delays[-1]:.0f} ms); see whether "
-            "positions and torques are of the same motion, and give the delay in seconds."
+            "--delay auto: the torques fit best at an end of the delays tried "
+            f"({1e3 * estimate.delays[0]:.0f} to {1e3 * estimate.delays[-1]:.0f} ms); "
+            "check whether positions and torques belong to the same motion, and give the delay "
+            "in seconds."
         )
-    if not found.status.is_success:
+    if not estimate.status.is_success:
         raise InvalidValueError(
-            f"--delay auto: {found.status.sentence} Give the delay in seconds, or leave it out."
+            f"--delay auto: {estimate.status.sentence} Give the delay in seconds, or leave it out."
         )
-    return float(found.delay)
+    return float(estimate.delay)
 
 
 def _read(
@@ -115,9 +119,9 @@ def _read(
 
 
 def _columns(words: list[str] | None) -> list[int | str] | int | str | None:
-    found = columns(words)
+    names = columns(words)
     # one word may be a pattern, or the name of a matrix
-    return found[0] if found is not None and len(found) == 1 else found
+    return names[0] if names is not None and len(names) == 1 else names
 
 
 def _or_none(words: list[str] | None) -> Any:

@@ -12,13 +12,12 @@ METHODS = (
 )  # fmt: skip
 FORMS = ("torque", "filtered", "power", "energy")
 _KINDS = ("Ia", "Fv", "Fc", "offset")
-LOSSES = ("huber", "cauchy", "tukey")
 
 
 def add_options(parser: Any) -> None:
     """Add the options for logs, held-out motion and the fit."""
     _add_files(parser.add_argument_group("the logs"))
-    _add_test(parser.add_argument_group("motion that is kept aside, one of"))
+    _add_test(parser.add_argument_group("held-out motion, one of"))
     _add_fit(parser.add_argument_group("the fit"))
 
 
@@ -26,13 +25,13 @@ def _add_files(files: Any) -> None:
     files.add_argument("--log", required=True, nargs="+", metavar="FILE",
                        help="CSV, NPZ, Parquet or MAT files, each a recording")  # fmt: skip
     files.add_argument("--torques-from", nargs="+", metavar="FILE",
-                       help="files that have the torques, one for each log")  # fmt: skip
+                       help="files with the torques, one for each log")  # fmt: skip
     for option, what in (
         ("--positions", "columns of the positions: names, numbers from 0, or a pattern"),
         ("--torques", "columns of the torques or currents"),
         ("--velocities", "columns of velocities, where they are measured, or none"),
         ("--accelerations", "columns of accelerations, where they are measured, or none"),
-        ("--references", "columns of the positions that the controller was to follow, or none"),
+        ("--references", "columns of the reference positions of the controller, or none"),
     ):
         files.add_argument(option, nargs="+", metavar="COLUMN", help=what)
     files.add_argument("--time", metavar="COLUMN", help='column of times, or "none"')
@@ -54,26 +53,27 @@ def _add_files(files: Any) -> None:
     files.add_argument("--rows", nargs=2, type=int, metavar=("FROM", "TO"),
                        help="rows that are fitted; default all")  # fmt: skip
     files.add_argument("--delay", metavar="SECONDS",
-                       help="by which the torques lag behind the positions, or auto to estimate "
+                       help="delay of the torques behind the positions, or auto to estimate "
                        "it")  # fmt: skip
 
 
 def _add_test(test: Any) -> None:
-    test.add_argument("--test", nargs="+", metavar="FILE", help="files that only test")
+    test.add_argument("--test", nargs="+", metavar="FILE", help="files of the held-out log")
     test.add_argument("--test-torques-from", nargs="+", metavar="FILE",
-                      help="files that have their torques")  # fmt: skip
+                      help="files with their torques")  # fmt: skip
     test.add_argument("--test-rows", nargs=2, type=int, metavar=("FROM", "TO"),
-                      help="rows of the logs that only test")  # fmt: skip
+                      help="held-out rows of the logs")  # fmt: skip
     test.add_argument("--test-share", type=float, metavar="SHARE",
-                      help="share at the end of the logs that only tests")  # fmt: skip
+                      help="held-out share at the end of the logs")  # fmt: skip
 
 
 def _add_fit(fitted: Any) -> None:
-    fitted.add_argument("--method", choices=METHODS, default="wls", metavar="METHOD",
-                        help=f"how the equations are solved: {', '.join(METHODS)} (default: "
-                        "%(default)s)")  # fmt: skip
+    fitted.add_argument("--method", default="wls", metavar="METHOD[:OPTION=VALUE,...]",
+                        help=f"method with its options: {', '.join(METHODS)}, such as "
+                        "robust:loss=tukey, ridge:strength=10, recursive:forgetting=0.99 or "
+                        "wls:essential=30 (default: %(default)s)")  # fmt: skip
     fitted.add_argument("--form", choices=FORMS, default="torque",
-                        help="what the equations balance (default: %(default)s)")  # fmt: skip
+                        help="balanced quantity (default: %(default)s)")  # fmt: skip
     fitted.add_argument("--drive", nargs="*", choices=_KINDS, default=list(_KINDS), metavar="KIND",
                         help="drive parameters that are identified (default: Ia Fv Fc "
                         "offset)")  # fmt: skip
@@ -92,24 +92,10 @@ def _add_fit(fitted: Any) -> None:
                         help="skip the checks of units, signs and order, and the removal of "
                         "outliers and frozen samples")  # fmt: skip
     fitted.add_argument("--consistent", action="store_true",
-                        help="tell what real bodies and drives cost (as --out does)")  # fmt: skip
+                        help="find a physically consistent robot too (as --out does)")  # fmt: skip
     fitted.add_argument("--prior", metavar="ROBOT",
-                        help="what decides what the torques do not: a robot, or the mass in "
-                        "kg of one of uniform bodies; default its own inertia")  # fmt: skip
-    fitted.add_argument("--essential", nargs="?", const="30", metavar="RATIO",
-                        help="leave out parameters that are not seen: until no relative deviation "
-                        "is more than RATIO (30) times the least; or f_test, aic")  # fmt: skip
-    fitted.add_argument("--loss", choices=LOSSES,
-                        help="of --method robust (default: huber)")  # fmt: skip
-    fitted.add_argument("--strength", type=float,
-                        help="of --method ridge, toward the robot's own parameters; default by "
-                        "cross-validation")  # fmt: skip
-    fitted.add_argument("--noise", type=float,
-                        help="of --method tls: noise of the columns, relative (default: "
-                        "0.001)")  # fmt: skip
-    fitted.add_argument("--forgetting", type=float,
-                        help="of --method recursive: weight of an instant relative to the "
-                        "next")  # fmt: skip
+                        help="prior inertia: of a robot, or of "
+                        "uniform bodies of this mass in kg; default the robot's own")  # fmt: skip
     fitted.add_argument("--kp", metavar="NUMBERS",
                         help="of methods iv, didim, cloe: the controller's gains of position, "
                         "N m/rad or N/m; with --kd. Default a tuned controller")  # fmt: skip

@@ -1,4 +1,4 @@
-"""What ``robotmodels identify`` hands over: the report, and the robot of real bodies."""
+"""Output of ``robotmodels identify``: the report, and a physically consistent robot."""
 
 from __future__ import annotations
 
@@ -10,17 +10,20 @@ from ..output import Report, with_extra
 from ..streams import say
 
 if TYPE_CHECKING:
-    from ...identification import ConsistentFit, IdentificationResult, Log
+    from ...identification import IdentificationResult, Log
     from ...inertia import InertialParameters
+    from ...minimal_parameters import StandardParameters
 
 
-def report(result: IdentificationResult, test: Log | None, robot: ConsistentFit | None) -> Report:
+def report(
+    result: IdentificationResult, test: Log | None, robot: StandardParameters | None
+) -> Report:
     """An identification in every form."""
-    from ...identification.reporting.result_data import result_data
-    from ...identification.reporting.text import report_text
-    from ...identification.reporting.write import write_result
+    from ...identification import report as text_of
+    from ...identification import write_result
+    from ...identification.result_file import result_data
 
-    text = report_text(result, robot)
+    text = text_of(result, robot)
 
     def write(folder: Path) -> list[str]:
         from ...viz import identification_html
@@ -40,25 +43,24 @@ def report(result: IdentificationResult, test: Log | None, robot: ConsistentFit 
 
 def real_bodies(
     result: IdentificationResult, prior: InertialParameters | None, asked: bool
-) -> ConsistentFit | None:
+) -> StandardParameters | None:
     """Physically consistent robot; unless requested, a failure is only reported."""
-    from ...identification.consistency.identified_robot import consistent_robot, prior_bodies
-    from ...identification.consistency.result import ConsistentStatus
+    from ...identification.consistent import consistent_robot, prior_bodies
 
     try:
         if prior is None:
             prior, sentences = prior_bodies(result.model)
             for sentence in sentences:
                 say(sentence)
-        found = consistent_robot(result, prior)
+        robot = consistent_robot(result, prior)
     except RobotModelsError as error:
         if asked:
             raise
         say(f"no identified.urdf: {error}")
         return None
-    if found.status is ConsistentStatus.FAILED:
+    if not robot.is_usable:
         if asked:
-            raise InvalidValueError(f"--consistent: {found.reason()}")
-        say(f"no identified.urdf: {found.reason()}")
+            raise InvalidValueError(f"--consistent: {robot.reason()}")
+        say(f"no identified.urdf: {robot.reason()}")
         return None
-    return found
+    return robot
