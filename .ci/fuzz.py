@@ -27,7 +27,6 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 READERS = [
     "robotmodels.urdf", "robotmodels.symoro", "robotmodels.logs", "robotmodels.csv_table",
     "robotmodels.calibration.read", "robotmodels.geometry", "robotmodels.khalil_frames",
-    "robotmodels.identification.excitation.files", "robotmodels.identification.reporting.write",
 ]  # fmt: skip
 
 

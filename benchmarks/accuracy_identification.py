@@ -27,37 +27,32 @@ from pathlib import Path
 import numpy as np
 
 import robotmodels as rm
+from robotmodels.estimation import Estimate, EstimateStatus, TriangularFactors
+from robotmodels.estimation.linear import inverse_std, ordinary, solved, weighted
 from robotmodels.identification import (
-    Equations,
-    Estimate,
-    EstimateStatus,
     Log,
     Processing,
-    Reduction,
     choose_processing,
     correlated_covariance,
     equations,
     exciting_trajectory,
     fit,
-    ordinary,
     reduce_equations,
-    weighted,
-    with_delay,
 )
 from robotmodels.identification.closed_loop import (
     ClosedLoop,
     Controller,
-    SimulatedEstimate,
+    Didim,
+    Instrumental,
+    OutputError,
     closed_loop,
-    didim,
     hausman_test,
-    instrumental,
-    output_error,
     simulated_log,
     tuned_controller,
 )
-from robotmodels.identification.closed_loop.loop import least_width
-from robotmodels.identification.methods.least_squares import solved, weights_of
+from robotmodels.identification.closed_loop.loop import friction_rates
+from robotmodels.identification.equations import Equations
+from robotmodels.logs import with_delay
 
 DT = 1e-3
 PERIOD = 10.0
@@ -123,7 +118,7 @@ def controller() -> tuple[Controller, np.ndarray]:
     }
     near = arm.with_inertia(type(arm.inertia)(bodies)).with_drive(rm.DriveParameters(**terms))
     gains = tuned_controller(arm, q, BANDWIDTH, period=DT, feed_forward=False)
-    return Controller(gains.kp, gains.kd, feed_forward=near), least_width(arm, q, DT)
+    return Controller(gains.kp, gains.kd, feed_forward=near), DT * friction_rates(arm, q).dry
 
 
 @cache
@@ -157,20 +152,20 @@ def coloured(case: str, seed: int) -> Row:
     return named("WLS", {**row, "time": clock()})
 
 
-def system_of(log: Log, choices: Processing) -> tuple[Equations, Reduction]:
-    """Equations and their reduction."""
+def system_of(log: Log, choices: Processing) -> tuple[Equations, TriangularFactors]:
+    """Equations and their triangular factors."""
     system = equations(base(), log, choices)
     return system, reduce_equations(system)
 
 
-def squares(system: Equations, reduction: Reduction, equal: bool = False) -> Row:
+def squares(system: Equations, factors: TriangularFactors, equal: bool = False) -> Row:
     """Least squares as `fit` has them: ordinary or weighted, and both kinds of deviations."""
-    found: Estimate = ordinary(reduction) if equal else weighted(reduction)
-    w = np.ones(system.kinds) if equal else weights_of(found.sigma, reduction)
-    _, inverse, _ = solved(reduction, w)
+    found: Estimate = ordinary(factors) if equal else weighted(factors)
+    w = np.ones(system.groups) if equal else inverse_std(factors, found.sigma)
+    _, inverse, _ = solved(factors, w)
     spread = correlated_covariance(system, found.values, w, inverse)
     deviations = np.sqrt(np.maximum(np.diag(spread.covariance), 0.0))
-    return {"values": found.values, "deviations": deviations, "white": found.deviations}
+    return {"values": found.values, "deviations": deviations, "white": found.standard_errors}
 
 
 def start_of(log: Log) -> np.ndarray:
@@ -215,22 +210,23 @@ def whole(seconds: float, case: str, seed: int) -> Row:
     clock = Clock()
     found = fit(robot(), log, base=base())
     return named("fit", {
-        "values": found.values, "deviations": found.deviations, "white": found.white,
-        "time": clock(),
+        "values": found.values, "deviations": found.standard_errors,
+        "white": found.details.iid_standard_errors, "time": clock(),
     })  # fmt: skip
 
 
 def simulating(
-    method: Callable, system: Equations, reduction: Reduction, start: np.ndarray
-) -> SimulatedEstimate:
+    method: Callable, system: Equations, factors: TriangularFactors, start: np.ndarray
+) -> Estimate:
     """One of the methods that simulate the robot."""
-    return method(system, reduction, start=start, loop=loop_of(system, start))
+    return method(start=start, loop=loop_of(system, start)).solve(system, factors)
 
 
-def simulated_row(found: SimulatedEstimate, clock: Clock) -> Row:
+def simulated_row(found: Estimate, clock: Clock) -> Row:
     """What is kept of it."""
     return {
-        "values": found.values, "deviations": found.deviations, "white": found.white,
+        "values": found.values, "deviations": found.standard_errors,
+        "white": found.details.iid_standard_errors,
         "solved": np.array(found.status is EstimateStatus.SOLVED),
         "iterations": np.array(found.iterations), "time": clock(),
     }  # fmt: skip
@@ -243,10 +239,10 @@ def compared(seconds: float, choices: dict, equal: bool, case: str, seed: int) -
     moved = with_delay(log, -0.5 * DT)
     chosen = choose_processing(moved, **choices)
     clock = Clock()
-    system, reduction = system_of(moved, chosen)
-    row = named("OLS" if equal else "WLS", {**squares(system, reduction, equal), "time": clock()})
+    system, factors = system_of(moved, chosen)
+    row = named("OLS" if equal else "WLS", {**squares(system, factors, equal), "time": clock()})
     start = start_of(moved)
-    found = simulating(instrumental, system, reduction, start)
+    found = simulating(Instrumental, system, factors, start)
     row |= named("IV", simulated_row(found, clock))
     verdict = hausman_test(system, found)
     row |= named("DWH", {
@@ -254,8 +250,8 @@ def compared(seconds: float, choices: dict, equal: bool, case: str, seed: int) -
         "time": clock(),
     })  # fmt: skip
     # the simulated torque is held as well
-    system, reduction = system_of(log, chosen)
-    return row | named("DIDIM", simulated_row(simulating(didim, system, reduction, start), clock))
+    system, factors = system_of(log, chosen)
+    return row | named("DIDIM", simulated_row(simulating(Didim, system, factors, start), clock))
 
 
 def default_on_loop(seconds: float, case: str, seed: int) -> Row:
@@ -265,7 +261,7 @@ def default_on_loop(seconds: float, case: str, seed: int) -> Row:
     chosen = choose_processing(moved)
     clock = Clock()
     row = named("WLS", {**squares(*system_of(moved, chosen)), "time": clock()})
-    found = simulating(didim, *system_of(log, chosen), start_of(moved))
+    found = simulating(Didim, *system_of(log, chosen), start_of(moved))
     return row | named("DIDIM", simulated_row(found, clock))
 
 
@@ -273,8 +269,8 @@ def outputs(seconds: float, case: str, seed: int) -> Row:
     """Closed-loop output error."""
     log = noisy(controlled(seconds), case, seed)
     clock = Clock()
-    system, reduction = system_of(log, choose_processing(log, **FILTER))
-    found = simulating(output_error, system, reduction, weighted(reduction).values)
+    system, factors = system_of(log, choose_processing(log, **FILTER))
+    found = simulating(OutputError, system, factors, weighted(factors).values)
     return named("CLOE", simulated_row(found, clock))
 
 

@@ -227,8 +227,12 @@ def regressor_rows(peer: bool, rounds: int) -> list[Row]:
         name, [Contestant("robotmodels", torques(columns=base), BATCH)], rounds, "us", {}
     )
     streams = {
-        "power, 84": lambda: regressors.power_regressor_chunks(model, *motion),
-        "momentum, 6 x 84, and its rate": lambda: regressors.momentum_regressor_chunks(model, q, v),
+        "power, 84": lambda: regressors.chunked(
+            regressors.power_regressor, model, *motion, size=1024
+        ),
+        "momentum, 6 x 84, and its rate": lambda: regressors.chunked(
+            regressors.momentum_regressor, model, q, v, size=128
+        ),
     }
     for work, stream in streams.items():
         field = [Contestant("robotmodels", lambda s=stream: through(s()), BATCH)]
@@ -236,7 +240,9 @@ def regressor_rows(peer: bool, rounds: int) -> list[Row]:
     energy = [
         Contestant(
             "robotmodels",
-            lambda: through(regressors.energy_regressor_chunks(model, q, v, drive=False)),
+            lambda: through(
+                regressors.chunked(rm.energy_regressor, model, q, v, size=1024, drive=False)
+            ),
             BATCH,
         ),
         Contestant(

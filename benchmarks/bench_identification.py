@@ -34,7 +34,8 @@ import numpy as np
 import robotmodels as rm
 from benchmarks.kept import RESULTS, keep
 from benchmarks.machine import head, machine
-from robotmodels.identification import choose_processing, fit, signals
+from robotmodels.identification import choose_processing, fit
+from robotmodels.identification.signals import signals
 from robotmodels.logs import Log
 
 DT = 1e-3
@@ -130,7 +131,7 @@ def child(name: str, way: str, folder: Path, rounds: int) -> None:
         if way == "same":
             chosen = choose_processing(log, decimation=1, dead_band=0.0, edges=0.0, filtered=False)
             return fit(model, log, "ols", processing=chosen, checked=False)
-        return fit(model, log, decimation=1 if way == "all rows" else None)
+        return fit(model, log, processing={"decimation": 1 if way == "all rows" else None})
 
     few = slice(0, min(len(q), 20_000))
     identify(Log(dt, q[few], tau[few], *(None if x is None else x[few] for x in (v, a))))
@@ -142,7 +143,8 @@ def child(name: str, way: str, folder: Path, rounds: int) -> None:
             spent.append((time.process_time() - processor, time.perf_counter() - clock))
     assert found is not None
     processor, clock = np.median(spent, axis=0).tolist()
-    error = found.fitted.filtered_rmse if way == "same" else found.fitted.rmse
+    errors = found.validation.in_sample
+    error = errors.filtered_rmse if way == "same" else errors.rmse
     print(json.dumps({
         "processor": processor, "clock": clock, "rank": len(found.names),
         "rmse": float(np.sqrt(np.mean(error**2))), "memory": memory()[0], "files": memory()[1],

@@ -28,17 +28,22 @@ def identified(model, log, method, **options):
 
 def words_of_identification(result) -> dict:
     """What is kept of an identification."""
-    estimate, processing = result.estimate, result.system.processing
+    processing, validation = result.equations.processing, result.validation
     kept = {
-        "names": result.names, "values": result.values, "standard_errors": result.deviations,
-        "status": estimate.status.name, "unidentifiable": result.unseen,
-        "equations": result.reduction.rows, "cutoff": processing.cutoff,
-        "decimation": processing.decimation, "in_sample": result.fitted.rmse,
-    }  # fmt: skip
-    if result.held_out is not None:
-        kept["held_out"] = result.held_out.rmse
-    if (outliers := getattr(estimate, "outliers", None)) is not None:
-        kept["outliers"] = outliers.counts
+        "names": result.names,
+        "values": result.values,
+        "standard_errors": result.standard_errors,
+        "status": result.status.name,
+        "unidentifiable": result.details.unidentifiable,
+        "equations": result.factors.rows,
+        "cutoff": processing.cutoff,
+        "decimation": processing.decimation,
+        "in_sample": validation.in_sample.rmse,
+    }
+    if validation.held_out is not None:
+        kept["held_out"] = validation.held_out.rmse
+    if isinstance(result.method, identification.Robust):
+        kept["outliers"] = result.estimate.details.counts
     return kept
 
 
@@ -64,7 +69,8 @@ def words_of_calibration(result) -> dict:
 def words_of_consistency(fit, result) -> dict:
     """What is kept of a physically consistent robot, with standard errors of least squares."""
     return {
-        "names": fit.names, "values": fit.base_values, "standard_errors": result.deviations,
+        "names": fit.base.names, "values": fit.base_values,
+        "standard_errors": result.standard_errors,
         "status": fit.status.name, "price": fit.price, "distance": fit.distance,
         "physical": bool(fit.inertia.is_physical.all()),
     }  # fmt: skip
@@ -72,7 +78,7 @@ def words_of_consistency(fit, result) -> dict:
 
 def says_biased(result) -> bool:
     """Verdict of the Durbin-Wu-Hausman test on a fit by instrumental variables."""
-    return bool(identification.hausman_test(result.system, result.estimate).biased)
+    return bool(identification.hausman_test(result.equations, result.estimate).biased)
 
 
 # --- files ----------------------------------------------------------------------------------------
@@ -165,9 +171,9 @@ TX40 = {
     **{name: (name, {}) for name in (
         "wls", "ols", "irls", "ridge", "robust", "tls", "sequential", "recursive", "iv",
     )},
-    "robust tukey": ("robust", {"loss": "tukey"}),
-    "wls essential": ("wls", {"essential": True}),
-    "wls shrunk": ("wls", {"shrinkage": True}),
+    "robust tukey": ("robust:loss=tukey", {}),
+    "wls essential": ("wls:essential=True", {}),
+    "wls shrunk": ("wls:shrinkage=True", {}),
     **{f"wls {form}": ("wls", {"form": form}) for form in ("filtered", "power", "energy")},
     "didim": ("didim", {}),
     "cloe": ("cloe", {}),
@@ -334,9 +340,13 @@ class Study:
         found = {}
         for method in methods:
             own = log if method == "didim" else moved  # the simulated torque is held as well
-            name, *shrunk = method.split()
-            its = {"shrinkage": bool(shrunk)} if name == "wls" else {"controller": self.controller}
-            result = identified(self.arm, own, name, **some, **its)
+            way = {
+                "wls": identification.Wls(shrinkage=False),
+                "wls shrunk": identification.Wls(shrinkage=True),
+                "iv": identification.Instrumental(self.controller),
+                "didim": identification.Didim(self.controller),
+            }[method]
+            result = identified(self.arm, own, way, **some)
             found[method] = self.judged(result)
             if method == "iv":
                 found["biased"] = says_biased(result)

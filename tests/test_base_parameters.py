@@ -12,14 +12,12 @@ from identities.random_robots import random_bodies, random_drive, random_pose, r
 import robotmodels as rm
 from robotmodels.drive import DriveKind
 from robotmodels.errors import InvalidValueError, ShapeError
-from robotmodels.estimation import column_basis
 from robotmodels.friction import AsymmetricFriction, StribeckFriction
 from robotmodels.minimal_parameters import BaseMethod, base_parameters
 from robotmodels.minimal_parameters.alignment import aligned_robot
 from robotmodels.minimal_parameters.formulas import constants_of
-from robotmodels.minimal_parameters.gap import miss, with_clear_gap
-from robotmodels.minimal_parameters.numeric import natural_sizes
-from robotmodels.minimal_parameters.restraint import reach
+from robotmodels.minimal_parameters.motion_span import reach
+from robotmodels.minimal_parameters.numeric import natural_sizes, residual_warning
 from robotmodels.regressors import parameter_names, parameter_vector, torque_regressor
 
 GRAVITIES = ((0.0, 0.0, -9.81), (0.0, -9.81, 0.0), (-9.81, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -116,53 +114,31 @@ def test_rules_and_numbers_agree_on_the_catalogue(name, rng):
         numbers = base_parameters(model, "numeric", drive=drive)
         equal(rules, numbers)
         kept, dependent = numbers.gap
-        assert dependent < 2e-11
-        assert kept > (1e-4 if numbers.notes else 0.01)  # nothing that no log would show
-        if not numbers.notes:
-            assert dependent < 1e-13
+        assert dependent < (2e-11 if numbers.notes else 1e-13)
+        assert kept > (1e-4 if numbers.notes else 0.01)  # no parameter that no log would show
         for base in (rules, numbers):
             keeps_torque(base, model, rng, drive)
-            smallest = abs(base.matrix[base.matrix != 0]).min()
-            assert smallest > (1e-13 if base.notes else 1e-6)
-            if base.notes:
-                exact = base_parameters(model, base.method, drive=drive, tolerance=1e-11)
-                assert turned(exact) < 1e-9
-                keeps_torque(exact, model, rng, drive)
+            assert abs(base.matrix[base.matrix != 0]).min() > (1e-13 if base.notes else 1e-6)
+    if rules.notes and model.f < 40:
+        exact = base_parameters(model, drive=drive, tolerance=1e-11)
+        assert turned(exact) < 1e-9
+        keeps_torque(exact, model, rng, drive)
 
 
 @pytest.mark.parametrize("build", [any_robot, right_angled_robot])
 def test_rules_and_numbers_agree_on_random_robots(build):
     rng = np.random.default_rng(7)
-    for _ in range(200):
+    for k in range(150):
         model = build(rng)
-        equal(base_parameters(model), base_parameters(model, "numeric"))
+        rules = base_parameters(model)
+        equal(rules, base_parameters(model, "numeric"))
+        if k % 5 == 0:
+            model = filled(model, rng)
+            for drive in (True, False):
+                keeps_torque(base_parameters(model, drive=drive), model, rng, drive)
 
 
-@pytest.mark.parametrize("build", [any_robot, right_angled_robot])
-def test_base_parameters_keep_the_torques_of_any_robot(build):
-    rng = np.random.default_rng(8)
-    for _ in range(40):
-        model = build(rng)
-        model = model.with_inertia(random_bodies(rng, model.f))
-        model = model.with_drive(random_drive(rng, model.n))
-        for drive in (True, False):
-            keeps_torque(base_parameters(model, drive=drive), model, rng, drive)
-
-
-@pytest.mark.parametrize("size", [1e-3, 1e3])
-def test_the_rank_does_not_depend_on_the_size_of_the_robot(size):
-    for name in ("rx90", "stanford_arm", "cobra_s600", "gantry"):
-        table = rm.load(name).table
-        lengths = {c: size * getattr(table, c) for c in ("b", "d", "r")}
-        scaled = rm.DHTable(
-            antecedent=table.antecedent, sigma=table.sigma, alpha=table.alpha, theta=table.theta,
-            gamma=table.gamma, **lengths,
-        )  # fmt: skip
-        model = rm.RobotModel.from_table(scaled, base=rm.load(name).base)
-        assert base_parameters(model, "numeric").names == base_parameters(rm.load(name)).names
-
-
-@pytest.mark.parametrize("length", [1e-3, 1e-4, 1e-5, 1e-6, 1e-9, 1e-12, 6e-17])
+@pytest.mark.parametrize("length", [1e-3, 1e-5, 1e-9, 6e-17])
 def test_tiny_lengths_are_no_unit_of_the_rank(length):
     """Lengths of rounding, or far below those that joints slide through, decide nothing."""
     rng, h = np.random.default_rng(2), np.pi / 2
@@ -205,7 +181,7 @@ def slightly_off(rng):
 
 def test_methods_agree_on_what_is_nearly_aligned():
     rng = np.random.default_rng(11)
-    for _ in range(120):
+    for _ in range(60):
         model = filled(slightly_off(rng), rng)
         rules, numbers = (
             base_parameters(model, drive=True),
@@ -235,7 +211,7 @@ def few_digits(model, rng, most):
 def test_axes_within_1e_5_rad_are_aligned_in_the_regrouping():
     rng = np.random.default_rng(12)
     apart = 0
-    for _ in range(100):
+    for _ in range(40):
         model = filled(right_angled_robot(rng), rng)
         rounded, far = few_digits(model, rng, 9e-6), few_digits(model, rng, 3e-4)
         for way in BaseMethod:
@@ -257,7 +233,7 @@ def test_axes_within_1e_5_rad_are_aligned_in_the_regrouping():
             exact = base_parameters(rounded, way, tolerance=1e-11, drive=True)
             assert turned(exact) < 1e-10
             apart += len(exact) > len(meant)
-    assert apart > 50
+    assert apart > 20
 
 
 def test_gravity_and_the_first_axis_are_aligned_in_any_base(rng):
@@ -294,7 +270,7 @@ def test_a_slope_of_prismatic_joints_is_aligned(rng):
         keeps_torque(base, rounded, rng)
 
 
-@pytest.mark.parametrize("gravity", [1e-13, 1e-12, 1e-11, 1e-10, 1e-6, 1e-3])
+@pytest.mark.parametrize("gravity", [1e-12, 1e-10, 1e-3])
 def test_hardly_any_gravity(gravity):
     for name in ("rx90", "gantry", "cobra_s600"):
         model = rm.load(name).with_gravity([0.0, 0.0, -gravity])
@@ -305,15 +281,10 @@ def test_torques_that_are_not_kept_are_told():
     base = base_parameters(rm.load("rx90"), "numeric")
     assert base.missed < 1e-14
     assert not base.notes
-    assert "NOT TO BE USED: these base parameters miss 2.0e-01" in miss(0.2, 1e-11)[0]
-
-
-def test_a_robot_without_joints():
-    model = rm.RobotModel.from_table(table_of({"sigma": 2, "d": 0.2}))
-    for method in ("symbolic", "numeric"):
-        base = base_parameters(model, method)
-        assert len(base) == 0
-        assert base.no_effect == parameter_names(model)
+    assert (
+        "NOT TO BE USED: these base parameters have torque errors of 2.0e-01"
+        in residual_warning(0.2, 1e-11)[0]
+    )
 
 
 # --- what others print ---------------------------------------------------------------------------
@@ -365,13 +336,6 @@ def test_rx90_prints_as_the_book():
     assert max(map(len, base.text.splitlines())) <= 100
 
 
-def test_ten_frames_and_more_have_their_numbers():
-    rows = [{"sigma": 0, "alpha": np.pi / 2 * (j % 2), "d": 0.1} for j in range(11)]
-    base = base_parameters(rm.RobotModel.from_table(rm.DHTable.from_rows(rows)))
-    assert base.names == base_parameters(base.model, "numeric").names
-    assert "D10" in base.text
-
-
 @pytest.mark.parametrize("build", [any_robot, right_angled_robot])
 def test_formulas_have_the_values_of_the_numbers(build):
     rng = np.random.default_rng(3)
@@ -400,27 +364,34 @@ def table_of(*rows):
     return rm.DHTable.from_rows(rows)
 
 
-def test_prismatic_along_the_first_revolute_axis():
-    base = base_parameters(
-        rm.RobotModel.from_table(table_of({"sigma": 0}, {"sigma": 1, "d": 0.3})), drive=False
-    )
+def of_rows(*rows):
+    return rm.RobotModel.from_table(table_of(*rows))
+
+
+def test_prismatic_and_horizontal_first_axes():
+    """Cases that other programs get wrong, and a robot without joints."""
+    quarter = np.pi / 2
+    base = base_parameters(of_rows({"sigma": 0}, {"sigma": 1, "d": 0.3}), drive=False)
     assert dict(base.regrouping["ZZ1"]) == pytest.approx({"ZZ1": 1, "ZZ2": 1, "MX2": 0.6})
     assert base.names == ("ZZ1", "M2")
-
-
-def test_prismatic_across_the_first_revolute_axis_keeps_the_right_moments():
-    quarter = np.pi / 2
     for theta, kept in ((0.0, ("MX2", "MZ2")), (quarter, ("MY2", "MZ2"))):
-        table = table_of({"sigma": 0}, {"sigma": 1, "alpha": quarter, "theta": theta})
-        base = base_parameters(rm.RobotModel.from_table(table), drive=False)
+        model = of_rows({"sigma": 0}, {"sigma": 1, "alpha": quarter, "theta": theta})
+        base = base_parameters(model, drive=False)
         assert tuple(n for n in base.names if n.startswith("M") and n != "M2") == kept
-
-
-def test_rotor_inertia_with_a_horizontal_first_axis():
-    table = table_of({"sigma": 0, "alpha": np.pi / 2}, {"sigma": 0, "d": 0.4})
-    base = base_parameters(rm.RobotModel.from_table(table))
+    base = base_parameters(of_rows({"sigma": 0, "alpha": quarter}, {"sigma": 0, "d": 0.4}))
     assert "Ia1" in base.regrouping["ZZ1"]
     assert "Ia2" in base.names
+    for method in ("symbolic", "numeric"):
+        assert len(base_parameters(of_rows({"sigma": 2, "d": 0.2}), method)) == 0
+
+
+def test_coupled_motors():
+    assert base_parameters(rm.load("tx40")).names[-3:] == ("Iam6", "Fvm6", "Fcm6")
+    # the rotors of two parallel axes and the inertia they carry make the coupling term up
+    coupled = rm.Transmission([[1.0, 0.0], [-1.0, 1.0]], Iam=[0.0, 0.1])
+    for method in ("symbolic", "numeric"):
+        base = base_parameters(rm.load("planar_2r").with_transmission(coupled), method)
+        assert "Iam2" not in base.names
 
 
 def test_gravity_loaded_prismatic_joint_keeps_its_mass_and_rotor():
@@ -430,11 +401,6 @@ def test_gravity_loaded_prismatic_joint_keeps_its_mass_and_rotor():
         assert base.regrouping["M1"]["offset1"] == pytest.approx(
             1 / 9.81
         )  # tau = M (a + g) + offset
-
-
-def test_ur10_with_friction_and_rotors():
-    base = base_parameters(rm.load("ur10e"))
-    assert len([n for n in base.names if not n.startswith("offset")]) == 52
 
 
 def test_counts_of_the_literature():
@@ -450,23 +416,6 @@ def test_counts_of_the_literature():
         ur10 = base_parameters(rm.load("erd:ur10"), method, drive=("Ia", "Fv", DriveKind.FC))
         assert len(ur10) == 52
     assert rotors.drive == (DriveKind.IA,)
-
-
-@pytest.mark.parametrize("method", ["symbolic", "numeric"])
-def test_default_drives_are_rotors_and_friction(method):
-    """RX-90: 52 by default, 58 with the offsets, which add nothing but themselves."""
-    rx90 = rm.load("rx90")
-    base, whole = base_parameters(rx90, method), base_parameters(rx90, method, drive=True)
-    assert (len(base), len(whole)) == (52, 58)
-    assert base.drive == (DriveKind.IA, DriveKind.FV, DriveKind.FC)
-    assert [name for name in whole.names if not name.startswith("offset")] == list(base.names)
-    equal(base, base_parameters(rx90, method, drive=("Ia", "Fv", "Fc")))
-    # what does not fit says which regressor does
-    q = np.zeros((3, 6))
-    W = rm.torque_regressor(rx90, q, q, q, drive=base.drive)
-    assert base.reduce(W).shape == (3, 6, 52)
-    with pytest.raises(ShapeError, match=r"drive=\('Ia', 'Fv', 'Fc'\)\), got \(3, 6, 84\)"):
-        base.reduce(rm.torque_regressor(rx90, q, q, q))
 
 
 @pytest.mark.parametrize(
@@ -486,36 +435,6 @@ def test_methods_agree_on_any_kinds(kinds, rng):
         torque = rm.idm_from_base(model, rules, rules.values(model), q, v, a)
         expected = rm.idm(model, q, v, a)
         assert abs(torque - expected).max() <= 1e-11 * max(1.0, abs(expected).max())
-
-
-def test_stribeck_friction_with_rotors(rng):
-    """Kinds that the friction model does not have stay; only those that clash are left out."""
-    model = filled(rm.load("rx90"), rng)
-    p = rng.uniform(0.5, 2.0, (3, 6))
-    stribeck = StribeckFriction(p[0], p[1], p[1] + p[2], np.full(6, 0.05))
-    found = [
-        base_parameters(model, way, drive=("Ia", "offset"), friction=stribeck) for way in BaseMethod
-    ]
-    equal(*found)
-    assert len(found[0]) == 40 + 6 + 18
-    bare = model.with_drive(rm.DriveParameters(Ia=model.drive.Ia, offset=model.drive.offset))
-    q, v, a = rng.uniform(-1, 1, (3, 50, 6))
-    for base in found:
-        W = torque_regressor(bare, q, v, a, drive=base.drive, friction=stribeck, columns=base)
-        torque = rm.idm(bare, q, v, a, friction=stribeck)
-        assert np.allclose(W @ base.values(bare), torque, atol=1e-10 * abs(torque).max())
-
-
-def test_coupled_motors_of_the_tx40():
-    model = rm.load("tx40")
-    base = base_parameters(model)
-    assert base.names[-3:] == ("Iam6", "Fvm6", "Fcm6")
-    # the rotors of two parallel axes and the inertia they carry make the coupling term up
-    planar = rm.load("planar_2r").with_transmission(
-        rm.Transmission([[1.0, 0.0], [-1.0, 1.0]], Iam=[0.0, 0.1])
-    )
-    for method in ("symbolic", "numeric"):
-        assert "Iam2" not in base_parameters(planar, method).names
 
 
 # --- the numeric method on motion and with constraints -------------------------------------------
@@ -553,9 +472,9 @@ def test_a_log_without_a_clear_gap_says_so():
             (note,) = (n for n in base.notes if n.startswith("No clear gap"))
             assert f"kept with {kept:.1e}" in note
             assert f"left out with {other:.1e}" in note
-            assert "tolerance (here 1e-11)" in note
+            assert "tolerance= (here 1e-11)" in note
             assert "richer motion" in note
-            doubtful = note.split("In doubt: ")[1].split(". A richer")[0].split(" and ")[0]
+            doubtful = note.split("Uncertain: ")[1].split(". Use a richer")[0].split(" and ")[0]
             assert {*doubtful.split(", ")} <= {*base.parameter_names}
             assert note[:40] in base.text
         else:
@@ -564,24 +483,12 @@ def test_a_log_without_a_clear_gap_says_so():
             assert kept > 3e-13
             assert other < 3e-10
         if len(base) < 58:
-            assert any(f"shows {len(base)} of the 58 base parameters" in n for n in base.notes)
+            assert any(f"excites {len(base)} of the 58 base parameters" in n for n in base.notes)
     assert doubted
     assert moved
     still = np.full((20, 6), 0.3), np.zeros((20, 6)), np.zeros((20, 6))
     base = base_parameters(model, "numeric", motion=still, drive=True)
-    assert "This motion shows 6 of the 58 base parameters; not kept: ZZ1," in base.notes[0]
-
-
-def test_a_gap_that_is_there_is_taken():
-    for lengths, kept in (
-        ((1.0, 2e-9, 2e-11, 9e-12, 5e-13, 1e-16), 5),  # the gap below, within a factor of 30
-        ((1.0, 1e-6, 2e-11, 9e-12, 6e-13, 1e-13), 2),  # the gap above
-        ((1.0, 1e-8, 2e-11, 1e-16, 1e-17, 0.0), 3),  # in a gap already
-        ((1.0, 1e-8, 2e-10, 2e-11, 5e-12, 1e-13), 4),  # none: stays at the tolerance
-    ):
-        W = np.diag(lengths)
-        basis = with_clear_gap(W, np.ones(6), 1e-11, column_basis(W))
-        assert len(basis.kept) == kept
+    assert "This motion excites 6 of the 58 base parameters; not kept: ZZ1," in base.notes[0]
 
 
 def test_joints_bound_to_each_other(rng):
@@ -634,45 +541,6 @@ def test_friction_models_are_columns_of_both_methods(name, rng):
         base_parameters(model, friction=3.0, drive=True)
 
 
-def test_a_trajectory_is_a_motion():
-    from robotmodels.trajectories import quintic
-
-    model = rm.load("rx90")
-    rest = quintic(np.zeros(6), [0.4, -0.7, 0.5, 1.1, -0.6, 0.9], duration=1.0)
-    by_path = base_parameters(model, "numeric", motion=rest)
-    samples = rest.resample(1000)
-    assert base_parameters(model, "numeric", motion=samples).names == by_path.names
-    by_arrays = base_parameters(model, "numeric", motion=(samples.q, samples.v, samples.a))
-    assert by_arrays.names == by_path.names
-    assert len(by_path) < len(base_parameters(model))  # all joints move as one
-
-
-def test_logs_with_nothing_or_with_nan_are_named():
-    model = rm.load("planar_2r")
-    log = np.ones((5, 2))
-    bad = log.copy()
-    bad[3, 1] = np.nan
-    with pytest.raises(
-        InvalidValueError, match=r"motion v: expected finite.*nan at index \[3, 1\]"
-    ):
-        base_parameters(model, "numeric", motion=(log, bad, log))
-
-
-@pytest.mark.parametrize("name", ["erd:so101", "erd:xarm7", "erd:baxter_left_arm"])
-def test_a_tolerance_takes_few_digits_for_what_is_meant(name):
-    model = rm.load(name)
-    exact = base_parameters(model, drive=False, tolerance=1e-11)
-    meant = [base_parameters(model, way, drive=False, tolerance=1e-4) for way in BaseMethod]
-    equal(*meant, tolerance=1e-4)
-    assert len(meant[0]) <= len(exact)
-    assert meant[0].names == base_parameters(model, drive=False).names
-    for base in meant:
-        assert "Treated as aligned: ax" in base.text
-        assert abs(base.matrix[base.matrix != 0]).min() > 1e-6
-        assert "e-1" not in base.text.split("Regrouped")[1].split("Rank")[0]
-    assert not base_parameters(rm.load("rx90")).notes
-
-
 def test_notes_tell_the_tolerance_to_use():
     model = rm.load("erd:bravo7_no_ee")
     exact = base_parameters(model, tolerance=1e-11, drive=True)
@@ -693,23 +561,6 @@ def test_notes_tell_the_tolerance_to_use():
     assert not base_parameters(rm.load("rx90"), tolerance=1e-4, drive=True).neglected
     for base in (exact, meant):
         assert max(map(len, base.text.splitlines())) <= 100
-
-
-def test_long_formulas_are_numbers():
-    """Oblique axes one behind the other: lines of the table stay lines."""
-    rows = [{"sigma": 0, "alpha": 0.3 * j, "d": 0.1 * j, "r": 0.2} for j in range(1, 7)]
-    base = base_parameters(rm.RobotModel.from_table(rm.DHTable.from_rows(rows)))
-    for text in (base.text, base_parameters(base.model, "numeric").text):
-        assert max(map(len, text.splitlines())) <= 100
-    assert "RL5" in base.text  # short ones keep their symbols
-    sizes = {f.name: sum(len(t.text) + 3 for t in f.terms) for f in base.formulas}
-    blocks = {block.split("R", 1)[0]: block for block in base.text.split("\n  ") if "R" in block}
-    long = [name for name, size in sizes.items() if size > 240]
-    short = [name for name, size in sizes.items() if name + "R" in base.text and size < 60]
-    assert long
-    assert short
-    assert all("sin" not in blocks[name] and "cos" not in blocks[name] for name in long)
-    assert any("D" in blocks[name] for name in short)
 
 
 def test_values_have_names_and_units(rng):
@@ -784,7 +635,7 @@ def test_values_belong_to_the_robot(rng):
     base = base_parameters(arm)
     with pytest.raises(InvalidValueError, match=r"'puma560' has others: axis 3 has another place"):
         base.values(rm.load("puma560"))
-    with pytest.raises(InvalidValueError, match="frames or kinds of joints"):
+    with pytest.raises(InvalidValueError, match="frames or kinds of joints differ"):
         base.values(rm.load("planar_2r"))
     with pytest.raises(InvalidValueError, match="gravity in the base is"):
         base.values(arm.with_gravity([0.0, 0.0, 0.0]))
@@ -820,10 +671,5 @@ def test_mistakes_are_named():
         base_parameters(model, drive=("rotor",))
     with pytest.raises(ShapeError, match=r"constraint: expected shape \(2, u\)"):
         base_parameters(model, "numeric", constraint=np.eye(3))
-    with pytest.raises(InvalidValueError, match="nothing moves"):
+    with pytest.raises(InvalidValueError, match="no joint moves"):
         base_parameters(model, "numeric", constraint=np.zeros((2, 1)))
-
-
-def test_enum_and_word_are_one():
-    model = rm.load("planar_2r")
-    assert base_parameters(model, BaseMethod.NUMERIC).names == base_parameters(model).names

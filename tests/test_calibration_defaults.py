@@ -218,7 +218,7 @@ def test_laws_of_the_readings_have_a_prior_of_the_same_effect():
     sizes = {}
     for prior in (ParameterPrior(), ParameterPrior(gain=np.inf, eccentricity=np.inf)):
         result = fit(arm, Position(q, seen), prior=prior, **options)
-        deviations = result.solution.fit.prior.deviation[: len(result.names)]
+        deviations = result.solution.fit.prior.sigma[: len(result.names)]
         sizes[prior.gain] = dict(zip(result.names, deviations, strict=True))
     assert sizes[None]["gain2"] == pytest.approx(5e-3 / np.abs(q[:, 1]).max())
     assert sizes[None]["sine3"] == pytest.approx(5e-3, rel=1e-2)
@@ -297,7 +297,7 @@ def test_the_prior_of_lengths_is_that_of_a_small_robot():
     q = rng.uniform(-2.0, 2.0, (60, 6))
     p = rm.dgm(arm, q)[:, :3, 3] + 1e-5 * rng.normal(size=(60, 3))
     result = fit(arm, Position(q, p), **ALONE)
-    sizes = result.solution.fit.prior.deviation[: len(result.names)]
+    sizes = result.solution.fit.prior.sigma[: len(result.names)]
     lengths = [e.element.is_length and 0 < e.row <= 6 for e in result.parameters.entries]
     assert sizes[lengths] == pytest.approx(1e-3 * result.parameters.skeleton.size)
     assert result.other_tool.rms < 1e-4

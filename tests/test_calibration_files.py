@@ -88,7 +88,7 @@ def test_columns_by_number_without_a_header(tmp_path):
         read_measurements(file, "position", RX90, columns=[0, 1, 2])
     with pytest.raises(InvalidValueError, match="has columns 0 to 8, got 9"):
         read_measurements(file, "position", RX90, joints=range(3, 9), columns=[0, 1, 9])
-    with pytest.raises(InvalidValueError, match="has no header, so that 'x' says nothing"):
+    with pytest.raises(InvalidValueError, match="has no header, so that 'x' names none"):
         read_measurements(file, "position", RX90, joints=range(3, 9), columns=["x", "y", "z"])
     with pytest.raises(InvalidValueError, match="a column for each of the 6 joints"):
         read_measurements(file, "position", RX90, joints=range(3, 8), columns=[0, 1, 2])

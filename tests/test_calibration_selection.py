@@ -1,4 +1,4 @@
-"""Observability indices, obstacles, and the choice of configurations."""
+"""Observability indices and the choice of configurations."""
 
 import pickle
 from itertools import combinations
@@ -14,9 +14,9 @@ from robotmodels.calibration.problem import guessed_fixtures, problem_of, stacke
 from robotmodels.calibration.selection.exchange import added, exchanged, greedy, index_of, nested
 from robotmodels.calibration.selection.group_rows import group_rows
 from robotmodels.calibration.selection.observability import Criterion, observability
-from robotmodels.calibration.selection.obstacles import Box, HalfSpace, Sphere, clearance
 from robotmodels.calibration.selection.select import select_configurations
 from robotmodels.errors import InvalidValueError, ShapeError
+from robotmodels.obstacles import Box, Plane, Sphere, clearance
 
 RX90 = rm.load("rx90")
 RX90 = RX90.with_table(
@@ -198,71 +198,6 @@ def test_deviations_by_default_count_angles_at_the_reach():
         group_rows(parameters, Kind.POSE, q, [1.0, 2.0])
 
 
-# --- obstacles ---------------------------------------------------------------------------------
-
-
-def sampled_distance(inside, start, end):
-    t = np.linspace(0, 1, 4001)[:, None]
-    return inside(start + t * (end - start)).min()
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_distances_of_segments_are_those_of_their_points(seed):
-    rng = np.random.default_rng(seed)
-    start, end = rng.normal(size=(2, 3))
-    if seed % 4 == 0:
-        end[: 1 + seed % 3] = start[: 1 + seed % 3]  # along an axis, or a point
-    c, r = rng.normal(size=3), 0.3
-    low, high = c - rng.uniform(0, 1, 3), c + rng.uniform(0, 1, 3)
-    n = rng.normal(size=3)
-    n /= np.linalg.norm(n)
-    for body, of_points in (
-        (Sphere(c, r), lambda p: np.linalg.norm(p - c, axis=1) - r),
-        (Box(low, high), lambda p: np.linalg.norm(p - np.clip(p, low, high), axis=1)),
-        (HalfSpace(2 * n, 0.2), lambda p: p @ n - 0.2),
-    ):
-        found = float(body.distance(start, end))
-        assert found <= sampled_distance(of_points, start, end) + 1e-12
-        assert found == pytest.approx(sampled_distance(of_points, start, end), abs=2e-3)
-
-
-def test_a_segment_through_a_box_touches_it():
-    box = Box([-1, -1, -1], [1, 1, 1])
-    assert box.distance(np.array([-5.0, 0, 0]), np.array([5.0, 0.5, 0])) == 0.0
-    corner = box.distance(np.array([3.0, 0, 0]), np.array([0.0, 3.0, 0]))
-    assert corner == pytest.approx(np.sqrt(0.5))
-
-
-def test_clearance_sees_links_and_tool_and_forgives_the_foundation():
-    arm = RX90.with_tool(rm.se3.translation(0, 0, 0.3))
-    floor = HalfSpace([0, 0, 1], 0.0)
-    up = np.array([0.0, np.pi / 2, 0.0, 0.0, 0.0, 0.0])
-    tip = rm.dgm(arm, up)[:3, 3]
-    corners = np.vstack([arm.base[:3, 3], rm.link_poses(arm, up)[:, :3, 3], tip])
-    for center in np.random.default_rng(0).uniform(-2, 2, (10, 3)):
-        t = np.linspace(0, 1, 2001)[:, None, None]
-        rods = corners[:-1] + t * np.diff(corners, axis=0)
-        least = np.linalg.norm(rods - center, axis=-1).min()
-        found = clearance(arm, up, [Sphere(center, 0.1)], 0.05)
-        assert found == pytest.approx(least - 0.15, abs=1e-3)
-    assert clearance(arm, up, [floor], 0.05) > 0.0  # it stands there, but its other links do not
-    assert clearance(arm, up, [Sphere(tip, 0.01)], 0.1) < 0.0
-    assert clearance(arm, up, [Sphere(rm.link_poses(arm, up)[3, :3, 3], 0.01)]) < 0.0
-    assert clearance(arm, up, []) == np.inf
-    assert clearance(arm, np.zeros((0, 6)), [floor]).shape == (0,)
-    assert clearance(arm, np.zeros((2, 3, 6)), [Sphere([9, 9, 9], 1)]).shape == (2, 3)
-    with pytest.raises(InvalidValueError, match=r"obstacles\[0\]"):
-        clearance(arm, up, ["floor"])
-    for kind, given in (
-        (Sphere, ([0, 0, 0], -1)),
-        (HalfSpace, ([0, 0, 0], 1)),
-        (Box, ([0, 0, 0], [1, -1, 1])),
-        (Sphere, ([0, 0, np.nan], 1)),
-    ):
-        with pytest.raises(InvalidValueError):
-            kind(*given)
-
-
 # --- the choice --------------------------------------------------------------------------------
 
 
@@ -354,7 +289,7 @@ def test_a_choice_prints_and_pickles(chosen):
 
 def test_limits_and_obstacles_are_respected_also_when_configurations_are_moved():
     bodies = [
-        HalfSpace([0, 0, 1], 0.0),
+        Plane([0, 0, 0], [0, 0, 1]),
         Sphere([0.6, 0.3, 0.4], 0.15),
         Box([-1, -1, -1], [-0.3, 1, 1]),
     ]
@@ -385,12 +320,12 @@ def test_given_candidates_beyond_limits_or_touching_are_left_out():
     pool = pool_of(1, 80)
     pool[:20, 0] = RX90.upper[0] + 0.1
     found = select_configurations(
-        RX90, Kind.POSE, 8, candidates=pool, obstacles=[HalfSpace([0, 0, 1], -0.2)],
+        RX90, Kind.POSE, 8, candidates=pool, obstacles=[Plane([0, 0, -0.2], [0, 0, 1])],
         rng=np.random.default_rng(0),
     )  # fmt: skip
     assert (found.candidates >= 20).all()
     assert found.left_out[0].startswith("20 candidates are beyond the limits")
-    assert clearance(RX90, found.q, [HalfSpace([0, 0, 1], -0.2)], 0.05).min() > 0.0
+    assert clearance(RX90, found.q, [Plane([0, 0, -0.2], [0, 0, 1])], 0.05).min() > 0.0
     assert np.array_equal(pool[found.candidates], found.q)
 
 

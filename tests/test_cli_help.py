@@ -217,8 +217,7 @@ EFFECTS = {
         "--test-torques-from": ["torques.csv"], "--test-rows": [1000, 1500], "--test-share": [0.3],
         "--method": ["ols"], "--form": ["power"], "--drive": ["Fv", "Fc"], "--cutoff": [10],
         "--decimation": [7], "--dead-band": [0.1], "--edges": [0.5], "--no-check": [],
-        "--consistent": [], "--prior": [7], "--essential": [5], "--loss": ["tukey"],
-        "--strength": [3], "--noise": [0.02], "--forgetting": [0.999], "--kp": [90], "--kd": [9],
+        "--consistent": [], "--prior": [7], "--kp": [90], "--kd": [9],
         "--workers": [0],
     },
 }  # fmt: skip
@@ -248,10 +247,7 @@ WITH = {
     ("identify", "--no-check"): ["--log", "positions.csv", "--torques-from", "torques.csv",
                                  "--dt", 0.005],
     ("identify", "--test-rows"): ["--rows", 0, 1000], ("identify", "--consistent"): ["--prior", 5],
-    ("identify", "--prior"): ["--consistent"], ("identify", "--loss"): ["--method", "robust"],
-    ("identify", "--strength"): ["--method", "ridge", "--robot", "heavy.urdf"],
-    ("identify", "--noise"): ["--method", "tls"],
-    ("identify", "--forgetting"): ["--method", "recursive"],
+    ("identify", "--prior"): ["--consistent"],
 }  # fmt: skip
 """What an option needs beside it; it is compared with this alone."""
 

@@ -18,14 +18,10 @@ CHAPTERS = sorted((DOCS / "book").glob("chapter_*.md"))
 ROOMS = (
     "robotmodels", "calibration", "datasets", "drive", "dynamics", "errors", "estimation",
     "friction", "geometry", "identification", "igm", "inertia", "kinematics", "logs",
-    "minimal_parameters", "model", "regressors", "robots", "se3", "simulation", "symbolic_dgm",
-    "symoro", "trajectories", "urdf", "viz",
+    "minimal_parameters", "model", "obstacles", "regressors", "robots", "se3", "simulation",
+    "symbolic_dgm", "symoro", "trajectories", "urdf", "viz",
 )  # fmt: skip
 FOR_OTHER_ROOMS = {
-    "drive": {
-        "DriveMatrices", "DriveWord", "Drives", "check_all_or_none", "drive_kinds",
-        "drive_matrices",
-    },
     "geometry": {"FIXED", "NOT_XML", "PRISMATIC", "REVOLUTE"},
     "inertia": {"PARAMETERS"},
     "model": {"FrameOfInterest", "GRAVITY", "PinocchioTwin", "check_model"},

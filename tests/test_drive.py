@@ -2,15 +2,17 @@
 
 import copy
 import pickle
+from dataclasses import fields
 
 import numpy as np
 import pytest
 from hypothesis import given
-from identities.random_robots import random_drive, random_transmission, seeds
+from identities.random_robots import random_drive, random_parameters, random_transmission, seeds
 
 import robotmodels as rm
 from robotmodels.drive import drive_matrices
 from robotmodels.errors import InertiaError, InvalidValueError, ShapeError
+from robotmodels.friction import AsymmetricFriction, GravityCompensator
 
 # joints from motors of the Staubli TX40: q = R^-1 q_motor, R diagonal but for R[6, 5] = 32
 RATIOS = np.diag([32.0, 32.0, 45.0, -48.0, 45.0, 32.0])
@@ -28,22 +30,6 @@ def test_tx40_wrist_couples_motor_6_only():
     wanted[5, 4] = 1.0  # the shaft of motor 6 turns with joints 5 and 6 together
     assert np.allclose(wrist.weights, wanted, atol=1e-15)
     assert wrist.to_encoder([0, 0, 0, 0, 1.0, 0]) == pytest.approx([0, 0, 0, 0, 45, 32])
-
-
-def test_tx40_coupled_friction_is_that_of_the_published_identification():
-    """tau_5 += Iam6 a6 + Fvm6 v6 + Fcm6 sign(v5 + v6), and joint 6 likewise with joint 5."""
-    Ia, Fv, Fc = 0.1 * np.arange(1, 7), np.arange(1.0, 7.0), 2.0 * np.arange(1, 7)
-    drive = rm.DriveParameters(Ia=Ia, Fv=Fv, Fc=Fc)
-    last = np.eye(6)[5]
-    Iam, Fvm, Fcm = 0.01, 0.6, 1.8
-    wrist = tx40(Iam=Iam * last, Fvm=Fvm * last, Fcm=Fcm * last)
-    rng = np.random.default_rng(0)
-    v, a = rng.normal(size=(2, 6))
-    wanted = Ia * a + Fv * v + Fc * np.sign(v)
-    both = Fcm * np.sign(v[4] + v[5])
-    wanted[4] += Iam * a[5] + Fvm * v[5] + both
-    wanted[5] += Iam * a[4] + Fvm * v[4] + both
-    assert np.allclose(drive_matrices(drive, wrist).torque(v, a), wanted, atol=1e-14)
 
 
 @given(seeds)
@@ -102,16 +88,6 @@ def test_drives_of_many_samples_are_those_of_one(batch):
             + drive.offset, rtol=1e-13, atol=1e-13)  # fmt: skip
 
 
-def test_drives_default_to_nothing():
-    drive = rm.DriveParameters(Fc=[1.0, 2.0])
-    assert drive.n == 2
-    assert not drive.is_zero
-    for zeros in (drive.Ia, drive.Fv, drive.offset):
-        assert zeros.tolist() == [0, 0]
-    assert rm.DriveParameters.zeros(3).is_zero
-    assert drive_matrices(drive, None).coupling.shape == (0, 2)
-
-
 def test_mimic_joints_are_singular_and_say_so():
     """Joint 2 follows joint 1: q has no unique encoder variables, but torques still go over."""
     gripper = rm.Transmission([[1, 0], [-1, 0]], offset=[0, 0.1])
@@ -137,57 +113,6 @@ def test_ranks_do_not_depend_on_units():
         assert not rm.Transmission(matrix).is_mimicry
 
 
-@pytest.mark.parametrize(
-    "make",
-    [lambda rng: random_drive(rng, 4), lambda rng: random_transmission(rng, 4)],
-    ids=["drive", "transmission"],
-)
-def test_drives_and_transmissions_are_values(make):
-    part, same = make(np.random.default_rng(1)), make(np.random.default_rng(1))
-    assert part == same
-    assert hash(part) == hash(same)
-    assert part != make(np.random.default_rng(2))
-    assert part != "part"
-    for copied in (part, copy.deepcopy(part), pickle.loads(pickle.dumps(part))):
-        assert copied == part
-        assert not copied.offset.flags.writeable
-    with pytest.raises(AttributeError):
-        part.offset = np.zeros(4)
-
-
-@pytest.mark.parametrize(
-    ("fields", "error", "words"),
-    [
-        ({}, InertiaError, "at least one of Ia, Fv, Fc, offset"),
-        ({"Ia": [1.0], "Fv": [1.0, 2.0]}, ShapeError, r"Ia \(1,\), Fv \(2,\)"),
-        ({"Ia": [[1.0]]}, ShapeError, r"Ia \(1, 1\)"),
-        ({"Fc": [np.nan]}, InvalidValueError, "Fc: .* got nan"),
-        ({"offset": "x"}, InvalidValueError, "offset: expected real numbers"),
-    ],
-)
-def test_mistakes_in_drives(fields, error, words):
-    with pytest.raises(error, match=words):
-        rm.DriveParameters(**fields)
-
-
-@pytest.mark.parametrize(
-    ("fields", "error", "words"),
-    [
-        ({"matrix": np.ones((2, 3))}, ShapeError, r"square \(n, n\) matrix, got \(2, 3\)"),
-        ({"matrix": [1.0, 2.0]}, ShapeError, "square"),
-        ({"matrix": [[np.inf]]}, InvalidValueError, "matrix: .* got inf"),
-        ({"matrix": np.eye(2), "offset": [0.0]}, ShapeError, "offset: expected shape"),
-        ({"matrix": np.eye(2), "offset": np.zeros((3, 2))}, ShapeError, "offset: expected shape"),
-        ({"matrix": np.eye(2), "Iam": [0.1, 0]}, InertiaError, "Motor 1 turns one joint only"),
-        ({"matrix": np.ones((2, 2)), "Fvm": [0.1, 0]}, InertiaError, "rank 1 of 2"),
-        ({"matrix": [[1, 0], [-1, 1]], "Fcm": [0.1, 0]}, InertiaError, r"the motors \[2\]"),
-    ],
-)
-def test_mistakes_in_transmissions(fields, error, words):
-    with pytest.raises(error, match=words):
-        rm.Transmission(**fields)
-
-
 def test_motors_given_by_joints():
     """``q_motor = R q``: the TX40's motor 6 is turned by joints 5 and 6."""
     R, turn = np.diag([45.0, 32.0]), [0.3, -0.2]
@@ -198,15 +123,53 @@ def test_motors_given_by_joints():
     np.testing.assert_allclose(R.T @ wrist.to_motor_torque(tau), tau, rtol=1e-13)
     assert wrist.coupled_motors == (2,)
     np.testing.assert_allclose(wrist.weights, [[1, 0], [1, 1]], atol=1e-14)
-    with pytest.raises(InvalidValueError, match="R has rank 1 of 2"):
-        rm.Transmission.from_motor([[1.0, 1.0], [1e6, 1e6]])
-    with pytest.raises(ShapeError, match="square"):
-        rm.Transmission.from_motor([[1.0, 1.0]])
 
 
-@pytest.mark.parametrize("method", ["to_joint", "to_encoder", "to_motor_torque"])
-def test_mistakes_in_vectors_through_the_gears(method):
-    with pytest.raises(ShapeError, match=r"expected shape \(\.\.\., 6\), got \(5,\)"):
-        getattr(tx40(), method)(np.zeros(5))
-    with pytest.raises(InvalidValueError, match="got nan"):
-        getattr(tx40(), method)([0, 0, np.nan, 0, 0, 0])
+PARTS = {
+    "drive": lambda rng: random_drive(rng, 4),
+    "transmission": lambda rng: random_transmission(rng, 4),
+    "inertia": lambda rng: random_parameters(rng, 4),
+    "friction": lambda rng: AsymmetricFriction(*rng.uniform(size=(4, 3))),
+    "compensator": lambda rng: GravityCompensator(3, [2, 3], values=rng.normal(size=(4, 2))),
+}
+
+
+@pytest.mark.parametrize("make", PARTS.values(), ids=PARTS)
+def test_parts_of_a_robot_are_values(make):
+    part, same = make(np.random.default_rng(1)), make(np.random.default_rng(1))
+    assert part == same
+    assert hash(part) == hash(same)
+    assert part != make(np.random.default_rng(2))
+    assert part != "part"
+    for copied in (part, copy.deepcopy(part), pickle.loads(pickle.dumps(part))):
+        assert copied == part
+        arrays = [x for f in fields(copied) if isinstance(x := getattr(copied, f.name), np.ndarray)]
+        assert arrays
+        assert not any(x.flags.writeable for x in arrays)
+    with pytest.raises(AttributeError):
+        setattr(part, fields(part)[0].name, np.zeros(4))
+
+
+@pytest.mark.parametrize(
+    ("make", "error", "words"),
+    [
+        (lambda: rm.DriveParameters(), InertiaError, "at least one of Ia, Fv, Fc, offset"),
+        (lambda: rm.DriveParameters([1.0], [1.0, 2.0]), ShapeError, r"Ia \(1,\), Fv \(2,\)"),
+        (lambda: rm.DriveParameters(Ia=[[1.0]]), ShapeError, r"Ia \(1, 1\)"),
+        (lambda: rm.DriveParameters(Fc=[np.nan]), InvalidValueError, "Fc: .* got nan"),
+        (lambda: rm.Transmission(np.ones((2, 3))), ShapeError, r"square \(n, n\) .* \(2, 3\)"),
+        (lambda: rm.Transmission([[np.inf]]), InvalidValueError, "matrix: .* got inf"),
+        (lambda: rm.Transmission(np.eye(2), [0.0]), ShapeError, "offset: expected shape"),
+        (lambda: rm.Transmission(np.eye(2), Iam=[0.1, 0]), InertiaError, "Motor 1 turns one joint"),
+        (lambda: rm.Transmission(np.ones((2, 2)), Fvm=[1, 0]), InertiaError, "rank 1 of 2"),
+        (lambda: tx40(Fcm=np.eye(6)[0]), InertiaError, r"the motors \[6\]"),
+        (lambda: rm.Transmission.from_motor(np.ones((2, 2))), InvalidValueError, "R has rank 1 of"),
+        (lambda: rm.Transmission.from_motor([[1.0, 1.0]]), ShapeError, "square"),
+        (lambda: tx40().to_joint(np.zeros(5)), ShapeError, r"\(\.\.\., 6\), got \(5,\)"),
+        (lambda: tx40().to_encoder(np.zeros(5)), ShapeError, "expected shape"),
+        (lambda: tx40().to_motor_torque([np.nan] * 6), InvalidValueError, "got nan"),
+    ],
+)
+def test_mistakes_in_drives_and_transmissions(make, error, words):
+    with pytest.raises(error, match=words):
+        make()

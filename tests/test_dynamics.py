@@ -87,79 +87,47 @@ def test_leading_axes_are_the_batch(case, model, batch):
 
 
 def test_batches_broadcast(case, model):
-    """One argument of three rows among single ones, each in turn; and an outer product."""
+    """One argument of three rows among single ones, each in turn; and an empty one."""
     function, lengths, core = case
     vectors = vectors_of(lengths, model, 3)
     for k in range(len(lengths)):
         mixed = [x if i == k else x[0] for i, x in enumerate(vectors)]
         full = [x if i == k else np.tile(x[0], (3, 1)) for i, x in enumerate(vectors)]
-        result = function(model, *mixed)
-        assert result.flags.c_contiguous
-        close(result, function(model, *full))
-        close(function(model, *(x[:0] if i == k else x for i, x in enumerate(mixed))),
-              np.empty((0, *shape_of(core, model))))  # fmt: skip
-    outer = [x[:, None] if i == 0 else x[:2] for i, x in enumerate(vectors)]
-    if len(outer) > 1:
-        result = function(model, *outer)
-        assert result.shape == (3, 2, *shape_of(core, model))
-        for i, j in np.ndindex(3, 2):
-            one = [x[i] if k == 0 else x[j] for k, x in enumerate(vectors)]
-            close(result[i, j], function(model, *one), 1e-11)
+        close(function(model, *mixed), function(model, *full))
+        none = function(model, *(x[:0] if i == k else x for i, x in enumerate(mixed)))
+        assert none.shape == (0, *shape_of(core, model))
 
 
-@pytest.mark.parametrize("batch", [(), (2,)], ids=str)
-def test_results_are_fresh_and_inputs_stay(case, model, batch):
-    function, lengths, _ = case
-    vectors = vectors_of(lengths, model, *batch)
-    copies = [x.copy() for x in vectors]
-    first = function(model, *vectors)
-    kept = first.copy()
-    second = function(model, *vectors)
-    assert first.flags.writeable
-    assert not np.shares_memory(first, second)
-    assert not any(np.shares_memory(first, x) for x in vectors)
-    first[...] = np.nan
-    np.testing.assert_array_equal(function(model, *vectors), kept)
-    np.testing.assert_array_equal(second, kept)
-    for x, copy in zip(vectors, copies, strict=True):
-        np.testing.assert_array_equal(x, copy)
-
-
-@pytest.mark.parametrize("batch", [(), (2,)], ids=str)
-def test_anything_like_an_array_is_taken(case, model, batch):
+def test_results_are_fresh_and_anything_like_an_array_is_taken(case, model):
     function, lengths, _ = case
     whole = [
-        np.arange(np.prod(batch, dtype=int) * k).reshape(*batch, k) % 3 - 1
+        np.arange(2 * k).reshape(2, k) % 3 - 1
         for k in (6 if length == "6" else model.n for length in lengths)
     ]
-    expected = function(model, *(x.astype(float) for x in whole))
-    frozen = [x.astype(float) for x in whole]
-    for x in frozen:
-        x.flags.writeable = False
-    np.testing.assert_array_equal(function(model, *frozen), expected)
+    vectors = [x.astype(float) for x in whole]
+    first = function(model, *vectors)
+    expected = first.copy()
+    first[...] = np.nan
+    for x, copy in zip(vectors, whole, strict=True):
+        np.testing.assert_array_equal(x, copy)
     for kind in (
         lambda x: x,
         lambda x: x.tolist(),
-        lambda x: tuple(x.tolist()),
         lambda x: x.astype(np.float32),
         lambda x: np.asfortranarray(x.astype(float)),
         lambda x: np.repeat(x.astype(float), 2, axis=-1)[..., ::2],
     ):
         np.testing.assert_array_equal(function(model, *map(kind, whole)), expected)
+        one = function(model, *(kind(x)[0] for x in whole))
+        close(one, expected[0], 1e-11)
 
 
 FAULTS = {
     "too long": (lambda k: np.zeros(k + 1), ShapeError, "expected shape"),
-    "too short": (lambda k: np.zeros((4, k - 1)), ShapeError, "expected shape"),
     "column": (lambda k: np.zeros((k, 1)), ShapeError, "ravel"),
-    "number": (lambda k: 0.0, ShapeError, "got ()"),
-    "NaN": (lambda k: np.r_[np.zeros(k - 1), np.nan], InvalidValueError, "nan"),
     "NaN in a list": (lambda k: [np.nan] + [0] * (k - 1), InvalidValueError, "nan"),
     "infinity": (lambda k: np.full((3, k), np.inf), InvalidValueError, "inf"),
     "text": (lambda k: ["0"] * k, InvalidValueError, "real numbers"),
-    "complex": (lambda k: np.zeros(k) * 1j, InvalidValueError, "complex"),
-    "truth": (lambda k: [True] * k, InvalidValueError, "bool"),
-    "ragged": (lambda k: [[0.0] * k, [0.0]], InvalidValueError, "regular"),
 }
 
 
@@ -171,35 +139,29 @@ def test_a_bad_vector_is_named(case, model, fault):
     for position, length in enumerate(lengths):
         vectors = vectors_of(lengths, model)
         vectors[position] = build(6 if length == "6" else model.n)
-        with pytest.raises(error) as caught:
+        with pytest.raises(error, match=f"^{names[position]}: .*{words}"):
             function(model, *vectors)
-        assert words in str(caught.value)
-        assert str(caught.value).startswith(f"{names[position]}:")
 
 
 @pytest.mark.parametrize("function", [rm.idm, rm.ddm])
-@pytest.mark.parametrize("drive", [True, False])
-def test_batches_that_do_not_fit_are_named(function, drive, model):
+def test_batches_that_do_not_fit_are_named(function, model):
     vectors = vectors_of("nnn6", model, 3)
     for k in range(4):
-        for others in (3, None):
-            if others is None and k == 3:
-                continue
-            mixed = [x[:2] if i == k else x for i, x in enumerate(vectors)]
-            if others is None:  # everything else single, but for the wrench
-                mixed = [x if i in (k, 3) else x[0] for i, x in enumerate(mixed)]
+        with pytest.raises(ShapeError, match="do not broadcast"):
+            function(model, *(x[:2] if i == k else x for i, x in enumerate(vectors)))
+        if k < 3:  # everything else single, but for the wrench
             with pytest.raises(ShapeError, match="do not broadcast"):
-                function(model, *mixed, drive=drive)
-    with pytest.raises(ShapeError, match="do not broadcast"):
-        rm.coriolis_matrix(model, vectors[0], vectors[1][:2])
-    with pytest.raises(ShapeError, match="do not broadcast"):
-        rm.kinetic_energy(model, vectors[0], vectors[1][:2])
+                function(model, *(x[:2] if i == k else x if i == 3 else x[0]
+                                  for i, x in enumerate(vectors)))  # fmt: skip
+    for function in (rm.coriolis_matrix, rm.kinetic_energy):
+        with pytest.raises(ShapeError, match="do not broadcast"):
+            function(model, vectors[0], vectors[1][:2])
 
 
 # --- singular mass matrices ------------------------------------------------------------------
 
 
-def test_a_massless_arm_has_no_direct_model(model):
+def test_joints_that_move_no_inertia_are_named(model):
     massless = model.with_inertia(None).with_drive(None).with_transmission(None)
     vectors = vectors_of("nnn", model, 4)
     with pytest.raises(SingularMassMatrixError, match=f"'{model.name}'.*with_inertia"):
@@ -208,20 +170,15 @@ def test_a_massless_arm_has_no_direct_model(model):
         rm.ddm(massless, *vectors)
     assert rm.ddm(massless, *(x[:0] for x in vectors)).shape == (0, model.n)
     rotors = massless.with_drive(rm.DriveParameters(Ia=np.full(model.n, 0.5)))
-    close(rm.ddm(rotors, *(x[0] for x in vectors)), 2 * vectors[2][0])
     close(rm.ddm(rotors, *vectors), 2 * vectors[2])
     with pytest.raises(SingularMassMatrixError):
         rm.ddm(rotors, *(x[0] for x in vectors), drive=False)
-
-
-def test_one_joint_without_inertia_is_enough():
-    """The last axis of a wrist that carries a point mass on itself."""
-    table = rm.DHTable.from_rows([{"sigma": 0}, {"sigma": 0, "d": 0.3}])
-    bodies = rm.InertialParameters.from_com([1, 2], [[0.1, 0, 0], [0, 0, 0.2]], np.zeros((2, 3, 3)))
-    arm = rm.RobotModel.from_table(table, bodies)
-    for q in ([0.1, 0.2], [[0.1, 0.2]]):
-        with pytest.raises(SingularMassMatrixError):
-            rm.ddm(arm, q, [0.0, 0.0], [1.0, 1.0])
+    wrist = rm.load("rx90").with_drive(None)
+    rows = wrist.inertia.values.copy()
+    rows[4:] = 0.0
+    wrist = wrist.with_inertia(rm.InertialParameters(rows))
+    with pytest.raises(SingularMassMatrixError, match=r"rank 4 of 6, .*of joints 5, 6 moves"):
+        rm.ddm(wrist, *np.full((3, 6), 0.4))
 
 
 def test_a_configuration_alone_may_be_singular():
@@ -260,13 +217,13 @@ def rx90_with(link, **values):
         (rx90_with(3, ZZ=-2.0, XX=-1.0), "link 3: a principal moment is -2.04 kg"),
         (
             rm.load("rx90").with_drive(rm.DriveParameters(Ia=[0, 0, 0, 0, 0, -3])),
-            "negative: -3 of joint 6",
+            r"Ia = \[.* -3.0\]",
         ),
         (
             rm.load("planar_2r")
             .with_drive(rm.DriveParameters(Ia=[1.0, 1.0]))
             .with_transmission(rm.Transmission([[1, 0], [-1, 1]], Iam=[0, 40.0])),
-            r"must fit the Ia.*\[0.0, 40.0\]",
+            r"coupled motors, Iam = \[0.0, 40.0\]",
         ),
     ],
     ids=["mass", "moments", "rotor", "coupled rotor"],
@@ -287,15 +244,23 @@ def test_a_negative_mass_that_does_no_harm_yet_is_warned_of():
             rm.ddm(model, q, zero, zero)
 
 
-def test_joints_that_move_no_inertia_are_named():
-    model = rm.load("rx90").with_drive(None)
-    rows = model.inertia.values.copy()
-    rows[4:] = 0.0
-    model = model.with_inertia(rm.InertialParameters(rows))
-    x = np.full(6, 0.4)
-    for q in (x, [x, x]):
-        with pytest.raises(SingularMassMatrixError, match=r"rank 4 of 6, .*of joints 5, 6 moves"):
-            rm.ddm(model, q, x, x)
+def test_a_mass_matrix_whose_entries_overflow_is_named():
+    # a mass on a slide that is run out so far that the square of its distance is no float
+    table = rm.DHTable(antecedent=[0, 1], sigma=[0, 1], alpha=[0.0, np.pi / 2])
+    links = np.zeros((2, 10))
+    links[:, 9] = 1.0
+    model = rm.RobotModel.from_table(table, inertia=rm.InertialParameters(links))
+    with pytest.raises(SingularMassMatrixError, match="overflow"):
+        rm.ddm(model, [0.0, 1e160], [0.0, 0.0], [1.0, 1.0])
+
+
+@pytest.mark.parametrize("mass", [1e-12, 1e12])
+def test_light_and_heavy_arms_are_not_singular(mass):
+    model = random_model(np.random.default_rng(1), f=5, gravity=False)
+    scaled = model.with_inertia(rm.InertialParameters(mass * model.inertia.values))
+    q, v, a = vectors_of("nnn", model, 2)
+    tolerance = 1e-13 * np.linalg.cond(rm.mass_matrix(model, q)).max()
+    close(rm.ddm(scaled, q, v, rm.idm(scaled, q, v, a)), a, tolerance)
 
 
 # --- joints that mimic others ----------------------------------------------------------------
@@ -373,17 +338,6 @@ def test_a_singular_coupling_is_named(matrix):
     for q in (np.zeros(2), np.zeros((3, 2))):
         with pytest.raises(InvalidValueError, match=f"^transmission: .*rank {rank} of 2.*None"):
             rm.ddm(model, q, q, q)
-
-
-@pytest.mark.parametrize("mass", [1e-12, 1e12])
-def test_light_and_heavy_arms_are_not_singular(mass):
-    model = random_model(np.random.default_rng(1), f=5, gravity=False)
-    scaled = model.with_inertia(rm.InertialParameters(mass * model.inertia.values))
-    q, v, a = vectors_of("nnn", model, 2)
-    tau = rm.idm(scaled, q, v, a)
-    tolerance = 1e-13 * np.linalg.cond(rm.mass_matrix(model, q)).max()
-    close(rm.ddm(scaled, q, v, tau), a, tolerance)
-    close(rm.ddm(scaled, q[0], v[0], tau[0]), a[0], tolerance)
 
 
 # --- bodies that no body is ------------------------------------------------------------------

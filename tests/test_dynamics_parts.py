@@ -41,27 +41,23 @@ def test_blocks_of_the_planar_arm_are_the_textbooks():
     np.testing.assert_allclose(C, [[0.0, h], [-h, 0.0]], atol=1e-15)
 
 
-@pytest.mark.parametrize("batch", [(), (3,), (2, 3), (0,), (2, 0)], ids=str)
-def test_blocks_have_batches(batch):
-    model = random_model(np.random.default_rng(3), f=6, tree=True, fixed=True)
-    q, _, _ = random_state(model, np.random.default_rng(1), *batch)
+@pytest.mark.parametrize("batch", [(), (2, 3), (0,)], ids=str)
+@pytest.mark.parametrize("f", [1, 6])
+def test_blocks_have_batches(batch, f):
+    model = random_model(np.random.default_rng(3), f=f, tree=True, fixed=True)
+    q, v, _ = random_state(model, np.random.default_rng(1), *batch)
     B, C = christoffel_blocks(model, q)
     n = model.n
     assert B.shape == (*batch, n, n * (n - 1) // 2)
-    assert C.shape == (*batch, n, n)
     assert B.flags.c_contiguous
     assert C.flags.c_contiguous
+    j, k = np.triu_indices(n, 1)
+    torque = (B @ (v[..., j] * v[..., k])[..., None] + C @ (v**2)[..., None])[..., 0]
+    np.testing.assert_allclose(
+        torque, (rm.coriolis_matrix(model, q, v) @ v[..., None])[..., 0], atol=1e-12
+    )
     with pytest.raises(ShapeError, match=r"^q: "):
         christoffel_blocks(model, np.zeros(n + 1))
-
-
-@pytest.mark.parametrize("n", [0, 1])
-def test_blocks_of_hardly_any_joint(n):
-    table = rm.DHTable.from_rows([{"sigma": 2}, *[{"sigma": 1}] * n])
-    model = rm.RobotModel.from_table(table)
-    B, C = christoffel_blocks(model, np.zeros((4, n)))
-    assert B.shape == (4, n, 0)
-    assert C.shape == (4, n, n)
 
 
 # --- coupled rotors ----------------------------------------------------------------------------
@@ -101,27 +97,6 @@ def test_rotors_of_a_tx40_wrist_turn_with_two_joints():
 # --- payloads ----------------------------------------------------------------------------------
 
 
-def test_a_payload_adds_up_with_the_link_it_is_on():
-    arm = planar().with_tool(_along(0.3))
-    loaded = with_payload(arm, 2.0, [0.1, 0.0, 0.0], np.diag([0.1, 0.2, 0.3]))
-    row = loaded.inertia.values[1] - arm.inertia.values[1]
-    expected = [0.1, 0, 0, 0.2 + 2 * 0.16, 0, 0.3 + 2 * 0.16, 2 * 0.4, 0, 0, 2.0]
-    np.testing.assert_allclose(row, expected, atol=1e-15)
-    np.testing.assert_array_equal(loaded.inertia.values[0], arm.inertia.values[0])
-    np.testing.assert_array_equal(loaded.tool, arm.tool)
-    on_link = with_payload(arm, 2.0, [0.4, 0.0, 0.0], np.diag([0.1, 0.2, 0.3]), frame=2)
-    np.testing.assert_allclose(on_link.inertia.values, loaded.inertia.values, atol=1e-15)
-    turned = arm.with_tool([[0, -1, 0, 0.3], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
-    turned = with_payload(turned, 2.0, [0.0, -0.1, 0.0], np.diag([0.2, 0.1, 0.3]))
-    np.testing.assert_allclose(turned.inertia.values, loaded.inertia.values, atol=1e-15)
-
-
-def _along(x):
-    T = np.eye(4)
-    T[0, 3] = x
-    return T
-
-
 def test_what_is_taken_off_leaves_nothing_behind():
     bare = planar().with_inertia(None)
     payload = 0.7, [0.1, 0.3, -0.2], np.diag([0.3, 0.2, 0.11])
@@ -132,8 +107,13 @@ def test_what_is_taken_off_leaves_nothing_behind():
     np.testing.assert_allclose(
         left, with_payload(bare, 0.1, [0.5, 0.1, 0.0]).inertia.values, atol=1e-15
     )
-    same = with_payload(bare, 0.0, [1.0, 0.0, 0.0])
-    np.testing.assert_array_equal(same.inertia.values, 0.0)
+    assert with_payload(bare, 0.0, [1.0, 0.0, 0.0]).inertia == bare.inertia
+    # point masses are on the border of what bodies have: rounding gives no warning
+    for mass in (1e-9, 1.0, 1e6):
+        for com in np.random.default_rng(0).normal(size=(10, 3)):
+            left = without_payload(with_payload(planar(), mass, com), mass, com).inertia.values
+            atol = 1e-14 * max(1.0, mass)
+            np.testing.assert_allclose(left, planar().inertia.values, atol=atol)
 
 
 @pytest.mark.parametrize(
@@ -157,29 +137,13 @@ def test_a_body_that_was_not_there_is_reported(payload, words):
     without_payload(identified, *payload)
 
 
-@pytest.mark.parametrize("mass", [1e-9, 1.0, 1e6])
-def test_rounding_is_no_body_that_was_not_there(mass):
-    """Point masses are on the border of what bodies have: taking one off gives no warning."""
-    rng = np.random.default_rng(0)
-    for _ in range(50):
-        com = rng.normal(size=3)
-        left = without_payload(with_payload(planar(), mass, com), mass, com)
-        np.testing.assert_allclose(
-            left.inertia.values, planar().inertia.values, atol=1e-14 * max(1.0, mass)
-        )
-
-
 @pytest.mark.parametrize(
     ("arguments", "error", "words"),
     [
         ((-1.0, [0, 0, 0]), InertiaError, "negative"),
-        ((1.0, [0, 0]), ShapeError, "com"),
         (([1.0], [0, 0, 0]), ShapeError, "mass"),
-        ((np.nan, [0, 0, 0]), InvalidValueError, "mass"),
-        ((1.0, [0, 0, 0], [1, 1, 1]), ShapeError, "inertia"),
         ((1.0, [0, 0, 0], np.diag([1.0, 0.1, 0.1])), InertiaError, "triangle"),
         ((1.0, [9, 0, 0], np.diag([1.0, 0.1, 0.1])), InertiaError, "triangle"),
-        ((1.0, [0, 0, 0], np.diag([-1.0, 1.0, 1.0])), InertiaError, "moment"),
         ((0.0, [0, 0, 0], np.eye(3)), InertiaError, "mass"),
         ((1.0, [0, 0, 0], [[1, 2, 0], [0, 1, 0], [0, 0, 1]]), InertiaError, "symmetric"),
         ((1.0, [0, 0, 0], None, "flange"), FrameNotFoundError, "flange"),
@@ -195,8 +159,8 @@ def test_mistakes_in_payloads(arguments, error, words):
 # --- base parameters ---------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["rx90", "puma560", "cobra_s600", "stanford_arm", "gantry"])
-@pytest.mark.parametrize("drive", [True, False])
+@pytest.mark.parametrize("name", ["rx90", "stanford_arm", "gantry"])
+@pytest.mark.parametrize("drive", [True, False, ("Ia",)])
 def test_base_parameters_give_the_torques_of_the_catalogue(name, drive):
     model = rm.load(name)
     rng = np.random.default_rng(0)
@@ -223,6 +187,21 @@ def test_base_parameters_give_the_torques_of_the_catalogue(name, drive):
     assert idm_from_base(model, base, values, q[:0], v[:0], a[:0]).shape == (0, model.n)
 
 
+def test_base_parameters_take_wrench_and_friction_as_the_whole_model_does():
+    model = rm.load("rx90")
+    base = base_parameters(model)
+    rng = np.random.default_rng(0)
+    q, v, a = rng.normal(size=(3, 5, 6))
+    parts = rng.uniform(1.0, 2.0, (4, 6))
+    options = {"wrench": rng.normal(size=(5, 6)), "friction": AsymmetricFriction(*parts)}
+    whole = rm.idm(model, q, v, a, **options)
+    found = idm_from_base(model, base, base.values(model), q, v, a, **options)
+    np.testing.assert_allclose(found, whole, rtol=0, atol=1e-10 * np.abs(whole).max())
+    options["friction"] = AsymmetricFriction(*parts[:, :2])
+    with pytest.raises(ShapeError, match="friction of 6 joints, got 2"):
+        idm_from_base(model, base, base.values(model), q, v, a, **options)
+
+
 def test_base_parameters_of_another_robot_are_refused():
     arm = planar()
     base = base_parameters(arm)
@@ -236,12 +215,8 @@ def test_base_parameters_of_another_robot_are_refused():
         idm_from_base(arm, base, base.values(arm), q, [0.0], q)
     # the same joints, but other lengths or another gravity: the numbers would be wrong
     for another in (planar(l1=0.6), arm.with_gravity([0, 0, -9.81])):
-        for call in (
-            lambda robot: base_model(robot, base, base.values(arm)),
-            lambda robot: idm_from_base(robot, base, base.values(arm), q, q, q),
-        ):
-            with pytest.raises(InvalidValueError, match="base parameters of"):
-                call(another)
+        with pytest.raises(InvalidValueError, match="base parameters of"):
+            base_model(another, base, base.values(arm))
 
 
 @pytest.mark.parametrize("drive", [True, False])

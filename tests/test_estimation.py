@@ -1,10 +1,13 @@
-"""Numerics of linear models: independent columns."""
+"""Linear models: independent columns, triangular factors."""
 
 import numpy as np
 import pytest
 
 from robotmodels.errors import InvalidValueError, ShapeError
-from robotmodels.estimation import column_basis, triangular_factor
+from robotmodels.estimation import column_basis
+from robotmodels.estimation.covariance import jackknife_inflation
+from robotmodels.estimation.factor import factors_of, merged, merged_tree, triangles_of
+from robotmodels.estimation.linear import solved
 
 
 def test_random_ranks(rng):
@@ -19,16 +22,11 @@ def test_random_ranks(rng):
         assert np.allclose(again, W, rtol=0, atol=1e-8 * abs(W).max(axis=0))
 
 
-def test_earlier_columns_are_kept(rng):
+def test_earlier_columns_are_kept_and_the_triangular_factor_is_enough(rng):
     W = rng.normal(size=(20, 3)) @ rng.normal(size=(3, 6))
-    assert column_basis(W).kept.tolist() == [0, 1, 2]
     assert column_basis(W, order=[5, 4, 3, 2, 1, 0]).kept.tolist() == [3, 4, 5]
-
-
-def test_the_triangular_factor_is_enough(rng):
-    W = rng.normal(size=(100, 4)) @ rng.normal(size=(4, 7))
     whole, factor = column_basis(W), column_basis(np.linalg.qr(W, mode="r"))
-    assert whole.kept.tolist() == factor.kept.tolist()
+    assert whole.kept.tolist() == factor.kept.tolist() == [0, 1, 2]
     assert np.allclose(whole.coefficients, factor.coefficients, atol=1e-10)
 
 
@@ -91,28 +89,60 @@ def test_nothing_and_less():
 
 
 def test_mistakes_are_named():
-    with pytest.raises(ShapeError, match="expected a matrix"):
-        column_basis([1.0, 2.0])
-    with pytest.raises(InvalidValueError, match="order"):
-        column_basis(np.eye(2), order=[0, 0])
-    with pytest.raises(InvalidValueError, match="scale"):
-        column_basis(np.eye(2), scale=[1.0, 0.0])
-    with pytest.raises(InvalidValueError, match="kinds"):
-        column_basis(np.eye(2), kinds=[0.5, 1.0])
-    with pytest.raises(InvalidValueError):
-        column_basis([[np.nan, 1.0]])
+    for W, options, error, words in (
+        ([1.0, 2.0], {}, ShapeError, "expected a matrix"),
+        (np.eye(2), {"order": [0, 0]}, InvalidValueError, "order"),
+        (np.eye(2), {"scale": [1.0, 0.0]}, InvalidValueError, "scale"),
+        (np.eye(2), {"kinds": [0.5, 1.0]}, InvalidValueError, "kinds"),
+        ([[np.nan, 1.0]], {}, InvalidValueError, "finite"),
+    ):
+        with pytest.raises(error, match=words):
+            column_basis(W, **options)
 
 
-def test_triangular_factor_of_pieces(rng):
+def test_triangles_of_pieces_have_the_products_of_all_rows(rng):
     W = rng.normal(size=(90, 3, 7))
     W[:, 0, 3:] = 0.0
     W[:40, 1, :2] = 0.0  # columns that are seen late
     W[:, 2, 5] = 0.0
     normal = np.einsum("kip,kiq->pq", W, W)
     for cuts in ([], [1], [40], [10, 20, 50, 89]):
-        R = triangular_factor(np.split(W, cuts), 7)
-        assert R.shape == (7, 7)
-        assert np.allclose(np.tril(R, -1), 0.0)
+        R = triangles_of(np.split(W, cuts), 7)
+        assert R.shape == (6 + 7 + 3, 7)
         assert np.allclose(R.T @ R, normal)
-    assert triangular_factor([], 4).shape == (0, 4)
-    assert triangular_factor([W[:0]], 7).shape == (0, 7)
+    assert triangles_of([], 4).shape == (0, 4)
+    assert triangles_of([W[:0]], 7).shape == (0, 7)
+
+
+def test_merged_trees_keep_the_order_and_merged_factors_the_products(rng):
+    assert merged_tree([], lambda a, b: a + b) is None
+    for count in range(1, 9):
+        assert merged_tree(map(str, range(count)), lambda a, b: a + b) == "01234567"[:count]
+    A, B = rng.normal(size=(5, 1, 3)), rng.normal(size=(6, 1, 3))
+    A[:, :, 1] = B[:, :, 1] = 0.0
+    parts = [
+        factors_of(("a", "b", "c"), W, W[..., 0], np.ones(W.shape[:2], dtype=bool)) for W in (A, B)
+    ]
+    (R,) = merged(*parts).factors
+    rows = np.vstack([np.column_stack((W[:, 0], W[:, 0, 0])) for W in (A, B)])
+    assert R.shape == (3, 4)
+    np.testing.assert_allclose(R.T @ R, rows.T @ rows, rtol=1e-13, atol=1e-13)
+    few = factors_of(("a", "b", "c"), A[:1], A[:1, :, 0], np.ones((1, 1), dtype=bool))
+    assert few.factors[0].shape == (1, 4)
+
+
+def test_the_jackknife_is_that_of_estimates_without_one_segment(rng):
+    A, e = rng.normal(size=(20, 12, 1, 3)), 0.1 * rng.normal(size=(20, 12, 1))
+    x = np.array([1.0, 2.0, 3.0]) + rng.normal(size=(20, 3))  # each segment has its own
+    y, use = np.einsum("kimp,kp->kim", A, x) + e, np.ones((12, 1), dtype=bool)
+    segments = [factors_of(("a", "b", "c"), A[k], y[k], use) for k in range(20)]
+    whole = merged_tree(segments, merged)
+    x, inverse, rest = solved(whole)
+    errors = np.sqrt(rest / 237 * np.diag(inverse))
+    others = [merged_tree(segments[:k] + segments[k + 1 :], merged) for k in range(20)]
+    moved = np.array([solved(other)[0] for other in others]) - x
+    expected = np.sqrt(((moved**2).sum(axis=0) / errors**2).mean())
+    found = jackknife_inflation(segments, whole, np.ones(1), errors)
+    assert found > 1.0
+    assert found == pytest.approx(expected, rel=1e-9)
+    assert jackknife_inflation(segments, whole, np.ones(1), 10.0 * errors) == 1.0

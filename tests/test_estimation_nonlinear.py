@@ -6,13 +6,9 @@ import numpy as np
 import pytest
 
 from robotmodels.errors import InvalidValueError, ShapeError
-from robotmodels.estimation import (
-    FitStatus,
-    Loss,
-    Prior,
-    confidence_intervals,
-    fit_nonlinear,
-)
+from robotmodels.estimation import FitStatus, Loss, Prior, confidence_intervals, fit_nonlinear
+from robotmodels.estimation.linearised import checked_problem, linear_problem
+from robotmodels.estimation.losses import terms_of
 
 LENGTHS = np.array([0.5, 0.4, 0.3, 0.3, 0.2])
 
@@ -67,7 +63,7 @@ def test_millimetres_and_metres_give_the_same_answer(loss, share):
     assert a.converged
     assert b.converged
     assert np.abs(b.x / unit - a.x).max() < 1e-13
-    assert np.allclose(b.deviations / unit, a.deviations, rtol=1e-9)
+    assert np.allclose(b.standard_errors / unit, a.standard_errors, rtol=1e-9)
     assert a.outliers.tolist() == b.outliers.tolist()
 
 
@@ -94,22 +90,18 @@ def test_outliers_do_not_move_a_robust_fit_by_its_deviation(loss, seed):
     clean = Arm(seed, share=0.0)
     assert len(arm.bad) > 15
     fit, reference = arm.fit(loss), clean.fit()
+    assert fit.iterations < 30  # Newton's, with the curvature of the loss
     limit = 1.0 if loss is not Loss.HUBER else 2.0  # the influence on Huber's is bounded, not zero
-    moved = np.abs(fit.x - reference.x) / fit.deviations
+    moved = np.abs(fit.x - reference.x) / fit.standard_errors
     assert fit.converged
     assert np.sqrt((moved**2).mean()) < limit
     assert set(fit.outliers.tolist()) == set(arm.bad.tolist())
     assert (fit.weights[np.isin(fit.block, arm.bad)] < 0.05).all()
+    r, J = arm(fit.x)  # the slope of the loss is rounding
+    assert np.abs(J.T @ (fit.weights * r)).max() < 1e-11 * np.abs(J).T.dot(np.abs(r)).max()
     assert 0.9 < fit.scale < 1.25
     # squares are moved, so that the data are a test
-    assert np.abs(arm.fit().x - reference.x).max() > 10 * fit.deviations.max()
-
-
-def test_estimate_of_tukey_is_a_stationary_point_of_its_loss():
-    arm = Arm(2, share=0.1)
-    fit = arm.fit(Loss.TUKEY)
-    r, J = arm(fit.x)
-    assert np.abs(J.T @ (fit.weights * r)).max() < 1e-11 * np.abs(J).T.dot(np.abs(r)).max()
+    assert np.abs(arm.fit().x - reference.x).max() > 10 * fit.standard_errors.max()
 
 
 def test_rows_may_come_in_any_order():
@@ -120,6 +112,7 @@ def test_rows_may_come_in_any_order():
         block=7 + 3 * arm.block[order], loss="tukey",
     )  # fmt: skip
     plain = arm.fit(Loss.TUKEY)
+    assert mixed.iterations == plain.iterations
     assert np.allclose(mixed.x, plain.x, rtol=0, atol=1e-14)
     assert set(mixed.outliers.tolist()) == set((7 + 3 * plain.outliers).tolist())
     assert np.allclose(mixed.weights, plain.weights[order], atol=1e-9)
@@ -137,38 +130,33 @@ def decay(seed, outliers=0, N=80):
         e = np.exp(-x[1] * t)
         return x[0] * e + x[2] - y, np.column_stack((e, -x[0] * t * e, np.ones(N)))
 
-    return linearise, truth
+    return linearise, truth, [1.0, 1.0, 0.0], np.arange(N)
 
 
-@pytest.mark.parametrize(("loss", "outliers"), [("squares", 0), ("tukey", 8)])
-def test_intervals_contain_the_truth_as_often_as_they_say(loss, outliers):
-    inside = np.zeros(3)
-    for seed in range(500):
-        linearise, truth = decay(seed, outliers)
-        fit = fit_nonlinear(linearise, [1.0, 1.0, 0.0], loss=loss)  # sigma 1 is far off: estimated
+def plane(seed, outliers):
+    rng = np.random.default_rng(seed)
+    A, truth = rng.normal(size=(120, 4)), rng.normal(size=4)
+    y = A @ truth + rng.normal(size=120)
+    y[:outliers] += 50.0
+    return lambda x: (A @ x - y, A), truth, np.zeros(4), np.arange(120) // 3
+
+
+@pytest.mark.parametrize(
+    ("case", "loss", "outliers", "count"),
+    [(decay, "squares", 0, 500), (decay, "tukey", 8, 500), (plane, "tukey", 12, 200)],
+)
+def test_intervals_contain_the_truth_as_often_as_they_should(case, loss, outliers, count):
+    inside = []
+    for seed in range(count):
+        linearise, truth, start, block = case(seed, outliers)
+        fit = fit_nonlinear(linearise, start, block=block, loss=loss)  # sigma 1 is far off
         low, high = confidence_intervals(fit, 0.95).T
-        inside += (low <= truth) & (truth <= high)
+        inside.append((low <= truth) & (truth <= high))
         assert fit.converged
-    assert 0.92 <= inside.mean() / 500 <= 0.97, inside
+    assert 0.92 <= np.mean(inside) <= 0.97
 
 
-def test_blocks_of_three_rows_have_covered_intervals_too():
-    rng = np.random.default_rng(4)
-    inside = 0.0
-    for _ in range(200):
-        A = rng.normal(size=(120, 4))
-        truth = rng.normal(size=4)
-        y = A @ truth + rng.normal(size=120)
-        y[:12] += 50.0
-        fit = fit_nonlinear(
-            lambda x, A=A, y=y: (A @ x - y, A), np.zeros(4), block=np.arange(120) // 3, loss="tukey"
-        )
-        low, high = confidence_intervals(fit).T
-        inside += ((low <= truth) & (truth <= high)).mean()
-    assert 0.92 <= inside / 200 <= 0.97
-
-
-def test_the_median_of_residuals_counts_what_parameters_take():
+def test_median_of_residuals_counts_what_parameters_take():
     def scale(seed):
         rng = np.random.default_rng(seed)
         A, e = rng.normal(size=(40, 20)), rng.normal(size=40)
@@ -177,63 +165,90 @@ def test_the_median_of_residuals_counts_what_parameters_take():
     assert 0.9 < np.median([scale(seed) for seed in range(100)]) < 1.1
 
 
+def test_robust_covariance_is_the_formula_of_huber():
+    """Variance of the influence over its squared mean slope, with the correction for P / M."""
+    rng = np.random.default_rng(0)
+    A, e = rng.normal(size=(60, 5)), rng.standard_t(3, size=60)
+    fit = fit_nonlinear(lambda x: (A @ x - e, A), np.zeros(5), loss="huber")
+    u = fit.residuals / fit.scale
+    psi = np.clip(u, -1.344998, 1.344998)
+    inside = np.abs(u) < 1.344998
+    more = 1 + 5 / 60 * inside.var() / inside.mean() ** 2
+    noise = (fit.scale * more) ** 2 * (psi @ psi) / 55 / inside.mean() ** 2
+    assert np.allclose(fit.covariance, noise * np.linalg.inv(A.T @ A), rtol=1e-5)
+
+
+def test_outliers_of_squares_are_judged_by_deleted_residuals():
+    rng = np.random.default_rng(1)
+    A = rng.normal(size=(40, 4))
+    A[0] *= 20.0  # this measurement draws the fit to itself
+    y = 0.01 * rng.normal(size=40)
+    y[0] += 3.0
+    y[7:9] += 0.5
+    fit = fit_nonlinear(lambda x: (A @ x - y, A), np.zeros(4))
+    assert abs(fit.residuals[0]) < np.abs(fit.residuals[7:9]).min()
+    assert set(fit.outliers.tolist()) == {0, 7, 8}
+    assert not len(fit_nonlinear(lambda x: (A[1:7] @ x - y[1:7], A[1:7]), np.zeros(4)).outliers)
+
+
 def test_known_deviation_is_taken_as_stated():
     arm = Arm(1)
     free, known = arm.fit(sigma=1e-5), arm.fit(sigma=1e-5, sigma_known=True)
     assert np.allclose(free.x, known.x)
     assert 9 < free.scale < 11
-    assert np.allclose(known.deviations * free.scale, free.deviations)
+    assert np.allclose(known.standard_errors * free.scale, free.standard_errors)
+    for sure, error in ((True, 1.0), (False, np.nan)):  # as many rows as parameters
+        fit = fit_nonlinear(lambda x: (x - 1.0, np.eye(2)), np.zeros(2), sigma_known=sure)
+        assert fit.converged
+        assert np.allclose(fit.standard_errors, error, equal_nan=True)
 
 
 def test_prior_is_the_maximum_a_posteriori():
     rng = np.random.default_rng(0)
     A, y = rng.normal(size=(8, 12)), rng.normal(size=8)
     prior = Prior(rng.normal(size=12), rng.uniform(0.5, 2.0, 12), strength=3.0)
-    fit = fit_nonlinear(lambda x: (A @ x - y, A), np.zeros(12), prior=prior, sigma_known=True)
-    information = A.T @ A + np.diag(3.0 / prior.deviation**2)
-    expected = np.linalg.solve(information, A.T @ y + 3.0 * prior.mean / prior.deviation**2)
-    assert fit.status is FitStatus.CONVERGED
-    assert np.allclose(fit.x, expected, rtol=1e-10)
-    assert np.allclose(fit.covariance, np.linalg.inv(information))
-    assert 0 < fit.freedom < 8
+
+    def fit(**options):
+        return fit_nonlinear(lambda x: (A @ x - y, A), np.zeros(12), prior=prior, **options)
+
+    known, free = fit(sigma_known=True), fit()
+    information = A.T @ A + np.diag(3.0 / prior.sigma**2)
+    expected = np.linalg.solve(information, A.T @ y + 3.0 * prior.mean / prior.sigma**2)
+    assert known.status is FitStatus.CONVERGED
+    assert np.allclose(known.x, expected, rtol=1e-10)
+    assert np.allclose(known.covariance, np.linalg.inv(information))
+    assert 0 < known.freedom < 8
     # noise that is estimated counts for the measurements alone
-    free = fit_nonlinear(lambda x: (A @ x - y, A), np.zeros(12), prior=prior)
     back = np.linalg.inv(information)
-    middle = free.scale**2 * A.T @ A + np.diag(3.0 / prior.deviation**2)
+    middle = free.scale**2 * A.T @ A + np.diag(3.0 / prior.sigma**2)
     assert not 0.9 < free.scale < 1.1
     assert np.allclose(free.covariance, back @ middle @ back)
-    robust = fit_nonlinear(
-        lambda x: (A @ x - y, A), np.zeros(12), prior=prior, sigma_known=True, loss="huber"
-    )
-    assert robust.converged
+    assert fit(sigma_known=True, loss="huber").converged
 
 
 def test_singular_direction_is_reported_and_the_rest_is_right():
     rng = np.random.default_rng(0)
-    A = rng.normal(size=(30, 4))
-    A[:, 3] = 2.0 * A[:, 2]
-    y = A @ [1.0, 2.0, 3.0, 0.0] + 0.01 * rng.normal(size=30)
-    fit = fit_nonlinear(lambda x: (A @ x - y, A), np.zeros(4))
-    assert fit.status is FitStatus.SINGULAR
-    assert fit.rank == 3
-    assert np.isinf(fit.deviations).tolist() == [False, False, True, True]
-    direction = fit.dropped[0] / fit.dropped[0][3]
-    assert np.allclose(direction, [0, 0, -2, 1], atol=1e-12)
-    held = fit_nonlinear(lambda x: (A @ x - y, A), np.zeros(4), truncation=1e-9)
-    assert held.converged
-    assert np.isfinite(held.deviations).all()
-    assert np.allclose(held.x, fit.x)
-    known = Prior(np.zeros(4), [np.inf, np.inf, np.inf, 1.0])
-    assert fit_nonlinear(lambda x: (A @ x - y, A), np.zeros(4), prior=known).converged
+    A = rng.normal(size=(30, 5))
+    A[:, 3], A[:, 4] = 2.0 * A[:, 2], 0.0
+    y = A @ [1.0, 2.0, 3.0, 0.0, 0.0] + 0.01 * rng.normal(size=30)
 
+    def fit(**options):
+        return fit_nonlinear(lambda x: (A @ x - y, A), np.zeros(5), **options)
 
-def test_column_without_effect_is_singular():
-    A = np.column_stack((np.ones(5), np.zeros(5)))
-    fit = fit_nonlinear(lambda x: (A @ x - np.arange(5.0), A), np.zeros(2))
-    assert fit.status is FitStatus.SINGULAR
-    assert np.isclose(fit.x[0], 2.0)
-    assert np.isinf(fit.deviations[1])
-    assert np.isfinite(fit.deviations[0])
+    for loss in Loss:
+        singular, held = fit(loss=loss), fit(loss=loss, truncation=1e-9)
+        assert singular.status is FitStatus.SINGULAR
+        assert singular.rank == 3
+        assert np.isinf(singular.standard_errors).tolist() == [False, False, True, True, True]
+        along = singular.dropped @ np.diag(1.0 / np.array([1.0, 1.0, -2.0, 1.0, 1.0]))
+        assert np.allclose(along[:, :2], 0.0, atol=1e-12)
+        assert np.allclose(along[:, 2], along[:, 3], atol=1e-12)
+        assert held.converged
+        assert np.isfinite(held.standard_errors).all()
+        assert np.allclose(held.x, singular.x)
+        assert held.x[4] == 0.0
+    known = Prior(np.zeros(5), [np.inf, np.inf, np.inf, 1.0, 1.0])
+    assert fit(prior=known).converged
 
 
 def test_condition_of_a_million_keeps_its_digits():
@@ -255,10 +270,9 @@ def test_far_start_and_wrong_jacobian():
             [[-20 * x[0], 10.0], [-1, 0]]
         )
 
-    for damping in (0.0, 0.1):
-        fit = fit_nonlinear(rosenbrock, [-1.2, 1.0], damping=damping, iterations=200)
-        assert fit.converged
-        assert np.allclose(fit.x, 1.0, rtol=1e-10)
+    fit = fit_nonlinear(rosenbrock, [-1.2, 1.0])
+    assert fit.converged
+    assert np.allclose(fit.x, 1.0, rtol=1e-10)
     uphill = fit_nonlinear(
         lambda x: (np.exp(-x[0] * t) - 0.5 * t, (t * np.exp(-x[0] * t))[:, None]), [1.0]
     )
@@ -267,50 +281,66 @@ def test_far_start_and_wrong_jacobian():
     assert short.status is FitStatus.ITERATION_LIMIT
     assert short.iterations == 2
 
-
-def test_trial_that_is_not_a_number_is_damped():
-    y = np.array([0.1, 0.2, 0.3])
-
-    def linearise(x):
+    def below_zero(x):  # after the first full step
         with np.errstate(invalid="ignore", divide="ignore"):
-            return np.log(x[0]) * np.ones(3) - np.log(y), np.full((3, 1), 1 / x[0])
+            return np.log(x[0]) - np.log([0.1, 0.2, 0.3]), np.full((3, 1), 1 / x[0])
 
-    fit = fit_nonlinear(linearise, [5.0])  # the first full step is below zero
+    fit = fit_nonlinear(below_zero, [5.0])
     assert fit.converged
-    assert np.isclose(fit.x[0], np.exp(np.log(y).mean()))
-    assert fit.steps[0, 3] > 0
+    assert np.isclose(fit.x[0], 0.006 ** (1 / 3))
 
 
-def test_as_many_rows_as_parameters_leave_no_noise_to_estimate():
-    fit = fit_nonlinear(lambda x: (x - 1.0, np.eye(2)), np.zeros(2))
-    assert fit.converged
-    assert np.isnan(fit.deviations).all()
-    known = fit_nonlinear(lambda x: (x - 1.0, np.eye(2)), np.zeros(2), sigma_known=True)
-    assert np.allclose(known.deviations, 1.0)
+@pytest.mark.parametrize("damping", [0.0, 1e-6, 1e-2, 1.0, 100.0])
+def test_a_damped_step_is_that_of_marquardt_and_predicts_the_decrease(rng, damping):
+    """(A^T A + damping s_1^2 D^2) dx = -A^T r, with D the lengths of the columns."""
+    A, r = rng.normal(size=(30, 4)) * [1.0, 10.0, 0.01, 1.0], rng.normal(size=30)
+    problem, point = checked_problem(lambda x: (A @ x + r, A), np.zeros(4), 1.0, None, None)
+    linear = linear_problem(problem, terms_of(Loss.SQUARES, problem.rows, 1.0), point, 0.0)
+    dx, gain, _ = linear.step(damping)
+    D = np.linalg.norm(A, axis=0)
+    s = np.linalg.svd(A / D, compute_uv=False)
+    expected = np.linalg.solve(A.T @ A + damping * s[0] ** 2 * np.diag(D**2), -A.T @ r)
+    np.testing.assert_allclose(dx * D, expected * D, rtol=0, atol=1e-12)
+    left = A @ dx + r
+    assert gain == pytest.approx(r @ r - left @ left, rel=1e-9)
 
 
 def test_mistakes_are_named():
-    def linear(x):
-        return x - 1.0, np.eye(2)
+    def mean(x):
+        return x - np.arange(4.0), np.ones((4, 1))
 
-    for options, error, text in (
+    for linearise, x0, error, words in (
+        (mean, [[0.0]], ShapeError, r"x0: expected parameters of shape \(P,\)"),
+        (mean, [], ShapeError, "P at least 1"),
+        ("mean", [0.0], InvalidValueError, "linearise: expected a function of x"),
+        (lambda x: (x - np.ones(4), np.ones((3, 1))), [0.0], ShapeError, r"a Jacobian \(4, 1\)"),
+        (lambda x: (x * np.nan, np.eye(1)), [0.0], InvalidValueError, "finite"),
+        (lambda x: (x + 1e200, np.eye(1)), [0.0], InvalidValueError, "overflow at x0"),
+    ):
+        with pytest.raises(error, match=words):
+            fit_nonlinear(linearise, x0)
+    for options, error, words in (
         ({"sigma": -1.0}, InvalidValueError, "positive"),
         ({"sigma": [1.0, 2.0, 3.0]}, ShapeError, "sigma"),
-        ({"block": [0.0, 1.0]}, InvalidValueError, "whole"),
+        ({"block": [0.0, 1.0, 2.0, 3.0]}, InvalidValueError, "whole"),
         ({"block": [0]}, ShapeError, "block"),
         ({"loss": "cubes"}, InvalidValueError, "tukey"),
-        ({"prior": Prior.none(3)}, ShapeError, "prior"),
+        ({"prior": Prior.none(3)}, ShapeError, "prior: expected one of 1 parameters, got 3"),
         ({"truncation": 2.0}, InvalidValueError, "truncation"),
         ({"iterations": 0}, InvalidValueError, "iterations"),
     ):
-        with pytest.raises(error, match=text):
-            fit_nonlinear(linear, np.zeros(2), **options)
-    with pytest.raises(InvalidValueError, match="finite"):
-        fit_nonlinear(lambda x: (x * np.nan, np.eye(2)), np.zeros(2))
-    with pytest.raises(ShapeError, match="Jacobian"):
-        fit_nonlinear(lambda x: (x, np.ones((3, 2))), np.zeros(2))
-    with pytest.raises(InvalidValueError, match="standard deviations"):
-        Prior([0.0], [0.0])
+        with pytest.raises(error, match=words):
+            fit_nonlinear(mean, [0.0], **options)
+    fewer = iter((mean, lambda x: (np.zeros(3), np.ones((3, 1)))))
+    with pytest.raises(ShapeError, match=r"residuals \(4,\) and a Jacobian \(4, 1\), got \(3,\)"):
+        fit_nonlinear(lambda x: next(fewer)(x), [0.0])
+    for arguments, error, words in (
+        (([0.0], [0.0]), InvalidValueError, "standard deviations"),
+        (([0.0, 0.0], [1.0]), ShapeError, "of one shape"),
+        (([0.0], [1.0], -1.0), InvalidValueError, "a strength from 0"),
+    ):
+        with pytest.raises(error, match=words):
+            Prior(*arguments)
 
 
 def test_fit_pickles_read_only():

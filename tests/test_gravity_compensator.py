@@ -12,7 +12,7 @@ import robotmodels as rm
 from robotmodels.dynamics import idm_from_base
 from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.friction import AsymmetricFriction, GravityCompensator
-from robotmodels.identification import Log, choose_processing, fit
+from robotmodels.identification import Log, choose_processing, fit, predicted_torque
 from robotmodels.regressors import (
     energy_difference_regressor,
     parameter_names,
@@ -205,7 +205,7 @@ def test_it_is_identified_exactly_without_noise(options, form):
         q, v, a = swinging(model, rng, samples=500)
         torque = rm.idm(model, q, v, a, friction=true)
         quick = (np.abs(v) > 1e-3).all(axis=1)  # beyond the dead band
-        off = np.abs(found.predict(q, v, a) - torque)[quick].max()
+        off = np.abs(predicted_torque(found, q, v, a) - torque)[quick].max()
         assert off < limit * np.abs(torque).max()
 
 
@@ -218,15 +218,15 @@ def test_a_compensator_that_is_left_out_is_seen_in_the_residuals():
     noise = 0.5 * rng.normal(size=log.tau.shape)
     noisy = Log(log.dt, log.q, log.tau + noise, log.v, log.a)
     none = Log(log.dt, log.q, noisy.tau - true.torque(log.v, log.q), log.v, log.a)
-    least = fitted(model, none, None).fitted.filtered_rmse[1]
-    without = fitted(model, noisy, None, checked=False).fitted.filtered_rmse[1]
+    least = fitted(model, none, None).validation.in_sample.filtered_rmse[1]
+    without = fitted(model, noisy, None, checked=False).validation.in_sample.filtered_rmse[1]
     spring = fitted(model, noisy, GravityCompensator(model.n, 2, **GEOMETRY))
     series = fitted(model, noisy, GravityCompensator(model.n, 2))
-    assert spring.fitted.filtered_rmse[1] == pytest.approx(least, rel=0.05)
+    assert spring.validation.in_sample.filtered_rmse[1] == pytest.approx(least, rel=0.05)
     assert without > 20 * least
     # two harmonics are most of a spring whose geometry is not known
-    assert series.fitted.filtered_rmse[1] < 0.3 * without
-    assert np.abs(spring.value("Kc2") - 4000.0) < 4 * spring.deviation("Kc2")
+    assert series.validation.in_sample.filtered_rmse[1] < 0.3 * without
+    assert np.abs(spring.value("Kc2") - 4000.0) < 4 * spring.standard_error("Kc2")
 
 
 def test_what_gravity_does_alike_is_regrouped():

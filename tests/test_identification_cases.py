@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from robotmodels.estimation.factor import TriangularFactors
+from robotmodels.estimation.linear import ordinary
 from robotmodels.identification.closed_loop.instrumental import instrument_step
-from robotmodels.identification.equations import Block
-from robotmodels.identification.methods.least_squares import ordinary
-from robotmodels.identification.scale.reduction import Reduction
+from robotmodels.identification.forms import Block
 
 NAMES = ("a", "b", "c")
 
@@ -14,7 +14,7 @@ def reduction_of(*systems):
     """Of equations A x = y, kind by kind."""
     factors = [np.linalg.qr(np.column_stack(pair), mode="r") for pair in systems]
     counts = np.array([len(y) for _, y in systems])
-    return Reduction(NAMES, tuple(factors), counts, np.zeros_like(counts))
+    return TriangularFactors(NAMES, tuple(factors), counts, np.zeros_like(counts))
 
 
 def test_the_deviation_of_a_few_equations_counts_what_parameters_take(rng):
@@ -60,4 +60,4 @@ def test_a_step_of_instruments_is_the_instrumental_estimate(rng):
     np.testing.assert_allclose(found.sigma, [sigma], rtol=1e-12)
     back = np.linalg.inv(z.T @ w)
     expected = sigma * np.sqrt(np.diag(back @ (z.T @ z) @ back.T))
-    np.testing.assert_allclose(found.deviations, expected, rtol=1e-9)
+    np.testing.assert_allclose(found.standard_errors, expected, rtol=1e-9)

@@ -5,22 +5,17 @@ import pytest
 
 import robotmodels as rm
 from robotmodels.drive import DriveParameters
-from robotmodels.identification import (
-    Log,
-    central_differences,
-    choose_processing,
-    equations,
-    ordinary,
-    reduce_equations,
-)
+from robotmodels.estimation.linear import ordinary
+from robotmodels.identification import Log, choose_processing, equations, reduce_equations
 from robotmodels.identification.closed_loop import (
+    Didim,
+    Instrumental,
     closed_loop,
-    didim,
     hausman_test,
-    instrumental,
     simulated_log,
     tuned_controller,
 )
+from robotmodels.identification.signals import central_differences
 from robotmodels.inertia import InertialParameters
 
 DT = 2e-3
@@ -70,12 +65,11 @@ def studied(count, position, torque, decimation, methods):
             log, decimation=decimation, dead_band=0.05, edges=0.0, filtered=False
         )
         system = equations(base, log, choices)
-        reduction = reduce_equations(system)
+        factors = reduce_equations(system)
         loop = closed_loop(system, 1.1 * truth, control, width=WIDTH)
-        both = [m(system, reduction, start=1.1 * truth, loop=loop, lags=0)
-                for m in methods]  # fmt: skip
-        found = (ordinary(reduction), *both)
-        errors.append([(one.values - truth) / one.deviations for one in found])
+        both = [m(start=1.1 * truth, loop=loop, lags=0).solve(system, factors) for m in methods]
+        found = (ordinary(factors), *both)
+        errors.append([(one.values - truth) / one.standard_errors for one in found])
         verdict = hausman_test(system, both[0], lags=0)
         off.append((both[0].values + verdict.effect - truth) / verdict.least_squares_errors)
         verdicts.append(verdict)
@@ -84,7 +78,7 @@ def studied(count, position, torque, decimation, methods):
 
 def test_differentiated_noise_biases_least_squares_alone_and_the_test_says_so():
     count = 8
-    errors, verdicts, _ = studied(count, 1e-4, 0.5, 1, (instrumental, didim))
+    errors, verdicts, _ = studied(count, 1e-4, 0.5, 1, (Instrumental, Didim))
     z = errors.mean(axis=0) * np.sqrt(count)  # of order one where nothing is biased
     assert np.abs(z[0]).max() > 6.0
     assert np.abs(z[1:]).max() < 4.0
@@ -96,7 +90,7 @@ def test_differentiated_noise_biases_least_squares_alone_and_the_test_says_so():
 
 
 def test_the_test_names_parameters_whose_bias_matters_and_no_others():
-    _, verdicts, off = studied(6, 3e-5, 0.5, 1, (instrumental,))
+    _, verdicts, off = studied(6, 3e-5, 0.5, 1, (Instrumental,))
     bias = np.abs(off.mean(axis=0))
     named = np.mean([verdict.biased_parameters for verdict in verdicts], axis=0)
     assert (bias > 2.0).sum() >= 3
@@ -107,6 +101,6 @@ def test_the_test_names_parameters_whose_bias_matters_and_no_others():
 
 @pytest.mark.parametrize(("position", "decimation"), [(0.0, 10), (3e-6, 1), (3e-5, 10)])
 def test_noise_whose_bias_does_not_matter_is_not_rejected(position, decimation):
-    _, verdicts, off = studied(10, position, 0.5, decimation, (instrumental,))
+    _, verdicts, off = studied(10, position, 0.5, decimation, (Instrumental,))
     assert np.abs(off.mean(axis=0)).max() < 0.7  # half a standard error, and what ten logs tell
     assert np.mean([verdict.biased for verdict in verdicts]) <= 0.1

@@ -1,15 +1,15 @@
 """Default fits of robots nobody tuned them to: prediction, refusals, intervals."""
 
 import warnings
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
 from identification_fleet import KINDS, case, pair, textbook
 
 import robotmodels as rm
-from robotmodels.errors import InvalidValueError, RobotModelsWarning
-from robotmodels.identification import Log, fit
+from robotmodels.errors import RobotModelsWarning
+from robotmodels.identification import Log, Wls, fit, predicted_torque
 
 ARMS = range(60, 90)  # of seeds 0 to 99, 94 keep the bound of 1.02 and 99 that of 1.15
 
@@ -22,12 +22,12 @@ def fitted(seed):
         warnings.simplefilter("ignore", RobotModelsWarning)  # some motions show too little
         found = fit(one.model, one.log)  # with its checks: nothing correct is refused
     shrunk = any("Shrinkage" in note for note in found.notes)
-    off = np.abs(found.values - found.base.values(one.model)) / found.deviations
+    off = np.abs(found.values - found.base.values(one.model)) / found.standard_errors
     return (
-        one.error(found.predict) / one.error(textbook(one.model, one.log)),
+        one.error(partial(predicted_torque, found)) / one.error(textbook(one.model, one.log)),
         None if shrunk else float((off < 1.96).mean()),
-        found.reduction.rows / len(found.names),
-        found.system.processing,
+        found.factors.rows / len(found.names),
+        found.equations.processing,
     )
 
 
@@ -61,9 +61,11 @@ def test_parameters_of_two_logs_of_one_robot_agree():
     ratios = []
     for seed in range(30):
         model, logs = pair(seed)
-        first, second = (fit(model, log, checked=False, shrinkage=False) for log in logs)
+        first, second = (fit(model, log, Wls(shrinkage=False), checked=False) for log in logs)
         assert first.names == second.names
-        apart = (first.values - second.values) / np.hypot(first.deviations, second.deviations)
+        apart = (first.values - second.values) / np.hypot(
+            first.standard_errors, second.standard_errors
+        )
         ratios.append(np.sqrt(np.mean(apart**2)))
     assert 0.8 < np.mean(ratios) < 1.2
 
@@ -73,7 +75,7 @@ def test_halves_of_the_tx40_log_agree():
     half = len(data.log) // 2
     first = fit(data.model, data.log.rows(0, half))
     second = fit(data.model, data.log.rows(half, len(data.log)))
-    apart = (first.values - second.values) / np.hypot(first.deviations, second.deviations)
+    apart = (first.values - second.values) / np.hypot(first.standard_errors, second.standard_errors)
     assert np.sqrt(np.mean(apart**2)) < 1.5
 
 
@@ -83,8 +85,8 @@ def test_a_log_may_begin_at_rest_with_a_coarse_encoder():
     q, _, _ = (np.concatenate((np.repeat(x[:1], rest, axis=0), x)) for x in (one.q, one.v, one.a))
     tau = np.concatenate((np.repeat(one.tau[:1], rest, axis=0), one.tau))
     found = fit(one.model, Log(one.log.dt, np.round(q / step) * step, tau), checked=False)
-    assert found.system.processing.motion < 10.0
-    assert one.error(found.predict) < 0.1
+    assert found.equations.processing.motion < 10.0
+    assert one.error(partial(predicted_torque, found)) < 0.1
 
 
 @pytest.mark.filterwarnings("ignore:Poor prediction")
@@ -110,10 +112,8 @@ def test_few_equations_shrink_by_default_and_say_so():
     one = case(61)
     short = one.log.rows(0, round(0.25 / one.log.dt))
     found = fit(one.model, short, checked=False)
-    assert found.reduction.rows < 20 * len(found.names)
+    assert found.factors.rows < 20 * len(found.names)
     assert any(note.startswith("Shrinkage") for note in found.notes)
     assert any("Fewer than 20 equations" in note for note in found.notes)
-    plain = fit(one.model, short, checked=False, shrinkage=False)
+    plain = fit(one.model, short, Wls(shrinkage=False), checked=False)
     assert not any(note.startswith("Shrinkage") for note in plain.notes)
-    with pytest.raises(InvalidValueError, match="'ols' does not take it"):
-        fit(one.model, short, "ols", checked=False, shrinkage=True)

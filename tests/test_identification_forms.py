@@ -7,15 +7,15 @@ import pytest
 from identification_logs import clean_log, odd_robots, swinging
 
 import robotmodels as rm
+from robotmodels.estimation.linear import weighted
 from robotmodels.friction import AsymmetricFriction
 from robotmodels.identification import (
-    EquationForm,
     Log,
     choose_processing,
     equations,
     reduce_equations,
-    weighted,
 )
+from robotmodels.identification.forms import EquationForm
 from robotmodels.minimal_parameters import base_parameters
 from robotmodels.regressors import energy_difference_regressor, power_regressor, torque_regressor
 
@@ -45,7 +45,7 @@ def test_every_form_recovers_exact_parameters(name, form, decimation):
     system = equations(base, log, plain(log, decimation), form)
     found = weighted(reduce_equations(system))
     true = base.values(model)
-    assert system.kinds == (model.n if form.by_joint else 1) == len(found.sigma)
+    assert system.groups == (model.n if form.by_joint else 1) == len(found.sigma)
     assert np.abs(found.values - true).max() < 1e-8 * np.abs(true).max()
 
 
@@ -70,9 +70,7 @@ def test_pieces_are_the_whole(form, decimation, monkeypatch):
     system = equations(base, log, plain(log, decimation), form)
     whole = collected(system)
     for size in (90, 300):
-        monkeypatch.setattr(
-            sys.modules["robotmodels.identification.preparation.signals"], "PIECE", size
-        )
+        monkeypatch.setattr(sys.modules["robotmodels.identification.signals"], "PIECE", size)
         assert len(system.pieces()) > 4
         parts = collected(system)
         for name, array in whole.items():
@@ -156,9 +154,9 @@ def test_several_recordings_some_too_short(form):
     q, v, a = (np.concatenate(x) for x in zip(*parts, strict=True))
     log = Log(2e-3, q, rm.idm(model, q, v, a), v, a, starts=(0, 900, 905, 907))
     system = equations(base, log, plain(log), form)
-    reduction = reduce_equations(system)
-    found = weighted(reduction)
+    factors = reduce_equations(system)
+    found = weighted(factors)
     assert np.abs(found.values - base.values(model)).max() < 1e-7
     inside = {EquationForm.FILTERED: 2 * 3, EquationForm.ENERGY: 2 * 3 + 1}.get(form, 0)
     expected = sum(max(n - inside, 0) for n in (900, 5, 2, 800))
-    assert (reduction.counts == expected).all()
+    assert (factors.counts == expected).all()

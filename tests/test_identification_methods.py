@@ -1,4 +1,4 @@
-"""Robust, total, drawn, sequential and recursive least squares: exact data, noise, spikes."""
+"""Methods of identification: exact data, noise, outliers, priors, drift, essential parameters."""
 
 import pickle
 
@@ -8,88 +8,144 @@ from identification_logs import clean_log, odd_robots, swinging
 
 import robotmodels as rm
 from robotmodels.errors import InvalidValueError, ShapeError
-from robotmodels.estimation import column_basis
-from robotmodels.estimation.losses import Loss
+from robotmodels.estimation.columns import column_basis
+from robotmodels.estimation.estimate import EstimateStatus
+from robotmodels.estimation.factor import TriangularFactors, factors_of
+from robotmodels.estimation.linear import first_weights, ordinary, ridge, weighted
+from robotmodels.estimation.total import TotalStatus, total
 from robotmodels.identification import (
-    EquationForm,
-    EstimateStatus,
     Log,
-    Method,
+    Recursive,
+    Ridge,
+    Robust,
+    Sequential,
+    Total,
     choose_processing,
     equations,
-    ordinary,
+    fit,
     reduce_equations,
-    weighted,
 )
-from robotmodels.identification.methods.lengths import Lengths
-from robotmodels.identification.methods.recursive import recursive
-from robotmodels.identification.methods.ridge import ridge, segments, select_ridge_strength
-from robotmodels.identification.methods.robust import robust
-from robotmodels.identification.methods.sequential import sequential
-from robotmodels.identification.methods.total import TotalStatus, total
-from robotmodels.identification.scale.reduction import Reduction
+from robotmodels.identification.forms import EquationForm
+from robotmodels.identification.method_names import METHODS, method_of
+from robotmodels.identification.methods.essential import RULES, essential
+from robotmodels.identification.reduction import segments
 from robotmodels.minimal_parameters import base_parameters
 
 ROBOTS = odd_robots()
 BASES = {name: base_parameters(model, drive=True) for name, model in ROBOTS.items()}
-METHODS = {
-    "huber": robust,
-    "tukey": lambda s, r: robust(s, r, "tukey"),
-    "cauchy": lambda s, r: robust(s, r, Loss.CAUCHY),
-    "squares": lambda s, r: robust(s, r, "squares"),
-    "total": lambda s, r: total(r),
-    "ridge": lambda s, r: ridge(r),
-    "ridge by parts": lambda s, r: ridge(r, parts=segments(s, 3)),
-    "prior": lambda s, r: ridge(r, np.ones(len(r.names)), np.ones(len(r.names))),
-    "sequential": sequential,
-    "recursive": lambda s, r: recursive(s, r, every=250),
-}
+CASES = (
+    "robust", "robust:loss=tukey", "robust:loss=cauchy", "robust:loss=squares", "tls", "ridge",
+    "sequential", "recursive",
+)  # fmt: skip
 
 
 def prepared(name, noise=0.0, seed=3, log=None, form=EquationForm.TORQUE, **options):
+    """Unfiltered equations of all samples, their factors, and the true parameters."""
+    options = {"samples": 2000, "dt": 4e-3} | options
     rng = np.random.default_rng(seed)
-    options.setdefault("samples", 2000)
-    options.setdefault("dt", 4e-3)
     given = clean_log(ROBOTS[name], rng, noise, **options) if log is None else log
     processing = choose_processing(given, filtered=False, decimation=1, edges=0.0, dead_band=0.0)
     system = equations(BASES[name], given, processing, form)
     return system, reduce_equations(system), BASES[name].values(ROBOTS[name])
 
 
-@pytest.mark.parametrize("method", METHODS)
+def of_columns(A, y, names=("XX1", "XY1", "XZ1", "offset1")):
+    """Factors of one group of equations A x = y."""
+    return factors_of(names[: A.shape[1]], A[:, None], y[:, None], np.ones((len(y), 1), dtype=bool))
+
+
+@pytest.mark.parametrize("method", CASES)
 @pytest.mark.parametrize("name", ROBOTS)
 def test_every_method_recovers_exact_parameters(name, method):
-    system, reduction, true = prepared(name)
-    found = METHODS[method](system, reduction)
+    system, factors, true = prepared(name)
+    found = method_of(method).solve(system, factors)
     assert found.status is EstimateStatus.SOLVED
     assert found.names == system.names
     assert np.abs(found.values - true).max() < 1e-8 * np.abs(true).max()
 
 
-@pytest.mark.parametrize("method", [*(m for m in METHODS if m != "ridge by parts")])
-def test_deviations_are_those_of_many_logs(method):
+@pytest.mark.parametrize("method", [*CASES, "prior"])
+def test_covariances_hold_over_many_logs(method):
     """Squares of errors in units of the covariance add up to the number of parameters."""
-    sums, errors, deviations = [], [], []
+    sums, errors, stated = [], [], []
     for seed in range(30):
-        system, reduction, true = prepared("zero lengths", 0.5, 100 + seed, samples=400, dt=0.02)
-        if method == "total":
-            found = total(reduction, 0.0)
-        elif method == "prior":  # a prior that is true
+        system, factors, true = prepared("zero lengths", 0.5, 100 + seed, samples=400, dt=0.02)
+        way = Total(0.0) if method == "tls" else None
+        if method == "prior":  # a prior that is true
             spread = 0.01 * np.ones(len(true))
             drawn = true + spread * np.random.default_rng(seed).normal(size=len(true))
-            found = ridge(reduction, drawn, spread)
-            assert 1.0 < found.degrees < len(true) - 1
-        else:
-            found = METHODS[method](system, reduction)
+            way = Ridge(drawn, spread)
+        found = (way or method_of(method)).solve(system, factors)
+        if method == "prior":
+            assert 1.0 < found.details.degrees < len(true) - 1
         e = found.values - true
         sums.append(e @ np.linalg.solve(found.covariance, e))
         errors.append(e)
-        deviations.append(found.deviations)
+        stated.append(found.standard_errors)
     b = len(true)
     # the mean of 30 chi squares of b degrees, within four deviations
     assert abs(np.mean(sums) / b - 1.0) < 4.0 * np.sqrt(2.0 / (30 * b)) + 0.06
-    ratio = np.std(errors, axis=0) / np.mean(deviations, axis=0)
-    assert 0.8 < np.median(ratio) < 1.25
+    assert 0.8 < np.median(np.std(errors, axis=0) / np.mean(stated, axis=0)) < 1.25
+
+
+def test_names_and_options_of_methods():
+    for name, kind in METHODS.items():
+        assert method_of(name.upper()).options() == {}
+        assert (kind.name, bool(kind.title)) == (name, True)
+    assert method_of("wls:essential=30, shrinkage=False").options() == {
+        "essential": 30, "shrinkage": False,
+    }  # fmt: skip
+    for text, said in (("gls", "expected one of ols"), ("robust:loss", "given as name=value")):
+        with pytest.raises(InvalidValueError, match=said):
+            method_of(text)
+    with pytest.raises(InvalidValueError, match="loss: expected one of"):
+        Robust("none").solve(*prepared("serial")[:2])
+
+
+# --- weights ----------------------------------------------------------------------------------
+
+
+def test_covariance_of_few_equations_is_that_of_the_textbook(rng):
+    A, y = rng.normal(size=(12, 3)), rng.normal(size=12)
+    found = ordinary(of_columns(A, y))
+    squares = np.linalg.lstsq(A, y)[1][0]
+    np.testing.assert_allclose(found.sigma, np.sqrt(squares / 9), rtol=1e-12)
+    np.testing.assert_allclose(
+        found.covariance, squares / 9 * np.linalg.inv(A.T @ A), rtol=1e-10, atol=1e-12
+    )
+
+
+def test_deviations_of_two_groups_share_the_parameters_by_leverage(rng):
+    sides = [(rng.normal(size=(n, 3)) * s, rng.normal(size=n)) for n, s in ((30, 1.0), (15, 0.2))]
+    parts = [of_columns(*side) for side in sides]
+    counts = np.array([30, 15])
+    factors = TriangularFactors(
+        parts[0].names, tuple(part.factors[0] for part in parts), counts, 0 * counts
+    )
+    A = np.vstack([A for A, _ in sides])
+    x = np.linalg.lstsq(A, np.concatenate([y for _, y in sides]))[0]
+    inverse = np.linalg.inv(A.T @ A)
+    expected = [
+        np.sqrt(((y - A @ x) ** 2).sum() / (len(y) - np.trace(A @ inverse @ A.T))) for A, y in sides
+    ]
+    found = ordinary(factors)
+    np.testing.assert_allclose(found.values, x, rtol=1e-11)
+    np.testing.assert_allclose(found.sigma, expected, rtol=1e-11)
+
+
+def test_a_group_of_few_equations_has_the_noise_of_all(rng):
+    A, y = rng.normal(size=(40, 2)), rng.normal(size=40)
+    few = of_columns(A[:2], np.zeros(2))
+    many = of_columns(A[2:], y[2:])
+    factors = TriangularFactors(
+        few.names, (few.factors[0], many.factors[0]), np.array([2, 38]), np.zeros(2)
+    )
+    found = weighted(factors)
+    assert found.sigma[0] > 0.5 * found.sigma[1]
+    assert "Group 1 of the equations" in found.notes[0]
+
+
+# --- outliers ---------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("loss", ["huber", "cauchy", "tukey"])
@@ -97,188 +153,143 @@ def test_spikes_in_five_per_cent_of_the_torques_do_no_harm(loss):
     name = "coupled wrist"
     rng = np.random.default_rng(11)
     log = clean_log(ROBOTS[name], rng, 0.05, samples=3000)
-    tau = np.array(log.tau)
-    hit = rng.random(tau.shape) < 0.05
+    tau, hit = np.array(log.tau), rng.random(log.tau.shape) < 0.05
     hit[:, 0] = False
     tau[hit] += rng.uniform(10.0, 30.0, size=tau.shape)[hit]
-    system, reduction, true = prepared(name, log=Log(log.dt, log.q, tau, log.v, log.a))
-    found = robust(system, reduction, loss)
-    clean = weighted(prepared(name, log=log)[1])
-    worst = {
-        name: np.abs((e.values - true) / clean.deviations).max()
-        for name, e in (("plain", weighted(reduction)), ("robust", found))
-    }
+    system, factors, true = prepared(name, log=Log(log.dt, log.q, tau, log.v, log.a))
+    found = Robust(loss).solve(system, factors)
+    clean = weighted(prepared(name, log=log)[1]).standard_errors
     assert found.status is EstimateStatus.SOLVED
-    assert worst["plain"] > 20.0
-    assert worst["robust"] < (10.0 if loss == "huber" else 5.0)
+    assert np.abs((weighted(factors).values - true) / clean).max() > 20.0
+    assert np.abs((found.values - true) / clean).max() < (10.0 if loss == "huber" else 5.0)
     assert np.abs(found.sigma - 0.05).max() < (0.02 if loss == "huber" else 0.015)
-    counts = hit.sum(axis=0)
-    assert (np.abs(found.outliers.counts - counts) <= 3).all()
-    places = zip(np.round(found.outliers.t / log.dt).astype(int), found.outliers.kind, strict=True)
-    assert len(found.outliers.t) == min(int(found.outliers.counts.sum()), 1000)
+    far = found.details
+    assert (np.abs(far.counts - hit.sum(axis=0)) <= 3).all()
+    assert len(far.t) == min(int(far.counts.sum()), 1000)
+    places = zip(np.round(far.t / log.dt).astype(int), far.group, strict=True)
     assert np.mean([hit[k, j] for k, j in places]) > 0.98
-    assert (np.diff(found.outliers.t) >= 0.0).all()
-    assert str(int(found.outliers.counts.sum())) in found.notes[0]
-    influence = found.influence(np.full((1, 4), 1e6))
-    assert (influence <= 0.2).all()
-    assert (influence[0] == 0.0).all() == (loss == "tukey")
-    again = pickle.loads(pickle.dumps(found))
-    assert not again.slopes.flags.writeable
-    assert again.loss is found.loss
+    assert (np.diff(far.t) >= 0.0).all()
+    assert str(int(far.counts.sum())) in found.notes[0]
+    assert not pickle.loads(pickle.dumps(found)).details.size.flags.writeable
 
 
-def test_a_robust_estimate_does_not_depend_on_what_is_kept(monkeypatch):
-    system, reduction, _ = prepared("serial", 0.3, samples=600)
-    kept = robust(system, reduction, "cauchy")
-    monkeypatch.setattr("robotmodels.identification.methods.robust._KEPT_BYTES", 0)
-    streamed = robust(system, reduction, "cauchy")
-    assert (kept.values == streamed.values).all()
-    assert kept.iterations == streamed.iterations
-
-
-def test_lengths_give_medians_in_bounded_memory():
-    rng = np.random.default_rng(0)
-    x = np.abs(rng.normal(size=(20001, 2)) * [1e-9, 1e6])
-    use = rng.random(x.shape) < 0.7
-    whole, parts = Lengths(2), Lengths(2)
-    whole.add(x, use)
-    for k in range(0, 20001, 777):
-        parts.add(x[k : k + 777], use[k : k + 777])
-    assert (whole.counts == parts.counts).all()
-    medians = [np.median(x[use[:, j], j]) / 0.674489750 for j in range(2)]
-    np.testing.assert_allclose(whole.deviations(), medians, rtol=3e-3)
-    assert (Lengths(2).deviations() == 0.0).all()
-    nothing = Lengths(1)
-    nothing.add(np.zeros((5, 1)), np.ones((5, 1), dtype=bool))
-    assert nothing.deviations() == 0.0
+# --- noise in the columns ---------------------------------------------------------------------
 
 
 def noisy_columns(rng, rows=4000, level=0.3, torque=0.1):
-    """A regressor of three noisy columns and one of ones, in which least squares are biased."""
+    """A regressor of three noisy columns and one of ones, in which least squares is biased."""
     A = np.column_stack((rng.normal(size=(rows, 3)), np.ones(rows)))
     x = np.array([2.0, -1.0, 0.5, 3.0])
-    y = A @ x + torque * rng.normal(size=rows)
     seen = A + level * rng.normal(size=A.shape) * [1, 1, 1, 0]
-    factor = np.linalg.qr(np.column_stack((seen, y)), mode="r")
-    names = ("XX1", "XY1", "XZ1", "offset1")
-    return Reduction(names, (factor,), np.array([rows]), np.array([0])), x
+    return of_columns(seen, A @ x + torque * rng.normal(size=rows)), x
 
 
-def test_total_least_squares_are_unbiased_where_others_are_not():
+def test_total_least_squares_is_unbiased_where_least_squares_is_not():
     rng = np.random.default_rng(4)
     sums, plain = [], []
     for _ in range(60):
-        reduction, x = noisy_columns(rng)
-        found = total(reduction, [0.3, 0.3, 0.3, 0.0, 0.1])
-        assert found.solution is TotalStatus.GENERIC
-        assert found.method is Method.TLS
+        factors, x = noisy_columns(rng)
+        found = total(factors, [0.3, 0.3, 0.3, 0.0, 0.1])
+        assert found.details.solution is TotalStatus.UNIQUE
         e = found.values - x
         sums.append(e @ np.linalg.solve(found.covariance, e))
-        plain.append(weighted(reduction).values - x)
-        # residuals' deviation times the noise of the torque gives the noise that was put in
-        assert abs(found.scale * found.noise[-1] * weighted(reduction).sigma[0] - 0.1) < 0.006
+        plain.append(weighted(factors).values - x)
+        # the scale times the assumed noise of the right side gives the noise that was put in
+        noise = found.details.scale * found.details.noise[-1] * weighted(factors).sigma[0]
+        assert abs(noise - 0.1) < 0.006
     assert abs(np.mean(sums) / 4 - 1.0) < 0.45
     assert np.mean(plain, axis=0)[0] < -0.1
-    again, _ = noisy_columns(rng)
-    relative = total(again, 0.3 / np.sqrt(1.09))
-    assert relative.noise[3] == 0.0
+    factors, _ = noisy_columns(rng)
+    relative = total(factors, 0.3 / np.sqrt(1.09), [False, False, False, True])
+    assert relative.details.noise[3] == 0.0
     assert np.abs(relative.values - x).max() < 0.1
 
 
-def test_total_least_squares_say_when_there_is_no_solution():
+def test_total_least_squares_without_a_solution_is_weighted_least_squares():
     rng = np.random.default_rng(5)
     A = np.column_stack((rng.normal(size=500), 1e-3 * rng.normal(size=500)))
-    y = rng.normal(size=500)
-    whole = np.linalg.qr(np.column_stack((A, y)))[0] * [1.0, 1e-3, 1.0]
-    reduction = Reduction(
-        ("XX1", "XY1"), (np.linalg.qr(whole, mode="r"),), np.array([500]), np.array([0])
-    )
-    found = total(reduction, [1.0, 1.0, 1.0])
-    assert found.solution is TotalStatus.NOT_GENERIC
-    assert found.solution.sentence in found.notes
-    assert (found.values == weighted(reduction).values).all()
-    alike = np.linalg.qr(np.column_stack((A, y)))[0]
-    reduction = Reduction(
-        ("XX1", "XY1"),
-        (np.linalg.qr(alike + 1e-9 * A[:, :1], mode="r"),),
-        np.array([500]),
-        np.array([0]),
-    )
-    assert total(reduction, [1.0, 1.0, 1.0]).solution is not TotalStatus.GENERIC
+    Q = np.linalg.qr(np.column_stack((A, rng.normal(size=500))))[0]
+    whole = Q * [1.0, 1e-3, 1.0]
+    factors = of_columns(whole[:, :2], whole[:, 2])
+    found = total(factors, [1.0, 1.0, 1.0])
+    assert found.details.solution is TotalStatus.NO_SOLUTION
+    assert found.details.solution.sentence in found.notes
+    assert (found.values == weighted(factors).values).all()
+    equal = Q + 1e-9 * A[:, :1]
+    found = total(of_columns(equal[:, :2], equal[:, 2]), [1.0, 1.0, 1.0])
+    assert found.details.solution is not TotalStatus.UNIQUE
     with pytest.raises(ShapeError, match="noise"):
-        total(reduction, [1.0, 1.0])
-    with pytest.raises(InvalidValueError, match="negative"):
-        total(reduction, -0.1)
-    with pytest.raises(InvalidValueError, match="torque"):
-        total(reduction, [1.0, 1.0, 0.0])
+        total(factors, [1.0, 1.0])
+    for wrong in (-0.1, [1.0, 1.0, 0.0]):
+        with pytest.raises(InvalidValueError, match="noise"):
+            total(factors, wrong)
 
 
-def test_a_prior_is_what_extra_equations_would_be():
-    _, reduction, true = prepared("prismatic", 0.5, samples=200)
-    b = len(true)
-    rng = np.random.default_rng(0)
+# --- priors -----------------------------------------------------------------------------------
+
+
+def test_a_prior_is_equal_to_extra_equations():
+    _, factors, true = prepared("prismatic", 0.5, samples=200)
+    b, rng = len(true), np.random.default_rng(0)
     prior, spread = true + 0.1 * rng.normal(size=b), rng.uniform(0.01, 1.0, size=b)
-    start = weighted(reduction)
-    R, y, _ = reduction.stacked(1.0 / ordinary(reduction).sigma)
+    R, y, _ = factors.stacked(first_weights(factors))
     for strength in (None, 1.0, 0.0, 40.0):
         s = np.sqrt(1.0 if strength is None else strength)
         whole, side = np.vstack((R, np.diag(s / spread))), np.append(y, s * prior / spread)
+        found = ridge(factors, prior, spread, strength)
         expected = np.linalg.lstsq(whole, side, rcond=None)[0]
-        found = ridge(reduction, prior, spread, strength)
         np.testing.assert_allclose(found.values, expected, rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(found.covariance, np.linalg.inv(whole.T @ whole), rtol=1e-6)
         hat = R @ np.linalg.inv(whole.T @ whole) @ R.T
-        assert abs(found.degrees - np.trace(hat)) < 1e-7
-    np.testing.assert_allclose(ridge(reduction, strength=0.0).values, start.values, rtol=1e-9)
-    assert ridge(reduction, prior, spread, strength=1e12).degrees < 0.01
+        assert abs(found.details.degrees - np.trace(hat)) < 1e-7
+    np.testing.assert_allclose(
+        ridge(factors, strength=0.0).values, weighted(factors).values, rtol=1e-9
+    )
+    assert ridge(factors, prior, spread, strength=1e12).details.degrees < 0.01
 
 
-def test_the_strength_follows_the_worth_of_the_prior():
-    # a log that says little: a prior that is right helps, one that is wrong is put aside
-    system, reduction, true = prepared("prismatic", 20.0, samples=300)
+def test_the_strength_follows_the_quality_of_the_prior():
+    # a log of little information: a right prior helps, a wrong one is given little strength
+    system, factors, true = prepared("prismatic", 20.0, samples=300)
     parts = segments(system, 4)
-    assert sum(part.rows for part in parts) == reduction.rows
-    spread = np.full(len(true), 0.01)
-    wrong = true + 3.0
-    plain = np.abs(weighted(reduction).values - true).sum()
-    for options in ({}, {"parts": parts}):
-        right = ridge(reduction, true, spread if options else None, **options)
-        far = ridge(reduction, wrong, spread if options else None, **options)
-        assert right.strength > 10.0 * far.strength
+    assert sum(part.rows for part in parts) == factors.rows
+    plain = np.abs(weighted(factors).values - true).sum()
+    for folds in (None, parts):
+        right, far = (ridge(factors, prior, folds=folds) for prior in (true, true + 3.0))
+        assert right.details.strength > 10.0 * far.details.strength
         assert np.abs(right.values - true).sum() < 0.5 * plain
-        assert right.degrees < far.degrees
-    chosen = select_ridge_strength(parts, true, spread)
-    assert chosen.errors.shape == (len(chosen.strengths), 4)
-    for wrong_call in (
-        lambda: ridge(reduction, strength=-1.0),
-        lambda: ridge(reduction, deviations=np.zeros(len(true))),
-        lambda: ridge(reduction, strength=1.0, parts=parts),
-        lambda: ridge(reduction, parts=parts[:1]),
+        assert right.details.degrees < far.details.degrees
+    for wrong in (
+        lambda: ridge(factors, strength=-1.0),
+        lambda: ridge(factors, errors=np.zeros(len(true))),
+        lambda: ridge(factors, folds=parts[:1]),
         lambda: segments(system, 1),
     ):
         with pytest.raises(InvalidValueError):
-            wrong_call()
+            wrong()
+
+
+# --- joint by joint -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_steps_go_from_the_last_joint_to_the_first(name):
-    system, reduction, _ = prepared(name, 0.1)
-    found = sequential(system, reduction)
-    joints = [j for step in found.steps for j in step.joints]
-    assert sorted(joints) == list(range(1, ROBOTS[name].n + 1))
-    firsts = [step.joints[0] for step in found.steps]
+    system, factors, _ = prepared(name, 0.1)
+    found = Sequential().solve(system, factors)
+    steps = found.details
+    assert sorted(j for step in steps for j in step.joints) == list(range(1, ROBOTS[name].n + 1))
+    firsts = [step.joints[0] for step in steps]
     assert firsts == sorted(firsts, reverse=True)
-    assert ((3, 4) in [step.joints for step in found.steps]) == (name == "coupled wrist")
-    told = [name for step in found.steps for name in step.names]
-    assert sorted(told) == sorted(reduction.names)
-    assert all(abs(step.sigma - 0.1) < 0.01 for step in found.steps)
-    assert found.steps[0].equations == reduction.counts[-1] * len(found.steps[0].joints)
+    assert ((3, 4) in [step.joints for step in steps]) == (name == "coupled wrist")
+    assert sorted(name for step in steps for name in step.names) == sorted(factors.names)
+    assert all(abs(step.sigma - 0.1) < 0.01 for step in steps)
+    assert steps[0].equations == factors.counts[-1] * len(steps[0].joints)
     # all steps at once are never worse
-    assert (found.deviations > 0.95 * weighted(reduction).deviations).all()
+    assert (found.standard_errors > 0.95 * weighted(factors).standard_errors).all()
 
 
 def resting_first_joint(rng, noise):
-    """A planar arm whose first joint rests: the second tells ZZ2 + Ia2 alone, the first ZZ2."""
+    """A planar arm whose first joint rests: the second determines ZZ2 + Ia2, the first ZZ2."""
     model = rm.load("planar_2r").with_drive(
         rm.DriveParameters(Ia=[0.4, 0.3], Fv=[1.0, 2.0], Fc=[0.5, 0.7], offset=[0.1, -0.2])
     )
@@ -289,124 +300,180 @@ def resting_first_joint(rng, noise):
     base = base_parameters(model, drive=True)
     processing = choose_processing(log, filtered=False, decimation=1, edges=0.0, dead_band=0.0)
     every = equations(base, log, processing)
-    R, _, _ = reduce_equations(every).stacked()
-    kept = column_basis(R, nothing=1e-7).kept.tolist()
-    return every.with_names(tuple(base.names[k] for k in kept))
+    kept = column_basis(reduce_equations(every).stacked()[0], nothing=1e-7).kept.tolist()
+    system = every.with_names(tuple(base.names[k] for k in kept))
+    return system, reduce_equations(system)
 
 
-def test_what_a_joint_does_not_tell_waits_for_the_joint_before():
-    exact = resting_first_joint(np.random.default_rng(0), 0.0)
-    reduction = reduce_equations(exact)
-    found = sequential(exact, reduction)
-    assert found.steps[0].waiting == ("ZZ2", "Ia2")
-    assert {"ZZ2", "Ia2"} <= set(found.steps[1].names)
-    np.testing.assert_allclose(found.values, weighted(reduction).values, atol=1e-10)
+def test_combined_parameters_wait_for_the_joint_before():
+    exact, factors = resting_first_joint(np.random.default_rng(0), 0.0)
+    found = Sequential().solve(exact, factors)
+    assert found.details[0].waiting == ("ZZ2", "Ia2")
+    assert {"ZZ2", "Ia2"} <= set(found.details[1].names)
+    np.testing.assert_allclose(found.values, weighted(factors).values, atol=1e-10)
     sums = []
     for seed in range(60):
-        system = resting_first_joint(np.random.default_rng(seed), 0.2)
-        noisy = sequential(system, reduce_equations(system))
-        clean = resting_first_joint(np.random.default_rng(seed), 0.0)
-        e = noisy.values - weighted(reduce_equations(clean)).values
+        noisy = Sequential().solve(*resting_first_joint(np.random.default_rng(seed), 0.2))
+        clean = resting_first_joint(np.random.default_rng(seed), 0.0)[1]
+        e = noisy.values - weighted(clean).values
         sums.append(e @ np.linalg.solve(noisy.covariance, e))
     b = len(found.names)
     assert abs(np.mean(sums) / b - 1.0) < 4.0 * np.sqrt(2.0 / (60 * b)) + 0.03
 
 
-def test_the_last_joint_does_not_learn_from_the_others():
+def test_errors_of_other_joints_do_not_reach_the_last_one():
     name = "rx90"
     log = clean_log(ROBOTS[name], np.random.default_rng(3), 0.1, samples=1500)
     tau = np.array(log.tau)
     tau[:, :4] += 30.0 * np.sin(log.t)[:, None]  # a wrong model of the other joints
-    results = []
-    for torques in (log.tau, tau):
-        given = Log(log.dt, log.q, torques, log.v, log.a)
-        system, reduction, _ = prepared(name, log=given)
-        results.append(sequential(system, reduction))
-    own = [results[0].names.index(n) for step in results[0].steps[:2] for n in step.names]
-    np.testing.assert_allclose(results[0].values[own], results[1].values[own], rtol=1e-9, atol=1e-9)
-    momentum, reduced, true = prepared(name, form=EquationForm.FILTERED)
-    assert np.abs(sequential(momentum, reduced).values - true).max() < 1e-5
-    power, reduced, _ = prepared(name, form=EquationForm.POWER)
+    logs = (log, Log(log.dt, log.q, tau, log.v, log.a))
+    one, other = (Sequential().solve(*prepared(name, log=given)[:2]) for given in logs)
+    last = [one.names.index(n) for step in one.details[:2] for n in step.names]
+    np.testing.assert_allclose(one.values[last], other.values[last], rtol=1e-9, atol=1e-9)
+    momentum, factors, true = prepared(name, form=EquationForm.FILTERED)
+    assert np.abs(Sequential().solve(momentum, factors).values - true).max() < 1e-5
     with pytest.raises(InvalidValueError, match="form"):
-        sequential(power, reduced)
+        Sequential().solve(*prepared(name, form=EquationForm.POWER)[:2])
+
+
+# --- in time ------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["serial", "tree", "rx90"])
-def test_recursion_ends_where_weighted_least_squares_are(name):
-    system, reduction, _ = prepared(name, 0.3)
-    found = recursive(system, reduction, every=37)
-    expected = weighted(reduction)
+def test_recursion_ends_at_weighted_least_squares(name):
+    system, factors, _ = prepared(name, 0.3)
+    found, expected = Recursive().solve(system, factors), weighted(factors)
     size = np.abs(expected.values).max()
     assert np.abs(found.values - expected.values).max() < 1e-10 * size
-    np.testing.assert_allclose(found.deviations, expected.deviations, rtol=1e-8)
-    assert len(found.history) == -(-2000 // 37)
-    assert found.memory == 2000.0
-    for k in (20, 40):  # the history is what the log up to there tells
-        t = found.history.t[k]
-        part = system.log.rows(0, round(t / system.log.dt) + 1)
-        cut = reduce_equations(equations(system.base, part, system.processing))
-        R, y, rest = cut.stacked(found.weights)
+    np.testing.assert_allclose(found.standard_errors, expected.standard_errors, rtol=1e-8)
+    history = found.details
+    assert (len(history), history.memory) == (200, 2000.0)
+    # fewer instants than parameters determine none
+    assert np.isnan(history.values[0]).all()
+    assert not np.isnan(history.values[-1]).any()
+    for k in (100, 150):  # the history is what the log up to there determines
+        part = system.log.rows(0, round(history.t[k] / system.log.dt) + 1)
+        cut = reduce_equations(system.with_log(part))
+        R, y, rest = cut.stacked(first_weights(factors))
         values = np.linalg.solve(R, y)
-        np.testing.assert_allclose(found.history.values[k], values, atol=1e-9 * size)
-        inverse = np.linalg.inv(R)
+        np.testing.assert_allclose(history.values[k], values, atol=1e-9 * size)
         scale = rest / (cut.rows - len(values))
-        deviations = np.sqrt(scale) * np.linalg.norm(inverse, axis=1)
-        np.testing.assert_allclose(found.history.deviations[k], deviations, rtol=1e-7)
-    early = recursive(system, reduction, every=1).history
-    assert np.isnan(early.values[0]).all()
-    assert not np.isnan(early.values[-1]).any()
+        errors = np.sqrt(scale) * np.linalg.norm(np.linalg.inv(R), axis=1)
+        np.testing.assert_allclose(history.standard_errors[k], errors, rtol=1e-7)
 
 
-def test_as_many_rows_as_columns_are_reduced_before_they_are_judged():
-    """b + 1 equations without a change of sign: Fc is the offset, though no diagonal shows it."""
+def test_dry_friction_is_unknown_until_the_velocity_changes_its_sign():
     model = rm.RobotModel.from_table(rm.DHTable(antecedent=[0], sigma=[0]))
     base = base_parameters(model, drive=True)
-    b, t = len(base), 0.02 * np.arange(370)[:, None]
+    t = 0.02 * np.arange(370)[:, None]
     q, v, a = np.sin(3 * t), 3 * np.cos(3 * t), -9 * np.sin(3 * t)
-    true = np.linspace(1.0, 2.0, b)
-    tau = base.reduce(rm.torque_regressor(model, q, v, a, drive=base.drive)) @ true
-    log = Log(0.02, q, tau, v, a)
+    true = np.linspace(1.0, 2.0, len(base))
+    log = Log(0.02, q, base.reduce(rm.torque_regressor(model, q, v, a, drive=base.drive)) @ true,
+              v, a)  # fmt: skip
     given = choose_processing(log, filtered=False, decimation=1, edges=0.0, dead_band=0.0)
     system = equations(base, log, given)
-    history = recursive(system, reduce_equations(system), every=b + 1).history
-    turned = int((v > 0.0).argmin()) // (b + 1)
-    assert np.isnan(history.values[:turned]).all()
-    assert np.isnan(history.deviations[:turned]).all()
-    values = history.values[turned:]
+    history = Recursive().solve(system, reduce_equations(system)).details
+    before = history.t < log.dt * int((v > 0.0).argmin())
+    assert 10 < before.sum() < 100
+    for rows in (history.values, history.standard_errors):
+        assert np.isnan(rows[before]).all()
+    values = history.values[len(before) - (~before).sum() + 2 :]
     np.testing.assert_allclose(values, np.tile(true, (len(values), 1)), rtol=1e-8)
-    # the same number of rows, told from the start: without what only a change of sign tells
-    base = base_parameters(model, drive=("Fv",))
-    system = equations(base, Log(0.02, q, v * true[1] + a * true[0], v, a), given)
-    assert base.names == ("ZZ1", "Fv1")
-    history = recursive(system, reduce_equations(system), every=3).history
-    np.testing.assert_allclose(history.values, np.tile(true[:2], (len(history), 1)), rtol=1e-8)
 
 
 def test_forgetting_follows_a_parameter_that_drifts():
     name = "serial"
     log = clean_log(ROBOTS[name], np.random.default_rng(3), 0.05, samples=6000)
     k = BASES[name].names.index("Fv4")
-    drift = np.where(np.arange(6000) < 3000, 0.0, 2.0)
     tau = np.array(log.tau)
-    tau[:, 3] += drift * log.v[:, 3]
-    system, reduction, true = prepared(name, log=Log(log.dt, log.q, tau, log.v, log.a))
-    found = recursive(system, reduction, forgetting=0.998)
-    assert abs(found.memory - 500.0) < 1.0
+    tau[:, 3] += np.where(np.arange(6000) < 3000, 0.0, 2.0) * log.v[:, 3]
+    system, factors, true = prepared(name, log=Log(log.dt, log.q, tau, log.v, log.a))
+    found = Recursive(0.998).solve(system, factors)
+    history = found.details
+    assert abs(history.memory - 500.0) < 1.0
     assert abs(found.values[k] - true[k] - 2.0) < 0.1
-    assert abs(weighted(reduction).values[k] - true[k] - 2.0) > 0.4
-    before = np.searchsorted(found.history.t, 3000 * log.dt) - 1
-    assert abs(found.history.values[before, k] - true[k]) < 0.1
+    assert abs(weighted(factors).values[k] - true[k] - 2.0) > 0.4
+    before = np.searchsorted(history.t, 3000 * log.dt) - 1
+    assert abs(history.values[before, k] - true[k]) < 0.1
     # weights of age by hand
     blocks = list(system.blocks())
-    whole_W, whole_y = (np.concatenate([getattr(b, x) for b in blocks]) for x in ("W", "y"))
-    w = 0.998 ** (np.arange(5999, -1, -1)[:, None] / 2.0) * found.weights
-    A, y = (w[..., None] * whole_W).reshape(-1, len(true)), (w * whole_y).reshape(-1)
-    expected = np.linalg.lstsq(A, y, rcond=None)[0]
+    W, y = (np.concatenate([getattr(b, x) for b in blocks]) for x in ("W", "y"))
+    w = 0.998 ** (np.arange(5999, -1, -1)[:, None] / 2.0) * first_weights(factors)
+    A, side = (w[..., None] * W).reshape(-1, len(true)), (w * y).reshape(-1)
+    expected = np.linalg.lstsq(A, side, rcond=None)[0]
     np.testing.assert_allclose(found.values, expected, atol=1e-9)
     for wrong in (0.0, 1.1, -0.5):
         with pytest.raises(InvalidValueError, match="forgetting"):
-            recursive(system, reduction, forgetting=wrong)
-    with pytest.raises(InvalidValueError, match="do not tell"):
-        recursive(system, reduction, forgetting=0.3)
-    with pytest.raises(InvalidValueError, match="every"):
-        recursive(system, reduction, every=0)
+            Recursive(wrong).solve(system, factors)
+    with pytest.raises(InvalidValueError, match="do not determine"):
+        Recursive(0.3).solve(system, factors)
+
+
+# --- essential parameters -----------------------------------------------------------------------
+
+NAMES = ("XX1", "XY1", "XZ1", "YZ1", "ZZ1", "MX1", "MY1", "Fv1")
+
+
+def designed(rng, rows=2000):
+    """Columns of like lengths and values from large to zero."""
+    A = rng.normal(size=(rows, 8))
+    y = A @ [100.0, 50.0, 20.0, 10.0, 0.0, 0.0, 0.0, 0.03] + rng.normal(size=rows)
+    return of_columns(A, y, NAMES), A, y
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_parameters_without_effect_are_dropped_in_the_order_of_their_errors(rule):
+    factors, A, y = designed(np.random.default_rng(2))
+    found = essential(factors, weighted(factors), rule)
+    assert found.names[:4] == NAMES[:4]
+    assert len(found.names) + len(found.dropped) == 8
+    assert len(found.names) <= 6
+    kept = list(range(8))
+    for name in found.dropped:
+        values, rest, *_ = np.linalg.lstsq(A[:, kept], y, rcond=None)
+        inverse = np.linalg.inv(A[:, kept].T @ A[:, kept])
+        relative = np.sqrt(rest[0] * np.diag(inverse)) / np.abs(values)
+        assert NAMES[kept[int(np.argmax(relative))]] == name
+        kept.pop(int(np.argmax(relative)))
+    again = weighted(factors.with_names(found.names))
+    np.testing.assert_allclose(
+        again.values, np.linalg.lstsq(A[:, kept], y, rcond=None)[0], rtol=1e-9
+    )
+
+
+def test_residuals_grow_by_a_tenth_at_most_and_by_chance_where_that_is_the_rule():
+    _, factors, _ = prepared("rx90", 0.5)
+    first = weighted(factors)
+    weights = first_weights(factors)
+    rest = factors.stacked(weights)[2]
+
+    def grown(found):
+        return np.sqrt(factors.with_names(found.names).stacked(weights)[2] / rest) - 1.0
+
+    assert 0.05 < grown(essential(factors, first)) <= 0.1
+    tested = essential(factors, first, "f_test")
+    gone = [factors.names.index(name) for name in tested.dropped]
+    assert (first.relative_errors[gone] > 0.2).all()
+    akaike = essential(factors, first, "aic")
+    assert grown(akaike) < np.exp(len(akaike.dropped) / factors.rows) - 1.0
+    for wrong in (0.5, "guess"):
+        with pytest.raises(InvalidValueError, match="essential"):
+            essential(factors, first, wrong)
+    with pytest.raises(InvalidValueError, match="XX9"):
+        factors.with_names(("XX9",))
+
+
+# Essential parameters of the TX40's log as they were published with it (FIGAROH, file of 25
+# essential parameters, ratio of relative deviations), by their standard names.
+PUBLISHED = """
+    ZZ1 Fv1 Fc1 XX2 XZ2 ZZ2 MX2 Fv2 Fc2 XX3 ZZ3 MY3 Ia3 Fv3 Fc3 Ia4 Fv4 Fc4 MY5 Ia5 Fv5 Fc5 Fv6
+    Fvm6 Fcm6
+"""
+
+
+def test_the_published_essential_parameters_of_a_real_robot_are_found():
+    data = rm.datasets.load_tx40()
+    base = base_parameters(data.model)
+    found = fit(data.model, data.log, "ols:essential=True", base=base)
+    # the rotor of the last motor is a column of its own here
+    assert set(found.names) == {*PUBLISHED.split(), "Ia6", "Iam6"}

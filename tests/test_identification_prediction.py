@@ -10,14 +10,16 @@ from identities.random_robots import random_model
 
 import robotmodels as rm
 from robotmodels.errors import InvalidValueError, RobotModelsWarning
+from robotmodels.estimation.estimate import EstimateStatus
 from robotmodels.identification import (
-    EstimateStatus,
     Log,
     compare_methods,
     consistent_robot,
     fit,
     identify_payload,
-    report_text,
+    predicted_torque,
+    report,
+    validate,
     write_result,
 )
 
@@ -87,7 +89,7 @@ def test_every_method_and_form_warns_of_a_log_that_it_cannot_explain(method, for
     assert status is not EstimateStatus.SOLVED
     assert len(said) == 1
     assert found.notes[0] == said[0]
-    verdict = plain(report_text(found)).split(" * ")[1]
+    verdict = plain(report(found)).split(" * ")[1]
     if status is EstimateStatus.UNSTABLE:
         assert said[0].startswith(status.sentence)
         assert verdict.startswith(status.sentence)
@@ -100,10 +102,10 @@ def test_the_sentence_names_joints_parts_and_the_log():
     wrong = log_of(lambda q, v, tau: tau * [1.0, -1.0])
     found, said = noticed(arm(), log_of(), test=wrong, checked=False)
     assert found.estimate.status is EstimateStatus.POOR_PREDICTION
-    assert "on the log kept aside: joint_2 (200 %)" in said[0]
+    assert "on the held-out log: joint_2 (200 %)" in said[0]
     assert "joint_1" not in said[0]
     assert "worse than predicting zero torque: joint_2." in said[0]
-    assert "do not carry over" in said[0]
+    assert "do not generalise" in said[0]
     # the same log fitted, which no parameters explain
     found, said = noticed(arm(), wrong, checked=False)
     assert "on the log: joint_" in said[0]
@@ -127,11 +129,11 @@ def test_of_random_robots_joints_are_named_from_thirty_per_cent_on(seed):
             return Log(log.dt, log.q, tau, log.v, log.a)
 
         found, said = noticed(model, loaded(log), test=loaded(other), checked=False)
-        own, aside = found.fitted, found.held_out
+        own, aside = found.validation.in_sample, found.validation.held_out
         text = " ".join(said)
         for j, name in enumerate(model.table.joint_names):
             if own.filtered_relative[j] > 0.31:
-                assert f"{name} (" in text.split("; on the log kept aside")[0]
+                assert f"{name} (" in text.split("; on the held-out log")[0]
             if max(own.filtered_relative[j], aside.filtered_relative[j]) < 0.29:
                 assert f"{name} (" not in text
             if aside.relative[j] > 1.05:
@@ -163,7 +165,7 @@ def test_noise_and_ripple_that_no_model_explains_are_no_poor_prediction():
         found, said = noticed(arm(), log_of(change), test=log_of(change, seed=1), checked=False)
         assert said == []
         assert found.estimate.status is EstimateStatus.SOLVED
-        assert found.held_out.relative.max() > 0.35
+        assert found.validation.held_out.relative.max() > 0.35
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -177,7 +179,7 @@ def test_a_joint_that_rests_is_judged_with_all_joints_together(seed):
     noise = rng.normal(size=(2, *q.shape))  # by which parameters of the joint seem to be seen
     torque = tau + 0.01 * np.sqrt(np.mean(tau**2, axis=0)) * noise[1]
     found, said = noticed(model, Log(2e-3, q + 1e-5 * noise[0], torque), checked=False)
-    own = found.fitted
+    own = found.validation.in_sample
     assert np.isnan(own.filtered_relative[-1])
     assert np.nanmax(own.filtered_relative) < 0.1
     part = own.rmse[-1] / np.linalg.norm(own.rmse / own.relative)
@@ -201,7 +203,7 @@ def test_tables_of_methods_show_the_status_of_poor_fits_and_do_not_repeat_the_wa
     assert found.fit_table.count("poor prediction") == 2
 
 
-# --- a simulated robot that ran away --------------------------------------------------------
+# --- a simulated robot that diverged --------------------------------------------------------
 
 
 @cache
@@ -215,32 +217,33 @@ def test_a_robot_that_ran_away_has_no_numbers_that_look_like_results():
     assert found.estimate.status is EstimateStatus.UNSTABLE
     assert said == [found.notes[0]]
     assert "start=" in said[0]
-    for numbers in (found.values, found.deviations, found.estimate.covariance, found.white,
-                    found.fitted.rmse, found.held_out.filtered_relative):  # fmt: skip
+    white, errors = found.details.iid_standard_errors, found.validation
+    for numbers in (found.values, found.standard_errors, found.covariance, white,
+                    errors.in_sample.rmse, errors.held_out.filtered_relative):  # fmt: skip
         assert np.isnan(numbers).all()
-    assert "ran away" in repr(found)
+    assert "diverged" in repr(found)
 
 
 def test_a_robot_that_ran_away_is_not_predicted_written_drawn_or_made_real(tmp_path):
     found, _ = ran_away()
     q = np.zeros(2)
     for refused in (
-        lambda: found.predict(q, q, q),
-        lambda: found.validate(log_of()),
+        lambda: predicted_torque(found, q, q, q),
+        lambda: validate(found, log_of()),
         lambda: consistent_robot(found),
         lambda: write_result(found, tmp_path / "result.json"),
         lambda: write_result(found, tmp_path / "result.urdf"),
         lambda: identify_payload(arm(), log_of(), found),
         lambda: rm.viz.plot_identification_parameters(found),
     ):
-        with pytest.raises(InvalidValueError, match="ran away, so that there are no parameters"):
+        with pytest.raises(InvalidValueError, match="diverged, so that there are no parameters"):
             refused()
     assert not list(tmp_path.iterdir())
 
 
 def test_the_report_of_a_robot_that_ran_away_says_so_and_shows_no_parameters():
     found, _ = ran_away()
-    text = report_text(found)
+    text = report(found)
     assert plain(text).split(" * ")[1].startswith(found.estimate.status.sentence)
     assert "negative" not in text
     assert "\nParameters\n" not in text
@@ -270,6 +273,6 @@ def test_the_command_line_prints_the_sentence_and_ends_with_its_status(tmp_path,
             str(tmp_path / "tau.csv"), "--dt", str(DT), "--no-check"]  # fmt: skip
     assert main([*call, "--method", "iv", "--out", str(tmp_path / "out")]) == 1
     out, err = capsys.readouterr()
-    assert "ran away" in err
+    assert "diverged" in err
     assert "│" not in out
     assert not (tmp_path / "out" / "result.json").exists()

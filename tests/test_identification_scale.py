@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import multiprocessing
-import subprocess
-import sys
 import threading
 import time
 import tracemalloc
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
-from dataclasses import replace
 from functools import cache
 from importlib import import_module
 
@@ -18,17 +15,14 @@ import pytest
 
 import robotmodels as rm
 from robotmodels.errors import InvalidValueError
-from robotmodels.identification import (
-    EquationForm,
-    choose_processing,
-    equations,
-    reduce_equations,
-    weighted,
-)
-from robotmodels.identification.preparation.signals import Piece, piece_alone, piece_signals
-from robotmodels.identification.scale.many_robots import reduce_many
-from robotmodels.identification.scale.reduction import merge
-from robotmodels.logs import Log, RefusedRows
+from robotmodels.estimation.covariance import correlated_covariance
+from robotmodels.estimation.factor import merged
+from robotmodels.estimation.linear import weighted
+from robotmodels.identification import choose_processing, equations, reduce_equations
+from robotmodels.identification.forms import EquationForm
+from robotmodels.identification.signals import Piece, piece_signals, slice_with_margin
+from robotmodels.logs import Log
+from robotmodels.logs.log import RefusedRows
 from robotmodels.minimal_parameters import base_parameters
 
 DT = 0.002
@@ -64,18 +58,9 @@ def replace_starts(log: Log, starts: tuple[int, ...]) -> Log:
     return Log(log.dt, log.q, log.tau, starts=starts)
 
 
-def bits(reduction) -> bytes:
-    counts = reduction.counts.tobytes() + reduction.left_out.tobytes()
-    return b"".join(R.tobytes() for R in reduction.factors) + counts
-
-
-@pytest.mark.parametrize("form", list(EquationForm))
-@pytest.mark.parametrize("decimation", [1, 5])
-def test_every_form_has_the_same_bits_from_threads(form, decimation):
-    whole = system(form, decimation)
-    here = bits(reduce_equations(whole))
-    with ThreadPoolExecutor(3) as pool:
-        assert bits(reduce_equations(whole, pool)) == here
+def bits(factors) -> bytes:
+    counts = factors.counts.tobytes() + factors.left_out.tobytes()
+    return b"".join(R.tobytes() for R in factors.factors) + counts
 
 
 @pytest.mark.parametrize("workers", [1, 2, 3, 4])
@@ -126,38 +111,12 @@ def test_a_dask_cluster_gives_the_same_bits(processes):
         assert bits(reduce_equations(whole, pool)) == here
 
 
-CODE = """
-import hashlib, numpy as np
-from robotmodels.identification.equations import Block
-from robotmodels.identification.scale.reduction import block_reduction, merge
-rng = np.random.default_rng(0)
-parts = []
-for _ in range(2):
-    W, y = rng.normal(size=(8192, 1, 64)), rng.normal(size=(8192, 1))
-    use = np.ones((8192, 1), dtype=bool)
-    names = tuple(map(str, range(64)))
-    parts.append(block_reduction(names, Block(np.arange(8192.0), W, y, use, y)))
-R, y, rest = merge(*parts).stacked()
-print(hashlib.sha256(R.tobytes() + y.tobytes() + np.float64(rest).tobytes()).hexdigest())
-"""
-
-
-def test_threads_of_blas_change_no_bit(monkeypatch):
-    found = set()
-    for threads in ("1", "2"):
-        monkeypatch.setenv("OPENBLAS_NUM_THREADS", threads)
-        run = subprocess.run([sys.executable, "-c", CODE], capture_output=True, text=True)
-        assert run.returncode == 0, run.stderr
-        found.add(run.stdout)
-    assert len(found) == 1
-
-
 def test_the_factor_is_that_of_all_equations():
     whole = system(decimation=7)
-    reduction = reduce_equations(whole)
+    factors = reduce_equations(whole)
     blocks = list(whole.blocks())
     weights = np.array([1.0, 3.0])
-    R, y, rest = reduction.stacked(weights)
+    R, y, rest = factors.stacked(weights)
     rows = np.vstack([
         w * np.column_stack((b.W[:, j], b.y[:, j]))[b.use[:, j]]
         for j, w in enumerate(weights)
@@ -169,7 +128,7 @@ def test_the_factor_is_that_of_all_equations():
     found[-1, -1] = y @ y + rest
     size = np.sqrt(np.diag(N))
     np.testing.assert_allclose(found / np.outer(size, size), N / np.outer(size, size), atol=1e-12)
-    assert reduction.rows == len(rows)
+    assert factors.rows == len(rows)
 
 
 def test_fewer_equations_than_parameters_and_columns_of_zeros():
@@ -177,20 +136,20 @@ def test_fewer_equations_than_parameters_and_columns_of_zeros():
     log = recorded("rx90", 400, 1)
     whole = equations(base_parameters(model), log, choose_processing(log, decimation=50, edges=0))
     block = whole.block(whole.pieces()[0])
-    reduction = reduce_equations(whole)
-    for j, R in enumerate(reduction.factors):
+    factors = reduce_equations(whole)
+    for j, R in enumerate(factors.factors):
         rows = np.column_stack((block.W[:, j], block.y[:, j]))[block.use[:, j]]
         scale = max(float(abs(rows.T @ rows).max()), 1e-300)
         np.testing.assert_allclose(R.T @ R / scale, rows.T @ rows / scale, atol=1e-13)
 
 
-def test_a_task_has_the_rows_of_its_piece_alone():
+def test_a_task_has_the_rows_of_its_slice_with_margin():
     whole = system()
     told = RefusedRows("a.csv", tuple(range(1000)), "NaN")
     log = Log(DT, whole.log.q, whole.log.tau, v=whole.log.q, refused=[told], notes=["long"])
     chosen = whole.processing
     for piece in whole.pieces():
-        alone, moved = piece_alone(log, chosen, piece)
+        alone, moved = slice_with_margin(log, chosen, piece)
         assert np.shares_memory(alone.q, log.q)
         assert (alone.refused, alone.notes) == ((), ())
         assert len(alone) < (piece.stop - piece.start) + 2 * 16384
@@ -202,7 +161,7 @@ def test_a_task_has_the_rows_of_its_piece_alone():
 
 def test_pieces_of_another_log_are_refused():
     whole = system()
-    with pytest.raises(InvalidValueError, match=r"take the pieces of this log"):
+    with pytest.raises(InvalidValueError, match=r"gives for this log"):
         whole.block(Piece(89_000, 91_000, 0, 100_000, 0, 100_000))
 
 
@@ -256,7 +215,7 @@ def test_after_an_error_what_waits_is_cancelled():
 
 def test_progress_never_falls_and_ends_at_one():
     whole = system()
-    logs = [whole, replace(whole, log=whole.log.rows(0, 50_000)), whole]
+    logs = [whole, whole.with_log(whole.log.rows(0, 50_000)), whole]
     with ThreadPoolExecutor(2) as pool:
         for executor in (None, pool):
             told: list[float] = []
@@ -282,7 +241,7 @@ def test_files_opened_one_at_a_time_give_what_merging_gives():
     one = reduce_equations(files())
     assert opened == [0, 1, 2, 3]
     parts = [reduce_equations(part) for part in files()]
-    other = merge(merge(parts[3], parts[1]), merge(parts[0], parts[2]))
+    other = merged(merged(parts[3], parts[1]), merged(parts[0], parts[2]))
     a, b = weighted(one), weighted(other)
     np.testing.assert_allclose(a.values, b.values, rtol=1e-9, atol=1e-9 * abs(b.values).max())
     np.testing.assert_allclose(a.covariance, b.covariance, rtol=1e-9, atol=1e-18)
@@ -300,7 +259,7 @@ def test_pieces_give_what_one_pass_gives(cutoff, monkeypatch):
     cut = equations(whole.base, log, chosen)
     in_pieces, blocks = reduce_equations(cut), list(cut.blocks())
     assert len(blocks) > 3
-    module = import_module("robotmodels.identification.preparation.signals")
+    module = import_module("robotmodels.identification.signals")
     monkeypatch.setattr(module, "PIECE", 10**9)
     monkeypatch.setattr(module, "_INSTANTS", 10**9)
     (block,) = cut.blocks()
@@ -310,24 +269,6 @@ def test_pieces_give_what_one_pass_gives(cutoff, monkeypatch):
         np.testing.assert_allclose(found, one, rtol=0, atol=1e-9 * abs(one).max())
     a, b = weighted(in_pieces), weighted(reduce_equations(cut))
     np.testing.assert_allclose(a.values, b.values, rtol=1e-9, atol=1e-9 * abs(b.values).max())
-
-
-def test_several_robots_together_are_each_as_alone():
-    first, second = system(), system(name="rx90", decimation=25)
-    third = [replace(first, log=first.log.rows(0, 40_000)), first]
-    alone = [reduce_equations(part) for part in (first, second, third)]
-    named = {"planar": first, "rx90": second, "both": third}
-    with ThreadPoolExecutor(2) as pool:
-        for executor in (None, pool):
-            told: list[float] = []
-            found = reduce_many(named, executor, told.append)
-            assert list(found) == list(named)
-            assert [bits(r) for r in found.values()] == [bits(r) for r in alone]
-            assert (np.diff(told) > 0.0).all()
-            assert told[-1] == 1.0
-    assert bits(reduce_many({1: iter(third)})[1]) == bits(alone[2])
-    with pytest.raises(InvalidValueError, match="at least one log of 'none'"):
-        reduce_many({"one": first, "none": []})
 
 
 def test_logs_that_do_not_belong_together_are_refused():
@@ -351,3 +292,32 @@ def test_memory_is_that_of_a_piece_whatever_the_length():
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     assert peaks[1] < 1.02 * peaks[0]
+
+
+def test_covariance_does_not_depend_on_pieces(monkeypatch):
+    whole = system(decimation=4)
+    part = whole.with_log(replace_starts(whole.log.rows(0, 30_000), (0,)))
+    rng = np.random.default_rng(8)
+    b = len(part.names)
+    given = rng.normal(size=b), np.array([1.0, 2.0]), np.eye(b)
+    once = correlated_covariance(part, *given)
+    monkeypatch.setattr(import_module("robotmodels.identification.signals"), "PIECE", 900)
+    assert len(part.pieces()) > 20
+    again = correlated_covariance(part, *given)
+    assert again.lags == once.lags
+    np.testing.assert_allclose(again.covariance, once.covariance, rtol=1e-9)
+    np.testing.assert_allclose(again.correlation, once.correlation, rtol=1e-9)
+
+
+def test_blocks_are_kept_as_far_as_memory_allows(monkeypatch):
+    whole = system(decimation=4).cached()
+    first = bits(reduce_equations(whole))
+    assert len(whole.cache.blocks) == len(whole.pieces())
+    assert bits(reduce_equations(whole)) == first
+    fewer = whole.with_names(whole.names[1:])
+    assert bits(reduce_equations(fewer)) == bits(reduce_equations(fewer.uncached()))
+    monkeypatch.setattr(import_module("robotmodels.identification.equations"), "_KEPT_BYTES", 10**6)
+    some = system(decimation=4).cached()
+    assert bits(reduce_equations(some)) == first
+    assert 0 < some.cache.size <= 10**6
+    assert some.with_log(some.log.rows(0, 20_000)).cache is None

@@ -1,32 +1,20 @@
-"""What makes identification quick and small: filters, kept blocks, parts of long logs."""
+"""What makes identification quick and small: kept blocks, parts of long logs."""
 
 from __future__ import annotations
 
 import pickle
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.signal import butter, sosfiltfilt, welch
 
 import robotmodels as rm
 from robotmodels._arrays import as_floats
 from robotmodels.errors import InvalidValueError
-from robotmodels.identification import (
-    EquationForm,
-    check_joints,
-    choose_processing,
-    equations,
-    fit,
-)
-from robotmodels.identification.equations import Equations
-from robotmodels.identification.preparation.filters import settling, zero_phase
-from robotmodels.identification.preparation.spectrum import power_density
-from robotmodels.identification.scale.kept_equations import kept_equations, plain
+from robotmodels.identification import choose_processing, equations, fit
+from robotmodels.identification.checks import check_joints
+from robotmodels.identification.forms import EquationForm
 from robotmodels.logs import FindingKind, Log, check_log
-from robotmodels.logs.long_channels import Runs
 from robotmodels.logs.stretches import stretches
 from robotmodels.minimal_parameters import base_parameters
 
@@ -49,101 +37,27 @@ def recorded(name: str, N: int, noise: float = 0.0) -> Log:
     return Log(DT, q, tau)
 
 
-@pytest.mark.parametrize("order", [1, 2, 3, 4, 5, 8])
-@pytest.mark.parametrize("band", [0.003, 0.012, 0.1, 0.3, 0.49])
-def test_zero_phase_is_that_of_scipy(order, band):
-    x = np.random.default_rng(0).normal(size=(3000, 2)).cumsum(axis=0)
-    wider = np.tan(np.pi * band) / (np.sqrt(2.0) - 1.0) ** (0.5 / order)
-    sos = butter(order, 2.0 * np.arctan(wider) / np.pi, output="sos")
-    poles = np.abs(np.concatenate([np.roots(row[3:]) for row in np.asarray(sos)]))
-    assert settling(band, 1.0, order) == pytest.approx(
-        np.log(1e-13) / np.log(poles.max()), abs=1.0, rel=1e-6
-    )
-    pad = min(settling(band, 1.0, order), len(x) - 1)
-    expected = sosfiltfilt(sos, x, axis=0, padtype="odd", padlen=pad)
-    # rounding grows with the memory of the filter, of either
-    assert np.abs(zero_phase(x, band, 1.0, order) - expected).max() < 1e-10 * np.abs(x).max()
-
-
-def test_zero_phase_takes_any_layout_and_leaves_its_input():
-    x = np.random.default_rng(1).normal(size=(500, 3, 2))
-    before = x.copy()
-    whole = zero_phase(x, 20.0, DT)
-    assert np.array_equal(x, before)
-    assert whole.shape == x.shape
-    assert np.array_equal(zero_phase(np.asfortranarray(x), 20.0, DT), whole)
-    assert np.array_equal(zero_phase(x[:, 1, 1], 20.0, DT), whole[:, 1, 1])
-    assert zero_phase(np.ones((4, 0)), 20.0, DT).shape == (4, 0)
-    assert np.allclose(zero_phase([3.0, 3.0], 20.0, DT), 3.0)
-    zero_phase(x, 20.0, DT, 4)
-    with pytest.raises(InvalidValueError, match="order"):
-        zero_phase(x, 20.0, DT, 4.0)  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize("length", [2, 3, 256, 257, 1000, 1001])
-def test_spectrum_is_that_of_scipy(length):
-    x = np.random.default_rng(0).normal(size=(1001, 3)).cumsum(axis=0)
-    f, P = welch(x, 50.0, nperseg=length, detrend="constant", axis=0)
-    own, density = power_density(x, 50.0, length)
-    assert np.allclose(own, f, rtol=1e-14, atol=0.0)
-    assert np.abs(density - P).max() < 1e-12 * P.max()
-
-
-def test_a_fit_does_not_import_scipy_signal():
-    code = (
-        "import sys, numpy as np, robotmodels as rm; from robotmodels.logs import Log\n"
-        "from robotmodels.identification import fit\n"
-        "m = rm.load('planar_2r'); t = 0.01 * np.arange(3000)[:, None] * [1.0, 2.3]\n"
-        "q, v, a = np.sin(t), [1.0, 2.3] * np.cos(t), -np.array([1.0, 5.29]) * np.sin(t)\n"
-        "fit(m, Log(0.01, q, rm.idm(m, q, v, a) + v), drive=('Fv',))\n"
-        "sys.exit('scipy.signal' in sys.modules)"
-    )
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
-
-
-@pytest.mark.parametrize("form", list(EquationForm))
-def test_kept_blocks_are_those_that_are_made_again(form):
-    log = recorded("planar_2r", 40_000, 0.01)
-    base = base_parameters(rm.load("planar_2r"), drive=("Fv", "Fc"))
-    system = equations(base, log, choose_processing(log, decimation=20), form)
-    made = list(system.blocks())
-    assert len(made) > 2
-    size = sum(x.nbytes for x in (made[0].t, made[0].W, made[0].y, made[0].use, made[0].v))
-    for most in (0, size, 2**25):
-        kept = kept_equations(system, most)
-        fewer = kept.with_names((system.names[3], system.names[0]))
-        for _ in range(2):
-            for one, other, few in zip(made, kept.blocks(), fewer.blocks(), strict=True):
-                for name in ("t", "W", "y", "use", "v"):
-                    assert np.array_equal(getattr(one, name), getattr(other, name))
-                assert np.array_equal(few.W, one.W[:, :, [3, 0]])
-                assert few.W.flags.c_contiguous
-        assert len(kept.store.blocks) == {0: 0, size: 1}.get(most, len(made))
-        assert kept.store.size <= most
-
-
 def test_kept_blocks_are_of_their_log_and_choices_alone():
     log = recorded("planar_2r", 8_000, 0.01)
     base = base_parameters(rm.load("planar_2r"), drive=("Fv", "Fc"))
-    kept = kept_equations(equations(base, log, choose_processing(log)))
+    kept = equations(base, log, choose_processing(log)).cached()
     (block,) = kept.blocks()
-    other = Log(DT, log.q, 2.0 * log.tau)
-    (doubled,) = replace(kept, log=other).blocks()
+    assert next(kept.blocks()) is block
+    (doubled,) = replace(kept, log=Log(DT, log.q, 2.0 * log.tau)).blocks()
     assert np.allclose(doubled.y, 2.0 * block.y)
-    (thinner,) = replace(kept, processing=choose_processing(log, decimation=7)).blocks()
-    assert len(thinner) == len(next(plain(replace(kept, processing=choose_processing(
-        log, decimation=7))).blocks()))  # fmt: skip
+    fewer = replace(kept, processing=choose_processing(log, decimation=7))
+    assert np.array_equal(next(fewer.blocks()).W, next(fewer.uncached().blocks()).W)
     (powers,) = replace(kept, form=EquationForm.POWER).blocks()
     assert powers.W.shape[1] == 1
     copy = pickle.loads(pickle.dumps(kept))
-    assert type(copy) is Equations
+    assert copy.cache is None
     assert np.array_equal(next(copy.blocks()).W, block.W)
 
 
 def test_a_result_keeps_no_blocks():
     log = recorded("planar_2r", 8_000, 0.01)
     found = fit(rm.load("planar_2r"), log, drive=("Fv", "Fc"))
-    assert type(found.system) is Equations
+    assert found.equations.cache is None
     assert len(pickle.dumps(found)) < 2 * 8 * log.q.size * 3
 
 
@@ -180,18 +94,6 @@ def test_what_a_long_log_hides_is_found_in_stretches_and_said():
     wrong = Log(DT, whole.q, whole.tau * [-1.0, 1.0])
     (found,) = [f for f in check_joints(wrong, model) if f.joints == ("1",)]
     assert "of 120000 samples" in found.sentence
-
-
-def test_runs_are_found_whatever_the_pieces():
-    rng = np.random.default_rng(3)
-    for _ in range(300):
-        same = rng.random(rng.integers(0, 30)) < rng.random()
-        runs = Runs(2)
-        for part in np.split(same, sorted(rng.integers(0, len(same) + 1, 3))):
-            runs.add(part)
-        steps = np.diff(np.concatenate([[0], same.astype(int), [0]]))
-        pairs = zip(np.flatnonzero(steps == 1), np.flatnonzero(steps == -1), strict=True)
-        assert runs.ended() == [(a, b) for a, b in pairs if b - a >= 2]
 
 
 def test_what_happens_once_in_a_long_log_is_found():

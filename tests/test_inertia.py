@@ -1,15 +1,11 @@
 """Inertial parameters: frames they move between, and what a real body can have."""
 
-import copy
-import pickle
-
 import numpy as np
 import pytest
 from hypothesis import given
 from identities.random_robots import (
     random_angle,
     random_bodies,
-    random_drive,
     random_length,
     random_parameters,
     random_pose,
@@ -95,6 +91,9 @@ def test_classical_inertia_keeps_the_bodies_where_they_are(seed):
     mass, com, tensor = central(rng, f)
     table, tool = rm.DHTable.from_standard(rows)
     links = rm.InertialParameters.from_standard(rows, mass, com, tensor)
+    turned = [{**r, "alpha": np.rad2deg(r["alpha"]), "theta": np.rad2deg(r["theta"])} for r in rows]
+    degrees = rm.InertialParameters.from_standard(turned, mass, com, tensor, degrees=True)
+    assert np.allclose(degrees.values, links.values, atol=1e-12)
     model = rm.RobotModel.from_table(table, inertia=links, tool=tool)
     q = rng.normal(size=f)
     ours = links.moved(table_poses(model, q))
@@ -109,15 +108,6 @@ def test_classical_inertia_keeps_the_bodies_where_they_are(seed):
         classical.append(T)
     wanted = rm.InertialParameters.from_com(mass, com, tensor).moved(np.array(classical))
     assert np.allclose(ours.values, wanted.values, atol=1e-11)
-
-
-def test_classical_inertia_in_degrees():
-    rows = [{"a": 0.3, "alpha": 90.0}, {"a": 0.2, "alpha": -45.0}]
-    radians = [{**row, "alpha": np.deg2rad(row["alpha"])} for row in rows]
-    given = ([1.0, 2.0], [[0, 0, 0.1], [0.1, 0, 0]], [np.eye(3)] * 2)
-    a = rm.InertialParameters.from_standard(rows, *given, degrees=True)
-    b = rm.InertialParameters.from_standard(iter(radians), *given)
-    assert np.allclose(a.values, b.values, atol=1e-15)
 
 
 # --- physical consistency ------------------------------------------------------------------------
@@ -165,16 +155,6 @@ def test_what_no_body_has_is_reported(values, words):
     assert str(report).startswith("link 1: not physical: ")
 
 
-def test_the_report_has_a_line_for_each_link():
-    links = rm.InertialParameters(np.vstack([body((0.1, 0.1, 0.1)).values, np.zeros((1, 10))]))
-    assert str(links.consistency()) == "link 1: physical\nlink 2: not physical: no mass"
-    assert links.is_physical.tolist() == [True, False]
-    finding = links.consistency().links[0]
-    assert (finding.link, finding.mass) == (1, 2.0)
-    assert finding.principal_moments == pytest.approx((0.1, 0.1, 0.1))
-    assert finding.triangle_gap == pytest.approx(0.1)
-
-
 def test_parameters_print_as_a_table_that_says_what_no_body_has():
     rows = np.vstack(
         [body((0.1, 0.1, 0.1)).values, [[1, 0, 0, 0.1, 0, 0.1, 0, 0, 0, -2.5]], np.zeros((1, 10)),
@@ -191,40 +171,14 @@ def test_parameters_print_as_a_table_that_says_what_no_body_has():
         "link 4: not physical: triangle inequality fails by 0.1 kg m^2",
     ]
     report = rm.InertialParameters(rows).consistency()
+    first = report.links[0]
+    assert (first.link, first.problems, str(first)) == (1, (), "link 1: physical")
     assert report.not_physical.startswith("link 2: negative mass -2.5 kg")
     assert report.not_physical.count("link") == 3
     assert str(rm.InertialParameters.zeros(0)).startswith("link")
 
 
-# --- being a value, and mistakes -----------------------------------------------------------------
-
-
-def test_parameters_are_values(rng):
-    links = random_parameters(rng, 3)
-    same = rm.InertialParameters(links.values.tolist())
-    assert same == links
-    assert hash(same) == hash(links)
-    assert rm.InertialParameters.zeros(3) != links
-    assert links != "links"
-    for copied in (links, copy.deepcopy(links), pickle.loads(pickle.dumps(links))):
-        assert copied == links
-        assert not copied.values.flags.writeable
-    with pytest.raises(AttributeError):
-        links.values = np.zeros((3, 10))
-
-
-@pytest.mark.parametrize(
-    ("values", "error", "words"),
-    [
-        (np.zeros(10), ShapeError, r"shape \(f, 10\), got \(10,\)"),
-        (np.zeros((2, 9)), ShapeError, "XX XY XZ YY YZ ZZ MX MY MZ M"),
-        ([["a"] * 10], InvalidValueError, "values: expected real numbers"),
-        ([[np.nan] * 10], InvalidValueError, r"values: .* nan at index \[0, 0\]"),
-    ],
-)
-def test_mistakes_in_values(values, error, words):
-    with pytest.raises(error, match=words):
-        rm.InertialParameters(values)
+# --- mistakes ------------------------------------------------------------------------------------
 
 
 GOOD = ([1.0], [[0.1, 0, 0]], [np.eye(3)])
@@ -236,9 +190,7 @@ GOOD = ([1.0], [[0.1, 0, 0]], [np.eye(3)])
         (0, [-1.0], InertiaError, "Link 1: a mass cannot be negative, got -1.0 kg"),
         (0, 1.0, ShapeError, r"mass: expected shape \(f,\)"),
         (0, [1.0, 2.0], ShapeError, "for 2 masses"),
-        (1, [0.1, 0, 0], ShapeError, r"com of shape \(1, 3\)"),
         (1, [[0.1, 0]], ShapeError, "com: expected shape"),
-        (2, [np.eye(2)], ShapeError, "inertia: expected shape"),
         (2, [np.triu(np.ones((3, 3)))], InertiaError, "must be symmetric"),
         (2, [np.full((3, 3), np.inf)], InvalidValueError, "inertia: .* got inf"),
     ],
@@ -248,25 +200,21 @@ def test_mistakes_in_bodies(place, value, error, words):
     arguments[place] = value
     with pytest.raises(error, match=words):
         rm.InertialParameters.from_com(*arguments)
-    if words.startswith("mass:"):
-        return
-    with pytest.raises(error):
-        rm.InertialParameters.from_standard([{}], *arguments)
+    if not words.startswith("mass:"):
+        with pytest.raises(error):
+            rm.InertialParameters.from_standard([{}], *arguments)
 
 
-def test_mistakes_in_moves():
+def test_mistakes_in_values_and_poses():
     links = rm.InertialParameters.zeros(2)
+    with pytest.raises(ShapeError, match=r"shape \(f, 10\), got \(10,\)"):
+        rm.InertialParameters(np.zeros(10))
+    with pytest.raises(InvalidValueError, match=r"values: .* nan at index \[0, 0\]"):
+        rm.InertialParameters([[np.nan] * 10])
     with pytest.raises(ShapeError, match=r"one pose per frame \(2, 4, 4\), got \(1, 4, 4\)"):
         links.moved([np.eye(4)])
     with pytest.raises(NotARotationError):
         links.moved([np.eye(4), 2 * np.eye(4)])
-
-
-def test_a_model_wants_parameters_of_its_own_frames(rng):
-    table = rm.DHTable.from_rows([{}, {}])
-    with pytest.raises(ShapeError, match=r"inertia: expected parameters of the 2 frames .* got 3"):
-        rm.RobotModel.from_table(table, inertia=random_bodies(rng, 3))
-    with pytest.raises(InvalidValueError, match="expected InertialParameters, got ndarray"):
-        rm.RobotModel.from_table(table, inertia=np.zeros((2, 10)))
-    with pytest.raises(ShapeError, match=r"drive: .* 2 moving joints .* got 3"):
-        rm.RobotModel.from_table(table, drive=random_drive(rng, 3))
+    table = rm.DHTable.from_rows([{}, {}, {}])
+    with pytest.raises(ShapeError, match=r"inertia: expected parameters of the 3 frames .* got 2"):
+        rm.RobotModel.from_table(table, inertia=links)

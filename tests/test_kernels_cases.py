@@ -3,13 +3,11 @@
 import numpy as np
 import pytest
 from numba import njit
-from scipy import signal
 
 import robotmodels as rm
 from robotmodels.igm import _homing, _prismatic
 from robotmodels.igm._arrange import AT_LIMIT
 from robotmodels.igm._regular import ordered_rows
-from robotmodels.kernels.biquads import forward_backward
 from robotmodels.kernels.bounded_velocity import nearest_inside
 from robotmodels.kernels.decimation import add_rows
 from robotmodels.kernels.differentiated_poses import (
@@ -24,7 +22,6 @@ from robotmodels.kernels.posture_chains import following_postures
 from robotmodels.kernels.proper_poses import improper_pose
 from robotmodels.kernels.regressor_gradient import regressor_gradients
 from robotmodels.kernels.torque_regressor import torque_regressors
-from robotmodels.kernels.triangles import fold_equations, fold_rows
 from robotmodels.se3 import from_rpy
 
 # Python cannot call what is inside kernels, unless it calls nothing: then as it is written
@@ -96,30 +93,6 @@ def test_singular_mass_matrices_are_told_whatever_their_sign(mass):
     code, out = accelerations_of(mass, [[1.0, 2.0, 3.0]])
     assert code == 0
     assert np.isnan(out).all()
-
-
-@pytest.mark.parametrize("rows", [1, 3, 4, 66, 200])
-def test_triangles_have_the_products_of_all_rows_folded_into_them(rng, rows):
-    """R^T R = sum of A^T A over the pieces, also where columns are empty or one another's sums."""
-    pieces = [rng.normal(size=(rows, 6)) for _ in range(3)]
-    for A in pieces:
-        A[:, 2] = 0.0
-        A[:, 4] = A[:, 0] - 2.0 * A[:, 1]
-    R = np.zeros((6, 6))
-    for A in pieces:
-        fold_rows(A, R)
-    np.testing.assert_array_equal(R, np.triu(R))
-    whole = np.vstack(pieces)
-    np.testing.assert_allclose(R.T @ R, whole.T @ whole, rtol=0, atol=1e-12 * rows)
-
-
-def test_triangles_of_equations_take_the_rows_and_columns_asked_for(rng):
-    W, y = rng.normal(size=(150, 2, 7)), rng.normal(size=(150, 2))
-    rows, columns = np.flatnonzero(rng.random(150) < 0.7), np.array([1, 2, 5])
-    R = np.zeros((4, 4))
-    fold_equations(W, y, 1, rows, columns, R)
-    A = np.column_stack((W[rows, 1][:, columns], y[rows, 1]))
-    np.testing.assert_allclose(R.T @ R, A.T @ A, rtol=0, atol=1e-11)
 
 
 def test_a_parameter_that_acts_on_several_elements_moves_the_end_by_all_of_them(rng):
@@ -373,18 +346,6 @@ def test_lengths_along_three_directions(rng):
         three_lengths(Z.copy(), Z @ wanted, reference, r)
         np.testing.assert_allclose(Z @ r, Z @ wanted, rtol=0, atol=1e-12)
         assert r[one] == reference[one]
-
-
-@pytest.mark.parametrize("order", [1, 2, 5])
-def test_sections_forward_and_backward_are_scipys(rng, order):
-    """They start at rest at the first value, which is far from zero here."""
-    sos = signal.butter(order, 0.2, output="sos")
-    sos[:, :3] += rng.uniform(0.1, 0.3, (len(sos), 3))  # no two coefficients are the same
-    x = 5.0 + rng.normal(size=(50, 2))
-    out = np.empty(x.shape)
-    assert forward_backward(np.ascontiguousarray(np.delete(sos, 3, axis=1)), x, 20, out) == 90
-    expected = signal.sosfiltfilt(sos, x, axis=0, padtype="odd", padlen=20)
-    np.testing.assert_allclose(out, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize(("f", "n"), [(1, 4), (3, 5), (5, 8), (6, 6)])

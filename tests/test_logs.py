@@ -1,5 +1,6 @@
-"""Logs as values: the time base, joining, moving in time, and checks that name what is wrong."""
+"""Logs as values: the time base, joining, shifting in time, and checks that name mistakes."""
 
+import re
 from itertools import pairwise
 
 import numpy as np
@@ -8,18 +9,57 @@ import pytest
 import robotmodels as rm
 from robotmodels.datasets import load_tx40
 from robotmodels.errors import InvalidValueError, ShapeError
-from robotmodels.logs import (
-    FindingKind,
-    Log,
-    RefusedRows,
-    Severity,
-    check_log,
-    join_logs,
-    with_delay,
-)  # fmt: skip
+from robotmodels.logs import FindingKind, Log, Severity, check_log, join_logs, with_delay
+from robotmodels.logs.log import RefusedRows
 from robotmodels.logs.time_base import regular_rows
 
 DT = 0.01
+Q = np.zeros((4, 2))
+
+
+@pytest.mark.parametrize(
+    ("given", "error", "words"),
+    [
+        ({"dt": 0.0}, InvalidValueError, "dt: expected the sampling period in seconds"),
+        ({"dt": [0.1, 0.1]}, InvalidValueError, "dt: expected the sampling period"),
+        ({"q": np.zeros(4)}, ShapeError, r"q: expected samples of shape \(N, n\)"),
+        ({"q": np.zeros((0, 2))}, InvalidValueError, "q: the log is empty"),
+        ({"tau": None}, InvalidValueError, "tau: expected samples"),
+        ({"tau": np.zeros((3, 2))}, ShapeError, r"tau: expected shape \(4, 2\) as q has it"),
+        ({"v": np.zeros((4, 1))}, ShapeError, r"v: expected shape \(4, 2\)"),
+        ({"names": ("one",)}, ShapeError, "names: expected 2 names of joints, got 1"),
+        ({"starts": (1,)}, InvalidValueError, "starts: expected ascending numbers"),
+        ({"starts": (0, 2, 2)}, InvalidValueError, "ascending"),
+        ({"starts": (0, 4)}, InvalidValueError, "below 4"),
+        ({"starts": ()}, InvalidValueError, "starts"),
+        ({"starts": (0.0, 2.0)}, InvalidValueError, "starts"),
+    ],
+)
+def test_impossible_logs_are_refused(given, error, words):
+    with pytest.raises(error, match=words):
+        Log(**{"dt": 0.1, "q": Q, "tau": Q} | given)
+
+
+def test_slices_are_rows():
+    log = smooth_log(starts=(0, 700))
+    part = log[600:-100]
+    assert np.array_equal(part.q, log.q[600:1900])
+    assert np.shares_memory(part.q, log.q)
+    assert part.starts.tolist() == [0, 100]
+    assert len(log[:]) == len(log)
+    for rows in (slice(0, 9000), slice(-9000, 10), slice(9000, 9001), slice(3, 3)):
+        with pytest.raises(InvalidValueError, match="2000 rows"):
+            log[rows]
+    for rows in (slice(None, None, 2), 3):
+        with pytest.raises(InvalidValueError, match=r"single samples.*needs a filter"):
+            log[rows]
+    assert part.duration == pytest.approx(13.0)
+    np.testing.assert_allclose(part.t[:3], [0.0, 0.01, 0.02])
+    assert "1300 samples of 2 joints at 100 Hz, 13 s in 2 recordings" in repr(part)
+    assert "recordings" not in repr(log.rows(0, 3))
+
+
+# --- time base -----------------------------------------------------------------------------------
 
 
 def values(t):
@@ -43,23 +83,7 @@ def test_gaps_and_jumps_back_split():
     assert rows.starts.tolist() == [0, 40, 70]
     assert rows.dt == pytest.approx(DT)
     assert np.array_equal(rows.values, values(t))
-    text = " ".join(rows.notes)
-    assert "time goes back once (before row 70" in text
-    assert "time has one gap (before row 40" in text
-
-
-def test_several_gaps_are_counted():
-    t = DT * np.arange(100)
-    t[40:] += 0.5
-    t[70:] += 0.5
-    assert "time has 2 gaps (the first before row 40" in regular_rows(t, values(t), "x").notes[0]
-
-
-def test_rows_are_not_left_out_without_a_filter():
-    t = DT * np.arange(300)
-    with pytest.raises(InvalidValueError, match="folds what is fast"):
-        regular_rows(t, values(t), "x", dt=0.02)
-    assert regular_rows(t, values(t), "x", dt=0.012).dt == 0.012
+    assert "goes back or has a gap at 2 rows, first before row 40" in " ".join(rows.notes)
 
 
 def test_gaps_may_be_allowed():
@@ -68,7 +92,6 @@ def test_gaps_may_be_allowed():
     assert len(split.starts) == 2
     whole = regular_rows(t, values(t), "x", dt=DT, largest_gap=5.0)
     assert len(whole.starts) == 1
-    assert len(whole.values) == 200
     np.testing.assert_allclose(whole.values, values(DT * np.arange(200)), atol=1e-4)
 
 
@@ -106,9 +129,7 @@ def test_repeated_stamps_are_refused_and_listed():
     assert "time is that of the row before" in refused.reason
     with pytest.raises(InvalidValueError, match="coarser than the sampling"):
         regular_rows(np.repeat(t, 3), values(np.repeat(t, 3)), "x")
-
-
-def test_a_break_beside_a_repeated_stamp_stays():
+    # a break beside a repeated stamp stays
     t = DT * np.arange(30)
     t[11] = t[10]
     t[12:] -= DT
@@ -119,48 +140,43 @@ def test_a_break_beside_a_repeated_stamp_stays():
     assert [refused.rows for refused in rows.refused] == [(9,), (11,)]
 
 
-def test_jitter_is_interpolated_over_and_said():
+@pytest.mark.parametrize(("size", "options"), [
+    (0.1, {}), (0.45, {"largest_gap": 3.0, "largest_jitter": 1.0}), (0.0, {"dt": 0.004}),
+])  # fmt: skip
+def test_jitter_and_other_periods_are_interpolated_and_noted(size, options):
     rng = np.random.default_rng(0)
-    t = DT * (np.arange(400) + rng.uniform(-0.1, 0.1, 400))
-    rows = regular_rows(t, values(t), "x")
+    t = DT * (np.arange(400) + rng.uniform(-size, size, 400))
+    rows = regular_rows(t, values(t), "x", **options)
     grid = t[0] + rows.dt * np.arange(len(rows.values))
-    np.testing.assert_allclose(rows.values, values(grid), atol=1e-6)
-    assert abs(rows.values - values(t)[: len(rows.values)]).max() > 1e-4  # which it was not before
+    assert grid[-1] > t[-1] - rows.dt
+    np.testing.assert_allclose(rows.values, values(grid), atol=1e-6 if size < 0.4 else 1e-4)
     assert any("cubic splines" in note for note in rows.notes)
-
-
-def test_jitter_that_is_too_large_is_an_error():
-    rng = np.random.default_rng(0)
-    t = DT * (np.arange(400) + rng.uniform(-0.45, 0.45, 400))
-    with pytest.raises(InvalidValueError, match=r"largest_jitter="):
-        regular_rows(t, values(t), "x", largest_gap=3.0)
-    rows = regular_rows(t, values(t), "x", largest_gap=3.0, largest_jitter=1.0)
-    grid = t[0] + rows.dt * np.arange(len(rows.values))
-    np.testing.assert_allclose(rows.values, values(grid), atol=1e-4)
-
-
-def test_another_period_may_be_asked_for():
-    t = DT * np.arange(300)
-    rows = regular_rows(t, values(t), "x", dt=0.004)
-    assert rows.dt == 0.004
-    assert len(rows.values) == 1 + int(2.99 / 0.004)
-    np.testing.assert_allclose(rows.values, values(0.004 * np.arange(len(rows.values))), atol=1e-6)
+    if size > 0.4:
+        with pytest.raises(InvalidValueError, match="largest_jitter="):
+            regular_rows(t, values(t), "x", largest_gap=3.0)
 
 
 def test_rows_without_neighbours_are_listed():
-    data = values(DT * np.arange(10))
+    t, data = DT * np.arange(10), values(DT * np.arange(10))
     data[[2, 4]] = np.nan
     rows = regular_rows(None, data, "x", dt=DT)
     assert [refused.rows for refused in rows.refused] == [(2, 4), (3,)]
     assert rows.starts.tolist() == [0, 2]
     assert len(rows.values) == 7
-    data[1::2] = np.nan
-    with pytest.raises(InvalidValueError, match="nothing is left"):
-        regular_rows(None, data, "x", dt=DT)
-    with pytest.raises(InvalidValueError, match="say dt="):
-        regular_rows(None, data, "x")
-    with pytest.raises(InvalidValueError, match="right column"):
-        regular_rows(-DT * np.arange(10), values(DT * np.arange(10)), "x")
+    bare = np.where(np.arange(10)[:, None] % 2, np.nan, data)
+    for stamps, given, dt, words in (
+        (None, bare, DT, "the log is empty"),
+        (None, data, None, "give dt="),
+        (-t, values(t), None, "right column"),
+        (t, values(t), 0.02, "without a filter"),
+        (t, values(t), 1e-6, "more than 100 of one"),
+        (t, data * np.nan, None, "every one of its 10 rows lacks"),
+    ):
+        with pytest.raises(InvalidValueError, match=words):
+            regular_rows(stamps, given, "x", dt=dt)
+
+
+# --- joining and shifting ------------------------------------------------------------------------
 
 
 def smooth_log(n=2, N=2000, **more):
@@ -179,16 +195,14 @@ def test_torques_are_moved_in_every_recording(delay):
     lengths = [700, 5, 1295]
     kept = [length - cut for length in lengths if length > cut + 1]
     assert np.diff([*moved.starts, len(moved)]).tolist() == kept
-    lost = 5 if cut + 1 >= 5 else 0
-    assert sum(len(rows.rows) for rows in moved.refused) == lost
+    assert sum(len(rows.rows) for rows in moved.refused) == (5 if cut + 1 >= 5 else 0)
     # where a position of the log stands, its torque is of that time and the delay
     first = 0 if delay > 0 else cut
     t = DT * (first + np.arange(kept[0]))[:, None]
     assert np.array_equal(moved.q[: kept[0]], log.q[first : first + kept[0]])
     expected = 3.0 * np.cos(0.7 * np.array([1, 2]) * (t + delay) + 1.0)
-    inner = slice(5, -5)
-    np.testing.assert_allclose(moved.tau[: kept[0]][inner], expected[inner], atol=1e-6)
-    assert "delay were taken out" in moved.notes[-1]
+    np.testing.assert_allclose(moved.tau[: kept[0]][5:-5], expected[5:-5], atol=1e-6)
+    assert "delay were removed" in moved.notes[-1]
     assert moved.v.shape == moved.q.shape
     assert with_delay(moved, delay).delay == 2.0 * delay
 
@@ -196,30 +210,10 @@ def test_torques_are_moved_in_every_recording(delay):
 def test_delays_that_leave_nothing_are_refused():
     log = smooth_log(N=50)
     assert with_delay(log, 0.0) is log
-    with pytest.raises(InvalidValueError, match="no recording is longer"):
-        with_delay(log, 1.0)
-    with pytest.raises(InvalidValueError, match="one number"):
-        with_delay(log, [0.1, 0.2])
-    with pytest.raises(InvalidValueError, match="delay"):
-        with_delay(log, np.nan)
-
-
-def test_slices_are_rows():
-    log = smooth_log(starts=(0, 700))
-    part = log[600:-100]
-    assert np.array_equal(part.q, log.q[600:1900])
-    assert part.starts.tolist() == [0, 100]
-    assert len(log[:]) == len(log)
-    assert len(log[slice(5, 10, 1)]) == 5
-    for rows in (slice(0, 9000), slice(-9000, 10), slice(9000, 9001)):
-        with pytest.raises(InvalidValueError, match="2000 rows"):
-            log[rows]
-    with pytest.raises(InvalidValueError, match="2000 rows"):
-        log.rows(0, 2001)
-    with pytest.raises(InvalidValueError, match="a step of 2"):
-        log[::2]
-    with pytest.raises(InvalidValueError, match="single samples"):
-        log[3]
+    for delay, words in ((1.0, "no recording is longer"), ([0.1, 0.2], "one number"),
+                         (np.nan, "delay")):  # fmt: skip
+        with pytest.raises(InvalidValueError, match=words):
+            with_delay(log, delay)
 
 
 def test_joined_logs_keep_what_all_have():
@@ -227,16 +221,17 @@ def test_joined_logs_keep_what_all_have():
     log = join_logs([a, b])
     assert log.starts.tolist() == [0, 2000]
     assert log.v is None
-    assert log.notes[0] == "a"
-    assert "1 of 2 logs" in log.notes[1]
+    assert log.notes == ("a", "v was left out: 1 of 2 joined logs have it.")
     assert join_logs([a, a]).v.shape == (4000, 2)
     lost = [RefusedRows(name, (3,), "no number") for name in "ab"]
     refused = [smooth_log(N=100, refused=[rows]) for rows in lost]
     assert list(join_logs(refused).refused) == lost
-    with pytest.raises(InvalidValueError, match="delay were taken out"):
+    with pytest.raises(InvalidValueError, match="use with_delay"):
         join_logs([a, with_delay(a, 0.02)])
-    with pytest.raises(ShapeError, match="joints"):
+    with pytest.raises(ShapeError, match=r"number 1 is of the joints 1, the first of 1, 2\."):
         join_logs([a, smooth_log(n=1)])
+    with pytest.raises(InvalidValueError, match="at least one"):
+        join_logs([])
 
 
 # --- checks --------------------------------------------------------------------------------------
@@ -252,13 +247,18 @@ def kinds(log, model=None):
 
 
 def changed(log, **fields):
-    arrays = {"q": np.array(log.q), "tau": np.array(log.tau)} | fields
-    return Log(log.dt, **arrays, names=log.names)
+    arrays = {"q": log.q, "tau": log.tau, "names": log.names} | fields
+    return Log(fields.pop("dt", log.dt), **{k: v for k, v in arrays.items() if k != "dt"})
 
 
 def test_a_good_log_has_no_findings(tx40):
     assert check_log(tx40.log, tx40.model) == ()
     assert check_log(smooth_log()) == ()
+    # names that are not the model's are not compared
+    assert check_log(changed(tx40.log, names="abcdef"), tx40.model) == ()
+
+
+ORDER = [0, 2, 1, 3, 4, 5]
 
 
 @pytest.mark.parametrize(
@@ -270,7 +270,6 @@ def test_a_good_log_has_no_findings(tx40):
         ("OUTSIDE_LIMITS", "DOUBTFUL", "joint_2",
          lambda d: {"q": d.log.q + np.array([0, 2.5, 0, 0, 0, 0])}),
         ("TORQUE_ABOVE_LIMITS", "USELESS", "gear ratios", lambda d: {"tau": 1000.0 * d.log.tau}),
-        ("TORQUE_BELOW_USE", "DOUBTFUL", "kN m", lambda d: {"tau": 1e-6 * d.log.tau}),
         ("CONSTANT_POSITION", "DOUBTFUL", "joint_3: it stays at",
          lambda d: {"q": d.log.q * [1, 1, 0, 1, 1, 1]}),
         ("CONSTANT_TORQUE", "USELESS", "joint_4: its torque is 0",
@@ -278,25 +277,40 @@ def test_a_good_log_has_no_findings(tx40):
         ("NOTHING_MOVES", "USELESS", "No joint moves", lambda d: {"q": 0.0 * d.log.q}),
         ("SATURATED", "DOUBTFUL", "the largest one", lambda d: {"tau": np.minimum(
             d.log.tau, np.quantile(d.log.tau, 0.93, axis=0))}),
-        ("QUANTISED", "DOUBTFUL", "steps of 0.1", lambda d: {"q": np.round(d.log.q, 1)}),
+        ("SATURATED", "DOUBTFUL", "the smallest one", lambda d: {"tau": np.maximum(
+            d.log.tau, np.quantile(d.log.tau, 0.07, axis=0))}),
         ("JUMP", "DOUBTFUL", "numpy.unwrap", lambda d: {"q": np.where(
             np.arange(45000)[:, None] >= 20000, d.log.q + 2 * np.pi, d.log.q)}),
-        ("TOO_FAST", "DOUBTFUL", "velocities", lambda d: {
-            "q": d.log.q + np.random.default_rng(0).normal(0, 0.01, (45000, 6))}),
         ("STUCK", "DOUBTFUL", "recorder is faster", lambda d: {
             "q": np.repeat(d.log.q[:9000], 5, axis=0),
             "tau": np.repeat(d.log.tau[:9000], 5, axis=0)}),
+        ("IMPLAUSIBLE_PERIOD", "USELESS", "milliseconds", lambda d: {"dt": 1.0}),
+        ("WRONG_JOINT_ORDER", "USELESS", "model= to read_log", lambda d: {
+            "q": d.log.q[:, ORDER], "tau": d.log.tau[:, ORDER],
+            "names": [d.log.names[j] for j in ORDER]}),
+        ("TOO_SHORT", "USELESS", "10 samples", lambda d: {
+            "q": d.log.q[:10], "tau": d.log.tau[:10]}),
+        ("TOO_SHORT", "DOUBTFUL", "60 samples", lambda d: {
+            "q": d.log.q[:60], "tau": d.log.tau[:60]}),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_named(tx40, kind, severity, words, change):
-    found = kinds(changed(tx40.log, **change(tx40)), tx40.model)
-    finding = found[FindingKind[kind]]
+def test_mistakes_are_named(tx40, kind, severity, words, change):
+    found = check_log(changed(tx40.log, **change(tx40)), tx40.model)
+    order = [list(Severity)[::-1].index(finding.severity) for finding in found]
+    assert order == sorted(order)  # the most severe first
+    finding = {finding.kind: finding for finding in found}[FindingKind[kind]]
     assert finding.severity is Severity[severity]
-    assert words in finding.sentence
-    assert str(finding) == finding.sentence
+    assert words in str(finding)
 
 
-def test_motor_angles_of_a_robot_without_transmission_are_named(tx40):
+def test_other_robots_and_other_objects_are_refused(tx40):
+    (finding,) = check_log(tx40.log, rm.load("panda"))
+    assert finding.kind is FindingKind.WRONG_JOINT_COUNT
+    assert "6 joints, panda has 7" in finding.sentence
+    for other, words in ((tx40, r"got Tx40Log; give its \.log"), (Q, "got ndarray; make one")):
+        with pytest.raises(InvalidValueError, match=words):
+            check_log(other)
+    # motor angles of a robot without a transmission
     model = rm.RobotModel.from_table(tx40.model.table)
     log = changed(tx40.log, q=20.0 * tx40.motor_positions)
     assert "gears= or transmission=" in kinds(log, model)[FindingKind.MOTOR_SIDE_POSITIONS].sentence
@@ -332,61 +346,6 @@ def test_joints_that_rest_between_moves_have_not_stopped():
             assert kinds(Log(dt, stopped, tau))[FindingKind.STUCK].joints == ("2",)
 
 
-def test_short_and_one_way_logs_are_named(tx40):
-    some = kinds(tx40.log.rows(0, 10), tx40.model)
-    assert some[FindingKind.TOO_SHORT].severity is Severity.USELESS
-    assert (
-        kinds(tx40.log.rows(0, 60), tx40.model)[FindingKind.TOO_SHORT].severity is Severity.DOUBTFUL
-    )
-    t = np.linspace(0.0, 1.0, 500)[:, None]
-    rng = np.random.default_rng(0)
-    one_way = kinds(Log(0.002, t + rng.normal(0, 1e-4, (500, 1)), t))
-    assert "one way only" in one_way[FindingKind.SLOWER_THAN_LOG].sentence
-    assert FindingKind.SLOWER_THAN_LOG not in kinds(Log(0.002, np.sin(7 * t), t))
-
-
-def test_other_robots_are_named(tx40):
-    found = check_log(tx40.log, rm.load("panda"))
-    assert [finding.kind for finding in found] == [FindingKind.WRONG_JOINT_COUNT]
-    assert "6 joints, panda has 7" in found[0].sentence
-
-
-def test_the_worst_is_said_first(tx40):
-    log = changed(
-        tx40.log, q=tx40.log.q * [1, 1, 0, 1, 1, 1], tau=tx40.log.tau * [1, 1, 1, 0, 1, 1]
-    )
-    severities = [finding.severity for finding in check_log(log, tx40.model)]
-    assert severities[0] is Severity.USELESS
-    assert severities[-1] is Severity.DOUBTFUL
-
-
-def test_what_is_no_log_is_said(tx40):
-    with pytest.raises(InvalidValueError, match=r"got Tx40Log; give its \.log"):
-        check_log(tx40, tx40.model)
-    with pytest.raises(InvalidValueError, match="got ndarray; make one"):
-        check_log(tx40.log.q)
-
-
-def test_joints_in_another_order_are_named(tx40):
-    order = [0, 2, 1, 3, 4, 5]
-    names = [tx40.log.names[j] for j in order]
-    log = Log(tx40.log.dt, tx40.log.q[:, order], tx40.log.tau[:, order], names=names)
-    finding = kinds(log, tx40.model)[FindingKind.WRONG_JOINT_ORDER]
-    assert finding.severity is Severity.USELESS
-    assert finding.joints == ("joint_3", "joint_2")
-    assert "model= to read_log" in finding.sentence
-    # names that are not the model's say nothing
-    other = Log(tx40.log.dt, tx40.log.q, tx40.log.tau, names="abcdef")
-    assert check_log(other, tx40.model) == ()
-
-
-def test_milliseconds_as_seconds_are_named(tx40):
-    log = Log(1.0, tx40.log.q, tx40.log.tau)
-    finding = kinds(log)[FindingKind.IMPLAUSIBLE_PERIOD]
-    assert finding.severity is Severity.USELESS
-    assert "milliseconds" in finding.sentence
-
-
 def rates(log):
     v = np.gradient(log.q, log.dt, axis=0)
     return v, np.gradient(v, log.dt, axis=0)
@@ -396,7 +355,7 @@ def off(log):
     return [f for f in check_log(log) if f.kind is FindingKind.RATES_OFF_POSITIONS]
 
 
-def test_rates_of_the_positions_are_not_named(tx40):
+def test_derivatives_of_the_positions_are_accepted(tx40):
     v, a = rates(tx40.log)
     rng = np.random.default_rng(0)
     for q, w in ((tx40.log.q, v), (tx40.log.q + rng.normal(0, 1e-4, v.shape), v),
@@ -412,26 +371,23 @@ def test_rates_of_the_positions_are_not_named(tx40):
 @pytest.mark.parametrize(
     ("factor", "joints", "words"),
     [
-        ([180 / np.pi] * 6, 6, "57.3 times what their positions say, that is degrees"),
+        ([180 / np.pi] * 6, 6, "57.3 times the derivatives of the positions, that is degrees"),
         ([1, 1, -1, 1, 1, 1], 1, "of the other sign"),
         ([1, 48, 1, 1, 1, 1], 1, "may be a gear ratio"),
-        ([1, 1, 1, 1, 1, 1.2], 1, "1.2 times"),
+        ([0.5] * 6, 6, "0.5 times.*sampling period"),
     ],
 )
-def test_rates_by_a_factor_are_named(tx40, name, factor, joints, words):
+def test_derivatives_by_a_factor_are_named(tx40, name, factor, joints, words):
     both = dict(zip("va", rates(tx40.log), strict=True))
     both[name] = both[name] * factor
     (finding,) = off(Log(tx40.log.dt, tx40.log.q, tx40.log.tau, **both))
     assert finding.severity is Severity.USELESS
     assert len(finding.joints) == joints
-    assert words in finding.sentence
+    assert re.search(words, finding.sentence)
 
 
-def test_rates_of_another_period_and_of_other_joints_are_named(tx40):
-    v, a = rates(tx40.log)
-    found = off(Log(2.0 * tx40.log.dt, tx40.log.q, tx40.log.tau, v, a))
-    assert [len(finding.joints) for finding in found] == [6, 6]
-    assert all("period may be 2 times the true one" in finding.sentence for finding in found)
+def test_derivatives_of_other_joints_are_named(tx40):
+    v, _ = rates(tx40.log)
     (finding,) = off(Log(tx40.log.dt, tx40.log.q, tx40.log.tau, v[:, [1, 0, 2, 3, 4, 5]]))
     assert finding.severity is Severity.DOUBTFUL
     assert finding.joints == ("1", "2")

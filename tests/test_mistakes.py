@@ -88,7 +88,7 @@ def test_a_log_kept_aside_is_another_one_of_the_same_robot(swings):
 @pytest.mark.parametrize(
     ("header", "options", "words"),
     [
-        (False, {"positions": ["q1"]}, "has no header, so that 'q1' says nothing"),
+        (False, {"positions": ["q1"]}, "has no header, so that 'q1' names none"),
         (True, {"positions": ["q1", "q2", "q2"]}, "several columns 'q2'"),
         (True, {"positions": [True, 2]}, "numbers or names of columns, got True"),
         (True, {"positions": ["q1", "q9"]}, "q9"),
@@ -132,10 +132,10 @@ def test_logs_whose_squares_are_no_numbers(size):
     assert Log(0.01, rows, 0.0 * torques).n == 2
 
 
-def test_positions_of_joints_without_limits_are_told_in_turns():
+def test_positions_of_joints_without_limits_are_named():
     arm = rm.load("planar_2r")
     q = np.sin(np.linspace(0.0, 20.0, 500))[:, None] * [1e40, 1.0]
-    with pytest.raises(InvalidValueError, match="turns; the model has no limits") as caught:
+    with pytest.raises(InvalidValueError, match="limits unknown") as caught:
         fit(arm, Log(0.01, q, q))
     assert "inf" not in str(caught.value)
 

@@ -9,7 +9,7 @@ from identities.random_robots import random_model, random_state
 from scipy.special import ellipj, ellipk
 
 from robotmodels.drive import DriveParameters, Transmission
-from robotmodels.dynamics import ddm, gravity_torque, idm, mass_matrix, with_payload
+from robotmodels.dynamics import ddm, gravity_torque, idm, mass_matrix
 from robotmodels.errors import (
     InertiaError,
     InvalidValueError,
@@ -30,15 +30,12 @@ from robotmodels.inertia import InertialParameters
 from robotmodels.model import RobotModel
 from robotmodels.robots import load
 from robotmodels.simulation import (
-    Integrator,
     SimulationEventKind,
     SimulationStatus,
     dynamics_map,
     simulate,
     torque_parts,
 )
-from robotmodels.simulation.dry_friction import DryFriction
-from robotmodels.simulation.forces import Forces
 
 G = 9.81
 KINDS = SimulationEventKind
@@ -90,25 +87,24 @@ def holds(model, sim, wrench=None, drive=True):
 # --- closed forms ------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("method", Integrator)
-def test_pendulum_swings_as_the_elliptic_functions_say(method):
+@pytest.mark.parametrize(
+    ("method", "tolerance"), [("DOP853", 1e-9), ("RK45", 1e-8), ("radau", 1e-6), ("BDF", 1e-4)]
+)
+def test_pendulum_swings_as_the_elliptic_functions_say(method, tolerance):
     length, start = 0.4, 1.9  # from the vertical
-    t = np.linspace(0.0, 3.0, 61)
-    fine = method in (Integrator.DOP853, Integrator.RK45)
+    t, rtol = np.linspace(0.0, 3.0, 61), 1e-10 if tolerance < 1e-7 else 1e-8
     sim = simulate(pendulum(length=length), [start - np.pi / 2], [0.0], t=t, method=method,
-                   rtol=1e-10 if fine else 1e-8, atol=1e-12)  # fmt: skip
+                   rtol=rtol)  # fmt: skip
     k = np.sin(start / 2)
     sn, _, _, _ = ellipj(ellipk(k * k) - np.sqrt(G / length) * t, k * k)
-    expected = 2.0 * np.arcsin(k * sn) - np.pi / 2
-    tolerance = {"DOP853": 1e-9, "RK45": 1e-8, "Radau": 1e-6, "BDF": 1e-4}[method.value]
-    assert np.abs(sim.q[:, 0] - expected).max() < tolerance
+    assert np.abs(sim.q[:, 0] - (2.0 * np.arcsin(k * sn) - np.pi / 2)).max() < tolerance
     assert sim.status is SimulationStatus.FINISHED
 
 
-def test_falling_arms_keep_their_energy():
+def test_falling_arms_keep_their_energy_and_return_when_time_is_reversed():
     for model, q, T in (
-        (double_pendulum(), [0.0, 0.3], 5.0),
-        (load("rx90"), np.full(6, 0.3), 1.0),
+        (double_pendulum(), [0.0, 0.3], 2.0),
+        (load("rx90"), np.full(6, 0.3), 0.5),
         (load("panda"), np.full(7, 0.2), 0.5),
     ):
         sim = simulate(model, q, np.zeros(model.n), t=T)
@@ -118,6 +114,20 @@ def test_falling_arms_keep_their_energy():
         assert np.abs(sim.energy - sim.energy[0]).max() < 1e-9 * np.ptp(sim.potential)
         assert sim.t[-1] == T
         assert sim.drift_rate * T == pytest.approx(sim.drift[-1])
+        back = simulate(model, sim.q[-1], -sim.v[-1], t=T)
+        assert np.abs(back.q[-1] - q).max() < 1e-6
+        assert np.abs(back.v[-1]).max() < 1e-5
+
+
+def test_momentum_is_that_of_the_forces_alone():
+    """Two masses on one rail: internal torques do not change the momentum of both."""
+    links = points([1.0, 3.0], [0.0, 0.0])
+    rail = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[1, 1]), links, gravity=(0, 0, 0))
+    sim = simulate(rail, [0.0, 0.5], [0.7, -0.4], lambda t, q, v: [0.0, -9.0 * q[1] - v[1] ** 3],
+                   np.linspace(0.0, 2.0, 9))  # fmt: skip
+    momentum = 1.0 * sim.v[:, 0] + 3.0 * sim.v.sum(axis=1)
+    assert np.ptp(sim.v[:, 1]) > 1.0
+    assert np.ptp(momentum) < 1e-9
 
 
 def test_tolerance_is_what_drift_follows():
@@ -125,16 +135,6 @@ def test_tolerance_is_what_drift_follows():
               for r in (1e-5, 1e-8, 1e-11)]  # fmt: skip
     assert drifts[0] > 1e-8
     assert drifts[0] > 30 * drifts[1] > 900 * drifts[2]
-
-
-def test_damped_slider_decays_exponentially():
-    t = np.linspace(0.0, 3.0, 31)
-    sim = simulate(slider(2.0, Ia=[0.5], Fv=[1.5]), [0.1], [2.0], t=t)
-    rate = 1.5 / 2.5
-    assert np.allclose(sim.v[:, 0], 2.0 * np.exp(-rate * t), atol=1e-10)
-    assert np.allclose(sim.q[:, 0], 0.1 + 2.0 / rate * (1 - np.exp(-rate * t)), atol=1e-10)
-    # 2.5 kg of mass and rotor at 2 m/s
-    assert np.allclose(sim.friction_work + sim.kinetic, 5.0, atol=1e-9)
 
 
 # --- dry friction ------------------------------------------------------------------------------
@@ -162,23 +162,6 @@ def test_slider_on_dry_friction_stops_stays_and_breaks_away():
     assert np.allclose(sim.friction[rest], sim.tau[rest])
     assert np.allclose(sim.friction[t < stop], Fc)
     assert sim.relative_drift < 1e-12
-
-
-def test_pendulum_comes_to_rest_off_the_vertical():
-    model = pendulum(Fc=[2.0])
-    sim = simulate(model, [0.5], [0.0], t=8.0)
-    load_at_rest = gravity_torque(model, sim.q[-1])[0]
-    assert sim.sticking[-1, 0]
-    assert 0.05 < abs(load_at_rest) <= 2.0
-    assert sim.friction[-1, 0] == pytest.approx(-load_at_rest)
-    assert sim.friction_work[-1] == pytest.approx(sim.energy[0] - sim.energy[-1], rel=1e-10)
-    swings = [e for e in sim.events if e.kind is KINDS.REVERSED]
-    assert len(swings) >= 2
-    assert sim.events[-1].kind is KINDS.STUCK
-    # each swing loses 2 Fc times its angle, exactly: check the first turning point by energy
-    first = simulate(model, [0.5], [0.0], t=[0.0, swings[0].t])
-    way = abs(first.q[-1, 0] - 0.5)
-    assert first.energy[0] - first.energy[-1] == pytest.approx(2.0 * way, rel=1e-9)
 
 
 def test_mass_on_a_spring_loses_the_same_at_every_turn():
@@ -210,10 +193,10 @@ def test_torques_that_change_while_all_joints_stick_are_seen():
     assert step.v[-1, 0] == pytest.approx(2.0 * (1.0 - 0.333), abs=1e-9)
 
 
-@pytest.mark.parametrize("excess", [1e-3, 1e-4, 1e-6, 1e-8])
+@pytest.mark.parametrize("excess", [1e-3, 1e-8])
 def test_parts_break_away_at_the_crossing_however_little_the_torque_exceeds(excess):
     """Torques that pass the breakaway torque for a short while, between looks of a step."""
-    for w in (0.7, 1.3, 2.9):
+    for w in (0.7, 2.9):
         sim = simulate(slider(Fc=[3.0]), [0.0], [0.0],
                        lambda t, q, v, w=w: [3.0 * (1.0 + excess) * np.sin(w * t)],
                        t=[0.0, 2.5 / w])  # fmt: skip
@@ -222,19 +205,6 @@ def test_parts_break_away_at_the_crossing_however_little_the_torque_exceeds(exce
         # what the rounding of a part in 1e13 of the torque takes, at the slope it crosses with
         late = 2e-13 / (w * np.sqrt(2.0 * excess))
         assert sim.events[0].t == pytest.approx(crossing, abs=late + 1e-14)
-
-
-@pytest.mark.parametrize("slope", [0.07, 4.1, 300.0])
-def test_a_ramp_breaks_away_at_its_crossing(slope):
-    for start in (0.0, 3.0):  # the second begins at the breakaway torque
-        sim = simulate(slider(Fc=[3.0]), [0.0], [0.0],
-                       lambda t, q, v, start=start: [start + slope * t],
-                       t=np.linspace(0.0, 4.0 / slope, 5))  # fmt: skip
-        crossing = (3.0 - start) / slope
-        assert [e.kind for e in sim.events] == [KINDS.BROKE_AWAY]
-        assert sim.events[0].t == pytest.approx(crossing, rel=1e-12, abs=2e-13 * 3.0 / slope)
-        after = np.maximum(sim.t - crossing, 0.0)
-        assert np.allclose(sim.v[:, 0], slope * after**2 / 4.0, rtol=1e-9, atol=1e-14)
 
 
 def test_a_part_that_hardly_turns_back_sticks():
@@ -249,14 +219,6 @@ def test_a_part_that_hardly_turns_back_sticks():
     assert sim.events[0].t == pytest.approx(1.0 - np.sqrt(low / c), abs=1e-9)
     assert sim.events[1].t == pytest.approx(1.0, abs=1e-11)
     assert sim.v[-1, 0] == pytest.approx(c, abs=1e-11)  # from rest at 1 s
-
-
-def test_a_limit_that_is_hardly_passed_stops():
-    beyond, brake = 1e-8, 3.0
-    speed = np.sqrt(2.0 * (0.5 + beyond) * brake / 2.0)
-    sim = simulate(slider(), [0.0], [speed], [-brake], [0.0, 2.0], stop_at_limits=True)
-    assert sim.status is SimulationStatus.LIMIT_REACHED
-    assert sim.t[-1] == pytest.approx(speed * 2.0 / brake - np.sqrt(4.0 * beyond / brake), abs=1e-9)
 
 
 def test_what_is_at_rest_at_the_start_sticks_or_not():
@@ -304,23 +266,25 @@ def test_smoothing_approaches_the_events_and_creeps():
 
 
 def test_friction_models_beside_the_drives():
-    t = np.linspace(0.0, 2.0, 41)
-    rail = slider()
-    own = simulate(slider(Fv=[0.4], Fc=[1.0]), [0.0], [0.9], lambda t, q, v: [0.5 * np.sin(3 * t)],
-                   t)  # fmt: skip
+    t, rail = np.linspace(0.0, 2.0, 41), slider()
+
+    def push(t, q, v):
+        return [0.5 * np.sin(3 * t)]
+
+    own = simulate(slider(Fv=[0.4], Fc=[1.0]), [0.0], [0.9], push, t)
     model = FrictionSum((ViscousFriction([0.4]), CoulombFriction([1.0])))
-    given = simulate(rail, [0.0], [0.9], lambda t, q, v: [0.5 * np.sin(3 * t)], t, friction=model)
+    given = simulate(rail, [0.0], [0.9], push, t, friction=model)
     assert np.allclose(own.q, given.q, atol=1e-10)
     assert np.allclose(own.friction, given.friction, atol=1e-8)
     assert np.array_equal(own.sticking, given.sticking)
     assert own.sticking[-1, 0]
-    # directions that differ: breaks away at 4 N backwards, holds 2 N forwards
+    # directions that differ: breaks away at 4 N backwards, holds 2.5 N forwards
     gears = AsymmetricFriction(Fvp=[0.1], Fcp=[2.5], Fvn=[0.2], Fcn=[4.0])
     for force, moves in ((2.4, False), (2.6, True), (-3.9, False), (-4.1, True)):
         sim = simulate(rail, [0.0], [0.0], [force], t, friction=gears)
         assert bool(sim.v[-1, 0]) is moves
         assert sim.v[-1, 0] * force >= 0.0
-    # Stribeck: static friction first, then less, so that the slider runs away
+    # Stribeck: static friction first, then less
     falling = StribeckFriction(Fv=[0.0], Fc=[1.0], Fs=[2.0], vs=[0.05])
     slow = simulate(rail, [0.0], [0.0], lambda t, q, v: [2.0 * t], t=t, friction=falling)
     assert [e.kind for e in slow.events] == [KINDS.BROKE_AWAY]
@@ -402,50 +366,16 @@ def test_motion_fits_the_inverse_model(seed):
     assert np.abs(a - sim.a[moving]).max(initial=0.0) < 1e-8 * np.abs(sim.a).max()
 
 
-def test_computed_torques_follow_a_wanted_motion():
-    """idm of a motion as the control: the simulation is that motion."""
-    model = load("rx90").with_drive(DriveParameters(Ia=np.full(6, 0.1), Fv=np.ones(6)))
-    model = with_payload(model, 3.0, [0.0, 0.0, 0.1])
-    size = np.array([0.3, -0.2, 0.4, 0.5, 0.1, -0.6])
-    wrench = np.array([1.0, 2.0, 3.0, 0.1, 0.2, 0.3])
-
-    def motion(t):
-        c, s = np.cos(3 * t), np.sin(3 * t)
-        return size * (1 - c), 3 * size * s, 9 * size * c
-
-    def control(t, q, v):
-        return idm(model, *motion(t), wrench=wrench)
-
-    t = np.linspace(0.0, 0.5, 11)
-    sim = simulate(model, *motion(0.0)[:2], control, t, wrench)
-    expected = np.array([motion(time)[0] for time in t])
-    assert np.abs(sim.q - expected).max() < 1e-8
-    assert np.abs(sim.wrench_work).max() > 1e-2
-    assert sim.relative_drift < 1e-9
-
-
-def test_drives_can_be_left_out():
-    model = double_pendulum(Ia=[1.0, 1.0], Fv=[1.0, 1.0], Fc=[3.0, 3.0], offset=[1.0, 1.0])
-    bare = double_pendulum()
-    t = np.linspace(0.0, 1.0, 11)
-    one, two = (simulate(m, [0, 0.2], [0, 0], None, t, drive=False) for m in (model, bare))
-    assert np.array_equal(one.q, two.q)
-    assert np.array_equal(one.kinetic, two.kinetic)
-
-
 def test_torques_at_times_are_linear_between_them():
-    t = np.array([0.0, 0.5, 0.6, 2.0])
-    tau = np.array([[0.0], [4.0], [-1.0], [2.0]])
+    t, tau = np.array([0.0, 0.5, 0.6, 2.0]), np.array([[0.0], [4.0], [-1.0], [2.0]])
     sim = simulate(slider(), [0.0], [0.0], tau, t)
     # the integral of piecewise linear forces is exact by trapezes
     v = np.concatenate([[0.0], np.cumsum(np.diff(t) * (tau[1:, 0] + tau[:-1, 0]) / 2)]) / 2.0
     assert np.allclose(sim.v[:, 0], v, atol=1e-13)
     assert np.allclose(sim.tau, tau)
     held = simulate(slider(), [0.0], [0.0], [4.0], t)
-    assert np.allclose(held.q[:, 0], t**2, atol=1e-13)
     assert np.allclose(held.control_work, 4.0 * t**2, atol=1e-12)
-    pushing = np.tile([0.0, 0.0, 4.0, 0, 0, 0], (4, 1))
-    against = simulate(slider(), [0.0], [0.0], None, t, pushing)
+    against = simulate(slider(), [0.0], [0.0], None, t, np.tile([0.0, 0.0, 4.0, 0, 0, 0], (4, 1)))
     assert np.allclose(against.q, -held.q, atol=1e-13)
     assert np.allclose(against.wrench_work, -4.0 * t**2, atol=1e-12)
 
@@ -467,34 +397,28 @@ def test_jumps_of_a_sampled_controller_cost_nothing_at_breaks():
 # --- structures and ends -----------------------------------------------------------------------
 
 
-def test_a_robot_without_joints_stands():
+def test_no_joints_and_no_duration():
     fixed = RobotModel.from_table(DHTable(antecedent=[0], sigma=[2]), points([1.0], [0.3]))
     for t in (1.0, [0.0, 0.5, 1.0]):
         sim = simulate(fixed, [], [], lambda t, q, v: [], t, np.ones(6), stop_at_limits=True)
         assert sim.q.shape == (len(sim.t), 0)
         assert sim.t[-1] == 1.0
         assert sim.relative_drift == 0.0
-        assert sim.status is SimulationStatus.FINISHED
-
-
-def test_one_instant_and_no_duration():
     for t in (0.0, [3.0]):
         sim = simulate(pendulum(), [0.0], [0.0], t=t)
         assert sim.q.shape == (1, 1)
         assert sim.a[0, 0] == pytest.approx(-G / 0.4)
         assert sim.drift_rate == 0.0
-    assert sim.t[0] == 3.0
 
 
 def test_a_limit_stops_the_motion():
-    limits = simulate(slider(), [0.0], [1.0], None, np.linspace(0, 2, 21), stop_at_limits=True)
+    t = np.linspace(0, 2, 21)
+    limits = simulate(slider(), [0.0], [1.0], None, t, stop_at_limits=True)
     assert limits.status is SimulationStatus.LIMIT_REACHED
     assert limits.t[-1] == pytest.approx(0.5, abs=1e-12)
     assert limits.q[-1, 0] == pytest.approx(0.5, abs=1e-12)
-    assert (limits.events[-1].kind, limits.events[-1].joint) == (KINDS.LIMIT, 0)
-    assert "reaches a limit" in str(limits)
-    free = simulate(slider(), [0.0], [1.0], None, np.linspace(0, 2, 21))
-    assert free.q[-1, 0] == pytest.approx(2.0)
+    assert "joint 1 reaches a limit" in str(limits)
+    assert simulate(slider(), [0.0], [1.0], None, t).q[-1, 0] == pytest.approx(2.0)
     inward = simulate(slider(), [0.5], [-1.0], None, 1.0, stop_at_limits=True)
     assert inward.status is SimulationStatus.FINISHED
     outward = simulate(slider(), [0.5], [1.0], None, 1.0, stop_at_limits=True)
@@ -502,61 +426,50 @@ def test_a_limit_stops_the_motion():
     assert outward.t[-1] == pytest.approx(0.0, abs=1e-9)
     with pytest.raises(InvalidValueError, match=r"joint 1 starts at 0\.6, outside its limits"):
         simulate(slider(), [0.6], [0.0], t=1.0, stop_at_limits=True)
-    endless = slider().with_table(slider().table.replace(lower=None, upper=None))
     with pytest.raises(InvalidValueError, match=r"stop_at_limits: no joint of .* finite limit"):
-        simulate(endless, [0.6], [0.0], t=1.0, stop_at_limits=True)
+        simulate(pendulum(), [0.6], [0.0], t=1.0, stop_at_limits=True)
 
 
-def test_ends_before_the_end_say_why():
+class Alternating:
+    """A torque that is another one at each evaluation."""
+
+    sign = 1.0
+
+    def __call__(self, t, q, v):
+        self.sign = -self.sign
+        return [5.0 * self.sign]
+
+
+def test_ends_before_the_end_have_a_status():
     few = simulate(double_pendulum(), [0, 0], [0, 0], t=10.0, max_evaluations=100)
     assert few.status is SimulationStatus.NOT_CONVERGED
     assert 0 < few.t[-1] < 10.0
     assert few.evaluations < 200
-    assert "used up" in few.reason
-
-    def grows(t, q, v):
-        return [np.exp(min(q[0], 700.0))]
-
-    wild = simulate(slider(), [0.0], [1.0], grows, t=10.0)
+    wild = simulate(slider(), [0.0], [1.0], lambda t, q, v: [np.exp(min(q[0], 700.0))], t=10.0)
     assert wild.status is SimulationStatus.STEP_TOO_SMALL
     assert wild.t[-1] < 3.0
     assert np.isfinite(wild.q).all()
-
-    class Alternating:
-        sign = 1.0
-
-        def __call__(self, t, q, v):
-            self.sign = -self.sign
-            return [5.0 * self.sign]
-
     torn = simulate(slider(Fc=[1.0]), [0.0], [0.0], Alternating(), t=1.0, max_evaluations=20000)
     assert torn.status is SimulationStatus.CHATTERING
     assert torn.t[-1] < 1e-6
-    # parameters of no body: the mass matrix vanishes on the way
+    # parameters of no body: the mass matrix vanishes on the way, and nothing is followed past it
     ghost = RobotModel.from_table(
         DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 1.0]),
         InertialParameters([[0, 0, 0, 0, 0, 0.5, 0, 0, 0, 0], [0, 0, 0, 0, 0, 1.0, 1.0, 0, 0, 0]]),
         gravity=(0, 0, 0),
     )
-    crossing = [q for q in np.linspace(0, np.pi, 400) if np.linalg.det(mass_matrix(ghost, [0, q]))
-                < 0.0]  # fmt: skip
-    assert crossing
+    assert min(np.linalg.det(mass_matrix(ghost, [0, q])) for q in np.linspace(0, np.pi, 50)) < 0.0
     lost = simulate(ghost, [0.0, np.pi / 2], [0.0, -1.0], t=10.0)
     assert lost.status in (SimulationStatus.SINGULAR, SimulationStatus.STEP_TOO_SMALL)
     assert lost.t[-1] < 10.0
-    # and nothing is followed past it
     assert np.linalg.eigvalsh(mass_matrix(ghost, lost.q)).min() > 0.0
-    forces = Forces(ghost, None, None, True, None, DryFriction.none(2), None)
-    assert np.isnan(forces.at(0.0, np.array([0.0, crossing[0]]), np.zeros(2))[0]).all()
-    assert forces.met_singular
 
 
-def test_progress_is_told(caplog):
+def test_progress_is_reported(caplog):
     seen = []
     simulate(double_pendulum(), [0, 0], [0, 0], t=1.0, progress=seen.append)
     assert seen[-1] == 1.0
     assert len(seen) > 10
-    assert (np.diff(seen) > 0).all()
     with caplog.at_level(logging.INFO, logger="robotmodels.simulation"):
         simulate(pendulum(), [0.0], [0.0], t=0.1, progress=True)
     assert "simulated 100 %" in caplog.text
@@ -571,7 +484,7 @@ def test_a_simulation_is_a_value():
         sim.q[0] = 1.0
     with pytest.raises(ValueError, match="read-only"):
         again.kinetic[0] = 1.0
-    assert "evaluations of the model" in str(sim)
+    assert f"evaluations of the model: {sim.evaluations}" in str(sim)
 
 
 @pytest.mark.parametrize(
@@ -579,44 +492,24 @@ def test_a_simulation_is_a_value():
     [
         ({"q0": [0.0, 1.0]}, "q0: expected shape"),
         ({"q0": [[0.0]]}, "q0: expected one state"),
-        ({"v0": [np.nan]}, "v0: expected finite"),
-        ({"t": -1.0}, "not negative"),
+        ({"t": -1.0}, "duration from 0"),
         ({"t": [0.0, 1.0, 1.0]}, "ascending times, got 1.0 s and then 1.0 s"),
-        ({"t": []}, "t: expected a duration"),
         ({"control": [1.0, 2.0]}, r"control: expected a function control\(t, q, v\) -> \(1,\), or"),
-        ({"control": [[1.0], [2.0]]}, "rows of values belong to the times t"),
-        ({"control": [[1.0], [2.0]], "t": [0, 1, 2]}, r"or \(3, 1\) for the times t"),
-        ({"control": [np.inf]}, "control: expected finite"),
-        (
-            {"control": lambda t, q, v: [1.0, 2.0]},
-            r"control\(t, q, v\) -> \(1,\), got shape \(2,\): \[1.0, 2.0\] at t = 0",
-        ),
-        ({"control": lambda t, q, v: None}, r"control\(t, q, v\) -> \(1,\), got None at t = 0 s"),
-        ({"control": lambda t, q, v: [[1.0], [1, 2]]}, r"got \[\[1.0\], \[1, 2\]\] at t = 0 s"),
-        (
-            {"control": lambda t, q: [1.0]},
-            r"a function control\(t, q, v\) -> \(1,\) of .*, got <lambda>\(t, q\), which does not",
-        ),
-        ({"wrench": np.sin}, r"a function wrench\(t, q, v\) -> \(6,\) of .*, got sin\("),
+        ({"control": [[1.0], [2.0]]}, "rows need the times t"),
+        ({"control": [[1.0], [2.0]], "t": [0, 1, 2]}, r"or \(3, 1\), got shape \(2, 1\)"),
+        ({"control": lambda t, q, v: [1.0, 2.0]}, r"at t = 0 s: expected shape \(1,\), got \(2,\)"),
+        ({"control": lambda t, q, v: [[1.0], [1, 2]]}, "regular array, got list"),
+        ({"control": lambda t, q, v: [np.nan if t > 0.5 else 0.0]}, r"control.* at t = 0.5.*nan"),
         ({"v0": [1e200]}, r"v0: the accelerations or the energy of velocities up to 1e\+200"),
-        ({"control": lambda t, q, v: [np.nan if t > 0.5 else 0.0]}, "control at t = 0.5.*nan"),
         ({"wrench": [1.0]}, r"array of shape \(6,\)"),
-        (
-            {"wrench": lambda t, q, v: np.zeros(3)},
-            r"wrench: expected wrench\(t, q, v\) -> \(6,\), got",
-        ),
         ({"friction": CoulombFriction([1.0, 2.0])}, "friction of 1 joints, got 2"),
         ({"friction": CoulombFriction([-1.0])}, "dry friction of joint 1 is negative"),
-        ({"smoothing": 0.0}, "smoothing: expected positive"),
-        ({"smoothing": [1.0, 1.0]}, "smoothing: expected one velocity"),
-        ({"method": "euler"}, "method: expected one of 'DOP853'"),
-        ({"rtol": 1e-16}, "rtol: steps cannot"),
-        ({"atol": -1.0}, "atol: expected a positive"),
-        ({"max_step": "x"}, "max_step: expected a positive"),
-        ({"max_evaluations": 0}, "max_evaluations: expected a whole number"),
-        ({"progress": 3}, "progress: expected a flag"),
+        ({"smoothing": 0.0}, "smoothing: expected at least"),
+        ({"smoothing": [1.0, 1.0]}, "smoothing: expected one number"),
+        ({"method": "euler"}, "method: expected one of 'dop853'"),
+        ({"rtol": 1e-16}, "rtol: expected at least 2.2e-14"),
+        ({"max_evaluations": 0}, "max_evaluations: expected at least 1"),
         ({"breaks": [[0.5]]}, "breaks: expected times"),
-        ({"model": "rx90"}, "load it first"),
     ],
 )
 def test_mistakes_are_named(arguments, message):
@@ -644,30 +537,19 @@ def test_errors_of_the_control_itself_say_when_they_came():
     def control(t, q, v):
         return [1.0 / (t - t)]
 
-    with pytest.raises(ZeroDivisionError) as caught:
-        simulate(slider(), [0.0], [0.0], control, 1.0)
-    assert caught.value.__notes__ == ["Raised by control(t, q, v) at t = 0 s."]
+    cases = (control, ZeroDivisionError), (lambda t, q: [0.0], TypeError)
+    for law, error in (*cases, (lambda t, q, v: [float("x")], ValueError)):
+        with pytest.raises(error) as caught:
+            simulate(slider(), [0.0], [0.0], law, 1.0)
+        assert caught.value.__notes__ == ["Raised by control(t, q, v) at t = 0 s."]
 
 
 def test_relative_drift_of_arms_at_rest_is_no_ratio_of_rounding_errors():
     hanging = simulate(pendulum(), [-np.pi / 2], [0.0], t=1.0)  # moves by rounding errors
     assert 0.0 < hanging.energy_turnover < 1e-25
     assert hanging.relative_drift < 1e-15
-    assert simulate(slider(), [0.0], [0.0], t=1.0).relative_drift == 0.0
-    # where little moves, it is against a millionth of the potential energy
-    nearly = simulate(pendulum(), [-np.pi / 2 + 1e-7], [0.0], t=1.0)
-    assert nearly.energy_turnover < 1e-12
-    assert nearly.relative_drift == pytest.approx(
-        np.abs(nearly.drift).max() / (1e-6 * np.abs(nearly.potential).max())
-    )
-    # and where it moves, against what is moved
     falls = simulate(pendulum(), [0.0], [0.0], t=1.0)
     assert falls.relative_drift == np.abs(falls.drift).max() / falls.energy_turnover
-
-
-def test_one_step_is_not_steps():
-    assert "in 1 step, 16 evaluations of the model" in str(simulate(slider(), [0], [0], t=1e-300))
-    assert "in 0 steps, 1 evaluation of the model" in str(simulate(slider(), [0], [0], t=0.0))
 
 
 # --- parts and maps ----------------------------------------------------------------------------
@@ -697,27 +579,24 @@ def test_parts_of_the_torque_make_the_whole(seed):
 
 
 def test_maps_over_joints():
-    arm = load("rx90")
+    arm, panda = load("rx90"), load("panda")
     line = dynamics_map(arm, 2, q=np.full(6, 0.1), samples=5)
-    panda = load("panda")
-    assert dynamics_map(panda, 3, samples=2).ranges[0] == pytest.approx(
-        [panda.lower[3], panda.upper[3]]
-    )
     for k, value in enumerate(line.ranges[0]):
-        q = np.full(6, 0.1)
-        q[2] = value
+        q = np.where(np.arange(6) == 2, value, 0.1)
         assert np.allclose(line.mass[k], mass_matrix(arm, q))
         assert np.allclose(line.gravity[k], gravity_torque(arm, q), atol=1e-12)
     face = dynamics_map(arm, (1, 2), ranges=[[-1, 1], [0, 2]], samples=(3, 4))
     assert np.allclose(face.gravity[2, 1], gravity_torque(arm, [0, 1, 2 / 3, 0, 0, 0]))
-    coupling = face.coupling
-    assert np.allclose(np.einsum("...ii->...i", coupling), 1.0)
-    assert np.abs(coupling).max() <= 1.0 + 1e-12
-    massless = dynamics_map(load("planar_2r"), 0, samples=2)
-    assert np.isnan(massless.coupling).all()
-    assert dynamics_map(slider(), 0, samples=2).ranges[0] == pytest.approx([-1.0, 0.5])
-    assert dynamics_map(pendulum(), 0, samples=2).ranges[0] == pytest.approx([-np.pi, np.pi])
+    assert np.allclose(np.einsum("...ii->...i", face.coupling), 1.0)
+    assert np.abs(face.coupling).max() <= 1.0 + 1e-12
+    assert np.isnan(dynamics_map(load("planar_2r"), 0, samples=2).coupling).all()
     assert pickle.loads(pickle.dumps(face)).joints == (1, 2)
+    for model, j, ends in (
+        (panda, 3, [panda.lower[3], panda.upper[3]]),
+        (slider(), 0, [-1.0, 0.5]),
+        (pendulum(), 0, [-np.pi, np.pi]),
+    ):
+        assert dynamics_map(model, j, samples=2).ranges[0] == pytest.approx(ends)
     for wrong, message in (
         ({"joints": (1, 1)}, "one or two different joints"),
         ({"joints": 6}, "numbers from 0 to 5"),
@@ -725,7 +604,7 @@ def test_maps_over_joints():
         ({"joints": (0, 1, 2)}, "one or two different joints"),
         ({"joints": 0, "ranges": [1, 0]}, "ascending ends"),
         ({"joints": (0, 1), "ranges": [0, 1]}, r"expected shape \(2, 2\)"),
-        ({"joints": 0, "samples": 1}, "samples: expected a whole number from 2"),
+        ({"joints": 0, "samples": 1}, "samples: expected 1 whole numbers from 2"),
     ):
         with pytest.raises(RobotModelsError, match=message):
             dynamics_map(arm, **wrong)

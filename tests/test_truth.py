@@ -6,7 +6,6 @@ import pytest
 import robotmodels as rm
 from robotmodels import calibration as cal
 from robotmodels.errors import InvalidValueError, ShapeError
-from robotmodels.estimation import coverage
 
 rng = np.random.default_rng(5)
 Q = rng.uniform(-2.0, 2.0, (60, 6))
@@ -107,34 +106,3 @@ def test_mistakes_are_told(arm):
         cal.true_errors("rx90", arm, Q)
     with pytest.raises(ShapeError):
         cal.true_errors(arm, arm, Q[:, :5])
-
-
-def test_intervals_hold_the_truth_as_often_as_they_say():
-    deviation = rng.uniform(0.1, 10.0, 20000)
-    truth = rng.normal(size=20000)
-    values = truth + deviation * rng.normal(size=20000)
-    for level in (0.5, 0.95):
-        found = coverage(values, deviation, truth, level)
-        assert found.held == pytest.approx(level, abs=0.01)  # three deviations of a share of 20000
-    assert found.rms_standardised == pytest.approx(1.0, abs=0.02)
-    assert found.rms == pytest.approx(np.sqrt(np.mean((values - truth) ** 2)))
-    assert coverage(values, deviation / 3.0, truth).held < 0.6
-
-
-def test_an_estimate_that_claims_to_be_exact_is_right_or_infinitely_wrong():
-    found = coverage([1.0, 2.0], [0.0, 0.0], [1.0, 3.0])
-    assert found.standardised.tolist() == [0.0, -np.inf]
-    assert found.held == 0.5
-
-
-def test_coverage_tells_mistakes():
-    with pytest.raises(ShapeError, match="truth: expected shape"):
-        coverage([1.0, 2.0], [1.0, 1.0], [1.0])
-    with pytest.raises(ShapeError, match="values"):
-        coverage([], [], [])
-    with pytest.raises(InvalidValueError, match="deviations"):
-        coverage([1.0], [-1.0], [1.0])
-    with pytest.raises(InvalidValueError, match="level"):
-        coverage([1.0], [1.0], [1.0], 95)
-    with pytest.raises(InvalidValueError):
-        coverage([np.nan], [1.0], [1.0])

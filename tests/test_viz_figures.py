@@ -261,7 +261,9 @@ FIGURES: dict[str, dict[str, Callable[[], Figure]]] = {
     "identification_correlations": {
         "": lambda: rm.viz.plot_identification_correlations(identified())
     },
-    "identification_deviations": {"": lambda: rm.viz.plot_identification_deviations(identified())},
+    "identification_standard_errors": {
+        "": lambda: rm.viz.plot_identification_standard_errors(identified())
+    },
     "identification_parameters": {"": lambda: rm.viz.plot_identification_parameters(identified())},
     "identification_residuals": {"": lambda: rm.viz.plot_identification_residuals(identified())},
     "identification_torques": {
@@ -297,7 +299,7 @@ FIGURES: dict[str, dict[str, Callable[[], Figure]]] = {
     "pose_path": {"": lambda: rm.viz.plot_pose_path(line_in_space(), title="A line")},
     "processing": {
         "": lambda: rm.viz.plot_processing(
-            identified().system.log, identified().system.processing, model=identified().model
+            identified().equations.log, identified().equations.processing, model=identified().model
         ),
         "result": lambda: rm.viz.plot_processing(identified(), title="Cutoffs"),
     },

@@ -7,15 +7,14 @@ import pytest
 
 import robotmodels as rm
 from robotmodels.errors import InvalidValueError, RobotModelsWarning, ShapeError
-from robotmodels.identification import Log, choose_processing, fit
-from robotmodels.identification.reporting.text import report_text
+from robotmodels.identification import Log, choose_processing, fit, report
 from robotmodels.minimal_parameters import uniform_bodies
 from robotmodels.viz import (
     identification_html,
     plot_identification_correlations,
-    plot_identification_deviations,
     plot_identification_parameters,
     plot_identification_residuals,
+    plot_identification_standard_errors,
     plot_identification_torques,
     plot_processing,
 )
@@ -87,7 +86,7 @@ def test_torques_are_those_of_the_log_and_the_result(found):
     assert [axes.get_ylabel() for axes in figure.axes[::2]] == [
         "force (N)", "torque (N m)", "torque (N m)",
     ]  # fmt: skip
-    log, edges = found.system.log, found.system.processing.edges
+    log, edges = found.equations.log, found.equations.processing.edges
     used = np.concatenate([log.tau[edges : 3500 - edges], log.tau[3500 + edges : -edges]])
     for j in range(3):
         own = lines(figure.axes[2 * j])
@@ -96,9 +95,9 @@ def test_torques_are_those_of_the_log_and_the_result(found):
         assert np.nanmin(measured) == used[:, j].min()
         assert np.isnan(measured).sum() == 1  # between the recordings
         rest = np.asarray(own["measured less predicted"].get_ydata(), dtype=float)
-        assert np.nanmax(np.abs(rest)) < 8.0 * found.fitted.rmse[j] + 1.0
+        assert np.nanmax(np.abs(rest)) < 8.0 * found.validation.in_sample.rmse[j] + 1.0
         title = figure.axes[2 * j + 1].get_title(loc="left")
-        assert title.endswith(f"kept aside: {100 * found.held_out.relative[j]:.3g} %")
+        assert title.endswith(f"held out: {100 * found.validation.held_out.relative[j]:.3g} %")
 
 
 def test_residuals_their_band_and_their_correlation(found):
@@ -106,7 +105,7 @@ def test_residuals_their_band_and_their_correlation(found):
     for j in range(3):
         left, right = figure.axes[2 * j], figure.axes[2 * j + 1]
         e = np.asarray(lines(left)["residual; its autocorrelation"].get_ydata(), dtype=float)
-        assert np.isfinite(e).sum() == found.reduction.counts[j]
+        assert np.isfinite(e).sum() == found.factors.counts[j]
         low, high = left.patches[0].get_y(), left.patches[0].get_height()
         assert low == pytest.approx(-2.0 * found.estimate.sigma[j])
         assert high == pytest.approx(4.0 * found.estimate.sigma[j])
@@ -118,7 +117,7 @@ def test_residuals_their_band_and_their_correlation(found):
 
 def test_effects_compare_parameters_by_their_torques(found):
     stacked = [(b.W / found.estimate.sigma[:, None], b.y / found.estimate.sigma, b.use)
-               for b in found.system.blocks()]  # fmt: skip
+               for b in found.equations.blocks()]  # fmt: skip
     W = np.concatenate([W[use] for W, _, use in stacked])
     y = np.concatenate([y[use] for _, y, use in stacked])
     expected = np.linalg.norm(W, axis=0) / np.linalg.norm(y)
@@ -129,16 +128,16 @@ def test_effects_compare_parameters_by_their_torques(found):
 
 
 def test_deviations_are_sorted_and_coloured_by_what_is_seen(found):
-    figure = drawn(plot_identification_deviations(found))
+    figure = drawn(plot_identification_standard_errors(found))
     names = [text.get_text() for text in figure.axes[0].get_xticklabels()]
-    order = np.argsort(-found.relative_deviations, kind="stable")
+    order = np.argsort(-found.relative_errors, kind="stable")
     assert names == [found.names[k] for k in order]
     tops = np.sort([bar.get_y() + bar.get_height() for bar in figure.axes[0].patches])[::-1]
-    np.testing.assert_allclose(tops, 100.0 * found.relative_deviations[order], rtol=1e-9)
+    np.testing.assert_allclose(tops, 100.0 * found.relative_errors[order], rtol=1e-9)
 
 
 def test_processing_shows_cutoffs_and_what_they_cut(found):
-    log, chosen = found.system.log, found.system.processing
+    log, chosen = found.equations.log, found.equations.processing
     figure = drawn(plot_processing(log, chosen, model=found.model))
     assert len(figure.axes) == 6
     assert figure.axes[0].get_ylabel() == "(m/√Hz)"
@@ -164,7 +163,7 @@ def test_processing_shows_cutoffs_and_what_they_cut(found):
 
 
 def test_torques_that_are_cut_are_told_relative_to_all(found):
-    log, chosen = found.system.log, found.system.processing
+    log, chosen = found.equations.log, found.equations.processing
     for axes, tau in zip(drawn(plot_processing(found)).axes[1:6:2], log.tau.T, strict=True):
         title = axes.get_title(loc="left")
         cut, share = re.search(r"torque: (\S+) N(?: m)? rms \((\S+) %\) cut", title).groups()
@@ -176,7 +175,7 @@ def test_torques_that_are_cut_are_told_relative_to_all(found):
 
 def test_processing_of_a_result_shows_why(found):
     """The last row: bias by noise and equations for each parameter, bounds and choice."""
-    chosen, b = found.system.processing, len(found.base)
+    chosen, b = found.equations.processing, len(found.base)
     figure = drawn(plot_processing(found, title="a title"))
     assert len(figure.axes) == 8
     bias, count = (lines(axes) for axes in figure.axes[6:])
@@ -198,19 +197,19 @@ def test_processing_of_a_result_shows_why(found):
     assert (curve[f < 0.5 * x] < 0.01).all()
     assert (curve[f > 2.0 * x] > 0.1).all()
     # one equation of each joint for each sample that is kept
-    expected = len(found.system.log) * 3 / chosen.decimation / b
+    expected = len(found.equations.log) * 3 / chosen.decimation / b
     assert count["choice"].get_ydata()[0] == pytest.approx(expected)
-    assert found.reduction.rows / b <= expected
+    assert found.factors.rows / b <= expected
     assert figure.axes[7].get_title(loc="left") == (
         f"about {expected:.3g} equations for each parameter"
     )
 
 
 def test_processing_of_a_result_shows_what_an_asked_cutoff_does(found):
-    model, log = found.model, found.system.log
+    model, log = found.model, found.equations.log
     noisy = Log(DT, log.q + 2e-4 * np.random.default_rng(5).normal(size=log.q.shape), log.tau)
     with pytest.warns(RobotModelsWarning, match="Poor prediction"):
-        asked = fit(model, noisy, cutoff=30.0, decimation=1, checked=False)
+        asked = fit(model, noisy, processing={"cutoff": 30.0, "decimation": 1}, checked=False)
     bias, count = (lines(axes) for axes in drawn(plot_processing(asked)).axes[6:])
     [x], [y] = bias["choice"].get_data()
     assert x == 30.0
@@ -221,13 +220,13 @@ def test_processing_of_a_result_shows_what_an_asked_cutoff_does(found):
     assert (x, y) == (0.4 / DT, len(log) * 3 / len(asked.base))  # no decimation
     one = fit(model, log, form="power", checked=False)
     [_], [y] = lines(plot_processing(one).axes[7])["choice"].get_data()
-    assert y == pytest.approx(len(log) / one.system.processing.decimation / len(one.base))
+    assert y == pytest.approx(len(log) / one.equations.processing.decimation / len(one.base))
 
 
 def test_predicted_bias_leaves_out_what_the_equations_leave_out():
     """Noise turns the sign of a coupled motor's velocity only in its dead band."""
     data = rm.datasets.load_tx40()
-    asked = fit(data.model, data.log, cutoff=60.0, decimation=20)
+    asked = fit(data.model, data.log, processing={"cutoff": 60.0, "decimation": 20})
     assert not any(note.startswith("Noise of the positions biases") for note in asked.notes)
     own = lines(plot_processing(asked).axes[12])
     f, curve = own["at other cutoffs"].get_data()
@@ -244,14 +243,14 @@ def test_every_number_of_joints(name):
         plot_identification_torques(result),
         plot_identification_residuals(result),
         plot_identification_parameters(result),
-        plot_identification_deviations(result),
+        plot_identification_standard_errors(result),
         plot_identification_correlations(result),
         plot_processing(result),
     ]
     assert len(figures[0].axes) == model.n
     for figure in figures:
         drawn(figure)
-    assert max(map(len, report_text(result).splitlines())) <= 100
+    assert max(map(len, report(result).splitlines())) <= 100
 
 
 def test_the_page_is_one_offline_file(found, tmp_path):
@@ -273,10 +272,10 @@ def test_wrong_arguments(found):
     with pytest.raises(ShapeError, match="3 joints, got 2"):
         plot_identification_torques(found, two)
     with pytest.raises(InvalidValueError, match="expected a Processing"):
-        plot_processing(found.system.log, None)
+        plot_processing(found.equations.log, None)
     with pytest.raises(InvalidValueError, match="expected a Log or an IdentificationResult"):
         plot_processing("log")
-    with pytest.raises(InvalidValueError, match="the result holds them"):
-        plot_processing(found, found.system.processing)
+    with pytest.raises(InvalidValueError, match="the result contains them"):
+        plot_processing(found, found.equations.processing)
     with pytest.raises(ShapeError, match="2 joints, got 3"):
-        plot_processing(two, found.system.processing)
+        plot_processing(two, found.equations.processing)

@@ -19,7 +19,8 @@ from benchmarks.bench_base_parameters import Motion, motion_of, rank_of
 from benchmarks.bench_identification import DT, simulate
 from benchmarks.measure import loop
 from benchmarks.side_by_side.works import Entry, Goal, Settings, Tool, Work, at_most
-from robotmodels.identification import choose_processing, fit, signals
+from robotmodels.identification import choose_processing, fit
+from robotmodels.identification.signals import signals
 from robotmodels.logs import Log
 
 RULES, NUMBERS = "by rules", "by numbers"
@@ -95,7 +96,7 @@ def _least_squares(settings: Settings, folder: Path) -> Work:
         grown = {n: _memory(n) for n in (count, 10 * count)}
 
     def said(found: Any) -> str:
-        error = float(np.sqrt(np.mean(found.fitted.rmse**2)))
+        error = float(np.sqrt(np.mean(found.validation.in_sample.rmse**2)))
         more = [f"{mb:.0f} MB more memory for {n:g} samples" for n, mb in grown.items()]
         return ", ".join(
             [f"rank {len(found.names)}", f"RMSE {error:.3f} N m of the raw torques", *more]
@@ -110,7 +111,8 @@ def _least_squares(settings: Settings, folder: Path) -> Work:
     entries = [
         Entry(Tool.OURS, "", lambda: fit(model, log), said=said, mode=DECIMATED),
         Entry(
-            Tool.OURS, "", lambda: fit(model, log, decimation=1), rounds=3, mode=EVERY_ROW
+            Tool.OURS, "", lambda: fit(model, log, processing={"decimation": 1}), rounds=3,
+            mode=EVERY_ROW,
         ),
         Entry(
             Tool.PINOCCHIO, "the regressor alone, Python loop", loop(one, sig.q, sig.v, sig.a),

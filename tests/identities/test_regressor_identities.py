@@ -3,7 +3,7 @@
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-from identities.random_robots import any_models, models, random_parameters, random_state, seeds
+from identities.random_robots import any_models, random_parameters, random_state, seeds
 
 import robotmodels as rm
 
@@ -81,16 +81,3 @@ def test_energy_regressor_times_parameters_is_the_energy(model, seed, drive):
     row = rm.energy_regressor(model, q[0], v[0], drive)
     close(row @ parameters, rm.kinetic_energy(model, q[0], v[0], drive)
           + rm.potential_energy(model, q[0]))  # fmt: skip
-
-
-@given(model=models(), seed=seeds, size=st.integers(1, 9))
-def test_chunks_are_the_whole_regressor(model, seed, size):
-    q, v, a = random_state(model, np.random.default_rng(seed), 7)
-    for drive in (True, False):
-        whole = rm.torque_regressor(model, q, v, a, drive)
-        seen = np.zeros(7, dtype=int)
-        for rows, W in rm.torque_regressor_chunks(model, q, v, a, drive, size):
-            assert W.shape[0] <= size
-            np.testing.assert_array_equal(W, whole[rows])
-            seen[rows] += 1
-        assert (seen == 1).all()

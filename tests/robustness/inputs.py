@@ -1,20 +1,17 @@
 """What can be read: seeds that are good, ways to damage them, and the calls to be judged."""
 
-import json
 import random as chance
-import tempfile
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 
 import robotmodels as rm
 from robotmodels.calibration import read_measurements
-from robotmodels.identification import read_coefficients, read_estimate, read_log
+from robotmodels.identification import read_log
 
 from . import mutations
-from .outcomes import check_finite, check_log, check_model, check_table, outcome
+from .outcomes import check_log, check_model, check_table, outcome
 
 URDF = """<robot name="arm">
  <material name="grey"><color rgba="0.5 0.5 0.5 1"/></material>
@@ -200,55 +197,6 @@ def _rows_judged(data, *_):
     )
 
 
-@cache
-def coefficients():
-    """A file of `write_coefficients`, as JSON."""
-    found = rm.identification.exciting_trajectory(
-        planar(), harmonics=2, starts=1, baseline=1, iterations=2, rng=0
-    )
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "motion.json"
-        rm.identification.write_coefficients(found, path)
-        return json.loads(path.read_text())
-
-
-@cache
-def estimate():
-    """A file of `write_result`, as JSON."""
-    arm = planar().with_gravity((0.0, -9.81, 0.0))
-    arm = arm.with_inertia(rm.uniform_bodies(arm, 5.0))
-    t, w = 0.005 * np.arange(2000)[:, None], np.array([2.0, 3.1])
-    q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
-    log = rm.identification.Log(0.005, q, rm.idm(arm, q, v, a) + 2.0 * v)
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "arm.json"
-        rm.identification.write_result(rm.identification.fit(arm, log, drive=("Fv",)), path)
-        return json.loads(path.read_text())
-
-
-def _json_damaged(good):
-    def damaged(random):
-        text = json.dumps(mutations.json_value(random, good())).encode()
-        return mutations.bytes_of(random, text, 3) if random.random() < 0.2 else text
-
-    return damaged
-
-
-def _coefficients_judged(data, folder, _):
-    path = folder / "motion.json"
-    path.write_bytes(data)
-    return outcome(
-        lambda: read_coefficients(path),
-        lambda motion: check_finite(motion.q(np.linspace(0.0, motion.duration, 5))),
-    )
-
-
-def _estimate_judged(data, folder, _):
-    path = folder / "arm.json"
-    path.write_bytes(data)
-    return outcome(lambda: read_estimate(path), lambda found: check_finite(found.values))
-
-
 TARGETS = {
     "urdf": Target(lambda random: mutations.urdf(random, URDF).encode(), _urdf_judged),
     "urdf_file": Target(
@@ -268,6 +216,4 @@ TARGETS = {
         lambda random: mutations.table(random, MEASURED_CSV), _measured_judged
     ),
     "rows": Target(lambda random: str(random.random()).encode(), _rows_judged),
-    "coefficients": Target(_json_damaged(coefficients), _coefficients_judged),
-    "estimate": Target(_json_damaged(estimate), _estimate_judged),
 }  # fmt: skip

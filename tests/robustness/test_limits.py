@@ -1,22 +1,17 @@
 """Inputs made to hang or to fill the memory are refused soon; what was found stays found."""
 
 import io
-import json
-import struct
 import tracemalloc
-import zipfile
-import zlib
 
 import numpy as np
 import pytest
-from robustness.inputs import LOG, LOG_CSV, PAR, URDF, coefficients, estimate, planar
+from robustness.inputs import LOG, LOG_CSV, PAR, URDF, planar
 from robustness.outcomes import SECONDS, Outcome, check_log, check_model, outcome, time_limit
 
 import robotmodels as rm
 from robotmodels.calibration import read_measurements
 from robotmodels.errors import InvalidValueError, ParFileError, UrdfError
-from robotmodels.identification import read_coefficients, read_estimate, read_log
-from robotmodels.logs.mat_file import read_mat
+from robotmodels.identification import read_log
 
 MOST = 400 * 2**20
 """Bytes that a refusal may hold."""
@@ -118,69 +113,6 @@ def test_one_line_of_a_hundred_megabytes(tmp_path):
     refused(lambda: read_measurements(path, "position", planar()), "longer than")
 
 
-def test_an_archive_that_unpacks_to_too_much(tmp_path, monkeypatch):
-    monkeypatch.setattr("robotmodels.logs.sizes._ALWAYS", 2**20)
-    path = tmp_path / "run.npz"
-    np.savez_compressed(path, q=np.zeros((2**22, 1)), tau=np.zeros((2**22, 1)))
-    refused(lambda: read_log(path, dt=0.01), "GB")
-
-
-def test_an_array_whose_header_promises_more_than_there_is(tmp_path):
-    path = tmp_path / "run.npz"
-    member = io.BytesIO()
-    shape = {"descr": "<f8", "fortran_order": False, "shape": (10**9, 1000)}
-    np.lib.format.write_array_header_1_0(member, shape)
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("q.npy", member.getvalue())
-    refused(lambda: read_log(path, dt=0.01), "NPZ")
-
-
-def _element(kind, data):
-    return struct.pack("<II", kind, len(data)) + data + bytes(-len(data) % 8)
-
-
-@pytest.mark.parametrize("said", [2**32 - 8, 2**31, 64])
-def test_a_mat_file_that_unpacks_to_too_much(tmp_path, said):
-    packed = zlib.compress(struct.pack("<II", 14, said) + bytes(2**24), 9)
-    path = tmp_path / "run.mat"
-    path.write_bytes(b" " * 124 + b"\x00\x01IM" + struct.pack("<II", 15, len(packed)) + packed)
-    refused(lambda: read_log(path, dt=0.01), "damaged")
-
-
-@pytest.mark.parametrize("shape", [(2**31 - 1, 2**31 - 1), (-1, 3), (3,), ()])
-def test_a_mat_file_with_sizes_that_are_none(tmp_path, shape):
-    # SciPy's reader ends the process on some of these
-    inside = _element(6, struct.pack("<II", 6, 0)) + _element(
-        5, struct.pack(f"<{len(shape)}i", *shape)
-    )
-    inside += _element(1, b"q") + _element(9, bytes(24))
-    path = tmp_path / "run.mat"
-    path.write_bytes(b" " * 124 + b"\x00\x01IM" + _element(14, inside))
-    refused(lambda: read_log(path, dt=0.01), "damaged")
-
-
-def test_mat_files_are_read_as_scipy_reads_them(tmp_path):
-    from scipy.io import loadmat, savemat
-
-    rng = np.random.default_rng(0)
-    values = {
-        "q": rng.normal(size=(7, 3)), "i": np.arange(12, dtype=np.int8).reshape(3, 4),
-        "u": np.arange(5, dtype=np.uint64), "f": np.float32(rng.normal(size=(2, 3))),
-        "c": rng.normal(size=3) + 1j, "rows": np.array(["abc", "de "]), "none": np.zeros((0, 3)),
-        "cube": rng.normal(size=(2, 3, 4)), "one": 3, "whole": np.arange(4.0),
-    }  # fmt: skip
-    for compressed in (False, True):
-        path = tmp_path / "some.mat"
-        savemat(path, {**values, "log": {"q": values["q"], "at": {"t": 1.5}}},
-                do_compression=compressed)  # fmt: skip
-        mine, theirs = read_mat(path), loadmat(path)
-        for name in values:
-            assert mine[name].shape == theirs[name].shape
-            assert (mine[name] == theirs[name]).all()
-        assert (mine["log.q"] == values["q"]).all()
-        assert mine["log.at.t"] == 1.5
-
-
 def test_a_grid_that_nobody_measured(tmp_path):
     path = tmp_path / "run.csv"
     path.write_text(LOG_CSV)
@@ -230,25 +162,3 @@ def test_numbers_that_have_no_square(tmp_path):
 
 
 # --- JSON -----------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("order", [10**400, 10**9, float("inf"), float("nan"), None, "x", -1])
-def test_a_motion_of_an_order_that_cannot_be_meant(tmp_path, order):
-    data = json.loads(json.dumps(coefficients()))
-    data["motion"]["order"] = order
-    path = tmp_path / "motion.json"
-    path.write_text(json.dumps(data))
-    assert outcome(lambda: read_coefficients(path), lambda m: None) is Outcome.REFUSED
-
-
-@pytest.mark.parametrize("key", ["parameters", "covariance", "sigma", "status", "method"])
-@pytest.mark.parametrize("value", [None, 3, "x", [], {}, [[1.0]], 10**400])
-def test_an_estimate_without_its_parts(tmp_path, key, value):
-    data = json.loads(json.dumps(estimate()))
-    data[key] = value
-    path = tmp_path / "arm.json"
-    path.write_text(json.dumps(data))
-    outcome(lambda: read_estimate(path), lambda found: None)
-    del data[key]
-    path.write_text(json.dumps(data))
-    assert outcome(lambda: read_estimate(path), lambda found: None) is Outcome.REFUSED

@@ -65,7 +65,6 @@ for name in ("a.csv", "a.npz", "a.mat", "a.parquet"):
     identification.read_log(here / name)
 calibration.read_measurements(here / "m.csv", "position", inputs.planar())
 assert sorted(p.name for p in here.iterdir()) == before, "a reader wrote a file"
-inputs.coefficients(), inputs.estimate()  # these write into a temporary folder of their own
 rm.write_urdf(model, here / "b.urdf")
 rm.viz.show(rm.load("rx90"), [0.0] * 6).save(here / "scene.html")
 rng = np.random.default_rng(0)
