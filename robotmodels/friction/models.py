@@ -72,7 +72,7 @@ class JointFriction(Value):
         return breakaway_torques(self)
 
     def _terms(self, v: Array) -> tuple[Array, ...]:
-        """Torque (..., n) per unit of each parameter of its joint."""
+        """Torque (..., n) per unit of each parameter of its joint; not needed beside a `basis`."""
         raise NotImplementedError
 
     def basis(self, v: ArrayLike) -> Array:

@@ -6,7 +6,7 @@ Analysis 49(4), 2011.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal, cast
@@ -83,7 +83,7 @@ Scores = Callable[[Array], Callable[[], Iterable[Block]]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SimulatingMethod(Method, ABC):
+class SimulatingMethod(Method):
     """Base of the methods: initial parameters, simulations until convergence, covariance."""
 
     controller: Controller | None = None

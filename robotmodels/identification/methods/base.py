@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields
 from typing import Any, ClassVar, Literal
 
@@ -12,7 +13,7 @@ from ..equations import Equations
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Method:
+class Method(ABC):
     """Base of the methods; ``essential`` drops insignificant parameters.
 
     True is the default ratio of relative standard errors (30); or another ratio, or a rule:
@@ -25,9 +26,9 @@ class Method:
     covariance: ClassVar[Literal["correlated", "scaled", "given"]] = "scaled"
     """Standard errors: computed for correlated residuals, scaled by the ratio of WLS, or given."""
 
+    @abstractmethod
     def solve(self, system: Equations, factors: TriangularFactors) -> Estimate:
         """Estimate the parameters of equations, given with their triangular factors."""
-        raise NotImplementedError
 
     def options(self) -> dict[str, Any]:
         """Options that differ from their defaults."""
