@@ -299,7 +299,7 @@ def test_the_prior_of_lengths_is_that_of_a_small_robot():
     result = fit(arm, Position(q, p), **ALONE)
     sizes = result.solution.fit.prior.sigma[: len(result.names)]
     lengths = [e.element.is_length and 0 < e.row <= 6 for e in result.parameters.entries]
-    assert sizes[lengths] == pytest.approx(1e-3 * result.parameters.skeleton.size)
+    assert sizes[lengths] == pytest.approx(1e-3 * result.parameters.table.size)
     assert result.other_tool.rms < 1e-4
 
 

@@ -335,7 +335,7 @@ def test_selection_shows_its_numbers():
     for axes, unit, factor in zip(figure.axes[1:], ("m", "rad"), (1e3, 180.0 / np.pi), strict=True):
         own = [u == unit for u in selected.parameters.units]
         drawn = {line.get_label(): line.get_ydata() for line in axes.get_lines()}
-        values = factor * selected.deviations[:, own]
+        values = factor * selected.standard_errors[:, own]
         np.testing.assert_allclose(drawn["median"], np.median(values, axis=1))
         np.testing.assert_allclose(drawn["largest"], values.max(axis=1))
         assert axes.get_yscale() == "log"

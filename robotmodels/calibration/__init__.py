@@ -3,26 +3,19 @@
 from ..file_units import AngleUnit, LengthUnit
 from ..obstacles import Box, Sphere
 from .candidates import candidate_parameters
-from .differential import DifferentialModel, differential_model
+from .differential import differential_model
 from .errors_seen import BlockErrors, ErrorSummary
 from .extended_table import (
     Element,
-    SixParameters,
-    Skeleton,
-    base_parameters_of,
-    pose_of_elements,
-    skeleton_of,
-    tool_parameters_of,
+    ExtendedTable,
+    extend_table,
 )
 from .file_kinds import FileKind
 from .fit import fit
 from .folds import AsideErrors
 from .identifiable import (
-    IdentifiabilityChange,
     IdentifiableParameters,
     Reason,
-    identifiability_change,
-    identifiable_on,
     identifiable_parameters,
 )
 from .inverse import CorrectedSolutions, CorrectionStatus, corrected_igm
@@ -43,6 +36,7 @@ from .measurements import (
     RelativePose,
 )
 from .measurements.kinds import Kind, drawn_groups
+from .observability import Criterion, Observability, observability
 from .offsets import JointOffsets, PoseOffsets, joint_offsets, pose_offsets
 from .other_tool import PredictedError, other_tool_error
 from .parameters import Compliance, ErrorLaw, GeometricParameter, GeometricParameters
@@ -54,23 +48,11 @@ from .reporting.write import calibrated_urdf, result_data, write_result
 from .residuals import measured_residuals
 from .result import CalibrationResult
 from .robot import (
-    Bending,
-    CalibratedEnd,
     CalibratedRobot,
-    JointErrors,
     calibrated_model,
     calibrated_pose,
-    encoder_transmission,
-    joint_errors_of,
-    reading_jacobian,
 )
-from .selection import (
-    Criterion,
-    Observability,
-    SelectedConfigurations,
-    observability,
-    select_configurations,
-)
+from .selection import SelectedConfigurations, select_configurations
 from .solve import Solution
 from .true_errors import TrueErrors, true_errors
 
@@ -78,10 +60,8 @@ __all__ = [
     "AngleUnit",
     "AsideErrors",
     "AxisPosition",
-    "Bending",
     "BlockErrors",
     "Box",
-    "CalibratedEnd",
     "CalibratedRobot",
     "CalibrationResult",
     "CameraPose",
@@ -89,7 +69,6 @@ __all__ = [
     "CorrectedSolutions",
     "CorrectionStatus",
     "Criterion",
-    "DifferentialModel",
     "Distance",
     "Element",
     "ErrorLaw",
@@ -98,9 +77,7 @@ __all__ = [
     "FrameContact",
     "GeometricParameter",
     "GeometricParameters",
-    "IdentifiabilityChange",
     "IdentifiableParameters",
-    "JointErrors",
     "JointOffsets",
     "Kind",
     "KnownDistance",
@@ -120,12 +97,10 @@ __all__ = [
     "Reason",
     "RelativePose",
     "SelectedConfigurations",
-    "SixParameters",
-    "Skeleton",
+    "ExtendedTable",
     "Solution",
     "Sphere",
     "TrueErrors",
-    "base_parameters_of",
     "calibrated_model",
     "calibrated_pose",
     "calibrated_urdf",
@@ -133,27 +108,20 @@ __all__ = [
     "corrected_igm",
     "differential_model",
     "drawn_groups",
-    "encoder_transmission",
     "fit",
-    "identifiability_change",
-    "identifiable_on",
     "identifiable_parameters",
-    "joint_errors_of",
     "joint_offsets",
     "measured_residuals",
     "observability",
     "other_tool_error",
-    "pose_of_elements",
     "pose_offsets",
     "problem_of",
     "read_measurements",
-    "reading_jacobian",
     "report_text",
     "result_data",
     "select_configurations",
     "side_by_side",
-    "skeleton_of",
-    "tool_parameters_of",
+    "extend_table",
     "true_errors",
     "write_result",
 ]

@@ -1,4 +1,4 @@
-"""The parameters that a calibration of a robot may look at, by the book's rules."""
+"""The candidate parameters of a calibration, by the book's rules (1.4.2)."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ import numpy as np
 
 from .._choices import chosen
 from ..errors import InvalidValueError
-from ..geometry import FIXED, PRISMATIC, REVOLUTE
+from ..geometry import FIXED, PRISMATIC
 from ..model import RobotModel
-from .extended_table import Element, Frame, Skeleton, skeleton_of
+from .extended_table import JOINT_VARIABLE, Element, ExtendedTable, Frame, extend_table
 from .parameters import Compliance, ErrorLaw, GeometricParameter, GeometricParameters
 
 NEARLY_PARALLEL = 0.05
-"""Sine of the angle between consecutive axes below which r_j gives way to beta_j (Hayati)."""
+"""Sine of the angle between consecutive axes below which beta_j replaces r_j (Hayati)."""
 _TURNS = (Element.GAMMA, Element.BETA, Element.ALPHA)
-"""Turns about the axes z, y, x of the frame that a row stands on."""
+"""Turns about the axes z, y, x of the antecedent frame."""
 
 
 def candidate_parameters(
@@ -30,12 +30,12 @@ def candidate_parameters(
     compliance: Compliance | str = Compliance.NONE,
     eccentricity: bool = False,
 ) -> GeometricParameters:
-    """All parameters that a calibration of this robot may look at, by the book's rules.
+    """All parameters that a calibration of this robot may estimate, by the book's rules.
 
     Each frame of the table has alpha, d, theta and r; where its axis is parallel to the one
-    before, or nearly so, beta takes the place of r (Hayati), because the common perpendicular is
-    then anywhere. The first row has theta and r alone, as the place of the robot says the rest.
-    Branches have gamma and b as well. Base and tools have the book's six.
+    before, or nearly so, beta replaces r (Hayati), because the common perpendicular may be
+    anywhere. The first row has theta and r alone, as the base has the other parameters. Branches
+    have gamma and b as well. Base and tools have the book's six.
 
     Parameters
     ----------
@@ -44,14 +44,14 @@ def candidate_parameters(
     frames : sequence of str, int or None
         The measured ends; None is the tool.
     base, tool : bool
-        Whether the place of the robot, and those of the ends, may be off.
+        Whether the base, and the ends, have errors.
     gains : bool
         Whether ``q = K q_c + q_0`` has errors in the diagonal of K.
     couplings : iterable of (int, int)
         Pairs (j, i) of frames: the reading of joint i moves joint j.
     compliance : Compliance or str
-        What gives way under gravity: ``"none"``, ``"joints"``, ``"links"``,
-        ``"isotropic"`` or ``"uniform"`` (see `Compliance`).
+        What yields under gravity: ``"none"``, ``"joints"``, ``"links"``, ``"isotropic"`` or
+        ``"uniform"`` (see `Compliance`).
     eccentricity : bool
         Whether readings have errors in the sine and cosine of the joint and of twice its value.
 
@@ -63,8 +63,8 @@ def candidate_parameters(
     Raises
     ------
     InvalidValueError, FrameNotFoundError
-        Not a model; unknown frames; a coupling of a frame that does not move; compliance asked of
-        a robot without masses.
+        Not a model; unknown frames; a coupling of a frame that does not move; compliance of a
+        robot without masses.
 
     References
     ----------
@@ -76,19 +76,17 @@ def candidate_parameters(
     >>> candidate_parameters(load("rx90"), base=False, tool=False).names[5:9]
     ('theta6', 'r1', 'alpha2', 'd2')
     """
-    skeleton = skeleton_of(model, frames)
-    on_path = sorted({int(r) for frame in skeleton.frames for r in skeleton.path(frame)})
-    table_rows = [r for r in on_path if 1 <= r <= model.f]
-    moving = [r for r in table_rows if skeleton.sigma[r] != FIXED]
-    own = {REVOLUTE: Element.THETA, PRISMATIC: Element.R}
+    table = extend_table(model, frames)
+    on_path = sorted({int(r) for frame in table.frames for r in table.path(frame)})
+    of_robot = [r for r in on_path if 1 <= r <= model.f]
+    moving = {r: JOINT_VARIABLE[table.sigma[r]] for r in of_robot if table.sigma[r] != FIXED}
     # lengths first: three of them place a point whatever the angles, also near the last axis
     six = [Element.B, Element.D, Element.R, Element.GAMMA, Element.ALPHA, Element.THETA]
-    places = [(r, e) for r in on_path if r > model.f for e in six] if tool else []
-    places += [(0, e) for e in six] if base else []
-    rest = [(r, own[int(skeleton.sigma[r])]) for r in moving]
-    for row in table_rows:
-        rest += [(row, element) for element in _elements_of(skeleton, row, on_path)]
-    entries = [GeometricParameter(r, e, source=r) for r, e in dict.fromkeys([*places, *rest])]
+    constant = [(r, e) for r in on_path if r > model.f for e in six] if tool else []
+    constant += [(0, e) for e in six] if base else []
+    constant += moving.items()
+    constant += [(r, element) for r in of_robot for element in _elements_of(table, r, on_path)]
+    entries = [GeometricParameter(r, e, source=r) for r, e in dict.fromkeys(constant)]
     laws: list[ErrorLaw] = []
     if eccentricity:
         laws += [ErrorLaw.SINE, ErrorLaw.COSINE, ErrorLaw.SINE_2, ErrorLaw.COSINE_2]
@@ -97,61 +95,60 @@ def candidate_parameters(
     compliance = chosen(Compliance, compliance, "compliance")
     if compliance is not Compliance.NONE and not model.inertia.values.any():
         raise InvalidValueError(
-            "compliance: the robot gives way under gravity, but this one has no masses. "
+            "compliance: it acts on the gravity loads, but this robot has no masses. "
             "Give it inertial parameters (with_inertia), or leave compliance out."
         )
     if compliance in (Compliance.JOINTS, Compliance.LINKS):
         laws.append(ErrorLaw.COMPLIANCE)
-    for law in laws:
-        for r in moving:
-            kind = int(skeleton.sigma[r])
-            if kind == PRISMATIC and law not in (ErrorLaw.GAIN, ErrorLaw.COMPLIANCE):
-                continue  # a linear scale has no turn to be off its axis
-            entries.append(GeometricParameter(r, own[kind], law, r))
-    if compliance is Compliance.LINKS:
-        bent = [(0, e, 0) for e in _TURNS]
-        bent += [
-            (s, e, r) for r in moving for s in _successors(skeleton, on_path, r) for e in _TURNS[1:]
-        ]
-        entries += [GeometricParameter(s, e, ErrorLaw.COMPLIANCE, r) for s, e, r in bent]
-    if compliance in (Compliance.ISOTROPIC, Compliance.UNIFORM):
-        at_mount = [(0, e, 0) for e in _TURNS]
-        at_joints = [
-            [(s, e, r) for s in _successors(skeleton, on_path, r) for e in _TURNS] for r in moving
-        ]
-        if compliance is Compliance.UNIFORM:
-            at_joints = [[action for actions in at_joints for action in actions]]
-        for (row, element, source), *also in [at_mount, *at_joints]:
-            law = ErrorLaw.COMPLIANCE
-            entries.append(GeometricParameter(row, element, law, source, tuple(also)))
+    entries += [
+        GeometricParameter(r, variable, law, r)
+        for law in laws
+        for r, variable in moving.items()
+        # a linear scale has no axis that its reading could be eccentric to
+        if variable is Element.THETA or law in (ErrorLaw.GAIN, ErrorLaw.COMPLIANCE)
+    ]
+    successors = [[s for s in on_path if table.antecedent[s] == r] for r in range(table.rows)]
+    entries += _bending(compliance, successors, list(moving))
     for j, i in couplings:
         if j not in moving or i not in moving or i == j:
             raise InvalidValueError(
-                f"couplings: expected pairs of two different moving frames among {moving}, got "
-                f"({j}, {i})."
+                f"couplings: expected pairs of two different moving frames among {list(moving)}, "
+                f"got ({j}, {i})."
             )
-        entries.append(GeometricParameter(j, own[int(skeleton.sigma[j])], ErrorLaw.GAIN, i))
-    return GeometricParameters(skeleton, tuple(entries))
+        entries.append(GeometricParameter(j, moving[j], ErrorLaw.GAIN, i))
+    return GeometricParameters(table, tuple(entries))
 
 
-def _successors(skeleton: Skeleton, on_path: list[int], row: int) -> list[int]:
-    return [s for s in on_path if skeleton.antecedent[s] == row]
+def _bending(
+    compliance: Compliance, successors: list[list[int]], moving: list[int]
+) -> list[GeometricParameter]:
+    """Compliances of the mount, and of what follows each moving row, about several axes."""
+    law = ErrorLaw.COMPLIANCE
+    mount = [(0, turn, 0) for turn in _TURNS]
+    if compliance is Compliance.LINKS:
+        links = [(s, turn, r) for r in moving for s in successors[r] for turn in _TURNS[1:]]
+        return [GeometricParameter(s, turn, law, r) for s, turn, r in [*mount, *links]]
+    if compliance not in (Compliance.ISOTROPIC, Compliance.UNIFORM):
+        return []
+    joints = [[(s, turn, r) for s in successors[r] for turn in _TURNS] for r in moving]
+    if compliance is Compliance.UNIFORM:
+        joints = [[action for actions in joints for action in actions]]
+    return [
+        GeometricParameter(row, element, law, source, tuple(also))
+        for (row, element, source), *also in [mount, *joints]
+    ]
 
 
-def _elements_of(skeleton: Skeleton, row: int, on_path: list[int]) -> list[Element]:
-    """Elements of a row of the table that may be off, besides its joint's own."""
-    antecedent = int(skeleton.antecedent[row])
-    siblings = [r for r in on_path if skeleton.antecedent[r] == antecedent]
-    branch = row != siblings[0]
+def _elements_of(table: ExtendedTable, row: int, on_path: list[int]) -> list[Element]:
+    """Elements of a row of the robot that may have errors."""
+    antecedent = int(table.antecedent[row])
+    branch = row != next(r for r in on_path if table.antecedent[r] == antecedent)
     if antecedent == 0 and not branch:
         return [Element.THETA, Element.R]
     elements = [Element.ALPHA, Element.D, Element.THETA, Element.R]
-    beta, alpha = skeleton.nominal[row, [Element.BETA, Element.ALPHA]]
-    along = abs(np.cos(beta) * np.cos(alpha))
-    if along > np.sqrt(1.0 - NEARLY_PARALLEL**2):
+    beta, alpha = table.nominal[row, [Element.BETA, Element.ALPHA]]
+    if abs(np.cos(beta) * np.cos(alpha)) > np.sqrt(1.0 - NEARLY_PARALLEL**2):
         elements.insert(2, Element.BETA)
-        if skeleton.sigma[row] != PRISMATIC:
+        if table.sigma[row] != PRISMATIC:
             elements.remove(Element.R)
-    if branch:
-        elements += [Element.GAMMA, Element.B]
-    return elements
+    return [*elements, Element.GAMMA, Element.B] if branch else elements

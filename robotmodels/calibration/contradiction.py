@@ -16,10 +16,10 @@ import numpy as np
 
 from .._arrays import Array
 from .errors_seen import block_errors
-from .identifiable import needs_a_length
 from .measurements import KnownDistance
 from .prior import ParameterPrior, refitted
 from .problem import Problem, satisfying, stacked
+from .scale import needs_a_length
 from .solve import Solution
 
 _CONTRADICTED = 3.0

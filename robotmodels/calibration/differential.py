@@ -1,32 +1,23 @@
-"""The generalised differential model: how every parameter moves what is measured."""
+"""The generalised differential model: derivatives of the measured poses by every parameter."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, as_exact, as_vector
-from .extended_table import Frame
+from .extended_table import ExtendedTable, Frame
 from .parameters import GeometricParameters
+
+Actions = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]
 
 
 class DifferentialModel(NamedTuple):
-    """Poses of an end with the deviations applied, and their derivatives.
+    """Poses T (..., 4, 4) of an end, and psi (..., 6, P), its [v; w] per unit of each parameter.
 
-    Attributes
-    ----------
-    T : ndarray, shape (..., 4, 4)
-        World poses, metres.
-    psi : ndarray, shape (..., 6, P)
-        ``[v; w]`` of the end per unit of each parameter, world axes, at the end's origin
-        (m and rad, per m, rad or the unit of the parameter).
-
-    Examples
-    --------
-    >>> DifferentialModel(np.eye(4), np.zeros((6, 2))).psi.shape
-    (6, 2)
+    World axes, at the end's origin; m and rad, per m, rad or the unit of the parameter.
     """
 
     T: Array
@@ -36,7 +27,7 @@ class DifferentialModel(NamedTuple):
 def differential_model(
     parameters: GeometricParameters,
     q: ArrayLike,
-    deviation: ArrayLike | None = None,
+    corrections: ArrayLike | None = None,
     frame: Frame = None,
     factors: Array | None = None,
 ) -> DifferentialModel:
@@ -48,8 +39,8 @@ def differential_model(
         P parameters.
     q : array_like, shape (..., n)
         Readings of the joints, rad or m.
-    deviation : array_like, shape (P,), optional
-        Values of the parameters, added to the nominal ones; default zero.
+    corrections : array_like, shape (P,), optional
+        xi, added to the nominal values of the parameters; default zero.
     frame : str, int or None
         The end; one of those the parameters were made for.
     factors : ndarray, shape (N, A), optional
@@ -73,27 +64,41 @@ def differential_model(
     --------
     >>> from robotmodels.calibration import candidate_parameters
     >>> from robotmodels.robots import load
-    >>> found = differential_model(candidate_parameters(load("rx90")), np.zeros((5, 6)))
-    >>> found.T.shape, found.psi.shape
+    >>> T, psi = differential_model(candidate_parameters(load("rx90")), np.zeros((5, 6)))
+    >>> T.shape, psi.shape
     ((5, 4, 4), (5, 6, 34))
+    """
+    table, P = parameters.table, len(parameters)
+    q = as_vector(q, parameters.model.n, "q")
+    xi = np.zeros(P) if corrections is None else as_exact(corrections, (P,), "corrections")
+    rows = q.reshape(-1, q.shape[-1])
+    factor = parameters.factors(rows) if factors is None else factors
+    after = table.after[table.end_row(frame) - 1 - table.model.f]
+    T, psi = screws_of(table, rows, table.path(frame), after, xi, parameters.actions, factor, P)
+    return DifferentialModel(T.reshape(*q.shape[:-1], 4, 4), psi.reshape(*q.shape[:-1], 6, P))
+
+
+def screws_of(
+    table: ExtendedTable,
+    q: Array,
+    path: NDArray[np.int64],
+    after: Array,
+    values: Array,
+    actions: Actions,
+    factors: Array,
+    columns: int,
+) -> DifferentialModel:
+    """Poses behind a path of rows, and the sum of factor times screw of each value.
+
+    Shapes: q (N, n), after (4, 4), values (columns,), actions (A,), factors (N, A).
     """
     from ..kernels.erroneous_poses import erroneous_poses
 
-    skeleton = parameters.skeleton
-    q = as_vector(q, parameters.model.n, "q")
-    P = len(parameters)
-    xi = np.zeros(P) if deviation is None else as_exact(deviation, (P,), "deviation")
-    rows = np.ascontiguousarray(q.reshape(-1, q.shape[-1]))
-    factor = parameters.factors(rows) if factors is None else factors
-    T = np.empty((len(rows), 4, 4))
-    psi = np.empty((len(rows), 6, P))
-    end = skeleton.end_row(frame) - 1 - skeleton.model.f
+    T, psi = np.empty((len(q), 4, 4)), np.empty((len(q), 6, columns))
+    turns = [np.ascontiguousarray(part) for pose in (table.before, after)
+             for part in (pose[:3, :3], pose[:3, 3])]  # fmt: skip
     erroneous_poses(
-        rows, skeleton.nominal, skeleton.sigma, skeleton.joint, skeleton.path(frame),
-        np.ascontiguousarray(skeleton.before[:3, :3]),
-        np.ascontiguousarray(skeleton.before[:3, 3]),
-        np.ascontiguousarray(skeleton.after[end, :3, :3]),
-        np.ascontiguousarray(skeleton.after[end, :3, 3]),
-        np.ascontiguousarray(xi), *parameters.actions, factor, T, psi,
+        np.ascontiguousarray(q), table.nominal, table.sigma, table.joint, path, *turns,
+        np.ascontiguousarray(values), *actions, factors, T, psi,
     )  # fmt: skip
-    return DifferentialModel(T.reshape(*q.shape[:-1], 4, 4), psi.reshape(*q.shape[:-1], 6, P))
+    return DifferentialModel(T, psi)

@@ -26,7 +26,7 @@ from .folds import (
 from .identifiable import (
     IdentifiableParameters,
     Reason,
-    all_deviations,
+    all_corrections,
     identifiable_on,
 )
 from .insignificant import insignificant_parameters, with_gained, without_insignificant
@@ -184,13 +184,13 @@ def fit(
     )
     check_enough(identifiable, measured, known_lengths, known, _TOLD_APART)
     if prior is not None:
-        prior = sized(prior, candidates.skeleton.size)
+        prior = sized(prior, candidates.table.size)
     prior_of, used = None, prior
 
     def identifiable_there(some: GeometricParameters) -> IdentifiableParameters:
         return identifiable_on(
             some, measured, known_lengths, (*known, *identifiable.of_reason(Reason.NOISE)),
-            deviation=all_deviations(some, estimated, solution.deviation),
+            corrections=all_corrections(some, estimated, solution.deviation),
             fixtures=solution.fixtures, dependent=_TOLD_APART,
         )  # fmt: skip
 

@@ -26,7 +26,7 @@ def insignificant_parameters(solution: Solution, start: Array) -> list[str]:
     # parameter, and constraints violated at the start seem to hold information. The worst is
     # removed first, as it may hide others.
     problem, prior = solution.problem, solution.fit.prior
-    reach = problem.parameters.skeleton.size
+    reach = problem.parameters.table.size
     limit = np.full(problem.P + problem.F, np.inf)
     limit[: problem.P] = [
         LARGEST_LENGTH * reach if entry.element.is_length else LARGEST_ANGLE

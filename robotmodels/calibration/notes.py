@@ -40,7 +40,7 @@ def notes_before(problem: Problem) -> tuple[str, ...]:
     moving = {
         row
         for f in measured_frames(problem.measurements)
-        for row in problem.parameters.skeleton.path(f)
+        for row in problem.parameters.table.path(f)
     }
     notes = check_readings(model, problem.measurements, moving)
     check_units(model, problem.measurements)
@@ -167,7 +167,7 @@ def is_implausible(solution: Solution) -> bool:
 
 def _implausible(solution: Solution) -> list[str]:
     """Notes on measurements whose estimated noise is larger than that of any measurement."""
-    length, notes = solution.problem.parameters.skeleton.size, []
+    length, notes = solution.problem.parameters.table.size, []
     for m, scale in zip(solution.problem.measurements, solution.scales, strict=True):
         if m.sigma is None and m.covariance is None and not solution.fit.sigma_known:
             size = max(
@@ -191,7 +191,7 @@ def _unlikely_deviations(solution: Solution) -> list[str]:
     """Parameters of the table that would be another robot's."""
     parameters = solution.problem.parameters
     f = parameters.model.f
-    size = solution.problem.parameters.skeleton.size
+    size = solution.problem.parameters.table.size
     far = [
         f"{entry.name} by {value:.3g} {entry.unit}"
         for entry, value in zip(parameters.entries, solution.deviation, strict=True)

@@ -1,4 +1,4 @@
-"""Correction for controllers that keep their nominal model: false joint values, false targets."""
+"""Correction for controllers that keep their nominal model: joint offsets and false targets."""
 
 from __future__ import annotations
 
@@ -14,35 +14,28 @@ from ..errors import InvalidValueError
 from ..igm.asked import above_zero, mask_of
 from ..kinematics import dgm
 from .inverse import CorrectedSolutions, corrected_igm
-from .robot import (
-    CalibratedRobot,
-    as_calibrated,
-    calibrated_pose,
-    missing_of_pose,
-    missing_slope,
-    reading_jacobian,
-)
-
-STEPS = 50
-DEPENDENT = 1e-9  # singular values beside the largest below which offsets are not told apart
+from .refinement import pose_error_slope, pose_errors
+from .robot import CalibratedRobot, as_calibrated, calibrated_pose, reading_jacobian
 
 if TYPE_CHECKING:
     from .result import CalibrationResult
 
+STEPS = 50
+DEPENDENT = 1e-9  # singular values beside the largest below which offsets are dependent
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointOffsets(Rebuilt):
-    """One constant offset for each joint, and what it leaves.
+    """One constant offset for each joint, and the errors without and with them.
 
     Parameters
     ----------
     offset : ndarray, shape (n,)
-        To be added to what the controller commands, rad or m.
+        To be added to the joint values that the controller commands, rad or m.
     rank : int
-        How many combinations of offsets the configurations tell apart; of the others the smallest
-        are taken.
+        Number of independent combinations of offsets; of the others the smallest are taken.
     before, after : ndarray, shape (N, 6)
-        What the real tool misses of the commanded pose without and with them: position (m) and
+        Error of the real tool at the commanded pose without and with them: position (m) and
         rotation vector (rad), world axes.
 
     References
@@ -87,7 +80,7 @@ class PoseOffsets(Rebuilt):
     Parameters
     ----------
     solutions : CorrectedSolutions
-        What the joints must read.
+        The readings at the true targets.
     command : ndarray, shape (..., S, 4, 4)
         The pose that the nominal robot has there, metres; NaN in rows without a solution. The
         controller must stay on the branch of the row.
@@ -108,31 +101,13 @@ class PoseOffsets(Rebuilt):
         object.__setattr__(self, "command", read_only(self.command))
 
     def nearest(self, q: ArrayLike) -> Array:
-        """False target of the solution nearest to a posture.
-
-        Parameters
-        ----------
-        q : array_like, shape (..., n)
-            Postures, rad or m.
-
-        Returns
-        -------
-        ndarray, shape (..., 4, 4)
-            World poses, metres; NaN for poses without a solution.
-
-        Raises
-        ------
-        ShapeError, InvalidValueError
-            ``q`` of the wrong length, or with NaN or infinity.
-        """
-        found = self.solutions
-        nearest = found.nearest(q)
-        if not found.q.shape[-2]:
+        """False target (..., 4, 4) of the solution nearest to a posture (..., n); NaN if none."""
+        rows = self.solutions.q
+        nearest = self.solutions.nearest(q)
+        if not rows.shape[-2]:
             return np.full((*nearest.shape[:-1], 4, 4), np.nan)
-        same = (found.q == nearest[..., None, :]).all(axis=-1).argmax(axis=-1)
-        command = np.broadcast_to(
-            self.command, (*nearest.shape[:-1], *self.command.shape[-3:])
-        )  # fmt: skip
+        same = (rows == nearest[..., None, :]).all(axis=-1).argmax(axis=-1)
+        command = np.broadcast_to(self.command, (*nearest.shape[:-1], *self.command.shape[-3:]))
         return np.take_along_axis(command, same[..., None, None, None], axis=-3)[..., 0, :, :]
 
 
@@ -142,17 +117,17 @@ def joint_offsets(
     mask: ArrayLike | None = None,
     length: float | None = None,
 ) -> JointOffsets:
-    """Constant joint offsets that serve best over a set of configurations, in least squares.
+    """Constant joint offsets with the least squares of errors over a set of configurations.
 
     Parameters
     ----------
     robot : CalibratedRobot or CalibrationResult
         The robot, n joints.
     q : array_like, shape (N, n)
-        What the controller would command, rad or m: the nominal model is to hold there.
+        Commanded joint values, rad or m: the poses of the nominal model there are wanted.
     mask : array_like, shape (6,), optional
         Components ``x y z rx ry rz`` (world axes) that count; default all, and positions alone for
-        a result of positions alone: orientations that nobody measured must not weigh.
+        a result of positions alone: orientations that were not measured must not weigh.
     length : float, optional
         Metres that weigh as much as a radian; default the mean distance of the tool from the
         base.
@@ -160,8 +135,8 @@ def joint_offsets(
     Returns
     -------
     JointOffsets
-        Offsets, and the errors before and after. Where only the joints' own offsets are off they
-        are cancelled exactly.
+        Offsets, and the errors before and after. Constant errors of the joint variables are
+        cancelled exactly.
 
     Raises
     ------
@@ -175,14 +150,12 @@ def joint_offsets(
 
     Examples
     --------
-    >>> from robotmodels.calibration import candidate_parameters
-    >>> from robotmodels.calibration.robot import calibrated_model
+    >>> from robotmodels.calibration import calibrated_model, candidate_parameters
     >>> from robotmodels.robots import load
     >>> parameters = candidate_parameters(load("rx90"))
     >>> robot = calibrated_model(parameters, 0.01 * (np.array(parameters.names) == "theta3"))
     >>> q = np.random.default_rng(0).uniform(-2, 2, size=(20, 6))
-    >>> found = joint_offsets(robot, q)
-    >>> found.offset.round(9) + 0.0
+    >>> joint_offsets(robot, q).offset.round(9) + 0.0
     array([ 0.  ,  0.  , -0.01,  0.  ,  0.  ,  0.  ])
     """
     if mask is None:
@@ -190,7 +163,7 @@ def joint_offsets(
     robot = as_calibrated(robot)
     n = robot.model.n
     commanded = np.atleast_2d(as_vector(q, n, "q")).reshape(-1, n)
-    asked = mask_of(mask)
+    requested = mask_of(mask)
     if not len(commanded):
         raise InvalidValueError("q: expected one configuration or more, got none.")
     wanted = dgm(robot.nominal, commanded)
@@ -198,29 +171,31 @@ def joint_offsets(
         away = np.linalg.norm(wanted[:, :3, 3] - robot.nominal.base[:3, 3], axis=1)
         length = float(away.mean()) or 1.0
     length = above_zero(length, "length")
-    weight = np.where(asked, np.repeat([1.0, length], 3), 0.0)
+    weight = np.where(requested, np.repeat([1.0, length], 3), 0.0)
     revolute = robot.model.table.sigma[robot.model.table.joint_rows] == 0
     unit = np.where(revolute, 1.0, length)
-    offset = np.zeros(n)
-    before = error = _missing(robot, commanded, wanted)
-    cost, rank = float(np.sum((weight * error) ** 2)), 0
+
+    def errors(offset: Array) -> tuple[Array, float]:
+        missing = pose_errors(calibrated_pose(robot, commanded + offset), wanted)
+        return missing, float(np.sum((weight * missing) ** 2))
+
+    offset, rank = np.zeros(n), 0
+    before, cost = errors(offset)
+    error = before
     for _ in range(STEPS):
         J = reading_jacobian(robot, commanded + offset)
-        W = weight[:, None] * missing_slope(J, error[:, 3:]) * unit
+        W = weight[:, None] * pose_error_slope(J, error[:, 3:]) * unit
         solved = np.linalg.lstsq(W.reshape(-1, n), (weight * error).ravel(), rcond=DEPENDENT)
-        rank = int(solved[2])
-        step = solved[0] * unit
+        rank, step = int(solved[2]), solved[0] * unit
         for _ in range(10):
-            trial = _missing(robot, commanded + offset + step, wanted)
-            after = float(np.sum((weight * trial) ** 2))
+            trial, after = errors(offset + step)
             if after <= cost:
                 break
             step = 0.5 * step
         else:
             break  # only rounding is left
-        offset, error = offset + step, trial
         done = cost - after <= 1e-15 * cost and np.abs(step / unit).max() < 1e-12
-        cost = after
+        offset, error, cost = offset + step, trial, after
         if done or cost == 0.0:
             break
     return JointOffsets(offset, rank, before, error)
@@ -266,30 +241,25 @@ def pose_offsets(
 
     Examples
     --------
-    >>> from robotmodels.calibration import candidate_parameters
-    >>> from robotmodels.calibration.robot import calibrated_model
+    >>> from robotmodels.calibration import calibrated_model, candidate_parameters
     >>> from robotmodels.igm import igm
     >>> from robotmodels.robots import load
     >>> parameters = candidate_parameters(load("rx90"))
     >>> xi = 1e-3 * np.random.default_rng(0).normal(size=len(parameters))
     >>> robot, q = calibrated_model(parameters, xi), np.array([0.1, 0.2, 1.3, 0.4, 0.5, 0.6])
     >>> T = dgm(robot.nominal, q)
-    >>> false = pose_offsets(robot, T, q).command[0]
-    >>> there = calibrated_pose(robot, igm(robot.nominal, false).nearest(q))
-    >>> bool(np.abs(there - T).max() < 1e-12)
+    >>> command = pose_offsets(robot, T, q).command[0]
+    >>> reached = calibrated_pose(robot, igm(robot.nominal, command).nearest(q))
+    >>> bool(np.abs(reached - T).max() < 1e-12)
     True
     """
     robot = as_calibrated(robot)
-    found = corrected_igm(robot, T, q_ref, mask, mask_axes, limits, lock)
-    command = np.full((*found.valid.shape, 4, 4), np.nan)
-    command[found.valid] = dgm(robot.nominal, found.q[found.valid])
-    return PoseOffsets(found, command)
-
-
-def _missing(robot: CalibratedRobot, q_read: Array, wanted: Array) -> Array:
-    """What the real tool misses, (N, 6), world axes."""
-    return missing_of_pose(calibrated_pose(robot, q_read), wanted)
+    solutions = corrected_igm(robot, T, q_ref, mask, mask_axes, limits, lock)
+    command = np.full((*solutions.valid.shape, 4, 4), np.nan)
+    command[solutions.valid] = dgm(robot.nominal, solutions.q[solutions.valid])
+    return PoseOffsets(solutions, command)
 
 
 def _rms(rows: Array) -> float:
+    """Root mean square of the lengths of rows."""
     return float(np.sqrt(np.mean(np.sum(rows**2, axis=-1)))) if len(rows) else 0.0

@@ -13,7 +13,7 @@ from ..errors import InvalidValueError
 from ..estimation.linearised import inverse_factor
 from ..se3 import skew
 from .differential import differential_model
-from .identifiable import Reason, all_deviations
+from .identifiable import Reason, all_corrections
 from .parameters import ErrorLaw, GeometricParameters
 from .prior import ParameterPrior, standard_deviations
 from .problem import problem_of, stacked
@@ -108,10 +108,10 @@ def other_tool_error(
         postures = postures[:: -(-len(postures) // _POSTURES)]
     else:
         postures = np.atleast_2d(as_vector(q, result.nominal.n, "q"))
-    skeleton = result.identifiable.candidates.skeleton
+    table = result.identifiable.candidates.table
     model = result.model
     if length is None:
-        length = max(float(np.linalg.norm(model.tool[:3, 3])), _LEAST_LENGTH * skeleton.size)
+        length = max(float(np.linalg.norm(model.tool[:3, 3])), _LEAST_LENGTH * table.size)
     elif not (np.isfinite(length) and length > 0.0):
         raise InvalidValueError(f"length: expected a positive length in metres, got {length!r}.")
     parameters, factor, deviation = _posterior(result)
@@ -149,7 +149,7 @@ def _posterior(result: CalibrationResult) -> tuple[GeometricParameters, Array, A
     }
     parameters = found.candidates.without(left_out)
     problem = problem_of(parameters, solution.problem.measurements)
-    deviation = all_deviations(parameters, estimated, solution.deviation)
+    deviation = all_corrections(parameters, estimated, solution.deviation)
     _, J = stacked(problem, np.concatenate([deviation, solution.fixtures]), solution.scales)
     if not fit.sigma_known:
         J = J / max(fit.scale, 1.0)  # below 1 the data are exact
@@ -171,7 +171,7 @@ def _moved(
     length: float,
 ) -> tuple[Array, Array]:
     """Points of six tools at N postures (6 N, 3), and how parameters move them (6 N, 6, P)."""
-    frame = parameters.skeleton.frames[0]
+    frame = parameters.table.frames[0]
     T, psi = differential_model(parameters, q, deviation, frame)
     end = robot.end(frame)
     assert end is not None

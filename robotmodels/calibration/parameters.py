@@ -1,8 +1,8 @@
-"""Laws."""
+"""Geometric parameters of a calibration: elements of the extended table and error laws."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Self
@@ -13,40 +13,53 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import Array, Rebuilt, as_vector, read_only
 from ..errors import InvalidValueError, nearest_names
 from ..model import RobotModel
-from .extended_table import Element, Skeleton, gravity_loads
+from .extended_table import JOINT_VARIABLE, Element, ExtendedTable, gravity_loads
 
 
 class ErrorLaw(Enum):
     """How the error of an element depends on the configuration.
 
-    A member's value is what the names of its parameters begin with; a constant error is called by
-    its element. Every law is linear in its parameter, whose factor is
+    The value is the prefix of the parameters' names; a constant error is named by its element.
+    Every law is linear in its parameter: ``error = parameter * factor``. A new law is a row here.
 
-    ============  =============================================================
-    CONSTANT      1
-    GAIN          the reading of a joint (rad or m); of another joint: coupling
-    COMPLIANCE    minus the gravity torque of a joint (N m or N)
-    SINE, COSINE  of the reading: an encoder that is mounted off its axis
-    SINE_2, ...   of twice the reading: a graduated disc that is not flat
-    ============  =============================================================
+    Attributes
+    ----------
+    unit : str
+        Unit of the parameter; ``{}`` stands for that of its element.
+    factor : callable or None
+        Factor by the reading of a joint (rad or m): the reading itself for GAIN (with another
+        joint: coupling), sines and cosines for an encoder off its axis or a graduated disc that is
+        not flat. None for CONSTANT (factor 1) and for COMPLIANCE, whose factor is the gravity load
+        on the element (N m or N).
 
     Examples
     --------
-    >>> ErrorLaw.GAIN.value
-    'gain'
+    >>> ErrorLaw.GAIN.value, ErrorLaw.SINE_2.factor(0.0)
+    ('gain', np.float64(0.0))
     """
 
-    CONSTANT = ""
-    GAIN = "gain"
-    COMPLIANCE = "compliance"
-    SINE = "sine"
-    COSINE = "cosine"
-    SINE_2 = "sine_2_"
-    COSINE_2 = "cosine_2_"
+    unit: str
+    factor: Callable[[Array], Array] | None
+
+    CONSTANT = "", "{}", None
+    GAIN = "gain", "1", lambda q: q
+    SINE = "sine", "{}", np.sin
+    COSINE = "cosine", "{}", np.cos
+    SINE_2 = "sine_2_", "{}", lambda q: np.sin(2.0 * q)
+    COSINE_2 = "cosine_2_", "{}", lambda q: np.cos(2.0 * q)
+    COMPLIANCE = "compliance", "{}/N m", None
+
+    def __new__(
+        cls, value: str, unit: str, factor: Callable[[Array], Array] | None = None
+    ) -> ErrorLaw:
+        """Attach unit and factor to the prefix."""
+        law = object.__new__(cls)
+        law._value_, law.unit, law.factor = value, unit, factor
+        return law
 
 
 class Compliance(Enum):
-    """What gives way under gravity, in proportion to its moment there.
+    """Elements that yield under gravity, in proportion to its load there.
 
     Examples
     --------
@@ -63,9 +76,7 @@ class Compliance(Enum):
 
 @dataclass(frozen=True, slots=True)
 class GeometricParameter:
-    """One parameter: the deviation of an element of a row, times its law.
-
-    A compliance that is the same about several axes acts on further elements as well.
+    """One parameter: the error of an element of a row, times the factor of its law.
 
     Parameters
     ----------
@@ -76,9 +87,10 @@ class GeometricParameter:
     law : ErrorLaw
         How it depends on the configuration.
     source : int
-        Row of the joint that the law reads, or whose load bends; the row's own for constant errors.
+        Row of the joint whose reading or load the law uses; its own row for constant errors.
     also : tuple of (int, Element, int)
-        Further rows and elements that it acts on alike, each with the row of its source.
+        Further rows and elements with the same error, each with the row of its source: a
+        compliance that is the same about several axes.
 
     Examples
     --------
@@ -96,14 +108,14 @@ class GeometricParameter:
 
     @property
     def actions(self) -> tuple[tuple[int, Element, int], ...]:
-        """All rows and elements that it acts on, and rows of the sources."""
+        """All rows and elements that it changes, with the rows of the sources."""
         return ((self.row, self.element, self.source), *self.also)
 
     @property
     def moves_own_joint(self) -> bool:
-        """Whether it adds to the variable of a joint alone."""
-        own = self.element in (Element.THETA, Element.R)
-        return own and not self.also and self.law is not ErrorLaw.CONSTANT
+        """Whether it adds to the variable of a single joint."""
+        variable = self.element in (Element.THETA, Element.R)
+        return variable and not self.also and self.law is not ErrorLaw.CONSTANT
 
     @property
     def name(self) -> str:
@@ -120,22 +132,21 @@ class GeometricParameter:
 
     @property
     def unit(self) -> str:
-        """Unit of the deviation, for a law that reads a revolute joint unless it is constant."""
-        own = "m" if self.element.is_length else "rad"
-        return {ErrorLaw.GAIN: "1", ErrorLaw.COMPLIANCE: f"{own}/N m"}.get(self.law, own)
+        """Unit of its value; of a gain and a compliance that of a revolute joint."""
+        return self.law.unit.format("m" if self.element.is_length else "rad")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GeometricParameters(Rebuilt):
     """Parameters of a robot, in the order in which they are preferred.
 
-    Where two of them act alike the earlier is kept and the later regrouped into it: first the
-    ends and the base, which are the least known and may be far off, then the variables of the
-    joints, the rest of the table, and last what depends on the configuration.
+    Of parameters with the same effect the earlier one is kept and the later regrouped into it. The
+    usual order is: ends and base, which are known least; the joint variables; the rest of the
+    table; last the parameters that depend on the configuration.
 
     Parameters
     ----------
-    skeleton : Skeleton
+    table : ExtendedTable
         The extended table.
     entries : tuple of GeometricParameter
         The parameters.
@@ -148,11 +159,16 @@ class GeometricParameters(Rebuilt):
     --------
     >>> from robotmodels.calibration import candidate_parameters
     >>> from robotmodels.robots import load
-    >>> candidate_parameters(load("rx90")).names[11:15]
+    >>> full = candidate_parameters(load("rx90"))
+    >>> full.names[11:15]
     ('theta0', 'theta1', 'theta2', 'theta3')
+    >>> full.subset(["d3", "theta2"]).names, full.preferring(["d3"]).names[0]
+    (('theta2', 'd3'), 'd3')
+    >>> len(full) - len(full.without(["r4"]))
+    1
     """
 
-    skeleton: Skeleton
+    table: ExtendedTable
     entries: tuple[GeometricParameter, ...]
     names: tuple[str, ...] = field(init=False)
     """Names, shape (P,)."""
@@ -161,18 +177,18 @@ class GeometricParameters(Rebuilt):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "names", tuple(entry.name for entry in self.entries))
-        found = [
+        actions = [
             (k, row, int(element))
             for k, entry in enumerate(self.entries)
             for row, element, _ in entry.actions
         ]
-        columns = np.array(found, dtype=np.int64).reshape(-1, 3).T
+        columns = np.array(actions, dtype=np.int64).reshape(-1, 3).T
         object.__setattr__(self, "actions", tuple(read_only(c, np.int64) for c in columns))
 
     @property
     def model(self) -> RobotModel:
         """The nominal robot."""
-        return self.skeleton.model
+        return self.table.model
 
     def __len__(self) -> int:
         return len(self.entries)
@@ -189,168 +205,64 @@ class GeometricParameters(Rebuilt):
     @property
     def nominal(self) -> Array:
         """Nominal value of each, rad or m; 0 for those that depend on the configuration."""
-        values = self.skeleton.nominal
+        values = self.table.nominal
         return read_only([
             values[e.row, e.element] if e.law is ErrorLaw.CONSTANT else 0.0 for e in self.entries
         ])  # fmt: skip
 
     @property
     def units(self) -> tuple[str, ...]:
-        """Unit of each deviation."""
+        """Unit of each."""
         return tuple(entry.unit for entry in self.entries)
 
     def index(self, names: Iterable[str], what: str = "parameters") -> NDArray[np.int64]:
-        """Positions of parameters by name.
-
-        Parameters
-        ----------
-        names : iterable of str
-            Names among `names`.
-        what : str
-            Used in the error message.
-
-        Returns
-        -------
-        ndarray of int
-            Positions.
-
-        Raises
-        ------
-        InvalidValueError
-            An unknown name; the message gives the nearest ones.
-        """
+        """Numbers of parameters by name; InvalidValueError with the nearest names if unknown."""
         known = {name: k for k, name in enumerate(self.names)}
-        found = []
+        numbers = []
         for name in as_names(names):
             if name not in known:
                 near = ", ".join(nearest_names(str(name), known)) or ", ".join(self.names)
                 raise InvalidValueError(
                     f"{what}: {name!r} is not a parameter of this calibration; near it: {near}."
                 )
-            found.append(known[name])
-        return np.array(found, dtype=np.int64)
+            numbers.append(known[name])
+        return np.array(numbers, dtype=np.int64)
 
     def subset(self, names: Iterable[str]) -> Self:
-        """Only some of the parameters, in this order of preference.
-
-        Parameters
-        ----------
-        names : iterable of str
-            Which.
-
-        Returns
-        -------
-        GeometricParameters
-            The subset.
-
-        Raises
-        ------
-        InvalidValueError
-            An unknown name.
-
-        Examples
-        --------
-        >>> from robotmodels.calibration import candidate_parameters
-        >>> from robotmodels.robots import load
-        >>> candidate_parameters(load("rx90")).subset(["d3", "theta2"]).names
-        ('theta2', 'd3')
-        """
+        """Some of the parameters, in this order of preference."""
         return replace(self, entries=tuple(self.entries[k] for k in sorted(self.index(names))))
 
     def preferring(self, names: Iterable[str]) -> Self:
-        """The same parameters, some of them before the others.
-
-        Parameters
-        ----------
-        names : iterable of str
-            Which are preferred, in this order.
-
-        Returns
-        -------
-        GeometricParameters
-            In another order.
-
-        Raises
-        ------
-        InvalidValueError
-            An unknown name.
-
-        Examples
-        --------
-        >>> from robotmodels.calibration import candidate_parameters
-        >>> from robotmodels.robots import load
-        >>> candidate_parameters(load("rx90")).preferring(["d3"]).names[0]
-        'd3'
-        """
+        """The same parameters, the named ones first and in the order given."""
         first = [self.entries[k] for k in self.index(names)]
         rest = [entry for entry in self.entries if entry not in first]
         return replace(self, entries=(*first, *rest))
 
     def without(self, names: Iterable[str]) -> Self:
-        """All but some of the parameters.
-
-        Parameters
-        ----------
-        names : iterable of str
-            Which to leave out: they stay at their nominal values.
-
-        Returns
-        -------
-        GeometricParameters
-            The others.
-
-        Raises
-        ------
-        InvalidValueError
-            An unknown name.
-
-        Examples
-        --------
-        >>> from robotmodels.calibration import candidate_parameters
-        >>> from robotmodels.robots import load
-        >>> full = candidate_parameters(load("rx90"))
-        >>> len(full) - len(full.without(["r4"]))
-        1
-        """
+        """All but the named parameters, which keep their nominal values."""
         left_out = set(self.index(names).tolist())
-        kept = tuple(e for k, e in enumerate(self.entries) if k not in left_out)
-        return replace(self, entries=kept)
+        return replace(
+            self, entries=tuple(e for k, e in enumerate(self.entries) if k not in left_out)
+        )
 
     def factors(self, q: ArrayLike) -> Array:
-        """What each deviation is multiplied by at each configuration.
-
-        Parameters
-        ----------
-        q : array_like, shape (N, n)
-            Readings of the joints, rad or m.
-
-        Returns
-        -------
-        ndarray, shape (N, A)
-            For each of `actions`: 1 for constant errors; else by `ErrorLaw`.
-        """
+        """Factor of each action by its law. Shapes: q (N, n) -> (N, A)."""
         q = np.atleast_2d(as_vector(q, self.model.n, "q"))
-        owner, rows, elements = self.actions
-        factor = np.ones((len(q), len(owner)))
-        laws = [self.entries[k].law for k in owner]
-        sources = [source for entry in self.entries for _, _, source in entry.actions]
-        loaded = [c for c, law in enumerate(laws) if law is ErrorLaw.COMPLIANCE]
+        actions = [(entry.law, action) for entry in self.entries for action in entry.actions]
+        factor = np.ones((len(q), len(actions)))
+        loaded = [c for c, (law, _) in enumerate(actions) if law is ErrorLaw.COMPLIANCE]
         if loaded:
-            bent = [(int(rows[c]), Element(int(elements[c])), sources[c]) for c in loaded]
-            factor[:, loaded] = gravity_loads(self.skeleton, q, bent)
-        for c, law in enumerate(laws):
-            if law in _LAWS:
-                factor[:, c] = _LAWS[law](q[:, self.skeleton.joint[sources[c]]])
+            factor[:, loaded] = gravity_loads(self.table, q, [actions[c][1] for c in loaded])
+        for c, (law, (_, _, source)) in enumerate(actions):
+            if law.factor is not None:
+                factor[:, c] = law.factor(q[:, self.table.joint[source]])
         return factor
 
-
-_LAWS = {
-    ErrorLaw.GAIN: lambda x: x,
-    ErrorLaw.SINE: np.sin,
-    ErrorLaw.COSINE: np.cos,
-    ErrorLaw.SINE_2: lambda x: np.sin(2.0 * x),
-    ErrorLaw.COSINE_2: lambda x: np.cos(2.0 * x),
-}
+    def bends(self, entry: GeometricParameter) -> bool:
+        """Whether a parameter is a compliance of a link or of the mount, not of a joint."""
+        variable = JOINT_VARIABLE[int(self.table.sigma[entry.row])]
+        joint = entry.element is variable and entry.moves_own_joint and entry.source == entry.row
+        return entry.law is ErrorLaw.COMPLIANCE and not joint
 
 
 def as_names(names: str | Iterable[str]) -> tuple[str, ...]:

@@ -47,7 +47,7 @@ def placed_robot(
     if not fixed:
         start = registered(model, measured, base=0 in rows, tool=any(rows - {0}))
         model = with_gravity_kept(start, model)
-    frames = candidates.skeleton.frames
+    frames = candidates.table.frames
     for _ in range(2):  # once more, as a tool off the last axis tells more than one on it
         few = candidate_parameters(model, frames).subset(names)
         found = identifiable_on(few, measured, scale_is_known=True)

@@ -146,7 +146,7 @@ _STRENGTHS = np.logspace(-3.0, 3.0, 13)
 def standard_deviations(prior: ParameterPrior, problem: Problem) -> Array:
     """Prior standard deviations of the parameters, shape (P,); infinite without prior."""
     parameters = problem.parameters
-    prior = sized(prior, parameters.skeleton.size)
+    prior = sized(prior, parameters.table.size)
     f = parameters.model.f
     return np.array([
         prior.named.get(e.name, _size(prior, e, f, largest))

@@ -1,4 +1,4 @@
-"""Links that bend and a mount that tilts under gravity: compliance that no joint variable holds."""
+"""The calibrated robot: a model with the constant corrections, and the laws that no table holds."""
 
 from __future__ import annotations
 
@@ -11,587 +11,126 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, Rebuilt, as_exact, as_vector, read_only
-from ..drive import Transmission
 from ..errors import InvalidValueError
-from ..kinematics import dgm, jacobian
 from ..model import RobotModel
-from ..se3.orientation import rotation_vectors_of
 from ..urdf.in_place import tool_link
-from .extended_table import Element, Frame, Skeleton, gravity_loads, pose_of_elements
-from .parameters import ErrorLaw, GeometricParameter, GeometricParameters
+from .differential import screws_of
+from .extended_table import (
+    JOINT_VARIABLE,
+    Element,
+    Frame,
+    frame_place,
+    pose_of_elements,
+)
+from .parameters import ErrorLaw, GeometricParameters
 
-_OWN = (Element.THETA, Element.R, None)  # of sigma 0, 1, 2
-_DIFFERENCE = 1e-4  # rad or m: of loads, whose slope only leads Newton's steps
+NEWTON_STEPS = 60
+LONGEST = 0.5  # step of a reading, rad or m
+ROUNDING = 2e-14  # of a joint variable, relative to the largest plus 1
+DIFFERENCE = 1e-4  # step of the central differences of the laws, rad or m
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Bending(Rebuilt):
-    """How far elements of the extended table give way where the joints read ``q_read``.
-
-    ``element += compliance * load(q_read)``, with the gravity loads of the nominal robot.
-
-    Parameters
-    ----------
-    skeleton : Skeleton
-        The nominal extended table, R rows.
-    elements : ndarray, shape (R, 7)
-        Its elements with the constant deviations, rad and m.
-    row, element, source : ndarray of int, shape (B,)
-        What gives way, and the row that all the load hangs on.
-    compliance : ndarray, shape (B,)
-        rad or m, per N m or N.
-
-    References
-    ----------
-    Seed book section 1.4.2; 1.5.1.1 for the loads.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from robotmodels.calibration import candidate_parameters
-    >>> from robotmodels.robots import load
-    >>> parameters = candidate_parameters(load("erd:ur10"), compliance="links")
-    >>> soft = 1e-6 * (np.array(parameters.names) == "compliance_beta3")
-    >>> bending = bending_of(parameters, parameters.skeleton.nominal, soft)
-    >>> bending.row, bending.given_way(np.zeros((1, 6))).shape
-    (array([3]), (1, 1))
-    """
-
-    skeleton: Skeleton
-    elements: Array
-    row: NDArray[np.int64]
-    element: NDArray[np.int64]
-    source: NDArray[np.int64]
-    compliance: Array
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "elements", read_only(self.elements))
-        object.__setattr__(self, "compliance", read_only(self.compliance))
-        for name in ("row", "element", "source"):
-            object.__setattr__(self, name, read_only(getattr(self, name), np.int64))
-
-    @property
-    def is_zero(self) -> bool:
-        """Whether nothing gives way but the joints about their own axes."""
-        return not self.compliance.size
-
-    @property
-    def tilts_mount(self) -> bool:
-        """Whether the base gives way."""
-        return bool((self.row == 0).any())
-
-    @property
-    def bent_rows(self) -> tuple[str, ...]:
-        """Names of the frames whose place on the link before gives way."""
-        rows = sorted({int(row) for row in self.row if row > 0})
-        return tuple(self.skeleton.row_name(row) for row in rows)
-
-    def path_to(self, row: int) -> NDArray[np.int64]:
-        """Rows from the world to a row of the extended table, the base's (0) first."""
-        rows = [row]
-        while rows[-1] > 0:
-            rows.append(int(self.skeleton.antecedent[rows[-1]]))
-        return np.array(rows[::-1], dtype=np.int64)
-
-    def given_way(self, q_read: Array) -> Array:
-        """How far each element gives way.
-
-        Parameters
-        ----------
-        q_read : ndarray, shape (N, n)
-            Readings, rad or m.
-
-        Returns
-        -------
-        ndarray, shape (N, B)
-            rad or m.
-        """
-        bent = [
-            (int(row), Element(int(element)), int(source))
-            for row, element, source in zip(self.row, self.element, self.source, strict=True)
-        ]
-        return gravity_loads(self.skeleton, q_read, bent) * self.compliance
-
-    def poses(self, q_read: Array, q: Array, path: NDArray[np.int64], after: Array) -> Array:
-        """World poses behind a row.
-
-        Parameters
-        ----------
-        q_read, q : ndarray, shape (N, n)
-            Readings, on which the loads depend, and joint variables, rad or m.
-        path : ndarray of int, shape (k,)
-            Rows from the world.
-        after : ndarray, shape (4, 4)
-            Constant pose behind the last of them, metres.
-
-        Returns
-        -------
-        ndarray, shape (N, 4, 4)
-            Metres.
-        """
-        owner = np.arange(len(self.row))
-        actions = owner, self.row, self.element
-        ones = np.ones(len(owner))
-        return self._recursion(q, path, after, ones, actions, self.given_way(q_read), 0)[0]
-
-    def jacobians(
-        self, q_read: Array, q: Array, path: NDArray[np.int64], after: Array
-    ) -> tuple[Array, Array]:
-        """How what is behind a row moves with the joints, and with the readings through the loads.
-
-        Parameters
-        ----------
-        q_read, q, path, after
-            As for `poses`.
-
-        Returns
-        -------
-        by_joint : ndarray, shape (N, 6, n)
-            ``[v; w]`` per unit of q at constant loads, world axes.
-        by_load : ndarray, shape (N, 6, n)
-            The same per unit of q_read through the loads alone, which are differentiated by
-            central differences.
-        """
-        skeleton, B = self.skeleton, len(self.row)
-        n = skeleton.model.n
-        moving = np.flatnonzero(skeleton.joint >= 0)
-        own = np.array([_OWN[sigma] for sigma in skeleton.sigma[moving]], dtype=np.int64)
-        # what bends is moved as it is bent, and once more by a unit of nothing, for its screw
-        owner = np.concatenate([np.arange(2 * B), 2 * B + skeleton.joint[moving]])
-        actions = (
-            owner,
-            np.concatenate([self.row, self.row, moving]),
-            np.concatenate([self.element, self.element, own]),
-        )
-        factor = np.ones((len(q), len(owner)))
-        factor[:, :B] = self.given_way(q_read)
-        size = np.concatenate([np.ones(B), np.zeros(B + n)])
-        screws = self._recursion(q, path, after, size, actions, factor, 2 * B + n)[1]
-        steps = _DIFFERENCE * np.eye(n)
-        slope = np.empty((len(q), B, n))
-        for j in range(n):
-            slope[..., j] = self.given_way(q_read + steps[j]) - self.given_way(q_read - steps[j])
-        slope /= 2.0 * _DIFFERENCE
-        return screws[..., 2 * B :], screws[..., B : 2 * B] @ slope
-
-    def _recursion(
-        self,
-        q: Array,
-        path: NDArray[np.int64],
-        after: Array,
-        size: Array,
-        actions: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]],
-        factor: Array,
-        columns: int,
-    ) -> tuple[Array, Array]:
-        from ..kernels.erroneous_poses import erroneous_poses
-
-        skeleton = self.skeleton
-        T, screws = np.empty((len(q), 4, 4)), np.empty((len(q), 6, columns))
-        erroneous_poses(
-            np.ascontiguousarray(q), self.elements, skeleton.sigma, skeleton.joint, path,
-            np.ascontiguousarray(skeleton.before[:3, :3]),
-            np.ascontiguousarray(skeleton.before[:3, 3]),
-            np.ascontiguousarray(after[:3, :3]), np.ascontiguousarray(after[:3, 3]),
-            size, *actions, factor, T, screws,
-        )  # fmt: skip
-        return T, screws
-
-
-def bends(parameters: GeometricParameters, entry: GeometricParameter) -> bool:
-    """Whether a parameter is a compliance that does not add to the variable of its own joint."""
-    if entry.law is not ErrorLaw.COMPLIANCE:
-        return False
-    own = entry.element is _OWN[int(parameters.skeleton.sigma[entry.row])]
-    return not (own and entry.moves_own_joint and entry.source == entry.row)
-
-
-def bending_of(parameters: GeometricParameters, elements: Array, deviation: ArrayLike) -> Bending:
-    """The corrections that bend links or tilt the mount.
-
-    Shapes: elements (R, 7), deviation (P,).
-    """
-    xi = as_exact(deviation, (len(parameters),), "deviation")
-    found = [
-        (*action, value)
-        for entry, value in zip(parameters.entries, xi, strict=True)
-        if value != 0.0 and bends(parameters, entry)
-        for action in entry.actions
-    ]
-    where = np.array([action[:3] for action in found], dtype=np.int64).reshape(-1, 3)
-    row, element, source = where.T
-    compliance = np.array([action[3] for action in found], dtype=np.float64)
-    return Bending(parameters.skeleton, elements, row, element, source, compliance)
-
-
-_ROUNDING = 4e-15
-_ROUNDS = 60
-_STEPS = 30
-_DIFFERENCE = 1e-4  # of a gravity torque: its error only slows Newton's steps down
-
-_FIELDS = {
-    ErrorLaw.GAIN: "gain",
-    ErrorLaw.SINE: "sine",
-    ErrorLaw.COSINE: "cosine",
-    ErrorLaw.SINE_2: "sine_2",
-    ErrorLaw.COSINE_2: "cosine_2",
-    ErrorLaw.COMPLIANCE: "compliance",
+_LAW_WORDS = {
+    ErrorLaw.GAIN: "Gains and couplings of the readings are",
+    ErrorLaw.COMPLIANCE: "Compliance of the joints is",
 }
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointErrors(Rebuilt):
-    """How far the joints are from their readings.
+    """Joint variables as a function of the readings, ``q = q_read + sum of values * factors``.
 
-    ::
-
-        q = q_read + G q_read + A sin(q_read) + B cos(q_read) + A2 sin(2 q_read)
-            + B2 cos(2 q_read) - C g(q_read)
-
-    with g the gravity torques of the nominal robot. Element (j, i) of a matrix is the effect of
-    what joint i reads (or carries) on joint j. Constant offsets are the table's.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The nominal robot, n joints.
-    gain, sine, cosine, sine_2, cosine_2, compliance : ndarray, shape (n, n)
-        G, A, B, A2, B2 (rad or m per rad, m or 1) and C (rad or m, per N m or N).
-
-    References
-    ----------
-    Seed book section 1.4.2 (``q = K q_c + q_0``).
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from robotmodels.calibration import candidate_parameters
-    >>> from robotmodels.robots import load
-    >>> parameters = candidate_parameters(load("rx90"), gains=True)
-    >>> errors = joint_errors_of(parameters, 0.01 * (np.array(parameters.names) == "gain2"))
-    >>> errors.actual([0.0, 1.0, 0.0, 0.0, 0.0, 0.0])[1]
-    np.float64(1.01)
-    >>> errors.reading([0.0, 1.01, 0.0, 0.0, 0.0, 0.0])[1].round(12)
-    np.float64(1.0)
+    ``laws`` are the P parameters that add to joint variables, ``values (P,)`` their corrections.
     """
 
-    model: RobotModel
-    gain: Array
-    sine: Array
-    cosine: Array
-    sine_2: Array
-    cosine_2: Array
-    compliance: Array
+    laws: GeometricParameters
+    values: Array
 
     def __post_init__(self) -> None:
-        n = self.model.n
-        for name in _FIELDS.values():
-            matrix = as_exact(getattr(self, name), (n, n), name)
-            object.__setattr__(self, name, read_only(matrix))
+        object.__setattr__(self, "values", read_only(self.values))
 
     @property
     def is_zero(self) -> bool:
-        """Whether the joints are where they read."""
-        return not any(getattr(self, name).any() for name in _FIELDS.values())
-
-    @property
-    def is_affine(self) -> bool:
-        """Whether there are only gains, so that a `Transmission` can hold the law."""
-        return not any(getattr(self, name).any() for name in _FIELDS.values() if name != "gain")
+        """Whether readings are joint variables."""
+        return not len(self.laws)
 
     def actual(self, q_read: ArrayLike) -> Array:
-        """Joint variables from their readings.
-
-        Parameters
-        ----------
-        q_read : array_like, shape (..., n)
-            Readings, rad or m.
-
-        Returns
-        -------
-        ndarray, shape (..., n)
-            Joint variables of the calibrated table, rad or m.
-
-        Raises
-        ------
-        ShapeError, InvalidValueError
-            Wrong length; NaN or infinity.
-
-        References
-        ----------
-        Seed book section 1.4.2.
-
-        Examples
-        --------
-        See `JointErrors`.
-        """
-        q = as_vector(q_read, self.model.n, "q_read")
-        return q + self._error(q)
-
-    def reading(self, q_actual: ArrayLike) -> Array:
-        """Readings at which the joints are where they are wanted, the inverse of `actual`.
-
-        By a fixed-point iteration on the part beside the gains, which small errors contract
-        quickly; by Newton's method where it does not settle.
-
-        Parameters
-        ----------
-        q_actual : array_like, shape (..., n)
-            Joint variables of the calibrated table, rad or m.
-
-        Returns
-        -------
-        ndarray, shape (..., n)
-            Readings, to rounding; NaN in rows where no reading was found (errors so large that
-            the readings do not go up with the joints).
-
-        Raises
-        ------
-        ShapeError, InvalidValueError
-            Wrong length, NaN or infinity; gains that take all motion away.
-
-        References
-        ----------
-        Seed book section 1.4.2.
-
-        Examples
-        --------
-        See `JointErrors`.
-        """
-        n = self.model.n
-        wanted = as_vector(q_actual, n, "q_actual")
-        if self.is_zero:
-            return wanted.copy()
-        rows = wanted.reshape(-1, n)
-        K = np.eye(n) + self.gain
-        if np.linalg.matrix_rank(K) < n:
-            raise InvalidValueError(
-                "gain: 1 + G is singular, so that some joints do not move with any reading; a "
-                "gain error is small beside 1."
-            )
-        inverse = np.asarray(np.linalg.inv(K), np.float64)
-        q = rows @ inverse.T
-        if not self.is_affine:
-            q = self._settled(q, rows, inverse)
-        else:
-            q = q + (rows - self.actual(q)) @ inverse.T  # the inverse's rounding
-        return q.reshape(wanted.shape)
+        """Joint variables of the calibrated table at readings, both (..., n), rad or m."""
+        q = as_vector(q_read, self.laws.model.n, "q_read")
+        return q + self._errors(q)
 
     def slope(self, q_read: ArrayLike) -> Array:
-        """Derivative of `actual` by the readings.
-
-        Parameters
-        ----------
-        q_read : array_like, shape (..., n)
-            Readings, rad or m.
-
-        Returns
-        -------
-        ndarray, shape (..., n, n)
-            Exact but for the compliance, whose part is a central difference.
-
-        Raises
-        ------
-        ShapeError, InvalidValueError
-            Wrong length; NaN or infinity.
-
-        References
-        ----------
-        Seed book section 1.4.2.
-
-        Examples
-        --------
-        >>> from robotmodels.calibration import candidate_parameters
-        >>> from robotmodels.robots import load
-        >>> parameters = candidate_parameters(load("lab_rr"), gains=True)
-        >>> deviation = 0.01 * (np.array(parameters.names) == "gain2")
-        >>> joint_errors_of(parameters, deviation).slope([0.0, 1.0])
-        array([[1.  , 0.  ],
-               [0.  , 1.01]])
-        """
-        n = self.model.n
+        """Derivative of `actual` by central differences of the laws, (..., n) -> (..., n, n)."""
+        n = self.laws.model.n
         q = as_vector(q_read, n, "q_read")[..., None, :]
-        D = (
-            np.eye(n) + self.gain
-            + self.sine * np.cos(q) - self.cosine * np.sin(q)
-            + 2.0 * (self.sine_2 * np.cos(2.0 * q) - self.cosine_2 * np.sin(2.0 * q))
-        )  # fmt: skip
-        if self.compliance.any():
-            steps = _DIFFERENCE * np.eye(n)
-            change = self._gravity(q + steps) - self._gravity(q - steps)
-            change /= 2.0 * _DIFFERENCE
-            D = D - self.compliance @ change.swapaxes(-1, -2)
-        return D
+        step = DIFFERENCE * np.eye(n)
+        change = self._errors(q + step) - self._errors(q - step)
+        return np.eye(n) + change.swapaxes(-1, -2) / (2.0 * DIFFERENCE)
 
-    def _error(self, q: Array) -> Array:
-        error = q @ self.gain.T
-        for law, of in ((self.sine, np.sin), (self.cosine, np.cos)):
-            if law.any():
-                error += of(q) @ law.T
-        for law, of in ((self.sine_2, np.sin), (self.cosine_2, np.cos)):
-            if law.any():
-                error += of(2.0 * q) @ law.T
-        if self.compliance.any():
-            error -= self._gravity(q) @ self.compliance.T
-        return error
+    def reading(self, q_actual: ArrayLike) -> Array:
+        """Readings that lead to joint variables, the inverse of `actual`, by Newton's method.
 
-    def _gravity(self, q: Array) -> Array:
-        from ..dynamics import gravity_torque
-
-        return gravity_torque(self.model, q)
-
-    def _settled(self, q: Array, wanted: Array, inverse: Array) -> Array:
-        """Fixed point, then Newton's steps for the rows that are left."""
-        floor = _ROUNDING * (1.0 + np.abs(wanted).max(axis=-1, initial=0.0))
-        moving = np.arange(len(q))
-        last = np.full(len(q), np.inf)
-        for _ in range(_ROUNDS):
-            step = (wanted[moving] - self.actual(q[moving])) @ inverse.T
-            size = np.abs(step).max(axis=-1, initial=0.0)
-            q[moving] += step
-            # contraction that is slower than this is left to Newton
-            going = (size > floor[moving]) & (size < 0.2 * last[moving])
-            last[moving] = size
-            moving = moving[going]
-            if not moving.size:
+        NaN in rows where none was found: errors so large that the law is not monotonic.
+        """
+        n = self.laws.model.n
+        goals = as_vector(q_actual, n, "q_actual")
+        wanted = goals.reshape(-1, n)
+        q = wanted.copy()
+        if self.is_zero:
+            return q.reshape(goals.shape)
+        floor = ROUNDING * (1.0 + np.abs(wanted).max(axis=-1, initial=0.0))
+        missing = wanted - self.actual(q)
+        size = np.abs(missing).max(axis=-1, initial=0.0)
+        for _ in range(NEWTON_STEPS):
+            going = np.flatnonzero(size > floor)
+            if not going.size:
                 break
-        floor *= 5.0
-        left = np.flatnonzero(np.abs(self.actual(q) - wanted).max(axis=-1, initial=0.0) > floor)
-        if not left.size:
-            return q
-        x = wanted[left] @ inverse.T
-        best = np.abs(self.actual(x) - wanted[left]).max(axis=-1)
-        for _ in range(_STEPS):
-            D = self.slope(x)
-            # the shortest step where the slope is singular
-            step = (np.linalg.pinv(D) @ (wanted[left] - self.actual(x))[..., None])[..., 0]
-            step *= np.minimum(1.0, 0.5 / np.maximum(np.abs(step).max(axis=-1), 0.5))[:, None]
-            error = np.abs(self.actual(x + step) - wanted[left]).max(axis=-1)
-            keep = error < best
-            step[~keep] *= 0.5
-            x = x + step
-            best = np.abs(self.actual(x) - wanted[left]).max(axis=-1)
-            if (best <= floor[left]).all():
-                break
-        x[best > floor[left]] = np.nan
-        q[left] = x
-        return q
+            D = self.slope(q[going])
+            # least squares: the law may be singular there
+            normal = D.swapaxes(-1, -2) @ D + 1e-12 * np.eye(n)
+            step = np.linalg.solve(normal, D.swapaxes(-1, -2) @ missing[going, :, None])[..., 0]
+            step *= np.minimum(1.0, LONGEST / np.maximum(np.abs(step).max(axis=-1), LONGEST))[
+                :, None
+            ]
+            trial = wanted[going] - self.actual(q[going] + step)
+            worse = np.abs(trial).max(axis=-1) >= size[going]
+            step[worse] *= 0.5
+            q[going] += step
+            trial[worse] = wanted[going[worse]] - self.actual(q[going[worse]])
+            missing[going], size[going] = trial, np.abs(trial).max(axis=-1)
+        q[size > floor] = np.nan
+        return q.reshape(goals.shape)
+
+    def _errors(self, q: Array) -> Array:
+        """Differences of joint variables and readings, (..., n)."""
+        if self.is_zero:
+            return np.zeros_like(q)
+        owner, rows, _ = self.laws.actions
+        effect = np.zeros((len(owner), q.shape[-1]))
+        effect[np.arange(len(owner)), self.laws.table.joint[rows]] = self.values[owner]
+        return (self.laws.factors(q.reshape(-1, q.shape[-1])) @ effect).reshape(q.shape)
 
 
-def joint_errors_of(parameters: GeometricParameters, deviation: ArrayLike) -> JointErrors:
-    """The part of some deviations that depends on the readings.
-
-    Parameters
-    ----------
-    parameters : GeometricParameters
-        P parameters.
-    deviation : array_like, shape (P,)
-        Their values.
-
-    Returns
-    -------
-    JointErrors
-        Gains, eccentricities and compliances of joints about their own axes; what bends links or
-        tilts the mount is not among them, see `bending_of`.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Not P finite numbers; a law that acts on an element which is not a joint's own variable.
-
-    References
-    ----------
-    Seed book section 1.4.2.
-
-    Examples
-    --------
-    See `JointErrors`.
-    """
-    xi = as_exact(deviation, (len(parameters),), "deviation")
-    skeleton, n = parameters.skeleton, parameters.model.n
-    laws = {name: np.zeros((n, n)) for name in _FIELDS.values()}
-    for entry, value in zip(parameters.entries, xi, strict=True):
-        if entry.law is ErrorLaw.CONSTANT or bends(parameters, entry):
+def joint_errors_of(parameters: GeometricParameters, corrections: ArrayLike) -> JointErrors:
+    """The parameters whose laws add to joint variables, with their nonzero corrections."""
+    xi = as_exact(corrections, (len(parameters),), "corrections")
+    table, chosen = parameters.table, []
+    for k, entry in enumerate(parameters.entries):
+        if entry.law is ErrorLaw.CONSTANT or parameters.bends(entry):
             continue
-        for row, element, source_row in entry.actions:
-            own = (Element.THETA, Element.R, None)[int(skeleton.sigma[row])]
-            source = int(skeleton.joint[source_row])
-            if element is not own or source < 0:
+        for row, element, source in entry.actions:
+            if element is not JOINT_VARIABLE[table.sigma[row]] or table.joint[source] < 0:
                 raise InvalidValueError(
                     f"{entry.name}: a law of the readings acts on the variable of a joint, and "
-                    f"reads one; this one acts on {element.word} of {skeleton.row_name(row)}."
+                    f"reads one; this one acts on {element.word} of {table.row_name(row)}."
                 )
-            laws[_FIELDS[entry.law]][int(skeleton.joint[row]), source] += value
-    return JointErrors(parameters.model, **laws)
-
-
-def encoder_transmission(errors: JointErrors) -> Transmission:
-    """Gains and couplings composed with the transmission that is there: ``q = K q_c + q_0``.
-
-    Takes the place of ``model.transmission`` together with `JointErrors`: the joint variables it
-    gives are those of the calibrated table already.
-
-    Parameters
-    ----------
-    errors : JointErrors
-        Gains only.
-
-    Returns
-    -------
-    Transmission
-        ``K' = (1 + G) K`` and ``q_0' = (1 + G) q_0``; K = 1 where the robot has none.
-
-    Raises
-    ------
-    InvalidValueError
-        Eccentricity or compliance, which no constant matrix holds.
-    InertiaError
-        Terms of a coupled motor which the gains take out of its coupling.
-
-    References
-    ----------
-    Seed book section 1.2.1 (last note) and 1.4.2.
-
-    Examples
-    --------
-    >>> from robotmodels.calibration import candidate_parameters
-    >>> from robotmodels.robots import load
-    >>> parameters = candidate_parameters(load("lab_rr"), gains=True)
-    >>> deviation = 0.01 * (np.array(parameters.names) == "gain2")
-    >>> encoder_transmission(joint_errors_of(parameters, deviation)).to_joint([1.0, 1.0])
-    array([1.  , 1.01])
-    """
-    if not errors.is_affine:
-        raise InvalidValueError(
-            "errors: eccentricity and compliance are no linear law of the encoders; use "
-            "JointErrors.actual and reading."
-        )
-    there = errors.model.transmission
-    K = np.eye(errors.model.n) + errors.gain
-    if there is None:
-        return Transmission(K)
-    return Transmission(K @ there.matrix, K @ there.offset, there.Iam, there.Fvm, there.Fcm)
+        if xi[k] != 0.0:
+            chosen.append(k)
+    laws = replace(parameters, entries=tuple(parameters.entries[k] for k in chosen))
+    return JointErrors(laws, xi[chosen])
 
 
 class CalibratedEnd(NamedTuple):
-    """A measured end of a calibrated robot.
-
-    Attributes
-    ----------
-    frame : str, int or None
-        As it was given to `candidate_parameters`; None is the tool.
-    parent : int
-        Number of the table's frame it is fixed to; 0 is R_0.
-    pose : ndarray, shape (4, 4)
-        In that frame with nothing bent, metres.
-    row : int
-        Its row of the extended table.
-
-    Examples
-    --------
-    >>> CalibratedEnd(None, 6, np.eye(4), 7).parent
-    6
-    """
+    """A measured end: its frame, the frame (0 is R_0) and pose it is fixed at, and its row."""
 
     frame: Frame
     parent: int
@@ -601,31 +140,29 @@ class CalibratedEnd(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class CalibratedRobot(Rebuilt):
-    """A robot with its deviations applied.
+    """A robot with its corrections applied.
 
-    Constant deviations are in ``model``, whose variables are where the joints are;
-    ``joint_errors`` lead there from what the joints read. What gravity bends elsewhere is in
-    ``bending``: no model with constant elements has it. Limits and named configurations are
-    those of the readings. Bodies keep their place in their own frames: inertial parameters are
-    those of the nominal robot, and so is the transmission.
+    Constant corrections are in ``model``, whose variables are the actual joint variables;
+    ``joint_errors.actual`` gives them from the readings. Links and a mount that bend under gravity
+    are in `calibrated_pose` alone: no model with constant elements has them. Limits and named
+    configurations are those of the readings. Bodies keep their place in their own frames: inertial
+    parameters are those of the nominal robot, and so is the transmission.
 
     Parameters
     ----------
     parameters : GeometricParameters
-        What was calibrated, with the nominal robot.
-    deviation : ndarray, shape (P,)
-        Values.
+        The calibrated parameters, with the nominal robot.
+    corrections : ndarray, shape (P,)
+        Their corrections (rad, m, or the unit of the parameter).
     model : RobotModel
-        The table (with beta, gamma and b), base and tool with the constant deviations in.
+        The table (with beta, gamma and b), base and tool with the constant corrections.
     structured : RobotModel
         The nominal table at the calibrated base and tool: it keeps the structure that gives a
-        closed form, and errs only by the deviations of the table.
+        closed form, and lacks only the corrections of the table.
     joint_errors : JointErrors
         Gains, couplings, eccentricity and compliance of the joints about their own axes.
-    bending : Bending
-        Compliance of the links and of the mount.
     ends : tuple of CalibratedEnd
-        Where the measured ends are.
+        The measured ends.
 
     References
     ----------
@@ -642,15 +179,14 @@ class CalibratedRobot(Rebuilt):
     """
 
     parameters: GeometricParameters
-    deviation: Array
+    corrections: Array
     model: RobotModel
     structured: RobotModel
     joint_errors: JointErrors
-    bending: Bending
     ends: tuple[CalibratedEnd, ...]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "deviation", read_only(self.deviation))
+        object.__setattr__(self, "corrections", read_only(self.corrections))
 
     @property
     def nominal(self) -> RobotModel:
@@ -658,26 +194,36 @@ class CalibratedRobot(Rebuilt):
         return self.parameters.model
 
     @property
+    def bent_rows(self) -> tuple[int, ...]:
+        """Rows of the extended table that bend under gravity, 0 for the mount; mostly none."""
+        p = self.parameters
+        entries = [e for e, value in zip(p.entries, self.corrections, strict=True) if value != 0.0]
+        return tuple(sorted({row for e in entries if p.bends(e) for row, _, _ in e.actions}))
+
+    @property
     def notes(self) -> tuple[str, ...]:
-        """What ``model`` alone, or a URDF of it, does not hold, in sentences."""
-        errors, notes = self.joint_errors, []
-        if errors.gain.any():
-            notes.append("Gains and couplings of the readings are in joint_errors, not in model.")
-        if any(m.any() for m in (errors.sine, errors.cosine, errors.sine_2, errors.cosine_2)):
-            notes.append("Eccentricity of the encoders is in joint_errors, not in model.")
-        if errors.compliance.any():
-            notes.append("Compliance of the joints is in joint_errors, not in model.")
-        if not self.bending.is_zero:
-            bent = self.bending.bent_rows
-            what = ["tilt of the mount"] if self.bending.tilts_mount else []
-            what += [f"bending before {', '.join(bent)}"] if bent else []
+        """Errors that ``model`` alone, or a URDF of it, does not hold, in sentences."""
+        present = {e.law for e in self.joint_errors.laws.entries}
+        table, bent = self.parameters.table, self.bent_rows
+        words = [
+            _LAW_WORDS.get(law, "Eccentricity of the encoders is")
+            for law in ErrorLaw
+            if law in present
+        ]
+        notes = [f"{what} in joint_errors, not in model." for what in dict.fromkeys(words)]
+        if bent:
+            places = ["tilt of the mount"] if bent[0] == 0 else []
+            links = ", ".join(table.row_name(row) for row in bent if row)
+            places += [f"bending before {links}"] if links else []
             notes.append(
-                f"What gives way under gravity ({' and '.join(what)}) is in bending, not in model."
+                f"Compliance of links and mount ({' and '.join(places)}) is in calibrated_pose, "
+                "not in model."
             )
         elsewhere = [
-            self.parameters.skeleton.row_name(end.row)
+            table.row_name(end.row)
             for end in self.ends
-            if end.frame not in _tool_names(self.model) and not _is_named(self.model, end.frame)
+            if end.frame not in _tool_names(self.model)
+            and all(named.name != end.frame for named in self.model.frames)
         ]
         if elsewhere:
             notes.append(
@@ -687,42 +233,15 @@ class CalibratedRobot(Rebuilt):
         return tuple(notes)
 
     def end(self, frame: Frame = None) -> CalibratedEnd | None:
-        """A measured end.
-
-        Parameters
-        ----------
-        frame : str, int or None
-            Any frame of the model; None, or its name, is the tool.
-
-        Returns
-        -------
-        CalibratedEnd or None
-            None for a frame that was not a measured end.
-        """
+        """The measured end at a frame (None or its name for the tool); None if not measured."""
         for end in self.ends:
-            if _same(end.frame, frame):
+            if type(end.frame) is type(frame) and end.frame == frame:
                 return end
         names = _tool_names(self.model)
         return next((e for e in self.ends if frame in names and e.frame in names), None)
 
     def with_tool_at(self, frame: Frame) -> Self:
-        """The same robot whose tool is another measured end, so that inverse models serve it.
-
-        Parameters
-        ----------
-        frame : str, int or None
-            One of the ends.
-
-        Returns
-        -------
-        CalibratedRobot
-            With ``model`` and ``structured`` that carry the end as their tool.
-
-        Raises
-        ------
-        InvalidValueError
-            Not a measured end, or one that no joint moves.
-        """
+        """The same robot whose tool is another measured end, so that inverse models serve it."""
         end = self.end(frame)
         if end is None or end.parent < 1:
             known = [e.frame for e in self.ends if e.parent >= 1]
@@ -730,30 +249,28 @@ class CalibratedRobot(Rebuilt):
                 f"frame: expected one of the measured ends that joints move, {known}, got "
                 f"{frame!r}."
             )
-        tool = end._replace(frame=None)
-        others = tuple(e for e in self.ends if e.frame is not None)
         return replace(
             self,
             model=self.model.with_tool(end.pose, end.parent),
             structured=self.structured.with_tool(end.pose, end.parent),
-            ends=(*others, tool),
+            ends=(*(e for e in self.ends if e.frame is not None), end._replace(frame=None)),
         )
 
 
-def calibrated_model(parameters: GeometricParameters, deviation: ArrayLike) -> CalibratedRobot:
-    """The robot that some deviations describe.
+def calibrated_model(parameters: GeometricParameters, corrections: ArrayLike) -> CalibratedRobot:
+    """The robot with given corrections.
 
     Parameters
     ----------
     parameters : GeometricParameters
         P parameters of a nominal robot.
-    deviation : array_like, shape (P,)
-        Their values, added to the nominal ones (rad, m, or the unit of the parameter).
+    corrections : array_like, shape (P,)
+        Added to the nominal values (rad, m, or the unit of the parameter).
 
     Returns
     -------
     CalibratedRobot
-        ``calibrated_pose`` of it equals ``differential_model(parameters, q, deviation).T``.
+        ``calibrated_pose`` of it equals ``differential_model(parameters, q, corrections).T``.
 
     Raises
     ------
@@ -767,51 +284,46 @@ def calibrated_model(parameters: GeometricParameters, deviation: ArrayLike) -> C
     Examples
     --------
     >>> from robotmodels.calibration import calibrated_pose, candidate_parameters
-    >>> from robotmodels.calibration import differential_model
+    >>> from robotmodels.kinematics import dgm
     >>> from robotmodels.robots import load
     >>> parameters = candidate_parameters(load("rx90"), gains=True)
     >>> xi = 1e-3 * np.random.default_rng(0).normal(size=len(parameters))
-    >>> q = [0.1, -0.4, 0.8, 0.2, 0.6, -0.3]
-    >>> T = calibrated_pose(calibrated_model(parameters, xi), q)
-    >>> np.allclose(T, differential_model(parameters, q, xi).T, atol=1e-14)
+    >>> robot, q_read = calibrated_model(parameters, xi), [0.1, -0.4, 0.8, 0.2, 0.6, -0.3]
+    >>> T = dgm(robot.model, robot.joint_errors.actual(q_read))
+    >>> np.allclose(T, calibrated_pose(robot, q_read), atol=1e-14)
     True
     """
-    xi = as_exact(deviation, (len(parameters),), "deviation")
-    skeleton, nominal = parameters.skeleton, parameters.model
-    elements = skeleton.nominal.copy()
+    xi = as_exact(corrections, (len(parameters),), "corrections")
+    table, nominal = parameters.table, parameters.model
+    elements = table.nominal.copy()
     for entry, value in zip(parameters.entries, xi, strict=True):
         if entry.law is ErrorLaw.CONSTANT:
             elements[entry.row, entry.element] += value
     f = nominal.f
-    changed = [bool((elements[row] != skeleton.nominal[row]).any()) for row in range(len(elements))]
-    # what is not off stays as it is, to the last digit
-    base = skeleton.before @ pose_of_elements(elements[0]) if changed[0] else nominal.base
+    changed = (elements != table.nominal).any(axis=1)
+    # poses without corrections stay equal to the last digit
+    base = table.before @ pose_of_elements(elements[0]) if changed[0] else nominal.base
     ends = []
-    for k, frame in enumerate(skeleton.frames):
-        found = nominal.twin.frame(frame)
-        if changed[1 + f + k]:
-            pose = pose_of_elements(elements[1 + f + k]) @ skeleton.after[k]
-        else:
-            pose = np.eye(4)
-            pose[:3, :3], pose[:3, 3] = found.rotation, found.position
-        ends.append(CalibratedEnd(frame, found.parent, read_only(pose), 1 + f + k))
-    columns = {e.word: elements[1 : 1 + f, e] for e in Element}
-    by_name = [end for end in ends if end.frame in _tool_names(nominal)]
-    tool = min(by_name, key=lambda end: end.frame is not None).pose if by_name else nominal.tool
-    poses = {end.frame: end.pose for end in ends if isinstance(end.frame, str)}
+    for row, frame in enumerate(table.frames, 1 + f):
+        parent, pose = frame_place(nominal, frame)
+        if changed[row]:
+            pose = pose_of_elements(elements[row]) @ table.after[row - 1 - f]
+        ends.append(CalibratedEnd(frame, parent, read_only(pose), row))
+    tools = [end for end in ends if end.frame in _tool_names(nominal)]
+    tool = min(tools, key=lambda end: end.frame is not None).pose if tools else nominal.tool
+    named = {end.frame: end.pose for end in ends if isinstance(end.frame, str)}
     model = replace(
-        with_moved_tool(nominal, tool, poses),
-        table=nominal.table.replace(**columns),
+        with_moved_tool(nominal, tool, named),
+        table=nominal.table.replace(**{e.word: elements[1 : 1 + f, e] for e in Element}),
         base=base,
-        notes=(*nominal.notes, f"Calibrated: {int(np.count_nonzero(xi))} parameters are off."),
+        notes=(*nominal.notes, f"Calibrated: {np.count_nonzero(xi)} corrections."),
     )
     return CalibratedRobot(
         parameters=parameters,
-        deviation=xi,
+        corrections=xi,
         model=model,
         structured=nominal.with_base(base).with_tool(tool),
         joint_errors=joint_errors_of(parameters, xi),
-        bending=bending_of(parameters, elements, xi),
         ends=tuple(ends),
     )
 
@@ -828,27 +340,14 @@ def with_moved_tool(
 
 def as_calibrated(robot: Any) -> CalibratedRobot:
     """Calibrated robot from itself or from the result of a fit."""
-    found = getattr(robot, "robot", robot)
-    if not isinstance(found, CalibratedRobot):
+    calibrated = getattr(robot, "robot", robot)
+    if not isinstance(calibrated, CalibratedRobot):
         raise InvalidValueError(
             "robot: expected a CalibratedRobot or a CalibrationResult, got "
             f"{type(robot).__name__}; make one with fit(...) or calibrated_model(parameters, "
-            "deviation)."
+            "corrections)."
         )
-    return found
-
-
-def _same(a: Frame, b: Frame) -> bool:
-    return type(a) is type(b) and a == b
-
-
-def _tool_names(model: RobotModel) -> tuple[str | None, ...]:
-    """Names of the tool: None, its frame, and its URDF link."""
-    return None, model.twin.names.tool, tool_link(model.parts)
-
-
-def _is_named(model: RobotModel, frame: Frame) -> bool:
-    return any(named.name == frame for named in model.frames)
+    return calibrated
 
 
 def calibrated_pose(robot: CalibratedRobot, q_read: ArrayLike, frame: Frame = None) -> Array:
@@ -881,95 +380,54 @@ def calibrated_pose(robot: CalibratedRobot, q_read: ArrayLike, frame: Frame = No
     --------
     See `calibrated_model`.
     """
-    readings = as_vector(q_read, robot.model.n, "q_read")
-    q = robot.joint_errors.actual(readings)
-    if not robot.bending.is_zero:
-        n, (path, after) = robot.model.n, tip_of(robot, frame)
-        T = robot.bending.poses(readings.reshape(-1, n), q.reshape(-1, n), path, after)
-        return T.reshape(*q.shape[:-1], 4, 4)
-    end = robot.end(frame)
-    if end is None:
-        return dgm(robot.model, q, frame)
-    return dgm(robot.model, q, end.parent) @ end.pose
-
-
-def tip_of(robot: CalibratedRobot, frame: Frame = None) -> tuple[NDArray[np.int64], Array]:
-    """Path of a frame in the extended table, and its constant pose behind the path's end."""
-    skeleton, end = robot.parameters.skeleton, robot.end(frame)
-    if end is not None:
-        return robot.bending.path_to(end.row), skeleton.after[end.row - 1 - robot.model.f]
-    found, pose = robot.model.twin.frame(frame), np.eye(4)
-    pose[:3, :3], pose[:3, 3] = found.rotation, found.position
-    return robot.bending.path_to(found.parent), pose
+    p, n = robot.parameters, robot.model.n
+    readings = as_vector(q_read, n, "q_read")
+    q = readings.reshape(-1, n)
+    path, after = _path_of(robot, frame)
+    T, _ = screws_of(p.table, q, path, after, robot.corrections, p.actions, p.factors(q), 0)
+    return T.reshape(*readings.shape[:-1], 4, 4)
 
 
 def reading_jacobian(robot: CalibratedRobot, q_read: ArrayLike) -> Array:
-    """Jacobian of a calibrated robot by the readings of its joints.
+    """Jacobian [v; w] of the tool by the readings, laws by central differences.
 
-    Parameters
-    ----------
-    robot : CalibratedRobot
-        The robot, n joints.
-    q_read : array_like, shape (..., n)
-        Readings, rad or m.
-
-    Returns
-    -------
-    ndarray, shape (..., 6, n)
-        ``[v; w]`` of the tool per unit of each reading, world axes; exact but for what changes
-        with the loads of gravity, which is a central difference.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Wrong length; NaN or infinity.
-
-    References
-    ----------
-    Seed book sections 1.3.1 and 1.4.6.
-
-    Examples
-    --------
-    >>> from robotmodels.calibration import candidate_parameters
-    >>> from robotmodels.calibration.robot import calibrated_model
-    >>> from robotmodels.robots import load
-    >>> parameters = candidate_parameters(load("erd:ur10"), compliance="uniform")
-    >>> soft = 1e-6 * np.array([name.startswith("compliance") for name in parameters.names])
-    >>> reading_jacobian(calibrated_model(parameters, soft), np.zeros((5, 6))).shape
-    (5, 6, 6)
+    Shapes: q_read (..., n) -> (..., 6, n).
     """
-    n, errors = robot.model.n, robot.joint_errors
+    p, table, n = robot.parameters, robot.parameters.table, robot.model.n
     readings = as_vector(q_read, n, "q_read")
-    rows = readings.reshape(-1, n)
-    q = errors.actual(rows)
-    if robot.bending.is_zero:
-        J = jacobian(robot.model, q) @ errors.slope(rows)
-    else:
-        by_joint, by_load = robot.bending.jacobians(rows, q, *tip_of(robot))
-        J = by_joint @ errors.slope(rows) + by_load
-    return J.reshape(*readings.shape[:-1], 6, n)
+    q = readings.reshape(-1, n)
+    owner, rows, elements = p.actions
+    laws = [k for k, e in enumerate(p.entries) if e.law is not ErrorLaw.CONSTANT]
+    active = np.flatnonzero(np.isin(owner, laws) & (robot.corrections[owner] != 0.0))
+    steps = DIFFERENCE * np.eye(n)
+    change = np.zeros((len(q), n, len(active)))
+    if active.size:
+        high, low = (p.factors((q[:, None] + step).reshape(-1, n)) for step in (steps, -steps))
+        change = (high - low)[:, active].reshape(change.shape)
+        change *= robot.corrections[owner[active]] / (2.0 * DIFFERENCE)
+    # column P + j: the motion of joint j, and the change of every law with its reading
+    P, moving = len(p), np.flatnonzero(table.joint >= 0)
+    variables = np.array([JOINT_VARIABLE[sigma] for sigma in table.sigma[moving]], np.int64)
+    actions = (
+        np.concatenate([owner, P + table.joint[moving], P + np.repeat(np.arange(n), len(active))]),
+        np.concatenate([rows, moving, np.tile(rows[active], n)]),
+        np.concatenate([elements, variables, np.tile(elements[active], n)]),
+    )
+    factors = np.hstack([p.factors(q), np.ones((len(q), n)), change.reshape(len(q), -1)])
+    values = np.concatenate([robot.corrections, np.zeros(n)])
+    _, psi = screws_of(table, q, *_path_of(robot), values, actions, factors, P + n)
+    return psi[..., P:].reshape(*readings.shape[:-1], 6, n)
 
 
-def missing_of_pose(T: Array, wanted: Array) -> Array:
-    """Pose errors: translation (m) and rotation vector (rad) from each pose to the wanted one.
+def _path_of(robot: CalibratedRobot, frame: Frame = None) -> tuple[NDArray[np.int64], Array]:
+    """Path of a frame in the extended table, and its constant pose behind the path's end."""
+    table, end = robot.parameters.table, robot.end(frame)
+    if end is not None:
+        return table.path_to(end.row), table.after[end.row - 1 - robot.model.f]
+    parent, pose = frame_place(robot.model, frame)
+    return table.path_to(parent), pose
 
-    Shapes: T, wanted (N, 4, 4) -> (N, 6).
-    """
-    turn = wanted[:, :3, :3] @ T[:, :3, :3].swapaxes(-1, -2)
-    return np.concatenate([wanted[:, :3, 3] - T[:, :3, 3], rotation_vectors_of(turn)], axis=1)
 
-
-def missing_slope(J: Array, phi: Array) -> Array:
-    """Minus the derivative of `missing_of_pose` at a rotation error ``phi``.
-
-    Shapes: J (N, 6, n), phi (N, 3) -> (N, 6, n).
-    """
-    t = np.linalg.norm(phi, axis=1)
-    half = 0.5 * np.where(t < 1e-3, 1.0, t)
-    c = np.where(t < 1e-3, 1.0 / 12.0 + t * t / 720.0,
-                 (1.0 - half / np.tan(half)) / (4.0 * half * half))  # fmt: skip
-    K = np.zeros((len(phi), 3, 3))
-    K[:, [2, 0, 1], [1, 2, 0]] = phi
-    K[:, [1, 2, 0], [2, 0, 1]] = -phi
-    turned = np.eye(3) + 0.5 * K + c[:, None, None] * (K @ K)
-    return np.concatenate([J[:, :3], turned @ J[:, 3:]], axis=1)
+def _tool_names(model: RobotModel) -> tuple[str | None, ...]:
+    """Names of the tool: None, its frame, and its URDF link."""
+    return None, model.twin.names.tool, tool_link(model.parts)

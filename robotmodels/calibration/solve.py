@@ -62,7 +62,7 @@ class Solution(Rebuilt):
 
 def first_scales(problem: Problem) -> tuple[Array, ...]:
     """Initial standard deviations: 1 mm, and 1 mm over the reach as an angle."""
-    size = problem.parameters.skeleton.size
+    size = problem.parameters.table.size
     length = _FIRST_LENGTH * min(1.0, size)
     return tuple(
         read_only([length if unit == "m" else length / size for unit in m.units])
@@ -132,7 +132,7 @@ def _floor(unit: str, size: float) -> float:
 
 
 def _is_exact(problem: Problem, scales: tuple[Array, ...]) -> bool:
-    size = problem.parameters.skeleton.size
+    size = problem.parameters.table.size
     return any(
         bool((scale <= [_floor(unit, size) for unit in m.units]).any())
         for m, scale in zip(problem.measurements, scales, strict=True)
@@ -144,7 +144,7 @@ def _estimated_scales(
 ) -> tuple[Array, ...]:
     """Noise of each measurement and unit, shrunk to the common value of its kind."""
     leverage = (fit.orthonormal_rows**2).sum(axis=1)
-    size = problem.parameters.skeleton.size
+    size = problem.parameters.table.size
     found: dict[tuple[type, str], list[tuple[int, float, float]]] = {}
     first = 0
     for k, (m, scale) in enumerate(zip(problem.measurements, scales, strict=True)):

@@ -20,7 +20,7 @@ from .._arrays import Array
 from ..geometry import FIXED, PRISMATIC
 from .candidates import candidate_parameters
 from .errors_seen import block_errors
-from .extended_table import Element, Skeleton
+from .extended_table import Element, ExtendedTable
 from .identifiable import IdentifiableParameters, Reason, needs_a_length
 from .measurements import Evaluation
 from .measurements.noise import whitened
@@ -80,7 +80,7 @@ def structure_of(solution: Solution, found: IdentifiableParameters) -> Structure
     """Lack-of-fit test of a solution; None if the residuals may be noise."""
     whole, is_complete = _all_parameters(solution, found)
     problem = problem_of(whole, solution.problem.measurements)
-    fit, size = solution.fit, whole.skeleton.size
+    fit, size = solution.fit, whole.table.size
     deviation = np.zeros(problem.P)
     deviation[: len(solution.deviation)] = solution.deviation
     errors = block_errors(problem, deviation, solution.fixtures)
@@ -139,10 +139,10 @@ def _all_parameters(
     solution: Solution, found: IdentifiableParameters
 ) -> tuple[GeometricParameters, bool]:
     """Parameters of the fit, the others of the table and all families; whether none is missing."""
-    skeleton = found.candidates.skeleton
-    has_masses = bool(skeleton.model.inertia.values.any())
+    table = found.candidates.table
+    has_masses = bool(table.model.inertia.values.any())
     everything = candidate_parameters(
-        skeleton.model, skeleton.frames, gains=True, eccentricity=True,
+        table.model, table.frames, gains=True, eccentricity=True,
         compliance=Compliance.JOINTS if has_masses else Compliance.NONE,
     )  # fmt: skip
     entries = {e.name: e for e in (*solution.problem.parameters.entries, *found.candidates.entries)}
@@ -153,8 +153,8 @@ def _all_parameters(
         # with all lengths free the robot shrinks until nothing is left of a residual
         fixed = {n for n, why in found.reasons.items() if why in (Reason.KNOWN, Reason.GAUGE)}
         entries = {n: e for n, e in entries.items() if n not in fixed | missing}
-        return GeometricParameters(skeleton, tuple(entries.values())), not missing
-    return GeometricParameters(skeleton, tuple(entries.values())), True
+        return GeometricParameters(table, tuple(entries.values())), not missing
+    return GeometricParameters(table, tuple(entries.values())), True
 
 
 def _posture_of_rows(problem: Problem) -> NDArray[np.int64]:
@@ -185,10 +185,10 @@ def _smooth_columns(problem: Problem, deviation: Array, solution: Solution) -> l
     parameters = problem.parameters
     own = [
         (k, e.row) for k, e in enumerate(parameters.entries)
-        if e.law is ErrorLaw.CONSTANT and _is_variable(parameters.skeleton, e.row, e.element)
+        if e.law is ErrorLaw.CONSTANT and _is_variable(parameters.table, e.row, e.element)
     ]  # fmt: skip
-    joints = parameters.skeleton.joint[[row for _, row in own]]
-    slides = parameters.skeleton.sigma[[row for _, row in own]] == PRISMATIC
+    joints = parameters.table.joint[[row for _, row in own]]
+    slides = parameters.table.sigma[[row for _, row in own]] == PRISMATIC
     readings = np.concatenate([view.q for m in problem.measurements for view in m.views])[:, joints]
     half = np.where(slides, np.ptp(readings, axis=0) / np.pi, 1.0)
     half[half == 0.0] = 1.0
@@ -208,11 +208,11 @@ def _smooth_columns(problem: Problem, deviation: Array, solution: Solution) -> l
     return columns
 
 
-def _is_variable(skeleton: Skeleton, row: int, element: Element) -> bool:
+def _is_variable(table: ExtendedTable, row: int, element: Element) -> bool:
     """Whether an element is the variable of a joint."""
-    if not 0 < row <= skeleton.model.f or skeleton.sigma[row] == FIXED:
+    if not 0 < row <= table.model.f or table.sigma[row] == FIXED:
         return False
-    return element is (Element.R if skeleton.sigma[row] == PRISMATIC else Element.THETA)
+    return element is (Element.R if table.sigma[row] == PRISMATIC else Element.THETA)
 
 
 def _harmonics(q: Array) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_exact, as_reals
-from ..calibration.extended_table import skeleton_of
+from ..calibration.extended_table import extend_table
 from ..calibration.parameters import GeometricParameters
 from ..calibration.result import CalibrationResult
 from ..errors import InvalidValueError, ShapeError
@@ -148,8 +148,8 @@ def plot_calibration_parameters(
 def _known(truth: ArrayLike | Mapping[str, float], found: CalibrationResult) -> Array:
     """True deviations from where the fit started, as the result's; NaN where they are unknown."""
     P = len(found.names)
-    skeleton = skeleton_of(found.nominal, found.parameters.skeleton.frames)
-    given = GeometricParameters(skeleton, found.parameters.entries)
+    table = extend_table(found.nominal, found.parameters.table.frames)
+    given = GeometricParameters(table, found.parameters.entries)
     moved = found.parameters.nominal - given.nominal
     if not isinstance(truth, Mapping):
         values = as_reals(truth, "truth")

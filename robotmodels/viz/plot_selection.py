@@ -110,7 +110,7 @@ def plot_selection(
     handles = {}
     for axes, unit in zip(every[1:], kinds, strict=True):
         factor, symbol = SHOWN.get(unit, (1.0, unit))
-        own = factor * selected.deviations[:, [k for k, u in enumerate(units) if u == unit]]
+        own = factor * selected.standard_errors[:, [k for k, u in enumerate(units) if u == unit]]
         axes.plot(counts, own, color=PALE, linewidth=THIN_WIDTH, alpha=0.8)
         handles["each"] = axes.get_lines()[0]
         for k, (name, values) in enumerate(

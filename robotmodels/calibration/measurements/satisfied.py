@@ -9,7 +9,7 @@ import numpy as np
 from ..._arrays import Array
 from ...geometry import FIXED, PRISMATIC
 from ..differential import differential_model
-from ..extended_table import Element, Skeleton
+from ..extended_table import Element, ExtendedTable
 from ..parameters import GeometricParameter, GeometricParameters
 from . import Evaluation, Measurement
 
@@ -25,9 +25,9 @@ def satisfied_measurement(
     """The measurement with readings moved by the least step to zero residuals."""
     if not measurement.views:
         return measurement
-    motions = _joint_motions(parameters.skeleton)
+    motions = _joint_motions(parameters.table)
     none = np.zeros(len(motions))
-    size = parameters.skeleton.size
+    size = parameters.table.size
     scale = np.array([size if unit == "m" else 1.0 for unit in measurement.units])
     both = replace(parameters, entries=parameters.entries + motions.entries)
     values = np.concatenate([xi, none])
@@ -74,15 +74,15 @@ def satisfied_measurement(
     return moved if len(kept) == measurement.blocks else moved.subset(kept)
 
 
-def _joint_motions(skeleton: Skeleton) -> GeometricParameters:
+def _joint_motions(table: ExtendedTable) -> GeometricParameters:
     """The motion of every joint as a parameter, in the order of the joints."""
-    rows = [r for r in range(skeleton.rows) if skeleton.sigma[r] != FIXED]
+    rows = [r for r in range(table.rows) if table.sigma[r] != FIXED]
     return GeometricParameters(
-        skeleton,
+        table,
         tuple(
             GeometricParameter(
-                r, Element.R if skeleton.sigma[r] == PRISMATIC else Element.THETA, source=r
+                r, Element.R if table.sigma[r] == PRISMATIC else Element.THETA, source=r
             )
-            for r in sorted(rows, key=lambda r: int(skeleton.joint[r]))
+            for r in sorted(rows, key=lambda r: int(table.joint[r]))
         ),
     )
