@@ -50,13 +50,14 @@ def compiled(*signature: Any) -> Any:
     """
 
     def decorate(function: Any) -> Any:
-        kernel = njit(
-            nogil=True,
-            fastmath=False,
-            error_model="numpy",
-            no_cpython_wrapper=not signature,
-            no_cfunc_wrapper=True,
-        )(function)
+        options: dict[str, Any] = {
+            "nogil": True,
+            "fastmath": False,
+            "error_model": "numpy",
+            "no_cpython_wrapper": not signature,
+            "no_cfunc_wrapper": True,
+        }
+        kernel: Any = njit(**options)(function)
         if kernel is function:  # numba's compilation is switched off
             return function
         cache = cache_of(function)
