@@ -704,7 +704,8 @@ MUTATIONS = [
         "def regular_rows(", "kept = kept[~again]", "kept = kept",
         "tests/test_logs.py -k repeated_stamps_are_refused_and_listed"),
     Mutation("logs: time base", "gaps are judged without the motion",
-        "def _split(\n    t: Array", "max(_GAP, _SHARE * shortest_period(", "min(_GAP, _SHARE * shortest_period(",
+        "def _split(\n    t: Array", "max(_GAP, _SHARE * shortest_period(",
+        "min(_GAP, _SHARE * shortest_period(",
         ("tests/test_logs.py -k"
          " missing_samples_are_interpolated_up_to_a_tenth_of_the_shortest_period")),
     Mutation("logs: time base", "of the rows that lack a number the first is listed",

@@ -108,3 +108,10 @@ def test_logs_without_a_delay_to_find_are_refused(robot):
     ):
         with pytest.raises(InvalidValueError, match=words):
             synchronisation(part, robot, **options)
+
+
+def test_motion_that_excites_little_is_named(robot):
+    log = simulated(robot)
+    q = np.where(np.arange(6) == 0, log.q, 0.3)
+    found = {f.kind: f for f in check_joints(Log(log.dt, q, log.tau), robot)}
+    assert "base parameters" in found[FindingKind.NOT_EXCITING].sentence
