@@ -159,12 +159,6 @@ def test_a_task_has_the_rows_of_its_slice_with_margin():
             np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
 
 
-def test_pieces_of_another_log_are_refused():
-    whole = system()
-    with pytest.raises(InvalidValueError, match=r"gives for this log"):
-        whole.block(Piece(89_000, 91_000, 0, 100_000, 0, 100_000))
-
-
 class Counting(Executor):
     """Does tasks when they are asked for, and counts those that wait."""
 
