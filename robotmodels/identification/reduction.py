@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InvalidValueError
-from ..estimation.factor import TriangularFactors, factors_of, merged, merged_tree
+from ..estimation.factor import TriangularFactors, factors_of, merged, merged_all
 from ..logs import Log
 from .equations import Equations
 from .signals import Piece, slice_with_margin
@@ -77,10 +77,7 @@ def reduce_equations(
     systems = (system,) if isinstance(system, Equations) else system
     tasks = _tasks(systems, executor is not None, len(systems) if isinstance(systems, Sized) else 0)
     done = _in_order(tasks, executor, window)
-    factors = merged_tree(_reported(done, progress), merged)
-    if factors is None:
-        raise InvalidValueError("system: expected the equations of at least one log, got none.")
-    return factors
+    return merged_all(_reported(done, progress))
 
 
 def _tasks(systems: Iterable[Equations], sent: bool, logs: int) -> Iterator[_Task]:

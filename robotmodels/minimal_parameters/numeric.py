@@ -101,7 +101,7 @@ def base_columns(
     kinds = drive_kinds(drive)
     scale = natural_sizes(model, kinds, friction)
     W = torque_factor(model, kinds, samples, constraint, friction)
-    basis = column_basis(W, None, scale, tolerance)
+    basis = column_basis(W, scale=scale, nothing=tolerance)
     if samples is not None:
         basis = rank_gap(W, scale, tolerance, basis)
     names = parameter_names(model, kinds, friction)
@@ -236,7 +236,7 @@ def rank_gap(W: Array, scale: Array, tolerance: float, basis: ColumnBasis) -> Co
         if above > lowest and below < highest and above >= _CLEAR * below
     ]
     for _, cut in sorted(cuts, reverse=True):
-        again = column_basis(W, None, scale, cut)
+        again = column_basis(W, scale=scale, nothing=cut)
         if _ratio(again) >= _CLEAR:
             return again
     return basis
