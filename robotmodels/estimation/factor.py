@@ -140,7 +140,7 @@ def merged_all(parts: Iterable[TriangularFactors]) -> TriangularFactors:
     for part in parts:
         total = part if total is None else merged(total, part)
     if total is None:
-        raise InvalidValueError("log: it has no equations; give a longer log.")
+        raise InvalidValueError("log: expected equations, got none; give a longer log.")
     return total
 
 
