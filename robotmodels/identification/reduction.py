@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 
 from ..errors import InvalidValueError
-from ..estimation.factor import TriangularFactors, factors_of, merged_all
+from ..estimation.factor import TriangularFactors, factors_of, merged, merged_all
 from .equations import Equations
 from .signals import Piece, slice_with_margin
 
