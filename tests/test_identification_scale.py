@@ -20,7 +20,7 @@ from robotmodels.estimation.factor import merged
 from robotmodels.estimation.linear import weighted
 from robotmodels.identification import choose_processing, equations, reduce_equations
 from robotmodels.identification.forms import EquationForm
-from robotmodels.identification.signals import Piece, piece_signals, slice_with_margin
+from robotmodels.identification.signals import piece_signals, slice_with_margin
 from robotmodels.logs import Log
 from robotmodels.logs.log import RefusedRows
 from robotmodels.minimal_parameters import base_parameters
