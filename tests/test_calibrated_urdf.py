@@ -13,13 +13,12 @@ from identities.random_robots import random_pose
 import robotmodels as rm
 from robotmodels import calibration, se3
 from robotmodels.calibration import calibrated_model, calibrated_urdf, candidate_parameters
-from robotmodels.cli import main
 from robotmodels.datasets import panda_double_socket
 from robotmodels.errors import UrdfError, UrdfWarning
 from robotmodels.robots.erd import ERD_ARMS, erd_folder
 
 EXACT = 1e-9
-SEEDS = range(12)
+SEEDS = range(6)
 
 
 # --- robots as people write them ------------------------------------------------------------------
@@ -182,13 +181,12 @@ def test_links_beside_the_chain_keep_their_place_in_their_bodies(seed):
     model = rm.RobotModel.from_urdf(text, tip_link="tip")
     robot = calibrated(model, rng, base=False)
     written = calibrated_urdf(robot)
-    for q in rng.uniform(-2.0, 2.0, (3, model.n)):
-        for name, on in (("camera", "l3"), ("lens", "l3"), ("flange", "l4"), ("cover", "l2"),
-                         ("plate", "base"), ("lamp", "base"), ("hand", "tip"),
-                         ("finger_2", "tip")):  # fmt: skip
-            np.testing.assert_allclose(
-                pin_pose(written, model, q, name, on), pin_pose(text, model, q, name, on), 0, EXACT
-            )
+    bodies = {"camera": "l3", "lens": "l3", "flange": "l4", "cover": "l2", "plate": "base",
+              "lamp": "base", "hand": "tip", "finger_2": "tip"}  # fmt: skip
+    for q in rng.uniform(-2.0, 2.0, (2, model.n)):
+        for name, on in bodies.items():
+            before, after = (pin_pose(t, model, q, name, on) for t in (text, written))
+            np.testing.assert_allclose(after, before, 0, EXACT)
         for name in ("camera", "lens", "flange", "l3"):
             there = rm.dgm(robot.model, q, name)
             np.testing.assert_allclose(pin_pose(written, model, q, name), there, 0, EXACT)
@@ -245,7 +243,7 @@ def test_fingers_in_the_table_follow_a_tip_before_them(seed):
 # --- base -----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("base_link", [None, "base"])
 @pytest.mark.parametrize("mount", [False, True])
 @pytest.mark.parametrize("stand", [False, True])
@@ -270,49 +268,35 @@ def test_the_base_is_placed_in_the_link_that_is_the_world(seed, base_link, mount
             np.testing.assert_allclose(moved, rm.dgm(robot.model, q, name), 0, EXACT)
 
 
-# --- tools ----------------------------------------------------------------------------------------
+# --- tools and sources ----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("tip_link", ["tip", "l4", None])
-def test_a_tool_that_is_no_link_becomes_one_and_the_tip_link_stays(seed, tip_link):
-    rng = np.random.default_rng(seed)
+def test_a_tool_that_is_no_link_becomes_one_and_the_tip_link_stays(tip_link, rng):
     text = arm_text(rng).replace('name="lamp"', 'name="tool"').replace('link="lamp"', 'link="tool"')
     bare = rm.RobotModel.from_urdf(text, tip_link=tip_link or "tip")
-    model = bare.with_tool(bare.tool @ se3.translation(0.0, 0.05, 0.1))
+    model, named = (
+        bare.with_tool(bare.tool @ se3.translation(0.0, 0.05, 0.1)),
+        bare.source.tool_link,
+    )
     robot = calibrated(model, rng, base=False)
     written = calibrated_urdf(robot)
-    named = bare.source.tool_link
     assert_same_poses(written, robot, rng, None, "tool_new", {"tip_link": "tool_new"})
     for q in rng.uniform(-2.0, 2.0, (3, model.n)):
         there = rm.dgm(robot.model, q, named)
         np.testing.assert_allclose(pin_pose(written, model, q, named), there, 0, EXACT)
-        np.testing.assert_allclose(
-            pin_pose(written, model, q, named, "l4"),
-            pin_pose(text, model, q, named, "l4"),
-            0,
-            EXACT,
-        )
+        before, after = (pin_pose(t, model, q, named, "l4") for t in (text, written))
+        np.testing.assert_allclose(after, before, 0, EXACT)
 
 
-def test_an_end_that_is_the_tip_link_is_the_tool(rng):
+def test_the_tip_link_or_another_measured_end_as_tool(rng):
     text = arm_text(rng)
     model = rm.RobotModel.from_urdf(text, tip_link="tip")
-    robot = calibrated(model, rng, ("tip",), base=False)
-    q = rng.uniform(-1.0, 1.0, model.n)
+    robot = calibrated(model, rng, ("tip", "camera"), base=False)
     assert robot.end().frame == "tip"
-    np.testing.assert_allclose(rm.dgm(robot.model, q), rm.dgm(robot.model, q, "tip"), 0, 1e-12)
     assert_same_poses(calibrated_urdf(robot), robot, rng, None, "tip", {"tip_link": "tip"})
-
-
-def test_the_tool_at_another_measured_end(rng):
-    text = arm_text(rng)
-    model = rm.RobotModel.from_urdf(text, tip_link="tip")
     robot = calibrated(model, rng, (None, "camera"), base=False)
     assert calibrated_urdf(robot.with_tool_at("camera")) == calibrated_urdf(robot)
-
-
-# --- what the source is ---------------------------------------------------------------------------
 
 
 def test_a_robot_keeps_its_source(rng):
@@ -324,9 +308,6 @@ def test_a_robot_keeps_its_source(rng):
         model.with_inertia(None), model.with_table(model.table.replace(d=model.table.d + 1e-3)),
     ):  # fmt: skip
         assert other.source == model.source
-    assert rm.RobotModel.from_urdf(text + "\n", "base", "tip") == rm.RobotModel.from_urdf(
-        text, "base", "tip"
-    )
     assert rm.load("rx90").source is None
 
 
@@ -393,7 +374,7 @@ def test_the_panda_that_was_calibrated_by_its_own_ball_is_right_at_the_ball():
     assert without_origins(written) == without_origins(data.urdf)
 
 
-@pytest.mark.parametrize("name", sorted(ERD_ARMS)[::3])
+@pytest.mark.parametrize("name", sorted(ERD_ARMS)[::4])
 def test_arms_of_example_robot_data_keep_all_but_origins(name):
     rng = np.random.default_rng(1)
     arm = ERD_ARMS[name]
@@ -403,65 +384,17 @@ def test_arms_of_example_robot_data_keep_all_but_origins(name):
     written = calibrated_urdf(robot)
     tip = arm.tool or model.source.tool_link
     for q in rng.uniform(-1.0, 1.0, (3, model.n)):
-        there = rm.dgm(robot.model, q)
         at = pin_pose(written, model, q, tip, arm.base_link)
-        np.testing.assert_allclose(at, there, 0, EXACT)
+        np.testing.assert_allclose(at, rm.dgm(robot.model, q), 0, EXACT)
     old, new = ET.fromstring(text), ET.fromstring(written)
-    for kind in ("link", "transmission", "gazebo", "material"):
-        before = [ET.tostring(e).strip() for e in old.findall(kind)]
-        assert [ET.tostring(e).strip() for e in new.findall(kind)][: len(before)] == before
-    for k, element in enumerate(old.findall("joint")):
-        other = new.findall("joint")[k]
-        for part in ("axis", "limit", "mimic", "parent", "dynamics", "safety_controller"):
-            a, b = element.find(part), other.find(part)
-            assert (a is None) == (b is None)
-            assert a is None or a.attrib == b.attrib
-        assert element.attrib == other.attrib
+    for kind in ("link", "transmission", "gazebo", "material", "joint"):
+        before, after = ([plain(e) for e in tree.findall(kind)] for tree in (old, new))
+        assert after[: len(before)] == before
 
 
-def test_a_robot_far_from_where_it_was_thought_is_placed_with_its_tool():
-    rng = np.random.default_rng(3)
-    text = arm_text(rng, length=6).replace('type="prismatic"', 'type="revolute"')
-    model = rm.RobotModel.from_urdf(text, tip_link="tip")
-    real = model.with_base(random_pose(rng, 3.0)).with_tool(model.tool @ random_pose(rng, 0.1))
-    q = rng.uniform(-2.0, 2.0, (40, model.n))
-    measured = calibration.Pose(q, rm.dgm(real, q), sigma=np.full(6, 1e-4))
-    result = calibration.fit(model, measured, folds=0, held_out=0.0)
-    written = calibrated_urdf(result.robot)
-    for at in q[:3]:
-        there = rm.dgm(result.model, at)
-        np.testing.assert_allclose(there, rm.dgm(real, at), 0, 1e-6)
-        np.testing.assert_allclose(pin_pose(written, model, at, "tip"), there, 0, EXACT)
-
-
-# --- files ----------------------------------------------------------------------------------------
-
-
-def test_the_command_line_writes_the_same_text(tmp_path, rng):
-    text = arm_text(rng, length=3)
-    (tmp_path / "arm.urdf").write_text(text, encoding="utf-8")
-    model = rm.RobotModel.from_urdf(text, tip_link="tip")
-    real = calibrated(model, rng, base=False, size=0.005).model
-    q = rng.uniform(-2.0, 2.0, (60, model.n))
-    rows = np.hstack([q, rm.dgm(real, q)[:, :3, 3] + 1e-5 * rng.normal(size=(60, 3))])
-    header = ",".join([*model.table.joint_names, "x", "y", "z"])
-    np.savetxt(tmp_path / "m.csv", rows, delimiter=",", header=header, comments="")
-    out = tmp_path / "out"
-    assert main([
-        "calibrate", "--robot", str(tmp_path / "arm.urdf"), "--tip-link", "tip", "--measurements",
-        str(tmp_path / "m.csv"), "--kind", "position", "--lengths", "m", "--angles", "rad",
-        "--folds", "0", "--held-out", "0", "--fixed-base", "--out", str(out),
-    ]) == 0  # fmt: skip
-    written = (out / "calibrated.urdf").read_text(encoding="utf-8")
-    assert without_origins(written) == without_origins(text)
-    missed = [
-        pin_pose(written, model, at, "tip")[:3, 3] - p
-        for at, p in zip(q, rows[:, -3:], strict=True)
-    ]
-    assert np.sqrt(np.mean(np.square(missed))) < 2e-5
-    measured = calibration.read_measurements(
-        tmp_path / "m.csv", "position", model, lengths="m", angles="rad"
-    )
-    result = calibration.fit(model, measured, base=False, folds=0, held_out=0.0)
-    calibration.write_result(result, tmp_path / "again.urdf")
-    assert (tmp_path / "again.urdf").read_text(encoding="utf-8") == written
+def plain(element):
+    """An element as text; of joints without origin, and child, which another link may carry."""
+    for name in ("origin", "child") if element.tag == "joint" else ():
+        for part in element.findall(name):
+            element.remove(part)
+    return "".join(ET.tostring(element, encoding="unicode").split())
