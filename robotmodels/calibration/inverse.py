@@ -70,14 +70,6 @@ class CorrectedSolutions(Rebuilt):
         Codes of `CorrectionStatus`, one for each nominal posture.
     row : ndarray of int, shape (..., C)
         Which of the S rows a nominal posture became; -1 if none.
-
-    References
-    ----------
-    Seed book section 1.4.6.
-
-    Examples
-    --------
-    See `corrected_igm`.
     """
 
     solutions: IGMSolutions

@@ -37,14 +37,6 @@ class JointOffsets(Rebuilt):
     before, after : ndarray, shape (N, 6)
         Error of the real tool at the commanded pose without and with them: position (m) and
         rotation vector (rad), world axes.
-
-    References
-    ----------
-    Seed book section 1.4.6.
-
-    Examples
-    --------
-    See `joint_offsets`.
     """
 
     offset: Array
@@ -84,14 +76,6 @@ class PoseOffsets(Rebuilt):
     command : ndarray, shape (..., S, 4, 4)
         The pose that the nominal robot has there, metres; NaN in rows without a solution. The
         controller must stay on the branch of the row.
-
-    References
-    ----------
-    Seed book section 1.4.6.
-
-    Examples
-    --------
-    See `pose_offsets`.
     """
 
     solutions: CorrectedSolutions
@@ -185,20 +169,12 @@ def joint_offsets(
     for _ in range(STEPS):
         J = reading_jacobian(robot, commanded + offset)
         W = weight[:, None] * pose_error_slope(J, error[:, 3:]) * unit
-        solved = np.linalg.lstsq(W.reshape(-1, n), (weight * error).ravel(), rcond=DEPENDENT)
-        rank, step = int(solved[2]), solved[0] * unit
-        for _ in range(10):
-            trial, after = errors(offset + step)
-            if after <= cost:
-                break
-            step = 0.5 * step
-        else:
+        step, _, rank, _ = np.linalg.lstsq(W.reshape(-1, n), (weight * error).ravel(), DEPENDENT)
+        trial, after = errors(offset + unit * step)
+        if not after < cost:
             break  # only rounding is left
-        done = cost - after <= 1e-15 * cost and np.abs(step / unit).max() < 1e-12
-        offset, error, cost = offset + step, trial, after
-        if done or cost == 0.0:
-            break
-    return JointOffsets(offset, rank, before, error)
+        offset, error, cost = offset + unit * step, trial, after
+    return JointOffsets(offset, int(rank), before, error)
 
 
 def pose_offsets(

@@ -298,7 +298,14 @@ def select_configurations(
             f"limits, clear of obstacles and meet. {' '.join(notes)} Draw more (drawn), or ask "
             "for fewer."
         )
-    kept = _identifiable(parameters, kind, pool, known_lengths, frame, rng)
+    ranked = groups_of(pool[np.sort(rng.permutation(len(pool))[:_RANKED])])
+    measured = measurement_of(parameters, kind, ranked, frame=frame)
+    kept = identifiable_on(parameters, [measured], known_lengths).kept
+    if not len(kept):
+        raise InvalidValueError(
+            f"kind: {kind.name} at the candidates identifies none of the {len(parameters)} "
+            "parameters."
+        )
     rows = group_rows(kept, kind, pool, sigma, frame)
     p, least = len(kept), ceil(len(kept) / rows.shape[1])
     if count < least:
@@ -440,26 +447,6 @@ def _given(
             "them drawn."
         )
     return q
-
-
-def _identifiable(
-    parameters: GeometricParameters,
-    kind: Kind,
-    pool: Array,
-    known_lengths: Iterable[str],
-    frame: Frame,
-    rng: np.random.Generator,
-) -> GeometricParameters:
-    """Parameters that the candidates identify."""
-    some = np.sort(rng.permutation(len(pool))[:_RANKED])
-    measured = measurement_of(parameters, kind, groups_of(pool[some]), frame=frame)
-    basis = identifiable_on(parameters, [measured], known_lengths)
-    if not basis.count:
-        raise InvalidValueError(
-            f"kind: the candidates identify none of the {len(parameters)} parameters by "
-            f"{kind.name}."
-        )
-    return basis.kept
 
 
 def _best(
