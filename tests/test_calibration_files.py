@@ -255,7 +255,7 @@ def test_distances_and_relative_poses(tmp_path):
         ("point_contact", {"rows": [1, 1, 0]}, "rows: point_contact has no rows"),
         ("point_contact", {"columns": ["x"]}, "columns: a contact measures nothing"),
         ("position", {"columns": ["x", "y"]}, "expected 3 columns"),
-        ("positions", {}, "expected one of 'position', 'pose'"),
+        ("positions", {}, "expected one of 'camera_pose', 'dist"),
     ],
 )
 def test_arguments_that_do_not_belong_to_a_kind(tmp_path, kind, options, message):

@@ -20,7 +20,7 @@ from robotmodels.calibration import (
 from robotmodels.calibration.identifiability.changed import identifiability_change
 from robotmodels.calibration.identifiability.identifiable import DEPENDENT
 from robotmodels.calibration.identifiability.structural import identifiable_parameters
-from robotmodels.calibration.measurements.kinds import Kind, as_kind, drawn_groups
+from robotmodels.calibration.measurements.kinds import as_kind, drawn_groups
 from robotmodels.errors import InvalidValueError
 
 ANGLES = [0.0, np.pi / 2, -np.pi / 2, np.pi, 0.4]
@@ -79,7 +79,7 @@ def spread(model, rng, N):
 def test_full_poses_tell_four_for_a_revolute_two_for_a_prismatic_joint_and_six(R, P, special):
     rng = np.random.default_rng(100 * R + P + 7 * special)
     for _ in range(2):
-        found = identifiable_parameters(serial(rng, R, P, special), Kind.POSE)
+        found = identifiable_parameters(serial(rng, R, P, special), "pose")
         assert found.count == 4 * R + 2 * P + 6
         assert found.gap[1] < 1e-9 < 1e-4 < found.gap[0]
 
@@ -92,9 +92,9 @@ def test_the_formula_supposes_that_no_two_consecutive_revolute_axes_coincide():
     for row in (2, 4):
         alpha, d = model.table.alpha.copy(), model.table.d.copy()
         alpha[row], d[row] = 0.0, 0.0
-        before = identifiable_parameters(model, Kind.POSE).count
+        before = identifiable_parameters(model, "pose").count
         model = model.with_table(model.table.replace(alpha=alpha, d=d))
-        assert identifiable_parameters(model, Kind.POSE).count == before - 1
+        assert identifiable_parameters(model, "pose").count == before - 1
 
 
 def test_ur10_has_thirty():
@@ -130,7 +130,7 @@ def test_point_contacts_tell_the_rank_of_differences_within_each_group(name):
     known = "d3" if name in ("rx90", "ur10e", "puma560") else "r3" if name == "panda" else "r2"
     found = identifiable_parameters(model, "point contact", known_lengths=[known])
     rng = np.random.default_rng(5)
-    q, label = drawn_groups(candidates, Kind.POINT_CONTACT, 25, 6, rng, limits=False)
+    q, label = drawn_groups(candidates, "point_contact", 25, 6, rng, limits=False)
     T, psi = differential_model(candidates, q)
     same = label[1:] == label[:-1]
     assert np.abs(np.diff(T[:, :3, 3], axis=0)[same]).max() < 1e-11
@@ -152,7 +152,7 @@ def test_regrouped_parameters_move_the_end_as_all_of_them_do(seed):
     model = random_model(
         rng, f=6, inertia=None, tree=seed % 2 == 1, fixed=seed % 3 == 0, limits=False
     )
-    found = identifiable_parameters(model, Kind.POSE, gains=seed % 4 == 0)
+    found = identifiable_parameters(model, "pose", gains=seed % 4 == 0)
     q = spread(model, np.random.default_rng(seed + 50), 40)
     all_, kept = (differential_model(p, q).psi for p in (found.candidates, found.kept))
     d = rng.normal(size=len(found.candidates))
@@ -162,8 +162,8 @@ def test_regrouped_parameters_move_the_end_as_all_of_them_do(seed):
 
 def test_the_regrouping_of_contacts_holds_up_to_the_touched_point():
     model = rm.load("puma560")
-    found = identifiable_parameters(model, Kind.POINT_CONTACT, known_lengths=["d3"])
-    groups = drawn_groups(found.candidates, Kind.POINT_CONTACT, 9, 5, np.random.default_rng(9))
+    found = identifiable_parameters(model, "point_contact", known_lengths=["d3"])
+    groups = drawn_groups(found.candidates, "point_contact", 9, 5, np.random.default_rng(9))
     q, label = groups
     d = np.random.default_rng(0).normal(size=len(found.candidates))
     stays = [k for k, name in enumerate(found.candidates.names)
@@ -177,7 +177,7 @@ def test_the_regrouping_of_contacts_holds_up_to_the_touched_point():
 
 
 def test_what_is_kept_left_out_and_regrouped_are_all_candidates_once():
-    found = identifiable_parameters(rm.load("rx90"), Kind.POINT_CONTACT, known_lengths=["d3"])
+    found = identifiable_parameters(rm.load("rx90"), "point_contact", known_lengths=["d3"])
     assert sorted([*found.names, *found.reasons]) == sorted(found.candidates.names)
     assert found.of_reason(Reason.KNOWN) == ("d3",)
     assert set(found.of_reason(Reason.GAUGE)) == {"gamma0", "b0", "alpha0", "d0", "theta0", "r0"}
@@ -190,7 +190,7 @@ def test_what_is_kept_left_out_and_regrouped_are_all_candidates_once():
 
 
 def test_it_prints_what_is_told_and_what_is_not():
-    text = str(identifiable_parameters(rm.load("rx90"), Kind.POINT_CONTACT, known_lengths=["d3"]))
+    text = str(identifiable_parameters(rm.load("rx90"), "point_contact", known_lengths=["d3"]))
     headings = ("Not identifiable", "Gauge", "Only in combination", "acts like", "stands for")
     for part in ("14 identifiable parameters of 34", *headings, "(it is known and fixed):\n  d3"):
         assert part in text
@@ -212,7 +212,7 @@ def test_orientation_alone_tells_no_length():
 # --- scale -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("kind", [Kind.POINT_CONTACT, Kind.FRAME_CONTACT, Kind.PLANE_CONTACT])
+@pytest.mark.parametrize("kind", ["point_contact", "frame_contact", "plane_contact"])
 def test_contacts_without_a_known_length_are_refused_with_names(kind):
     with pytest.raises(InvalidValueError, match=r"know no length.*known_lengths=\('\w+',\).*d3"):
         identifiable_parameters(rm.load("kr6_r900"), kind)
@@ -225,8 +225,8 @@ def test_contacts_without_a_known_length_are_refused_with_names(kind):
 
 def test_points_measured_as_well_give_the_scale_and_the_place():
     model = rm.load("rx90")
-    both = identifiable_parameters(model, [Kind.POINT_CONTACT, Kind.POSITION])
-    alone = identifiable_parameters(model, Kind.POSITION)
+    both = identifiable_parameters(model, ["point_contact", "position"])
+    alone = identifiable_parameters(model, "position")
     assert both.count == alone.count
     assert not both.of_reason(Reason.GAUGE)
 
@@ -236,8 +236,8 @@ def test_points_measured_as_well_give_the_scale_and_the_place():
 
 def test_what_small_deviations_show_is_said_in_a_sentence():
     model = rm.load("rx90")
-    nominal = identifiable_parameters(model, Kind.POSITION)
-    solved = identifiable_parameters(model, Kind.POSITION, deviation={"d7": 1e-3})
+    nominal = identifiable_parameters(model, "position")
+    solved = identifiable_parameters(model, "position", deviation={"d7": 1e-3})
     change = identifiability_change(nominal, solved)
     assert not change.is_same
     assert "theta5" in change.gained
@@ -249,7 +249,7 @@ def test_what_small_deviations_show_is_said_in_a_sentence():
     assert same.is_same
     assert str(same) == "The same 21 parameters are identifiable in both."
     with pytest.raises(InvalidValueError, match="same candidate"):
-        identifiability_change(nominal, identifiable_parameters(model, Kind.POSE, base=False))
+        identifiability_change(nominal, identifiable_parameters(model, "pose", base=False))
 
 
 def test_contacts_are_judged_where_the_deviating_robot_meets_them():
@@ -257,11 +257,11 @@ def test_contacts_are_judged_where_the_deviating_robot_meets_them():
     rng = np.random.default_rng(3)
     candidates = candidate_parameters(model)
     xi = 1e-3 * rng.normal(size=len(candidates)) * (candidates.rows > 0)
-    q, label = drawn_groups(candidates, Kind.POINT_CONTACT, 14, 8, rng, deviation=xi, limits=False)
+    q, label = drawn_groups(candidates, "point_contact", 14, 8, rng, deviation=xi, limits=False)
     T = differential_model(candidates, q, xi).T
     assert np.abs(np.diff(T[:, :3, 3], axis=0)[np.diff(label) == 0]).max() < 1e-11
-    nominal = identifiable_parameters(model, Kind.POINT_CONTACT, known_lengths=["d3"])
-    solved = identifiable_parameters(model, Kind.POINT_CONTACT, known_lengths=["d3"], deviation=xi)
+    nominal = identifiable_parameters(model, "point_contact", known_lengths=["d3"])
+    solved = identifiable_parameters(model, "point_contact", known_lengths=["d3"], deviation=xi)
     # the readings of one robot violate the contacts of the other by millimetres: where that was
     # not seen, directions that nothing shows would be counted
     on_data = identifiable_parameters(
@@ -275,7 +275,7 @@ def test_contacts_are_judged_where_the_deviating_robot_meets_them():
 def test_data_tell_no_more_than_the_structure():
     model = rm.load("puma560")
     rng = np.random.default_rng(1)
-    structure = identifiable_parameters(model, Kind.POSE)
+    structure = identifiable_parameters(model, "pose")
     q = spread(model, rng, 50)
     assert identifiable_parameters(model, Pose(q, rm.dgm(model, q))).names == structure.names
     q[:, 4:] = 0.3  # two joints at rest
@@ -289,12 +289,12 @@ def test_data_tell_no_more_than_the_structure():
 def test_subsets_of_parameters_and_known_ones():
     model = rm.load("rx90")
     some = ["theta2", "theta3", "d3", "r4"]
-    found = identifiable_parameters(model, Kind.POSE, parameters=some)
+    found = identifiable_parameters(model, "pose", parameters=some)
     assert found.names == ("theta2", "theta3", "d3", "r4")
-    found = identifiable_parameters(model, Kind.POSE, known=["theta2"])
+    found = identifiable_parameters(model, "pose", known=["theta2"])
     assert found.of_reason(Reason.KNOWN) == ("theta2",)
     assert found.count == 29
-    bare = identifiable_parameters(model, Kind.POSE, base=False, tool=False)
+    bare = identifiable_parameters(model, "pose", base=False, tool=False)
     assert all(1 <= row <= 6 for row in bare.candidates.rows)
 
 
@@ -311,13 +311,13 @@ def test_mistakes_are_named():
         identifiable_parameters(model, "pose", parameters=candidate_parameters(rm.load("puma560")))
     one = serial(np.random.default_rng(0), 1, 0, False)
     with pytest.raises(InvalidValueError, match="two postures"):
-        identifiable_parameters(one, Kind.POINT_CONTACT, known_lengths=["r1"])
+        identifiable_parameters(one, "point_contact", known_lengths=["r1"])
     wrist = rm.RobotModel.from_table(
         rm.DHTable.from_rows([{"sigma": 0}, {"sigma": 0, "alpha": 1}, {"sigma": 0, "alpha": -1}])
     )
     with pytest.raises(InvalidValueError, match="would do here: none"):
-        identifiable_parameters(wrist, Kind.POINT_CONTACT)
-    assert as_kind("point-contact") is as_kind(PointContact) is Kind.POINT_CONTACT
+        identifiable_parameters(wrist, "point_contact")
+    assert as_kind("point-contact") is as_kind(PointContact) is PointContact
 
 
 @pytest.mark.parametrize("unit", [1e-6, 1e-4, 1e-2, 1e2, 1e4, 1e6])

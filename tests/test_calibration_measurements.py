@@ -25,11 +25,11 @@ from robotmodels.calibration.measurements import (
     Pose,
     Position,
     RelativePose,
-    length_is_known,
-    lonely_labels,
+    scale_is_observable,
+    single_observations,
+    whitened,
 )
-from robotmodels.calibration.measurements.noise import whitened
-from robotmodels.calibration.measurements.pivots import pivot_of
+from robotmodels.calibration.measurements.positions import pivot_of
 from robotmodels.calibration.problem import guessed_fixtures, linearised, satisfying
 from robotmodels.errors import InvalidValueError, NotARotationError, ShapeError
 
@@ -365,13 +365,13 @@ def test_lengths_of_several_measurements_together():
     other = PointContact(q, known={0: [0.5, 0.0, 0.3]}, name="other")
     floor = PlaneContact(q, known={0: [0, 0, 1, 0.0]})
     same_height = PlaneContact(q, known={0: [0, 0, 1, 0.2]})
-    assert length_is_known([one, other])
-    assert length_is_known([one, floor])
-    assert not length_is_known([one, same_height])
-    assert not length_is_known([one])
-    assert length_is_known([one], [0.0, 0.0, 0.0])
-    assert not length_is_known([one], [0.5, 0.0, 0.2])
-    assert not length_is_known([PointContact(q)], [0.0, 0.0, 0.0])
+    assert scale_is_observable([one, other])
+    assert scale_is_observable([one, floor])
+    assert not scale_is_observable([one, same_height])
+    assert not scale_is_observable([one])
+    assert scale_is_observable([one], [0.0, 0.0, 0.0])
+    assert not scale_is_observable([one], [0.5, 0.0, 0.2])
+    assert not scale_is_observable([PointContact(q)], [0.0, 0.0, 0.0])
 
 
 @pytest.mark.parametrize("kind", ["point", "frame", "plane", "line"])
@@ -395,7 +395,7 @@ def test_a_robot_dilated_from_a_known_place_touches_as_before(kind):
         m.linearise([Evaluation(at, psi)], np.zeros(0)).residual[:, lengths] for at in (T, dilated)
     )
     np.testing.assert_allclose(small, s * there, atol=1e-12)
-    A, b = m.dilation_centres
+    A, b = m.scale_centres
     np.testing.assert_allclose(A @ c, b, atol=1e-12)
 
 
@@ -449,20 +449,22 @@ def test_a_plane_touched_along_a_line_does_not_know_its_normal():
 def test_what_is_touched_too_seldom_is_named_with_what_to_do():
     q = np.zeros((4, 6))
     alone = PointContact(q, [0, 0, 0, 1])
-    assert [found.label for found in lonely_labels([alone])] == ["point:1"]
-    assert "point:1 is measured once: 3 rows" in str(lonely_labels([alone])[0])
-    assert lonely_labels([alone, PointContact(q[:1], [1])]) == ()
-    assert lonely_labels([alone, KnownDistance("point:0", "point:1", 0.1)]) == ()
-    assert [found.label for found in lonely_labels([PlaneContact(q, [0, 0, 0, 1])])] == [
+    assert [found.label for found in single_observations([alone])] == ["point:1"]
+    assert "point:1 is measured once: 3 rows" in str(single_observations([alone])[0])
+    assert single_observations([alone, PointContact(q[:1], [1])]) == ()
+    assert single_observations([alone, KnownDistance("point:0", "point:1", 0.1)]) == ()
+    assert [found.label for found in single_observations([PlaneContact(q, [0, 0, 0, 1])])] == [
         "plane:0", "plane:1",
     ]  # fmt: skip
-    assert lonely_labels([PlaneContact(q)]) == ()
-    assert lonely_labels([LaserLine(q)]) == ()
-    assert len(lonely_labels([LaserLine(q, [0, 0, 1, 1])])) == 2
-    assert len(lonely_labels([FrameContact(q, [0, 0, 0, 1])])) == 1
-    assert len(lonely_labels([Distance(q, 0.1, offset=True)])) == 1
-    assert lonely_labels([Distance(q, 0.1), AxisPosition(q, 0.1, [0, 0, 1])]) == ()
-    assert lonely_labels([FrameContact(q, [0, 1, 2, 3], {k: np.eye(4) for k in range(4)})]) == ()
+    assert single_observations([PlaneContact(q)]) == ()
+    assert single_observations([LaserLine(q)]) == ()
+    assert len(single_observations([LaserLine(q, [0, 0, 1, 1])])) == 2
+    assert len(single_observations([FrameContact(q, [0, 0, 0, 1])])) == 1
+    assert len(single_observations([Distance(q, 0.1, offset=True)])) == 1
+    assert single_observations([Distance(q, 0.1), AxisPosition(q, 0.1, [0, 0, 1])]) == ()
+    assert (
+        single_observations([FrameContact(q, [0, 1, 2, 3], {k: np.eye(4) for k in range(4)})]) == ()
+    )
 
 
 @pytest.mark.parametrize("kind", ["linked", "linked_point", "camera"])

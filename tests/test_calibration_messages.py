@@ -16,7 +16,6 @@ from robotmodels.calibration import (
     Position,
     fit,
 )
-from robotmodels.calibration.files_read import check_columns, check_contents
 from robotmodels.calibration.measurements import (
     AxisPosition,
     CameraPose,
@@ -26,6 +25,8 @@ from robotmodels.calibration.measurements import (
     PlaneContact,
     RelativePose,
 )
+from robotmodels.calibration.read import _check_contents as check_contents
+from robotmodels.calibration.read import _check_same_columns as check_columns
 from robotmodels.calibration.read import read_measurements
 from robotmodels.cli import main
 from robotmodels.cli.option_words import in_options
@@ -227,7 +228,7 @@ def test_every_kind_keeps_its_files(tmp_path):
         AxisPosition(q, np.arange(6.0), [0, 0, 1]),
     ]  # fmt: skip
     for kind in kinds:
-        object.__setattr__(kind, "_origin", read._origin)
+        object.__setattr__(kind, "origin", read.origin)
         views = [view.q for view in kind.views]
         assert kind.with_configurations(views).files == read.files
         assert [f.rows for f in kind.subset(np.array([1, 4])).files] == [2]

@@ -22,7 +22,6 @@ from .extended_table.six_parameters import (
     tool_parameters_of,
 )
 from .extended_table.skeleton import Skeleton, skeleton_of
-from .file_kinds import FileKind
 from .fit import fit
 from .folds import AsideErrors
 from .identifiability.changed import IdentifiabilityChange, identifiability_change
@@ -44,7 +43,7 @@ from .measurements import (
     Position,
     RelativePose,
 )
-from .measurements.kinds import Kind, drawn_groups
+from .measurements.kinds import drawn_groups
 from .other_tool import PredictedError, other_tool_error
 from .prior import ParameterPrior
 from .problem import Problem, problem_of
@@ -79,7 +78,6 @@ __all__ = [
     "Element",
     "ErrorLaw",
     "ErrorSummary",
-    "FileKind",
     "FrameContact",
     "GeometricParameter",
     "GeometricParameters",
@@ -87,7 +85,6 @@ __all__ = [
     "IdentifiableParameters",
     "JointErrors",
     "JointOffsets",
-    "Kind",
     "KnownDistance",
     "LaserLine",
     "LengthUnit",

@@ -16,8 +16,15 @@ from ..errors import InvalidValueError, ShapeError
 from .expected_joints import expected_joints_text
 from .extended_table.differential import differential_model
 from .extended_table.parameters import GeometricParameters
-from .measurements import Evaluation, Fixture, Linearised, Measurement, PointContact
-from .measurements.noise import whitened
+from .measurements import (
+    Evaluation,
+    Fixture,
+    Linearised,
+    Measurement,
+    PointContact,
+    whitened,
+)
+from .measurements.kinds import satisfied_measurement
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -235,8 +242,6 @@ def stacked(problem: Problem, x: Array, scales: tuple[Array, ...]) -> tuple[Arra
 
 def satisfying(problem: Problem, xi: Array, fixtures: Array) -> Problem:
     """The problem with readings moved to satisfy the constraints exactly, to judge ranks."""
-    from .measurements.satisfied import satisfied_measurement
-
     moved = []
     for m in problem.measurements:
         if not m.is_constraint:

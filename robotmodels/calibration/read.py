@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -20,18 +21,16 @@ from ..kinematics.coordinates.kinds import orientation_kind
 from ..model import RobotModel, check_model
 from .expected_joints import expected_joints_text
 from .extended_table.skeleton import Frame
-from .file_kinds import CONTACTS, FileKind, as_file_kind
-from .files_read import check_columns, check_contents, rows_read
 from .length_units import unit_error_of_positions, unit_error_of_spread
-from .measurements import Distance, Measurement, Pose, Position, RelativePose
-from .measurements.measurement import of_files
+from .measurements import FileRow, Measurement, Pose
+from .measurements.base import fields_of, required
+from .measurements.kinds import Kind, as_kind
+from .reading_limits import beyond_limits
 
-_POSITION_NAMES = ("x", "y", "z")
-_QUATERNION_NAMES = ("qw", "qx", "qy", "qz")
-_DIGITS = 1e-3
-"""How far from 1 the length of a quaternion of few digits may be."""
-_TURNS = 30.0
-_TURN = 2.0 * np.pi
+_QUATERNION_TOLERANCE = 1e-3
+"""Largest deviation from 1 of the length of a quaternion of few digits."""
+_LARGEST_ANGLE = 30.0
+"""Largest plausible angle, rad; beyond it, degrees are assumed."""
 
 
 def read_measurements(
@@ -65,9 +64,10 @@ def read_measurements(
     path : str, Path or iterable of them
         A file, several, or a folder, whose files that fit ``pattern`` are read in the order of
         their names. The rows of several files follow each other.
-    kind : FileKind, str or class
+    kind : str or class
         ``"position"``, ``"pose"``, ``"orientation"``, ``"distance"``, ``"point_contact"``,
-        ``"frame_contact"``, ``"plane_contact"``, ``"relative_pose"``.
+        ``"frame_contact"``, ``"plane_contact"``, ``"laser_line"``, ``"camera_pose"``,
+        ``"relative_pose"``; or the class of a kind.
     model : RobotModel
         The robot: names, number and types of its joints.
     joints : sequence of str or int, length n, optional
@@ -78,9 +78,9 @@ def read_measurements(
         the orientation's coordinates (for quaternions also qw, qx, qy, qz); ``distance`` for
         distances. Contacts have none.
     label : str or int, optional
-        Contacts: column that says which point, pose or plane each row touches; distances from a
-        pivot: which pivot. Default: the names of the files without their suffix where there are
-        several; else all the same.
+        Column of the label of the touched point, pose, plane or line, of the pivot of a distance,
+        of the board of a camera. Default: the names of the files without their suffix where there
+        are several; else all the same.
     other_joints : sequence of str or int, length n, optional
         Columns of the readings at the other end of a distance (without them it is from a pivot),
         or of a relative pose.
@@ -112,8 +112,8 @@ def read_measurements(
     Raises
     ------
     InvalidValueError
-        Columns that are not there; a cell that is empty or no finite number, with its line; units
-        that cannot be right; files of a folder that do not hold the same.
+        Missing columns; a cell that is empty or no finite number, with its line; units that cannot
+        be right; files of a folder with different contents.
     OSError
         A file cannot be opened.
 
@@ -133,78 +133,112 @@ def read_measurements(
     array([0.2, 0.3, 0. ])
     """
     check_model(model)
-    kind = as_file_kind(kind)
-    _check_arguments(kind, label, other_joints, rows)
+    kind = as_kind(kind, among=is_readable)
     length = as_file_unit(LengthUnit, lengths, "lengths")
     angle = as_file_unit(AngleUnit, angles, "angles")
     turn = angle if joint_angles is None else as_file_unit(AngleUnit, joint_angles, "joint_angles")
+    written = None if orientation is None else orientation_kind(orientation)
+    _check_arguments(kind, label, other_joints, rows, columns)
+    needs = _needed(kind, written)
     files, folder = _files(path, pattern)
     tables = [open_table(file, delimiter) for file in files]
-    written = None if orientation is None else orientation_kind(orientation)
-    needs = _needed(kind, written, columns)
-
     if folder is not None:
-        check_columns(tables)
-    counts: list[int] = []
+        _check_same_columns(tables)
+    revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
 
-    def readings(given: Sequence[Column] | None, what: str) -> Array:
+    def readings(given: Sequence[Column] | None, what: str) -> list[Array]:
         found = [_joint_columns(t, model, given, what, alone=not needs) for t in tables]
         parts = [t.numbers(c) for t, c in zip(tables, found, strict=True)]
-        counts[:] = [len(part) for part in parts]
-        q = np.concatenate(parts)
-        revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
-        _check_turns(q[:, revolute], turn, files[0], "joint_angles" if joint_angles else "angles")
-        return q * np.where(revolute, turn.factor, length.factor)
+        units = "joint_angles" if joint_angles else "angles"
+        _check_angles(np.concatenate(parts)[:, revolute], turn, files[0], units)
+        return [part * np.where(revolute, turn.factor, length.factor) for part in parts]
 
-    q = readings(joints, "joints")
+    parts = readings(joints, "joints")
+    q = np.concatenate(parts)
     if len(tables) > 1:
-        check_contents(tables, np.split(q, np.cumsum(counts)[:-1]), model, frame)
+        _check_contents(tables, parts, model, frame)
     found = [_measured_columns(t, needs, columns) for t in tables]
     values = stacked_columns(tables, found) if needs else np.zeros((len(q), 0))
-    more: dict[str, Any] = {"sigma": sigma, "frame": frame}
-    called = name or (folder.resolve().name if folder is not None else None)
-    if called is not None:
-        more["name"] = called
+    given: dict[str, Any] = {"q": q, "sigma": sigma, "frame": frame}
+    for f in fields(kind):
+        content = f.metadata.get("content")
+        if (
+            content == "joints"
+            and f.name != "q"
+            and (other_joints is not None or "joints" in required(kind))
+        ):
+            given[f.name] = np.concatenate(readings(other_joints, "other_joints"))
+        elif content == "point":
+            given[f.name] = length.factor * values
+            _check_lengths(given[f.name], q, model, length, files[0], frame)
+        elif content == "length":
+            given[f.name] = length.factor * values[:, 0]
+        elif content == "pose" and written is not None:
+            given[f.name] = _poses(written, values, length, angle, files[0])
+            if issubclass(kind, Pose) and _pose_parts(kind)[0]:
+                _check_lengths(given[f.name][:, :3, 3], q, model, length, files[0], frame)
+        elif content == "label" and other_joints is None:
+            given[f.name] = _labels(tables, label, parts)
+    if rows is not None:
+        given["rows"] = rows
+    if name is not None or folder is not None:
+        given["name"] = name if folder is None or name else folder.resolve().name
+    return kind(**given, origin=_origin(tables, parts))
 
-    def measurement() -> Measurement:
-        if kind is FileKind.POSITION:
-            p = length.factor * values
-            _check_lengths(p, q, model, length, files[0], frame)
-            return Position(q, p, (1, 1, 1) if rows is None else rows, **more)
-        if written is not None and kind.has_orientation:
-            T = _poses(kind, written, values, length, angle, files[0])
-            if kind is FileKind.RELATIVE_POSE:
-                other = readings(other_joints, "other_joints")
-                return RelativePose(q, other, T, (1,) * 6 if rows is None else rows, **more)
-            if kind is FileKind.ORIENTATION:
-                more.setdefault("name", "orientation")
-                return Pose(q, T, (0, 0, 0, 1, 1, 1) if rows is None else rows, **more)
-            _check_lengths(T[:, :3, 3], q, model, length, files[0], frame)
-            return Pose(q, T, (1,) * 6 if rows is None else rows, **more)
-        if kind is FileKind.DISTANCE:
-            measured = length.factor * values[:, 0]
-            if other_joints is not None:
-                return Distance(q, measured, readings(other_joints, "other_joints"), **more)
-            return Distance(q, measured, pivot=_labels(tables, label, q), **more)
-        return CONTACTS[kind](q, _labels(tables, label, q), **more)
 
-    return of_files(measurement(), rows_read(tables, counts))
+def is_readable(kind: Kind) -> bool:
+    """Whether files can hold all that a kind needs."""
+    return bool(fields_of(kind, "joints")) and required(kind) <= {
+        "joints", "pose", "point", "length", "label",
+    }  # fmt: skip
+
+
+def _pose_parts(kind: Kind) -> tuple[bool, bool]:
+    """Whether a kind measures a position and an orientation of a pose, by default."""
+    rows: Any = next((f.default for f in fields(kind) if f.name == "rows"), ())
+    has_pose = bool(fields_of(kind, "pose"))
+    return has_pose and any(rows[:3]), has_pose and any(rows[3:])
 
 
 def _check_arguments(
-    kind: FileKind, label: Column | None, other_joints: Sequence[Column] | None,
+    kind: Kind,
+    label: Column | None,
+    other_joints: Sequence[Column] | None,
     rows: Sequence[int] | None,
-) -> None:  # fmt: skip
-    """Refuse arguments that say nothing about a kind."""
-    word = kind.name.lower()
-    if label is not None and (
-        not (kind.is_contact or kind is FileKind.DISTANCE) or other_joints is not None
-    ):
-        raise InvalidValueError(f"label: {word} has no labels here; leave it out.")
-    if other_joints is not None and kind not in (FileKind.DISTANCE, FileKind.RELATIVE_POSE):
-        raise InvalidValueError(f"other_joints: {word} has one end; leave them out.")
-    if rows is not None and not (kind.has_orientation or kind is FileKind.POSITION):
-        raise InvalidValueError(f"rows: {word} has no rows to choose; leave them out.")
+    columns: Sequence[Column] | None,
+) -> None:
+    """Refuse arguments that do not belong to a kind."""
+    if label is not None and (other_joints is not None or not fields_of(kind, "label")):
+        raise InvalidValueError(f"label: {kind.word} has no labels here; leave it out.")
+    if other_joints is not None and len(fields_of(kind, "joints")) < 2:
+        raise InvalidValueError(f"other_joints: {kind.word} has one end; leave them out.")
+    if rows is not None and "rows" not in (f.name for f in fields(kind)):
+        raise InvalidValueError(f"rows: {kind.word} has no rows to choose; leave them out.")
+    if columns is not None and not any(fields_of(kind, c) for c in ("pose", "point", "length")):
+        raise InvalidValueError("columns: a contact measures nothing; see label.")
+
+
+def _needed(kind: Kind, written: OrientationKind | None) -> list[tuple[str, ...]]:
+    """Names of the measured columns, in one or more spellings; none for contacts."""
+    for f in fields_of(kind, "length"):
+        return [(name,) for name in f.metadata["names"]]
+    has_position, has_orientation = _pose_parts(kind)
+    position = ("x", "y", "z") if has_position or fields_of(kind, "point") else ()
+    if not has_orientation:
+        return [position] if position else []
+    if written is None:
+        raise InvalidValueError(
+            "orientation: say how orientations are written: 'rpy_urdf' (turns about x, y, z in "
+            "this order of columns), 'rpy' (about z, y, x), 'quaternion' (scalar first), "
+            "'angle_axis' or another of OrientationKind."
+        )
+    names = [tuple(written.labels[3:])]
+    if written is OrientationKind.QUATERNION:
+        names.append(("qw", "qx", "qy", "qz"))
+    return [(*position, *each) for each in names]
+
+
+# --- files and columns ----------------------------------------------------------------------------
 
 
 def _files(
@@ -227,34 +261,20 @@ def _files(
     return found, path
 
 
-def _needed(
-    kind: FileKind, written: OrientationKind | None, columns: Sequence[Column] | None
-) -> tuple[tuple[str, ...], ...]:
-    """Names of the measured columns, in one or more spellings; none for contacts."""
-    if kind.is_contact:
-        if columns is not None:
-            raise InvalidValueError("columns: a contact measures nothing; see label.")
-        return ()
-    if kind is FileKind.POSITION:
-        return (_POSITION_NAMES,)
-    if kind is FileKind.DISTANCE:
-        return (("distance",), ("length",))
-    if written is None:
-        raise InvalidValueError(
-            "orientation: say how orientations are written: 'rpy_urdf' (turns about x, y, z in "
-            "this order of columns), 'rpy' (about z, y, x), 'quaternion' (scalar first), "
-            "'angle_axis' or another of OrientationKind."
-        )
-    own = [written.labels[3:]]
-    if written is OrientationKind.QUATERNION:
-        own.append(_QUATERNION_NAMES)
-    return tuple(tuple(o) if kind is FileKind.ORIENTATION else (*_POSITION_NAMES, *o) for o in own)
+def _origin(tables: Sequence[CsvTable], parts: Sequence[Array]) -> tuple[FileRow, ...]:
+    """Every row of the files, by the name of its file with the folder."""
+    names = [f"{t.path.resolve().parent.name}/{t.path.name}" for t in tables]
+    return tuple(
+        FileRow(name, row + 1)
+        for name, part in zip(names, parts, strict=True)
+        for row in range(len(part))
+    )
 
 
 def _joint_columns(
     table: CsvTable, model: RobotModel, given: Sequence[Column] | None, what: str, alone: bool
 ) -> tuple[int, ...]:
-    n = model.n
+    n, names = model.n, model.table.joint_names
     if given is not None:
         if isinstance(given, str) or len(given) != n:
             raise InvalidValueError(
@@ -262,25 +282,23 @@ def _joint_columns(
                 f"{expected_joints_text(model)}"
             )
         return tuple(table.number(column, what) for column in given)
-    names = model.table.joint_names
-    advice = f"Give them as {what}=[...], a name or number (from 0) for each of the {n} joints."
-    advice += expected_joints_text(model)
+    found = table.find(names) or table.find([f"q{j + 1}" for j in range(n)])
     if what == "other_joints":
-        raise InvalidValueError(f"other_joints: two ends need two readings. {advice}")
-    if table.names:
-        numbered = [f"q{j + 1}" for j in range(n)]
-        found = table.find(names)
-        found = table.find(numbered) if found is None else found
-        if found is None:
-            raise InvalidValueError(
-                f"{table.path}: the header has neither the joints of {model.name} "
-                f"({', '.join(names)}) nor q1 to q{n}; it has {', '.join(table.names)}. {advice}"
-            )
+        error = "other_joints: two ends need two readings."
+    elif table.names and found is not None:
         return found
-    if alone and table.width == n:
+    elif table.names:
+        error = (
+            f"{table.path}: the header has neither the joints of {model.name} "
+            f"({', '.join(names)}) nor q1 to q{n}; it has {', '.join(table.names)}."
+        )
+    elif alone and table.width == n:
         return tuple(range(n))
+    else:
+        error = f"{table.path}: no header says which of its {table.width} columns are the joints."
     raise InvalidValueError(
-        f"{table.path}: no header says which of its {table.width} columns are the joints. {advice}"
+        f"{error} Give them as {what}=[...], a name or number (from 0) for each of the {n} joints."
+        f"{expected_joints_text(model)}"
     )
 
 
@@ -289,8 +307,8 @@ def _measured_columns(
 ) -> tuple[int, ...]:
     if not needs:
         return ()
-    count = len(needs[0])
     if given is not None:
+        count = len(needs[0])
         if isinstance(given, str) or len(given) != count:
             raise InvalidValueError(
                 f"columns: expected {count} columns ({', '.join(needs[0])}), got {given!r:.80}."
@@ -308,29 +326,72 @@ def _measured_columns(
     )
 
 
-def _labels(tables: Sequence[CsvTable], label: Column | None, q: Array) -> tuple[str, ...]:
+def _labels(
+    tables: Sequence[CsvTable], label: Column | None, parts: Sequence[Array]
+) -> tuple[str, ...]:
     if label is not None:
         return tuple(x for table in tables for x in table.labels(table.number(label, "label")))
-    if len(tables) == 1:
-        return ("0",) * len(q)
-    stems = [table.path.stem for table in tables]
+    stems = [table.path.stem if len(tables) > 1 else "0" for table in tables]
     if len(set(stems)) < len(stems):
-        # the same name in several folders: these are different points
+        # files of the same name in several folders are different targets
         stems = [f"{table.path.parent.name}/{table.path.stem}" for table in tables]
-    counts = [len(table.numbers([0])) for table in tables]
-    return tuple(stem for stem, count in zip(stems, counts, strict=True) for _ in range(count))
+    return tuple(stem for stem, part in zip(stems, parts, strict=True) for _ in part)
+
+
+# --- plausibility ---------------------------------------------------------------------------------
+
+
+def _check_same_columns(tables: Sequence[CsvTable]) -> None:
+    """Refuse files of a folder whose columns differ in number or name."""
+    kinds: dict[str, list[str]] = {}
+    for t in tables:
+        columns = f"columns {', '.join(t.names)}" if t.names else f"{t.width} columns, no header"
+        kinds.setdefault(columns, []).append(t.path.name)
+    if len(kinds) > 1:
+        listed = "; ".join(f"{', '.join(names)}: {columns}" for columns, names in kinds.items())
+        raise InvalidValueError(
+            f"path: the files of {tables[0].path.parent} do not have the same columns ({listed}). "
+            "Select the files by pattern='*.csv', or name them."
+        )
+
+
+def _check_contents(
+    tables: Sequence[CsvTable], readings: Sequence[Array], model: RobotModel, frame: Frame
+) -> None:
+    """Refuse files whose columns are not joint readings. Shapes: readings (N, n)."""
+    rows = set(model.twin.frame(frame).path.tolist())
+    other: dict[str, str] = {}
+    for t, q in zip(tables, readings, strict=True):
+        sentences, refused = beyond_limits(model, q, rows)
+        if len(q) > 2 and q.shape[1] > 3 and _has_quaternions(q):
+            other[t.path.name] = "four columns are unit quaternions: poses"
+        elif refused:
+            other[t.path.name] = f"beyond limits: {sentences[0]}"
+    if other and len(other) < len(tables):
+        raise InvalidValueError(
+            f"path: among {', '.join(t.path.name for t in tables)}, these are not readings of the "
+            f"joints of {model.name}: "
+            + "; ".join(f"{name} ({why})" for name, why in other.items())
+            + ". Select the files by pattern='*.csv', or name them."
+        )
+
+
+def _has_quaternions(q: Array) -> bool:
+    """Whether four adjacent columns have length 1 in every row."""
+    square = np.lib.stride_tricks.sliding_window_view(q**2, 4, axis=1).sum(axis=-1)
+    return bool((np.abs(square - 1.0) < 2.0 * _QUATERNION_TOLERANCE).all(axis=0).any())
 
 
 def _poses(
-    kind: FileKind, written: OrientationKind, values: Array, length: LengthUnit, angle: AngleUnit,
-    file: Path,
-) -> Array:  # fmt: skip
-    turned_only = kind is FileKind.ORIENTATION
-    p = np.zeros((len(values), 3)) if turned_only else length.factor * values[:, :3]
-    o = values if turned_only else values[:, 3:]
+    written: OrientationKind, values: Array, length: LengthUnit, angle: AngleUnit, file: Path
+) -> Array:
+    """Poses of columns: position if there is one, then orientation. Shapes: values (N, m)."""
+    count = values.shape[1] - (written.dimension - 3)
+    p = length.factor * values[:, :3] if count else np.zeros((len(values), 3))
+    o = values[:, count:]
     if written is OrientationKind.QUATERNION:
-        size = np.sqrt(np.minimum(np.abs(o), 1e9) ** 2 @ np.ones(o.shape[1]))
-        wrong = np.flatnonzero(abs(size - 1.0) > _DIGITS)
+        size = np.linalg.norm(np.clip(o, -1e9, 1e9), axis=1)
+        wrong = np.flatnonzero(abs(size - 1.0) > _QUATERNION_TOLERANCE)
         if len(wrong):
             raise InvalidValueError(
                 f"{file}: the quaternion of row {wrong[0] + 1} has length {size[wrong[0]]:.4g}; "
@@ -338,18 +399,18 @@ def _poses(
             )
         o = o / size[:, None]
     elif written not in (OrientationKind.DIRECTION_COSINES, OrientationKind.TWO_AXES):
-        _check_turns(o, angle, file, "angles")
+        _check_angles(o, angle, file, "angles")
         o = angle.factor * o
     return se3.as_pose(pose_from_coordinates(np.hstack([p, o]), written), "columns")
 
 
-def _check_turns(values: Array, unit: AngleUnit, file: Path, argument: str) -> None:
+def _check_angles(values: Array, unit: AngleUnit, file: Path, argument: str) -> None:
     largest = float(np.abs(values).max(initial=0.0))
-    if unit is AngleUnit.RADIAN and largest > _TURNS:
+    if unit is AngleUnit.RADIAN and largest > _LARGEST_ANGLE:
         raise InvalidValueError(
             f"{file}: an angle of {largest:.4g} rad; these look like degrees. Say {argument}='deg'."
         )
-    if unit is AngleUnit.DEGREE and values.size and largest <= _TURN and np.ptp(values) > 1.0:
+    if unit is AngleUnit.DEGREE and values.size and largest <= 2 * np.pi and np.ptp(values) > 1.0:
         raise InvalidValueError(
             f"{file}: no angle is larger than {largest:.4g} deg; these look like radians. Say "
             f"{argument}='rad'."
@@ -359,7 +420,8 @@ def _check_turns(values: Array, unit: AngleUnit, file: Path, argument: str) -> N
 def _check_lengths(
     p: Array, q: Array, model: RobotModel, unit: LengthUnit, file: Path, frame: Frame
 ) -> None:
-    # squares of what is farther apart than this are no numbers
+    """Refuse positions in another unit. Shapes: p (N, 3), q (N, n)."""
+    # clipped so that squares of wrong columns do not overflow
     nominal, p = dgm(model, np.clip(q, -1e3, 1e3), frame)[:, :3, 3], np.clip(p, -1e150, 1e150)
     spread = float(np.linalg.norm(np.ptp(p, axis=0)))
     slip = unit_error_of_positions(nominal, p) or unit_error_of_spread(model, frame, spread)

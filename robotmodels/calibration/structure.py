@@ -25,8 +25,7 @@ from .extended_table.parameters import GeometricParameters
 from .extended_table.skeleton import Skeleton
 from .identifiability.identifiable import IdentifiableParameters, Reason
 from .identifiability.scale import needs_a_length
-from .measurements import Evaluation
-from .measurements.noise import whitened
+from .measurements import Evaluation, whitened
 from .problem import Problem, evaluations, problem_of, stacked
 from .solve import Solution
 

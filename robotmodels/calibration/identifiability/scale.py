@@ -12,7 +12,7 @@ from ...geometry import PRISMATIC
 from ...kinematics.lengths import spread_configurations
 from ..extended_table.differential import differential_model
 from ..extended_table.elements import ErrorLaw
-from ..measurements import length_is_known
+from ..measurements import scale_is_observable
 from ..problem import Problem
 
 _POSTURES = 40
@@ -30,7 +30,7 @@ def needs_a_length(problem: Problem, known: Iterable[str]) -> bool:
     base_is_known = not any(
         e.row == 0 and e.law is ErrorLaw.CONSTANT and e.name not in known for e in p.entries
     )
-    if length_is_known(problem.measurements, p.model.base[:3, 3] if base_is_known else None):
+    if scale_is_observable(problem.measurements, p.model.base[:3, 3] if base_is_known else None):
         return False
     return any(
         e.law is ErrorLaw.CONSTANT and e.element.is_length and 0 < e.row <= p.model.f

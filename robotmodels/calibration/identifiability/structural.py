@@ -23,12 +23,11 @@ from .identifiable import IdentifiableParameters, identifiable_on
 _SEED = 14
 _CONTACTS = 14
 """Contacts that are drawn for structural identifiability, and postures of each."""
-_POSTURES = {Kind.FRAME_CONTACT: 6, Kind.POINT_CONTACT: 8, Kind.PLANE_CONTACT: 14}
 
 
 def identifiable_parameters(
     model: RobotModel,
-    measurements: Measurement | Kind | Any | Iterable[Any],
+    measurements: Any,
     *,
     frame: Frame = None,
     known_lengths: Iterable[str] = (),
@@ -58,7 +57,7 @@ def identifiable_parameters(
     model : RobotModel
         The robot.
     measurements : kinds or data, one or more
-        `Kind` (or its name, or the class: ``Pose``, ``Position``, ``PointContact``), or measured
+        Classes (`Pose`, `Position`, `PointContact`) or their names (``"pose"``), or measured
         data; kinds and data together as well.
     frame : str, int or None
         The end that kinds look at; None is the tool. Data say it themselves.
@@ -95,7 +94,7 @@ def identifiable_parameters(
     Examples
     --------
     >>> from robotmodels.robots import load
-    >>> identifiable_parameters(load("ur10e"), Kind.POSE).count
+    >>> identifiable_parameters(load("ur10e"), "pose").count
     30
     """
     check_model(model)
@@ -129,22 +128,22 @@ def drawn_measurement(
 ) -> Measurement:
     """Random noise-free measurements, enough to identify all that the kind can identify."""
     groups, postures = 20 + 2 * len(candidates), kind.postures
-    if kind.is_contact:
-        groups, postures = _CONTACTS, _POSTURES[kind]
+    if kind.is_constraint:
+        groups, postures = _CONTACTS, 2 * kind.postures + 2
     found = drawn_groups(
         candidates, kind, groups, postures, rng, frame=frame, deviation=deviation, limits=False
     )
     if not found.count:
         raise InvalidValueError(
-            f"{kind.name}: this robot has no two postures for {kind.value.split(' in ')[0]}, so "
-            "nothing can be told from it. Measure something else (Position, Pose), or let the "
-            "robot touch with fewer constraints."
+            f"{kind.word}: this robot does not reach a target in two postures, so that nothing is "
+            "identifiable. Measure something else (Position, Pose), or let the robot touch with "
+            "fewer constraints."
         )
     return measurement_of(candidates, kind, found, frame=frame, deviation=deviation)
 
 
 def _asked(measurements: Any) -> list[Measurement | Kind]:
-    single = isinstance(measurements, Measurement | Kind | str | type)
+    single = isinstance(measurements, Measurement | str | type)
     given = [measurements] if single else list(measurements)
     if not given:
         raise InvalidValueError("measurements: expected kinds or measured data, got none.")

@@ -12,9 +12,8 @@ from ...errors import InvalidValueError, ShapeError
 from ...kinematics.lengths import characteristic_length
 from ..extended_table.parameters import GeometricParameters
 from ..extended_table.skeleton import Frame
-from ..measurements import Measurement
+from ..measurements import Measurement, whitened
 from ..measurements.kinds import Kind, groups_of, measurement_of
-from ..measurements.noise import whitened
 from ..problem import linearised, problem_of
 
 LENGTH_NOISE = 1e-4
@@ -24,7 +23,7 @@ _CHUNK = 32
 
 def group_rows(
     parameters: GeometricParameters,
-    kind: Kind,
+    kind: Kind | str,
     q: Array,
     sigma: ArrayLike | None = None,
     frame: Frame = None,
@@ -42,7 +41,7 @@ def group_rows(
         problem = problem_of(parameters, [measurement])
         fixtures = measurement.guess(_seen(problem, none)) if problem.F else np.zeros(0)
         if fixtures is None:
-            raise InvalidValueError(f"kind: the fixtures of {kind.name} cannot be guessed.")
+            raise InvalidValueError("kind: its fixtures cannot be guessed.")
         scale = _noise(measurement, sigma, parameters, frame)
         (found,) = linearised(problem, none, fixtures)
         A = whitened(measurement, found.by_parameters, scale).reshape(G, -1, len(parameters))

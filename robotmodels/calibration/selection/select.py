@@ -21,7 +21,6 @@ from ..extended_table.candidates import candidate_parameters
 from ..extended_table.parameters import GeometricParameters
 from ..extended_table.skeleton import Frame
 from ..identifiability.identifiable import identifiable_on
-from ..measurements import Measurement
 from ..measurements.kinds import Groups, Kind, as_kind, drawn_groups, groups_of, measurement_of
 from .exchange import Progress, exchanged, greedy, index_of, nested
 from .group_rows import group_rows
@@ -38,7 +37,7 @@ _MEETING = 1e-6
 
 def select_configurations(
     model: RobotModel,
-    kind: Kind | str | type[Measurement],
+    kind: Kind | str,
     count: int,
     *,
     candidates: ArrayLike | None = None,
@@ -71,8 +70,8 @@ def select_configurations(
     ----------
     model : RobotModel
         The robot, n joints.
-    kind : Kind
-        What shall be measured; also its name or class.
+    kind : class or str
+        What shall be measured: `Pose`, `PointContact`, ... or ``"point_contact"``, ...
     count : int
         How many configurations, or contacts.
     candidates : array_like, shape (N, n) or (N, m, n), optional
@@ -128,7 +127,7 @@ def select_configurations(
     --------
     >>> from robotmodels.robots import load
     >>> found = select_configurations(
-    ...     load("rx90"), Kind.POSE, 20, drawn=200, rng=np.random.default_rng(0))
+    ...     load("rx90"), "pose", 20, drawn=200, rng=np.random.default_rng(0))
     >>> found.q.shape, len(found.parameters)
     ((20, 6), 30)
     """
@@ -139,7 +138,7 @@ def select_configurations(
     starts = _whole(starts, "starts")
     rng = np.random.default_rng() if rng is None else rng
     told = _progress(progress)
-    if optimise and kind.is_contact:
+    if optimise and kind.is_constraint:
         raise InvalidValueError(
             "optimise: the postures of a contact cannot be moved one by one; draw more candidates."
         )
@@ -165,7 +164,7 @@ def select_configurations(
     p, least = len(kept), ceil(len(kept) / rows.shape[1])
     if count < least:
         raise InvalidValueError(
-            f"count: {p} parameters need at least {least} for {kind.name}, got {count}."
+            f"count: {p} parameters need at least {least} for {kind.word}, got {count}."
         )
     effect = np.sqrt((rows**2).sum(axis=(0, 1)) / len(rows))
     scaled = rows / effect
@@ -268,7 +267,7 @@ def _given(
         q = q[:, None]
     if q.ndim != 3 or q.shape[2] != n or q.shape[1] < min(kind.postures, 2):
         raise ShapeError(f"candidates: expected shape {expected}, got {q.shape}.")
-    if kind.is_contact and len(q):
+    if kind.is_constraint and len(q):
         _check_meeting(parameters, kind, q, space.frame)
     within = space.within_limits(q)
     clear = space.clear(q)
@@ -312,7 +311,7 @@ def _identifiable(
     found = identifiable_on(parameters, [measured], known_lengths)
     if not found.count:
         raise InvalidValueError(
-            f"kind: the candidates tell none of the {len(parameters)} parameters by {kind.name}."
+            f"kind: the candidates tell none of the {len(parameters)} parameters by {kind.word}."
         )
     return found.kept
 

@@ -23,7 +23,7 @@ class SelectedConfigurations(Rebuilt):
 
     Parameters
     ----------
-    kind : Kind
+    kind : class
         What shall be measured there.
     groups : ndarray, shape (count, m, n)
         Postures of each chosen configuration: one for measurements from outside, several for
@@ -147,7 +147,7 @@ class SelectedConfigurations(Rebuilt):
         size = self.groups.shape[1]
         each = "" if size == 1 else f", {size} postures each"
         lines = [
-            f"{self.count} chosen of {self.pool} candidates for {self.kind.value}{each}: "
+            f"{self.count} chosen of {self.pool} candidates for {self.kind.word}{each}: "
             f"{self.criterion.name} {self.observability.value(self.criterion):.4g} for "
             f"{len(self.parameters)} parameters.",
             str(self.observability) + ".",

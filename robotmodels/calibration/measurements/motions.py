@@ -1,4 +1,7 @@
-"""Rotation vectors of small rotations, and how they change.
+"""Small rotations, and poses that depend on unknowns: values with derivatives.
+
+A pose that depends on C unknowns is an `Evaluation`: T (N, 4, 4) and psi (N, 6, C), the twist
+``[v; w]`` of the pose's origin by each unknown, in the axes in which the pose is given.
 
 Source: T. D. Barfoot, State Estimation for Robotics, Cambridge 2017, eq. (7.76).
 """
@@ -6,9 +9,11 @@ Source: T. D. Barfoot, State Estimation for Robotics, Cambridge 2017, eq. (7.76)
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from ..._arrays import Array
 from ...se3 import skew
+from .base import Evaluation
 
 
 def rotation_errors(R: Array, R_measured: Array) -> Array:
@@ -16,8 +21,6 @@ def rotation_errors(R: Array, R_measured: Array) -> Array:
 
     Shapes: R, R_measured (N, 3, 3) -> (N, 3).
     """
-    from scipy.spatial.transform import Rotation
-
     if not len(R):
         return np.zeros((0, 3))
     # products of rotations are rotations: the check would take longer than the rest
@@ -53,8 +56,6 @@ def left_jacobians(u: Array) -> Array:
 
 def rotations_of(u: Array) -> Array:
     """Rotation matrices of rotation vectors. Shapes: u (N, 3) -> (N, 3, 3)."""
-    from scipy.spatial.transform import Rotation
-
     return Rotation.from_rotvec(u).as_matrix() if len(u) else np.zeros((0, 3, 3))
 
 
@@ -89,3 +90,47 @@ def unit_vector(direction: Array) -> Array:
     """Normalise a direction; unit vectors are returned unchanged."""
     length = float(np.linalg.norm(direction))
     return direction if abs(length - 1.0) < 1e-15 else direction / length
+
+
+def widened(pose: Evaluation, columns: int) -> Evaluation:
+    """Append zero columns for unknowns that do not move the poses."""
+    T, psi = pose
+    return Evaluation(T, np.concatenate([psi, np.zeros((*psi.shape[:2], columns))], axis=-1))
+
+
+def product(a: Evaluation, b: Evaluation) -> Evaluation:
+    """``T_a T_b``."""
+    R = a.T[:, :3, :3]
+    arm = (R @ b.T[:, :3, 3:])[..., 0]
+    psi = np.empty_like(a.psi)
+    psi[:, :3] = a.psi[:, :3] - skew(arm) @ a.psi[:, 3:] + R @ b.psi[:, :3]
+    psi[:, 3:] = a.psi[:, 3:] + R @ b.psi[:, 3:]
+    return Evaluation(a.T @ b.T, psi)
+
+
+def relative(a: Evaluation, b: Evaluation) -> Evaluation:
+    """``T_a^-1 T_b``, the pose of b in a."""
+    Rt = a.T[:, :3, :3].swapaxes(-1, -2)
+    apart = b.T[:, :3, 3] - a.T[:, :3, 3]
+    T = np.tile(np.eye(4), (len(Rt), 1, 1))
+    T[:, :3, :3] = Rt @ b.T[:, :3, :3]
+    T[:, :3, 3] = (Rt @ apart[..., None])[..., 0]
+    psi = np.empty_like(a.psi)
+    psi[:, :3] = Rt @ (b.psi[:, :3] - a.psi[:, :3] + skew(apart) @ a.psi[:, 3:])
+    psi[:, 3:] = Rt @ (b.psi[:, 3:] - a.psi[:, 3:])
+    return Evaluation(T, psi)
+
+
+def difference(a: Evaluation, T: Array, psi: Array | None = None) -> tuple[Array, Array]:
+    """Position of a less that of T, and the rotation vector from T to a; psi is that of T.
+
+    Shapes: T (N, 4, 4), psi (N, 6, C) -> residual (N, 6), jacobian (N, 6, C).
+    """
+    u = rotation_errors(a.T[:, :3, :3], T[:, :3, :3])
+    J = a.psi.copy()
+    J[:, 3:] = inverse_left_jacobians(u) @ a.psi[:, 3:]
+    if psi is not None:
+        J[:, :3] -= psi[:, :3]
+        # a rotation of T is applied before the rotation vector, which changes the sign of u
+        J[:, 3:] -= inverse_left_jacobians(-u) @ psi[:, 3:]
+    return np.hstack([a.T[:, :3, 3] - T[:, :3, 3], u]), J
