@@ -7,7 +7,7 @@ import pytest
 from identities.random_robots import random_model, random_pose, random_state
 
 import robotmodels as rm
-from robotmodels.calibration import Reason, candidate_parameters, differential_model, problem_of
+from robotmodels.calibration import Reason, candidate_parameters, differential_model
 from robotmodels.calibration.identifiability.identifiable import identifiable_on
 from robotmodels.calibration.identifiability.structural import identifiable_parameters
 from robotmodels.calibration.joined import side_by_side
@@ -30,7 +30,7 @@ from robotmodels.calibration.measurements import (
     whitened,
 )
 from robotmodels.calibration.measurements.positions import pivot_of
-from robotmodels.calibration.problem import guessed_fixtures, linearised, satisfying
+from robotmodels.calibration.problem import guessed_fixtures, linearised, problem_of, satisfying
 from robotmodels.errors import InvalidValueError, NotARotationError, ShapeError
 
 B = 12
@@ -449,21 +449,21 @@ def test_a_plane_touched_along_a_line_does_not_know_its_normal():
 def test_what_is_touched_too_seldom_is_named_with_what_to_do():
     q = np.zeros((4, 6))
     alone = PointContact(q, [0, 0, 0, 1])
-    assert [found.label for found in single_observations([alone])] == ["point:1"]
-    assert "point:1 is measured once: 3 rows" in str(single_observations([alone])[0])
-    assert single_observations([alone, PointContact(q[:1], [1])]) == ()
-    assert single_observations([alone, KnownDistance("point:0", "point:1", 0.1)]) == ()
-    assert [found.label for found in single_observations([PlaneContact(q, [0, 0, 0, 1])])] == [
+    assert list(single_observations([alone])) == ["point:1"]
+    assert "point:1 is measured once: 3 rows" in single_observations([alone])["point:1"]
+    assert single_observations([alone, PointContact(q[:1], [1])]) == {}
+    assert single_observations([alone, KnownDistance("point:0", "point:1", 0.1)]) == {}
+    assert list(single_observations([PlaneContact(q, [0, 0, 0, 1])])) == [
         "plane:0", "plane:1",
     ]  # fmt: skip
-    assert single_observations([PlaneContact(q)]) == ()
-    assert single_observations([LaserLine(q)]) == ()
+    assert single_observations([PlaneContact(q)]) == {}
+    assert single_observations([LaserLine(q)]) == {}
     assert len(single_observations([LaserLine(q, [0, 0, 1, 1])])) == 2
     assert len(single_observations([FrameContact(q, [0, 0, 0, 1])])) == 1
     assert len(single_observations([Distance(q, 0.1, offset=True)])) == 1
-    assert single_observations([Distance(q, 0.1), AxisPosition(q, 0.1, [0, 0, 1])]) == ()
+    assert single_observations([Distance(q, 0.1), AxisPosition(q, 0.1, [0, 0, 1])]) == {}
     assert (
-        single_observations([FrameContact(q, [0, 1, 2, 3], {k: np.eye(4) for k in range(4)})]) == ()
+        single_observations([FrameContact(q, [0, 1, 2, 3], {k: np.eye(4) for k in range(4)})]) == {}
     )
 
 

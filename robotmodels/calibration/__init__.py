@@ -43,10 +43,8 @@ from .measurements import (
     Position,
     RelativePose,
 )
-from .measurements.kinds import drawn_groups
 from .other_tool import PredictedError, other_tool_error
 from .prior import ParameterPrior
-from .problem import Problem, problem_of
 from .read import read_measurements
 from .reporting.text import report_text
 from .reporting.write import calibrated_urdf, result_data, write_result
@@ -98,7 +96,6 @@ __all__ = [
     "PoseOffsets",
     "Position",
     "PredictedError",
-    "Problem",
     "Reason",
     "RelativePose",
     "SelectedConfigurations",
@@ -114,7 +111,6 @@ __all__ = [
     "candidate_parameters",
     "corrected_igm",
     "differential_model",
-    "drawn_groups",
     "encoder_transmission",
     "fit",
     "identifiability_change",
@@ -127,7 +123,6 @@ __all__ = [
     "other_tool_error",
     "pose_of_elements",
     "pose_offsets",
-    "problem_of",
     "read_measurements",
     "reading_jacobian",
     "report_text",

@@ -52,7 +52,7 @@ def notes_before(problem: Problem) -> tuple[str, ...]:
                 "information, but make the standard deviations too small. Leave them out."
             )
     notes += _same_names(problem)
-    notes += [str(single) for single in single_observations(problem.measurements)]
+    notes += single_observations(problem.measurements).values()
     for j, reading in enumerate(_all_readings(problem).T):
         row = model.table.joint_rows[j] + 1
         if row in moving and len(reading) and float(np.std(reading)) < _HARDLY:

@@ -129,7 +129,7 @@ def _places(
     """Place index of each block, -1 for blocks without a place."""
     place = np.full(len(posture), -1, dtype=np.int64)
     p = np.concatenate([dgm(model, m.views[0].q, m.views[0].frame)[:, :3, 3] for m in seen])
-    single = {one.label for one in single_observations(seen)}
+    single = single_observations(seen)
     names = [m.label if isinstance(m, Labelled) else [None] * m.blocks for m in seen]
     labelled = np.array(
         [

@@ -8,16 +8,13 @@ from .base import (
     Labelled,
     Linearised,
     Measurement,
-    SingleObservation,
     View,
-    scale_is_observable,
-    single_observations,
-    whitened,
 )
 from .contacts import FrameContact, LaserLine, PlaneContact, PointContact
 from .links import KnownDistance, LinkedFrames
 from .poses import CameraPose, Orientation, Pose, RelativePose
 from .positions import AxisPosition, Distance, Position
+from .several import scale_is_observable, single_observations, whitened
 
 __all__ = [
     "AxisPosition",
@@ -40,7 +37,6 @@ __all__ = [
     "Pose",
     "Position",
     "RelativePose",
-    "SingleObservation",
     "View",
     "scale_is_observable",
     "single_observations",

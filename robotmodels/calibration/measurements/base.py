@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, field, fields, replace
 from re import sub
 from typing import Any, ClassVar, NamedTuple, Self
@@ -18,10 +18,10 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._arrays import Array, as_exact
+from ..._arrays import Array
 from ...errors import InvalidValueError
 from ..extended_table.skeleton import Frame
-from .fields import Given, as_covariance, as_sigma
+from .fields import NOISE, Given, as_covariance, as_sigma
 
 Row = tuple[str, str]
 """Label and unit, ``"m"`` or ``"rad"``, of a row of residuals or of an unknown coordinate."""
@@ -137,7 +137,7 @@ class Measurement(_Declared):
     Seed book sections 1.4.4 and 1.4.5.
     """
 
-    origin: tuple[FileRow, ...] = field(default=(), kw_only=True, repr=False)
+    origin: tuple[FileRow, ...] = field(default=(), kw_only=True, repr=False, metadata=NOISE)
 
     kinds: ClassVar[dict[str, type[Measurement]]] = {}
     word: ClassVar[str]
@@ -258,31 +258,25 @@ class Measurement(_Declared):
 
     def subset(self, blocks: NDArray[np.int64]) -> Self:
         """Only some of the blocks."""
-        values = {f.name: getattr(self, f.name) for f in fields(self)}
         changed: dict[str, Any] = {}
         for f in fields(self):
-            value = values[f.name]
-            if isinstance(value, tuple) and ("block" in f.metadata or f.name == "origin"):
+            value = getattr(self, f.name)
+            if "block" in f.metadata and isinstance(value, tuple):
                 changed[f.name] = tuple(value[b] for b in blocks) if value else ()
-            elif value is not None and "block" in f.metadata:
+            elif "block" in f.metadata and value is not None:
                 changed[f.name] = value[blocks]
         if isinstance(self, Labelled):
-            kept = set(np.array(self.label)[blocks])
+            kept = {self.label[b] for b in blocks}
             changed["known"] = {k: v for k, v in self.known.items() if k in kept}
         return replace(self, **changed)
 
     @classmethod
     def drawn(cls, q: Array, T: Array, label: Any, **more: Any) -> Self:
-        """Noise-free measurement of a robot with poses T of its end; equal labels, one target.
-
-        Shapes: q (N, n), T (N, 4, 4), label (N,).
-        """
+        """Noise-free measurement of a robot with poses T of its end; equal labels, one target."""
         values: dict[str, Any] = {"pose": T, "point": T[:, :3, 3], "label": label}
-        needed = [f for f in fields(cls) if "block" in f.metadata and f.name != "q"]
-        names = {f.name: f.metadata.get("content") for f in needed}
-        given = {name: values[content] for name, content in names.items() if content in values}
+        contents = {f.name: f.metadata.get("content") for f in fields(cls)}
         kind: Any = cls
-        return kind(q, **given, **more)
+        return kind(q, **{name: values[c] for name, c in contents.items() if c in values}, **more)
 
 
 def fields_of(kind: type[Measurement], content: str) -> list[Field[Any]]:
@@ -298,6 +292,12 @@ def required(kind: type[Measurement]) -> set[str]:
 
 def _rebuilt(kind: type[Measurement], values: dict[str, Any]) -> Measurement:
     return kind(**values)
+
+
+def have_solution(A: Array, b: Array) -> bool:
+    """Whether ``A c = b`` has a solution. Shapes: A (m, 3), b (m,)."""
+    c = np.linalg.lstsq(A, b, rcond=1e-10)[0]
+    return bool(np.abs(A @ c - b).max(initial=0.0) <= 1e-9 * max(np.abs(b).max(initial=0.0), 1e-3))
 
 
 class Labelled(Measurement):
@@ -331,8 +331,9 @@ class Labelled(Measurement):
 
     @property
     def unknown(self) -> tuple[str, ...]:
-        """Labels of the targets that are estimated."""
-        return tuple(label for label in self.labels if label not in self.known)
+        """Labels of the targets that are estimated; none without labels."""
+        given = self.labels if getattr(self, self.label_field) else ()
+        return tuple(label for label in given if label not in self.known)
 
     @property
     def groups(self) -> NDArray[np.int64]:
@@ -393,85 +394,17 @@ class Contact(Labelled):
     @property
     def knows_length(self) -> bool:
         """Whether known targets have no common point; else the robot can shrink towards it."""
-        return not have_common_point(*self.scale_centres)
+        return not have_solution(*self.scale_centres)
+
+    @property
+    def scale_centres(self) -> tuple[Array, Array]:
+        """Points at which the rows in metres of known targets vanish: they are linear in them."""
+        T, psi = np.tile(np.eye(4), (self.blocks, 1, 1)), np.tile(np.eye(6, 3), (self.blocks, 1, 1))
+        part = self.linearise([Evaluation(T, psi)], np.zeros(len(self.fixtures)))
+        rows = np.outer(self.unknown_groups < 0, [unit == "m" for unit in self.units])
+        return part.by_parameters[rows], -part.residual[rows]
 
     @staticmethod
     @abstractmethod
     def target_at(T: Array, rng: np.random.Generator) -> Array:
         """A known target that an end at pose T meets, the rest of it at random."""
-
-
-# --- all measurements together --------------------------------------------------------------------
-
-
-def whitened(measurement: Measurement, rows: Array, scale: Array) -> Array:
-    """Rows divided by their standard deviations, or by the root of their covariance.
-
-    Shapes: rows (B, k) or (B, k, m), scale (k,).
-    """
-    extra = (...,) + (None,) * (rows.ndim - 2)
-    if measurement.covariance is not None:
-        factor = np.linalg.cholesky(measurement.covariance)
-        columns = rows if rows.ndim == 3 else rows[..., None]
-        return np.linalg.solve(factor, columns).astype(np.float64).reshape(rows.shape)
-    sigma = scale if measurement.sigma is None else measurement.sigma
-    return rows / sigma[extra]
-
-
-def have_common_point(A: Array, b: Array) -> bool:
-    """Whether ``A c = b`` has a solution. Shapes: A (m, 3), b (m,)."""
-    if not len(b):
-        return True
-    c = np.linalg.lstsq(A, b, rcond=1e-10)[0]
-    return bool(np.abs(A @ c - b).max() <= 1e-9 * max(float(np.abs(b).max()), 1e-3))
-
-
-def scale_is_observable(measurements: Iterable[Measurement], base_origin: Any = None) -> bool:
-    """Whether measurements determine the scale of a robot, all of them together."""
-    measurements = tuple(measurements)
-    if any(m.knows_length for m in measurements):
-        return True
-    parts = [m.scale_centres for m in measurements]
-    if base_origin is not None:
-        parts.append((np.eye(3), as_exact(base_origin, (3,), "base_origin")))
-    A = np.concatenate([np.zeros((0, 3)), *(part[0] for part in parts)])
-    b = np.concatenate([np.zeros(0), *(part[1] for part in parts)])
-    return not have_common_point(A, b)
-
-
-class SingleObservation(NamedTuple):
-    """Target whose measurements determine only its own unknowns."""
-
-    label: str
-    rows: int
-    unknowns: int
-    blocks: int
-
-    def __str__(self) -> str:
-        times = "once" if self.blocks == 1 else f"{self.blocks} times"
-        return (
-            f"{self.label} is measured {times}: {self.rows} rows determine its {self.unknowns} "
-            "unknown coordinates at most, and no parameter of the robot. Measure it in more "
-            "postures, or leave it out."
-        )
-
-
-def single_observations(measurements: Iterable[Measurement]) -> tuple[SingleObservation, ...]:
-    """Targets with no more rows, over all measurements, than unknowns of their own."""
-    unknowns: dict[str, set[str]] = {}
-    rows, blocks = Counter[str](), Counter[str]()
-    for m in measurements:
-        names = [fixture.name for fixture in m.fixtures]
-        for target in dict.fromkeys(name.rpartition(".")[0] for name in names):
-            label = target.removeprefix(f"{m.name}:")
-            # kinds without labels have fixtures that all blocks share
-            count = m.label.count(label) if isinstance(m, Labelled) else m.blocks
-            own = {name for name in names if name.rpartition(".")[0] == target}
-            unknowns.setdefault(target, set()).update(own)
-            rows[target] += count * len(m.axes)
-            blocks[target] += count
-    return tuple(
-        SingleObservation(target, rows[target], len(names), blocks[target])
-        for target, names in unknowns.items()
-        if rows[target] <= len(names)
-    )

@@ -26,7 +26,7 @@ from .base import (
 from .fields import Given
 from .motions import difference, tilt_of, tilted_axes, unit_vector, widened
 from .poses import as_known_pose, mean_poses, target_poses
-from .positions import as_point, points_fixed, target_points
+from .positions import as_point, target_points
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,8 +35,8 @@ class PointContact(Contact):
 
     Parameters
     ----------
-    q, known, sigma, covariance, frame, name
-        As for `Measurement`; known points are positions in the world, shape (3,).
+    known : mapping of label to array_like, shape (3,), optional
+        Positions of points in the world, metres.
     point : array_like of int or str, shape (N,), optional
         Label of the touched point; default: all the same.
 
@@ -56,11 +56,6 @@ class PointContact(Contact):
 
     all_rows = unknowns = POSITION_ROWS
     postures = 4
-
-    @property
-    def scale_centres(self) -> tuple[Array, Array]:
-        """The known points."""
-        return points_fixed(list(self.known.values()))
 
     def guess(self, evaluations: Sequence[Evaluation]) -> Array:
         """Mean position of the touches of each point."""
@@ -88,8 +83,8 @@ class FrameContact(Contact):
 
     Parameters
     ----------
-    q, known, sigma, covariance, frame, name
-        As for `Measurement`; known poses are poses in the world, shape (4, 4).
+    known : mapping of label to array_like, shape (4, 4), optional
+        Poses in the world, metres.
     pose : array_like of int or str, shape (N,), optional
         Label of the pose that is reached; default: all the same.
 
@@ -109,11 +104,6 @@ class FrameContact(Contact):
 
     all_rows = unknowns = POSE_ROWS
     postures = 2
-
-    @property
-    def scale_centres(self) -> tuple[Array, Array]:
-        """The origins of the known poses."""
-        return points_fixed([T[:3, 3] for T in self.known.values()])
 
     def guess(self, evaluations: Sequence[Evaluation]) -> Array:
         """Mean of the poses that the nominal robot reaches."""
@@ -148,8 +138,8 @@ class PlaneContact(Contact):
 
     Parameters
     ----------
-    q, known, sigma, covariance, frame, name
-        As for `Measurement`; known planes are normal (of length 1) and offset (m), shape (4,).
+    known : mapping of label to array_like, shape (4,), optional
+        Normals (of length 1) and offsets (m) of planes in the world.
     plane : array_like of int or str, shape (N,), optional
         Label of the touched plane; default: all the same.
 
@@ -172,12 +162,6 @@ class PlaneContact(Contact):
     all_rows = (("normal", "m"),)
     unknowns = (("rx", "rad"), ("ry", "rad"), ("offset", "m"))
     postures = 6
-
-    @property
-    def scale_centres(self) -> tuple[Array, Array]:
-        """The known planes."""
-        planes = np.array(list(self.known.values())).reshape(-1, 4)
-        return planes[:, :3], planes[:, 3]
 
     def guess(self, evaluations: Sequence[Evaluation]) -> Array:
         """Mean plane of the touches of each: normal where they spread least."""
@@ -233,8 +217,8 @@ class LaserLine(Contact):
 
     Parameters
     ----------
-    q, known, sigma, covariance, frame, name
-        As for `Measurement`; known lines are a point (m) and a direction, shape (2, 3).
+    known : mapping of label to array_like, shape (2, 3), optional
+        Points (m) and directions of lines in the world.
     line : array_like of int or str, shape (N,), optional
         Label of the line; default: all the same.
 
@@ -262,13 +246,6 @@ class LaserLine(Contact):
     all_rows = (("x", "m"), ("y", "m"))
     unknowns = (("rx", "rad"), ("ry", "rad"), ("x", "m"), ("y", "m"))
     postures = 6
-
-    @property
-    def scale_centres(self) -> tuple[Array, Array]:
-        """The known lines."""
-        four = np.array([_coordinates(line) for line in self.known.values()]).reshape(-1, 4)
-        across = tilted_axes(four[:, :2])[0][:, :, :2]
-        return across.swapaxes(1, 2).reshape(-1, 3), four[:, 2:].reshape(-1)
 
     def guess(self, evaluations: Sequence[Evaluation]) -> Array:
         """Mean line of the positions on each: direction where they spread most."""

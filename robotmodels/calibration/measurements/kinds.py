@@ -98,27 +98,7 @@ def drawn_groups(
 ) -> Groups:
     """Configurations spread over the joint ranges, those of a contact moved until they meet.
 
-    Parameters
-    ----------
-    parameters : GeometricParameters
-        Of the robot.
-    kind : str or class
-        Kind of measurement.
-    groups, postures : int
-        Largest numbers; contacts that cannot be reached in two postures are left out.
-    rng : numpy.random.Generator
-        Source of random numbers.
-    frame : str, int or None
-        The end.
-    deviation : ndarray, shape (P,), optional
-        Of the robot that meets the contacts; default the nominal one.
-    limits : bool
-        Whether postures of contacts beyond the limits of the joints are left out.
-
-    Returns
-    -------
-    Groups
-        Fewer than asked, or none, where few postures meet.
+    At most so many groups and postures; targets that are not reached in two postures are left out.
     """
     model, kind = parameters.model, as_kind(kind)
     if not issubclass(kind, Contact):
@@ -186,19 +166,18 @@ def satisfied_measurement(
             # bending changes with the readings, so that Newton's step is not exact
             found = differential_model(both, view.q, values, view.frame)
             ends.append(Evaluation(found.T, found.psi[..., P:]))
-        still = [Evaluation(e.T, np.zeros_like(e.psi)) for e in ends]
         parts = [
-            measurement.linearise([*still[:k], ends[k], *still[k + 1 :]], fixtures)
-            for k in range(len(ends))
+            measurement.linearise(
+                [Evaluation(T, psi * (f == g)) for f, (T, psi) in zip(first, ends, strict=True)],
+                fixtures,
+            )
+            for g in own
         ]
         residual = parts[0].residual
         off = np.abs(residual / scale).max(axis=1)
         if (off < 1e-13).all():
             break
-        J = np.zeros((len(off), residual.shape[1], count * len(own)))
-        for part, f in zip(parts, first, strict=True):
-            at = own.index(f) * count
-            J[:, :, at : at + count] += part.by_parameters
+        J = np.concatenate([part.by_parameters for part in parts], axis=-1)
         step = -(np.linalg.pinv(J, rcond=1e-6) @ residual[..., None])[..., 0]
         step *= np.minimum(1.0, _LONGEST / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
         for k, f in enumerate(first):

@@ -43,8 +43,8 @@ class LinkedFrames(Labelled):
 
     Parameters
     ----------
-    q, known, sigma, covariance, name
-        As for `Measurement`; q has the readings of all joints, known poses X have shape (4, 4).
+    known : mapping of label to array_like, shape (4, 4), optional
+        Poses X, metres.
     frame, frame_other : str, int or None
         The two ends; None is the tool.
     link : array_like of int or str, shape (N,), optional
@@ -138,8 +138,6 @@ class KnownDistance(Measurement):
     sigma : float
         Standard deviation of the length, m; default 0.1 mm, which a calliper or a drilled plate
         reaches.
-    covariance, name
-        As for `Measurement`.
 
     Examples
     --------

@@ -27,7 +27,7 @@ from .base import (
     Row,
 )
 from .fields import Given
-from .motions import difference, left_jacobians, mean_rotation, relative, rotations_of, widened
+from .motions import difference, left_jacobians, relative, widened
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,8 +41,6 @@ class Pose(Measurement):
 
     Parameters
     ----------
-    q, sigma, covariance, frame, name
-        As for `Measurement`.
     T : array_like, shape (N, 4, 4)
         Measured poses, metres.
     rows : six of 0 or 1
@@ -64,36 +62,19 @@ class Pose(Measurement):
 
     all_rows = POSE_ROWS
 
-    @classmethod
-    def of_orientations(
-        cls,
-        q: Array,
-        R: ArrayLike,
-        sigma: Given = None,
-        covariance: Given = None,
-        frame: Frame = None,
-        name: str = "orientation",
-    ) -> Self:
+    @staticmethod
+    def of_orientations(q: Array, R: ArrayLike, *arguments: Any, **options: Any) -> Orientation:
         """Measured orientations alone: an inclinometer with compass, a gyroscope, a level.
 
-        Parameters
-        ----------
-        q, sigma, covariance, frame, name
-            As for `Measurement`; rows of a block are rx, ry, rz.
-        R : array_like, shape (N, 3, 3)
-            Measured rotations from the end's axes to the world's.
-
-        Returns
-        -------
-        Pose
-            With ``rows=[0, 0, 0, 1, 1, 1]``.
+        R (N, 3, 3) are rotations from the end's axes to the world's; sigma, covariance, frame and
+        name follow.
         """
         rotations = as_core(R, (3, 3), "R")
         if rotations.ndim != 3:
             raise ShapeError(f"R: expected shape (N, 3, 3), got {rotations.shape}.")
         T = np.tile(np.eye(4), (len(rotations), 1, 1))
         T[:, :3, :3] = rotations
-        return cls(q, T, (0, 0, 0, 1, 1, 1), sigma, covariance, frame, name)
+        return Orientation(q, T, (0, 0, 0, 1, 1, 1), *arguments, **options)
 
     def linearise(self, evaluations: Sequence[Evaluation], fixtures: Array) -> Linearised:
         """Position difference and rotation vector, world axes."""
@@ -125,8 +106,6 @@ class RelativePose(Measurement):
         Measured pose of the end at ``q_other`` in the end at ``q``, metres.
     rows : six of 0 or 1
         Which of x, y, z, rx, ry, rz (axes of the end at ``q``) are measured.
-    sigma, covariance, frame, name
-        As for `Measurement`.
 
     Examples
     --------
@@ -148,21 +127,9 @@ class RelativePose(Measurement):
 
     @classmethod
     def successive(cls, q: Any, T: Any, *arguments: Any, **options: Any) -> Self:
-        """Each configuration relative to the previous one.
+        """Each configuration of q (N + 1, n) relative to the previous one: T (N, 4, 4).
 
-        Parameters
-        ----------
-        q : array_like, shape (N + 1, n)
-            Readings of the joints in succession, rad or m.
-        T : array_like, shape (N, 4, 4)
-            ``T(q_k)^-1 T(q_k+1)`` as measured, metres.
-        *arguments, **options
-            rows, sigma, covariance, frame, name, as for the class.
-
-        Returns
-        -------
-        RelativePose
-            N pairs.
+        rows, sigma, covariance, frame and name follow.
         """
         q = np.asarray(q)
         if len(q) < 2:
@@ -195,8 +162,8 @@ class CameraPose(Labelled):
 
     Parameters
     ----------
-    q, known, sigma, covariance, frame, name
-        As for `Measurement`; known boards are poses in the world, shape (4, 4).
+    known : mapping of label to array_like, shape (4, 4), optional
+        Poses of boards in the world, metres.
     T : array_like, shape (N, 4, 4)
         Measured poses of the board in the camera, metres.
     board : array_like of int or str, shape (N,), optional
@@ -268,7 +235,8 @@ def target_poses(kind: Labelled, fixtures: Array, parameters: int) -> Evaluation
     six = np.zeros((len(kind.unknown), 6))
     six[:, at] = fixtures.reshape(len(six), len(at))
     poses = np.tile(np.eye(4), (len(six), 1, 1))
-    poses[:, :3, :3], poses[:, :3, 3] = rotations_of(six[:, 3:]), six[:, :3]
+    poses[:, :3, :3] = Rotation.from_rotvec(six[:, 3:]).as_matrix()
+    poses[:, :3, 3] = six[:, :3]
     by_six = np.tile(np.eye(6), (len(six), 1, 1))
     by_six[:, 3:, 3:] = left_jacobians(six[:, 3:])
     T, by_fixtures = kind.targets(poses, by_six[:, :, at], kind.known)
@@ -280,7 +248,7 @@ def mean_poses(kind: Labelled, T: Array) -> Array:
     at = [POSE_ROWS.index(row) for row in kind.coordinates]
 
     def mean(blocks: Any) -> Array:
-        turn = Rotation.from_matrix(mean_rotation(T[blocks, :3, :3])).as_rotvec()
+        turn = Rotation.from_matrix(T[blocks, :3, :3]).mean().as_rotvec()
         return np.concatenate([T[blocks, :3, 3].mean(axis=0), turn])[at]
 
     return kind.guess_each(mean)

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from ..._arrays import Array, as_exact, read_only
 from ...errors import InvalidValueError
@@ -24,7 +25,7 @@ from .base import (
     Measurement,
 )
 from .fields import Given
-from .motions import rotations_of, tilt_of, tilted_axes, unit_vector
+from .motions import tilt_of, tilted_axes, unit_vector
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,8 +37,6 @@ class Position(Measurement):
 
     Parameters
     ----------
-    q, sigma, covariance, frame, name
-        As for `Measurement`.
     p : array_like, shape (N, 3)
         Measured positions in the world, metres.
     rows : three of 0 or 1
@@ -74,8 +73,6 @@ class AxisPosition(Measurement):
 
     Parameters
     ----------
-    q, sigma, covariance, frame, name
-        As for `Measurement`.
     value : array_like, shape (N,)
         Readings of the gauge, metres.
     axis : array_like, shape (3,)
@@ -168,7 +165,7 @@ def _axes_along(direction: Array) -> Array:
     """Right-handed axes, z along a direction."""
     if direction[2] < 0.0:  # the rotation is not unique near the opposite of z
         return _axes_along(-direction) @ np.diag([1.0, -1.0, -1.0])
-    return rotations_of(np.append(tilt_of(direction), 0.0)[None])[0]
+    return tilted_axes(tilt_of(direction)[None])[0][0]
 
 
 # --- distances ------------------------------------------------------------------------------------
@@ -202,8 +199,8 @@ class Distance(Labelled):
 
     Parameters
     ----------
-    q, known, sigma, covariance, frame, name
-        As for `Measurement`; known pivots are positions in the world, shape (3,).
+    known : mapping of label to array_like, shape (3,), optional
+        Positions of pivots in the world, metres.
     length : array_like, shape (N,) or ()
         Measured lengths, metres; one number for a bar that stays the same.
     q_other : array_like, shape (N, n), optional
@@ -245,12 +242,6 @@ class Distance(Labelled):
             raise InvalidValueError(_EITHER)
 
     @property
-    def unknown(self) -> tuple[str, ...]:
-        """Labels of the pivots that are estimated."""
-        given = self.labels if self.pivot is not None else ()
-        return tuple(label for label in given if label not in self.known)
-
-    @property
     def fixtures(self) -> tuple[Fixture, ...]:
         """Coordinates of the unknown pivots, then offsets."""
         names = [f"{self.name}:{label}" for label in self.unknown]
@@ -262,7 +253,8 @@ class Distance(Labelled):
     @property
     def scale_centres(self) -> tuple[Array, Array]:
         """The known pivots."""
-        return points_fixed(list(self.known.values()))
+        pivots = np.array(list(self.known.values())).reshape(-1)
+        return np.tile(np.eye(3), (len(self.known), 1)), pivots
 
     @property
     def knows_length(self) -> bool:
@@ -313,57 +305,27 @@ def target_points(kind: Labelled, fixtures: Array) -> tuple[Array, Array]:
     return kind.targets(points, np.tile(np.eye(3), (len(points), 1, 1)), kind.known)
 
 
-def points_fixed(points: Sequence[Array]) -> tuple[Array, Array]:
-    """Linear constraints ``A c = b``: c is at each of some points."""
-    return np.tile(np.eye(3), (len(points), 1)), np.array(points).reshape(-1)
-
-
-_FLAT = 1e-2
-"""Spread across a plane, relative to that in it, below which positions are taken as coplanar."""
-_STEPS = 20
-
-
 def pivot_of(p: Array, length: Array, offset: bool) -> Array:
-    """Least-squares centre of positions at measured distances.
-
-    Shapes: p (N, 3), length (N,) -> (3,).
-    """
+    """Least-squares centre of positions at measured distances: p (N, 3), length (N,) -> (3,)."""
     mean = p.mean(axis=0)
     x = p - mean
     size = float(np.abs(x).max()) or 1.0
     # |x - c|^2 = (length - o)^2 is linear in c, o and o^2 - c.c
     square = (x**2).sum(axis=1) - length**2
-    columns = [2.0 * x / size, np.ones((len(x), 1))]
-    if offset:
-        columns.append(-2.0 * length[:, None] / size)
-    A = np.hstack(columns)
+    A = np.column_stack([2.0 * x / size, np.ones(len(x)), -2.0 * offset * length / size])
     _, spread, axes = np.linalg.svd(x, full_matrices=True)
-    spread = np.append(spread, np.zeros(3))[:3]
-    flat = spread[2] < _FLAT * spread[0]
-    c = np.linalg.lstsq(A, square / size**2, rcond=_FLAT if flat else 1e-9)[0][:3] * size
+    # positions across whose plane the spread is below 1 % of that in it count as coplanar
+    flat = np.append(spread, np.zeros(3))[2] < 1e-2 * spread[0]
+    c = np.linalg.lstsq(A, square / size**2, rcond=1e-2 if flat else 1e-9)[0][:3] * size
     if flat:
         c -= axes[2] * (axes[2] @ c)
         if not offset:
             height = float(np.mean(length**2 - ((x - c) ** 2).sum(axis=1)))
             down = axes[2] if axes[2, 2] <= 0.0 else -axes[2]
             c += np.sqrt(max(height, 0.0)) * down
-    return mean + _refined(x, length, c, offset)
 
+    def error(centre: Array) -> Array:
+        far = np.linalg.norm(x - centre, axis=1) - length
+        return far - far.mean() if offset else far
 
-def _refined(x: Array, length: Array, c: Array, offset: bool) -> Array:
-    """Gauss-Newton steps on the distances themselves, as long as they improve."""
-    o = float(np.mean(length - np.linalg.norm(x - c, axis=1))) if offset else 0.0
-    best = np.append(c, o)
-    cost = np.inf
-    trial = best
-    for _ in range(_STEPS):
-        vector = x - trial[:3]
-        distance = np.linalg.norm(vector, axis=1)
-        error = length - distance - trial[3]
-        if not error @ error < cost:
-            break
-        best, cost = trial, float(error @ error)
-        J = -vector / np.where(distance > 0.0, distance, 1.0)[:, None]
-        J = np.hstack([J, np.full((len(x), 1), float(offset))])
-        trial = best + np.linalg.lstsq(J, error, rcond=1e-6)[0]
-    return best[:3]
+    return mean + least_squares(error, c, "3-point", x_scale=size, xtol=1e-12, ftol=1e-12).x
