@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from .. import se3
 from .._arrays import Array
-from ..csv_table import Column, CsvTable, open_table, stacked_columns
+from ..csv_table import Column, CsvTable, open_table
 from ..errors import InvalidValueError
 from ..file_units import AngleUnit, LengthUnit, as_file_unit
 from ..geometry import REVOLUTE
@@ -55,19 +55,18 @@ def read_measurements(
 ) -> Measurement:
     r"""Read measurements of one kind from one or more text files (CSV), a row each.
 
-    Lines that begin with ``#`` are comments. A first line of words is a header; the columns are
-    then found by the names below, or by those given. Without a header they are given by number,
-    from 0, unless the file holds the readings of the joints and nothing else.
+    Lines that begin with ``#`` are comments. A first line of words is a header with the names of
+    the columns. Without a header columns are given by number, from 0, unless the file holds the
+    readings of the joints and nothing else.
 
     Parameters
     ----------
     path : str, Path or iterable of them
         A file, several, or a folder, whose files that fit ``pattern`` are read in the order of
-        their names. The rows of several files follow each other.
+        their names.
     kind : str or class
-        ``"position"``, ``"pose"``, ``"orientation"``, ``"distance"``, ``"point_contact"``,
-        ``"frame_contact"``, ``"plane_contact"``, ``"laser_line"``, ``"camera_pose"``,
-        ``"relative_pose"``; or the class of a kind.
+        Such as ``"position"``, ``"pose"``, ``"orientation"``, ``"distance"``,
+        ``"point_contact"``, ``"relative_pose"``; or the class of a kind.
     model : RobotModel
         The robot: names, number and types of its joints.
     joints : sequence of str or int, length n, optional
@@ -138,8 +137,15 @@ def read_measurements(
     angle = as_file_unit(AngleUnit, angles, "angles")
     turn = angle if joint_angles is None else as_file_unit(AngleUnit, joint_angles, "joint_angles")
     written = None if orientation is None else orientation_kind(orientation)
-    _check_arguments(kind, label, other_joints, rows, columns)
     needs = _needed(kind, written)
+    for argument, value, is_used in (
+        ("label", label, fields_of(kind, "label") and other_joints is None),
+        ("other_joints", other_joints, len(fields_of(kind, "joints")) > 1),
+        ("rows", rows, "rows" in (f.name for f in fields(kind))),
+        ("columns", columns, needs),
+    ):
+        if value is not None and not is_used:
+            raise InvalidValueError(f"{argument}: {kind.word} does not use it here; leave it out.")
     files, folder = _files(path, pattern)
     tables = [open_table(file, delimiter) for file in files]
     if folder is not None:
@@ -157,17 +163,16 @@ def read_measurements(
     q = np.concatenate(parts)
     if len(tables) > 1:
         _check_contents(tables, parts, model, frame)
-    found = [_measured_columns(t, needs, columns) for t in tables]
-    values = stacked_columns(tables, found) if needs else np.zeros((len(q), 0))
+    values = np.zeros((len(q), 0))
+    if needs:
+        found = [t.numbers(_measured_columns(t, needs, columns)) for t in tables]
+        values = np.concatenate(found)
     given: dict[str, Any] = {"q": q, "sigma": sigma, "frame": frame}
     for f in fields(kind):
         content = f.metadata.get("content")
-        if (
-            content == "joints"
-            and f.name != "q"
-            and (other_joints is not None or "joints" in required(kind))
-        ):
-            given[f.name] = np.concatenate(readings(other_joints, "other_joints"))
+        if content == "joints" and f.name != "q":
+            if other_joints is not None or "joints" in required(kind):
+                given[f.name] = np.concatenate(readings(other_joints, "other_joints"))
         elif content == "point":
             given[f.name] = length.factor * values
             _check_lengths(given[f.name], q, model, length, files[0], frame)
@@ -181,8 +186,8 @@ def read_measurements(
             given[f.name] = _labels(tables, label, parts)
     if rows is not None:
         given["rows"] = rows
-    if name is not None or folder is not None:
-        given["name"] = name if folder is None or name else folder.resolve().name
+    if name or folder is not None:
+        given["name"] = name or Path(folder or "").resolve().name
     return kind(**given, origin=_origin(tables, parts))
 
 
@@ -198,24 +203,6 @@ def _pose_parts(kind: Kind) -> tuple[bool, bool]:
     rows: Any = next((f.default for f in fields(kind) if f.name == "rows"), ())
     has_pose = bool(fields_of(kind, "pose"))
     return has_pose and any(rows[:3]), has_pose and any(rows[3:])
-
-
-def _check_arguments(
-    kind: Kind,
-    label: Column | None,
-    other_joints: Sequence[Column] | None,
-    rows: Sequence[int] | None,
-    columns: Sequence[Column] | None,
-) -> None:
-    """Refuse arguments that do not belong to a kind."""
-    if label is not None and (other_joints is not None or not fields_of(kind, "label")):
-        raise InvalidValueError(f"label: {kind.word} has no labels here; leave it out.")
-    if other_joints is not None and len(fields_of(kind, "joints")) < 2:
-        raise InvalidValueError(f"other_joints: {kind.word} has one end; leave them out.")
-    if rows is not None and "rows" not in (f.name for f in fields(kind)):
-        raise InvalidValueError(f"rows: {kind.word} has no rows to choose; leave them out.")
-    if columns is not None and not any(fields_of(kind, c) for c in ("pose", "point", "length")):
-        raise InvalidValueError("columns: a contact measures nothing; see label.")
 
 
 def _needed(kind: Kind, written: OrientationKind | None) -> list[tuple[str, ...]]:
@@ -241,24 +228,22 @@ def _needed(kind: Kind, written: OrientationKind | None) -> list[tuple[str, ...]
 # --- files and columns ----------------------------------------------------------------------------
 
 
-def _files(
-    path: str | Path | Iterable[str | Path], pattern: str
-) -> tuple[tuple[Path, ...], Path | None]:
+def _files(path: str | Path | Iterable[str | Path], pattern: str) -> tuple[list[Path], Path | None]:
     """Files to be read, and their folder if that was given."""
-    if not isinstance(path, str | Path):
-        files = tuple(Path(each) for each in path)
+    if isinstance(path, str | Path) and not Path(path).is_dir():
+        return [Path(path)], None
+    if isinstance(path, str | Path):
+        folder = Path(path)
+        files = sorted(folder.glob(pattern))
         if not files:
-            raise InvalidValueError("path: expected a file, a folder or several files, got none.")
-        return files, None
-    path = Path(path)
-    if not path.is_dir():
-        return (path,), None
-    found = tuple(sorted(path.glob(pattern)))
-    if not found:
-        raise InvalidValueError(
-            f"path: the folder {path} has no file {pattern!r}; say which in pattern."
-        )
-    return found, path
+            raise InvalidValueError(
+                f"path: the folder {path} has no file {pattern!r}; say which in pattern."
+            )
+        return files, folder
+    files = [Path(each) for each in path]
+    if not files:
+        raise InvalidValueError("path: expected a file, a folder or several files, got none.")
+    return files, None
 
 
 def _origin(tables: Sequence[CsvTable], parts: Sequence[Array]) -> tuple[FileRow, ...]:
@@ -287,13 +272,13 @@ def _joint_columns(
         error = "other_joints: two ends need two readings."
     elif table.names and found is not None:
         return found
+    elif not table.names and alone and table.width == n:
+        return tuple(range(n))
     elif table.names:
         error = (
             f"{table.path}: the header has neither the joints of {model.name} "
             f"({', '.join(names)}) nor q1 to q{n}; it has {', '.join(table.names)}."
         )
-    elif alone and table.width == n:
-        return tuple(range(n))
     else:
         error = f"{table.path}: no header says which of its {table.width} columns are the joints."
     raise InvalidValueError(
@@ -305,17 +290,14 @@ def _joint_columns(
 def _measured_columns(
     table: CsvTable, needs: Sequence[Sequence[str]], given: Sequence[Column] | None
 ) -> tuple[int, ...]:
-    if not needs:
-        return ()
     if given is not None:
-        count = len(needs[0])
-        if isinstance(given, str) or len(given) != count:
+        if isinstance(given, str) or len(given) != len(needs[0]):
             raise InvalidValueError(
-                f"columns: expected {count} columns ({', '.join(needs[0])}), got {given!r:.80}."
+                f"columns: expected {len(needs[0])} columns ({', '.join(needs[0])}), got "
+                f"{given!r:.80}."
             )
         return tuple(table.number(column, "columns") for column in given)
-    for names in needs:
-        found = table.find(names)
+    for found in map(table.find, needs):
         if found is not None:
             return found
     wanted = " or ".join(", ".join(names) for names in needs)
@@ -363,23 +345,18 @@ def _check_contents(
     other: dict[str, str] = {}
     for t, q in zip(tables, readings, strict=True):
         sentences, refused = beyond_limits(model, q, rows)
-        if len(q) > 2 and q.shape[1] > 3 and _has_quaternions(q):
+        square = np.lib.stride_tricks.sliding_window_view(np.pad(q**2, ((0, 0), (0, 3))), 4, axis=1)
+        near = np.abs(square.sum(axis=-1) - 1.0) < 2.0 * _QUATERNION_TOLERANCE
+        if len(q) > 2 and near.all(axis=0).any():
             other[t.path.name] = "four columns are unit quaternions: poses"
         elif refused:
             other[t.path.name] = f"beyond limits: {sentences[0]}"
     if other and len(other) < len(tables):
+        listed = "; ".join(f"{name} ({why})" for name, why in other.items())
         raise InvalidValueError(
             f"path: among {', '.join(t.path.name for t in tables)}, these are not readings of the "
-            f"joints of {model.name}: "
-            + "; ".join(f"{name} ({why})" for name, why in other.items())
-            + ". Select the files by pattern='*.csv', or name them."
+            f"joints of {model.name}: {listed}. Select the files by pattern='*.csv', or name them."
         )
-
-
-def _has_quaternions(q: Array) -> bool:
-    """Whether four adjacent columns have length 1 in every row."""
-    square = np.lib.stride_tricks.sliding_window_view(q**2, 4, axis=1).sum(axis=-1)
-    return bool((np.abs(square - 1.0) < 2.0 * _QUATERNION_TOLERANCE).all(axis=0).any())
 
 
 def _poses(
@@ -424,12 +401,10 @@ def _check_lengths(
     # clipped so that squares of wrong columns do not overflow
     nominal, p = dgm(model, np.clip(q, -1e3, 1e3), frame)[:, :3, 3], np.clip(p, -1e150, 1e150)
     spread = float(np.linalg.norm(np.ptp(p, axis=0)))
-    slip = unit_error_of_positions(nominal, p) or unit_error_of_spread(model, frame, spread)
-    if slip is None:
-        return
-    stated = "metres" if unit is LengthUnit.METRE else "millimetres"
-    symbol = {"metres": "m", "millimetres": "mm"}.get(slip.unit)
-    advice = f"Multiply them by {slip.factor:.4g}."
-    if symbol and slip.taken == stated:
-        advice = f"Say lengths={symbol!r}."
-    raise InvalidValueError(f"{file}: positions are {slip.sentence(stated)}. {advice}")
+    error = unit_error_of_positions(nominal, p) or unit_error_of_spread(model, frame, spread)
+    if error is not None:
+        stated = "metres" if unit is LengthUnit.METRE else "millimetres"
+        symbol = {"metres": "m", "millimetres": "mm"}.get(error.unit)
+        use_symbol = symbol is not None and error.taken == stated
+        advice = f"Say lengths={symbol!r}" if use_symbol else f"Multiply them by {error.factor:.4g}"
+        raise InvalidValueError(f"{file}: positions are {error.sentence(stated)}. {advice}.")

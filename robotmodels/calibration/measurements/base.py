@@ -143,6 +143,8 @@ class Measurement(_Declared):
     word: ClassVar[str]
     """Name of the kind, such as ``point_contact``."""
     all_rows: ClassVar[tuple[Row, ...]]
+    in_world: ClassVar[bool] = True
+    """Whether the measurement is relative to the world, not to the robot."""
     is_constraint: ClassVar[bool] = False
     """Whether ranks are judged at readings that satisfy the residuals exactly."""
     postures: ClassVar[int] = 1
@@ -225,7 +227,7 @@ class Measurement(_Declared):
     @property
     def sees_base(self) -> bool:
         """Whether the base pose matters."""
-        return True
+        return self.in_world
 
     @property
     def scale_centres(self) -> tuple[Array, Array]:
@@ -361,7 +363,7 @@ class Labelled(Measurement):
     @property
     def sees_base(self) -> bool:
         """Only through targets that are known in the world."""
-        return bool(self.known)
+        return self.in_world and bool(self.known)
 
     def guess_each(self, guess: Callable[[NDArray[np.bool_]], Any]) -> Array:
         """First values of all unknown targets from a function of the blocks of one."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -24,9 +24,9 @@ Metadata = dict[str, Any]
 
 def as_readings(m: Any, name: str, value: Any) -> Any:
     """Check joint readings; those of another end have the shape of q."""
-    if value is None and name != "q":
+    if name != "q" and value is None:
         return None
-    q = as_floats(value, name)
+    q = as_floats(cast(Any, value), name)
     if q.ndim != 2:
         raise ShapeError(
             f"{name}: expected shape (N, n), a row for each measurement, got {q.shape}."

@@ -71,6 +71,7 @@ class LinkedFrames(Labelled):
 
     all_rows = POSE_ROWS
     is_constraint = True
+    in_world = False
 
     def _check(self) -> None:
         if self.frame == self.frame_other:
@@ -90,11 +91,6 @@ class LinkedFrames(Labelled):
     def views(self) -> tuple[View, ...]:
         """Both ends at the same configurations."""
         return (View(self.frame, self.q), View(self.frame_other, self.q))
-
-    @property
-    def sees_base(self) -> bool:
-        """Both ends have the same base."""
-        return False
 
     @property
     def knows_length(self) -> bool:
@@ -153,6 +149,7 @@ class KnownDistance(Measurement):
     name: str = "known distance"
 
     all_rows = (("length", "m"),)
+    in_world = False
 
     def _check(self) -> None:
         if self.point == self.other:
@@ -160,11 +157,6 @@ class KnownDistance(Measurement):
         length = float(as_floats(self.length, "length"))
         if length <= 0.0:
             raise InvalidValueError(f"length: expected a positive length in metres, got {length}.")
-
-    @property
-    def sees_base(self) -> bool:
-        """A distance does not depend on it."""
-        return False
 
     @property
     def fixtures(self) -> tuple[Fixture, ...]:

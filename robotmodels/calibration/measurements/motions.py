@@ -36,7 +36,7 @@ def inverse_left_jacobians(u: Array) -> Array:
 
 def left_jacobians(u: Array) -> Array:
     """Left Jacobians of rotation vectors, ``w = J d u``: (N, 3) -> (N, 3, 3)."""
-    return np.linalg.inv(inverse_left_jacobians(u))
+    return np.linalg.inv(inverse_left_jacobians(u)).astype(np.float64)
 
 
 def tilt_of(direction: Array) -> Array:

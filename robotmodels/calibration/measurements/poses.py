@@ -124,6 +124,7 @@ class RelativePose(Measurement):
     name: str = "relative pose"
 
     all_rows = POSE_ROWS
+    in_world = False
 
     @classmethod
     def successive(cls, q: Any, T: Any, *arguments: Any, **options: Any) -> Self:
@@ -135,11 +136,6 @@ class RelativePose(Measurement):
         if len(q) < 2:
             raise InvalidValueError("q: expected two or more configurations, got one.")
         return cls(q[:-1], q[1:], T, *arguments, **options)
-
-    @property
-    def sees_base(self) -> bool:
-        """Two poses of the same robot do not depend on it."""
-        return False
 
     @property
     def knows_length(self) -> bool:
