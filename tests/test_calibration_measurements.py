@@ -500,7 +500,7 @@ def test_a_new_kind_is_drawn_read_selected_and_fitted(tmp_path):
         (InvalidValueError, "q: expected finite", lambda: FrameContact(Q4 * np.nan)),
         (ShapeError, "a row for each measurement", lambda: PlaneContact(Q4[0])),
         (ShapeError, "pose: expected a label for each of the 4", lambda: FrameContact(Q4, [0, 1])),
-        (ValueError, "has the point '2'; there", lambda: PointContact(Q4, TWO, {2: Z[0, :3]})),
+        (ValueError, "has the point '2'; exp", lambda: PointContact(Q4, TWO, {2: Z[0, :3]})),
         (InvalidValueError, "expected a mapping", lambda: PointContact(Q4, known=[0.1, 0.2, 0.3])),
         (ValueError, r"of length 2\. Divide", lambda: PlaneContact(Q4, known={0: [0, 0, 2, 0.4]})),
         (ValueError, "in the second row", lambda: LaserLine(Q4, known={0: np.zeros((2, 3))})),

@@ -67,7 +67,7 @@ class Problem(Rebuilt):
 
     @property
     def sees_base(self) -> bool:
-        """Whether some measurement sees where the robot stands."""
+        """Whether some measurement depends on the base."""
         return any(m.sees_base for m in self.measurements)
 
     def columns(self, measurement: Measurement) -> NDArray[np.int64]:
@@ -143,8 +143,8 @@ def evaluations(problem: Problem, xi: Array) -> list[list[Evaluation]]:
 def guessed_fixtures(problem: Problem, xi: Array) -> Array:
     """Initial values of all fixtures. Shapes: xi (P,) -> (F,)."""
     values = np.full(problem.F, np.nan)
-    for m, seen in zip(problem.measurements, evaluations(problem, xi), strict=True):
-        guess = m.guess(seen)
+    for m, poses in zip(problem.measurements, evaluations(problem, xi), strict=True):
+        guess = m.guess(poses)
         if guess is not None:
             at = problem.columns(m)
             new = np.isnan(values[at])
@@ -164,8 +164,8 @@ def guessed_fixtures(problem: Problem, xi: Array) -> Array:
 def linearised(problem: Problem, xi: Array, fixtures: Array) -> list[Linearised]:
     """Residuals and derivatives of each measurement. Shapes: xi (P,), fixtures (F,)."""
     return [
-        m.linearise(seen, fixtures[problem.columns(m)])
-        for m, seen in zip(problem.measurements, evaluations(problem, xi), strict=True)
+        m.linearise(poses, fixtures[problem.columns(m)])
+        for m, poses in zip(problem.measurements, evaluations(problem, xi), strict=True)
     ]
 
 

@@ -72,13 +72,13 @@ def read_measurements(
     joints : sequence of str or int, length n, optional
         Columns of the readings; default those named as the joints of the robot, or q1 to qn.
     columns : sequence of str or int, optional
-        Columns of what was measured, in the order of its coordinates: position, then orientation
+        Columns of the measured coordinates, in their order: position, then orientation
         as ``orientation`` orders it (a quaternion scalar first). Default x, y, z and the names of
         the orientation's coordinates (for quaternions also qw, qx, qy, qz); ``distance`` for
         distances. Contacts have none.
     label : str or int, optional
         Column of the label of the touched point, pose, plane or line, of the pivot of a distance,
-        of the board of a camera. Default: the names of the files without their suffix where there
+        of the board of a camera. Default: the names of the files without their suffix if there
         are several; else all the same.
     other_joints : sequence of str or int, length n, optional
         Columns of the readings at the other end of a distance (without them it is from a pivot),
@@ -106,7 +106,7 @@ def read_measurements(
     Returns
     -------
     Measurement
-        Metres and radians; ``files`` lists what was read.
+        Metres and radians; ``files`` lists the files and their rows.
 
     Raises
     ------
@@ -215,9 +215,9 @@ def _needed(kind: Kind, written: OrientationKind | None) -> list[tuple[str, ...]
         return [position] if position else []
     if written is None:
         raise InvalidValueError(
-            "orientation: say how orientations are written: 'rpy_urdf' (turns about x, y, z in "
-            "this order of columns), 'rpy' (about z, y, x), 'quaternion' (scalar first), "
-            "'angle_axis' or another of OrientationKind."
+            "orientation: expected 'rpy_urdf' (angles about x, y, z in this order of columns), "
+            "'rpy' (about z, y, x), 'quaternion' (scalar first), 'angle_axis' or another of "
+            "OrientationKind."
         )
     names = [tuple(written.labels[3:])]
     if written is OrientationKind.QUATERNION:
@@ -237,7 +237,7 @@ def _files(path: str | Path | Iterable[str | Path], pattern: str) -> tuple[list[
         files = sorted(folder.glob(pattern))
         if not files:
             raise InvalidValueError(
-                f"path: the folder {path} has no file {pattern!r}; say which in pattern."
+                f"path: the folder {path} has no file {pattern!r}; give another pattern."
             )
         return files, folder
     files = [Path(each) for each in path]
@@ -301,7 +301,7 @@ def _measured_columns(
         if found is not None:
             return found
     wanted = " or ".join(", ".join(names) for names in needs)
-    has = f"the header is {', '.join(table.names)}" if table.names else "there is no header"
+    has = f"the header is {', '.join(table.names)}" if table.names else "the file has no header"
     raise InvalidValueError(
         f"{table.path}: expected columns {wanted}; {has}. Give them as columns=[...], a name or "
         "number (from 0) for each."
@@ -362,7 +362,7 @@ def _check_contents(
 def _poses(
     written: OrientationKind, values: Array, length: LengthUnit, angle: AngleUnit, file: Path
 ) -> Array:
-    """Poses of columns: position if there is one, then orientation. Shapes: values (N, m)."""
+    """Poses of columns: position if it is measured, then orientation. Shapes: values (N, m)."""
     count = values.shape[1] - (written.dimension - 3)
     p = length.factor * values[:, :3] if count else np.zeros((len(values), 3))
     o = values[:, count:]
@@ -372,7 +372,7 @@ def _poses(
         if len(wrong):
             raise InvalidValueError(
                 f"{file}: the quaternion of row {wrong[0] + 1} has length {size[wrong[0]]:.4g}; "
-                "expected 1. See whether columns names the right ones, the scalar first."
+                "expected 1. Check that columns names the right ones, the scalar first."
             )
         o = o / size[:, None]
     elif written not in (OrientationKind.DIRECTION_COSINES, OrientationKind.TWO_AXES):
@@ -385,11 +385,11 @@ def _check_angles(values: Array, unit: AngleUnit, file: Path, argument: str) -> 
     largest = float(np.abs(values).max(initial=0.0))
     if unit is AngleUnit.RADIAN and largest > _LARGEST_ANGLE:
         raise InvalidValueError(
-            f"{file}: an angle of {largest:.4g} rad; these look like degrees. Say {argument}='deg'."
+            f"{file}: an angle of {largest:.4g} rad; these look like degrees. Use {argument}='deg'."
         )
     if unit is AngleUnit.DEGREE and values.size and largest <= 2 * np.pi and np.ptp(values) > 1.0:
         raise InvalidValueError(
-            f"{file}: no angle is larger than {largest:.4g} deg; these look like radians. Say "
+            f"{file}: no angle is larger than {largest:.4g} deg; these look like radians. Use "
             f"{argument}='rad'."
         )
 
@@ -406,5 +406,5 @@ def _check_lengths(
         stated = "metres" if unit is LengthUnit.METRE else "millimetres"
         symbol = {"metres": "m", "millimetres": "mm"}.get(error.unit)
         use_symbol = symbol is not None and error.taken == stated
-        advice = f"Say lengths={symbol!r}" if use_symbol else f"Multiply them by {error.factor:.4g}"
+        advice = f"Use lengths={symbol!r}" if use_symbol else f"Multiply them by {error.factor:.4g}"
         raise InvalidValueError(f"{file}: positions are {error.sentence(stated)}. {advice}.")

@@ -3,7 +3,6 @@
 from .base import (
     Contact,
     Evaluation,
-    FileRow,
     Fixture,
     Labelled,
     Linearised,
@@ -11,6 +10,7 @@ from .base import (
     View,
 )
 from .contacts import FrameContact, LaserLine, PlaneContact, PointContact
+from .fields import FileRow
 from .links import KnownDistance, LinkedFrames
 from .poses import CameraPose, Orientation, Pose, RelativePose
 from .positions import AxisPosition, Distance, Position

@@ -1,7 +1,7 @@
 """Base of all kinds of measurement, and the fields that they are declared with.
 
 A kind is a frozen dataclass. Its fields carry metadata of `fields`; checks, subsets, copies, noise,
-files and selection of configurations follow from them. What remains for a kind: the rows of a block
+files and selection of configurations follow from them. A kind adds the rows of a block
 (`all_rows`), the coordinates of unknown targets (`unknowns`), first values for them (`guess`), and
 residuals with derivatives (`linearise`).
 """
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ..._arrays import Array
 from ...errors import InvalidValueError
 from ..extended_table.skeleton import Frame
-from .fields import NOISE, Given, as_covariance, as_sigma
+from .fields import NOISE, FileRow, FileRows, Given, as_covariance, as_sigma
 
 Row = tuple[str, str]
 """Label and unit, ``"m"`` or ``"rad"``, of a row of residuals or of an unknown coordinate."""
@@ -62,29 +62,6 @@ class Linearised(NamedTuple):
     residual: Array
     by_parameters: Array
     by_fixtures: Array
-
-
-class FileRows(NamedTuple):
-    """Name and number of rows of a file."""
-
-    name: str
-    rows: int
-
-    def __str__(self) -> str:
-        return f"{self.name} ({self.rows} rows)"
-
-
-class FileRow(NamedTuple):
-    """Row of a file, counted from 1 without the header."""
-
-    name: str
-    row: int
-
-    def __str__(self) -> str:
-        return f"{self.name} row {self.row}"
-
-
-# --- the base -------------------------------------------------------------------------------------
 
 
 class _Declared(ABC):
@@ -170,7 +147,7 @@ class Measurement(_Declared):
             object.__setattr__(self, "covariance", covariance)
 
     def _check(self) -> None:
-        """Check what one field alone does not show."""
+        """Check fields against each other."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         values = {f.name: getattr(self, f.name) for f in fields(self)}

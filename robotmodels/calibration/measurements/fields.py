@@ -1,4 +1,4 @@
-"""Fields of the kinds of measurement: metadata that says how a field is checked and used.
+"""Fields of the kinds of measurement: metadata that defines how a field is checked and used.
 
 ``check(measurement, name, value)`` returns the value to store. A field with ``block`` has a value
 for each block. Files hold the contents joints, pose, point, length (in a column with one of
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -20,6 +20,26 @@ from ...errors import InvalidValueError, ShapeError
 Given = Any
 """A field: array-like when given, read-only array, tuple or mapping once the object is built."""
 Metadata = dict[str, Any]
+
+
+class FileRows(NamedTuple):
+    """Name and number of rows of a file."""
+
+    name: str
+    rows: int
+
+    def __str__(self) -> str:
+        return f"{self.name} ({self.rows} rows)"
+
+
+class FileRow(NamedTuple):
+    """Row of a file, counted from 1 without the header."""
+
+    name: str
+    row: int
+
+    def __str__(self) -> str:
+        return f"{self.name} row {self.row}"
 
 
 def as_readings(m: Any, name: str, value: Any) -> Any:
@@ -99,8 +119,8 @@ def targets(check: Callable[[Any, str], Array]) -> Metadata:
         values = {str(k): check(v, f"{name}[{k!r}]") for k, v in (given or {}).items()}
         for label in values.keys() - set(m.label):
             raise InvalidValueError(
-                f"{name}: no row of q has the {m.label_field} {label!r}; there are "
-                f"{', '.join(m.labels)}."
+                f"{name}: no row of q has the {m.label_field} {label!r}; expected one "
+                f"of {', '.join(m.labels)}."
             )
         return MappingProxyType(values)
 

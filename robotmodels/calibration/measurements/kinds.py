@@ -130,7 +130,7 @@ def drawn_groups(
 
 
 def _turned_inside(parameters: GeometricParameters, q: Array) -> Array:
-    """Revolute joints by whole turns into their limits, or near the middle where there are none."""
+    """Revolute joints by whole turns into their limits, or near the middle without limits."""
     model = parameters.model
     revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
     both = np.isfinite(model.lower) & np.isfinite(model.upper)
@@ -158,7 +158,7 @@ def satisfied_measurement(
     q = [view.q.copy() for view in views]
     # ends at the same readings (two arms of a tree) move together
     first = [next(i for i, v in enumerate(views) if v.q is view.q) for view in views]
-    own = sorted(set(first))
+    distinct = sorted(set(first))
     off = np.full(measurement.blocks, np.inf)
     for _ in range(_STEPS):
         ends = []
@@ -171,7 +171,7 @@ def satisfied_measurement(
                 [Evaluation(T, psi * (f == g)) for f, (T, psi) in zip(first, ends, strict=True)],
                 fixtures,
             )
-            for g in own
+            for g in distinct
         ]
         residual = parts[0].residual
         off = np.abs(residual / scale).max(axis=1)
@@ -181,7 +181,7 @@ def satisfied_measurement(
         step = -(np.linalg.pinv(J, rcond=1e-6) @ residual[..., None])[..., 0]
         step *= np.minimum(1.0, _LONGEST / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
         for k, f in enumerate(first):
-            at = own.index(f) * count
+            at = distinct.index(f) * count
             q[k] = q[k] + step[:, at : at + count]
     kept = np.flatnonzero(off < 1e-10)
     return measurement.with_configurations(q).subset(kept) if len(kept) else None

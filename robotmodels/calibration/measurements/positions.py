@@ -110,7 +110,7 @@ class AxisPosition(Measurement):
         """Two rotations of an unknown axis, and an unknown zero."""
         turns = () if self.axis_is_known else (("turn_1", "rad"), ("turn_2", "rad"))
         zero = () if self.zero is not None else (("zero", "m"),)
-        return tuple(Fixture(f"{self.name}.{what}", unit) for what, unit in (*turns, *zero))
+        return tuple(Fixture(f"{self.name}.{word}", unit) for word, unit in (*turns, *zero))
 
     @property
     def scale_centres(self) -> tuple[Array, Array]:
