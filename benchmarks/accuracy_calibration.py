@@ -21,7 +21,7 @@ from robotmodels.calibration.identifiable import (
     Reason,
     identifiable_parameters,
 )
-from robotmodels.calibration.measurements.kinds import Kind, drawn_groups
+from robotmodels.calibration.measurements.kinds import as_kind, drawn_groups
 from robotmodels.calibration.selection import group_rows
 
 ROBOTS = {
@@ -31,8 +31,8 @@ ROBOTS = {
 TARGET = rm.se3.translation(0.1, 0.05, 0.15)
 """Of what is measured, in the tool's frame: at the wrist centre positions would say nothing of the
 wrist."""
-KINDS = tuple(Kind)
-CONTACTS = (Kind.ORIENTATION, Kind.FRAME_CONTACT, Kind.POINT_CONTACT, Kind.PLANE_CONTACT)
+CONTACTS = ("orientation", "frame_contact", "point_contact", "plane_contact")
+KINDS = ("pose", "position", *CONTACTS)
 MARKS = {
     None: "●", Reason.REGROUPED: "r", Reason.NO_EFFECT: "0", Reason.GAUGE: "g", Reason.KNOWN: "k",
 }  # fmt: skip
@@ -43,12 +43,12 @@ length is measured. The target is 0.1, 0.05, 0.15 m beside the tool's frame. Con
 points, poses or planes, all unknown, each met in several postures on the nominal robot."""
 
 
-def rank_elsewhere(found: IdentifiableParameters, kind: Kind, seed: int) -> tuple[int, float]:
+def rank_elsewhere(found: IdentifiableParameters, kind: str, seed: int) -> tuple[int, float]:
     """Rank of other random configurations by singular values, and the gap that it rests on."""
     p, rng = found.candidates, np.random.default_rng(seed)
     fixed = {*found.of_reason(Reason.KNOWN), *found.of_reason(Reason.GAUGE)}
     p = p.without(fixed) if fixed else p
-    m = kind.postures
+    m = as_kind(kind).postures
     drawn = drawn_groups(p, kind, 60 if m > 1 else 150, m, rng, limits=False)
     full = np.bincount(drawn.label)[drawn.label] == m
     q = drawn.q[full].reshape(-1, m, drawn.q.shape[1])
@@ -72,7 +72,7 @@ def table(name: str) -> tuple[list[str], bool]:
         found = identifiable_parameters(robot, kind, known_lengths=lengths)
         columns[kind] = found
         ranks[kind] = rank_elsewhere(found, kind, 7)
-    names = [kind.name.lower().replace("_", " ") for kind in columns]
+    names = [kind.replace("_", " ") for kind in columns]
     lines = [f"## {name}", "", "| parameter | nominal | " + " | ".join(names) + " |",
              "|---|---:|" + ":-:|" * len(names)]  # fmt: skip
     candidates = next(iter(columns.values())).candidates

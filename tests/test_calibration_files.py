@@ -10,6 +10,7 @@ from robotmodels.calibration import KnownDistance, PointContact, Pose, Position,
 from robotmodels.calibration.measurements import (
     Distance,
     FrameContact,
+    LaserLine,
     PlaneContact,
     RelativePose,
 )
@@ -48,7 +49,7 @@ def rows_of(*parts):
     return [[float(v) for v in row] for row in np.column_stack(parts)]
 
 
-# --- columns --------------------------------------------------------------------------------------
+# --- columns and units ----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("delimiter", [",", ";", "\t", " "])
@@ -56,81 +57,65 @@ def test_positions_by_the_names_of_the_joints(tmp_path, delimiter):
     names = ["time", *reversed(NAMES), "Z", "y", "x"]  # any order, any capitals
     rows = rows_of(np.arange(12.0), Q[:, ::-1], T[:, 2, 3], T[:, 1, 3], T[:, 0, 3])
     file = written(tmp_path / "a.csv", names, rows, delimiter)
-    found = read_measurements(file, "position", RX90, sigma=1e-4)
+    found = read_measurements(file, "position", RX90, sigma=1e-4, rows=[1, 0, 1])
     assert isinstance(found, Position)
-    np.testing.assert_allclose(found.q, Q, rtol=1e-11)
-    np.testing.assert_allclose(found.p, T[:, :3, 3], rtol=1e-10)
-    assert found.sigma is not None
+    assert found.axes == ("x", "z")
     assert found.sigma[0, 0] == 1e-4
-
-
-def test_joints_called_q1_to_qn_columns_by_argument_and_a_mark_at_the_beginning(tmp_path):
-    header = [f"q{j + 1}" for j in range(6)] + ["px", "py", "pz"]
-    file = written(tmp_path / "a.csv", header, rows_of(Q, T[:, :3, 3]), encoding="utf-8-sig")
-    found = read_measurements(file, Position, RX90, columns=["px", "py", "pz"])
-    np.testing.assert_allclose(found.p, T[:, :3, 3], rtol=1e-10)
-    with pytest.raises(InvalidValueError, match=r"expected columns x, y, z; the header is q1"):
-        read_measurements(file, Position, RX90)
-    with pytest.raises(InvalidValueError, match=r"no column 'pu'; near it: p"):
-        read_measurements(file, Position, RX90, columns=["pu", "py", "pz"])
-    with pytest.raises(InvalidValueError, match="neither the joints of scara"):
-        read_measurements(
-            written(tmp_path / "b.csv", ["a", "b", "c"], rows_of(Q[:, :3])), "point_contact", SCARA
-        )
-
-
-def test_columns_by_number_without_a_header(tmp_path):
-    file = written(tmp_path / "a.txt", None, rows_of(T[:, :3, 3], Q), " ")
-    found = read_measurements(file, "position", RX90, joints=range(3, 9), columns=[0, 1, 2])
     np.testing.assert_allclose(found.q, Q, rtol=1e-11)
     np.testing.assert_allclose(found.p, T[:, :3, 3], rtol=1e-10)
-    with pytest.raises(InvalidValueError, match="no header says which of its 9 columns"):
-        read_measurements(file, "position", RX90, columns=[0, 1, 2])
-    with pytest.raises(InvalidValueError, match="has columns 0 to 8, got 9"):
-        read_measurements(file, "position", RX90, joints=range(3, 9), columns=[0, 1, 9])
-    with pytest.raises(InvalidValueError, match="has no header, so that 'x' names none"):
-        read_measurements(file, "position", RX90, joints=range(3, 9), columns=["x", "y", "z"])
-    with pytest.raises(InvalidValueError, match="a column for each of the 6 joints"):
-        read_measurements(file, "position", RX90, joints=range(3, 8), columns=[0, 1, 2])
 
 
-def test_only_some_coordinates_count(tmp_path):
-    file = written(tmp_path / "a.csv", [*NAMES, "x", "y", "z"], rows_of(Q, T[:, :3, 3]))
-    assert read_measurements(file, "position", RX90, rows=[1, 0, 1]).axes == ("x", "z")
-
-
-# --- units ----------------------------------------------------------------------------------------
+def test_columns_by_argument_and_by_number(tmp_path):
+    header = [f"q{j + 1}" for j in range(6)] + ["px", "py", "pz"]
+    named = written(tmp_path / "a.csv", header, rows_of(Q, T[:, :3, 3]), encoding="utf-8-sig")
+    bare = written(tmp_path / "a.txt", None, rows_of(T[:, :3, 3], Q), " ")
+    for file, more in (
+        (named, {"columns": ["px", "py", "pz"]}),
+        (bare, {"joints": range(3, 9), "columns": [0, 1, 2]}),
+    ):
+        found = read_measurements(file, Position, RX90, **more)
+        np.testing.assert_allclose(found.q, Q, rtol=1e-11)
+        np.testing.assert_allclose(found.p, T[:, :3, 3], rtol=1e-10)
+    for file, model, more, message in (
+        (named, RX90, {}, r"expected columns x, y, z; the header is q1"),
+        (named, RX90, {"columns": ["pu", "py", "pz"]}, r"no column 'pu'; near it: p"),
+        (named, RX90, {"columns": ["px", "py"]}, "expected 3 columns"),
+        (named, SCARA, {"joints": ["q1"]}, "a column for each of the 3 joints"),
+        (bare, RX90, {"columns": [0, 1, 2]}, "no header says which of its 9 columns"),
+        (bare, RX90, {"joints": range(3, 9), "columns": [0, 1, 9]}, "columns 0 to 8, got 9"),
+        (bare, RX90, {"joints": range(3, 9), "columns": list("xyz")}, "has no header, so that 'x'"),
+        (written(tmp_path / "b.csv", ["a", "b"], [[1.0, 2.0]]), SCARA, {}, "joints of scara"),
+    ):
+        with pytest.raises(InvalidValueError, match=message):
+            read_measurements(file, "position", model, **more)
 
 
 def test_millimetres_and_degrees_give_the_same_as_metres_and_radians(tmp_path):
     q = np.random.default_rng(0).uniform(-1.0, 1.0, (9, 3))
     p = dgm(SCARA, q)[:, :3, 3]
     header = ["waist", "elbow", "lift", "x", "y", "z"]
-    si = written(tmp_path / "si.csv", header, rows_of(q, p))
     # a prismatic joint is read in the unit of lengths
-    shop = written(
-        tmp_path / "mm.csv", header, rows_of(np.rad2deg(q[:, :2]), 1e3 * q[:, 2], 1e3 * p)
-    )
-    a = read_measurements(si, "position", SCARA)
-    b = read_measurements(shop, "position", SCARA, lengths="mm", angles="deg")
-    np.testing.assert_allclose(b.q, a.q, rtol=1e-10)
-    np.testing.assert_allclose(b.p, a.p, rtol=1e-10, atol=1e-15)
+    rows = rows_of(np.rad2deg(q[:, :2]), 1e3 * q[:, 2], 1e3 * p)
+    file = written(tmp_path / "mm.csv", header, rows)
+    found = read_measurements(file, "position", SCARA, lengths="mm", angles="deg")
+    np.testing.assert_allclose(found.q, q, rtol=1e-10)
+    np.testing.assert_allclose(found.p, p, rtol=1e-10, atol=1e-15)
 
 
 @pytest.mark.parametrize(
     ("scale", "options", "message"),
     [
-        ((180.0 / np.pi, 1.0), {}, "look like degrees. Say angles='deg'"),
-        ((1.0, 1.0), {"angles": "deg"}, "look like radians. Say angles='rad'"),
-        ((1.0, 1.0), {"angles": "rad", "joint_angles": "deg"}, "Say joint_angles='rad'"),
-        ((1.0, 1e3), {}, "look like millimetres. Say lengths='mm'"),
-        ((1.0, 1.0), {"lengths": "mm"}, "look like metres. Say lengths='m'"),
+        ((180.0 / np.pi, 1.0), {}, "look like degrees. Use angles='deg'"),
+        ((1.0, 1.0), {"angles": "deg"}, "look like radians. Use angles='rad'"),
+        ((1.0, 1.0), {"angles": "rad", "joint_angles": "deg"}, "Use joint_angles='rad'"),
+        ((1.0, 1e3), {}, "look like millimetres. Use lengths='mm'"),
+        ((1.0, 1.0), {"lengths": "mm"}, "look like metres. Use lengths='m'"),
         ((1.0, 1.0), {"lengths": "inch"}, "lengths: expected 'm' or 'mm', got 'inch'"),
+        ((1.0, 1.0), {"label": "x"}, "label: position does not use it"),
+        ((1.0, 1.0), {"other_joints": NAMES}, "other_joints: position does not use it"),
     ],
 )
-def test_a_unit_error_of_units_is_named_with_the_argument_that_repairs_it(
-    tmp_path, scale, options, message
-):
+def test_units_and_arguments_that_cannot_be_right_are_named(tmp_path, scale, options, message):
     rows = rows_of(scale[0] * Q, scale[1] * T[:, :3, 3])
     file = written(tmp_path / "a.csv", [*NAMES, "x", "y", "z"], rows)
     with pytest.raises(InvalidValueError, match=message):
@@ -139,20 +124,19 @@ def test_a_unit_error_of_units_is_named_with_the_argument_that_repairs_it(
 
 # --- orientations ---------------------------------------------------------------------------------
 
-KINDS = [
-    "rpy_urdf", "rpy", "quaternion", "angle_axis", "euler", "direction_cosines", "two_axes",
-]  # fmt: skip
 
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_poses_in_every_way_to_write_them(tmp_path, kind):
-    x = operational_coordinates(T, kind)
+@pytest.mark.parametrize(
+    "written_as",
+    ["rpy_urdf", "rpy", "quaternion", "angle_axis", "euler", "direction_cosines", "two_axes"],
+)
+def test_poses_in_every_way_to_write_them(tmp_path, written_as):
+    x = operational_coordinates(T, written_as)
     numbers = [*range(6, 6 + x.shape[1])]
     file = written(tmp_path / "a.csv", None, rows_of(Q, x))
-    more = {"joints": range(6), "orientation": kind}
-    pose = read_measurements(file, "pose", RX90, columns=numbers, **more)
-    assert isinstance(pose, Pose)
-    np.testing.assert_allclose(pose.T, T, atol=1e-10)
+    more = {"joints": range(6), "orientation": written_as}
+    for kind in (Pose, "camera_pose"):
+        pose = read_measurements(file, kind, RX90, columns=numbers, **more)
+        np.testing.assert_allclose(pose.T, T, atol=1e-10)
     turned = read_measurements(file, "orientation", RX90, columns=numbers[3:], **more)
     assert turned.axes == ("rx", "ry", "rz")
     np.testing.assert_allclose(turned.T[:, :3, :3], T[:, :3, :3], atol=1e-10)
@@ -164,23 +148,22 @@ def test_quaternions_of_few_digits_scalar_last_and_angles_in_degrees(tmp_path):
     file = written(tmp_path / "a.csv", header, rows_of(Q, x[:, :3], x[:, 4:], x[:, 3]))
     pose = read_measurements(file, "pose", RX90, orientation="quaternion")
     np.testing.assert_allclose(pose.T, T, atol=5e-5)
+    wrong = {"orientation": "quaternion", "columns": ["x", "y", "z", "x", "qx", "qy", "qz"]}
     with pytest.raises(InvalidValueError, match="quaternion of row 1 has length"):
-        read_measurements(file, "pose", RX90, orientation="quaternion",
-                          columns=["x", "y", "z", "x", "qx", "qy", "qz"])  # fmt: skip
+        read_measurements(file, "pose", RX90, **wrong)
+    with pytest.raises(InvalidValueError, match="orientation: expected 'rpy_urdf'"):
+        read_measurements(file, "pose", RX90)
     y = operational_coordinates(T, "rpy_urdf")
     header = [*NAMES, "x", "y", "z", "roll", "pitch", "yaw"]
     file = written(tmp_path / "b.csv", header, rows_of(Q, y[:, :3], np.rad2deg(y[:, 3:])))
-    pose = read_measurements(
-        file, "pose", RX90, orientation="rpy_urdf", angles="deg", joint_angles="rad"
-    )
+    units = {"angles": "deg", "joint_angles": "rad"}
+    pose = read_measurements(file, "pose", RX90, orientation="rpy_urdf", **units)
     np.testing.assert_allclose(pose.T, T, atol=1e-10)
-    with pytest.raises(InvalidValueError, match="orientation: say how orientations are written"):
-        read_measurements(file, "pose", RX90)
-    cosines = operational_coordinates(T, "direction_cosines") * np.r_[np.ones(3), 1.1 * np.ones(9)]
+    cosines = 1.1 * operational_coordinates(T, "direction_cosines")
     file = written(tmp_path / "c.csv", None, rows_of(Q, cosines))
+    numbers = {"joints": range(6), "columns": range(6, 18)}
     with pytest.raises(NotARotationError):
-        read_measurements(file, "pose", RX90, joints=range(6), columns=range(6, 18),
-                          orientation="direction_cosines")  # fmt: skip
+        read_measurements(file, "pose", RX90, orientation="direction_cosines", **numbers)
 
 
 # --- contacts and pairs ---------------------------------------------------------------------------
@@ -192,6 +175,7 @@ def test_quaternions_of_few_digits_scalar_last_and_angles_in_degrees(tmp_path):
         ("point_contact", PointContact, "point"),
         ("frame_contact", FrameContact, "pose"),
         ("plane-contact", PlaneContact, "plane"),
+        (LaserLine, LaserLine, "line"),
     ],
 )
 def test_contacts_with_labels_of_a_column_or_of_files(tmp_path, kind, built, field):
@@ -201,18 +185,20 @@ def test_contacts_with_labels_of_a_column_or_of_files(tmp_path, kind, built, fie
     found = read_measurements(file, kind, RX90, label="touched")
     assert isinstance(found, built)
     assert getattr(found, field) == tuple(labels)
+    for option in ({"columns": ["touched"]}, {"rows": [1, 1, 0]}):
+        with pytest.raises(InvalidValueError, match="does not use it here"):
+            read_measurements(file, kind, RX90, **option)
     bare = written(tmp_path / "bare.csv", None, [[row[-1], *row[:-1]] for row in rows])
     found = read_measurements(bare, kind, RX90, joints=range(1, 7), label=0)
     assert getattr(found, field) == tuple(labels)
     folder = tmp_path / "place"
     folder.mkdir()
-    written(folder / "hole_1.csv", None, rows_of(Q[5:]))
-    written(folder / "hole_0.csv", None, rows_of(Q[:5]))
-    written(folder / "other.csv", None, rows_of(Q))
+    for name, q in (("hole_1", Q[5:]), ("hole_0", Q[:5]), ("other", Q)):
+        written(folder / f"{name}.csv", None, rows_of(q))
     found = read_measurements(folder, kind, RX90, pattern="hole_?.csv")
     assert found.name == "place"
     assert getattr(found, field) == ("hole_0",) * 5 + ("hole_1",) * 7
-    np.testing.assert_allclose(found.views[0].q, Q, rtol=1e-11)
+    np.testing.assert_allclose(found.q, Q, rtol=1e-11)
     with pytest.raises(InvalidValueError, match=r"no file 'pin_\*'"):
         read_measurements(folder, kind, RX90, pattern="pin_*")
 
@@ -247,74 +233,49 @@ def test_distances_and_relative_poses(tmp_path):
         read_measurements(file, RelativePose, RX90, **more)
 
 
-@pytest.mark.parametrize(
-    ("kind", "options", "message"),
-    [
-        ("position", {"label": "x"}, "label: position has no labels"),
-        ("position", {"other_joints": NAMES}, "other_joints: position has one end"),
-        ("point_contact", {"rows": [1, 1, 0]}, "rows: point_contact has no rows"),
-        ("point_contact", {"columns": ["x"]}, "columns: a contact measures nothing"),
-        ("position", {"columns": ["x", "y"]}, "expected 3 columns"),
-        ("positions", {}, "expected one of 'position', 'pose'"),
-    ],
-)
-def test_arguments_that_do_not_belong_to_a_kind(tmp_path, kind, options, message):
-    file = written(tmp_path / "a.csv", [*NAMES, "x", "y", "z"], rows_of(Q, T[:, :3, 3]))
-    with pytest.raises(InvalidValueError, match=message):
-        read_measurements(file, kind, RX90, **options)
+def test_kinds_that_files_cannot_hold_are_refused(tmp_path):
+    for kind in ("positions", "known_distance", KnownDistance, "linked_frames", "axis_position"):
+        with pytest.raises(InvalidValueError, match=r"expected one of .*'camera_pose', 'distance'"):
+            read_measurements(tmp_path, kind, RX90)
 
 
-# --- what is wrong in a file ----------------------------------------------------------------------
+# --- mistakes in a file ---------------------------------------------------------------------------
+
+HEADER = ",".join(NAMES)
 
 
 @pytest.mark.parametrize(
-    ("cell", "message"),
+    ("text", "message"),
     [
-        ("nan", r"line 6: column 2 \(joint_3\) is 'nan'. A row that was not measured is left out"),
-        ("inf", r"line 6: column 2 \(joint_3\) is 'inf'"),
-        ("", r"line 6: column 2 \(joint_3\) is empty"),
-        ("  ", r"line 6: column 2 \(joint_3\) is empty"),
-        ("n/a", r"line 6: column 2 \(joint_3\) is 'n/a', not a number"),
+        (
+            f"# a comment\n{HEADER}\n\n1,1,nan,1,1,1",
+            r"line 4: column 2 \(joint_3\) is 'nan'. A row",
+        ),
+        (f"{HEADER}\n1,1,inf,1,1,1", r"line 2: column 2 \(joint_3\) is 'inf'"),
+        (f"{HEADER}\n1,1,,1,1,1", r"line 2: column 2 \(joint_3\) is empty"),
+        (f"{HEADER}\n1,1,n/a,1,1,1", r"line 2: column 2 \(joint_3\) is 'n/a', not a number"),
+        (f"{HEADER}\n1,1,1,1,1,1\n1,2,3", "line 3: expected 6 columns as in the first"),
+        (HEADER.replace(",", ";") + "\n0,5;1;1;1;1;1", r"is '0,5', not a number\. Write a point"),
+        ("# nothing\n\n", "the file is empty"),
+        (HEADER, "no line of numbers"),
+        ("\xff\xfe\x00\x81", "expected a text file"),
     ],
 )
-def test_a_bad_cell_is_named_with_its_line(tmp_path, cell, message):
-    rows = [[f"{v:.6f}" for v in row] for row in np.column_stack([Q, T[:, :3, 3]])]
-    rows[2][2] = cell
-    lines = ["# a tracker", ",".join([*NAMES, "x", "y", "z"]), "", *(",".join(r) for r in rows)]
-    file = tmp_path / "a.csv"
-    file.write_text("\n".join(lines))
+def test_mistakes_in_a_file_are_named_with_their_line(tmp_path, text, message):
+    (tmp_path / "a.csv").write_bytes(text.encode("latin-1"))
     with pytest.raises(InvalidValueError, match=message):
-        read_measurements(file, "position", RX90)
+        read_measurements(tmp_path / "a.csv", "point_contact", RX90)
 
 
-def test_short_lines_decimal_commas_empty_files_and_files_of_bytes(tmp_path):
-    file = written(tmp_path / "a.csv", [*NAMES, "x", "y", "z"], rows_of(Q, T[:, :3, 3]))
-    file.write_text(file.read_text() + "1,2,3\n")
-    with pytest.raises(InvalidValueError, match="line 14: expected 9 columns as in the first"):
-        read_measurements(file, "position", RX90)
-    file.write_text(";".join(NAMES) + "\n" + ";".join(["0,5"] * 6) + "\n")
-    with pytest.raises(InvalidValueError, match=r"is '0,5', not a number\. Write a point"):
-        read_measurements(file, "point_contact", RX90)
-    file.write_text("# nothing\n\n")
-    with pytest.raises(InvalidValueError, match="the file is empty"):
-        read_measurements(file, "point_contact", RX90)
-    file.write_text(",".join(NAMES) + "\n")
-    with pytest.raises(InvalidValueError, match="no line of numbers"):
-        read_measurements(file, "point_contact", RX90)
-    file.write_bytes(b"\xff\xfe\x00\x81")
-    with pytest.raises(InvalidValueError, match="expected a text file"):
-        read_measurements(file, "point_contact", RX90)
+def test_missing_files_and_labels(tmp_path):
     with pytest.raises(FileNotFoundError):
         read_measurements(tmp_path / "missing.csv", "point_contact", RX90)
     with pytest.raises(InvalidValueError, match="several files, got none"):
         read_measurements([], "point_contact", RX90)
-    file.write_text(",".join([*NAMES, "label"]) + "\n" + "1,1,1,1,1,1,a\n1,1,1,1,1,1,\n")
+    file = tmp_path / "a.csv"
+    file.write_text(f"{HEADER},label\n1,1,1,1,1,1,a\n1,1,1,1,1,1,\n")
     with pytest.raises(InvalidValueError, match=r"line 3: column 6 \(label\) is empty"):
         read_measurements(file, "point_contact", RX90, label="label")
-
-
-def test_a_header_is_told_from_labels(tmp_path):
-    file = tmp_path / "a.csv"
     file.write_text("hole a,1,2,3\n")
     assert open_table(file).names == ()
     file.write_text("hole,q1,q2,q3\nhole a,1,2,3\n")

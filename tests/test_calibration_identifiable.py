@@ -9,23 +9,21 @@ from identities.random_robots import random_model, random_pose
 import robotmodels as rm
 from robotmodels import calibration
 from robotmodels.calibration import (
-    Kind,
     PointContact,
     Pose,
     Position,
     Reason,
     candidate_parameters,
     differential_model,
-    drawn_groups,
     identifiable_parameters,
 )
 from robotmodels.calibration.identifiable import DEPENDENT, identifiable_on
-from robotmodels.calibration.measurements.kinds import as_kind
+from robotmodels.calibration.measurements.kinds import as_kind, drawn_groups
 from robotmodels.errors import InvalidValueError
 from robotmodels.kinematics.lengths import spread_configurations
 
 ANGLES = [0.0, np.pi / 2, -np.pi / 2, np.pi, 0.4]
-CONTACTS = [Kind.POINT_CONTACT, Kind.FRAME_CONTACT, Kind.PLANE_CONTACT]
+CONTACTS = ["point_contact", "frame_contact", "plane_contact"]
 
 
 def serial(rng, R, P, special):
@@ -61,7 +59,7 @@ def rank_of(W):
 @pytest.mark.parametrize(("R", "P"), [(6, 0), (3, 3), (2, 1), (0, 3), (7, 0), (1, 0)])
 def test_full_poses_identify_four_for_a_revolute_two_for_a_prismatic_joint_and_six(R, P, special):
     rng = np.random.default_rng(100 * R + P + 7 * special)
-    basis = identifiable_parameters(serial(rng, R, P, special), Kind.POSE)
+    basis = identifiable_parameters(serial(rng, R, P, special), "pose")
     assert basis.count == 4 * R + 2 * P + 6
     assert basis.gap[1] < 1e-9 < 1e-4 < basis.gap[0]
 
@@ -73,9 +71,9 @@ def test_coinciding_consecutive_revolute_axes_lack_a_parameter():
     for row in (2, 4):
         alpha, d = model.table.alpha.copy(), model.table.d.copy()
         alpha[row], d[row] = 0.0, 0.0
-        before = identifiable_parameters(model, Kind.POSE).count
+        before = identifiable_parameters(model, "pose").count
         model = model.with_table(model.table.replace(alpha=alpha, d=d))
-        assert identifiable_parameters(model, Kind.POSE).count == before - 1
+        assert identifiable_parameters(model, "pose").count == before - 1
 
 
 @pytest.mark.parametrize(
@@ -85,7 +83,7 @@ def test_coinciding_consecutive_revolute_axes_lack_a_parameter():
         ("ur10e", "pose", 30),
         ("rx90", Position, 21),  # the wrist centre: theta4 to theta6 have no effect
         ("rx90", "orientation", 15),  # directions of six axes, turn of the tool
-        ("rx90", [Kind.POINT_CONTACT, Kind.POSITION], 21),  # points give scale and place
+        ("rx90", ["point_contact", "position"], 21),  # points give scale and place
     ],
 )
 def test_counts_of_known_robots(name, kind, count):
@@ -124,7 +122,7 @@ def test_point_contacts_identify_the_rank_of_differences_within_each_group(name,
     candidates = candidate_parameters(model)
     basis = identifiable_parameters(model, "point contact", known_lengths=[known])
     rng = np.random.default_rng(5)
-    q, label = drawn_groups(candidates, Kind.POINT_CONTACT, 25, 6, rng, limits=False)
+    q, label = drawn_groups(candidates, "point_contact", 25, 6, rng, limits=False)
     T, psi = differential_model(candidates, q)
     same = label[1:] == label[:-1]
     assert np.abs(np.diff(T[:, :3, 3], axis=0)[same]).max() < 1e-11
@@ -144,7 +142,7 @@ def test_regrouped_parameters_move_the_end_as_all_of_them_do(seed):
     model = random_model(
         rng, f=6, inertia=None, tree=seed % 2 == 1, fixed=seed % 3 == 0, limits=False
     )
-    basis = identifiable_parameters(model, Kind.POSE, gains=seed % 4 == 0)
+    basis = identifiable_parameters(model, "pose", gains=seed % 4 == 0)
     q = spread_configurations(model, 40, np.random.default_rng(seed + 50))
     all_, kept = (differential_model(p, q).psi for p in (basis.candidates, basis.kept))
     d = rng.normal(size=len(basis.candidates))
@@ -153,9 +151,9 @@ def test_regrouped_parameters_move_the_end_as_all_of_them_do(seed):
 
 
 def test_the_regrouping_of_contacts_holds_up_to_the_touched_point():
-    basis = identifiable_parameters(rm.load("puma560"), Kind.POINT_CONTACT, known_lengths=["d3"])
+    basis = identifiable_parameters(rm.load("puma560"), "point_contact", known_lengths=["d3"])
     rng = np.random.default_rng(9)
-    q, label = drawn_groups(basis.candidates, Kind.POINT_CONTACT, 9, 5, rng)
+    q, label = drawn_groups(basis.candidates, "point_contact", 9, 5, rng)
     stays = {*basis.of_reason(Reason.GAUGE), *basis.of_reason(Reason.KNOWN)}
     d = np.array([0.0 if name in stays else rng.normal() for name in basis.candidates.names])
     left = differential_model(basis.candidates, q).psi[:, :3] @ d
@@ -165,7 +163,7 @@ def test_the_regrouping_of_contacts_holds_up_to_the_touched_point():
 
 
 def test_every_candidate_is_kept_or_has_a_reason_and_the_text_says_so():
-    basis = identifiable_parameters(rm.load("rx90"), Kind.POINT_CONTACT, known_lengths=["d3"])
+    basis = identifiable_parameters(rm.load("rx90"), "point_contact", known_lengths=["d3"])
     assert sorted([*basis.names, *basis.reasons]) == sorted(basis.candidates.names)
     assert basis.of_reason(Reason.KNOWN) == ("d3",)
     assert set(basis.of_reason(Reason.GAUGE)) == {"gamma0", "b0", "alpha0", "d0", "theta0", "r0"}
@@ -194,8 +192,8 @@ def test_contacts_without_a_known_length_are_refused_with_names(kind):
 
 def test_small_corrections_make_parameters_identifiable_but_badly():
     model = rm.load("rx90")
-    nominal = identifiable_parameters(model, Kind.POSITION)
-    calibrated = identifiable_parameters(model, Kind.POSITION, corrections={"d7": 1e-3})
+    nominal = identifiable_parameters(model, "position")
+    calibrated = identifiable_parameters(model, "position", corrections={"d7": 1e-3})
     assert nominal.reasons["theta5"] is Reason.NO_EFFECT
     assert "theta5" in calibrated.names
     assert calibrated.gap[0] < 1e-2 * nominal.gap[0]
@@ -206,21 +204,21 @@ def test_contacts_are_judged_where_the_corrected_robot_meets_them():
     rng = np.random.default_rng(3)
     candidates = candidate_parameters(model)
     xi = 1e-3 * rng.normal(size=len(candidates)) * (candidates.rows > 0)
-    q, label = drawn_groups(candidates, Kind.POINT_CONTACT, 14, 8, rng, deviation=xi, limits=False)
+    q, label = drawn_groups(candidates, "point_contact", 14, 8, rng, deviation=xi, limits=False)
     T = differential_model(candidates, q, xi).T
     assert np.abs(np.diff(T[:, :3, 3], axis=0)[np.diff(label) == 0]).max() < 1e-11
     # readings of one robot violate the contacts of the other by millimetres: as they are, they
     # would make more parameters identifiable
     for corrections in (None, xi):
         options = {"known_lengths": ["d3"], "corrections": corrections}
-        structure = identifiable_parameters(model, Kind.POINT_CONTACT, **options)
+        structure = identifiable_parameters(model, "point_contact", **options)
         of_data = identifiable_parameters(model, PointContact(q, label), **options)
         assert of_data.count == structure.count
 
 
 def test_data_identify_no_more_than_the_structure():
     model = rm.load("puma560")
-    structure = identifiable_parameters(model, Kind.POSE)
+    structure = identifiable_parameters(model, "pose")
     q = spread_configurations(model, 50, np.random.default_rng(1))
     assert identifiable_parameters(model, Pose(q, rm.dgm(model, q))).names == structure.names
     few = Pose(q[:3], rm.dgm(model, q[:3]))
@@ -233,11 +231,11 @@ def test_data_identify_no_more_than_the_structure():
 def test_subsets_of_parameters_and_known_ones():
     model = rm.load("rx90")
     some = ["theta2", "theta3", "d3", "r4"]
-    assert list(identifiable_parameters(model, Kind.POSE, parameters=some).names) == some
-    basis = identifiable_parameters(model, Kind.POSE, known=["theta2"])
+    assert list(identifiable_parameters(model, "pose", parameters=some).names) == some
+    basis = identifiable_parameters(model, "pose", known=["theta2"])
     assert basis.of_reason(Reason.KNOWN) == ("theta2",)
     assert basis.count == 29
-    bare = identifiable_parameters(model, Kind.POSE, base=False, tool=False)
+    bare = identifiable_parameters(model, "pose", base=False, tool=False)
     assert all(1 <= row <= 6 for row in bare.candidates.rows)
 
 
@@ -253,13 +251,13 @@ def test_mistakes_are_named():
             identifiable_parameters(model, wrong, **options)
     one = serial(np.random.default_rng(0), 1, 0, False)
     with pytest.raises(InvalidValueError, match="two postures"):
-        identifiable_parameters(one, Kind.POINT_CONTACT, known_lengths=["r1"])
+        identifiable_parameters(one, "point_contact", known_lengths=["r1"])
     wrist = rm.RobotModel.from_table(
         rm.DHTable.from_rows([{"sigma": 0}, {"sigma": 0, "alpha": 1}, {"sigma": 0, "alpha": -1}])
     )
     with pytest.raises(InvalidValueError, match="would do here: none"):
-        identifiable_parameters(wrist, Kind.POINT_CONTACT)
-    assert as_kind("point-contact") is as_kind(PointContact) is Kind.POINT_CONTACT
+        identifiable_parameters(wrist, "point_contact")
+    assert as_kind("point-contact") is as_kind(PointContact) is PointContact
 
 
 @pytest.mark.parametrize("unit", [1e-6, 1e-2, 1e2, 1e6])

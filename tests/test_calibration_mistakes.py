@@ -413,8 +413,8 @@ def test_the_unit_of_a_known_distance_of_a_real_arm_is_named(robot):
 @pytest.mark.parametrize(
     ("factor", "lengths", "advice"),
     [
-        (1e3, "m", "like millimetres. Say lengths='mm'"),
-        (1.0, "mm", "like metres. Say lengths='m'"),
+        (1e3, "m", "like millimetres. Use lengths='mm'"),
+        (1.0, "mm", "like metres. Use lengths='m'"),
         (1e2, "m", "like centimetres. Multiply them by 0.01"),
         (1e2, "mm", "like centimetres. Multiply them by 10"),
         (1 / 0.0254, "mm", "like inches. Multiply them by 25.4"),

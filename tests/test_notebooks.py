@@ -275,4 +275,4 @@ def test_an_unknown_name_is_seen():
         "cal.Kind.SMELL", "rm.fit_all",
     ]  # fmt: skip
     assert unknown_names(none, ["`rx90.with_toll(1)`"]) == ["with_toll()"]
-    assert unknown_names(none, ["`rm.load`, `cal.Kind.POSE`, `rx90.with_tool(1)`"]) == []
+    assert unknown_names(none, ["`rm.load`, `cal.Pose`, `rx90.with_tool(1)`"]) == []

@@ -10,7 +10,6 @@ from .extended_table import (
     ExtendedTable,
     extend_table,
 )
-from .file_kinds import FileKind
 from .fit import fit
 from .folds import AsideErrors
 from .identifiable import (
@@ -35,13 +34,11 @@ from .measurements import (
     Position,
     RelativePose,
 )
-from .measurements.kinds import Kind, drawn_groups
 from .observability import Criterion, Observability, observability
 from .offsets import JointOffsets, PoseOffsets, joint_offsets, pose_offsets
 from .other_tool import PredictedError, other_tool_error
 from .parameters import Compliance, ErrorLaw, GeometricParameter, GeometricParameters
 from .prior import ParameterPrior
-from .problem import Problem, problem_of
 from .read import read_measurements
 from .reporting.text import report_text
 from .reporting.write import calibrated_urdf, result_data, write_result
@@ -73,13 +70,11 @@ __all__ = [
     "Element",
     "ErrorLaw",
     "ErrorSummary",
-    "FileKind",
     "FrameContact",
     "GeometricParameter",
     "GeometricParameters",
     "IdentifiableParameters",
     "JointOffsets",
-    "Kind",
     "KnownDistance",
     "LaserLine",
     "LengthUnit",
@@ -93,7 +88,6 @@ __all__ = [
     "PoseOffsets",
     "Position",
     "PredictedError",
-    "Problem",
     "Reason",
     "RelativePose",
     "SelectedConfigurations",
@@ -107,7 +101,6 @@ __all__ = [
     "candidate_parameters",
     "corrected_igm",
     "differential_model",
-    "drawn_groups",
     "fit",
     "identifiable_parameters",
     "joint_offsets",
@@ -115,7 +108,6 @@ __all__ = [
     "observability",
     "other_tool_error",
     "pose_offsets",
-    "problem_of",
     "read_measurements",
     "report_text",
     "result_data",

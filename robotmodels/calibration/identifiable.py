@@ -35,8 +35,7 @@ DEPENDENT = 1e-7
 _EMPTY = 1e-9  # length of a column beside the longest, below which it has no effect
 _SEED = 14
 _CONTACTS = 14
-"""Contacts that are drawn for structural identifiability, and postures of each."""
-_POSTURES = {Kind.FRAME_CONTACT: 6, Kind.POINT_CONTACT: 8, Kind.PLANE_CONTACT: 14}
+"""Number of contacts that are drawn for structural identifiability."""
 
 
 class Reason(Enum):
@@ -185,7 +184,7 @@ def _sum_text(terms: dict[str, float]) -> str:
 
 def identifiable_parameters(
     model: RobotModel,
-    measurements: Measurement | Kind | Any | Iterable[Any],
+    measurements: Any,
     *,
     frame: Frame = None,
     known_lengths: Iterable[str] = (),
@@ -215,7 +214,7 @@ def identifiable_parameters(
     model : RobotModel
         The robot.
     measurements : kinds or data, one or more
-        `Kind` (or its name, or the class: ``Pose``, ``Position``, ``PointContact``), or measured
+        Classes (`Pose`, `Position`, `PointContact`) or their names (``"pose"``), or measured
         data; kinds and data together as well.
     frame : str, int or None
         The end of kinds; None is the tool. Data have their own.
@@ -252,7 +251,7 @@ def identifiable_parameters(
     Examples
     --------
     >>> from robotmodels.robots import load
-    >>> identifiable_parameters(load("ur10e"), Kind.POSE).count
+    >>> identifiable_parameters(load("ur10e"), "pose").count
     30
     """
     check_model(model)
@@ -286,7 +285,7 @@ def identifiable_parameters(
 
 def _kinds_and_data(measurements: Any) -> list[Measurement | Kind]:
     """Kinds and measured data, from a single one or several."""
-    single = isinstance(measurements, Measurement | Kind | str | type)
+    single = isinstance(measurements, Measurement | str | type)
     given = [measurements] if single else list(measurements)
     if not given:
         raise InvalidValueError("measurements: expected kinds or measured data, got none.")
@@ -305,16 +304,16 @@ def _drawn(
 ) -> Measurement:
     """Random noise-free measurements, enough to identify all that the kind can identify."""
     count, postures = 20 + 2 * len(candidates), kind.postures
-    if kind.is_contact:
-        count, postures = _CONTACTS, _POSTURES[kind]
+    if kind.is_constraint:
+        count, postures = _CONTACTS, 2 * kind.postures + 2
     groups = drawn_groups(
         candidates, kind, count, postures, rng, frame=frame, deviation=xi, limits=False
     )
     if not groups.count:
         raise InvalidValueError(
-            f"{kind.name}: this robot has no two postures for {kind.value.split(' in ')[0]}, so "
-            "nothing can be identified from it. Measure something else (Position, Pose), or let "
-            "the robot touch with fewer constraints."
+            f"{kind.word}: this robot does not reach a target in two postures, so that nothing is "
+            "identifiable. Measure something else (Position, Pose), or let the robot touch with "
+            "fewer constraints."
         )
     return measurement_of(candidates, kind, groups, frame=frame, deviation=xi)
 

@@ -10,8 +10,7 @@ from ..geometry import REVOLUTE
 from .folds import AsideErrors
 from .identifiable import IdentifiableParameters
 from .length_units import check_units
-from .measurements import Pose, Position, lonely_labels
-from .measurements.measurement import origin_of
+from .measurements import Pose, Position, single_observations
 from .parameters import ErrorLaw
 from .problem import Problem, measured_frames
 from .reading_limits import check_readings
@@ -53,7 +52,7 @@ def notes_before(problem: Problem) -> tuple[str, ...]:
                 "information, but make the standard deviations too small. Leave them out."
             )
     notes += _same_names(problem)
-    notes += [str(lonely) for lonely in lonely_labels(problem.measurements)]
+    notes += single_observations(problem.measurements).values()
     for j, reading in enumerate(_all_readings(problem).T):
         row = model.table.joint_rows[j] + 1
         if row in moving and len(reading) and float(np.std(reading)) < _HARDLY:
@@ -121,7 +120,7 @@ def notes_after(
         )
     if len(fit.outliers):
         one = len(fit.outliers) == 1
-        rows = [row for m in problem.measurements for row in origin_of(m) or [None] * m.blocks]
+        rows = [row for m in problem.measurements for row in m.origin or [None] * m.blocks]
         numbers = ", ".join(
             f"{b + 1}" + (f" in {rows[b]}" if rows[b] else "") for b in fit.outliers[:_LISTED]
         )

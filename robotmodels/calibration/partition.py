@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import connected_components
 from ..kinematics import dgm
 from ..kinematics.lengths import characteristic_length
 from ..model import RobotModel
-from .measurements import Labelled, Measurement, length_is_known, lonely_labels
+from .measurements import Labelled, Measurement, scale_is_observable, single_observations
 
 _NEAR = 0.2
 """Extent of one place, relative to the size of the robot."""
@@ -129,11 +129,11 @@ def _places(
     """Place index of each block, -1 for blocks without a place."""
     place = np.full(len(posture), -1, dtype=np.int64)
     p = np.concatenate([dgm(model, m.views[0].q, m.views[0].frame)[:, :3, 3] for m in seen])
-    lonely = {one.label for one in lonely_labels(seen)}
+    single = single_observations(seen)
     names = [m.label if isinstance(m, Labelled) else [None] * m.blocks for m in seen]
     labelled = np.array(
         [
-            label is not None and f"{m.name}:{label}" not in lonely
+            label is not None and f"{m.name}:{label}" not in single
             for m, own in zip(seen, names, strict=True)
             for label in own
         ]
@@ -164,13 +164,13 @@ def _dealt_places(
 ) -> Numbers:
     """Fold of each block by its place; each fold leaves a known length in its fit."""
     fold = np.full(len(place), -1, dtype=np.int64)
-    length = length_is_known(measurements)
+    length = scale_is_observable(measurements)
     for one in rng.permutation(np.unique(place[place >= 0])):
         sizes = np.bincount(fold[fold >= 0], minlength=folds)
         for k in np.argsort(sizes, kind="stable"):
             tried = np.where(place == one, k, fold)
             left = parted(measurements, tried != k)
-            if left and (not length or length_is_known(m for _, m in left)):
+            if left and (not length or scale_is_observable(m for _, m in left)):
                 fold = tried
                 break
     return fold

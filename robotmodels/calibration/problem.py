@@ -1,4 +1,4 @@
-"""All measurements of a calibration together: one vector of unknowns, one stack of rows.
+"""All measurements of a calibration: one vector of unknowns, one stack of rows.
 
 Source: Seed book section 1.4.5.
 """
@@ -15,33 +15,23 @@ from .._arrays import Array, Rebuilt
 from ..errors import InvalidValueError, ShapeError
 from .differential import differential_model
 from .expected_joints import expected_joints_text
-from .measurements import Evaluation, Fixture, Linearised, Measurement, PointContact
-from .measurements.noise import whitened
+from .measurements import (
+    Evaluation,
+    Fixture,
+    Linearised,
+    Measurement,
+    PointContact,
+    whitened,
+)
+from .measurements.kinds import satisfied_measurement
 from .parameters import GeometricParameters
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Problem(Rebuilt):
-    """Parameters, measurements and their fixtures. The unknowns are [parameters, fixtures].
+    """Parameters, measurements and their F fixtures; the unknowns are [parameters, fixtures].
 
-    Parameters
-    ----------
-    parameters : GeometricParameters
-        P parameters of the robot.
-    measurements : tuple of Measurement
-        What was measured.
-    fixtures : tuple of Fixture
-        F unknowns of the measurements, each name once.
-    factors : tuple
-        For each measurement and view, ``parameters.factors(q)``.
-
-    Examples
-    --------
-    >>> from robotmodels.calibration import Position, candidate_parameters
-    >>> from robotmodels.robots import load
-    >>> measured = Position(np.zeros((4, 6)), np.zeros((4, 3)))
-    >>> problem_of(candidate_parameters(load("rx90")), [measured]).rows
-    12
+    ``factors`` are ``parameters.factors(q)`` of each measurement and view.
     """
 
     parameters: GeometricParameters
@@ -67,11 +57,8 @@ class Problem(Rebuilt):
     @property
     def block(self) -> NDArray[np.int64]:
         """Number of the block of each row, counted through all measurements, shape (M,)."""
-        parts, first = [], 0
-        for m in self.measurements:
-            parts.append(np.repeat(np.arange(first, first + m.blocks), len(m.axes)))
-            first += m.blocks
-        return np.concatenate(parts)
+        rows = [np.full(m.blocks, len(m.axes)) for m in self.measurements]
+        return np.repeat(np.arange(self.blocks), np.concatenate(rows))
 
     @property
     def blocks(self) -> int:
@@ -80,7 +67,7 @@ class Problem(Rebuilt):
 
     @property
     def sees_base(self) -> bool:
-        """Whether some measurement sees where the robot stands."""
+        """Whether some measurement depends on the base."""
         return any(m.sees_base for m in self.measurements)
 
     def columns(self, measurement: Measurement) -> NDArray[np.int64]:
@@ -92,33 +79,7 @@ class Problem(Rebuilt):
 def problem_of(
     parameters: GeometricParameters, measurements: Measurement | Iterable[Measurement]
 ) -> Problem:
-    """Put measurements together.
-
-    Parameters
-    ----------
-    parameters : GeometricParameters
-        Of the robot; made for every end that is measured.
-    measurements : iterable of Measurement
-        One or more.
-
-    Returns
-    -------
-    Problem
-        Of the measurements as they are.
-
-    Raises
-    ------
-    InvalidValueError, ShapeError
-        No measurement, something else; readings of another robot; a fixture with two units.
-
-    Examples
-    --------
-    >>> from robotmodels.calibration import PointContact, candidate_parameters
-    >>> from robotmodels.robots import load
-    >>> touched = PointContact(np.zeros((4, 6)), ["a", "a", "b", "b"])
-    >>> problem_of(candidate_parameters(load("rx90")), [touched]).F
-    6
-    """
+    """Problem of one or more measurements of a robot."""
     measurements = as_measurements(measurements)
     fixtures: dict[str, Fixture] = {}
     n = parameters.model.n
@@ -164,7 +125,7 @@ def _factors(
 
 
 def measured_frames(measurements: Iterable[Measurement]) -> tuple[str | int | None, ...]:
-    """Ends that measurements see, each once."""
+    """Ends that are measured, each once."""
     return tuple(dict.fromkeys(view.frame for m in measurements for view in m.views)) or (None,)
 
 
@@ -182,8 +143,8 @@ def evaluations(problem: Problem, xi: Array) -> list[list[Evaluation]]:
 def guessed_fixtures(problem: Problem, xi: Array) -> Array:
     """Initial values of all fixtures. Shapes: xi (P,) -> (F,)."""
     values = np.full(problem.F, np.nan)
-    for m, seen in zip(problem.measurements, evaluations(problem, xi), strict=True):
-        guess = m.guess(seen)
+    for m, poses in zip(problem.measurements, evaluations(problem, xi), strict=True):
+        guess = m.guess(poses)
         if guess is not None:
             at = problem.columns(m)
             new = np.isnan(values[at])
@@ -191,10 +152,8 @@ def guessed_fixtures(problem: Problem, xi: Array) -> Array:
     if np.isnan(values).any():
         pairs = zip(problem.fixtures, values, strict=True)
         names = dict.fromkeys(f.name.rsplit(".", 1)[0] for f, v in pairs if np.isnan(v))
-        touched = dict.fromkeys(
-            f.name.rsplit(".", 1)[0]
-            for m in problem.measurements if isinstance(m, PointContact) for f in m.fixtures
-        )  # fmt: skip
+        contacts = [m for m in problem.measurements if isinstance(m, PointContact)]
+        touched = dict.fromkeys(f"{m.name}:{label}" for m in contacts for label in m.unknown)
         raise InvalidValueError(
             f"No measurement touches {', '.join(names)}. Touched points: "
             f"{', '.join(touched) or 'none'}."
@@ -205,8 +164,8 @@ def guessed_fixtures(problem: Problem, xi: Array) -> Array:
 def linearised(problem: Problem, xi: Array, fixtures: Array) -> list[Linearised]:
     """Residuals and derivatives of each measurement. Shapes: xi (P,), fixtures (F,)."""
     return [
-        m.linearise(seen, fixtures[problem.columns(m)])
-        for m, seen in zip(problem.measurements, evaluations(problem, xi), strict=True)
+        m.linearise(poses, fixtures[problem.columns(m)])
+        for m, poses in zip(problem.measurements, evaluations(problem, xi), strict=True)
     ]
 
 
@@ -218,10 +177,8 @@ def stacked(problem: Problem, x: Array, scales: tuple[Array, ...]) -> tuple[Arra
     P = problem.P
     residual = np.empty(problem.rows)
     jacobian = np.zeros((problem.rows, P + problem.F))
-    first = 0
-    for m, part, scale in zip(
-        problem.measurements, linearised(problem, x[:P], x[P:]), scales, strict=True
-    ):
+    first, parts = 0, linearised(problem, x[:P], x[P:])
+    for m, part, scale in zip(problem.measurements, parts, scales, strict=True):
         rows = slice(first, first + part.residual.size)
         first = rows.stop
         residual[rows] = whitened(m, part.residual, scale).ravel()
@@ -235,17 +192,12 @@ def stacked(problem: Problem, x: Array, scales: tuple[Array, ...]) -> tuple[Arra
 
 def satisfying(problem: Problem, xi: Array, fixtures: Array) -> Problem:
     """The problem with readings moved to satisfy the constraints exactly, to judge ranks."""
-    from .measurements.satisfied import satisfied_measurement
-
-    moved = []
-    for m in problem.measurements:
-        if not m.is_constraint:
-            moved.append(m)
-            continue
-        new = satisfied_measurement(problem.parameters, m, xi, fixtures[problem.columns(m)])
-        if new is not None:
-            moved.append(new)
-    measurements = tuple(moved)
-    return replace(
-        problem, measurements=measurements, factors=_factors(problem.parameters, measurements)
-    )
+    parameters = problem.parameters
+    moved = [
+        satisfied_measurement(parameters, m, xi, fixtures[problem.columns(m)])
+        if m.is_constraint
+        else m
+        for m in problem.measurements
+    ]
+    measurements = tuple(m for m in moved if m is not None)
+    return replace(problem, measurements=measurements, factors=_factors(parameters, measurements))

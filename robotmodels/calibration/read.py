@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from .. import se3
 from .._arrays import Array
-from ..csv_table import Column, CsvTable, open_table, stacked_columns
+from ..csv_table import Column, CsvTable, open_table
 from ..errors import InvalidValueError
 from ..file_units import AngleUnit, LengthUnit, as_file_unit
 from ..geometry import REVOLUTE
@@ -20,18 +21,16 @@ from ..kinematics.coordinates.kinds import orientation_kind
 from ..model import RobotModel, check_model
 from .expected_joints import expected_joints_text
 from .extended_table import Frame
-from .file_kinds import CONTACTS, FileKind, as_file_kind
-from .files_read import check_columns, check_contents, rows_read
 from .length_units import unit_error_of_positions, unit_error_of_spread
-from .measurements import Distance, Measurement, Pose, Position, RelativePose
-from .measurements.measurement import of_files
+from .measurements import FileRow, Measurement, Pose
+from .measurements.base import fields_of, required
+from .measurements.kinds import Kind, as_kind
+from .reading_limits import beyond_limits
 
-_POSITION_NAMES = ("x", "y", "z")
-_QUATERNION_NAMES = ("qw", "qx", "qy", "qz")
-_DIGITS = 1e-3
-"""How far from 1 the length of a quaternion of few digits may be."""
-_TURNS = 30.0
-_TURN = 2.0 * np.pi
+_QUATERNION_TOLERANCE = 1e-3
+"""Largest deviation from 1 of the length of a quaternion of few digits."""
+_LARGEST_ANGLE = 30.0
+"""Largest plausible angle, rad; beyond it, degrees are assumed."""
 
 
 def read_measurements(
@@ -56,31 +55,31 @@ def read_measurements(
 ) -> Measurement:
     r"""Read measurements of one kind from one or more text files (CSV), a row each.
 
-    Lines that begin with ``#`` are comments. A first line of words is a header; the columns are
-    then found by the names below, or by those given. Without a header they are given by number,
-    from 0, unless the file holds the readings of the joints and nothing else.
+    Lines that begin with ``#`` are comments. A first line of words is a header with the names of
+    the columns. Without a header columns are given by number, from 0, unless the file holds the
+    readings of the joints and nothing else.
 
     Parameters
     ----------
     path : str, Path or iterable of them
         A file, several, or a folder, whose files that fit ``pattern`` are read in the order of
-        their names. The rows of several files follow each other.
-    kind : FileKind, str or class
-        ``"position"``, ``"pose"``, ``"orientation"``, ``"distance"``, ``"point_contact"``,
-        ``"frame_contact"``, ``"plane_contact"``, ``"relative_pose"``.
+        their names.
+    kind : str or class
+        Such as ``"position"``, ``"pose"``, ``"orientation"``, ``"distance"``,
+        ``"point_contact"``, ``"relative_pose"``; or the class of a kind.
     model : RobotModel
         The robot: names, number and types of its joints.
     joints : sequence of str or int, length n, optional
         Columns of the readings; default those named as the joints of the robot, or q1 to qn.
     columns : sequence of str or int, optional
-        Columns of what was measured, in the order of its coordinates: position, then orientation
+        Columns of the measured coordinates, in their order: position, then orientation
         as ``orientation`` orders it (a quaternion scalar first). Default x, y, z and the names of
         the orientation's coordinates (for quaternions also qw, qx, qy, qz); ``distance`` for
         distances. Contacts have none.
     label : str or int, optional
-        Contacts: column that says which point, pose or plane each row touches; distances from a
-        pivot: which pivot. Default: the names of the files without their suffix where there are
-        several; else all the same.
+        Column of the label of the touched point, pose, plane or line, of the pivot of a distance,
+        of the board of a camera. Default: the names of the files without their suffix if there
+        are several; else all the same.
     other_joints : sequence of str or int, length n, optional
         Columns of the readings at the other end of a distance (without them it is from a pivot),
         or of a relative pose.
@@ -107,13 +106,13 @@ def read_measurements(
     Returns
     -------
     Measurement
-        Metres and radians; ``files`` lists what was read.
+        Metres and radians; ``files`` lists the files and their rows.
 
     Raises
     ------
     InvalidValueError
-        Columns that are not there; a cell that is empty or no finite number, with its line; units
-        that cannot be right; files of a folder that do not hold the same.
+        Missing columns; a cell that is empty or no finite number, with its line; units that cannot
+        be right; files of a folder with different contents.
     OSError
         A file cannot be opened.
 
@@ -133,128 +132,134 @@ def read_measurements(
     array([0.2, 0.3, 0. ])
     """
     check_model(model)
-    kind = as_file_kind(kind)
-    _check_arguments(kind, label, other_joints, rows)
+    kind = as_kind(kind, among=is_readable)
     length = as_file_unit(LengthUnit, lengths, "lengths")
     angle = as_file_unit(AngleUnit, angles, "angles")
     turn = angle if joint_angles is None else as_file_unit(AngleUnit, joint_angles, "joint_angles")
+    written = None if orientation is None else orientation_kind(orientation)
+    needs = _needed(kind, written)
+    for argument, value, is_used in (
+        ("label", label, fields_of(kind, "label") and other_joints is None),
+        ("other_joints", other_joints, len(fields_of(kind, "joints")) > 1),
+        ("rows", rows, "rows" in (f.name for f in fields(kind))),
+        ("columns", columns, needs),
+    ):
+        if value is not None and not is_used:
+            raise InvalidValueError(f"{argument}: {kind.word} does not use it here; leave it out.")
     files, folder = _files(path, pattern)
     tables = [open_table(file, delimiter) for file in files]
-    written = None if orientation is None else orientation_kind(orientation)
-    needs = _needed(kind, written, columns)
-
     if folder is not None:
-        check_columns(tables)
-    counts: list[int] = []
+        _check_same_columns(tables)
+    revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
 
-    def readings(given: Sequence[Column] | None, what: str) -> Array:
+    def readings(given: Sequence[Column] | None, what: str) -> list[Array]:
         found = [_joint_columns(t, model, given, what, alone=not needs) for t in tables]
         parts = [t.numbers(c) for t, c in zip(tables, found, strict=True)]
-        counts[:] = [len(part) for part in parts]
-        q = np.concatenate(parts)
-        revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
-        _check_turns(q[:, revolute], turn, files[0], "joint_angles" if joint_angles else "angles")
-        return q * np.where(revolute, turn.factor, length.factor)
+        units = "joint_angles" if joint_angles else "angles"
+        _check_angles(np.concatenate(parts)[:, revolute], turn, files[0], units)
+        return [part * np.where(revolute, turn.factor, length.factor) for part in parts]
 
-    q = readings(joints, "joints")
+    parts = readings(joints, "joints")
+    q = np.concatenate(parts)
     if len(tables) > 1:
-        check_contents(tables, np.split(q, np.cumsum(counts)[:-1]), model, frame)
-    found = [_measured_columns(t, needs, columns) for t in tables]
-    values = stacked_columns(tables, found) if needs else np.zeros((len(q), 0))
-    more: dict[str, Any] = {"sigma": sigma, "frame": frame}
-    called = name or (folder.resolve().name if folder is not None else None)
-    if called is not None:
-        more["name"] = called
-
-    def measurement() -> Measurement:
-        if kind is FileKind.POSITION:
-            p = length.factor * values
-            _check_lengths(p, q, model, length, files[0], frame)
-            return Position(q, p, (1, 1, 1) if rows is None else rows, **more)
-        if written is not None and kind.has_orientation:
-            T = _poses(kind, written, values, length, angle, files[0])
-            if kind is FileKind.RELATIVE_POSE:
-                other = readings(other_joints, "other_joints")
-                return RelativePose(q, other, T, (1,) * 6 if rows is None else rows, **more)
-            if kind is FileKind.ORIENTATION:
-                more.setdefault("name", "orientation")
-                return Pose(q, T, (0, 0, 0, 1, 1, 1) if rows is None else rows, **more)
-            _check_lengths(T[:, :3, 3], q, model, length, files[0], frame)
-            return Pose(q, T, (1,) * 6 if rows is None else rows, **more)
-        if kind is FileKind.DISTANCE:
-            measured = length.factor * values[:, 0]
-            if other_joints is not None:
-                return Distance(q, measured, readings(other_joints, "other_joints"), **more)
-            return Distance(q, measured, pivot=_labels(tables, label, q), **more)
-        return CONTACTS[kind](q, _labels(tables, label, q), **more)
-
-    return of_files(measurement(), rows_read(tables, counts))
+        _check_contents(tables, parts, model, frame)
+    values = np.zeros((len(q), 0))
+    if needs:
+        found = [t.numbers(_measured_columns(t, needs, columns)) for t in tables]
+        values = np.concatenate(found)
+    given: dict[str, Any] = {"q": q, "sigma": sigma, "frame": frame}
+    for f in fields(kind):
+        content = f.metadata.get("content")
+        if content == "joints" and f.name != "q":
+            if other_joints is not None or "joints" in required(kind):
+                given[f.name] = np.concatenate(readings(other_joints, "other_joints"))
+        elif content == "point":
+            given[f.name] = length.factor * values
+            _check_lengths(given[f.name], q, model, length, files[0], frame)
+        elif content == "length":
+            given[f.name] = length.factor * values[:, 0]
+        elif content == "pose" and written is not None:
+            given[f.name] = _poses(written, values, length, angle, files[0])
+            if issubclass(kind, Pose) and _pose_parts(kind)[0]:
+                _check_lengths(given[f.name][:, :3, 3], q, model, length, files[0], frame)
+        elif content == "label" and other_joints is None:
+            given[f.name] = _labels(tables, label, parts)
+    if rows is not None:
+        given["rows"] = rows
+    if name or folder is not None:
+        given["name"] = name or Path(folder or "").resolve().name
+    return kind(**given, origin=_origin(tables, parts))
 
 
-def _check_arguments(
-    kind: FileKind, label: Column | None, other_joints: Sequence[Column] | None,
-    rows: Sequence[int] | None,
-) -> None:  # fmt: skip
-    """Refuse arguments that say nothing about a kind."""
-    word = kind.name.lower()
-    if label is not None and (
-        not (kind.is_contact or kind is FileKind.DISTANCE) or other_joints is not None
-    ):
-        raise InvalidValueError(f"label: {word} has no labels here; leave it out.")
-    if other_joints is not None and kind not in (FileKind.DISTANCE, FileKind.RELATIVE_POSE):
-        raise InvalidValueError(f"other_joints: {word} has one end; leave them out.")
-    if rows is not None and not (kind.has_orientation or kind is FileKind.POSITION):
-        raise InvalidValueError(f"rows: {word} has no rows to choose; leave them out.")
+def is_readable(kind: Kind) -> bool:
+    """Whether files can hold all that a kind needs."""
+    return bool(fields_of(kind, "joints")) and required(kind) <= {
+        "joints", "pose", "point", "length", "label",
+    }  # fmt: skip
 
 
-def _files(
-    path: str | Path | Iterable[str | Path], pattern: str
-) -> tuple[tuple[Path, ...], Path | None]:
-    """Files to be read, and their folder if that was given."""
-    if not isinstance(path, str | Path):
-        files = tuple(Path(each) for each in path)
-        if not files:
-            raise InvalidValueError("path: expected a file, a folder or several files, got none.")
-        return files, None
-    path = Path(path)
-    if not path.is_dir():
-        return (path,), None
-    found = tuple(sorted(path.glob(pattern)))
-    if not found:
-        raise InvalidValueError(
-            f"path: the folder {path} has no file {pattern!r}; say which in pattern."
-        )
-    return found, path
+def _pose_parts(kind: Kind) -> tuple[bool, bool]:
+    """Whether a kind measures a position and an orientation of a pose, by default."""
+    rows: Any = next((f.default for f in fields(kind) if f.name == "rows"), ())
+    has_pose = bool(fields_of(kind, "pose"))
+    return has_pose and any(rows[:3]), has_pose and any(rows[3:])
 
 
-def _needed(
-    kind: FileKind, written: OrientationKind | None, columns: Sequence[Column] | None
-) -> tuple[tuple[str, ...], ...]:
+def _needed(kind: Kind, written: OrientationKind | None) -> list[tuple[str, ...]]:
     """Names of the measured columns, in one or more spellings; none for contacts."""
-    if kind.is_contact:
-        if columns is not None:
-            raise InvalidValueError("columns: a contact measures nothing; see label.")
-        return ()
-    if kind is FileKind.POSITION:
-        return (_POSITION_NAMES,)
-    if kind is FileKind.DISTANCE:
-        return (("distance",), ("length",))
+    for f in fields_of(kind, "length"):
+        return [(name,) for name in f.metadata["names"]]
+    has_position, has_orientation = _pose_parts(kind)
+    position = ("x", "y", "z") if has_position or fields_of(kind, "point") else ()
+    if not has_orientation:
+        return [position] if position else []
     if written is None:
         raise InvalidValueError(
-            "orientation: say how orientations are written: 'rpy_urdf' (turns about x, y, z in "
-            "this order of columns), 'rpy' (about z, y, x), 'quaternion' (scalar first), "
-            "'angle_axis' or another of OrientationKind."
+            "orientation: expected 'rpy_urdf' (angles about x, y, z in this order of columns), "
+            "'rpy' (about z, y, x), 'quaternion' (scalar first), 'angle_axis' or another of "
+            "OrientationKind."
         )
-    own = [written.labels[3:]]
+    names = [tuple(written.labels[3:])]
     if written is OrientationKind.QUATERNION:
-        own.append(_QUATERNION_NAMES)
-    return tuple(tuple(o) if kind is FileKind.ORIENTATION else (*_POSITION_NAMES, *o) for o in own)
+        names.append(("qw", "qx", "qy", "qz"))
+    return [(*position, *each) for each in names]
+
+
+# --- files and columns ----------------------------------------------------------------------------
+
+
+def _files(path: str | Path | Iterable[str | Path], pattern: str) -> tuple[list[Path], Path | None]:
+    """Files to be read, and their folder if that was given."""
+    if isinstance(path, str | Path) and not Path(path).is_dir():
+        return [Path(path)], None
+    if isinstance(path, str | Path):
+        folder = Path(path)
+        files = sorted(folder.glob(pattern))
+        if not files:
+            raise InvalidValueError(
+                f"path: the folder {path} has no file {pattern!r}; give another pattern."
+            )
+        return files, folder
+    files = [Path(each) for each in path]
+    if not files:
+        raise InvalidValueError("path: expected a file, a folder or several files, got none.")
+    return files, None
+
+
+def _origin(tables: Sequence[CsvTable], parts: Sequence[Array]) -> tuple[FileRow, ...]:
+    """Every row of the files, by the name of its file with the folder."""
+    names = [f"{t.path.resolve().parent.name}/{t.path.name}" for t in tables]
+    return tuple(
+        FileRow(name, row + 1)
+        for name, part in zip(names, parts, strict=True)
+        for row in range(len(part))
+    )
 
 
 def _joint_columns(
     table: CsvTable, model: RobotModel, given: Sequence[Column] | None, what: str, alone: bool
 ) -> tuple[int, ...]:
-    n = model.n
+    n, names = model.n, model.table.joint_names
     if given is not None:
         if isinstance(given, str) or len(given) != n:
             raise InvalidValueError(
@@ -262,96 +267,129 @@ def _joint_columns(
                 f"{expected_joints_text(model)}"
             )
         return tuple(table.number(column, what) for column in given)
-    names = model.table.joint_names
-    advice = f"Give them as {what}=[...], a name or number (from 0) for each of the {n} joints."
-    advice += expected_joints_text(model)
+    found = table.find(names) or table.find([f"q{j + 1}" for j in range(n)])
     if what == "other_joints":
-        raise InvalidValueError(f"other_joints: two ends need two readings. {advice}")
-    if table.names:
-        numbered = [f"q{j + 1}" for j in range(n)]
-        found = table.find(names)
-        found = table.find(numbered) if found is None else found
-        if found is None:
-            raise InvalidValueError(
-                f"{table.path}: the header has neither the joints of {model.name} "
-                f"({', '.join(names)}) nor q1 to q{n}; it has {', '.join(table.names)}. {advice}"
-            )
+        error = "other_joints: two ends need two readings."
+    elif table.names and found is not None:
         return found
-    if alone and table.width == n:
+    elif not table.names and alone and table.width == n:
         return tuple(range(n))
+    elif table.names:
+        error = (
+            f"{table.path}: the header has neither the joints of {model.name} "
+            f"({', '.join(names)}) nor q1 to q{n}; it has {', '.join(table.names)}."
+        )
+    else:
+        error = f"{table.path}: no header says which of its {table.width} columns are the joints."
     raise InvalidValueError(
-        f"{table.path}: no header says which of its {table.width} columns are the joints. {advice}"
+        f"{error} Give them as {what}=[...], a name or number (from 0) for each of the {n} joints."
+        f"{expected_joints_text(model)}"
     )
 
 
 def _measured_columns(
     table: CsvTable, needs: Sequence[Sequence[str]], given: Sequence[Column] | None
 ) -> tuple[int, ...]:
-    if not needs:
-        return ()
-    count = len(needs[0])
     if given is not None:
-        if isinstance(given, str) or len(given) != count:
+        if isinstance(given, str) or len(given) != len(needs[0]):
             raise InvalidValueError(
-                f"columns: expected {count} columns ({', '.join(needs[0])}), got {given!r:.80}."
+                f"columns: expected {len(needs[0])} columns ({', '.join(needs[0])}), got "
+                f"{given!r:.80}."
             )
         return tuple(table.number(column, "columns") for column in given)
-    for names in needs:
-        found = table.find(names)
+    for found in map(table.find, needs):
         if found is not None:
             return found
     wanted = " or ".join(", ".join(names) for names in needs)
-    has = f"the header is {', '.join(table.names)}" if table.names else "there is no header"
+    has = f"the header is {', '.join(table.names)}" if table.names else "the file has no header"
     raise InvalidValueError(
         f"{table.path}: expected columns {wanted}; {has}. Give them as columns=[...], a name or "
         "number (from 0) for each."
     )
 
 
-def _labels(tables: Sequence[CsvTable], label: Column | None, q: Array) -> tuple[str, ...]:
+def _labels(
+    tables: Sequence[CsvTable], label: Column | None, parts: Sequence[Array]
+) -> tuple[str, ...]:
     if label is not None:
         return tuple(x for table in tables for x in table.labels(table.number(label, "label")))
-    if len(tables) == 1:
-        return ("0",) * len(q)
-    stems = [table.path.stem for table in tables]
+    stems = [table.path.stem if len(tables) > 1 else "0" for table in tables]
     if len(set(stems)) < len(stems):
-        # the same name in several folders: these are different points
+        # files of the same name in several folders are different targets
         stems = [f"{table.path.parent.name}/{table.path.stem}" for table in tables]
-    counts = [len(table.numbers([0])) for table in tables]
-    return tuple(stem for stem, count in zip(stems, counts, strict=True) for _ in range(count))
+    return tuple(stem for stem, part in zip(stems, parts, strict=True) for _ in part)
+
+
+# --- plausibility ---------------------------------------------------------------------------------
+
+
+def _check_same_columns(tables: Sequence[CsvTable]) -> None:
+    """Refuse files of a folder whose columns differ in number or name."""
+    kinds: dict[str, list[str]] = {}
+    for t in tables:
+        columns = f"columns {', '.join(t.names)}" if t.names else f"{t.width} columns, no header"
+        kinds.setdefault(columns, []).append(t.path.name)
+    if len(kinds) > 1:
+        listed = "; ".join(f"{', '.join(names)}: {columns}" for columns, names in kinds.items())
+        raise InvalidValueError(
+            f"path: the files of {tables[0].path.parent} do not have the same columns ({listed}). "
+            "Select the files by pattern='*.csv', or name them."
+        )
+
+
+def _check_contents(
+    tables: Sequence[CsvTable], readings: Sequence[Array], model: RobotModel, frame: Frame
+) -> None:
+    """Refuse files whose columns are not joint readings. Shapes: readings (N, n)."""
+    rows = set(model.twin.frame(frame).path.tolist())
+    other: dict[str, str] = {}
+    for t, q in zip(tables, readings, strict=True):
+        sentences, refused = beyond_limits(model, q, rows)
+        square = np.lib.stride_tricks.sliding_window_view(np.pad(q**2, ((0, 0), (0, 3))), 4, axis=1)
+        near = np.abs(square.sum(axis=-1) - 1.0) < 2.0 * _QUATERNION_TOLERANCE
+        if len(q) > 2 and near.all(axis=0).any():
+            other[t.path.name] = "four columns are unit quaternions: poses"
+        elif refused:
+            other[t.path.name] = f"beyond limits: {sentences[0]}"
+    if other and len(other) < len(tables):
+        listed = "; ".join(f"{name} ({why})" for name, why in other.items())
+        raise InvalidValueError(
+            f"path: among {', '.join(t.path.name for t in tables)}, these are not readings of the "
+            f"joints of {model.name}: {listed}. Select the files by pattern='*.csv', or name them."
+        )
 
 
 def _poses(
-    kind: FileKind, written: OrientationKind, values: Array, length: LengthUnit, angle: AngleUnit,
-    file: Path,
-) -> Array:  # fmt: skip
-    turned_only = kind is FileKind.ORIENTATION
-    p = np.zeros((len(values), 3)) if turned_only else length.factor * values[:, :3]
-    o = values if turned_only else values[:, 3:]
+    written: OrientationKind, values: Array, length: LengthUnit, angle: AngleUnit, file: Path
+) -> Array:
+    """Poses of columns: position if it is measured, then orientation. Shapes: values (N, m)."""
+    count = values.shape[1] - (written.dimension - 3)
+    p = length.factor * values[:, :3] if count else np.zeros((len(values), 3))
+    o = values[:, count:]
     if written is OrientationKind.QUATERNION:
-        size = np.sqrt(np.minimum(np.abs(o), 1e9) ** 2 @ np.ones(o.shape[1]))
-        wrong = np.flatnonzero(abs(size - 1.0) > _DIGITS)
+        size = np.linalg.norm(np.clip(o, -1e9, 1e9), axis=1)
+        wrong = np.flatnonzero(abs(size - 1.0) > _QUATERNION_TOLERANCE)
         if len(wrong):
             raise InvalidValueError(
                 f"{file}: the quaternion of row {wrong[0] + 1} has length {size[wrong[0]]:.4g}; "
-                "expected 1. See whether columns names the right ones, the scalar first."
+                "expected 1. Check that columns names the right ones, the scalar first."
             )
         o = o / size[:, None]
     elif written not in (OrientationKind.DIRECTION_COSINES, OrientationKind.TWO_AXES):
-        _check_turns(o, angle, file, "angles")
+        _check_angles(o, angle, file, "angles")
         o = angle.factor * o
     return se3.as_pose(pose_from_coordinates(np.hstack([p, o]), written), "columns")
 
 
-def _check_turns(values: Array, unit: AngleUnit, file: Path, argument: str) -> None:
+def _check_angles(values: Array, unit: AngleUnit, file: Path, argument: str) -> None:
     largest = float(np.abs(values).max(initial=0.0))
-    if unit is AngleUnit.RADIAN and largest > _TURNS:
+    if unit is AngleUnit.RADIAN and largest > _LARGEST_ANGLE:
         raise InvalidValueError(
-            f"{file}: an angle of {largest:.4g} rad; these look like degrees. Say {argument}='deg'."
+            f"{file}: an angle of {largest:.4g} rad; these look like degrees. Use {argument}='deg'."
         )
-    if unit is AngleUnit.DEGREE and values.size and largest <= _TURN and np.ptp(values) > 1.0:
+    if unit is AngleUnit.DEGREE and values.size and largest <= 2 * np.pi and np.ptp(values) > 1.0:
         raise InvalidValueError(
-            f"{file}: no angle is larger than {largest:.4g} deg; these look like radians. Say "
+            f"{file}: no angle is larger than {largest:.4g} deg; these look like radians. Use "
             f"{argument}='rad'."
         )
 
@@ -359,15 +397,14 @@ def _check_turns(values: Array, unit: AngleUnit, file: Path, argument: str) -> N
 def _check_lengths(
     p: Array, q: Array, model: RobotModel, unit: LengthUnit, file: Path, frame: Frame
 ) -> None:
-    # squares of what is farther apart than this are no numbers
+    """Refuse positions in another unit. Shapes: p (N, 3), q (N, n)."""
+    # clipped so that squares of wrong columns do not overflow
     nominal, p = dgm(model, np.clip(q, -1e3, 1e3), frame)[:, :3, 3], np.clip(p, -1e150, 1e150)
     spread = float(np.linalg.norm(np.ptp(p, axis=0)))
-    slip = unit_error_of_positions(nominal, p) or unit_error_of_spread(model, frame, spread)
-    if slip is None:
-        return
-    stated = "metres" if unit is LengthUnit.METRE else "millimetres"
-    symbol = {"metres": "m", "millimetres": "mm"}.get(slip.unit)
-    advice = f"Multiply them by {slip.factor:.4g}."
-    if symbol and slip.taken == stated:
-        advice = f"Say lengths={symbol!r}."
-    raise InvalidValueError(f"{file}: positions are {slip.sentence(stated)}. {advice}")
+    error = unit_error_of_positions(nominal, p) or unit_error_of_spread(model, frame, spread)
+    if error is not None:
+        stated = "metres" if unit is LengthUnit.METRE else "millimetres"
+        symbol = {"metres": "m", "millimetres": "mm"}.get(error.unit)
+        use_symbol = symbol is not None and error.taken == stated
+        advice = f"Use lengths={symbol!r}" if use_symbol else f"Multiply them by {error.factor:.4g}"
+        raise InvalidValueError(f"{file}: positions are {error.sentence(stated)}. {advice}.")

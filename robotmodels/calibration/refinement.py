@@ -14,7 +14,7 @@ from ..geometry import REVOLUTE
 from ..igm.solutions import IGMSolutions
 from ..kinematics import dgm
 from ..se3.orientation import rotation_vectors_of
-from .measurements.rotation_vectors import inverse_left_jacobians
+from .measurements.motions import inverse_left_jacobians
 from .robot import CalibratedRobot, calibrated_pose, reading_jacobian
 
 STEPS = 15  # in the joint variables

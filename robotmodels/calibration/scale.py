@@ -11,7 +11,7 @@ from ..errors import InvalidValueError
 from ..geometry import PRISMATIC
 from ..kinematics.lengths import spread_configurations
 from .differential import differential_model
-from .measurements import length_is_known
+from .measurements import scale_is_observable
 from .parameters import ErrorLaw, GeometricParameters
 from .problem import Problem
 
@@ -26,7 +26,7 @@ def needs_a_length(problem: Problem, known: Iterable[str]) -> bool:
     p, known = problem.parameters, set(known)
     constant = [e for e in p.entries if e.law is ErrorLaw.CONSTANT]
     base_is_known = all(e.name in known for e in constant if e.row == 0)
-    if length_is_known(problem.measurements, p.model.base[:3, 3] if base_is_known else None):
+    if scale_is_observable(problem.measurements, p.model.base[:3, 3] if base_is_known else None):
         return False
     return any(e.element.is_length and 0 < e.row <= p.model.f for e in constant)
 
@@ -38,7 +38,7 @@ def check_scale(problem: Problem, W: Array, fixed: Sequence[str], named: Sequenc
     # readings of prismatic joints are lengths, and may be enough
     slides = bool((p.table.sigma == PRISMATIC).any())
     distances = _distances(p)
-    if (named or slides) and scale_is_observable(problem, R, fixed, distances):
+    if (named or slides) and _scale_is_kept(problem, R, fixed, distances):
         return
     least = _SCALE_TOLERANCE * p.table.size
     rest = [name for name in fixed if name not in named]
@@ -49,7 +49,7 @@ def check_scale(problem: Problem, W: Array, fixed: Sequence[str], named: Sequenc
         and entry.element.is_length
         and abs(value) > least
         and 0 < entry.row <= p.model.f
-        and scale_is_observable(problem, R, [*rest, entry.name], distances)
+        and _scale_is_kept(problem, R, [*rest, entry.name], distances)
     ]
     known = "These measurements know no length"
     problem_text = f"{known}: a robot shrunk to nothing would satisfy them."
@@ -65,7 +65,7 @@ def check_scale(problem: Problem, W: Array, fixed: Sequence[str], named: Sequenc
     )
 
 
-def scale_is_observable(
+def _scale_is_kept(
     problem: Problem, R: Array, fixed: Iterable[str], distances: tuple[Array, Array]
 ) -> bool:
     """Whether no unidentifiable direction scales all distances of the end. Shapes: R (k, F + P)."""

@@ -30,9 +30,8 @@ from .exchange import (
 )
 from .extended_table import Frame
 from .identifiable import identifiable_on
-from .measurements import Measurement
+from .measurements import Measurement, whitened
 from .measurements.kinds import Kind, as_kind, drawn_groups, groups_of, measurement_of
-from .measurements.noise import whitened
 from .observability import Criterion, Observability, observability
 from .parameters import GeometricParameters
 from .problem import guessed_fixtures, linearised, problem_of
@@ -56,7 +55,7 @@ class SelectedConfigurations(Rebuilt):
 
     Parameters
     ----------
-    kind : Kind
+    kind : class
         What shall be measured there.
     groups : ndarray, shape (count, m, n)
         Postures of each selected configuration: one for measurements from outside, several for
@@ -154,7 +153,7 @@ class SelectedConfigurations(Rebuilt):
         size = self.groups.shape[1]
         each = "" if size == 1 else f", {size} postures each"
         lines = [
-            f"{self.count} chosen of {self.pool} candidates for {self.kind.value}{each}: "
+            f"{self.count} chosen of {self.pool} candidates for {self.kind.word}{each}: "
             f"{self.criterion.name} {self.observability.value(self.criterion):.4g} for "
             f"{len(self.parameters)} parameters.",
             f"{self.observability}.",
@@ -166,7 +165,7 @@ class SelectedConfigurations(Rebuilt):
 
 def select_configurations(
     model: RobotModel,
-    kind: Kind | str | type[Measurement],
+    kind: Kind | str,
     count: int,
     *,
     candidates: ArrayLike | None = None,
@@ -199,8 +198,8 @@ def select_configurations(
     ----------
     model : RobotModel
         The robot, n joints.
-    kind : Kind
-        What shall be measured; also its name or class.
+    kind : class or str
+        What shall be measured: `Pose`, `PointContact`, ... or ``"point_contact"``, ...
     count : int
         How many configurations, or contacts.
     candidates : array_like, shape (N, n) or (N, m, n), optional
@@ -255,7 +254,7 @@ def select_configurations(
     --------
     >>> from robotmodels.robots import load
     >>> found = select_configurations(
-    ...     load("rx90"), Kind.POSE, 20, drawn=200, rng=np.random.default_rng(0))
+    ...     load("rx90"), "pose", 20, drawn=200, rng=np.random.default_rng(0))
     >>> found.q.shape, len(found.parameters)
     ((20, 6), 30)
     """
@@ -265,7 +264,7 @@ def select_configurations(
     count, starts = _whole(count, "count"), _whole(starts, "starts")
     rng = np.random.default_rng() if rng is None else rng
     report = _progress(progress)
-    if optimise and kind.is_contact:
+    if optimise and kind.is_constraint:
         raise InvalidValueError(
             "optimise: the postures of a contact cannot be moved one by one; draw more candidates."
         )
@@ -303,14 +302,14 @@ def select_configurations(
     kept = identifiable_on(parameters, [measured], known_lengths).kept
     if not len(kept):
         raise InvalidValueError(
-            f"kind: {kind.name} at the candidates identifies none of the {len(parameters)} "
+            f"kind: {kind.word} at the candidates identifies none of the {len(parameters)} "
             "parameters."
         )
     rows = group_rows(kept, kind, pool, sigma, frame)
     p, least = len(kept), ceil(len(kept) / rows.shape[1])
     if count < least:
         raise InvalidValueError(
-            f"count: {p} parameters need at least {least} for {kind.name}, got {count}."
+            f"count: {p} parameters need at least {least} for {kind.word}, got {count}."
         )
     effect = np.sqrt((rows**2).sum(axis=(0, 1)) / len(rows))
     scaled = rows / effect
@@ -336,7 +335,7 @@ def select_configurations(
 
 def group_rows(
     parameters: GeometricParameters,
-    kind: Kind,
+    kind: Kind | str,
     q: Array,
     sigma: ArrayLike | None = None,
     frame: Frame = None,
@@ -433,7 +432,7 @@ def _given(
         q = q[:, None]
     if q.ndim != 3 or q.shape[2] != n or q.shape[1] < min(kind.postures, 2):
         raise ShapeError(f"candidates: expected shape {expected}, got {q.shape}.")
-    if not kind.is_contact or not len(q):
+    if not kind.is_constraint or not len(q):
         return q
     problem = problem_of(parameters, [measurement_of(parameters, kind, groups_of(q), frame=frame)])
     xi = np.zeros(len(parameters))

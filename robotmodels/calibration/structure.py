@@ -22,8 +22,7 @@ from .candidates import candidate_parameters
 from .errors_seen import block_errors
 from .extended_table import Element, ExtendedTable
 from .identifiable import IdentifiableParameters, Reason, needs_a_length
-from .measurements import Evaluation
-from .measurements.noise import whitened
+from .measurements import Evaluation, whitened
 from .parameters import Compliance, ErrorLaw, GeometricParameters
 from .problem import Problem, evaluations, problem_of, stacked
 from .solve import Solution

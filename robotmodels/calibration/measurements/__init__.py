@@ -1,27 +1,28 @@
-"""What can be measured: one kind a file, to be mixed freely in one fit (sections 1.4.4, 1.4.5)."""
+"""Kinds of measurement, to be mixed freely in one fit (sections 1.4.4, 1.4.5)."""
 
-from .axis_position import AxisPosition
-from .camera_pose import CameraPose
-from .dilations import length_is_known
-from .distance import Distance
-from .frame_contact import FrameContact
-from .known_distance import KnownDistance
-from .labelled import Labelled
-from .laser_line import LaserLine
-from .linked_frames import LinkedFrames
-from .lonely import LonelyLabel, lonely_labels
-from .measurement import Evaluation, Fixture, Linearised, Measurement, View
-from .plane_contact import PlaneContact
-from .point_contact import PointContact
-from .pose import Pose
-from .position import Position
-from .relative_pose import RelativePose
+from .base import (
+    Contact,
+    Evaluation,
+    Fixture,
+    Labelled,
+    Linearised,
+    Measurement,
+    View,
+)
+from .contacts import FrameContact, LaserLine, PlaneContact, PointContact
+from .fields import FileRow
+from .links import KnownDistance, LinkedFrames
+from .poses import CameraPose, Orientation, Pose, RelativePose
+from .positions import AxisPosition, Distance, Position
+from .several import scale_is_observable, single_observations, whitened
 
 __all__ = [
     "AxisPosition",
     "CameraPose",
+    "Contact",
     "Distance",
     "Evaluation",
+    "FileRow",
     "Fixture",
     "FrameContact",
     "KnownDistance",
@@ -29,14 +30,15 @@ __all__ = [
     "LaserLine",
     "Linearised",
     "LinkedFrames",
-    "LonelyLabel",
     "Measurement",
+    "Orientation",
     "PlaneContact",
     "PointContact",
     "Pose",
     "Position",
     "RelativePose",
     "View",
-    "length_is_known",
-    "lonely_labels",
+    "scale_is_observable",
+    "single_observations",
+    "whitened",
 ]

@@ -1,78 +1,55 @@
-"""Kinds of measurement before anything is measured: configurations that each of them admits.
+"""Kinds by name, and the configurations that they admit before anything is measured.
 
-Configurations come in groups: one posture for what is measured from outside, several postures of
-the same contact for what the robot measures on itself. Each group has its own unknown point, pose
-or plane.
+Configurations come in groups with equal labels: one posture for measurements from outside, several
+postures of the same unknown target for contacts.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
-from enum import Enum
+from inspect import isabstract
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..._arrays import Array, read_only
-from ..._choices import chosen
 from ...errors import InvalidValueError
-from ...geometry import REVOLUTE
+from ...geometry import FIXED, PRISMATIC, REVOLUTE
 from ...kinematics.lengths import spread_configurations
-from .. import measurements as m
 from ..differential import differential_model
-from ..extended_table import Frame
-from ..parameters import GeometricParameters
-from . import Measurement
-from .satisfied import satisfied_measurement
+from ..extended_table import Element, ExtendedTable, Frame
+from ..parameters import GeometricParameter, GeometricParameters
+from .base import Contact, Evaluation, Labelled, Measurement, required
 
+Kind = type[Measurement]
+"""A kind of measurement: its class."""
 _STARTS = 6
-"""Starts of the search for each posture that is asked for."""
-_SAME = 1e-4
-"""Postures nearer than that (rad or m) are the same."""
+"""Starts of the search for each posture."""
+_STEPS = 40
+_LONGEST = 0.3
+"""Longest step of a joint in one iteration, rad or m."""
 
 
-class Kind(Enum):
-    """What could be measured; the value is the sentence.
-
-    Examples
-    --------
-    >>> Kind.POINT_CONTACT.postures
-    4
-    """
-
-    POSE = "poses of the end, from outside"
-    POSITION = "positions of the end, from outside"
-    ORIENTATION = "orientations of the end, from outside"
-    FRAME_CONTACT = "the same pose reached in several postures"
-    POINT_CONTACT = "the same point touched in several postures"
-    PLANE_CONTACT = "the same plane touched in several postures"
-
-    @property
-    def postures(self) -> int:
-        """Postures of a group, by default."""
-        return _POSTURES.get(self, 1)
-
-    @property
-    def is_contact(self) -> bool:
-        """Whether the postures of a group must meet."""
-        return self in (Kind.FRAME_CONTACT, Kind.POINT_CONTACT, Kind.PLANE_CONTACT)
-
-
-_POSTURES = {Kind.FRAME_CONTACT: 2, Kind.POINT_CONTACT: 4, Kind.PLANE_CONTACT: 6}
-
-
-def as_kind(value: Any, name: str = "kind") -> Kind:
-    """A kind given as a member of `Kind`, by its name, or as the class of its measurements."""
-    if isinstance(value, type) and issubclass(value, Measurement):
-        words = "".join(f"_{c}" if c.isupper() else c for c in value.__name__).strip("_")
-        if words.upper() in Kind.__members__:
-            return Kind[words.upper()]
+def as_kind(value: Any, name: str = "kind", among: Any = None) -> Kind:
+    """A kind given as its class or by its word; by default one that configurations determine."""
+    among = is_selectable if among is None else among
+    word = value.word if isinstance(value, type) and issubclass(value, Measurement) else value
+    if isinstance(word, str):
+        word = word.strip().lower().replace("-", "_").replace(" ", "_")
+    possible = {k: c for k, c in Measurement.kinds.items() if not isabstract(c) and among(c)}
+    if word not in possible:
+        words = ", ".join(repr(each) for each in sorted(possible))
         raise InvalidValueError(
-            f"{name}: {value.__name__} alone does not say what is measured where; give measured "
-            f"data, or one of {', '.join(kind.name for kind in Kind)}."
+            f"{name}: expected one of {words}, or the class of one, got {value!r:.80}."
         )
-    return chosen(Kind, value, name)
+    return possible[word]
+
+
+def is_selectable(kind: Kind) -> bool:
+    """Whether configurations determine its noise-free measurements."""
+    shared = issubclass(kind, Labelled) and not issubclass(kind, Contact)
+    return not shared and ("drawn" in vars(kind) or required(kind) <= {"pose", "point", "label"})
 
 
 class Groups(NamedTuple):
@@ -93,9 +70,23 @@ def groups_of(q: Array) -> Groups:
     return Groups(q.reshape(-1, n), np.repeat(np.arange(G), size))
 
 
+def measurement_of(
+    parameters: GeometricParameters,
+    kind: Kind | str,
+    groups: Groups,
+    *,
+    frame: Frame = None,
+    deviation: Array | None = None,
+    sigma: Array | float | None = None,
+) -> Measurement:
+    """Noise-free measurement of a robot at given configurations."""
+    T = differential_model(parameters, groups.q, deviation, frame).T
+    return as_kind(kind).drawn(groups.q, T, groups.label, sigma=sigma, frame=frame)
+
+
 def drawn_groups(
     parameters: GeometricParameters,
-    kind: Kind,
+    kind: Kind | str,
     groups: int,
     postures: int,
     rng: np.random.Generator,
@@ -106,123 +97,100 @@ def drawn_groups(
 ) -> Groups:
     """Configurations spread over the joint ranges, those of a contact moved until they meet.
 
-    Parameters
-    ----------
-    parameters : GeometricParameters
-        Of the robot.
-    kind : Kind
-        What is measured.
-    groups, postures : int
-        How many, at most; contacts that cannot be reached in two postures are left out.
-    rng : numpy.random.Generator
-        Where chance comes from.
-    frame : str, int or None
-        The end.
-    deviation : ndarray, shape (P,), optional
-        Of the robot that meets the contacts; default the nominal one.
-    limits : bool
-        Whether postures of contacts beyond the limits of the joints are left out.
-
-    Returns
-    -------
-    Groups
-        Fewer than asked, or none, where few postures meet.
+    At most so many groups and postures; targets that are not reached in two postures are left out.
     """
-    model = parameters.model
-    if not kind.is_contact:
-        return groups_of(
-            spread_configurations(model, groups * postures, rng).reshape(groups, postures, -1)
-        )
+    model, kind = parameters.model, as_kind(kind)
+    if not issubclass(kind, Contact):
+        q = spread_configurations(model, groups * postures, rng)
+        return groups_of(q.reshape(groups, postures, -1))
     first = spread_configurations(model, groups, rng)
     starts = spread_configurations(model, groups * postures * _STARTS, rng)
-    label = np.repeat(np.arange(groups), postures * _STARTS)
     moving = parameters if deviation is not None else replace(parameters, entries=())
     xi = np.zeros(len(moving)) if deviation is None else deviation
     T = differential_model(moving, first, xi, frame).T
-    target, group_of = _target(kind, T, starts, label, frame, rng, moving, xi)
-    met = satisfied_measurement(moving, target, xi, np.zeros(0))
+    known = {g: kind.target_at(T[g], rng) for g in range(groups)}
+    label = np.repeat(np.arange(groups), postures * _STARTS)
+    start = kind.drawn(starts, np.zeros((len(starts), 4, 4)), label, frame=frame, known=known)
+    met = satisfied_measurement(moving, start, xi, np.zeros(0))
     found: dict[int, list[Array]] = {g: [first[g]] for g in range(groups)}
-    if met is not None:
-        q = _turned_inside(parameters, met.views[0].q)
-        within = (q >= model.lower - 1e-9) & (q <= model.upper + 1e-9)
-        inside = np.asarray(within.all(axis=1))
-        for row, g, allowed in zip(q, group_of(met), inside, strict=True):
-            members = found[g]
-            new = len(members) < postures and all(_differ(row, other) for other in members)
-            if new and (allowed or not limits):
+    if isinstance(met, Contact):
+        q = _turned_inside(parameters, met.q)
+        allowed = np.all((q >= model.lower - 1e-9) & (q <= model.upper + 1e-9), axis=1)
+        for row, g, inside in zip(q, met.label, allowed, strict=True):
+            members = found[int(g)]
+            new = all(np.abs(row - other).max() > 1e-4 for other in members)
+            if new and len(members) < postures and (inside or not limits):
                 members.append(row)
     kept = [np.array(members) for members in found.values() if len(members) > 1]
-    n = model.n
     return Groups(
-        np.concatenate([np.zeros((0, n)), *kept]),
+        np.concatenate([np.zeros((0, model.n)), *kept]),
         np.repeat(np.arange(len(kept)), [len(members) for members in kept]).astype(np.int64),
     )
 
 
-def measurement_of(
-    parameters: GeometricParameters,
-    kind: Kind,
-    groups: Groups,
-    *,
-    frame: Frame = None,
-    deviation: Array | None = None,
-    sigma: Array | float | None = None,
-) -> Measurement:
-    """Noise-free measurement of a robot at given configurations."""
-    q, label = groups
-    T = differential_model(parameters, q, deviation, frame).T
-    more: dict[str, Any] = {"sigma": sigma, "frame": frame}
-    match kind:
-        case Kind.POSE:
-            return m.Pose(q, T, **more)
-        case Kind.ORIENTATION:
-            return m.Pose(q, T, rows=[0, 0, 0, 1, 1, 1], name="orientation", **more)
-        case Kind.POSITION:
-            return m.Position(q, T[:, :3, 3], **more)
-        case Kind.POINT_CONTACT:
-            return m.PointContact(q, label, **more)
-        case Kind.FRAME_CONTACT:
-            return m.FrameContact(q, label, **more)
-        case Kind.PLANE_CONTACT:
-            return m.PlaneContact(q, label, **more)
-
-
-def _target(
-    kind: Kind, T: Array, starts: Array, label: NDArray[np.int64], frame: Frame,
-    rng: np.random.Generator, moving: GeometricParameters, xi: Array,
-) -> tuple[Measurement, Any]:  # fmt: skip
-    """What the starts shall be moved to, and a function that says which group each row is of."""
-    p = T[:, :3, 3]
-    places = p[label]
-    if kind is Kind.PLANE_CONTACT:
-        # every start goes to the foot of its perpendicular on the plane of its group
-        normal = rng.normal(size=p.shape)
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-        starting = differential_model(moving, starts, xi, frame).T[:, :3, 3]
-        height = ((starting - places) * normal[label]).sum(axis=1)
-        places = starting - height[:, None] * normal[label]
-    number = {place.tobytes(): int(g) for place, g in zip(places, label, strict=True)}
-
-    def group_of(met: Any) -> list[int]:
-        found = met.T[:, :3, 3] if kind is Kind.FRAME_CONTACT else met.p
-        return [number[np.ascontiguousarray(place).tobytes()] for place in found]
-
-    if kind is Kind.FRAME_CONTACT:
-        return m.Pose(starts, T[label], frame=frame), group_of
-    return m.Position(starts, places, frame=frame), group_of
-
-
 def _turned_inside(parameters: GeometricParameters, q: Array) -> Array:
-    """Revolute joints by whole turns into their limits, or near the middle where there are none."""
+    """Revolute joints by whole turns into their limits, or near the middle without limits."""
     model = parameters.model
-    turning = model.table.sigma[model.table.joint_rows] == REVOLUTE
+    revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
     both = np.isfinite(model.lower) & np.isfinite(model.upper)
-    middle = np.where(
-        both, 0.5 * (np.where(both, model.lower, 0) + np.where(both, model.upper, 0)), 0.0
-    )
+    lower, upper = (np.where(both, limit, 0.0) for limit in (model.lower, model.upper))
+    middle = 0.5 * (lower + upper)
     turned = middle + np.remainder(q - middle + np.pi, 2.0 * np.pi) - np.pi
-    return read_only(np.where(turning, turned, q))
+    return read_only(np.where(revolute, turned, q))
 
 
-def _differ(a: Array, b: Array) -> bool:
-    return bool(np.abs(a - b).max() > _SAME)
+def satisfied_measurement(
+    parameters: GeometricParameters, measurement: Measurement, xi: Array, fixtures: Array
+) -> Measurement | None:
+    """The measurement with readings moved by the least step to zero residuals.
+
+    Blocks that do not reach them are left out; None if no block does.
+    """
+    if not measurement.views:
+        return measurement
+    motions = _joint_motions(parameters.table)
+    size, P, count = parameters.table.size, len(parameters), len(motions)
+    scale = np.array([size if unit == "m" else 1.0 for unit in measurement.units])
+    both = replace(parameters, entries=parameters.entries + motions.entries)
+    values = np.concatenate([xi, np.zeros(count)])
+    views = measurement.views
+    q = [view.q.copy() for view in views]
+    # ends at the same readings (two arms of a tree) move together
+    first = [next(i for i, v in enumerate(views) if v.q is view.q) for view in views]
+    distinct = sorted(set(first))
+    off = np.full(measurement.blocks, np.inf)
+    for _ in range(_STEPS):
+        ends = []
+        for view in measurement.with_configurations(q).views:
+            # bending changes with the readings, so that Newton's step is not exact
+            found = differential_model(both, view.q, values, view.frame)
+            ends.append(Evaluation(found.T, found.psi[..., P:]))
+        parts = [
+            measurement.linearise(
+                [Evaluation(T, psi * (f == g)) for f, (T, psi) in zip(first, ends, strict=True)],
+                fixtures,
+            )
+            for g in distinct
+        ]
+        residual = parts[0].residual
+        off = np.abs(residual / scale).max(axis=1)
+        if (off < 1e-13).all():
+            break
+        J = np.concatenate([part.by_parameters for part in parts], axis=-1)
+        step = -(np.linalg.pinv(J, rcond=1e-6) @ residual[..., None])[..., 0]
+        step *= np.minimum(1.0, _LONGEST / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
+        for k, f in enumerate(first):
+            at = distinct.index(f) * count
+            q[k] = q[k] + step[:, at : at + count]
+    kept = np.flatnonzero(off < 1e-10)
+    return measurement.with_configurations(q).subset(kept) if len(kept) else None
+
+
+def _joint_motions(table: ExtendedTable) -> GeometricParameters:
+    """The motion of every joint as a parameter, in the order of the joints."""
+    rows = [r for r in range(table.rows) if table.sigma[r] != FIXED]
+    entries = [
+        GeometricParameter(r, Element.R if table.sigma[r] == PRISMATIC else Element.THETA, source=r)
+        for r in sorted(rows, key=lambda r: int(table.joint[r]))
+    ]
+    return GeometricParameters(table, tuple(entries))

@@ -12,7 +12,6 @@ from ...model import RobotModel
 from ...table_text import ReportSection, ReportTable, table_of
 from ..errors_seen import BlockErrors
 from ..measurements import Measurement
-from ..measurements.measurement import origin_of
 from .units import degrees, in_unit, millimetres, printed_unit
 
 if TYPE_CHECKING:
@@ -158,7 +157,7 @@ def outlier_section(result: CalibrationResult) -> ReportSection | None:
         if seen[block]:
             p, angle = float(result.after.position[at]), float(result.after.angle[at])
             lengths = (millimetres(p), degrees(angle))
-        at, origin = int(inside[block]), origin_of(m)
+        at, origin = int(inside[block]), m.origin
         where = (origin[at].name, str(origin[at].row)) if origin else (m.name, str(at + 1))
         rows.append((str(int(block) + 1), *where, *lengths, f"{weight:.2g}"))
     more = (
