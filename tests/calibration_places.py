@@ -165,5 +165,5 @@ def stated_over_true(protocol, seed, prior=PRIOR):
     far = np.full(arm.nominal.n, np.inf)  # simulated postures do not keep the limits
     table = arm.nominal.table.replace(lower=-far, upper=far)
     found = fit(arm.nominal.with_table(table), measured, prior=prior, held_out=fresh)
-    stated = (found.cross_validation.after, found.after)
-    return [errors.summary("m").rms / found.held_out.after.summary("m").rms for errors in stated]
+    stated = (found.validation.folds, found.validation.in_sample)
+    return [errors.rms["m"] / found.validation.held_out.rms["m"] for errors in stated]

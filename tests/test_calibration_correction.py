@@ -26,7 +26,7 @@ from robotmodels.calibration.extended_table.parameters import (
     GeometricParameter,
     GeometricParameters,
 )
-from robotmodels.calibration.reporting.write import calibrated_urdf
+from robotmodels.calibration.write import calibrated_urdf
 from robotmodels.errors import InvalidValueError, ShapeError, UrdfWarning
 
 

@@ -19,8 +19,9 @@ from robotmodels.calibration import (
     differential_model,
     fit,
     other_tool_error,
+    report,
 )
-from robotmodels.calibration.registration import best_motion
+from robotmodels.calibration.alignment import best_motion
 
 ALONE = {"folds": 0, "held_out": 0}
 ARMS = range(100, 130)
@@ -125,8 +126,8 @@ def test_a_real_arm_keeps_its_flange(panda):
     for options in ({}, {"prior": None}):
         result = fit(nominal, measured, **options, **ALONE)
         assert apart(result.model) < 0.2 * apart(nominal)
-        assert result.after.summary("m").mean < 2.2e-4
-        assert np.abs(result.deviation).max() < 0.03
+        assert result.validation.in_sample.mean["m"] < 2.2e-4
+        assert np.abs(result.corrections).max() < 0.03
 
 
 def test_the_headline_says_how_far_another_tool_could_be_off(panda):
@@ -136,7 +137,7 @@ def test_the_headline_says_how_far_another_tool_could_be_off(panda):
     assert found == other_tool_error(result)
     assert found.rms < found.largest
     assert found.rms < 0.3 * found.nominal
-    outcome = result.report().split("Notes")[0]
+    outcome = report(result).split("Notes")[0]
     words = " ".join(outcome.split())
     assert f"in the measured postures: {1e3 * found.rms:.2g} mm" in words
     assert "Prior standard deviations of the table: 1 mm, 5 mrad." in words
@@ -179,10 +180,10 @@ def test_what_the_measurements_do_not_tell_is_held_by_the_prior(panda):
     seen = rm.dgm(arm, q)[:, :3, 3] + 2e-4 * rng.normal(size=(60, 3))
     result = fit(arm, Position(q, seen), **ALONE)
     assert result.held_by_prior
-    assert "Determined mainly by the prior" in result.report()
+    assert "Determined mainly by the prior" in report(result)
     assert not fit(arm, Position(q, seen), prior=None, **ALONE).held_by_prior
     held = [result.names.index(name) for name in result.held_by_prior]
-    assert np.abs(result.deviation[held]).max() < 5e-3
+    assert np.abs(result.corrections[held]).max() < 5e-3
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -201,7 +202,7 @@ def test_a_robot_far_from_nominal_is_not_taken_for_noise(seed):
     q = rng.uniform(-2.0, 2.0, (30, 6))
     seen = rm.dgm(real, q)[:, :3, 3] + 1e-4 * rng.normal(size=(30, 3))
     result = fit(arm, Position(q, seen), **ALONE)
-    assert result.after.summary("m").rms < 3e-4
+    assert result.validation.in_sample.rms["m"] < 3e-4
     assert any("increased" in n and "of angles from 0.005" in n for n in result.notes)
     fresh = rng.uniform(-2.0, 2.0, (100, 6))
     error = (rm.dgm(result.model, fresh) - rm.dgm(real, fresh))[:, :3, 3]
@@ -272,7 +273,7 @@ def test_nearly_parallel_axes_do_not_drive_lengths_away(seed):
     )
     assert apart(result.model) < 0.6 * apart(arm)
     assert apart(result.model) < 1.1 * apart(shared.model)
-    assert np.abs(result.deviation[np.array(result.units) == "m"]).max() < 0.01
+    assert np.abs(result.corrections[np.array(result.units) == "m"]).max() < 0.01
 
 
 def test_exact_data_leave_another_tool_in_doubt():
@@ -324,5 +325,5 @@ def test_what_only_the_solution_tells_joins_the_fit():
     q = rng.uniform(-2.0, 2.0, (80, 6))
     p = rm.dgm(real, q)[:, :3, 3] + 1e-5 * rng.normal(size=(80, 3))
     result = fit(arm, Position(q, p), **ALONE)
-    assert set(result.again.names) <= set(result.names)
-    assert result.after.summary("m").rms < 3e-5
+    assert set(result.identifiable_after.names) <= set(result.names)
+    assert result.validation.in_sample.rms["m"] < 3e-5

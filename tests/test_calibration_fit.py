@@ -142,9 +142,9 @@ def test_poses_tell_all_of_the_robot(scene):
     assert len(result.names) == 30  # 4 R + 2 P + 6
     assert result.status is FitStatus.CONVERGED
     assert np.abs(rm.dgm(result.model, scene.fresh) - rm.dgm(scene.real, scene.fresh)).max() < EXACT
-    assert result.given.summary("m").rms > 5e-3
-    assert result.after.summary("m").largest < EXACT
-    assert result.after.summary("rad").largest < EXACT
+    assert result.validation.given.rms["m"] > 5e-3
+    assert result.validation.in_sample.max["m"] < EXACT
+    assert result.validation.in_sample.max["rad"] < EXACT
 
 
 def test_positions_tell_all_but_the_tool_s_orientation(scene):
@@ -339,8 +339,8 @@ def test_a_base_three_metres_away_and_turned_is_found(scene, kind):
     error = rm.dgm(result.model, scene.fresh) - rm.dgm(real, scene.fresh)
     assert np.abs(error[:, :3, 3]).max() < EXACT
     # errors before are those of the table, not of where the robot stands
-    assert result.given.summary("m").mean > 1.0
-    assert result.before.summary("m").mean < 0.02
+    assert result.validation.given.mean["m"] > 1.0
+    assert result.validation.nominal.mean["m"] < 0.02
 
 
 def test_a_tool_that_is_not_known_is_found(scene):
@@ -386,7 +386,7 @@ def test_stated_deviations_are_those_of_many_repeats():
         result = fit(s.nominal, Pose(s.q, s.noisy()), **ALONE)
         k = result.names.index("d3")
         errors.append(result.values[k] - s.real.table.d[2])
-        stated.append(result.standard_deviation[k])
+        stated.append(result.standard_errors[k])
     # d3 is told by itself: the length between two parallel axes
     size = np.sqrt(np.mean((np.array(errors) / stated) ** 2))
     assert 0.7 < size < 1.35  # chi squared of 30, 99 %
@@ -411,11 +411,11 @@ def test_outliers_do_not_move_a_robust_fit():
     robust = fit(s.nominal, Position(s.q, p), loss="tukey", **ALONE)
     plain = fit(s.nominal, Position(s.q, p), **ALONE)
     assert robust.names == clean.names
-    moved = np.abs(robust.values - clean.values) / robust.standard_deviation
+    moved = np.abs(robust.values - clean.values) / robust.standard_errors
     assert moved.max() < 1.0
     assert set(bad) <= set(robust.solution.fit.outliers)
     # while least squares is moved by many times the deviation of clean data
-    assert (np.abs(plain.values - clean.values) / clean.standard_deviation).max() > 5.0
+    assert (np.abs(plain.values - clean.values) / clean.standard_errors).max() > 5.0
 
 
 @pytest.mark.parametrize("states_noise", [True, False])
@@ -441,7 +441,7 @@ def test_millimetres_and_metres_give_the_same_answer(states_noise):
     scale = np.where(np.array(metres.units) == "m", unit, 1.0)
     for one, other in (
         (metres.values, millimetres.values),
-        (metres.standard_deviation, millimetres.standard_deviation),
+        (metres.standard_errors, millimetres.standard_errors),
     ):
         assert np.abs(one - other / scale).max() < EXACT
 
@@ -462,10 +462,11 @@ def test_measurements_kept_aside_have_no_say():
     one = fit(s.nominal, train, held_out=aside, folds=0)
     other = fit(s.nominal, train, held_out=with_row_off(aside, 3), folds=0)
     assert np.array_equal(one.values, other.values)
-    assert np.array_equal(one.standard_deviation, other.standard_deviation)
+    assert np.array_equal(one.standard_errors, other.standard_errors)
     truth = p[40:] - rm.dgm(one.model, s.q[40:])[:, :3, 3]
-    assert one.held_out.after.position == pytest.approx(np.linalg.norm(truth, axis=1), abs=1e-12)
-    changed = np.flatnonzero(one.held_out.after.position != other.held_out.after.position)
+    here, there = (r.validation.held_out.position for r in (one, other))
+    assert here == pytest.approx(np.linalg.norm(truth, axis=1), abs=1e-12)
+    changed = np.flatnonzero(here != there)
     assert changed.tolist() == [3]
 
 
@@ -475,7 +476,7 @@ def test_errors_aside_are_of_fits_without_them(way):
     measured = Position(s.q, s.noisy()[:, :3, 3])
     options = {"folds": 5, "held_out": 0} if way == "folds" else {"folds": 0, "held_out": 0.2}
     result = fit(s.nominal, measured, rng=3, **options)
-    aside = result.cross_validation if way == "folds" else result.held_out
+    aside = result.validation.folds if way == "folds" else result.validation.held_out
     assert sorted(aside.blocks) == list(range(50)) if way == "folds" else len(aside.blocks) == 10
     first = np.sort(aside.blocks[:10])
     near = np.arange(first[0] - 3, first[-1] + 4)  # what is next to a run resembles it
@@ -483,33 +484,33 @@ def test_errors_aside_are_of_fits_without_them(way):
     kept = np.setdiff1d(np.arange(50), near)
     alone = fit(s.nominal, measured.subset(kept), **ALONE)
     gap = measured.p[first] - rm.dgm(alone.model, s.q[first])[:, :3, 3]
-    found = aside.after.position[:10][np.argsort(aside.blocks[:10])]
+    found = aside.position[:10][np.argsort(aside.blocks[:10])]
     assert found == pytest.approx(np.linalg.norm(gap, axis=1), abs=1e-8)
 
 
 def test_an_outlier_aside_does_not_reach_its_own_prediction():
     s = Scene(seed=9, count=50)
     measured = Position(s.q, s.noisy()[:, :3, 3])
-    good = fit(s.nominal, measured, rng=3, folds=5, held_out=0).cross_validation
-    bad = fit(s.nominal, with_row_off(measured, 17), rng=3, folds=5, held_out=0).cross_validation
+    good = fit(s.nominal, measured, rng=3, folds=5, held_out=0).validation.folds
+    bad = fit(s.nominal, with_row_off(measured, 17), rng=3, folds=5, held_out=0).validation.folds
     at = int(np.flatnonzero(good.blocks == 17)[0])
     fold = np.arange(10 * (at // 10), 10 * (at // 10) + 10)
     others = fold[fold != at]
-    assert bad.after.position[others] == pytest.approx(good.after.position[others], abs=1e-8)
-    assert bad.after.position[at] == pytest.approx(0.02, abs=1e-3)
+    assert bad.position[others] == pytest.approx(good.position[others], abs=1e-8)
+    assert bad.position[at] == pytest.approx(0.02, abs=1e-3)
     # and every other fold is spoilt by it
     rest = np.setdiff1d(np.arange(50), fold)
-    assert bad.after.position[rest].mean() > 2.0 * good.after.position[rest].mean()
+    assert bad.position[rest].mean() > 2.0 * good.position[rest].mean()
 
 
 def test_errors_aside_are_larger_than_those_of_what_was_fitted():
     s = Scene(seed=10, count=25)
     result = fit(s.nominal, Pose(s.q, s.noisy()))
-    inside, aside = result.after.summary("m").rms, result.cross_validation.after.summary("m").rms
+    inside, aside = result.validation.in_sample.rms["m"], result.validation.folds.rms["m"]
     assert inside < 1.8e-4 < aside
-    assert result.cross_validation.before.summary("m").rms > 1e-3
-    assert result.cross_validation.folds == 5
-    assert result.held_out is not None
+    assert result.validation.folds.nominal.rms["m"] > 1e-3
+    assert result.validation.folds.fits == 5
+    assert result.validation.held_out is not None
 
 
 # --- more than a table ----------------------------------------------------------------------------
@@ -522,7 +523,7 @@ def heavy():
 
 
 def predicted(result, q):
-    return differential_model(result.parameters, q, result.deviation)[0]
+    return differential_model(result.parameters, q, result.corrections)[0]
 
 
 def test_gains_and_couplings_are_recovered(heavy):
@@ -618,7 +619,7 @@ def test_bending_of_links_is_recovered(heavy):
     result = fit(heavy, Pose(q, bent(q)), compliance="links", **ALONE)
     assert np.abs(predicted(result, fresh) - bent(fresh)).max() < EXACT
     rigid = fit(heavy, Pose(q, bent(q)), **ALONE)
-    assert rigid.after.summary("m").rms > 1e-4
+    assert rigid.validation.in_sample.rms["m"] > 1e-4
 
 
 @pytest.mark.parametrize("kind", ["isotropic", "uniform"])
@@ -675,7 +676,7 @@ def test_only_named_parameters_are_estimated(scene):
     for given in (names, candidate_parameters(scene.nominal).subset(names)):
         result = fit(scene.nominal, Pose(scene.q, T), parameters=given, **ALONE)
         assert result.names == ("theta2", "theta3", "d3")
-        assert result.deviation == pytest.approx([0.002, -0.003, 0.0], abs=EXACT)
+        assert result.corrections == pytest.approx([0.002, -0.003, 0.0], abs=EXACT)
         assert np.array_equal(result.model.tool, scene.nominal.tool)
 
 
@@ -700,10 +701,10 @@ def test_a_prior_pulls_to_the_nominal_robot_where_data_say_little():
         for r in (plain, pulled)
     ]
     assert error[1] < 0.7 * error[0]
-    assert pulled.after.summary("m").rms > plain.after.summary("m").rms
+    assert pulled.validation.in_sample.rms["m"] > plain.validation.in_sample.rms["m"]
     tight = fit(s.nominal, measured, prior=ParameterPrior(1e-12, 1e-12), **ALONE)
     of_table = [k for k, e in enumerate(tight.parameters.entries) if 0 < e.row <= 6]
-    assert np.abs(tight.deviation[of_table]).max() < 1e-9
+    assert np.abs(tight.corrections[of_table]).max() < 1e-9
 
 
 def test_the_strength_of_a_prior_follows_the_data():
@@ -728,7 +729,7 @@ def test_truncation_leaves_out_what_is_hardly_seen():
     seen = Position(q, T[:, :3, 3])
     cut = fit(s.nominal, seen, truncation=1e-3, prior=None, **ALONE)
     assert cut.solution.fit.rank == len(cut.names) - 4
-    assert np.abs(cut.deviation).max() < 0.01
+    assert np.abs(cut.corrections).max() < 0.01
     # without it, as many parameters stay where they are by name
     named = fit(s.nominal, seen, prior=None, **ALONE)
     assert len(named.identifiable.of_reason(Reason.NOISE)) == 4

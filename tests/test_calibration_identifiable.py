@@ -15,10 +15,9 @@ from robotmodels.calibration import (
     Reason,
     candidate_parameters,
     differential_model,
-    identifiable_on,
 )
 from robotmodels.calibration.identifiability.changed import identifiability_change
-from robotmodels.calibration.identifiability.identifiable import DEPENDENT
+from robotmodels.calibration.identifiability.identifiable import DEPENDENT, identifiable_on
 from robotmodels.calibration.identifiability.structural import identifiable_parameters
 from robotmodels.calibration.measurements.kinds import Kind, as_kind, drawn_groups
 from robotmodels.errors import InvalidValueError
@@ -346,5 +345,5 @@ def test_the_unit_of_length_does_not_tell_what_is_identifiable(unit):
     assert other.names == one.names
     assert other_contact == contact
     assert (other_exact, other.status) == (exact, one.status)
-    rms = other.after.summary("m").rms / unit
-    assert rms == pytest.approx(one.after.summary("m").rms, rel=1e-9)
+    rms = other.validation.in_sample.rms["m"] / unit
+    assert rms == pytest.approx(one.validation.in_sample.rms["m"], rel=1e-9)

@@ -7,10 +7,10 @@ import pytest
 from identities.random_robots import random_model, random_pose, random_state
 
 import robotmodels as rm
-from robotmodels.calibration import Reason, candidate_parameters, differential_model, problem_of
+from robotmodels.calibration import Reason, candidate_parameters, differential_model
+from robotmodels.calibration.combined_arms import combine_arms
 from robotmodels.calibration.identifiability.identifiable import identifiable_on
 from robotmodels.calibration.identifiability.structural import identifiable_parameters
-from robotmodels.calibration.joined import side_by_side
 from robotmodels.calibration.measurements import (
     AxisPosition,
     CameraPose,
@@ -30,7 +30,7 @@ from robotmodels.calibration.measurements import (
 )
 from robotmodels.calibration.measurements.noise import whitened
 from robotmodels.calibration.measurements.pivots import pivot_of
-from robotmodels.calibration.problem import guessed_fixtures, linearised, satisfying
+from robotmodels.calibration.problem import guessed_fixtures, linearised, problem_of, satisfying
 from robotmodels.errors import InvalidValueError, NotARotationError, ShapeError
 
 B = 12
@@ -210,7 +210,7 @@ def test_residuals_vanish_for_the_robot_that_was_measured_and_the_guess_finds_it
 @pytest.mark.parametrize("kind", CONSTRAINTS)
 def test_readings_are_moved_to_where_a_constraint_holds(kind):
     rng = np.random.default_rng(8)
-    pair = side_by_side(rm.load("ur10e"), rm.load("rx90"), random_pose(rng))
+    pair = combine_arms(rm.load("ur10e"), rm.load("rx90"), random_pose(rng))
     ends = ("a_tool", "b_tool")
     q0 = rng.uniform(-1.5, 1.5, 12)
     candidates = candidate_parameters(pair, ends)
@@ -478,7 +478,7 @@ def test_what_two_arms_or_a_camera_on_the_arm_tell_is_judged(kind):
         assert found.count == 4 * 6 + 6 - 6
         assert set(found.of_reason(Reason.GAUGE)) >= {"b0", "d0", "r0"}
         return
-    pair = side_by_side(rm.load("ur10e"), rm.load("rx90"), rm.se3.translation(0.9, 0.1, 0.0))
+    pair = combine_arms(rm.load("ur10e"), rm.load("rx90"), rm.se3.translation(0.9, 0.1, 0.0))
     ends = ("a_tool", "b_tool")
     q0 = np.array([0.2, -1.0, 1.4, 0.3, 1.0, 0.1, 2.8, -0.9, 1.2, 0.4, 0.9, -0.2])
     candidates = candidate_parameters(pair, ends)

@@ -9,14 +9,8 @@ from identities.random_robots import random_bodies
 from test_calibration_fit import erroneous, touching
 
 import robotmodels as rm
-from robotmodels.calibration import (
-    ParameterPrior,
-    PointContact,
-    Pose,
-    Position,
-    fit,
-    report_text,
-)
+from robotmodels.calibration import ParameterPrior, PointContact, Pose, Position, fit
+from robotmodels.calibration.report import report
 
 NOISE = 1e-4
 """Standard deviation of positions, m."""
@@ -134,7 +128,7 @@ def test_the_term_brings_on_fresh_data_what_it_promises(kind):
         fresh = scene.measured(200)
         without, with_it = (
             fit(scene.arm, measured, prior=ParameterPrior(), folds=0, held_out=fresh, **options)
-            .held_out.after.summary("m").rms
+            .validation.held_out.rms["m"]
             for options in ({}, OPTIONS[promise[0]])
         )  # fmt: skip
         ratios.append((without - with_it) / (promise[1] - promise[2]))
@@ -199,7 +193,7 @@ def test_what_a_prior_holds_back_is_geometry():
     scene = Scene(2)
     tight = ParameterPrior(length=1e-5, angle=1e-5)
     result = fit(scene.arm, scene.measured(80), prior=tight, folds=0, held_out=0)
-    assert result.after.summary("m").rms > 3 * NOISE
+    assert result.validation.in_sample.rms["m"] > 3 * NOISE
     assert not note(result)
 
 
@@ -263,7 +257,7 @@ def test_without_folds_nothing_is_tried():
 
 
 def test_the_report_says_it():
-    text = " ".join(report_text(fitted(0, "compliance")[2]).split())
+    text = " ".join(report(fitted(0, "compliance")[2]).split())
     assert "Not geometry: the residuals depend on the posture" in text
     assert "Try joint compliance next." in text
     assert "Standard errors assume independent residuals and are too short." in text

@@ -12,7 +12,7 @@ Q = rng.uniform(-2.0, 2.0, (60, 6))
 
 
 def rms(errors):
-    return [e.summary("m").rms for e in errors]
+    return [e.rms["m"] for e in errors]
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +59,7 @@ def test_the_least_errors_are_those_of_a_fit_of_base_and_tool(arm):
     for free, errors in ((base, found[1]), ((*base, "b7", "d7", "r7"), found[2])):
         fitted = cal.fit(arm, truth, parameters=free, folds=0, held_out=0.0)
         # the fit fixes what it cannot tell, which moves no position
-        assert errors.summary("m").rms == pytest.approx(fitted.after.summary("m").rms, rel=1e-9)
+        assert errors.rms["m"] == pytest.approx(fitted.validation.in_sample.rms["m"], rel=1e-9)
 
 
 def test_joint_errors_and_compliance_are_of_the_robot_that_is_judged(arm):
@@ -102,7 +102,7 @@ def test_mistakes_are_told(arm):
         cal.true_errors(arm, arm, Q[:2])
     with pytest.raises(InvalidValueError, match="robot with the 6 joints"):
         cal.true_errors(arm, rm.load("planar_2r"), Q)
-    with pytest.raises(InvalidValueError, match="expected a RobotModel"):
+    with pytest.raises(InvalidValueError, match="expected a CalibratedRobot"):
         cal.true_errors("rx90", arm, Q)
     with pytest.raises(ShapeError):
         cal.true_errors(arm, arm, Q[:, :5])

@@ -11,8 +11,8 @@ from ..csv_table import CsvTable
 from ..errors import InvalidValueError
 from ..model import RobotModel
 from .extended_table.skeleton import Frame
+from .joint_readings import beyond_limits
 from .measurements.measurement import FileRow
-from .reading_limits import beyond_limits
 
 _UNIT = 1e-3
 """How far from 1 the length of a quaternion of few digits may be."""

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from .._arrays import Array, Rebuilt
 from ..errors import InvalidValueError, ShapeError
-from .expected_joints import expected_joints_text
 from .extended_table.differential import differential_model
 from .extended_table.parameters import GeometricParameters
+from .joint_readings import expected_joints_text
 from .measurements import Evaluation, Fixture, Linearised, Measurement, PointContact
 from .measurements.noise import whitened
 

@@ -18,10 +18,10 @@ from ..geometry import REVOLUTE
 from ..kinematics import OrientationKind, dgm, pose_from_coordinates
 from ..kinematics.coordinates.kinds import orientation_kind
 from ..model import RobotModel, check_model
-from .expected_joints import expected_joints_text
 from .extended_table.skeleton import Frame
 from .file_kinds import CONTACTS, FileKind, as_file_kind
 from .files_read import check_columns, check_contents, rows_read
+from .joint_readings import expected_joints_text
 from .length_units import unit_error_of_positions, unit_error_of_spread
 from .measurements import Distance, Measurement, Pose, Position, RelativePose
 from .measurements.measurement import of_files

@@ -5,33 +5,32 @@ from __future__ import annotations
 import json
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from ..._arrays import Array
-from ...errors import InvalidValueError, MissingExtraError, UrdfWarning
-from ...estimation import confidence_intervals
-from ...model import to_urdf
-from ...urdf.in_place import urdf_in_place
-from ..calibrated_robot.calibrated import CalibratedRobot
-from ..errors_seen import BlockErrors
+from .._arrays import Array
+from ..errors import InvalidValueError, MissingExtraError, UrdfWarning
+from ..estimation import confidence_intervals
+from ..model import to_urdf
+from ..urdf.in_place import urdf_in_place
+from .calibrated_robot.calibrated import CalibratedRobot
+from .result import CalibrationResult
+from .solve import states_noise
+from .validation import Errors, HeldOutErrors
 
-if TYPE_CHECKING:
-    from ..result import CalibrationResult
-
-_FORMAT = 1
-"""Raised when the meaning of an entry changes."""
-_YAML = (".yaml", ".yml")
+_FORMAT = 2
+"""Raised when the meaning or the name of an entry changes."""
+_COLUMNS = ("gamma", "b", "beta", "alpha", "d", "theta", "r")
 
 
 def write_result(result: CalibrationResult, path: str | Path) -> None:
-    """Write a calibration; the suffix of the file says how.
+    """Write a calibration to a file whose suffix gives its format.
 
-    ``.json`` and ``.yaml`` hold the same (SI units, stated beside each parameter; what is not
-    finite is null). YAML is written by PyYAML, which the package's own dependencies bring (meshcat
-    needs pyngrok, which needs it). To keep everything and go on with it in Python, pickle the
-    result: files hold what other programs need.
+    ``.json`` and ``.yaml`` hold the same (SI units, stated beside each parameter; null for numbers
+    that are not finite). YAML is written by PyYAML, which the package's own dependencies bring
+    (meshcat needs pyngrok, which needs it). To keep everything and go on with it in Python, pickle
+    the result: files hold what other programs need.
 
     Parameters
     ----------
@@ -45,7 +44,7 @@ def write_result(result: CalibrationResult, path: str | Path) -> None:
     InvalidValueError
         Another suffix.
     MissingExtraError
-        PyYAML is not there.
+        PyYAML is not installed.
     UrdfError
         As `calibrated_urdf`.
     OSError
@@ -79,7 +78,7 @@ def write_result(result: CalibrationResult, path: str | Path) -> None:
         text = calibrated_urdf(result.robot)
     elif suffix == ".json":
         text = json.dumps(result_data(result), indent=2, ensure_ascii=False) + "\n"
-    elif suffix in _YAML:
+    elif suffix in (".yaml", ".yml"):
         try:
             import yaml
         except ImportError:
@@ -95,64 +94,53 @@ def write_result(result: CalibrationResult, path: str | Path) -> None:
 
 
 def result_data(result: CalibrationResult) -> dict[str, Any]:
-    """A calibration as plain lists, numbers and words, as `write_result` writes it.
-
-    Parameters
-    ----------
-    result : CalibrationResult
-        Of `fit`.
-
-    Returns
-    -------
-    dict
-        SI units; None for what is not finite.
-
-    References
-    ----------
-    Seed book section 1.4.6.
-
-    Examples
-    --------
-    >>> import robotmodels as rm
-    >>> import robotmodels.calibration as calibration
-    >>> arm = rm.load("rx90")
-    >>> q = np.random.default_rng(0).uniform(-1.5, 1.5, (40, 6))
-    >>> result = calibration.fit(arm, calibration.Pose(q, rm.dgm(arm, q)), folds=0, held_out=0.0)
-    >>> result_data(result)["parameters"][0]["unit"]
-    'm'
-    """
+    """A calibration as plain lists, numbers and words, SI units; None for what is not finite."""
     fit, problem = result.solution.fit, result.solution.problem
     interval = confidence_intervals(fit)
-    start = result.parameters.nominal
-    fixture_std = fit.standard_errors[problem.P :]
+    validation, table = result.validation, result.model.table
+    columns = zip(
+        result.names, result.units, result.parameters.nominal, result.corrections, result.values,
+        result.standard_errors, interval, strict=False,
+    )  # fmt: skip
+    fixtures = zip(problem.fixtures, result.solution.fixtures, strict=True)
+    errors_of_fixtures = fit.standard_errors[problem.P :]
     return {
         "format": _FORMAT,
         "robot": result.nominal.name,
-        "status": {"name": result.status.name, "sentence": result.status.sentence},
+        "status": {"name": result.status.name, "sentence": result.reason()},
         "measurements": [
             {
-                "name": m.name, "kind": type(m).__name__, "blocks": m.blocks,
-                "rows": list(m.axes), "units": list(m.units),
-                "noise": _numbers(scale) if m.sigma is None and m.covariance is None else None,
+                "name": m.name,
+                "kind": type(m).__name__,
+                "blocks": m.blocks,
+                "rows": list(m.axes),
+                "units": list(m.units),
+                "noise": None if states_noise(m) else _numbers(scale),
                 "files": [{"name": file.name, "rows": file.rows} for file in m.files],
             }
             for m, scale in zip(problem.measurements, result.solution.scales, strict=True)
         ],
         "parameters": [
             {
-                "name": name, "unit": unit, "start": _number(start[k]),
-                "deviation": _number(result.deviation[k]), "value": _number(result.values[k]),
-                "std": _number(result.standard_deviation[k]), "interval_95": _numbers(interval[k]),
+                "name": name,
+                "unit": unit,
+                "start": _number(start),
+                "correction": _number(correction),
+                "value": _number(value),
+                "standard_error": _number(error),
+                "interval_95": _numbers(ends),
             }
-            for k, (name, unit) in enumerate(zip(result.names, result.units, strict=True))
+            for name, unit, start, correction, value, error, ends in columns
         ],
         "covariance": [_numbers(row) for row in result.covariance],
         "fixtures": [
             {
-                "name": fixture.name, "unit": fixture.unit,
-                "value": _number(result.fixtures[fixture.name]), "std": _number(fixture_std[k]),
+                "name": fixture.name,
+                "unit": fixture.unit,
+                "value": _number(value),
+                "standard_error": _number(errors_of_fixtures[k]),
             }
-            for k, fixture in enumerate(problem.fixtures)
+            for k, (fixture, value) in enumerate(fixtures)
         ],
         "known": list(result.known),
         "left_out": {name: why.name for name, why in result.identifiable.reasons.items()},
@@ -160,13 +148,13 @@ def result_data(result: CalibrationResult) -> dict[str, Any]:
             name: {other: float(c) for other, c in terms.items()}
             for name, terms in result.identifiable.regrouping.items()
         },
-        "condition": _number(result.again.condition),
+        "condition": _number(result.identifiable_after.condition),
         "errors": {
-            "given": _errors(result.given),
-            "before": _errors(result.before),
-            "after": _errors(result.after),
-            "folds": _aside(result.cross_validation),
-            "held_out": _aside(result.held_out),
+            "given": _errors(validation.given),
+            "nominal": _errors(validation.nominal),
+            "in_sample": _errors(validation.in_sample),
+            "folds": _held_out(validation.folds),
+            "held_out": _held_out(validation.held_out),
         },
         "outliers": [int(block) for block in fit.outliers],
         "base": [_numbers(row) for row in result.model.base],
@@ -175,38 +163,28 @@ def result_data(result: CalibrationResult) -> dict[str, Any]:
             {"frame": end.frame, "parent": int(end.parent), "pose": [_numbers(r) for r in end.pose]}
             for end in result.robot.ends
         ],
-        "table": _table(result),
+        "table": [
+            {
+                "name": str(table.names[j]),
+                "antecedent": int(table.antecedent[j]),
+                "sigma": int(table.sigma[j]),
+                **{word: _number(getattr(table, word)[j]) for word in _COLUMNS},
+            }
+            for j in range(table.f)
+        ],
         "notes": [*result.notes, *result.robot.notes],
-    }  # fmt: skip
+    }
 
 
-def _table(result: CalibrationResult) -> list[dict[str, Any]]:
-    table = result.model.table
-    columns = ("gamma", "b", "beta", "alpha", "d", "theta", "r")
-    return [
-        {
-            "name": str(table.names[j]), "antecedent": int(table.antecedent[j]),
-            "sigma": int(table.sigma[j]),
-            **{word: _number(getattr(table, word)[j]) for word in columns},
-        }
-        for j in range(table.f)
-    ]  # fmt: skip
+def _errors(errors: Errors) -> dict[str, Any]:
+    words = {"rms": errors.rms, "mean": errors.mean, "max": errors.max, "count": errors.count}
+    return {unit: {word: by_unit[unit] for word, by_unit in words.items()} for unit in errors.count}
 
 
-def _errors(errors: BlockErrors) -> dict[str, Any]:
-    return {
-        unit: None if not (s := errors.summary(unit)).blocks else
-        {"rms": s.rms, "mean": s.mean, "max": s.largest, "blocks": s.blocks}
-        for unit in ("m", "rad")
-    }  # fmt: skip
-
-
-def _aside(errors: Any) -> dict[str, Any] | None:
+def _held_out(errors: HeldOutErrors | None) -> dict[str, Any] | None:
     if errors is None:
         return None
-    return {
-        "fits": errors.folds, "before": _errors(errors.before), "after": _errors(errors.after)
-    }  # fmt: skip
+    return {"fits": errors.fits, "nominal": _errors(errors.nominal), "after": _errors(errors)}
 
 
 def _number(value: Any) -> float | None:
@@ -244,7 +222,7 @@ def calibrated_urdf(robot: CalibratedRobot) -> str:
     str
         Text that `RobotModel.from_urdf` reads back to the same poses of the tool and the measured
         links, with the same ``base_link`` and ``tip_link`` (``tip_link="tool"`` if that is new).
-        Its joint variables are where the joints are, not what they read.
+        Its joint variables are the positions of the joints, not their readings.
 
     Raises
     ------
@@ -262,7 +240,8 @@ def calibrated_urdf(robot: CalibratedRobot) -> str:
 
     Examples
     --------
-    >>> from robotmodels.calibration import calibrated_model, candidate_parameters
+    >>> from robotmodels.calibration import candidate_parameters
+    >>> from robotmodels.calibration.calibrated_robot.calibrated import calibrated_model
     >>> from robotmodels.model import RobotModel
     >>> from robotmodels.robots import load
     >>> parameters = candidate_parameters(load("lab_rr"))
@@ -270,14 +249,14 @@ def calibrated_urdf(robot: CalibratedRobot) -> str:
     >>> RobotModel.from_urdf(text).n
     2
     """
+    notes, K = [*robot.notes], robot.model.transmission
     if robot.model.source is None:
         text = to_urdf(robot.model)
     else:
         measured = [end.frame for end in robot.ends if isinstance(end.frame, str)]
         text = urdf_in_place(robot.model.parts, measured)
-    notes, K = [*robot.notes], robot.model.transmission
-    if K is not None and K.is_invertible and robot.model.source is not None:
-        notes.append("The transmission is in model: the joints of the text are the table's.")
+        if K is not None and K.is_invertible:
+            notes.append("The transmission is in model: the joints of the text are the table's.")
     if notes:
         warnings.warn(
             f"Not in the URDF: {' '.join(notes)} Keep the calibrated robot (pickle) to keep them.",
