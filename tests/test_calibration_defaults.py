@@ -18,10 +18,10 @@ from robotmodels.calibration import (
     candidate_parameters,
     differential_model,
     fit,
-    other_tool_error,
     report,
 )
 from robotmodels.calibration.alignment import best_motion
+from robotmodels.calibration.other_tool import other_tool_error
 
 ALONE = {"folds": 0, "held_out": 0}
 ARMS = range(100, 130)

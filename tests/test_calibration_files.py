@@ -357,7 +357,7 @@ def test_json_and_yaml_hold_the_result(result, tmp_path):
     np.testing.assert_allclose(data["covariance"], result.covariance)
     assert {f["name"]: f["value"] for f in data["fixtures"]} == result.fixtures
     assert len(data["fixtures"]) == 6
-    assert data["errors"]["after"]["m"]["rms"] == result.validation.in_sample.rms["m"]
+    assert data["errors"]["in_sample"]["m"]["rms"] == result.validation.in_sample.rms["m"]
     assert data["errors"]["folds"] is None
     assert data["measurements"][-1]["kind"] == "KnownDistance"
     np.testing.assert_allclose(data["tool"], result.model.tool)

@@ -255,7 +255,7 @@ def test_flat_scenes_are_low():
 def test_compliance_is_shown_in_whole_numbers(sockets):
     figure = plot_calibration_parameters(sockets)
     axes = figure.axes[2]
-    assert axes.get_xlabel() == "deviation (µrad/(N m))"
+    assert axes.get_xlabel() == "correction (µrad/(N m))"
     figure.draw_without_rendering()
     assert axes.xaxis.get_offset_text().get_text() == ""
     names = [text.get_text() for text in axes.get_yticklabels()]
@@ -308,7 +308,7 @@ def test_truth_in_the_order_of_the_parameters(results):
     given[at] = 1e-3
     shown = crosses(plot_calibration_parameters(result, truth=given))
     assert shown["theta3"] == pytest.approx(1e-3)
-    with pytest.raises(ShapeError, match="truth: expected one deviation"):
+    with pytest.raises(ShapeError, match="truth: expected one correction"):
         plot_calibration_parameters(result, truth=given[1:])
     with pytest.raises(InvalidValueError, match=r"truth: expected names of candidates.*theta33"):
         plot_calibration_parameters(result, truth={"theta33": 0.0})

@@ -1,7 +1,6 @@
 """Geometric calibration: from measurements, or from the robot touching things (section 1.4)."""
 
 from ..obstacles import Box, Sphere
-from .alignment import true_errors
 from .calibrated_robot.calibrated import CalibratedRobot, calibrated_model
 from .calibrated_robot.calibrated_pose import calibrated_pose
 from .combined_arms import combine_arms
@@ -29,7 +28,6 @@ from .measurements import (
     Position,
     RelativePose,
 )
-from .other_tool import other_tool_error
 from .prior import ParameterPrior
 from .read import read_measurements
 from .report import report
@@ -74,11 +72,9 @@ __all__ = [
     "identifiable_parameters",
     "joint_offsets",
     "observability",
-    "other_tool_error",
     "pose_offsets",
     "read_measurements",
     "report",
     "select_configurations",
-    "true_errors",
     "write_result",
 ]

@@ -143,43 +143,8 @@ class TrueErrors(NamedTuple):
 def true_errors(robot: Any, real: Any, q: ArrayLike, frame: Frame = None) -> TrueErrors:
     """Position errors of a robot against the one that it stands for (absolute accuracy).
 
-    Residuals of a fit are not the errors of the robot elsewhere; a simulation knows these.
-
-    Parameters
-    ----------
-    robot : RobotModel, CalibratedRobot or CalibrationResult
-        The robot that is judged, n joints.
-    real : RobotModel or CalibratedRobot
-        What it should be, n joints.
-    q : array_like, shape (N, n)
-        Readings of the joints, rad or m: three configurations or more, other ones than those of
-        the fit.
-    frame : str, int or None
-        The end; None is the tool.
-
-    Returns
-    -------
-    TrueErrors
-        `Errors` of N positions: ``as_it_stands``, ``base_fitted`` and ``base_and_tool_fitted``.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError, FrameNotFoundError
-        Not N rows of n finite numbers, fewer than three; something that is no robot, or robots
-        with different numbers of joints; an unknown frame.
-
-    References
-    ----------
-    Seed book sections 1.4.4 and 1.4.6; ISO 9283:1998, "Manipulating industrial robots:
-    performance criteria and related test methods", on the accuracy of poses.
-
-    Examples
-    --------
-    >>> import robotmodels as rm
-    >>> arm, q = rm.load("rx90"), np.random.default_rng(0).uniform(-2.0, 2.0, (50, 6))
-    >>> real = arm.with_base(rm.se3.translation(0.003, 0.0, 0.004))
-    >>> [round(1e3 * errors.rms["m"], 6) for errors in true_errors(arm, real, q)]
-    [5.0, 0.0, 0.0]
+    ``robot``: a model, a calibrated robot or the result of a fit; ``q``: three or more readings
+    (N, n), other ones than those of the fit; ``frame``: the end, None is the tool.
     """
     model, real_model = (x if isinstance(x, RobotModel) else as_calibrated(x).model
                          for x in (robot, real))  # fmt: skip

@@ -1,7 +1,6 @@
 """Measurements that contradict the others: known distances, and outliers under squares.
 
-The other measurements and the prior predict the distances: a wrong one is a shift of its row, and
-a mistake common to several a scale of their rows (mean-shift outlier models, chosen forward).
+The measurements without the known distances, and the prior, predict these and their covariance.
 
 Source: R. D. Cook, S. Weisberg, "Residuals and Influence in Regression", 1982, section 2.2.
 """
@@ -9,6 +8,7 @@ Source: R. D. Cook, S. Weisberg, "Residuals and Influence in Regression", 1982, 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -27,180 +27,131 @@ from .validation import errors_of
 
 _CONTRADICTED = 3.0
 """Difference from which a distance is reported, standard errors."""
-_AS_LIKELY = 6.0
-"""Difference of squared errors below which two explanations are about equally likely (1 to 20)."""
 _COMMON = 0.5
 """Part of the residuals assumed systematic, so that averaging over postures does not reduce it."""
-_ALONE = 1e-8
-"""1 - leverage of a row below which no other row predicts it."""
 _REFITS = 2
 """Largest number of fits without the outliers."""
 
 
 class Contradiction(NamedTuple):
-    """Known distances, numbers of their blocks, and their prediction by all else.
-
-    ``sigma``: standard deviation of their mean length; ``others`` and ``error``: prediction of it
-    and standard error, m; ``rivals``: distances of which one may be wrong instead.
-    """
+    """Known distances of one stated length, numbers of their blocks, and their prediction."""
 
     blocks: tuple[int, ...]
     measurements: tuple[KnownDistance, ...]
     sigma: float
-    others: float
+    """Standard deviation of their mean length, m."""
+    predicted: float
+    """Prediction of their mean length, m, by a source."""
     error: float
-    prior: bool
-    rivals: tuple[str, ...]
+    """Standard error of the prediction, m."""
+    source: str
+    rival: str
+    """A distance that may be wrong instead; empty for none."""
 
     def sentence(self) -> str:
         """The note about it."""
-        m, error, many = self.measurements[0], 1e3 * self.error, len(self.measurements)
-        length = 1e3 * math.fsum(m.length for m in self.measurements) / many
-        errors = abs(1e3 * self.others - length) / (1e3 * math.hypot(self.sigma, self.error))
+        m, many, error = self.measurements[0], len(self.measurements), 1e3 * self.error
+        length = 1e3 * m.length
+        errors = abs(1e3 * self.predicted - length) / (1e3 * math.hypot(self.sigma, self.error))
         digits = max(0, 1 - math.floor(math.log10(max(error, 1e-6))))
-        stated = f"{_named(m)}: stated {length:.6g} mm, but"
-        its = "Check the length, its two points, and its"
-        if many > 1:
-            equal = len({m.length for m in self.measurements}) == 1
-            stated = f"{many} known distances of {length:.6g} mm{'' if equal else ' in the mean'}:"
-            its = "Check the lengths, their points, and their"
-        either = f" It or {' or '.join(self.rivals)}: one of these." if self.rivals else ""
+        stated = f"{many} known distances of {length:.6g} mm:"
+        its = "Check the lengths, their points, and their"
+        if many == 1:
+            stated = f"{_named(m)}: stated {length:.6g} mm, but"
+            its = "Check the length, its two points, and its"
+        either = f" It or {self.rival}: one of these." if self.rival else ""
         return (
-            f"{stated} the other measurements{' and the prior' if self.prior else ''} predict "
-            f"{1e3 * self.others:.{digits}f} +- {error:.{digits}f} mm (a difference of "
-            f"{errors:.0f} standard errors). {its} standard deviation of "
-            f"{1e3 * self.sigma * math.sqrt(many):.2g} mm.{either}"
+            f"{stated} {self.source} predict {1e3 * self.predicted:.{digits}f} +- "
+            f"{error:.{digits}f} mm (a difference of {errors:.0f} standard errors). {its} standard "
+            f"deviation of {1e3 * self.sigma * math.sqrt(many):.2g} mm.{either}"
         )
 
 
 def contradictions(
     solution: Solution, given: ParameterPrior | None, size_is_known: bool
 ) -> list[Contradiction]:
-    """Known distances that differ from the prediction by all else, the first found first.
+    """Known distances that differ from the prediction by all other measurements.
 
     ``given`` is the prior before it was widened, perhaps to suit a wrong distance.
     """
     measurements = solution.problem.measurements
     numbers = [k for k, m in enumerate(measurements) if isinstance(m, KnownDistance)]
-    known = [m for m in measurements if isinstance(m, KnownDistance)]
-    if not known:
+    rival = ""
+    if numbers and not size_is_known and needs_a_length(_without(solution, numbers)[0], ()):
+        # where they alone give the scale, the first of them does
+        first, *numbers = numbers
+        rival = _named(measurements[first])  # type: ignore[arg-type]
+    if not numbers:
         return []
+    problem, scales = _without(solution, numbers)
+    others = refitted(solution, problem, solution.fit.x, scales, given)
+    if len(others.fit.dropped) > len(solution.fit.dropped):
+        return []
+    known = [m for m in measurements if isinstance(m, KnownDistance)][-len(numbers) :]
     sigma = np.array([_sigma(m, solution.scales[k]) for k, m in zip(numbers, known, strict=True)])
-    length = np.array([m.length for m in known])
-    is_open = not size_is_known and needs_a_length(_without(solution, numbers)[0], ())
-    # where they alone give the scale, one of them does, and then the scale is left open
-    M, v = _evidence(solution, numbers[1:] if is_open else numbers, numbers, sigma, given)
-    if is_open:
-        M, v = _explained(M, v, length / sigma)
-    groups = [(k,) for k in range(len(known))]
-    if size_is_known:
-        alike = [tuple(np.flatnonzero(length == value).tolist()) for value in np.unique(length)]
-        groups += [g for g in dict.fromkeys([*alike, tuple(range(len(known)))]) if len(g) > 1]
-    columns = np.zeros((len(known), len(groups)))
-    for j, group in enumerate(groups):
-        columns[list(group), j] = (length / sigma)[list(group)]
-    chosen, rivals, rank = _chosen(M, v, columns, groups)
-    total = float(v @ np.linalg.pinv(M, rcond=_ALONE, hermitian=True) @ v)
-    while True:
-        G = columns[:, chosen]
-        spread = np.linalg.inv(G.T @ M @ G)
-        shift = spread @ (G.T @ v)
-        left = max(total - float(shift @ (G.T @ v)), 0.0) / max(rank - len(chosen), 1)
-        # differences among distances beyond their noise make what they have in common uncertain
-        many = np.array([len(groups[j]) > 1 for j in chosen], dtype=bool)
-        variance = np.diagonal(spread) * np.where(many, max(1.0, left), 1.0)
-        errors = shift**2 / variance
-        if not chosen or errors.min() > _CONTRADICTED**2:
-            break
-        worst = int(errors.argmin())
-        del chosen[worst], rivals[worst]
+    shift, covariance = _predicted_differences(solution, others, numbers, sigma)
     firsts = np.cumsum([0, *(m.blocks for m in measurements)])
     has_prior = bool(np.isfinite(solution.fit.prior.sigma).any())
     found = []
-    for j, s, square, others in zip(chosen, shift, variance, rivals, strict=True):
-        group = list(groups[j])
-        mean = float(length[group].mean())
-        of_mean = float(np.linalg.norm(sigma[group])) / len(group)
+    for group in _wrong_groups(shift, covariance, sigma, [m.length for m in known]):
+        size = len(group)
         found.append(
             Contradiction(
                 tuple(int(firsts[numbers[k]]) for k in group),
                 tuple(known[k] for k in group),
-                of_mean,
-                mean * (1.0 - s),
-                math.sqrt(max(square * mean**2 - of_mean**2, 0.0)),
-                has_prior,
-                tuple(_named(known[groups[k][0]]) for k in others),
+                float(np.linalg.norm(sigma[group])) / size,
+                known[group[0]].length + float(shift[group].mean()),
+                math.sqrt(covariance[np.ix_(group, group)].sum()) / size,
+                f"the other measurements{' and the prior' if has_prior else ''}",
+                rival,
             )
         )
     return found
 
 
-def _chosen(
-    M: Array, v: Array, columns: Array, groups: list[tuple[int, ...]]
-) -> tuple[list[int], list[list[int]], int]:
-    """Columns that explain v, one after the other, single columns that do so as well; rank of M."""
-    rank = int((np.linalg.eigvalsh(M) > _ALONE).sum())
-    chosen: list[int] = []
-    rivals: list[list[int]] = []
-    while len(chosen) < rank:
-        seen = np.einsum("kj,kl,lj->j", columns, M, columns)
-        has_effect = seen > _ALONE * (columns**2).sum(axis=0)
-        gain = np.where(has_effect, (columns.T @ v) ** 2 / np.where(has_effect, seen, 1.0), 0.0)
-        for j, group in enumerate(groups):
-            if len(group) > 1:  # a common mistake leaves no differences among its distances
-                at = list(group)
-                part = np.linalg.pinv(M[np.ix_(at, at)], rcond=_ALONE, hermitian=True)
-                gain[j] /= max(1.0, (v[at] @ part @ v[at] - gain[j]) / (len(at) - 1))
-        if gain.max() <= _CONTRADICTED**2:
-            break
-        # of explanations that are about equally likely, the one by the fewest mistakes
-        likely = np.flatnonzero(gain > gain.max() - _AS_LIKELY).tolist()
-        best = min(likely, key=lambda j: (len(groups[j]), -gain[j]))
-        chosen.append(best)
-        rivals.append([j for j in likely if j != best and len(groups[j] + groups[best]) == 2])
-        M, v = _explained(M, v, columns[:, best])
-    return chosen, rivals, rank
+def _wrong_groups(
+    shift: Array, covariance: Array, sigma: Array, lengths: Sequence[float]
+) -> list[list[int]]:
+    """Distances that are wrong, those of one length together where their mean is.
 
-
-def _explained(M: Array, v: Array, column: Array) -> tuple[Array, Array]:
-    """Evidence M, v that is left where the factor of a column is free."""
-    side = M @ column
-    size = float(column @ side)
-    if size <= _ALONE * float(column @ column):
-        return M, v
-    return M - np.outer(side, side) / size, v - side * float(column @ v) / size
-
-
-def _evidence(
-    solution: Solution,
-    left_out: list[int],
-    numbers: list[int],
-    sigma: Array,
-    given: ParameterPrior | None,
-) -> tuple[Array, Array]:
-    """Inverse covariance M (K, K) of (stated - predicted lengths) / sigma, and M times them (K,).
-
-    By the fit without distances; by that with them where the other determines less.
+    Shapes: shift, sigma (K,); covariance (K, K).
     """
-    problem, scales = _without(solution, left_out)
-    without = refitted(solution, problem, solution.fit.x, scales, given)
-    is_less = len(without.fit.dropped) > len(solution.fit.dropped)
-    fit, x = (solution.fit, solution.fit.x) if is_less else (without.fit, _unbiased(without))
-    others = [k for k in range(len(solution.scales)) if k not in numbers]
-    distances, scales = _without(solution, others)
+    variance = covariance + np.diag(sigma**2)
+    limit = _CONTRADICTED**2
+    groups, left = [], []
+    for length in dict.fromkeys(lengths):
+        alike = [k for k, other in enumerate(lengths) if other == length]
+        mean = float(shift[alike].mean())
+        apart = (shift[alike] - mean) ** 2 <= limit * variance[alike, alike]
+        total = float(variance[np.ix_(alike, alike)].sum()) / len(alike) ** 2
+        if len(alike) > 1 and apart.all() and mean**2 > limit * total:
+            groups.append(alike)
+        else:
+            left += alike
+    while left:  # differences given that the others are right
+        inverse = np.linalg.inv(variance[np.ix_(left, left)])
+        beyond = (inverse @ shift[left]) ** 2 > limit * np.diagonal(inverse)
+        alone = shift[left] ** 2 / variance[left, left]
+        if not beyond.any():
+            break
+        groups.append([left.pop(int(np.argmax(np.where(beyond, alone, -1.0))))])
+    return groups
+
+
+def _predicted_differences(
+    solution: Solution, others: Solution, numbers: list[int], sigma: Array
+) -> tuple[Array, Array]:
+    """Predicted less stated lengths (K,), m, and the covariance of the prediction (K, K)."""
+    rest = [k for k in range(len(solution.scales)) if k not in numbers]
+    distances, scales = _without(solution, rest)
+    x = _unbiased(others)
     residual, jacobian = stacked(distances, x, scales)
-    T, unit = jacobian @ fit.basis, np.eye(len(numbers))
-    if is_less:  # the whitened residuals are M times the differences, and I - T T' is M
-        M, v = unit - T @ T.T, -residual
-    else:
-        M = np.linalg.inv(unit + T @ T.T)
-        v = -M @ residual
+    T = sigma[:, None] * (jacobian @ others.fit.basis)
     rms = errors_of(solution.problem, x[: distances.P], x[distances.P :]).rms["m"]
-    damped = np.linalg.inv(unit + M @ np.diag((_COMMON * rms / sigma) ** 2))
-    return damped @ M, damped @ v
+    return sigma * residual, T @ T.T + (_COMMON * rms) ** 2 * np.eye(len(numbers))
 
 
-def _without(solution: Solution, left_out: list[int]) -> tuple[Problem, tuple[Array, ...]]:
+def _without(solution: Solution, left_out: Sequence[int]) -> tuple[Problem, tuple[Array, ...]]:
     """The problem without some measurements, and the noise of the others."""
     problem = solution.problem
     kept = [k for k in range(len(problem.measurements)) if k not in left_out]

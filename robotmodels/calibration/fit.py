@@ -159,7 +159,6 @@ def fit(
         candidates = candidates if names is None else candidates.subset(names)
     if prior is not None:
         candidates.index(prior.named, "prior")
-        prior = sized(prior, candidates.skeleton.size)
     as_given = problem_of(candidates, measured)
     notes = [*notes_before(as_given)]
     given = nominal = errors_of(as_given, np.zeros(as_given.P))
@@ -169,6 +168,8 @@ def fit(
         if aligned is not None:
             nominal = aligned.errors
             candidates = make_candidates(aligned.model).subset(candidates.names)
+    if prior is not None:
+        prior = sized(prior, candidates.skeleton.size)
     estimate = _estimate(
         candidates, measured, known, known_lengths, prior, loss=loss, truncation=truncation, rng=rng
     )
@@ -260,8 +261,7 @@ def _estimate(
         problem = problem_of(estimated, measured)
         zero = np.zeros(problem.P)
         start = np.concatenate([zero, guessed_fixtures(problem, zero)])
-        strength = with_strength(prior, problem, loss, rng)
-        used = None if prior is None else replace(prior, strength=strength)
+        used = with_strength(prior, problem, loss, rng)
         solution = solve(problem, start, loss=loss, prior=used, truncation=truncation)
         insignificant = [] if truncation else insignificant_parameters(solution, start)
         fixed = (*known, *identifiable.of_reason(Reason.NOISE))

@@ -1,8 +1,13 @@
-"""Predicted error of another tool after a calibration."""
+"""Predicted error of another tool after a calibration.
+
+Corrections that do not move the measured tool can move another. The covariance of the fit, and the
+default prior of parameters that were not estimated, are propagated to other tools. If the
+measurements do not determine the base, a rigid motion is fitted to the error.
+"""
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,10 +21,9 @@ from .calibrated_robot.calibrated import CalibratedRobot
 from .extended_table.differential import differential_model
 from .extended_table.elements import ErrorLaw
 from .extended_table.parameters import GeometricParameters
-from .identifiability.identifiable import IdentifiableParameters, Reason, all_deviations
+from .identifiability.identifiable import Reason, all_deviations
 from .prior import ParameterPrior, standard_deviations
 from .problem import problem_of, stacked
-from .solve import Solution
 
 _POSTURES = 200
 """Largest number of the measured postures that a prediction is made for."""
@@ -28,84 +32,25 @@ _LEAST_LENGTH = 0.1
 
 
 class PredictedError(NamedTuple):
-    """Standard errors of a tool that took no part in the calibration, m and rad.
-
-    ``rms`` and ``largest`` of its point over postures and directions, ``angle`` (rms) of its
-    orientation; ``nominal``: rms distance between the nominal and the calibrated robot for the same
-    tools; ``length``: distance of the point from the last frame of the table.
-    """
+    """Standard errors of a tool that took no part in the calibration, m and rad."""
 
     rms: float
     largest: float
+    """Of the tool's point: root mean square over postures and directions, and the worst."""
     angle: float
     nominal: float
+    """Rms distance between the nominal and the calibrated robot for the same tools."""
     length: float
-
-
-class Calibrated(Protocol):
-    """The parts of a result that the prediction needs."""
-
-    @property
-    def identifiable(self) -> IdentifiableParameters:
-        """Identifiable parameters."""
-        ...
-
-    @property
-    def solution(self) -> Solution:
-        """The fit."""
-        ...
-
-    @property
-    def robot(self) -> CalibratedRobot:
-        """The calibrated robot."""
-        ...
+    """Distance of the tool's point from the last frame of the table."""
 
 
 def other_tool_error(
-    result: Calibrated, q: ArrayLike | None = None, length: float | None = None
+    result: Any, q: ArrayLike | None = None, length: float | None = None
 ) -> PredictedError:
     """Predicted error of another tool whose pose on the flange is known.
 
-    Corrections that do not move the measured tool can move another. The covariance of the fit, and
-    the default prior of parameters that were not estimated, are propagated to other tools. If the
-    measurements do not determine the base, a rigid motion is fitted to the error.
-
-    Parameters
-    ----------
-    result : CalibrationResult
-        Of `fit`.
-    q : array_like, shape (N, n), optional
-        Readings of the joints at which the tool works, rad or m; default those of the measurements.
-    length : float, optional
-        Distance of the tool's point from the last frame, m; default that of the present tool, and
-        at least a tenth of the robot's size. Tools point along the six half-axes of the frame.
-
-    Returns
-    -------
-    PredictedError
-        Standard errors (the error exceeds them in about one case of three): ``rms, largest`` of
-        the tool's point, m, ``angle``, rad; ``nominal``: of the nominal robot; ``length``.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Not N rows of n finite numbers; a length that is not positive.
-
-    References
-    ----------
-    Seed book section 1.4.4.
-
-    Examples
-    --------
-    >>> import robotmodels as rm
-    >>> import robotmodels.calibration as calibration
-    >>> arm, rng = rm.load("rx90"), np.random.default_rng(0)
-    >>> q = rng.uniform(-1.5, 1.5, (40, 6))
-    >>> p = rm.dgm(arm, q)[:, :3, 3] + 1e-4 * rng.normal(size=(40, 3))
-    >>> result = calibration.fit(arm, calibration.Position(q, p), folds=0, held_out=0.0)
-    >>> found = other_tool_error(result)      # the positions of a point on the last axis
-    >>> found.rms > 3e-4, found.length
-    (True, 0.1)
+    ``q`` (N, n): readings at which it works; ``length``: of its point from the last frame, m, by
+    default that of the present tool. It points along the six half-axes of the frame.
     """
     problem, robot = result.solution.problem, result.robot
     if q is None:
@@ -137,7 +82,7 @@ def other_tool_error(
     return PredictedError(*(float(np.sqrt(x)) for x in numbers), float(length))
 
 
-def _posterior(result: Calibrated) -> tuple[GeometricParameters, Array, Array]:
+def _posterior(result: Any) -> tuple[GeometricParameters, Array, Array]:
     """Unknown candidates, a factor F of their covariance F F^T, and their corrections."""
     identifiable, solution = result.identifiable, result.solution
     fit, estimated = solution.fit, solution.problem.parameters

@@ -7,7 +7,7 @@ measured next to a posture of the fit resembles it, and its errors would be too 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -19,13 +19,12 @@ from scipy.sparse.csgraph import connected_components
 from .._arrays import Array, Rebuilt, read_only
 from ..errors import InvalidValueError
 from ..estimation import Loss, fit_nonlinear
-from ..estimation.strength import select_strength
 from ..kinematics import dgm
 from ..kinematics.lengths import characteristic_length
 from ..model import RobotModel
 from .extended_table.parameters import GeometricParameters
 from .measurements import Labelled, Measurement, length_is_known, lonely_labels
-from .prior import ParameterPrior, gaussian_prior
+from .prior import ParameterPrior
 from .problem import Problem, guessed_fixtures, linearised, problem_of, stacked
 from .solve import ROUGH, Solution, first_scales, refitted, solve
 
@@ -111,8 +110,14 @@ class HeldOutErrors(Errors):
 class Validation:
     """Errors of a calibration.
 
-    ``given``: the robot as given; ``nominal``: with its base and tool alone fitted, where they may
-    be off; ``in_sample``: calibrated; ``folds``, ``held_out``: on data held out, None without them.
+    Parameters
+    ----------
+    given, nominal, in_sample : Errors
+        Of the robot as given, with its base and tool alone fitted (where they may be off), and
+        calibrated.
+    folds, held_out : Errors or None
+        On data held out of the fits (cross-validation; one more fit, or the caller's); their
+        ``nominal`` is before the calibration.
     """
 
     given: Errors
@@ -212,34 +217,26 @@ def tested(solution: Solution, test: Sequence[Measurement]) -> HeldOutErrors:
 
 def with_strength(
     prior: ParameterPrior | None, problem: Problem, loss: Loss, rng: np.random.Generator
-) -> float | None:
-    """Strength of a prior: that given, or chosen by cross-validation."""
+) -> ParameterPrior | None:
+    """The prior with a strength: that given, or chosen by cross-validation."""
     if prior is None or prior.strength is not None:
-        return None if prior is None else prior.strength
+        return prior
     if problem.blocks < 2 * _FOLDS:
         raise InvalidValueError(
             f"strength: choosing it needs {2 * _FOLDS} measurements or more, got "
             f"{problem.blocks}; give the strength."
         )
-    scales = solve(problem, loss=loss, prior=prior).scales
-    zero = np.zeros(problem.P)
-    start = np.concatenate([zero, guessed_fixtures(problem, zero)])
-    measurements = problem.measurements
-    seen = np.repeat([bool(m.views) for m in measurements], [m.blocks for m in measurements])
-    partition = partition_blocks(
-        problem.parameters.model, measurements, _FOLDS, rng, whole_places=False
-    )
-    masks = np.zeros((len(partition.parts), len(seen)), dtype=bool)
-    masks[:, seen] = [test for test, _ in partition.parts]
-    return select_strength(
-        lambda x: stacked(problem, x, scales),
-        start,
-        gaussian_prior(prior, problem),
-        masks[:, problem.block],
-        _STRENGTHS,
-        problem.block,
-        loss,
-    ).strength
+    splits = splits_of(problem.parameters.model, problem.measurements, _FOLDS, rng)
+    whole = solve(problem, loss=loss, prior=prior)
+    nominal = errors_of(problem, np.zeros(problem.P))
+    candidates = [replace(prior, strength=float(strength)) for strength in _STRENGTHS]
+    sizes = []
+    for candidate in candidates:
+        errors = cross_validated(replace(whole, prior=candidate), splits, nominal, lambda: None)
+        by_unit = errors.rms if loss is Loss.SQUARES else errors.mean
+        sizes.append([by_unit[unit] / nominal.rms[unit] for unit in by_unit])
+    relative = np.array(sizes) / np.min(sizes, axis=0)
+    return candidates[int(np.argmin((relative**2).sum(axis=1)))]
 
 
 # --- partition of measurements into folds ---------------------------------------------------------
@@ -293,7 +290,6 @@ def partition_blocks(
     measurements: Sequence[Measurement],
     folds: int,
     rng: np.random.Generator,
-    whole_places: bool = True,
 ) -> Partition:
     """Folds of whole places or runs of postures; equal readings are always in one fold."""
     seen = [m for m in measurements if m.views]
@@ -305,7 +301,7 @@ def partition_blocks(
     place = _places(model, seen, posture, label, near)
     count = len(np.unique(place[place >= 0]))
     whole, note = np.zeros(len(posture), dtype=np.bool_), ""
-    if whole_places and count >= _FEWEST:
+    if count >= _FEWEST:
         assigned = _assigned_places(measurements, place, folds, rng)
         if (assigned >= 0).any():
             fold, whole = assigned, place >= 0

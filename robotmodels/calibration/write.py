@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from .._arrays import Array
 from ..errors import InvalidValueError, MissingExtraError, UrdfWarning
 from ..estimation import confidence_intervals
 from ..model import to_urdf
@@ -21,7 +20,10 @@ from .validation import Errors, HeldOutErrors
 
 _FORMAT = 2
 """Raised when the meaning or the name of an entry changes."""
-_COLUMNS = ("gamma", "b", "beta", "alpha", "d", "theta", "r")
+_COLUMNS = (
+    *("names", "antecedent", "sigma"),
+    *("gamma", "b", "beta", "alpha", "d", "theta", "r"),
+)
 
 
 def write_result(result: CalibrationResult, path: str | Path) -> None:
@@ -96,15 +98,23 @@ def write_result(result: CalibrationResult, path: str | Path) -> None:
 def result_data(result: CalibrationResult) -> dict[str, Any]:
     """A calibration as plain lists, numbers and words, SI units; None for what is not finite."""
     fit, problem = result.solution.fit, result.solution.problem
-    interval = confidence_intervals(fit)
-    validation, table = result.validation, result.model.table
-    columns = zip(
-        result.names, result.units, result.parameters.nominal, result.corrections, result.values,
-        result.standard_errors, interval, strict=False,
-    )  # fmt: skip
-    fixtures = zip(problem.fixtures, result.solution.fixtures, strict=True)
-    errors_of_fixtures = fit.standard_errors[problem.P :]
-    return {
+    validation, table, found = result.validation, result.model.table, result.identifiable
+    measurements = zip(problem.measurements, result.solution.scales, strict=True)
+    parameters = zip(
+        result.names,
+        result.units,
+        result.parameters.nominal,
+        result.corrections,
+        result.values,
+        result.standard_errors,
+        confidence_intervals(fit),
+        strict=False,
+    )
+    fixtures = zip(
+        problem.fixtures, result.solution.fixtures, fit.standard_errors[problem.P :], strict=True
+    )
+    words = ("name", "unit", "start", "correction", "value", "standard_error", "interval_95")
+    data = {
         "format": _FORMAT,
         "robot": result.nominal.name,
         "status": {"name": result.status.name, "sentence": result.reason()},
@@ -113,86 +123,62 @@ def result_data(result: CalibrationResult) -> dict[str, Any]:
                 "name": m.name,
                 "kind": type(m).__name__,
                 "blocks": m.blocks,
-                "rows": list(m.axes),
-                "units": list(m.units),
-                "noise": None if states_noise(m) else _numbers(scale),
+                "rows": m.axes,
+                "units": m.units,
+                "noise": None if states_noise(m) else scale,
                 "files": [{"name": file.name, "rows": file.rows} for file in m.files],
             }
-            for m, scale in zip(problem.measurements, result.solution.scales, strict=True)
+            for m, scale in measurements
         ],
-        "parameters": [
-            {
-                "name": name,
-                "unit": unit,
-                "start": _number(start),
-                "correction": _number(correction),
-                "value": _number(value),
-                "standard_error": _number(error),
-                "interval_95": _numbers(ends),
-            }
-            for name, unit, start, correction, value, error, ends in columns
-        ],
-        "covariance": [_numbers(row) for row in result.covariance],
+        "parameters": [dict(zip(words, row, strict=True)) for row in parameters],
+        "covariance": result.covariance,
         "fixtures": [
-            {
-                "name": fixture.name,
-                "unit": fixture.unit,
-                "value": _number(value),
-                "standard_error": _number(errors_of_fixtures[k]),
-            }
-            for k, (fixture, value) in enumerate(fixtures)
+            {"name": fixture.name, "unit": fixture.unit, "value": value, "standard_error": error}
+            for fixture, value, error in fixtures
         ],
-        "known": list(result.known),
-        "left_out": {name: why.name for name, why in result.identifiable.reasons.items()},
-        "regrouping": {
-            name: {other: float(c) for other, c in terms.items()}
-            for name, terms in result.identifiable.regrouping.items()
-        },
-        "condition": _number(result.identifiable_after.condition),
+        "known": result.known,
+        "left_out": {name: why.name for name, why in found.reasons.items()},
+        "regrouping": found.regrouping,
+        "condition": result.identifiable_after.condition,
         "errors": {
-            "given": _errors(validation.given),
-            "nominal": _errors(validation.nominal),
-            "in_sample": _errors(validation.in_sample),
-            "folds": _held_out(validation.folds),
-            "held_out": _held_out(validation.held_out),
+            word: _errors(getattr(validation, word))
+            for word in ("given", "nominal", "in_sample", "folds", "held_out")
         },
-        "outliers": [int(block) for block in fit.outliers],
-        "base": [_numbers(row) for row in result.model.base],
-        "tool": [_numbers(row) for row in result.model.tool],
+        "outliers": fit.outliers,
+        "base": result.model.base,
+        "tool": result.model.tool,
         "ends": [
-            {"frame": end.frame, "parent": int(end.parent), "pose": [_numbers(r) for r in end.pose]}
+            {"frame": end.frame, "parent": end.parent, "pose": end.pose}
             for end in result.robot.ends
         ],
-        "table": [
-            {
-                "name": str(table.names[j]),
-                "antecedent": int(table.antecedent[j]),
-                "sigma": int(table.sigma[j]),
-                **{word: _number(getattr(table, word)[j]) for word in _COLUMNS},
-            }
-            for j in range(table.f)
-        ],
+        "table": {word: getattr(table, word) for word in _COLUMNS},
         "notes": [*result.notes, *result.robot.notes],
     }
+    return dict(_plain(data))
 
 
-def _errors(errors: Errors) -> dict[str, Any]:
-    words = {"rms": errors.rms, "mean": errors.mean, "max": errors.max, "count": errors.count}
-    return {unit: {word: by_unit[unit] for word, by_unit in words.items()} for unit in errors.count}
-
-
-def _held_out(errors: HeldOutErrors | None) -> dict[str, Any] | None:
+def _errors(errors: Errors | None) -> dict[str, Any] | None:
+    """Errors by unit; of those held out, also before the calibration."""
     if errors is None:
         return None
-    return {"fits": errors.fits, "nominal": _errors(errors.nominal), "after": _errors(errors)}
+    words = ("rms", "mean", "max", "count")
+    sizes: dict[str, Any] = {
+        unit: {word: getattr(errors, word)[unit] for word in words} for unit in errors.count
+    }
+    if isinstance(errors, HeldOutErrors):
+        sizes |= {"fits": errors.fits, "nominal": _errors(errors.nominal)}
+    return sizes
 
 
-def _number(value: Any) -> float | None:
-    return float(value) if np.isfinite(value) else None
-
-
-def _numbers(values: Array) -> list[float | None]:
-    return [_number(value) for value in values]
+def _plain(value: Any) -> Any:
+    """Lists and numbers in place of tuples, arrays and numbers of NumPy; None for not finite."""
+    if isinstance(value, dict):
+        return {str(key): _plain(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple | np.ndarray):
+        return [_plain(entry) for entry in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
 def calibrated_urdf(robot: CalibratedRobot) -> str:
