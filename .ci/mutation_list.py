@@ -665,7 +665,7 @@ MUTATIONS = [
         "def partition_blocks(", "(fold != k) & ~next_to[k]", "~next_to[k]",
         "tests/test_calibration_validation.py -k sockets"),
     Mutation("calibration: prior", "the prior keeps its strength",
-        "def with_strength(", "strength=float(strength))", "strength=1.0)",
+        "def settled_prior(", "strength=float(strength))", "strength=1.0)",
         "tests/test_calibration_fit.py -k strength_of_a_prior"),
     Mutation("estimation: covariance", "information of the prior has the noise of the measurements",
         "def covariance(\n    problem: Problem", "noise * data.T @ data + known.T @ known",

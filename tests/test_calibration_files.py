@@ -361,7 +361,7 @@ def test_json_and_yaml_hold_the_result(result, tmp_path):
     assert data["errors"]["folds"] is None
     assert data["measurements"][-1]["kind"] == "KnownDistance"
     np.testing.assert_allclose(data["tool"], result.model.tool)
-    np.testing.assert_allclose([row["alpha"] for row in data["table"]], result.model.table.alpha)
+    np.testing.assert_allclose(data["table"]["alpha"], result.model.table.alpha)
 
 
 @pytest.mark.filterwarnings("ignore::robotmodels.errors.UrdfWarning")

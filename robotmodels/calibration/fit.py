@@ -32,7 +32,7 @@ from .result import CalibrationResult
 from .significance import adjusted, check_enough, insignificant_parameters
 from .solve import Solution, solve
 from .structure import note_of_structure, structure_of, trials_of
-from .validation import Validation, cross_validated, errors_of, splits_of, tested, with_strength
+from .validation import Validation, cross_validated, errors_of, settled_prior, splits_of, tested
 
 Progress = Callable[[int, int, str], None]
 """Called with the number of finished fits, their total, and the current task."""
@@ -261,7 +261,7 @@ def _estimate(
         problem = problem_of(estimated, measured)
         zero = np.zeros(problem.P)
         start = np.concatenate([zero, guessed_fixtures(problem, zero)])
-        used = with_strength(prior, problem, loss, rng)
+        used = settled_prior(prior, problem, loss, rng)
         solution = solve(problem, start, loss=loss, prior=used, truncation=truncation)
         insignificant = [] if truncation else insignificant_parameters(solution, start)
         fixed = (*known, *identifiable.of_reason(Reason.NOISE))

@@ -215,7 +215,7 @@ def tested(solution: Solution, test: Sequence[Measurement]) -> HeldOutErrors:
     return HeldOutErrors(errors.position, errors.angle, blocks, nominal, 1, None)
 
 
-def with_strength(
+def settled_prior(
     prior: ParameterPrior | None, problem: Problem, loss: Loss, rng: np.random.Generator
 ) -> ParameterPrior | None:
     """The prior with a strength: that given, or chosen by cross-validation."""
