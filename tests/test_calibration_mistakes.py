@@ -75,10 +75,10 @@ def listed(arm, bad, prior=None):
 @pytest.mark.parametrize("prior", [None, ParameterPrior()])
 @pytest.mark.parametrize("bad", [1, 2, 4])
 def test_the_bad_rows_alone_are_outliers_under_squares(bad, prior):
-    found = [listed(Arm(seed), bad, prior) for seed in range(20)]
+    found = [listed(Arm(seed), bad, prior) for seed in range(6)]
     assert all(wrong <= listing for listing, wrong in found)
     # one fit in twenty lists another row by chance
-    assert sum(listing == wrong for listing, wrong in found) >= 17
+    assert sum(listing == wrong for listing, wrong in found) >= 5
 
 
 @pytest.mark.parametrize("kind", ["pose", "contact"])
@@ -105,11 +105,6 @@ def test_the_bad_row_alone_is_an_outlier_among_poses_and_contacts(kind):
         alone += found == [7]
     assert hits == len(REACHED)
     assert alone >= len(REACHED) - 1
-
-
-def test_without_a_bad_row_one_fit_in_twenty_lists_an_outlier():
-    listings = [listed(Arm(seed), 0)[0] for seed in range(100, 220)]
-    assert 1 <= sum(bool(listing) for listing in listings) <= 12
 
 
 # --- known distances ------------------------------------------------------------------------------
@@ -142,63 +137,57 @@ def between(length, other=1, **more):
     return KnownDistance("point:0", f"point:{other}", length, **more)
 
 
-def said_of_distances(result):
-    return [note for note in result.notes if note.startswith("known distance")]
+def notes_of_distances(result):
+    return [n for n in result.notes if "known distance" in n and "prior allows" not in n]
+
+
+def prediction(note):
+    """Predicted length and its standard error in a note, mm."""
+    return (float(x) for x in note.split(" predict ")[1].split(" mm")[0].split(" +- "))
 
 
 REACHED = [0, 2, 3, 4, 5, 7, 8, 9]
 """Seeds of arms that reach their points."""
 
 
-def test_a_known_distance_is_known_to_a_tenth_of_a_millimetre():
-    assert between(0.05).sigma == pytest.approx(1e-4)
-
-
 @pytest.mark.parametrize("seed", REACHED)
 def test_a_wrong_distance_is_contradicted_by_the_lengths_of_the_table(seed):
     arm, touched = contacts(seed)
-    right = fit(arm.nominal, [touched, between(0.05)], prior=ParameterPrior(), **ALONE)
-    assert not said_of_distances(right)
+    assert between(0.05).sigma == pytest.approx(1e-4)
+    right, wrong = (fit(arm.nominal, [touched, between(x)], **ALONE) for x in (0.05, 0.051))
+    assert not notes_of_distances(right)
     assert touched.blocks not in right.solution.fit.outliers
-    wrong = fit(arm.nominal, [touched, between(0.051)], prior=ParameterPrior(), **ALONE)
-    (note,) = said_of_distances(wrong)
+    (note,) = notes_of_distances(wrong)
     assert (
         "point:0 to point:1: stated 51 mm, but the other measurements and the prior predict" in note
     )
-    said, doubt = (float(x) for x in note.split(" predict ")[1].split(" mm")[0].split(" +- "))
-    assert abs(said - 50.0) < 4.0 * doubt < 2.0
-    assert "standard errors)" in note
+    mean, error = prediction(note)
+    assert abs(mean - 50.0) < 4.0 * error < 2.0
     assert wrong.solution.fit.outliers.tolist()[0] == touched.blocks
-    assert "stated 51 mm" in report(wrong)
+    # without a prior it alone gives the scale, and nothing contradicts it
+    alone = fit(arm.nominal, [touched, between(0.051)], **ALONE, prior=None)
+    assert not notes_of_distances(alone)
+    assert touched.blocks not in alone.solution.fit.outliers
 
 
-@pytest.mark.parametrize("seed", REACHED)
-def test_a_distance_that_alone_gives_the_scale_is_contradicted_by_nothing(seed):
-    arm, touched = contacts(seed)
-    for length in (0.05, 0.051):
-        result = fit(arm.nominal, [touched, between(length)], **ALONE, prior=None)
-        assert not said_of_distances(result)
-        assert touched.blocks not in result.solution.fit.outliers
-
-
-@pytest.mark.parametrize("seed", REACHED[:4])
+@pytest.mark.parametrize("seed", REACHED[:3])
 def test_the_wrong_one_of_two_distances_is_named(seed):
     arm, touched = contacts(seed, [(0.0, 0.03, 0.04), (0.2, 0.0, 0.0)])
     stated = [touched, between(0.05), between(0.21, 2)]
-    result = fit(arm.nominal, stated, prior=ParameterPrior(), **ALONE)
-    (note,) = said_of_distances(result)
+    result = fit(arm.nominal, stated, **ALONE)
+    (note,) = notes_of_distances(result)
     assert "point:0 to point:2: stated 210 mm" in note
     assert touched.blocks + 1 in result.solution.fit.outliers
     assert touched.blocks not in result.solution.fit.outliers
     # without anything else either may be wrong
-    (note,) = said_of_distances(fit(arm.nominal, stated, prior=None, **ALONE))
+    (note,) = notes_of_distances(fit(arm.nominal, stated, prior=None, **ALONE))
     assert "one of these" in note
     assert "point:0 to point:1" in note
     assert "point:0 to point:2" in note
 
 
-def three_places(seed):
-    """Contacts of a random arm with two points at each of three places."""
+@pytest.mark.parametrize("seed", [0, 3, 7])
+def test_a_wrong_length_at_every_place_and_at_one_place_are_distinguished(seed):
     arm = Arm(seed)
     q, labels = [], []
     while len(q) < 3:
@@ -207,31 +196,20 @@ def three_places(seed):
         if len(there) == 24:
             labels += [2 * len(q) + k for k in at]
             q.append(there)
-    return arm, PointContact(np.concatenate(q), labels)
+    touched = PointContact(np.concatenate(q), labels)
 
+    def fitted(lengths):
+        ends = ((f"point:{2 * k}", f"point:{2 * k + 1}") for k in range(3))
+        known = [KnownDistance(*pair, x) for pair, x in zip(ends, lengths, strict=True)]
+        return fit(arm.nominal, [touched, *known], **ALONE)
 
-def known_at(lengths):
-    return [
-        KnownDistance(f"point:{2 * k}", f"point:{2 * k + 1}", length)
-        for k, length in enumerate(lengths)
-    ]
-
-
-def notes_of_distances(result):
-    return [n for n in result.notes if "known distance" in n and "prior allows" not in n]
-
-
-@pytest.mark.parametrize("seed", [0, 3, 7])
-def test_one_wrong_length_at_every_place_and_at_one_place_are_told_apart(seed):
-    arm, touched = three_places(seed)
-    assert not notes_of_distances(fit(arm.nominal, [touched, *known_at([0.05] * 3)], **ALONE))
-    for length in (0.049, 0.051, 0.055):
-        every = fit(arm.nominal, [touched, *known_at([length] * 3)], **ALONE)
-        (note,) = notes_of_distances(every)
+    assert not notes_of_distances(fitted([0.05] * 3))
+    for length in (0.049, 0.055):
+        (note,) = notes_of_distances(fitted([length] * 3))
         assert note.startswith(f"3 known distances of {1e3 * length:g} mm: the other measurements")
-        said, doubt = (float(x) for x in note.split(" predict ")[1].split(" mm")[0].split(" +- "))
-        assert abs(said - 50.0) < 4.0 * doubt < 1.5
-        one = fit(arm.nominal, [touched, *known_at([0.05, length, 0.05])], **ALONE)
+        mean, error = prediction(note)
+        assert abs(mean - 50.0) < 4.0 * error < 1.5
+        one = fitted([0.05, length, 0.05])
         (note,) = notes_of_distances(one)
         assert f"point:2 to point:3: stated {1e3 * length:g} mm" in note
         assert touched.blocks + 1 in one.solution.fit.outliers
@@ -239,42 +217,28 @@ def test_one_wrong_length_at_every_place_and_at_one_place_are_told_apart(seed):
 
 
 @pytest.mark.parametrize("robot", ["panda_1", "panda_2"])
-def test_a_real_arm_contradicts_a_length_that_is_wrong_at_every_place(robot):
+def test_a_real_arm_contradicts_51_for_50(robot):
     data = panda_double_socket(robot)
-    touched = [
-        PointContact(np.concatenate(pair), [0] * len(pair[0]) + [1] * len(pair[1]), name=place)
+    touched = {
+        place: PointContact(np.concatenate(pair), np.repeat([0, 1], [*map(len, pair)]), name=place)
         for place, pair in data.places.items()
-    ]
+    }
 
-    def said(length):
-        known = [KnownDistance(f"{p}:0", f"{p}:1", length) for p in data.places]
-        return fit(data.model, [*touched, *known], **ALONE)
+    def fitted(length, places):
+        known = [KnownDistance(f"{p}:0", f"{p}:1", length) for p in places]
+        return fit(data.model, [*(touched[p] for p in places), *known], **ALONE)
 
-    assert not notes_of_distances(said(data.distance))
-    wrong = said(data.distance + 1e-3)
+    assert not notes_of_distances(fitted(data.distance, touched))
+    wrong = fitted(data.distance + 1e-3, touched)
     (note,) = notes_of_distances(wrong)
+    assert note.startswith(f"{len(touched)} known distances of 51 mm")
     # the prior of lengths was widened to suit them
     (widened,) = (n for n in wrong.notes if "prior allows" in n)
     assert ("of lengths" in widened) == widened.endswith("Check the known distances.")
     assert robot != "panda_1" or "of lengths" in widened
-    assert note.startswith(f"{len(touched)} known distances of 51 mm")
-
-
-def test_a_real_arm_contradicts_51_for_50():
-    data = panda_double_socket()
-    contacts_of, known_of = [], []
-    for place, (one, other) in data.places.items():
-        labels = [0] * len(one) + [1] * len(other)
-        contacts_of.append(PointContact(np.concatenate([one, other]), labels, name=place))
-        known_of.append(KnownDistance(f"{place}:0", f"{place}:1", data.distance))
-    together = fit(data.model, [*contacts_of, *known_of], prior=ParameterPrior(), **ALONE)
-    assert not said_of_distances(together)
-    for place, (one, other) in data.places.items():
-        touched = PointContact(np.concatenate([one, other]), [0] * len(one) + [1] * len(other))
-        for length, expected in ((data.distance, 0), (data.distance + 1e-3, 1)):
-            known = between(length)
-            result = fit(data.model, [touched, known], prior=ParameterPrior(), **ALONE)
-            assert len(said_of_distances(result)) == expected, place
+    for place in touched if robot == "panda_1" else ():
+        assert not notes_of_distances(fitted(data.distance, [place]))
+        assert len(notes_of_distances(fitted(data.distance + 1e-3, [place]))) == 1
 
 
 # --- too few measurements -------------------------------------------------------------------------
@@ -299,7 +263,7 @@ def measured_by(kind, seed):
 
 
 @pytest.mark.parametrize("prior", [None, ParameterPrior()])
-@pytest.mark.parametrize("seed", [0, 3, 9])
+@pytest.mark.parametrize("seed", [0, 9])
 @pytest.mark.parametrize("kind", ["pose", "position", "distance", "contact"])
 def test_the_number_of_missing_measurements_is_right_at_once(kind, seed, prior):
     arm, first = measured_by(kind, seed)
@@ -369,25 +333,17 @@ KINDS = ["position", "pose", "pivot", "pair", "camera", "relative"]
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize(("factor", "sentence"), FACTORS)
+@pytest.mark.parametrize(("factor", "sentence"), [*FACTORS, (1.0, ""), (1.5, "")])
 def test_the_unit_of_lengths_is_named(kind, factor, sentence):
-    for seed in range(6):
+    for seed in range(2):
         arm = Arm(seed)
         measured = seen_by(kind, arm, arm.readings(25), factor)
+        if not sentence:  # right lengths, or a scale that is wrong by another factor
+            assert not any("look like" in x for x in fit(arm.nominal, measured, **ALONE).notes)
+            continue
         with pytest.raises(InvalidValueError, match=sentence) as caught:
             fit(arm.nominal, measured, **ALONE)
         assert f"multiply by {1.0 / factor:.4g}" in str(caught.value)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_right_lengths_are_never_blamed_on_units(kind):
-    for seed in range(12):
-        arm = Arm(seed)
-        q = arm.readings(40)
-        fit(arm.nominal, seen_by(kind, arm, q, 1.0), **ALONE)
-        # nor is a scale that is wrong by another factor
-        result = fit(arm.nominal, seen_by(kind, arm, q, 1.5), **ALONE)
-        assert not any("look like" in note for note in result.notes)
 
 
 @pytest.mark.parametrize("prior", [None, ParameterPrior()])
@@ -399,16 +355,6 @@ def test_the_unit_of_a_known_distance_is_named(factor, sentence, prior):
             fit(arm.nominal, [touched, between(0.05 * factor)], prior=prior, **ALONE)
         assert sentence in str(caught.value)
         assert "Pass metres: 0.05" in str(caught.value)
-
-
-@pytest.mark.parametrize("robot", ["panda_1", "panda_2"])
-def test_the_unit_of_a_known_distance_of_a_real_arm_is_named(robot):
-    data = panda_double_socket(robot)
-    for one, other in data.places.values():
-        touched = PointContact(np.concatenate([one, other]), [0] * len(one) + [1] * len(other))
-        for factor, unit in ((1000.0, "millimetres"), (100.0, "centimetres")):
-            with pytest.raises(InvalidValueError, match=f"look like {unit}. The nominal"):
-                fit(data.model, [touched, between(factor * data.distance)], **ALONE)
 
 
 @pytest.mark.parametrize(
@@ -521,23 +467,6 @@ def test_a_folder_that_also_holds_poses_is_not_read_as_readings(socket, limits):
     assert found.labels == ("hole_0", "hole_1")
 
 
-@pytest.mark.parametrize("header", [True, False])
-def test_files_of_a_folder_have_the_same_columns(tmp_path, header):
-    arm = Arm(0)
-    q = arm.readings(5)
-    names = "q1,q2,q3,q4,q5,q6" if header else ""
-    more = names and f"{names},x,y,z,u,v,w"
-    for file, rows, head in (("a", q, names), ("b", q, names), ("c", np.hstack([q, q]), more)):
-        np.savetxt(tmp_path / f"{file}.csv", rows, delimiter=",", header=head, comments="")
-    with pytest.raises(InvalidValueError, match="do not have the same columns") as caught:
-        read_measurements(tmp_path, "point_contact", arm.nominal)
-    assert "a.csv, b.csv: " in str(caught.value)
-    assert "; c.csv: " in str(caught.value)
-    assert (
-        read_measurements(tmp_path, "point_contact", arm.nominal, pattern="[ab].csv").blocks == 10
-    )
-
-
 def test_the_files_read_are_listed(socket):
     data, folder = socket
     found = read_measurements(folder, "point_contact", data.model, pattern="hole_?.csv")
@@ -603,7 +532,7 @@ MARKERS = {
 }
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_markers_are_added_in_one_call_and_calibrated(seed):
     arm = Arm(seed)
     off = {name: p + 2e-3 * arm.rng.normal(size=3) for name, p in MARKERS.items()}
@@ -641,20 +570,3 @@ def test_frames_are_given_in_any_frame_as_points_or_poses():
     assert rm.dgm(again, q, "c") == pytest.approx(at, abs=1e-14)
     assert "b" not in arm.frame_names
     assert rm.dgm(pickle.loads(pickle.dumps(again)), q, "c") == pytest.approx(at, abs=1e-14)
-
-
-@pytest.mark.parametrize(
-    ("frames", "frame", "error", "sentence"),
-    [
-        ({"joint_2": [0, 0, 0]}, None, InvalidValueError, "'joint_2' is taken"),
-        ({"tool": [0, 0, 0]}, None, InvalidValueError, "'tool' is taken"),
-        ({"a": [0, 0]}, None, ShapeError, r"frames\['a'\]"),
-        ({"a": 2.0 * np.eye(4)}, None, rm.errors.RobotModelsError, r"frames\['a'\]"),
-        ({"": [0, 0, 0]}, None, InvalidValueError, "not empty"),
-        ([[0, 0, 0]], None, InvalidValueError, "mapping of names"),
-        ({"a": [0, 0, 0]}, "hand", rm.errors.FrameNotFoundError, "hand"),
-    ],
-)
-def test_frames_that_make_no_sense_are_refused(frames, frame, error, sentence):
-    with pytest.raises(error, match=sentence):
-        Arm(1).nominal.with_frames(frames, frame)

@@ -10,7 +10,6 @@ from test_calibration_fit import erroneous, touching
 
 import robotmodels as rm
 from robotmodels.calibration import ParameterPrior, PointContact, Pose, Position, fit
-from robotmodels.calibration.report import report
 
 NOISE = 1e-4
 """Standard deviation of positions, m."""
@@ -99,7 +98,7 @@ def fitted(seed, kind, masses=True):
 @pytest.mark.parametrize("prior", [None, ParameterPrior()])
 def test_noise_has_no_structure(prior):
     found = []
-    for seed in range(40):
+    for seed in range(20):
         scene = Scene(seed)
         result = fit(scene.arm, scene.measured(50), prior=prior, folds=0, held_out=0)
         found.append(bool(note(result)))
@@ -208,15 +207,6 @@ def test_an_error_that_all_measurements_of_a_posture_share_is_noise():
     assert sum(found) <= 1
 
 
-def test_a_row_that_is_far_off_is_no_structure():
-    for seed in range(5):
-        scene = Scene(seed)
-        measured = scene.measured(60)
-        p = measured.p.copy()
-        p[7] += 0.02
-        assert not note(fit(scene.arm, Position(measured.q, p), folds=0, held_out=0))
-
-
 def test_exact_data_and_few_postures_have_no_structure():
     scene = Scene(0)
     q = scene.readings(40)
@@ -246,18 +236,3 @@ def test_fits_are_tried_only_where_there_is_structure():
         assert {of for _, of, _ in said} == {total}
         assert total == 4 if kind == "none" else total >= least
         assert any(doing == "terms to try next" for *_, doing in said) == (kind != "none")
-
-
-def test_without_folds_nothing_is_tried():
-    scene, measured, _ = fitted(0, "compliance")
-    text = note(fit(scene.arm, measured, folds=0))
-    assert "Joint compliance (compliance='joints')" in text
-    assert "a fit with folds compares" in text
-    assert named(text) is None
-
-
-def test_the_report_says_it():
-    text = " ".join(report(fitted(0, "compliance")[2]).split())
-    assert "Not geometry: the residuals depend on the posture" in text
-    assert "Try joint compliance next." in text
-    assert "Standard errors assume independent residuals and are too short." in text
