@@ -223,16 +223,3 @@ def test_the_page_says_what_the_text_says_and_needs_no_network(contacts, tmp_pat
     assert "http" not in re.sub(r"base64,[^\"]*", "", text)
     with pytest.raises(InvalidValueError, match="expected a CalibrationResult"):
         html_report("result", tmp_path / "b.html")
-
-
-def test_a_figure_that_cannot_be_drawn_is_said_on_the_page(tmp_path):
-    arm = load("rx90")
-    q = np.random.default_rng(0).uniform(-1.8, 1.8, (40, 6))
-    measured = Pose(q, dgm(arm, q), rows=[0, 0, 0, 1, 1, 1], name="<turned> & measured")
-    result = fit(arm, measured, known_lengths=["d3"], folds=0, held_out=0.0)
-    html_report(result, tmp_path / "a.html")
-    text = (tmp_path / "a.html").read_text(encoding="utf-8")
-    assert text.count("<img ") == 4
-    assert "none of its measurements has the three coordinates of a position" in text
-    assert "&lt;turned&gt; &amp; measured" in text
-    assert "rms mm" not in text
