@@ -8,9 +8,8 @@ from test_calibration_measurements import slope
 import robotmodels as rm
 from robotmodels.calibration import GeometricParameters, candidate_parameters, differential_model
 from robotmodels.calibration.combined_arms import combine_arms
-from robotmodels.calibration.extended_table.elements import Element, ErrorLaw
-from robotmodels.calibration.extended_table.parameters import GeometricParameter
-from robotmodels.calibration.extended_table.skeleton import skeleton_of
+from robotmodels.calibration.extended_table import Element, skeleton_of
+from robotmodels.calibration.parameters import ErrorLaw, GeometricParameter
 from robotmodels.errors import InvalidValueError, NotARotationError, ShapeError
 from robotmodels.geometry import FIXED, PRISMATIC
 

@@ -7,7 +7,6 @@ import pytest
 
 from robotmodels import se3
 from robotmodels.calibration import KnownDistance, PointContact, Pose, Position, fit
-from robotmodels.calibration.calibrated_robot.calibrated_pose import calibrated_pose
 from robotmodels.calibration.measurements import (
     Distance,
     FrameContact,
@@ -15,6 +14,7 @@ from robotmodels.calibration.measurements import (
     RelativePose,
 )
 from robotmodels.calibration.read import read_measurements
+from robotmodels.calibration.robot import calibrated_pose
 from robotmodels.calibration.write import result_data, write_result
 from robotmodels.csv_table import open_table
 from robotmodels.errors import InvalidValueError, NotARotationError
@@ -349,8 +349,9 @@ def test_json_and_yaml_hold_the_result(result, tmp_path):
     assert data == json.loads(json.dumps(result_data(result), allow_nan=False))
     assert [p["name"] for p in data["parameters"]] == list(result.names)
     np.testing.assert_allclose([p["value"] for p in data["parameters"]], result.values)
-    errors = [p["standard_error"] for p in data["parameters"]]
-    np.testing.assert_allclose(errors, result.standard_errors)
+    np.testing.assert_allclose(
+        [p["standard_error"] for p in data["parameters"]], result.standard_errors
+    )
     inside = [p["interval_95"][0] < p["correction"] < p["interval_95"][1]
               for p in data["parameters"]]  # fmt: skip
     assert all(inside)

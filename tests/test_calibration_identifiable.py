@@ -16,9 +16,12 @@ from robotmodels.calibration import (
     candidate_parameters,
     differential_model,
 )
-from robotmodels.calibration.identifiability.changed import identifiability_change
-from robotmodels.calibration.identifiability.identifiable import DEPENDENT, identifiable_on
-from robotmodels.calibration.identifiability.structural import identifiable_parameters
+from robotmodels.calibration.identifiable import (
+    DEPENDENT,
+    identifiability_change,
+    identifiable_on,
+    identifiable_parameters,
+)
 from robotmodels.calibration.measurements.kinds import Kind, as_kind, drawn_groups
 from robotmodels.errors import InvalidValueError
 

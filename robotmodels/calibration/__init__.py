@@ -1,18 +1,12 @@
 """Geometric calibration: from measurements, or from the robot touching things (section 1.4)."""
 
 from ..obstacles import Box, Sphere
-from .calibrated_robot.calibrated import CalibratedRobot, calibrated_model
-from .calibrated_robot.calibrated_pose import calibrated_pose
+from .candidates import candidate_parameters
 from .combined_arms import combine_arms
-from .correction.corrected import corrected_igm
-from .correction.offsets import joint_offsets, pose_offsets
-from .extended_table.candidates import candidate_parameters
-from .extended_table.differential import differential_model
-from .extended_table.elements import Compliance
-from .extended_table.parameters import GeometricParameters
+from .differential import differential_model
 from .fit import fit
-from .identifiability.identifiable import Reason
-from .identifiability.structural import identifiable_parameters
+from .identifiable import Reason, identifiable_parameters
+from .inverse import corrected_igm
 from .measurements import (
     AxisPosition,
     CameraPose,
@@ -28,12 +22,14 @@ from .measurements import (
     Position,
     RelativePose,
 )
+from .offsets import joint_offsets, pose_offsets
+from .parameters import Compliance, GeometricParameters
 from .prior import ParameterPrior
 from .read import read_measurements
 from .report import report
 from .result import CalibrationResult
-from .selection.observability import observability
-from .selection.select import select_configurations
+from .robot import CalibratedRobot, calibrated_model, calibrated_pose
+from .selection import observability, select_configurations
 from .validation import Errors, Validation
 from .write import calibrated_urdf, write_result
 

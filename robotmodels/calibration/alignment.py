@@ -19,15 +19,13 @@ from ..kinematics import dgm
 from ..kinematics.lengths import characteristic_length
 from ..model import RobotModel
 from ..se3 import skew
-from .calibrated_robot.calibrated import as_calibrated, calibrated_model, with_moved_tool
-from .calibrated_robot.calibrated_pose import calibrated_pose
-from .extended_table.candidates import candidate_parameters
-from .extended_table.elements import ErrorLaw
-from .extended_table.parameters import GeometricParameters
-from .extended_table.skeleton import Frame
-from .identifiability.identifiable import identifiable_on
+from .candidates import candidate_parameters
+from .extended_table import Frame
+from .identifiable import identifiable_on
 from .measurements import Measurement, Pose, Position
+from .parameters import ErrorLaw, GeometricParameters
 from .problem import problem_of
+from .robot import as_calibrated, calibrated_model, calibrated_pose, with_moved_tool
 from .solve import ROUGH, first_scales, solve
 from .validation import Errors, errors_of
 

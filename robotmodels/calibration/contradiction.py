@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from .._arrays import Array
 from ..estimation import Loss
 from ..estimation.outlying import outlying
-from .identifiability.scale import needs_a_length
+from .identifiable import needs_a_length
 from .measurements import KnownDistance
 from .prior import ParameterPrior
 from .problem import Problem, problem_of, satisfying, stacked

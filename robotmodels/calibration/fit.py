@@ -14,18 +14,12 @@ from ..errors import InvalidValueError
 from ..estimation import Loss
 from ..model import RobotModel, check_model
 from .alignment import align_base_and_tool
+from .candidates import candidate_parameters
 from .contradiction import contradictions, with_outliers
-from .extended_table.candidates import candidate_parameters
-from .extended_table.elements import Compliance
-from .extended_table.parameters import GeometricParameters, as_names
-from .identifiability.identifiable import (
-    IdentifiableParameters,
-    Reason,
-    all_deviations,
-    identifiable_on,
-)
+from .identifiable import IdentifiableParameters, Reason, all_deviations, identifiable_on
 from .measurements import KnownDistance, Measurement
 from .notes import implausible, notes_after, notes_before, notes_of_errors
+from .parameters import Compliance, GeometricParameters, as_names
 from .prior import ParameterPrior, estimated_with, note_of_prior, sized, widened
 from .problem import as_measurements, guessed_fixtures, measured_frames, problem_of
 from .result import CalibrationResult

@@ -15,7 +15,7 @@ from ..kinematics import dgm
 from ..kinematics.lengths import characteristic_length
 from ..model import RobotModel
 from .alignment import best_motion
-from .extended_table.skeleton import Frame
+from .extended_table import Frame
 from .measurements import (
     CameraPose,
     Distance,

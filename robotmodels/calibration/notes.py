@@ -8,12 +8,12 @@ from .._arrays import Array
 from ..estimation import FitStatus
 from ..geometry import REVOLUTE
 from ..table_text import in_unit, printed_unit
-from .extended_table.elements import ErrorLaw
-from .identifiability.identifiable import IdentifiableParameters
+from .identifiable import IdentifiableParameters
 from .joint_readings import check_readings
 from .length_units import check_units
 from .measurements import Measurement, Pose, Position, lonely_labels
 from .measurements.measurement import origin_of
+from .parameters import ErrorLaw
 from .problem import Problem, measured_frames
 from .solve import Solution, states_noise
 from .validation import Validation

@@ -10,10 +10,9 @@ import numpy as np
 from .._arrays import Array, Rebuilt, as_reals
 from ..errors import InvalidValueError
 from ..estimation import NonlinearFit, Prior
-from .extended_table.elements import ErrorLaw
-from .extended_table.parameters import GeometricParameter, GeometricParameters
-from .identifiability.identifiable import IdentifiableParameters
+from .identifiable import IdentifiableParameters
 from .measurements import Measurement
+from .parameters import ErrorLaw, GeometricParameter, GeometricParameters
 from .problem import Problem, problem_of
 
 _ANOTHER_ROBOT = 3.0

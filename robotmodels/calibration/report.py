@@ -24,11 +24,11 @@ from ..table_text import (
     printed_unit,
     table_of,
 )
-from .extended_table.elements import ErrorLaw
-from .identifiability.identifiable import Reason
+from .identifiable import Reason
 from .measurements import Measurement
 from .measurements.measurement import origin_of
 from .notes import implausible
+from .parameters import ErrorLaw
 from .problem import evaluations, linearised
 from .result import CalibrationResult
 from .solve import states_noise

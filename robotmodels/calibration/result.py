@@ -10,10 +10,10 @@ from .._arrays import Array, Rebuilt
 from ..errors import InvalidValueError, nearest_names
 from ..estimation import FitStatus
 from ..model import RobotModel
-from .calibrated_robot.calibrated import CalibratedRobot, calibrated_model
-from .extended_table.parameters import GeometricParameters
-from .identifiability.identifiable import IdentifiableParameters
+from .identifiable import IdentifiableParameters
 from .other_tool import PredictedError, other_tool_error
+from .parameters import GeometricParameters
+from .robot import CalibratedRobot, calibrated_model
 from .solve import Solution
 from .validation import Validation
 

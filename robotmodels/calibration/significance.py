@@ -12,13 +12,9 @@ from ..errors import InvalidValueError
 from ..estimation.linearised import inverse_factor
 from ..kinematics.lengths import spread_configurations
 from ..model import RobotModel
-from .identifiability.identifiable import (
-    DEPENDENT,
-    IdentifiableParameters,
-    Reason,
-    identifiable_on,
-)
+from .identifiable import IdentifiableParameters, Reason, identifiable_on
 from .measurements import Measurement
+from .offsets import DEPENDENT
 from .prior import largest_factors
 from .problem import guessed_fixtures, problem_of, stacked
 from .solve import Solution

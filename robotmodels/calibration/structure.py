@@ -21,13 +21,12 @@ from numpy.typing import NDArray
 from .._arrays import Array
 from ..geometry import FIXED, PRISMATIC
 from ..table_text import in_unit, printed_unit
-from .extended_table.candidates import candidate_parameters
-from .extended_table.elements import Compliance, Element, ErrorLaw
-from .extended_table.parameters import GeometricParameters
-from .identifiability.identifiable import IdentifiableParameters, Reason
-from .identifiability.scale import needs_a_length
+from .candidates import candidate_parameters
+from .extended_table import Element
+from .identifiable import IdentifiableParameters, Reason, needs_a_length
 from .measurements import Evaluation
 from .measurements.noise import whitened
+from .parameters import Compliance, ErrorLaw, GeometricParameters
 from .prior import estimated_with
 from .problem import Problem, evaluations, problem_of, stacked
 from .solve import ROUGH, Solution, refitted

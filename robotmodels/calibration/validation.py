@@ -22,8 +22,8 @@ from ..estimation import Loss, fit_nonlinear
 from ..kinematics import dgm
 from ..kinematics.lengths import characteristic_length
 from ..model import RobotModel
-from .extended_table.parameters import GeometricParameters
 from .measurements import Labelled, Measurement, length_is_known, lonely_labels
+from .parameters import GeometricParameters
 from .prior import ParameterPrior
 from .problem import Problem, guessed_fixtures, linearised, problem_of, stacked
 from .solve import ROUGH, Solution, first_scales, refitted, solve

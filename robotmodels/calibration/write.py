@@ -13,8 +13,8 @@ from ..errors import InvalidValueError, MissingExtraError, UrdfWarning
 from ..estimation import confidence_intervals
 from ..model import to_urdf
 from ..urdf.in_place import urdf_in_place
-from .calibrated_robot.calibrated import CalibratedRobot
 from .result import CalibrationResult
+from .robot import CalibratedRobot
 from .solve import states_noise
 from .validation import Errors, HeldOutErrors
 
@@ -227,7 +227,7 @@ def calibrated_urdf(robot: CalibratedRobot) -> str:
     Examples
     --------
     >>> from robotmodels.calibration import candidate_parameters
-    >>> from robotmodels.calibration.calibrated_robot.calibrated import calibrated_model
+    >>> from robotmodels.calibration.robot import calibrated_model
     >>> from robotmodels.model import RobotModel
     >>> from robotmodels.robots import load
     >>> parameters = candidate_parameters(load("lab_rr"))
