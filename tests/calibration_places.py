@@ -136,11 +136,6 @@ def markers(arm):
     return [arm.seen(q) for _ in range(3)], [arm.seen(fresh)]
 
 
-def spread(arm):
-    """Positions in 40 to 120 random postures."""
-    return [arm.seen(arm.postures(int(arm.rng.integers(40, 121))))], [arm.seen(arm.postures(300))]
-
-
 def motion(arm):
     """Positions during a motion of three harmonics, 60 to 200 of them; ten other motions."""
     around = arm.postures(400)
@@ -155,7 +150,7 @@ def motion(arm):
     return [arm.seen(one())], [arm.seen(np.concatenate([one() for _ in range(10)]))]
 
 
-PROTOCOLS = {f.__name__: f for f in (points, sockets, markers, spread, motion)}
+PROTOCOLS = {f.__name__: f for f in (points, sockets, markers, motion)}
 
 
 def stated_over_true(protocol, seed, prior=PRIOR):

@@ -11,18 +11,14 @@ from robotmodels.calibration.report import report
 from robotmodels.calibration.validation import splits_of
 
 
-@pytest.mark.parametrize(("name", "first"), [("points", 60), ("sockets", 0), ("markers", 0),
-                                         ("spread", 0), ("motion", 0)])  # fmt: skip
-def test_the_stated_error_is_that_of_a_new_place(name, first):
-    ratios = [stated_over_true(PROTOCOLS[name], seed) for seed in range(first, first + 30)]
+@pytest.mark.parametrize(
+    ("name", "prior"), [("markers", PRIOR), ("motion", PRIOR), ("markers", None)]
+)
+def test_the_stated_error_is_that_of_a_new_place(name, prior):
+    ratios = [stated_over_true(PROTOCOLS[name], seed, prior) for seed in range(10)]
     folds, in_sample = np.mean(ratios, axis=0)
     assert 1.0 <= folds <= 1.3
     assert in_sample < 0.9 * folds
-
-
-def test_the_stated_error_holds_without_a_prior():
-    ratios = [stated_over_true(PROTOCOLS["markers"], seed, None)[0] for seed in range(10)]
-    assert 1.0 <= np.mean(ratios) <= 1.3
 
 
 # --- what belongs together ------------------------------------------------------------------------
@@ -163,17 +159,3 @@ def test_a_point_that_is_touched_once_is_no_place():
     for part in parts_of(arm, [*contacts, once]):
         assert once in part.training
         assert len(labels(part.test)) == 1
-
-
-def test_progress_ends_at_its_total():
-    arm, said = Arm(0), []
-    fit(arm.nominal, sockets(arm, 4)[0], prior=PRIOR, progress=lambda *x: said.append(x))
-    assert [done for done, _, _ in said] == list(range(1, said[-1][1] + 1))
-    assert [doing for *_, doing in said].count("cross-validation") == 4
-
-
-def test_the_same_chance_keeps_the_same_aside(places):
-    arm = Arm(0)
-    again = fit(arm.nominal, sockets(arm, 4)[0], prior=PRIOR)
-    assert np.array_equal(again.validation.folds.blocks, places.validation.folds.blocks)
-    assert np.array_equal(again.validation.held_out.position, places.validation.held_out.position)
