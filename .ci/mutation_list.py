@@ -662,7 +662,7 @@ MUTATIONS = [
         "def linear_problem(", "bend = slope - weight", "bend = weight - slope",
         "tests/test_estimation_nonlinear.py -k outliers_do_not_move_a_robust_fit"),
     Mutation("calibration: validation", "a fold is fitted as well",
-        "def partition_blocks(", "(fold != k) & ~next_to[k]", "~next_to[k]",
+        "def partition(", "(fold != k) & ~next_to[k]", "~next_to[k]",
         "tests/test_calibration_validation.py -k sockets"),
     Mutation("calibration: prior", "the prior keeps its strength",
         "def settled_prior(", "strength=float(strength))", "strength=1.0)",

@@ -120,9 +120,9 @@ def test_what_is_not_estimated_is_listed_with_its_reason(contacts):
     text = report(contacts)
     assert "d3: it is known and fixed." in text
     assert "theta7: it does not change what is measured." in text
-    (table,) = tables(contacts, "Known, and not identifiable")
-    assert set(cells(table)) - {""} == set(contacts.identifiable.regrouped_into)
-    assert cells(table)["r1"][0].strip() == "+1 r0"
+    for name in contacts.identifiable.regrouped_into:
+        assert f"* {name}: " in text
+    assert "* r1: +1 r0\n" in text
 
 
 def test_kinds_noise_and_ranges(contacts):

@@ -8,7 +8,7 @@ import robotmodels as rm
 from robotmodels.calibration import KnownDistance, PointContact, Position, fit
 from robotmodels.calibration.measurements import Distance
 from robotmodels.calibration.report import report
-from robotmodels.calibration.validation import splits_of
+from robotmodels.calibration.validation import partition
 
 
 @pytest.mark.parametrize(
@@ -25,7 +25,7 @@ def test_the_stated_error_is_that_of_a_new_place(name, prior):
 
 
 def parts_of(arm, measured, folds=5, seed=0):
-    return splits_of(arm.nominal, measured, folds, np.random.default_rng(seed))
+    return partition(arm.nominal, measured, folds, np.random.default_rng(seed)).splits
 
 
 def labels(measurements):

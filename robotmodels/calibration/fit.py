@@ -26,7 +26,7 @@ from .result import CalibrationResult
 from .significance import adjusted, check_enough, insignificant_parameters
 from .solve import Solution, solve
 from .structure import note_of_structure, structure_of, trials_of
-from .validation import Validation, cross_validated, errors_of, settled_prior, splits_of, tested
+from .validation import Validation, cross_validated, errors_of, partition, settled_prior, tested
 
 Progress = Callable[[int, int, str], None]
 """Called with the number of finished fits, their total, and the current task."""
@@ -173,21 +173,23 @@ def fit(
     solution = with_outliers(solution, contradicted, expected)
     structure = None if implausible(solution) else structure_of(solution, estimate.identifiable)
     blocks = sum(m.blocks for m in measured if m.views)
-    parts = splits_of(model, measured, folds, rng) if folds and blocks >= 2 * folds else []
-    last = splits_of(model, measured, max(round(1.0 / share), 2), rng)[:1] if share else []
+    parts = partition(model, measured, folds if blocks >= 2 * folds else 0, rng)
+    last = partition(model, measured, max(round(1.0 / share), 2) if share else 0, rng)
+    last = last._replace(splits=last.splits[:1])
+    fits = len(parts.splits)
     if folds and blocks < 2 * folds:
         notes.append(f"{blocks} measurements are too few for {folds} folds: none were made.")
-    elif (folds or share) and not (parts or last):
+    elif (folds or share) and not (parts.splits or last.splits):
         notes.append("Nothing can be kept aside: each object is measured in one posture alone.")
-    trials_to_fit = len(structure.indicated) if structure and parts else 0
-    step = _Steps(progress, 1 + len(parts) + len(last) + trials_to_fit * (1 + len(parts)))
+    trials_to_fit = len(structure.indicated) if structure and fits else 0
+    step = _Steps(progress, 1 + fits + len(last.splits) + trials_to_fit * (1 + fits))
     step("all measurements")
     in_folds = in_test = None
-    if parts:
+    if fits:
         in_folds = cross_validated(solution, parts, nominal, partial(step, "cross-validation"))
     if test:
         in_test = tested(solution, test)
-    elif last:
+    elif last.splits:
         in_test = cross_validated(solution, last, nominal, partial(step, "measurements kept aside"))
     if structure is not None:
         trials = []
@@ -211,7 +213,7 @@ def fit(
         notes=(
             *notes_of_errors(solution, validation),
             *notes,
-            *dict.fromkeys(p.partition.note for p in (*parts, *last) if p.partition.note),
+            *dict.fromkeys(part.note for part in (parts, last) if part.note),
             *note_of_prior(prior, estimate.prior, distances),
             *(c.sentence() for c in contradicted),
             *notes_after(solution, estimate.identifiable, estimate.identifiable_after),

@@ -190,12 +190,6 @@ def _unlikely_noise(solution: Solution) -> list[str]:
                 "for a slip of units (mm for m, degrees for rad), a wrong frame, or readings that "
                 "do not belong to their measurements."
             )
-        elif states_noise(m) and m.views and 0.0 < size < 1.0 / _FAR:
-            notes.append(
-                f"{m.name}: residuals are {1.0 / size:.3g} times smaller than the stated standard "
-                "deviations. Look for a slip of units in sigma; the standard errors of the "
-                "parameters depend on it."
-            )
     return notes
 
 

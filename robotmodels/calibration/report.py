@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from textwrap import wrap
 from typing import NamedTuple
 
 import numpy as np
@@ -98,7 +97,7 @@ def _outcome(result: CalibrationResult) -> ReportSection:
         + (f" {len(fit.dropped)} directions were left out." if len(fit.dropped) else ""),
     ]
     test = validation.held_out  # measurements that the user held out come first, then all folds
-    if test is None or test.partition is not None:
+    if test is None or test.description:
         test = validation.folds or test
     kept_aside = {} if test is None else test.rms
     for unit, rms in validation.in_sample.rms.items():
@@ -188,9 +187,8 @@ def _errors(result: CalibrationResult) -> ReportSection:
         if held is not None:
             name = f"{held.fits} folds" if name == "folds" else name
             named += [(f"{name}, before", held.nominal), (f"{name}, after", held)]
-            if held.partition is not None:
-                text = f"{name.capitalize()}: {held.partition.description} kept aside."
-                sentences.append(text)
+            if held.description:
+                sentences.append(f"{name.capitalize()}: {held.description} kept aside.")
     if validation.folds is None and validation.held_out is None:
         sentences.append("No measurements were kept aside: errors elsewhere are not known.")
     units = tuple(validation.in_sample.count)
@@ -289,19 +287,12 @@ def _left_out(result: CalibrationResult) -> ReportSection:
     names = {why: ", ".join(found.of_reason(why)) for why in reasons}
     body += [f"{listed}: {why.value}." for why, listed in names.items() if listed]
     if found.regrouped_into:
-        rows = []
-        for name, terms in found.regrouped_into.items():
-            words = [f"{c:+.3g} {other}" for other, c in terms.items() if abs(c) > 1e-9]
-            lines = wrap("   ".join(words) or "the unknown fixtures", 78)
-            rows += [(name if k == 0 else "", f"{line:<78}") for k, line in enumerate(lines)]
-        width = max(len(line.rstrip()) for _, line in rows)
         body.append(
-            f"Seen only in combination ({Reason.REGROUPED.value}): a correction of 1 (m, rad) "
-            "acts like"
+            f"Only in combination ({Reason.REGROUPED.value}); a correction of 1 (m, rad) acts like:"
         )
-        body.append(
-            table_of(("parameter", "acts like"), [(name, line[:width]) for name, line in rows])
-        )
+    for name, terms in found.regrouped_into.items():
+        words = (f"{c:+.3g} {other}" for other, c in terms.items() if abs(c) > 1e-9)
+        body.append(f"* {name}: {' '.join(words) or 'the unknown fixtures'}")
     body.append(
         f"Sines of the angles to the columns before: {found.gap[0]:.1e} is the smallest that was "
         f"kept, {found.gap[1]:.1e} the largest left out."

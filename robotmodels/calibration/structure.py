@@ -30,7 +30,7 @@ from .parameters import Compliance, ErrorLaw, GeometricParameters
 from .prior import estimated_with
 from .problem import Problem, evaluations, problem_of, stacked
 from .solve import ROUGH, Solution, refitted
-from .validation import Errors, HeldOutErrors, Split, cross_validated, errors_of
+from .validation import Errors, HeldOutErrors, Partition, cross_validated, errors_of
 
 _SIGNIFICANCE = 0.01
 """Significance level of all tests together."""
@@ -77,7 +77,6 @@ class Structure(NamedTuple):
     p: float
     parameters: GeometricParameters
     indicated: tuple[TermFamily, ...]
-    others: tuple[TermFamily, ...]
     is_complete: bool
 
 
@@ -140,8 +139,7 @@ def structure_of(solution: Solution, found: IdentifiableParameters) -> Structure
         return None
     best = sorted(p_values, key=lambda family: p_values[family])
     indicated = tuple(family for family in best if p_values[family] < _INDICATED)
-    others = tuple(family for family in best if family not in indicated)
-    return Structure(p, whole, indicated, others, is_complete)
+    return Structure(p, whole, indicated, is_complete)
 
 
 def _all_parameters(
@@ -253,15 +251,15 @@ def trials_of(
     solution: Solution,
     candidates: GeometricParameters,
     identify: Callable[[GeometricParameters], IdentifiableParameters],
-    splits: Sequence[Split],
+    parts: Partition,
     validation: HeldOutErrors,
     nominal: Errors,
     done: Callable[[], None],
 ) -> list[Trial]:
-    """Fits with each indicated family, validated on the same splits; largest gain first.
+    """Fits with each indicated family, validated on the same parts; largest gain first.
 
     ``identify`` gives the identifiable ones of some candidates; ``validation`` are the errors of
-    the splits without the family.
+    the parts without the family.
     """
     measurements, old = solution.problem.measurements, solution.problem.parameters
     trials: list[Trial] = []
@@ -277,7 +275,7 @@ def trials_of(
         start = np.concatenate([solution.corrections, np.zeros(len(added)), solution.fixtures])
         found = refitted(solution, wider, start, solution.scales, tolerance=ROUGH)
         done()
-        errors = cross_validated(found, splits, nominal, done)
+        errors = cross_validated(found, parts, nominal, done)
         trials.append(Trial(family, errors, *_gain(validation, errors)))
         fits[family] = found, identifiable
     trials.sort(key=lambda trial: -trial.gain)
@@ -316,6 +314,10 @@ def note_of_structure(structure: Structure, trials: Sequence[Trial], without: Er
         "Standard errors assume independent residuals and are too short.",
     ]
     helpful = [trial for trial in trials if trial.helps]
+    is_explained = bool(helpful) and helpful[0].explains_all
+    if without is None and structure.indicated:
+        terms = " or ".join(f"{family.word} ({family.option})" for family in structure.indicated)
+        text.append(f"A fit with folds shows whether {terms} explains it.")
     if without is not None and helpful:
         found = [
             f"{t.family.word} ({t.family.option}) from {_change(without, t.errors)}"
@@ -324,36 +326,16 @@ def note_of_structure(structure: Structure, trials: Sequence[Trial], without: Er
         text.append(
             f"Try {helpful[0].family.word} next. Rms error on data kept aside: {'; '.join(found)}."
         )
-    if without is not None and len(helpful) < len(trials):
-        found = [f"{t.family.word} ({_change(without, t.errors)})" for t in trials if not t.helps]
-        text.append(
-            "Tried, with a change of less than three standard errors on data kept aside: "
-            f"{', '.join(found)}."
-        )
-    if without is None and structure.indicated:
-        terms = " or ".join(f"{family.word} ({family.option})" for family in structure.indicated)
-        text.append(f"{_capitalised(terms)} may explain it; a fit with folds compares.")
-    if structure.others:
-        terms = " or ".join(family.word for family in structure.others)
-        text.append(f"{_capitalised(terms)} would not explain it.")
+        if not is_explained:
+            text.append(f"With {helpful[0].family.word} they still depend on the posture.")
     if not structure.parameters.model.inertia.values.any():
         text.append("Give the model masses (with_inertia) to try joint compliance.")
-    is_explained = bool(helpful) and helpful[0].explains_all
-    if helpful and not is_explained:
-        text.append(f"With {helpful[0].family.word} they still depend on the posture.")
-    may_help = any(trial.gain > _GAIN for trial in trials)
-    if may_help and not helpful:
-        text.append("More postures would decide between them.")
-    if (trials or not structure.indicated) and not is_explained and (helpful or not may_help):
+    if (trials or not structure.indicated) and not is_explained:
         text.append(
             "Backlash, friction, drift or bending links may be the cause: approach every posture "
             "from the same side, and repeat some measurements at the end."
         )
     return " ".join(text)
-
-
-def _capitalised(words: str) -> str:
-    return words[:1].upper() + words[1:]
 
 
 def _change(before: Errors, after: Errors) -> str:

@@ -94,16 +94,15 @@ class Errors(Rebuilt):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HeldOutErrors(Errors):
-    """Errors of measurements held out of ``fits`` fits.
+    """Errors of measurements (numbers ``blocks``) held out of ``fits`` fits, and before.
 
-    Shapes: blocks (B,), their numbers; ``nominal``: errors before the calibration; ``partition``:
-    how they were chosen, None if the caller did.
+    ``description``: how they were chosen, empty if the caller did.
     """
 
     blocks: Numbers
     nominal: Errors
     fits: int
-    partition: Partition | None
+    description: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,12 +176,12 @@ def suited_fixtures(problem: Problem, corrections: Array, known: dict[str, float
 
 
 def cross_validated(
-    solution: Solution, splits: Sequence[Split], nominal: Errors, done: Callable[[], None]
+    solution: Solution, parts: Partition, nominal: Errors, done: Callable[[], None]
 ) -> HeldOutErrors:
-    """Errors of the held-out measurements of each split, by a fit of the others."""
+    """Errors of the held-out measurements of each part, by a fit of the others."""
     found = []
     known = solution.fixture_values
-    for split in splits:
+    for split in parts.splits:
         problem = problem_of(solution.problem.parameters, split.training)
         start = [known[fixture.name] for fixture in problem.fixtures]
         fitted = refitted(
@@ -195,14 +194,14 @@ def cross_validated(
         corrections, values = fitted.corrections, fitted.fixture_values
         found.append(errors_elsewhere(problem.parameters, corrections, split.test, values))
         done()
-    blocks = np.concatenate([split.blocks for split in splits])
+    blocks = np.concatenate([split.blocks for split in parts.splits])
     return HeldOutErrors(
         np.concatenate([errors.position for errors in found]),
         np.concatenate([errors.angle for errors in found]),
         blocks,
         Errors(nominal.position[blocks], nominal.angle[blocks]),
-        len(splits),
-        splits[0].partition,
+        len(parts.splits),
+        parts.description,
     )
 
 
@@ -212,7 +211,7 @@ def tested(solution: Solution, test: Sequence[Measurement]) -> HeldOutErrors:
     errors = errors_elsewhere(parameters, solution.corrections, test, known)
     nominal = errors_elsewhere(parameters, np.zeros(len(parameters)), test, {})
     blocks = np.arange(len(errors.position))
-    return HeldOutErrors(errors.position, errors.angle, blocks, nominal, 1, None)
+    return HeldOutErrors(errors.position, errors.angle, blocks, nominal, 1)
 
 
 def settled_prior(
@@ -226,13 +225,13 @@ def settled_prior(
             f"strength: choosing it needs {2 * _FOLDS} measurements or more, got "
             f"{problem.blocks}; give the strength."
         )
-    splits = splits_of(problem.parameters.model, problem.measurements, _FOLDS, rng)
+    parts = partition(problem.parameters.model, problem.measurements, _FOLDS, rng)
     whole = solve(problem, loss=loss, prior=prior)
     nominal = errors_of(problem, np.zeros(problem.P))
     candidates = [replace(prior, strength=float(strength)) for strength in _STRENGTHS]
     sizes = []
     for candidate in candidates:
-        errors = cross_validated(replace(whole, prior=candidate), splits, nominal, lambda: None)
+        errors = cross_validated(replace(whole, prior=candidate), parts, nominal, lambda: None)
         by_unit = errors.rms if loss is Loss.SQUARES else errors.mean
         sizes.append([by_unit[unit] / nominal.rms[unit] for unit in by_unit])
     relative = np.array(sizes) / np.min(sizes, axis=0)
@@ -242,59 +241,33 @@ def settled_prior(
 # --- partition of measurements into folds ---------------------------------------------------------
 
 
-class Partition(NamedTuple):
-    """Masks (B,) of test and training blocks, number of places, whether runs are left out."""
-
-    parts: tuple[tuple[Mask, Mask], ...]
-    places: int
-    runs: bool
-    note: str
-
-    @property
-    def description(self) -> str:
-        """Text for the report."""
-        runs = "runs of successive postures, those next to a run left out of the fit as well,"
-        whole = f"whole places ({self.places})"
-        if self.places and self.runs:
-            return f"{whole}; elsewhere {runs}"
-        return whole if self.places else runs
-
-
 class Split(NamedTuple):
-    """Measurements to fit and their numbers, those held out with their blocks, and the rule."""
+    """Measurements to fit and their numbers, those held out with their blocks."""
 
     training: tuple[Measurement, ...]
     test: tuple[Measurement, ...]
     numbers: tuple[int, ...]
     blocks: Numbers
-    partition: Partition
 
 
-def splits_of(
+class Partition(NamedTuple):
+    """Splits of measurements, with a description for the report and a note, empty for none."""
+
+    splits: tuple[Split, ...]
+    description: str
+    note: str
+
+
+def partition(
     model: RobotModel, measurements: Sequence[Measurement], folds: int, rng: np.random.Generator
-) -> list[Split]:
-    """At most ``folds`` parts that are held out in turn: whole places, or runs of postures."""
-    partition = partition_blocks(model, measurements, folds, rng)
-    splits = []
-    for test, training in partition.parts:
-        kept = _restricted(measurements, training)
-        held_out = [m for _, m in _restricted(measurements, test) if m.views]
-        numbers = tuple(k for k, _ in kept)
-        blocks = np.flatnonzero(test)
-        splits.append(Split(tuple(m for _, m in kept), tuple(held_out), numbers, blocks, partition))
-    return splits
-
-
-def partition_blocks(
-    model: RobotModel,
-    measurements: Sequence[Measurement],
-    folds: int,
-    rng: np.random.Generator,
 ) -> Partition:
-    """Folds of whole places or runs of postures; equal readings are always in one fold."""
+    """At most ``folds`` parts that are held out in turn: whole places, or runs of postures.
+
+    Equal readings are always in one part.
+    """
     seen = [m for m in measurements if m.views]
-    if not seen:
-        return Partition((), 0, False, "")
+    if not seen or not folds:
+        return Partition((), "", "")
     posture, label = _postures(seen), _label_numbers(seen)
     fold = np.full(len(posture), -1, dtype=np.int64)
     near = _NEAR * characteristic_length(model)
@@ -311,7 +284,7 @@ def partition_blocks(
             "of other postures there, and may be larger at another place. Measure at three or "
             f"more places, over {near:.2g} m apart."
         )
-    places, runs = len(np.unique(place[fold >= 0])), False
+    places, has_runs = len(np.unique(place[fold >= 0])), False
     of_posture = np.full(int(posture.max()) + 1, -1, dtype=np.int64)
     of_posture[posture[whole]] = fold[whole]
     next_to = np.zeros((folds, len(posture)), dtype=np.bool_)
@@ -320,7 +293,7 @@ def partition_blocks(
         met, first = np.unique(posture[blocks], return_index=True)
         met = met[np.argsort(first)]
         if len(met) > 1:
-            runs = True
+            has_runs = True
             turn = rng.permutation(folds)[np.arange(len(met)) * folds // len(met)]
             of_posture[met] = np.where(of_posture[met] < 0, turn, of_posture[met])
             width = len(met) // (3 * folds)
@@ -328,9 +301,15 @@ def partition_blocks(
                 wide = np.convolve(of_posture[met] == k, np.ones(2 * width + 1), "same") > 0.5
                 next_to[k, blocks] = np.isin(posture[blocks], met[wide])
     fold[~whole] = of_posture[posture[~whole]]
-    used = [k for k in range(folds) if (fold == k).any()]
-    parts = tuple((fold == k, (fold != k) & ~next_to[k]) for k in used)
-    return Partition(parts, places, runs, note)
+    splits = []
+    for k in np.unique(fold[fold >= 0]):
+        training = _restricted(measurements, (fold != k) & ~next_to[k])
+        test = tuple(m for _, m in _restricted(measurements, fold == k) if m.views)
+        numbers, kept = zip(*training, strict=True) if training else ((), ())
+        splits.append(Split(kept, test, numbers, np.flatnonzero(fold == k)))
+    runs = "runs of successive postures, those next to a run left out of the fit as well,"
+    parts = [f"whole places ({places})"] * bool(places) + [runs] * has_runs
+    return Partition(tuple(splits), "; elsewhere ".join(parts), note)
 
 
 def _postures(seen: Sequence[Measurement]) -> Numbers:
