@@ -819,7 +819,7 @@ MUTATIONS = [
         "def toggle(self, blocks", "self.r -= sign *", "self.r += sign *",
         "tests/test_calibration_mistakes.py -k outliers_under_squares"),
     Mutation("calibration: measurements", "a known distance is predicted from the other side",
-        "def contradictions(", ".length + float(shift", ".length - float(shift",
+        "def contradictions(", "(m.length + mean)", "(m.length - mean)",
         "tests/test_calibration_mistakes.py -k contradicted_by_the_lengths"),
     Mutation("calibration: measurements", "as many rows as unknowns are enough",
         "def check_enough(", "P + F + 1 - problem.rows", "P + F - problem.rows",

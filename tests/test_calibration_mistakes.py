@@ -17,7 +17,6 @@ from robotmodels.calibration import (
     report,
 )
 from robotmodels.calibration.measurements import CameraPose, Distance, RelativePose
-from robotmodels.cli import main
 from robotmodels.datasets import panda_double_socket
 from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.geometry import DHTable
@@ -278,19 +277,6 @@ def test_the_number_of_missing_measurements_is_right_at_once(kind, seed, prior):
         fit(arm.nominal, first(enough - 1), prior=prior, **ALONE)
 
 
-def test_a_joint_that_stays_still_is_not_counted_as_missing():
-    arm = Arm(0)
-    q = arm.readings(40)
-    q[:, 2] = 0.3
-    p = arm.positions(q)
-    with pytest.raises(InvalidValueError, match="at least") as caught:
-        fit(arm.nominal, Position(q[:3], p[:3]), **ALONE)
-    enough = 3 + int(str(caught.value).split("at least ")[1].split()[0])
-    fit(arm.nominal, Position(q[:enough], p[:enough]), **ALONE)
-    with pytest.raises(InvalidValueError, match="at least 1 more"):
-        fit(arm.nominal, Position(q[: enough - 1], p[: enough - 1]), **ALONE)
-
-
 # --- units ----------------------------------------------------------------------------------------
 
 FACTORS = [
@@ -362,11 +348,8 @@ def test_the_unit_of_a_known_distance_is_named(factor, sentence, prior):
     [
         (1e3, "m", "like millimetres. Say lengths='mm'"),
         (1.0, "mm", "like metres. Say lengths='m'"),
-        (1e2, "m", "like centimetres. Multiply them by 0.01"),
         (1e2, "mm", "like centimetres. Multiply them by 10"),
-        (1 / 0.0254, "mm", "like inches. Multiply them by 25.4"),
-        (1e4, "m", None),
-        (1e3, "mm", None), (1.0, "m", None),
+        (1e3, "mm", None),
     ],
 )  # fmt: skip
 def test_the_unit_of_a_file_is_named(tmp_path, factor, lengths, advice):
@@ -375,10 +358,10 @@ def test_the_unit_of_a_file_is_named(tmp_path, factor, lengths, advice):
     rows = np.hstack([q, factor * arm.positions(q)])
     file = tmp_path / "tracker.csv"
     np.savetxt(file, rows, delimiter=",", header="q1,q2,q3,q4,q5,q6,x,y,z", comments="")
-    if advice is None and factor < 1e4:
+    if advice is None:
         assert read_measurements(file, "position", arm.nominal, lengths=lengths).blocks == 20
         return
-    with pytest.raises(InvalidValueError, match=advice or "look like millimetres"):
+    with pytest.raises(InvalidValueError, match=advice):
         read_measurements(file, "position", arm.nominal, lengths=lengths)
 
 
@@ -480,25 +463,6 @@ def test_the_files_read_are_listed(socket):
     by_hand = fit(data.model, [touched, known], prior=ParameterPrior(), **ALONE)
     assert "Read for" not in report(by_hand)
     assert np.array_equal(by_hand.values, result.values)
-
-
-def test_the_command_line_lists_the_files(socket, tmp_path, capsys):
-    data, folder = socket
-    urdf = tmp_path / "panda.urdf"
-    urdf.write_text(data.urdf)
-    words = [
-        "calibrate", "--robot", str(urdf), "--tip-link", "panda_link8", "--measurements",
-        str(folder), "--pattern", "hole_?.csv", "--kind", "point-contact", "--known-distance",
-        "hole_0", "hole_1", "0.05", "--prior", "1e-3 5e-3", "--folds", "0", "--held-out", "0",
-        "--test", str(folder / "hole_0.csv"),
-    ]  # fmt: skip
-    assert main(words) == 0
-    out = " ".join(capsys.readouterr().out.split())
-    assert "Read for front: front/hole_0.csv (30 rows), front/hole_1.csv (32 rows)." in out
-    assert "Read for test: front/hole_0.csv (30 rows)." in out
-    assert main([*words, "--out", str(tmp_path / "out")]) == 0
-    out = " ".join(capsys.readouterr().out.split())
-    assert "Read for front: front/hole_0.csv (30 rows), front/hole_1.csv (32 rows)." in out
 
 
 def test_joints_beside_the_chain_are_named_where_their_columns_are_missing(tmp_path):

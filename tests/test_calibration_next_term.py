@@ -224,15 +224,3 @@ def test_a_term_of_the_fit_is_not_named_again():
     result = fit(scene.arm, measured, compliance="joints", folds=2, held_out=0)
     assert named(note(result))[0] == "gear eccentricity"
     assert "joint compliance" not in note(result)
-
-
-def test_fits_are_tried_only_where_there_is_structure():
-    for kind, least in (("none", 4), ("compliance", 8)):
-        said = []
-        scene, measured, _ = fitted(0, kind)
-        fit(scene.arm, measured, folds=3, held_out=0, progress=lambda *x, s=said: s.append(x))
-        total = said[0][1]
-        assert [done for done, _, _ in said] == list(range(1, total + 1))
-        assert {of for _, of, _ in said} == {total}
-        assert total == 4 if kind == "none" else total >= least
-        assert any(doing == "terms to try next" for *_, doing in said) == (kind != "none")

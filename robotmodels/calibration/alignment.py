@@ -50,17 +50,10 @@ def _nearest_rotation(M: Array) -> Array:
     return U @ np.diag([1.0, 1.0, float(np.sign(np.linalg.det(U @ Vt)))]) @ Vt
 
 
-class AlignedRobot(NamedTuple):
-    """A robot with fitted base and tool, and its errors."""
-
-    model: RobotModel
-    errors: Errors
-
-
 def align_base_and_tool(
     candidates: GeometricParameters, measured: Sequence[Measurement], fixed: Collection[str]
-) -> AlignedRobot | None:
-    """Fit base and tool alone (seed book, section 1.4.4.3); None if they are fixed or unknown."""
+) -> tuple[RobotModel, Errors] | None:
+    """Robot with base and tool fitted alone, and its errors; None if they are fixed or unknown."""
     model = candidates.model
     names = [
         e.name
@@ -83,7 +76,7 @@ def align_base_and_tool(
         model = _with_gravity_of(calibrated_model(kept, solution.corrections).model, model)
         if len(kept) == len(names):
             break
-    return AlignedRobot(model, errors_of(problem, solution.corrections, solution.fixtures))
+    return model, errors_of(problem, solution.corrections, solution.fixtures)
 
 
 def _with_gravity_of(placed: RobotModel, model: RobotModel) -> RobotModel:

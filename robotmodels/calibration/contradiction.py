@@ -34,37 +34,10 @@ _REFITS = 2
 
 
 class Contradiction(NamedTuple):
-    """Known distances of one stated length, numbers of their blocks, and their prediction."""
+    """Numbers of the blocks of known distances that are wrong, and the note about them."""
 
     blocks: tuple[int, ...]
-    measurements: tuple[KnownDistance, ...]
-    sigma: float
-    """Standard deviation of their mean length, m."""
-    predicted: float
-    """Prediction of their mean length, m, by a source."""
-    error: float
-    """Standard error of the prediction, m."""
-    source: str
-    rival: str
-    """A distance that may be wrong instead; empty for none."""
-
-    def sentence(self) -> str:
-        """The note about it."""
-        m, many, error = self.measurements[0], len(self.measurements), 1e3 * self.error
-        length = 1e3 * m.length
-        errors = abs(1e3 * self.predicted - length) / (1e3 * math.hypot(self.sigma, self.error))
-        digits = max(0, 1 - math.floor(math.log10(max(error, 1e-6))))
-        stated = f"{many} known distances of {length:.6g} mm:"
-        its = "Check the lengths, their points, and their"
-        if many == 1:
-            stated = f"{_named(m)}: stated {length:.6g} mm, but"
-            its = "Check the length, its two points, and its"
-        either = f" It or {self.rival}: one of these." if self.rival else ""
-        return (
-            f"{stated} {self.source} predict {1e3 * self.predicted:.{digits}f} +- "
-            f"{error:.{digits}f} mm (a difference of {errors:.0f} standard errors). {its} standard "
-            f"deviation of {1e3 * self.sigma * math.sqrt(many):.2g} mm.{either}"
-        )
+    note: str
 
 
 def contradictions(
@@ -91,21 +64,27 @@ def contradictions(
     sigma = np.array([_sigma(m, solution.scales[k]) for k, m in zip(numbers, known, strict=True)])
     shift, covariance = _predicted_differences(solution, others, numbers, sigma)
     firsts = np.cumsum([0, *(m.blocks for m in measurements)])
-    has_prior = bool(np.isfinite(solution.fit.prior.sigma).any())
+    source = "the other measurements"
+    source += " and the prior" if np.isfinite(solution.fit.prior.sigma).any() else ""
     found = []
     for group in _wrong_groups(shift, covariance, sigma, [m.length for m in known]):
-        size = len(group)
-        found.append(
-            Contradiction(
-                tuple(int(firsts[numbers[k]]) for k in group),
-                tuple(known[k] for k in group),
-                float(np.linalg.norm(sigma[group])) / size,
-                known[group[0]].length + float(shift[group].mean()),
-                math.sqrt(covariance[np.ix_(group, group)].sum()) / size,
-                f"the other measurements{' and the prior' if has_prior else ''}",
-                rival,
-            )
+        m, many = known[group[0]], len(group)
+        mean = float(shift[group].mean())
+        error = math.sqrt(covariance[np.ix_(group, group)].sum()) / many
+        size = float(np.linalg.norm(sigma[group])) / many
+        digits = max(0, 1 - math.floor(math.log10(max(1e3 * error, 1e-6))))
+        stated, its = f"{_named(m)}: stated {1e3 * m.length:.6g} mm, but", "the length, its points,"
+        if many > 1:
+            stated = f"{many} known distances of {1e3 * m.length:.6g} mm:"
+            its = "the lengths, their points,"
+        note = (
+            f"{stated} {source} predict {1e3 * (m.length + mean):.{digits}f} +- "
+            f"{1e3 * error:.{digits}f} mm (a difference of "
+            f"{abs(mean) / math.hypot(size, error):.0f} standard errors). Check {its} and the "
+            f"standard deviation of {1e3 * size * math.sqrt(many):.2g} mm."
         )
+        note += f" It or {rival}: one of these." if rival else ""
+        found.append(Contradiction(tuple(int(firsts[numbers[k]]) for k in group), note))
     return found
 
 

@@ -160,8 +160,8 @@ def fit(
         fixed = {*known, *known_lengths, *(() if prior is None else prior.named)}
         aligned = align_base_and_tool(candidates, measured, fixed)
         if aligned is not None:
-            nominal = aligned.errors
-            candidates = make_candidates(aligned.model).subset(candidates.names)
+            aligned_model, nominal = aligned
+            candidates = make_candidates(aligned_model).subset(candidates.names)
     if prior is not None:
         prior = sized(prior, candidates.skeleton.size)
     estimate = _estimate(
@@ -215,7 +215,7 @@ def fit(
             *notes,
             *dict.fromkeys(part.note for part in (parts, last) if part.note),
             *note_of_prior(prior, estimate.prior, distances),
-            *(c.sentence() for c in contradicted),
+            *(c.note for c in contradicted),
             *notes_after(solution, estimate.identifiable, estimate.identifiable_after),
         ),
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import permutations
 from math import exp, log
 from typing import NamedTuple
 
@@ -28,17 +29,10 @@ from .measurements import (
 )
 
 _UNITS = {"metres": 1.0, "centimetres": 1e-2, "inches": 0.0254, "millimetres": 1e-3}
-_PAIRS = (
-    ("millimetres", "metres"),
-    ("centimetres", "metres"),
-    ("inches", "metres"),
-    ("millimetres", "centimetres"),
-    ("millimetres", "inches"),
-)
 _SLIPS = {
     (unit, taken): _UNITS[taken] / _UNITS[unit]
-    for one, other in _PAIRS
-    for unit, taken in ((one, other), (other, one))
+    for unit, taken in permutations(_UNITS, 2)
+    if {unit, taken} != {"centimetres", "inches"}
 }
 """Ratio of stated to true lengths, by their unit and the unit that was assumed."""
 _TENFOLD = {

@@ -77,8 +77,9 @@ def other_tool_error(
     position = squares[:, :3, :-1].sum(axis=(1, 2))
     angle = squares[:, 3:, :-1].sum(axis=(1, 2))
     nominal = squares[:, :3, -1].sum(axis=1)
-    numbers = (position.mean(), position.max(), angle.mean(), nominal.mean())
-    return PredictedError(*(float(np.sqrt(x)) for x in numbers), float(length))
+    means = (position.mean(), position.max(), angle.mean(), nominal.mean())
+    rms, largest, turned, before = (float(np.sqrt(x)) for x in means)
+    return PredictedError(rms, largest, turned, before, float(length))
 
 
 def _posterior(result: Any) -> tuple[GeometricParameters, Array, Array]:

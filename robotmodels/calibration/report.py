@@ -333,7 +333,7 @@ def _outliers(result: CalibrationResult) -> ReportSection:
         lengths = ("-", "-")
         if m.views:
             at = place[block]
-            lengths = millimetres(errors.position[at]), degrees(errors.angle[at])
+            lengths = millimetres(float(errors.position[at])), degrees(float(errors.angle[at]))
         origin = origin_of(m)
         where = (origin[inside].name, origin[inside].row) if origin else (m.name, inside + 1)
         weight = float(fit.weights[fit.block == block].mean())

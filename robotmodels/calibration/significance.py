@@ -102,7 +102,9 @@ def insignificant_parameters(solution: Solution, start: Array) -> list[str]:
     ] / np.maximum(largest_factors(problem), _TINY)  # fmt: skip
     information = np.diag(np.sqrt(prior.strength) / prior.sigma)
     factors = [
-        np.linalg.qr(np.vstack([stacked(problem, x, solution.scales)[1], information]), mode="r")
+        np.asarray(
+            np.linalg.qr(np.vstack([stacked(problem, x, solution.scales)[1], information]))[1]
+        )
         for x in (start, solution.fit.x)
     ]
     kept = list(range(len(limit)))
