@@ -5,8 +5,8 @@ from .candidates import candidate_parameters
 from .combined_arms import combine_arms
 from .differential import differential_model
 from .fit import fit
-from .identifiable import Reason, identifiable_parameters
-from .inverse import corrected_igm
+from .identifiable import IdentifiableParameters, Reason, identifiable_parameters
+from .inverse import CorrectedSolutions, corrected_igm
 from .measurements import (
     AxisPosition,
     CameraPose,
@@ -22,14 +22,19 @@ from .measurements import (
     Position,
     RelativePose,
 )
-from .offsets import joint_offsets, pose_offsets
+from .offsets import JointOffsets, PoseOffsets, joint_offsets, pose_offsets
 from .parameters import Compliance, GeometricParameters
 from .prior import ParameterPrior
 from .read import read_measurements
 from .report import report
 from .result import CalibrationResult
 from .robot import CalibratedRobot, calibrated_model, calibrated_pose
-from .selection import observability, select_configurations
+from .selection import (
+    Observability,
+    SelectedConfigurations,
+    observability,
+    select_configurations,
+)
 from .validation import Errors, Validation
 from .write import calibrated_urdf, write_result
 
@@ -40,21 +45,27 @@ __all__ = [
     "CalibrationResult",
     "CameraPose",
     "Compliance",
+    "CorrectedSolutions",
     "Distance",
     "Errors",
     "FrameContact",
     "GeometricParameters",
+    "IdentifiableParameters",
+    "JointOffsets",
     "KnownDistance",
     "LaserLine",
     "LinkedFrames",
     "Measurement",
+    "Observability",
     "ParameterPrior",
     "PlaneContact",
     "PointContact",
     "Pose",
+    "PoseOffsets",
     "Position",
     "Reason",
     "RelativePose",
+    "SelectedConfigurations",
     "Sphere",
     "Validation",
     "calibrated_model",
