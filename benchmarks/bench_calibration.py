@@ -100,11 +100,11 @@ def speed_rows(sizes: tuple[int, ...], rounds: int, figaroh: str, pybotics: str)
                 rounds,
             )[name]
             processor, clock = took.processor.median, took.clock.median
-            errors = found.after.summary("m"), found.after.summary("rad")
+            rms = found.validation.in_sample.rms
             rows.append({
                 "work": count, "name": name, "processor": processor, "clock": clock,
-                "parameters": [len(found.names)], "position": errors[0].rms,
-                "angle": errors[1].rms, "floor": floor,
+                "parameters": [len(found.names)], "position": rms["m"],
+                "angle": rms["rad"], "floor": floor,
                 "goal": GOALS[count] if name == OURS else None,
             })  # fmt: skip
         print(count, [f"{r['name']} {r['processor']:.4f} s" for r in rows[-2:]], flush=True)

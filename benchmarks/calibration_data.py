@@ -151,10 +151,10 @@ def panda_errors(
         measured += [touches(data, place), KnownDistance(*ends, data.distance, sigma=SOCKETS)]
     others = [touches(data, place) for place in test]
     found = fit(model, measured, folds=0, held_out=others, **PANDA_WAYS[way])
-    assert found.held_out is not None
-    errors, elsewhere, first = found.held_out.after.position, {}, 0
+    assert found.validation.held_out is not None
+    errors, elsewhere, first = found.validation.held_out.position, {}, 0
     for place, contact in zip(test, others, strict=True):
         elsewhere[place] = float(errors[first : first + contact.blocks].mean())
         first += contact.blocks
-    before, after = found.before.summary("m").mean, found.after.summary("m").mean
+    before, after = found.validation.nominal.mean["m"], found.validation.in_sample.mean["m"]
     return before, after, elsewhere

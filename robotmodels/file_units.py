@@ -11,13 +11,7 @@ from .errors import InvalidValueError
 
 
 class LengthUnit(Enum):
-    """Unit of the lengths in a file; the value is its symbol.
-
-    Examples
-    --------
-    >>> LengthUnit("mm").factor
-    0.001
-    """
+    """Unit of the lengths in a file; the value is its symbol."""
 
     METRE = "m"
     MILLIMETRE = "mm"
@@ -29,13 +23,7 @@ class LengthUnit(Enum):
 
 
 class AngleUnit(Enum):
-    """Unit of the angles in a file; the value is its symbol.
-
-    Examples
-    --------
-    >>> round(AngleUnit("deg").factor, 6)
-    0.017453
-    """
+    """Unit of the angles in a file; the value is its symbol."""
 
     RADIAN = "rad"
     DEGREE = "deg"

@@ -106,3 +106,34 @@ def percent_text(ratio: float) -> str:
     if ratio >= 9.995:
         return "> 999 %"
     return f"{100.0 * ratio:.2g} %" if ratio < 0.995 else f"{100.0 * ratio:.0f} %"
+
+
+def millimetres(value: float) -> str:
+    """A length in metres as text in millimetres, to a tenth of a micrometre."""
+    return _fixed(1e3 * value)
+
+
+def degrees(value: float) -> str:
+    """An angle in radians as text in degrees, to a tenth of a thousandth."""
+    return _fixed(57.29577951308232 * value)
+
+
+def in_unit(value: float, unit: str) -> str:
+    """A number in its printed unit: m as mm, rad as deg, others as they are."""
+    if unit in ("m", "rad"):
+        return millimetres(value) if unit == "m" else degrees(value)
+    return "-" if value != value else f"{value:.3e}"
+
+
+def printed_unit(unit: str) -> str:
+    """Name of the unit that `in_unit` prints."""
+    return {"m": "mm", "rad": "deg"}.get(unit, unit)
+
+
+def _fixed(value: float) -> str:
+    """Four decimals; a power of ten for what is below the last of them or far above it."""
+    if value != value:
+        return "-"
+    if abs(value) < 1e-8:  # millimetres or degrees: rounding of a source
+        return "0"
+    return f"{value:.4f}" if 5e-5 <= abs(value) < 1e6 else f"{value:.1e}"

@@ -136,11 +136,6 @@ def markers(arm):
     return [arm.seen(q) for _ in range(3)], [arm.seen(fresh)]
 
 
-def spread(arm):
-    """Positions in 40 to 120 random postures."""
-    return [arm.seen(arm.postures(int(arm.rng.integers(40, 121))))], [arm.seen(arm.postures(300))]
-
-
 def motion(arm):
     """Positions during a motion of three harmonics, 60 to 200 of them; ten other motions."""
     around = arm.postures(400)
@@ -155,7 +150,7 @@ def motion(arm):
     return [arm.seen(one())], [arm.seen(np.concatenate([one() for _ in range(10)]))]
 
 
-PROTOCOLS = {f.__name__: f for f in (points, sockets, markers, spread, motion)}
+PROTOCOLS = {f.__name__: f for f in (points, sockets, markers, motion)}
 
 
 def stated_over_true(protocol, seed, prior=PRIOR):
@@ -165,5 +160,5 @@ def stated_over_true(protocol, seed, prior=PRIOR):
     far = np.full(arm.nominal.n, np.inf)  # simulated postures do not keep the limits
     table = arm.nominal.table.replace(lower=-far, upper=far)
     found = fit(arm.nominal.with_table(table), measured, prior=prior, held_out=fresh)
-    stated = (found.cross_validation.after, found.after)
-    return [errors.summary("m").rms / found.held_out.after.summary("m").rms for errors in stated]
+    stated = (found.validation.folds, found.validation.in_sample)
+    return [errors.rms["m"] / found.validation.held_out.rms["m"] for errors in stated]

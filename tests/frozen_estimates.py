@@ -51,18 +51,20 @@ def words_of_calibration(result) -> dict:
     """What is kept of a calibration; errors are mean, rms and largest, by unit."""
 
     def errors(blocks):
-        some = {unit: blocks.summary(unit) for unit in ("m", "rad")}
-        return {unit: [s.mean, s.rms, s.largest] for unit, s in some.items() if s.blocks}
+        return {unit: [blocks.mean[unit], blocks.rms[unit], blocks.max[unit]]
+                for unit in blocks.count}  # fmt: skip
 
     kept = {
-        "names": result.names, "corrections": result.deviation,
-        "standard_errors": result.standard_deviation, "status": result.status.name,
+        "names": result.names, "corrections": result.corrections,
+        "standard_errors": result.standard_errors, "status": result.status.name,
         "unidentifiable": {k: v.name for k, v in result.identifiable.reasons.items()},
-        "nominal": errors(result.before), "in_sample": errors(result.after),
+        "nominal": errors(result.validation.nominal),
+        "in_sample": errors(result.validation.in_sample),
     }  # fmt: skip
-    for word, aside in (("folds", result.cross_validation), ("held_out", result.held_out)):
+    for word, aside in (("folds", result.validation.folds),
+                        ("held_out", result.validation.held_out)):  # fmt: skip
         if aside is not None:
-            kept[word] = errors(aside.after)
+            kept[word] = errors(aside)
     return kept
 
 

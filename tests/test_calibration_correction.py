@@ -11,10 +11,6 @@ from identities.random_robots import random_model, random_pose, robot_size
 import robotmodels as rm
 from robotmodels.calibration import (
     Compliance,
-    CorrectionStatus,
-    Element,
-    ErrorLaw,
-    GeometricParameter,
     GeometricParameters,
     calibrated_model,
     calibrated_pose,
@@ -25,6 +21,9 @@ from robotmodels.calibration import (
     joint_offsets,
     pose_offsets,
 )
+from robotmodels.calibration.extended_table import Element
+from robotmodels.calibration.inverse import CorrectionStatus
+from robotmodels.calibration.parameters import ErrorLaw, GeometricParameter
 from robotmodels.calibration.refinement import pose_errors
 from robotmodels.calibration.robot import joint_errors_of, reading_jacobian
 from robotmodels.errors import InvalidValueError, ShapeError, UrdfWarning

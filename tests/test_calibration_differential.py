@@ -7,15 +7,13 @@ from test_calibration_measurements import slope
 
 import robotmodels as rm
 from robotmodels.calibration import (
-    Element,
-    ErrorLaw,
-    GeometricParameter,
     GeometricParameters,
     candidate_parameters,
+    combine_arms,
     differential_model,
-    extend_table,
 )
-from robotmodels.calibration.joined import side_by_side
+from robotmodels.calibration.extended_table import Element, extend_table
+from robotmodels.calibration.parameters import ErrorLaw, GeometricParameter
 from robotmodels.errors import InvalidValueError, NotARotationError, ShapeError
 from robotmodels.geometry import FIXED, PRISMATIC
 
@@ -159,7 +157,7 @@ def test_two_robots_side_by_side_move_as_they_did(seed):
     a = random_model(rng, f=4, tree=seed % 2 == 0, fixed=True, drive=True, transmission=seed > 3)
     b = random_model(rng, f=5, fixed=seed % 2 == 0, drive=True, tip="any").with_gravity(a.gravity)
     place = [None, np.eye(4), a.base, b.base, a.base @ rm.se3.translation(1, 0, 0), a.base][seed]
-    pair = side_by_side(a, b, place)
+    pair = combine_arms(a, b, place)
     b = b if place is None else b.with_base(place)
     q, v, acceleration = random_state(pair, rng, 5)
     parts = (("a", a, slice(None, a.n)), ("b", b, slice(a.n, None)))
@@ -175,10 +173,10 @@ def test_two_robots_side_by_side_move_as_they_did(seed):
     np.testing.assert_array_equal(pair.table.effort, np.r_[a.table.effort, b.table.effort])
 
 
-def test_robots_read_from_urdf_keep_their_frames_side_by_side():
+def test_robots_read_from_urdf_keep_their_frames_combine_arms():
     panda = rm.load("erd:panda")
     place = rm.se3.translation(0.0, 1.0, 0.0) @ panda.base
-    pair = side_by_side(panda, panda, place, ("left", "right"))
+    pair = combine_arms(panda, panda, place, ("left", "right"))
     q = np.random.default_rng(0).uniform(-1, 1, (3, panda.n))
     both = np.hstack([q, q])
     for frame in panda.frames:
@@ -192,8 +190,8 @@ def test_robots_read_from_urdf_keep_their_frames_side_by_side():
 def test_what_cannot_stand_side_by_side_is_named():
     arm = rm.load("rx90")
     with pytest.raises(InvalidValueError, match="two different texts"):
-        side_by_side(arm, arm, names=("a", "a"))
+        combine_arms(arm, arm, names=("a", "a"))
     with pytest.raises(InvalidValueError, match="its gravity"):
-        side_by_side(arm, arm.with_gravity([0, 9.81, 0]))
+        combine_arms(arm, arm.with_gravity([0, 9.81, 0]))
     with pytest.raises(NotARotationError):
-        side_by_side(arm, arm, 2 * np.eye(4))
+        combine_arms(arm, arm, 2 * np.eye(4))

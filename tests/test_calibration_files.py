@@ -15,8 +15,8 @@ from robotmodels.calibration.measurements import (
     RelativePose,
 )
 from robotmodels.calibration.read import read_measurements
-from robotmodels.calibration.reporting.write import result_data, write_result
 from robotmodels.calibration.robot import calibrated_pose
+from robotmodels.calibration.write import result_data, write_result
 from robotmodels.csv_table import open_table
 from robotmodels.errors import InvalidValueError, NotARotationError
 from robotmodels.geometry import DHTable
@@ -310,18 +310,20 @@ def test_json_and_yaml_hold_the_result(result, tmp_path):
     assert data == json.loads(json.dumps(result_data(result), allow_nan=False))
     assert [p["name"] for p in data["parameters"]] == list(result.names)
     np.testing.assert_allclose([p["value"] for p in data["parameters"]], result.values)
-    np.testing.assert_allclose([p["std"] for p in data["parameters"]], result.standard_deviation)
-    inside = [p["interval_95"][0] < p["deviation"] < p["interval_95"][1]
+    np.testing.assert_allclose(
+        [p["standard_error"] for p in data["parameters"]], result.standard_errors
+    )
+    inside = [p["interval_95"][0] < p["correction"] < p["interval_95"][1]
               for p in data["parameters"]]  # fmt: skip
     assert all(inside)
     np.testing.assert_allclose(data["covariance"], result.covariance)
     assert {f["name"]: f["value"] for f in data["fixtures"]} == result.fixtures
     assert len(data["fixtures"]) == 6
-    assert data["errors"]["after"]["m"]["rms"] == result.after.summary("m").rms
+    assert data["errors"]["in_sample"]["m"]["rms"] == result.validation.in_sample.rms["m"]
     assert data["errors"]["folds"] is None
     assert data["measurements"][-1]["kind"] == "KnownDistance"
     np.testing.assert_allclose(data["tool"], result.model.tool)
-    np.testing.assert_allclose([row["alpha"] for row in data["table"]], result.model.table.alpha)
+    np.testing.assert_allclose(data["table"]["alpha"], result.model.table.alpha)
 
 
 @pytest.mark.filterwarnings("ignore::robotmodels.errors.UrdfWarning")

@@ -9,8 +9,8 @@ from identities.random_robots import random_model, random_pose, random_state
 
 import robotmodels as rm
 from robotmodels.calibration import Reason, candidate_parameters, differential_model, fit
+from robotmodels.calibration.combined_arms import combine_arms
 from robotmodels.calibration.identifiable import identifiable_on, identifiable_parameters
-from robotmodels.calibration.joined import side_by_side
 from robotmodels.calibration.measurements import (
     AxisPosition,
     CameraPose,
@@ -397,7 +397,7 @@ def test_a_camera_on_the_arm_identifies_all_but_the_base():
 
 @pytest.mark.parametrize("full", [True, False])
 def test_linked_arms_identify_the_parameters_of_their_loop(full):
-    pair = side_by_side(rm.load("ur10e"), rm.load("rx90"), rm.se3.translation(0.9, 0.1, 0.0))
+    pair = combine_arms(rm.load("ur10e"), rm.load("rx90"), rm.se3.translation(0.9, 0.1, 0.0))
     ends, rng = ("a_tool", "b_tool"), np.random.default_rng(6)
     q0 = np.array([0.2, -1.0, 1.4, 0.3, 1.0, 0.1, 2.8, -0.9, 1.2, 0.4, 0.9, -0.2])
     candidates = candidate_parameters(pair, ends)

@@ -15,6 +15,7 @@ from robotmodels.calibration import (
     Pose,
     Position,
     fit,
+    report,
 )
 from robotmodels.calibration.read import _check_contents as check_contents
 from robotmodels.calibration.read import _check_same_columns as check_columns
@@ -78,11 +79,11 @@ def test_implausible_residuals_are_the_first_note_and_end_the_search_for_their_c
         q = arm.readings(40)
         p = arm.positions(q)
         wrong, right = fit(arm.nominal, Position(q, p[::-1])), fit(arm.nominal, Position(q, p))
-        assert re.match(r"position: what is left is \d+ % of the robot's size", wrong.notes[0])
+        assert re.match(r"position: the residuals are \d+ % of the robot's size", wrong.notes[0])
         assert not any("depend on the posture" in note for note in wrong.notes)
-        assert "another tool" not in wrong.report()
-        assert not any("what is left" in note for note in right.notes)
-        assert "Predicted standard error of another tool" in right.report()
+        assert "another tool" not in report(wrong)
+        assert not any("the residuals are" in note for note in right.notes)
+        assert "Predicted standard error of another tool" in report(right)
 
 
 # --- parameters -----------------------------------------------------------------------------------
@@ -138,8 +139,8 @@ def test_no_gain_is_one_note_in_the_units_of_the_report(prior, advice):
     assert f"fewer parameters, {advice}" in note
     words = r"position error \(cross-validation ([\d.]+) to ([\d.]+), held out .* mm, rms\)"
     was, after = (float(number) for number in re.search(words, note).groups())
-    assert was == pytest.approx(1e3 * result.cross_validation.before.summary("m").rms, abs=1e-4)
-    assert after == pytest.approx(1e3 * result.cross_validation.after.summary("m").rms, abs=1e-4)
+    assert was == pytest.approx(1e3 * result.validation.folds.nominal.rms["m"], abs=1e-4)
+    assert after == pytest.approx(1e3 * result.validation.folds.rms["m"], abs=1e-4)
 
 
 # --- files ----------------------------------------------------------------------------------------
@@ -175,7 +176,7 @@ def test_outliers_name_their_files_and_rows(places):
         (note,) = (n for n in result.notes if "outlier" in n)
         assert f"{block + 1} in front/hole_1.csv row 8" in note
         assert note.endswith("residuals are larger than noise explains.")
-        text = result.report()
+        text = report(result)
         table = text[text.index("\nOutliers\n") :]
         assert re.search(rf"│ +{block + 1} │ +front/hole_1\.csv │ +8 │", table)
 

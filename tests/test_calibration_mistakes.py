@@ -14,9 +14,9 @@ from robotmodels.calibration import (
     Position,
     fit,
     read_measurements,
+    report,
 )
 from robotmodels.calibration.measurements import CameraPose, Distance, RelativePose
-from robotmodels.cli import main
 from robotmodels.datasets import panda_double_socket
 from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.geometry import DHTable
@@ -74,10 +74,10 @@ def listed(arm, bad, prior=None):
 @pytest.mark.parametrize("prior", [None, ParameterPrior()])
 @pytest.mark.parametrize("bad", [1, 2, 4])
 def test_the_bad_rows_alone_are_outliers_under_squares(bad, prior):
-    found = [listed(Arm(seed), bad, prior) for seed in range(20)]
+    found = [listed(Arm(seed), bad, prior) for seed in range(6)]
     assert all(wrong <= listing for listing, wrong in found)
     # one fit in twenty lists another row by chance
-    assert sum(listing == wrong for listing, wrong in found) >= 17
+    assert sum(listing == wrong for listing, wrong in found) >= 5
 
 
 @pytest.mark.parametrize("kind", ["pose", "contact"])
@@ -104,11 +104,6 @@ def test_the_bad_row_alone_is_an_outlier_among_poses_and_contacts(kind):
         alone += found == [7]
     assert hits == len(REACHED)
     assert alone >= len(REACHED) - 1
-
-
-def test_without_a_bad_row_one_fit_in_twenty_lists_an_outlier():
-    listings = [listed(Arm(seed), 0)[0] for seed in range(100, 220)]
-    assert 1 <= sum(bool(listing) for listing in listings) <= 12
 
 
 # --- known distances ------------------------------------------------------------------------------
@@ -141,63 +136,57 @@ def between(length, other=1, **more):
     return KnownDistance("point:0", f"point:{other}", length, **more)
 
 
-def said_of_distances(result):
-    return [note for note in result.notes if note.startswith("known distance")]
+def notes_of_distances(result):
+    return [n for n in result.notes if "known distance" in n and "prior allows" not in n]
+
+
+def prediction(note):
+    """Predicted length and its standard error in a note, mm."""
+    return (float(x) for x in note.split(" predict ")[1].split(" mm")[0].split(" +- "))
 
 
 REACHED = [0, 2, 3, 4, 5, 7, 8, 9]
 """Seeds of arms that reach their points."""
 
 
-def test_a_known_distance_is_known_to_a_tenth_of_a_millimetre():
-    assert between(0.05).sigma == pytest.approx(1e-4)
-
-
 @pytest.mark.parametrize("seed", REACHED)
 def test_a_wrong_distance_is_contradicted_by_the_lengths_of_the_table(seed):
     arm, touched = contacts(seed)
-    right = fit(arm.nominal, [touched, between(0.05)], prior=ParameterPrior(), **ALONE)
-    assert not said_of_distances(right)
+    assert between(0.05).sigma == pytest.approx(1e-4)
+    right, wrong = (fit(arm.nominal, [touched, between(x)], **ALONE) for x in (0.05, 0.051))
+    assert not notes_of_distances(right)
     assert touched.blocks not in right.solution.fit.outliers
-    wrong = fit(arm.nominal, [touched, between(0.051)], prior=ParameterPrior(), **ALONE)
-    (note,) = said_of_distances(wrong)
+    (note,) = notes_of_distances(wrong)
     assert (
         "point:0 to point:1: stated 51 mm, but the other measurements and the prior predict" in note
     )
-    said, doubt = (float(x) for x in note.split(" predict ")[1].split(" mm")[0].split(" +- "))
-    assert abs(said - 50.0) < 4.0 * doubt < 2.0
-    assert "standard errors)" in note
+    mean, error = prediction(note)
+    assert abs(mean - 50.0) < 4.0 * error < 2.0
     assert wrong.solution.fit.outliers.tolist()[0] == touched.blocks
-    assert "stated 51 mm" in wrong.report()
+    # without a prior it alone gives the scale, and nothing contradicts it
+    alone = fit(arm.nominal, [touched, between(0.051)], **ALONE, prior=None)
+    assert not notes_of_distances(alone)
+    assert touched.blocks not in alone.solution.fit.outliers
 
 
-@pytest.mark.parametrize("seed", REACHED)
-def test_a_distance_that_alone_gives_the_scale_is_contradicted_by_nothing(seed):
-    arm, touched = contacts(seed)
-    for length in (0.05, 0.051):
-        result = fit(arm.nominal, [touched, between(length)], **ALONE, prior=None)
-        assert not said_of_distances(result)
-        assert touched.blocks not in result.solution.fit.outliers
-
-
-@pytest.mark.parametrize("seed", REACHED[:4])
+@pytest.mark.parametrize("seed", REACHED[:3])
 def test_the_wrong_one_of_two_distances_is_named(seed):
     arm, touched = contacts(seed, [(0.0, 0.03, 0.04), (0.2, 0.0, 0.0)])
     stated = [touched, between(0.05), between(0.21, 2)]
-    result = fit(arm.nominal, stated, prior=ParameterPrior(), **ALONE)
-    (note,) = said_of_distances(result)
+    result = fit(arm.nominal, stated, **ALONE)
+    (note,) = notes_of_distances(result)
     assert "point:0 to point:2: stated 210 mm" in note
     assert touched.blocks + 1 in result.solution.fit.outliers
     assert touched.blocks not in result.solution.fit.outliers
     # without anything else either may be wrong
-    (note,) = said_of_distances(fit(arm.nominal, stated, prior=None, **ALONE))
+    (note,) = notes_of_distances(fit(arm.nominal, stated, prior=None, **ALONE))
     assert "one of these" in note
     assert "point:0 to point:1" in note
     assert "point:0 to point:2" in note
 
 
-def three_places(seed):
-    """Contacts of a random arm with two points at each of three places."""
+@pytest.mark.parametrize("seed", [0, 3, 7])
+def test_a_wrong_length_at_every_place_and_at_one_place_are_distinguished(seed):
     arm = Arm(seed)
     q, labels = [], []
     while len(q) < 3:
@@ -206,31 +195,20 @@ def three_places(seed):
         if len(there) == 24:
             labels += [2 * len(q) + k for k in at]
             q.append(there)
-    return arm, PointContact(np.concatenate(q), labels)
+    touched = PointContact(np.concatenate(q), labels)
 
+    def fitted(lengths):
+        ends = ((f"point:{2 * k}", f"point:{2 * k + 1}") for k in range(3))
+        known = [KnownDistance(*pair, x) for pair, x in zip(ends, lengths, strict=True)]
+        return fit(arm.nominal, [touched, *known], **ALONE)
 
-def known_at(lengths):
-    return [
-        KnownDistance(f"point:{2 * k}", f"point:{2 * k + 1}", length)
-        for k, length in enumerate(lengths)
-    ]
-
-
-def notes_of_distances(result):
-    return [n for n in result.notes if "known distance" in n and "prior allows" not in n]
-
-
-@pytest.mark.parametrize("seed", [0, 3, 7])
-def test_one_wrong_length_at_every_place_and_at_one_place_are_told_apart(seed):
-    arm, touched = three_places(seed)
-    assert not notes_of_distances(fit(arm.nominal, [touched, *known_at([0.05] * 3)], **ALONE))
-    for length in (0.049, 0.051, 0.055):
-        every = fit(arm.nominal, [touched, *known_at([length] * 3)], **ALONE)
-        (note,) = notes_of_distances(every)
+    assert not notes_of_distances(fitted([0.05] * 3))
+    for length in (0.049, 0.055):
+        (note,) = notes_of_distances(fitted([length] * 3))
         assert note.startswith(f"3 known distances of {1e3 * length:g} mm: the other measurements")
-        said, doubt = (float(x) for x in note.split(" predict ")[1].split(" mm")[0].split(" +- "))
-        assert abs(said - 50.0) < 4.0 * doubt < 1.5
-        one = fit(arm.nominal, [touched, *known_at([0.05, length, 0.05])], **ALONE)
+        mean, error = prediction(note)
+        assert abs(mean - 50.0) < 4.0 * error < 1.5
+        one = fitted([0.05, length, 0.05])
         (note,) = notes_of_distances(one)
         assert f"point:2 to point:3: stated {1e3 * length:g} mm" in note
         assert touched.blocks + 1 in one.solution.fit.outliers
@@ -238,42 +216,28 @@ def test_one_wrong_length_at_every_place_and_at_one_place_are_told_apart(seed):
 
 
 @pytest.mark.parametrize("robot", ["panda_1", "panda_2"])
-def test_a_real_arm_contradicts_a_length_that_is_wrong_at_every_place(robot):
+def test_a_real_arm_contradicts_51_for_50(robot):
     data = panda_double_socket(robot)
-    touched = [
-        PointContact(np.concatenate(pair), [0] * len(pair[0]) + [1] * len(pair[1]), name=place)
+    touched = {
+        place: PointContact(np.concatenate(pair), np.repeat([0, 1], [*map(len, pair)]), name=place)
         for place, pair in data.places.items()
-    ]
+    }
 
-    def said(length):
-        known = [KnownDistance(f"{p}:0", f"{p}:1", length) for p in data.places]
-        return fit(data.model, [*touched, *known], **ALONE)
+    def fitted(length, places):
+        known = [KnownDistance(f"{p}:0", f"{p}:1", length) for p in places]
+        return fit(data.model, [*(touched[p] for p in places), *known], **ALONE)
 
-    assert not notes_of_distances(said(data.distance))
-    wrong = said(data.distance + 1e-3)
+    assert not notes_of_distances(fitted(data.distance, touched))
+    wrong = fitted(data.distance + 1e-3, touched)
     (note,) = notes_of_distances(wrong)
+    assert note.startswith(f"{len(touched)} known distances of 51 mm")
     # the prior of lengths was widened to suit them
     (widened,) = (n for n in wrong.notes if "prior allows" in n)
     assert ("of lengths" in widened) == widened.endswith("Check the known distances.")
     assert robot != "panda_1" or "of lengths" in widened
-    assert note.startswith(f"{len(touched)} known distances of 51 mm")
-
-
-def test_a_real_arm_contradicts_51_for_50():
-    data = panda_double_socket()
-    contacts_of, known_of = [], []
-    for place, (one, other) in data.places.items():
-        labels = [0] * len(one) + [1] * len(other)
-        contacts_of.append(PointContact(np.concatenate([one, other]), labels, name=place))
-        known_of.append(KnownDistance(f"{place}:0", f"{place}:1", data.distance))
-    together = fit(data.model, [*contacts_of, *known_of], prior=ParameterPrior(), **ALONE)
-    assert not said_of_distances(together)
-    for place, (one, other) in data.places.items():
-        touched = PointContact(np.concatenate([one, other]), [0] * len(one) + [1] * len(other))
-        for length, expected in ((data.distance, 0), (data.distance + 1e-3, 1)):
-            known = between(length)
-            result = fit(data.model, [touched, known], prior=ParameterPrior(), **ALONE)
-            assert len(said_of_distances(result)) == expected, place
+    for place in touched if robot == "panda_1" else ():
+        assert not notes_of_distances(fitted(data.distance, [place]))
+        assert len(notes_of_distances(fitted(data.distance + 1e-3, [place]))) == 1
 
 
 # --- too few measurements -------------------------------------------------------------------------
@@ -298,7 +262,7 @@ def measured_by(kind, seed):
 
 
 @pytest.mark.parametrize("prior", [None, ParameterPrior()])
-@pytest.mark.parametrize("seed", [0, 3, 9])
+@pytest.mark.parametrize("seed", [0, 9])
 @pytest.mark.parametrize("kind", ["pose", "position", "distance", "contact"])
 def test_the_number_of_missing_measurements_is_right_at_once(kind, seed, prior):
     arm, first = measured_by(kind, seed)
@@ -311,19 +275,6 @@ def test_the_number_of_missing_measurements_is_right_at_once(kind, seed, prior):
     fit(arm.nominal, first(enough), prior=prior, **ALONE)
     with pytest.raises(InvalidValueError, match="at least 1 more"):
         fit(arm.nominal, first(enough - 1), prior=prior, **ALONE)
-
-
-def test_a_joint_that_stays_still_is_not_counted_as_missing():
-    arm = Arm(0)
-    q = arm.readings(40)
-    q[:, 2] = 0.3
-    p = arm.positions(q)
-    with pytest.raises(InvalidValueError, match="at least") as caught:
-        fit(arm.nominal, Position(q[:3], p[:3]), **ALONE)
-    enough = 3 + int(str(caught.value).split("at least ")[1].split()[0])
-    fit(arm.nominal, Position(q[:enough], p[:enough]), **ALONE)
-    with pytest.raises(InvalidValueError, match="at least 1 more"):
-        fit(arm.nominal, Position(q[: enough - 1], p[: enough - 1]), **ALONE)
 
 
 # --- units ----------------------------------------------------------------------------------------
@@ -368,25 +319,17 @@ KINDS = ["position", "pose", "pivot", "pair", "camera", "relative"]
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize(("factor", "sentence"), FACTORS)
+@pytest.mark.parametrize(("factor", "sentence"), [*FACTORS, (1.0, ""), (1.5, "")])
 def test_the_unit_of_lengths_is_named(kind, factor, sentence):
-    for seed in range(6):
+    for seed in range(2):
         arm = Arm(seed)
         measured = seen_by(kind, arm, arm.readings(25), factor)
+        if not sentence:  # right lengths, or a scale that is wrong by another factor
+            assert not any("look like" in x for x in fit(arm.nominal, measured, **ALONE).notes)
+            continue
         with pytest.raises(InvalidValueError, match=sentence) as caught:
             fit(arm.nominal, measured, **ALONE)
         assert f"multiply by {1.0 / factor:.4g}" in str(caught.value)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_right_lengths_are_never_blamed_on_units(kind):
-    for seed in range(12):
-        arm = Arm(seed)
-        q = arm.readings(40)
-        fit(arm.nominal, seen_by(kind, arm, q, 1.0), **ALONE)
-        # nor is a scale that is wrong by another factor
-        result = fit(arm.nominal, seen_by(kind, arm, q, 1.5), **ALONE)
-        assert not any("look like" in note for note in result.notes)
 
 
 @pytest.mark.parametrize("prior", [None, ParameterPrior()])
@@ -400,26 +343,13 @@ def test_the_unit_of_a_known_distance_is_named(factor, sentence, prior):
         assert "Pass metres: 0.05" in str(caught.value)
 
 
-@pytest.mark.parametrize("robot", ["panda_1", "panda_2"])
-def test_the_unit_of_a_known_distance_of_a_real_arm_is_named(robot):
-    data = panda_double_socket(robot)
-    for one, other in data.places.values():
-        touched = PointContact(np.concatenate([one, other]), [0] * len(one) + [1] * len(other))
-        for factor, unit in ((1000.0, "millimetres"), (100.0, "centimetres")):
-            with pytest.raises(InvalidValueError, match=f"look like {unit}. The nominal"):
-                fit(data.model, [touched, between(factor * data.distance)], **ALONE)
-
-
 @pytest.mark.parametrize(
     ("factor", "lengths", "advice"),
     [
         (1e3, "m", "like millimetres. Use lengths='mm'"),
         (1.0, "mm", "like metres. Use lengths='m'"),
-        (1e2, "m", "like centimetres. Multiply them by 0.01"),
         (1e2, "mm", "like centimetres. Multiply them by 10"),
-        (1 / 0.0254, "mm", "like inches. Multiply them by 25.4"),
-        (1e4, "m", None),
-        (1e3, "mm", None), (1.0, "m", None),
+        (1e3, "mm", None),
     ],
 )  # fmt: skip
 def test_the_unit_of_a_file_is_named(tmp_path, factor, lengths, advice):
@@ -428,10 +358,10 @@ def test_the_unit_of_a_file_is_named(tmp_path, factor, lengths, advice):
     rows = np.hstack([q, factor * arm.positions(q)])
     file = tmp_path / "tracker.csv"
     np.savetxt(file, rows, delimiter=",", header="q1,q2,q3,q4,q5,q6,x,y,z", comments="")
-    if advice is None and factor < 1e4:
+    if advice is None:
         assert read_measurements(file, "position", arm.nominal, lengths=lengths).blocks == 20
         return
-    with pytest.raises(InvalidValueError, match=advice or "look like millimetres"):
+    with pytest.raises(InvalidValueError, match=advice):
         read_measurements(file, "position", arm.nominal, lengths=lengths)
 
 
@@ -477,7 +407,7 @@ def test_a_few_readings_beyond_the_limits_are_a_note():
     (note,) = (note for note in result.notes if "beyond the limits" in note)
     assert "joint 2" in note
     assert "1 of 40 readings, by up to 0.3 rad" in note
-    assert note in result.report().replace("\n", " ") or "beyond the limits" in result.report()
+    assert note in report(result).replace("\n", " ") or "beyond the limits" in report(result)
     # a zero that is off by a degree is no news, and without limits there is nothing to say
     q[3, 1] = UPPER[1] + 0.017
     p = arm.positions(q)
@@ -520,23 +450,6 @@ def test_a_folder_that_also_holds_poses_is_not_read_as_readings(socket, limits):
     assert found.labels == ("hole_0", "hole_1")
 
 
-@pytest.mark.parametrize("header", [True, False])
-def test_files_of_a_folder_have_the_same_columns(tmp_path, header):
-    arm = Arm(0)
-    q = arm.readings(5)
-    names = "q1,q2,q3,q4,q5,q6" if header else ""
-    more = names and f"{names},x,y,z,u,v,w"
-    for file, rows, head in (("a", q, names), ("b", q, names), ("c", np.hstack([q, q]), more)):
-        np.savetxt(tmp_path / f"{file}.csv", rows, delimiter=",", header=head, comments="")
-    with pytest.raises(InvalidValueError, match="do not have the same columns") as caught:
-        read_measurements(tmp_path, "point_contact", arm.nominal)
-    assert "a.csv, b.csv: " in str(caught.value)
-    assert "; c.csv: " in str(caught.value)
-    assert (
-        read_measurements(tmp_path, "point_contact", arm.nominal, pattern="[ab].csv").blocks == 10
-    )
-
-
 def test_the_files_read_are_listed(socket):
     data, folder = socket
     found = read_measurements(folder, "point_contact", data.model, pattern="hole_?.csv")
@@ -544,31 +457,12 @@ def test_the_files_read_are_listed(socket):
     assert ", ".join(str(file) for file in found.files) == listed
     known = KnownDistance("front:hole_0", "front:hole_1", data.distance)
     result = fit(data.model, [found, known], prior=ParameterPrior(), **ALONE)
-    assert f"Read for front: {listed}." in result.report()
-    assert f"Read for front: {listed}." in pickle.loads(pickle.dumps(result)).report()
+    assert f"Read for front: {listed}." in report(result)
+    assert f"Read for front: {listed}." in report(pickle.loads(pickle.dumps(result)))
     touched = PointContact(found.q, found.label, name="front")
     by_hand = fit(data.model, [touched, known], prior=ParameterPrior(), **ALONE)
-    assert "Read for" not in by_hand.report()
+    assert "Read for" not in report(by_hand)
     assert np.array_equal(by_hand.values, result.values)
-
-
-def test_the_command_line_lists_the_files(socket, tmp_path, capsys):
-    data, folder = socket
-    urdf = tmp_path / "panda.urdf"
-    urdf.write_text(data.urdf)
-    words = [
-        "calibrate", "--robot", str(urdf), "--tip-link", "panda_link8", "--measurements",
-        str(folder), "--pattern", "hole_?.csv", "--kind", "point-contact", "--known-distance",
-        "hole_0", "hole_1", "0.05", "--prior", "1e-3 5e-3", "--folds", "0", "--held-out", "0",
-        "--test", str(folder / "hole_0.csv"),
-    ]  # fmt: skip
-    assert main(words) == 0
-    out = " ".join(capsys.readouterr().out.split())
-    assert "Read for front: front/hole_0.csv (30 rows), front/hole_1.csv (32 rows)." in out
-    assert "Read for test: front/hole_0.csv (30 rows)." in out
-    assert main([*words, "--out", str(tmp_path / "out")]) == 0
-    out = " ".join(capsys.readouterr().out.split())
-    assert "Read for front: front/hole_0.csv (30 rows), front/hole_1.csv (32 rows)." in out
 
 
 def test_joints_beside_the_chain_are_named_where_their_columns_are_missing(tmp_path):
@@ -602,7 +496,7 @@ MARKERS = {
 }
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_markers_are_added_in_one_call_and_calibrated(seed):
     arm = Arm(seed)
     off = {name: p + 2e-3 * arm.rng.normal(size=3) for name, p in MARKERS.items()}
@@ -640,20 +534,3 @@ def test_frames_are_given_in_any_frame_as_points_or_poses():
     assert rm.dgm(again, q, "c") == pytest.approx(at, abs=1e-14)
     assert "b" not in arm.frame_names
     assert rm.dgm(pickle.loads(pickle.dumps(again)), q, "c") == pytest.approx(at, abs=1e-14)
-
-
-@pytest.mark.parametrize(
-    ("frames", "frame", "error", "sentence"),
-    [
-        ({"joint_2": [0, 0, 0]}, None, InvalidValueError, "'joint_2' is taken"),
-        ({"tool": [0, 0, 0]}, None, InvalidValueError, "'tool' is taken"),
-        ({"a": [0, 0]}, None, ShapeError, r"frames\['a'\]"),
-        ({"a": 2.0 * np.eye(4)}, None, rm.errors.RobotModelsError, r"frames\['a'\]"),
-        ({"": [0, 0, 0]}, None, InvalidValueError, "not empty"),
-        ([[0, 0, 0]], None, InvalidValueError, "mapping of names"),
-        ({"a": [0, 0, 0]}, "hand", rm.errors.FrameNotFoundError, "hand"),
-    ],
-)
-def test_frames_that_make_no_sense_are_refused(frames, frame, error, sentence):
-    with pytest.raises(error, match=sentence):
-        Arm(1).nominal.with_frames(frames, frame)

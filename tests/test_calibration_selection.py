@@ -8,7 +8,6 @@ import pytest
 
 import robotmodels as rm
 from robotmodels.calibration import (
-    Criterion,
     PointContact,
     candidate_parameters,
     differential_model,
@@ -18,6 +17,7 @@ from robotmodels.calibration import (
 )
 from robotmodels.calibration.exchange import added, exchanged, greedy, index_of, nested
 from robotmodels.calibration.measurements.kinds import as_kind, drawn_groups
+from robotmodels.calibration.observability import Criterion
 from robotmodels.calibration.problem import guessed_fixtures, problem_of, stacked
 from robotmodels.calibration.selection import group_rows
 from robotmodels.errors import InvalidValueError, ShapeError

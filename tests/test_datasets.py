@@ -110,7 +110,7 @@ def test_compliance_of_the_panda_can_be_asked():
     soft = calibration.fit(data.model, measured, compliance="isotropic", **some)
     assert any(name.startswith("compliance") for name in soft.names)
     assert not any(name.startswith("compliance") for name in stiff.names)
-    assert soft.after.summary("m").rms < stiff.after.summary("m").rms
+    assert soft.validation.in_sample.rms["m"] < stiff.validation.in_sample.rms["m"]
 
 
 def test_an_unknown_panda_is_named():

@@ -4,16 +4,13 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, t
 
-from robotmodels.errors import InvalidValueError, ShapeError
+from robotmodels.errors import InvalidValueError
 from robotmodels.estimation import (
-    Loss,
     Prior,
     confidence_intervals,
     fit_diagnostics,
     fit_nonlinear,
-    k_folds,
 )
-from robotmodels.estimation.strength import select_strength
 
 
 def linear(seed=0, M=240, P=4, noise=0.1):
@@ -111,50 +108,3 @@ def test_residual_tests_reject_what_they_should_and_seldom_else():
     exact = fit_diagnostics(fit_nonlinear(lambda a: ((a[0] - 2.0) * x, x[:, None]), [2.0]))
     assert exact.independence.passed
     assert "no residuals to test" in exact.independence.sentence
-
-
-def test_folds_keep_groups_together():
-    group = np.random.default_rng(0).integers(0, 23, 300)
-    masks = k_folds(group, 5, rng=3)
-    assert (masks.sum(axis=0) == 1).all()
-    for mask in masks:
-        assert not np.intersect1d(group[mask], group[~mask]).size
-    assert np.array_equal(masks, k_folds(group, 5, rng=3))
-    assert not np.array_equal(masks, k_folds(group, 5, rng=4))
-    assert k_folds(range(20), 3, rng=0).sum(axis=1).tolist() == [7, 7, 6]
-    for k in (1, 24, True, 2.0):
-        with pytest.raises(InvalidValueError, match="folds"):
-            k_folds(group, k, rng=0)
-    with pytest.raises(InvalidValueError, match="whole"):
-        k_folds([0.5, 1.0], 2, rng=0)
-    with pytest.raises(ShapeError, match="each row"):
-        k_folds([[1, 2]], 2, rng=0)
-
-
-@pytest.mark.parametrize("loss", [Loss.SQUARES, Loss.TUKEY])
-def test_cross_validation_finds_the_strength_that_predicts(loss):
-    rng = np.random.default_rng(1)
-    A = rng.normal(size=(80, 40))
-    truth = 0.1 * rng.normal(size=40)
-    y = A @ truth + rng.normal(size=80)
-    if loss is Loss.TUKEY:
-        y[::10] += 100.0
-    prior = Prior(np.zeros(40), np.full(40, 0.1))
-    folds, strengths, block = k_folds(range(80), 4, rng=0), np.logspace(-4, 4, 9), np.arange(80)
-
-    def linearise(x):
-        return A @ x - y, A
-
-    found = select_strength(linearise, np.zeros(40), prior, folds, strengths, block, loss)
-    assert 0.1 <= found.strength <= 10.0  # the prior is true
-    assert found.errors.shape == (9, 4)
-    error = [
-        np.linalg.norm(
-            fit_nonlinear(linearise, np.zeros(40), prior=prior.with_strength(s), loss=loss).x
-            - truth
-        )
-        for s in (found.strength, 1e-4)
-    ]
-    assert error[0] < 0.7 * error[1]
-    with pytest.raises(InvalidValueError, match="both parts"):
-        select_strength(linearise, np.zeros(40), prior, folds, strengths, block // 2)

@@ -536,7 +536,7 @@ def test_a_sequence_that_stays_at_gimbal_lock():
 
 
 @every_kind
-def test_sequences_side_by_side(kind, rng):
+def test_sequences_combine_arms(kind, rng):
     T = np.stack([wandering(rng, 40) for _ in range(6)], axis=1).reshape(40, 2, 3, 4, 4)
     near = operational_coordinates(T[0], kind) + 0.5 * rng.normal(size=(2, 3, kind.dimension))
     for start in (None, near, near[0, 0], near[:1]):

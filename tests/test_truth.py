@@ -5,6 +5,7 @@ import pytest
 
 import robotmodels as rm
 from robotmodels import calibration as cal
+from robotmodels.calibration.alignment import true_errors
 from robotmodels.errors import InvalidValueError, ShapeError
 
 rng = np.random.default_rng(5)
@@ -12,7 +13,7 @@ Q = rng.uniform(-2.0, 2.0, (60, 6))
 
 
 def rms(errors):
-    return [e.summary("m").rms for e in errors]
+    return [e.rms["m"] for e in errors]
 
 
 @pytest.fixture(scope="module")
@@ -33,11 +34,11 @@ def moved(arm, base=None, tool=None, d3=0.0):
 def test_what_base_and_tool_explain_is_taken_away(arm, far):
     base = rm.se3.translation(far, -far, 0.3) @ rm.se3.rotation("z", far) @ rm.se3.rotation("x", 1)
     tool = rm.se3.translation(0.01, -0.02, 0.005)
-    stands, placed, both = rms(cal.true_errors(arm, moved(arm, base), Q))
+    stands, placed, both = rms(true_errors(arm, moved(arm, base), Q))
     assert stands > 1e-3
     assert placed < 1e-14
     assert both < 1e-14
-    stands, placed, both = rms(cal.true_errors(arm, moved(arm, base, tool), Q))
+    stands, placed, both = rms(true_errors(arm, moved(arm, base, tool), Q))
     assert stands > 1e-3
     assert placed > 5e-3
     assert both < 1e-13
@@ -45,21 +46,21 @@ def test_what_base_and_tool_explain_is_taken_away(arm, far):
 
 def test_what_the_table_is_to_blame_for_is_left(arm):
     real = moved(arm, rm.se3.rotation("y", 0.4), rm.se3.translation(0.004, 0.0, 0.01), 1e-3)
-    stands, placed, both = rms(cal.true_errors(arm, real, Q))
+    stands, placed, both = rms(true_errors(arm, real, Q))
     assert stands > placed > both > 1e-4
     # the robot itself has no errors
-    assert max(rms(cal.true_errors(real, real, Q))) < 1e-13
+    assert max(rms(true_errors(real, real, Q))) < 1e-13
 
 
 def test_the_least_errors_are_those_of_a_fit_of_base_and_tool(arm):
     real = moved(arm, rm.se3.rotation("y", 0.02), rm.se3.translation(0.004, 0.0, 0.01), 2e-3)
     truth = cal.Position(Q, rm.dgm(real, Q)[:, :3, 3])
     base = ("b0", "d0", "r0", "gamma0", "alpha0", "theta0")
-    found = cal.true_errors(arm, real, Q)
+    found = true_errors(arm, real, Q)
     for free, errors in ((base, found[1]), ((*base, "b7", "d7", "r7"), found[2])):
         fitted = cal.fit(arm, truth, parameters=free, folds=0, held_out=0.0)
         # the fit fixes what it cannot tell, which moves no position
-        assert errors.summary("m").rms == pytest.approx(fitted.after.summary("m").rms, rel=1e-9)
+        assert errors.rms["m"] == pytest.approx(fitted.validation.in_sample.rms["m"], rel=1e-9)
 
 
 def test_joint_errors_and_compliance_are_of_the_robot_that_is_judged(arm):
@@ -69,10 +70,10 @@ def test_joint_errors_and_compliance_are_of_the_robot_that_is_judged(arm):
     xi[parameters.names.index("compliance_joints")] = 2e-5
     real = cal.calibrated_model(parameters, xi)
     # the model alone has neither gains nor compliance, the calibrated robot has
-    assert max(rms(cal.true_errors(real, real, Q))) < 1e-13
-    assert rms(cal.true_errors(real.model, real, Q))[2] > 1e-4
+    assert max(rms(true_errors(real, real, Q))) < 1e-13
+    assert rms(true_errors(real.model, real, Q))[2] > 1e-4
     apart = np.linalg.norm((cal.calibrated_pose(real, Q) - rm.dgm(arm, Q))[:, :3, 3], axis=1)
-    assert np.allclose(cal.true_errors(arm, real, Q).as_it_stands.position, apart, atol=1e-15)
+    assert np.allclose(true_errors(arm, real, Q).as_it_stands.position, apart, atol=1e-15)
 
 
 def test_a_planar_robot_and_a_slide_have_base_and_tool_that_are_not_told_apart():
@@ -80,7 +81,7 @@ def test_a_planar_robot_and_a_slide_have_base_and_tool_that_are_not_told_apart()
         model = rm.load(name)
         q = rng.uniform(-0.5, 0.5, (20, model.n))
         real = model.with_base(rm.se3.translation(0.1, 0.2, 0.0) @ model.base)
-        stands, placed, both = rms(cal.true_errors(model, real, q))
+        stands, placed, both = rms(true_errors(model, real, q))
         assert stands > 0.2
         assert placed < 1e-13
         assert both < 1e-13
@@ -89,8 +90,8 @@ def test_a_planar_robot_and_a_slide_have_base_and_tool_that_are_not_told_apart()
 def test_the_end_can_be_a_frame_and_a_result_of_a_fit(arm):
     real = moved(arm, d3=1e-3)
     found = cal.fit(arm, cal.Position(Q, rm.dgm(real, Q)[:, :3, 3]), folds=0, held_out=0.0)
-    assert rms(cal.true_errors(found, real, Q + 0.3))[0] < 1e-9
-    elbow = cal.true_errors(arm, real, Q, frame=3)
+    assert rms(true_errors(found, real, Q + 0.3))[0] < 1e-9
+    elbow = true_errors(arm, real, Q, frame=3)
     assert elbow.as_it_stands.position == pytest.approx(
         np.full(60, 1e-3)
     )  # frame 3 is d3 behind frame 2
@@ -99,10 +100,10 @@ def test_the_end_can_be_a_frame_and_a_result_of_a_fit(arm):
 
 def test_mistakes_are_told(arm):
     with pytest.raises(InvalidValueError, match="three configurations"):
-        cal.true_errors(arm, arm, Q[:2])
+        true_errors(arm, arm, Q[:2])
     with pytest.raises(InvalidValueError, match="robot with the 6 joints"):
-        cal.true_errors(arm, rm.load("planar_2r"), Q)
-    with pytest.raises(InvalidValueError, match="expected a RobotModel"):
-        cal.true_errors("rx90", arm, Q)
+        true_errors(arm, rm.load("planar_2r"), Q)
+    with pytest.raises(InvalidValueError, match="expected a CalibratedRobot"):
+        true_errors("rx90", arm, Q)
     with pytest.raises(ShapeError):
-        cal.true_errors(arm, arm, Q[:, :5])
+        true_errors(arm, arm, Q[:, :5])

@@ -21,7 +21,7 @@ from robotmodels.calibration import (
     fit,
     select_configurations,
 )
-from robotmodels.calibration.residuals import measured_residuals
+from robotmodels.calibration.report import measured_residuals
 from robotmodels.datasets import panda_double_socket
 from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.estimation import confidence_intervals
@@ -146,7 +146,7 @@ def test_parameters_and_intervals_are_those_of_the_result(results):
     assert set(shown) == set(result.names)
     interval = confidence_intervals(result.solution.fit, 0.9)
     for k, name in enumerate(result.names):
-        np.testing.assert_allclose(shown[name], (result.deviation[k], *interval[k]), atol=1e-12)
+        np.testing.assert_allclose(shown[name], (result.corrections[k], *interval[k]), atol=1e-12)
     assert "90 % intervals" in figure.legends[0].get_title().get_text()
 
 
@@ -255,7 +255,7 @@ def test_flat_scenes_are_low():
 def test_compliance_is_shown_in_whole_numbers(sockets):
     figure = plot_calibration_parameters(sockets)
     axes = figure.axes[2]
-    assert axes.get_xlabel() == "deviation (µrad/(N m))"
+    assert axes.get_xlabel() == "correction (µrad/(N m))"
     figure.draw_without_rendering()
     assert axes.xaxis.get_offset_text().get_text() == ""
     names = [text.get_text() for text in axes.get_yticklabels()]
@@ -263,7 +263,7 @@ def test_compliance_is_shown_in_whole_numbers(sockets):
     for bars in axes.containers:
         values |= dict(zip(bars[0].get_ydata(), bars[0].get_xdata(), strict=True))
     for k, name in enumerate(names):
-        found = sockets.deviation[sockets.names.index(name)]
+        found = sockets.corrections[sockets.names.index(name)]
         assert values[k] == pytest.approx(1e6 * found)
 
 
@@ -293,7 +293,7 @@ def test_known_truth_is_drawn_where_the_fit_finds_it():
     figure = plot_calibration_parameters(result, truth=truth)
     shown = crosses(figure)
     assert set(shown) == set(result.names)
-    for name, deviation in zip(result.names, result.deviation, strict=True):
+    for name, deviation in zip(result.names, result.corrections, strict=True):
         assert shown[name] == pytest.approx(deviation, abs=2e-9)
     assert figure.legends[0].get_texts()[-1].get_text() == "truth"
     some = crosses(plot_calibration_parameters(result, truth={"d3": truth["d3"]}))
@@ -308,7 +308,7 @@ def test_truth_in_the_order_of_the_parameters(results):
     given[at] = 1e-3
     shown = crosses(plot_calibration_parameters(result, truth=given))
     assert shown["theta3"] == pytest.approx(1e-3)
-    with pytest.raises(ShapeError, match="truth: expected one deviation"):
+    with pytest.raises(ShapeError, match="truth: expected one correction"):
         plot_calibration_parameters(result, truth=given[1:])
     with pytest.raises(InvalidValueError, match=r"truth: expected names of candidates.*theta33"):
         plot_calibration_parameters(result, truth={"theta33": 0.0})

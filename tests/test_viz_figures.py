@@ -214,7 +214,7 @@ def excited():
 @cache
 def selected():
     return cal.select_configurations(
-        RX90, cal.Position, 20, drawn=60, starts=1, rng=np.random.default_rng(0)
+        RX90, "position", 20, drawn=60, starts=1, rng=np.random.default_rng(0)
     )
 
 

@@ -24,7 +24,7 @@ def calibration(settings: Settings) -> Iterator[Work]:
             return fit(m, Pose(x, y), folds=0, held_out=0)
 
         def said(found: CalibrationResult) -> str:
-            error = 1e3 * found.after.summary("m").rms
+            error = 1e3 * found.validation.in_sample.rms["m"]
             return f"{len(found.names)} parameters, {error:.3f} mm"
 
         entries = [Entry(Tool.OURS, "", ours, said=said)]

@@ -1,7 +1,6 @@
-"""Consistency of known distances with the other measurements.
+"""Measurements that contradict the others: known distances, and outliers under squares.
 
-The other measurements and the prior predict the distances: a wrong one is a shift of its row, and
-a mistake common to several a scale of their rows (mean-shift outlier models, chosen forward).
+The measurements without the known distances, and the prior, predict these and their covariance.
 
 Source: R. D. Cook, S. Weisberg, "Residuals and Influence in Regression", 1982, section 2.2.
 """
@@ -9,209 +8,132 @@ Source: R. D. Cook, S. Weisberg, "Residuals and Influence in Regression", 1982, 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .._arrays import Array
-from .errors_seen import block_errors
+from ..estimation import Loss
+from ..estimation.outlying import outlying
 from .measurements import KnownDistance
-from .prior import ParameterPrior, refitted
-from .problem import Problem, satisfying, stacked
+from .prior import ParameterPrior
+from .problem import Problem, problem_of, satisfying, stacked
 from .scale import needs_a_length
-from .solve import Solution
+from .solve import Solution, refitted
+from .validation import errors_of
 
 _CONTRADICTED = 3.0
 """Difference from which a distance is reported, standard errors."""
-_AS_LIKELY = 6.0
-"""Difference of squared errors below which two explanations are about equally likely (1 to 20)."""
 _COMMON = 0.5
 """Part of the residuals assumed systematic, so that averaging over postures does not reduce it."""
-_ALONE = 1e-8
-"""1 - leverage of a row below which no other row predicts it."""
+_REFITS = 2
+"""Largest number of fits without the outliers."""
 
 
 class Contradiction(NamedTuple):
-    """Known distances and their prediction without them."""
+    """Numbers of the blocks of known distances that are wrong, and the note about them."""
 
     blocks: tuple[int, ...]
-    """Their numbers among all blocks."""
-    measurements: tuple[KnownDistance, ...]
-    sigma: float
-    """Standard deviation of their mean length, m."""
-    others: float
-    """Prediction of their mean length, m."""
-    doubt: float
-    """Standard error of the prediction, m."""
-    prior: bool
-    """Whether a prior takes part in the prediction."""
-    rivals: tuple[str, ...]
-    """Other known distances of which one may be wrong instead."""
-
-    def sentence(self) -> str:
-        """The note about it."""
-        m, doubt, many = self.measurements[0], 1e3 * self.doubt, len(self.measurements)
-        length = 1e3 * math.fsum(m.length for m in self.measurements) / many
-        errors = abs(1e3 * self.others - length) / (1e3 * math.hypot(self.sigma, self.doubt))
-        digits = max(0, 1 - math.floor(math.log10(max(doubt, 1e-6))))
-        stated = f"{_named(m)}: stated {length:.6g} mm, but"
-        its = "Check the length, its two points, and its"
-        if many > 1:
-            equal = len({m.length for m in self.measurements}) == 1
-            stated = f"{many} known distances of {length:.6g} mm{'' if equal else ' in the mean'}:"
-            its = "Check the lengths, their points, and their"
-        either = f" It or {' or '.join(self.rivals)}: one of these." if self.rivals else ""
-        return (
-            f"{stated} the other measurements{' and the prior' if self.prior else ''} predict "
-            f"{1e3 * self.others:.{digits}f} +- {doubt:.{digits}f} mm (a difference of "
-            f"{errors:.0f} standard errors). {its} standard deviation of "
-            f"{1e3 * self.sigma * math.sqrt(many):.2g} mm.{either}"
-        )
+    note: str
 
 
 def contradictions(
-    solution: Solution,
-    given: ParameterPrior | None,
-    size_is_known: bool,
-    truncation: float | None = None,
+    solution: Solution, given: ParameterPrior | None, size_is_known: bool
 ) -> list[Contradiction]:
-    """Known distances that differ from what all else predicts, the first found first.
+    """Known distances that differ from the prediction by all other measurements.
 
     ``given`` is the prior before it was widened, perhaps to suit a wrong distance.
     """
     measurements = solution.problem.measurements
     numbers = [k for k, m in enumerate(measurements) if isinstance(m, KnownDistance)]
-    known = [m for m in measurements if isinstance(m, KnownDistance)]
-    if not known:
+    rival = ""
+    if numbers and not size_is_known and needs_a_length(_without(solution, numbers)[0], ()):
+        # where they alone give the scale, the first of them does
+        first, *numbers = numbers
+        rival = _named(measurements[first])  # type: ignore[arg-type]
+    if not numbers:
         return []
-    scales = [solution.scales[k] for k in numbers]
-    is_open = not size_is_known and needs_a_length(_kept(solution, numbers)[0], ())
-    # where they alone give the scale, one of them does, and then the scale is left open
-    without = _refitted(solution, numbers[1:] if is_open else numbers, given, truncation)
-    M, v = _evidence(solution, without, numbers, known, scales)
-    sigma = np.array([_sigma(m, scale) for m, scale in zip(known, scales, strict=True)])
-    length = np.array([m.length for m in known])
-    if is_open:
-        M, v = _explained(M, v, length / sigma)
-    groups = [(k,) for k in range(len(known))]
-    if size_is_known:
-        alike = [tuple(np.flatnonzero(length == value).tolist()) for value in np.unique(length)]
-        groups += [g for g in dict.fromkeys([*alike, tuple(range(len(known)))]) if len(g) > 1]
-    columns = np.zeros((len(known), len(groups)))
-    for j, group in enumerate(groups):
-        columns[list(group), j] = (length / sigma)[list(group)]
-    chosen, rivals, rank = _chosen(M, v, columns, groups)
-    total = float(v @ np.linalg.pinv(M, rcond=_ALONE, hermitian=True) @ v)
-    many = np.array([len(groups[j]) > 1 for j in chosen], dtype=bool)
-    while True:
-        G = columns[:, chosen]
-        spread = np.linalg.inv(G.T @ M @ G)
-        shift = spread @ (G.T @ v)
-        left = max(total - float(shift @ (G.T @ v)), 0.0) / max(rank - len(chosen), 1)
-        # differences among distances beyond their noise make what they have in common uncertain
-        variance = np.diagonal(spread) * np.where(many, max(1.0, left), 1.0)
-        errors = shift**2 / variance
-        if not len(chosen) or errors.min() > _CONTRADICTED**2:
-            break
-        out = int(errors.argmin())
-        del chosen[out], rivals[out]
-        many = np.delete(many, out)
+    problem, scales = _without(solution, numbers)
+    others = refitted(solution, problem, solution.fit.x, scales, given)
+    if len(others.fit.dropped) > len(solution.fit.dropped):
+        return []
+    known = [m for m in measurements if isinstance(m, KnownDistance)][-len(numbers) :]
+    sigma = np.array([_sigma(m, solution.scales[k]) for k, m in zip(numbers, known, strict=True)])
+    shift, covariance = _predicted_differences(solution, others, numbers, sigma)
     firsts = np.cumsum([0, *(m.blocks for m in measurements)])
+    source = "the other measurements"
+    source += " and the prior" if np.isfinite(solution.fit.prior.sigma).any() else ""
     found = []
-    for j, s, square, others in zip(chosen, shift, variance, rivals, strict=True):
-        group = list(groups[j])
-        mean = float(length[group].mean())
-        own = float(np.linalg.norm(sigma[group])) / len(group)
-        doubt = math.sqrt(max(square * mean**2 - own**2, 0.0))
-        found.append(
-            Contradiction(
-                tuple(int(firsts[numbers[k]]) for k in group), tuple(known[k] for k in group), own,
-                mean * (1.0 - s), doubt, bool(np.isfinite(solution.fit.prior.sigma).any()),
-                tuple(_named(known[groups[k][0]]) for k in others),
-            )
-        )  # fmt: skip
+    for group in _wrong_groups(shift, covariance, sigma, [m.length for m in known]):
+        m, many = known[group[0]], len(group)
+        mean = float(shift[group].mean())
+        error = math.sqrt(covariance[np.ix_(group, group)].sum()) / many
+        size = float(np.linalg.norm(sigma[group])) / many
+        digits = max(0, 1 - math.floor(math.log10(max(1e3 * error, 1e-6))))
+        stated, its = f"{_named(m)}: stated {1e3 * m.length:.6g} mm, but", "the length, its points,"
+        if many > 1:
+            stated = f"{many} known distances of {1e3 * m.length:.6g} mm:"
+            its = "the lengths, their points,"
+        note = (
+            f"{stated} {source} predict {1e3 * (m.length + mean):.{digits}f} +- "
+            f"{1e3 * error:.{digits}f} mm (a difference of "
+            f"{abs(mean) / math.hypot(size, error):.0f} standard errors). Check {its} and the "
+            f"standard deviation of {1e3 * size * math.sqrt(many):.2g} mm."
+        )
+        note += f" It or {rival}: one of these." if rival else ""
+        found.append(Contradiction(tuple(int(firsts[numbers[k]]) for k in group), note))
     return found
 
 
-def _chosen(
-    M: Array, v: Array, columns: Array, groups: list[tuple[int, ...]]
-) -> tuple[list[int], list[list[int]], int]:
-    """Columns that explain v, one after the other, single columns that do so as well; rank of M."""
-    rank = int((np.linalg.eigvalsh(M) > _ALONE).sum())
-    chosen: list[int] = []
-    rivals: list[list[int]] = []
-    while len(chosen) < rank:
-        seen = np.einsum("kj,kl,lj->j", columns, M, columns)
-        told = seen > _ALONE * (columns**2).sum(axis=0)
-        gain = np.where(told, (columns.T @ v) ** 2 / np.where(told, seen, 1.0), 0.0)
-        for j, group in enumerate(groups):
-            if len(group) > 1:  # a common mistake leaves no differences among its distances
-                at = list(group)
-                part = np.linalg.pinv(M[np.ix_(at, at)], rcond=_ALONE, hermitian=True)
-                gain[j] /= max(1.0, (v[at] @ part @ v[at] - gain[j]) / (len(at) - 1))
-        if gain.max() <= _CONTRADICTED**2:
-            break
-        # of explanations that are about equally likely, the one by the fewest mistakes
-        likely = np.flatnonzero(gain > gain.max() - _AS_LIKELY).tolist()
-        best = min(likely, key=lambda j: (len(groups[j]), -gain[j]))
-        chosen.append(best)
-        rivals.append([j for j in likely if j != best and len(groups[j] + groups[best]) == 2])
-        M, v = _explained(M, v, columns[:, best])
-    return chosen, rivals, rank
+def _wrong_groups(
+    shift: Array, covariance: Array, sigma: Array, lengths: Sequence[float]
+) -> list[list[int]]:
+    """Distances that are wrong, those of one length together where their mean is.
 
-
-def _explained(M: Array, v: Array, column: Array) -> tuple[Array, Array]:
-    """Evidence M, v that is left where the factor of a column is free."""
-    side = M @ column
-    size = float(column @ side)
-    if size <= _ALONE * float(column @ column):
-        return M, v
-    return M - np.outer(side, side) / size, v - side * float(column @ v) / size
-
-
-def _evidence(
-    solution: Solution,
-    without: Solution | None,
-    numbers: list[int],
-    known: list[KnownDistance],
-    scales: list[Array],
-) -> tuple[Array, Array]:
-    """Inverse covariance M of (stated - predicted lengths) / sigma, and its product with them.
-
-    It comes from the fit without distances, or, where there is none, from that with them, in which
-    the whitened residuals are the product and I - T T' is M. Shapes: -> (K, K), (K,).
+    Shapes: shift, sigma (K,); covariance (K, K).
     """
-    fit = solution.fit if without is None else without.fit
-    x = fit.x if without is None else _of_satisfied(without)
-    distances = replace(solution.problem, measurements=tuple(known), factors=((),) * len(known))
-    residual, jacobian = stacked(distances, x, tuple(scales))
-    T = jacobian @ fit.basis
-    if without is None:
-        M, v = np.eye(len(known)) - T @ T.T, -residual
-    else:
-        M = np.linalg.inv(np.eye(len(known)) + T @ T.T)
-        v = -M @ residual
-    errors = block_errors(solution.problem, x[: distances.P], x[distances.P :])
-    sigma = np.array([_sigma(m, scale) for m, scale in zip(known, scales, strict=True)])
-    common = np.diag((_COMMON * errors.summary("m").rms / sigma) ** 2)
-    damped = np.linalg.inv(np.eye(len(known)) + M @ common)
-    return damped @ M, damped @ v
+    variance = covariance + np.diag(sigma**2)
+    limit = _CONTRADICTED**2
+    groups, left = [], []
+    for length in dict.fromkeys(lengths):
+        alike = [k for k, other in enumerate(lengths) if other == length]
+        mean = float(shift[alike].mean())
+        apart = (shift[alike] - mean) ** 2 <= limit * variance[alike, alike]
+        total = float(variance[np.ix_(alike, alike)].sum()) / len(alike) ** 2
+        if len(alike) > 1 and apart.all() and mean**2 > limit * total:
+            groups.append(alike)
+        else:
+            left += alike
+    while left:  # differences given that the others are right
+        inverse = np.linalg.inv(variance[np.ix_(left, left)])
+        beyond = (inverse @ shift[left]) ** 2 > limit * np.diagonal(inverse)
+        alone = shift[left] ** 2 / variance[left, left]
+        if not beyond.any():
+            break
+        groups.append([left.pop(int(np.argmax(np.where(beyond, alone, -1.0))))])
+    return groups
 
 
-def _refitted(
-    solution: Solution, out: list[int], given: ParameterPrior | None, truncation: float | None
-) -> Solution | None:
-    """The fit without some measurements; None where it determines less than the fit with them."""
-    others, scales = _kept(solution, out)
-    found = refitted(given, others, solution, solution.fit.x, scales, truncation)
-    return None if len(found.fit.dropped) > len(solution.fit.dropped) else found
+def _predicted_differences(
+    solution: Solution, others: Solution, numbers: list[int], sigma: Array
+) -> tuple[Array, Array]:
+    """Predicted less stated lengths (K,), m, and the covariance of the prediction (K, K)."""
+    rest = [k for k in range(len(solution.scales)) if k not in numbers]
+    distances, scales = _without(solution, rest)
+    x = _unbiased(others)
+    residual, jacobian = stacked(distances, x, scales)
+    T = sigma[:, None] * (jacobian @ others.fit.basis)
+    rms = errors_of(solution.problem, x[: distances.P], x[distances.P :]).rms["m"]
+    return sigma * residual, T @ T.T + (_COMMON * rms) ** 2 * np.eye(len(numbers))
 
 
-def _kept(solution: Solution, out: list[int]) -> tuple[Problem, tuple[Array, ...]]:
+def _without(solution: Solution, left_out: Sequence[int]) -> tuple[Problem, tuple[Array, ...]]:
     """The problem without some measurements, and the noise of the others."""
     problem = solution.problem
-    kept = [k for k in range(len(problem.measurements)) if k not in out]
+    kept = [k for k in range(len(problem.measurements)) if k not in left_out]
     part = replace(
         problem,
         measurements=tuple(problem.measurements[k] for k in kept),
@@ -220,14 +142,14 @@ def _kept(solution: Solution, out: list[int]) -> tuple[Problem, tuple[Array, ...
     return part, tuple(solution.scales[k] for k in kept)
 
 
-def _of_satisfied(solution: Solution) -> Array:
-    """The unknowns without the bias of contacts whose noise makes a smaller robot fit better.
+def _unbiased(solution: Solution) -> Array:
+    """The unknowns (P + F,) without the bias of contacts whose noise favours a smaller robot.
 
     The Jacobian at readings that satisfy the constraints is independent of the noise, so that it
-    is the instrument of a step. Shapes: -> (P + F,).
+    is the instrument of a step.
     """
     fit = solution.fit
-    exact = satisfying(solution.problem, solution.deviation, solution.fixtures)
+    exact = satisfying(solution.problem, solution.corrections, solution.fixtures)
     if exact.rows != solution.problem.rows:
         return fit.x
     change = stacked(exact, fit.x, solution.scales)[1] - fit.jacobian
@@ -243,3 +165,66 @@ def _sigma(m: KnownDistance, scale: Array) -> float:
 
 def _named(m: KnownDistance) -> str:
     return f"{m.name} {m.point} to {m.other}"
+
+
+# --- outliers -------------------------------------------------------------------------------------
+
+
+def with_outliers(
+    solution: Solution, contradicted: list[Contradiction], given: ParameterPrior | None
+) -> Solution:
+    """The fit with its outliers; known distances are none unless they are contradicted."""
+    # Contacts leave the scale open, so that they shrink to nothing in a fit without the distance
+    # that alone gives it. An outlier bends the noise, the widths of the prior and the weights of a
+    # fit, so that all are judged again by a fit without those listed.
+    problem, fit = solution.problem, solution.fit
+    if fit.loss is not Loss.SQUARES:
+        return solution
+    trusted = np.repeat(
+        [not m.views for m in problem.measurements], [m.blocks for m in problem.measurements]
+    )
+    wrong = np.array([b for c in contradicted for b in c.blocks], dtype=np.int64)
+    outliers = wrong if len(wrong) else fit.outliers
+    if trusted.any() and not len(wrong):
+        rows = fit.orthonormal_rows
+        outliers = outlying(rows, fit.whitened, fit.block, fit.freedom, trusted)
+    for _ in range(_REFITS):
+        rest = _rows_without(solution, outliers, given) if len(outliers) else None
+        if rest is None:
+            break
+        before = outliers
+        rows, residual, freedom = rest
+        outliers = outlying(rows, residual, fit.block, freedom, trusted, before)
+        outliers = np.concatenate([wrong, outliers[~np.isin(outliers, wrong)]])
+        if set(outliers) == set(before):
+            break
+    return replace(solution, fit=replace(fit, outliers=outliers))
+
+
+def _rows_without(
+    solution: Solution, outliers: NDArray[np.int64], given: ParameterPrior | None
+) -> tuple[Array, Array, float] | None:
+    """Orthonormal rows and residuals of all blocks by a fit without some, and its freedom.
+
+    None where too little is left.
+    """
+    problem = solution.problem
+    parts = np.split(np.arange(problem.blocks), np.cumsum([m.blocks for m in problem.measurements]))
+    kept = [np.flatnonzero(~np.isin(part, outliers)) for part in parts]
+    numbers = [k for k, _ in enumerate(problem.measurements) if len(kept[k])]
+    rest = problem_of(
+        problem.parameters, [problem.measurements[k].subset(kept[k]) for k in numbers]
+    )
+    if len(rest.fixtures) < problem.F or rest.rows <= problem.P + problem.F:
+        return None
+    values, scales = solution.fixture_values, list(solution.scales)
+    start = np.array([*solution.corrections, *(values[f.name] for f in rest.fixtures)])
+    found = refitted(solution, rest, start, tuple(scales[k] for k in numbers), given)
+    for k, scale in zip(numbers, found.scales, strict=True):
+        scales[k] = scale
+    values = found.fixture_values
+    x = np.array([*found.corrections, *(values[f.name] for f in problem.fixtures)])
+    residual, jacobian = stacked(problem, x, tuple(scales))
+    place = {f.name: problem.P + k for k, f in enumerate(problem.fixtures)}
+    order = [*range(problem.P), *(place[f.name] for f in rest.fixtures)]
+    return jacobian[:, order] @ found.fit.basis, residual, found.fit.freedom

@@ -28,18 +28,9 @@ _LEAST_SINE = 0.5
 
 
 class Element(IntEnum):
-    """Elementary motions of a row, in the order in which they follow each other.
+    """Elementary motions of a row, eq. [1.3] with Hayati's beta, in their order.
 
     ``Rot(z, gamma) Trans(z, b) Rot(y, beta) Rot(x, alpha) Trans(x, d) Rot(z, theta) Trans(z, r)``
-
-    References
-    ----------
-    Seed book section 1.4.2, eq. [1.3]; S. Hayati, IEEE CDC 1983, for beta.
-
-    Examples
-    --------
-    >>> Element.D.is_length, Element.D.word
-    (True, 'd')
     """
 
     GAMMA = 0
@@ -69,44 +60,23 @@ _AXIS = (2, 2, 1, 0, 0, 2, 2)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ExtendedTable(Rebuilt):
-    """The table of a robot with its base as row 0 and each measured end as a row behind.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot, f frames and n joints.
-    frames : tuple
-        The measured ends; None is the tool.
-    nominal : ndarray, shape (R, 7)
-        gamma, b, beta, alpha, d, theta, r of each row (rad, m); R = 1 + f + number of ends.
-    antecedent : ndarray of int, shape (R,)
-        Antecedent row; -1 for row 0.
-    sigma, joint : ndarray of int, shape (R,)
-        0 revolute, 1 prismatic, 2 fixed; number of the joint in q (from 0), -1 if fixed.
-    before : ndarray, shape (4, 4)
-        Constant turn in front of row 0.
-    after : ndarray, shape (number of ends, 4, 4)
-        Constant turn behind each end.
-
-    References
-    ----------
-    Seed book section 1.4.2.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> extend_table(load("rx90")).nominal.shape
-    (8, 7)
-    """
+    """The table of a robot with its base as row 0 and each measured end as a row behind."""
 
     model: RobotModel
     frames: tuple[Frame, ...]
+    """The measured ends; None is the tool."""
     nominal: Array
+    """gamma, b, beta, alpha, d, theta, r of each row (rad, m), shape (R, 7)."""
     antecedent: NDArray[np.int64]
+    """Antecedent row, shape (R,); -1 for row 0."""
     sigma: NDArray[np.int64]
+    """0 revolute, 1 prismatic, 2 fixed, shape (R,)."""
     joint: NDArray[np.int64]
+    """Number of the joint in q (from 0), -1 if fixed, shape (R,)."""
     before: Array
+    """Constant turn in front of row 0, shape (4, 4)."""
     after: Array
+    """Constant turn behind each end, shape (number of ends, 4, 4)."""
 
     def __post_init__(self) -> None:
         for name in ("antecedent", "sigma", "joint"):
@@ -157,35 +127,7 @@ class ExtendedTable(Rebuilt):
 
 
 def extend_table(model: RobotModel, frames: Sequence[Frame] = (None,)) -> ExtendedTable:
-    """Extend the table of a robot by its base and the measured ends.
-
-    Parameters
-    ----------
-    model : RobotModel
-        The robot.
-    frames : sequence of str, int or None
-        The measured ends, each once; None is the tool.
-
-    Returns
-    -------
-    ExtendedTable
-        Base, frames and ends.
-
-    Raises
-    ------
-    InvalidValueError, FrameNotFoundError
-        Not a model; no end or the same twice; an unknown frame.
-
-    References
-    ----------
-    Seed book section 1.4.2.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> extend_table(load("rx90")).path(None)
-    array([0, 1, 2, 3, 4, 5, 6, 7])
-    """
+    """Extend the table of a robot by its base and the measured ends, each once."""
     check_model(model)
     frames = tuple(frames)
     if not frames or len(set(frames)) < len(frames):

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,36 +13,20 @@ from .._choices import chosen
 from ..errors import InvalidValueError
 from ..estimation import Loss
 from ..model import RobotModel, check_model
+from .alignment import align_base_and_tool
 from .candidates import candidate_parameters
-from .contradiction import contradictions
-from .enough import check_enough
-from .errors_seen import block_errors
-from .folds import (
-    Refit,
-    Split,
-    errors_of_others,
-    errors_of_splits,
-    splits,
-    suited_fixtures,
-)
-from .identifiable import (
-    IdentifiableParameters,
-    Reason,
-    all_corrections,
-    identifiable_on,
-)
-from .insignificant import insignificant_parameters, with_gained, without_insignificant
+from .contradiction import contradictions, with_outliers
+from .identifiable import IdentifiableParameters, Reason, all_corrections, identifiable_on
 from .measurements import KnownDistance, Measurement
-from .next_term import note_of_structure, trials_of
-from .notes import is_implausible, notes_after, notes_before, notes_of_errors
-from .outliers import judged
+from .notes import implausible, notes_after, notes_before, notes_of_errors
 from .parameters import Compliance, GeometricParameters, as_names
-from .placing import placed_robot
-from .prior import ParameterPrior, estimated_with, note_of_prior, settled_prior, sized, widened
+from .prior import ParameterPrior, estimated_with, note_of_prior, sized, widened
 from .problem import as_measurements, guessed_fixtures, measured_frames, problem_of
 from .result import CalibrationResult
-from .solve import solve
-from .structure import structure_of
+from .significance import adjusted, check_enough, insignificant_parameters
+from .solve import Solution, solve
+from .structure import note_of_structure, structure_of, trials_of
+from .validation import Validation, cross_validated, errors_of, partition, settled_prior, tested
 
 Progress = Callable[[int, int, str], None]
 """Called with the number of finished fits, their total, and the current task."""
@@ -49,7 +35,7 @@ _PRIOR = ParameterPrior()
 _SEED = 1
 _TRIES = 6
 """Largest number of fits for the choice of parameters and of the prior's width."""
-_TOLD_APART = 1e-4
+_DEPENDENT = 1e-4
 """Sine of the angle below which a column counts as dependent."""
 
 
@@ -76,17 +62,17 @@ def fit(
 ) -> CalibrationResult:
     """Estimate the geometric parameters of a robot, also called kinematic calibration.
 
-    Parameters that the measurements cannot tell stay as they are or are regrouped into others;
-    the result says which. All measurements take part in the estimate; the errors on data kept
+    Parameters that the measurements do not determine stay nominal or are regrouped into others;
+    the result lists them. All measurements take part in the estimate; the errors on data kept
     aside come from further fits without them. Where the residuals depend on the posture in a way
-    that no parameter takes, a note says so and, with folds, names the term to try next (joint
+    that no parameter explains, a note says so and, with folds, names the term to try next (joint
     compliance, gear eccentricity, gains) and what it gains on data kept aside.
 
     Parameters
     ----------
     model : RobotModel
-        The nominal robot; its base and tool are where the fit begins (if they are far off, the
-        measured positions say where it stands).
+        The nominal robot; its base and tool are where the fit begins (if they are far off, it
+        begins where the measured positions are).
     measurements : Measurement or iterable of Measurement
         One or more, of any kinds.
     parameters : GeometricParameters or iterable of str, optional
@@ -100,8 +86,8 @@ def fit(
         ``"squares"`` (the default), or against outliers ``"huber"``, ``"cauchy"``, ``"tukey"``.
     prior : ParameterPrior, optional
         How large the corrections are expected to be, so that the estimate is the maximum a
-        posteriori; default `ParameterPrior()`. Corrections that contradict it widen it, and a note
-        says so. None for none: parameters that noise hides still stay where they are.
+        posteriori; default `ParameterPrior()`. Corrections that contradict it widen it, with a
+        note. None for none: parameters that noise hides still stay nominal.
     truncation : float, optional
         Directions whose singular value relative to the largest is smaller are left out.
     folds : int
@@ -114,12 +100,12 @@ def fit(
     rng : numpy.random.Generator or int, optional
         For the folds; default the same each time.
     progress : callable, optional
-        ``progress(done, of, doing)`` after each fit.
+        ``progress(done, total, task)`` after each fit.
 
     Returns
     -------
     CalibrationResult
-        Values with deviations, errors before and after, the calibrated robot.
+        Corrections with standard errors, errors before and after, the calibrated robot.
 
     Raises
     ------
@@ -138,132 +124,173 @@ def fit(
     >>> arm = rm.load("rx90")
     >>> real = arm.with_tool(rm.se3.translation(0.001, 0.0, 0.1))
     >>> q = np.random.default_rng(0).uniform(-1.5, 1.5, (40, 6))
-    >>> found = fit(arm, rm.calibration.Pose(q, rm.dgm(real, q)), folds=0)
-    >>> found.model.tool[:3, 3].round(6)
+    >>> result = fit(arm, rm.calibration.Pose(q, rm.dgm(real, q)), folds=0)
+    >>> result.model.tool[:3, 3].round(6)
     array([0.001, 0.   , 0.1  ])
     """
     check_model(model)
-    measured = as_measurements(measurements)
-    aside = _measurements_aside(held_out)
+    measured, (share, test) = as_measurements(measurements), _held_out(held_out)
     if folds and folds < 2:
         raise InvalidValueError(f"folds: expected 2 or more, or 0 for none, got {folds}.")
     loss = Loss.SQUARES if loss is None else chosen(Loss, loss, "loss")
-    chance = np.random.default_rng(_SEED if rng is None else rng)
-    frames = measured_frames((*measured, *aside))
-    given = names = None
-    if isinstance(parameters, GeometricParameters):
-        given = parameters
-    elif parameters is not None:
-        names = as_names(parameters)
-
-    def candidates_of(robot: RobotModel) -> GeometricParameters:
-        found = candidate_parameters(
-            robot, frames, base=base, tool=tool, gains=gains, couplings=couplings,
-            compliance=compliance, eccentricity=eccentricity,
-        )  # fmt: skip
-        return found if names is None else found.subset(names)
-
+    rng = np.random.default_rng(_SEED if rng is None else rng)
     known, known_lengths = as_names(known), as_names(known_lengths)
-    candidates = candidates_of(model) if given is None else given
+    make_candidates = partial(
+        candidate_parameters,
+        frames=measured_frames((*measured, *test)),
+        base=base,
+        tool=tool,
+        gains=gains,
+        couplings=tuple(couplings),
+        compliance=compliance,
+        eccentricity=eccentricity,
+    )
+    if isinstance(parameters, GeometricParameters):
+        candidates = parameters
+    else:
+        names = None if parameters is None else as_names(parameters)
+        candidates = make_candidates(model)
+        candidates = candidates if names is None else candidates.subset(names)
     if prior is not None:
         candidates.index(prior.named, "prior")
     as_given = problem_of(candidates, measured)
-    notes = notes_before(as_given)
-    nothing = np.zeros(as_given.P)
-    errors_given = block_errors(as_given, nothing, suited_fixtures(as_given, nothing, {}))
-    placed = None
-    if given is None:
+    notes = [*notes_before(as_given)]
+    given = nominal = errors_of(as_given, np.zeros(as_given.P))
+    if not isinstance(parameters, GeometricParameters):
         fixed = {*known, *known_lengths, *(() if prior is None else prior.named)}
-        placed = placed_robot(candidates, measured, fixed)
-        if placed is not None:
-            candidates = candidates_of(placed.model)
-    before = errors_given if placed is None else placed.errors
-    share = held_out if isinstance(held_out, float | int) else 0.0
-    identifiable = identifiable_on(
-        candidates, measured, known_lengths, known, dependent=_TOLD_APART
-    )
-    check_enough(identifiable, measured, known_lengths, known, _TOLD_APART)
+        aligned = align_base_and_tool(candidates, measured, fixed)
+        if aligned is not None:
+            aligned_model, nominal = aligned
+            candidates = make_candidates(aligned_model).subset(candidates.names)
     if prior is not None:
         prior = sized(prior, candidates.table.size)
-    prior_of, used = None, prior
+    estimate = _estimate(
+        candidates, measured, known, known_lengths, prior, loss=loss, truncation=truncation, rng=rng
+    )
+    solution = estimate.solution
+    expected = None if prior is None else replace(prior, strength=solution.fit.prior.strength)
+    contradicted = contradictions(solution, expected, bool(known_lengths) or prior is not None)
+    solution = with_outliers(solution, contradicted, expected)
+    structure = None if implausible(solution) else structure_of(solution, estimate.identifiable)
+    blocks = sum(m.blocks for m in measured if m.views)
+    parts = partition(model, measured, folds if blocks >= 2 * folds else 0, rng)
+    last = partition(model, measured, max(round(1.0 / share), 2) if share else 0, rng)
+    last = last._replace(splits=last.splits[:1])
+    fits = len(parts.splits)
+    if folds and blocks < 2 * folds:
+        notes.append(f"{blocks} measurements are too few for {folds} folds: none were made.")
+    elif (folds or share) and not (parts.splits or last.splits):
+        notes.append("Nothing can be kept aside: each object is measured in one posture alone.")
+    trials_to_fit = len(structure.indicated) if structure and fits else 0
+    step = _Steps(progress, 1 + fits + len(last.splits) + trials_to_fit * (1 + fits))
+    step("all measurements")
+    in_folds = in_test = None
+    if fits:
+        in_folds = cross_validated(solution, parts, nominal, partial(step, "cross-validation"))
+    if test:
+        in_test = tested(solution, test)
+    elif last.splits:
+        in_test = cross_validated(solution, last, nominal, partial(step, "measurements kept aside"))
+    if structure is not None:
+        trials = []
+        if in_folds is not None:
+            done = partial(step, "terms to try next")
+            preferred, identify = estimate.preferred, estimate.identify
+            trials = trials_of(
+                structure, solution, preferred, identify, parts, in_folds, nominal, done
+            )
+        notes.append(note_of_structure(structure, trials, in_folds))
+    in_sample = errors_of(solution.problem, solution.corrections, solution.fixtures)
+    validation = Validation(given, nominal, in_sample, in_folds, in_test)
+    distances = any(isinstance(m, KnownDistance) for m in measured)
+    return CalibrationResult(
+        nominal=model,
+        known=(*known_lengths, *known),
+        identifiable=estimate.identifiable,
+        identifiable_after=estimate.identifiable_after,
+        solution=solution,
+        validation=validation,
+        notes=(
+            *notes_of_errors(solution, validation),
+            *notes,
+            *dict.fromkeys(part.note for part in (parts, last) if part.note),
+            *note_of_prior(prior, estimate.prior, distances),
+            *(c.note for c in contradicted),
+            *notes_after(solution, estimate.identifiable, estimate.identifiable_after),
+        ),
+    )
 
-    def identifiable_there(some: GeometricParameters) -> IdentifiableParameters:
-        return identifiable_on(
-            some, measured, known_lengths, (*known, *identifiable.of_reason(Reason.NOISE)),
-            corrections=all_corrections(some, estimated, solution.deviation),
-            fixtures=solution.fixtures, dependent=_TOLD_APART,
-        )  # fmt: skip
 
+class _Estimate(NamedTuple):
+    """A solution, the identifiable parameters before and at it, and the prior as widened.
+
+    ``preferred`` are the candidates with those estimated first; ``identify`` gives the identifiable
+    ones of some candidates at the solution.
+    """
+
+    solution: Solution
+    identifiable: IdentifiableParameters
+    identifiable_after: IdentifiableParameters
+    prior: ParameterPrior | None
+    preferred: GeometricParameters
+    identify: Callable[[GeometricParameters], IdentifiableParameters]
+
+
+def _estimate(
+    candidates: GeometricParameters,
+    measured: tuple[Measurement, ...],
+    known: tuple[str, ...],
+    known_lengths: tuple[str, ...],
+    prior: ParameterPrior | None,
+    *,
+    loss: Loss,
+    truncation: float | None,
+    rng: np.random.Generator,
+) -> _Estimate:
+    """Fit the parameters that are identifiable and significant, with a prior that suits them."""
+    identifiable = identifiable_on(candidates, measured, known_lengths, known, dependent=_DEPENDENT)
+    check_enough(identifiable, measured, known_lengths, known, _DEPENDENT)
     for _ in range(_TRIES):
-        if used is not None:
-            prior_of = partial(settled_prior, used, loss=loss, rng=chance)
-        estimated = (
-            identifiable.kept if used is None else estimated_with(used, identifiable, measured)
-        )
+        estimated = identifiable.kept
+        if prior is not None:
+            estimated = estimated_with(prior, identifiable, measured)
         problem = problem_of(estimated, measured)
-        gaussian = None if prior_of is None else prior_of(problem)
         zero = np.zeros(problem.P)
         start = np.concatenate([zero, guessed_fixtures(problem, zero)])
-        solution = solve(problem, start, loss=loss, prior=gaussian, truncation=truncation)
-        wider = None if used is None else widened(used, solution)
+        used = settled_prior(prior, problem, loss, rng)
+        solution = solve(problem, start, loss=loss, prior=used, truncation=truncation)
         insignificant = [] if truncation else insignificant_parameters(solution, start)
+        fixed = (*known, *identifiable.of_reason(Reason.NOISE))
+        identify = partial(_identifiable_at, solution, known_lengths, fixed)
         preferred = candidates.preferring(estimated.names)
-        again = identifiable_there(preferred)
+        after = identify(preferred)
+        found = _Estimate(solution, identifiable, after, prior, preferred, identify)
+        wider = None if prior is None else widened(prior, problem, solution.fit)
         # columns that depend on others at the nominal robot may not at the solution
-        gained = set(again.names) - set(estimated.names) if used is not None else set()
-        if not insignificant and not gained and wider is used:
+        gained = set(after.names) - set(estimated.names) if prior is not None else set()
+        if not insignificant and not gained and wider is prior:
             break
-        used, identifiable = (
-            wider,
-            with_gained(without_insignificant(identifiable, insignificant), gained),
-        )
-    size_is_known = bool(known_lengths) or prior is not None
-    contradicted = contradictions(solution, prior, size_is_known, truncation)
-    solution = judged(solution, contradicted, prior, truncation)
-    structure = None if is_implausible(solution) else structure_of(solution, identifiable)
-    blocks = sum(m.blocks for m in measured if m.views)
-    parts: list[Split] = []
-    share_aside: list[Split] = []
-    if folds and blocks < 2 * folds:
-        notes = (*notes, f"{blocks} measurements are too few for {folds} folds: none were made.")
-    elif folds:
-        parts = splits(model, measured, folds, chance)
-    if share:
-        share_aside = splits(model, measured, max(round(1.0 / share), 2), chance)[:1]
-    if (folds or share) and blocks >= 2 * folds and not (parts or share_aside):
-        notes = (*notes, "Nothing can be kept aside: each thing is measured in one posture alone.")
-    fits_to_try = len(structure.indicated) * (1 + len(parts)) if structure and parts else 0
-    step = _Steps(progress, 1 + len(parts) + len(share_aside) + fits_to_try)
-    step("all measurements")
-    refit = Refit(solution, prior_of, truncation)
-    validation = kept_aside = None
-    if parts:
-        validation = errors_of_splits(refit, parts, before, lambda: step("cross-validation"))
-    if aside:
-        kept_aside = errors_of_others(refit, aside)
-    elif share_aside:
-        doing = "measurements kept aside"
-        kept_aside = errors_of_splits(refit, share_aside, before, lambda: step(doing))
-    if structure is not None:
-        tried = [] if validation is None else trials_of(
-            structure, refit, preferred, identifiable_there, used, parts, before, validation,
-            lambda: step("terms to try next"),
-        )  # fmt: skip
-        notes = (*notes, note_of_structure(structure, tried, validation))
-    return CalibrationResult(
-        nominal=model, known=(*known_lengths, *known), identifiable=identifiable, again=again,
-        solution=solution, given=errors_given, before=before,
-        after=block_errors(problem, solution.deviation, solution.fixtures),
-        cross_validation=validation, held_out=kept_aside,
-        notes=(
-            *notes_of_errors(solution, validation, kept_aside),
-            *notes,
-            *dict.fromkeys(p.partition.note for p in (*parts, *share_aside) if p.partition.note),
-            *note_of_prior(prior, used, any(isinstance(m, KnownDistance) for m in measured)),
-            *(c.sentence() for c in contradicted),
-            *notes_after(solution, identifiable, again),
-        ),
-    )  # fmt: skip
+        prior, identifiable = wider, adjusted(identifiable, insignificant, gained)
+    return found
+
+
+def _identifiable_at(
+    solution: Solution,
+    known_lengths: tuple[str, ...],
+    known: tuple[str, ...],
+    candidates: GeometricParameters,
+) -> IdentifiableParameters:
+    """Identifiable ones of some candidates at a solution."""
+    estimated = solution.problem.parameters
+    return identifiable_on(
+        candidates,
+        solution.problem.measurements,
+        known_lengths,
+        known,
+        corrections=all_corrections(candidates, estimated, solution.corrections),
+        fixtures=solution.fixtures,
+        dependent=_DEPENDENT,
+    )
 
 
 class _Steps:
@@ -272,19 +299,20 @@ class _Steps:
     def __init__(self, progress: Progress | None, total: int) -> None:
         self._progress, self._total, self._done = progress, total, 0
 
-    def __call__(self, doing: str) -> None:
+    def __call__(self, task: str) -> None:
         self._done += 1
         if self._progress is not None:
-            self._progress(self._done, self._total, doing)
+            self._progress(self._done, self._total, task)
 
 
-def _measurements_aside(
+def _held_out(
     held_out: float | Measurement | Sequence[Measurement],
-) -> tuple[Measurement, ...]:
-    if isinstance(held_out, float | int):
-        if not 0.0 <= held_out < 1.0:
-            raise InvalidValueError(
-                f"held_out: expected a share from 0 to under 1, or measurements, got {held_out}."
-            )
-        return ()
-    return as_measurements(held_out, "held_out")
+) -> tuple[float, tuple[Measurement, ...]]:
+    """Share that is held out, and measurements that are."""
+    if not isinstance(held_out, float | int):
+        return 0.0, as_measurements(held_out, "held_out")
+    if not 0.0 <= held_out < 1.0:
+        raise InvalidValueError(
+            f"held_out: expected a share from 0 to under 1, or measurements, got {held_out}."
+        )
+    return float(held_out), ()

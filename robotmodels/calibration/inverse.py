@@ -32,18 +32,7 @@ MERGE = 1e-6
 
 
 class CorrectionStatus(Outcome):
-    """Outcome of the refinement of a posture of the nominal robot; fits int8.
-
-    Attributes
-    ----------
-    sentence : str
-        The outcome in words.
-
-    Examples
-    --------
-    >>> CorrectionStatus.MERGED.sentence
-    'It converges to the same posture as another nominal one before it.'
-    """
+    """Outcome of the refinement of a posture of the nominal robot; fits int8."""
 
     ARRIVED = 0, "It converges to a posture of the calibrated robot."
     MERGED = 1, "It converges to the same posture as another nominal one before it."

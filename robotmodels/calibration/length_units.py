@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import permutations
 from math import exp, log
 from typing import NamedTuple
 
@@ -14,6 +15,7 @@ from ..errors import InvalidValueError
 from ..kinematics import dgm
 from ..kinematics.lengths import characteristic_length
 from ..model import RobotModel
+from .alignment import best_motion
 from .extended_table import Frame
 from .measurements import (
     CameraPose,
@@ -25,17 +27,14 @@ from .measurements import (
     Position,
     RelativePose,
 )
-from .registration import best_motion
 
 _UNITS = {"metres": 1.0, "centimetres": 1e-2, "inches": 0.0254, "millimetres": 1e-3}
 _SLIPS = {
     (unit, taken): _UNITS[taken] / _UNITS[unit]
-    for unit, taken in (
-        ("millimetres", "metres"), ("centimetres", "metres"), ("inches", "metres"),
-        ("millimetres", "centimetres"), ("millimetres", "inches"),
-    )
-}  # fmt: skip
-_SLIPS |= {(taken, unit): 1.0 / factor for (unit, taken), factor in _SLIPS.items()}
+    for unit, taken in permutations(_UNITS, 2)
+    if {unit, taken} != {"centimetres", "inches"}
+}
+"""Ratio of stated to true lengths, by their unit and the unit that was assumed."""
 _TENFOLD = {
     ("millimetres", "centimetres"): "ten times too long: a slip of a decimal, or mm for cm",
     ("centimetres", "millimetres"): "ten times too short: a slip of a decimal, or cm for mm",
@@ -46,23 +45,18 @@ _NEAR = 0.15
 _ALIKE = 0.3
 """Largest relative residual of measured against scaled nominal lengths."""
 _FAR = 3.0
-"""Difference of a known distance, in scatters of the nominal points, from which units are checked.
-"""
-_SPREAD = 50.0
-"""Implausible measured spread, relative to the robot's reach."""
-_STILL = 200.0
-"""Ratio of nominal to measured spread from which the measured point counts as fixed."""
+"""Difference of a known distance, in scatters of the nominal points, for a check of its unit."""
+_SPREAD, _STILL = 50.0, 200.0
+"""Implausible ratios: of a measured spread to the robot's reach, and of nominal to measured."""
 _FEW = 7
 """Smallest number of lengths for the check of a pivot."""
 
 
 class UnitError(NamedTuple):
-    """Ratio of measured to nominal lengths explained by a unit."""
+    """Ratio of measured to nominal lengths explained by the actual and the assumed unit."""
 
     unit: str
-    """Actual unit."""
     taken: str
-    """Assumed unit."""
     ratio: float
 
     def sentence(self, stated: str = "metres") -> str:
@@ -79,7 +73,7 @@ class UnitError(NamedTuple):
 
 
 def unit_error_of(ratio: float, near: float = _NEAR) -> UnitError | None:
-    """The slip of units whose factor is near a ratio of measured to nominal lengths."""
+    """The unit error whose factor is near a ratio of measured to nominal lengths."""
     if not 0.0 < ratio < np.inf:
         return None
     pair = min(_SLIPS, key=lambda key: abs(log(ratio / _SLIPS[key])))
@@ -91,17 +85,9 @@ def unit_error_of_positions(nominal: Array, measured: Array) -> UnitError | None
     """Unit error of positions, by a similarity fit. Shapes: nominal, measured (N, 3)."""
     if len(nominal) < 3:
         return None
-    T = best_motion(nominal, measured)
-    turned = (nominal - nominal.mean(axis=0)) @ T[:3, :3].T
-    return unit_error_of_lengths(turned.ravel(), (measured - measured.mean(axis=0)).ravel())
-
-
-def unit_error_of_lengths(nominal: Array, measured: Array) -> UnitError | None:
-    """By the ratio of lengths (N,), where they are of the same movements."""
-    size = float(nominal @ nominal)
-    ratio = float(nominal @ measured) / size if size > 0.0 else 0.0
-    left = float(np.linalg.norm(measured - ratio * nominal))
-    return unit_error_of(ratio) if left < _ALIKE * float(np.linalg.norm(measured)) else None
+    R = best_motion(nominal, measured)[:3, :3]
+    turned = (nominal - nominal.mean(axis=0)) @ R.T
+    return _unit_error_of_lengths(turned, measured - measured.mean(axis=0))
 
 
 def unit_error_of_spread(model: RobotModel, frame: Frame, spread: float) -> UnitError | None:
@@ -110,14 +96,21 @@ def unit_error_of_spread(model: RobotModel, frame: Frame, spread: float) -> Unit
     return UnitError("millimetres", "metres", ratio) if ratio > _SPREAD else None
 
 
+def _unit_error_of_lengths(nominal: Array, measured: Array) -> UnitError | None:
+    """By the ratio of the lengths of the same movements, if it is one."""
+    size = float((nominal * nominal).sum())
+    ratio = float((nominal * measured).sum()) / size if size > 0.0 else 0.0
+    left = float(np.linalg.norm(measured - ratio * nominal))
+    return unit_error_of(ratio) if left < _ALIKE * float(np.linalg.norm(measured)) else None
+
+
 def _unit_error_of_pivot(p: Array, length: Array) -> UnitError | None:
     """By ``|p - c|^2 = s length^2``, which is linear in c, c.c and s."""
     if len(p) < _FEW:
         return None
     x = p - p.mean(axis=0)
     square = (x * x).sum(axis=1)
-    scaled = (length / length.max()) ** 2
-    A = np.column_stack([x, np.ones(len(x)), scaled])
+    A = np.column_stack([x, np.ones(len(x)), (length / length.max()) ** 2])
     found = np.linalg.lstsq(A, square, rcond=None)[0]
     left = np.linalg.norm(A @ found - square)
     if left > _ALIKE * np.linalg.norm(square - square.mean()) or found[-1] <= 0.0:
@@ -127,77 +120,68 @@ def _unit_error_of_pivot(p: Array, length: Array) -> UnitError | None:
 
 def check_units(model: RobotModel, measurements: Sequence[Measurement]) -> None:
     """Refuse lengths in another unit than metres."""
+    points: dict[str, list[Array]] = {}
     for k, m in enumerate(measurements):
-        found = _slip(model, m)
-        if found is not None:
-            what, slip = found
+        where = f"measurements[{k}] ({m.name})"
+        quantity, error = _unit_error(model, m)
+        if error is not None:
             raise InvalidValueError(
-                f"measurements[{k}] ({m.name}): {what} are {slip.sentence()}. Pass metres: "
-                f"multiply by {slip.factor:.4g}."
+                f"{where}: {quantity} are {error.sentence()}. Pass metres: multiply by "
+                f"{error.factor:.4g}."
             )
         if isinstance(m, Pose | Position):
-            _check_spread(model, m, f"measurements[{k}] ({m.name})")
-    points = _touched(model, measurements)
+            _check_spread(model, m, where)
+        elif isinstance(m, PointContact):
+            for label, p in zip(m.label, dgm(model, m.q, m.frame)[:, :3, 3], strict=True):
+                points.setdefault(f"{m.name}:{label}", []).append(p)
     for m in measurements:
         if isinstance(m, KnownDistance) and m.point in points and m.other in points:
-            _check_distance(m, points[m.point], points[m.other])
+            _check_distance(m, np.array(points[m.point]), np.array(points[m.other]))
 
 
-def _slip(model: RobotModel, m: Measurement) -> tuple[str, UnitError] | None:
-    """What is measured and its slip of units, if there is one."""
-    slip = None
+def _unit_error(model: RobotModel, m: Measurement) -> tuple[str, UnitError | None]:
+    """The measured quantity and its unit error, if there is one."""
     if isinstance(m, Pose | Position) and all(m.rows[:3]):
-        p = m.T[:, :3, 3] if isinstance(m, Pose) else m.p
-        what, slip = "positions", unit_error_of_positions(dgm(model, m.q, m.frame)[:, :3, 3], p)
-        slip = slip or unit_error_of_spread(
-            model, m.frame, float(np.linalg.norm(np.ptp(p, axis=0)))
-        )
-    elif isinstance(m, CameraPose) and all(m.rows):
-        what = "positions of the boards"
-        camera, seen = dgm(model, m.q, m.frame)[:, :3, 3], se3.inverse(m.T)[:, :3, 3]
-        for group in range(len(m.labels)):
-            of = m.groups == group
-            slip = slip or unit_error_of_positions(camera[of], seen[of])
-    elif isinstance(m, RelativePose) and all(m.rows[:3]):
-        what = "displacements"
+        p = _positions(m)
+        error = unit_error_of_positions(dgm(model, m.q, m.frame)[:, :3, 3], p)
+        size = float(np.linalg.norm(np.ptp(p, axis=0)))
+        return "positions", error or unit_error_of_spread(model, m.frame, size)
+    if isinstance(m, CameraPose) and all(m.rows):
+        p, seen = dgm(model, m.q, m.frame)[:, :3, 3], se3.inverse(m.T)[:, :3, 3]
+        boards = (m.groups == k for k in range(len(m.labels)))
+        errors = (unit_error_of_positions(p[board], seen[board]) for board in boards)
+        return "positions of the boards", next(filter(None, errors), None)
+    if isinstance(m, RelativePose) and all(m.rows[:3]):
         moved = se3.inverse(dgm(model, m.q, m.frame)) @ dgm(model, m.q_other, m.frame)
-        slip = unit_error_of_lengths(moved[:, :3, 3].ravel(), m.T[:, :3, 3].ravel())
-    elif isinstance(m, Distance) and not m.offset:
-        what = "lengths"
+        return "displacements", _unit_error_of_lengths(moved[:, :3, 3], m.T[:, :3, 3])
+    if isinstance(m, Distance) and not m.offset:
         p = dgm(model, m.q, m.frame)[:, :3, 3]
         if m.q_other is not None:
-            apart = p - dgm(model, m.q_other, m.frame)[:, :3, 3]
-            slip = unit_error_of_lengths(np.linalg.norm(apart, axis=1), m.length)
+            apart = np.linalg.norm(p - dgm(model, m.q_other, m.frame)[:, :3, 3], axis=1)
+            error = _unit_error_of_lengths(apart, m.length)
         else:
-            for group in range(len(m.labels)):
-                of = m.groups == group
-                slip = slip or _unit_error_of_pivot(p[of], m.length[of])
-        slip = slip or unit_error_of_spread(model, m.frame, float(np.median(m.length)))
-    return None if slip is None else (what, slip)
+            pivots = (m.groups == k for k in range(len(m.labels)))
+            errors = (_unit_error_of_pivot(p[one], m.length[one]) for one in pivots)
+            error = next(filter(None, errors), None)
+        size = float(np.median(m.length))
+        return "lengths", error or unit_error_of_spread(model, m.frame, size)
+    return "", None
+
+
+def _positions(m: Pose | Position) -> Array:
+    return m.T[:, :3, 3] if isinstance(m, Pose) else m.p
 
 
 def _check_spread(model: RobotModel, m: Pose | Position, where: str) -> None:
     """Refuse positions that do not move although the robot does."""
-    p = m.T[:, :3, 3] if isinstance(m, Pose) else m.p
-    spread = float(np.linalg.norm(np.ptp(p, axis=0)))
-    nominal = float(np.linalg.norm(np.ptp(dgm(model, m.q, m.frame)[:, :3, 3], axis=0)))
-    if 0.0 < spread < nominal / _STILL:
+    measured, nominal = _positions(m), dgm(model, m.q, m.frame)[:, :3, 3]
+    spread, expected = (float(np.linalg.norm(np.ptp(p, axis=0))) for p in (measured, nominal))
+    if 0.0 < spread < expected / _STILL:
         raise InvalidValueError(
             f"{where}: positions are spread over {spread:.3g} m, but those of the robot over "
-            f"{nominal:.3g} m: these look like the same position all the time, or like kilometres. "
-            "Pass metres."
+            f"{expected:.3g} m: these look like the same position all the time, or like "
+            "kilometres. Pass metres."
         )
-
-
-def _touched(model: RobotModel, measurements: Sequence[Measurement]) -> dict[str, Array]:
-    """Nominal positions of the end, by the name of the point that it touches."""
-    found: dict[str, list[Array]] = {}
-    for m in measurements:
-        if isinstance(m, PointContact):
-            p = dgm(model, m.q, m.frame)[:, :3, 3]
-            for label, place in zip(m.label, p, strict=True):
-                found.setdefault(f"{m.name}:{label}", []).append(place)
-    return {name: np.array(places) for name, places in found.items()}
 
 
 def _check_distance(m: KnownDistance, one: Array, other: Array) -> None:
@@ -207,12 +191,12 @@ def _check_distance(m: KnownDistance, one: Array, other: Array) -> None:
     scatter = float(np.sqrt((spread**2).sum(axis=1).mean()))
     if abs(m.length - apart) <= _FAR * scatter:
         return
-    # halfway to the next factor, that of inches, if the nominal robot knows no better
+    # halfway to the next factor, that of inches, if the nominal robot is no better
     near = min(_NEAR + scatter / max(apart, 1e-12), exp(0.5 * log(39.37 / 25.4)) - 1.0)
-    slip = unit_error_of(m.length / max(apart, 1e-12), near)
-    if slip is not None:
+    error = unit_error_of(m.length / max(apart, 1e-12), near)
+    if error is not None:
         raise InvalidValueError(
             f"{m.name} {m.point} to {m.other}: {m.length:.6g} m is "
-            f"{_TENFOLD.get((slip.unit, slip.taken)) or slip.sentence()}. The nominal robot gives "
-            f"{apart:.4g} m. Pass metres: {slip.factor * m.length:.5g}."
+            f"{_TENFOLD.get((error.unit, error.taken)) or error.sentence()}. The nominal robot "
+            f"gives {apart:.4g} m. Pass metres: {error.factor * m.length:.5g}."
         )

@@ -17,29 +17,16 @@ from .extended_table import JOINT_VARIABLE, Element, ExtendedTable, gravity_load
 
 
 class ErrorLaw(Enum):
-    """How the error of an element depends on the configuration.
+    """How the error of an element depends on the configuration: ``error = parameter * factor``.
 
-    The value is the prefix of the parameters' names; a constant error is named by its element.
-    Every law is linear in its parameter: ``error = parameter * factor``. A new law is a row here.
-
-    Attributes
-    ----------
-    unit : str
-        Unit of the parameter; ``{}`` stands for that of its element.
-    factor : callable or None
-        Factor by the reading of a joint (rad or m): the reading itself for GAIN (with another
-        joint: coupling), sines and cosines for an encoder off its axis or a graduated disc that is
-        not flat. None for CONSTANT (factor 1) and for COMPLIANCE, whose factor is the gravity load
-        on the element (N m or N).
-
-    Examples
-    --------
-    >>> ErrorLaw.GAIN.value, ErrorLaw.SINE_2.factor(0.0)
-    ('gain', np.float64(0.0))
+    The value is the prefix of the names; constant errors are named by their element. A new law is
+    a row here.
     """
 
     unit: str
+    """Unit of the parameter; ``{}`` stands for that of its element."""
     factor: Callable[[Array], Array] | None
+    """By the reading of a joint (rad or m); None for 1 and for the gravity load (N m or N)."""
 
     CONSTANT = "", "{}", None
     GAIN = "gain", "1", lambda q: q
@@ -76,35 +63,16 @@ class Compliance(Enum):
 
 @dataclass(frozen=True, slots=True)
 class GeometricParameter:
-    """One parameter: the error of an element of a row, times the factor of its law.
-
-    Parameters
-    ----------
-    row : int
-        Row of the extended table: 0 the base, 1 to f the frames, then the ends.
-    element : Element
-        Which of the seven elementary motions.
-    law : ErrorLaw
-        How it depends on the configuration.
-    source : int
-        Row of the joint whose reading or load the law uses; its own row for constant errors.
-    also : tuple of (int, Element, int)
-        Further rows and elements with the same error, each with the row of its source: a
-        compliance that is the same about several axes.
-
-    Examples
-    --------
-    >>> GeometricParameter(3, Element.THETA, ErrorLaw.GAIN, 3).name
-    'gain3'
-    >>> GeometricParameter(6, Element.THETA, ErrorLaw.GAIN, 5).name
-    'gain6_5'
-    """
+    """One parameter: the error of an element of a row, times the factor of its law."""
 
     row: int
+    """Row of the extended table: 0 the base, 1 to f the frames, then the ends."""
     element: Element
     law: ErrorLaw = ErrorLaw.CONSTANT
     source: int = -1
+    """Row of the joint whose reading or load the law uses; its own row for constant errors."""
     also: tuple[tuple[int, Element, int], ...] = ()
+    """Further rows and elements with the same error, each with the row of its source."""
 
     @property
     def actions(self) -> tuple[tuple[int, Element, int], ...]:

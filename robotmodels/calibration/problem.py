@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from .._arrays import Array, Rebuilt
 from ..errors import InvalidValueError, ShapeError
 from .differential import differential_model
-from .expected_joints import expected_joints_text
+from .joint_readings import expected_joints_text
 from .measurements import (
     Evaluation,
     Fixture,

@@ -19,13 +19,12 @@ from ..geometry import REVOLUTE
 from ..kinematics import OrientationKind, dgm, pose_from_coordinates
 from ..kinematics.coordinates.kinds import orientation_kind
 from ..model import RobotModel, check_model
-from .expected_joints import expected_joints_text
 from .extended_table import Frame
+from .joint_readings import beyond_limits, expected_joints_text
 from .length_units import unit_error_of_positions, unit_error_of_spread
 from .measurements import FileRow, Measurement, Pose
 from .measurements.base import fields_of, required
 from .measurements.kinds import Kind, as_kind
-from .reading_limits import beyond_limits
 
 _QUATERNION_TOLERANCE = 1e-3
 """Largest deviation from 1 of the length of a quaternion of few digits."""

@@ -1,4 +1,4 @@
-"""What a calibration gives: values with deviations, errors before and after, and the robot."""
+"""Result of a calibration: corrections, standard errors, validation, and the robot."""
 
 from __future__ import annotations
 
@@ -7,43 +7,39 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._arrays import Array, Rebuilt
+from ..errors import InvalidValueError, nearest_names
 from ..estimation import FitStatus
 from ..model import RobotModel
-from .errors_seen import BlockErrors
-from .folds import AsideErrors, fixtures_by_name
 from .identifiable import IdentifiableParameters
 from .other_tool import PredictedError, other_tool_error
 from .parameters import GeometricParameters
 from .robot import CalibratedRobot, calibrated_model
 from .solve import Solution
+from .validation import Validation
 
-_SAYS_LITTLE = 0.7
-"""Standard error relative to the prior's from which a parameter is determined mainly by the prior.
-"""
+_BY_PRIOR = 0.7
+"""Standard error relative to the prior's from which a parameter is determined mainly by it."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class CalibrationResult(Rebuilt):
     """A calibrated robot, and what is needed to judge it.
 
     Parameters
     ----------
     nominal : RobotModel
-        The robot as it was given.
+        The robot as given.
     known : tuple of str
-        Parameters that were told to stay as they are.
-    identifiable, again : IdentifiableParameters
-        What the measurements tell, judged at the nominal robot and at the solution.
+        Parameters that were fixed by the caller.
+    identifiable, identifiable_after : IdentifiableParameters
+        Identifiable parameters at the nominal robot and at the solution.
     solution : Solution
         The fit: parameters, fixtures, covariance, weights, noise.
-    given, before, after : BlockErrors
-        Of all measurements: the robot as it was given, with base and tool alone fitted (where they
-        may be off: what is left is what the table is to blame for), and the calibrated one; each
-        with the fixtures that suit it.
-    cross_validation, held_out : AsideErrors or None
-        Errors on data that did not take part.
+    validation : Validation
+        Errors: ``nominal`` (base and tool alone fitted), ``in_sample``, ``folds``, ``held_out``
+        (None without them), ``given``; each with ``.mean, .rms, .max`` by unit, ``rms["m"]``.
     notes : tuple of str
-        What is strange, and what to do.
+        Findings and advice.
 
     References
     ----------
@@ -53,79 +49,96 @@ class CalibrationResult(Rebuilt):
     nominal: RobotModel
     known: tuple[str, ...]
     identifiable: IdentifiableParameters
-    again: IdentifiableParameters
+    identifiable_after: IdentifiableParameters
     solution: Solution
-    given: BlockErrors
-    before: BlockErrors
-    after: BlockErrors
-    cross_validation: AsideErrors | None
-    held_out: AsideErrors | None
+    validation: Validation
     notes: tuple[str, ...]
 
     @property
     def parameters(self) -> GeometricParameters:
-        """The parameters that were estimated."""
+        """The estimated parameters."""
         return self.solution.problem.parameters
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Their names, shape (P,)."""
+        """Names of the P estimated parameters."""
         return self.parameters.names
 
     @property
     def units(self) -> tuple[str, ...]:
-        """Units of the deviations."""
+        """Their units."""
         return self.parameters.units
 
     @property
-    def deviation(self) -> Array:
-        """What is added to the values at the start of the fit, shape (P,)."""
-        return self.solution.deviation
+    def corrections(self) -> Array:
+        """Corrections of the values at the start of the fit, shape (P,)."""
+        return self.solution.corrections
 
     @property
     def values(self) -> Array:
         """Calibrated values: of the table's columns, base and tool; shape (P,)."""
-        return self.parameters.nominal + self.deviation
+        return self.parameters.nominal + self.corrections
 
     @property
     def covariance(self) -> Array:
-        """Of the deviations, shape (P, P)."""
+        """Covariance of the values, shape (P, P)."""
         P = len(self.parameters)
         return self.solution.fit.covariance[:P, :P]
 
     @property
-    def standard_deviation(self) -> Array:
-        """Of the deviations, shape (P,)."""
+    def standard_errors(self) -> Array:
+        """Standard errors of the values, shape (P,)."""
         return np.sqrt(np.diagonal(self.covariance))
 
     @property
-    def relative_deviation(self) -> Array:
-        """Standard deviation over the size of the deviation, shape (P,); inf where it is zero."""
-        size = np.abs(self.deviation)
+    def relative_errors(self) -> Array:
+        """Standard errors relative to the corrections, shape (P,); inf where these are zero."""
+        size = np.abs(self.corrections)
         return np.divide(
-            self.standard_deviation, size, out=np.full(len(size), np.inf), where=size > 0.0
+            self.standard_errors, size, out=np.full(len(size), np.inf), where=size > 0.0
         )
 
     @property
     def correlation(self) -> Array:
-        """Correlations of the deviations, shape (P, P)."""
-        s = self.standard_deviation
+        """Correlations of the values, shape (P, P)."""
+        s = self.standard_errors
         return self.covariance / np.outer(s, s)
 
     @property
     def fixtures(self) -> dict[str, float]:
         """Estimated points, planes and targets, by name, m or rad."""
-        return fixtures_by_name(self.solution)
+        return self.solution.fixture_values
 
     @property
     def status(self) -> FitStatus:
-        """How the fit ended; its sentence says it."""
+        """Outcome of the fit."""
         return self.solution.fit.status
+
+    def reason(self) -> str:
+        """Sentence of the status."""
+        return self.status.sentence
+
+    def value(self, name: str) -> float:
+        """Calibrated value of one parameter, m, rad or its unit."""
+        return float(self.values[self._number(name)])
+
+    def standard_error(self, name: str) -> float:
+        """Standard error of one parameter, m, rad or its unit."""
+        return float(self.standard_errors[self._number(name)])
+
+    def _number(self, name: str) -> int:
+        if name not in self.names:
+            near = ", ".join(nearest_names(name, self.names)) or "none"
+            raise InvalidValueError(
+                f"name: {name!r} was not estimated; near it: {near}. `names` lists the estimated "
+                "parameters, `identifiable.reasons` why others were not."
+            )
+        return self.names.index(name)
 
     @property
     def robot(self) -> CalibratedRobot:
         """The calibrated robot, with what a table cannot hold."""
-        return calibrated_model(self.parameters, self.deviation)
+        return calibrated_model(self.parameters, self.corrections)
 
     @property
     def model(self) -> RobotModel:
@@ -139,35 +152,26 @@ class CalibrationResult(Rebuilt):
 
     @property
     def held_by_prior(self) -> tuple[str, ...]:
-        """Parameters that the measurements say little of: they stay near where they were."""
-        told = (
-            self.standard_deviation
-            < _SAYS_LITTLE * self.solution.fit.prior.sigma[: len(self.names)]
-        )
-        return tuple(name for name, is_told in zip(self.names, told, strict=True) if not is_told)
+        """Parameters that are determined mainly by the prior."""
+        sigma = self.solution.fit.prior.sigma[: len(self.names)]
+        held = ~(self.standard_errors < _BY_PRIOR * sigma)
+        return tuple(np.array(self.names, dtype=object)[held])
 
     @property
     def measured_mask(self) -> tuple[int, ...]:
-        """Components x y z rx ry rz that the measurements have seen."""
+        """Components x y z rx ry rz that were measured."""
         units = {unit for m in self.solution.problem.measurements for unit in m.units}
         return (int("m" in units),) * 3 + (int("rad" in units),) * 3
 
     def __repr__(self) -> str:
-        """The headline of the report: a result holds too much to be listed."""
+        before, after = self.validation.nominal.rms, self.validation.in_sample.rms
+        words = {"m": "position", "rad": "angle"}
         errors = [
-            f"rms {word} error {self.before.summary(unit).rms:.4g} -> "
-            f"{self.after.summary(unit).rms:.4g} {unit}"
-            for unit, word in (("m", "position"), ("rad", "angle"))
-            if self.after.summary(unit).blocks
+            f"rms {words[unit]} error {before[unit]:.4g} -> {rms:.4g} {unit}"
+            for unit, rms in after.items()
         ]
         return (
             f"<CalibrationResult of {self.nominal.name}: {len(self.names)} parameters, "
             f"{self.status.name.lower()}, {', '.join(errors)}; another tool about "
-            f"{self.other_tool.rms:.2g} m; see .report()>"
+            f"{self.other_tool.rms:.2g} m>"
         )
-
-    def report(self) -> str:
-        """All of it as text."""
-        from .reporting.text import report_text
-
-        return report_text(self)

@@ -1,8 +1,8 @@
-"""A test whether residuals still depend on the posture: structure that no parameter takes.
+"""Structure in the residuals: a test whether they depend on the posture, and the term to try next.
 
-Residuals are taken orthogonal to all columns of the geometry, so that a prior has no say. Each test
-compares the square of their projection on some columns with those after the signs of whole postures
-were drawn at random, which independent noise of any size allows.
+Residuals are taken orthogonal to all columns of the geometry, so that a prior has no effect. Each
+test compares the square of their projection on some columns with those after the signs of whole
+postures were drawn at random, which independent noise of any size allows.
 
 Source: C. F. J. Wu, "Jackknife, bootstrap and other resampling methods in regression analysis", The
 Annals of Statistics 14, 1986.
@@ -10,6 +10,8 @@ Annals of Statistics 14, 1986.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import combinations
 from typing import NamedTuple
 
@@ -18,21 +20,24 @@ from numpy.typing import NDArray
 
 from .._arrays import Array
 from ..geometry import FIXED, PRISMATIC
+from ..table_text import in_unit, printed_unit
 from .candidates import candidate_parameters
-from .errors_seen import block_errors
-from .extended_table import Element, ExtendedTable
-from .identifiable import IdentifiableParameters, Reason, needs_a_length
+from .extended_table import Element
+from .identifiable import IdentifiableParameters, Reason
 from .measurements import Evaluation, whitened
 from .parameters import Compliance, ErrorLaw, GeometricParameters
+from .prior import estimated_with
 from .problem import Problem, evaluations, problem_of, stacked
-from .solve import Solution
+from .scale import needs_a_length
+from .solve import ROUGH, Solution, refitted
+from .validation import Errors, HeldOutErrors, Partition, cross_validated, errors_of
 
-_DOUBT = 0.01
+_SIGNIFICANCE = 0.01
 """Significance level of all tests together."""
-_HINT = 0.05
+_INDICATED = 0.05
 """Significance level at which a family is tried."""
 _FLIPS = 999
-LEAST_P = 4.0 / (1 + _FLIPS)
+_LEAST_P = 4.0 / (1 + _FLIPS)
 """Smallest p-value that four tests with so many draws of signs can give."""
 _FEWEST = 20
 """Smallest numbers of postures and of residual degrees of freedom for the test."""
@@ -40,6 +45,10 @@ _ROUNDING = 1e-8
 """Largest residuals of exact data, relative to the robot's size, or rad."""
 _DEPENDENT = 1e-4
 """Sine of the angle to the columns of the fit below which a column is one of them."""
+_SURE = 3.0
+"""Standard errors by which the mean square of errors on data kept aside must fall."""
+_GAIN = 0.02
+"""Smallest relative decrease of the mean square."""
 
 
 class TermFamily(NamedTuple):
@@ -50,45 +59,42 @@ class TermFamily(NamedTuple):
     laws: tuple[ErrorLaw, ...]
 
 
-FAMILIES = (
+_WAVES = (ErrorLaw.SINE, ErrorLaw.COSINE, ErrorLaw.SINE_2, ErrorLaw.COSINE_2)
+_FAMILIES = (
     TermFamily("joint compliance", "compliance='joints'", (ErrorLaw.COMPLIANCE,)),
-    TermFamily(
-        "gear eccentricity", "eccentricity=True",
-        (ErrorLaw.SINE, ErrorLaw.COSINE, ErrorLaw.SINE_2, ErrorLaw.COSINE_2),
-    ),
+    TermFamily("gear eccentricity", "eccentricity=True", _WAVES),
     TermFamily("gains of the readings", "gains=True", (ErrorLaw.GAIN,)),
-)  # fmt: skip
+)
 
 
 class Structure(NamedTuple):
-    """Residuals that depend on the posture, and the families of terms that they resemble."""
+    """Residuals that depend on the posture, and the families of terms that they resemble.
+
+    ``p``: p-value of all tests together; ``parameters``: those of the fit, the others of the table
+    and all families; ``is_complete``: whether no parameter of the table is missing among them.
+    """
 
     p: float
-    """p-value of the combined test (Bonferroni)."""
     parameters: GeometricParameters
-    """Those of the fit, the others of the table, and those of all families."""
     indicated: tuple[TermFamily, ...]
-    """Families that the fit did not include and that the residuals resemble."""
-    others: tuple[TermFamily, ...]
-    """Families not included and not indicated."""
     is_complete: bool
-    """Whether the test allows for every parameter of the table, base and tool."""
 
 
 def structure_of(solution: Solution, found: IdentifiableParameters) -> Structure | None:
-    """Lack-of-fit test of a solution; None if the residuals may be noise."""
+    """Test the residuals of a fit; None without structure, for exact data and few postures."""
+    fit = solution.fit
     whole, is_complete = _all_parameters(solution, found)
     problem = problem_of(whole, solution.problem.measurements)
-    fit, size = solution.fit, whole.table.size
-    deviation = np.zeros(problem.P)
-    deviation[: len(solution.deviation)] = solution.deviation
-    errors = block_errors(problem, deviation, solution.fixtures)
-    largest = max(np.nanmax(e, initial=0.0) for e in (errors.position / size, errors.angle))
+    corrections = np.zeros(problem.P)
+    corrections[whole.index(solution.problem.parameters.names)] = solution.corrections
+    errors = errors_of(problem, corrections, solution.fixtures)
+    sizes = {"m": whole.table.size, "rad": 1.0}
+    largest = max((e / sizes[unit] for unit, e in errors.max.items()), default=0.0)
     posture = _posture_of_rows(problem)
     count = int(posture.max()) + 1
     if largest < _ROUNDING or count < _FEWEST:
         return None
-    r, J = stacked(problem, np.concatenate([deviation, solution.fixtures]), solution.scales)
+    r, J = stacked(problem, np.concatenate([corrections, solution.fixtures]), solution.scales)
     weight = np.sqrt(fit.weights)
     r, J = weight * r, weight[:, None] * J
     included = {e.law for e in found.candidates.entries} | {ErrorLaw.CONSTANT}
@@ -105,33 +111,35 @@ def structure_of(solution: Solution, found: IdentifiableParameters) -> Structure
         return np.add.reduceat((columns * r[:, None])[order], first, axis=0)
 
     def projected(columns: Array) -> Array:
+        columns = _unit_columns(columns)
         return columns - Q @ (Q.T @ columns)
 
     total = float(r @ r)
     left = total - ((signs @ by_posture(Q)) ** 2).sum(axis=1)
 
-    def chance(sums: Array) -> float:
+    def p_value(sums: Array) -> float:
         drawn = ((signs @ sums) ** 2).sum(axis=1) / left
         return (1 + int((drawn >= (sums.sum(axis=0) ** 2).sum() / total).sum())) / (1 + _FLIPS)
 
-    odds = {}
-    for family in FAMILIES:
-        own = [k for k, e in enumerate(whole.entries) if e.law in family.laws]
-        columns = _basis(projected(_unit_columns(J[:, own])), _DEPENDENT)
+    p_values = {}
+    for family in _FAMILIES:
+        terms = [k for k, e in enumerate(whole.entries) if e.law in family.laws]
+        columns = _basis(projected(J[:, terms]), _DEPENDENT)
         if included.isdisjoint(family.laws) and columns.shape[1]:
-            odds[family] = chance(by_posture(columns))
+            p_values[family] = p_value(by_posture(columns))
+    tests = [*p_values.values()]
     smooth = [
-        by_posture(projected(_unit_columns(weight[:, None] * columns)))
-        for columns in _smooth_columns(problem, deviation, solution)
+        by_posture(projected(weight[:, None] * columns))
+        for columns in _smooth_columns(problem, corrections, solution)
     ]
-    tests = [*odds.values(), *([chance(np.hstack(smooth))] if smooth else [])]
+    if smooth:
+        tests.append(p_value(np.hstack(smooth)))
     p = min(1.0, len(tests) * min(tests, default=1.0))
-    if p >= _DOUBT:
+    if p >= _SIGNIFICANCE:
         return None
-    best = sorted(odds, key=lambda family: odds[family])
-    indicated = tuple(family for family in best if odds[family] < _HINT)
-    others = tuple(family for family in best if family not in indicated)
-    return Structure(p, whole, indicated, others, is_complete)
+    best = sorted(p_values, key=lambda family: p_values[family])
+    indicated = tuple(family for family in best if p_values[family] < _INDICATED)
+    return Structure(p, whole, indicated, is_complete)
 
 
 def _all_parameters(
@@ -141,19 +149,21 @@ def _all_parameters(
     table = found.candidates.table
     has_masses = bool(table.model.inertia.values.any())
     everything = candidate_parameters(
-        table.model, table.frames, gains=True, eccentricity=True,
+        table.model,
+        table.frames,
+        gains=True,
+        eccentricity=True,
         compliance=Compliance.JOINTS if has_masses else Compliance.NONE,
-    )  # fmt: skip
+    )
     entries = {e.name: e for e in (*solution.problem.parameters.entries, *found.candidates.entries)}
     others = {e.name: e for e in everything.entries if e.name not in entries}
+    left_out: set[str] = set()
     missing = {name for name, e in others.items() if e.law is ErrorLaw.CONSTANT}
-    entries |= others
-    if needs_a_length(problem_of(everything, solution.problem.measurements), ()):
-        # with all lengths free the robot shrinks until nothing is left of a residual
-        fixed = {n for n, why in found.reasons.items() if why in (Reason.KNOWN, Reason.GAUGE)}
-        entries = {n: e for n, e in entries.items() if n not in fixed | missing}
-        return GeometricParameters(table, tuple(entries.values())), not missing
-    return GeometricParameters(table, tuple(entries.values())), True
+    is_open = needs_a_length(problem_of(everything, solution.problem.measurements), ())
+    if is_open:  # with all lengths free the robot shrinks until nothing is left of a residual
+        left_out = missing.union(*(found.of_reason(why) for why in (Reason.KNOWN, Reason.GAUGE)))
+    kept = (e for name, e in (entries | others).items() if name not in left_out)
+    return GeometricParameters(table, tuple(kept)), not (is_open and missing)
 
 
 def _posture_of_rows(problem: Problem) -> NDArray[np.int64]:
@@ -179,39 +189,34 @@ def _basis(columns: Array, least: float) -> Array:
     return np.asarray(U[:, s > least])
 
 
-def _smooth_columns(problem: Problem, deviation: Array, solution: Solution) -> list[Array]:
-    """Jacobian columns of smooth position errors of each joint."""
-    parameters = problem.parameters
-    own = [
-        (k, e.row) for k, e in enumerate(parameters.entries)
-        if e.law is ErrorLaw.CONSTANT and _is_variable(parameters.table, e.row, e.element)
-    ]  # fmt: skip
-    joints = parameters.table.joint[[row for _, row in own]]
-    slides = parameters.table.sigma[[row for _, row in own]] == PRISMATIC
+def _smooth_columns(problem: Problem, corrections: Array, solution: Solution) -> list[Array]:
+    """Jacobian columns of smooth position errors of each joint: sines, cosines and products."""
+    table = problem.parameters.table
+    variables = []
+    for k, e in enumerate(problem.parameters.entries):
+        variable = Element.R if table.sigma[e.row] == PRISMATIC else Element.THETA
+        moves = 0 < e.row <= table.model.f and table.sigma[e.row] != FIXED
+        if e.law is ErrorLaw.CONSTANT and moves and e.element is variable:
+            variables.append((k, e.row))
+    rows = [row for _, row in variables]
+    joints, slides = table.joint[rows], table.sigma[rows] == PRISMATIC
     readings = np.concatenate([view.q for m in problem.measurements for view in m.views])[:, joints]
     half = np.where(slides, np.ptp(readings, axis=0) / np.pi, 1.0)
     half[half == 0.0] = 1.0
-    seen = evaluations(problem, deviation)
+    seen = evaluations(problem, corrections)
     columns = []
-    for k, _ in own:
+    for k, _ in variables:
         parts = []
         for m, views, scale in zip(problem.measurements, seen, solution.scales, strict=True):
             wide = []
             for at, view in zip(views, m.views, strict=True):
                 factor = _harmonics(view.q[:, joints] / half)
                 wide.append(Evaluation(at.T, at.psi[:, :, k, None] * factor[:, None, :]))
-            rows = m.linearise(wide, solution.fixtures[problem.columns(m)]).by_parameters
-            parts.append(whitened(m, rows, scale).reshape(m.blocks * len(m.axes), -1))
-        wide_as = max(part.shape[1] for part in parts)
-        columns.append(np.vstack([np.pad(p, ((0, 0), (0, wide_as - p.shape[1]))) for p in parts]))
+            by_terms = m.linearise(wide, solution.fixtures[problem.columns(m)]).by_parameters
+            parts.append(whitened(m, by_terms, scale).reshape(m.blocks * len(m.axes), -1))
+        width = max(part.shape[1] for part in parts)  # 0 of known distances
+        columns.append(np.vstack([np.pad(p, ((0, 0), (0, width - p.shape[1]))) for p in parts]))
     return columns
-
-
-def _is_variable(table: ExtendedTable, row: int, element: Element) -> bool:
-    """Whether an element is the variable of a joint."""
-    if not 0 < row <= table.model.f or table.sigma[row] == FIXED:
-        return False
-    return element is (Element.R if table.sigma[row] == PRISMATIC else Element.THETA)
 
 
 def _harmonics(q: Array) -> Array:
@@ -222,3 +227,120 @@ def _harmonics(q: Array) -> Array:
         for i, j in combinations(range(q.shape[1]), 2)
     ]
     return np.concatenate([waves.reshape(len(q), -1), *products], axis=1)
+
+
+# --- terms to try next ----------------------------------------------------------------------------
+
+
+class Trial(NamedTuple):
+    """A fit with one more family, judged on data kept aside.
+
+    ``gain``: relative decrease of their mean square; ``helps``: whether it is significant;
+    ``explains_all``: whether the residuals of this fit show no structure.
+    """
+
+    family: TermFamily
+    errors: Errors
+    gain: float
+    helps: bool
+    explains_all: bool = False
+
+
+def trials_of(
+    structure: Structure,
+    solution: Solution,
+    candidates: GeometricParameters,
+    identify: Callable[[GeometricParameters], IdentifiableParameters],
+    parts: Partition,
+    validation: HeldOutErrors,
+    nominal: Errors,
+    done: Callable[[], None],
+) -> list[Trial]:
+    """Fits with each indicated family, validated on the same parts; largest gain first.
+
+    ``identify`` gives the identifiable ones of some candidates; ``validation`` are the errors of
+    the parts without the family.
+    """
+    measurements, old = solution.problem.measurements, solution.problem.parameters
+    trials: list[Trial] = []
+    fits: dict[TermFamily, tuple[Solution, IdentifiableParameters]] = {}
+    for family in structure.indicated:
+        new = [e for e in structure.parameters.entries if e.law in family.laws]
+        identifiable = identify(replace(candidates, entries=(*candidates.entries, *new)))
+        kept = identifiable.kept
+        if solution.prior is not None:
+            kept = estimated_with(solution.prior, identifiable, measurements)
+        added = [e for e in new if e.name in kept.names]
+        wider = problem_of(replace(old, entries=(*old.entries, *added)), measurements)
+        start = np.concatenate([solution.corrections, np.zeros(len(added)), solution.fixtures])
+        found = refitted(solution, wider, start, solution.scales, tolerance=ROUGH)
+        done()
+        errors = cross_validated(found, parts, nominal, done)
+        trials.append(Trial(family, errors, *_gain(validation, errors)))
+        fits[family] = found, identifiable
+    trials.sort(key=lambda trial: -trial.gain)
+    best = next((trial.family for trial in trials if trial.helps), None)
+    return [
+        trial._replace(
+            explains_all=trial.family == best and structure_of(*fits[trial.family]) is None
+        )
+        for trial in trials
+    ]
+
+
+def _gain(before: Errors, after: Errors) -> tuple[float, bool]:
+    """Relative decrease of the mean square, units by their rms; whether it is significant."""
+    scale = before.rms.get("m", np.inf), before.rms.get("rad", np.inf)
+    was, now = (
+        np.nansum([(errors.position / scale[0]) ** 2, (errors.angle / scale[1]) ** 2], axis=0)
+        for errors in (before, after)
+    )
+    decrease = was - now
+    mean = float(decrease.mean())
+    gain = mean / float(was.mean())
+    is_sure = mean > _SURE * float(decrease.std()) / np.sqrt(len(decrease))
+    return gain, bool(is_sure and gain > _GAIN)
+
+
+def note_of_structure(structure: Structure, trials: Sequence[Trial], without: Errors | None) -> str:
+    """Note on residual structure and the recommended term."""
+    p = f"p {'<=' if structure.p <= _LEAST_P else '='} {structure.p:.2g}"
+    text = [
+        f"Not geometry: the residuals depend on the posture ({p}), and no parameter of the table "
+        "explains it."
+        if structure.is_complete
+        else f"The residuals depend on the posture ({p}), and no estimated parameter explains it; "
+        "parameters of the table that were left out may be the cause.",
+        "Standard errors assume independent residuals and are too short.",
+    ]
+    helpful = [trial for trial in trials if trial.helps]
+    is_explained = bool(helpful) and helpful[0].explains_all
+    if without is None and structure.indicated:
+        terms = " or ".join(f"{family.word} ({family.option})" for family in structure.indicated)
+        text.append(f"A fit with folds shows whether {terms} explains it.")
+    if without is not None and helpful:
+        found = [
+            f"{t.family.word} ({t.family.option}) from {_change(without, t.errors)}"
+            for t in helpful
+        ]
+        text.append(
+            f"Try {helpful[0].family.word} next. Rms error on data kept aside: {'; '.join(found)}."
+        )
+        if not is_explained:
+            text.append(f"With {helpful[0].family.word} they still depend on the posture.")
+    if not structure.parameters.model.inertia.values.any():
+        text.append("Give the model masses (with_inertia) to try joint compliance.")
+    if (trials or not structure.indicated) and not is_explained:
+        text.append(
+            "Backlash, friction, drift or bending links may be the cause: approach every posture "
+            "from the same side, and repeat some measurements at the end."
+        )
+    return " ".join(text)
+
+
+def _change(before: Errors, after: Errors) -> str:
+    """Rms errors before and after, of each unit that was measured."""
+    return " and ".join(
+        f"{in_unit(before.rms[unit], unit)} to {in_unit(rms, unit)} {printed_unit(unit)}"
+        for unit, rms in after.rms.items()
+    )

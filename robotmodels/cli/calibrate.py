@@ -192,11 +192,11 @@ def read(
 
 
 def _report(result: CalibrationResult, aside: Measurement | float) -> Report:
-    from ..calibration.reporting.measured_sections import files_sentence
-    from ..calibration.reporting.write import result_data, write_result
+    from ..calibration.report import files_sentence, report
+    from ..calibration.write import result_data, write_result
 
     tested = "" if isinstance(aside, float | int) else f"\n{files_sentence(aside)}\n"
-    text = result.report() + tested
+    text = report(result) + tested
 
     def write(folder: Path) -> list[str]:
         from ..viz import html_report

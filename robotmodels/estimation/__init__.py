@@ -5,7 +5,6 @@ from .covariance import CorrelatedCovariance, correlated_covariance
 from .diagnostics import FitDiagnostics, ResidualTest, confidence_intervals, fit_diagnostics
 from .estimate import Estimate, EstimateStatus
 from .factor import TriangularFactors
-from .folds import k_folds
 from .losses import Loss
 from .nonlinear import FitStatus, NonlinearFit, fit_nonlinear
 from .prior import Prior
@@ -27,5 +26,4 @@ __all__ = [
     "correlated_covariance",
     "fit_diagnostics",
     "fit_nonlinear",
-    "k_folds",
 ]

@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..calibration.reporting.text import report_sections
+from ..calibration.report import report_sections
 from ..calibration.result import CalibrationResult
 from .plot_calibration_in_space import plot_calibration_in_space
 from .plot_calibration_normality import plot_calibration_normality
@@ -32,7 +32,7 @@ _FIGURES: tuple[tuple[Callable[[CalibrationResult], Figure], str], ...] = (
         plot_calibration_in_space,
         "Errors of position where they were made, magnified as stated; crosses are outliers.",
     ),
-    (plot_calibration_parameters, "Deviations of the parameters with their intervals."),
+    (plot_calibration_parameters, "Corrections of the parameters with their intervals."),
     (plot_calibration_correlations, "Correlations of the estimates."),
     (
         plot_calibration_normality,

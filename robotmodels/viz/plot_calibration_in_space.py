@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, as_exact
-from ..calibration.residuals import MeasuredResiduals, measured_residuals
+from ..calibration.report import MeasuredResiduals, measured_residuals
 from ..calibration.result import CalibrationResult
 from ..errors import InvalidValueError
 from .figures import LABEL_SIZE, PAGE, new_figure

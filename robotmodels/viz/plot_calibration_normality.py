@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..calibration.residuals import measured_residuals
+from ..calibration.report import measured_residuals
 from ..calibration.result import CalibrationResult
 from .figures import LIMIT_DASHES, PAGE, legend_above, line_style, new_figure, panels
 from .palette import INK, PALE

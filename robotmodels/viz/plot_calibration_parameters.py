@@ -31,7 +31,7 @@ SHOWN = {
     "rad/N m": (1e6, "µrad/(N m)"),
     "m/N m": (1e6, "µm/(N m)"),
 }
-"""Factors and symbols of the units in which deviations are drawn; gains as they are."""
+"""Factors and symbols of the units in which corrections are drawn; gains as they are."""
 TITLES = {
     "m": "lengths", "rad": "angles", "1": "gains", "rad/N m": "compliance",
     "m/N m": "compliance of lengths",
@@ -57,7 +57,7 @@ def plot_calibration_parameters(
     level : float
         Probability of the intervals.
     truth : array_like, shape (P,), or mapping of str to float, optional
-        Known deviations, such as those of a simulation: drawn as crosses. Of the P parameters of
+        Known corrections, such as those of a simulation: drawn as crosses. Of the P parameters of
         the result in their order, NaN where unknown; or by names of candidates (m, rad, ...). Of
         these the regrouped ones are added to the parameters that stand for them, to first order,
         and those that are not named count as zero. They count from the robot as it was given.
@@ -74,10 +74,10 @@ def plot_calibration_parameters(
     Raises
     ------
     InvalidValueError
-        Not a result; a level that is no probability; true deviations of parameters that are no
+        Not a result; a level that is no probability; true corrections of parameters that are no
         candidates.
     ShapeError
-        Not one true deviation for each parameter.
+        Not one true correction for each parameter.
     MissingExtraError
         Matplotlib is not installed.
 
@@ -93,7 +93,7 @@ def plot_calibration_parameters(
     >>> q = np.random.default_rng(0).uniform(-1.5, 1.5, (40, 6))
     >>> result = calibration.fit(arm, calibration.Pose(q, rm.dgm(arm, q)), folds=0, held_out=0.0)
     >>> [axes.get_xlabel() for axes in plot_calibration_parameters(result).axes]
-    ['deviation (mm)', 'deviation (deg)']
+    ['correction (mm)', 'correction (deg)']
     """
     found = as_result(result)
     known = None if truth is None else _known(truth, found)
@@ -115,9 +115,9 @@ def plot_calibration_parameters(
             if not own.any():
                 continue
             k = np.array(some)[own]
-            ends = factor * np.abs(interval[k].T - found.deviation[k])
+            ends = factor * np.abs(interval[k].T - found.corrections[k])
             axes.errorbar(
-                factor * found.deviation[k], y[own], xerr=np.nan_to_num(ends, posinf=0.0),
+                factor * found.corrections[k], y[own], xerr=np.nan_to_num(ends, posinf=0.0),
                 fmt=marker, color=color, markersize=3.2, elinewidth=1.1, capsize=1.8, label=name,
             )  # fmt: skip
         sizes = factor * np.abs(interval[some]).max(axis=1)
@@ -132,7 +132,7 @@ def plot_calibration_parameters(
         axes.set_ylim(len(some) - 0.4, -0.6)
         axes.margins(x=0.06)
         axes.grid(False, axis="y")
-        axes.set_xlabel(f"deviation ({symbol})")
+        axes.set_xlabel(f"correction ({symbol})")
         axes.set_title(TITLES.get(unit, unit), size=SMALL_SIZE + 1.0, color=INK)
     handles = {}
     for axes in grid[0]:
@@ -141,12 +141,12 @@ def plot_calibration_parameters(
     if "truth" in handles:  # last
         handles["truth"] = handles.pop("truth")
     percent = f"{100.0 * level:g} %"
-    legend_above(figure, list(handles.values()), title or f"deviations and {percent} intervals")
+    legend_above(figure, list(handles.values()), title or f"corrections and {percent} intervals")
     return figure
 
 
 def _known(truth: ArrayLike | Mapping[str, float], found: CalibrationResult) -> Array:
-    """True deviations from where the fit started, as the result's; NaN where they are unknown."""
+    """True corrections from where the fit started, as the result's; NaN where they are unknown."""
     P = len(found.names)
     table = extend_table(found.nominal, found.parameters.table.frames)
     given = GeometricParameters(table, found.parameters.entries)
@@ -155,7 +155,7 @@ def _known(truth: ArrayLike | Mapping[str, float], found: CalibrationResult) -> 
         values = as_reals(truth, "truth")
         if values.shape != (P,):
             raise ShapeError(
-                f"truth: expected one deviation for each of the {P} parameters of the result, got "
+                f"truth: expected one correction for each of the {P} parameters of the result, got "
                 f"shape {values.shape}; or a mapping of names of candidates."
             )
         return values - moved

@@ -1,4 +1,4 @@
-"""Two robots as one tree, so that what links them is measured like everything else."""
+"""Two robots as one tree, so that links between them are measured like everything else."""
 
 from __future__ import annotations
 
@@ -18,11 +18,10 @@ from ..urdf import NamedFrame
 from .extended_table import base_parameters_of
 
 _COLUMNS = ("gamma", "b", "beta", "alpha", "d", "theta", "r")
-_LIMITS = ("lower", "upper", "velocity", "effort")
 _SAME_GRAVITY = 1e-6
 
 
-def side_by_side(
+def combine_arms(
     model_a: RobotModel,
     model_b: RobotModel,
     base_b: Any = None,
@@ -30,9 +29,9 @@ def side_by_side(
 ) -> RobotModel:
     """One robot with the arms of two: its joints are those of the first, then of the second.
 
-    The second stands on a fixed frame ``b_base`` of the first one's table, whose parameters say
-    where it stands. Ends are called ``a_tool`` and ``b_tool``, frames and joints keep their names
-    behind ``a_`` and ``b_``. The tool of the whole is that of the first robot.
+    The second stands on a fixed frame ``b_base`` of the first one's table, whose parameters are its
+    place. Ends are called ``a_tool`` and ``b_tool``, frames and joints keep their names behind
+    ``a_`` and ``b_``. The tool of the whole is that of the first robot.
 
     Parameters
     ----------
@@ -42,12 +41,12 @@ def side_by_side(
         Z of the second, the place of its R_0 in the world of the first, metres; default its own.
         A robot read from a URDF that is moved by T stands at ``T @ model_b.base``.
     names : tuple of two str
-        What stands before the names, instead of ``a`` and ``b``.
+        Prefixes, instead of ``a`` and ``b``.
 
     Returns
     -------
     RobotModel
-        A tree with n_a + n_b joints. Postures that both robots name are kept.
+        A tree with n_a + n_b joints. Configurations that both robots name are kept.
 
     Raises
     ------
@@ -57,7 +56,7 @@ def side_by_side(
     Examples
     --------
     >>> import robotmodels as rm
-    >>> pair = side_by_side(rm.load("rx90"), rm.load("rx90"), rm.se3.translation(1.2, 0.0, 0.0))
+    >>> pair = combine_arms(rm.load("rx90"), rm.load("rx90"), rm.se3.translation(1.2, 0.0, 0.0))
     >>> pair.n, [round(float(rm.dgm(pair, np.zeros(12), f)[0, 3]), 3) for f in ("a_tool", "b_tool")]
     (12, [0.45, 1.65])
     """
@@ -66,40 +65,36 @@ def side_by_side(
     a, b = (str(name) for name in names)
     if not a or not b or a == b:
         raise InvalidValueError(f"names: expected two different texts, got {names!r}.")
+    if np.abs(model_a.gravity - model_b.gravity).max() > _SAME_GRAVITY:
+        raise InvalidValueError(
+            f"model_b: its gravity {model_b.gravity.tolist()} in the world is not that of model_a, "
+            f"{model_a.gravity.tolist()}. Give both the same with with_gravity; base_b is the "
+            "place of the second robot."
+        )
     place = model_b.base if base_b is None else se3.as_single_pose(base_b, "base_b")
-    _check_gravity(model_a, model_b)
     stand = base_parameters_of(se3.inverse(model_a.base) @ place)
     rows = [stand.elements]
     if not np.array_equal(stand.turn, np.eye(4)):
         # a base that is upright as the other: the constant turn is a frame of its own
         rows.insert(0, base_parameters_of(se3.rotation("x", -np.pi / 2)).elements)
+    table = _table(model_a.table, model_b.table, rows, (a, b))
     shift = model_a.f + len(rows)
-    table = _table(model_a, model_b, rows, (a, b))
-    massless = np.zeros((len(rows), 10))
     frames, taken = [], set(table.names)
     for prefix, robot, up in ((a, model_a, 0), (b, model_b, shift)):
-        own = [NamedFrame("tool", robot.tip, robot.tool), *robot.frames]
-        if prefix == a:
-            own.append(NamedFrame("base", 0, np.eye(4)))
-        for frame in own:
+        ends = [NamedFrame("tool", robot.tip, robot.tool), *robot.frames]
+        ends += [NamedFrame("base", 0, np.eye(4))] if prefix == a else []
+        for frame in ends:
             name = _free(f"{prefix}_{frame.name}", taken)
             # R_0 of the second robot is the frame that it stands on
             frames.append(replace(frame, name=name, parent=frame.parent + up))
-    visuals = (
-        *model_a.visuals,
-        *(replace(visual, frame=visual.frame + shift) for visual in model_b.visuals),
-    )
-    joint = RobotModel.from_table(
+    bodies = model_a.inertia.values, np.zeros((len(rows), 10)), model_b.inertia.values
+    common = model_a.configurations.keys() & model_b.configurations.keys()
+    whole = RobotModel.from_table(
         table,
-        inertia=InertialParameters(
-            np.vstack([model_a.inertia.values, massless, model_b.inertia.values])
+        inertia=InertialParameters(np.vstack(bodies)),
+        drive=DriveParameters(
+            **_joined(model_a.drive, model_b.drive, [x.name for x in fields(DriveParameters)])
         ),
-        drive=DriveParameters(**{
-            field.name: np.concatenate([
-                getattr(model_a.drive, field.name), getattr(model_b.drive, field.name)
-            ])
-            for field in fields(DriveParameters)
-        }),
         base=model_a.base,
         tool=model_a.tool,
         tip=model_a.tip,
@@ -109,50 +104,47 @@ def side_by_side(
         configurations={
             key: np.concatenate([q, model_b.configurations[key]])
             for key, q in model_a.configurations.items()
-            if key in model_b.configurations
+            if key in common
         },
-    )  # fmt: skip
-    notes = (*(f"{a}: {n}" for n in model_a.notes), *(f"{b}: {n}" for n in model_b.notes))
-    return replace(joint, frames=tuple(frames), visuals=visuals, notes=notes)
+    )
+    moved = (replace(visual, frame=visual.frame + shift) for visual in model_b.visuals)
+    return replace(
+        whole,
+        frames=tuple(frames),
+        visuals=(*model_a.visuals, *moved),
+        notes=(*(f"{a}: {n}" for n in model_a.notes), *(f"{b}: {n}" for n in model_b.notes)),
+    )
 
 
-def _check_gravity(model_a: RobotModel, model_b: RobotModel) -> None:
-    if np.abs(model_a.gravity - model_b.gravity).max() > _SAME_GRAVITY:
-        raise InvalidValueError(
-            f"model_b: its gravity {model_b.gravity.tolist()} in the world is not that of model_a, "
-            f"{model_a.gravity.tolist()}. Give both the same with with_gravity; base_b says how "
-            "the second robot stands."
-        )
+def _joined(one: Any, other: Any, words: Any) -> dict[str, Array]:
+    """Attributes of two objects, one behind the other."""
+    return {word: np.concatenate([getattr(one, word), getattr(other, word)]) for word in words}
 
 
 def _table(
-    model_a: RobotModel, model_b: RobotModel, stand: list[Array], names: tuple[str, str]
+    first: DHTable, second: DHTable, stand: list[Array], prefixes: tuple[str, str]
 ) -> DHTable:
-    first, second = model_a.table, model_b.table
-    a, b = names
+    """Rows of the first table, of the stand of the second robot, and of the second table."""
+    a, b = prefixes
     count = len(stand)
     shift = first.f + count
-    columns = {
-        name: np.concatenate([
-            getattr(first, name), [row[k] for row in stand], getattr(second, name)
-        ])
-        for k, name in enumerate(_COLUMNS)
-    }  # fmt: skip
-    limits = {
-        name: np.concatenate([getattr(first, name), getattr(second, name)]) for name in _LIMITS
-    }
-    own = [f"{a}_{name}" for name in first.names]
-    others = [f"{b}_{name}" for name in second.names]
-    taken = {*own, *others}
+    names_a, names_b = [f"{a}_{x}" for x in first.names], [f"{b}_{x}" for x in second.names]
+    taken = {*names_a, *names_b}
     standing = [_free(f"{b}_{name}", taken) for name in ("turn", "base")[-count:]]
+    columns = {
+        word: np.concatenate(
+            [getattr(first, word), [row[k] for row in stand], getattr(second, word)]
+        )
+        for k, word in enumerate(_COLUMNS)
+    }
     chain = [0, *range(first.f + 1, shift)]
     return DHTable(
         antecedent=np.concatenate([first.antecedent, chain, second.antecedent + shift]),
         sigma=np.concatenate([first.sigma, [FIXED] * count, second.sigma]),
         mu=np.concatenate([first.mu, [0] * count, second.mu]),
-        names=[*own, *standing, *others],
+        names=[*names_a, *standing, *names_b],
         **columns,
-        **limits,
+        **_joined(first, second, ("lower", "upper", "velocity", "effort")),
     )
 
 
@@ -165,14 +157,11 @@ def _transmission(model_a: RobotModel, model_b: RobotModel) -> Transmission | No
     )
     K = np.zeros((one.n + other.n, one.n + other.n))
     K[: one.n, : one.n], K[one.n :, one.n :] = one.matrix, other.matrix
-    rest = {
-        name: np.concatenate([getattr(one, name), getattr(other, name)])
-        for name in ("offset", "Iam", "Fvm", "Fcm")
-    }
-    return Transmission(K, **rest)
+    return Transmission(K, **_joined(one, other, ("offset", "Iam", "Fvm", "Fcm")))
 
 
 def _free(name: str, taken: set[str]) -> str:
+    """The name, made different from those taken, and taken."""
     while name in taken:
         name += "_link"
     taken.add(name)

@@ -1,4 +1,4 @@
-"""Check of joint readings against the joint limits."""
+"""Checks of joint readings: their number, and the limits of the joints."""
 
 from __future__ import annotations
 
@@ -14,23 +14,37 @@ from .measurements import Measurement
 
 _TURNS = 30.0
 """Largest plausible reading of a revolute joint, rad; beyond it, degrees are assumed."""
-_BEYOND, _PART = 0.02, 0.02
-"""Tolerance beyond a limit, rad or m, or relative to the range."""
+_TOLERANCE = 0.02
+"""Tolerance beyond a limit, rad or m and relative to the range."""
 _MOST = 0.6
 """Fraction of the readings of a joint beyond its limits from which they are refused: more than that
 of a symmetric range where a limit is at zero, as in simulated data that ignore limits."""
 
 
+def expected_joints_text(model: RobotModel) -> str:
+    """Sentence on the expected joints; empty if all move the tool."""
+    moving = model.twin.frame(None).path.tolist()
+    names = model.table.joint_names
+    rows = zip(names, model.table.joint_rows, strict=True)
+    idle = [name for name, row in rows if row + 1 not in moving]
+    if not idle:
+        return ""
+    return (
+        f" All {model.n} joints of the model count: {', '.join(names)}. {', '.join(idle)} do not "
+        "move the tool. Read the robot with tip_link='LINK' to leave them out."
+    )
+
+
 def check_readings(
     model: RobotModel, measurements: Sequence[Measurement], rows: set[int]
 ) -> list[str]:
-    """Compare readings with the limits of the joints."""
-    wheres: dict[str, list[str]] = {}
+    """Compare readings with the limits of the joints: notes, or an error."""
+    beyond: dict[str, list[str]] = {}
     revolute = model.table.sigma[model.table.joint_rows] == REVOLUTE
     for k, m in enumerate(measurements):
-        where = f"measurements[{k}] ({m.name})"
         if not m.views:
             continue
+        where = f"measurements[{k}] ({m.name})"
         q = np.concatenate([view.q for view in m.views])
         largest = float(np.abs(q[:, revolute]).max(initial=0.0))
         if largest > _TURNS:
@@ -38,21 +52,21 @@ def check_readings(
                 f"{where}: a revolute joint reads {largest:.4g} rad; these look like degrees. "
                 "Pass radians: np.deg2rad(q)."
             )
-        said, most = beyond_limits(model, q, rows)
+        sentences, most = beyond_limits(model, q, rows)
         if most:
             raise InvalidValueError(
-                f"{where}: readings beyond the limits of the joints: {'; '.join(said)}. See "
-                "whether the columns are readings in the order of the joints, with the signs and "
+                f"{where}: readings beyond the limits of the joints: {'; '.join(sentences)}. Check "
+                "that the columns are readings in the order of the joints, with the signs and "
                 "zeros of the model, in rad and m. If the limits of the model are wrong, give it "
                 "others: model.with_table(model.table.replace(lower=..., upper=...))."
             )
-        if said:
-            wheres.setdefault("; ".join(said), []).append(where)
-    if not wheres:
+        if sentences:
+            beyond.setdefault("; ".join(sentences), []).append(where)
+    if not beyond:
         return []
-    listed = "; ".join(f"{', '.join(where)}: {said}" for said, where in wheres.items())
+    listed = "; ".join(f"{', '.join(where)}: {text}" for text, where in beyond.items())
     return [
-        f"Readings beyond the limits of the joints: {listed}. See whether sign, zero and unit of "
+        f"Readings beyond the limits of the joints: {listed}. Check that sign, zero and unit of "
         "these readings are those of the model."
     ]
 
@@ -60,18 +74,17 @@ def check_readings(
 def beyond_limits(model: RobotModel, q: Array, rows: set[int]) -> tuple[list[str], bool]:
     """Sentences on joints beyond their limits, and whether to refuse them. Shapes: q (N, n)."""
     lower, upper = model.lower, model.upper
-    room = np.maximum(_BEYOND, _PART * np.where(np.isfinite(upper - lower), upper - lower, 0.0))
+    width = np.where(np.isfinite(upper - lower), upper - lower, 0.0)
+    tolerance = _TOLERANCE * np.maximum(1.0, width)
     checked = (upper > lower) & [row + 1 in rows for row in model.table.joint_rows]
-    over = np.where(checked, np.maximum(lower - q, q - upper) - room, -np.inf)
-    number = (over > 0.0).sum(axis=0)
-    said = []
+    over = np.where(checked, np.maximum(lower - q, q - upper), -np.inf)
+    number = (over > tolerance).sum(axis=0)
+    sentences = []
     for j in np.flatnonzero(number):
         is_revolute = model.table.sigma[model.table.joint_rows[j]] == REVOLUTE
-        unit = "rad" if is_revolute else "m"
-        beyond = over[over[:, j] > 0.0, j] + room[j]
-        said.append(
+        sentences.append(
             f"joint {j + 1} ({model.table.joint_names[j]}) in {number[j]} of {len(q)} readings, by "
-            f"up to {beyond.max():.3g} {unit} (reads {q[:, j].min():.4g} to "
-            f"{q[:, j].max():.4g}, limits {lower[j]:.4g} to {upper[j]:.4g})"
+            f"up to {over[:, j].max():.3g} {'rad' if is_revolute else 'm'} (reads "
+            f"{q[:, j].min():.4g} to {q[:, j].max():.4g}, limits {lower[j]:.4g} to {upper[j]:.4g})"
         )
-    return said, bool((number > _MOST * len(q)).any())
+    return sentences, bool((number > _MOST * len(q)).any())

@@ -1,0 +1,171 @@
+"""Base and tool that suit a robot best: where a fit begins, and what true errors are relative to.
+
+Source: W. Kabsch, "A solution for the best rotation to relate two sets of vectors", Acta
+Crystallographica A32, 1976.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import se3
+from .._arrays import Array, as_vector
+from ..errors import InvalidValueError
+from ..kinematics import dgm
+from ..model import RobotModel
+from ..se3 import skew
+from .candidates import candidate_parameters
+from .extended_table import Frame
+from .identifiable import identifiable_on
+from .measurements import Measurement, Pose, Position
+from .parameters import ErrorLaw, GeometricParameters
+from .problem import problem_of
+from .robot import as_calibrated, calibrated_model, calibrated_pose, with_moved_tool
+from .solve import ROUGH, first_scales, solve
+from .validation import Errors, errors_of
+
+_STEPS = 50
+_ROUNDING = 1e-13
+"""Step relative to the size of the work, from which on further ones are rounding."""
+
+
+def best_motion(points: Array, targets: Array) -> Array:
+    """Least-squares rigid motion from points to targets (Kabsch).
+
+    Shapes: points, targets (N, 3) -> (4, 4).
+    """
+    a, b = points.mean(axis=0), targets.mean(axis=0)
+    T = np.eye(4)
+    T[:3, :3] = _nearest_rotation((targets - b).T @ (points - a))
+    T[:3, 3] = b - T[:3, :3] @ a
+    return T
+
+
+def _nearest_rotation(M: Array) -> Array:
+    U, _, Vt = np.linalg.svd(M)
+    return U @ np.diag([1.0, 1.0, float(np.sign(np.linalg.det(U @ Vt)))]) @ Vt
+
+
+def align_base_and_tool(
+    candidates: GeometricParameters, measured: Sequence[Measurement], fixed: Collection[str]
+) -> tuple[RobotModel, Errors] | None:
+    """Robot with base and tool fitted alone, and its errors; None if they are fixed or unknown."""
+    model = candidates.model
+    names = [
+        e.name
+        for e in candidates.entries
+        if e.law is ErrorLaw.CONSTANT and not 0 < e.row <= model.f and e.name not in fixed
+    ]
+    if not names:
+        return None
+    rows = {candidates.entries[k].row for k in candidates.index(names)}
+    if not fixed:
+        start = _kabsch_alignment(model, measured, base=0 in rows, tool=any(rows - {0}))
+        model = _with_gravity_of(start, model)
+    for _ in range(2):  # a tool off the last axis determines more than one on it
+        few = candidate_parameters(model, candidates.table.frames).subset(names)
+        kept = identifiable_on(few, measured, scale_is_known=True).kept
+        if not len(kept):
+            return None
+        problem = problem_of(kept, measured)
+        solution = solve(problem, scales=first_scales(problem), tolerance=ROUGH)
+        model = _with_gravity_of(calibrated_model(kept, solution.corrections).model, model)
+        if len(kept) == len(names):
+            break
+    return model, errors_of(problem, solution.corrections, solution.fixtures)
+
+
+def _with_gravity_of(placed: RobotModel, model: RobotModel) -> RobotModel:
+    """Robot with another base and the gravity of the old one in R_0."""
+    return placed.with_gravity(placed.base[:3, :3] @ model.base[:3, :3].T @ model.gravity)
+
+
+def _kabsch_alignment(
+    model: RobotModel, measurements: Sequence[Measurement], base: bool, tool: bool
+) -> RobotModel:
+    """Robot with base and tool aligned to the measured positions."""
+    usable = [
+        m
+        for m in measurements
+        if isinstance(m, Pose | Position) and all(m.rows[:3]) and m.frame is None
+    ]
+    if not usable or not (base or tool):
+        return model
+    measured = np.concatenate([m.T[:, :3, 3] if isinstance(m, Pose) else m.p for m in usable])
+    computed = np.concatenate([dgm(model, m.q)[:, :3, 3] for m in usable])
+    poses = [m for m in usable if isinstance(m, Pose) and all(m.rows)]
+    if base:
+        model = model.with_base(best_motion(computed, measured) @ model.base)
+    if tool and poses:
+        found = np.concatenate([se3.inverse(dgm(model, m.q)) @ m.T for m in poses])
+        offset = found.mean(axis=0)
+        offset[:3, :3] = _nearest_rotation(offset[:3, :3])
+        model = with_moved_tool(model, model.tool @ offset)
+    return model
+
+
+# --- errors relative to a known robot -------------------------------------------------------------
+
+
+class TrueErrors(NamedTuple):
+    """Position errors as the robot stands, with its base, and with base and tool's point fitted."""
+
+    as_it_stands: Errors
+    base_fitted: Errors
+    base_and_tool_fitted: Errors
+
+
+def true_errors(robot: Any, real: Any, q: ArrayLike, frame: Frame = None) -> TrueErrors:
+    """Position errors of a robot against the one that it stands for (absolute accuracy).
+
+    ``robot``: a model, a calibrated robot or the result of a fit; ``q``: three or more readings
+    (N, n), other ones than those of the fit; ``frame``: the end, None is the tool.
+    """
+    model, real_model = (x if isinstance(x, RobotModel) else as_calibrated(x).model
+                         for x in (robot, real))  # fmt: skip
+    if model.n != real_model.n:
+        raise InvalidValueError(
+            f"real: expected a robot with the {model.n} joints of robot, got {real_model.n} joints."
+        )
+    readings = np.atleast_2d(as_vector(q, model.n, "q")).reshape(-1, model.n)
+    if len(readings) < 3:
+        raise InvalidValueError(
+            f"q: expected three configurations or more to place a base by, got {len(readings)}."
+        )
+    T, goal = _poses(robot, readings, frame), _poses(real, readings, frame)[:, :3, 3]
+    p = T[:, :3, 3]
+    at_best = p + T[:, :3, :3] @ _best_tool(T, goal)
+    gaps = p - goal, _base_fitted(p, goal), _base_fitted(at_best, goal)
+    none = np.full(len(p), np.nan)
+    return TrueErrors(*(Errors(np.linalg.norm(gap, axis=1), none) for gap in gaps))
+
+
+def _poses(robot: Any, q: Array, frame: Frame) -> Array:
+    if isinstance(robot, RobotModel):
+        return dgm(robot, q, frame)
+    return calibrated_pose(as_calibrated(robot), q, frame)
+
+
+def _base_fitted(p: Array, goal: Array) -> Array:
+    Z = best_motion(p, goal)
+    return p @ Z[:3, :3].T + Z[:3, 3] - goal
+
+
+def _best_tool(T: Array, goal: Array) -> Array:
+    """Point of the tool (3,) by Gauss-Newton, with the six parameters of the base."""
+    R, p, point = T[:, :3, :3], T[:, :3, 3], np.zeros(3)
+    size = float(np.linalg.norm(np.ptp(goal, axis=0))) or 1.0
+    for _ in range(_STEPS):
+        Z = best_motion(p + R @ point, goal)
+        at = (p + R @ point) @ Z[:3, :3].T
+        J = np.concatenate([np.broadcast_to(np.eye(3), R.shape), -skew(at), Z[:3, :3] @ R], axis=2)
+        # the shortest step: base and tool need not be distinguishable
+        step = np.linalg.lstsq(J.reshape(-1, 9), (goal - at - Z[:3, 3]).ravel(), rcond=1e-9)[0]
+        point = point + step[6:]
+        if np.linalg.norm(step[6:]) < _ROUNDING * size:
+            break
+    return point

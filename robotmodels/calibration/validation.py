@@ -1,0 +1,398 @@
+"""Errors of a calibration, on the measurements of the fit and on measurements held out of it.
+
+Cross-validation leaves out whole places that are touched, or runs of successive postures: what is
+measured next to a posture of the fit resembles it, and its errors would be too small.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.cluster.hierarchy import fcluster, linkage
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from .._arrays import Array, Rebuilt, read_only
+from ..errors import InvalidValueError
+from ..estimation import Loss, fit_nonlinear
+from ..kinematics import dgm
+from ..kinematics.lengths import characteristic_length
+from ..model import RobotModel
+from .measurements import Labelled, Measurement, scale_is_observable, single_observations
+from .parameters import GeometricParameters
+from .prior import ParameterPrior
+from .problem import Problem, guessed_fixtures, linearised, problem_of, stacked
+from .solve import ROUGH, Solution, first_scales, refitted, solve
+
+_NEAR = 0.2
+"""Extent of one place, relative to the size of the robot."""
+_FEWEST = 3
+"""Smallest number of places for leaving places out."""
+_STRENGTHS = np.logspace(-3.0, 3.0, 13)
+_FOLDS = 5
+"""Folds for the choice of a prior's strength."""
+
+Numbers = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Errors(Rebuilt):
+    """Lengths of the residuals of measurements, and their statistics by unit. Read-only.
+
+    ``mean``, ``rms``, ``max`` and ``count`` are mappings with the keys ``"m"`` and ``"rad"``, as
+    far as such rows are measured. Known distances are left out.
+
+    Parameters
+    ----------
+    position, angle : ndarray, shape (B,)
+        Of each measurement, m and rad; NaN where it has no rows of the unit.
+
+    Examples
+    --------
+    >>> errors = Errors([0.003, 0.004], [np.nan, np.nan])
+    >>> errors.mean, errors.max["m"]
+    ({'m': 0.0035}, 0.004)
+    """
+
+    position: Array
+    angle: Array
+
+    def __post_init__(self) -> None:
+        for name in ("position", "angle"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    @property
+    def mean(self) -> dict[str, float]:
+        """Mean length, m or rad."""
+        return {unit: float(lengths.mean()) for unit, lengths in self._lengths()}
+
+    @property
+    def rms(self) -> dict[str, float]:
+        """Root mean square length, m or rad."""
+        return {unit: float(np.sqrt(np.mean(lengths**2))) for unit, lengths in self._lengths()}
+
+    @property
+    def max(self) -> dict[str, float]:
+        """Largest length, m or rad."""
+        return {unit: float(lengths.max()) for unit, lengths in self._lengths()}
+
+    @property
+    def count(self) -> dict[str, int]:
+        """Number of measurements."""
+        return {unit: len(lengths) for unit, lengths in self._lengths()}
+
+    def _lengths(self) -> list[tuple[str, Array]]:
+        by_unit = (("m", self.position), ("rad", self.angle))
+        measured = [(unit, lengths[~np.isnan(lengths)]) for unit, lengths in by_unit]
+        return [(unit, lengths) for unit, lengths in measured if len(lengths)]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeldOutErrors(Errors):
+    """Errors of measurements (numbers ``blocks``) held out of ``fits`` fits, and before.
+
+    ``description``: how they were chosen, empty if the caller did.
+    """
+
+    blocks: Numbers
+    nominal: Errors
+    fits: int
+    description: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Validation:
+    """Errors of a calibration.
+
+    Parameters
+    ----------
+    given, nominal, in_sample : Errors
+        Of the robot as given, with its base and tool alone fitted (where they may be off), and
+        calibrated.
+    folds, held_out : Errors or None
+        On data held out of the fits (cross-validation; one more fit, or the caller's); their
+        ``nominal`` is before the calibration.
+    """
+
+    given: Errors
+    nominal: Errors
+    in_sample: Errors
+    folds: HeldOutErrors | None = None
+    held_out: HeldOutErrors | None = None
+
+
+def errors_of(problem: Problem, corrections: Array, fixtures: Array | None = None) -> Errors:
+    """Errors at given corrections (P,), by default with the fixtures that suit them best."""
+    if fixtures is None:
+        fixtures = suited_fixtures(problem, corrections, {})
+    parts = zip(problem.measurements, linearised(problem, corrections, fixtures), strict=True)
+    measured = [(m, part.residual) for m, part in parts if m.views]
+
+    def lengths(unit: str) -> Array:
+        columns = [(residual, np.array(m.units) == unit) for m, residual in measured]
+        of_each = [
+            np.linalg.norm(residual[:, rows], axis=1)
+            if rows.any()
+            else np.full(len(residual), np.nan)
+            for residual, rows in columns
+        ]
+        return np.concatenate([np.zeros(0), *of_each])
+
+    return Errors(lengths("m"), lengths("rad"))
+
+
+def errors_elsewhere(
+    parameters: GeometricParameters,
+    corrections: Array,
+    measurements: Sequence[Measurement],
+    known: dict[str, float],
+) -> Errors:
+    """Errors of measurements that were not fitted; fixtures are known ones, or suit best."""
+    problem = problem_of(parameters, measurements)
+    return errors_of(problem, corrections, suited_fixtures(problem, corrections, known))
+
+
+def suited_fixtures(problem: Problem, corrections: Array, known: dict[str, float]) -> Array:
+    """Least-squares fixtures at given corrections (P,), shape (F,)."""
+    values = np.array([known.get(fixture.name, np.nan) for fixture in problem.fixtures])
+    free = np.flatnonzero(np.isnan(values))
+    if not len(free):
+        return values
+    values[free] = guessed_fixtures(problem, corrections)[free]
+    scales = first_scales(problem)
+
+    def linearise(x: Array) -> tuple[Array, Array]:
+        values[free] = x
+        r, J = stacked(problem, np.concatenate([corrections, values]), scales)
+        return r, J[:, problem.P + free]
+
+    values[free] = fit_nonlinear(linearise, values[free], block=problem.block).x
+    return values
+
+
+def cross_validated(
+    solution: Solution, parts: Partition, nominal: Errors, done: Callable[[], None]
+) -> HeldOutErrors:
+    """Errors of the held-out measurements of each part, by a fit of the others."""
+    found = []
+    known = solution.fixture_values
+    for split in parts.splits:
+        problem = problem_of(solution.problem.parameters, split.training)
+        start = [known[fixture.name] for fixture in problem.fixtures]
+        fitted = refitted(
+            solution,
+            problem,
+            np.concatenate([solution.corrections, start]),
+            tuple(solution.scales[k] for k in split.numbers),
+            tolerance=ROUGH,
+        )
+        corrections, values = fitted.corrections, fitted.fixture_values
+        found.append(errors_elsewhere(problem.parameters, corrections, split.test, values))
+        done()
+    blocks = np.concatenate([split.blocks for split in parts.splits])
+    return HeldOutErrors(
+        np.concatenate([errors.position for errors in found]),
+        np.concatenate([errors.angle for errors in found]),
+        blocks,
+        Errors(nominal.position[blocks], nominal.angle[blocks]),
+        len(parts.splits),
+        parts.description,
+    )
+
+
+def tested(solution: Solution, test: Sequence[Measurement]) -> HeldOutErrors:
+    """Errors of measurements that took part in no fit."""
+    parameters, known = solution.problem.parameters, solution.fixture_values
+    errors = errors_elsewhere(parameters, solution.corrections, test, known)
+    nominal = errors_elsewhere(parameters, np.zeros(len(parameters)), test, {})
+    blocks = np.arange(len(errors.position))
+    return HeldOutErrors(errors.position, errors.angle, blocks, nominal, 1)
+
+
+def settled_prior(
+    prior: ParameterPrior | None, problem: Problem, loss: Loss, rng: np.random.Generator
+) -> ParameterPrior | None:
+    """The prior with a strength: that given, or chosen by cross-validation."""
+    if prior is None or prior.strength is not None:
+        return prior
+    if problem.blocks < 2 * _FOLDS:
+        raise InvalidValueError(
+            f"strength: choosing it needs {2 * _FOLDS} measurements or more, got "
+            f"{problem.blocks}; give the strength."
+        )
+    parts = partition(problem.parameters.model, problem.measurements, _FOLDS, rng)
+    whole = solve(problem, loss=loss, prior=prior)
+    nominal = errors_of(problem, np.zeros(problem.P))
+    candidates = [replace(prior, strength=float(strength)) for strength in _STRENGTHS]
+    sizes = []
+    for candidate in candidates:
+        errors = cross_validated(replace(whole, prior=candidate), parts, nominal, lambda: None)
+        by_unit = errors.rms if loss is Loss.SQUARES else errors.mean
+        sizes.append([by_unit[unit] / nominal.rms[unit] for unit in by_unit])
+    relative = np.array(sizes) / np.min(sizes, axis=0)
+    return candidates[int(np.argmin((relative**2).sum(axis=1)))]
+
+
+# --- partition of measurements into folds ---------------------------------------------------------
+
+
+class Split(NamedTuple):
+    """Measurements to fit and their numbers, those held out with their blocks."""
+
+    training: tuple[Measurement, ...]
+    test: tuple[Measurement, ...]
+    numbers: tuple[int, ...]
+    blocks: Numbers
+
+
+class Partition(NamedTuple):
+    """Splits of measurements, with a description for the report and a note, empty for none."""
+
+    splits: tuple[Split, ...]
+    description: str
+    note: str
+
+
+def partition(
+    model: RobotModel, measurements: Sequence[Measurement], folds: int, rng: np.random.Generator
+) -> Partition:
+    """At most ``folds`` parts that are held out in turn: whole places, or runs of postures.
+
+    Equal readings are always in one part.
+    """
+    seen = [m for m in measurements if m.views]
+    if not seen or not folds:
+        return Partition((), "", "")
+    posture, label = _postures(seen), _label_numbers(seen)
+    fold = np.full(len(posture), -1, dtype=np.int64)
+    near = _NEAR * characteristic_length(model)
+    place = _places(model, seen, posture, label, near)
+    count = len(np.unique(place[place >= 0]))
+    whole, note = np.zeros(len(posture), dtype=np.bool_), ""
+    if count >= _FEWEST:
+        assigned = _assigned_places(measurements, place, folds, rng)
+        if (assigned >= 0).any():
+            fold, whole = assigned, place >= 0
+    elif count and (place >= 0).all():
+        note = (
+            f"Measured at {count} place{'s'[: count > 1]} only: the errors on data kept aside are "
+            "of other postures there, and may be larger at another place. Measure at three or "
+            f"more places, over {near:.2g} m apart."
+        )
+    places, has_runs = len(np.unique(place[fold >= 0])), False
+    of_posture = np.full(int(posture.max()) + 1, -1, dtype=np.int64)
+    of_posture[posture[whole]] = fold[whole]
+    next_to = np.zeros((folds, len(posture)), dtype=np.bool_)
+    for one in np.unique(label[~whole]):
+        blocks = np.flatnonzero((label == one) & ~whole)
+        met, first = np.unique(posture[blocks], return_index=True)
+        met = met[np.argsort(first)]
+        if len(met) > 1:
+            has_runs = True
+            turn = rng.permutation(folds)[np.arange(len(met)) * folds // len(met)]
+            of_posture[met] = np.where(of_posture[met] < 0, turn, of_posture[met])
+            width = len(met) // (3 * folds)
+            for k in range(folds):
+                wide = np.convolve(of_posture[met] == k, np.ones(2 * width + 1), "same") > 0.5
+                next_to[k, blocks] = np.isin(posture[blocks], met[wide])
+    fold[~whole] = of_posture[posture[~whole]]
+    splits = []
+    for k in np.unique(fold[fold >= 0]):
+        training = _restricted(measurements, (fold != k) & ~next_to[k])
+        test = tuple(m for _, m in _restricted(measurements, fold == k) if m.views)
+        numbers, kept = zip(*training, strict=True) if training else ((), ())
+        splits.append(Split(kept, test, numbers, np.flatnonzero(fold == k)))
+    runs = "runs of successive postures, those next to a run left out of the fit as well,"
+    parts = [f"whole places ({places})"] * bool(places) + [runs] * has_runs
+    return Partition(tuple(splits), "; elsewhere ".join(parts), note)
+
+
+def _postures(seen: Sequence[Measurement]) -> Numbers:
+    """Posture index of each block; equal readings have the same index."""
+    found: dict[bytes, int] = {}
+    numbers = []
+    for m in seen:
+        for rows in zip(*(view.q for view in m.views), strict=True):
+            distinct = dict.fromkeys(row.tobytes() for row in rows)
+            numbers.append(found.setdefault(b"".join(distinct), len(found)))
+    return np.array(numbers, dtype=np.int64)
+
+
+def _label_numbers(seen: Sequence[Measurement]) -> Numbers:
+    """Index of the touched or observed object of each block."""
+    found: dict[tuple[str, ...], int] = {}
+    numbers = []
+    for m in seen:
+        names = [(m.name,) if m.fixtures else ()] * m.blocks
+        if isinstance(m, Labelled):
+            names = [(m.name, label) for label in m.label]
+        numbers += [found.setdefault(name, len(found)) for name in names]
+    return np.array(numbers, dtype=np.int64)
+
+
+def _places(
+    model: RobotModel, seen: Sequence[Measurement], posture: Numbers, label: Numbers, near: float
+) -> Numbers:
+    """Place index of each block, -1 for blocks without a place."""
+    place = np.full(len(posture), -1, dtype=np.int64)
+    p = np.concatenate([dgm(model, m.views[0].q, m.views[0].frame)[:, :3, 3] for m in seen])
+    single = set(single_observations(seen))
+    names = (
+        (f"{m.name}:{x}" for x in m.label) if isinstance(m, Labelled) else [None] * m.blocks
+        for m in seen
+    )
+    labelled = np.array([x is not None and x not in single for some in names for x in some])
+    centres, at = np.zeros((0, 3)), np.full(len(posture), -1, dtype=np.int64)
+    for one in np.unique(label[labelled]):
+        blocks = label == one
+        centre = p[blocks].mean(axis=0)
+        if np.linalg.norm(p[blocks] - centre, axis=1).max() < near:
+            at[blocks] = len(centres)
+            centres = np.vstack([centres, centre])
+    held = at >= 0
+    if not held.any():
+        return place
+    region = np.ones(1, dtype=np.int64)
+    if len(centres) > 1:
+        region = fcluster(linkage(centres, "complete"), near, "distance").astype(np.int64)
+    # objects that are measured in one posture are at one place
+    one, other = region[at[held]], posture[held] + len(centres) + 1
+    size = int(other.max()) + 1
+    links = coo_array((np.ones(len(one)), (one, other)), shape=(size, size))
+    place[held] = connected_components(links, directed=False)[1][one]
+    return place
+
+
+def _assigned_places(
+    measurements: Sequence[Measurement], place: Numbers, folds: int, rng: np.random.Generator
+) -> Numbers:
+    """Fold of each block by its place; a known length remains in the fit of each fold."""
+    fold = np.full(len(place), -1, dtype=np.int64)
+    length = scale_is_observable(measurements)
+    for one in rng.permutation(np.unique(place[place >= 0])):
+        sizes = np.bincount(fold[fold >= 0], minlength=folds)
+        for k in np.argsort(sizes, kind="stable"):
+            tried = np.where(place == one, k, fold)
+            left = _restricted(measurements, tried != k)
+            if left and (not length or scale_is_observable(m for _, m in left)):
+                fold = tried
+                break
+    return fold
+
+
+def _restricted(measurements: Sequence[Measurement], kept: Mask) -> list[tuple[int, Measurement]]:
+    """Measurements restricted to some blocks, with their indices."""
+    parts: list[tuple[int, Measurement]] = []
+    first = 0
+    for k, m in enumerate(measurements):
+        part = np.flatnonzero(kept[first : first + m.blocks]) if m.views else np.arange(m.blocks)
+        first += m.blocks if m.views else 0
+        if len(part):
+            parts.append((k, m if len(part) == m.blocks else m.subset(part)))
+    touched = {f.name for _, m in parts if m.views for f in m.fixtures}
+    return [(k, m) for k, m in parts if m.views or touched.issuperset(f.name for f in m.fixtures)]
