@@ -102,7 +102,7 @@ class Refinement:
         self.bends = bool(robot.bent_rows)
         self.mask, self.in_tool_axes, self.tolerance = mask, in_tool_axes, tolerance
         self.is_redundant = int((on_path & ~self.locked).sum()) > int(mask.sum())
-        self._arm = (*model.chain, *tool.kernel_arguments)
+        self._arm = (model.chain, *tool.kernel_arguments)
 
     def refine(
         self, targets: Array, starts: Array, present: Flags, held: Flags, wanted: Array
