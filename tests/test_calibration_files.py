@@ -212,6 +212,17 @@ def test_the_same_file_name_in_two_folders_is_two_points(tmp_path):
     assert set(found.point) == {"front/hole", "back/hole"}
 
 
+def test_files_of_a_folder_with_other_contents_are_refused(tmp_path):
+    written(tmp_path / "a.csv", None, rows_of(Q))
+    for other, message in (
+        (np.hstack([Q, Q]), "do not have the same columns"),
+        (np.tile([0.0, 0.0, 0.0, 1.0, 0.0, 0.0], (9, 1)), "unit quaternions: poses"),
+    ):
+        written(tmp_path / "b.csv", None, rows_of(other))
+        with pytest.raises(InvalidValueError, match=message):
+            read_measurements(tmp_path, "point_contact", RX90, joints=range(6))
+
+
 def test_distances_and_relative_poses(tmp_path):
     other = Q[::-1]
     length = np.linalg.norm(T[:, :3, 3] - T[::-1, :3, 3], axis=1)

@@ -187,14 +187,15 @@ def read_measurements(
         given["rows"] = rows
     if name or folder is not None:
         given["name"] = name or Path(folder or "").resolve().name
-    return kind(**given, origin=_origin(tables, parts))
+    names = [f"{t.path.resolve().parent.name}/{t.path.name}" for t in tables]
+    numbers = [(name, k + 1) for name, q in zip(names, parts, strict=True) for k in range(len(q))]
+    return kind(**given, origin=tuple(FileRow(*number) for number in numbers))
 
 
 def is_readable(kind: Kind) -> bool:
     """Whether files can hold all that a kind needs."""
-    return bool(fields_of(kind, "joints")) and required(kind) <= {
-        "joints", "pose", "point", "length", "label",
-    }  # fmt: skip
+    contents = {"joints", "pose", "point", "length", "label"}
+    return bool(fields_of(kind, "joints")) and required(kind) <= contents
 
 
 def _pose_parts(kind: Kind) -> tuple[bool, bool]:
@@ -229,30 +230,15 @@ def _needed(kind: Kind, written: OrientationKind | None) -> list[tuple[str, ...]
 
 def _files(path: str | Path | Iterable[str | Path], pattern: str) -> tuple[list[Path], Path | None]:
     """Files to be read, and their folder if that was given."""
-    if isinstance(path, str | Path) and not Path(path).is_dir():
-        return [Path(path)], None
-    if isinstance(path, str | Path):
-        folder = Path(path)
-        files = sorted(folder.glob(pattern))
-        if not files:
-            raise InvalidValueError(
-                f"path: the folder {path} has no file {pattern!r}; give another pattern."
-            )
-        return files, folder
-    files = [Path(each) for each in path]
+    folder = Path(path) if isinstance(path, str | Path) and Path(path).is_dir() else None
+    if folder is not None:
+        files, error = sorted(folder.glob(pattern)), f"the folder {folder} has no file {pattern!r}"
+    else:
+        files = [Path(each) for each in ([path] if isinstance(path, str | Path) else path)]
+        error = "expected a file, a folder or several files, got none"
     if not files:
-        raise InvalidValueError("path: expected a file, a folder or several files, got none.")
-    return files, None
-
-
-def _origin(tables: Sequence[CsvTable], parts: Sequence[Array]) -> tuple[FileRow, ...]:
-    """Every row of the files, by the name of its file with the folder."""
-    names = [f"{t.path.resolve().parent.name}/{t.path.name}" for t in tables]
-    return tuple(
-        FileRow(name, row + 1)
-        for name, part in zip(names, parts, strict=True)
-        for row in range(len(part))
-    )
+        raise InvalidValueError(f"path: {error}.")
+    return files, folder
 
 
 def _joint_columns(
