@@ -16,6 +16,7 @@ from .. import se3
 from .._arrays import Array, as_vector
 from ..errors import InvalidValueError
 from ..kinematics import dgm
+from ..kinematics.lengths import characteristic_length
 from ..model import RobotModel
 from ..se3 import skew
 from .candidates import candidate_parameters
@@ -28,6 +29,10 @@ from .robot import as_calibrated, calibrated_model, calibrated_pose, with_moved_
 from .solve import ROUGH, first_scales, solve
 from .validation import Errors, errors_of
 
+_NEAR = 0.2
+"""Largest mean residual, in lengths of the robot, that a fit is started from as it is."""
+_ALIKE = 1.0 + 2.0 * np.cos(0.5)
+"""Least mean trace of the rotations from nominal to measured poses for the same."""
 _STEPS = 50
 _ROUNDING = 1e-13
 """Step relative to the size of the work, from which on further ones are rounding."""
@@ -87,7 +92,7 @@ def _with_gravity_of(placed: RobotModel, model: RobotModel) -> RobotModel:
 def _kabsch_alignment(
     model: RobotModel, measurements: Sequence[Measurement], base: bool, tool: bool
 ) -> RobotModel:
-    """Robot with base and tool aligned to the measured positions."""
+    """Robot with base and tool aligned to the measured positions, where they are far off."""
     usable = [
         m
         for m in measurements
@@ -98,6 +103,12 @@ def _kabsch_alignment(
     measured = np.concatenate([m.T[:, :3, 3] if isinstance(m, Pose) else m.p for m in usable])
     computed = np.concatenate([dgm(model, m.q)[:, :3, 3] for m in usable])
     poses = [m for m in usable if isinstance(m, Pose) and all(m.rows)]
+    turned = (dgm(model, m.q)[:, :3, :3].swapaxes(1, 2) @ m.T[:, :3, :3] for m in poses)
+    error = np.mean(np.linalg.norm(measured - computed, axis=1))
+    if error < _NEAR * characteristic_length(model) and all(
+        np.trace(R, axis1=1, axis2=2).mean() > _ALIKE for R in turned
+    ):
+        return model
     if base:
         model = model.with_base(best_motion(computed, measured) @ model.base)
     if tool and poses:

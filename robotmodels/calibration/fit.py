@@ -26,7 +26,14 @@ from .result import CalibrationResult
 from .significance import adjusted, check_enough, insignificant_parameters
 from .solve import Solution, solve
 from .structure import note_of_structure, structure_of, trials_of
-from .validation import Validation, cross_validated, errors_of, partition, settled_prior, tested
+from .validation import (
+    Validation,
+    cross_validated,
+    errors_of,
+    errors_on,
+    partition,
+    settled_prior,
+)
 
 Progress = Callable[[int, int, str], None]
 """Called with the number of finished fits, their total, and the current task."""
@@ -188,7 +195,7 @@ def fit(
     if fits:
         in_folds = cross_validated(solution, parts, nominal, partial(step, "cross-validation"))
     if test:
-        in_test = tested(solution, test)
+        in_test = errors_on(solution, test)
     elif last.splits:
         in_test = cross_validated(solution, last, nominal, partial(step, "measurements kept aside"))
     if structure is not None:

@@ -205,7 +205,7 @@ def cross_validated(
     )
 
 
-def tested(solution: Solution, test: Sequence[Measurement]) -> HeldOutErrors:
+def errors_on(solution: Solution, test: Sequence[Measurement]) -> HeldOutErrors:
     """Errors of measurements that took part in no fit."""
     parameters, known = solution.problem.parameters, solution.fixture_values
     errors = errors_elsewhere(parameters, solution.corrections, test, known)
