@@ -9,7 +9,7 @@ from .constraints import CenterOfMassBox, CenterOfMassEllipsoid
 from .find import base_parameters
 from .physical import PhysicalStatus
 from .result import BaseMethod, BaseParameters
-from .values_table import BaseValues
+from .tables import BaseValues
 
 __all__ = [
     "BaseMethod",

@@ -127,12 +127,9 @@ def base_parameters(
             "the free variables.",
         )
     columns = TorqueColumns(aligned, kinds, friction, least, samples, G)
-    ruled = _by_rules(columns) if way is BaseMethod.SYMBOLIC else None
     neglected, error, gap = (), None, None
-    if ruled is not None:
-        kept, matrix = ruled
-    else:
-        kept, matrix = columns.basis.kept, columns.basis.coefficients
+    kept, matrix, numeric = _combinations(columns, way is BaseMethod.SYMBOLIC)
+    if numeric:
         neglected, error = columns.neglected(matrix), columns.torque_error(kept, matrix)
         notes += (*columns.notes, *residual_warning(error, least))
         gap = columns.basis.gap if way is BaseMethod.NUMERIC else None
@@ -149,32 +146,36 @@ def base_parameters(
     )
 
 
-def _by_rules(columns: TorqueColumns) -> tuple[NDArray[np.int64], Array] | None:
-    """Kept parameters (b,) and combinations (b, p) by Khalil's rules.
+def _combinations(columns: TorqueColumns, symbolic: bool) -> tuple[NDArray[np.int64], Array, bool]:
+    """Kept parameters (b,), combinations (b, p), and whether the numeric method decided.
 
-    None where the tolerance decides, and with columns that have no rule (couplings, friction).
+    It decides what depends on a zero tolerance; couplings and friction have no rule.
     """
-    model, drive = columns.model, columns.drive
-    p, lengths = len(columns.names), (model.table.d, model.table.r, model.table.b)
-    if columns.tolerance > NOTHING or p > 10 * model.f + model.n * len(drive):
-        return None
-    sizes = np.abs(np.concatenate(lengths)) / reach(model)
-    sizes = np.append(sizes, np.linalg.norm(model.gravity) / EARTH)
-    if ((sizes > _FINEST) & (sizes < _COARSEST)).any():
-        return None
-    terms, coarse = (
-        regrouped(model, *rows_of_numbers(model, zero), drive, zero)
-        for zero in (_FINEST, _COARSEST)
+    if not symbolic:
+        return columns.basis.kept, columns.basis.coefficients, True
+    model, drive, zero, sizes = columns.model, columns.drive, columns.tolerance, columns.sizes
+    fine, coarse, terms = (
+        regrouped(model, *rows_of_numbers(model, small), drive, small)
+        for small in (_FINEST, _COARSEST, zero)
     )
-    if terms.keys() != coarse.keys():
-        return None
+    table = model.table
+    small = np.abs(np.concatenate((table.d, table.r, table.b))) / reach(model)
+    small = np.append(small, np.linalg.norm(model.gravity) / EARTH)
+    has_rules = len(sizes) == 10 * model.f + model.n * len(drive)
+    clear = has_rules and zero <= NOTHING and fine.keys() == coarse.keys()
+    clear = clear and not ((small > _FINEST) & (small < _COARSEST)).any()
     kept = np.array(sorted(terms), dtype=np.int64)
-    matrix = np.zeros((len(kept), p))
+    matrix = np.zeros((len(kept), len(sizes)))
     for row, number in zip(matrix, kept.tolist(), strict=True):
         row[list(terms[number])] = list(terms[number].values())
-    sizes = columns.sizes
-    matrix[abs(matrix * sizes) <= columns.tolerance * sizes[kept][:, None]] = 0.0
-    return kept, matrix
+    matrix[abs(matrix * sizes) <= zero * sizes[kept][:, None]] = 0.0
+    if clear or (
+        np.array_equal(kept, columns.basis.kept)
+        and (matrix.any(axis=0) == columns.basis.coefficients.any(axis=0)).all()
+        and columns.torque_error(kept, matrix) <= zero
+    ):
+        return kept, matrix, not clear
+    return columns.basis.kept, columns.basis.coefficients, True
 
 
 def _part(tolerance: Any) -> float:
