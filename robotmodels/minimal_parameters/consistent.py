@@ -53,7 +53,7 @@ from ..model import RobotModel
 from ..regressors import parameter_vector
 from ..table_text import boxed
 from .bodies import check_definite
-from .constraints import CenterOfMassBound, mass_constraints
+from .constraints import CenterOfMassBox, mass_constraints
 from .physical import MARGIN, PhysicalFit, PhysicalProblem, PhysicalStatus, Squares
 from .result import BaseParameters
 
@@ -243,15 +243,11 @@ class StandardParameters(Rebuilt):
         return "\n".join(lines)
 
     def _columns(self) -> list[tuple[str, list[str]]]:
-        """Columns of the table: part, parameter, prior, value and difference."""
-        part = [""] * (len(self.names) + 1)
-        for j, good in enumerate(self.inertia.is_physical):
-            part[10 * j] = f"link {j + 1}: {'' if good else 'not '}physical"
-        part[10 * self.base.model.f] = "drives"
+        """Columns of the table: parameter, prior, value and difference."""
         letters = [name.rstrip("0123456789") for name in self.names]
         kinds = np.array([_PRINTED_KINDS.get(kind, kind) for kind in letters])
         sizes = np.maximum(np.abs(self.prior), np.abs(self.values))
-        columns = [("", part[: len(self.names)]), ("parameter", list(self.names))]
+        columns = [("parameter", list(self.names))]
         for title, numbers, form in (
             ("prior", self.prior, ".6g"),
             ("value", self.values, ".6g"),
@@ -314,10 +310,8 @@ def standard_parameters(
     W = _relative(base, b) if weights is None else as_core(weights, (len(base),), "weights")
     if W.ndim != 2:
         raise ShapeError(f"weights: expected shape (k, {len(base)}), got {W.shape}.")
-    near, P0, drives = _checked_prior(base, prior, drive_prior, margin)
-    squares = Squares(W @ base.matrix, W @ b, base.matrix, b)
-    fit = PhysicalProblem(base, near, P0, b, margin).fit(squares, b, 0.0, TOLERANCE)
-    return StandardParameters(base, b, near, drives, fit)
+    robot = fit_consistent(base, W, W @ b, prior=prior, drive_prior=drive_prior, margin=margin)
+    return replace(robot, requested=b)
 
 
 def fit_consistent(
@@ -330,7 +324,7 @@ def fit_consistent(
     prior: InertialParameters | None = None,
     drive_prior: DriveParameters | None = None,
     mass_bounds: ArrayLike | None = None,
-    centre_bounds: Sequence[CenterOfMassBound] = (),
+    centre_bounds: Sequence[CenterOfMassBox] = (),
     total_mass: ArrayLike | None = None,
     gamma: float = 0.0,
     tolerance: float = TOLERANCE,
@@ -355,7 +349,7 @@ def fit_consistent(
         Number of residuals, for their root mean square.
     mass_bounds : array_like, shape (f, 2), optional
         Least and greatest mass of each link, kg; infinite for none, equal where it is known.
-    centre_bounds : sequence of CenterOfMassBox or CenterOfMassEllipsoid
+    centre_bounds : sequence of CenterOfMassBox
         Bounds of centres of mass.
     total_mass : float or array_like, shape (2,), optional
         Mass of all links together, known or between two values, kg.

@@ -25,20 +25,15 @@ from .result import BaseParameters
 
 MARGIN = 1e-3
 """Default smallest eigenvalue of a pseudo-inertia, relative to the prior's."""
-_SOLVER = {
-    "tol_gap_abs": 1e-9,
-    "tol_gap_rel": 1e-9,
-    "tol_feas": 1e-9,
-    "max_iter": 200,
-    "accept_unknown": True,
-}
+_SOLVER = {"max_iter": 200, "accept_unknown": True}
+_SOLVER |= dict.fromkeys(("tol_gap_abs", "tol_gap_rel", "tol_feas"), 1e-9)
 _UNIQUE = 1e-8
 """Weight of the squared distance, in the solver's units, which makes least squares unique."""
 _RATIO, _ROUNDS = 10.0, 4
 """Ratio of the solution to the assumed sizes above which the problem is rescaled."""
 _ROOM = 1e-3
 """Additional margin of the nearest robot, relative, so that its base parameters are feasible."""
-_KEPT, _SAME = 1e-9, 1e-13
+_KEPT, _SAME = 1e-9, 1e-11
 """Zero tolerances of base parameter deviations, relative: of a robot, of the prior."""
 _ROUNDING = 5e-9
 """Rounding tolerance of a constraint violation, natural units times distance."""
@@ -53,10 +48,7 @@ _SMALL = 1e-2
 class PhysicalStatus(Outcome):
     """Outcome of the search for a physical robot."""
 
-    EXACT = (
-        0,
-        "The robot has exactly these base parameters; its residuals are not increased.",
-    )
+    EXACT = 0, "The robot has exactly these base parameters; its residuals are not increased."
     CONSTRAINED = 1, "No physical robot has these base parameters; this one is the best of all."
     WEIGHTED = 2, "The best compromise of residuals and distance from the prior, by its weight."
     INACCURATE = 3, "The solver stopped early: the robot is physical, but a better one may exist."
@@ -169,9 +161,7 @@ class PhysicalProblem:
 
         With a weight of the squared distance, the least sum of both. Shapes: b (b,).
         """
-        size = max(
-            1.0, float(np.abs(b / np.where(self.natural > 0, self.natural, 1.0)).max(initial=0))
-        )
+        size = max(1.0, float(np.abs(b / self.natural).max(initial=0.0)))
         x = self._nearest_exact(squares, size) if weight == 0.0 else None
         if x is not None:
             return self._result(x, squares, PhysicalStatus.EXACT)
@@ -360,11 +350,8 @@ def nearest_body(F: Array, t: Array, radius: float = 0.1) -> Array | None:
     x = cp.Variable(10)
     size = mass * float(np.abs(scaled).max(initial=0.0)) or 1.0
     squares = cp.sum_squares(scaled @ x * (mass / size) - t / size) + 1e-12 * cp.sum_squares(x)
-    _solved(
-        cp.Problem(
-            cp.Minimize(squares), [cp.reshape(maps @ x, (4, 4), order="C") >> 1e-7 * np.eye(4)]
-        )
-    )
+    body = cp.reshape(maps @ x, (4, 4), order="C") >> 1e-7 * np.eye(4)
+    _solved(cp.Problem(cp.Minimize(squares), [body]))
     return None if x.value is None else mass * unit * x.value
 
 

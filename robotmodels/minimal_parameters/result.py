@@ -19,7 +19,7 @@ from ..friction import Friction
 from ..geometry import PRISMATIC, REVOLUTE
 from ..latex_text import markdown
 from ..model import RobotModel, check_model
-from ..regressors import energy_parameter_names, parameter_names, parameter_vector
+from ..regressors import parameter_names, parameter_vector
 from .alignment import aligned_robot
 from .formulas import Formula, constants_of, formulas, symbolic_texts
 from .rules import reach
@@ -53,8 +53,7 @@ class BaseParameters:
     model : RobotModel
         The robot.
     drive : bool or collection of DriveKind or str
-        Kinds of drive parameters among the p standard parameters; stored as a tuple of
-        `DriveKind`, empty where there are none.
+        Kinds of drive parameters among the p standard parameters; stored as a tuple of `DriveKind`.
     kept : ndarray of int, shape (b,)
         Numbers of the kept standard parameters.
     matrix : ndarray, shape (b, p)
@@ -64,23 +63,20 @@ class BaseParameters:
     gap : (float, float), optional
         Rank gap of the numeric method: smallest residual norm of a kept column and largest of a
         dropped one, relative to the longest column (parameters in natural units, those of a robot
-        of this size and unit mass); the tolerance is between. If the gap is small, `notes` names
-        the uncertain parameters.
+        of this size and unit mass). If it is small, `notes` names the uncertain parameters.
     friction : Friction, optional
         A linear friction model whose parameters come after those of the drives.
-    tolerance : float
-        Part of the largest torque that counts as zero.
+    tolerance, angle : float
+        Part of the largest torque that counts as zero; angle in rad up to which axes were taken as
+        parallel or perpendicular.
     notes : tuple of str
-        Findings: nearly aligned axes, constrained joints, an uncertain rank, a motion with little
-        excitation.
+        Nearly aligned axes, constrained joints, an uncertain rank, a motion with little excitation.
     neglected : tuple of str
         Parameters whose effect on the torques is below the tolerance, or only due to the angles of
         axes treated as aligned.
     torque_error : float, optional
         Largest torque error on an independent motion, relative to the largest torque; for logged
         motion on the same samples. None for symbolic rules alone.
-    angle : float
-        Angle in rad up to which axes were taken as parallel or perpendicular.
 
     Raises
     ------
@@ -188,23 +184,10 @@ class BaseParameters:
                 f"W: expected shape (..., {p}), a column for each standard parameter (with the "
                 "same friction as these base parameters, and the same drives: "
                 f"drive={tuple(kind.value for kind in drive_kinds(self.drive))}), got {W.shape}."
-                + self._energy_hint(W.shape[-1] if W.ndim else 0)
+                " An energy has no columns of Fv, Fc, offset: reduce it by base parameters without "
+                "them, base_parameters(model, drive=('Ia',))."
             )
         return np.ascontiguousarray(W[..., self.kept])
-
-    def _energy_hint(self, columns: int) -> str:
-        """Advice where a regressor has the columns of an energy."""
-        energy = energy_parameter_names(self.model, self.drive)
-        kinds = dict.fromkeys(
-            name.rstrip("0123456789") for name in self.parameter_names if name not in energy
-        )
-        sizes = len(energy), len(energy_parameter_names(self.model))
-        if columns not in sizes or not kinds:
-            return ""
-        return (
-            f" An energy has no columns of {', '.join(kinds)}: reduce it by base parameters without"
-            " them, base_parameters(model, drive=('Ia',))."
-        )
 
     def values(self, model: RobotModel) -> Array:
         """Base parameters (b,) of a model's standard parameters; raises for other structures."""
