@@ -21,7 +21,7 @@ from robotmodels.minimal_parameters.rules import reach
 from robotmodels.regressors import parameter_names, parameter_vector, torque_regressor
 
 GRAVITIES = ((0.0, 0.0, -9.81), (0.0, -9.81, 0.0), (-9.81, 0.0, 0.0), (0.0, 0.0, 0.0))
-CATALOGUE = rm.robots()
+CATALOGUE = [name for name in rm.robots() if rm.load(name).f < 30]  # frozen ones have all
 
 
 def any_robot(rng):
@@ -108,27 +108,23 @@ def filled(model, rng):
 @pytest.mark.parametrize("name", CATALOGUE)
 def test_rules_and_numbers_agree_on_the_catalogue(name, rng):
     model = filled(rm.load(name), rng)
-    # the great trees once; their links are the same with and without drives
-    for drive in (True, False) if model.f < 40 else (True,):
-        rules = base_parameters(model, drive=drive)
-        numbers = base_parameters(model, "numeric", drive=drive)
-        equal(rules, numbers)
-        kept, dependent = numbers.gap
-        assert dependent < (2e-11 if numbers.notes else 1e-13)
-        assert kept > (1e-4 if numbers.notes else 0.01)  # no parameter that no log would show
-        for base in (rules, numbers):
-            keeps_torque(base, model, rng, drive)
-            assert abs(base.matrix[base.matrix != 0]).min() > (1e-13 if base.notes else 1e-6)
-    if rules.notes and model.f < 40:
-        exact = base_parameters(model, drive=drive, tolerance=1e-11)
+    rules = base_parameters(model, drive=True)
+    numbers = base_parameters(model, "numeric", drive=True)
+    equal(rules, numbers)
+    kept, dependent = numbers.gap
+    assert dependent < (2e-11 if numbers.notes else 1e-13)
+    assert kept > (1e-4 if numbers.notes else 0.01)  # no parameter that no log would show
+    keeps_torque(rules, model, rng)
+    if rules.notes:
+        exact = base_parameters(model, tolerance=1e-11, drive=True)
         assert turned(exact) < 1e-9
-        keeps_torque(exact, model, rng, drive)
+        keeps_torque(exact, model, rng)
 
 
 @pytest.mark.parametrize("build", [any_robot, right_angled_robot])
 def test_rules_and_numbers_agree_on_random_robots(build):
     rng = np.random.default_rng(7)
-    for k in range(150):
+    for k in range(100):
         model = build(rng)
         rules = base_parameters(model)
         equal(rules, base_parameters(model, "numeric"))
@@ -156,12 +152,7 @@ def test_tiny_lengths_are_no_unit_of_the_rank(length):
             rules = base_parameters(model, friction=more, drive=True)
             numbers = base_parameters(model, "numeric", friction=more, drive=True)
             equal(rules, numbers)
-            if length < 1e-9 and more is None:
-                nothing = [{k: x for k, x in row.items() if k not in "dr"} for row in rows]
-                exact = base_parameters(rm.RobotModel.from_table(table_of(*nothing)), drive=True)
-                assert numbers.names == exact.names
         keeps_torque(base_parameters(model, "numeric", drive=True), model, rng, True)
-        keeps_torque(base_parameters(model, drive=True), model, rng, True)
 
 
 def slightly_off(rng):
@@ -181,7 +172,7 @@ def slightly_off(rng):
 
 def test_methods_agree_on_what_is_nearly_aligned():
     rng = np.random.default_rng(11)
-    for _ in range(60):
+    for _ in range(40):
         model = filled(slightly_off(rng), rng)
         rules, numbers = (
             base_parameters(model, drive=True),
@@ -211,7 +202,7 @@ def few_digits(model, rng, most):
 def test_axes_within_1e_5_rad_are_aligned_in_the_regrouping():
     rng = np.random.default_rng(12)
     apart = 0
-    for _ in range(40):
+    for _ in range(20):
         model = filled(right_angled_robot(rng), rng)
         rounded, far = few_digits(model, rng, 9e-6), few_digits(model, rng, 3e-4)
         for way in BaseMethod:
@@ -236,7 +227,7 @@ def test_axes_within_1e_5_rad_are_aligned_in_the_regrouping():
             exact = base_parameters(rounded, way, tolerance=1e-11, drive=True)
             assert turned(exact) < 1e-10
             apart += len(exact) > len(meant)
-    assert apart > 20
+    assert apart > 10
 
 
 def test_gravity_and_the_first_axis_are_aligned_in_any_base(rng):
@@ -273,14 +264,7 @@ def test_a_slope_of_prismatic_joints_is_aligned(rng):
         keeps_torque(base, rounded, rng)
 
 
-@pytest.mark.parametrize("gravity", [1e-12, 1e-10, 1e-3])
-def test_hardly_any_gravity(gravity):
-    for name in ("rx90", "gantry", "cobra_s600"):
-        model = rm.load(name).with_gravity([0.0, 0.0, -gravity])
-        assert base_parameters(model).names == base_parameters(model, "numeric").names
-
-
-def test_torques_that_are_not_kept_are_told():
+def test_torque_errors_are_noted():
     base = base_parameters(rm.load("rx90"), "numeric")
     assert base.torque_error < 1e-14
     assert not base.notes
@@ -408,17 +392,13 @@ def test_gravity_loaded_prismatic_joint_keeps_its_mass_and_rotor():
 
 def test_counts_of_the_literature():
     """Rotors alone for the RX-90, rotors and friction for the UR10, by words and by members."""
-    rx90 = rm.load("rx90")
-    for method in ("symbolic", "numeric"):
-        rotors = base_parameters(rx90, method, drive=("Ia",))
-        assert len(rotors) == 40
-        assert len(rotors.no_effect) == 11
-        assert rotors.text.startswith("rx90: 40 base parameters of 66 standard ones")
-        assert "Ia kg m^2" in rotors.text
+    for method in BaseMethod:
+        rotors = base_parameters(rm.load("rx90"), method, drive=("Ia",))
+        assert (len(rotors), len(rotors.no_effect)) == (40, 11)
+        assert rotors.drive == (DriveKind.IA,)
         assert "Fv" not in rotors.text
         ur10 = base_parameters(rm.load("erd:ur10"), method, drive=("Ia", "Fv", DriveKind.FC))
         assert len(ur10) == 52
-    assert rotors.drive == (DriveKind.IA,)
 
 
 @pytest.mark.parametrize(
@@ -426,7 +406,7 @@ def test_counts_of_the_literature():
 )
 def test_methods_agree_on_any_kinds(kinds, rng):
     robots = [rm.load(name) for name in ("gantry", "cobra_s600", "tx40", "stanford_arm")]
-    robots += [right_angled_robot(rng) for _ in range(8)]
+    robots += [right_angled_robot(rng) for _ in range(4)]
     for model in robots:
         model = filled(model, rng)
         rules = base_parameters(model, drive=kinds)
@@ -456,32 +436,26 @@ def test_motion_that_shows_less_keeps_less(rng):
     assert np.allclose(again, W, atol=1e-8 * abs(W).max())
 
 
-def small_log(rng, amplitude, samples=400):
-    """Motion about one posture of the RX-90."""
-    q, v, a = amplitude * rng.normal(size=(3, samples, 6))
-    return q + rng.normal(size=6), v, a
-
-
-def test_a_log_without_a_clear_gap_says_so():
-    """In small motions parameters fade: the line goes to a gap, or is said to be in none."""
+def test_a_log_without_a_clear_gap_is_noted():
+    """In small motions parameters fade: the tolerance moves to a gap, or a note names them."""
     model, rng = rm.load("rx90"), np.random.default_rng(0)
     moved = doubted = 0
     for amplitude in 10.0 ** np.linspace(-5.0, -3.0, 9):
-        base = base_parameters(model, "numeric", motion=small_log(rng, amplitude), drive=True)
+        q, v, a = amplitude * rng.normal(size=(3, 400, 6))
+        motion = q + rng.normal(size=6), v, a
+        base = base_parameters(model, "numeric", motion=motion, drive=True)
         kept, other = base.gap
-        assert kept > other  # what is reported is what decided
-        if kept < 100 * other:
+        assert kept > other
+        notes = [n for n in base.notes if n.startswith("No clear gap")]
+        assert bool(notes) == (kept < 100 * other)
+        if notes:
             doubted += 1
-            (note,) = (n for n in base.notes if n.startswith("No clear gap"))
-            assert f"kept with {kept:.1e}" in note
-            assert f"left out with {other:.1e}" in note
-            assert "tolerance= (here 1e-11)" in note
-            assert "richer motion" in note
-            doubtful = note.split("Uncertain: ")[1].split(". Use a richer")[0].split(" and ")[0]
-            assert {*doubtful.split(", ")} <= {*base.parameter_names}
-            assert note[:40] in base.text
+            assert f"kept with {kept:.1e}" in notes[0]
+            assert f"left out with {other:.1e}" in notes[0]
+            assert "Use a richer motion, or state the zero tolerance= (here 1e-11)" in notes[0]
+            names = notes[0].split("Uncertain: ")[1].split(". Use a richer")[0].split(" and ")[0]
+            assert {*names.split(", ")} <= {*base.parameter_names}
         else:
-            assert not any(n.startswith("No clear gap") for n in base.notes)
             moved += kept < 1e-11 or other > 1e-11
             assert kept > 3e-13
             assert other < 3e-10
@@ -540,30 +514,23 @@ def test_friction_models_are_columns_of_both_methods(name, rng):
     assert pickle.loads(pickle.dumps(rules)).names == rules.names
     with pytest.raises(InvalidValueError, match=r"Fv columns already.*drive=\('Ia', 'offset'\)"):
         base_parameters(model, friction=stribeck, drive=True)
-    with pytest.raises(InvalidValueError, match="expected a friction model"):
-        base_parameters(model, friction=3.0, drive=True)
 
 
-def test_notes_tell_the_tolerance_to_use():
+def test_notes_name_the_tolerance_to_use():
     model = rm.load("erd:bravo7_no_ee")
     exact = base_parameters(model, tolerance=1e-11, drive=True)
     assert "tolerance=1e-08 would align them" in exact.notes[0]
     meant = base_parameters(model, tolerance=1e-8, drive=True)
     assert len(meant) == 58 < len(exact)
     assert "Treated as aligned" in meant.text
-    # what a great tolerance leaves out has an effect, and is not said to have none
+    # what a great tolerance leaves out has an effect, and is not listed without one
     assert meant.neglected == ("MX1", "MY1", "MZ2")
     assert "Neglected, about 1e-08 of the largest torque or less: MX1, MY1, MZ2" in meant.text
     assert r"MX_{1}" in meant.latex.split("Neglected")[1]
     assert not {*meant.neglected} & {*meant.no_effect, *meant.alone, *meant.in_combination}
-    assert (
-        base_parameters(model, "numeric", tolerance=1e-8, drive=True).neglected == meant.neglected
-    )
-    assert base_parameters(model, drive=True).neglected == meant.neglected
-    assert base_parameters(model, drive=True).names == meant.names
-    assert not base_parameters(rm.load("rx90"), tolerance=1e-4, drive=True).neglected
-    for base in (exact, meant):
-        assert max(map(len, base.text.splitlines())) <= 100
+    for base in (base_parameters(model, "numeric", tolerance=1e-8, drive=True),
+                 base_parameters(model, drive=True)):  # fmt: skip
+        assert (base.names, base.neglected) == (meant.names, meant.neglected)
 
 
 def test_values_have_names_and_units(rng):
@@ -578,46 +545,42 @@ def test_values_have_names_and_units(rng):
     assert cells["ZZ1R"] == (f"{table['ZZ1']:.6g}", "kg m^2")
     assert [cells[k][1] for k in ("Fv1", "Fv3", "Fc1", "Fc3")] == ["N m s/rad", "N s/m", "N m", "N"]
     assert cells["M3R"][1] == "kg"
-    said = " ".join(str(base).split())
-    assert "; Ia kg m^2, Fv N m s/rad, Fc N m;" in said
-    assert "; of prismatic joints Ia kg, Fv N s/m, Fc N " in said + " "
-    again = base.value_table(base.values(model))
+    text = " ".join(str(base).split())
+    assert "; Ia kg m^2, Fv N m s/rad, Fc N m;" in text
+    assert "; of prismatic joints Ia kg, Fv N s/m, Fc N " in text + " "
+    again = pickle.loads(pickle.dumps(base.value_table(base.values(model))))
     assert dict(again) == dict(table)
-    assert not pickle.loads(pickle.dumps(again)).numbers.flags.writeable
+    assert not again.numbers.flags.writeable
     with pytest.raises(ShapeError, match="values"):
         base.value_table([1.0, 2.0])
     with pytest.raises(KeyError, match=r"No base parameter 'ZZZ1'.* mean ZZ1"):
         table["ZZZ1"]
 
 
-def test_constraints_are_told():
+def test_constraints_are_noted():
     model = rm.load("planar_3r")
     mimic = rm.Transmission([[1.0, 0, 0], [0, 1.0, 0], [0, -1.0, 0]])
     base = base_parameters(model, "numeric", constraint=mimic)
     assert "constrained: rank 2 of 3" in base.text
-    assert "wrong" not in base.text
     assert base.names == base_parameters(model, "numeric", constraint=mimic.matrix[:, :2]).names
     mistake = base_parameters(rm.load("rx90"), "numeric", constraint=np.ones((6, 6)))
     assert "rank 1 of 6, so that the torques are those of one free variable." in mistake.text
     assert "6 columns of the constraint depend on each other" in mistake.notes[0]
-    assert len(mistake) < 40
     assert not base_parameters(model, "numeric", constraint=np.eye(3)).notes
-    own = base_parameters(model.with_transmission(mimic))
-    assert "is singular, rank 2 of 3" in own.text
+    assert "is singular, rank 2 of 3" in base_parameters(model.with_transmission(mimic)).text
 
 
 # --- the result ----------------------------------------------------------------------------------
 
 
-def test_null_space_is_unseen(rng):
-    model = rm.load("stanford_arm")
-    base = base_parameters(model, drive=True)
-    W = torque_regressor(model, *rng.normal(size=(3, 50, 6)))
+def test_null_space_has_no_torque(rng):
+    base = base_parameters(rm.load("stanford_arm"), drive=True)
+    W = torque_regressor(base.model, *rng.normal(size=(3, 50, 6)))
     assert base.null_space.shape == (84, 84 - len(base))
     assert abs(W @ base.null_space).max() < 1e-11
     assert abs(base.matrix @ base.null_space).max() < 1e-14
     names = {*base.no_effect, *base.alone, *base.in_combination}
-    assert names == set(parameter_names(model))
+    assert names == set(parameter_names(base.model))
     assert "XY4" in base.alone
     assert {"YY5", "ZZ4"} <= set(base.in_combination)
 
@@ -625,7 +588,6 @@ def test_null_space_is_unseen(rng):
 def test_result_is_a_value():
     base = base_parameters(rm.load("cobra_s600"), drive=True)
     again = pickle.loads(pickle.dumps(base))
-    assert again.names == base.names
     assert again.text == base.text
     assert not again.matrix.flags.writeable
     with pytest.raises(TypeError):
@@ -656,23 +618,18 @@ def test_values_belong_to_the_robot(rng):
 
 
 def test_mistakes_are_named():
-    model = rm.load("planar_2r")
-    with pytest.raises(InvalidValueError, match=r"'symbolic', 'numeric', or a member.*'khalil'"):
-        base_parameters(model, "khalil")
-    with pytest.raises(InvalidValueError, match="constraint: the symbolic method"):
-        base_parameters(model, constraint=np.eye(2))
-    with pytest.raises(InvalidValueError, match="log is empty"):
-        base_parameters(model, "numeric", motion=(np.zeros((0, 2)),) * 3)
-    with pytest.raises(InvalidValueError, match="three arrays"):
-        base_parameters(model, "numeric", motion=np.zeros((5, 2)))
-    for tolerance in (0.0, 0.9, "a", [1e-9]):
-        with pytest.raises(InvalidValueError, match="tolerance"):
-            base_parameters(model, "numeric", tolerance=tolerance)
-    with pytest.raises(
-        InvalidValueError, match="drive: expected one of 'ia', 'fv', 'fc', 'offset'"
+    for error, words, given in (
+        (InvalidValueError, r"'symbolic', 'numeric', or a member.*'khalil'", {"method": "khalil"}),
+        (InvalidValueError, "symbolic method", {"method": "symbolic", "constraint": np.eye(2)}),
+        (InvalidValueError, "log is empty", {"motion": (np.zeros((0, 2)),) * 3}),
+        (InvalidValueError, "three arrays", {"motion": np.zeros((5, 2))}),
+        (InvalidValueError, "tolerance", {"tolerance": 0.0}),
+        (InvalidValueError, "tolerance", {"tolerance": 0.9}),
+        (InvalidValueError, "tolerance", {"tolerance": [1e-9]}),
+        (InvalidValueError, "drive: expected one of 'ia', 'fv'", {"drive": ("rotor",)}),
+        (ShapeError, r"constraint: expected shape \(2, u\)", {"constraint": np.eye(3)}),
+        (InvalidValueError, "no joint moves", {"constraint": np.zeros((2, 1))}),
+        (InvalidValueError, "expected a friction model", {"friction": 3.0}),
     ):
-        base_parameters(model, drive=("rotor",))
-    with pytest.raises(ShapeError, match=r"constraint: expected shape \(2, u\)"):
-        base_parameters(model, "numeric", constraint=np.eye(3))
-    with pytest.raises(InvalidValueError, match="no joint moves"):
-        base_parameters(model, "numeric", constraint=np.zeros((2, 1)))
+        with pytest.raises(error, match=words):
+            base_parameters(rm.load("planar_2r"), **{"method": "numeric", **given})

@@ -166,12 +166,7 @@ class PhysicalProblem:
         if x is not None:
             return self._result(x, squares, PhysicalStatus.EXACT)
         x, gap, found = self._least_squares(squares, size, weight)
-        if found is None:
-            found = self._solve(1.0)
-            infeasible = found.status.endswith("PrimalInfeasible")
-            status = PhysicalStatus.INFEASIBLE if infeasible else PhysicalStatus.FAILED
-            return self._result(self.prior, squares, status, np.inf, found)
-        if weight == 0.0:
+        if found is not None and weight == 0.0:
             radius = (squares.sum(x) * (1.0 + tolerance) - squares.least) ** 0.5 or 1.0
             ball = squares.fit / radius, squares.target / radius
             nearer = self._solve(self._numbers(x), within=ball).x
@@ -179,8 +174,11 @@ class PhysicalProblem:
             # an early end may leave the ball of equal fits
             if np.sum((ball[0] @ nearer - ball[1]) ** 2) <= 1.0 + 1e-6 and self.is_met(nearer):
                 x, gap = nearer, self._gap(nearer, squares, found, weight)
-        if not self.is_met(x):
-            return self._result(self.prior, squares, PhysicalStatus.FAILED, np.inf, found)
+        if found is None or not self.is_met(x):
+            found = self._solve(1.0)
+            infeasible = found.status.endswith("PrimalInfeasible")
+            status = PhysicalStatus.INFEASIBLE if infeasible else PhysicalStatus.FAILED
+            return self._result(self.prior, squares, status, np.inf, found)
         if gap > _GAP + tolerance:
             return self._result(x, squares, PhysicalStatus.INACCURATE, gap, found)
         status = PhysicalStatus.CONSTRAINED if weight == 0.0 else PhysicalStatus.WEIGHTED
