@@ -310,8 +310,11 @@ def standard_parameters(
     W = _relative(base, b) if weights is None else as_core(weights, (len(base),), "weights")
     if W.ndim != 2:
         raise ShapeError(f"weights: expected shape (k, {len(base)}), got {W.shape}.")
-    robot = fit_consistent(base, W, W @ b, prior=prior, drive_prior=drive_prior, margin=margin)
-    return replace(robot, requested=b)
+    near, P0, drives = _checked_prior(base, prior, drive_prior, margin)
+    size = float(np.abs(b).max(initial=0.0))
+    squares = Squares(W @ base.matrix, W @ b, base.matrix, b, size, 0.0)
+    fit = PhysicalProblem(base, near, P0, b, margin).fit(squares, b, 0.0, TOLERANCE)
+    return StandardParameters(base, b, near, drives, fit)
 
 
 def fit_consistent(
@@ -456,4 +459,6 @@ def _squares(
     target = U.T @ y
     level, same = target / values, (V / natural) @ base.matrix
     least = float(np.sum((y - U @ target) ** 2)) + rest
-    return Squares(U.T @ R @ base.matrix, target, same, level, least), (V.T @ level) * natural
+    size = float(np.abs(level).max(initial=0.0))
+    fitted = Squares(U.T @ R @ base.matrix, target, same, level, size, least)
+    return fitted, (V.T @ level) * natural

@@ -7,7 +7,7 @@ Sources: P. Wensing, S. Kim and J.-J. Slotine, IEEE RA-L 3(1), 2018; C. Sousa an
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -29,13 +29,18 @@ class Constraint:
     """Standard parameters x with ``rows @ x + offset`` in a cone. Shapes: rows (k, p), offset (k,).
 
     The cone: zero, non-negative numbers, or a positive semidefinite matrix, row by row. A sentence
-    for each number, or one for the matrix.
+    for each number, or one for the matrix, whose eigenvalues may be negative up to the room.
     """
 
     cone: Literal["zero", "nonnegative", "semidefinite"]
     rows: Array
     offset: Array
     sentences: tuple[str, ...]
+    room: float = 0.0
+
+    def about(self, x: Array, scale: Array) -> Constraint:
+        """The same on ``z``, for the parameters ``x + scale @ z``."""
+        return replace(self, rows=self.rows @ scale, offset=self.rows @ x + self.offset)
 
     def slack(self, x: Array) -> Array:
         """Distance to the boundary, one for each sentence; negative outside."""
@@ -45,25 +50,21 @@ class Constraint:
             return np.asarray(np.linalg.eigvalsh(s.reshape(k, k))[:1], dtype=np.float64)
         return s if self.cone == "nonnegative" else -np.abs(s)
 
-    def inside(self, x: Array, least: float = 0.0) -> Array:
-        """Parameters whose matrix has a multiple of 1 added, so that its slack is not negative."""
+    def inside(self, x: Array) -> Array:
+        """Parameters with a multiple of 1 added to the matrix where its slack is negative."""
         slack = float(self.slack(x)[0])
-        if slack >= least:
+        if slack >= -self.room:
             return x
         one = np.eye(round(len(self.offset) ** 0.5)).ravel()
         return x - slack * np.linalg.lstsq(self.rows, one, rcond=None)[0]
 
-    def stated(
-        self, cp: Any, change: Any, unit: Array, x: Array, size: float, room: float = 0.0
-    ) -> Any:
-        """The constraint on ``x + size * unit @ change``, divided by size. Shapes: unit (p, p).
-
-        The eigenvalues of a matrix are at least ``room`` and the solver's rounding.
-        """
-        s = (self.rows @ unit) @ change + (self.rows @ x + self.offset) / size
+    def stated(self, cp: Any, x: Any, size: float, part: float) -> Any:
+        """The constraint on ``size * x``, divided by size; eigenvalues above a part of the room."""
+        s = self.rows @ x + self.offset / size
         if self.cone == "semidefinite":
             k = round(len(self.offset) ** 0.5)
-            return cp.reshape(s, (k, k), order="C") >> (_INSIDE + room / size) * np.eye(k)
+            least = _INSIDE + part * self.room / size
+            return cp.reshape(s, (k, k), order="C") >> least * np.eye(k)
         return s >= 0 if self.cone == "nonnegative" else s == 0
 
 
