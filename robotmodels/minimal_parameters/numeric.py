@@ -122,7 +122,7 @@ class TorqueColumns:
     @cached_property
     def basis(self) -> ColumnBasis:
         """Independent columns; on samples the tolerance moves to the widest gap near it."""
-        basis = column_basis(self.factor, None, self.sizes, self.tolerance)
+        basis = column_basis(self.factor, scale=self.sizes, nothing=self.tolerance)
         if self.samples is None or _ratio(basis) >= _CLEAR:
             return basis
         left = np.maximum(np.append(np.sort(basis.distance)[::-1], 0.0), _ROUNDING)
@@ -133,7 +133,7 @@ class TorqueColumns:
             if above > lowest and below < highest and above >= _CLEAR * below
         ]
         for _, cut in sorted(cuts, reverse=True):
-            again = column_basis(self.factor, None, self.sizes, cut)
+            again = column_basis(self.factor, scale=self.sizes, nothing=cut)
             if _ratio(again) >= _CLEAR:
                 return again
         return basis
