@@ -60,6 +60,12 @@ def test_a_prior_that_is_the_robot_is_returned_as_it_is(rng):
             assert found.model.transmission == model.transmission
 
 
+def test_drives_of_the_prior_stay_where_they_are_not_parameters(rng):
+    model, drives = robot("planar_2r", rng), random_drive(rng, 2)
+    base = base_parameters(model, drive=False)
+    assert standard_parameters(base, base.values(model), drive_prior=drives).drive == drives
+
+
 @pytest.mark.parametrize("scale", [1e-2, 1e9])
 def test_a_prior_of_another_order_of_magnitude(scale, rng):
     """Physical bodies of far greater mass than the prior are found."""

@@ -128,7 +128,7 @@ def base_parameters(
         )
     columns = TorqueColumns(aligned, kinds, friction, least, samples, G)
     neglected, error, gap = (), None, None
-    kept, matrix, numeric = _combinations(columns, way is BaseMethod.SYMBOLIC)
+    kept, matrix, numeric = _regrouping(columns, way is BaseMethod.SYMBOLIC)
     if numeric:
         neglected, error = columns.neglected(matrix), columns.torque_error(kept, matrix)
         notes += (*columns.notes, *residual_warning(error, least))
@@ -146,7 +146,7 @@ def base_parameters(
     )
 
 
-def _combinations(columns: TorqueColumns, symbolic: bool) -> tuple[NDArray[np.int64], Array, bool]:
+def _regrouping(columns: TorqueColumns, symbolic: bool) -> tuple[NDArray[np.int64], Array, bool]:
     """Kept parameters (b,), combinations (b, p), and whether the numeric method decided.
 
     It decides what depends on a zero tolerance; couplings and friction have no rule.
