@@ -7,13 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 from identities.random_robots import random_bodies, random_drive, random_model, random_state
-from scipy.optimize import least_squares
 from urdf_parity import urdf_parity
 
 import robotmodels as rm
 from robotmodels.errors import InertiaError, InvalidValueError, MissingExtraError, ShapeError
 from robotmodels.friction import AsymmetricFriction, StribeckFriction, TorqueOffset, ViscousFriction
-from robotmodels.identification import Log, consistent_robot, fit
 from robotmodels.minimal_parameters import (
     CenterOfMassBox,
     PhysicalStatus,
@@ -22,7 +20,6 @@ from robotmodels.minimal_parameters import (
     physical,
     uniform_bodies,
 )
-from robotmodels.minimal_parameters.bodies import pseudo_inertias
 from robotmodels.regressors import parameter_vector
 
 EXACT, CONSTRAINED = PhysicalStatus.EXACT, PhysicalStatus.CONSTRAINED
@@ -93,57 +90,6 @@ def test_a_physical_robot_is_found_without_residuals(kind, rng):
     assert abs(rm.idm(found.of(model), q, v, a) - torque).max() <= 1e-8 * abs(torque).max()
 
 
-def cholesky_fit(base, W, tau, P0, margin, start):
-    """The same problem by factors: P = margin P0 + L L^T, drives squared; no cones, no solver."""
-    f, p = base.model.f, len(base.parameter_names)
-    root = np.linalg.cholesky(P0)
-    low = np.tril_indices(4)
-    offset = np.array([name.startswith("offset") for name in base.parameter_names[10 * f :]])
-
-    def standard(u):
-        x = np.zeros(p)
-        for j in range(f):
-            L = np.zeros((4, 4))
-            L[low] = u[10 * j : 10 * j + 10]
-            P = root[j] @ (margin * np.eye(4) + L @ L.T) @ root[j].T
-            J = np.trace(P[:3, :3]) * np.eye(3) - P[:3, :3]
-            x[10 * j : 10 * j + 10] = [*J[np.triu_indices(3)], *P[:3, 3], P[3, 3]]
-        x[10 * f :] = np.where(offset, u[10 * f :], u[10 * f :] ** 2)
-        return x
-
-    found = least_squares(
-        lambda u: W @ (base.matrix @ standard(u)) - tau, start, xtol=1e-14, ftol=1e-14, gtol=1e-14,
-        max_nfev=200,
-    )  # fmt: skip
-    return 2.0 * found.cost
-
-
-def test_the_optimum_of_an_independent_method(rng):
-    """Data of no physical robot: the optimum of unconstrained least squares of Cholesky factors."""
-    model = arm(rng)
-    base = base_parameters(model, drive=True)
-    values = base.values(model)
-    values[base.names.index("ZZ2")] *= -0.3
-    values[base.names.index("Fc1")] = -0.4
-    motion = random_state(model, rng, 30)
-    *_, W, _ = weighted(base, motion)
-    tau = W @ values + 0.1 * rng.normal(size=len(W))
-    R, y, rest, *_ = weighted(base, motion, tau.reshape(30, -1))
-    prior = uniform_bodies(model, 6.0)
-    found = fit_consistent(base, R, y, rest=rest, prior=prior)
-    assert found.status is CONSTRAINED
-    assert found.residual_increase > 1.0
-    assert found.fit.squares == pytest.approx(np.sum((W @ found.base_values - tau) ** 2), rel=1e-9)
-    assert found.fit.gap < 2e-4
-    starts = [0.7 * rng.normal(size=len(base.parameter_names)) for _ in range(2)]
-    P0 = pseudo_inertias(prior)
-    best = rest + min(cholesky_fit(base, R, y, P0, 1e-3, u) for u in starts)
-    assert best >= found.fit.squares * (1.0 - found.fit.gap) * (1.0 - 1e-9)  # the bound holds
-    assert found.fit.squares <= best * (1.0 + 2e-4)
-    assert "Fc1 is zero." in found.fit.active
-    assert any("pseudo-inertia of link 2" in sentence for sentence in found.fit.active)
-
-
 def test_residuals_do_not_decrease_towards_physical_robots(rng):
     """Feasible directions, near and far; also for the regressor itself and in other units."""
     model = arm(rng, "rx90")
@@ -177,16 +123,15 @@ def test_small_and_large_robots_are_the_same_problem(rng):
     model = rm.load("rx90")
     true = model.with_inertia(uniform_bodies(model, 60.0))
     true = true.with_drive(rm.DriveParameters(Ia=[0] * 6, Fv=[10] * 6, Fc=[5] * 6, offset=[0] * 6))
-    base, R, y, rest, *_ = noisy(true, rng, 0.3, samples=15)
+    _, R, y, rest, *_ = noisy(true, rng, 0.3, samples=15)
     base = base_parameters(model, drive=True)
-    fits = {
-        s: fit_consistent(base, R, s * y, rest=s**2 * rest, prior=uniform_bodies(model, 60.0 * s))
-        for s in (1e-6, 1e-3, 1.0, 1e3, 1e6)
-    }
-    expected = fits[1.0]
+    expected, *fits = (
+        fit_consistent(base, R, s * y, rest=s**2 * rest, prior=uniform_bodies(model, 60.0 * s))
+        for s in (1.0, 1e-6, 1e6)
+    )
     assert expected.status is CONSTRAINED
     assert expected.residual_increase > 0.1
-    for s, found in fits.items():
+    for s, found in zip((1e-6, 1e6), fits, strict=True):
         assert found.status is CONSTRAINED
         assert found.fit.gap < 2e-4
         assert found.fit.squares == pytest.approx(s**2 * expected.fit.squares, rel=1e-6)
@@ -239,14 +184,14 @@ def test_bounds_on_masses_are_kept_and_named(rng):
     loose = fit_consistent(base, R, y, rest=rest, prior=prior)
     bounds = np.tile([-np.inf, np.inf], (6, 1))
     bounds[1] = 0.5, 0.5
-    bounds[2] = loose.inertia.mass[2] * 1.2, np.inf
+    bounds[2, 0] = loose.inertia.mass[2] * 1.2
     bounds[3] = 0.0, 0.3
     found = fit_consistent(base, R, y, rest=rest, prior=prior, mass_bounds=bounds, total_mass=9.0)
     assert found.status in (EXACT, CONSTRAINED)
-    assert found.inertia.mass[1] == pytest.approx(0.5, rel=1e-7)
-    assert found.inertia.mass[2] >= bounds[2, 0] * (1 - 1e-7)
-    assert found.inertia.mass[3] <= 0.3 * (1 + 1e-7)
-    assert found.inertia.mass.sum() == pytest.approx(9.0, rel=1e-7)
+    mass = found.inertia.mass
+    assert (mass[1], mass.sum()) == pytest.approx((0.5, 9.0), rel=1e-7)
+    assert mass[2] >= bounds[2, 0] * (1 - 1e-7)
+    assert mass[3] <= 0.3 * (1 + 1e-7)
     assert found.inertia.is_physical.all()
     assert "The mass of link 4 is at its upper bound, 0.3 kg." in found.fit.active
     assert found.fit.squares >= loose.fit.squares * (1 - 1e-5)
@@ -407,15 +352,13 @@ def test_without_the_solver(monkeypatch, rng):
 def heavy_arm(rng):
     """An arm of a tonne with heavy drives, and the same without parameters (6 joints)."""
     s = rng.uniform(0.7, 1.3, 6)
-    rows = [
-        {"alpha": 0.0, "d": 0.0, "theta": 0.0, "r": 0.7 * s[0]},
-        {"alpha": -QUARTER, "d": 0.35 * s[1], "theta": -QUARTER, "r": 0.0},
-        {"alpha": 0.0, "d": 1.15 * s[2], "theta": 0.0, "r": 0.0},
-        {"alpha": -QUARTER, "d": -0.05 * s[3], "theta": 0.0, "r": 1.2 * s[4]},
-        {"alpha": QUARTER, "d": 0.0, "theta": 0.0, "r": 0.0},
-        {"alpha": -QUARTER, "d": 0.0, "theta": 0.0, "r": 0.2 * s[5]},
-    ]
-    bare = rm.RobotModel.from_table(rm.DHTable.from_rows([{"sigma": 0, **row} for row in rows]))
+    table = rm.DHTable(
+        antecedent=range(6), sigma=[0] * 6, theta=[0, -QUARTER, 0, 0, 0, 0],
+        alpha=[0.0, -QUARTER, 0.0, -QUARTER, QUARTER, -QUARTER],
+        d=[0.0, 0.35 * s[1], 1.15 * s[2], -0.05 * s[3], 0.0, 0.0],
+        r=[0.7 * s[0], 0.0, 0.0, 1.2 * s[4], 0.0, 0.2 * s[5]],
+    )  # fmt: skip
+    bare = rm.RobotModel.from_table(table)
     mass = np.array([400.0, 300.0, 250.0, 60.0, 30.0, 80.0]) * rng.uniform(0.6, 1.6, 6)
     size = np.array([0.4, 0.6, 0.4, 0.3, 0.15, 0.15])
     second = []
@@ -471,7 +414,6 @@ def test_noisy_logs_of_heavy_arms_converge(seed):
     assert found.fit.stopped == ""
     assert found.fit.gap <= PROVED
     assert found.inertia.is_physical.all()
-    # the true robot is one of those that the proof is about, so consistency costs no more than it
     truth = base_parameters(arm, drive=drive).values(arm)
     squares = rest + np.sum((R @ truth - y) ** 2)
     assert found.fit.squares <= squares * (1.0 + found.fit.gap)
@@ -506,40 +448,16 @@ def test_robots_of_any_structure_converge_on_slow_motion(seed):
     assert found.fit.squares <= truth * (1.0 + PROVED)
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_default_fit_then_consistent_robot(seed):
-    """A log of 10 s at 250 Hz, ripple at 110 Hz: converged, and the bounds are named by joint."""
-    rng = np.random.default_rng(seed)
-    arm, bare = heavy_arm(rng)
-    t = np.arange(0.0, 10.0, 0.004)
-    motion = slow_motion(rng, t)
-    tau, sigma = measured(rng, arm, motion, 0.1, 0.1)
-    tau += 0.5 * sigma * np.sin(2.0 * np.pi * 110.0 * t)[:, None]
-    result = fit(bare, Log(0.004, motion[0], tau), drive=("Ia", "Fv", "Fc"), checked=False)
-    robot = consistent_robot(result, uniform_bodies(bare, 100.0))
-    assert robot.status in (EXACT, CONSTRAINED), robot.reason()
-    assert robot.fit.gap <= PROVED
-    true = rm.idm(arm, *motion)
-    error = rm.idm(robot.of(bare), *motion) - true
-    assert np.sqrt(np.mean(error**2)) < 0.15 * np.sqrt(np.mean(true**2))
-    assert all(sentence in robot.reason() for sentence in robot.fit.active)
-    assert "link" in robot.reason()
-
-
-def stopped_after(iterations, monkeypatch):
-    monkeypatch.setitem(physical._SOLVER, "max_iter", iterations)
+def test_a_solver_that_stops_early_is_reported(monkeypatch):
     rng = np.random.default_rng(0)
     arm, bare = heavy_arm(rng)
     motion = slow_motion(rng, np.linspace(0.0, 10.0, 60))
     tau, sigma = measured(rng, arm, motion, 0.2, 0.1)
     base = base_parameters(bare, drive=("Ia", "Fv", "Fc"))
     R, y, rest, *_ = weighted(base, motion, tau, sigma)
-    return fit_consistent(base, R, y, rest=rest, prior=uniform_bodies(bare, 100.0))
-
-
-def test_a_solver_that_stops_early_says_where(monkeypatch):
-    best = stopped_after(500, monkeypatch)
-    early = stopped_after(5, monkeypatch)
+    best = fit_consistent(base, R, y, rest=rest, prior=uniform_bodies(bare, 100.0))
+    monkeypatch.setitem(physical._SOLVER, "max_iter", 5)
+    early = fit_consistent(base, R, y, rest=rest, prior=uniform_bodies(bare, 100.0))
     assert best.status is CONSTRAINED
     assert early.status is PhysicalStatus.INACCURATE
     assert early.fit.gap > best.fit.gap

@@ -108,6 +108,7 @@ def test_uniform_bodies():
     one = rm.RobotModel.from_table(rm.DHTable(antecedent=[0], sigma=[0]))
     ball = uniform_bodies(one, 2.0, radius=0.1)
     assert ball.values[0, [0, 3, 5, 9]] == pytest.approx([0.008, 0.008, 0.008, 2.0])
+    assert pseudo_inertias(ball)[0] == pytest.approx(np.diag([0.004, 0.004, 0.004, 2.0]))
     # a bar of length 2 along x with a ball at its joint; the last link is a ball
     two = rm.RobotModel.from_table(rm.DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0.0, 2.0]))
     r, length = 0.3, 2.0
