@@ -63,8 +63,6 @@ _RANK = 1e-10
 """Rank tolerance: relative singular value of columns in natural units."""
 _ZERO = 1e-9
 """Print tolerance of a change, relative to the largest parameter of its kind."""
-_PRINTED_KINDS = {**dict.fromkeys(("XX", "XY", "XZ", "YY", "YZ", "ZZ", "Ia"), "J")}
-_PRINTED_KINDS |= dict.fromkeys(("MX", "MY", "MZ"), "MS")
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -244,18 +242,16 @@ class StandardParameters(Rebuilt):
 
     def _columns(self) -> list[tuple[str, list[str]]]:
         """Columns of the table: parameter, prior, value and difference."""
-        letters = [name.rstrip("0123456789") for name in self.names]
-        kinds = np.array([_PRINTED_KINDS.get(kind, kind) for kind in letters])
         sizes = np.maximum(np.abs(self.prior), np.abs(self.values))
+        small = (_ZERO * _largest_of_kind(self.names, sizes)).tolist()
         columns = [("parameter", list(self.names))]
         for title, numbers, form in (
             ("prior", self.prior, ".6g"),
             ("value", self.values, ".6g"),
             ("difference", self.values - self.prior, "+.3g"),
         ):
-            pairs = zip(numbers.tolist(), kinds.tolist(), strict=True)
-            small = {kind: _ZERO * sizes[kinds == kind].max() for kind in set(kinds.tolist())}
-            texts = ["0" if abs(x) <= small[kind] else f"{x:{form}}" for x, kind in pairs]
+            pairs = zip(numbers.tolist(), small, strict=True)
+            texts = ["0" if abs(x) <= least else f"{x:{form}}" for x, least in pairs]
             columns.append((title, texts))
         return columns
 
@@ -307,12 +303,14 @@ def standard_parameters(
     ('EXACT', 0.0)
     """
     b = as_exact(values, (len(base),), "values")
-    W = _relative(base, b) if weights is None else as_core(weights, (len(base),), "weights")
+    if weights is None:  # relative to the values, at least a thousandth of the largest of a kind
+        sizes = np.maximum(np.abs(b), 1e-3 * _largest_of_kind(base.names, np.abs(b)))
+        weights = np.diag(1.0 / np.where(sizes > 0.0, sizes, 1.0))
+    W = as_core(weights, (len(base),), "weights")
     if W.ndim != 2:
         raise ShapeError(f"weights: expected shape (k, {len(base)}), got {W.shape}.")
     near, P0, drives = _checked_prior(base, prior, drive_prior, margin)
-    size = float(np.abs(b).max(initial=0.0))
-    squares = Squares(W @ base.matrix, W @ b, base.matrix, b, size, 0.0)
+    squares = Squares(W, base.matrix, b, float(np.abs(b).max(initial=0.0)))
     fit = PhysicalProblem(base, near, P0, b, margin).fit(squares, b, 0.0, TOLERANCE)
     return StandardParameters(base, b, near, drives, fit)
 
@@ -380,17 +378,14 @@ def fit_consistent(
     >>> robot.status.name, bool(robot.inertia.is_physical.all())
     ('CONSTRAINED', True)
     """
-    if not (np.isfinite(gamma) and gamma >= 0.0):
-        raise InvalidValueError(f"gamma: expected a weight, zero or more, got {gamma}.")
-    if not 0.0 < tolerance < 1.0:
-        raise InvalidValueError(f"tolerance: expected a part between 0 and 1, got {tolerance}.")
-    if rows is not None and rows < 1:
-        raise InvalidValueError(f"rows: expected the number of residuals, got {rows}.")
-    if not (np.isfinite(rest) and rest >= 0.0):
-        raise InvalidValueError(
-            f"rest: expected a sum of squares, zero or more, got {rest}; "
-            "give 0 for rounding below zero."
-        )
+    for name, value, good, expected in (
+        ("gamma", gamma, 0.0 <= gamma < inf, "a weight, zero or more"),
+        ("tolerance", tolerance, 0.0 < tolerance < 1.0, "a part between 0 and 1"),
+        ("rows", rows, rows is None or rows >= 1, "the number of residuals"),
+        ("rest", rest, 0.0 <= rest < inf, "a sum of squares, zero or more (0 for rounding)"),
+    ):
+        if not good:
+            raise InvalidValueError(f"{name}: expected {expected}, got {value}.")
     near, P0, drives = _checked_prior(base, prior, drive_prior, margin)
     factor = as_core(R, (len(base),), "R")
     if factor.ndim != 2:
@@ -436,14 +431,10 @@ def _checked_prior(
     return parameter_vector(robot, base.drive, base.friction), P0, drives
 
 
-def _relative(base: BaseParameters, b: Array) -> Array:
-    """Weights relative to the values, each at least a thousandth of the largest of its kind."""
-    kinds = np.array([name.rstrip("0123456789")[:1] for name in base.names])
-    sizes = np.abs(b)
-    for kind in set(kinds.tolist()):
-        same = kinds == kind
-        sizes[same] = np.maximum(sizes[same], 1e-3 * sizes[same].max())
-    return np.diag(1.0 / np.where(sizes > 0, sizes, 1.0))
+def _largest_of_kind(names: Sequence[str], sizes: Array) -> Array:
+    """Largest size of the parameters that begin with the same letter. Shapes: (p,) -> (p,)."""
+    kinds = np.array([name[:1] for name in names])
+    return np.array([sizes[kinds == kind].max() for kind in kinds.tolist()])
 
 
 def _squares(
@@ -459,6 +450,5 @@ def _squares(
     target = U.T @ y
     level, same = target / values, (V / natural) @ base.matrix
     least = float(np.sum((y - U @ target) ** 2)) + rest
-    size = float(np.abs(level).max(initial=0.0))
-    fitted = Squares(U.T @ R @ base.matrix, target, same, level, size, least)
-    return fitted, (V.T @ level) * natural
+    squares = Squares(np.diag(values), same, level, float(np.abs(level).max(initial=0.0)), least)
+    return squares, (V.T @ level) * natural

@@ -9,7 +9,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -58,26 +58,28 @@ class PhysicalStatus(Outcome):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Squares:
-    """Sum of squares ``|fit @ x - target|^2 + least``, and ``same @ x = level`` where it is least.
+    """Sum of squares ``|weights @ (same @ x - level)|^2 + least``; levels are of this size.
 
-    Shapes: fit, same (k, p), target, level (k,). Levels are of this size.
+    Shapes: weights (r, k), same (k, p), level (k,).
     """
 
-    fit: Array
-    target: Array
+    weights: Array
     same: Array
     level: Array
     size: float
-    least: float
+    least: float = 0.0
 
     def about(self, x: Array, scale: Array) -> Squares:
         """The same of ``z``, for the parameters ``x + scale @ z``."""
-        target, level = self.target - self.fit @ x, self.level - self.same @ x
-        return Squares(self.fit @ scale, target, self.same @ scale, level, self.size, self.least)
+        return replace(self, same=self.same @ scale, level=self.level - self.same @ x)
+
+    def rows(self, size: float) -> tuple[Array, Array]:
+        """Weighted rows (r, p) and right side (r,), both divided by a size."""
+        return self.weights @ self.same / size, self.weights @ self.level / size
 
     def sum(self, x: Array) -> float:
         """The sum of squares of standard parameters."""
-        return float(np.sum((self.fit @ x - self.target) ** 2)) + self.least
+        return float(np.sum((self.weights @ (self.same @ x - self.level)) ** 2)) + self.least
 
     def is_least(self, x: Array, part: float) -> bool:
         """Whether standard parameters have the least sum, up to a relative tolerance."""
@@ -173,7 +175,7 @@ class PhysicalProblem:
         z, gap, found = self._least_squares(squares, size, weight)
         if found is not None and weight == 0.0:
             radius = (squares.sum(z) * (1.0 + tolerance) - squares.least) ** 0.5 or 1.0
-            ball = squares.fit / radius, squares.target / radius
+            ball = squares.rows(radius)
             nearer = self._solve(_rms(z), within=ball).z
             nearer = z if nearer is None else self._settled(nearer)
             # an early end may leave the ball of equal fits
@@ -203,8 +205,9 @@ class PhysicalProblem:
         The problem is rescaled until the assumed sizes of squares and changes were right.
         """
         best, least, found = np.zeros_like(self.prior), np.inf, None
-        smallest = max(squares.least, 1e-8 * float(squares.target @ squares.target), 1e-300)
-        total = max(smallest, squares.sum(best))
+        total = squares.sum(best)
+        smallest = max(squares.least, 1e-8 * total, 1e-300)
+        total = max(smallest, total)
         for _ in range(_ROUNDS):
             again = self._solve(size, squares, total, weight or _UNIQUE * total / size**2)
             if again.z is None:
@@ -244,9 +247,8 @@ class PhysicalProblem:
         stated = [one.stated(cp, u, size, room) for one in self.constraints]
         objective = cp.sum_squares(u) * (weight / total * size**2 if squares else 1.0)
         if squares is not None:
-            root = total**0.5
-            rows = size / root * squares.fit
-            objective += cp.sum_squares(rows @ u - squares.target / root)
+            rows, right = squares.rows(total**0.5)
+            objective += cp.sum_squares((size * rows) @ u - right)
         if equal is not None:
             E, e = equal
             lengths = np.maximum(size * np.linalg.norm(E, axis=1), 1e-300)
