@@ -75,8 +75,9 @@ def formulas(
         order = number not in members, key[0] != "", _frame(names[members[0]]), members[0]
         return *order, Term(value, *key, tuple(names[k] for k in members))
 
-    found = []
-    for number, row in zip(kept.tolist(), matrix, strict=True):
+    found: list[Formula] = []
+    numbers: list[int] = kept.tolist()
+    for number, row in zip(numbers, matrix, strict=True):
         groups: dict[tuple[str, str], tuple[float, list[int]]] = {}
         for k in np.flatnonzero(row).tolist():
             value, key = float(row[k]), texts.get((number, k))
@@ -85,7 +86,7 @@ def formulas(
                 key = text, text
             groups.setdefault(key, (value, []))[1].append(k)
         terms = sorted(term(number, key, *group) for key, group in groups.items())
-        found.append(Formula(names[number], tuple(one for *_, one in terms)))
+        found.append(Formula(names[number], tuple(one[-1] for one in terms)))
     return tuple(found)
 
 

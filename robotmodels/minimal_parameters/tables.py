@@ -63,9 +63,9 @@ class BaseTable(NamedTuple):
             lines.append(_filled(f"  with {values}", 7))
         parts = [(label, ", ".join(names)) for label, names in self.lists if names]
         parts.append(("Units", self.units))
-        if self.rank:
-            parts.append(tuple(self.rank.split(": ", 1)))
         lines += [_filled(f"{label}: {words}", min(len(label) + 2, 10)) for label, words in parts]
+        if self.rank:
+            lines.append(_filled(self.rank, self.rank.index(":") + 2))
         return "\n".join(lines)
 
     @property
