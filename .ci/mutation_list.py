@@ -415,7 +415,7 @@ MUTATIONS = [
         "tests/test_standard_parameters.py -k base_parameters_of_no_robot"),
     Mutation("minimal parameters: standard parameters",
         "drives that were not identified are those of the model, not of the prior",
-        "class StandardParameters(", ".with_drive(self.drive_prior)", ".with_drive(self.base.model.drive)",
+        "class StandardParameters(", ".with_drive(self.drive_prior)", "",
         "tests/test_standard_parameters.py -k drives_of_the_prior"),
     Mutation("minimal parameters: standard parameters",
         "a difference is that of the prior to the value",
