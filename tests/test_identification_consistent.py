@@ -10,7 +10,7 @@ from identities.random_robots import random_bodies, random_drive, random_model, 
 from urdf_parity import urdf_parity
 
 import robotmodels as rm
-from robotmodels.errors import InertiaError, InvalidValueError, MissingExtraError, ShapeError
+from robotmodels.errors import InvalidValueError, MissingExtraError, ShapeError
 from robotmodels.friction import AsymmetricFriction, StribeckFriction, TorqueOffset, ViscousFriction
 from robotmodels.minimal_parameters import (
     CenterOfMassBox,
@@ -316,13 +316,10 @@ def test_mistakes_are_named(rng):
         (InvalidValueError, "margin", {"margin": 1.0}),
         (InvalidValueError, "tolerance", {"tolerance": 0.0}),
         (InvalidValueError, "prior: expected 2 links", {"prior": rm.InertialParameters.zeros(3)}),
-        (InertiaError, "prior: link 1", {"prior": rm.InertialParameters.zeros(2)}),
         (InvalidValueError, "drive_prior", {"drive_prior": rm.DriveParameters.zeros(3)}),
         (ShapeError, r"mass_bounds: expected shape \(2, 2\)", {"mass_bounds": [1.0, 2.0]}),
         (InvalidValueError, "mass of link 2", {"mass_bounds": [[0, 1], [2, 1]]}),
         (InvalidValueError, "mass of link 1", {"mass_bounds": [[-5, -1], [2, 3]]}),
-        (InvalidValueError, "mass of link 1", {"mass_bounds": [[np.nan, 1], [2, 3]]}),
-        (InvalidValueError, "total mass of all", {"total_mass": -1.0}),
         (ShapeError, "total_mass", {"total_mass": [1.0, 2.0, 3.0]}),
         (InvalidValueError, "no link 3", {"centre_bounds": [CenterOfMassBox(3, [0] * 3, [1] * 3)]}),
         (InvalidValueError, "expected CenterOfMassBox", {"centre_bounds": [3]}),

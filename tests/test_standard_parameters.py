@@ -24,25 +24,23 @@ def robot(name, rng):
 def test_nothing_is_nearer_to_the_prior(rng):
     """Small steps in the null space do not come nearer among physical bodies."""
     model = robot("planar_2r", rng)
-    base = base_parameters(model, drive=True)
+    base = base_parameters(model, drive=False)
     prior = uniform_bodies(model, 10.0)
     found = standard_parameters(base, base.values(model), prior=prior)
     P0 = pseudo_inertias(prior)
     whiten = np.linalg.inv(np.linalg.cholesky(P0))
 
-    def change(inertia):
-        P = whiten @ (pseudo_inertias(inertia) - P0) @ np.swapaxes(whiten, 1, 2)
+    def change(values):
+        bodies = rm.InertialParameters(values.reshape(2, 10))
+        P = whiten @ (pseudo_inertias(bodies) - P0) @ np.swapaxes(whiten, 1, 2)
         return np.sqrt((P**2).sum()), np.linalg.eigvalsh(P + np.eye(4)).min()
 
-    distance, least = change(found.inertia)
+    distance, least = change(found.values)
+    assert distance == pytest.approx(found.distance, rel=1e-9)
     assert least > 0.99e-3
-    pi = np.concatenate([found.inertia.values.ravel(), np.zeros(8)])
     for _ in range(200):
         step = base.null_space @ (1e-4 * rng.normal(size=base.null_space.shape[1]))
-        moved = rm.InertialParameters((pi + step)[:20].reshape(2, 10))
-        if abs(step[20:]).max() > 0:  # the drives' share of the distance is not compared here
-            step[20:] = 0
-        nearer, least = change(moved)
+        nearer, least = change(found.values + step)
         assert nearer >= distance - 1e-4 or least < 1e-3
 
 
@@ -64,21 +62,6 @@ def test_drives_of_the_prior_stay_where_they_are_not_parameters(rng):
     model, drives = robot("planar_2r", rng), random_drive(rng, 2)
     base = base_parameters(model, drive=False)
     assert standard_parameters(base, base.values(model), drive_prior=drives).drive == drives
-
-
-@pytest.mark.parametrize("scale", [1e-2, 1e9])
-def test_a_prior_of_another_order_of_magnitude(scale, rng):
-    """Physical bodies of far greater mass than the prior are found."""
-    model = robot("rx90", rng).with_inertia(uniform_bodies(rm.load("rx90"), 30.0))
-    base = base_parameters(model)
-    drives = (scale * getattr(model.drive, k) for k in ("Ia", "Fv", "Fc", "offset"))
-    heavy = model.with_inertia(rm.InertialParameters(scale * model.inertia.values))
-    heavy = heavy.with_drive(rm.DriveParameters(*drives))
-    values = base.values(heavy)
-    found = standard_parameters(base, values)
-    assert found.status is PhysicalStatus.EXACT
-    assert abs(found.deviation).max() <= 1e-12 * abs(values).max()
-    assert found.inertia.is_physical.all()
 
 
 def test_base_parameters_of_no_robot(rng):
