@@ -29,8 +29,8 @@ _SOLVER = {"max_iter": 200, "accept_unknown": True}
 _SOLVER |= dict.fromkeys(("tol_gap_abs", "tol_gap_rel", "tol_feas"), 1e-9)
 _UNIQUE = 1e-8
 """Weight of the squared distance, in the solver's units, which makes least squares unique."""
-_RATIO, _ROUNDS = 10.0, 4
-"""Ratio of the solution to the assumed sizes above which the problem is rescaled."""
+_ROUNDS = 4
+"""Solutions of least squares, each with the sizes of the one before, until the gap is small."""
 _ROOM = 2e-3
 """Additional margin of the nearest robot: its base parameters are feasible. Part of the room."""
 _KEPT, _SAME = 1e-9, 1e-13
@@ -204,24 +204,18 @@ class PhysicalProblem:
 
         The problem is rescaled until the assumed sizes of squares and changes were right.
         """
-        best, least, found = np.zeros_like(self.prior), np.inf, None
-        total = squares.sum(best)
-        smallest = max(squares.least, 1e-8 * total, 1e-300)
-        total = max(smallest, total)
+        z, gap, found = np.zeros_like(self.prior), np.inf, None
+        smallest = max(squares.least, 1e-8 * squares.sum(z), 1e-300)
         for _ in range(_ROUNDS):
+            total = max(smallest, squares.sum(z))
             again = self._solve(size, squares, total, weight or _UNIQUE * total / size**2)
             if again.z is None:
                 break
-            z = self._settled(again.z)
-            gap = self._gap(z, squares, again, weight)
-            if gap <= least:
-                best, least, found = z, gap, again
-            used = total, size
-            total, size = max(smallest, squares.sum(z)), max(size, _rms(z))
-            fits = max(total, used[0]) <= _RATIO * min(total, used[0])
-            if fits and size <= _RATIO * used[1] and gap <= 10.0 * _GAP:
+            found, z = again, self._settled(again.z)
+            gap, size = self._gap(z, squares, found, weight), max(size, _rms(z))
+            if gap <= _GAP:
                 break
-        return best, least, found
+        return z, gap, found
 
     def _gap(self, z: Array, squares: Squares, found: _Solution, weight: float) -> float:
         """Optimality gap relative to the objective, for robots within twice the distance."""
