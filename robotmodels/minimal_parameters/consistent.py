@@ -28,11 +28,9 @@ MissingExtraError
 
 References
 ----------
-Seed book section 1.6.3; P. Wensing, S. Kim and J.-J. Slotine, "Linear matrix inequalities for
-physically consistent inertial parameter identification", IEEE RA-L 3(1), 2018; C. Sousa and
-R. Cortesao, "Physical feasibility of robot base inertial parameter identification", IJRR 33(6),
-2014; T. Lee, P. Wensing and F. Park, "Geometric robot dynamic identification", IEEE T-RO 36(2),
-2020 (the distance).
+Seed book section 1.6.3; P. Wensing, S. Kim and J.-J. Slotine, IEEE RA-L 3(1), 2018 (LMI);
+C. Sousa and R. Cortesao, IJRR 33(6), 2014; T. Lee, P. Wensing and F. Park, "Geometric robot dynamic
+identification", IEEE T-RO 36(2), 2020 (the distance).
 """
 
 from __future__ import annotations
@@ -81,11 +79,10 @@ class StandardParameters(Rebuilt):
         Drives of the prior, for the kinds that are not among the parameters.
     fit : PhysicalFit
         ``squares`` of the residuals and ``least`` without constraints, both weighted; ``distance``
-        from the prior, the root of the summed squares of the relative changes of the
-        pseudo-inertias, ``|P0^-1/2 (P - P0) P0^-1/2|``, and of the drives; ``gap``, by the solver's
-        dual value: the part of the squares by which a robot within twice the distance may be better
-        (with ``gamma``: of the sum with the weighted distance); ``active`` constraints, a sentence
-        each; ``stopped``: the ending of a solver that stopped early.
+        from the prior, of the relative changes of pseudo-inertias, ``|P0^-1/2 (P - P0) P0^-1/2|``,
+        and of drives; ``gap``: the part of the squares (with ``gamma``: and of the weighted
+        distance) by which a robot within twice the distance may be better, by the solver's dual
+        value; ``active`` constraints; ``stopped``: the ending of a solver that stopped early.
     rows : int or None
         Number of residuals.
 

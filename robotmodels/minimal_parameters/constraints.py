@@ -29,14 +29,14 @@ class Constraint:
     """Standard parameters x with ``rows @ x + offset`` in a cone. Shapes: rows (k, p), offset (k,).
 
     The cone: zero, non-negative numbers, or a positive semidefinite matrix, row by row. A sentence
-    for each number, or one for the matrix, whose eigenvalues may be negative up to the room.
+    for each number, or one for the matrix, whose eigenvalues may be negative up to the allowance.
     """
 
     cone: Literal["zero", "nonnegative", "semidefinite"]
     rows: Array
     offset: Array
     sentences: tuple[str, ...]
-    room: float = 0.0
+    allowance: float = 0.0
 
     def about(self, x: Array, scale: Array) -> Constraint:
         """The same on ``z``, for the parameters ``x + scale @ z``."""
@@ -53,17 +53,17 @@ class Constraint:
     def inside(self, x: Array) -> Array:
         """Parameters with a multiple of 1 added to the matrix where its slack is negative."""
         slack = float(self.slack(x)[0])
-        if slack >= -self.room:
+        if slack >= -self.allowance:
             return x
         one = np.eye(round(len(self.offset) ** 0.5)).ravel()
         return x - slack * np.linalg.lstsq(self.rows, one, rcond=None)[0]
 
     def stated(self, cp: Any, x: Any, size: float, part: float) -> Any:
-        """The constraint on ``size * x``, divided by size; eigenvalues above a part of the room."""
+        """The constraint on ``size * x``, divided by size; matrices above a part of the allowance."""
         s = self.rows @ x + self.offset / size
         if self.cone == "semidefinite":
             k = round(len(self.offset) ** 0.5)
-            least = _INSIDE + part * self.room / size
+            least = _INSIDE + part * self.allowance / size
             return cp.reshape(s, (k, k), order="C") >> least * np.eye(k)
         return s >= 0 if self.cone == "nonnegative" else s == 0
 
@@ -140,7 +140,7 @@ class CenterOfMassBox(Rebuilt):
     Raises
     ------
     ShapeError, InvalidValueError
-        Corners of the wrong shape, NaN, or the wrong way round.
+        Corners of the wrong shape, NaN, or low above high.
 
     Examples
     --------

@@ -102,12 +102,12 @@ def base_parameters(
     (36, {'ZZ4': 1.0, 'YY5': 1.0})
     """
     check_model(model)
-    way = chosen(BaseMethod, method, "method")
+    kind = chosen(BaseMethod, method, "method")
     kinds = drive_kinds(drive)
     angle, least = (ALIGNED, NOTHING) if tolerance is None else (_part(tolerance),) * 2
     if friction is not None:
         check_linear(check_friction(friction, model.n))
-    if way is BaseMethod.SYMBOLIC:
+    if kind is BaseMethod.SYMBOLIC:
         for name, value in (("motion", motion), ("constraint", constraint)):
             if value is not None:
                 raise InvalidValueError(
@@ -128,11 +128,11 @@ def base_parameters(
         )
     columns = TorqueColumns(aligned, kinds, friction, least, samples, G)
     neglected, error, gap = (), None, None
-    kept, matrix, numeric = _regrouping(columns, way is BaseMethod.SYMBOLIC)
+    kept, matrix, numeric = _regrouping(columns, kind is BaseMethod.SYMBOLIC)
     if numeric:
         neglected, error = columns.neglected(matrix), columns.torque_error(kept, matrix)
         notes += (*columns.notes, *residual_warning(error, least))
-        gap = columns.basis.gap if way is BaseMethod.NUMERIC else None
+        gap = columns.basis.gap if kind is BaseMethod.NUMERIC else None
     if aligned is not model:
         columns = replace(columns, model=model)
         neglected, error = columns.neglected(matrix), columns.torque_error(kept, matrix)
@@ -142,7 +142,7 @@ def base_parameters(
         )
         notes = (notes[0], sentence, *notes[1:])
     return BaseParameters(
-        model, kinds, kept, matrix, way, gap, friction, least, notes, neglected, error, angle
+        model, kinds, kept, matrix, kind, gap, friction, least, notes, neglected, error, angle
     )
 
 
@@ -202,12 +202,12 @@ def _samples(model: RobotModel, motion: Any) -> Samples:
         )
     names = ("motion q", "motion v", "motion a")
     arrays = tuple(as_vector(x, model.n, s) for x, s in zip(motion, names, strict=True))
-    _, rows = batch_rows(arrays, names)
-    if rows[0].shape[0] == 0:
+    q, v, a = batch_rows(arrays, names)[1]
+    if not len(q):
         raise InvalidValueError(
             "motion: the log is empty; give at least one sample, or none for random motion."
         )
-    return rows[0], rows[1], rows[2]
+    return q, v, a
 
 
 def _constraint(
@@ -225,18 +225,14 @@ def _constraint(
         raise InvalidValueError("constraint: all zero, so that no joint moves.")
     lengths = np.linalg.norm(G, axis=0)
     kept = column_basis(G, scale=1.0 / np.where(lengths > 0.0, lengths, 1.0)).kept
-    rank, columns = len(kept), int((lengths > 0.0).sum())
-    G = np.ascontiguousarray(G[:, kept])
-    if rank == n:
-        return G, ()
-    free = "one free variable" if rank == 1 else f"{rank} free variables"
+    rank, columns = len(kept), np.count_nonzero(lengths)
     note = (
         f"Joint variables are constrained: rank {rank} of {n}, so that the torques are those of "
-        f"{free}."
+        f"{'one free variable' if rank == 1 else f'{rank} free variables'}."
     )
     if rank < columns:
         note += (
             f" The {columns} columns of the constraint depend on each other; if no joint is meant "
             "to follow others, the matrix is wrong."
         )
-    return G, (note,)
+    return np.ascontiguousarray(G[:, kept]), (note,) if rank < n else ()

@@ -31,8 +31,8 @@ _UNIQUE = 1e-8
 """Weight of the squared distance, in the solver's units, which makes least squares unique."""
 _ROUNDS = 4
 """Solutions of least squares, each with the sizes of the one before, until the gap is small."""
-_ROOM = 2e-3
-"""Additional margin of the nearest robot: its base parameters are feasible. Part of the room."""
+_STRICT = 2e-3
+"""Additional margin of the nearest robot, part of the allowance: feasible base parameters."""
 _KEPT, _SAME = 1e-9, 1e-13
 """Zero tolerances of base parameter deviations, relative: of a robot, of the prior."""
 _ROUNDING = 5e-9
@@ -154,7 +154,7 @@ class PhysicalProblem:
     def is_met(self, z: Array) -> bool:
         """Whether bodies are definite and other constraints satisfied up to rounding."""
         rounding = _ROUNDING * (1.0 + float(np.linalg.norm(z)))
-        return all((one.slack(z) >= -(one.room or rounding)).all() for one in self.constraints)
+        return all((one.slack(z) >= -(one.allowance or rounding)).all() for one in self.constraints)
 
     def fit(self, squares: Squares, b: Array, weight: float, tolerance: float) -> PhysicalFit:
         """Physically consistent least squares; of equal fits, the nearest to the prior.
@@ -237,8 +237,8 @@ class PhysicalProblem:
         """Least ``|F z - t|^2 + weight * |z|^2``, with ``E z = e`` or ``|B z - b| <= 1``."""
         cp = _cvxpy()
         u = cp.Variable(len(self.prior))  # z / size
-        room = _ROOM if within is not None else 0.0
-        stated = [one.stated(cp, u, size, room) for one in self.constraints]
+        strict = _STRICT if within is not None else 0.0
+        stated = [one.stated(cp, u, size, strict) for one in self.constraints]
         objective = cp.sum_squares(u) * (weight / total * size**2 if squares else 1.0)
         if squares is not None:
             rows, right = squares.rows(total**0.5)
@@ -342,7 +342,7 @@ def nearest_body(F: Array, t: Array, radius: float = 0.1) -> Array | None:
 
 
 def _solved(problem: Any) -> Any:
-    """Solve a problem with Clarabel; its own result."""
+    """Solve a problem with Clarabel; the result of Clarabel."""
     cp = _cvxpy()
     data, chain, inverse = problem.get_problem_data(cp.CLARABEL, solver_opts=dict(_SOLVER))
     raw = chain.solve_via_data(problem, data, solver_opts=dict(_SOLVER))
