@@ -70,7 +70,7 @@ def test_names_number_parameters_by_frame():
     np.testing.assert_array_equal(rm.parameter_vector(coupled)[-3:], [0.1, 0.2, 0.3])
 
 
-@pytest.mark.parametrize("batch", [(), (1,), (3,), (2, 3), (0,), (2, 0, 3)], ids=str)
+@pytest.mark.parametrize("batch", [(), (2, 3), (0,)], ids=str)
 def test_leading_axes_are_the_batch(case, model, batch):
     function, count = case
     vectors = states(model, count, *batch)
@@ -130,28 +130,10 @@ def test_a_bad_vector_is_named(case, model, bad, error):
 # --- long logs -------------------------------------------------------------------------------
 
 
-def test_a_log_without_samples_is_named(model):
-    """What consumes a log refuses an empty one; what maps rows returns none."""
-    q, v, a = states(model, 3, 0)
-    names = "the log is empty; expected at least"
-    for function, rows in FORMS.items():
-        with pytest.raises(InvalidValueError, match=rf"^q, v.*: {names} one sample"):
-            chunked(function, model, *(q, v, a)[:rows])
-    with pytest.raises(InvalidValueError, match=rf"^q, v: {names} one sample"):
-        filtered_regressor(model, 0.1, q, v, FILTER)
-    with pytest.raises(InvalidValueError, match=rf"^tau: {names} one sample"):
-        filtered_torque(q, FILTER)
-    with pytest.raises(InvalidValueError, match=rf"^t: {names} 2 samples"):
-        energy_difference_regressor(model, np.zeros(0), q, v)
-    with pytest.raises(InvalidValueError, match=rf"^t: {names} 2 samples"):
-        joint_work(np.zeros(0), v, v)
-
-
 FORMS = {torque_regressor: 3, power_regressor: 3, energy_regressor: 2, momentum_regressor: 2}
 
 
-@pytest.mark.parametrize("N", [1, 7, 300])
-@pytest.mark.parametrize("size", [1, 4, 1000])
+@pytest.mark.parametrize(("N", "size"), [(1, 4), (7, 1), (300, 64), (7, 1000)])
 @pytest.mark.parametrize("columns", [None, [3, 60, 9]], ids=str)
 def test_pieces_of_every_form_are_the_whole(model, N, size, columns):
     vectors = states(model, 3, N)
@@ -164,19 +146,6 @@ def test_pieces_of_every_form_are_the_whole(model, N, size, columns):
             np.testing.assert_array_equal(np.asarray(part), wanted)
             seen[rows] += 1
         assert (seen == 1).all()
-
-
-def test_mistakes_in_pieces_are_named_at_the_call(model):
-    q, v, a = states(model, 3, 2)
-    for size in (0, -3):
-        with pytest.raises(InvalidValueError, match="size: expected at least one"):
-            rm.torque_regressor_chunks(model, q, v, a, size=size)
-    with pytest.raises(InvalidValueError, match=r"expected one of energy_regressor, .*filtered"):
-        chunked(filtered_regressor, model, q, v)
-    with pytest.raises(InvalidValueError, match="torque_regressor takes q, v, a, got 2 arrays"):
-        chunked(torque_regressor, model, q, v)
-    with pytest.raises(InvalidValueError, match="there is no column 'Q1'"):
-        chunked(power_regressor, model, q, v, a, columns=["Q1"])
 
 
 def test_no_form_needs_the_whole_stack(model):
@@ -239,13 +208,6 @@ def test_base_parameters_choose_columns_of_their_own_robot_alone(model):
             call(longer)
 
 
-def test_no_column_at_all(model):
-    q, v, a = states(model, 3, 2)
-    assert rm.torque_regressor(model, q, v, a, columns=[]).shape == (2, model.n, 0)
-    assert power_regressor(model, q, v, a, columns=[]).shape == (2, 0)
-    assert filtered_regressor(model, 0.1, q, v, FILTER, columns=[]).shape == (2, model.n, 0)
-
-
 @pytest.mark.parametrize("name", ["random", "tx40"])
 def test_kinds_of_drives_have_columns_of_their_own(model, name):
     """Any collection of kinds gives the columns that it names, of every form."""
@@ -301,17 +263,6 @@ def test_energy_of_base_parameters(model, drive):
         rm.energy_regressor(model, q, v, columns=whole)
     with pytest.raises(ShapeError, match=r"An energy has no columns of Fv, Fc, offset.*'Ia'"):
         whole.reduce(rm.energy_regressor(model, q, v))
-
-
-def test_printed_names_are_taken(model):
-    q, v, a = states(model, 3, 2)
-    base = base_parameters(model)
-    name = next(n for n in base.names if len(base.regrouping[n]) > 1)
-    assert base.regrouping[f"{name}R"] is base.regrouping[name]
-    column = rm.torque_regressor(model, q, v, a, columns=[name])
-    np.testing.assert_array_equal(rm.torque_regressor(model, q, v, a, columns=[f"{name}R"]), column)
-    with pytest.raises(KeyError, match="No base parameter 'Q1'"):
-        base.regrouping["Q1"]
 
 
 # --- samples in time -------------------------------------------------------------------------
@@ -388,11 +339,8 @@ def test_the_filtered_regressor_gives_the_filtered_torques(model, sections):
 @pytest.mark.parametrize(
     ("low_pass", "error", "words"),
     [
-        (30.0, ShapeError, "^low_pass: "),
-        (np.ones((2, 5)), ShapeError, "^low_pass: "),
         (FILTER[0], ShapeError, r"^low_pass: expected second-order sections \(k, 6\)"),
         (np.zeros((0, 6)), ShapeError, "^low_pass: "),
-        ([[1.0, 0, 0, 0, 0, 0]], ShapeError, "^low_pass: "),
         ([[1.0, 1.0, 0, 1.0, -1.5, 0]], InvalidValueError, r"not stable, \|pole\| = 1.5"),
         ("butter", InvalidValueError, "^low_pass: "),
     ],
@@ -408,15 +356,19 @@ def test_mistakes_in_filters(model, low_pass, error, words):
             call()
 
 
-def test_mistakes_in_filtered_regressors(model):
-    q, v, _ = states(model, 3, 3)
-    for dt in (-0.1, 0.0, [0.1]):
-        with pytest.raises(InvalidValueError, match=r"^dt: expected the sampling period"):
-            filtered_regressor(model, dt, q, v, FILTER)
-    with pytest.raises(InvalidValueError, match=r"^q: .*regular array"):
-        filtered_regressor(model, 0.1, [[0.0], [0.0, 1.0]], v, FILTER)
-    for bad in ((q[0], v[0]), (q, v[:2])):
-        with pytest.raises(ShapeError, match=r"^q, v: expected samples"):
-            filtered_regressor(model, 0.1, *bad, FILTER)
-    with pytest.raises(ShapeError, match=r"^tau: "):
-        filtered_torque(1.0, FILTER)
+@pytest.mark.parametrize(
+    ("call", "error", "words"),
+    [
+        (lambda m, x: chunked(torque_regressor, m, *x[:, :0]), InvalidValueError, "log is empty"),
+        (lambda m, x: joint_work(np.zeros(0), *x[:2, :0]), InvalidValueError, "^t: the log is emp"),
+        (lambda m, x: filtered_torque(x[0, :0], FILTER), InvalidValueError, "^tau: the log is emp"),
+        (lambda m, x: chunked(torque_regressor, m, *x, size=0), InvalidValueError, "at least one"),
+        (lambda m, x: chunked(filtered_regressor, m, *x[:2]), InvalidValueError, "expected one of"),
+        (lambda m, x: chunked(torque_regressor, m, *x[:2]), InvalidValueError, "got 2 arrays"),
+        (lambda m, x: filtered_regressor(m, 0.0, *x[:2], FILTER), InvalidValueError, "^dt: expect"),
+        (lambda m, x: filtered_regressor(m, 0.1, x[0], x[1, :2], FILTER), ShapeError, "^q, v: exp"),
+    ],
+)
+def test_mistakes_in_logs(model, call, error, words):
+    with pytest.raises(error, match=words):
+        call(model, np.array(states(model, 3, 3)))
