@@ -1,6 +1,5 @@
 """Drives and transmissions: the TX40 wrist, power through the gears, mimics, mistakes."""
 
-import copy
 import pickle
 from dataclasses import fields
 
@@ -83,24 +82,17 @@ def test_drives_of_many_samples_are_those_of_one(batch):
     np.testing.assert_allclose(found, wanted, rtol=1e-14, atol=1e-14)
 
 
-def test_mimic_joints_are_singular_and_say_so():
+def test_mimic_joints_are_singular_and_ranks_do_not_depend_on_units():
     """Joint 2 follows joint 1: q has no unique encoder variables, but torques still go over."""
     gripper = rm.Transmission([[1, 0], [-1, 0]], offset=[0, 0.1])
-    assert not gripper.is_invertible
     assert gripper.coupled_motors == ()
     assert gripper.to_joint([0.3, 7.0]) == pytest.approx([0.3, -0.2])
     assert gripper.to_motor_torque([2.0, 0.5]) == pytest.approx([1.5, 0.0])
     with pytest.raises(InvalidValueError, match="a joint mimics another one"):
         gripper.to_encoder([0.3, -0.2])
-
-
-def test_ranks_do_not_depend_on_units():
-    """Joints in metres and gears of thousands: columns of any size are independent."""
     for size in (1e-20, 1e20):
         gears = rm.Transmission([[size, 0.0], [-size, 1.0]])
-        assert gears.is_invertible
-        assert not gears.is_mimicry
-        assert gears.coupled_motors == (2,)
+        assert (gears.is_invertible, gears.is_mimicry, gears.coupled_motors) == (True, False, (2,))
     fingers = rm.Transmission([[1e-20, 0, 0], [1e-20, 0, 0], [0, 0, 1.0]])
     assert (fingers.rank, fingers.is_mimicry) == (2, True)
     np.testing.assert_array_equal(fingers.free, [[1e-20, 0], [1e-20, 0], [0, 1]])
@@ -119,16 +111,13 @@ PARTS = {
 
 @pytest.mark.parametrize("make", PARTS.values(), ids=PARTS)
 def test_parts_of_a_robot_are_values(make):
-    part, same = make(np.random.default_rng(1)), make(np.random.default_rng(1))
-    assert part == same
-    assert hash(part) == hash(same)
+    part = make(np.random.default_rng(1))
     assert part != make(np.random.default_rng(2))
-    assert part != "part"
-    for copied in (part, copy.deepcopy(part), pickle.loads(pickle.dumps(part))):
+    for copied in (make(np.random.default_rng(1)), pickle.loads(pickle.dumps(part))):
         assert copied == part
-        arrays = [x for f in fields(copied) if isinstance(x := getattr(copied, f.name), np.ndarray)]
-        assert arrays
-        assert not any(x.flags.writeable for x in arrays)
+        assert hash(copied) == hash(part)
+        values = [getattr(copied, f.name) for f in fields(copied)]
+        assert not any(x.flags.writeable for x in values if isinstance(x, np.ndarray))
     with pytest.raises(AttributeError):
         setattr(part, fields(part)[0].name, np.zeros(4))
 

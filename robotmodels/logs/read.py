@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from .._arrays import as_floats
 from ..csv_table import Column
 from ..drive import Transmission
-from ..errors import InvalidValueError, ShapeError
+from ..errors import InvalidValueError
 from ..file_units import AngleUnit, LengthUnit, TimeUnit, as_file_unit
 from ..model import RobotModel, check_model
 from .columns import Quantity
@@ -146,8 +146,8 @@ def read_log(
     if model is not None:
         check_model(model)
     files = _sources(path, "path")
-    others = (None,) * len(files)
-    others = others if torques_from is None else _sources(torques_from, "torques_from")
+    apart = torques_from is not None
+    others = _sources(torques_from, "torques_from") if apart else (None,) * len(files)
     if len(others) != len(files):
         raise InvalidValueError(
             f"torques_from: expected a file for each of the {len(files)} of path, got "
@@ -158,7 +158,8 @@ def read_log(
     angle = as_file_unit(AngleUnit, angles, "angles")
     length = as_file_unit(LengthUnit, lengths, "lengths")
     unit = None if times is None else as_file_unit(TimeUnit, times, "times")
-    names = _names(joints, model)
+    default = None if model is None else model.table.joint_names
+    names = default if joints is None else tuple(map(str, joints))
     choices = {
         Quantity.POSITION: positions,
         Quantity.TORQUE: torques,
@@ -192,55 +193,31 @@ def read_log(
                 moved = quantity in (Quantity.POSITION, Quantity.POSITION_REFERENCE)
                 arrays[quantity.field] = values + offset if moved else values
         notes = [*raw.notes, *rows.notes]
-        coupled = model is not None and model.transmission and not model.transmission.is_mimicry
-        if model is not None and coupled and gears is None and transmission is None:
+        motors = gears is not None or transmission is not None
+        K = None if model is None or motors else model.transmission
+        if model is not None and K is not None and not K.is_mimicry:
             notes.append(
                 f"{model.name} has a transmission, but positions and torques were read as those of "
                 "the joints; give transmission=model.transmission if they are those of the motors."
             )
-        log = Log(
-            rows.dt,
-            **arrays,
-            starts=rows.starts,
-            names=raw.names,
-            sources=[_source(one, columns, len(rows.values)) for one in each if one is not None],
-            refused=rows.refused,
-            notes=notes,
-        )
-        logs.append(log)
+        sources = [_source(one, columns, len(rows.values)) for one in each if one is not None]
+        more = {"sources": sources, "refused": rows.refused, "notes": notes}
+        logs.append(Log(rows.dt, **arrays, starts=rows.starts, names=raw.names, **more))
     return logs[0] if len(logs) == 1 else join_logs(logs)
 
 
 def _sources(given: Any, what: str) -> tuple[Source, ...]:
     one = isinstance(given, str | Path | Mapping) or hasattr(given, "columns")
     sources: Any = [given] if one else given
-    if not (given_sources := tuple(sources)):
+    if not (files := tuple(sources)):
         raise InvalidValueError(f"{what}: expected a file or several, got none.")
-    return given_sources
+    return files
 
 
 def _table(source: Source, delimiter: str | None) -> LogTable:
-    if not isinstance(source, str | Path):
-        return table_of(Path("arrays"), {str(name): source[name] for name in source})
-    path = Path(source)
-    if path.is_dir():
-        raise InvalidValueError(
-            f"path: {path} is a folder; give its files, such as sorted(Path(...).glob('*.csv'))."
-        )
-    return open_log_table(path, delimiter)
-
-
-def _names(joints: Sequence[str] | None, model: RobotModel | None) -> tuple[str, ...] | None:
-    default = None if model is None else model.table.joint_names
-    if joints is None:
-        return default
-    names = tuple(map(str, joints))
-    if default is not None and len(names) != len(default):
-        raise ShapeError(
-            f"joints: {len(names)} names were given; the model has the {len(default)} joints "
-            f"{', '.join(default)}."
-        )
-    return names
+    if isinstance(source, str | Path):
+        return open_log_table(Path(source), delimiter)
+    return table_of(Path("arrays"), {str(name): source[name] for name in source})
 
 
 def _source(given: Source, values: np.ndarray, rows: int) -> LogSource:

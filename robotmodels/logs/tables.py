@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -15,7 +14,7 @@ import numpy as np
 
 from .._arrays import Array
 from ..csv_table import Column, CsvTable, column_number, is_number, open_table
-from ..errors import InvalidValueError, MissingExtraError
+from ..errors import InvalidValueError, MissingExtraError, nearest_names
 
 Choice = Column | Sequence[Column]
 
@@ -92,10 +91,13 @@ class LogTable:
 
 def open_log_table(path: Path, delimiter: str | None = None) -> LogTable:
     """Open a file as columns: NPZ, Parquet and MAT by the suffix, text otherwise."""
+    if path.is_dir():
+        raise InvalidValueError(
+            f"path: {path} is a folder; give its files, such as sorted(Path(...).glob('*.csv'))."
+        )
     if not path.exists():
-        near = get_close_matches(path.name, [each.name for each in path.parent.glob("*")])
-        advice = f"near it are {', '.join(near)}" if near else "check its folder and its name"
-        raise _NoFileError(f"{path}: there is no such file; {advice}.")
+        near = nearest_names(path.name, [each.name for each in path.parent.glob("*")])
+        raise _NoFileError(f"{path}: there is no such file; near it: {', '.join(near) or 'none'}.")
     read = {".npz": _npz, ".parquet": _parquet, ".pq": _parquet, ".mat": _mat}
     suffix = path.suffix.lower()
     if suffix in read:

@@ -17,7 +17,7 @@ from ..errors import InertiaError, InvalidValueError, ShapeError
 from ..friction import Friction, check_friction
 from ..model import RobotModel, check_model
 from .dry_friction import check_dissipates
-from .integration import Integration, Options
+from .integration import Integration
 from .motion import Law, Motion
 from .result import Integrator, Simulation
 
@@ -137,19 +137,19 @@ def simulate(
     cuts = [(float(x), x in jumps) for x in (start, *inside, end)]
     if max_evaluations is None:  # default: a few seconds of computing time
         max_evaluations = int(min(100_000 + 1e4 * (end - start) + 200 * len(cuts), 2**62))
-    options = Options(
-        chosen(Integrator, method, "method"),
-        float(_positive(rtol, "rtol", least=_FINEST)),
-        float(_positive(atol, "atol")),
-        float(_positive(max_step, "max_step")),
-        int(_positive(max_evaluations, "max_evaluations", least=1)),
-        _log_progress if progress is True else progress or None,
-    )
+    budget = int(_positive(max_evaluations, "max_evaluations", least=1))
+    integrator = chosen(Integrator, method, "method")
+    tolerances = {
+        "rtol": float(_positive(rtol, "rtol", least=_FINEST)),
+        "atol": float(_positive(atol, "atol")),
+        "max_step": float(_positive(max_step, "max_step")),
+    }
     limits = _limits(model, q) if stop_at_limits else None
     motion = Motion(model, law, tool, drive, friction, width)
     check_dissipates(motion.dry)
     _check_start(model, q, v, drive, motion.dry.lower.size > 0)
-    run = Integration(motion, times, limits, options)
+    report = _log_progress if progress is True else progress or None
+    run = Integration(motion, times, limits, integrator, tolerances, budget, report)
     with np.errstate(over="ignore", invalid="ignore"):  # an unbounded motion is a status
         run.follow(q, v, cuts)
     q, v, a, tau, taken, held, works = (np.array(x) for x in zip(*run.rows, strict=True))
