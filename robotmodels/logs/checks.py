@@ -304,8 +304,10 @@ def _bad(bad: BadSamples) -> _Finding:
             "gap is short and leaves the rows out where it is long."
         )
         return FindingKind.STUCK, Severity.DOUBTFUL, words
-    words = f"outliers in its {word}: {len(rows)} (the first at row {rows[0]}); fit replaces them "
-    return FindingKind.SPIKES, Severity.DOUBTFUL, words + "by interpolation."
+    words = f"{len(rows)} samples of its {word} are outliers (the first at row {rows[0]}); fit "
+    if len(rows) == 1:
+        words = f"1 sample of its {word} is an outlier (at row {rows[0]}); fit "
+    return FindingKind.SPIKES, Severity.DOUBTFUL, words + "replaces outliers by interpolation."
 
 
 def _position(log: Log, j: int, bad: list[BadSamples]) -> Iterator[_Finding]:
