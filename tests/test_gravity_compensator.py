@@ -153,7 +153,7 @@ def test_its_work_between_samples_is_the_change_of_its_energy():
 
 
 @pytest.mark.parametrize("width", [None, 1e-3])
-def test_simulation_keeps_energy_and_joints_stick_against_it(width):
+def test_simulation_keeps_its_energy(width):
     rng = np.random.default_rng(3)
     model = random_arm(rng, 2)
     spring = GravityCompensator(2, 2, a=0.2, b=0.3, phi=0.4, values=[400.0, -60.0])
@@ -163,15 +163,6 @@ def test_simulation_keeps_energy_and_joints_stick_against_it(width):
     assert sim.relative_drift < 1e-8
     tau = rm.idm(smooth, sim.q, sim.v, sim.a, friction=spring)
     assert np.abs(tau).max() < 1e-9 * np.abs(spring.torque(sim.v, sim.q)).max()
-    if width is not None:
-        return
-    # at rest without gravity, the spring moves the joint only if dry friction does not hold it
-    still = model.with_gravity(np.zeros(3))
-    force = abs(spring.torque(np.zeros(2), [0.5, -0.3])[1])
-    for share, moves in ((0.99, True), (1.01, False)):
-        stuck = still.with_drive(rm.DriveParameters(Ia=[0.1, 0.1], Fc=[1e4, share * force]))
-        sim = rm.simulate(stuck, [0.5, -0.3], [0.0, 0.0], t=0.05, friction=spring)
-        assert (np.ptp(sim.q[:, 1]) > 1e-6) == moves
 
 
 @pytest.mark.parametrize(("options", "form"), [(SPRING, "energy"), (SERIES, "torque")])

@@ -1,6 +1,5 @@
 """The border of the regressors: columns and their names, batches, chunks, errors."""
 
-import tracemalloc
 
 import numpy as np
 import pytest
@@ -148,21 +147,6 @@ def test_pieces_of_every_form_are_the_whole(model, N, size, columns):
         assert (seen == 1).all()
 
 
-def test_no_form_needs_the_whole_stack(model):
-    vectors = states(model, 3, 4000)
-    stack = 8 * vectors[0].size * rm.parameter_vector(model).size
-    for form, count in FORMS.items():
-        list(chunked(form, model, *(x[:8] for x in vectors[:count])))  # compile
-        tracemalloc.start()
-        try:
-            for _ in chunked(form, model, *vectors[:count], size=64):
-                pass
-            _, peak = tracemalloc.get_traced_memory()
-        finally:
-            tracemalloc.stop()
-        assert peak < stack / 10, form
-
-
 # --- columns ---------------------------------------------------------------------------------
 
 
@@ -273,13 +257,9 @@ def test_energy_of_base_parameters(model, drive):
     [
         ({"t": [0.0, 1.0, 1.0]}, InvalidValueError, "ascending"),
         ({"t": [0.0, 1.0]}, ShapeError, "^q: expected shape"),
-        ({"t": [[0.0]]}, ShapeError, "^t: "),
         ({"t": [0.0]}, InvalidValueError, "the log has 1 sample; expected at least 2"),
-        ({"t": [0.0, np.nan, 1.0]}, InvalidValueError, "^t: "),
         ({"knots": [0, 3]}, InvalidValueError, "knots: .*from 0 to 2"),
         ({"knots": [1, 0]}, InvalidValueError, "knots"),
-        ({"knots": [1]}, InvalidValueError, "knots"),
-        ({"knots": []}, InvalidValueError, "knots"),
         ({"knots": [0.0, 1.0]}, InvalidValueError, "knots"),
     ],
     ids=str,
