@@ -1,6 +1,5 @@
 """The border of the regressors: columns and their names, batches, chunks, errors."""
 
-
 import numpy as np
 import pytest
 from identities.random_robots import random_model, random_state

@@ -10,18 +10,18 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import as_floats
+from .._arrays import Array, as_exact, as_floats
 from ..csv_table import Column
 from ..drive import Transmission
-from ..errors import InvalidValueError
+from ..errors import InvalidValueError, ShapeError
 from ..file_units import AngleUnit, LengthUnit, TimeUnit, as_file_unit
+from ..geometry import PRISMATIC
 from ..model import RobotModel, check_model
 from .columns import Quantity
 from .log import Log, LogSource, join_logs
 from .samples import Request, read_samples
 from .tables import Choice, LogTable, open_log_table, table_of
 from .time_base import regular_rows
-from .units import joint_side
 
 Source = str | Path | Mapping[str, Any]
 _SHORTEST, _LONGEST = 1e-6, 10.0
@@ -226,3 +226,55 @@ def _source(given: Source, values: np.ndarray, rows: int) -> LogSource:
         return LogSource("arrays", hashlib.sha256(values.tobytes()).hexdigest(), rows)
     with Path(given).open("rb") as stream:
         return LogSource(Path(given).name, hashlib.file_digest(stream, "sha256").hexdigest(), rows)
+
+
+def joint_side(
+    n: int,
+    angles: AngleUnit,
+    lengths: LengthUnit,
+    signs: ArrayLike | None,
+    gears: ArrayLike | None,
+    transmission: Transmission | None,
+    drive_gains: ArrayLike | None,
+    offsets: ArrayLike | None,
+    model: RobotModel | None,
+) -> tuple[Array, Array, Array]:
+    """Matrices (n, n) from the columns of positions and torques to the joints, and an offset."""
+    unit = np.full(n, angles.factor)
+    if gears is not None and transmission is not None:
+        raise InvalidValueError(
+            "gears, transmission: give one of them; a transmission includes the gear ratios."
+        )
+    if gears is None and transmission is None and model is not None:
+        prismatic = model.table.sigma[model.table.joint_rows] == PRISMATIC
+        unit[prismatic] = lengths.factor
+    sign = _each(signs, n, "signs", 1.0)
+    if (np.abs(sign) != 1.0).any():
+        raise InvalidValueError(f"signs: expected 1 or -1 for each of the {n} joints, got {signs}.")
+    gain = sign * _each(drive_gains, n, "drive_gains", 1.0)
+    ratio = _each(gears, n, "gears", 1.0)
+    for name, value in (("drive_gains", gain), ("gears", ratio)):
+        if not value.all():
+            raise InvalidValueError(f"{name}: expected numbers other than zero.")
+    K, zero = np.diag(1.0 / ratio), np.zeros(n)
+    if transmission is not None:
+        if transmission.n != n:
+            raise ShapeError(
+                f"transmission: it has {transmission.n} joints, the log has {n} columns of "
+                "positions."
+            )
+        if not transmission.is_invertible:
+            raise InvalidValueError(
+                "transmission: joints mimic others, so that motor torques do not determine those "
+                "of the joints; give the model of the independent joints."
+            )
+        K, zero = transmission.matrix, transmission.offset
+    offset = zero + _each(offsets, n, "offsets", 0.0)
+    return (sign * unit)[:, None] * K.T, gain[:, None] * np.linalg.inv(K), offset
+
+
+def _each(value: ArrayLike | None, n: int, name: str, default: float) -> Array:
+    if value is None:
+        return np.full(n, default)
+    array = as_floats(value, name)
+    return np.full(n, float(array)) if array.ndim == 0 else as_exact(array, (n,), name)
