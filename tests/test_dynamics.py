@@ -1,4 +1,4 @@
-"""The border of the dynamic models: shapes, batches, wrenches, singular matrices, errors."""
+"""The border of dynamic models and regressors: shapes, batches, singular matrices, errors."""
 
 import numpy as np
 import pytest
@@ -12,6 +12,11 @@ from robotmodels.errors import (
     SingularMassMatrixError,
 )
 from robotmodels.inertia import InertiaWarning
+from robotmodels.regressors import (
+    energy_parameter_names,
+    momentum_regressor,
+    power_regressor,
+)
 
 # name: function of the model and its vectors, lengths of these, shape of the result
 FUNCTIONS = {
@@ -27,6 +32,11 @@ FUNCTIONS = {
     "kinetic_energy": (rm.kinetic_energy, "nn", ()),
     "rigid kinetic_energy": (lambda m, *x: rm.kinetic_energy(m, *x, drive=False), "nn", ()),
     "potential_energy": (rm.potential_energy, "n", ()),
+    "torque_regressor": (rm.torque_regressor, "nnn", ("n", "p")),
+    "power_regressor": (power_regressor, "nnn", ("p",)),
+    "momentum": (lambda m, *x: momentum_regressor(m, *x).momentum, "nn", ("n", "p")),
+    "force": (lambda m, *x: momentum_regressor(m, *x).force, "nn", ("n", "p")),
+    "energy_regressor": (rm.energy_regressor, "nn", ("e",)),
 }
 
 
@@ -57,7 +67,8 @@ def model(request):
 
 
 def shape_of(core, model):
-    return tuple(model.n if k == "n" else k for k in core)
+    sizes = {"n": model.n, "p": len(rm.parameter_names(model))}
+    return tuple((sizes | {"e": len(energy_parameter_names(model))})[k] for k in core)
 
 
 def vectors_of(lengths, model, *batch):

@@ -23,20 +23,6 @@ from robotmodels.regressors import (
 )
 
 FILTER = signal.butter(1, 5.0, fs=100.0, output="sos")
-FUNCTIONS = {
-    "torque": (rm.torque_regressor, 3),
-    "torque without drives": (lambda m, *x: rm.torque_regressor(m, *x, drive=False), 3),
-    "power": (power_regressor, 3),
-    "momentum": (lambda m, *x: momentum_regressor(m, *x).momentum, 2),
-    "momentum's force": (lambda m, *x: momentum_regressor(m, *x).force, 2),
-    "energy": (rm.energy_regressor, 2),
-    "energy without rotors": (lambda m, *x: rm.energy_regressor(m, *x, drive=False), 2),
-}
-
-
-@pytest.fixture(params=FUNCTIONS)
-def case(request):
-    return FUNCTIONS[request.param]
 
 
 @pytest.fixture(scope="module")
@@ -66,63 +52,6 @@ def test_names_number_parameters_by_frame():
     coupled = two_joints(transmission=wrist)
     assert rm.parameter_names(coupled) == (*names, "Iam3", "Fvm3", "Fcm3")
     np.testing.assert_array_equal(rm.parameter_vector(coupled)[-3:], [0.1, 0.2, 0.3])
-
-
-@pytest.mark.parametrize("batch", [(), (2, 3), (0,)], ids=str)
-def test_leading_axes_are_the_batch(case, model, batch):
-    function, count = case
-    vectors = states(model, count, *batch)
-    result = function(model, *vectors)
-    n, f = model.n, model.f
-    core = {
-        "torque": (n, 10 * f + 4 * n),
-        "torque without drives": (n, 10 * f),
-        "power": (10 * f + 4 * n,),
-        "momentum": (n, 10 * f + 4 * n),
-        "momentum's force": (n, 10 * f + 4 * n),
-        "energy": (10 * f + n,),
-        "energy without rotors": (10 * f,),
-    }[next(k for k, v in FUNCTIONS.items() if v == case)]
-    assert result.shape == (*batch, *core)
-    assert result.dtype == np.float64
-    assert result.flags.c_contiguous
-    for index in np.ndindex(*batch):
-        np.testing.assert_array_equal(result[index], function(model, *(x[index] for x in vectors)))
-
-
-def test_batches_broadcast(case, model):
-    function, count = case
-    vectors = states(model, count, 3)
-    for k in range(count):
-        mixed = [x if i == k else x[0] for i, x in enumerate(vectors)]
-        full = [x if i == k else np.tile(x[0], (3, 1)) for i, x in enumerate(vectors)]
-        np.testing.assert_array_equal(function(model, *mixed), function(model, *full))
-        lists = [x.tolist() for x in mixed]
-        np.testing.assert_array_equal(function(model, *lists), function(model, *full))
-        with pytest.raises(ShapeError, match="do not broadcast"):
-            function(model, *(x[:2] if i == k else x for i, x in enumerate(vectors)))
-
-
-@pytest.mark.parametrize(
-    ("bad", "error"),
-    [
-        (lambda n: np.zeros(n + 1), ShapeError),
-        (lambda n: np.zeros((n, 1)), ShapeError),
-        (lambda n: np.full((2, n), np.nan), InvalidValueError),
-        (lambda n: [np.inf] * n, InvalidValueError),
-        (lambda n: ["a"] * n, InvalidValueError),
-    ],
-    ids=["too long", "column", "NaN", "infinity", "text"],
-)
-def test_a_bad_vector_is_named(case, model, bad, error):
-    function, count = case
-    chunks = (lambda m, *x: rm.torque_regressor_chunks(m, *x), 3)
-    for call, arguments in ((function, count), chunks):
-        for position in range(arguments):
-            vectors = list(states(model, arguments))
-            vectors[position] = bad(model.n)
-            with pytest.raises(error, match=f"^{'qva'[position]}: "):
-                call(model, *vectors)
 
 
 # --- long logs -------------------------------------------------------------------------------
@@ -165,12 +94,10 @@ def test_pieces_of_every_form_are_the_whole(model, N, size, columns):
     ],
     ids=str,
 )
-def test_columns_that_are_not_there_are_named(case, model, columns, error, words):
-    function, count = case
-    if function not in (rm.torque_regressor, rm.energy_regressor, power_regressor):
-        function, count = momentum_regressor, 2
-    with pytest.raises(error, match=words):
-        function(model, *states(model, count), columns=columns)
+def test_columns_that_are_not_there_are_named(model, columns, error, words):
+    for function, count in FORMS.items():
+        with pytest.raises(error, match=words):
+            function(model, *states(model, count), columns=columns)
 
 
 def test_base_parameters_choose_columns_of_their_own_robot_alone(model):
