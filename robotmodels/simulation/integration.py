@@ -7,6 +7,7 @@ budget is used up; here each step is searched between its ends as well.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from itertools import pairwise
 from math import nextafter
 from typing import Any, NamedTuple
@@ -160,33 +161,30 @@ class Integration:
         least = -_ROUNDING * (1.0 + (np.abs(G) @ np.abs(Y)).max(axis=1, initial=0.0))
         event: Event | None = None
         for i in np.flatnonzero(values.min(axis=1) - np.ptp(values, axis=1) < least).tolist():
-
-            def distance(s: float, i: int = i) -> float:
-                return float(G[i] @ dense(s)[: 2 * n] + c[i])
-
+            distance = partial(lambda i, s: float(G[i] @ dense(s)[: 2 * n] + c[i]), i)
             root = first_below(distance, ts, values[i], float(least[i]))
             if root is not None and (event is None or root[0] < event.t):
                 limit = int(self._limits[i - slip.size]) % n if i >= slip.size else -1
                 event = Event(root[0], -1 if limit >= 0 else int(slip[i]), limit)
-        if mode.stuck.size:
-            # torques after the first event belong to another mode
-            within = ts if event is None else ts[: max(int(np.searchsorted(ts, event.t)) + 1, 2)]
+        if not mode.stuck.size:
+            return event
 
-            def margin(s: float) -> float:
-                y = np.ascontiguousarray(dense(s))
-                reaction = self.motion.at(s, y[:n], y[n : 2 * n]).reaction
-                return self.dry.margin(mode, reaction)
+        def margin(s: float) -> float:
+            y = np.ascontiguousarray(dense(s))
+            return self.dry.margin(mode, self.motion.at(s, y[:n], y[n : 2 * n]).reaction)
 
-            margins = np.array([margin(float(s)) for s in within])
-            root = first_below(margin, within, margins, -_SLACK, -_ROUNDING)
-            if root is not None:
-                # past the root, so that a jump of the torques is included
-                t, end = root
-                step = float(np.spacing(max(abs(t), abs(end))))
-                while t < end and margin(t) >= -_ROUNDING:
-                    t, step = min(t + step, end), 2.0 * step
-                event = Event(t) if event is None or t < event.t else event
-        return event
+        # torques after the first event belong to another mode
+        within = ts if event is None else ts[: max(int(np.searchsorted(ts, event.t)) + 1, 2)]
+        margins = np.array([margin(float(s)) for s in within])
+        root = first_below(margin, within, margins, -_SLACK, -_ROUNDING)
+        if root is None:
+            return event
+        # past the root, so that a jump of the torques is included
+        t, end = root
+        step = float(np.spacing(max(abs(t), abs(end))))
+        while t < end and margin(t) >= -_ROUNDING:
+            t, step = min(t + step, end), 2.0 * step
+        return Event(t) if event is None or t < event.t else event
 
     def _change(self, t: float, y: Array, event: Event) -> Array:
         """State after an event, which changes the mode or ends the simulation."""

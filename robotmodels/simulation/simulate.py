@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_exact, as_floats, as_reals
 from .._choices import chosen
 from ..drive import check_all_or_none
-from ..dynamics import ddm, kinetic_energy, mass_matrix, potential_energy
-from ..errors import InertiaError, InvalidValueError, ShapeError
+from ..dynamics import ddm, kinetic_energy, potential_energy
+from ..errors import InvalidValueError, ShapeError
 from ..friction import Friction, check_friction
 from ..model import RobotModel, check_model
 from .dry_friction import check_dissipates
@@ -74,8 +74,7 @@ def simulate(
         own velocity.
     smoothing : array_like, scalar or shape (n,), optional
         Velocities w (rad/s or m/s) of a simpler model without events: ``tanh(v / w)`` instead of
-        ``sign(v)``. Joints then creep where they should stick, and narrow widths are stiff (take
-        ``method="Radau"``).
+        ``sign(v)``. Joints creep where they should stick; narrow widths are stiff (use "Radau").
     stop_at_limits : bool
         Whether the simulation ends where a joint reaches a finite limit of its table. Otherwise
         limits are ignored.
@@ -147,7 +146,7 @@ def simulate(
     limits = _limits(model, q) if stop_at_limits else None
     motion = Motion(model, law, tool, drive, friction, width)
     check_dissipates(motion.dry)
-    _check_start(model, q, v, drive, motion.dry.lower.size > 0)
+    _check_start(model, q, v, drive)
     report = _log_progress if progress is True else progress or None
     run = Integration(motion, times, limits, integrator, tolerances, budget, report)
     with np.errstate(over="ignore", invalid="ignore"):  # an unbounded motion is a status
@@ -244,7 +243,7 @@ def _limits(model: RobotModel, q: Array) -> tuple[Array, Array]:
     return lower, upper
 
 
-def _check_start(model: RobotModel, q: Array, v: Array, drive: bool, dry: bool) -> None:
+def _check_start(model: RobotModel, q: Array, v: Array, drive: bool) -> None:
     """Raise for a start without unique finite accelerations."""
     with np.errstate(over="ignore", invalid="ignore"):
         # its errors name joints without inertia, unphysical links and singular couplings
@@ -259,10 +258,4 @@ def _check_start(model: RobotModel, q: Array, v: Array, drive: bool, dry: bool) 
         raise InvalidValueError(
             f"v0: the accelerations or the energy of velocities up to {np.abs(v).max():.3g} are "
             "not finite; start slower."
-        )
-    if dry and not np.linalg.eigvalsh(mass_matrix(model, q, drive))[0] > 0.0:
-        raise InertiaError(
-            f"the mass matrix of {model.name!r} is not positive definite at q0, so that it is not "
-            "defined which joints dry friction holds. Repair the inertial parameters "
-            "(InertialParameters.consistency()), or give smoothing=."
         )
