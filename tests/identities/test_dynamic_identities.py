@@ -11,7 +11,6 @@ from identities.random_robots import (
     random_drive,
     random_parameters,
     random_pose,
-    random_rotation,
     random_state,
     seeds,
 )
@@ -235,17 +234,6 @@ def test_the_order_of_the_rows_changes_no_physics(model, seed):
 
 
 @given(model=any_models(), seed=seeds)
-def test_coriolis_torque_is_the_bias_without_gravity(model, seed):
-    q, v, _ = random_state(model, np.random.default_rng(seed), 2)
-    weightless = model.with_gravity([0.0, 0.0, 0.0])
-    bias = rm.idm(weightless, q, v, 0 * v, drive=False)
-    C = rm.coriolis_matrix(model, q, v)
-    close(np.einsum("kij,kj->ki", C, v), bias)
-    close(rm.idm(model, q, v, 0 * v, drive=False) - rm.gravity_torque(model, q), bias)
-    close(rm.coriolis_matrix(model, q[0], v[0]) @ v[0], bias[0])
-
-
-@given(model=any_models(), seed=seeds)
 def test_mass_matrix_rate_less_twice_coriolis_is_skew(model, seed):
     q, v, _ = random_state(model, np.random.default_rng(seed))
     rate = derivative(lambda t: rm.mass_matrix(model, q + np.outer(t, v)), rate_of(v))
@@ -315,17 +303,6 @@ def test_drives_store_energy_in_rotors_and_dissipate_the_rest(model, seed):
     close(friction, expected, 1e-9 * max(1.0, abs(power) / expected))
 
 
-@given(model=models(drive=True, transmission=True), seed=seeds)
-def test_friction_stops_with_the_motion(model, seed):
-    """No Coulomb torque at rest, and friction turns with the velocity."""
-    q, v, _ = random_state(model, np.random.default_rng(seed))
-    rest = rm.idm(model, q, 0 * v, 0 * v)
-    close(rest, rm.gravity_torque(model, q) + model.drive.offset)
-    bias = [rm.idm(model, q, s * v, 0 * v) - rm.idm(model, q, s * v, 0 * v, drive=False)
-            - model.drive.offset for s in (1, -1)]  # fmt: skip
-    close(bias[0], -bias[1])
-
-
 @given(model=any_models(tip="any"), seed=seeds)
 def test_virtual_work_of_the_wrench(model, seed):
     rng = np.random.default_rng(seed)
@@ -362,16 +339,6 @@ def test_gravity_torque_is_the_slope_of_the_potential(model, seed):
 
 
 @given(model=any_models(), seed=seeds)
-def test_gravity_of_any_direction_adds_up(model, seed):
-    rng = np.random.default_rng(seed)
-    q, _, _ = random_state(model, rng)
-    first, second = rng.normal(size=(2, 3))
-    parts = [rm.gravity_torque(model.with_gravity(g), q) for g in (first, second)]
-    close(rm.gravity_torque(model.with_gravity(first + second), q), sum(parts))
-    assert not rm.gravity_torque(model.with_gravity([0, 0, 0]), q).any()
-
-
-@given(model=any_models(), seed=seeds)
 def test_turning_the_whole_world_changes_no_torque(model, seed):
     """Base, gravity and wrench turned together; where the base stands never matters."""
     rng = np.random.default_rng(seed)
@@ -389,35 +356,6 @@ def test_turning_the_whole_world_changes_no_torque(model, seed):
     close(rm.kinetic_energy(turned, q, v), rm.kinetic_energy(model, q, v))
     shifted = model.with_base(model.base + np.pad(rng.normal(size=(3, 1)), ((0, 1), (3, 0))))
     close(rm.idm(shifted, q, v, a, w), rm.idm(model, q, v, a, w))
-
-
-@given(model=models(), seed=seeds)
-def test_a_falling_base_feels_no_weight(model, seed):
-    """A robot on a vertical slide that falls freely: Newton's and Einstein's elevator."""
-    rng = np.random.default_rng(seed)
-    q, v, a = random_state(model, rng)
-    table, Z = model.table, random_rotation(rng)
-    # row 1 slides along z of the base, along which gravity is turned
-    lift = rm.DHTable(
-        antecedent=np.r_[0, table.antecedent + 1],
-        sigma=np.r_[1, table.sigma],
-        **{
-            key: np.r_[0.0, getattr(table, key)]
-            for key in ("gamma", "b", "beta", "alpha", "d", "theta", "r")
-        },
-    )
-    base = np.eye(4)
-    base[:3, :3] = Z
-    falling = rm.RobotModel.from_table(
-        lift,
-        rm.InertialParameters(np.vstack([np.zeros(10), model.inertia.values])),
-        base=base,
-        gravity=-9.81 * Z[:, 2],
-    )
-    tau = rm.idm(falling, np.r_[0.3, q], np.r_[2.0, v], np.r_[-9.81, a])
-    floating = model.with_base(base).with_gravity([0, 0, 0]).with_drive(None)
-    floating = floating.with_transmission(None)
-    close(tau[1:], rm.idm(floating, q, v, a))
 
 
 # --- units -----------------------------------------------------------------------------------

@@ -10,7 +10,6 @@ from identities.random_robots import (
     any_models,
     close,
     models,
-    random_parameters,
     random_state,
     seeds,
 )
@@ -264,19 +263,6 @@ def test_each_column_is_the_torque_of_one_parameter(model, seed):
             close(W[:, column], rm.idm(idle.with_transmission(unit), q, v, a))
             column += 1
     assert column == W.shape[-1]
-
-
-@given(model=any_models(), seed=seeds)
-def test_the_regressor_knows_no_parameters(model, seed):
-    rng = np.random.default_rng(seed)
-    q, v, a = random_state(model, rng, 2)
-    other = model.with_inertia(random_parameters(rng, model.f)).with_drive(None)
-    np.testing.assert_array_equal(
-        rm.torque_regressor(other, q, v, a), rm.torque_regressor(model, q, v, a)
-    )
-    np.testing.assert_array_equal(
-        rm.energy_regressor(other, q, v), rm.energy_regressor(model, q, v)
-    )
 
 
 @given(model=any_models(), seed=seeds, drive=st.booleans())
