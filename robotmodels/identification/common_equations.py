@@ -88,16 +88,12 @@ class CommonEquations:
 def residual_noise(factors: TriangularFactors) -> Array:
     """Standard deviation of the residuals of each kind, from its equations alone, shape (m,)."""
     noise = np.ones(len(factors.factors))
-    for m, F in enumerate(factors.factors):
-        size = float(np.linalg.norm(F[:, -1]))
-        count = max(int(factors.counts[m]), 1)
-        if not size > 0.0:
-            continue
-        U, s, _ = np.linalg.svd(F[:, :-1] / column_lengths(F[:, :-1]), full_matrices=False)
-        U = U[:, s > 1e-12 * s.max(initial=0.0)]
-        rest = float(np.linalg.norm(F[:, -1] - U @ (U.T @ F[:, -1])))
-        left = max(count - U.shape[1], 1)
-        noise[m] = max(rest / np.sqrt(left), _ROUNDING * size / np.sqrt(count))
+    for m, (F, rows) in enumerate(zip(factors.factors, factors.counts.tolist(), strict=True)):
+        if (size := float(np.linalg.norm(F[:, -1]))) > 0.0:
+            A = F[:, :-1] / column_lengths(F[:, :-1])
+            x, _, rank, _ = np.linalg.lstsq(A, F[:, -1], rcond=1e-12)
+            rest = float(np.linalg.norm(F[:, -1] - A @ x)) / np.sqrt(max(rows - rank, 1))
+            noise[m] = max(rest, _ROUNDING * size / np.sqrt(max(rows, 1)))
     return noise
 
 
