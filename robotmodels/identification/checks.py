@@ -30,7 +30,7 @@ from .delay import (
     representative_part,
     synchronisation,
 )
-from .joint_hypotheses import better_hypotheses
+from .joint_hypotheses import ADVICE, better_hypotheses
 
 
 def accepted_log(
@@ -118,7 +118,7 @@ def _signs_and_order(
         if not likely:
             return
         best, correction = likely[0], likely[0].correction
-        words, advice = correction.words, correction.advice
+        words, advice = correction.words, ADVICE[correction.kind]
         if len(likely) > 1:
             alike = "; ".join(other.correction.words for other in likely[1:])
             advice = f"{advice} Equally likely: {alike}."
