@@ -1035,11 +1035,10 @@ MUTATIONS = [
         ("tests/test_identification_closed_loop_noise.py -k"
          " the_test_names_parameters_whose_bias_matters_and_no_others"), True),
     Mutation("identification: synchronisation", "torques are moved the other way",
-        "class _JointEquations:", "self.rows[:, None] + delays",
-        "self.rows[:, None] - delays",
+        "def _shifted_residuals(", "used[:, None] + delays", "used[:, None] - delays",
         "tests/test_logs_synchronisation.py -k a_delay_that_is_removed_is_not_found_again", True),
     Mutation("identification: checks", "torques in mN m are of motors",
-        "def _torque_sizes(", "gains[j] / 1e3", "gains[j] * 1e3",
+        "def _torque_sizes(", "gains[name] / 1e3", "gains[name] * 1e3",
         "tests/test_identification_checks.py -k torques_beside_the_models_own_inertia", True),
     Mutation("identification: residuals", "kurtosis without what is normal",
         "def residual_diagnostics(", "/ counts - 3.0", "/ counts",

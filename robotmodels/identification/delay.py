@@ -142,7 +142,7 @@ def synchronisation(
     part = representative_part(log, min(fc, 1.0 / span))
     curves, inflation = np.full((2, log.n, len(delays)), np.nan)
     power = 0.0
-    for j, residuals, freedom, size in _residuals(part, fc, margin, model, delays):
+    for j, residuals, freedom, size in _shifted_residuals(part, fc, margin, model, delays):
         squares = (residuals**2).sum(axis=0)
         variance = max(squares.min() / freedom, 1e-24 * size / len(residuals), 1e-300)
         curves[j], power = squares / variance, power + size / variance
@@ -231,7 +231,7 @@ def motor_speeds(model: RobotModel) -> Array:
     return np.concatenate([np.eye(model.n), model.transmission.weights[motors]])
 
 
-def _residuals(
+def _shifted_residuals(
     log: Log, cutoff: float, margin: int, model: RobotModel, delays: Array
 ) -> Iterator[tuple[int, Array, int, float]]:
     """Joints with enough samples in motion: number, residuals (rows, S) of the shifted torques.
