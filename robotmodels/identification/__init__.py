@@ -7,25 +7,20 @@ from ..estimation.covariance import correlated_covariance
 from ..logs import Log, check_log, read_log
 from ..minimal_parameters import CenterOfMassBox
 from .closed_loop import (
-    ClosedLoop,
     Controller,
     Didim,
     Instrumental,
     OutputError,
     hausman_test,
     simulated_log,
+    tuned_controller,
 )
 from .comparison import compare_methods
 from .consistent import consistent_robot
 from .delay import synchronisation
 from .drive_gains import identify_drive_gains
 from .equations import equations
-from .excitation import (
-    ExcitingTrajectory,
-    WorkspaceBox,
-    exciting_trajectory,
-    write_trajectory,
-)
+from .excitation import ExcitingTrajectory, exciting_trajectory, write_trajectory
 from .fit import fit
 from .friction import fit_friction
 from .methods.linear import Irls, Ols, Ridge, Total, Wls
@@ -43,7 +38,6 @@ from .validation import Errors, Validation
 
 __all__ = [
     "CenterOfMassBox",
-    "ClosedLoop",
     "Controller",
     "Didim",
     "Errors",
@@ -64,7 +58,6 @@ __all__ = [
     "Total",
     "Validation",
     "Wls",
-    "WorkspaceBox",
     "check_log",
     "choose_processing",
     "compare_methods",
@@ -83,6 +76,7 @@ __all__ = [
     "report",
     "simulated_log",
     "synchronisation",
+    "tuned_controller",
     "validate",
     "write_result",
     "write_trajectory",

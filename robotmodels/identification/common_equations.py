@@ -13,14 +13,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import Array, Rebuilt, read_only
-from .._outcomes import Outcome
-from ..errors import InvalidValueError, nearest_names
+from .._arrays import Array
+from ..errors import InvalidValueError
+from ..estimation.estimate import NamedValues
 from ..estimation.factor import TriangularFactors, reduced
+from ..estimation.linear import residual_noise as residual_noise
 from ..logs import Log
 from ..logs.log import check_is_log
 from ..minimal_parameters import BaseParameters
-from ..regressors.columns import plain_name
 from ..table_text import boxed
 from .equations import Block, Equations, equations
 from .forms import RowForm, torque_block
@@ -29,8 +29,6 @@ from .signals import Piece, Processing
 
 UNIDENTIFIABLE = 1e-7
 """Rank tolerance: residual column norm relative to the largest."""
-_ROUNDING = 1e-8
-"""Smallest standard deviation of residuals, relative to the measured side."""
 
 
 def equations_of(
@@ -85,55 +83,16 @@ class CommonEquations:
         return block if M is None else replace(block, W=block.W @ M)
 
 
-def residual_noise(factors: TriangularFactors) -> Array:
-    """Standard deviation of the residuals of each kind, from its equations alone, shape (m,)."""
-    noise = np.ones(len(factors.factors))
-    for m, (F, rows) in enumerate(zip(factors.factors, factors.counts.tolist(), strict=True)):
-        if (size := float(np.linalg.norm(F[:, -1]))) > 0.0:
-            A = F[:, :-1] / column_lengths(F[:, :-1])
-            x, _, rank, _ = np.linalg.lstsq(A, F[:, -1], rcond=1e-12)
-            rest = float(np.linalg.norm(F[:, -1] - A @ x)) / np.sqrt(max(rows - rank, 1))
-            noise[m] = max(rest, _ROUNDING * size / np.sqrt(max(rows, 1)))
-    return noise
-
-
 def column_lengths(R: Array) -> Array:
     """Lengths of columns, 1 for those that are zero."""
     lengths = np.linalg.norm(R, axis=0)
     return np.where(lengths > 0.0, lengths, 1.0)
 
 
-class NamedEstimate(Rebuilt):
-    """Base of results with names, values, covariance and status; read-only."""
+class NamedEstimate(NamedValues):
+    """Base of results with names, values, covariance and status that print as a table."""
 
     __slots__ = ()
-    names: tuple[str, ...]
-    values: Array
-    covariance: Array
-    status: Outcome
-
-    def __post_init__(self) -> None:
-        for name in self.__slots__:
-            value = getattr(self, name)
-            if isinstance(value, np.ndarray):
-                object.__setattr__(self, name, read_only(value))
-
-    @property
-    def standard_errors(self) -> Array:
-        """Standard errors of the values, corrected for correlated residuals."""
-        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
-
-    def value(self, name: str) -> float:
-        """Value of one parameter, SI units."""
-        return float(self.values[self._place(name)])
-
-    def standard_error(self, name: str) -> float:
-        """Standard error of one parameter, SI units."""
-        return float(self.standard_errors[self._place(name)])
-
-    def reason(self) -> str:
-        """The status as a sentence."""
-        return self.status.sentence
 
     def __str__(self) -> str:
         if not np.isfinite(self.values).all():
@@ -144,10 +103,3 @@ class NamedEstimate(Rebuilt):
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {len(self.names)} parameters, {self.status.name}>"
-
-    def _place(self, name: str) -> int:
-        name = plain_name(name, self.names)
-        if name not in self.names:
-            near = ", ".join(nearest_names(name, self.names)) or "none"
-            raise InvalidValueError(f"name: {name!r} was not identified; near it: {near}.")
-        return self.names.index(name)

@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 
 from ..errors import InvalidValueError
-from ..estimation.factor import TriangularFactors, factors_of, merged, merged_tree
+from ..estimation.factor import TriangularFactors, factors_of, merged, merged_all
 from .equations import Equations
 from .signals import Piece, slice_with_margin
 
@@ -82,10 +82,7 @@ def reduce_equations(
         if progress is not None and fraction < 1.0:
             progress(1.0)
 
-    factors = merged_tree(leaves(), merged)
-    if factors is None:
-        raise InvalidValueError("system: expected the equations of at least one log, got none.")
-    return factors
+    return merged_all(leaves())
 
 
 _Task = tuple[Callable[[], TriangularFactors], float]
