@@ -7,12 +7,12 @@ correlated series).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import Array, Rebuilt, read_only
+from .._arrays import Array, Frozen
 from .equations import Equations
 
 _LAGS = 40
@@ -23,7 +23,7 @@ _FEW = 20
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ResidualDiagnostics(Rebuilt):
+class ResidualDiagnostics(Frozen):
     """Statistics of the residuals of m groups of equations over L lags. Read-only.
 
     Shapes: counts, mean, std, skewness, kurtosis (less 3 of a normal distribution) (m,);
@@ -39,11 +39,6 @@ class ResidualDiagnostics(Rebuilt):
     kurtosis: Array
     white_p: Array
     normal_p: Array
-
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            kind = np.int64 if field.name == "counts" else float
-            object.__setattr__(self, field.name, read_only(getattr(self, field.name), kind))
 
     @property
     def lags(self) -> int:
