@@ -34,13 +34,19 @@ from .joint_hypotheses import ADVICE, better_hypotheses
 
 
 def accepted_log(
-    log: Log, model: RobotModel, name: str, friction: Friction | None = None
+    log: Log, model: RobotModel, name: str, friction: Friction | None = None, joints: bool = True
 ) -> tuple[Log, tuple[str, ...]]:
     """Check and clean a log, with sentences on the findings; raise if it is unusable."""
-    log, findings = _cleaned(log, model)
-    if not any(finding.severity is Severity.USELESS for finding in findings):
+    findings = check_log(log, model)
+    if any(finding.kind in (FindingKind.STUCK, FindingKind.SPIKES) for finding in findings):
+        log = cleaned(log)
+    if joints and not any(finding.severity is Severity.USELESS for finding in findings):
         findings = (*findings, *check_joints(log, model, friction))
-    return log, _sentences(findings, name)
+    useless = [str(finding) for finding in findings if finding.severity is Severity.USELESS]
+    if useless:
+        advice = "(checked=False uses the log unchanged.)"
+        raise InvalidValueError(f"{name}: {' '.join(useless)} {advice}")
+    return log, tuple(map(str, findings))
 
 
 def accepted_test(
@@ -63,22 +69,8 @@ def accepted_test(
         )
     if not checked:
         return test, ()
-    test, findings = _cleaned(test, model)
-    return test, tuple(f"Of the held-out log: {each}" for each in _sentences(findings, "test"))
-
-
-def _cleaned(log: Log, model: RobotModel) -> tuple[Log, tuple[LogFinding, ...]]:
-    findings = check_log(log, model)
-    bad = any(finding.kind in (FindingKind.STUCK, FindingKind.SPIKES) for finding in findings)
-    return cleaned(log) if bad else log, findings
-
-
-def _sentences(findings: tuple[LogFinding, ...], name: str) -> tuple[str, ...]:
-    useless = [str(finding) for finding in findings if finding.severity is Severity.USELESS]
-    if useless:
-        advice = "(checked=False uses the log unchanged.)"
-        raise InvalidValueError(f"{name}: {' '.join(useless)} {advice}")
-    return tuple(str(finding) for finding in findings)
+    test, sentences = accepted_log(test, model, "test", joints=False)
+    return test, tuple(f"Of the held-out log: {sentence}" for sentence in sentences)
 
 
 def check_joints(
