@@ -45,16 +45,15 @@ SHORT = 3
 
 
 class EquationForm(Enum):
-    """Quantity that the equations balance."""
+    """Quantity that the equations balance: of each joint (torque, filtered) or of the robot.
+
+    Torque and power need accelerations.
+    """
 
     TORQUE = "torques of the joints"
-    """The inverse dynamic model: one equation for each joint; needs accelerations."""
     FILTERED = "rates of the momenta of the joints"
-    """The momentum form through a low-pass: one for each joint, without accelerations."""
     POWER = "power of all joints together"
-    """One equation at each instant; needs accelerations."""
     ENERGY = "energy of the robot between instants"
-    """One equation for each interval, without accelerations."""
 
     @property
     def by_joint(self) -> bool:

@@ -332,14 +332,11 @@ def _band(f: Array, P: Array, noise: Array) -> tuple[float, float]:
 def checked_processing(given: object, log: Log) -> Processing | dict[str, Any]:
     """Check of a Processing against a log, or of options by name (None where not given)."""
     if isinstance(given, Processing):
-        if abs(given.dt - log.dt) > 1e-6 * log.dt:
+        joints = len(given.dead_band)
+        if joints != log.n or abs(given.dt - log.dt) > 1e-6 * log.dt:
             raise InvalidValueError(
-                f"processing: it was chosen for samples of {given.dt:g} s, the log has "
-                f"{log.dt:g} s; leave out processing= for the default choice."
-            )
-        if len(given.dead_band) != log.n:
-            raise InvalidValueError(
-                f"processing: it was chosen for {len(given.dead_band)} joints, the log has {log.n}."
+                f"processing: it was chosen for {joints} joints and samples of {given.dt:g} s, the "
+                f"log has {log.n} and {log.dt:g} s; leave out processing= for the default choice."
             )
         return given
     if given is not None and (not isinstance(given, Mapping) or set(given) - set(CHOICES)):
