@@ -112,8 +112,8 @@ def _signs_and_order(
         best, correction = likely[0], likely[0].correction
         words, advice = correction.words, ADVICE[correction.kind]
         if len(likely) > 1:
-            alike = "; ".join(other.correction.words for other in likely[1:])
-            advice = f"{advice} Equally likely: {alike}."
+            others = "; ".join(other.correction.words for other in likely[1:])
+            advice = f"{advice} Equally likely: {others}."
         sentence = (
             f"{words[0].upper()}{words[1:]}: with this correction the equations of all joints "
             f"leave {100.0 * best.left:.2g} % of the variance of the affected torques unexplained "

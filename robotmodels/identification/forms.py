@@ -57,7 +57,7 @@ class EquationForm(Enum):
 
     @property
     def by_joint(self) -> bool:
-        """Whether each joint has equations of its own."""
+        """Whether each joint has separate equations."""
         return self in (EquationForm.TORQUE, EquationForm.FILTERED)
 
 
@@ -182,8 +182,8 @@ def energy_block(source: EquationSource, piece: Piece) -> Block:
     of_energy = np.array([name in stored for name in source.names], dtype=bool)
     energies, losses = (np.array(source.names)[k].tolist() for k in (of_energy, ~of_energy))
     options = {"drive": base.drive, "friction": base.friction}
-    lost = power_regressor(base.model, q, v, np.zeros_like(v), columns=losses, **options)
-    power = np.column_stack((lost, (tau * v).sum(axis=1)))
+    dissipated = power_regressor(base.model, q, v, np.zeros_like(v), columns=losses, **options)
+    power = np.column_stack((dissipated, (tau * v).sum(axis=1)))
     count = len(power) - len(_INTEGRAL) + 1
     between = sum(weight * power[k : k + count] for k, weight in enumerate(_INTEGRAL))
     work = np.add.reduceat(dt * between, knots[:-1], axis=0)

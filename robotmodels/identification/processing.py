@@ -118,15 +118,15 @@ def processing_for(
     decimation: int | None = None,
     dead_band: ArrayLike | None = None,
     edges: float | None = None,
-    kinds: int | None = None,
+    groups: int | None = None,
 ) -> Processing:
-    """Choose the processing for a robot; ``kinds`` equations at a time (default one per joint).
+    """Choose the processing for a robot; ``groups`` equations at a time (default one per joint).
 
     The cutoff is the highest that biases no parameter by more than `MOST_BIAS` standard errors,
     the decimation leaves `LEAST_EQUATIONS` equations for each parameter where there are as many.
     """
     motion, noise = motion_of(log)
-    most = max(1, int(equations_per_parameter(base, log, kinds, 1) / LEAST_EQUATIONS))
+    most = max(1, int(equations_per_parameter(base, log, groups, 1) / LEAST_EQUATIONS))
     step = None if decimation is None else _checked_decimation(log, decimation)
     highest = min(max(_HIGHEST, _EQUATIONS_OF_MOTION * motion), _NYQUIST / log.dt)
     lowest = min(_EQUATIONS_OF_MOTION * motion, highest)
@@ -175,10 +175,10 @@ def decimation_for(cutoff: float, dt: float) -> int:
 
 
 def equations_per_parameter(
-    base: BaseParameters, log: Log, kinds: int | None, decimation: int
+    base: BaseParameters, log: Log, groups: int | None, decimation: int
 ) -> float:
-    """Equations for each parameter, ``kinds`` at a time; edges and dead bands not subtracted."""
-    return len(log) * (kinds or log.n) / (decimation * len(base))
+    """Equations for each parameter, ``groups`` at a time; edges and dead bands not subtracted."""
+    return len(log) * (groups or log.n) / (decimation * len(base))
 
 
 def _completed(
