@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -280,13 +280,13 @@ def motion_of(log: Log) -> tuple[float, Array]:
 
     rate, rng = 1.0 / log.dt, np.random.default_rng(0)
     noise = PositionNoise.of(log)
-    bands, powers = [], []
-    if _longest(log) < 8:
+    bands, powers, windows = [], [], _windows(log)
+    if not windows:
         raise InvalidValueError(
             f"log: its longest recording has {_longest(log)} samples, which are too few for a "
             "spectrum."
         )
-    for q in _windows(log):
+    for q in windows:
         both = np.diff(np.concatenate((q, noise.draw(q, log.dt, rng)), axis=1), axis=0) * rate
         f, P = periodogram(both, rate, "hann", axis=0)
         joints = np.array([_band(f[1:], P[1:, j], P[1:, log.n + j]) for j in range(log.n)])
@@ -302,11 +302,11 @@ def motion_of(log: Log) -> tuple[float, Array]:
     return motion if motion > 0.0 else float(np.min(bands)), noise.std
 
 
-def _windows(log: Log) -> Iterator[Array]:
+def _windows(log: Log) -> list[Array]:
     """Positions of a bounded part of a log, recording by recording."""
     length = max(8, int(_SECONDS / log.dt))
     part = stretches(log, length, _WINDOWS * length)
-    return (np.asarray(part.q[rows]) for rows in part.recordings() if rows.stop - rows.start >= 8)
+    return [np.asarray(part.q[rows]) for rows in part.recordings() if rows.stop - rows.start >= 8]
 
 
 def _band(f: Array, P: Array, noise: Array) -> tuple[float, float]:
