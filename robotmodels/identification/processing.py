@@ -90,8 +90,8 @@ def choose_processing(
     >>> t = np.arange(0.0, 20.0, 0.001)[:, None]
     >>> swing = Log(0.001, np.sin(2 * np.pi * t), np.cos(2 * np.pi * t))
     >>> chosen = choose_processing(swing)
-    >>> round(chosen.motion, 1), round(chosen.cutoff), chosen.decimation
-    (1.1, 11, 150)
+    >>> round(chosen.motion, 2), chosen.decimation
+    (1.05, 152)
     """
     motion, noise = motion_of(log)
     if not filtered:
