@@ -4,7 +4,7 @@ import numpy as np
 
 from robotmodels.estimation.factor import TriangularFactors
 from robotmodels.estimation.linear import ordinary
-from robotmodels.identification.closed_loop.instrumental import instrument_step
+from robotmodels.identification.closed_loop.method import instrument_step
 from robotmodels.identification.forms import Block
 
 NAMES = ("a", "b", "c")
@@ -53,7 +53,7 @@ def test_a_step_of_instruments_is_the_instrumental_estimate(rng):
     y = W[:, 0] @ [1.0, -2.0, 3.0] + 0.01 * rng.normal(size=N)
     block = Block(np.arange(N) * 1.0, W, y[:, None], np.ones((N, 1), bool), np.ones((N, 1)))
     start, size = np.array([0.9, -2.1, 3.2]), np.array([1.0, 0.5, 2.0])
-    found = instrument_step(reduction_of((W[:, 0], y)), start, iter([(Z, block)]), size)
+    found = instrument_step(NAMES, start, lambda: [(Z, block)], size)
     z, w = Z[:, 0], W[:, 0]
     np.testing.assert_allclose(found.values, np.linalg.solve(z.T @ w, z.T @ y), rtol=1e-10)
     sigma = np.sqrt(((y - w @ start) ** 2).sum() / (N - 3))

@@ -15,8 +15,8 @@ from ...estimation.estimate import Estimate
 from ...estimation.factor import reduced
 from ...estimation.linear import group_leverage, solved, value_sizes
 from ..equations import Block, Equations
-from .instrumental import instrument_step, paired
-from .method import GivenBlocks
+from .method import GivenBlocks, instrument_step
+from .methods import instrument_pairs
 from .simulation import ClosedLoopSimulator, SimulationDivergedError
 
 _EFFECT = 0.5
@@ -136,17 +136,16 @@ def hausman_test(
         return untested
     simulator = ClosedLoopSimulator(system, loop)
     try:
-        signals = simulator.signals(values)
+        pairs = instrument_pairs(simulator, values)
     except SimulationDivergedError:  # the last step of an estimate that did not converge
         return untested
-    pairs = paired(simulator)
-    factors = reduced(system.names, (block for _, block in pairs(signals)))
-    step = instrument_step(factors, values, pairs(signals), value_sizes(factors))
+    factors = reduced(system.names, (block for _, block in pairs()))
+    step = instrument_step(system.names, values, pairs, value_sizes(factors))
     ls_values, inverse, _ = solved(factors, step.weights)
 
     def residuals() -> Iterator[Block]:
         """Scores of the difference of the estimates and of least squares."""
-        for Z, block in pairs(signals):
+        for Z, block in pairs():
             least = block.W @ inverse
             W = np.concatenate((least - Z @ step.inverse.T, least), axis=2)
             yield replace(block, W=W, y=block.y - block.W @ ls_values)
