@@ -26,12 +26,14 @@ from robotmodels.identification import (
     tuned_controller,
 )
 from robotmodels.identification.closed_loop.loop import closed_loop, friction_rates, robot_of
+from robotmodels.identification.closed_loop.method import instrument_step
 from robotmodels.identification.closed_loop.simulation import (
     ClosedLoopSimulator,
     SimulationDivergedError,
     with_enough_steps,
 )
 from robotmodels.identification.fit import _identifiable
+from robotmodels.identification.forms import Block
 from robotmodels.identification.signals import central_differences
 from robotmodels.inertia import InertialParameters
 
@@ -199,7 +201,7 @@ def test_a_robot_of_base_parameters_has_the_torques_of_the_equations():
     q_ref, v_ref = motion(6, 0.2, 1e-3, 0)
     system = equations(base, Log(1e-3, q_ref, v_ref), choose_processing(Log(1e-3, q_ref, v_ref)))
     twin, a = robot_of(system, base.values(arm)), np.ones((200, 6))
-    assert not (twin.drive.Fc.any() or twin.drive.offset.any() or twin.transmission.Fcm.any())
+    assert not any(x.any() for x in (twin.drive.Fc, twin.drive.offset, twin.transmission.Fcm))
     assert twin.transmission.Iam.any()
     W = rm.torque_regressor(arm, q_ref, v_ref, a, drive=("Ia", "Fv"), columns=base.names)
     assert np.allclose(
@@ -227,6 +229,27 @@ def test_pieces_and_recordings_are_simulated_as_one_run_each(monkeypatch):
 
 
 # --- methods --------------------------------------------------------------------------------------
+
+
+def test_a_step_of_instruments_is_the_instrumental_estimate(rng):
+    """(Z^T W)^-1 Z^T y from any start, with s^2 (Z^T W)^-1 Z^T Z (W^T Z)^-1.
+
+    The instruments differ much from the regressor, so that no product can stand for another.
+    """
+    N = 200
+    W, Z = rng.normal(size=(N, 1, 3)), rng.normal(size=(N, 1, 3))
+    W = 0.3 * W + 0.7 * Z @ rng.normal(size=(3, 3))
+    y = W[:, 0] @ [1.0, -2.0, 3.0] + 0.01 * rng.normal(size=N)
+    block = Block(np.arange(N) * 1.0, W, y[:, None], np.ones((N, 1), bool), np.ones((N, 1)))
+    start, size = np.array([0.9, -2.1, 3.2]), np.array([1.0, 0.5, 2.0])
+    found = instrument_step(("a", "b", "c"), start, lambda: [(Z, block)], size)
+    z, w = Z[:, 0], W[:, 0]
+    np.testing.assert_allclose(found.values, np.linalg.solve(z.T @ w, z.T @ y), rtol=1e-10)
+    sigma = np.sqrt(((y - w @ start) ** 2).sum() / (N - 3))
+    np.testing.assert_allclose(found.sigma, [sigma], rtol=1e-12)
+    back = np.linalg.inv(z.T @ w)
+    expected = sigma * np.sqrt(np.diag(back @ (z.T @ z) @ back.T))
+    np.testing.assert_allclose(found.standard_errors, expected, rtol=1e-9)
 
 
 @pytest.mark.parametrize("kind", KINDS)
