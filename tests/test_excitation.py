@@ -1,10 +1,6 @@
 """Exciting trajectories: gradients, limits, quality beside random motions, and the budget."""
 
 import pickle
-import re
-import subprocess
-import sys
-import time
 
 import numpy as np
 import pytest
@@ -12,9 +8,13 @@ from identities.random_robots import random_model, random_state
 
 import robotmodels as rm
 from robotmodels.errors import FrameNotFoundError, InvalidValueError, ShapeError
-from robotmodels.identification import WorkspaceBox, exciting_trajectory
-from robotmodels.identification.excitation import excitation_limits, search
-from robotmodels.identification.excitation.limits import box_distances, excitation_torques
+from robotmodels.identification import exciting_trajectory
+from robotmodels.identification.excitation import search
+from robotmodels.identification.excitation.limits import (
+    excitation_limits,
+    excitation_torques,
+    origin_distances,
+)
 from robotmodels.identification.excitation.motions import MotionBasis
 from robotmodels.identification.excitation.objective import (
     ExcitationProblem,
@@ -22,15 +22,13 @@ from robotmodels.identification.excitation.objective import (
     log_volume,
     smooth_condition,
 )
-from robotmodels.identification.excitation.result import ExcitationStatus
+from robotmodels.obstacles import Box, Plane, Sphere
 from robotmodels.trajectories import MotionLimits
 
 ROBOTS = {
     "serial": {"f": 4},
     "coupled wrist": {"prismatic": False, "transmission": True, "f": 4},
-    "tree": {"tree": True, "f": 6, "tip": "any"},
-    "fixed frames": {"tree": True, "fixed": True, "f": 6},
-    "one joint": {"f": 1},
+    "tree with fixed frames": {"tree": True, "fixed": True, "f": 6, "tip": "any"},
 }
 
 
@@ -51,11 +49,10 @@ def slope(function, x, direction, step=1e-6):
 
 
 @pytest.mark.parametrize("smooth", [False, True])
-@pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("kind", ROBOTS)
-def test_regressor_of_a_motion_and_its_gradients(kind, seed, smooth):
+def test_regressor_of_a_motion_and_its_gradients(kind, smooth):
     """The rows of each sample depend on that sample alone; any choice of columns."""
-    model, rng = robot(kind, seed), np.random.default_rng(seed)
+    model, rng = robot(kind), np.random.default_rng(1)
     motion = random_state(model, rng, 4)
     names = [str(name) for name in rng.permutation(rm.parameter_names(model))]
     names = names[: max(3, 2 * len(names) // 3)]
@@ -64,7 +61,7 @@ def test_regressor_of_a_motion_and_its_gradients(kind, seed, smooth):
     if not smooth:
         assert np.array_equal(W, rm.torque_regressor(model, *motion, columns=names))
     G = rng.normal(size=W.shape)
-    for k, found in enumerate(regressor.gradients(*motion, G)):
+    for k, gradient in enumerate(regressor.gradients(*motion, G)):
         for j in range(model.n):
 
             def value(x, k=k, j=j):
@@ -74,9 +71,7 @@ def test_regressor_of_a_motion_and_its_gradients(kind, seed, smooth):
 
             expected = slope(value, motion[k][:, j], np.ones(4), 1e-5)
             size = max(1.0, 0.1 * np.abs(G).sum())
-            assert np.allclose(found[:, j], expected, rtol=1e-7, atol=1e-8 * size)
-    empty = np.zeros((0, model.n))
-    assert regressor.gradients(empty, empty, empty, G[:0])[0].shape == (0, model.n)
+            assert np.allclose(gradient[:, j], expected, rtol=1e-7, atol=1e-8 * size)
 
 
 @pytest.mark.parametrize("power", [2.0, 60.0, None])
@@ -106,23 +101,29 @@ def test_smooth_condition_is_an_upper_bound_that_closes():
     assert np.isclose(log_volume(W)[0], -np.linalg.slogdet(W.T @ W)[1] / 16.0)
 
 
-BOXES = (
-    WorkspaceBox([-0.3, -0.3, -np.inf], [0.3, 0.3, 0.4]),
-    WorkspaceBox([-0.2] * 3, [0.4] * 3, (1, 4), inside=False),
+BODIES = Box([-0.2] * 3, [0.4] * 3), Sphere([0.3, 0.0, 0.2], 0.2)
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "criterion"),
+    [
+        ("serial", "fourier", "condition"),
+        ("coupled wrist", "spline", "log_det"),
+        ("tree with fixed frames", "fourier", "condition"),
+    ],
 )
-
-
-@pytest.mark.parametrize("criterion", ["condition", "log_det"])
-@pytest.mark.parametrize("kind", ["fourier", "spline"])
-@pytest.mark.parametrize("name", ["serial", "coupled wrist", "fixed frames"])
 def test_gradient_of_the_search(name, kind, criterion):
     model, rng = robot(name, 8), np.random.default_rng(6)
     base = rm.base_parameters(model, drive=("Ia", "Fv", "Fc"))
     limits = MotionLimits(2.0, 8.0, 80.0, lower=-1.5, upper=2.0).for_joints(model.n)
     torques = np.abs(rm.idm(model, *random_state(model, rng, 200))).mean(axis=0)
     weight, basis = rng.uniform(0.5, 2.0, (model.n, len(base))), MotionBasis(kind, 4.0, 4)
+
+    def distances(q):
+        return origin_distances(model, (1, None), Box([-0.3] * 3, [0.3, 0.3, 9.0]), BODIES, q)
+
     problem = ExcitationProblem(
-        model, basis, base, criterion, limits, torques, BOXES, 40, weight, 0.01
+        model, basis, base, criterion, limits, torques, distances, 40, weight, 0.01
     )
     x = 0.6 * rng.normal(size=problem.units.size)
     value, gradient = problem.value(x, 8.0, 50.0)
@@ -131,32 +132,21 @@ def test_gradient_of_the_search(name, kind, criterion):
         d = rng.normal(size=x.size)
         expected = slope(lambda y: problem.value(y, 8.0, 50.0)[0], x, d, 2e-7)
         assert np.isclose(gradient @ d, expected, rtol=3e-5, atol=1e-5 * np.linalg.norm(gradient))
-    sharp = MotionRegressor(model, rm.parameter_names(model), True)
-    motion = problem.motion(x)[:3]
-    torque = sharp.matrix(*motion) @ rm.parameter_vector(model)
-    assert np.allclose(torque, rm.idm(model, *motion), atol=1e-9 * np.abs(torque).max())
 
 
-@pytest.mark.parametrize("inside", [True, False])
-def test_distances_of_boxes_and_their_gradients(inside):
+def test_distances_of_origins_and_their_gradients():
     model, rng = robot("serial", 11), np.random.default_rng(11)
-    box = WorkspaceBox([-0.3, -0.2, 0.0], [0.2, np.inf, 0.5], [2, model.f], inside=inside)
-    q = rng.uniform(-2.0, 2.0, (300, model.n))
-    values, by_q = box_distances(model, box, q)
-    points = np.stack([rm.dgm(model, q, frame)[:, :3, 3] for frame in box.frames], axis=1)
-    beyond = np.maximum(box.lower - points, points - box.upper)
-    clear = -beyond.max(axis=2)
-    if not inside:
-        far = np.linalg.norm(np.maximum(beyond, 0.0), axis=2)
-        clear = np.where(far > 0.0, far, -clear)
-    assert np.allclose(values.min(axis=1), clear.min(axis=1))
-    assert np.allclose(box.clearance(points), clear)
-    d = rng.normal(size=model.n)
-    expected = slope(lambda x: box_distances(model, box, x)[0], q, d)
+    workspace, ball, frames = Box([-0.3, -0.2, 0.0], [0.2, np.inf, 0.5]), BODIES[1], (2, None)
+    q, d = rng.uniform(-2.0, 2.0, (300, model.n)), rng.normal(size=model.n)
+    values, by_q = origin_distances(model, frames, workspace, [ball], q)
+    points = np.stack([rm.dgm(model, q, frame)[:, :3, 3] for frame in frames], axis=1)
+    assert np.allclose(values[:, :2], np.linalg.norm(points - ball.center, axis=2) - 0.2)
+    beyond = np.maximum(workspace.lower - points, points - workspace.upper)
+    inside = (beyond <= 0.0).all(axis=2)
+    assert np.allclose(values[:, 2:], np.where(inside, -beyond.max(axis=2), values[:, 2:]))
+    assert np.allclose((values[:, 2:] >= 0.0), inside)
+    expected = slope(lambda x: origin_distances(model, frames, workspace, [ball], x)[0], q, d)
     assert np.isclose(by_q @ d, expected, atol=1e-6).mean() > 0.999
-
-
-# --- motions --------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("kind", ["fourier", "spline"])
@@ -171,19 +161,13 @@ def test_motions_are_closed_and_rest_at_their_ends(kind):
     assert np.allclose(trajectory.q(0.0), trajectory.q(3.0))
     still = basis.trajectory(basis.constant(np.array([0.5, -1.0])))
     assert np.allclose(still.q(t), [0.5, -1.0])
-    assert np.abs(still.v(t)).max() < 1e-12
-
-
-def test_fourier_series_may_move_at_the_ends():
-    assert MotionBasis("fourier", 1.0, 1, rest=False).count == 3
-    assert np.abs(quick(harmonics=2, rest=False).trajectory.v(0.0)).max() > 1e-3
 
 
 # --- results --------------------------------------------------------------------------------------
 
 
 def keeps_limits(found):
-    """Every limit on a grid of its own, boxes included."""
+    """Configurations on a fine grid, where every limit is tested."""
     t = np.linspace(0.0, found.basis.duration, 6007)
     q, v, a = (f(t) for f in (found.trajectory.q, found.trajectory.v, found.trajectory.a))
     of, room = found.limits.motion.limits, 1.0 + 1e-9
@@ -208,6 +192,7 @@ def test_rx90_is_excited_far_better_than_by_chance(rx90):
     assert sum(rx90.starts[0].stages) == len(rx90.starts[0].history)
     keeps_limits(rx90)
     assert "joint 1, 2, 3, 4, 5, 6" in rx90.notes[0]
+    assert "The 2 starts ended at condition numbers from" in rx90.notes[-1]
     # its numbers are those of the base regressor
     t = np.arange(500) * 0.02
     motion = [f(t) for f in (rx90.trajectory.q, rx90.trajectory.v, rx90.trajectory.a)]
@@ -222,29 +207,26 @@ def test_results_are_values_and_repeat_with_their_seed(rx90):
     again = pickle.loads(pickle.dumps(rx90))
     assert not again.coefficients.flags.writeable
     assert np.array_equal(again.trajectory.q(1.0), rx90.trajectory.q(1.0))
-    assert again.condition == rx90.condition
     assert "every limit is kept" in str(rx90)
-    assert repr(rx90).startswith("<ExcitingTrajectory of 'rx90': condition number")
-    one, two, other = (quick(harmonics=3, rng=seed).coefficients for seed in (1, 1, 2))
-    assert np.array_equal(one, two)
-    assert not np.array_equal(one, other)
+    first, second, other = (quick(harmonics=3, rng=seed).coefficients for seed in (1, 1, 2))
+    assert np.array_equal(first, second)
+    assert not np.array_equal(first, other)
 
 
-@pytest.mark.parametrize("criterion", ["condition", "log_det"])
-@pytest.mark.parametrize("kind", ["fourier", "spline"])
-def test_tight_torques_and_boxes_are_kept(kind, criterion):
-    boxes = [
-        WorkspaceBox([-np.inf, -np.inf, 0.1], [np.inf] * 3, ("tool", "wrist_3_joint")),
-        WorkspaceBox([0.2, 0.2, -1.0], [2.0, 2.0, 2.0], inside=False),
-    ]
+@pytest.mark.parametrize(("kind", "criterion"), [("fourier", "log_det"), ("spline", "condition")])
+def test_tight_torques_and_distances_are_kept(kind, criterion):
+    bodies = [Plane([0.0, 0.0, 0.1], [0.0, 0.0, 1.0]), Box([0.2, 0.2, -1.0], [2.0, 2.0, 2.0])]
+    workspace, frames = Box([-1.2] * 3, [1.2] * 3), ("tool", "wrist_3_joint")
     torques = np.array([120.0, 130.0, 80.0, 20.0, 20.0, 20.0])
     limits = MotionLimits.of_model(rm.load("ur10e"), acceleration=5.0)
-    options = {"kind": kind, "criterion": criterion, "boxes": boxes, "torque_limits": torques}
-    found = quick("ur10e", limits=limits, rng=3, **options)
+    found = quick(
+        "ur10e", limits=limits, rng=3, kind=kind, criterion=criterion, torque_limits=torques,
+        workspace=workspace, obstacles=bodies, frames=frames,
+    )  # fmt: skip
     q = keeps_limits(found)
     assert np.array_equal(found.limits.torque_limits, torques)
-    for box, clearance in zip(boxes, found.limits.clearance, strict=True):
-        assert box_distances(found.model, box, q)[0].min() >= clearance - 1e-9 >= 0.0
+    distances, _ = origin_distances(found.model, frames, workspace, bodies, q)
+    assert distances.min() >= found.limits.clearance - 1e-9 >= 0.0
     assert found.quality.of(criterion) < min(quality.of(criterion) for quality in found.baseline)
 
 
@@ -271,12 +253,14 @@ def test_weights_count():
     assert plain.condition < weighted.condition
 
 
-def test_what_cannot_be_done_is_a_status_that_names_the_limits():
-    box, torques = WorkspaceBox([-3, -3, 0.6], [3, 3, 0.8]), [330, 0.5, 0.5, 56, 56, 56]
-    found = quick("ur10e", torque_limits=torques, boxes=box, iterations=5)
-    assert found.status is ExcitationStatus.INFEASIBLE
-    assert re.search("joint 2: torque .*, allowed 0.5", " ".join(found.limits.violations()))
-    assert not found.limits.kept
+def test_infeasible_limits_are_a_status_that_names_them():
+    bodies, box = [Sphere([0, 0, 0], 9.0)], Box([-3, -3, 0.6], [3, 3, 0.8])
+    weak = [330, 0.5, 0.5, 56, 56, 56]
+    found = quick("ur10e", torque_limits=weak, workspace=box, obstacles=bodies, iterations=5)
+    assert found.status.name == "INFEASIBLE"
+    broken = " ".join(found.limits.violations())
+    assert "allowed 0.5" in broken
+    assert "workspace" in broken
     assert found.baseline == ()
     assert any("larger torque_limits" in note for note in found.notes)
     assert "limits that are not kept" in str(found)
@@ -319,22 +303,17 @@ def test_missing_limits_are_assumed_and_noted():
         ({"kind": "spline", "rest": False}, InvalidValueError, "rest"),
         ({"points": 4}, InvalidValueError, "harmonics="),
         ({"kind": "bezier"}, InvalidValueError, "'fourier', 'spline'"),
-        ({"criterion": "best"}, InvalidValueError, "'condition', 'log_det'"),
         ({"duration": 0.0}, InvalidValueError, "duration"),
-        ({"duration": None}, InvalidValueError, "duration"),
         ({"samples": 3}, InvalidValueError, "take more"),
         ({"margin": 0.7}, InvalidValueError, "margin"),
-        ({"starts": 0}, InvalidValueError, "starts"),
         ({"iterations": 1.5}, InvalidValueError, "iterations"),
-        ({"sigma": [1.0, 0.0]}, InvalidValueError, "sigma"),
         ({"scale": [1.0]}, ShapeError, "scale"),
         ({"torque_limits": [1.0, 2.0, 3.0]}, ShapeError, "torque_limits"),
         ({"torque_limits": -1.0}, InvalidValueError, "torque_limits"),
         ({"limits": MotionLimits(0.0)}, InvalidValueError, "no range"),
-        ({"limits": MotionLimits([1.0, 1.0, 1.0])}, ShapeError, "limits"),
-        ({"boxes": WorkspaceBox([0] * 3, [1] * 3, "hand")}, FrameNotFoundError, "hand"),
-        ({"boxes": [3]}, InvalidValueError, "WorkspaceBox"),
-        ({"base": "all"}, InvalidValueError, "base"),
+        ({"frames": "hand"}, FrameNotFoundError, "hand"),
+        ({"obstacles": [3]}, InvalidValueError, "obstacles"),
+        ({"workspace": 3}, InvalidValueError, "workspace"),
         ({"base": rm.base_parameters(rm.load("rx90"))}, InvalidValueError, "others"),
         ({"progress": 3}, InvalidValueError, "progress"),
     ],
@@ -344,104 +323,21 @@ def test_mistakes_are_named(options, error, message):
         quick(**options)
 
 
-def test_boxes_are_checked():
-    for lower, upper, error in (
-        ([0.0] * 2, [1.0] * 3, ShapeError),
-        ([0.0] * 3, [1.0, 1.0, 0.0], InvalidValueError),
-        ([-np.inf] * 3, [np.inf] * 3, InvalidValueError),
-    ):
-        with pytest.raises(error):
-            WorkspaceBox(lower, upper)
-
-
-# --- the budget -----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", ["rx90", "panda"])
-def test_the_budget_bounds_the_multiplications_of_any_robot(name, monkeypatch):
-    budget, seen = 7e8, []
+def test_the_budget_bounds_the_multiplications(monkeypatch):
+    budget, works, done = 6e8, [], []
     value = ExcitationProblem.value
 
     def counting(self, *arguments):
-        seen.append(self.work)
+        works.append(self.work)
         return value(self, *arguments)
 
     monkeypatch.setattr(ExcitationProblem, "value", counting)
     monkeypatch.setattr(search, "BUDGET", budget)
-    one = exciting_trajectory(rm.load(name), rng=0)
-    evaluations = len(seen)
-    assert 0.5 * budget < sum(seen) < 1.2 * budget
-    assert len(one.starts) == 1
-    assert len(one.baseline) <= 24
-    assert one.status is ExcitationStatus.LIMIT_OF_ITERATIONS
-    assert any("more iterations (iterations=" in note for note in one.notes)
-    assert any("benefit of more starts cannot be estimated" in note for note in one.notes)
-    assert one.limits.kept
-    assert one.condition < one.baseline_conditions[0]
-    twice = exciting_trajectory(rm.load(name), rng=0, starts=2)
-    assert len(seen) - evaluations == pytest.approx(2 * evaluations, rel=0.25)
-    assert twice.condition <= one.condition
-
-
-def test_iterations_that_are_asked_for_are_made_and_counted(monkeypatch):
-    monkeypatch.setattr(search, "BUDGET", 1e8)
-    done = []
-    found = quick(starts=2, progress=lambda *counts: done.append(counts))
-    assert found.starts[0].stages.tolist() == [20, 20, 20, 20]
-    assert found.status is ExcitationStatus.LIMIT_OF_ITERATIONS
-    assert done == [(k, 8) for k in range(1, 9)]
-
-
-SCRIPT = """
-import hashlib, robotmodels as rm
-from robotmodels.identification import exciting_trajectory
-found = exciting_trajectory(rm.load("rx90"), starts=1, baseline=3, iterations=10, rng=5)
-print(hashlib.sha256(found.coefficients.tobytes()).hexdigest())
-"""
-
-
-def test_the_same_bits_with_any_number_of_threads(monkeypatch):
-    seen = set()
-    for threads in ("1", "2"):
-        monkeypatch.setenv("OPENBLAS_NUM_THREADS", threads)
-        command = [sys.executable, "-c", SCRIPT]
-        seen.add(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
-    assert len(seen) == 1
-
-
-def expected_gain(found):
-    """Percent that the notes expect of twice the starts."""
-    (number,) = re.findall(r"lower the condition number by about (\S+) %", " ".join(found.notes))
-    return float(number)
-
-
-def test_twice_the_starts_bring_about_what_is_expected():
-    rng = np.random.default_rng(0)
-    values = rng.normal(size=(4000, 16))
-    expected = np.mean([search.gain_of_twice(row[:8]) for row in values])
-    assert expected == pytest.approx(np.mean(values[:, :8].min(1) - values.min(1)), rel=0.1)
-    assert search.gain_of_twice(values[0, :1]) == 0.0
-    # two robots, three searches each: what 8 starts found beyond their first 4
-    expected, brought = [], []
-    for name in ("planar_2r", "lab_trr"):
-        for seed in range(3):
-            options = {"harmonics": 3, "baseline": 8, "iterations": 30, "rng": seed}
-            twice = exciting_trajectory(rm.load(name), starts=8, **options)
-            ends = np.log([start.after.condition for start in twice.starts])
-            assert expected_gain(twice) == pytest.approx(100 * search.gain_of_twice(ends), rel=0.06)
-            expected.append(search.gain_of_twice(ends[:4]))
-            brought.append(ends[:4].min() - ends.min())
-    assert 0.25 * np.mean(expected) < np.mean(brought) < 4.0 * np.mean(expected)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("name", "reached"), [("ur10e", 29.2), ("panda", 28.8), ("iiwa14", 37.8)])
-def test_the_default_is_good_within_twenty_seconds(name, reached):
-    start = time.process_time()
-    found = exciting_trajectory(rm.load(name), rng=0)
-    assert time.process_time() - start < 20.0
+    found = exciting_trajectory(rm.load("ur10e"), rng=0, progress=lambda *pair: done.append(pair))
+    assert 0.5 * budget < sum(works) < 1.2 * budget
+    assert done == [(k, 4) for k in range(1, 5)]
+    assert found.status.name == "LIMIT_OF_ITERATIONS"
     assert found.limits.kept
-    assert found.condition < 1.3 * reached
-    assert found.condition < found.baseline_conditions[0]
-    assert len(found.baseline) == 100
-    assert 0.0 < expected_gain(found) < 20.0
+    assert found.condition < min(60.0, found.baseline_conditions[0])
+    # given iterations are made, whatever the budget
+    assert quick(iterations=20).starts[0].stages.tolist() == [20, 20, 20, 20]

@@ -17,7 +17,8 @@ from .progress import progress
 from .source import add_source, robot_of
 
 if TYPE_CHECKING:
-    from ..identification.excitation import ExcitingTrajectory, WorkspaceBox
+    from ..identification.excitation import ExcitingTrajectory
+    from ..obstacles import Box
     from ..trajectories import MotionLimits
 
 _RATE = 1000.0
@@ -128,7 +129,8 @@ def run(arguments: argparse.Namespace) -> int:
             points=arguments.points, kind=arguments.kind, criterion=arguments.criterion,
             drive=tuple(arguments.drive) or False, limits=_limits(arguments, model),
             torque_limits=_each(arguments.torque_limits, n, "--torque-limits"),
-            sigma=_each(arguments.sigma, n, "--sigma"), boxes=_boxes(arguments),
+            sigma=_each(arguments.sigma, n, "--sigma"), workspace=_workspace(arguments),
+            obstacles=_boxes(arguments.keep_out, "--keep-out"),
             starts=arguments.starts, baseline=arguments.random, iterations=arguments.iterations,
             rng=arguments.seed, progress=False if bar is None else bar.steps,
         )  # fmt: skip
@@ -190,21 +192,33 @@ def _each(text: str | None, n: int, option: str) -> Array | None:
     return None if values is None else np.full(n, values)
 
 
-def _boxes(arguments: argparse.Namespace) -> list[WorkspaceBox]:
-    from ..identification.excitation import WorkspaceBox
+def _workspace(arguments: argparse.Namespace) -> Box | None:
+    """Intersection of the boxes of --box."""
+    from ..obstacles import Box
+
+    boxes = _boxes(arguments.box, "--box")
+    if len(boxes) < 2:
+        return boxes[0] if boxes else None
+    lower = np.max([box.lower for box in boxes], axis=0)
+    upper = np.min([box.upper for box in boxes], axis=0)
+    if not (lower < upper).all():
+        raise InvalidValueError("--box: the boxes have no common point.")
+    return Box(lower, upper)
+
+
+def _boxes(given: list[str], option: str) -> list[Box]:
+    from ..obstacles import Box
 
     boxes = []
-    for option, given, inside in (("--box", arguments.box, True),
-                                  ("--keep-out", arguments.keep_out, False)):  # fmt: skip
-        for text in given:
-            try:  # infinity means that there is no face
-                corners = np.array([float(word) for word in text.replace(",", " ").split()])
-            except ValueError:
-                corners = np.array([])
-            if len(corners) != 6:
-                raise InvalidValueError(f"{option}: expected six numbers in m, got {text!r}.")
-            try:
-                boxes.append(WorkspaceBox(corners[:3], corners[3:], inside=inside))
-            except InvalidValueError as error:
-                raise InvalidValueError(f"{option}: {error}") from error
+    for text in given:
+        try:  # infinity means that there is no face
+            corners = np.array([float(word) for word in text.replace(",", " ").split()])
+        except ValueError:
+            corners = np.array([])
+        if len(corners) != 6:
+            raise InvalidValueError(f"{option}: expected six numbers in m, got {text!r}.")
+        try:
+            boxes.append(Box(corners[:3], corners[3:]))
+        except InvalidValueError as error:
+            raise InvalidValueError(f"{option}: {error}") from error
     return boxes

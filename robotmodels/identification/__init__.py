@@ -20,12 +20,7 @@ from .consistent import consistent_robot
 from .delay import synchronisation
 from .drive_gains import identify_drive_gains
 from .equations import equations
-from .excitation import (
-    ExcitingTrajectory,
-    WorkspaceBox,
-    exciting_trajectory,
-    write_trajectory,
-)
+from .excitation import ExcitingTrajectory, exciting_trajectory, write_trajectory
 from .fit import fit
 from .friction import fit_friction
 from .methods.linear import Irls, Ols, Ridge, Total, Wls
@@ -63,7 +58,6 @@ __all__ = [
     "Total",
     "Validation",
     "Wls",
-    "WorkspaceBox",
     "check_log",
     "choose_processing",
     "compare_methods",

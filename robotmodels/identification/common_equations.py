@@ -23,14 +23,12 @@ from ..logs.log import check_is_log
 from ..minimal_parameters import BaseParameters
 from ..table_text import boxed
 from .equations import Block, Equations, equations
-from .forms import RowForm, formed_block
+from .forms import RowForm, torque_block
 from .processing import checked_processing, choose_processing
 from .signals import Piece, Processing
 
 UNIDENTIFIABLE = 1e-7
 """Rank tolerance: residual column norm relative to the largest."""
-
-Task = tuple[Equations, Piece, Array | None, RowForm | None]
 
 
 def equations_of(
@@ -64,28 +62,25 @@ class CommonEquations:
 
     def blocks(self) -> Iterator[Block]:
         """Equations of all logs in the common unknowns, piece by piece."""
-        return (_block(task) for task in self._tasks())
+        return map(self._block, self._pieces())
 
     def reduced(self, executor: Executor | None = None) -> TriangularFactors:
         """Triangular factors of all logs."""
         run = map if executor is None else executor.map
-        return reduced(self.names, run(_block, self._tasks()))
+        return reduced(self.names, run(self._block, self._pieces()))
 
     def columns(self, kept: NDArray[np.int64]) -> CommonEquations:
         """The same equations in some of the unknowns."""
         maps = tuple(None if M is None else M[:, kept] for M in self.maps)
         return replace(self, names=tuple(self.names[k] for k in kept), maps=maps)
 
-    def _tasks(self) -> Iterator[Task]:
-        for system, matrix in zip(self.systems, self.maps, strict=True):
-            for piece in system.pieces():
-                yield system, piece, matrix, self.form
+    def _pieces(self) -> Iterator[tuple[int, Piece]]:
+        return ((k, piece) for k, system in enumerate(self.systems) for piece in system.pieces())
 
-
-def _block(task: Task) -> Block:
-    system, piece, matrix, form = task
-    block = system.block(piece) if form is None else formed_block(system, piece, form)
-    return block if matrix is None else replace(block, W=block.W @ matrix)
+    def _block(self, number: tuple[int, Piece]) -> Block:
+        k, piece = number
+        block, M = torque_block(self.systems[k], piece, self.form), self.maps[k]
+        return block if M is None else replace(block, W=block.W @ M)
 
 
 def column_lengths(R: Array) -> Array:

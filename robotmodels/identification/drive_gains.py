@@ -1,9 +1,7 @@
 """Drive gains: torque per current of each motor, identified with a known load.
 
 Source: M. Gautier and S. Briot, "Global identification of joint drive gains and dynamic parameters
-of robots", ASME J. Dynamic Systems, Measurement and Control 136(5), 2014, section 3; S. Van Huffel
-and J. Vandewalle, "The total least squares problem", SIAM, 1991, sections 3.5 and 3.6 (exact
-columns, scaled columns).
+of robots", ASME J. Dynamic Systems, Measurement and Control 136(5), 2014, section 3.
 """
 
 from __future__ import annotations
@@ -12,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,9 +39,8 @@ from .forms import FormedRows
 from .payload import LoadedLog, common_unknowns
 from .signals import Processing
 
-_ITERATIONS = 30
-_SIGNIFICANT = 5.0
-"""Least gap of the last two singular values, standard deviations of their noise."""
+_SIGNIFICANT = 3.0
+"""Least significant gain, in standard errors."""
 
 
 class GainStatus(Outcome):
@@ -52,8 +49,8 @@ class GainStatus(Outcome):
     SOLVED = 0, "The gains are those that fit all logs best."
     NOT_IDENTIFIABLE = (
         1,
-        "The last two singular values are nearly equal: other gain ratios fit equally well; "
-        "use a motion that excites the joints together.",
+        "Some gains do not differ from zero by three standard errors; use a motion that excites "
+        "the joints together, or longer logs.",
     )
     LOAD_INSIGNIFICANT = (
         2,
@@ -72,8 +69,6 @@ class DriveGains(NamedEstimate):
     covariance: Array
     side: Array
     noise: Array
-    singular_values: Array
-    status: GainStatus
 
     @property
     def gains(self) -> Array:
@@ -86,10 +81,12 @@ class DriveGains(NamedEstimate):
         return self.standard_errors[-len(self.noise) :]
 
     @property
-    def ratio(self) -> float:
-        """Ratio of the last two singular values, both at least at the noise level."""
-        s = np.maximum(self.singular_values, 1.0)
-        return float(s[-2] / s[-1]) if len(s) > 1 else np.inf
+    def status(self) -> GainStatus:
+        """Outcome: whether all gains, some or none differ from zero by three standard errors."""
+        significant = np.abs(self.gains) > _SIGNIFICANT * self.gain_standard_errors
+        if significant.all():
+            return GainStatus.SOLVED
+        return GainStatus.NOT_IDENTIFIABLE if significant.any() else GainStatus.LOAD_INSIGNIFICANT
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -109,7 +106,6 @@ def identify_drive_gains(
     unloaded: Log | Sequence[Log],
     loaded: LoadedLog | Sequence[LoadedLog],
     *,
-    method: Literal["tls", "wls"] = "tls",
     drive: Drives = True,
     friction: Friction | None = None,
     base: BaseParameters | None = None,
@@ -120,7 +116,8 @@ def identify_drive_gains(
 
     The torques of the logs are motor currents times gear ratios. Currents alone fix the gains and
     the parameters up to a common factor, which the known load fixes. The currents of coupled
-    motors are separated by the transmission of the model.
+    motors are separated by the transmission of the model. The estimate is that of maximum
+    likelihood for noise of the currents, to which total least squares is an approximation.
 
     Parameters
     ----------
@@ -130,10 +127,6 @@ def identify_drive_gains(
         Without load; may be empty where loads differ.
     loaded : LoadedLog or sequence of LoadedLog
         With loads whose masses are known at least.
-    method : {"tls", "wls"}
-        Total least squares: the currents are noisy, all other columns exact, and each is scaled by
-        the length of its noise. Weighted least squares, with the known load on the right side, is
-        simpler, and biased by noise.
     drive, friction, base
         As for `fit`.
     processing : Processing, optional
@@ -147,8 +140,7 @@ def identify_drive_gains(
         ``.gains`` and ``.gain_standard_errors``, torque on the joint side per unit of the log;
         ``.applied(log)``, the log with torques; ``.names, .values, .standard_errors, .covariance``
         of the base parameters, of the unknown parameters of loads (``"MX load 1"``) and of the
-        gains (``"gain 1"``); ``.noise`` of the currents and ``.singular_values`` in its units;
-        ``.status``, ``.notes``.
+        gains (``"gain 1"``); ``.noise`` of the currents; ``.status``, ``.notes``.
 
     Raises
     ------
@@ -175,22 +167,17 @@ def identify_drive_gains(
     array([1. , 1.2, 1.4, 1.6, 1.8, 2. ])
     """
     check_model(model)
-    if method not in ("tls", "wls"):
-        raise InvalidValueError(f"method: expected 'tls' or 'wls', got {method!r:.60}.")
     bare = (unloaded,) if isinstance(unloaded, Log) else tuple(unloaded)
     carried = (loaded,) if isinstance(loaded, LoadedLog) else tuple(loaded)
-    if not all(isinstance(each, LoadedLog) for each in carried):
-        raise InvalidValueError("loaded: expected LoadedLog(log, KnownPayload(mass)), or several.")
-    if not carried:
+    if not carried or not all(isinstance(each, LoadedLog) for each in carried):
         raise InvalidValueError(
             "loaded: without a known load the scale of the gains is undetermined; give at least "
             "one LoadedLog(log, KnownPayload(mass))."
         )
-    logs = (*bare, *(each.log for each in carried))
     base = parameters_of(model, base, drive, friction)
     side, n = motor_side(model), model.n
     form = None if np.array_equal(side, np.eye(n)) else partial(_motor_rows, side)
-    systems = equations_of(base, logs, processing)
+    systems = equations_of(base, (*bare, *(each.log for each in carried)), processing)
     loads = [*[None] * len(bare), *(each.payload for each in carried)]
     every = CommonEquations(systems, *common_unknowns(base, loads), form)
     whole = every.reduced(executor)
@@ -198,25 +185,23 @@ def identify_drive_gains(
     basis = column_basis(whole.stacked(1.0 / noise)[0], nothing=UNIDENTIFIABLE)
     kept, last = basis.kept, len(every.names) - 1
     names = [every.names[k] for k in kept if k != last] + [f"gain {m + 1}" for m in range(n)]
-    none = np.full(len(names), np.nan)
-    values, covariance, s = none, np.outer(none, none), none[-n:]
+    values = np.full(len(names), np.nan)
+    covariance = np.outer(values, values)
     # no other column may depend on the known load, the last column
-    solvable = last in kept and np.count_nonzero(basis.coefficients[-1]) == 1
-    if solvable:
+    if last in kept and np.count_nonzero(basis.coefficients[-1]) == 1:
         part = whole.with_names(tuple(every.names[k] for k in kept))
-        solution, inverse, weights, s = _solved(part, noise, method == "tls")
-        solvable = bool(np.isfinite(solution).all())
-        if solvable:
-            linear = _LinearisedEquations(every.columns(kept), solution)
-            spread = correlated_covariance(linear, solution, weights, inverse)
-            values, covariance = solution, spread.covariance
-    result = DriveGains(base, tuple(names), values, covariance, side, noise, s, GainStatus.SOLVED)
-    chance = _SIGNIFICANT * np.sqrt(2.0 / max(float(whole.counts.min()), 1.0))
-    if solvable and result.ratio**2 < 1.0 + chance:
-        return replace(result, status=GainStatus.NOT_IDENTIFIABLE)
-    if not (result.gain_standard_errors < np.abs(result.gains)).any():
-        return replace(result, status=GainStatus.LOAD_INSIGNIFICANT)
-    return result
+        x, inverse = _solved(part, noise)
+        rows = _LinearisedEquations(every.columns(kept), x)
+        spread = correlated_covariance(rows, 0.0 * x, 1.0 / noise, inverse).covariance
+        # gains are the reciprocals of the last unknowns
+        c = len(x) - n
+        with np.errstate(divide="ignore", invalid="ignore"):
+            values = np.append(x[:c], 1.0 / x[c:])
+            slopes = np.append(np.ones(c), values[c:] ** 2)
+            covariance = spread * np.outer(slopes, slopes)
+            covariance[:c, c:] *= -1.0
+            covariance[c:, :c] *= -1.0
+    return DriveGains(base, tuple(names), values, covariance, side, noise)
 
 
 def motor_side(model: RobotModel) -> Array:
@@ -236,68 +221,55 @@ def motor_side(model: RobotModel) -> Array:
 
 def _motor_rows(side: Array, W: Array, tau: Array, v: Array, use: NDArray[np.bool_]) -> FormedRows:
     """Equations of the motors, from the joint equations at the rate of the log."""
-    needed = (side != 0.0).astype(np.int64)
-    rest = (~use).astype(np.int64) @ needed.T
+    rest = (~use).astype(np.int64) @ (side != 0.0).astype(np.int64).T
     return np.einsum("mj,kjb->kmb", side, W), tau @ side.T, rest == 0
 
 
-def _solved(
-    factors: TriangularFactors, noise: Array, total: bool
-) -> tuple[Array, Array, Array, Array]:
-    """Solution of ``E x + known - diag(currents) gains = 0`` by scaled total least squares.
+def _solved(factors: TriangularFactors, noise: Array) -> tuple[Array, Array]:
+    """Least squares of ``currents - u (E x + known)``, u the reciprocal gains.
 
-    Shapes: -> values (c + n,), inverse information, weights (n,), singular values (n,).
+    Shapes: -> x and u (c + n,), inverse information.
     """
-    from scipy.linalg import solve_triangular
+    from scipy.optimize import least_squares
 
     n, c = len(noise), len(factors.names) - 1
-    keep = [*range(c), *range(c + 1, c + 1 + n)]
-    currents = (-F[:, -1:] * np.eye(n)[m] for m, F in enumerate(factors.factors))
-    wide = [np.hstack((F[:, :-1], y)) for F, y in zip(factors.factors, currents, strict=True)]
-    weights, none = 1.0 / noise, np.zeros((c + 1 + n, c + 1 + n))
-    for _ in range(_ITERATIONS):
-        rows = [weight * F for weight, F in zip(weights, wide, strict=True)]
-        R = np.asarray(np.linalg.qr(np.vstack((none, *rows)), mode="r"))
-        scale = weights * noise * np.sqrt(np.maximum(factors.counts, 1))
-        _, s, V = np.linalg.svd(R[c + 1 :, c + 1 :] / scale)
-        if total:
-            g = V[-1] / scale
-            exact = -solve_triangular(R[: c + 1, : c + 1], R[: c + 1, c + 1 :] @ g)
-            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-                values = np.append(exact[:-1], g) / exact[-1]
-        else:
-            size = column_lengths(R[:, keep])
-            values = np.linalg.lstsq(R[:, keep] / size, -R[:, c], rcond=1e-13)[0] / size
-        gains = np.abs(values[c:])
-        if not np.isfinite(gains).all() or not gains.any():
-            break
-        # a motor whose gain vanishes would get all the weight
-        before, weights = weights, 1.0 / (noise * np.maximum(gains, 1e-6 * gains.max()))
-        if np.abs(weights - before).max() <= 1e-9 * weights.max():
-            break
-    R = R[:, keep]
-    size = column_lengths(R)
-    # less the expected squares of the noise of the currents
-    added = np.concatenate((np.zeros(c), scale if total else np.zeros(n))) / size
-    share, vectors = np.linalg.eigh((R / size).T @ (R / size) - np.diag(added**2))
-    inverse = (vectors / np.maximum(share, 1e-14 * share[-1])) @ vectors.T / np.outer(size, size)
-    return values, inverse, weights, s
+    rows = np.vstack([F / sigma for F, sigma in zip(factors.factors, noise, strict=True)])
+    E, known, currents = rows[:, :c], rows[:, c], rows[:, -1]
+    motors = np.repeat(np.eye(n), [len(F) for F in factors.factors], axis=0)
+
+    def residuals(z: Array) -> Array:
+        return currents - (motors @ z[c:]) * (E @ z[:c] + known)
+
+    def slopes(z: Array) -> Array:
+        torque = E @ z[:c] + known
+        return -np.hstack(((motors @ z[c:])[:, None] * E, torque[:, None] * motors))
+
+    # start: least squares of E x + known - currents gains, linear in x and the gains
+    A = np.hstack((E, -currents[:, None] * motors))
+    size = column_lengths(A)
+    start = np.linalg.lstsq(A / size, -known, rcond=1e-13)[0] / size
+    start[c:] = 1.0 / np.where(start[c:] == 0.0, np.inf, start[c:])
+    options: dict[str, Any] = {"jac": slopes, "x_scale": "jac", "xtol": 1e-12, "ftol": 1e-14}
+    solution = least_squares(residuals, start, **options)
+    J = slopes(solution.x)
+    size = column_lengths(J)
+    half = np.linalg.pinv(J / size, rcond=1e-12) / size[:, None]
+    return solution.x, half @ half.T
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _LinearisedEquations:
-    """Equations linearised at a solution, with noise-free currents as columns."""
+    """Equations of the currents, linearised at x and reciprocal gains u, shape (c + n,)."""
 
     system: CommonEquations
     values: Array
 
     def blocks(self) -> Iterator[Block]:
-        """Blocks whose residuals at the solution are gain x current - torque."""
+        """Blocks with the slopes as columns and the residuals as the measured side."""
         c = len(self.system.names) - 1
-        gains = self.values[c:]
+        u = self.values[c:]
         for block in self.system.blocks():
             torque = block.W @ np.append(self.values[:c], 1.0)
-            slopes = -torque / np.where(gains != 0.0, gains, np.inf)
-            W = np.concatenate((block.W[:, :, :c], slopes[:, :, None] * np.eye(len(gains))), axis=2)
-            y = block.y * gains - torque + W @ self.values
-            yield replace(block, W=W, y=y)
+            columns = torque[:, :, None] * np.eye(len(u))
+            W = np.concatenate((u[:, None] * block.W[:, :, :c], columns), axis=2)
+            yield replace(block, W=W, y=block.y - u * torque)

@@ -1,7 +1,7 @@
 """Friction curves that are not linear in their parameters: Stribeck friction, friction by load.
 
-Both are fitted together with the base parameters and drives: least squares by a trust region, on
-triangular factors of the columns and residuals at each point, tests of each joint's curve after.
+Both are fitted together with the base parameters and drives by one nonlinear least-squares fit on
+triangular factors of the columns and residuals at each point; a test of each joint's curve follows.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from ..errors import InvalidValueError
 from ..estimation import column_basis
 from ..estimation.covariance import correlated_covariance
 from ..estimation.factor import TriangularFactors
+from ..estimation.linear import check_count
 from ..friction import LoadFriction, StribeckFriction
 from ..inertia import PARAMETERS
 from ..logs import Log
@@ -44,19 +45,11 @@ _Curve = Callable[[Array, Array, Array, Array], tuple[Array, Array, Array]]
 torque, columns of the curve parameters (k, n, c), torque of the curve (k, n)."""
 _GRID = 16
 """Stribeck velocities that are tried first, for each joint and exponent."""
-_SOLVER: dict[str, Any] = {
-    "x_scale": "jac",
-    "xtol": 1e-9,
-    "ftol": 1e-11,
-    "gtol": None,
-    "max_nfev": 60,
-}
+_SOLVER: dict[str, Any] = {"x_scale": "jac", "xtol": 1e-9, "ftol": 1e-11, "gtol": None}
 _SIGNIFICANT = 1e-3
 """Significance level of a friction curve."""
 _DEPENDENT = 1e-10
 """Rank tolerance: singular value relative to the largest."""
-_LOAD_START = 0.1
-"""Second start of load-dependent friction, relative: its absolute values may have two minima."""
 
 
 class FrictionStatus(Outcome):
@@ -87,7 +80,7 @@ class FrictionFit(NamedEstimate):
 
     @property
     def significant(self) -> NDArray[np.bool_]:
-        """Joints whose curve is significant, shape (n,)."""
+        """Joints whose curve is significant and positive, shape (n,)."""
         return (self.p_value < _SIGNIFICANT) & (self._by_joint(_KINDS[self.curve][0]) > 0.0)
 
     @property
@@ -95,12 +88,10 @@ class FrictionFit(NamedEstimate):
         """The friction of all joints, without Stribeck's curve where it is not significant."""
         if self.curve == "load":
             return LoadFriction(self._by_joint("Fl"))
-        significant = self.significant
         # negative by noise: zero
         Fc, drop, Fv = (np.maximum(self._by_joint(kind), 0.0) for kind in ("Fc", "drop", "Fv"))
-        Fs = Fc + drop
-        vs = np.where(significant, self._by_joint("vs"), 1.0)
-        return StribeckFriction(Fv, Fc, Fs, vs, self.exponent)
+        vs = np.where(self.significant, self._by_joint("vs"), 1.0)
+        return StribeckFriction(Fv, Fc, Fc + drop, vs, self.exponent)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -195,13 +186,8 @@ def fit_friction(
         )
     (system,) = equations_of(base, (log,), processing)
     factors = reduce_equations(system)
+    check_count(factors)
     identifiable = column_basis(factors.stacked()[0], nothing=UNIDENTIFIABLE).kept
-    curves = len(_KINDS[curve]) * model.n
-    if factors.rows <= len(identifiable) + curves:
-        raise InvalidValueError(
-            f"log: {factors.rows} equations are too few for {len(identifiable)} parameters and "
-            f"{curves} of the curves; give a longer log, or a smaller decimation (processing=)."
-        )
     system = system.with_names(tuple(base.names[k] for k in identifiable))
     return _fit_load(system) if curve == "load" else _fit_stribeck(system, powers)
 
@@ -222,9 +208,8 @@ class _Point:
     @property
     def first(self) -> NDArray[np.int64]:
         """Entries of the first curve parameter of each joint, shape (n,)."""
-        return np.linspace(
-            len(self.system.names), len(self.x), self.system.model.n, False, dtype=int
-        )
+        b, n = len(self.system.names), self.system.model.n
+        return np.arange(b, len(self.x), (len(self.x) - b) // n)
 
     def at(self, part: Array) -> _Point:
         """The point with other values of the free parameters."""
@@ -234,12 +219,14 @@ class _Point:
 
     def tangents(self) -> CommonEquations:
         """Columns of the free parameters, and the residuals as the measured side."""
-        b = len(self.system.names)
-        theta, curves = self.x[:b], self.x[b:].reshape(self.system.model.n, -1)
+        b, n = len(self.system.names), self.system.model.n
+        theta, curves = self.x[:b], self.x[b:].reshape(n, -1)
 
         def form(W: Array, tau: Array, v: Array, use: NDArray[np.bool_]) -> FormedRows:
             changed, columns, torque = self.curve(W, v, theta, curves)
-            whole = np.concatenate((changed, _by_joint(columns)), axis=2)
+            by_joint = np.zeros((len(W), n, *curves.shape))
+            by_joint[:, range(n), range(n)] = columns
+            whole = np.concatenate((changed, by_joint.reshape(len(W), n, -1)), axis=2)
             return np.take(whole, self.free, axis=2), tau - W @ theta - torque, use
 
         return CommonEquations((self.system,), tuple(map(str, self.free)), (None,), form)
@@ -250,13 +237,6 @@ class _Point:
         weights = 1.0 / residual_noise(factors) if weights is None else weights
         R, e, rest = factors.stacked(weights)
         return factors, weights, np.vstack((R, 0.0 * R[:1])), np.append(e, np.sqrt(rest))
-
-    def stepped(self, columns: NDArray[np.bool_]) -> _Point:
-        """One Gauss-Newton step of some of the parameters, all of which are free."""
-        _, _, R, e = self.linear()
-        x = self.x.copy()
-        x[columns] += _least_squares(R[:, columns], e)
-        return self.at(x)
 
     def fitted(self) -> tuple[_Point, bool]:
         """Least squares of the free parameters that are independent, with this point's weights."""
@@ -296,8 +276,7 @@ class _Point:
             columns = np.arange(first, first + c)
             if np.isin(columns, self.free).all():
                 k = np.searchsorted(self.free, first)
-                square = x[first] ** 2 / variance[k] if R[:, k].any() else 0.0
-                p_value[j] = chi2.sf(square, c)
+                p_value[j] = chi2.sf(x[first] ** 2 / variance[k], c) if R[:, k].any() else 1.0
             # without a curve its velocity is undetermined
             if c > 1 and (p_value[j] >= _SIGNIFICANT or x[first] <= 0.0):
                 x[first] = 0.0
@@ -316,9 +295,9 @@ def _stribeck(exponent: Array) -> _Curve:
     """Stribeck friction by the drop and vs of each joint."""
 
     def curve(W: Array, v: Array, theta: Array, x: Array) -> tuple[Array, Array, Array]:
-        (drop, vs), (column, ratio) = x.T, _decay(v, x[:, 1], exponent)
-        torque = drop * column
-        return W, np.stack((column, torque * ratio * exponent / vs), axis=2), torque
+        (drop, vs), ratio = x.T, (np.abs(v) / x[:, 1]) ** exponent
+        column = np.exp(-ratio) * np.sign(v)
+        return W, np.stack((column, drop * column * ratio * exponent / vs), axis=2), drop * column
 
     return curve
 
@@ -336,13 +315,6 @@ def _by_load(links: NDArray[np.bool_]) -> _Curve:
     return curve
 
 
-def _decay(v: Array, vs: Array, exponent: Array) -> tuple[Array, Array]:
-    """Stribeck's curve ``exp(-r) sign(v)`` and ``r = |v / vs|^exponent``."""
-    with np.errstate(over="ignore", under="ignore"):
-        ratio = np.minimum((np.abs(v) / vs) ** exponent, 700.0)
-        return np.exp(-ratio) * np.sign(v), ratio
-
-
 def _fit_stribeck(system: Equations, powers: Array) -> FrictionFit:
     """Best Stribeck curve of each joint on a grid of velocities and exponents, then refined."""
     n, b, log = system.model.n, len(system.names), system.log
@@ -355,51 +327,46 @@ def _fit_stribeck(system: Equations, powers: Array) -> FrictionFit:
     c = vs.shape[1]
 
     def all_curves(W: Array, v: Array, theta: Array, x: Array) -> tuple[Array, Array, Array]:
-        return W, _decay(v[:, :, None], vs, exponent)[0], 0.0 * v
+        decay = np.exp(-((np.abs(v)[:, :, None] / vs) ** exponent))
+        return W, decay * np.sign(v)[:, :, None], 0.0 * v
 
     _, _, R, y = _point(system, all_curves, np.zeros((n, c))).linear()
-    best = np.full(n, -1)
-    for j in (*range(n), *range(n)):  # a second time, with the curves of the other joints
-        others = [b + c * i + k for i, k in enumerate(best) if i != j and k >= 0]
-        fixed, tried = R[:, [*range(b), *others]], R[:, b + c * j : b + c * (j + 1)]
-        right = np.column_stack((tried, y))
-        right -= fixed @ _least_squares(fixed, right)
-        gain = (right[:, -1] @ right[:, :-1]) / column_lengths(right[:, :-1])
-        best[j] = int(np.argmax(np.abs(gain)))
-    curves = np.column_stack((np.zeros(n), vs[range(n), best]))
-    point = _point(system, _stribeck(exponent[best]), curves)
-    point.limits[:, b + 1 :: 2] = 0.1 * low, 4.0 * high
-    linear = np.full(len(point.x), True)
-    linear[b + 1 :: 2] = False
-    point, p_value = point.stepped(linear), np.ones(n)
-    start, _ = point.tested(p_value)  # the velocity of a zero curve is undetermined
-    return _search(start, p_value, exponent[best])[1]
+    tried = np.column_stack((R[:, b:], y))
+    tried -= R[:, :b] @ _least_squares(R[:, :b], tried)
+    gain = np.abs(tried[:, -1] @ tried[:, :-1]) / column_lengths(tried[:, :-1])
+    best = gain.reshape(n, c).argmax(axis=1)
+    start = _point(
+        system, _stribeck(exponent[best]), np.column_stack((0.0 * high, vs[range(n), best]))
+    )
+    columns = [*range(b), *(b + c * np.arange(n) + best)]
+    start.x[[*range(b), *start.first]] = _least_squares(R[:, columns], y)
+    start.limits[:, b + 1 :: 2] = 0.1 * low, 4.0 * high
+    p_value = np.ones(n)
+    start, _ = start.tested(p_value)  # a curve of zero has no velocity
+    return _refined(start, p_value, exponent[best])
 
 
 def _fit_load(system: Equations) -> FrictionFit:
-    """Better fit of two starts: without and with load-dependent friction."""
+    """Load-dependent friction, from the fit without it."""
     n, b = system.model.n, len(system.names)
     links = np.array([name.rstrip("0123456789") in PARAMETERS for name in system.names])
-    linear = np.arange(b + n) < b
-    point = _point(system, _by_load(links), np.zeros((n, 1))).stepped(linear)
-    other = point.at(np.where(linear, point.x, _LOAD_START))
-    for _ in range(3):  # the other parameters are adapted first
-        other = other.stepped(linear)
-    starts = (point, other)
-    fits = [_search(start, np.ones(n), np.zeros(0)) for start in starts]
-    return min(fits, key=lambda fit: fit[0])[1]
+    start = _point(system, _by_load(links), np.zeros((n, 1)))
+    _, _, R, y = start.linear()
+    start.x[:b] = _least_squares(R[:, :b], y)
+    return _refined(start, np.ones(n), np.zeros(0))
 
 
-def _search(point: _Point, p_value: Array, exponent: Array) -> tuple[float, FrictionFit]:
-    """Best fit from a start, and minus its log-likelihood."""
-    rounds = 0
+def _refined(point: _Point, p_value: Array, exponent: Array) -> FrictionFit:
+    """Best fit from a start."""
+    before = None
     while True:
-        rounds, (found, converged) = rounds + 1, point.fitted()
+        found, converged = point.fitted()
         # a curve that compensated an error of another joint's curve becomes insignificant
         point, covariance = found.tested(p_value)
-        if len(point.free) == len(found.free) and rounds > 1:
+        if len(point.free) == len(found.free) == before:
             break
-    factors, _, _, _ = point.linear()
+        before = len(point.free)
+    factors = point.linear()[0]
     sigma = np.sqrt(factors.sums(np.zeros(len(point.free))) / np.maximum(factors.counts, 1))
     system, base = point.system, point.system.base
     kinds = _KINDS["stribeck" if exponent.size else "load"]
@@ -408,16 +375,8 @@ def _search(point: _Point, p_value: Array, exponent: Array) -> tuple[float, Fric
     status = FrictionStatus.SOLVED if converged else FrictionStatus.NOT_CONVERGED
     fit = FrictionFit(base, names, values, covariance, p_value, exponent, sigma, status)
     if not fit.significant.any():
-        fit = replace(fit, status=FrictionStatus.INSIGNIFICANT)
-    return float(factors.counts @ np.log(np.maximum(sigma, 1e-150))), fit
-
-
-def _by_joint(columns: Array) -> Array:
-    """Block-diagonal arrangement of columns (k, n, c) as (k, n, n c)."""
-    k, n, c = columns.shape
-    wide = np.zeros((k, n, n, c))
-    wide[:, range(n), range(n)] = columns
-    return wide.reshape(k, n, n * c)
+        return replace(fit, status=FrictionStatus.INSIGNIFICANT)
+    return fit
 
 
 def _least_squares(R: Array, right: Array) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -85,8 +85,7 @@ class KnownPayload(Rebuilt):
             )
         object.__setattr__(self, "mass", mass)
         for name, shape in (("com", (3,)), ("inertia", (3, 3))):
-            value = getattr(self, name)
-            if value is not None:
+            if (value := getattr(self, name)) is not None:
                 object.__setattr__(self, name, read_only(as_exact(value, shape, name)))
         _ = self.parameters  # raises for a tensor that is not symmetric
 
@@ -162,6 +161,12 @@ class PayloadEstimate(NamedEstimate):
         return tuple(name for name in self.names if len(self.regrouping[name]) == 1)
 
     @property
+    def unidentifiable(self) -> tuple[str, ...]:
+        """Parameters without effect on the torques of the logs."""
+        regrouped = {name for terms in self.regrouping.values() for name in terms}
+        return tuple(name for name in PARAMETERS if name not in regrouped)
+
+    @property
     def parameters(self) -> Array:
         """The ten parameters, NaN for those not individually identifiable, shape (10,)."""
         alone = self.identifiable
@@ -182,8 +187,7 @@ class PayloadEstimate(NamedEstimate):
     @property
     def inertia(self) -> Array:
         """Inertia tensor about the centre of mass, kg m^2, shape (3, 3); NaN if not identified."""
-        XX, XY, XZ, YY, YZ, ZZ = self.parameters[:6]
-        c, tensor = self.com, np.array([[XX, XY, XZ], [XY, YY, YZ], [XZ, YZ, ZZ]])
+        c, tensor = self.com, self.parameters[[[0, 1, 2], [1, 3, 4], [2, 4, 5]]]
         return tensor - self.mass * (c @ c * np.eye(3) - np.outer(c, c))
 
     @property
@@ -195,27 +199,20 @@ class PayloadEstimate(NamedEstimate):
                 f"payload: {', '.join(missing)} are not identified; excite them by the motion, "
                 "or give with_payload(...) the parameters that are known."
             )
-        tensor = self.inertia
         model, frame = self.carrier
         try:
-            return with_payload(model, self.mass, self.com, 0.5 * (tensor + tensor.T), frame)
+            return with_payload(model, self.mass, self.com, self.inertia, frame)
         except InertiaError as error:
             raise InertiaError(
                 f"{error} identify_payload(..., consistent=True) avoids it."
             ) from None
 
     @property
-    def unidentifiable(self) -> tuple[str, ...]:
-        """Parameters without effect on the torques of the logs."""
-        regrouped = {name for terms in self.regrouping.values() for name in terms}
-        return tuple(name for name in PARAMETERS if name not in regrouped)
-
-    @property
     def notes(self) -> tuple[str, ...]:
-        """Unidentifiable parameters."""
-        notes = []
-        if self.unidentifiable:
-            notes.append(f"The logs do not excite {', '.join(self.unidentifiable)} of the load.")
+        """Unidentifiable parameters, and a negative mass."""
+        names, notes = ", ".join(self.unidentifiable), []
+        if names:
+            notes.append(f"The logs do not excite {names} of the load.")
         if "M" in self.names and self.value("M") < -_SIGNIFICANT * self.standard_error("M"):
             notes.append(
                 "The mass is negative: the loaded log and the reference may be exchanged, or the "
@@ -315,14 +312,13 @@ def identify_payload(
         base, log = base_parameters(model, drive=True, friction=friction), reference
     systems = equations_of(base, (log, loaded), processing)
     possible = sorted({name.rstrip("0123456789") for name in base.names} - set(PARAMETERS))
-    for kind in changed:
-        if kind not in possible:
-            raise InvalidValueError(
-                f"changed: {kind!r} is no kind of drive or friction parameter that is identified; "
-                f"there are {', '.join(possible) or 'none'}."
-            )
-    names, maps = common_unknowns(base, (None, UnknownPayload(frame)), changed)
-    every = CommonEquations(systems, names, maps)
+    if unknown := set(changed) - set(possible):
+        raise InvalidValueError(
+            f"changed: {', '.join(map(repr, sorted(unknown)))} are no kinds of drive or friction "
+            f"parameters that are identified; there are {', '.join(possible) or 'none'}."
+        )
+    unknowns = common_unknowns(base, (None, UnknownPayload(frame)), changed)
+    every = CommonEquations(systems, *unknowns)
     whole = every.reduced(executor)
     sigma = residual_noise(whole)
     basis = column_basis(whole.stacked(1.0 / sigma)[0], nothing=UNIDENTIFIABLE)
@@ -332,31 +328,25 @@ def identify_payload(
     covariance = correlated_covariance(
         every.columns(basis.kept), values, 1.0 / sigma, inverse
     ).covariance
-    first = names.index("XX load 1")
+    first = whole.names.index("XX load 1")
     r = int((basis.kept < first).sum())
-    values, cost = values[r:], 0.0
-    if consistent:
-        values, cost = _nearest_body(factors, 1.0 / sigma, values, basis.coefficients[r:, first:-1])
-    names = [name.removesuffix(" load 1") for name in names]
+    values, covariance = values[r:], covariance[r:, r:]
+    groups, kept = basis.coefficients[r:, first:-1], [PARAMETERS[k - first] for k in basis.kept[r:]]
     regrouping = {
-        names[k]: {names[t]: float(row[t]) for t in np.flatnonzero(row)}
-        for k, row in zip(basis.kept[r:], basis.coefficients[r:], strict=True)
+        name: {PARAMETERS[t]: float(row[t]) for t in np.flatnonzero(row)}
+        for name, row in zip(kept, groups, strict=True)
     }
-    alone = len(regrouping) == 10 and all(len(terms) == 1 for terms in regrouping.values())
-    status = PayloadStatus.COMPLETE if alone else PayloadStatus.PARTIAL
-    estimate = PayloadEstimate(
-        (model, frame),
-        tuple(regrouping),
-        values,
-        covariance[r:, r:],
-        regrouping,
-        sigma,
-        cost,
-        status,
+    complete = len(kept) == 10 and all(len(terms) == 1 for terms in regrouping.values())
+    status, cost = PayloadStatus.COMPLETE if complete else PayloadStatus.PARTIAL, 0.0
+    if consistent:
+        values, cost = _nearest_body(factors, 1.0 / sigma, values, groups)
+    if np.isnan(cost):
+        status = PayloadStatus.NO_FEASIBLE_BODY
+    elif (np.abs(values) < _SIGNIFICANT * np.sqrt(np.diag(covariance))).all():
+        status = PayloadStatus.INSIGNIFICANT
+    return PayloadEstimate(
+        (model, frame), tuple(kept), values, covariance, regrouping, sigma, cost, status
     )
-    if (np.abs(values) < _SIGNIFICANT * estimate.standard_errors).all():
-        estimate = replace(estimate, status=PayloadStatus.INSIGNIFICANT)
-    return replace(estimate, status=PayloadStatus.NO_FEASIBLE_BODY) if np.isnan(cost) else estimate
 
 
 class UnknownPayload(NamedTuple):

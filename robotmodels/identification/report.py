@@ -252,8 +252,8 @@ def _consistent(robot: StandardParameters) -> ReportSection:
     rows = [(name, number_text(free), number_text(real)) for name, free, real in columns]
     body: list[str | ReportTable] = [
         " ".join((robot.status.sentence, robot.fit.stopped)).strip()
-        + f" Its residuals are {robot.price:.3g} % larger than those of least squares (root of the "
-        f"weighted squares). {robot.optimality}",
+        + f" Its residuals are {robot.residual_increase:.3g} % larger than those of least squares "
+        f"(root of the weighted squares). {robot.optimality}",
         *(f"* {sentence}" for sentence in robot.fit.active),
         table_of(("base", "least squares", "consistent robot"), rows),
     ]

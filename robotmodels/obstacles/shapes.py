@@ -176,7 +176,7 @@ class Box(Rebuilt):
         """Least signed distance, a convex function on the segment, by bisection of its slope."""
         along = end - start
         low, high = np.zeros(along.shape[:-1]), np.ones(along.shape[:-1])
-        for _ in range(_HALVINGS):
+        for _ in range(_HALVINGS if along.any() else 0):
             t = 0.5 * (low + high)
             _, gradient = self.signed(start + t[..., None] * along)
             falls = (gradient * along).sum(axis=-1) < 0.0

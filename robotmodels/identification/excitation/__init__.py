@@ -5,13 +5,6 @@ Seed book section 1.6.2.3.
 
 from .exciting import exciting_trajectory
 from .files import write_trajectory
-from .limits import WorkspaceBox, excitation_limits
 from .result import ExcitingTrajectory
 
-__all__ = [
-    "ExcitingTrajectory",
-    "WorkspaceBox",
-    "excitation_limits",
-    "exciting_trajectory",
-    "write_trajectory",
-]
+__all__ = ["ExcitingTrajectory", "exciting_trajectory", "write_trajectory"]

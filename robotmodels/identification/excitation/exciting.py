@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import Any
 
@@ -15,15 +15,19 @@ from ...drive import Drives
 from ...errors import InvalidValueError, ShapeError
 from ...minimal_parameters import BaseParameters, base_parameters
 from ...model import RobotModel, check_model
+from ...obstacles import Box
+from ...obstacles.clearance import Frame, checked_obstacles
+from ...obstacles.shapes import Obstacle
 from ...trajectories import MotionLimits
 from . import search
-from .limits import WorkspaceBox, box_distances, excitation_limits, excitation_torques
+from .limits import excitation_limits, excitation_torques, origin_distances
 from .motions import KINDS, MotionBasis
-from .objective import CRITERIA, ExcitationProblem
+from .objective import CRITERIA, Distances, ExcitationProblem
 from .result import ExcitationStart, ExcitationStatus, ExcitingTrajectory
 
 _LOG = logging.getLogger(__name__)
-_DENSE = 5  # samples for the final quality, times those of the search
+_DENSE = 5
+"""Samples for the final quality, times those of the search."""
 
 Progress = Callable[[int, int], None]
 
@@ -40,7 +44,9 @@ def exciting_trajectory(
     base: BaseParameters | None = None,
     limits: MotionLimits | None = None,
     torque_limits: ArrayLike | None = None,
-    boxes: WorkspaceBox | Sequence[WorkspaceBox] = (),
+    workspace: Box | None = None,
+    obstacles: Obstacle | Iterable[Obstacle] = (),
+    frames: Sequence[Frame] = (None,),
     sigma: ArrayLike | None = None,
     scale: ArrayLike | None = None,
     samples: int | None = None,
@@ -56,7 +62,7 @@ def exciting_trajectory(
 
     Random motions within the limits are drawn, the best of them are improved by quasi-Newton steps
     with analytic gradients, and the best result is kept. Positions, velocities and accelerations
-    keep their limits everywhere, torques and boxes on a fine grid with an allowance for the
+    keep their limits everywhere, torques and distances on a fine grid with an allowance for the
     extremes between its samples.
 
     Parameters
@@ -79,11 +85,15 @@ def exciting_trajectory(
         Parameters to be identified; default those of the model with ``drive``.
     limits : MotionLimits, optional
         Limits of position, velocity, acceleration and jerk; default the table's. Missing ones are
-        assumed, see `excitation_limits`; ``notes`` names them.
+        assumed, and named in ``notes``.
     torque_limits : array_like, shape () or (n,), optional
         N m or N, for the model's own parameters; default the table's, where the model has masses.
-    boxes : WorkspaceBox or sequence of WorkspaceBox
-        Boxes that frames stay inside or outside.
+    workspace : Box, optional
+        Box in which the origins of ``frames`` stay.
+    obstacles : Sphere, Box, Plane, Capsule, or iterable of these
+        Bodies of `obstacles` outside of which these origins stay, such as a floor.
+    frames : sequence of str, int or None
+        Names or numbers of frames; None is the tool.
     sigma : array_like, shape () or (n,), optional
         Standard deviations of the torques' noise, by which rows are divided; default 1.
     scale : array_like, shape (b,), optional
@@ -96,7 +106,7 @@ def exciting_trajectory(
         Whether velocity and acceleration vanish at the ends of a Fourier series, as of a spline.
     starts, baseline : int, optional
         Numbers of random motions that are improved and drawn; default 8 and 100, fewer for robots
-        whose evaluations exceed the budget. The notes estimate the benefit of twice the starts.
+        whose evaluations exceed the budget.
     iterations : int, optional
         Largest number of iterations of each of the four stages of a start; a stage ends earlier
         where the criterion falls by less than 1 % over 25 of them. Default 200 and a budget of
@@ -118,7 +128,7 @@ def exciting_trajectory(
     ShapeError, InvalidValueError
         Arguments out of range; too few samples for the parameters; friction in ``base``.
     FrameNotFoundError
-        A box for an unknown frame.
+        Unknown ``frames``.
 
     References
     ----------
@@ -157,9 +167,9 @@ def exciting_trajectory(
         raise InvalidValueError(f"margin: expected a part from 0 to below 0.5, got {margin!r:.40}.")
     scale = _sizes(1.0 if scale is None else scale, len(base), "scale")
     weight = scale / _sizes(1.0 if sigma is None else sigma, model.n, "sigma")[:, None]
-    given = _boxes(model, boxes)
+    distances = _distances(model, workspace, obstacles, frames)
     problem = ExcitationProblem(
-        model, basis, base, criterion, bounds, torques, given, samples, weight, float(margin)
+        model, basis, base, criterion, bounds, torques, distances, samples, weight, float(margin)
     )
     count, evaluations, pool = search.shared_budget(problem)
     count = count if starts is None else _whole(starts, "starts")
@@ -176,8 +186,7 @@ def exciting_trajectory(
     kept = [search.limits_kept(problem, basis.trajectory(X)).kept for X in drawn]
     # feasible motions first
     best = sorted(range(len(drawn)), key=lambda k: (not kept[k], before[k].of(criterion)))[:count]
-    done: list[ExcitationStart] = []
-    ends: list[Array] = []
+    ends: list[tuple[ExcitationStart, Array]] = []
     for s, k in enumerate(best):
         X, history, counts, status = search.improved(
             problem, drawn[k], *budget, lambda stage, b=s * stages: report(b + stage, total)
@@ -186,54 +195,38 @@ def exciting_trajectory(
         worse = after.of(criterion) > before[k].of(criterion)
         if kept[k] and (worse or status is ExcitationStatus.INFEASIBLE):  # the start was better
             X, after, status = drawn[k], before[k], ExcitationStatus.LIMIT_OF_ITERATIONS
-        done.append(ExcitationStart(before[k], after, history, counts, status))
-        ends.append(X)
-    first = min(range(len(done)), key=lambda k: done[k].rank(criterion))
-    X, trajectory = ends[first], basis.trajectory(ends[first])
-    extremes = search.limits_kept(problem, trajectory)
+        ends.append((ExcitationStart(before[k], after, history, counts, status), X))
+    _, X = min(ends, key=lambda end: end[0].rank(criterion))
     random = tuple(quality for quality, ok in zip(before, kept, strict=True) if ok)
     if len(random) < len(drawn):
         notes += (
             f"{len(drawn) - len(random)} of {len(drawn)} random motions do not keep the limits and "
             "are left out of the comparison.",
         )
-    notes += (*torque_notes, *_advice(done, criterion))
+    done, trajectory = tuple(start for start, _ in ends), basis.trajectory(X)
+    notes += (*torque_notes, _advice(done, criterion))
+    extremes = search.limits_kept(problem, trajectory)
     return ExcitingTrajectory(
-        trajectory, model, base, criterion, extremes, tuple(done), random, basis, X, notes
+        trajectory, model, base, criterion, extremes, done, random, basis, X, notes
     )
 
 
-def _advice(done: Sequence[ExcitationStart], criterion: str) -> tuple[str, ...]:
-    """Sentences about broken limits, or the benefit of a greater budget by the spread of starts."""
-    kept = [start for start in done if start.status is not ExcitationStatus.INFEASIBLE]
+def _advice(done: Sequence[ExcitationStart], criterion: str) -> str:
+    """Sentence about broken limits, or how far the starts agree."""
+    kept = [start.after for start in done if start.status is not ExcitationStatus.INFEASIBLE]
     if not kept:
         return (
             "Widen the limits that are named as broken, give the motion more time (duration), or "
-            "more starts; a robot that cannot carry its weight needs larger torque_limits.",
+            "more starts; a robot that cannot carry its weight needs larger torque_limits."
         )
-    values = np.array([start.after.of(criterion) for start in kept])
-    best = kept[int(values.argmin())]
-    if criterion == "condition":
-        gain = 100.0 * search.gain_of_twice(np.log(values))
-        benefit = f"lower the condition number by about {gain:.2g} %"
-    else:
-        benefit = f"raise the log det by about {search.gain_of_twice(values):.2g}"
-        values = -values
-    if len(values) == 1:
-        notes = ["With one start the benefit of more starts cannot be estimated; use starts=2."]
-    else:
-        notes = [
-            f"Doubling the number of starts (starts={2 * len(done)}) is expected to {benefit}; the "
-            f"{len(values)} starts ended between {values.min():.4g} and {values.max():.4g}."
-        ]
-    last = best.history[len(best.history) - int(best.stages[-1]) :]
-    if best.status is ExcitationStatus.LIMIT_OF_ITERATIONS and len(last) > 1:
-        fall = 100.0 * (1.0 - np.exp(min(0.0, last[-1] - last[len(last) // 2])))
-        notes.append(
-            f"In the second half of the last stage the criterion still fell by {fall:.2g} %; more "
-            f"iterations (iterations={2 * max(int(best.stages.max()), 1)}) would lower it further."
-        )
-    return tuple(notes)
+    if len(kept) == 1:
+        return "Only one start ended within the limits; more of them (starts=) may end lower."
+    ends = sorted(quality.of(criterion) for quality in kept)
+    name = "condition numbers" if criterion == "condition" else "minus log det"
+    return (
+        f"The {len(ends)} starts ended at {name} from {ends[0]:.4g} to {ends[-1]:.4g}; where they "
+        "differ, more starts (starts=) may end lower."
+    )
 
 
 def _checked_base(model: RobotModel, base: BaseParameters | None, drive: Drives) -> BaseParameters:
@@ -252,14 +245,15 @@ def _checked_base(model: RobotModel, base: BaseParameters | None, drive: Drives)
     return base
 
 
-def _boxes(model: RobotModel, boxes: Any) -> tuple[WorkspaceBox, ...]:
-    """Boxes as a tuple, their frames known to the model."""
-    given = (boxes,) if isinstance(boxes, WorkspaceBox) else tuple(boxes)
-    for box in given:
-        if not isinstance(box, WorkspaceBox):
-            raise InvalidValueError(f"boxes: expected WorkspaceBox, got {type(box).__name__}.")
-        box_distances(model, box, np.zeros((1, model.n)))
-    return given
+def _distances(model: RobotModel, workspace: Any, obstacles: Any, frames: Any) -> Distances | None:
+    """Distances that must not be negative as a function of q (N, n), None without any."""
+    bodies = checked_obstacles(obstacles)
+    if not isinstance(workspace, Box | None):
+        raise InvalidValueError(f"workspace: expected Box, got {workspace!r:.60}.")
+    frames = (frames,) if isinstance(frames, str | int | None) else tuple(frames)
+    distances = partial(origin_distances, model, frames, workspace, bodies)
+    distances(np.zeros((1, model.n)))  # raises for unknown frames
+    return distances if frames and (workspace is not None or bodies) else None
 
 
 def _word(value: Any, words: Any, name: str) -> str:
@@ -283,23 +277,17 @@ def _sizes(value: ArrayLike, n: int, name: str) -> Array:
 
 def _whole(value: Any, name: str) -> int:
     """A whole number from 1."""
-    try:
-        number = int(value)
-    except (TypeError, ValueError, OverflowError):
-        number = 0
-    if isinstance(value, bool) or number < 1 or number != value:
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
         raise InvalidValueError(f"{name}: expected a whole number from 1, got {value!r:.60}.")
-    return number
+    return int(value)
 
 
 def _progress(progress: Any) -> Callable[[int, int], Any]:
     """A function of (done, total)."""
     if callable(progress):
         return progress
-    if progress is True:
-        return partial(_LOG.info, "%d of %d stages are done")
-    if progress:
+    if progress not in (True, False, None):
         raise InvalidValueError(
             f"progress: expected a flag or a function of (done, total), got {progress!r:.60}."
         )
-    return lambda done, total: None
+    return partial(_LOG.log, logging.INFO if progress else logging.DEBUG, "%d of %d stages done")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -76,18 +77,18 @@ def write_trajectory(
             path.write_text(text + "\n", encoding="utf-8")
             return
         table, motion = trajectory.model.table, trajectory.trajectory
-        names = table.joint_names if names is None else names
+        names = names or table.joint_names
         turns = (table.sigma[table.joint_rows] == REVOLUTE).tolist() if turns is None else turns
-    elif ending == ".json":
-        raise InvalidValueError(f"{path.name}: .json is for exciting trajectories; take .csv.")
     else:
         motion = trajectory
+        if ending == ".json":
+            raise InvalidValueError(f"{path.name}: .json is for exciting trajectories; take .csv.")
     hertz = as_floats(rate, "rate")
     if hertz.ndim or hertz <= 0.0:
         raise InvalidValueError(f"rate: expected a positive number of hertz, got {rate!r:.40}.")
     n = motion.n
-    names = [f"joint_{j + 1}" for j in range(n)] if names is None else [str(x) for x in names]
-    turns = [True] * n if turns is None else [bool(x) for x in turns]
+    names = names or [f"joint_{j + 1}" for j in range(n)]
+    turns = [True] * n if turns is None else turns
     if len(names) != n or len(turns) != n:
         raise ShapeError(
             f"names, turns: expected one for each of {n} joints, got {len(names)} and {len(turns)}."
@@ -111,69 +112,57 @@ def write_trajectory(
         for letter, per in (("q", ""), ("v", "/s"), ("a", "/s^2"))
         for name, unit in zip(names, units, strict=True)
     ]
-    rows = np.column_stack((t, q, v, a))
-    first = ",".join(header)
+    rows, first = np.column_stack((t, q, v, a)), ",".join(header)
     np.savetxt(path, rows, "%.12g", ",", header=first, comments="", encoding="utf-8")
 
 
 def excitation_data(result: ExcitingTrajectory) -> dict[str, Any]:
     """The result in plain numbers and texts."""
-    limits, basis = result.limits, result.basis
-    of = limits.motion.limits
-    generator, arguments = basis.arguments(result.coefficients)
+    limits, of = result.limits, result.limits.motion.limits
+    generator, arguments = result.basis.arguments(result.coefficients)
     data = {
         "robot": result.model.name,
-        "status": result.status.name.lower(),
+        "status": result.status,
         "sentence": result.status.sentence,
         "criterion": result.criterion,
-        "condition": result.condition,
-        "scaled_condition": result.scaled_condition,
-        "weighted_condition": result.quality.weighted_condition,
-        "log_det": result.log_det,
-        "base_parameters": list(result.base.names),
+        **asdict(result.quality),
+        "base_parameters": result.base.names,
         "starts": [
             {
                 "before": start.before.condition,
                 "after": start.after.condition,
-                "iterations": int(start.stages.sum()),
-                "status": start.status.name.lower(),
+                "iterations": start.stages.sum(),
+                "status": start.status,
             }
             for start in result.starts
         ],
         "random_conditions": result.baseline_conditions,
         "limits": {
             "kept": limits.kept,
-            "violations": list(limits.violations()),
-            "position": np.stack((of.lower, of.upper)),
-            "velocity": np.stack((of.velocity_lower, of.velocity)),
-            "acceleration": np.stack((of.acceleration_lower, of.acceleration)),
+            "violations": limits.violations(),
+            "position": (of.lower, of.upper),
+            "velocity": (of.velocity_lower, of.velocity),
+            "acceleration": (of.acceleration_lower, of.acceleration),
             "torque": limits.torque_limits,
             "greatest_torque": limits.torque,
             "clearance": limits.clearance,
         },
-        "notes": list(result.notes),
-        "motion": {
-            "generator": generator,
-            "arguments": arguments,
-        },
+        "notes": result.notes,
+        "motion": {"generator": generator, "arguments": arguments},
     }
     return json_data(data)
 
 
 def _ros(names: Sequence[str], t: Array, q: Array, v: Array, a: Array) -> str:
     """The fields of ROS' JointTrajectory; lists in JSON are YAML as well."""
-    lines = ["joint_names: " + json.dumps(list(names), ensure_ascii=False), "points:"]
-    nanoseconds = np.rint(t * 1e9).astype(np.int64)
-    for k, ns in enumerate(nanoseconds):
-        sec, nanosec = divmod(int(ns), 1_000_000_000)
-        lines += [
-            f"- positions: {_list(q[k])}",
-            f"  velocities: {_list(v[k])}",
-            f"  accelerations: {_list(a[k])}",
-            f"  time_from_start: {{sec: {sec}, nanosec: {nanosec}}}",
-        ]
+    lines = ["joint_names: " + json.dumps([*map(str, names)], ensure_ascii=False), "points:"]
+    for k, nanoseconds in enumerate(np.rint(t * 1e9).astype(np.int64).tolist()):
+        for mark, name, row in (
+            ("-", "positions", q),
+            (" ", "velocities", v),
+            (" ", "accelerations", a),
+        ):
+            lines.append(f"{mark} {name}: [{', '.join(f'{x:.12f}' for x in row[k])}]")
+        sec, nanosec = divmod(nanoseconds, 1_000_000_000)
+        lines.append(f"  time_from_start: {{sec: {sec}, nanosec: {nanosec}}}")
     return "\n".join(lines) + "\n"
-
-
-def _list(row: Array) -> str:
-    return "[" + ", ".join(f"{x:.12f}" for x in row) + "]"

@@ -1,22 +1,24 @@
-"""Limits of an exciting trajectory: joints, torques, and boxes of the workspace."""
+"""Limits of an exciting trajectory: joints, torques, workspace and obstacles."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._arrays import Array, Rebuilt, as_reals, read_only
+from ..._arrays import Array, as_reals, read_only
 from ...errors import InvalidValueError, ShapeError
 from ...geometry import REVOLUTE
 from ...model import RobotModel
 from ...obstacles import Box
-from ...obstacles.clearance import origins
+from ...obstacles.clearance import Frame, origins
+from ...obstacles.shapes import Obstacle
 from ...trajectories import MotionLimits
 
-_RISE = 0.25  # s: default time from rest to full velocity
+_RISE = 0.25
+"""Default time from rest to full velocity, s."""
 
 
 def excitation_limits(
@@ -32,40 +34,33 @@ def excitation_limits(
     open_low, open_high = np.isinf(given.lower), np.isinf(given.upper)
     lower = np.where(open_low, np.where(open_high, -0.5 * span, given.upper - span), given.lower)
     upper = np.where(open_high, np.where(open_low, 0.5 * span, given.lower + span), given.upper)
-    v, v_lower = _bounded(given.velocity, given.velocity_lower, rate)
-    rise = np.maximum(v, -v_lower) / _RISE
-    a, a_lower = _bounded(given.acceleration, given.acceleration_lower, rise)
-    notes = []
-    for name, low, high, room, taken in (
-        ("position", lower, upper, given.upper - given.lower, 0.5 * (upper - lower)),
-        ("velocity", v_lower, v, given.velocity - given.velocity_lower, v),
-        ("acceleration", a_lower, a, given.acceleration - given.acceleration_lower, a),
-    ):
-        missing = np.isinf(room)
-        if missing.any():
-            joints = ", ".join(str(j + 1) for j in np.flatnonzero(missing))
-            values = ", ".join(f"{x:.4g}" for x in np.unique(taken[missing]))
-            notes.append(f"No limit of {name} is given for joint {joints}; {values} is taken.")
-        if (low >= high).any():
-            j = int((low >= high).argmax())
-            raise InvalidValueError(
-                f"limits: the {name} of joint {j + 1} has no range, {low[j]:g} to {high[j]:g}: "
-                "an unmoved joint is not excited. Widen it, or lock the joint in the model."
-            )
-    finite = {
-        "lower": lower,
-        "upper": upper,
-        "velocity": v,
-        "velocity_lower": v_lower,
-        "acceleration": a,
-        "acceleration_lower": a_lower,
-    }
-    return replace(given, **finite), tuple(notes)
+    finite = {"lower": lower, "upper": upper}
+    notes = _assumed("position", given.lower, given.upper, lower, upper, 0.5 * (upper - lower))
+    for name in ("velocity", "acceleration"):
+        least, most = getattr(given, f"{name}_lower"), getattr(given, name)
+        low, high = np.where(np.isinf(least), -rate, least), np.where(np.isinf(most), rate, most)
+        finite |= {f"{name}_lower": low, name: high}
+        notes += _assumed(name, least, most, low, high, high)
+        rate = np.maximum(high, -low) / _RISE
+    return replace(given, **finite), notes
 
 
-def _bounded(most: Array, least: Array, size: Array) -> tuple[Array, Array]:
-    """Limits with finite values for infinite ones."""
-    return np.where(np.isinf(most), size, most), np.where(np.isinf(least), -size, least)
+def _assumed(
+    name: str, least: Array, most: Array, low: Array, high: Array, taken: Array
+) -> tuple[str, ...]:
+    """Note on the joints whose given range is open; raises for finite ranges that are empty."""
+    if (low >= high).any():
+        j = int((low >= high).argmax())
+        raise InvalidValueError(
+            f"limits: the {name} of joint {j + 1} has no range, {low[j]:g} to {high[j]:g}: "
+            "an unmoved joint is not excited. Widen it, or lock the joint in the model."
+        )
+    missing = np.isinf(most - least)
+    if not missing.any():
+        return ()
+    joints = ", ".join(str(j + 1) for j in np.flatnonzero(missing))
+    values = ", ".join(f"{x:.4g}" for x in np.unique(taken[missing]))
+    return (f"No limit of {name} is given for joint {joints}; {values} is taken.",)
 
 
 def excitation_torques(
@@ -75,12 +70,12 @@ def excitation_torques(
     massive = bool(np.any(model.inertia.values))
     if torque_limits is None:
         effort = np.asarray(model.table.effort, dtype=float)
-        if np.isfinite(effort).any() and not massive:
-            return np.full(model.n, np.inf), (
-                f"{model.name} has no inertial parameters, so that its limits of torque are not "
-                "tested; give it rough ones with with_inertia.",
-            )
-        return read_only(effort), ()
+        if massive or np.isinf(effort).all():
+            return read_only(effort), ()
+        return np.full(model.n, np.inf), (
+            f"{model.name} has no inertial parameters, so that its limits of torque are not "
+            "tested; give it rough ones with with_inertia.",
+        )
     given = as_reals(torque_limits, "torque_limits")
     if given.shape not in ((), (model.n,)):
         raise ShapeError(f"torque_limits: expected shape ({model.n},), got {given.shape}.")
@@ -94,70 +89,27 @@ def excitation_torques(
     return read_only(np.broadcast_to(given, (model.n,))), ()
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class WorkspaceBox(Rebuilt):
-    """A box in the world, its faces along the axes, for the origins of some frames.
+def origin_distances(
+    model: RobotModel,
+    frames: Sequence[Frame],
+    workspace: Box | None,
+    obstacles: Sequence[Obstacle],
+    q: Array,
+) -> tuple[Array, Array]:
+    """Distances of origins from obstacles and the workspace's outside, and their gradients.
 
-    Parameters
-    ----------
-    lower, upper : array_like, shape (3,)
-        Corners, metres; infinite where there is no face. ``lower=(-inf, -inf, 0)`` with an infinite
-        ``upper`` is all above a floor.
-    frames : sequence of str or int
-        Frames (names or numbers) whose origins are bounded; empty for the tool.
-    inside : bool
-        Whether they stay inside, or else keep out.
-
-    Raises
-    ------
-    ShapeError, InvalidValueError
-        Not three numbers; NaN; ``lower`` not below ``upper``; no finite face.
-
-    Examples
-    --------
-    >>> floor = WorkspaceBox([-np.inf, -np.inf, 0.0], [np.inf] * 3)
-    >>> float(floor.clearance(np.array([1.0, 0.0, 0.2])))
-    0.2
+    Shapes: q (N, n) -> (N, p), (N, p, n).
     """
-
-    lower: Array
-    upper: Array
-    frames: Sequence[str | int] = ()
-    inside: bool = True
-
-    def __post_init__(self) -> None:
-        box = Box(self.lower, self.upper)
-        if (box.lower == box.upper).any():
-            raise InvalidValueError(
-                f"lower, upper: expected lower below upper on each axis, got {box.lower} and "
-                f"{box.upper}."
-            )
-        frames = (self.frames,) if isinstance(self.frames, str | int) else tuple(self.frames)
-        for name, value in (("lower", box.lower), ("upper", box.upper), ("frames", frames)):
-            object.__setattr__(self, name, value)
-
-    def clearance(self, points: Array) -> Array:
-        """Distance of points (..., 3) from the forbidden side, metres; negative within it."""
-        return self.signed(points)[0].min(axis=-1)
-
-    def signed(self, points: Array) -> tuple[Array, Array]:
-        """Distances from the forbidden side, of each face that bounds, and gradients.
-
-        Shapes: (..., 3) -> (..., K), (..., K, 3); a box that is kept out of has one distance.
-        """
-        if not self.inside:
-            distance, gradient = Box(self.lower, self.upper).signed(points)
-            return distance[..., None], gradient[..., None, :]
-        offset = np.r_[self.lower, -self.upper]
-        faces = np.isfinite(offset)
-        normals = np.vstack((np.eye(3), -np.eye(3)))[faces]
-        distance = points @ normals.T - offset[faces]
-        return distance, np.broadcast_to(normals, (*distance.shape, 3))
-
-
-def box_distances(model: RobotModel, box: WorkspaceBox, q: Array) -> tuple[Array, Array]:
-    """Distances of all frames of a box and their gradients. Shapes: (N, n) -> (N, p), (N, p, n)."""
-    P, J = origins(model, q, box.frames or (None,))
-    distance, gradient = box.signed(P)
-    slope = np.einsum("nfkc,nfcj->nfkj", gradient, J)
-    return distance.reshape(len(q), -1), slope.reshape(len(q), -1, model.n)
+    P, J = origins(model, q, frames)
+    distances, normals = [np.zeros((len(q), 0))], [np.zeros((len(q), 0, 3))]
+    for body in obstacles:
+        distance, _, normal = body.nearest(P, P)
+        distances.append(distance)
+        normals.append(normal)
+    if workspace is not None:
+        outside, normal = workspace.signed(P)
+        distances.append(-outside)
+        normals.append(-normal)
+    repeated = np.tile(J, (1, len(distances) - 1, 1, 1))
+    slopes = np.einsum("npc,npcj->npj", np.concatenate(normals, axis=1), repeated)
+    return np.concatenate(distances, axis=1), slopes

@@ -5,7 +5,7 @@ The criterion is a function of the singular values of the base regressor, stacke
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -17,14 +17,20 @@ from ...minimal_parameters import BaseParameters, base_parameters
 from ...model import RobotModel
 from ...regressors import parameter_names, torque_regressor
 from ...trajectories import MotionLimits
-from .limits import WorkspaceBox, box_distances
 from .motions import MotionBasis
 
 CRITERIA = ("condition", "log_det")
-_LEAST = 1e-12  # least diagonal entry of the factor, relative to the column norm
-_BLOCK = 2**18  # largest number of multiplications that OpenBLAS runs in one thread
-_SIGN = 0.02  # regularisation velocity of dry friction, relative to the velocity limit
-_BOX = 0.25  # m: penalty scale of a box, as half the range of a joint
+_LEAST = 1e-12
+"""Least diagonal entry of the factor, relative to the column norm."""
+_BLOCK = 2**18
+"""Largest number of multiplications that OpenBLAS runs in one thread."""
+_SIGN = 0.02
+"""Regularisation velocity of dry friction, relative to the velocity limit."""
+_LENGTH = 0.25
+"""Penalty scale of distances from the workspace's limits and obstacles, m."""
+
+Distances = Callable[[Array], tuple[Array, Array]]
+"""From q (N, n): distances (N, p) that must not be negative, and their gradients (N, p, n)."""
 
 
 class ExcitationProblem:
@@ -38,13 +44,13 @@ class ExcitationProblem:
         criterion: str,
         limits: MotionLimits,
         torque_limits: Array,
-        boxes: Sequence[WorkspaceBox],
+        distances: Distances | None,
         samples: int,
         weight: Array,
         margin: float,
     ) -> None:
         self.model, self.basis, self.base, self.criterion = model, basis, base, criterion
-        self.limits, self.torque_limits, self.boxes = limits, torque_limits, tuple(boxes)
+        self.limits, self.torque_limits, self.distances = limits, torque_limits, distances
         self.weight, self.margin = weight, margin
         self.t = basis.duration / samples * np.arange(samples, dtype=np.float64)
         orders = 4 if np.isfinite(limits.jerk).any() else 3
@@ -59,7 +65,12 @@ class ExcitationProblem:
         width = _SIGN * np.minimum(limits.velocity, -limits.velocity_lower)
         self.regressor = MotionRegressor(model, names, drive, width)
         self.bounds = [self._bounds(order) for order in range(orders)]
-        self.units = self._units()
+        # coefficients (P, n) of each function by which a joint alone reaches its limits
+        self.units = np.full((basis.count, model.n), np.inf)
+        for B, (low, high, _) in zip(self.functions, self.bounds, strict=True):
+            with np.errstate(divide="ignore"):
+                reach = 0.5 * (high - low) / np.abs(B).max(axis=0)[:, None]
+            self.units = np.minimum(self.units, reach)
 
     @property
     def work(self) -> float:
@@ -96,11 +107,11 @@ class ExcitationProblem:
             over = np.sign(torque) * np.maximum(np.abs(torque) - room, 0.0) / room
             value += 0.5 * weight * float((over**2).sum())
             G += (weight * over / room)[:, :, None] * self.values
-        for box in self.boxes:
-            distance, by_q = box_distances(self.model, box, q)
-            over = np.maximum(self.margin - distance / _BOX, 0.0)
+        if self.distances is not None:
+            distance, by_q = self.distances(q)
+            over = np.maximum(self.margin - distance / _LENGTH, 0.0)
             value += 0.5 * weight * float((over**2).sum())
-            by_motion[0] -= (weight / _BOX) * np.einsum("ij,ijk->ik", over, by_q)
+            by_motion[0] -= (weight / _LENGTH) * np.einsum("ij,ijk->ik", over, by_q)
         for slope, part in zip(by_motion, self.regressor.gradients(q, v, a, G), strict=False):
             slope += part
         total = sum(B.T @ slope for B, slope in zip(self.functions, by_motion, strict=True))
@@ -118,24 +129,11 @@ class ExcitationProblem:
 
     def _bounds(self, order: int) -> tuple[Array, Array, Array]:
         """Lower and upper bound of a derivative within the margin, and half its range."""
-        of = self.limits
-        low, high = (
-            (of.lower, of.upper),
-            (of.velocity_lower, of.velocity),
-            (of.acceleration_lower, of.acceleration),
-            (of.jerk_lower, of.jerk),
-        )[order]
+        name = ("", "velocity", "acceleration", "jerk")[order]
+        high = getattr(self.limits, name or "upper")
+        low = getattr(self.limits, f"{name}_lower" if name else "lower")
         half = np.where(np.isfinite(high - low), 0.5 * (high - low), 1.0)
         return low + self.margin * half, high - self.margin * half, half
-
-    def _units(self) -> Array:
-        """Coefficients (P, n) of each function by which a joint alone reaches its limits."""
-        units = np.full((self.basis.count, self.model.n), np.inf)
-        for B, (low, high, _) in zip(self.functions, self.bounds, strict=True):
-            peak = np.abs(B).max(axis=0)[:, None]
-            with np.errstate(divide="ignore"):
-                units = np.minimum(units, np.where(peak > 0.0, 0.5 * (high - low) / peak, np.inf))
-        return units
 
 
 class MotionRegressor:

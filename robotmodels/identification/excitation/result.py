@@ -20,7 +20,8 @@ class ExcitationStatus(Outcome):
     CONVERGED = 0, "The criterion fell by less than 1 % over the last 25 iterations, or not at all."
     LIMIT_OF_ITERATIONS = (
         1,
-        "The limit on iterations or evaluations was reached before the criterion converged.",
+        "The limit on iterations or evaluations was reached before the criterion converged; "
+        "more iterations (iterations=) would lower it further.",
     )
     INFEASIBLE = 2, "No motion was found that keeps every limit."
 
@@ -45,19 +46,18 @@ class ExcitationQuality:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ExcitationLimits(Rebuilt):
-    """Extremes of a motion, and the limits.
+    """Extremes of a motion and limits: joints, torques (n,), least distance in m (inf if none).
 
-    Exact for positions, velocities and accelerations (``motion``); torques (n,) in N m or N and
-    clearances of the boxes (B,) in m with an allowance for extremes between samples.
+    Those of torques and distances have an allowance for extremes between samples.
     """
 
     motion: LimitsReport
     torque_limits: Array
     torque: Array
-    clearance: Array
+    clearance: float
 
     def __post_init__(self) -> None:
-        for name in ("torque_limits", "torque", "clearance"):
+        for name in ("torque_limits", "torque"):
             object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
@@ -67,15 +67,16 @@ class ExcitationLimits(Rebuilt):
 
     def violations(self) -> tuple[str, ...]:
         """The limits that are not kept, one sentence each."""
-        torques = [
+        found = [
             f"joint {j + 1}: torque {self.torque[j]:.6g}, allowed {self.torque_limits[j]:.6g}"
             for j in np.flatnonzero(self.torque > self.torque_limits)
         ]
-        boxes = [
-            f"box {k + 1}: a frame is {-self.clearance[k]:.4g} m beyond it"
-            for k in np.flatnonzero(self.clearance < 0.0)
-        ]
-        return (*self.motion.violations(), *torques, *boxes)
+        if self.clearance < 0.0:
+            found.append(
+                f"workspace, obstacles: a frame is {-self.clearance:.4g} m outside of the "
+                "workspace or within an obstacle"
+            )
+        return (*self.motion.violations(), *found)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,7 +127,7 @@ class ExcitingTrajectory(Rebuilt):
     coefficients : ndarray, shape (P, n)
         Their coefficients.
     notes : tuple of str
-        Limits that were assumed, and the expected benefit of more starts or iterations.
+        Limits that were assumed, and how far the starts agree.
     """
 
     trajectory: Trajectory
@@ -195,10 +196,9 @@ class ExcitingTrajectory(Rebuilt):
             )
         after = ", ".join(f"{start.after.condition:.4g}" for start in self.starts)
         lines.append(f"  condition numbers of the {len(self.starts)} starts: {after}")
-        if broken := self.limits.violations():
-            lines += ["  limits that are not kept:", *(f"    {line}" for line in broken)]
-        else:
-            lines.append("  every limit is kept")
+        broken = self.limits.violations()
+        lines.append("  limits that are not kept:" if broken else "  every limit is kept")
+        lines += [f"    {line}" for line in broken]
         return "\n".join([*lines, *(f"  {note}" for note in self.notes)])
 
     def __repr__(self) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable
 from typing import Any
 
@@ -11,20 +12,26 @@ from ..._arrays import Array
 from ...dynamics import idm
 from ...model import RobotModel
 from ...trajectories import Trajectory
-from .limits import box_distances
 from .objective import ExcitationProblem, MotionRegressor, triangular_factor
 from .result import ExcitationLimits, ExcitationQuality, ExcitationStatus
 
-# stages: power of the singular values in the smooth condition number, weight of the penalties
 STAGES = ((2.0, 30.0), (6.0, 300.0), (20.0, 3e3), (60.0, 1e4))
-BUDGET = 3e10  # multiplications of a search: about ten seconds of a processor of 2020
-STARTS, RANDOM, ITERATIONS = 8, 100, 200  # largest defaults
-_FEWEST = 250  # least number of evaluations of a start
-_WINDOW, _LITTLE = 25, 0.01  # convergence: decrease below 1 % over 25 iterations
-_DENSE = 8  # samples for the limits, times those of the search
-_POSTURES = 400, 300  # numbers of drawn postures near the middle of the ranges and far from it
+"""Power of the singular values in the smooth condition number, and weight of the penalties."""
+BUDGET = 3e10
+"""Multiplications of a search: about ten seconds of a processor of 2020."""
+STARTS, RANDOM, ITERATIONS = 8, 100, 200
+"""Largest default numbers of starts, random motions, and iterations of a stage."""
+_FEWEST = 250
+"""Least number of evaluations of a start."""
+_WINDOW, _DECREASE = 25, 0.01
+"""Convergence: decrease below 1 % over 25 iterations."""
+_DENSE = 8
+"""Samples for the limits, times those of the search."""
+_POSTURES = 400
+"""Number of random postures from which a feasible mean is chosen."""
 _FACTORS = (1.0, 0.9998, 0.9995, 0.999, 0.998, 0.995, 0.99, 0.98, 0.95, 0.9, 0.8, 0.65, 0.5, 0.35)
 _FACTORS += (0.2, 0.1, 0.05)
+"""Factors that reduce a motion about its mean."""
 
 
 def shared_budget(problem: ExcitationProblem) -> tuple[int, int, int]:
@@ -34,16 +41,6 @@ def shared_budget(problem: ExcitationProblem) -> tuple[int, int, int]:
     # random motions use a finer grid, and at most a quarter of the budget
     drawn = min(RANDOM, max(STARTS, evaluations // 24))
     return starts, evaluations // starts, drawn
-
-
-def gain_of_twice(values: Array) -> float:
-    """Expected decrease of the minimum for twice as many normal values."""
-    from scipy.special import ndtri
-
-    if (k := len(values)) < 2:
-        return 0.0
-    least, least_of_twice = ndtri((np.array([k, 2 * k]) - 0.375) / (np.array([k, 2 * k]) + 0.25))
-    return float(np.std(values, ddof=1) * (least_of_twice - least))
 
 
 def improved(
@@ -68,10 +65,9 @@ def improved(
         stage_done(k + 1)
     best = problem.coefficients(x)
     feasible = within_limits(problem, best)
+    status = ExcitationStatus.LIMIT_OF_ITERATIONS if cut else ExcitationStatus.CONVERGED
     if feasible is None:
         status, feasible = ExcitationStatus.INFEASIBLE, best
-    else:
-        status = ExcitationStatus.LIMIT_OF_ITERATIONS if cut else ExcitationStatus.CONVERGED
     return feasible, np.array(history), np.array(counts), status
 
 
@@ -92,7 +88,7 @@ def _stage(
     def callback(intermediate_result: Any) -> None:  # name required by SciPy
         nonlocal cut
         history.append(float(intermediate_result.fun))
-        if len(history) > _WINDOW and history[-1 - _WINDOW] - history[-1] < _LITTLE:
+        if len(history) > _WINDOW and history[-1 - _WINDOW] - history[-1] < _DECREASE:
             raise StopIteration
         if evaluations >= most:
             cut = True
@@ -124,25 +120,19 @@ def within_limits(problem: ExcitationProblem, X: Array) -> Array | None:
     """Motion (P, n) scaled about its mean to keep the limits, by bisection of the factors."""
     still = problem.basis.constant(_means(problem, X))
 
-    def scaled(k: int) -> Array:
-        return still + _FACTORS[k] * (X - still)
+    def kept(factor: float) -> bool:
+        trajectory = problem.basis.trajectory(still + factor * (X - still))
+        return limits_kept(problem, trajectory).kept
 
-    # the factor at `broken` breaks limits, that at `good` is the largest known to keep them
-    broken, good, k = -1, len(_FACTORS), 0
-    while good - broken > 1:
-        if limits_kept(problem, problem.basis.trajectory(scaled(k))).kept:
-            good = k
-        else:
-            broken = k
-        k = (broken + good) // 2
-    return None if good == len(_FACTORS) else scaled(good)
+    k = 0 if kept(_FACTORS[0]) else bisect_left(_FACTORS, True, 1, key=kept)
+    return still + _FACTORS[k] * (X - still) if k < len(_FACTORS) else None
 
 
 def limits_kept(problem: ExcitationProblem, trajectory: Trajectory) -> ExcitationLimits:
     """Extremes of a motion, and all limits of a problem.
 
     Between samples a torque, which is smooth but for dry friction, may exceed them by an eighth of
-    its second difference, and a clearance, which has kinks, by a half.
+    its second difference, and a distance, which has kinks, by a half.
     """
     model = problem.model
     times = np.linspace(0.0, problem.basis.duration, _DENSE * len(problem.t) + 1)
@@ -152,10 +142,12 @@ def limits_kept(problem: ExcitationProblem, trajectory: Trajectory) -> Excitatio
     if (beside := _beside_jumps(model, times, v)).size:
         qb, vb, ab = trajectory.motion.derivatives(beside, (0, 1, 2))
         peaks = np.maximum(peaks, np.abs(idm(model, qb, vb, ab)).max(axis=0))
-    distances = [box_distances(model, box, q)[0] for box in problem.boxes]
-    clearance = [(free - _between(free, 0.5)).min() for free in distances]
+    clearance = np.inf
+    if problem.distances is not None:
+        distance, _ = problem.distances(q)
+        clearance = float((distance - _between(distance, 0.5)).min())
     report = trajectory.check(problem.limits)
-    return ExcitationLimits(report, problem.torque_limits, peaks, np.array(clearance))
+    return ExcitationLimits(report, problem.torque_limits, peaks, clearance)
 
 
 def quality(problem: ExcitationProblem, trajectory: Trajectory, times: Array) -> ExcitationQuality:
@@ -176,10 +168,7 @@ def quality(problem: ExcitationProblem, trajectory: Trajectory, times: Array) ->
 
 def _between(y: Array, part: float) -> Array:
     """A part of the second differences of samples (N, m)."""
-    bend = np.zeros(y.shape)
-    bend[1:-1] = part * np.abs(np.diff(y, 2, axis=0))
-    bend[0], bend[-1] = bend[1], bend[-2]
-    return bend
+    return np.pad(part * np.abs(np.diff(y, 2, axis=0)), ((1, 1), (0, 0)), "edge")
 
 
 def _beside_jumps(model: RobotModel, times: Array, v: Array) -> Array:
@@ -189,12 +178,10 @@ def _beside_jumps(model: RobotModel, times: Array, v: Array) -> Array:
         rows = model.transmission.weights[[m - 1 for m in model.transmission.coupled_motors]]
         turning = np.hstack((v, v @ rows.T))
     before, which = np.nonzero(turning[:-1] * turning[1:] < 0.0)
-    one, two = turning[before, which], turning[before + 1, which]
+    first, second = turning[before, which], turning[before + 1, which]
     step = times[1] - times[0]
-    at = times[before] + step * one / (one - two)
-    # linear interpolation of the zero, and times on both sides of it
-    near = 0.02 * step
-    return np.clip(np.concatenate((at - near, at + near)), times[0], times[-1])
+    at = times[before] + step * first / (first - second)  # zero of the linear interpolation
+    return np.clip(np.concatenate((at - 0.02 * step, at + 0.02 * step)), times[0], times[-1])
 
 
 def _means(problem: ExcitationProblem, X: Array) -> Array:
@@ -203,16 +190,15 @@ def _means(problem: ExcitationProblem, X: Array) -> Array:
 
 
 def _middle(problem: ExcitationProblem, rng: np.random.Generator) -> Array:
-    """Feasible posture near the middle of the ranges, if there is one."""
+    """Feasible posture, if there is one, that is drawn near the middle of the ranges first."""
     low, high, half = problem.bounds[0]
-    near, far = (rng.uniform(-1.0, 1.0, (count, half.size)) for count in _POSTURES)
-    drawn = 0.5 * (low + high) + np.concatenate((0.3 * half * near[: -len(far)], 0.95 * half * far))
+    reach = np.where(np.arange(_POSTURES) < _POSTURES // 4, 0.3, 0.95)[:, None]
+    drawn = 0.5 * (low + high) + reach * half * rng.uniform(-1.0, 1.0, (_POSTURES, half.size))
     excess = np.zeros(len(drawn))
     if problem.values.any():
         still = np.zeros(drawn.shape)
         torque = np.abs(idm(problem.model, drawn, still, still, drive=False))
         excess += np.maximum(torque / problem.torque_limits - 0.8, 0.0).sum(axis=1)
-    for box in problem.boxes:
-        distance, _ = box_distances(problem.model, box, drawn)
-        excess += np.maximum(0.02 - distance, 0.0).sum(axis=1)
+    if problem.distances is not None:
+        excess += np.maximum(0.02 - problem.distances(drawn)[0], 0.0).sum(axis=1)
     return drawn[int(excess.argmin())]
