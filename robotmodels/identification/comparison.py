@@ -147,15 +147,9 @@ def compare_methods(
 
     Examples
     --------
-    >>> from robotmodels.dynamics import idm
-    >>> from robotmodels.identification import Log
-    >>> from robotmodels.robots import load
-    >>> model, t, w = load("rx90"), 0.01 * np.arange(600)[:, None], np.linspace(1.0, 5.0, 6)
-    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
-    >>> log = Log(0.01, q, idm(model, q, v, a), v, a)
-    >>> comparison = compare_methods(
-    ...     model, log, ("ols", "wls"), ("torque", "filtered"), drive=False, checked=False
-    ... )
+    >>> from robotmodels.datasets import example_log
+    >>> options = {"methods": ("ols", "wls"), "forms": ("torque", "filtered"), "drive": ("Fv",)}
+    >>> comparison = compare_methods(*example_log(), **options)
     >>> [row.label for row in comparison.fits]
     ['ols', 'wls', 'ols, filtered', 'wls, filtered']
     """
