@@ -1,6 +1,5 @@
 """Methods that simulate the controlled robot recover the parameters of exact logs."""
 
-import importlib
 import pickle
 from dataclasses import replace
 
@@ -27,11 +26,6 @@ from robotmodels.identification import (
 )
 from robotmodels.identification.closed_loop.loop import closed_loop, friction_rates, robot_of
 from robotmodels.identification.closed_loop.method import instrument_step
-from robotmodels.identification.closed_loop.simulation import (
-    ClosedLoopSimulator,
-    SimulationDivergedError,
-    with_enough_steps,
-)
 from robotmodels.identification.fit import _identifiable
 from robotmodels.identification.forms import Block
 from robotmodels.identification.signals import central_differences
@@ -185,16 +179,6 @@ def test_controllers_hold_limit_and_integrate():
     assert np.abs(settled[worst]) < 0.1 * np.abs(plain[worst])
 
 
-def test_feed_forward_reduces_tracking_errors():
-    arm = robot("tx40")
-    q_ref, v_ref = motion(6, 1.0, 1e-3, 4)
-    errors = []
-    for ahead in (False, True):
-        control = tuned_controller(arm, q_ref, 5.0, period=1e-3, feed_forward=ahead)
-        errors.append(np.abs(simulated_log(arm, control, q_ref, v_ref, 1e-3).q - q_ref).max())
-    assert errors[1] < 0.1 * errors[0]
-
-
 def test_a_robot_of_base_parameters_has_the_torques_of_the_equations():
     arm = robot("tx40")
     base = rm.base_parameters(arm, drive=("Ia", "Fv"))
@@ -207,25 +191,6 @@ def test_a_robot_of_base_parameters_has_the_torques_of_the_equations():
     assert np.allclose(
         rm.idm(twin, q_ref, v_ref, a), W @ base.values(arm), rtol=1e-9, atol=1e-9
     )  # fmt: skip
-
-
-def test_pieces_and_recordings_are_simulated_as_one_run_each(monkeypatch):
-    arm, control, log, width = recorded("prismatic", 1.0)
-    arrays = (log.q, log.tau, log.v, log.a, log.q_ref, log.v_ref)
-    twice = Log(log.dt, *(np.vstack((x, x)) for x in arrays), starts=(0, len(log)))
-    signals = importlib.import_module("robotmodels.identification.signals")
-    monkeypatch.setattr(signals, "PIECE", 64)
-    system, _, truth = problem(arm, twice, width, decimation=5)
-    assert len(system.pieces()) > 10
-    simulator = ClosedLoopSimulator(system, closed_loop(system, truth, control, width, 1))
-    simulated = simulator.signals(truth)
-    for piece in system.pieces():
-        rows, inner = simulator.window(piece)
-        for name in ("q", "v", "a", "tau"):
-            exact, found = getattr(twice, name), getattr(simulated[piece.begin], name)
-            assert np.allclose(
-                found[inner], exact[rows], rtol=1e-7, atol=1e-7 * np.abs(exact).max()
-            )
 
 
 # --- methods --------------------------------------------------------------------------------------
@@ -255,6 +220,9 @@ def test_a_step_of_instruments_is_the_instrumental_estimate(rng):
 @pytest.mark.parametrize("kind", KINDS)
 def test_instruments_and_didim_recover_exact_parameters(kind):
     arm, control, log, width = recorded(kind)
+    if kind == "prismatic":  # two recordings
+        arrays = (log.q, log.tau, log.v, log.a, log.q_ref, log.v_ref)
+        log = Log(log.dt, *(np.vstack((x, x)) for x in arrays), starts=(0, len(log)))
     system, factors, truth = problem(arm, log, width)
     start = values_of(system, other(arm))
     assert off(start, truth, factors) > 1e-3
@@ -384,18 +352,6 @@ def test_a_joint_too_stiff_for_any_steps_is_named_and_not_simulated():
     assert "simulation is not stable" in notes
     with pytest.raises(InvalidValueError, match="substeps"):
         simulated_log(robot_of(system, truth), loop.controller, log.q_ref, log.v_ref, log.dt)
-
-
-def test_parameters_of_less_inertia_than_the_first_are_simulated_in_more_steps():
-    arm = stiff_robot(2e-3, 2.0, 1.0)
-    log, system, _, truth = stiff_problem(arm, 2.0, 1e-3)
-    loop = closed_loop(system, truth, width=0.05, substeps=1)
-    finer = with_enough_steps(stiff_robot(2e-4, 2.0, 1.0), loop, log)
-    assert 1e-3 / finer.substeps * 2.0 / 2e-4 < 2.0
-    assert finer.hold == finer.substeps
-    assert with_enough_steps(arm, loop, log) is loop
-    with pytest.raises(SimulationDivergedError):
-        with_enough_steps(stiff_robot(2e-6, 2.0, 1.0), loop, log)
 
 
 def test_didim_that_does_not_converge_has_a_status_and_finite_numbers():

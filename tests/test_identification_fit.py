@@ -4,8 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
-from identification_logs import clean_log, odd_robots, swinging
-from identities.random_robots import random_drive
+from identification_logs import clean_log, odd_robots
 
 import robotmodels as rm
 from robotmodels.errors import InvalidValueError, ShapeError
@@ -15,7 +14,6 @@ from robotmodels.identification import (
     Wls,
     choose_processing,
     fit,
-    predicted_torque,
     validate,
 )
 from robotmodels.identification.torques import parameter_torque
@@ -62,29 +60,6 @@ def test_exact_parameters_without_noise(name):
         assert found.validation.nominal.rmse.max() < 1e-9
     bare = model.with_inertia(rm.InertialParameters(np.zeros((model.f, 10))))
     assert fit(bare, log, processing=as_it_is(log, 25)).validation.nominal is None
-
-
-def test_right_angles_of_few_digits_give_no_parameter_that_no_log_shows():
-    rng = np.random.default_rng(3)
-    model = rm.load("rx90")
-    table = model.table.replace(alpha=model.table.alpha.round(4))  # as many files are written
-    model = model.with_table(table).with_drive(random_drive(rng, model.n))
-    log = clean_log(model, rng, noise=0.1)
-    found = fit(model, log, base=rm.base_parameters(model, drive=True))
-    assert found.scaled_condition < 100
-    assert any(
-        note.startswith("Treated as aligned: axis 2 and axis 1") for note in found.base.notes
-    )
-    z = (found.values - found.base.values(model)) / found.standard_errors
-    assert np.sqrt((z**2).mean()) < 1.3
-    every = fit(model, log, base=rm.base_parameters(model, drive=True, tolerance=1e-11))
-    assert every.scaled_condition > 1e4 * found.scaled_condition
-    # what is predicted is the torque of the table as given, to the angles that were taken
-    q, v, a = swinging(model, rng, samples=400)
-    one, other = (predicted_torque(x, q, v, a) for x in (found, every))
-    torque = rm.idm(model, q, v, a)
-    errors = [np.sqrt(((x - torque) ** 2).mean()) for x in (one, other)]
-    assert errors[0] < 1.05 * errors[1] + 1e-5 * np.abs(torque).max()
 
 
 def test_friction_models_are_identified():
@@ -185,21 +160,6 @@ def test_tx40_held_out(trained):
     assert (trained.validation.held_out.rmse < best).all(), trained.validation.held_out.rmse
     assert trained.validation.held_out.samples == 15750 - 2 * trained.equations.processing.edges
     assert (np.abs(trained.validation.held_out.bias) < trained.validation.held_out.rmse).all()
-
-
-def test_tx40_choices_come_from_the_log(whole):
-    choices = whole.equations.processing
-    assert 5.0 < choices.motion < 10.0
-    assert 2.5 * choices.motion < choices.torque_cutoff < choices.cutoff < 100.0
-    assert whole.factors.rows >= 20 * len(whole.names)
-    # the dead bands published with the data are about the ramps that the log's friction shows
-    published = np.array([0.0501, 0.0501, 0.0750, 0.0716, 0.0559, 0.1222])
-    assert (choices.dead_band < published).all()
-    assert (
-        (0.5 * published < whole.details.friction_ramp)
-        & (whole.details.friction_ramp < 1.5 * published)
-    ).all()
-    assert whole.scaled_condition < 40.0 < whole.condition
 
 
 def test_a_result_survives_pickling(whole):

@@ -310,16 +310,6 @@ def test_combined_parameters_wait_for_the_joint_before():
     assert abs(np.mean(sums) / b - 1.0) < 4.0 * np.sqrt(2.0 / (60 * b)) + 0.03
 
 
-def test_errors_of_other_joints_do_not_reach_the_last_one():
-    log = clean_log(ROBOTS["rx90"], np.random.default_rng(3), 0.1, samples=1500)
-    tau = np.array(log.tau)
-    tau[:, :4] += 30.0 * np.sin(log.t)[:, None]  # a wrong model of the other joints
-    logs = (log, Log(log.dt, log.q, tau, log.v, log.a))
-    one, other = (Sequential().solve(*prepared("rx90", log=given)[:2]) for given in logs)
-    last = [one.names.index(n) for step in one.details[:2] for n in step.names]
-    np.testing.assert_allclose(one.values[last], other.values[last], rtol=1e-9, atol=1e-9)
-
-
 # --- in time ------------------------------------------------------------------------------------
 
 
