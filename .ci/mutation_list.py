@@ -1027,7 +1027,7 @@ MUTATIONS = [
         "def common_unknowns(", "P @ load.parameters", "0.0 * P @ load.parameters",
         "tests/test_identification_loads.py -k exact_logs_give_exact_gains", True),
     Mutation("identification: friction curves", "static friction is the drop alone",
-        "def friction(self) -> StribeckFriction", "Fc + drop, vs", "drop, vs",
+        "def _refined(point", "Fc + drop, vs", "drop, vs",
         "tests/test_identification_loads.py -k exact_stribeck_curve", True),
     Mutation("identification: bias test",
         "the variance of least squares stands for that of the difference",

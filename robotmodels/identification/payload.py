@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from .._arrays import Array, Rebuilt, as_exact, read_only
 from .._outcomes import Outcome
 from ..dynamics import with_payload
-from ..errors import InertiaError, InvalidValueError
+from ..errors import InvalidValueError
 from ..estimation import column_basis
 from ..estimation.covariance import correlated_covariance
 from ..estimation.factor import TriangularFactors
@@ -192,7 +192,7 @@ class PayloadEstimate(NamedEstimate):
 
     @property
     def carried(self) -> RobotModel:
-        """Robot with the load; all ten parameters must be identified."""
+        """Robot with the load, if all ten parameters are identified and physically consistent."""
         missing = [p for p, x in zip(PARAMETERS, self.parameters, strict=True) if np.isnan(x)]
         if missing:
             raise InvalidValueError(
@@ -200,12 +200,7 @@ class PayloadEstimate(NamedEstimate):
                 "or give with_payload(...) the parameters that are known."
             )
         model, frame = self.carrier
-        try:
-            return with_payload(model, self.mass, self.com, self.inertia, frame)
-        except InertiaError as error:
-            raise InertiaError(
-                f"{error} identify_payload(..., consistent=True) avoids it."
-            ) from None
+        return with_payload(model, self.mass, self.com, self.inertia, frame)
 
     @property
     def notes(self) -> tuple[str, ...]:
