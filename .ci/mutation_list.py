@@ -931,10 +931,10 @@ MUTATIONS = [
     # --- exciting trajectories -------------------------------------------------------------------
     Mutation("excitation: objective", "a sign of the slope of the condition number",
         "def smooth_condition(", "_product(W, rise - ", "_product(W, rise + ",
-        "tests/test_excitation.py -k gradients_of_criteria", True),
+        "tests/test_excitation.py -k gradient_of_the_search", True),
     Mutation("excitation: objective", "slope of smooth dry friction", "def gradients(self, q",
         "(1.0 - np.tanh(v @ row / width) ** 2)", "(1.0 + np.tanh(v @ row / width) ** 2)",
-        "tests/test_excitation.py -k regressor_of_a_motion", True),
+        "tests/test_excitation.py -k gradient_of_the_search", True),
     Mutation("excitation: objective", "obstacles attract", "distance, by_q = self.distances(q)",
         "by_motion[0] -= (weight / _LENGTH)", "by_motion[0] += (weight / _LENGTH)",
         "tests/test_excitation.py -k gradient_of_the_search", True),
