@@ -16,10 +16,13 @@ from pathlib import Path
 import numpy as np
 
 import robotmodels as rm
-from robotmodels.calibration.identifiability.identifiable import IdentifiableParameters, Reason
-from robotmodels.calibration.identifiability.structural import identifiable_parameters
+from robotmodels.calibration.identifiable import (
+    IdentifiableParameters,
+    Reason,
+    identifiable_parameters,
+)
 from robotmodels.calibration.measurements.kinds import Kind, drawn_groups
-from robotmodels.calibration.selection.group_rows import group_rows
+from robotmodels.calibration.selection import group_rows
 
 ROBOTS = {
     "puma560": "d3", "stanford_arm": "r2", "rx90": "d3", "ur10e": "d3", "panda": "r3",

@@ -40,12 +40,10 @@ from robotmodels.identification import (
     reduce_equations,
 )
 from robotmodels.identification.closed_loop import (
-    ClosedLoop,
     Controller,
     Didim,
     Instrumental,
     OutputError,
-    closed_loop,
     hausman_test,
     simulated_log,
     tuned_controller,
@@ -173,12 +171,6 @@ def start_of(log: Log) -> np.ndarray:
     return weighted(system_of(log, choose_processing(log, **FILTER))[1]).values
 
 
-def loop_of(system: Equations, start: np.ndarray) -> ClosedLoop | None:
-    """The loop that made the log, for the methods that simulate it."""
-    own, width = controller()
-    return closed_loop(system, start, own, width=width)
-
-
 def named(prefix: str, row: Row) -> Row:
     """Quantities under the name of their method."""
     return {f"{prefix}.{key}": value for key, value in row.items()}
@@ -218,8 +210,9 @@ def whole(seconds: float, case: str, seed: int) -> Row:
 def simulating(
     method: Callable, system: Equations, factors: TriangularFactors, start: np.ndarray
 ) -> Estimate:
-    """One of the methods that simulate the robot."""
-    return method(start=start, loop=loop_of(system, start)).solve(system, factors)
+    """One of the methods that simulate the robot, in the loop that made the log."""
+    own, width = controller()
+    return method(own, start=start, width=width).solve(system, factors)
 
 
 def simulated_row(found: Estimate, clock: Clock) -> Row:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 import robotmodels as rm
 from robotmodels.calibration import KnownDistance, ParameterPrior, PointContact, Pose, fit
-from robotmodels.calibration.calibrated_robot.calibrated_pose import calibrated_pose
 from robotmodels.calibration.measurements import CameraPose
+from robotmodels.calibration.robot import calibrated_pose
 from robotmodels.datasets import DoubleSocket, panda_double_socket, ur10_camera
 
 Array = NDArray[np.float64]

@@ -1,9 +1,6 @@
 """What every test shares: the hypothesis profiles and a seeded generator."""
 
 import os
-from importlib import import_module
-from importlib.util import find_spec
-from pathlib import Path
 
 # tests run beside each other: threads of the linear algebra would wait for one another, which
 # takes longer than the small matrices here. Read when NumPy is first imported.
@@ -25,21 +22,17 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "quick"))
 def pytest_configure(config):
     """Let the workers of a run compile the kernels together, each beginning at another one.
 
-    They compile when their modules are imported, minutes in a fresh clone, and what one worker has
-    compiled the others find on the disk. Without this all import everything in the same order.
+    What one worker has compiled the others find on the disk.
     """
     worker = getattr(config, "workerinput", None)
-    if worker is None:
+    if worker is None or os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
         return
-    package = Path(find_spec("robotmodels").origin).parent
-    names = [
-        ".".join(path.relative_to(package.parent).with_suffix("").parts)
-        for path in sorted(package.rglob("*.py"))
-        if "_compile import" in path.read_text(encoding="utf-8")
-    ]
+    from robotmodels.kernels.prepare import compile_module, kernel_modules
+
+    names = kernel_modules()
     first = int(worker["workerid"].removeprefix("gw")) * len(names) // worker["workercount"]
     for name in names[first:] + names[:first]:
-        import_module(name)
+        compile_module(name)
 
 
 @pytest.fixture

@@ -71,7 +71,7 @@ def words_of_consistency(fit, result) -> dict:
     return {
         "names": fit.base.names, "values": fit.base_values,
         "standard_errors": result.standard_errors,
-        "status": fit.status.name, "price": fit.price, "distance": fit.distance,
+        "status": fit.status.name, "price": fit.residual_increase, "distance": fit.distance,
         "physical": bool(fit.inertia.is_physical.all()),
     }  # fmt: skip
 

@@ -16,8 +16,8 @@ from robotmodels.friction import AsymmetricFriction, StribeckFriction
 from robotmodels.minimal_parameters import BaseMethod, base_parameters
 from robotmodels.minimal_parameters.alignment import aligned_robot
 from robotmodels.minimal_parameters.formulas import constants_of
-from robotmodels.minimal_parameters.motion_span import reach
-from robotmodels.minimal_parameters.numeric import natural_sizes, residual_warning
+from robotmodels.minimal_parameters.numeric import TorqueColumns, residual_warning
+from robotmodels.minimal_parameters.rules import reach
 from robotmodels.regressors import parameter_names, parameter_vector, torque_regressor
 
 GRAVITIES = ((0.0, 0.0, -9.81), (0.0, -9.81, 0.0), (-9.81, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -64,7 +64,7 @@ def equal(one, other, tolerance=1e-10):
     assert one.names == other.names
     assert one.no_effect == other.no_effect
     model = one.model
-    sizes = natural_sizes(model, one.drive, one.friction)
+    sizes = TorqueColumns(model, one.drive, one.friction).sizes
     size = reach(model)
     slides = np.where(model.table.sigma[model.table.joint_rows] == 1, size, 1.0)
     q, v, a = np.random.default_rng(5).uniform(-1, 1, (3, 12, model.n)) * slides
@@ -226,8 +226,11 @@ def test_axes_within_1e_5_rad_are_aligned_in_the_regrouping():
             keeps_torque(base, rounded, rng)
             if base.notes:
                 assert base.notes[0].startswith("Treated as aligned: ")
-                assert f"aligned robot by up to {base.missed:.0e} of the largest" in base.notes[1]
-                assert 0.0 < base.missed < 3 * turned(base)
+                assert (
+                    f"aligned robot by up to {base.torque_error:.0e} of the largest"
+                    in base.notes[1]
+                )
+                assert 0.0 < base.torque_error < 3 * turned(base)
             # not so beyond 1e-5 rad, and not if every digit is meant
             keeps_torque(base_parameters(far, way, drive=True), far, rng, tolerance=3e-10)
             exact = base_parameters(rounded, way, tolerance=1e-11, drive=True)
@@ -279,7 +282,7 @@ def test_hardly_any_gravity(gravity):
 
 def test_torques_that_are_not_kept_are_told():
     base = base_parameters(rm.load("rx90"), "numeric")
-    assert base.missed < 1e-14
+    assert base.torque_error < 1e-14
     assert not base.notes
     assert (
         "NOT TO BE USED: these base parameters have torque errors of 2.0e-01"

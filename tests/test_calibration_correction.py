@@ -9,24 +9,24 @@ from identities.random_robots import random_model, random_pose, robot_size
 
 import robotmodels as rm
 from robotmodels.calibration import candidate_parameters, differential_model
-from robotmodels.calibration.calibrated_robot.calibrated import calibrated_model
-from robotmodels.calibration.calibrated_robot.calibrated_pose import calibrated_pose
-from robotmodels.calibration.calibrated_robot.joint_errors import (
-    encoder_transmission,
-    joint_errors_of,
-)
-from robotmodels.calibration.calibrated_robot.reading_jacobian import (
-    missing_of_pose,
-    reading_jacobian,
-)
-from robotmodels.calibration.correction.corrected import CorrectionStatus, corrected_igm
-from robotmodels.calibration.correction.offsets import joint_offsets, pose_offsets
-from robotmodels.calibration.extended_table.elements import Compliance, Element, ErrorLaw
-from robotmodels.calibration.extended_table.parameters import (
+from robotmodels.calibration.extended_table import Element
+from robotmodels.calibration.inverse import CorrectionStatus, corrected_igm
+from robotmodels.calibration.offsets import joint_offsets, pose_offsets
+from robotmodels.calibration.parameters import (
+    Compliance,
+    ErrorLaw,
     GeometricParameter,
     GeometricParameters,
 )
 from robotmodels.calibration.reporting.write import calibrated_urdf
+from robotmodels.calibration.robot import (
+    calibrated_model,
+    calibrated_pose,
+    encoder_transmission,
+    joint_errors_of,
+    missing_of_pose,
+    reading_jacobian,
+)
 from robotmodels.errors import InvalidValueError, ShapeError, UrdfWarning
 
 

@@ -14,7 +14,7 @@ from robotmodels.calibration import (
     differential_model,
     skeleton_of,
 )
-from robotmodels.calibration.extended_table.elements import Element
+from robotmodels.calibration.extended_table import Element
 from robotmodels.calibration.joined import side_by_side
 from robotmodels.errors import InvalidValueError, NotARotationError, ShapeError
 from robotmodels.geometry import FIXED, PRISMATIC

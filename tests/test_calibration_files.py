@@ -7,7 +7,6 @@ import pytest
 
 from robotmodels import se3
 from robotmodels.calibration import KnownDistance, PointContact, Pose, Position, fit
-from robotmodels.calibration.calibrated_robot.calibrated_pose import calibrated_pose
 from robotmodels.calibration.measurements import (
     Distance,
     FrameContact,
@@ -16,6 +15,7 @@ from robotmodels.calibration.measurements import (
 )
 from robotmodels.calibration.read import read_measurements
 from robotmodels.calibration.reporting.write import result_data, write_result
+from robotmodels.calibration.robot import calibrated_pose
 from robotmodels.csv_table import open_table
 from robotmodels.errors import InvalidValueError, NotARotationError
 from robotmodels.geometry import DHTable

@@ -19,7 +19,6 @@ from robotmodels.calibration import (
     fit,
     joint_offsets,
 )
-from robotmodels.calibration.calibrated_robot.calibrated_pose import calibrated_pose
 from robotmodels.calibration.measurements import (
     AxisPosition,
     CameraPose,
@@ -29,6 +28,7 @@ from robotmodels.calibration.measurements import (
     PlaneContact,
     RelativePose,
 )
+from robotmodels.calibration.robot import calibrated_pose
 from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.estimation import FitStatus, confidence_intervals
 

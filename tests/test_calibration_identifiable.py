@@ -17,9 +17,11 @@ from robotmodels.calibration import (
     differential_model,
     identifiable_on,
 )
-from robotmodels.calibration.identifiability.changed import identifiability_change
-from robotmodels.calibration.identifiability.identifiable import DEPENDENT
-from robotmodels.calibration.identifiability.structural import identifiable_parameters
+from robotmodels.calibration.identifiable import (
+    DEPENDENT,
+    identifiability_change,
+    identifiable_parameters,
+)
 from robotmodels.calibration.measurements.kinds import Kind, as_kind, drawn_groups
 from robotmodels.errors import InvalidValueError
 

@@ -8,8 +8,7 @@ from identities.random_robots import random_model, random_pose, random_state
 
 import robotmodels as rm
 from robotmodels.calibration import Reason, candidate_parameters, differential_model, problem_of
-from robotmodels.calibration.identifiability.identifiable import identifiable_on
-from robotmodels.calibration.identifiability.structural import identifiable_parameters
+from robotmodels.calibration.identifiable import identifiable_on, identifiable_parameters
 from robotmodels.calibration.joined import side_by_side
 from robotmodels.calibration.measurements import (
     AxisPosition,

@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from robotmodels import se3
 from robotmodels.calibration import KnownDistance, PointContact, Pose, Position, fit
-from robotmodels.calibration.extended_table.candidates import candidate_parameters
-from robotmodels.calibration.extended_table.differential import differential_model
+from robotmodels.calibration.candidates import candidate_parameters
+from robotmodels.calibration.differential import differential_model
 from robotmodels.calibration.problem import linearised
 from robotmodels.calibration.reporting.text import report_sections, report_text, strong_correlations
 from robotmodels.calibration.reporting.units import degrees, in_unit, millimetres

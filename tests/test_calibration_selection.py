@@ -8,13 +8,20 @@ import pytest
 
 import robotmodels as rm
 from robotmodels.calibration import PointContact, candidate_parameters, differential_model
-from robotmodels.calibration.identifiability.structural import identifiable_parameters
+from robotmodels.calibration.identifiable import identifiable_parameters
 from robotmodels.calibration.measurements.kinds import Kind, drawn_groups, groups_of, measurement_of
 from robotmodels.calibration.problem import guessed_fixtures, problem_of, stacked
-from robotmodels.calibration.selection.exchange import added, exchanged, greedy, index_of, nested
-from robotmodels.calibration.selection.group_rows import group_rows
-from robotmodels.calibration.selection.observability import Criterion, observability
-from robotmodels.calibration.selection.select import select_configurations
+from robotmodels.calibration.selection import (
+    Criterion,
+    added,
+    exchanged,
+    greedy,
+    group_rows,
+    index_of,
+    nested,
+    observability,
+    select_configurations,
+)
 from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.obstacles import Box, Plane, Sphere, clearance
 

@@ -540,7 +540,7 @@ def test_identify_takes_the_rule_of_essential_parameters_by_name(run, motion):
 
 def test_choices_are_those_of_the_package():
     """The commands list them without importing the rooms that define them."""
-    from robotmodels.calibration.extended_table.elements import Compliance
+    from robotmodels.calibration.parameters import Compliance
     from robotmodels.cli import calibrate
     from robotmodels.cli.identify import options
     from robotmodels.estimation.losses import Loss

@@ -96,7 +96,7 @@ FILES = {
     "identify": identify_files,
     "calibrate": calibrate_files,
 }
-"""What the examples of a command need; those of demo run in test_cli.py."""
+"""What the examples of a command need; demo runs in test_cli.py, compile in test_compilation.py."""
 
 
 @pytest.fixture
@@ -110,7 +110,7 @@ def run(capsys):
 
 
 def test_every_command_has_examples_that_are_tried():
-    assert {*FILES, "demo"} == set(COMMANDS)
+    assert {*FILES, "demo", "compile"} == set(COMMANDS)
     assert all(examples(command) for command in COMMANDS)
     assert examples("demo") == [["demo"], ["demo", "--real", "--out", "tx40/"]]
 

@@ -6,7 +6,7 @@ import pytest
 from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.estimation import column_basis
 from robotmodels.estimation.covariance import jackknife_inflation
-from robotmodels.estimation.factor import factors_of, merged, merged_tree, triangles_of
+from robotmodels.estimation.factor import factors_of, merged, merged_all, triangles_of
 from robotmodels.estimation.linear import solved
 
 
@@ -20,56 +20,43 @@ def test_random_ranks(rng):
         assert basis.rank == min(r, p)
         again = W[:, basis.kept] @ basis.coefficients
         assert np.allclose(again, W, rtol=0, atol=1e-8 * abs(W).max(axis=0))
+        factor = column_basis(np.linalg.qr(W, mode="r"), scale=1.0 / sizes)
+        assert factor.kept.tolist() == basis.kept.tolist()
+        assert np.allclose(factor.coefficients, basis.coefficients, rtol=1e-8, atol=1e-8)
 
 
-def test_earlier_columns_are_kept_and_the_triangular_factor_is_enough(rng):
-    W = rng.normal(size=(20, 3)) @ rng.normal(size=(3, 6))
-    assert column_basis(W, order=[5, 4, 3, 2, 1, 0]).kept.tolist() == [3, 4, 5]
-    whole, factor = column_basis(W), column_basis(np.linalg.qr(W, mode="r"))
-    assert whole.kept.tolist() == factor.kept.tolist() == [0, 1, 2]
-    assert np.allclose(whole.coefficients, factor.coefficients, atol=1e-10)
-
-
-def test_gap_and_empty_columns(rng):
-    W = rng.normal(size=(30, 5))
+def test_gaps_of_empty_dependent_and_nearly_empty_columns(rng):
+    W = rng.normal(size=(30, 6))
     W[:, 2] = 0.0
     W[:, 4] = W[:, 0] - W[:, 1]
     basis = column_basis(W)
-    assert basis.empty.tolist() == [2]
-    assert basis.dependent.tolist() == [4]
-    assert basis.coefficients[:, 4].tolist() == pytest.approx([1.0, -1.0, 0.0])
-    kept, dependent = basis.gap
-    assert kept > 0.1
-    assert dependent < 1e-14
-
-
-def test_the_gap_tells_of_what_is_nearly_empty(rng):
+    assert (basis.empty.tolist(), basis.dependent.tolist()) == ([2], [4])
+    assert basis.coefficients[:, 4].tolist() == pytest.approx([1.0, -1.0, 0.0, 0.0])
+    assert basis.gap[0] > 0.1
+    assert basis.gap[1] < 1e-14
     W = rng.normal(size=(30, 6))
-    W[:, 5] *= 1e-7  # independent of all, but it hardly acts
-    W[:, 3] = W[:, 0] + 1e-6 * W[:, 3]  # acts, but nearly depends
+    W[:, 5] *= 1e-7  # independent of all, with little effect
+    W[:, 3] = W[:, 0] + 1e-6 * W[:, 3]  # nearly dependent
     basis = column_basis(W)
     assert basis.kept.tolist() == [0, 1, 2, 3, 4, 5]
     assert basis.distance[3] == pytest.approx(1e-6, rel=0.5)
     assert basis.gap[0] == basis.distance[5] < 2e-7
-    # compared with others of its kind it is as long as any
-    assert column_basis(W, kinds=[0, 0, 0, 0, 0, 1]).distance[5] > 0.5
-    W[:, 5] *= 1e-8  # what is not kept is told as well
-    assert 1e-16 < column_basis(W, kinds=[0] * 6).gap[1] < 2e-15
+    W[:, 5] *= 1e-8  # the distance of a dropped column is in the gap
+    assert 1e-16 < column_basis(W).gap[1] < 2e-15
 
 
-def test_what_hardly_acts_takes_nothing_over(rng):
+def test_short_columns_are_considered_last(rng):
     W = rng.normal(size=(40, 3))
-    W[:, 0] = 1e-7 * W[:, 2]  # first in the order, and the same as the last
+    W[:, 0] = 1e-7 * W[:, 2]
     basis = column_basis(W)
     assert basis.kept.tolist() == [1, 2]
     assert basis.coefficients[:, 0].tolist() == pytest.approx([0.0, 1e-7], abs=1e-20)
     assert basis.coefficients[0, 0] == 0.0
-    # between equals the order decides
-    W[:, 0] = 0.1 * W[:, 2]
+    W[:, 0] = 0.1 * W[:, 2]  # columns of similar length are taken in their order
     assert column_basis(W).kept.tolist() == [0, 1]
 
 
-def test_coefficients_are_zero_where_there_are_none(rng):
+def test_coefficients_that_are_rounding_are_zero(rng):
     kept = rng.normal(size=(50, 5))
     kept[:, 4] = kept[:, 0] + 1e-6 * kept[:, 4]  # magnifies rounding to 1e-10
     C = np.array([[1.0, 0.0], [0.0, 2.0], [0.0, 0.0], [3.0, 0.0], [0.0, 0.0]])
@@ -79,31 +66,25 @@ def test_coefficients_are_zero_where_there_are_none(rng):
     assert np.allclose(basis.coefficients[:, 5:], C, atol=1e-14)
 
 
-def test_nothing_and_less():
+def test_matrices_without_rows_or_columns_and_mistakes():
     assert column_basis(np.zeros((3, 2))).rank == 0
     assert column_basis(np.zeros((0, 2))).empty.tolist() == [0, 1]
     assert column_basis(np.zeros((3, 0))).rank == 0
     wide = column_basis([[1.0, 2.0, 3.0]])
-    assert wide.kept.tolist() == [0]
-    assert wide.coefficients.tolist() == [[1.0, 2.0, 3.0]]
-
-
-def test_mistakes_are_named():
-    for W, options, error, words in (
-        ([1.0, 2.0], {}, ShapeError, "expected a matrix"),
-        (np.eye(2), {"order": [0, 0]}, InvalidValueError, "order"),
-        (np.eye(2), {"scale": [1.0, 0.0]}, InvalidValueError, "scale"),
-        (np.eye(2), {"kinds": [0.5, 1.0]}, InvalidValueError, "kinds"),
-        ([[np.nan, 1.0]], {}, InvalidValueError, "finite"),
+    assert (wide.kept.tolist(), wide.coefficients.tolist()) == ([0], [[1.0, 2.0, 3.0]])
+    for W, scale, error, words in (
+        ([1.0, 2.0], None, ShapeError, "expected a matrix"),
+        (np.eye(2), [1.0, 0.0], InvalidValueError, "scale"),
+        ([[np.nan, 1.0]], None, InvalidValueError, "finite"),
     ):
         with pytest.raises(error, match=words):
-            column_basis(W, **options)
+            column_basis(W, scale=scale)
 
 
 def test_triangles_of_pieces_have_the_products_of_all_rows(rng):
     W = rng.normal(size=(90, 3, 7))
     W[:, 0, 3:] = 0.0
-    W[:40, 1, :2] = 0.0  # columns that are seen late
+    W[:40, 1, :2] = 0.0  # columns that are zero at first
     W[:, 2, 5] = 0.0
     normal = np.einsum("kip,kiq->pq", W, W)
     for cuts in ([], [1], [40], [10, 20, 50, 89]):
@@ -114,10 +95,7 @@ def test_triangles_of_pieces_have_the_products_of_all_rows(rng):
     assert triangles_of([W[:0]], 7).shape == (0, 7)
 
 
-def test_merged_trees_keep_the_order_and_merged_factors_the_products(rng):
-    assert merged_tree([], lambda a, b: a + b) is None
-    for count in range(1, 9):
-        assert merged_tree(map(str, range(count)), lambda a, b: a + b) == "01234567"[:count]
+def test_merged_factors_have_the_products_of_both(rng):
     A, B = rng.normal(size=(5, 1, 3)), rng.normal(size=(6, 1, 3))
     A[:, :, 1] = B[:, :, 1] = 0.0
     parts = [
@@ -129,17 +107,19 @@ def test_merged_trees_keep_the_order_and_merged_factors_the_products(rng):
     np.testing.assert_allclose(R.T @ R, rows.T @ rows, rtol=1e-13, atol=1e-13)
     few = factors_of(("a", "b", "c"), A[:1], A[:1, :, 0], np.ones((1, 1), dtype=bool))
     assert few.factors[0].shape == (1, 4)
+    with pytest.raises(InvalidValueError, match="got none"):
+        merged_all([])
 
 
 def test_the_jackknife_is_that_of_estimates_without_one_segment(rng):
     A, e = rng.normal(size=(20, 12, 1, 3)), 0.1 * rng.normal(size=(20, 12, 1))
-    x = np.array([1.0, 2.0, 3.0]) + rng.normal(size=(20, 3))  # each segment has its own
+    x = np.array([1.0, 2.0, 3.0]) + rng.normal(size=(20, 3))  # different in each segment
     y, use = np.einsum("kimp,kp->kim", A, x) + e, np.ones((12, 1), dtype=bool)
     segments = [factors_of(("a", "b", "c"), A[k], y[k], use) for k in range(20)]
-    whole = merged_tree(segments, merged)
+    whole = merged_all(segments)
     x, inverse, rest = solved(whole)
     errors = np.sqrt(rest / 237 * np.diag(inverse))
-    others = [merged_tree(segments[:k] + segments[k + 1 :], merged) for k in range(20)]
+    others = [merged_all(segments[:k] + segments[k + 1 :]) for k in range(20)]
     moved = np.array([solved(other)[0] for other in others]) - x
     expected = np.sqrt(((moved**2).sum(axis=0) / errors**2).mean())
     found = jackknife_inflation(segments, whole, np.ones(1), errors)

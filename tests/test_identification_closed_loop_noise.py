@@ -10,7 +10,6 @@ from robotmodels.identification import Log, choose_processing, equations, reduce
 from robotmodels.identification.closed_loop import (
     Didim,
     Instrumental,
-    closed_loop,
     hausman_test,
     simulated_log,
     tuned_controller,
@@ -66,8 +65,8 @@ def studied(count, position, torque, decimation, methods):
         )
         system = equations(base, log, choices)
         factors = reduce_equations(system)
-        loop = closed_loop(system, 1.1 * truth, control, width=WIDTH)
-        both = [m(start=1.1 * truth, loop=loop, lags=0).solve(system, factors) for m in methods]
+        options = {"start": 1.1 * truth, "lags": 0, "width": WIDTH}
+        both = [m(control, **options).solve(system, factors) for m in methods]
         found = (ordinary(factors), *both)
         errors.append([(one.values - truth) / one.standard_errors for one in found])
         verdict = hausman_test(system, both[0], lags=0)

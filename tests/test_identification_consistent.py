@@ -89,7 +89,7 @@ def test_a_real_robot_comes_back_at_no_price(kind, rng):
             base, R, y, rest=rest, rows=len(W), prior=uniform_bodies(model, 3.0 * model.f)
         )
         assert found.status is EXACT
-        assert found.price == 0.0
+        assert found.residual_increase == 0.0
         assert found.fit.gap == 0.0
         sizes = np.maximum(abs(values), 1e-3 * abs(values).max())
         assert (abs(found.base_values - values) <= 1e-8 * sizes).all()
@@ -142,7 +142,7 @@ def test_the_optimum_of_an_independent_method(seed):
     prior = uniform_bodies(model, 6.0)
     found = fit_consistent(base, R, y, rest=rest, prior=prior)
     assert found.status is CONSTRAINED
-    assert found.price > 1.0
+    assert found.residual_increase > 1.0
     assert found.fit.squares == pytest.approx(np.sum((W @ found.base_values - tau) ** 2), rel=1e-9)
     assert found.fit.gap < 2e-4
     starts = [0.7 * rng.normal(size=len(base.parameter_names)) for _ in range(2)]
@@ -160,7 +160,7 @@ def test_no_real_robot_on_the_way_to_others_fits_better(rng):
     base, R, y, rest, W, tau = noisy(model, rng, 0.5, samples=15)
     found = fit_consistent(base, R, y, rest=rest, prior=uniform_bodies(model, 20.0))
     assert found.status is CONSTRAINED
-    assert found.price > 0.0
+    assert found.residual_increase > 0.0
     for _ in range(100):
         other = model.with_inertia(random_bodies(rng, 6)).with_drive(random_drive(rng, 6))
         way = parameter_vector(other) - found.values
@@ -185,7 +185,7 @@ def test_the_regressor_itself_and_other_units_give_the_same(rng):
     assert whole.rms is None
     for scale in (1e-4, 1e4):  # weights of other units
         again = fit_consistent(base, scale * R, scale * y, rest=scale**2 * rest, prior=prior)
-        assert again.price == pytest.approx(found.price, rel=1e-6)
+        assert again.residual_increase == pytest.approx(found.residual_increase, rel=1e-6)
         assert again.base_values == pytest.approx(found.base_values, rel=1e-4, abs=1e-5)
 
 
@@ -202,7 +202,7 @@ def test_small_and_large_robots_are_the_same_problem(rng):
     }
     expected = fits[1.0]
     assert expected.status is CONSTRAINED
-    assert expected.price > 0.1
+    assert expected.residual_increase > 0.1
     for s, found in fits.items():
         assert found.status is CONSTRAINED
         assert found.fit.gap < 2e-4
@@ -366,16 +366,16 @@ def test_frictions_of_models_take_energy(friction, bad, rng):
     assert found.status is CONSTRAINED
     assert found.values[list(base.parameter_names).index(bad)] == pytest.approx(0.0, abs=1e-4)
     assert f"{bad} is zero." in found.fit.active
-    assert found.parts.friction is not None
+    assert found.friction is not None
     if isinstance(friction, StribeckFriction):  # Fs below Fc is no Stribeck curve
         values[base.names.index("Fs2")], values[base.names.index("Fc1")] = 1.0, 3.0
         found = fit_consistent(base, R, R @ values, rest=rest, prior=uniform_bodies(model, 6.0))
         assert "Fs2 of Stribeck's curve is its Fc2." in found.fit.active
-        StribeckFriction(*found.parts.friction, vs=[0.1, 0.1])  # Fs >= Fc >= 0, or it is refused
+        StribeckFriction(*found.friction, vs=[0.1, 0.1])  # Fs >= Fc >= 0, or it is refused
     elif bad == "Fv2":  # an offset has either sign
-        assert found.parts.friction[-1, 0] == pytest.approx(-1.0, abs=0.1)
+        assert found.friction[-1, 0] == pytest.approx(-1.0, abs=0.1)
     else:
-        assert (found.parts.friction >= 0.0).all()
+        assert (found.friction >= 0.0).all()
 
 
 def test_the_weight_trades_residuals_for_nearness(rng):
@@ -411,17 +411,17 @@ def test_the_result_is_a_value(rng):
     base, R, y, rest, W, _ = noisy(model, rng, 0.5, samples=12)
     found = fit_consistent(base, R, y, rest=rest, rows=len(W), prior=uniform_bodies(model, 6.0))
     again = pickle.loads(pickle.dumps(found))
-    assert again.price == found.price
+    assert again.residual_increase == found.residual_increase
     assert not again.base_values.flags.writeable
     assert not again.values.flags.writeable
     assert found.standard_errors is None
     assert set(found.notes) >= {*found.fit.active}
     text = str(found)
     assert found.status.sentence in text
-    assert f"{found.price:.3g} %" in text
+    assert f"{found.residual_increase:.3g} %" in text
     for said in found.fit.active:
         assert said in text
-    assert f"residuals +{found.price:.3g} %" in repr(found)
+    assert f"residuals +{found.residual_increase:.3g} %" in repr(found)
     assert found.base_values == pytest.approx(base.values(found.of(model)), rel=1e-12, abs=1e-12)
 
 

@@ -101,8 +101,8 @@ def test_noisy_logs_of_heavy_arms_converge(seed):
     squares = rest + np.sum((R @ truth - y) ** 2)
     assert found.fit.squares <= squares * (1.0 + found.fit.gap)
     if unmodelled == 0.0:
-        assert found.price <= 100.0 * (np.sqrt(squares / found.fit.least) - 1.0) + 0.02
-        assert found.price < 12.0
+        assert found.residual_increase <= 100.0 * (np.sqrt(squares / found.fit.least) - 1.0) + 0.02
+        assert found.residual_increase < 12.0
 
 
 @pytest.mark.parametrize("seed", range(24))

@@ -318,4 +318,4 @@ def test_the_urdf_is_of_real_bodies_and_has_the_torques(found, tmp_path):
     assert "Physically consistent robot" in text
     data = result_data(found, robot)["consistent"]
     assert list(data["base"]) == list(found.names)
-    assert data["price_percent"] == robot.price
+    assert data["residual_increase_percent"] == robot.residual_increase

@@ -20,7 +20,7 @@ from robotmodels.estimation.factor import merged
 from robotmodels.estimation.linear import weighted
 from robotmodels.identification import choose_processing, equations, reduce_equations
 from robotmodels.identification.forms import EquationForm
-from robotmodels.identification.signals import Piece, piece_signals, slice_with_margin
+from robotmodels.identification.signals import piece_signals, slice_with_margin
 from robotmodels.logs import Log
 from robotmodels.logs.log import RefusedRows
 from robotmodels.minimal_parameters import base_parameters
@@ -157,12 +157,6 @@ def test_a_task_has_the_rows_of_its_slice_with_margin():
         other = piece_signals(alone, chosen, moved, chosen.reach)
         for name in ("q", "v", "a", "tau"):
             np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
-
-
-def test_pieces_of_another_log_are_refused():
-    whole = system()
-    with pytest.raises(InvalidValueError, match=r"gives for this log"):
-        whole.block(Piece(89_000, 91_000, 0, 100_000, 0, 100_000))
 
 
 class Counting(Executor):

@@ -18,7 +18,6 @@ from robotmodels.identification import (
     hausman_test,
     reduce_equations,
 )
-from robotmodels.identification.closed_loop import closed_loop
 from robotmodels.logs import with_delay
 
 
@@ -27,10 +26,6 @@ def least_squares(log, choices, way=weighted):
     system = equations(study().base, log, choices)
     factors = reduce_equations(system)
     return way(factors), system, factors
-
-
-def loop_of(system, start):
-    return closed_loop(system, start, study().controller, width=study().given["width"])
 
 
 def test_a_held_torque_acts_half_a_period_later():
@@ -60,12 +55,13 @@ def test_least_squares_without_filter_are_biased_and_the_test_says_so():
     # by chance, one of a hundred thousand is beyond 4.5
     assert (np.abs(z) > 4.5).sum() >= 10
     assert np.abs(z).max() > 100.0
-    after = Instrumental(start=start, loop=loop_of(system, start)).solve(system, factors)
+    options = {"start": start, "width": study().given["width"]}
+    after = Instrumental(study().controller, **options).solve(system, factors)
     verdict = hausman_test(system, after)
     assert verdict.biased
     assert verdict.p < 1e-6
     system = equations(study().base, log, raw)
-    method = Didim(start=start, loop=loop_of(system, start))
+    method = Didim(study().controller, **options)
     simulated = method.solve(system, reduce_equations(system))
     assert simulated.status is EstimateStatus.SOLVED
     for estimate in (after, simulated):

@@ -28,16 +28,21 @@ Q = np.zeros((4, 2))
         ({"tau": np.zeros((3, 2))}, ShapeError, r"tau: expected shape \(4, 2\) as q has it"),
         ({"v": np.zeros((4, 1))}, ShapeError, r"v: expected shape \(4, 2\)"),
         ({"names": ("one",)}, ShapeError, "names: expected 2 names of joints, got 1"),
-        ({"starts": (1,)}, InvalidValueError, "starts: expected ascending numbers"),
-        ({"starts": (0, 2, 2)}, InvalidValueError, "ascending"),
+        ({"starts": (0, 2, 2)}, InvalidValueError, "starts: expected ascending numbers"),
         ({"starts": (0, 4)}, InvalidValueError, "below 4"),
         ({"starts": ()}, InvalidValueError, "starts"),
-        ({"starts": (0.0, 2.0)}, InvalidValueError, "starts"),
     ],
 )
 def test_impossible_logs_are_refused(given, error, words):
     with pytest.raises(error, match=words):
         Log(**{"dt": 0.1, "q": Q, "tau": Q} | given)
+
+
+def smooth_log(n=2, N=2000, **more):
+    t = DT * np.arange(N)[:, None]
+    j = np.arange(1, n + 1)
+    q = np.sin(0.7 * j * t) + 0.3 * np.cos(1.1 * j * t)
+    return Log(DT, q, 3.0 * np.cos(0.7 * j * t + 1.0), **more)
 
 
 def test_slices_are_rows():
@@ -46,17 +51,13 @@ def test_slices_are_rows():
     assert np.array_equal(part.q, log.q[600:1900])
     assert np.shares_memory(part.q, log.q)
     assert part.starts.tolist() == [0, 100]
-    assert len(log[:]) == len(log)
-    for rows in (slice(0, 9000), slice(-9000, 10), slice(9000, 9001), slice(3, 3)):
+    for rows in (slice(0, 9000), slice(3, 3)):
         with pytest.raises(InvalidValueError, match="2000 rows"):
             log[rows]
     for rows in (slice(None, None, 2), 3):
         with pytest.raises(InvalidValueError, match=r"single samples.*needs a filter"):
             log[rows]
-    assert part.duration == pytest.approx(13.0)
-    np.testing.assert_allclose(part.t[:3], [0.0, 0.01, 0.02])
     assert "1300 samples of 2 joints at 100 Hz, 13 s in 2 recordings" in repr(part)
-    assert "recordings" not in repr(log.rows(0, 3))
 
 
 # --- time base -----------------------------------------------------------------------------------
@@ -64,15 +65,6 @@ def test_slices_are_rows():
 
 def values(t):
     return np.column_stack([np.sin(t), np.cos(3.0 * t)])
-
-
-def test_regular_stamps_are_kept_as_they_are():
-    t = 1.6e9 + DT * np.arange(100)
-    rows = regular_rows(t, values(t - 1.6e9), "x")
-    assert rows.dt == pytest.approx(DT, rel=1e-7)
-    assert np.array_equal(rows.values, values(t - 1.6e9))
-    assert rows.starts.tolist() == [0]
-    assert not rows.refused
 
 
 def test_gaps_and_jumps_back_split():
@@ -110,13 +102,9 @@ def test_missing_samples_are_interpolated_up_to_a_tenth_of_the_shortest_period(s
     found = regular_rows(t[~lost] if stamped else None, rows, "x", dt=None if stamped else dt)
     assert found.starts.tolist() == [0, 1500]
     assert found.dt == pytest.approx(dt, rel=1e-9)
-    truth = np.delete(data, slice(1500, 1540), axis=0)
-    np.testing.assert_allclose(found.values, truth, atol=1e-3)
-    (note,) = [note for note in found.notes if "interpolated" in note]
+    np.testing.assert_allclose(found.values, np.delete(data, slice(1500, 1540), axis=0), atol=1e-3)
     inserted = len(found.values) - int((~lost).sum())
-    assert f"x: {inserted} missing samples were interpolated (gaps up to 0.064 s; " in note
-    shortest = float(note.split("motion ")[1].split()[0])
-    assert 0.7 < shortest < 1.12
+    assert any(f"x: {inserted} missing samples were interp" in note for note in found.notes)
 
 
 def test_repeated_stamps_are_refused_and_listed():
@@ -170,7 +158,7 @@ def test_rows_without_neighbours_are_listed():
         (-t, values(t), None, "right column"),
         (t, values(t), 0.02, "without a filter"),
         (t, values(t), 1e-6, "more than 100 of one"),
-        (t, data * np.nan, None, "every one of its 10 rows lacks"),
+        (t, data * np.nan, None, "0 of its 10 rows have all numbers"),
     ):
         with pytest.raises(InvalidValueError, match=words):
             regular_rows(stamps, given, "x", dt=dt)
@@ -179,21 +167,12 @@ def test_rows_without_neighbours_are_listed():
 # --- joining and shifting ------------------------------------------------------------------------
 
 
-def smooth_log(n=2, N=2000, **more):
-    t = DT * np.arange(N)[:, None]
-    j = np.arange(1, n + 1)
-    q = np.sin(0.7 * j * t) + 0.3 * np.cos(1.1 * j * t)
-    return Log(DT, q, 3.0 * np.cos(0.7 * j * t + 1.0), **more)
-
-
-@pytest.mark.parametrize("delay", [0.04, -0.03, 0.0137, -0.0042])
+@pytest.mark.parametrize("delay", [0.04, -0.0042])
 def test_torques_are_moved_in_every_recording(delay):
     log = smooth_log(v=np.ones((2000, 2)), starts=(0, 700, 705))
     moved = with_delay(log, delay)
     cut = int(np.ceil(abs(delay) / DT - 1e-9))
-    assert moved.delay == delay
-    lengths = [700, 5, 1295]
-    kept = [length - cut for length in lengths if length > cut + 1]
+    kept = [length - cut for length in (700, 5, 1295) if length > cut + 1]
     assert np.diff([*moved.starts, len(moved)]).tolist() == kept
     assert sum(len(rows.rows) for rows in moved.refused) == (5 if cut + 1 >= 5 else 0)
     # where a position of the log stands, its torque is of that time and the delay
@@ -202,18 +181,12 @@ def test_torques_are_moved_in_every_recording(delay):
     assert np.array_equal(moved.q[: kept[0]], log.q[first : first + kept[0]])
     expected = 3.0 * np.cos(0.7 * np.array([1, 2]) * (t + delay) + 1.0)
     np.testing.assert_allclose(moved.tau[: kept[0]][5:-5], expected[5:-5], atol=1e-6)
-    assert "delay were removed" in moved.notes[-1]
     assert moved.v.shape == moved.q.shape
     assert with_delay(moved, delay).delay == 2.0 * delay
-
-
-def test_delays_that_leave_nothing_are_refused():
-    log = smooth_log(N=50)
     assert with_delay(log, 0.0) is log
-    for delay, words in ((1.0, "no recording is longer"), ([0.1, 0.2], "one number"),
-                         (np.nan, "delay")):  # fmt: skip
+    for bad, words in ((20.0, "no recording is longer"), ([0.1, 0.2], "one number")):
         with pytest.raises(InvalidValueError, match=words):
-            with_delay(log, delay)
+            with_delay(log, bad)
 
 
 def test_joined_logs_keep_what_all_have():
@@ -239,23 +212,22 @@ def test_joined_logs_keep_what_all_have():
 
 @pytest.fixture(scope="module")
 def tx40():
-    return load_tx40()
-
-
-def kinds(log, model=None):
-    return {finding.kind: finding for finding in check_log(log, model)}
+    """Every fifth sample of the data set, whose check is quick."""
+    data = load_tx40()
+    log = data.log
+    return data.model, Log(5 * log.dt, log.q[::5], log.tau[::5], names=log.names), data
 
 
 def changed(log, **fields):
-    arrays = {"q": log.q, "tau": log.tau, "names": log.names} | fields
-    return Log(fields.pop("dt", log.dt), **{k: v for k, v in arrays.items() if k != "dt"})
+    return Log(**{"dt": log.dt, "q": log.q, "tau": log.tau, "names": log.names} | fields)
 
 
 def test_a_good_log_has_no_findings(tx40):
-    assert check_log(tx40.log, tx40.model) == ()
+    model, log, data = tx40
+    assert check_log(data.log, model) == ()
     assert check_log(smooth_log()) == ()
     # names that are not the model's are not compared
-    assert check_log(changed(tx40.log, names="abcdef"), tx40.model) == ()
+    assert check_log(changed(log, names="abcdef"), model) == ()
 
 
 ORDER = [0, 2, 1, 3, 4, 5]
@@ -264,38 +236,33 @@ ORDER = [0, 2, 1, 3, 4, 5]
 @pytest.mark.parametrize(
     ("kind", "severity", "words", "change"),
     [
-        ("POSITIONS_IN_DEGREES", "USELESS", "angles='deg'", lambda d: {"q": np.degrees(d.log.q)}),
-        ("MOTOR_SIDE_POSITIONS", "USELESS", "transmission=model.transmission",
-         lambda d: {"q": d.motor_positions}),
-        ("OUTSIDE_LIMITS", "DOUBTFUL", "joint_2",
-         lambda d: {"q": d.log.q + np.array([0, 2.5, 0, 0, 0, 0])}),
-        ("TORQUE_ABOVE_LIMITS", "USELESS", "gear ratios", lambda d: {"tau": 1000.0 * d.log.tau}),
+        ("POSITIONS_IN_DEGREES", "USELESS", "angles='deg'", lambda q, tau: {"q": np.degrees(q)}),
+        ("OUTSIDE_LIMITS", "DOUBTFUL", "joint_2", lambda q, tau: {"q": q + 2.5 * np.eye(6)[1]}),
+        ("TORQUE_ABOVE_LIMITS", "USELESS", "gear ratios", lambda q, tau: {"tau": 1000.0 * tau}),
         ("CONSTANT_POSITION", "DOUBTFUL", "joint_3: it stays at",
-         lambda d: {"q": d.log.q * [1, 1, 0, 1, 1, 1]}),
+         lambda q, tau: {"q": q * [1, 1, 0, 1, 1, 1]}),
         ("CONSTANT_TORQUE", "USELESS", "joint_4: its torque is 0",
-         lambda d: {"tau": d.log.tau * [1, 1, 1, 0, 1, 1]}),
-        ("NOTHING_MOVES", "USELESS", "No joint moves", lambda d: {"q": 0.0 * d.log.q}),
-        ("SATURATED", "DOUBTFUL", "the largest one", lambda d: {"tau": np.minimum(
-            d.log.tau, np.quantile(d.log.tau, 0.93, axis=0))}),
-        ("SATURATED", "DOUBTFUL", "the smallest one", lambda d: {"tau": np.maximum(
-            d.log.tau, np.quantile(d.log.tau, 0.07, axis=0))}),
-        ("JUMP", "DOUBTFUL", "numpy.unwrap", lambda d: {"q": np.where(
-            np.arange(45000)[:, None] >= 20000, d.log.q + 2 * np.pi, d.log.q)}),
-        ("STUCK", "DOUBTFUL", "recorder is faster", lambda d: {
-            "q": np.repeat(d.log.q[:9000], 5, axis=0),
-            "tau": np.repeat(d.log.tau[:9000], 5, axis=0)}),
-        ("IMPLAUSIBLE_PERIOD", "USELESS", "milliseconds", lambda d: {"dt": 1.0}),
-        ("WRONG_JOINT_ORDER", "USELESS", "model= to read_log", lambda d: {
-            "q": d.log.q[:, ORDER], "tau": d.log.tau[:, ORDER],
-            "names": [d.log.names[j] for j in ORDER]}),
-        ("TOO_SHORT", "USELESS", "10 samples", lambda d: {
-            "q": d.log.q[:10], "tau": d.log.tau[:10]}),
-        ("TOO_SHORT", "DOUBTFUL", "60 samples", lambda d: {
-            "q": d.log.q[:60], "tau": d.log.tau[:60]}),
+         lambda q, tau: {"tau": tau * [1, 1, 1, 0, 1, 1]}),
+        ("NOTHING_MOVES", "USELESS", "No joint moves", lambda q, tau: {"q": 0.0 * q}),
+        ("SATURATED", "DOUBTFUL", "the largest one", lambda q, tau: {
+            "tau": np.minimum(tau, np.quantile(tau, 0.93, axis=0))}),
+        ("SATURATED", "DOUBTFUL", "the smallest one", lambda q, tau: {
+            "tau": np.maximum(tau, np.quantile(tau, 0.07, axis=0))}),
+        ("JUMP", "DOUBTFUL", "numpy.unwrap", lambda q, tau: {
+            "q": np.where(np.arange(9000)[:, None] >= 4000, q + 2 * np.pi, q)}),
+        ("STUCK", "DOUBTFUL", "recorder is faster", lambda q, tau: {
+            "q": np.repeat(q[:1800], 5, axis=0), "tau": np.repeat(tau[:1800], 5, axis=0)}),
+        ("IMPLAUSIBLE_PERIOD", "USELESS", "milliseconds", lambda q, tau: {"dt": 1.0}),
+        ("WRONG_JOINT_ORDER", "USELESS", "model= to read_log", lambda q, tau: {
+            "q": q[:, ORDER], "tau": tau[:, ORDER],
+            "names": [f"joint_{j + 1}" for j in ORDER]}),
+        ("TOO_SHORT", "USELESS", "10 samples", lambda q, tau: {"q": q[:10], "tau": tau[:10]}),
+        ("TOO_SHORT", "DOUBTFUL", "60 samples", lambda q, tau: {"q": q[:60], "tau": tau[:60]}),
     ],
 )  # fmt: skip
 def test_mistakes_are_named(tx40, kind, severity, words, change):
-    found = check_log(changed(tx40.log, **change(tx40)), tx40.model)
+    model, log, _ = tx40
+    found = check_log(changed(log, **change(log.q, log.tau)), model)
     order = [list(Severity)[::-1].index(finding.severity) for finding in found]
     assert order == sorted(order)  # the most severe first
     finding = {finding.kind: finding for finding in found}[FindingKind[kind]]
@@ -303,33 +270,28 @@ def test_mistakes_are_named(tx40, kind, severity, words, change):
     assert words in str(finding)
 
 
-def test_other_robots_and_other_objects_are_refused(tx40):
-    (finding,) = check_log(tx40.log, rm.load("panda"))
+def test_other_robots_and_motor_angles_are_named(tx40):
+    model, log, data = tx40
+    (finding,) = check_log(log, rm.load("panda"))
     assert finding.kind is FindingKind.WRONG_JOINT_COUNT
     assert "6 joints, panda has 7" in finding.sentence
-    for other, words in ((tx40, r"got Tx40Log; give its \.log"), (Q, "got ndarray; make one")):
+    for other, words in ((data, r"got Tx40Log; give its \.log"), (Q, "got ndarray; make one")):
         with pytest.raises(InvalidValueError, match=words):
             check_log(other)
-    # motor angles of a robot without a transmission
-    model = rm.RobotModel.from_table(tx40.model.table)
-    log = changed(tx40.log, q=20.0 * tx40.motor_positions)
-    assert "gears= or transmission=" in kinds(log, model)[FindingKind.MOTOR_SIDE_POSITIONS].sentence
-
-
-def test_a_sensor_that_stops_is_named(tx40):
-    v = np.abs(np.diff(tx40.log.q[:, 0]))
-    row = int(np.argmax(v[1000:40000])) + 1000
-    q = np.array(tx40.log.q)
-    q[row : row + 120, 0] = q[row, 0]
-    finding = kinds(changed(tx40.log, q=q))[FindingKind.STUCK]
-    assert finding.joints == ("joint_1",)
-    assert f"for 120 samples from row {row}" in finding.sentence
+    motors = changed(log, q=data.motor_positions[::5])
+    plain = rm.RobotModel.from_table(model.table)
+    for robot, given, words in (
+        (model, motors, "transmission=model.transmission"),
+        (plain, changed(log, q=20.0 * motors.q), "gears= or transmission="),
+    ):
+        kinds = {finding.kind: finding for finding in check_log(given, robot)}
+        assert words in kinds[FindingKind.MOTOR_SIDE_POSITIONS].sentence
 
 
 def test_joints_that_rest_between_moves_have_not_stopped():
     rng = np.random.default_rng(2)
     corners = np.cumsum(rng.normal(size=(9, 3)), axis=0)
-    for dt, step in ((0.001, 0.0), (0.01, 0.0), (0.004, 1e-3), (0.004, 1e-5)):
+    for dt, step in ((0.001, 0.0), (0.004, 1e-3), (0.004, 1e-5)):
         parts = []
         for a, b in pairwise(corners):  # as long at rest as in motion
             s = np.clip(np.arange(0.0, 2.0, dt), 0.0, 1.0)[:, None]
@@ -338,12 +300,14 @@ def test_joints_that_rest_between_moves_have_not_stopped():
         q = np.concatenate(parts)
         q = np.round(q / step) * step if step else q
         tau = np.gradient(np.gradient(q, dt, axis=0), dt, axis=0) + rng.normal(size=q.shape)
-        assert not {FindingKind.STUCK, FindingKind.SPIKES} & set(kinds(Log(dt, q, tau)))
-        stopped = np.array(q)
+        kinds = {finding.kind for finding in check_log(Log(dt, q, tau))}
+        assert not {FindingKind.STUCK, FindingKind.SPIKES} & kinds
         row = int(0.5 / dt) + 7
-        stopped[row:, 1] = stopped[row, 1]  # for good
+        q[row:, 1] = q[row, 1]  # for good
         if step < 1e-3:
-            assert kinds(Log(dt, stopped, tau))[FindingKind.STUCK].joints == ("2",)
+            stuck = [f for f in check_log(Log(dt, q, tau)) if f.kind is FindingKind.STUCK]
+            assert stuck[0].joints == ("2",)
+            assert f"from row {row}" in stuck[0].sentence
 
 
 def rates(log):
@@ -356,39 +320,38 @@ def off(log):
 
 
 def test_derivatives_of_the_positions_are_accepted(tx40):
-    v, a = rates(tx40.log)
+    _, log, _ = tx40
+    v, a = rates(log)
     rng = np.random.default_rng(0)
-    for q, w in ((tx40.log.q, v), (tx40.log.q + rng.normal(0, 1e-4, v.shape), v),
-                 (tx40.log.q, v + rng.normal(0, 0.1, v.shape))):  # fmt: skip
-        log = Log(tx40.log.dt, q, tx40.log.tau, w, a, starts=(0, 3, 5, 200, 20000))
-        assert off(log) == []
+    for q, w in ((log.q, v), (log.q + rng.normal(0, 1e-4, v.shape), v),
+                 (log.q, v + rng.normal(0, 0.1, v.shape))):  # fmt: skip
+        assert off(Log(log.dt, q, log.tau, w, a, starts=(0, 3, 5, 40, 4000))) == []
     still = np.full((500, 1), 0.3) + rng.normal(0, 1e-6, (500, 1))
     assert off(Log(DT, still, still, rng.normal(0, 1e-3, (500, 1)))) == []
-    assert off(Log(DT, np.ones((2, 1)), np.ones((2, 1)), np.ones((2, 1)), np.ones((2, 1)))) == []
+    assert off(Log(DT, *np.ones((4, 2, 1)))) == []
 
 
 @pytest.mark.parametrize("name", ["v", "a"])
 @pytest.mark.parametrize(
     ("factor", "joints", "words"),
     [
-        ([180 / np.pi] * 6, 6, "57.3 times the derivatives of the positions, that is degrees"),
-        ([1, 1, -1, 1, 1, 1], 1, "of the other sign"),
-        ([1, 48, 1, 1, 1, 1], 1, "may be a gear ratio"),
-        ([0.5] * 6, 6, "0.5 times.*sampling period"),
+        ([180 / np.pi] * 6, 6, r"57\.3 times the derivatives of the positions"),
+        ([1, 1, -1, 1, 1, 1], 1, "are -1 times"),
     ],
 )
 def test_derivatives_by_a_factor_are_named(tx40, name, factor, joints, words):
-    both = dict(zip("va", rates(tx40.log), strict=True))
+    _, log, _ = tx40
+    both = dict(zip("va", rates(log), strict=True))
     both[name] = both[name] * factor
-    (finding,) = off(Log(tx40.log.dt, tx40.log.q, tx40.log.tau, **both))
+    (finding,) = off(Log(log.dt, log.q, log.tau, **both))
     assert finding.severity is Severity.USELESS
     assert len(finding.joints) == joints
     assert re.search(words, finding.sentence)
 
 
 def test_derivatives_of_other_joints_are_named(tx40):
-    v, _ = rates(tx40.log)
-    (finding,) = off(Log(tx40.log.dt, tx40.log.q, tx40.log.tau, v[:, [1, 0, 2, 3, 4, 5]]))
+    _, log, _ = tx40
+    (finding,) = off(Log(log.dt, log.q, log.tau, rates(log)[0][:, [1, 0, 2, 3, 4, 5]]))
     assert finding.severity is Severity.DOUBTFUL
     assert finding.joints == ("1", "2")
     assert "do not follow" in finding.sentence

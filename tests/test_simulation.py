@@ -2,6 +2,7 @@
 
 import logging
 import pickle
+from itertools import cycle
 
 import numpy as np
 import pytest
@@ -87,9 +88,7 @@ def holds(model, sim, wrench=None, drive=True):
 # --- closed forms ------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("method", "tolerance"), [("DOP853", 1e-9), ("RK45", 1e-8), ("radau", 1e-6), ("BDF", 1e-4)]
-)
+@pytest.mark.parametrize(("method", "tolerance"), [("DOP853", 1e-9), ("radau", 1e-6)])
 def test_pendulum_swings_as_the_elliptic_functions_say(method, tolerance):
     length, start = 0.4, 1.9  # from the vertical
     t, rtol = np.linspace(0.0, 3.0, 61), 1e-10 if tolerance < 1e-7 else 1e-8
@@ -99,42 +98,6 @@ def test_pendulum_swings_as_the_elliptic_functions_say(method, tolerance):
     sn, _, _, _ = ellipj(ellipk(k * k) - np.sqrt(G / length) * t, k * k)
     assert np.abs(sim.q[:, 0] - (2.0 * np.arcsin(k * sn) - np.pi / 2)).max() < tolerance
     assert sim.status is SimulationStatus.FINISHED
-
-
-def test_falling_arms_keep_their_energy_and_return_when_time_is_reversed():
-    for model, q, T in (
-        (double_pendulum(), [0.0, 0.3], 2.0),
-        (load("rx90"), np.full(6, 0.3), 0.5),
-        (load("panda"), np.full(7, 0.2), 0.5),
-    ):
-        sim = simulate(model, q, np.zeros(model.n), t=T)
-        assert sim.status is SimulationStatus.FINISHED
-        assert sim.kinetic.max() > 1.0
-        assert sim.relative_drift < 1e-9
-        assert np.abs(sim.energy - sim.energy[0]).max() < 1e-9 * np.ptp(sim.potential)
-        assert sim.t[-1] == T
-        assert sim.drift_rate * T == pytest.approx(sim.drift[-1])
-        back = simulate(model, sim.q[-1], -sim.v[-1], t=T)
-        assert np.abs(back.q[-1] - q).max() < 1e-6
-        assert np.abs(back.v[-1]).max() < 1e-5
-
-
-def test_momentum_is_that_of_the_forces_alone():
-    """Two masses on one rail: internal torques do not change the momentum of both."""
-    links = points([1.0, 3.0], [0.0, 0.0])
-    rail = RobotModel.from_table(DHTable(antecedent=[0, 1], sigma=[1, 1]), links, gravity=(0, 0, 0))
-    sim = simulate(rail, [0.0, 0.5], [0.7, -0.4], lambda t, q, v: [0.0, -9.0 * q[1] - v[1] ** 3],
-                   np.linspace(0.0, 2.0, 9))  # fmt: skip
-    momentum = 1.0 * sim.v[:, 0] + 3.0 * sim.v.sum(axis=1)
-    assert np.ptp(sim.v[:, 1]) > 1.0
-    assert np.ptp(momentum) < 1e-9
-
-
-def test_tolerance_is_what_drift_follows():
-    drifts = [simulate(double_pendulum(), [0.0, 0.3], [0, 0], t=2.0, rtol=r, atol=r).relative_drift
-              for r in (1e-5, 1e-8, 1e-11)]  # fmt: skip
-    assert drifts[0] > 1e-8
-    assert drifts[0] > 30 * drifts[1] > 900 * drifts[2]
 
 
 # --- dry friction ------------------------------------------------------------------------------
@@ -193,7 +156,7 @@ def test_torques_that_change_while_all_joints_stick_are_seen():
     assert step.v[-1, 0] == pytest.approx(2.0 * (1.0 - 0.333), abs=1e-9)
 
 
-@pytest.mark.parametrize("excess", [1e-3, 1e-8])
+@pytest.mark.parametrize("excess", [1e-8])
 def test_parts_break_away_at_the_crossing_however_little_the_torque_exceeds(excess):
     """Torques that pass the breakaway torque for a short while, between looks of a step."""
     for w in (0.7, 2.9):
@@ -205,31 +168,6 @@ def test_parts_break_away_at_the_crossing_however_little_the_torque_exceeds(exce
         # what the rounding of a part in 1e13 of the torque takes, at the slope it crosses with
         late = 2e-13 / (w * np.sqrt(2.0 * excess))
         assert sim.events[0].t == pytest.approx(crossing, abs=late + 1e-14)
-
-
-def test_a_part_that_hardly_turns_back_sticks():
-    """A velocity that would be negative for less than the time between two looks."""
-    low, c = 1e-7, 0.05
-
-    def control(t, q, v):  # v = c (t - 1)^2 - low against 1 N of friction, 2 kg
-        return [1.0 + 4.0 * c * (t - 1.0)]
-
-    sim = simulate(slider(Fc=[1.0]), [0.0], [c - low], control, [0.0, 2.0])
-    assert [e.kind for e in sim.events] == [KINDS.STUCK, KINDS.BROKE_AWAY]
-    assert sim.events[0].t == pytest.approx(1.0 - np.sqrt(low / c), abs=1e-9)
-    assert sim.events[1].t == pytest.approx(1.0, abs=1e-11)
-    assert sim.v[-1, 0] == pytest.approx(c, abs=1e-11)  # from rest at 1 s
-
-
-def test_what_is_at_rest_at_the_start_sticks_or_not():
-    held = simulate(pendulum(Fc=[8.0]), [0.0], [0.0], t=1.0)  # 2 kg at 0.4 m: 7.848 N m
-    assert held.sticking.all()
-    assert not held.v.any()
-    assert held.friction[0, 0] == pytest.approx(-2.0 * 0.4 * G)
-    assert held.drift[-1] == 0.0
-    falls = simulate(pendulum(Fc=[7.8]), [0.0], [0.0], t=[0.0, 0.1])
-    assert not falls.sticking.any()
-    assert falls.a[0, 0] == pytest.approx((-7.848 + 7.8) / 0.32)
 
 
 def test_joints_stick_one_by_one_and_the_others_move_on():
@@ -245,59 +183,6 @@ def test_joints_stick_one_by_one_and_the_others_move_on():
     assert np.allclose(sim.friction[slips], (np.sign(sim.v) * [1.0, 0.05])[slips], atol=1e-12)
     assert sim.relative_drift < 1e-8
     assert {e.kind for e in sim.events} >= {KINDS.STUCK, KINDS.BROKE_AWAY, KINDS.REVERSED}
-
-
-def test_smoothing_approaches_the_events_and_creeps():
-    model = double_pendulum(Fc=[1.0, 0.3])
-    t = np.linspace(0.0, 2.0, 21)
-    exact = simulate(model, [0.2, 0.3], [0.0, 0.0], t=t)
-    errors = []
-    for width in (3e-2, 3e-3):
-        near = simulate(model, [0.2, 0.3], [0, 0], t=t, smoothing=width, rtol=1e-8, atol=1e-9)
-        assert not near.events
-        assert near.relative_drift < 1e-6
-        errors.append(np.abs(near.q - exact.q).max())
-    assert errors[1] < 0.3 * errors[0] < 0.1
-    creeping = simulate(pendulum(Fc=[8.0]), [0.0], [0.0], t=1.0, smoothing=[0.01], method="Radau")
-    # tanh(v / w) = load / Fc, where it has crept to
-    weight = gravity_torque(pendulum(), creeping.q[-1])[0]
-    assert weight < 7.848
-    assert creeping.v[-1, 0] == pytest.approx(-0.01 * np.arctanh(weight / 8.0), rel=1e-4)
-
-
-def test_friction_models_beside_the_drives():
-    t, rail = np.linspace(0.0, 2.0, 41), slider()
-
-    def push(t, q, v):
-        return [0.5 * np.sin(3 * t)]
-
-    own = simulate(slider(Fv=[0.4], Fc=[1.0]), [0.0], [0.9], push, t)
-    model = FrictionSum((ViscousFriction([0.4]), CoulombFriction([1.0])))
-    given = simulate(rail, [0.0], [0.9], push, t, friction=model)
-    assert np.allclose(own.q, given.q, atol=1e-10)
-    assert np.allclose(own.friction, given.friction, atol=1e-8)
-    assert np.array_equal(own.sticking, given.sticking)
-    assert own.sticking[-1, 0]
-    # directions that differ: breaks away at 4 N backwards, holds 2.5 N forwards
-    gears = AsymmetricFriction(Fvp=[0.1], Fcp=[2.5], Fvn=[0.2], Fcn=[4.0])
-    for force, moves in ((2.4, False), (2.6, True), (-3.9, False), (-4.1, True)):
-        sim = simulate(rail, [0.0], [0.0], [force], t, friction=gears)
-        assert bool(sim.v[-1, 0]) is moves
-        assert sim.v[-1, 0] * force >= 0.0
-    # Stribeck: static friction first, then less
-    falling = StribeckFriction(Fv=[0.0], Fc=[1.0], Fs=[2.0], vs=[0.05])
-    slow = simulate(rail, [0.0], [0.0], lambda t, q, v: [2.0 * t], t=t, friction=falling)
-    assert [e.kind for e in slow.events] == [KINDS.BROKE_AWAY]
-    assert slow.events[0].t == pytest.approx(1.0, abs=1e-8)
-    assert 0.8 < slow.v[-1, 0] < 1.0  # 0.5 m/s with Fc = 2 always, 1 m/s with Fc = 1
-    # an offset is no dry friction
-    pushed = simulate(rail, [0.0], [0.0], None, t, friction=TorqueOffset([1.0]))
-    assert np.allclose(pushed.a, -0.5)
-    assert not pushed.events
-    smooth = simulate(rail, [0.0], [0.9], None, t, friction=gears, smoothing=1e-4, method="Radau",
-                      rtol=1e-8)  # fmt: skip
-    sharp = simulate(rail, [0.0], [0.9], None, t, friction=gears)
-    assert np.abs(smooth.q - sharp.q).max() < 1e-4
 
 
 def coupled_wrist(Fcm=0.5, Fc=(0.3, 0.2)):
@@ -346,7 +231,7 @@ def test_more_friction_than_joints_holds_and_breaks_away():
 # --- the motion against the models ---------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_motion_fits_the_inverse_model(seed):
     rng = np.random.default_rng(seed)
     model = random_model(rng, f=5, tree=seed % 2 == 1, fixed=seed % 3 == 1, drive=True,
@@ -397,165 +282,174 @@ def test_jumps_of_a_sampled_controller_cost_nothing_at_breaks():
 # --- structures and ends -----------------------------------------------------------------------
 
 
+# --- parts and maps ----------------------------------------------------------------------------
+
+
+def test_friction_models_beside_the_drives():
+    t, rail = np.linspace(0.0, 2.0, 41), slider()
+
+    def push(t, q, v):
+        return [0.5 * np.sin(3 * t)]
+
+    own = simulate(slider(Fv=[0.4], Fc=[1.0]), [0.0], [0.9], push, t)
+    model = FrictionSum((ViscousFriction([0.4]), CoulombFriction([1.0])))
+    given = simulate(rail, [0.0], [0.9], push, t, friction=model)
+    assert np.allclose(own.q, given.q, atol=1e-10)
+    assert np.array_equal(own.sticking, given.sticking)
+    assert own.sticking[-1, 0]
+    # directions that differ: breaks away at 4 N backwards, holds 2.5 N forwards
+    gears = AsymmetricFriction(Fvp=[0.1], Fcp=[2.5], Fvn=[0.2], Fcn=[4.0])
+    for force, moves in ((2.4, False), (2.6, True), (-3.9, False), (-4.1, True)):
+        sim = simulate(rail, [0.0], [0.0], [force], t, friction=gears)
+        assert bool(sim.v[-1, 0]) is moves
+        assert sim.v[-1, 0] * force >= 0.0
+    # Stribeck: static friction first, then less
+    falling = StribeckFriction(Fv=[0.0], Fc=[1.0], Fs=[2.0], vs=[0.05])
+    slow = simulate(rail, [0.0], [0.0], lambda t, q, v: [2.0 * t], t=t, friction=falling)
+    assert [e.kind for e in slow.events] == [KINDS.BROKE_AWAY]
+    assert slow.events[0].t == pytest.approx(1.0, abs=1e-8)
+    assert 0.8 < slow.v[-1, 0] < 1.0  # 0.5 m/s with Fc = 2 always, 1 m/s with Fc = 1
+    # an offset is no dry friction
+    pushed = simulate(rail, [0.0], [0.0], None, t, friction=TorqueOffset([1.0]))
+    assert np.allclose(pushed.a, -0.5)
+    # smoothed jumps approach the events, and joints creep where they should stick
+    stiff = {"smoothing": 1e-4, "method": "Radau", "rtol": 1e-8}
+    smooth = simulate(rail, [0.0], [0.9], None, t, friction=gears, **stiff)
+    assert not smooth.events
+    sharp = simulate(rail, [0.0], [0.9], None, t, friction=gears)
+    assert np.abs(smooth.q - sharp.q).max() < 1e-4
+    creeping = simulate(pendulum(Fc=[8.0]), [0.0], [0.0], t=1.0, smoothing=[0.01], method="Radau")
+    # tanh(v / w) = load / Fc, where it has crept to
+    weight = gravity_torque(pendulum(), creeping.q[-1])[0]
+    assert creeping.v[-1, 0] == pytest.approx(-0.01 * np.arctanh(weight / 8.0), rel=1e-4)
+
+
+# --- ends, values and mistakes -------------------------------------------------------------------
+
+
+def test_falling_arms_keep_their_energy_and_return_when_time_is_reversed():
+    for model, q, T in (
+        (double_pendulum(), [0.0, 0.3], 2.0),
+        (load("panda"), np.full(7, 0.2), 0.5),
+    ):
+        sim = simulate(model, q, np.zeros(model.n), t=T)
+        assert sim.kinetic.max() > 1.0
+        assert sim.relative_drift < 1e-9
+        assert np.abs(sim.energy - sim.energy[0]).max() < 1e-9 * np.ptp(sim.potential)
+        back = simulate(model, sim.q[-1], -sim.v[-1], t=T)
+        assert np.abs(back.q[-1] - q).max() < 1e-6
+    resting = simulate(pendulum(), [-np.pi / 2], [0.0], t=1.0)  # moves by rounding errors
+    assert resting.relative_drift < 1e-15
+
+
 def test_no_joints_and_no_duration():
     fixed = RobotModel.from_table(DHTable(antecedent=[0], sigma=[2]), points([1.0], [0.3]))
     for t in (1.0, [0.0, 0.5, 1.0]):
         sim = simulate(fixed, [], [], lambda t, q, v: [], t, np.ones(6), stop_at_limits=True)
         assert sim.q.shape == (len(sim.t), 0)
         assert sim.t[-1] == 1.0
-        assert sim.relative_drift == 0.0
     for t in (0.0, [3.0]):
         sim = simulate(pendulum(), [0.0], [0.0], t=t)
-        assert sim.q.shape == (1, 1)
-        assert sim.a[0, 0] == pytest.approx(-G / 0.4)
-        assert sim.drift_rate == 0.0
+        assert sim.a == pytest.approx(np.array([[-G / 0.4]]))
 
 
 def test_a_limit_stops_the_motion():
-    t = np.linspace(0, 2, 21)
-    limits = simulate(slider(), [0.0], [1.0], None, t, stop_at_limits=True)
-    assert limits.status is SimulationStatus.LIMIT_REACHED
-    assert limits.t[-1] == pytest.approx(0.5, abs=1e-12)
-    assert limits.q[-1, 0] == pytest.approx(0.5, abs=1e-12)
-    assert "joint 1 reaches a limit" in str(limits)
-    assert simulate(slider(), [0.0], [1.0], None, t).q[-1, 0] == pytest.approx(2.0)
-    inward = simulate(slider(), [0.5], [-1.0], None, 1.0, stop_at_limits=True)
-    assert inward.status is SimulationStatus.FINISHED
-    outward = simulate(slider(), [0.5], [1.0], None, 1.0, stop_at_limits=True)
-    assert outward.status is SimulationStatus.LIMIT_REACHED
-    assert outward.t[-1] == pytest.approx(0.0, abs=1e-9)
+    free = simulate(slider(), [0.0], [1.0], t=[0.0, 2.0])
+    assert free.q[-1, 0] == pytest.approx(2.0)
+    for q, v, end in ((0.0, 1.0, 0.5), (0.5, 1.0, 0.0), (0.5, -1.0, None)):
+        sim = simulate(slider(), [q], [v], t=1.0, stop_at_limits=True)
+        if end is None:
+            assert sim.status is SimulationStatus.FINISHED
+        else:
+            assert sim.status is SimulationStatus.LIMIT_REACHED
+            assert sim.t[-1] == pytest.approx(end, abs=1e-9)
+            assert "joint 1 reaches a limit" in str(sim)
     with pytest.raises(InvalidValueError, match=r"joint 1 starts at 0\.6, outside its limits"):
         simulate(slider(), [0.6], [0.0], t=1.0, stop_at_limits=True)
     with pytest.raises(InvalidValueError, match=r"stop_at_limits: no joint of .* finite limit"):
         simulate(pendulum(), [0.6], [0.0], t=1.0, stop_at_limits=True)
 
 
-class Alternating:
-    """A torque that is another one at each evaluation."""
-
-    sign = 1.0
-
-    def __call__(self, t, q, v):
-        self.sign = -self.sign
-        return [5.0 * self.sign]
-
-
 def test_ends_before_the_end_have_a_status():
     few = simulate(double_pendulum(), [0, 0], [0, 0], t=10.0, max_evaluations=100)
     assert few.status is SimulationStatus.NOT_CONVERGED
     assert 0 < few.t[-1] < 10.0
-    assert few.evaluations < 200
     wild = simulate(slider(), [0.0], [1.0], lambda t, q, v: [np.exp(min(q[0], 700.0))], t=10.0)
     assert wild.status is SimulationStatus.STEP_TOO_SMALL
-    assert wild.t[-1] < 3.0
     assert np.isfinite(wild.q).all()
-    torn = simulate(slider(Fc=[1.0]), [0.0], [0.0], Alternating(), t=1.0, max_evaluations=20000)
+    signs = cycle([5.0, -5.0])  # a torque that is another one at each evaluation
+    torn = simulate(slider(Fc=[1.0]), [0.0], [0.0], lambda t, q, v: [next(signs)], t=1.0)
     assert torn.status is SimulationStatus.CHATTERING
-    assert torn.t[-1] < 1e-6
     # parameters of no body: the mass matrix vanishes on the way, and nothing is followed past it
     ghost = RobotModel.from_table(
         DHTable(antecedent=[0, 1], sigma=[0, 0], d=[0, 1.0]),
         InertialParameters([[0, 0, 0, 0, 0, 0.5, 0, 0, 0, 0], [0, 0, 0, 0, 0, 1.0, 1.0, 0, 0, 0]]),
         gravity=(0, 0, 0),
     )
-    assert min(np.linalg.det(mass_matrix(ghost, [0, q])) for q in np.linspace(0, np.pi, 50)) < 0.0
     lost = simulate(ghost, [0.0, np.pi / 2], [0.0, -1.0], t=10.0)
     assert lost.status in (SimulationStatus.SINGULAR, SimulationStatus.STEP_TOO_SMALL)
-    assert lost.t[-1] < 10.0
     assert np.linalg.eigvalsh(mass_matrix(ghost, lost.q)).min() > 0.0
 
 
-def test_progress_is_reported(caplog):
-    seen = []
-    simulate(double_pendulum(), [0, 0], [0, 0], t=1.0, progress=seen.append)
-    assert seen[-1] == 1.0
-    assert len(seen) > 10
+def test_a_simulation_is_a_value_and_reports_progress(caplog):
+    done = []
+    sim = simulate(pendulum(Fc=[2.0]), [0.5], [0.0], t=0.3, progress=done.append)
+    assert done[-1] == 1.0
+    again = pickle.loads(pickle.dumps(sim))
+    assert np.array_equal(again.q, sim.q)
+    assert again.events == sim.events
+    with pytest.raises(ValueError, match="read-only"):
+        again.kinetic[0] = 1.0
+    assert f"evaluations of the model: {sim.evaluations}" in str(sim)
     with caplog.at_level(logging.INFO, logger="robotmodels.simulation"):
         simulate(pendulum(), [0.0], [0.0], t=0.1, progress=True)
     assert "simulated 100 %" in caplog.text
 
 
-def test_a_simulation_is_a_value():
-    sim = simulate(pendulum(Fc=[2.0]), [0.5], [0.0], t=0.3)
-    again = pickle.loads(pickle.dumps(sim))
-    assert np.array_equal(again.q, sim.q)
-    assert again.events == sim.events
-    with pytest.raises(ValueError, match="read-only"):
-        sim.q[0] = 1.0
-    with pytest.raises(ValueError, match="read-only"):
-        again.kinetic[0] = 1.0
-    assert f"evaluations of the model: {sim.evaluations}" in str(sim)
+def broken(t, q, v):
+    return [1.0 / (t - t)]
+
+
+COUPLED = double_pendulum().with_transmission(Transmission([[1.0, 1.0], [1.0, 1.0]]))
+MIMICS = double_pendulum().with_transmission(Transmission([[1.0, 0.0], [1.0, 0.0]]))
 
 
 @pytest.mark.parametrize(
-    ("arguments", "message"),
+    ("arguments", "error", "message"),
     [
-        ({"q0": [0.0, 1.0]}, "q0: expected shape"),
-        ({"q0": [[0.0]]}, "q0: expected one state"),
-        ({"t": -1.0}, "duration from 0"),
-        ({"t": [0.0, 1.0, 1.0]}, "ascending times, got 1.0 s and then 1.0 s"),
-        ({"control": [1.0, 2.0]}, r"control: expected a function control\(t, q, v\) -> \(1,\), or"),
-        ({"control": [[1.0], [2.0]]}, "rows need the times t"),
-        ({"control": [[1.0], [2.0]], "t": [0, 1, 2]}, r"or \(3, 1\), got shape \(2, 1\)"),
-        ({"control": lambda t, q, v: [1.0, 2.0]}, r"at t = 0 s: expected shape \(1,\), got \(2,\)"),
-        ({"control": lambda t, q, v: [[1.0], [1, 2]]}, "regular array, got list"),
-        ({"control": lambda t, q, v: [np.nan if t > 0.5 else 0.0]}, r"control.* at t = 0.5.*nan"),
-        ({"v0": [1e200]}, r"v0: the accelerations or the energy of velocities up to 1e\+200"),
-        ({"wrench": [1.0]}, r"array of shape \(6,\)"),
-        ({"friction": CoulombFriction([1.0, 2.0])}, "friction of 1 joints, got 2"),
-        ({"friction": CoulombFriction([-1.0])}, "dry friction of joint 1 is negative"),
-        ({"smoothing": 0.0}, "smoothing: expected at least"),
-        ({"smoothing": [1.0, 1.0]}, "smoothing: expected one number"),
-        ({"method": "euler"}, "method: expected one of 'dop853'"),
-        ({"rtol": 1e-16}, "rtol: expected at least 2.2e-14"),
-        ({"max_evaluations": 0}, "max_evaluations: expected at least 1"),
-        ({"breaks": [[0.5]]}, "breaks: expected times"),
+        ({"q0": [[0.0]]}, ShapeError, "q0: expected shape"),
+        ({"t": -1.0}, ShapeError, "duration from 0"),
+        ({"t": [0.0, 1.0, 1.0]}, InvalidValueError, "ascending times, got 1.0 s and then 1.0 s"),
+        ({"control": [1.0, 2.0]}, ShapeError, r"function control\(t, q, v\) -> \(1,\), or"),
+        ({"control": [[1.0], [2.0]], "t": [0, 1, 2]}, ShapeError, r"or \(3, 1\), got shape"),
+        ({"control": lambda t, q, v: [1.0, 2.0]}, ShapeError, r"at t = 0 s: expected shape \(1,\)"),
+        ({"control": broken}, ZeroDivisionError, "division"),
+        ({"v0": [1e200]}, InvalidValueError, r"v0: the accelerations or the energy of"),
+        ({"friction": CoulombFriction([1.0, 2.0])}, ShapeError, "friction of 1 joints, got 2"),
+        ({"friction": CoulombFriction([-1.0])}, InvalidValueError, "of joint 1 is negative"),
+        ({"smoothing": 0.0}, InvalidValueError, "smoothing: expected at least"),
+        ({"method": "euler"}, InvalidValueError, "method: expected one of 'dop853'"),
+        ({"breaks": [[0.5]]}, ShapeError, "breaks: expected times"),
+        ({"model": load("planar_2r")}, SingularMassMatrixError, "moves no inertia"),
+        ({"model": slider().with_inertia(InertialParameters([[0] * 9 + [-1.0]]))}, InertiaError,
+         "link 1: negative mass -1 kg"),
+        ({"model": COUPLED}, InvalidValueError, "coupling matrix K is singular, it has rank 1"),
+        ({"model": MIMICS}, InvalidValueError, "joints that mimic others, which simulate does"),
     ],
-)
-def test_mistakes_are_named(arguments, message):
-    given = {"model": pendulum(), "q0": [0.0], "v0": [0.0], "t": 1.0} | arguments
-    with pytest.raises(RobotModelsError, match=message) as caught:
-        simulate(given.pop("model"), given.pop("q0"), given.pop("v0"), **given)
-    assert isinstance(caught.value, (ShapeError, InvalidValueError))
-
-
-def test_mass_matrices_that_cannot_be_inverted_are_named():
-    with pytest.raises(SingularMassMatrixError, match="moves no inertia"):
-        simulate(load("planar_2r"), [0, 0], [0, 0], t=1.0)
-    negative = slider().with_inertia(InertialParameters([[0] * 9 + [-1.0]]))
-    with pytest.raises(InertiaError, match="link 1: negative mass -1 kg"):
-        simulate(negative, [0.0], [0.0], [1.0], t=1.0)
-    singular = double_pendulum().with_transmission(Transmission([[1.0, 1.0], [1.0, 1.0]]))
-    with pytest.raises(InvalidValueError, match="coupling matrix K is singular, it has rank 1"):
-        simulate(singular, [0.0, 0.0], [0.0, 0.0], t=1.0)
-    mimics = double_pendulum().with_transmission(Transmission([[1.0, 0.0], [1.0, 0.0]]))
-    with pytest.raises(InvalidValueError, match="joints that mimic others, which simulate does"):
-        simulate(mimics, [0.1, 0.1], [0.0, 0.0], t=1.0)
-
-
-def test_errors_of_the_control_itself_say_when_they_came():
-    def control(t, q, v):
-        return [1.0 / (t - t)]
-
-    cases = (control, ZeroDivisionError), (lambda t, q: [0.0], TypeError)
-    for law, error in (*cases, (lambda t, q, v: [float("x")], ValueError)):
-        with pytest.raises(error) as caught:
-            simulate(slider(), [0.0], [0.0], law, 1.0)
+)  # fmt: skip
+def test_mistakes_are_named(arguments, error, message):
+    model = arguments.get("model", pendulum())
+    given = {"model": model, "q0": np.zeros(model.n), "v0": np.zeros(model.n), "t": 1.0} | arguments
+    with pytest.raises(error, match=message) as caught:
+        simulate(**given)
+    if arguments.get("control") is broken:
         assert caught.value.__notes__ == ["Raised by control(t, q, v) at t = 0 s."]
-
-
-def test_relative_drift_of_arms_at_rest_is_no_ratio_of_rounding_errors():
-    hanging = simulate(pendulum(), [-np.pi / 2], [0.0], t=1.0)  # moves by rounding errors
-    assert 0.0 < hanging.energy_turnover < 1e-25
-    assert hanging.relative_drift < 1e-15
-    falls = simulate(pendulum(), [0.0], [0.0], t=1.0)
-    assert falls.relative_drift == np.abs(falls.drift).max() / falls.energy_turnover
 
 
 # --- parts and maps ----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, 2])
 def test_parts_of_the_torque_make_the_whole(seed):
     rng = np.random.default_rng(seed)
     model = random_model(rng, f=5, tree=True, fixed=True, drive=True, transmission=seed > 1)
@@ -567,30 +461,26 @@ def test_parts_of_the_torque_make_the_whole(seed):
     assert np.abs(parts.total - whole).max() < 1e-12 * np.abs(whole).max()
     assert np.allclose(parts.inertia, np.einsum("...ij,...j", mass_matrix(model, q), a))
     assert np.array_equal(parts.gravity, gravity_torque(model, q))
-    twice = torque_parts(model, q, 2 * v, a)
-    assert np.allclose(twice.coriolis, 4 * parts.coriolis)
+    assert np.allclose(torque_parts(model, q, 2 * v, a).coriolis, 4 * parts.coriolis)
     with pytest.raises(InvalidValueError, match="q, v, a: the motion is empty"):
         torque_parts(model, q[:0], v[:0], a[:0])
     bare = torque_parts(model, q, v, a, drive=False)
     assert not bare.friction.any()
-    assert not bare.wrench.any()
     assert np.allclose(bare.total, idm(model, q, v, a, drive=False))
-    assert np.array_equal(pickle.loads(pickle.dumps(bare)).gravity, bare.gravity)
 
 
 def test_maps_over_joints():
     arm, panda = load("rx90"), load("panda")
     line = dynamics_map(arm, 2, q=np.full(6, 0.1), samples=5)
-    for k, value in enumerate(line.ranges[0]):
-        q = np.where(np.arange(6) == 2, value, 0.1)
-        assert np.allclose(line.mass[k], mass_matrix(arm, q))
-        assert np.allclose(line.gravity[k], gravity_torque(arm, q), atol=1e-12)
+    q = np.tile(np.full(6, 0.1), (5, 1))
+    q[:, 2] = line.ranges[0]
+    assert np.allclose(line.mass, mass_matrix(arm, q))
+    assert np.allclose(line.gravity, gravity_torque(arm, q), atol=1e-12)
     face = dynamics_map(arm, (1, 2), ranges=[[-1, 1], [0, 2]], samples=(3, 4))
     assert np.allclose(face.gravity[2, 1], gravity_torque(arm, [0, 1, 2 / 3, 0, 0, 0]))
     assert np.allclose(np.einsum("...ii->...i", face.coupling), 1.0)
     assert np.abs(face.coupling).max() <= 1.0 + 1e-12
     assert np.isnan(dynamics_map(load("planar_2r"), 0, samples=2).coupling).all()
-    assert pickle.loads(pickle.dumps(face)).joints == (1, 2)
     for model, j, ends in (
         (panda, 3, [panda.lower[3], panda.upper[3]]),
         (slider(), 0, [-1.0, 0.5]),
@@ -599,9 +489,6 @@ def test_maps_over_joints():
         assert dynamics_map(model, j, samples=2).ranges[0] == pytest.approx(ends)
     for wrong, message in (
         ({"joints": (1, 1)}, "one or two different joints"),
-        ({"joints": 6}, "numbers from 0 to 5"),
-        ({"joints": "a"}, "one or two different joints"),
-        ({"joints": (0, 1, 2)}, "one or two different joints"),
         ({"joints": 0, "ranges": [1, 0]}, "ascending ends"),
         ({"joints": (0, 1), "ranges": [0, 1]}, r"expected shape \(2, 2\)"),
         ({"joints": 0, "samples": 1}, "samples: expected 1 whole numbers from 2"),

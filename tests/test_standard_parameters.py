@@ -75,7 +75,7 @@ def test_a_prior_that_is_the_robot_is_returned_as_it_is(rng):
             assert found.distance == 0.0
             assert found.inertia == model.inertia
             assert found.drive == model.drive
-            assert found.parts.transmission == model.transmission
+            assert found.model.transmission == model.transmission
 
 
 @pytest.mark.parametrize("scale", [1e-2, 1e3, 1e6, 1e9])
@@ -199,7 +199,7 @@ def test_friction_models_come_back(rng):
     values[base.names.index("Fs2")] = 7.0
     found = standard_parameters(base, values, prior=uniform_bodies(model, 10.0))
     assert found.status is PhysicalStatus.EXACT
-    np.testing.assert_allclose(found.parts.friction, [[1, 2], [3, 4], [5, 7]], rtol=1e-6)
+    np.testing.assert_allclose(found.friction, [[1, 2], [3, 4], [5, 7]], rtol=1e-6)
 
 
 def test_the_nearest_of_no_robot_stays_near_the_prior(rng):

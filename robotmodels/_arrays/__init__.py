@@ -5,11 +5,12 @@ Leading axes are batch axes and broadcast against each other; the last axes are 
 
 from .batch import batch_rows, batch_shape
 from .border import LARGEST, Array, as_bounded, as_core, as_exact, as_floats, as_reals, as_vector
-from .values import Rebuilt, Value, read_only, same_value, value_hash
+from .values import Frozen, Rebuilt, Value, read_only, same_value, value_hash
 
 __all__ = [
     "LARGEST",
     "Array",
+    "Frozen",
     "Rebuilt",
     "Value",
     "as_bounded",

@@ -37,6 +37,18 @@ def _rebuilt(kind: type, values: tuple[Any, ...]) -> Any:
     return kind(*values)
 
 
+class Frozen(Rebuilt):
+    """Base of frozen dataclasses whose arrays become read-only copies."""
+
+    __slots__ = ()
+
+    def __post_init__(self) -> None:
+        for field in fields(self):  # type: ignore[arg-type]
+            value = getattr(self, field.name)
+            if isinstance(value, np.ndarray):
+                object.__setattr__(self, field.name, read_only(value, value.dtype.type))
+
+
 class Value(Rebuilt):
     """Base of frozen dataclasses that are equal if their fields are, arrays included."""
 

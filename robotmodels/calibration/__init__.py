@@ -2,32 +2,30 @@
 
 from ..file_units import AngleUnit, LengthUnit
 from ..obstacles import Box, Sphere
-from .calibrated_robot.bending import Bending
-from .calibrated_robot.calibrated import CalibratedEnd, CalibratedRobot, calibrated_model
-from .calibrated_robot.calibrated_pose import calibrated_pose
-from .calibrated_robot.joint_errors import JointErrors, encoder_transmission, joint_errors_of
-from .calibrated_robot.reading_jacobian import reading_jacobian
-from .correction.corrected import corrected_igm
-from .correction.corrected_solutions import CorrectedSolutions, CorrectionStatus
-from .correction.offsets import JointOffsets, PoseOffsets, joint_offsets, pose_offsets
+from .candidates import candidate_parameters
+from .differential import DifferentialModel, differential_model
 from .errors_seen import BlockErrors, ErrorSummary
-from .extended_table.candidates import candidate_parameters
-from .extended_table.differential import DifferentialModel, differential_model
-from .extended_table.elements import Compliance, Element, ErrorLaw
-from .extended_table.parameters import GeometricParameter, GeometricParameters
-from .extended_table.six_parameters import (
+from .extended_table import (
+    Element,
     SixParameters,
+    Skeleton,
     base_parameters_of,
     pose_of_elements,
+    skeleton_of,
     tool_parameters_of,
 )
-from .extended_table.skeleton import Skeleton, skeleton_of
 from .file_kinds import FileKind
 from .fit import fit
 from .folds import AsideErrors
-from .identifiability.changed import IdentifiabilityChange, identifiability_change
-from .identifiability.identifiable import IdentifiableParameters, Reason, identifiable_on
-from .identifiability.structural import identifiable_parameters
+from .identifiable import (
+    IdentifiabilityChange,
+    IdentifiableParameters,
+    Reason,
+    identifiability_change,
+    identifiable_on,
+    identifiable_parameters,
+)
+from .inverse import CorrectedSolutions, CorrectionStatus, corrected_igm
 from .joined import side_by_side
 from .measurements import (
     AxisPosition,
@@ -45,7 +43,9 @@ from .measurements import (
     RelativePose,
 )
 from .measurements.kinds import Kind, drawn_groups
+from .offsets import JointOffsets, PoseOffsets, joint_offsets, pose_offsets
 from .other_tool import PredictedError, other_tool_error
+from .parameters import Compliance, ErrorLaw, GeometricParameter, GeometricParameters
 from .prior import ParameterPrior
 from .problem import Problem, problem_of
 from .read import read_measurements
@@ -53,9 +53,24 @@ from .reporting.text import report_text
 from .reporting.write import calibrated_urdf, result_data, write_result
 from .residuals import measured_residuals
 from .result import CalibrationResult
-from .selection.observability import Criterion, Observability, observability
-from .selection.select import select_configurations
-from .selection.selected import SelectedConfigurations
+from .robot import (
+    Bending,
+    CalibratedEnd,
+    CalibratedRobot,
+    JointErrors,
+    calibrated_model,
+    calibrated_pose,
+    encoder_transmission,
+    joint_errors_of,
+    reading_jacobian,
+)
+from .selection import (
+    Criterion,
+    Observability,
+    SelectedConfigurations,
+    observability,
+    select_configurations,
+)
 from .solve import Solution
 from .true_errors import TrueErrors, true_errors
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from .._arrays import Array
 from .errors_seen import block_errors
-from .identifiability.scale import needs_a_length
+from .identifiable import needs_a_length
 from .measurements import KnownDistance
 from .prior import ParameterPrior, refitted
 from .problem import Problem, satisfying, stacked

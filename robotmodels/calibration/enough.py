@@ -9,7 +9,7 @@ import numpy as np
 from .._arrays import Array
 from ..errors import InvalidValueError
 from ..kinematics.lengths import spread_configurations
-from .identifiability.identifiable import DEPENDENT, IdentifiableParameters, identifiable_on
+from .identifiable import DEPENDENT, IdentifiableParameters, identifiable_on
 from .measurements import Measurement
 from .problem import guessed_fixtures, problem_of
 

@@ -10,7 +10,7 @@ from .._arrays import Array
 from ..csv_table import CsvTable
 from ..errors import InvalidValueError
 from ..model import RobotModel
-from .extended_table.skeleton import Frame
+from .extended_table import Frame
 from .measurements.measurement import FileRow
 from .reading_limits import beyond_limits
 

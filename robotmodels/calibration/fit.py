@@ -11,12 +11,10 @@ from .._choices import chosen
 from ..errors import InvalidValueError
 from ..estimation import Loss
 from ..model import RobotModel, check_model
+from .candidates import candidate_parameters
 from .contradiction import contradictions
 from .enough import check_enough
 from .errors_seen import block_errors
-from .extended_table.candidates import candidate_parameters
-from .extended_table.elements import Compliance
-from .extended_table.parameters import GeometricParameters, as_names
 from .folds import (
     Refit,
     Split,
@@ -25,7 +23,7 @@ from .folds import (
     splits,
     suited_fixtures,
 )
-from .identifiability.identifiable import (
+from .identifiable import (
     IdentifiableParameters,
     Reason,
     all_deviations,
@@ -36,6 +34,7 @@ from .measurements import KnownDistance, Measurement
 from .next_term import note_of_structure, trials_of
 from .notes import is_implausible, notes_after, notes_before, notes_of_errors
 from .outliers import judged
+from .parameters import Compliance, GeometricParameters, as_names
 from .placing import placed_robot
 from .prior import ParameterPrior, estimated_with, note_of_prior, settled_prior, sized, widened
 from .problem import as_measurements, guessed_fixtures, measured_frames, problem_of

@@ -13,8 +13,8 @@ from .._arrays import Array, Rebuilt
 from ..estimation import Prior, fit_nonlinear
 from ..model import RobotModel
 from .errors_seen import BlockErrors, block_errors
-from .extended_table.parameters import GeometricParameters
 from .measurements import Measurement
+from .parameters import GeometricParameters
 from .partition import Part, Partition, parted, partition_blocks
 from .problem import Problem, guessed_fixtures, problem_of, stacked
 from .solve import Solution, first_scales, solve

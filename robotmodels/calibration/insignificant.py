@@ -9,7 +9,7 @@ import numpy as np
 
 from .._arrays import Array
 from ..estimation.linearised import inverse_factor
-from .identifiability.identifiable import IdentifiableParameters, Reason
+from .identifiable import IdentifiableParameters, Reason
 from .prior import largest_factors
 from .problem import stacked
 from .solve import Solution

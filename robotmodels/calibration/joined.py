@@ -15,7 +15,7 @@ from ..geometry import FIXED, DHTable
 from ..inertia import InertialParameters
 from ..model import RobotModel, check_model
 from ..urdf import NamedFrame
-from .extended_table.six_parameters import base_parameters_of
+from .extended_table import base_parameters_of
 
 _COLUMNS = ("gamma", "b", "beta", "alpha", "d", "theta", "r")
 _LIMITS = ("lower", "upper", "velocity", "effort")

@@ -14,7 +14,7 @@ from ..errors import InvalidValueError
 from ..kinematics import dgm
 from ..kinematics.lengths import characteristic_length
 from ..model import RobotModel
-from .extended_table.skeleton import Frame
+from .extended_table import Frame
 from .measurements import (
     CameraPose,
     Distance,

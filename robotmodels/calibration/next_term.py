@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from .errors_seen import BlockErrors
-from .extended_table.parameters import GeometricParameters
 from .folds import AsideErrors, Refit, Split, errors_of_splits
-from .identifiability.identifiable import IdentifiableParameters
+from .identifiable import IdentifiableParameters
+from .parameters import GeometricParameters
 from .prior import ParameterPrior, estimated_with
 from .problem import problem_of
 from .reporting.units import in_unit, printed_unit

@@ -7,12 +7,12 @@ import numpy as np
 from .._arrays import Array
 from ..estimation import FitStatus
 from ..geometry import REVOLUTE
-from .extended_table.elements import ErrorLaw
 from .folds import AsideErrors
-from .identifiability.identifiable import IdentifiableParameters
+from .identifiable import IdentifiableParameters
 from .length_units import check_units
 from .measurements import Pose, Position, lonely_labels
 from .measurements.measurement import origin_of
+from .parameters import ErrorLaw
 from .problem import Problem, measured_frames
 from .reading_limits import check_readings
 from .reporting.units import in_unit, printed_unit

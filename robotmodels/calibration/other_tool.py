@@ -12,13 +12,12 @@ from .._arrays import Array, as_vector
 from ..errors import InvalidValueError
 from ..estimation.linearised import inverse_factor
 from ..se3 import skew
-from .calibrated_robot.calibrated import CalibratedRobot
-from .extended_table.differential import differential_model
-from .extended_table.elements import ErrorLaw
-from .extended_table.parameters import GeometricParameters
-from .identifiability.identifiable import Reason, all_deviations
+from .differential import differential_model
+from .identifiable import Reason, all_deviations
+from .parameters import ErrorLaw, GeometricParameters
 from .prior import ParameterPrior, standard_deviations
 from .problem import problem_of, stacked
+from .robot import CalibratedRobot
 
 if TYPE_CHECKING:
     from .result import CalibrationResult

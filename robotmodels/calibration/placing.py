@@ -6,15 +6,14 @@ from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 from ..model import RobotModel
-from .calibrated_robot.calibrated import calibrated_model
+from .candidates import candidate_parameters
 from .errors_seen import BlockErrors, block_errors
-from .extended_table.candidates import candidate_parameters
-from .extended_table.elements import ErrorLaw
-from .extended_table.parameters import GeometricParameters
-from .identifiability.identifiable import identifiable_on
+from .identifiable import identifiable_on
 from .measurements import Measurement
+from .parameters import ErrorLaw, GeometricParameters
 from .problem import problem_of
 from .registration import registered
+from .robot import calibrated_model
 from .solve import first_scales, solve
 
 _ROUGH = 1e-6

@@ -11,10 +11,9 @@ from .._arrays import Array, Rebuilt, as_reals
 from ..errors import InvalidValueError
 from ..estimation import Loss, Prior
 from ..estimation.strength import select_strength
-from .extended_table.elements import ErrorLaw
-from .extended_table.parameters import GeometricParameter, GeometricParameters
-from .identifiability.identifiable import IdentifiableParameters
+from .identifiable import IdentifiableParameters
 from .measurements import Measurement
+from .parameters import ErrorLaw, GeometricParameter, GeometricParameters
 from .partition import partition_blocks
 from .problem import Problem, guessed_fixtures, problem_of, stacked
 from .solve import Solution, solve

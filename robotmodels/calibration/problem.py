@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from .._arrays import Array, Rebuilt
 from ..errors import InvalidValueError, ShapeError
+from .differential import differential_model
 from .expected_joints import expected_joints_text
-from .extended_table.differential import differential_model
-from .extended_table.parameters import GeometricParameters
 from .measurements import Evaluation, Fixture, Linearised, Measurement, PointContact
 from .measurements.noise import whitened
+from .parameters import GeometricParameters
 
 
 @dataclass(frozen=True, slots=True, eq=False)

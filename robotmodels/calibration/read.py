@@ -19,7 +19,7 @@ from ..kinematics import OrientationKind, dgm, pose_from_coordinates
 from ..kinematics.coordinates.kinds import orientation_kind
 from ..model import RobotModel, check_model
 from .expected_joints import expected_joints_text
-from .extended_table.skeleton import Frame
+from .extended_table import Frame
 from .file_kinds import CONTACTS, FileKind, as_file_kind
 from .files_read import check_columns, check_contents, rows_read
 from .length_units import unit_error_of_positions, unit_error_of_spread

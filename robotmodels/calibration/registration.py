@@ -15,8 +15,8 @@ from .._arrays import Array
 from ..kinematics import dgm
 from ..kinematics.lengths import characteristic_length
 from ..model import RobotModel
-from .calibrated_robot.calibrated import with_moved_tool
 from .measurements import Measurement, Pose, Position
+from .robot import with_moved_tool
 
 _NEAR = 0.2
 """Largest mean residual, in lengths of the robot, that a fit is started from as it is."""

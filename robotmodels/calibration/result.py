@@ -9,12 +9,12 @@ import numpy as np
 from .._arrays import Array, Rebuilt
 from ..estimation import FitStatus
 from ..model import RobotModel
-from .calibrated_robot.calibrated import CalibratedRobot, calibrated_model
 from .errors_seen import BlockErrors
-from .extended_table.parameters import GeometricParameters
 from .folds import AsideErrors, fixtures_by_name
-from .identifiability.identifiable import IdentifiableParameters
+from .identifiable import IdentifiableParameters
 from .other_tool import PredictedError, other_tool_error
+from .parameters import GeometricParameters
+from .robot import CalibratedRobot, calibrated_model
 from .solve import Solution
 
 _SAYS_LITTLE = 0.7

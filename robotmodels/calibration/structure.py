@@ -18,15 +18,13 @@ from numpy.typing import NDArray
 
 from .._arrays import Array
 from ..geometry import FIXED, PRISMATIC
+from .candidates import candidate_parameters
 from .errors_seen import block_errors
-from .extended_table.candidates import candidate_parameters
-from .extended_table.elements import Compliance, Element, ErrorLaw
-from .extended_table.parameters import GeometricParameters
-from .extended_table.skeleton import Skeleton
-from .identifiability.identifiable import IdentifiableParameters, Reason
-from .identifiability.scale import needs_a_length
+from .extended_table import Element, Skeleton
+from .identifiable import IdentifiableParameters, Reason, needs_a_length
 from .measurements import Evaluation
 from .measurements.noise import whitened
+from .parameters import Compliance, ErrorLaw, GeometricParameters
 from .problem import Problem, evaluations, problem_of, stacked
 from .solve import Solution
 

@@ -12,12 +12,11 @@ from ..errors import InvalidValueError
 from ..kinematics import dgm
 from ..model import RobotModel
 from ..se3 import skew
-from .calibrated_robot.calibrated import CalibratedRobot, as_calibrated
-from .calibrated_robot.calibrated_pose import calibrated_pose
 from .errors_seen import BlockErrors
-from .extended_table.skeleton import Frame
+from .extended_table import Frame
 from .registration import best_motion
 from .result import CalibrationResult
+from .robot import CalibratedRobot, as_calibrated, calibrated_pose
 
 _STEPS = 50
 _ROUNDING = 1e-13

@@ -105,7 +105,9 @@ def _real_bodies(result: IdentificationResult) -> StandardParameters | None:
     except MissingExtraError as error:
         _print(f"No physically consistent robot, no URDF: {error}")
         return None
-    print(f"Physical bodies and drives: residuals {robot.price:.2f} % above least squares")
+    print(
+        f"Physical bodies and drives: residuals {robot.residual_increase:.2f} % above least squares"
+    )
     return robot
 
 

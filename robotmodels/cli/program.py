@@ -28,6 +28,7 @@ COMMANDS = {
     "excite": "a motion for the dynamic identification of a robot",
     "identify": "dynamic parameters of a robot from logs of its motion",
     "view": "open a robot with joint sliders in the browser",
+    "compile": "compile everything in advance, so that first calls are fast",
 }
 """Each is the module of the same name, which is imported when it is asked for."""
 _EXAMPLES = """\

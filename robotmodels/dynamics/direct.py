@@ -1,19 +1,30 @@
-"""Direct dynamic model."""
+"""Direct dynamic model, with joints that mimic others, and errors of mass matrices.
+
+Where joints mimic others, ``q = K q_c + q_0`` with a singular K. With G the columns of K that are
+not zero, ``v = G v_c``, and the forces of the constraint do no work:
+``G^T (M G a_c + h - tau) = 0`` (seed book section 1.2.1, last note, and 1.5.1).
+"""
 
 from __future__ import annotations
+
+import warnings
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_vector, batch_rows, batch_shape
-from ..drive import check_all_or_none
+from ..drive import Transmission, check_all_or_none
+from ..errors import InertiaError, InvalidValueError, SingularMassMatrixError
 from ..friction import Friction, check_friction
 from ..friction.protocols import torque_at
+from ..inertia import InertiaWarning
 from ..model import RobotModel, check_model
-from .inverse import wrench_torque
-from .mass_errors import mass_matrix_error, warn_of_negative_mass
-from .mimicry import check_follows, following_accelerations, free_motion
+from .inverse import rigid_torques, wrench_torque
 from .parts import mass_matrix
+
+_FOLLOWS = 1e-9  # relative to 1 + |q|: rounding of joints that follow others
+_PART = 0.05  # least share of the largest joint motion of a named joint
 
 
 def ddm(
@@ -109,3 +120,124 @@ def ddm(
         raise mass_matrix_error(model, M, drive, where)
     warn_of_negative_mass(model)
     return out.reshape(*batch, n)
+
+
+@lru_cache(maxsize=32)
+def free_motion(transmission: Transmission) -> Array | None:
+    """Joint velocities per free coordinate, shape (n, m); None if all joints are free."""
+    if transmission.is_invertible:
+        return None
+    if not transmission.is_mimicry:
+        n, rank = transmission.n, transmission.rank
+        raise InvalidValueError(
+            f"transmission: the coupling matrix K is singular, it has rank {rank} of {n}, so that "
+            "motor torques do not determine the motion. Correct it, or remove it with "
+            "model.with_transmission(None). For mimic joints, the columns of their motors are "
+            "zero, as RobotModel.from_urdf(..., mimic=True) makes them."
+        )
+    G = transmission.free
+    return G / np.linalg.norm(G, axis=0)
+
+
+def check_follows(model: RobotModel, free: Array, q: Array, v: Array) -> None:
+    """Raise for positions and velocities in which mimic joints do not follow their masters.
+
+    Shapes: free (n, m); q, v (..., n).
+    """
+    K = model.transmission
+    offset = np.zeros(model.n) if K is None else K.offset
+    for name, values in (("q", q - offset), ("v", v)):
+        away = np.abs(values - values @ np.linalg.pinv(free).T @ free.T)
+        size = 1.0 + np.abs(values).max(axis=-1, initial=0.0, keepdims=True)
+        if (away > _FOLLOWS * size).any():
+            j = int(np.argmax(away.reshape(-1, model.n).max(axis=0)))
+            shift = "" if name == "q" else " - transmission.offset"
+            raise InvalidValueError(
+                f"{name}: the joints of {model.name!r} that mimic others do not follow them here "
+                f"(joint {j + 1} is off by {away[..., j].max():.3g}). Take "
+                f"{name} = model.transmission.to_joint({name}_c){shift} of the encoder variables, "
+                "or model.with_transmission(None) to let all joints move independently."
+            )
+
+
+def following_accelerations(
+    model: RobotModel, free: Array, q: Array, v: Array, tau: Array, drive: bool
+) -> Array:
+    """Joint accelerations with mimic joints.
+
+    Shapes: free (n, m); q, v, tau (..., n) -> (..., n).
+    """
+    batch, (q, v, tau) = batch_rows((q, v, tau), ("q", "v", "tau"))
+    rest = (tau - rigid_torques(model, q, v, np.zeros_like(q))) @ free
+    M = free.T @ mass_matrix(model, q, drive) @ free
+    size = unit_sizes(M)
+    scaled = M / (size[:, :, None] * size[:, None, :])
+    definite = np.linalg.eigvalsh(scaled)[:, 0] > rounding(free.shape[1])
+    for i in np.flatnonzero(~definite)[:1]:
+        where = f" (first in sample {i} of {len(q)})" if batch else ""
+        raise mass_matrix_error(model, M[i], drive, where, free)
+    a_c = np.linalg.solve(scaled, (rest / size)[..., None])[..., 0] / size
+    return (a_c @ free.T).reshape(*batch, model.n)
+
+
+def mass_matrix_error(
+    model: RobotModel, M: Array, drive: bool, where: str = "", free: Array | None = None
+) -> InertiaError | SingularMassMatrixError:
+    """Exception for a mass matrix that is singular or not positive definite.
+
+    Shapes: M (m, m), free (n, m).
+    """
+    title = f"the mass matrix of {model.name!r} is"
+    advice = (
+        "Give inertial parameters with model.with_inertia(...), or rotor inertias Ia with "
+        "model.with_drive(...)."
+    )
+    if not np.isfinite(M).all():
+        return SingularMassMatrixError(f"{title} singular{where}: its entries overflow. {advice}")
+    m, size = len(M), unit_sizes(M)
+    values, vectors = np.linalg.eigh(M / (size[:, None] * size))
+    if values[0] < -rounding(m):
+        links = model.inertia.consistency().not_physical
+        rotors = f"Check the rotor inertias Ia = {model.drive.Ia.tolist()}" if drive else ""
+        if drive and model.transmission is not None and model.transmission.Iam.any():
+            rotors += f" and, of coupled motors, Iam = {model.transmission.Iam.tolist()}"
+        return InertiaError(
+            f"{title} not positive definite{where}: {(values < 0.0).sum()} of its {m} eigenvalues "
+            f"are negative. {f'Not physical: {links}. ' * bool(links)}{rotors + '. ' * drive}"
+            "Correct these parameters; standard_parameters(...) finds the nearest physical ones."
+        )
+    null = vectors[:, values <= max(rounding(m), values[0])] / size[:, None]
+    motion = np.abs(null if free is None else free @ null).max(axis=1)
+    joints = [str(j + 1) for j in np.flatnonzero(motion > _PART * motion.max())]
+    return SingularMassMatrixError(
+        f"{title} singular{where}: it has rank {m - null.shape[1]} of {m}, and a motion of "
+        f"joint{'s' * (len(joints) > 1)} {', '.join(joints)} moves no inertia. {advice}"
+    )
+
+
+def unit_sizes(M: Array) -> Array:
+    """Units (..., m) in which mass matrices (..., m, m) have unit (or zero) diagonals."""
+    size = np.sqrt(np.abs(np.diagonal(M, axis1=-2, axis2=-1)))
+    return np.where(size > 0.0, size, 1.0)
+
+
+def rounding(m: int) -> float:
+    """Relative rounding of the eigenvalues of a mass matrix of unit diagonal."""
+    return 4 * m * float(np.finfo(np.float64).eps)
+
+
+def warn_of_negative_mass(model: RobotModel) -> None:
+    """Warn the caller of the caller of links with negative masses."""
+    if (model.inertia.mass < 0.0).any():
+        links = ", ".join(
+            f"link {j + 1} ({model.table.names[j]}) {mass:g} kg"
+            for j, mass in enumerate(model.inertia.mass)
+            if mass < 0.0
+        )
+        warnings.warn(
+            f"negative mass in {model.name!r}: {links}. The mass matrix is positive definite here, "
+            "and the accelerations are those of the equations, but these links are not physical; "
+            "see model.inertia.consistency().",
+            InertiaWarning,
+            stacklevel=3,
+        )

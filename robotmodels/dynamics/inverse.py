@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from typing import Any
+
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
@@ -102,10 +105,21 @@ def rigid_torques(model: RobotModel, q: Array, v: Array, a: Array) -> Array:
     """Torques of the rigid bodies under gravity, by the compiled recursion."""
     from ..kernels.newton_euler import joint_torques
 
-    batch, rows = batch_rows((q, v, a), ("q", "v", "a"))
-    out = np.empty(rows[0].shape)
-    joint_torques(*rows, *model.chain, model.inertia.values, model.gravity, out)
-    return out.reshape(*batch, model.n)
+    return batched(joint_torques, model, {"q": q, "v": v, "a": a}, (model.n,), model.gravity)
+
+
+def batched(
+    kernel: Callable[..., Any],
+    model: RobotModel,
+    arrays: Mapping[str, Array],
+    core: tuple[int, ...],
+    *more: Array,
+) -> Array:
+    """Result (..., *core) of a compiled recursion in table order at joint vectors (..., n)."""
+    batch, rows = batch_rows(tuple(arrays.values()), tuple(arrays))
+    out = np.empty((len(rows[0]), *core))
+    kernel(*rows, *model.chain, model.inertia.values, *more, out)
+    return out.reshape((*batch, *core))
 
 
 def wrench_torque(model: RobotModel, q: Array, w: Array) -> Array:
@@ -121,11 +135,9 @@ def wrench_torque(model: RobotModel, q: Array, w: Array) -> Array:
 
     batch, rows = batch_rows((q, w), ("q", "wrench"))
     tau = np.empty(rows[0].shape)
-    J = np.empty((min(_CHUNK, rows[0].shape[0]), 6, model.n))
-    for start in range(0, rows[0].shape[0], _CHUNK):
+    for start in range(0, len(tau), _CHUNK):
         piece = slice(start, start + _CHUNK)
-        configurations = rows[0][piece]
-        k = configurations.shape[0]
-        jacobians(configurations, *model.chain, *tool.kernel_arguments, _WORLD_ALIGNED, J[:k])
-        np.einsum("ki,kij->kj", rows[1][piece], J[:k], out=tau[piece])
+        J = np.empty((len(tau[piece]), 6, model.n))
+        jacobians(rows[0][piece], *model.chain, *tool.kernel_arguments, _WORLD_ALIGNED, J)
+        np.einsum("ki,kij->kj", rows[1][piece], J, out=tau[piece])
     return tau.reshape(*batch, model.n)

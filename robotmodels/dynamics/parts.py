@@ -18,10 +18,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, as_vector, batch_rows
+from .._arrays import Array, as_vector
 from ..drive import check_all_or_none
 from ..model import RobotModel, check_model
-from .inverse import rigid_torques
+from .inverse import batched, rigid_torques
 
 
 def mass_matrix(model: RobotModel, q: ArrayLike, drive: bool = True) -> Array:
@@ -59,10 +59,7 @@ def mass_matrix(model: RobotModel, q: ArrayLike, drive: bool = True) -> Array:
     else:
         from ..kernels.mass_matrix import mass_matrices
 
-        batch, (rows,) = batch_rows((q,), ("q",))
-        M = np.empty((rows.shape[0], model.n, model.n))
-        mass_matrices(rows, *model.chain, model.inertia.values, M)
-        M = M.reshape(*batch, model.n, model.n)
+        M = batched(mass_matrices, model, {"q": q}, (model.n, model.n))
     if drive and (drives := model.drive_matrices) is not None:
         M = M + drives.rotor
     return M
@@ -96,10 +93,7 @@ def coriolis_matrix(model: RobotModel, q: ArrayLike, v: ArrayLike) -> Array:
         return np.array(C if twin.in_table_order else C[np.ix_(twin.order, twin.order)], order="C")
     from ..kernels.coriolis import coriolis_matrices
 
-    batch, rows = batch_rows((q, v), ("q", "v"))
-    out = np.empty((rows[0].shape[0], model.n, model.n))
-    coriolis_matrices(*rows, *model.chain, model.inertia.values, out)
-    return out.reshape(*batch, model.n, model.n)
+    return batched(coriolis_matrices, model, {"q": q, "v": v}, (model.n, model.n))
 
 
 def christoffel_blocks(model: RobotModel, q: ArrayLike) -> tuple[Array, Array]:
@@ -131,24 +125,18 @@ def christoffel_blocks(model: RobotModel, q: ArrayLike) -> tuple[Array, Array]:
     >>> B.round(12), C.round(12)
     (array([[-0.1], [ 0. ]]), array([[ 0.  , -0.05], [ 0.05,  0.  ]]))
     """
-    check_model(model)
-    n = model.n
-    batch, (rows,) = batch_rows((as_vector(q, n, "q"),), ("q",))
     from ..kernels.coriolis import coriolis_matrices
 
+    check_model(model)
+    n = model.n
+    q = as_vector(q, n, "q")
     # C(q, v) is linear in v and made of Christoffel symbols: column k of them is C(q, e_k)
-    symbols = np.empty((n, rows.shape[0], n, n))
-    for k in range(n):
-        unit = np.zeros_like(rows)
-        unit[:, k] = 1.0
-        coriolis_matrices(rows, unit, *model.chain, model.inertia.values, symbols[k])
+    arrays = {"q": q[..., None, :], "v": np.eye(n)}
+    symbols = batched(coriolis_matrices, model, arrays, (n, n))  # (..., k, i, j)
     j, k = np.triu_indices(n, 1)
-    B = 2.0 * np.moveaxis(symbols[k, :, :, j], 0, -1)
-    C = np.einsum("jkij->kij", symbols)
-    return (
-        np.ascontiguousarray(B).reshape(*batch, n, j.size),
-        np.ascontiguousarray(C).reshape(*batch, n, n),
-    )
+    B = 2.0 * np.moveaxis(symbols[..., k, :, j], 0, -1)
+    C = np.einsum("...jij->...ij", symbols)
+    return np.ascontiguousarray(B), np.ascontiguousarray(C)
 
 
 def gravity_torque(model: RobotModel, q: ArrayLike) -> Array:
@@ -216,10 +204,7 @@ def kinetic_energy(model: RobotModel, q: ArrayLike, v: ArrayLike, drive: bool = 
     else:
         from ..kernels.energies import kinetic_energies
 
-        batch, rows = batch_rows((q, v), ("q", "v"))
-        energy = np.empty(rows[0].shape[0])
-        kinetic_energies(*rows, *model.chain, model.inertia.values, energy)
-        energy = energy.reshape(batch)
+        energy = batched(kinetic_energies, model, {"q": q, "v": v}, ())
     if drive and (drives := model.drive_matrices) is not None:
         energy = energy + 0.5 * np.einsum("...i,ij,...j->...", v, drives.rotor, v)
     return np.asarray(energy)
@@ -252,15 +237,11 @@ def potential_energy(model: RobotModel, q: ArrayLike) -> Array:
     twin = model.twin
     # Pinocchio leaves out bodies that are fixed to the base
     if q.ndim == 1 and twin.serves_dynamics and twin.base_is_massless:
-        return np.asarray(
-            pin.computePotentialEnergy(twin.model, twin.data(), twin.to_pin(q)), dtype=np.float64
-        )
+        energy = pin.computePotentialEnergy(twin.model, twin.data(), twin.to_pin(q))
+        return np.asarray(energy, dtype=np.float64)
     from ..kernels.energies import potential_energies
 
-    batch, (rows,) = batch_rows((q,), ("q",))
-    energy = np.empty(rows.shape[0])
-    potential_energies(rows, *model.chain, model.inertia.values, model.gravity, energy)
-    return energy.reshape(batch)
+    return batched(potential_energies, model, {"q": q}, (), model.gravity)
 
 
 @lru_cache

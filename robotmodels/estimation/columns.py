@@ -1,9 +1,8 @@
 """Independent columns of a matrix: which are kept, and how the others follow from them.
 
-Columns are taken in an order of preference, and a column is kept if it is not a combination of
-those kept before it. So a dependent column is regrouped into columns that come earlier. Short
-columns are considered after the others: coefficients on a short column are large, and amplify
-rounding.
+A column is kept if it is not a combination of those kept before it, so that a dependent column is
+regrouped into columns that come earlier. Short columns are considered after the others:
+coefficients on a short column are large, and amplify rounding.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Rebuilt, as_floats, read_only
+from .._arrays import Array, Frozen, as_exact, as_floats
 from ..errors import InvalidValueError, ShapeError
 
 NOTHING = 1e-11
@@ -26,7 +25,7 @@ _TALL = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ColumnBasis(Rebuilt):
+class ColumnBasis(Frozen):
     """Independent columns of a matrix, and the others as their combinations. Read-only.
 
     Parameters
@@ -40,8 +39,7 @@ class ColumnBasis(Rebuilt):
         product as all parameters are ``coefficients @ parameters``.
     distance : ndarray, shape (p,)
         Residual norm of each column after projection on those kept before it, relative to the
-        longest column of its kind: small for a column that nearly depends on others and for one
-        that is nearly empty.
+        longest column: small for a column that nearly depends on others or is nearly empty.
 
     Examples
     --------
@@ -55,17 +53,6 @@ class ColumnBasis(Rebuilt):
     empty: NDArray[np.int64]
     coefficients: Array
     distance: Array
-
-    def __post_init__(self) -> None:
-        for name, dtype in (("kept", np.int64), ("empty", np.int64)):
-            object.__setattr__(self, name, read_only(getattr(self, name), dtype))
-        for name in ("coefficients", "distance"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
-        if self.coefficients.shape != (len(self.kept), len(self.distance)):
-            raise ShapeError(
-                f"coefficients: expected shape {(len(self.kept), len(self.distance))}, got "
-                f"{self.coefficients.shape}."
-            )
 
     @property
     def rank(self) -> int:
@@ -91,37 +78,24 @@ class ColumnBasis(Rebuilt):
 
 
 def column_basis(
-    W: ArrayLike,
-    order: ArrayLike | None = None,
-    scale: ArrayLike | None = None,
-    nothing: float = NOTHING,
-    kinds: ArrayLike | None = None,
-    longest: float | None = None,
+    W: ArrayLike, *, scale: ArrayLike | None = None, nothing: float = NOTHING
 ) -> ColumnBasis:
-    """Choose independent columns in an order of preference.
+    """Choose independent columns, the earlier ones first.
 
     A column is kept if its residual after projection on the columns kept before is longer than
     ``nothing``. Lengths are in the units that ``scale`` gives, relative to the longest column: the
-    error of any product is at most that part of the largest.
-
-    Columns with residuals below 1e-4 (then 1e-8) are considered after the others, whatever their
-    place in the order, so that coefficients and their rounding errors stay bounded.
+    error of any product is at most that part of the largest. Columns with residuals below 1e-4
+    (then 1e-8) are considered after the others, so that coefficients stay bounded.
 
     Parameters
     ----------
     W : array_like, shape (N, p)
         The matrix, or the triangular factor of it: only ``W^T W`` matters.
-    order : array_like of int, shape (p,), optional
-        Columns from the most to the least preferred; default their order in the matrix.
     scale : array_like, shape (p,), optional
         Natural size of the parameter of each column, so that ``W * scale`` has comparable columns;
         default 1.
     nothing : float
         Rank tolerance relative to the longest column; also that of coefficients.
-    kinds : array_like of int, shape (p,), optional
-        Columns of one number are compared with each other in `ColumnBasis.gap`; default all.
-    longest : float, optional
-        Reference length; default that of the longest column of ``W * scale``.
 
     Returns
     -------
@@ -131,7 +105,7 @@ def column_basis(
     Raises
     ------
     ShapeError, InvalidValueError
-        Not a matrix, NaN, an order that is no permutation, or scales that are not positive.
+        Not a matrix, NaN, or scales that are not positive.
 
     References
     ----------
@@ -140,32 +114,28 @@ def column_basis(
 
     Examples
     --------
-    >>> column_basis(np.ones((5, 3)), order=[2, 0, 1]).kept
-    array([2])
+    >>> column_basis(np.ones((5, 3))).kept
+    array([0])
     """
     W = as_floats(W, "W")
     if W.ndim != 2:
         raise ShapeError(f"W: expected a matrix of shape (N, p), got {W.shape}.")
     p = W.shape[1]
-    order = np.arange(p) if order is None else _permutation(order, p)
-    scale = np.ones(p) if scale is None else _positive(scale, p)
-    alike = np.zeros(p, dtype=np.int64) if kinds is None else _kinds(kinds, p)
+    scale = np.ones(p) if scale is None else as_exact(scale, (p,), "scale")
+    if not (scale > 0.0).all():
+        raise InvalidValueError(f"scale: expected positive numbers, got {scale.min():g}.")
     length = np.sqrt((W * W).sum(axis=0)) * scale
-    longest = float(length.max(initial=0.0) if longest is None else longest) or 1.0
-    U = W * (scale / longest)
+    longest = float(length.max(initial=0.0)) or 1.0
+    U, length = W * (scale / longest), length / longest
     if U.shape[0] > _TALL * p:
         U = np.asarray(np.linalg.qr(U, mode="r"))
-    length = length / longest
-    kept, parts, left = _kept_columns(U, order[length[order] > nothing], nothing)
+    kept, parts, left = _kept_columns(U, np.flatnonzero(length > nothing), nothing)
     left[length <= nothing] = length[length <= nothing]
     combinations = _combinations(parts, kept, left, nothing)
     rows = np.argsort(kept)
     kept = kept[rows]
     coefficients = combinations[rows] * scale[kept][:, None] / scale
-    most = np.zeros(alike.max(initial=-1) + 1)
-    np.maximum.at(most, alike, length)
-    distance = left / np.where(most > nothing, most, 1.0)[alike]
-    return ColumnBasis(kept, np.flatnonzero(length <= nothing), coefficients, distance)
+    return ColumnBasis(kept, np.flatnonzero(length <= nothing), coefficients, left)
 
 
 def _kept_columns(
@@ -222,26 +192,3 @@ def _combinations(parts: Array, kept: NDArray[np.int64], left: Array, nothing: f
             coefficients[terms, k] = again
     coefficients[:, kept] = np.eye(b)
     return coefficients
-
-
-def _permutation(order: ArrayLike, p: int) -> NDArray[np.int64]:
-    numbers = np.asarray(order)
-    if numbers.shape != (p,) or sorted(numbers.tolist()) != list(range(p)):
-        raise InvalidValueError(
-            f"order: expected each column number from 0 to {p - 1} once, got {order!r:.80}."
-        )
-    return numbers.astype(np.int64)
-
-
-def _positive(scale: ArrayLike, p: int) -> Array:
-    values = as_floats(scale, "scale")
-    if values.shape != (p,) or not (values > 0).all():
-        raise InvalidValueError(f"scale: expected {p} positive numbers, got {scale!r:.80}.")
-    return values
-
-
-def _kinds(kinds: ArrayLike, p: int) -> NDArray[np.int64]:
-    values = np.asarray(kinds)
-    if values.shape != (p,) or values.dtype.kind not in "iu" or (values < 0).any():
-        raise InvalidValueError(f"kinds: expected {p} numbers from 0, got {kinds!r:.80}.")
-    return values.astype(np.int64)

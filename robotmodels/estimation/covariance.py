@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .._arrays import Array, Rebuilt, read_only
+from .._arrays import Array, Frozen
 from .factor import Rows, TriangularFactors
 from .linear import LEAST_FREEDOM
 
@@ -27,7 +27,7 @@ _LARGEST_LEVERAGE = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CorrelatedCovariance(Rebuilt):
+class CorrelatedCovariance(Frozen):
     """Covariance of estimates for correlated residuals. Read-only.
 
     Parameters
@@ -43,10 +43,6 @@ class CorrelatedCovariance(Rebuilt):
     covariance: Array
     lags: int
     correlation: Array
-
-    def __post_init__(self) -> None:
-        for name in ("covariance", "correlation"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
 
 def correlated_covariance(

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
-from .._arrays import Array, Rebuilt, read_only
+from .._arrays import Array, Frozen
 from ..errors import InvalidValueError
 from .nonlinear import NonlinearFit
 from .outlying import blocks_by_size
@@ -40,7 +40,7 @@ class ResidualTest:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FitDiagnostics(Rebuilt):
+class FitDiagnostics(Frozen):
     """Statistics of a fit. Read-only.
 
     Parameters
@@ -70,11 +70,6 @@ class FitDiagnostics(Rebuilt):
     independence: ResidualTest
     leverage: Array
     influence: Array
-
-    def __post_init__(self) -> None:
-        for name in (f.name for f in fields(self)):
-            if isinstance(value := getattr(self, name), np.ndarray):
-                object.__setattr__(self, name, read_only(value))
 
 
 def fit_diagnostics(fit: NonlinearFit) -> FitDiagnostics:

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from .._arrays import Array, Rebuilt, read_only
+from .._arrays import Array, Frozen
 from .._outcomes import Outcome
+from ..errors import InvalidValueError, nearest_names
 
 
 class EstimateStatus(Outcome):
@@ -37,8 +38,56 @@ class EstimateStatus(Outcome):
     )
 
 
+class NamedValues(Frozen):
+    """Base of results with names, values, covariance and status."""
+
+    __slots__ = ()
+    names: tuple[str, ...]
+    values: Array
+    covariance: Array
+    status: Outcome
+
+    @property
+    def standard_errors(self) -> Array:
+        """Standard errors of the values, shape (b,)."""
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+
+    @property
+    def relative_errors(self) -> Array:
+        """Standard errors relative to the values, shape (b,); infinite for a value of 0."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = self.standard_errors / np.abs(self.values)
+            return np.where(self.values != 0.0, ratio, np.inf)
+
+    @property
+    def correlation(self) -> Array:
+        """Correlation of the estimates, shape (b, b); NaN where a standard error is 0."""
+        s = self.standard_errors
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return self.covariance / np.outer(s, s)
+
+    def value(self, name: str) -> float:
+        """Value of one parameter, SI units, by its name such as ``"ZZ1"`` or ``"ZZ1R"``."""
+        return float(self.values[self._number(name)])
+
+    def standard_error(self, name: str) -> float:
+        """Standard error of one parameter, SI units."""
+        return float(self.standard_errors[self._number(name)])
+
+    def reason(self) -> str:
+        """The status as a sentence."""
+        return self.status.sentence
+
+    def _number(self, name: str) -> int:
+        for text in (name, name.removesuffix("R")):  # R marks regrouped parameters in print
+            if text in self.names:
+                return self.names.index(text)
+        near = ", ".join(nearest_names(name, self.names)) or "none"
+        raise InvalidValueError(f"name: {name!r} was not identified; near it: {near}.")
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class Estimate(Rebuilt):
+class Estimate(NamedValues):
     """Parameters with standard errors. Read-only.
 
     Parameters
@@ -69,26 +118,3 @@ class Estimate(Rebuilt):
     iterations: int = 1
     notes: tuple[str, ...] = ()
     details: Any = None
-
-    def __post_init__(self) -> None:
-        for name in ("values", "covariance", "sigma"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
-
-    @property
-    def standard_errors(self) -> Array:
-        """Standard errors of the values, shape (b,)."""
-        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
-
-    @property
-    def relative_errors(self) -> Array:
-        """Standard errors relative to the values, shape (b,); infinite for a value of 0."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ratio = self.standard_errors / np.abs(self.values)
-            return np.where(self.values != 0.0, ratio, np.inf)
-
-    @property
-    def correlation(self) -> Array:
-        """Correlation of the estimates, shape (b, b); NaN where a standard error is 0."""
-        s = self.standard_errors
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return self.covariance / np.outer(s, s)

@@ -6,17 +6,15 @@ sequential QR and LU factorizations", SIAM J. Scientific Computing 34(1), 2012.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import Array, Rebuilt, read_only
+from .._arrays import Array, Frozen, read_only
 from ..errors import InvalidValueError
-
-T = TypeVar("T")
 
 
 class Block(Protocol):
@@ -28,17 +26,14 @@ class Block(Protocol):
     @property
     def W(self) -> Array:
         """Regressor."""
-        ...
 
     @property
     def y(self) -> Array:
         """Right side."""
-        ...
 
     @property
     def use(self) -> NDArray[np.bool_]:
         """Mask of used equations."""
-        ...
 
 
 class Rows(Protocol):
@@ -46,11 +41,10 @@ class Rows(Protocol):
 
     def blocks(self) -> Iterable[Block]:
         """The blocks, in order."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TriangularFactors(Rebuilt):
+class TriangularFactors(Frozen):
     """Triangular factors of equations, one for each group such as a joint. Read-only.
 
     Parameters
@@ -79,8 +73,7 @@ class TriangularFactors(Rebuilt):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "factors", tuple(read_only(R) for R in self.factors))
-        for name in ("counts", "left_out"):
-            object.__setattr__(self, name, read_only(getattr(self, name), np.int64))
+        Frozen.__post_init__(self)
 
     @property
     def rows(self) -> int:
@@ -116,12 +109,12 @@ def factors_of(
     names: tuple[str, ...], W: Array, y: Array, use: NDArray[np.bool_]
 ) -> TriangularFactors:
     """Reduce the equations of one block. Shapes: W (k, m, b), y (k, m), use (k, m)."""
-    factors = []
-    for j, taking_part in enumerate(use.T):
-        rows = np.column_stack((W[taking_part, j], y[taking_part, j]))
-        factors.append(_of_columns(rows))
+    factors = tuple(
+        _of_columns(np.column_stack((W[taking_part, j], y[taking_part, j])))
+        for j, taking_part in enumerate(use.T)
+    )
     counts = use.sum(axis=0)
-    return TriangularFactors(names, tuple(factors), counts, len(use) - counts)
+    return TriangularFactors(names, factors, counts, len(use) - counts)
 
 
 def merged(first: TriangularFactors, second: TriangularFactors) -> TriangularFactors:
@@ -141,42 +134,28 @@ def merged(first: TriangularFactors, second: TriangularFactors) -> TriangularFac
     )
 
 
-def merged_tree(leaves: Iterable[T], merge: Callable[[T, T], T]) -> T | None:
-    """Merge factors in a binary tree fixed by their number and order."""
-    waiting: list[tuple[int, T]] = []
-    for leaf in leaves:
-        level = 0
-        while waiting and waiting[-1][0] == level:
-            leaf = merge(waiting.pop()[1], leaf)
-            level += 1
-        waiting.append((level, leaf))
-    if not waiting:
-        return None
-    root = waiting.pop()[1]
-    while waiting:
-        root = merge(waiting.pop()[1], root)
-    return root
+def merged_all(parts: Iterable[TriangularFactors]) -> TriangularFactors:
+    """Factors of the equations of all parts, merged in their order."""
+    total = None
+    for part in parts:
+        total = part if total is None else merged(total, part)
+    if total is None:
+        raise InvalidValueError("log: expected equations, got none; give a longer log.")
+    return total
 
 
 def reduced(names: tuple[str, ...], blocks: Iterable[Block]) -> TriangularFactors:
     """Triangular factors of blocks of equations in named parameters."""
-    leaves = (factors_of(names, block.W, block.y, block.use) for block in blocks)
-    factors = merged_tree(leaves, merged)
-    if factors is None:
-        raise InvalidValueError("log: it has no equations; give a longer log.")
-    return factors
+    return merged_all(factors_of(names, block.W, block.y, block.use) for block in blocks)
 
 
 def triangles_of(pieces: Iterable[Array], columns: int) -> Array:
     """Rows (r, columns) with the products of all pieces (k, m, columns), a triangle a group."""
-    leaves = ([_of_columns(W[:, j]) for j in range(W.shape[1])] for W in pieces)
-    rows_of_groups = merged_tree(
-        leaves,
-        lambda first, second: [
-            _of_columns(np.vstack(pair)) for pair in zip(first, second, strict=True)
-        ],
-    )
-    return np.vstack([np.zeros((0, columns)), *(rows_of_groups or ())])
+    groups: list[Array] = []
+    for W in pieces:
+        groups = groups or [np.zeros((0, columns))] * W.shape[1]
+        groups = [_of_columns(np.vstack((R, W[:, j]))) for j, R in enumerate(groups)]
+    return np.vstack([np.zeros((0, columns)), *groups])
 
 
 def triangle(rows: Array) -> Array:

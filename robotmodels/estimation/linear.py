@@ -11,29 +11,25 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Rebuilt, as_exact, as_floats, read_only
+from .._arrays import Array, Frozen, as_exact, as_floats
 from ..errors import InvalidValueError
 from .estimate import Estimate, EstimateStatus
-from .factor import TriangularFactors, merged, merged_tree
+from .factor import TriangularFactors, merged_all
 
 _ITERATIONS = 100
 LEAST_FREEDOM = 5.0
 """Residual degrees of freedom of a group below which the pooled variance is used."""
 _STILL = 1e-8
 """Convergence tolerance: change of the parameters in standard errors."""
+_ROUNDING = 1e-8
+"""Least standard deviation of residuals, relative to the right side."""
 _PER_DECADE = 8
 """Candidate prior strengths per decade."""
 
 
 def ordinary(factors: TriangularFactors) -> Estimate:
     """Ordinary least squares: all equations have the same weight."""
-    check_count(factors)
-    values, inverse, rest = solved(factors)
-    leverage = group_leverage(factors, None, inverse)
-    sigma = residual_std(factors, values, leverage)
-    covariance = rest / (factors.rows - len(values)) * inverse
-    notes = _few_equations(factors, leverage)
-    return Estimate(factors.names, values, covariance, sigma, notes=notes)
+    return weighted(factors, 0)
 
 
 def weighted(factors: TriangularFactors, iterations: int = 1) -> Estimate:
@@ -44,30 +40,28 @@ def weighted(factors: TriangularFactors, iterations: int = 1) -> Estimate:
     """
     check_count(factors)
     values, inverse, rest = solved(factors)
-    weights: Array | None = None
-    status = EstimateStatus.SOLVED if iterations == 1 else EstimateStatus.NOT_CONVERGED
+    leverage = group_leverage(factors, None, inverse)
+    status = EstimateStatus.SOLVED if iterations <= 1 else EstimateStatus.NOT_CONVERGED
     done = 0
     while done < iterations:
         done += 1
         before = values
-        leverage = group_leverage(factors, weights, inverse)
         weights = inverse_std(factors, residual_std(factors, values, leverage))
         values, inverse, rest = solved(factors, weights)
+        leverage = group_leverage(factors, weights, inverse)
         moved = np.abs(values - before)
         if (moved <= _STILL * np.sqrt(np.diag(inverse)) + 1e-15 * np.abs(values)).all():
             status = EstimateStatus.SOLVED
             break
-    leverage = group_leverage(factors, weights, inverse)
+    sigma = residual_std(factors, values, leverage)
     covariance = rest / (factors.rows - len(values)) * inverse
-    return Estimate(
-        factors.names,
-        values,
-        covariance,
-        residual_std(factors, values, leverage),
-        status,
-        done,
-        _few_equations(factors, leverage),
+    notes = tuple(
+        f"Group {j + 1} of the equations (joint) has {factors.counts[j]} equations for "
+        f"{leverage[j]:.1f} parameters: the pooled variance is used. A longer "
+        "log, or a smaller decimation or dead band, gives it more."
+        for j in np.flatnonzero(_too_few(factors, leverage))
     )
+    return Estimate(factors.names, values, covariance, sigma, status, max(done, 1), notes)
 
 
 def reweighted(factors: TriangularFactors) -> Estimate:
@@ -110,6 +104,10 @@ def residual_std(factors: TriangularFactors, values: Array, leverage: Array | No
     return np.sqrt(np.where(counts > 0, np.where(few, np.maximum(pooled, separate), separate), 0.0))
 
 
+def _too_few(factors: TriangularFactors, leverage: Array) -> NDArray[np.bool_]:
+    return (factors.counts > 0) & (factors.counts - leverage < LEAST_FREEDOM)
+
+
 def inverse_std(factors: TriangularFactors, sigma: Array) -> Array:
     """Weights 1 / sigma of the groups (m,); exact groups get a finite weight by rounding."""
     sizes = np.array([np.linalg.norm(R[:, -1]) for R in factors.factors])
@@ -124,6 +122,30 @@ def first_weights(factors: TriangularFactors) -> Array:
     return inverse_std(factors, ordinary(factors).sigma)
 
 
+def residual_noise(factors: TriangularFactors) -> Array:
+    """Standard deviation of the residuals of each group (m,), solved alone; 1 for a zero side."""
+    noise = np.ones(len(factors.factors))
+    for m, R in enumerate(factors.factors):
+        A, y = R[:, :-1], R[:, -1]
+        length, size = np.linalg.norm(A, axis=0), float(np.linalg.norm(y))
+        count = max(int(factors.counts[m]), 1)
+        if size > 0.0:
+            U, s, _ = np.linalg.svd(A / np.where(length > 0.0, length, 1.0), full_matrices=False)
+            U = U[:, s > 1e-12 * s.max(initial=0.0)]
+            rest = float(np.linalg.norm(y - U @ (U.T @ y)))
+            rest /= np.sqrt(max(count - U.shape[1], 1))
+            noise[m] = max(rest, _ROUNDING * size / np.sqrt(count))
+    return noise
+
+
+def value_sizes(factors: TriangularFactors) -> Array:
+    """Parameter values (b,) whose separate right sides have the size of the measured one."""
+    whole = np.vstack(factors.factors)
+    length = np.linalg.norm(whole[:, :-1], axis=0)
+    size = max(float(np.linalg.norm(whole[:, -1])), 1e-300)
+    return size / np.where(length > 0.0, length, 1.0)
+
+
 def check_count(factors: TriangularFactors) -> None:
     """Raise for fewer equations than parameters."""
     b = len(factors.names)
@@ -134,21 +156,8 @@ def check_count(factors: TriangularFactors) -> None:
         )
 
 
-def _too_few(factors: TriangularFactors, leverage: Array) -> NDArray[np.bool_]:
-    return (factors.counts > 0) & (factors.counts - leverage < LEAST_FREEDOM)
-
-
-def _few_equations(factors: TriangularFactors, leverage: Array) -> tuple[str, ...]:
-    return tuple(
-        f"Group {j + 1} of the equations (joint) has {factors.counts[j]} equations for "
-        f"{leverage[j]:.1f} parameters: the pooled variance is used. A longer "
-        "log, or a smaller decimation or dead band, gives it more."
-        for j in np.flatnonzero(_too_few(factors, leverage))
-    )
-
-
 @dataclass(frozen=True, slots=True, eq=False)
-class RidgeDetails(Rebuilt):
+class RidgeDetails(Frozen):
     """Prior of a ridge estimate: values (b,), their errors (b,), strength, degrees of freedom."""
 
     prior: Array
@@ -156,48 +165,41 @@ class RidgeDetails(Rebuilt):
     strength: float
     degrees: float
 
-    def __post_init__(self) -> None:
-        for name in ("prior", "prior_errors"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
-
 
 def ridge(
     factors: TriangularFactors,
     prior: ArrayLike | None = None,
     errors: ArrayLike | None = None,
     strength: float | None = None,
-    folds: Sequence[TriangularFactors] | None = None,
+    folds: Sequence[TriangularFactors] = (),
 ) -> Estimate:
     """Weighted least squares with a Gaussian prior: values (b,) and their standard errors (b,).
 
-    Without errors it acts in proportion to each column; the strength of its squares is then
-    chosen by cross-validation over folds (parts of the data) or, without them, generalised (GCV).
+    Without errors it acts in proportion to each column, and its strength (a factor on the squares)
+    is chosen by cross-validation over folds, which are parts of the data.
     """
-    check_count(factors)
-    start = weighted(factors)
-    weights = first_weights(factors)
+    start, weights = weighted(factors), first_weights(factors)
     b = len(start.values)
     x0 = np.zeros(b) if prior is None else as_exact(prior, (b,), "prior")
-    R, y, rest = factors.stacked(weights)
-    d = _prior_errors(errors, R, factors.rows)
+    R, y, _ = factors.stacked(weights)
+    if errors is None:
+        d = np.sqrt(factors.rows) / np.linalg.norm(R, axis=0)
+    else:
+        d = as_exact(errors, (b,), "prior_errors")
+        if not (d > 0.0).all():
+            raise InvalidValueError(f"prior_errors: expected positive numbers, got {d.min():g}.")
     if strength is not None:
         factor = float(as_floats(strength, "strength"))
         if not factor >= 0.0:
             raise InvalidValueError(f"strength: expected a number from 0, got {strength!r:.60}.")
-    elif errors is not None:
-        factor = 1.0
-    elif folds is not None:
-        factor = _strength_by_folds(folds, x0, d, weights)
     else:
-        factor = _strength_by_gcv(R, y - R @ x0, rest, d, factors.rows)
+        factor = 1.0 if errors is not None else _strength(folds, x0, d, weights, R)
     U, s, Vt = np.linalg.svd(R * d)
     values = x0 + d * (Vt.T @ (s / (s**2 + factor) * (U.T @ (y - R @ x0))))
     half = (d[:, None] * Vt.T) / np.sqrt(s**2 + factor)
     degrees = float((s**2 / (s**2 + factor)).sum())
-    moved = np.abs(values - start.values)
-    errors_before = start.standard_errors
-    far = np.where(moved > 0.0, np.inf, 0.0)
-    np.divide(moved, errors_before, out=far, where=errors_before > 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        far = np.nan_to_num(np.abs(values - start.values) / start.standard_errors, posinf=np.inf)
     k = int(np.argmax(far))
     note = (
         f"The data determine {degrees:.1f} of {b} parameters and the prior the rest (strength "
@@ -215,49 +217,22 @@ def ridge(
     )
 
 
-def _prior_errors(errors: ArrayLike | None, R: Array, rows: int) -> Array:
-    if errors is None:
-        return np.sqrt(rows) / np.linalg.norm(R, axis=0)
-    d = as_exact(errors, (R.shape[1],), "prior_errors")
-    if not (d > 0.0).all():
-        raise InvalidValueError(f"prior_errors: expected positive numbers, got {d.min():g}.")
-    return d
-
-
-def _strength_by_folds(
-    folds: Sequence[TriangularFactors], x0: Array, d: Array, weights: Array
+def _strength(
+    folds: Sequence[TriangularFactors], x0: Array, d: Array, weights: Array, R: Array
 ) -> float:
-    """Strength with the least cross-validation error."""
-    errors, strengths = 0.0, np.zeros(0)
+    """Strength with the least cross-validation error: zero, or from negligible to dominant."""
+    if len(folds) < 2:
+        raise InvalidValueError(f"folds: expected two or more, got {len(folds)}; or give strength.")
+    s = np.linalg.svd(R * d, compute_uv=False)
+    low, high = np.log10(1e-4 * max(s[-1], 1e-12 * s[0]) ** 2), np.log10(1e2 * s[0] ** 2)
+    strengths = np.append(0.0, np.logspace(low, high, int(_PER_DECADE * (high - low)) + 2))
+    errors = np.zeros(len(strengths))
     for k, test_set in enumerate(folds):
-        rest = merged_tree((fold for i, fold in enumerate(folds) if i != k), merged)
-        if rest is None:
-            raise InvalidValueError(f"folds: expected two or more, got {len(folds)}.")
-        R, y, _ = rest.stacked(weights)
-        U, s, Vt = np.linalg.svd(R * d)
-        if not len(strengths):
-            whole = merged(rest, test_set).stacked(weights)[0]
-            strengths = _strengths(np.linalg.svd(whole * d)[1])
-        z = U.T @ (y - R @ x0)
+        A, y, _ = merged_all(fold for i, fold in enumerate(folds) if i != k).stacked(weights)
+        U, s, Vt = np.linalg.svd(A * d)
         total = s**2 + strengths[:, None]
         gains = np.divide(s * np.ones_like(total), total, out=np.zeros_like(total), where=total > 0)
-        tried = x0 + d * ((gains * z) @ Vt)
+        tried = x0 + d * ((gains * (U.T @ (y - A @ x0))) @ Vt)
         squares = np.array([test_set.sums(values) @ weights**2 for values in tried])
-        errors = errors + squares / max(test_set.rows, 1)
+        errors += squares / max(test_set.rows, 1)
     return float(strengths[int(np.argmin(errors))])
-
-
-def _strength_by_gcv(R: Array, y: Array, rest: float, d: Array, rows: int) -> float:
-    """Strength whose generalised cross-validation error is least."""
-    U, s, _ = np.linalg.svd(R * d)
-    strengths = _strengths(s)
-    left = strengths[:, None] / (s**2 + strengths[:, None])
-    squares = (left**2 * (U.T @ y) ** 2).sum(axis=1) + rest
-    freedom = rows - (1.0 - left).sum(axis=1)
-    return float(strengths[int(np.argmin(squares / freedom**2))])
-
-
-def _strengths(s: Array) -> Array:
-    """Candidate strengths: zero, and from a negligible to a dominant prior."""
-    low, high = np.log10(1e-4 * max(s[-1], 1e-12 * s[0]) ** 2), np.log10(1e2 * s[0] ** 2)
-    return np.append(0.0, np.logspace(low, high, int(_PER_DECADE * (high - low)) + 2))

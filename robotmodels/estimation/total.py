@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Rebuilt, as_floats, read_only
+from .._arrays import Array, Frozen, as_floats
 from .._outcomes import Outcome
 from ..errors import InvalidValueError, ShapeError
 from .estimate import Estimate
@@ -41,15 +41,12 @@ class TotalStatus(Outcome):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TotalDetails(Rebuilt):
+class TotalDetails(Frozen):
     """Assumed noise of the columns and the right side (b + 1,), its estimated scale, outcome."""
 
     noise: Array
     scale: float
     solution: TotalStatus
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "noise", read_only(self.noise))
 
 
 def total(

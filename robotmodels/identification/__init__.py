@@ -7,13 +7,13 @@ from ..estimation.covariance import correlated_covariance
 from ..logs import Log, check_log, read_log
 from ..minimal_parameters import CenterOfMassBox
 from .closed_loop import (
-    ClosedLoop,
     Controller,
     Didim,
     Instrumental,
     OutputError,
     hausman_test,
     simulated_log,
+    tuned_controller,
 )
 from .comparison import compare_methods
 from .consistent import consistent_robot
@@ -38,7 +38,6 @@ from .validation import Errors, Validation
 
 __all__ = [
     "CenterOfMassBox",
-    "ClosedLoop",
     "Controller",
     "Didim",
     "Errors",
@@ -77,6 +76,7 @@ __all__ = [
     "report",
     "simulated_log",
     "synchronisation",
+    "tuned_controller",
     "validate",
     "write_result",
     "write_trajectory",

@@ -5,6 +5,7 @@ Seed book sections 1.6.2.1 to 1.6.2.4.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from .._arrays import Array
 from ..dynamics import idm
 from ..errors import InvalidValueError
+from ..estimation.factor import triangle
 from ..friction import Friction
 from ..friction.protocols import by_dependence
 from ..logs import FindingKind, Log, LogFinding, Severity, check_log
@@ -28,7 +30,7 @@ from .delay import (
     representative_part,
     synchronisation,
 )
-from .joint_hypotheses import BOTH, LogCorrection, better_hypotheses
+from .joint_hypotheses import better_hypotheses
 
 
 def accepted_log(
@@ -88,39 +90,37 @@ def check_joints(
     part = representative_part(log, cutoff)
     findings: list[LogFinding] = []
     try:
-        x = filtered_samples(part, cutoff, 2, 300)
-        samples = np.stack([signal[x.rows] for signal in (x.q, x.v, x.a, x.tau)])
-        compensators = by_dependence(friction)[1]
-        _signs_and_order(part, model, samples, cutoff, compensators, findings)
-        _torque_sizes(part, model, samples, findings)
-        _excitation(model, samples, findings)
-        _delay(part, model, findings)
+        x, rows = filtered_samples(part, cutoff, 2, 300)
+        samples = np.stack([signal[rows] for signal in (x.q, x.v, x.a, x.tau)])
+        findings += _signs_and_order(part, model, samples, cutoff, by_dependence(friction)[1])
+        findings += _torque_sizes(part, model, samples)
+        findings += _excitation(model, samples)
+        findings += _delay(part, model)
     except InvalidValueError as error:  # too short or at rest
         words = f"Signs, order, excitation or delay were not checked: {error}"
-        findings.append(LogFinding(FindingKind.TOO_SHORT, Severity.DOUBTFUL, (), words))
+        findings.append(_doubtful(FindingKind.TOO_SHORT, words))
     if part is not log:
         extent = f" (From {len(part)} of {len(log)} samples.)"
         findings = [replace(finding, sentence=finding.sentence + extent) for finding in findings]
     return tuple(findings)
 
 
+def _doubtful(kind: FindingKind, sentence: str, joints: tuple[str, ...] = ()) -> LogFinding:
+    return LogFinding(kind, Severity.DOUBTFUL, joints, sentence)
+
+
 def _signs_and_order(
-    log: Log,
-    model: RobotModel,
-    samples: Array,
-    cutoff: float,
-    compensators: Friction | None,
-    findings: list[LogFinding],
-) -> None:
-    """Report wrong signs, swapped joints and degrees, the most likely first."""
+    log: Log, model: RobotModel, samples: Array, cutoff: float, compensators: Friction | None
+) -> Iterator[LogFinding]:
+    """Wrong signs, swapped joints and degrees, the most likely first."""
     for _ in range(log.n):
-        likely = better_hypotheses(samples, model, cutoff, compensators)
+        likely = better_hypotheses(samples, model, cutoff, log.names, compensators)
         if not likely:
             return
-        best, others = likely[0], likely[1:]
-        kind, words, advice = _description(best.correction, log)
-        if others:
-            alike = "; ".join(_description(other.correction, log)[1] for other in others)
+        best, correction = likely[0], likely[0].correction
+        words, advice = correction.words, correction.advice
+        if len(likely) > 1:
+            alike = "; ".join(other.correction.words for other in likely[1:])
             advice = f"{advice} Equally likely: {alike}."
         sentence = (
             f"{words[0].upper()}{words[1:]}: with this correction the equations of all joints "
@@ -129,43 +129,15 @@ def _signs_and_order(
             f"{advice}"
         )
         severity = Severity.USELESS if best.certain else Severity.DOUBTFUL
-        names = tuple(log.names[j] for j in best.correction.joints)
-        findings.append(LogFinding(kind, severity, names, sentence))
+        names = tuple(log.names[j] for j in correction.joints)
+        yield LogFinding(correction.kind, severity, names, sentence)
         if not best.certain:
             return
-        samples = best.correction.of(samples)
+        samples = correction.of(samples)
 
 
-def _description(correction: LogCorrection, log: Log) -> tuple[FindingKind, str, str]:
-    """Kind, name and advice of a hypothesis."""
-    names, columns = [log.names[j] for j in correction.joints], correction.columns
-    kind, advice = FindingKind.WRONG_SIGN, "Use negative drive_gains= of read_log."
-    if correction.kind == "degrees":
-        kind, words = FindingKind.POSITIONS_IN_DEGREES, "positions look like degrees"
-        advice = (
-            "Read the log with angles='deg', or with gears= or transmission= if they are motor "
-            "angles."
-        )
-    elif correction.kind == "swap":
-        kind = FindingKind.SWAPPED_JOINTS
-        words = f"joints {names[0]} and {names[1]} look swapped in {columns}"
-        advice = "Check the order of the columns (positions=, torques= of read_log)."
-    elif len(names) > 1:
-        words = "the torques of all joints have the wrong sign"
-    elif columns == BOTH:
-        words = f"joint {names[0]} looks flipped (wrong sign of position and torque)"
-        advice = "Give it -1 in signs= of read_log."
-    else:
-        words = f"the {columns[:-1]} of joint {names[0]} has the wrong sign"
-        advice = (
-            "Use signs= of read_log to reverse position and torque together, or negative "
-            "drive_gains= to reverse the torque alone."
-        )
-    return kind, words, advice
-
-
-def _torque_sizes(log: Log, model: RobotModel, samples: Array, findings: list[LogFinding]) -> None:
-    """Report joints whose torques differ in size from those of the model's inertia, if it has any.
+def _torque_sizes(log: Log, model: RobotModel, samples: Array) -> Iterator[LogFinding]:
+    """Joints whose torques differ in size from those of the model's inertia, if it has any.
 
     Joints whose torque the inertia does not explain are skipped.
     """
@@ -173,38 +145,36 @@ def _torque_sizes(log: Log, model: RobotModel, samples: Array, findings: list[Lo
         return
     q, v, a, tau = samples
     predicted, gains = idm(model, q, v, a, drive=False), {}
-    for j in range(log.n):
+    for j, name in enumerate(log.names):
         friction = np.column_stack([v[:, j], np.sign(v[:, j]), a[:, j], np.ones(len(v))])
         both = np.column_stack([predicted[:, j], tau[:, j]])
         (xx, xy), (_, yy) = np.cov((both - friction @ np.linalg.lstsq(friction, both)[0]).T)
         if xy > 0.0 and xy**2 > 0.5 * xx * yy:
-            gains[j] = float(xy / xx)
+            gains[name] = float(xy / xx)
     # inertias of catalogues are wrong by less than a factor of 20
-    large = {j: f"{gain:.3g} times" for j, gain in gains.items() if gain > 20.0}
-    small = {j: f"1/{1.0 / gain:.3g}" for j, gain in gains.items() if gain < 1.0 / 20.0}
+    large = {name: f"{gain:.3g} times" for name, gain in gains.items() if gain > 20.0}
+    small = {name: f"1/{1.0 / gain:.3g}" for name, gain in gains.items() if gain < 1.0 / 20.0}
     units = "in another unit: check units, drive_gains= and gears= of read_log."
-    if all(1.0 / 3.0 < gains[j] / 1e3 < 3.0 for j in large):
+    if all(1.0 / 3.0 < gains[name] / 1e3 < 3.0 for name in large):
         units = "in mN m: use drive_gains=0.001."
     some = " or in kN m" if len(small) == len(gains) > 1 else " at these joints only"
     motors = f"motor torques{some}: see gears=, transmission= and drive_gains= of read_log."
     for off, size, advice in ((large, "larger", units), (small, "smaller", motors)):
         if off:
-            names = tuple(log.names[j] for j in off)
-            listed = ", ".join(f"{log.names[j]}: {factor}" for j, factor in off.items())
+            listed = ", ".join(f"{name}: {factor}" for name, factor in off.items())
             sentence = (
                 f"Torques without friction are much {size} than those computed from the model's "
                 f"inertia ({listed}); they may be {advice}"
             )
-            kind = FindingKind.TORQUE_OFF_INERTIA
-            findings.append(LogFinding(kind, Severity.DOUBTFUL, names, sentence))
+            yield _doubtful(FindingKind.TORQUE_OFF_INERTIA, sentence, tuple(off))
 
 
-def _excitation(model: RobotModel, samples: Array, findings: list[LogFinding]) -> None:
-    """Report a motion on which the regressor has less than full rank."""
+def _excitation(model: RobotModel, samples: Array) -> Iterator[LogFinding]:
+    """A motion on which the regressor has less than full rank."""
     base = base_parameters(model, drive=True)
     W = torque_regressor(model, *samples[:3], columns=base.names)
-    R = np.asarray(np.linalg.qr(W.reshape(-1, len(base)), mode="r"))
-    size = np.sqrt((R**2).sum(axis=0))
+    R = triangle(W.reshape(-1, len(base)))
+    size = np.linalg.norm(R, axis=0)
     kept = size > 1e-9 * size.max(initial=0.0)
     rank = int(np.linalg.matrix_rank(R[:, kept] / size[kept], rtol=1e-6)) if kept.any() else 0
     if rank < len(base):
@@ -213,11 +183,11 @@ def _excitation(model: RobotModel, samples: Array, findings: list[LogFinding]) -
             "identifiable. Record a motion that excites them (exciting_trajectory), or "
             "identify the joints that move."
         )
-        findings.append(LogFinding(FindingKind.NOT_EXCITING, Severity.DOUBTFUL, (), sentence))
+        yield _doubtful(FindingKind.NOT_EXCITING, sentence)
 
 
-def _delay(log: Log, model: RobotModel, findings: list[LogFinding]) -> None:
-    """Report a delay between torques and positions."""
+def _delay(log: Log, model: RobotModel) -> Iterator[LogFinding]:
+    """A delay between torques and positions."""
     estimate = synchronisation(log, model)
     if estimate.status is SynchronisationStatus.AT_THE_END:
         sentence = (
@@ -226,8 +196,7 @@ def _delay(log: Log, model: RobotModel, findings: list[LogFinding]) -> None:
             "the delay is larger, or they belong to different motions. Extend the range by "
             "synchronisation(log, model, within=...), and remove the delay by with_delay."
         )
+        yield _doubtful(FindingKind.OUT_OF_STEP, sentence)
     elif estimate.is_out_of_step:
         sentence = f"{estimate} Remove it by with_delay(log, {estimate.delay:.3g})."
-    else:
-        return
-    findings.append(LogFinding(FindingKind.OUT_OF_STEP, Severity.DOUBTFUL, (), sentence))
+        yield _doubtful(FindingKind.OUT_OF_STEP, sentence)

@@ -13,26 +13,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import Array, Rebuilt, read_only
-from .._outcomes import Outcome
-from ..errors import InvalidValueError, nearest_names
+from .._arrays import Array
+from ..errors import InvalidValueError
+from ..estimation.estimate import NamedValues
 from ..estimation.factor import TriangularFactors, reduced
+from ..estimation.linear import residual_noise as residual_noise
 from ..logs import Log
 from ..logs.log import check_is_log
 from ..minimal_parameters import BaseParameters
-from ..regressors.columns import plain_name
 from ..table_text import boxed
 from .equations import Block, Equations, equations
-from .forms import RowForm, formed_block
+from .forms import RowForm, torque_block
 from .processing import checked_processing, choose_processing
 from .signals import Piece, Processing
 
 UNIDENTIFIABLE = 1e-7
 """Rank tolerance: residual column norm relative to the largest."""
-_ROUNDING = 1e-8
-"""Smallest standard deviation of residuals, relative to the measured side."""
-
-Task = tuple[Equations, Piece, Array | None, RowForm | None]
 
 
 def equations_of(
@@ -66,44 +62,25 @@ class CommonEquations:
 
     def blocks(self) -> Iterator[Block]:
         """Equations of all logs in the common unknowns, piece by piece."""
-        return (_block(task) for task in self._tasks())
+        return map(self._block, self._pieces())
 
     def reduced(self, executor: Executor | None = None) -> TriangularFactors:
         """Triangular factors of all logs."""
         run = map if executor is None else executor.map
-        return reduced(self.names, run(_block, self._tasks()))
+        return reduced(self.names, run(self._block, self._pieces()))
 
     def columns(self, kept: NDArray[np.int64]) -> CommonEquations:
         """The same equations in some of the unknowns."""
         maps = tuple(None if M is None else M[:, kept] for M in self.maps)
         return replace(self, names=tuple(self.names[k] for k in kept), maps=maps)
 
-    def _tasks(self) -> Iterator[Task]:
-        for system, matrix in zip(self.systems, self.maps, strict=True):
-            for piece in system.pieces():
-                yield system, piece, matrix, self.form
+    def _pieces(self) -> Iterator[tuple[int, Piece]]:
+        return ((k, piece) for k, system in enumerate(self.systems) for piece in system.pieces())
 
-
-def _block(task: Task) -> Block:
-    system, piece, matrix, form = task
-    block = system.block(piece) if form is None else formed_block(system, piece, form)
-    return block if matrix is None else replace(block, W=block.W @ matrix)
-
-
-def residual_noise(factors: TriangularFactors) -> Array:
-    """Standard deviation of the residuals of each kind, from its equations alone, shape (m,)."""
-    noise = np.ones(len(factors.factors))
-    for m, F in enumerate(factors.factors):
-        size = float(np.linalg.norm(F[:, -1]))
-        count = max(int(factors.counts[m]), 1)
-        if not size > 0.0:
-            continue
-        U, s, _ = np.linalg.svd(F[:, :-1] / column_lengths(F[:, :-1]), full_matrices=False)
-        U = U[:, s > 1e-12 * s.max(initial=0.0)]
-        rest = float(np.linalg.norm(F[:, -1] - U @ (U.T @ F[:, -1])))
-        left = max(count - U.shape[1], 1)
-        noise[m] = max(rest / np.sqrt(left), _ROUNDING * size / np.sqrt(count))
-    return noise
+    def _block(self, number: tuple[int, Piece]) -> Block:
+        k, piece = number
+        block, M = torque_block(self.systems[k], piece, self.form), self.maps[k]
+        return block if M is None else replace(block, W=block.W @ M)
 
 
 def column_lengths(R: Array) -> Array:
@@ -112,37 +89,10 @@ def column_lengths(R: Array) -> Array:
     return np.where(lengths > 0.0, lengths, 1.0)
 
 
-class NamedEstimate(Rebuilt):
-    """Base of results with names, values, covariance and status; read-only."""
+class NamedEstimate(NamedValues):
+    """Base of results with names, values, covariance and status that print as a table."""
 
     __slots__ = ()
-    names: tuple[str, ...]
-    values: Array
-    covariance: Array
-    status: Outcome
-
-    def __post_init__(self) -> None:
-        for name in self.__slots__:
-            value = getattr(self, name)
-            if isinstance(value, np.ndarray):
-                object.__setattr__(self, name, read_only(value))
-
-    @property
-    def standard_errors(self) -> Array:
-        """Standard errors of the values, corrected for correlated residuals."""
-        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
-
-    def value(self, name: str) -> float:
-        """Value of one parameter, SI units."""
-        return float(self.values[self._place(name)])
-
-    def standard_error(self, name: str) -> float:
-        """Standard error of one parameter, SI units."""
-        return float(self.standard_errors[self._place(name)])
-
-    def reason(self) -> str:
-        """The status as a sentence."""
-        return self.status.sentence
 
     def __str__(self) -> str:
         if not np.isfinite(self.values).all():
@@ -153,10 +103,3 @@ class NamedEstimate(Rebuilt):
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {len(self.names)} parameters, {self.status.name}>"
-
-    def _place(self, name: str) -> int:
-        name = plain_name(name, self.names)
-        if name not in self.names:
-            near = ", ".join(nearest_names(name, self.names)) or "none"
-            raise InvalidValueError(f"name: {name!r} was not identified; near it: {near}.")
-        return self.names.index(name)

@@ -15,7 +15,7 @@ from ..logs.log import check_is_log
 from ..logs.stretches import SAMPLES, stretches
 from ..model import RobotModel, check_model
 from ..regressors import torque_regressor
-from .signals import central_differences, zero_phase
+from .signals import Signals, central_differences, zero_phase
 
 SMOOTH_DRIVE = ("Ia", "Fv", "offset")
 """Drive parameters whose columns are continuous at velocity reversals."""
@@ -144,37 +144,33 @@ def synchronisation(
     count = int(np.ceil(span / step))
     delays: Array = np.asarray(step * np.arange(-count, count + 1), np.float64)
     margin = int(np.ceil((delays[-1] + 2.0 * step) / log.dt)) + 2
-    joints = _joint_equations(
-        filtered_samples(representative_part(log, min(fc, 1.0 / span)), fc, margin), model
-    )
+    part = representative_part(log, min(fc, 1.0 / span))
+    joints = _joint_equations(part, fc, margin, model)
     if not joints:
         raise InvalidValueError(
             "log: no joint has enough samples in motion to compare torques with; see check_log."
         )
     curves, power = np.full((log.n, len(delays)), np.nan), 0.0
+    each, errors = np.full(log.n, np.nan), np.full(log.n, np.nan)
     for j, joint in joints.items():
         squares = (joint.residuals(delays) ** 2).sum(axis=0)
         rows, rank = joint.basis.shape
         size = float((joint.tau[joint.rows] ** 2).sum())
         variance = max(squares.min() / (rows - rank), 1e-24 * size / rows, 1e-300)
         curves[j], power = squares / variance, power + size / variance
-    total = np.nansum(curves, axis=0)
-    delay, standard_error = _minimum(list(joints.values()), delays, total)
-    joint_delays, joint_standard_errors = np.full(log.n, np.nan), np.full(log.n, np.nan)
-    for j, joint in joints.items():
         at, error = _minimum([joint], delays, curves[j])
         if np.isfinite(error):
-            joint_delays[j], joint_standard_errors[j] = at, error
+            each[j], errors[j] = at, error
+    total = np.nansum(curves, axis=0)
+    delay, standard_error = _minimum(list(joints.values()), delays, total)
     relative = np.sqrt(total / power)
+    status = SynchronisationStatus.FLAT
     if delay in (delays[0], delays[-1]):
         status = SynchronisationStatus.AT_THE_END
+    # a single sine is flat: its phase is equally well explained by friction
     elif standard_error < span and float(np.ptp(relative)) > 1e-6:
         status = SynchronisationStatus.FOUND
-    else:  # as for a single sine, whose phase is equally well explained by friction
-        status = SynchronisationStatus.FLAT
-    return Synchronisation(
-        status, delay, standard_error, joint_delays, joint_standard_errors, delays, relative, log.dt
-    )
+    return Synchronisation(status, delay, standard_error, each, errors, delays, relative, log.dt)
 
 
 def check_log_and_model(log: Log, model: RobotModel) -> None:
@@ -196,32 +192,23 @@ def representative_part(log: Log, cutoff: float) -> Log:
     return stretches(log, length, max(SAMPLES, length))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class FilteredSamples:
-    """Zero-phase filtered signals of a log (N, n), and the numbers of a sparse subset of rows."""
+def filtered_samples(
+    log: Log, cutoff: float, margin: int, most: int = 6000
+) -> tuple[Signals, NDArray[np.int64]]:
+    """Zero-phase filtered signals, torques too, and the numbers of a sparse subset of rows.
 
-    log: Log
-    cutoff: float
-    q: Array
-    v: Array
-    a: Array
-    tau: Array
-    rows: NDArray[np.int64]
-
-
-def filtered_samples(log: Log, cutoff: float, margin: int, most: int = 6000) -> FilteredSamples:
-    """Filter and differentiate a log; its rows are at least ``margin`` away from all ends."""
+    The rows are at least ``margin`` away from all ends of recordings.
+    """
     step = max(1, int(0.4 / (cutoff * log.dt)))  # filtered signals contain no more
     margin += int(np.ceil(1.0 / (cutoff * log.dt)))
     q, v, a, tau = (np.zeros(log.q.shape) for _ in range(4))
     kept = []
     for part in log.recordings():
-        if part.stop - part.start <= 2 * margin + step:
-            continue
-        q[part], tau[part] = (zero_phase(x[part], cutoff, log.dt) for x in (log.q, log.tau))
-        v[part] = central_differences(q[part], log.dt)
-        a[part] = central_differences(v[part], log.dt)
-        kept.append(np.arange(part.start + margin, part.stop - margin, step))
+        if part.stop - part.start > 2 * margin + step:
+            q[part], tau[part] = (zero_phase(x[part], cutoff, log.dt) for x in (log.q, log.tau))
+            v[part] = central_differences(q[part], log.dt)
+            a[part] = central_differences(v[part], log.dt)
+            kept.append(np.arange(part.start + margin, part.stop - margin, step))
     if not kept:
         raise InvalidValueError(
             f"log: no recording is longer than {2 * margin + step} samples, which the filter at "
@@ -230,7 +217,7 @@ def filtered_samples(log: Log, cutoff: float, margin: int, most: int = 6000) -> 
     rows = np.concatenate(kept)
     if len(rows) > most:
         rows = rows[np.linspace(0, len(rows) - 1, most).round().astype(int)]
-    return FilteredSamples(log, cutoff, q, v, a, tau, rows)
+    return Signals(log.t, q, v, a, tau), rows
 
 
 def motor_speeds(model: RobotModel) -> Array:
@@ -258,29 +245,32 @@ class _JointEquations:
         return y - self.basis @ (self.basis.T @ y)
 
 
-def _joint_equations(x: FilteredSamples, model: RobotModel) -> dict[int, _JointEquations]:
+def _joint_equations(
+    log: Log, cutoff: float, margin: int, model: RobotModel
+) -> dict[int, _JointEquations]:
     """Equations of the joints that have enough samples in motion."""
-    weights, dt = motor_speeds(model), x.log.dt
+    x, rows = filtered_samples(log, cutoff, margin)
+    weights, dt = motor_speeds(model), log.dt
     speed = x.v @ weights.T
     steps, largest = np.sign(speed), np.abs(speed).max(axis=0)
-    moving = np.abs(speed[x.rows]) > 0.02 * largest
-    near = int(np.ceil(0.25 / (x.cutoff * dt)))  # around a reversal
+    moving = np.abs(speed[rows]) > 0.02 * largest
+    near = int(np.ceil(0.25 / (cutoff * dt)))  # around a reversal
     for side in (-near, near):
-        moving &= steps[np.clip(x.rows + side, 0, len(steps) - 1)] == steps[x.rows]
+        moving &= steps[np.clip(rows + side, 0, len(steps) - 1)] == steps[rows]
     # dry friction of a joint that never moves is constant
     usable = ~(~(moving | (largest < 1e-9)) @ (weights != 0.0))
-    for part in x.log.recordings():  # the filter spreads steps as in the torques
-        steps[part] = zero_phase(steps[part], x.cutoff, dt)
-    W = torque_regressor(model, x.q[x.rows], x.v[x.rows], x.a[x.rows], drive=SMOOTH_DRIVE)
+    for part in log.recordings():  # the filter spreads steps as in the torques
+        steps[part] = zero_phase(steps[part], cutoff, dt)
+    W = torque_regressor(model, x.q[rows], x.v[rows], x.a[rows], drive=SMOOTH_DRIVE)
     equations = {}
-    for j in range(x.log.n):
-        rows = x.rows[usable[:, j]]
-        A = np.concatenate([W[usable[:, j], j], steps[rows] * weights[:, j]], axis=1)
-        size = np.sqrt((A**2).sum(axis=0))
+    for j in range(log.n):
+        used = usable[:, j]
+        A = np.concatenate([W[used, j], steps[rows[used]] * weights[:, j]], axis=1)
+        size = np.linalg.norm(A, axis=0)
         U, s, _ = np.linalg.svd(A / np.where(size > 0.0, size, 1.0), full_matrices=False)
         basis = np.ascontiguousarray(U[:, s > 1e-9 * s.max(initial=0.0)])
-        if len(rows) > basis.shape[1] + 10:
-            equations[j] = _JointEquations(x.tau[:, j], dt, rows, basis)
+        if len(basis) > basis.shape[1] + 10:
+            equations[j] = _JointEquations(x.tau[:, j], dt, rows[used], basis)
     return equations
 
 

@@ -14,7 +14,7 @@ from ..friction import Friction
 from ..logs import Log
 from ..minimal_parameters import BaseParameters, base_parameters
 from ..model import RobotModel
-from .forms import FORMS, Block, EquationForm
+from .forms import FORMS, Block, EquationForm, EquationSource
 from .signals import Piece, Processing, pieces
 
 _KEPT_BYTES = 2**26
@@ -23,43 +23,21 @@ _KEPT_BYTES = 2**26
 
 @dataclass(slots=True)
 class _Cache:
-    """Blocks of the first pieces of a log, in all columns of the equations they were made of."""
+    """Blocks of the first pieces of a log, in columns ``names``."""
 
-    whole: Equations
-    blocks: dict[Piece, Block] = field(default_factory=dict)
+    names: tuple[str, ...]
+    blocks: dict[tuple[Log, Processing, EquationForm, Piece], Block] = field(default_factory=dict)
     size: int = 0
-
-    def serves(self, system: Equations) -> bool:
-        """Whether equations are these in some of the columns, and not of another log or form."""
-        whole, base = self.whole, system.base
-        return (
-            system.log is whole.log
-            and system.processing is whole.processing
-            and system.form is whole.form
-            and base.model is whole.base.model
-            and base.friction is whole.base.friction
-        )
-
-    def keep(self, piece: Piece, block: Block) -> None:
-        """Store a block if the cache has room."""
-        size = sum(x.nbytes for x in (block.t, block.W, block.y, block.use, block.v))
-        if self.size + size <= _KEPT_BYTES:
-            self.size += size
-            self.blocks[piece] = block
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Equations:
+class Equations(EquationSource):
     """Equations of a log in b parameters of a robot, made piece by piece; `cached` keeps blocks.
 
     ``names`` are the base parameters that have columns, ``form`` is the quantity that is
     balanced.
     """
 
-    base: BaseParameters
-    names: tuple[str, ...]
-    log: Log
-    processing: Processing
     form: EquationForm = EquationForm.TORQUE
     cache: Any = None
 
@@ -83,7 +61,7 @@ class Equations:
 
     def cached(self) -> Equations:
         """The same equations with a cache of blocks."""
-        return replace(self, cache=_Cache(self.uncached()))
+        return replace(self, cache=_Cache(self.names))
 
     def uncached(self) -> Equations:
         """The same equations without a cache."""
@@ -95,22 +73,24 @@ class Equations:
 
     def block(self, piece: Piece) -> Block:
         """Equations of a piece; read-only."""
-        if self.cache is None or not self.cache.serves(self):
+        if (cache := self.cache) is None:
             return FORMS[self.form](self, piece)
-        block = self.cache.blocks.get(piece)
+        key = self.log, self.processing, self.form, piece
+        block = cache.blocks.get(key)
         if block is None:
-            block = FORMS[self.form](self.cache.whole, piece)
-            self.cache.keep(piece, block)
-        names = self.cache.whole.names
-        if self.names == names:
+            block = FORMS[self.form](replace(self, names=cache.names), piece)
+            size = sum(x.nbytes for x in (block.t, block.W, block.y, block.use, block.v))
+            if cache.size + size <= _KEPT_BYTES:
+                cache.size += size
+                cache.blocks[key] = block
+        if self.names == cache.names:
             return block
-        columns = [names.index(name) for name in self.names]
+        columns = [cache.names.index(name) for name in self.names]
         return replace(block, W=np.take(block.W, columns, axis=2))
 
     def blocks(self) -> Iterator[Block]:
         """Equations of the whole log, piece by piece."""
-        for piece in self.pieces():
-            yield self.block(piece)
+        return map(self.block, self.pieces())
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Equations, (self.base, self.names, self.log, self.processing, self.form)

@@ -25,7 +25,7 @@ from .equations import Equations, equations, parameters_of
 from .forms import EquationForm
 from .method_names import method_of
 from .methods.base import Method
-from .methods.essential import Essential, essential
+from .methods.essential import essential
 from .processing import LEAST_EQUATIONS, checked_processing, processing_for
 from .reduction import reduce_equations
 from .result import FitDetails, IdentificationResult
@@ -140,37 +140,29 @@ def fit(
     system, factors = _equations(base, log, form, processing, executor, progress)
     system, factors, gap, missing = _identifiable(system, factors)
     estimate = method.solve(system, factors)
-    selection = _essential(method, factors, estimate)
-    if selection.dropped:
-        system = system.with_names(selection.names)
-        factors = factors.with_names(selection.names)
-        estimate = method.solve(system, factors)
-    estimate, uncertainty = with_uncertainty(method, system, factors, estimate)
+    dropped, rule = (), ""
+    if method.essential is not False and estimate.status is not EstimateStatus.UNSTABLE:
+        names, dropped, rule = essential(factors, estimate, method.essential)
+        if dropped:
+            system, factors = system.with_names(names), factors.with_names(names)
+            estimate = method.solve(system, factors)
+    estimate, iid, lags = with_uncertainty(method, system, factors, estimate)
     validation, ramp = _validation(system, estimate, log, test)
-    warning = _warning(system, estimate, validation)
+    if estimate.status is EstimateStatus.UNSTABLE:
+        warning = f"{estimate.status.sentence} {estimate.notes[-1]}"
+    else:
+        sides = validation.in_sample, validation.held_out
+        warning = poor_prediction(model, system.processing, *sides)
+    notes = (*log.notes, *findings, *system.processing.notes, *estimate.notes)
+    notes = (*notes, *_count_notes(factors, missing, dropped))
     if warning:
         warnings.warn(warning, RobotModelsWarning, stacklevel=2)
+        notes = (warning, *notes)
         if estimate.status is EstimateStatus.SOLVED:
             estimate = replace(estimate, status=EstimateStatus.POOR_PREDICTION)
-    counts = _count_notes(factors, missing, selection.dropped)
-    notes = (*log.notes, *findings, *system.processing.notes, *estimate.notes, *counts)
-    details = FitDetails(
-        uncertainty.iid_standard_errors,
-        uncertainty.correlation_lags,
-        gap,
-        missing,
-        selection.dropped,
-        selection.rule,
-        ramp,
-    )
+    details = FitDetails(iid, lags, gap, missing, dropped, rule, ramp)
     return IdentificationResult(
-        system.uncached(),
-        factors,
-        method,
-        estimate,
-        validation,
-        details,
-        (warning, *notes) if warning else notes,
+        system.uncached(), factors, method, estimate, validation, details, notes
     )
 
 
@@ -187,23 +179,25 @@ def _equations(
     Where dead bands leave too few equations, the decimation is reduced.
     """
     given = checked_processing(processing, log)
-    kinds = log.n if form.by_joint else 1
+    groups = log.n if form.by_joint else 1
 
     def made(decimation: int | None) -> Equations:
         if isinstance(given, Processing):
-            chosen = given
+            choice = given
         else:
-            chosen = processing_for(base, log, **given | {"decimation": decimation}, kinds=kinds)
+            options = given | {"decimation": decimation}
+            choice = processing_for(base, log, **options, kinds=groups)
         if not form.by_joint:
-            chosen = replace(chosen, notes=(*chosen.notes, _ONE_EQUATION))
-        return equations(base, log, chosen, form).cached()
+            choice = replace(choice, notes=(*choice.notes, _ONE_EQUATION))
+        return equations(base, log, choice, form).cached()
 
-    fixed = True if isinstance(given, Processing) else given["decimation"] is not None
-    system = made(None if isinstance(given, Processing) else given["decimation"])
+    fixed = isinstance(given, Processing)
+    asked = None if fixed else given["decimation"]
+    system = made(asked)
     factors = reduce_equations(system, executor, progress)
     share = factors.rows / (LEAST_EQUATIONS * len(base))
     step = system.processing.decimation
-    if not fixed and share < 1.0 < step:
+    if not fixed and asked is None and share < 1.0 < step:
         # with a margin, since the excluded samples depend on the cutoff
         system = made(max(1, int(_SPARE * share * step)))
         factors = reduce_equations(system, executor)
@@ -221,30 +215,15 @@ def _identifiable(
     system: Equations, factors: TriangularFactors
 ) -> tuple[Equations, TriangularFactors, tuple[float, float], tuple[str, ...]]:
     """Equations in the identifiable parameters, into which the others are regrouped."""
-    R, _, _ = factors.stacked()
-    basis = column_basis(R, nothing=_NO_EFFECT)
+    basis = column_basis(factors.stacked()[0], nothing=_NO_EFFECT)
     if basis.rank == len(factors.names):
         return system, factors, basis.gap, ()
     base, kept = system.base, basis.kept
-    matrix = basis.coefficients @ base.matrix
-    reduced = BaseParameters(
-        base.model,
-        base.drive,
-        base.kept[kept],
-        matrix,
-        base.method,
-        basis.gap,
-        friction=base.friction,
-    )
+    matrix, gap = basis.coefficients @ base.matrix, basis.gap
+    reduced = replace(base, kept=base.kept[kept], matrix=matrix, gap=gap)
     names = tuple(factors.names[k] for k in kept)
     missing = tuple(name for name in factors.names if name not in names)
-    return system.with_names(names, reduced), factors.with_names(names), basis.gap, missing
-
-
-def _essential(method: Method, factors: TriangularFactors, estimate: Estimate) -> Essential:
-    if method.essential is False or estimate.status is EstimateStatus.UNSTABLE:
-        return Essential(factors.names, (), "")
-    return essential(factors, estimate, method.essential)
+    return system.with_names(names, reduced), factors.with_names(names), gap, missing
 
 
 def _validation(
@@ -260,15 +239,6 @@ def _validation(
     if test is not None:
         held_out, _ = prediction_errors(system.with_log(test), estimate.values, ramp)
     return Validation(in_sample, held_out, nominal), ramp
-
-
-def _warning(system: Equations, estimate: Estimate, validation: Validation) -> str:
-    """Warning about a diverged estimate or poor prediction; empty if there is none."""
-    if estimate.status is EstimateStatus.UNSTABLE:
-        return f"{estimate.status.sentence} {estimate.notes[-1]}"
-    return poor_prediction(
-        system.model, system.processing, validation.in_sample, validation.held_out
-    )
 
 
 def _count_notes(

@@ -8,9 +8,9 @@ model", IEEE ICRA 1997; M. Gautier and W. Khalil, IEEE CDC 1988 (energy).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,7 @@ from ..regressors import (
 )
 from .signals import Piece, Processing, Signals, decimation_window, piece_signals
 
-_CHUNK = 1024
+_CHUNK, _MOMENTUM_CHUNK = 1024, 128
 """Largest number of samples in a regressor chunk."""
 _LEAST_WEIGHT = 0.5
 """Share of the decimation window that must lie outside the dead band."""
@@ -77,28 +77,27 @@ class Block:
         return len(self.t)
 
 
-class EquationSource(Protocol):
-    """Log, base parameters and processing from which equations are formed."""
+@dataclass(frozen=True, slots=True, eq=False)
+class EquationSource:
+    """A log, its processing, and the base parameters that have columns, by their names."""
 
-    @property
-    def base(self) -> BaseParameters:
-        """Base parameters of the robot."""
-        ...
+    base: BaseParameters
+    names: tuple[str, ...]
+    log: Log
+    processing: Processing
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the parameters with columns."""
-        ...
+    def signals(self, piece: Piece, reach: int | None = None) -> Signals:
+        """Filtered signals of a piece and beside it, by default as the decimation needs them."""
+        reach = self.processing.reach if reach is None else reach
+        return piece_signals(self.log, self.processing, piece, reach)
 
-    @property
-    def log(self) -> Log:
-        """The log."""
-        ...
-
-    @property
-    def processing(self) -> Processing:
-        """Filters, decimation and dead bands."""
-        ...
+    def chunks(
+        self, regressor: Callable[..., Any], *samples: Array, size: int = _CHUNK
+    ) -> Iterator[Any]:
+        """Regressor of samples (N, n), chunk by chunk in one reused buffer."""
+        base, columns = self.base, {"columns": self.names, "friction": self.base.friction}
+        parts = chunked(regressor, base.model, *samples, size=size, drive=base.drive, **columns)
+        return (W for _, W in parts)
 
 
 FormedRows = tuple[Array, Array, NDArray[np.bool_]]
@@ -107,187 +106,94 @@ RowForm = Callable[[Array, Array, Array, NDArray[np.bool_]], FormedRows]
 (k, m, c), right side (k, m) and use (k, m)."""
 
 
-def torque_block(source: EquationSource, piece: Piece) -> Block:
-    """Torque equations of a piece of the log (seed book, section 1.6.2)."""
-    signals = piece_signals(source.log, source.processing, piece, source.processing.reach)
-    return signals_block(source, piece, signals)
+def torque_block(source: EquationSource, piece: Piece, form: RowForm | None = None) -> Block:
+    """Torque equations of a piece (seed book, section 1.6.2), combined or extended by a form."""
+    return signals_block(source, piece, source.signals(piece), form)
 
 
-def signals_block(source: EquationSource, piece: Piece, signals: Signals) -> Block:
+def signals_block(
+    source: EquationSource, piece: Piece, x: Signals, form: RowForm | None = None
+) -> Block:
     """Torque equations of given signals, such as simulated ones, at the instants of a piece."""
-    step, base = source.processing.decimation, source.base
-    kept, grid = _instants(source, piece)
-    use = outside_dead_band(source, signals)
-    options = {"drive": base.drive, "columns": source.names, "friction": base.friction}
-    if step == 1:
-        q, v, a = signals.q[kept], signals.v[kept], signals.a[kept]
-        W = torque_regressor(base.model, q, v, a, **options)
-        return Block(signals.t[kept], W, signals.tau[kept], use[kept], v)
-    motion = signals.q, signals.v, signals.a
-    chunks = chunked(torque_regressor, base.model, *motion, size=_CHUNK, **options)
-    W, taking_part = _decimated_rows(chunks, use, grid, len(source.names))
-    y, _ = _decimated_rows([(slice(None), signals.tau[:, :, None])], use, grid, 1)
-    return Block(signals.t[kept], W, y[:, :, 0], taking_part, decimated([signals.v], *grid))
-
-
-def formed_block(source: EquationSource, piece: Piece, form: RowForm) -> Block:
-    """Torque equations of a piece, combined or extended at the rate of the log."""
-    base = source.base
-    signals = piece_signals(source.log, source.processing, piece, source.processing.reach)
-    kept, grid = _instants(source, piece)
-    use = outside_dead_band(source, signals)
-    chunks = chunked(
-        torque_regressor,
-        base.model,
-        signals.q,
-        signals.v,
-        signals.a,
-        size=_CHUNK,
-        drive=base.drive,
-        columns=source.names,
-        friction=base.friction,
-    )
-    rows, uses = [], []
-    for part, W in chunks:
-        new, y, new_use = form(W, signals.tau[part], signals.v[part], use[part])
-        rows.append((part, np.concatenate((new, y[:, :, None]), axis=2)))
-        uses.append(new_use)
-    columns = rows[0][1].shape[2]
-    both, taking_part = _decimated_rows(rows, np.concatenate(uses), grid, columns)
-    W = np.ascontiguousarray(both[:, :, :-1])
-    return Block(signals.t[kept], W, both[:, :, -1], taking_part, decimated([signals.v], *grid))
+    chunks = source.chunks(torque_regressor, x.q, x.v, x.a)
+    rows = _rows(chunks, x.tau, x.v, outside_dead_band(source, x), form)
+    return _decimated_block(rows, x.t, x.v, _grid(source, piece))
 
 
 def filtered_block(source: EquationSource, piece: Piece) -> Block:
     """Filtered momentum equations of a piece of the log (seed book, section 1.6.2)."""
-    processing, base = source.processing, source.base
     # low-pass, differences at its ends, and the offset of the first sample
-    around = processing.reach + 2 * SHORT
-    signals = piece_signals(source.log, processing, piece, around)
-    first = piece.start - max(piece.start - around, piece.low)
-    length = max(min(piece.stop + SHORT, piece.high - SHORT) - piece.start - SHORT, 0)
-    grid = (processing.decimation, first, -(-length // processing.decimation))
+    around = source.processing.reach + 2 * SHORT
+    count = min(piece.stop, piece.high - 2 * SHORT) - piece.start
+    if count <= 0:
+        return _no_equations(source, source.base.model.n)
+    x = source.signals(piece, around)
     # samples and the first equation start SHORT rows inside
-    inner = slice(SHORT, max(len(signals) - SHORT, SHORT))
-    use, tau, v = outside_dead_band(source, signals)[inner], signals.tau[inner], signals.v[inner]
-    chunks = chunked(
-        momentum_regressor,
-        base.model,
-        signals.q,
-        signals.v,
-        size=128,
-        drive=base.drive,
-        columns=source.names,
-        friction=base.friction,
-    )
-    shape = (base.model.n, len(source.names))
-    rates = _momentum_rates(chunks, source.log.dt, shape)
-    W, taking_part = _decimated_rows(rates, use, grid, shape[1])
-    y, _ = _decimated_rows([(slice(None), tau[:, :, None])], use, grid, 1)
-    start = first + SHORT
-    t = signals.t[start : start + length : processing.decimation]
-    return Block(t, W, y[:, :, 0], taking_part, decimated([v], *grid))
+    inner = slice(SHORT, len(x) - SHORT)
+    use = outside_dead_band(source, x)[inner]
+    momenta = source.chunks(momentum_regressor, x.q, x.v, size=_MOMENTUM_CHUNK)
+    rows = _rows(_momentum_rates(momenta, source.log.dt), x.tau[inner], x.v[inner], use)
+    step, first = source.processing.decimation, piece.start - max(piece.start - around, piece.low)
+    return _decimated_block(rows, x.t[inner], x.v[inner], (step, first, -(-count // step)))
 
 
-def _momentum_rates(
-    chunks: Iterable[tuple[slice, tuple[Array, Array]]], dt: float, shape: tuple[int, int]
-) -> Iterator[tuple[slice, Array]]:
+def _momentum_rates(chunks: Iterable[tuple[Array, Array]], dt: float) -> Iterator[Array]:
     """Regressors of the samples that have ``SHORT`` others on either side."""
-    momenta, forces = np.empty((2, 0, *shape))
-    done = 0
-    for _, (P, S) in chunks:
-        momenta, forces = np.concatenate((momenta, P)), np.concatenate((forces, S))
-        inner = len(momenta) - 2 * SHORT
-        if inner <= 0:
-            continue
+    left = None
+    for chunk in chunks:
+        both = chunk if left is None else map(np.concatenate, zip(left, chunk, strict=True))
+        momenta, forces = both
+        inner = max(len(momenta) - 2 * SHORT, 0)
         out = -forces[SHORT : SHORT + inner]
         for away, weight in enumerate(_DERIVATIVE, start=1):
             ahead, behind = momenta[SHORT + away :][:inner], momenta[SHORT - away :][:inner]
             out += weight / dt * (ahead - behind)
-        yield slice(done, done + inner), out
-        done += inner
-        momenta, forces = momenta[inner:], forces[inner:]
+        yield out
+        left = momenta[inner:].copy(), forces[inner:].copy()
 
 
 def power_block(source: EquationSource, piece: Piece) -> Block:
     """Power equations of a piece of the log (seed book, section 1.6.3)."""
-    processing, base = source.processing, source.base
-    signals = piece_signals(source.log, processing, piece, processing.reach)
-    kept, grid = _instants(source, piece)
-    b = len(source.names)
-    chunks = chunked(
-        power_regressor,
-        base.model,
-        signals.q,
-        signals.v,
-        signals.a,
-        size=_CHUNK,
-        drive=base.drive,
-        columns=source.names,
-        friction=base.friction,
-    )
-
-    def rows() -> Iterator[Array]:
-        for part, d in chunks:
-            power = np.einsum("kj,kj->k", signals.tau[part], signals.v[part])
-            yield np.column_stack((d, power, signals.v[part]))
-
-    means = decimated(rows(), *grid)
-    v = means[:, b + 1 :]
-    use = np.logical_or.reduce(moving_joints(base.model, processing.dead_band, v), axis=1)[:, None]
-    return Block(signals.t[kept], means[:, None, :b], means[:, b : b + 1], use, v)
+    x = source.signals(piece)
+    power = (x.tau * x.v).sum(axis=1, keepdims=True)
+    chunks = (d[:, None] for d in source.chunks(power_regressor, x.q, x.v, x.a))
+    rows = _rows(chunks, power, x.v, np.ones(power.shape, dtype=bool))
+    block = _decimated_block(rows, x.t, x.v, _grid(source, piece), 0.0)
+    moving = moving_joints(source.base.model, source.processing.dead_band, block.v)
+    return replace(block, use=moving.any(axis=1, keepdims=True))
 
 
 def energy_block(source: EquationSource, piece: Piece) -> Block:
     """Energy equations over intervals of a piece (seed book, sections 1.5.1.2 and 1.6.3)."""
-    log, processing, base = source.log, source.processing, source.base
-    b, n = len(source.names), base.model.n
-    begin = piece.start + SHORT
-    end = min(piece.stop + SHORT, piece.high - 1 - SHORT)
+    dt, base, around = source.log.dt, source.base, 2 * SHORT
+    begin, end = piece.start + SHORT, min(piece.stop + SHORT, piece.high - 1 - SHORT)
     if end <= begin:
-        empty = np.zeros((0, 1))
-        use = np.zeros((0, 1), dtype=bool)
-        return Block(np.zeros(0), np.zeros((0, 1, b)), empty, use, np.zeros((0, n)))
-    around = 2 * SHORT
-    signals = piece_signals(log, processing, piece, around)
+        return _no_equations(source, 1)
+    x = source.signals(piece, around)
     first = max(piece.start - around, piece.low)
-    rows = slice(begin - SHORT + 1 - first, end + SHORT - first)
-    q, v, tau = signals.q[rows], signals.v[rows], signals.tau[rows]
     # samples from two before the first knot to two after the last
     ahead = SHORT - 1
-    knots = np.append(np.arange(0, end - begin, processing.decimation), end - begin)
+    rows = slice(begin - ahead - first, end + SHORT - first)
+    q, v, tau = x.q[rows], x.v[rows], x.tau[rows]
+    knots = np.append(np.arange(0, end - begin, source.processing.decimation), end - begin)
     stored = energy_parameter_names(base.model, base.drive)
     of_energy = np.array([name in stored for name in source.names], dtype=bool)
-    names = np.array(source.names, dtype=object)
-    W = np.zeros((len(knots) - 1, b))
-    W[:, of_energy] = energy_difference_regressor(
-        base.model,
-        log.dt * np.arange(len(q)),
-        q,
-        v,
-        base.drive,
-        columns=names[of_energy].tolist(),
-        friction=base.friction,
-        knots=knots + ahead,
-    )
-    lost = power_regressor(
-        base.model,
-        q,
-        v,
-        np.zeros_like(v),
-        base.drive,
-        columns=names[~of_energy].tolist(),
-        friction=base.friction,
-    )
+    energies, losses = (np.array(source.names)[k].tolist() for k in (of_energy, ~of_energy))
+    options = {"drive": base.drive, "friction": base.friction}
+    lost = power_regressor(base.model, q, v, np.zeros_like(v), columns=losses, **options)
     power = np.column_stack((lost, (tau * v).sum(axis=1)))
     count = len(power) - len(_INTEGRAL) + 1
     between = sum(weight * power[k : k + count] for k, weight in enumerate(_INTEGRAL))
-    work = np.add.reduceat(log.dt * between, knots[:-1], axis=0)
+    work = np.add.reduceat(dt * between, knots[:-1], axis=0)
+    W = np.empty((len(work), len(source.names)))
     W[:, ~of_energy] = work[:, :-1]
+    W[:, of_energy] = energy_difference_regressor(
+        base.model, dt * np.arange(len(q)), q, v, columns=energies, knots=knots + ahead, **options
+    )
     inner = v[ahead : ahead + end - begin]
-    moves = ~(np.abs(inner) < processing.dead_band).all(axis=1)
+    moves = ~(np.abs(inner) < source.processing.dead_band).all(axis=1)
     use = np.logical_or.reduceat(moves, knots[:-1])[:, None]
-    middle = signals.t[begin - first] + 0.5 * log.dt * (knots[:-1] + knots[1:])
+    middle = x.t[begin - first] + 0.5 * dt * (knots[:-1] + knots[1:])
     means = np.add.reduceat(inner, knots[:-1], axis=0) / np.diff(knots)[:, None]
     return Block(middle, W[:, None, :], work[:, -1:], use, means)
 
@@ -298,14 +204,6 @@ FORMS: dict[EquationForm, Callable[[EquationSource, Piece], Block]] = {
     EquationForm.POWER: power_block,
     EquationForm.ENERGY: energy_block,
 }
-
-
-def decimated(chunks: Iterable[Array], step: int, centre: int, count: int) -> Array:
-    """Decimated signals (count, c) of chunks (k, c), without excluded samples."""
-    parts = [np.ascontiguousarray(chunk)[:, None] for chunk in chunks]
-    rows = ((slice(None), part) for part in parts)
-    use = np.ones((sum(map(len, parts)), 1), dtype=bool)
-    return _decimated_rows(rows, use, (step, centre, count), parts[0].shape[2], 0.0)[0][:, 0]
 
 
 def outside_dead_band(source: EquationSource, signals: Signals) -> NDArray[np.bool_]:
@@ -337,50 +235,81 @@ def moving_joints(model: RobotModel, band: Array, v: Array) -> NDArray[np.bool_]
     return mask
 
 
-def _instants(source: EquationSource, piece: Piece) -> tuple[slice, tuple[int, int, int]]:
-    """Samples of the decimated instants of a piece; decimation, first of them, their number."""
+def decimated(chunks: Iterable[Array], step: int, centre: int, count: int) -> Array:
+    """Decimated signals (count, c) of chunks (k, c), without excluded samples."""
+    rows = ((x[:, None], np.ones((len(x), 1), dtype=bool)) for x in chunks)
+    return _decimated_rows(rows, (step, centre, count), 0.0)[0][:, 0]
+
+
+def _no_equations(source: EquationSource, groups: int) -> Block:
+    """Equations of a piece that is too short for one."""
+    y, v = np.zeros((0, groups)), np.zeros((0, source.base.model.n))
+    return Block(np.zeros(0), np.zeros((*y.shape, len(source.names))), y, y > 0.0, v)
+
+
+def _grid(source: EquationSource, piece: Piece) -> tuple[int, int, int]:
+    """Decimation, first of the decimated instants of a piece, and their number."""
     step = source.processing.decimation
     first = piece.start - max(piece.start - source.processing.reach, piece.low)
-    length = piece.stop - piece.start
-    return slice(first, first + length, step), (step, first, -(-length // step))
+    return step, first, -(-(piece.stop - piece.start) // step)
+
+
+def _rows(
+    chunks: Iterable[Array],
+    y: Array,
+    v: Array,
+    use: NDArray[np.bool_],
+    form: RowForm | None = None,
+) -> Iterator[tuple[Array, NDArray[np.bool_]]]:
+    """Rows [W, y] (k, m, b + 1) of successive samples, and their use (k, m)."""
+    first = 0
+    for W in chunks:
+        part = slice(first, first + len(W))
+        first = part.stop
+        formed = (W, y[part], use[part]) if form is None else form(W, y[part], v[part], use[part])
+        yield np.concatenate((formed[0], formed[1][:, :, None]), axis=2), formed[2]
+
+
+def _decimated_block(
+    rows: Iterable[tuple[Array, NDArray[np.bool_]]],
+    t: Array,
+    v: Array,
+    grid: tuple[int, int, int],
+    least: float = _LEAST_WEIGHT,
+) -> Block:
+    """Equations of rows [W, y] at the rate of the log."""
+    means, use = _decimated_rows(rows, grid, least)
+    step, first, count = grid
+    t, v = t[first::step][:count], decimated([v], *grid)
+    return Block(t, means[:, :, :-1], means[:, :, -1], use, v)
 
 
 def _decimated_rows(
-    chunks: Iterable[tuple[slice, Array]],
-    use: NDArray[np.bool_],
-    grid: tuple[int, int, int],
-    columns: int,
-    least: float = _LEAST_WEIGHT,
+    chunks: Iterable[tuple[Array, NDArray[np.bool_]]], grid: tuple[int, int, int], least: float
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Low-pass and decimate equations; a joint's samples in its dead band have no weight.
 
-    Chunks are rows (k, m, columns) in order, use (N, m); both sides exclude the same samples.
-    Returns means (count, m, columns) and use (count, m).
+    Chunks are rows (k, m, c) in order and their use (k, m), for both sides of the equations.
+    Returns means (count, m, c) and use (count, m).
     """
     from ..kernels.decimation import add_rows
 
     step, centre, count = grid
-    taps = decimation_window(step)
-    weights = np.zeros((count, use.shape[1]))
-    sums = np.zeros((*weights.shape, columns))
-    first = 0
-    for _, rows in chunks:
-        part = use[first : first + len(rows)]
+    if step == 1:
+        rows, use = map(np.concatenate, zip(*chunks, strict=True))
+        return rows[centre:][:count], use[centre:][:count]
+    taps, done = decimation_window(step), 0
+    sums, weights = np.zeros((count, 0, 0)), np.zeros((count, 0))
+    for rows, use in chunks:
+        if not sums.size:
+            sums = np.zeros((count, *rows.shape[1:]))
+            weights = np.zeros(sums.shape[:2])
         nonzero = np.asarray(rows.any(axis=0))
         # columns of earlier links and drives are zero
-        start = np.where(np.any(nonzero, axis=1), nonzero.argmax(axis=1), rows.shape[2])
-        add_rows(
-            np.ascontiguousarray(rows),
-            part.astype(np.int64).reshape(-1),
-            start.astype(np.int64),
-            taps,
-            step,
-            first,
-            centre,
-            sums,
-            weights,
-        )
-        first += len(rows)
+        start = np.where(nonzero.any(axis=1), nonzero.argmax(axis=1), rows.shape[2])
+        flags = use.astype(np.int64).reshape(-1)
+        add_rows(np.ascontiguousarray(rows), flags, start, taps, step, done, centre, sums, weights)
+        done += len(rows)
     taking_part = weights > least
     factors = np.where(taking_part, 1.0 / np.where(taking_part, weights, 1.0), 0.0)
     return factors[:, :, None] * sums, taking_part

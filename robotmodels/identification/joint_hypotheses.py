@@ -6,7 +6,7 @@ Econometrica 57(2), 1989.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 from typing import NamedTuple
 
@@ -15,6 +15,7 @@ import numpy as np
 from .._arrays import Array
 from ..friction import Friction
 from ..geometry import PRISMATIC
+from ..logs import FindingKind
 from ..model import RobotModel
 from ..regressors import torque_regressor
 from .delay import SMOOTH_DRIVE, motor_speeds
@@ -28,14 +29,22 @@ _REVERSALS = 6
 """Least number of reversals of a joint for a certain hypothesis."""
 _FLOOR = 1e-6
 """Least residual variance relative to the torque; smaller ones are equal."""
-POSITIONS, TORQUES, BOTH = "positions", "torques", "positions and torques"
+_DEGREES = (
+    "Read the log with angles='deg', or with gears= or transmission= if they are motor angles."
+)
+_ORDER = "Check the order of the columns (positions=, torques= of read_log)."
+_SIGNS = (
+    "Use signs= of read_log to reverse position and torque together, or negative drive_gains= to "
+    "reverse the torque alone."
+)
 
 
 class LogCorrection(NamedTuple):
-    """Correction of a log by matrices (n, n): "sign" or "swap" of joints, "degrees"."""
+    """Correction of a log by matrices (n, n), and the mistake that it corrects."""
 
-    kind: str
-    columns: str
+    kind: FindingKind
+    words: str
+    advice: str
     joints: tuple[int, ...]
     position: Array
     torque: Array
@@ -57,7 +66,11 @@ class Hypothesis(NamedTuple):
 
 
 def better_hypotheses(
-    samples: Array, model: RobotModel, cutoff: float, compensators: Friction | None = None
+    samples: Array,
+    model: RobotModel,
+    cutoff: float,
+    names: Sequence[str],
+    compensators: Friction | None = None,
 ) -> tuple[Hypothesis, ...]:
     """Corrections of samples (4, T, n) that fit significantly better, best first."""
     tau = samples[3]
@@ -66,10 +79,10 @@ def better_hypotheses(
     given = _equations(model, samples, cutoff, compensators)
     likelihood, share = given.fit(tau)
     hypotheses: list[Hypothesis] = []
-    for group in _corrections(model, samples[0]):
-        equations = given
-        if group[0].columns != TORQUES:
-            equations = _equations(model, group[0].of(samples), cutoff, compensators)
+    for group in _corrections(model, samples[0], names):
+        corrected, equations = group[0].of(samples), given
+        if not np.array_equal(corrected[:3], samples[:3]):
+            equations = _equations(model, corrected, cutoff, compensators)
         for correction in group:
             torques, count = tau @ correction.torque.T, min(len(correction.joints), 2)
             # a fit without sign constraints is at least as good, and quicker
@@ -89,42 +102,55 @@ def better_hypotheses(
 
 def _gain(share: Array, base: Array) -> float:
     """Logarithm of the ratio of the products of the residual variances of all joints."""
-    return float(np.log(base).sum() - np.log(share).sum())
+    return float(np.log(base / share).sum())
 
 
 def _significance(difference: Array) -> float:
     """Mean of differences over its standard error; 20 blocks of time are treated as independent."""
-    blocks = np.array_split(difference, min(20, len(difference)))
-    means = np.array([block.mean() for block in blocks])
+    means = np.array([block.mean() for block in np.array_split(difference, 20) if block.size])
     error = means.std(ddof=1) / np.sqrt(len(means)) if len(means) > 1 else np.inf
     return float(means.mean() / max(error, 1e-300))
 
 
-def _corrections(model: RobotModel, q: Array) -> Iterator[list[LogCorrection]]:
+def _corrections(
+    model: RobotModel, q: Array, names: Sequence[str]
+) -> Iterator[list[LogCorrection]]:
     """Signs, swaps and degrees; corrections of a list have the same positions."""
-    n = model.n
-    unit = np.eye(n)
-    changes: list[tuple[str, tuple[int, ...], Array]] = [
-        ("sign", (j,), unit - 2.0 * np.diag(unit[j])) for j in range(n)
-    ]
+    n, unit = model.n, np.eye(model.n)
+    wrong, swapped = FindingKind.WRONG_SIGN, FindingKind.SWAPPED_JOINTS
+    changes: list[tuple[tuple[int, ...], Array]]
+    changes = [((j,), unit - 2.0 * np.diag(unit[j])) for j in range(n)]
     for i, j in combinations(range(n), 2):
         order = np.arange(n)
         order[[i, j]] = j, i
-        changes.append(("swap", (i, j), unit[order]))
-    every = [LogCorrection("sign", TORQUES, tuple(range(n)), unit, -unit)] if n > 1 else []
-    yield [
-        LogCorrection(kind, TORQUES, joints, unit, change) for kind, joints, change in changes
-    ] + every
-    for kind, joints, change in changes:
-        yield [
-            LogCorrection(kind, POSITIONS, joints, change, unit),
-            LogCorrection(kind, BOTH, joints, change, change),
-        ]
+        changes.append(((i, j), unit[order]))
+
+    def correction(joints: tuple[int, ...], position: Array, torque: Array) -> LogCorrection:
+        columns = [x for x, M in (("positions", position), ("torques", torque)) if M is not unit]
+        some = " and ".join(names[j] for j in joints)
+        if len(joints) > 1:
+            words = f"joints {some} look swapped in {' and '.join(columns)}"
+            return LogCorrection(swapped, words, _ORDER, joints, position, torque)
+        words, advice = f"the {columns[0][:-1]} of joint {some} has the wrong sign", _SIGNS
+        if len(columns) > 1:
+            words = f"joint {some} looks flipped (wrong sign of position and torque)"
+            advice = "Give it -1 in signs= of read_log."
+        return LogCorrection(wrong, words, advice, joints, position, torque)
+
+    torques = [correction(joints, unit, change) for joints, change in changes]
+    if n > 1:
+        words = "the torques of all joints have the wrong sign"
+        advice = "Use negative drive_gains= of read_log."
+        torques.append(LogCorrection(wrong, words, advice, tuple(range(n)), unit, -unit))
+    yield torques
+    for joints, change in changes:
+        yield [correction(joints, change, unit), correction(joints, change, change)]
     turning = model.table.sigma[model.table.joint_rows] != PRISMATIC
     if (np.abs(q[:, turning]) > 2.0 * np.pi).any():
+        kind, words = FindingKind.POSITIONS_IN_DEGREES, "positions look like degrees"
         degrees = np.diag(np.where(turning, np.pi / 180.0, 1.0))
         joints = tuple(np.flatnonzero(turning).tolist())
-        yield [LogCorrection("degrees", POSITIONS, joints, degrees, unit)]
+        yield [LogCorrection(kind, words, _DEGREES, joints, degrees, unit)]
 
 
 class _Equations(NamedTuple):
@@ -162,13 +188,9 @@ def _solved(A: Array, b: Array, free: int) -> Array:
     scale = np.sqrt(np.diag(A))
     R = cholesky(A / np.outer(scale, scale) + 1e-10 * np.eye(len(A)), check_finite=False)
     c = solve_triangular(R, b / scale, trans=1, check_finite=False)
-    x = np.zeros(len(A))
-    if free < len(A):
-        x[free:] = nnls(R[free:, free:], c[free:])[0]
-    if free:
-        rest = c[:free] - R[:free, free:] @ x[free:]
-        x[:free] = solve_triangular(R[:free, :free], rest, check_finite=False)
-    return x / scale
+    limited = nnls(R[free:, free:], c[free:])[0] if free < len(A) else c[free:]
+    rest = c[:free] - R[:free, free:] @ limited
+    return np.append(solve_triangular(R[:free, :free], rest, check_finite=False), limited) / scale
 
 
 def _equations(
@@ -179,9 +201,9 @@ def _equations(
     n, links = model.n, 10 * model.table.f
     W = torque_regressor(model, q, v, a, drive=SMOOTH_DRIVE, friction=compensators)
     bodies = W[:, :, :links].reshape(len(q), n, -1, 10)
-    XX, YY, ZZ = (bodies[..., k].copy() for k in (0, 3, 5))
     # XX = Lyy + Lzz and so on: second moments Lxx, Lyy, Lzz of a body are not negative
-    bodies[..., 0], bodies[..., 3], bodies[..., 5] = YY + ZZ, XX + ZZ, XX + YY
+    second = bodies[..., [0, 3, 5]]
+    bodies[..., [0, 3, 5]] = second.sum(axis=-1, keepdims=True) - second
     # corrections change velocities sample by sample: the step of dry friction at a reversal is not
     # filtered but drawn out over a quarter of a period of the cutoff
     weights = motor_speeds(model)

@@ -15,7 +15,7 @@ from .methods.recursive import Recursive
 from .methods.robust import Robust
 from .methods.sequential import Sequential
 
-_OBJECTS = ("prior", "controller", "loop")
+_OBJECTS = ("prior", "controller")
 """Options that are objects and have no text form."""
 _WORDS = {"true": "True", "false": "False", "none": "None"}
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_floats
 from ..errors import InvalidValueError, ShapeError
 from ..logs import Log
+from ..logs.stretches import stretches
 from ..minimal_parameters import BaseParameters
 from .position_noise import PositionNoise, predicted_bias
 from .signals import HALF, Processing, central_differences, zero_phase
@@ -29,7 +30,7 @@ _HIGHEST, _STEP, _WIDTH = 15.0, 1.3, 2.5
 """Highest cutoff of the equations in Hz (joints are flexible above); ratio of the cutoffs that are
 tried; cutoff of the positions, in cutoffs of the equations, so that it does not distort them."""
 _WINDOWS, _SECONDS = 8, 16.0
-"""Largest number and length (s) of the windows for spectra and velocities."""
+"""Largest number and length (s) of the stretches for spectra and velocities."""
 
 
 def choose_processing(
@@ -102,9 +103,11 @@ def choose_processing(
     else:
         band = _checked_cutoff(log, cutoff)
         why = f"{_filtered(band)}, as requested."
-    step = decimation_for(_EQUATIONS_OF_MOTION * motion, log.dt)
-    step = max(1, min(step, _longest(log) // 20)) if decimation is None else decimation
-    return _completed(log, motion, noise, band, step, dead_band, edges, why, order, accuracy)
+    if decimation is None:
+        step = decimation_for(_EQUATIONS_OF_MOTION * motion, log.dt)
+        decimation = max(1, min(step, _longest(log) // 20))
+    choices = band, decimation, dead_band, edges, why
+    return _completed(log, motion, noise, *choices, order, accuracy)
 
 
 def processing_for(
@@ -190,16 +193,13 @@ def _completed(
     accuracy: int = 4,
 ) -> Processing:
     """Processing with these cutoffs, and the dead bands and edges that follow from them."""
-    step = _checked_decimation(log, step)
-    notes = [
-        f"The velocities have 99.9 % of their power below {motion:.3g} Hz; noise of "
-        f"the positions {_listed(noise)} (standard deviation).",
-        why,
-        "No decimation."
-        if step == 1
-        else f"Regressor and torque are low-pass filtered at {HALF / (step * log.dt):.3g} Hz, and "
-        f"one of {step} samples is kept.",
-    ]
+    step, thinned = _checked_decimation(log, step), "No decimation."
+    if step > 1:
+        thinned = f"Regressor and torque are low-pass filtered at {HALF / (step * log.dt):.3g} Hz, "
+        thinned += f"and one of {step} samples is kept."
+    spectrum = f"The velocities have 99.9 % of their power below {motion:.3g} Hz; noise of the "
+    spectrum += f"positions {_listed(noise)} (standard deviation)."
+    notes = [spectrum, why, thinned]
     if dead_band is None:
         # white noise of density s^2 / (fs / 2) through a low-pass and a derivative
         f = min(band or np.inf, 0.5 / log.dt)
@@ -288,8 +288,12 @@ def motion_of(log: Log) -> tuple[float, Array]:
     rate, rng = 1.0 / log.dt, np.random.default_rng(0)
     noise = PositionNoise.of(log)
     bands, power = [], []
-    for part in _windows(log):
-        q = np.asarray(log.q[part])
+    if _longest(log) < 8:
+        raise InvalidValueError(
+            f"log: its longest recording has {_longest(log)} samples, which are too few for a "
+            "spectrum."
+        )
+    for q in _windows(log):
         both = np.diff(np.concatenate((q, noise.draw(q, log.dt, rng)), axis=1), axis=0) * rate
         f, P = periodogram(both, rate, "hann", axis=0)
         bands_of_joints = [_band(f[1:], P[1:, j], P[1:, log.n + j]) for j in range(log.n)]
@@ -305,22 +309,11 @@ def motion_of(log: Log) -> tuple[float, Array]:
     return motion if motion > 0.0 else float(np.min(bands)), noise.std
 
 
-def _windows(log: Log) -> list[slice]:
-    """Windows of bounded number and length, spread over each recording."""
+def _windows(log: Log) -> Iterator[Array]:
+    """Positions of a bounded part of a log, recording by recording."""
     length = max(8, int(_SECONDS / log.dt))
-    parts = [part for part in log.recordings() if part.stop - part.start >= 8]
-    if not parts:
-        raise InvalidValueError(
-            f"log: its longest recording has {_longest(log)} samples, which are too few for a "
-            "spectrum."
-        )
-    spread = np.unique(np.linspace(0, len(parts) - 1, _WINDOWS).round().astype(int))
-    windows = []
-    for part in (parts[k] for k in spread):
-        count = min(max(1, _WINDOWS // len(spread)), -(-(part.stop - part.start) // length))
-        starts = np.linspace(part.start, max(part.start, part.stop - length), count)
-        windows += [slice(int(x), min(int(x) + length, part.stop)) for x in starts.round()]
-    return windows
+    part = stretches(log, length, _WINDOWS * length)
+    return (np.asarray(part.q[rows]) for rows in part.recordings() if rows.stop - rows.start >= 8)
 
 
 def _band(f: Array, P: Array, noise: Array) -> tuple[float, float]:
@@ -346,7 +339,7 @@ def _averaged(S: Array, width: int) -> Array:
 
 def _fastest(log: Log, cutoff: float) -> Array:
     """99 % quantile of the filtered absolute velocities (n,)."""
-    filtered = (zero_phase(log.q[part], cutoff, log.dt) for part in _windows(log))
+    filtered = (zero_phase(q, cutoff, log.dt) for q in _windows(log))
     speeds = (np.abs(central_differences(q, log.dt, 2)) for q in filtered)
     return np.max([np.percentile(v, 99.0, axis=0) for v in speeds], axis=0)
 

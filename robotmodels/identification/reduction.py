@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 import os
-import pickle
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sized
 from concurrent.futures import Executor, Future
-from functools import lru_cache
-from typing import Any
+from functools import partial
 
 import numpy as np
 
 from ..errors import InvalidValueError
-from ..estimation.factor import TriangularFactors, factors_of, merged, merged_tree
-from ..logs import Log
+from ..estimation.factor import TriangularFactors, factors_of, merged, merged_all
 from .equations import Equations
 from .signals import Piece, slice_with_margin
-
-_Task = tuple[Callable[..., TriangularFactors], tuple[Any, ...], float | None]
-"""Function, its arguments, and the fraction of the work that is done after it."""
 
 
 def reduce_equations(
@@ -75,47 +69,54 @@ def reduce_equations(
     (8, True)
     """
     systems = (system,) if isinstance(system, Equations) else system
-    tasks = _tasks(systems, executor is not None, len(systems) if isinstance(systems, Sized) else 0)
-    done = _in_order(tasks, executor, window)
-    factors = merged_tree(_reported(done, progress), merged)
-    if factors is None:
-        raise InvalidValueError("system: expected the equations of at least one log, got none.")
-    return factors
-
-
-def _tasks(systems: Iterable[Equations], sent: bool, logs: int) -> Iterator[_Task]:
-    """One task per piece, without a fraction if the number of logs is unknown (0)."""
-    for k, system in enumerate(systems):
-        pieces = system.pieces()
-        # a robot is rebuilt when it is unpickled: each worker does that once
-        empty = Log(system.log.dt, system.log.q[:1], system.log.tau[:1], names=system.log.names)
-        robot = pickle.dumps(system.with_log(empty)) if sent else b""
-        for i, piece in enumerate(pieces):
-            fraction = (k + (i + 1) / len(pieces)) / logs if logs else None
-            if sent:
-                part, moved = slice_with_margin(system.log, system.processing, piece)
-                yield _of_worker, (robot, part, moved), fraction
-            else:
-                yield _of_piece, (system, piece), fraction
-
-
-def _in_order(
-    tasks: Iterable[_Task], executor: Executor | None, window: int | None
-) -> Iterator[tuple[TriangularFactors, float | None]]:
-    """Results in the order of the tasks, of which at most ``window`` are submitted at a time."""
     most = 2 * (os.cpu_count() or 1) + 2 if window is None else window
     if most < 1:
         raise InvalidValueError(f"window: expected at least one piece at a time, got {window}.")
+
+    def leaves() -> Iterator[TriangularFactors]:
+        fraction = 0.0
+        for factors, fraction in _results(_tasks(systems, executor is not None), executor, most):
+            yield factors
+            if progress is not None and fraction > 0.0:
+                progress(fraction)
+        if progress is not None and fraction < 1.0:
+            progress(1.0)
+
+    return merged_all(leaves())
+
+
+_Task = tuple[Callable[[], TriangularFactors], float]
+"""Work on a piece, and the fraction of all work that is done after it; 0 if it is not known."""
+
+
+def _tasks(systems: Iterable[Equations], sent: bool) -> Iterator[_Task]:
+    """One task per piece; what is sent to a worker has the samples of its piece alone."""
+    logs = len(systems) if isinstance(systems, Sized) else 0
+    for k, system in enumerate(systems):
+        pieces = system.pieces()
+        for i, piece in enumerate(pieces):
+            part = system
+            if sent:
+                log, piece = slice_with_margin(system.log, system.processing, piece)
+                part = system.with_log(log)
+            fraction = (k + (i + 1) / len(pieces)) / logs if logs else 0.0
+            yield partial(_piece_factors, part, piece), fraction
+
+
+def _results(
+    tasks: Iterable[_Task], executor: Executor | None, window: int
+) -> Iterator[tuple[TriangularFactors, float]]:
+    """Results in the order of the tasks, of which at most ``window`` are submitted at a time."""
     if executor is None:
-        yield from ((function(*given), fraction) for function, given, fraction in tasks)
+        yield from ((task(), fraction) for task, fraction in tasks)
         return
-    waiting: deque[tuple[Future[TriangularFactors], float | None]] = deque()
+    waiting: deque[tuple[Future[TriangularFactors], float]] = deque()
     try:
-        for function, given, fraction in tasks:
-            if len(waiting) == most:
+        for task, fraction in tasks:
+            if len(waiting) == window:
                 first, done = waiting.popleft()
                 yield first.result(), done
-            waiting.append((executor.submit(function, *given), fraction))
+            waiting.append((executor.submit(task), fraction))
         while waiting:
             first, done = waiting.popleft()
             yield first.result(), done
@@ -125,26 +126,9 @@ def _in_order(
             future.cancel()
 
 
-def _reported(
-    done: Iterable[tuple[TriangularFactors, float | None]],
-    progress: Callable[[float], None] | None,
-) -> Iterator[TriangularFactors]:
-    last = 0.0
-    for factors, fraction in done:
-        yield factors
-        if progress is not None and fraction is not None:
-            progress(last := fraction)
-    if progress is not None and last < 1.0:
-        progress(1.0)
-
-
-def _of_piece(system: Equations, piece: Piece) -> TriangularFactors:
+def _piece_factors(system: Equations, piece: Piece) -> TriangularFactors:
     block = system.block(piece)
     return factors_of(system.names, block.W, block.y, block.use)
-
-
-def _of_worker(robot: bytes, log: Log, piece: Piece) -> TriangularFactors:
-    return _of_piece(_rebuilt(robot).with_log(log), piece)
 
 
 def segments(system: Equations, count: int) -> tuple[TriangularFactors, ...]:
@@ -152,19 +136,13 @@ def segments(system: Equations, count: int) -> tuple[TriangularFactors, ...]:
     total = sum(len(block) for block in system.blocks())
     if not 2 <= count <= total:
         raise InvalidValueError(f"count: expected from 2 to {total} parts, got {count!r:.40}.")
-    ends = np.linspace(0, total, count + 1).astype(int)
-    parts: list[TriangularFactors | None] = [None] * count
-    first = 0
+    ends, first = np.linspace(0, total, count + 1).astype(int)[1:], 0
+    parts: dict[int, TriangularFactors] = {}
     for block in system.blocks():
-        for k, part in enumerate(parts):
-            rows = slice(*np.clip(ends[k : k + 2] - first, 0, len(block)).tolist())
-            if rows.start < rows.stop:
-                new = factors_of(system.names, block.W[rows], block.y[rows], block.use[rows])
-                parts[k] = new if part is None else merged(part, new)
+        place = np.searchsorted(ends, first + np.arange(len(block)), side="right")
+        for k in np.unique(place).tolist():
+            rows = place == k
+            new = factors_of(system.names, block.W[rows], block.y[rows], block.use[rows])
+            parts[k] = merged(parts[k], new) if k in parts else new
         first += len(block)
-    return tuple(part for part in parts if part is not None)
-
-
-@lru_cache(maxsize=4)
-def _rebuilt(robot: bytes) -> Equations:
-    return pickle.loads(robot)
+    return tuple(parts.values())

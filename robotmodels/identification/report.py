@@ -265,8 +265,8 @@ def _consistent(robot: StandardParameters | None) -> tuple[ReportSection, ...]:
         return ()
     body: list[str | ReportTable] = [
         " ".join((robot.status.sentence, robot.fit.stopped)).strip()
-        + f" Its residuals are {robot.price:.3g} % larger than those of least squares (root of the "
-        f"weighted squares). {robot.optimality}"
+        + f" Its residuals are {robot.residual_increase:.3g} % larger than those of least squares "
+        f"(root of the weighted squares). {robot.optimality}"
     ]
     body += [f"* {sentence}" for sentence in robot.fit.active]
     columns = zip(robot.base.names, robot.requested, robot.base_values, strict=True)

@@ -7,15 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Rebuilt, read_only
-from ..errors import InvalidValueError, nearest_names
-from ..estimation.estimate import Estimate, EstimateStatus
+from .._arrays import Array, Frozen
+from ..errors import InvalidValueError
+from ..estimation.estimate import Estimate, EstimateStatus, NamedValues
 from ..estimation.factor import TriangularFactors
 from ..logs import Log
 from ..logs.log import check_is_log
 from ..minimal_parameters import BaseParameters
 from ..model import RobotModel
-from ..regressors.columns import plain_name
 from .equations import Equations
 from .methods.base import Method, check_solved
 from .torques import parameter_torque
@@ -23,7 +22,7 @@ from .validation import Errors, Validation, prediction_errors
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FitDetails(Rebuilt):
+class FitDetails(Frozen):
     """Facts about the equations and the covariance of an identification. Read-only.
 
     Shapes: iid_standard_errors (b,) for white residuals; friction_ramp (n,), rad/s or m/s, within
@@ -38,13 +37,9 @@ class FitDetails(Rebuilt):
     essential_rule: str
     friction_ramp: Array
 
-    def __post_init__(self) -> None:
-        for name in ("iid_standard_errors", "friction_ramp"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
-
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class IdentificationResult(Rebuilt):
+class IdentificationResult(NamedValues):
     """Identified parameters of a robot.
 
     Parameters
@@ -98,18 +93,8 @@ class IdentificationResult(Rebuilt):
         return self.estimate.values
 
     @property
-    def standard_errors(self) -> Array:
-        """Their standard errors, corrected for correlated residuals, shape (b,)."""
-        return self.estimate.standard_errors
-
-    @property
-    def relative_errors(self) -> Array:
-        """Relative standard errors, shape (b,)."""
-        return self.estimate.relative_errors
-
-    @property
     def covariance(self) -> Array:
-        """Covariance of the values, shape (b, b)."""
+        """Covariance of the values, corrected for correlated residuals, shape (b, b)."""
         return self.estimate.covariance
 
     @property
@@ -117,25 +102,11 @@ class IdentificationResult(Rebuilt):
         """Outcome of the identification."""
         return self.estimate.status
 
-    def reason(self) -> str:
-        """Sentence of the status."""
-        return self.status.sentence
-
-    def value(self, name: str) -> float:
-        """Value of one parameter in SI units, by its name such as ``"ZZ1"`` or ``"ZZ1R"``."""
-        return float(self.values[self._number(name)])
-
-    def standard_error(self, name: str) -> float:
-        """Standard error of one parameter in SI units."""
-        return float(self.standard_errors[self._number(name)])
-
     @property
     def base_values(self) -> Array:
         """Values of all base parameters, dropped ones zero, shape (len(base),)."""
-        place = {name: k for k, name in enumerate(self.base.names)}
-        values = np.zeros(len(self.base))
-        values[[place[name] for name in self.names]] = self.values
-        return values
+        known = dict(zip(self.names, self.values.tolist(), strict=True))
+        return np.array([known.get(name, 0.0) for name in self.base.names])
 
     @property
     def condition(self) -> float:
@@ -147,16 +118,6 @@ class IdentificationResult(Rebuilt):
         """Condition number of the regressor with columns of length one."""
         R, _, _ = self.factors.stacked()
         return float(np.linalg.cond(R / np.linalg.norm(R, axis=0)))
-
-    def _number(self, name: str) -> int:
-        plain = plain_name(name, self.names)
-        if plain not in self.names:
-            near = ", ".join(nearest_names(name, self.names)) or "none"
-            raise InvalidValueError(
-                f"name: {name!r} was not identified; near it: {near}. `names` lists the identified "
-                "parameters, `details.unidentifiable` and `details.dropped` the others."
-            )
-        return self.names.index(plain)
 
     def __repr__(self) -> str:
         if self.status is EstimateStatus.UNSTABLE:

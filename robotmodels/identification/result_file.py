@@ -228,7 +228,7 @@ def _choices(result: IdentificationResult) -> dict[str, Any]:
 def _robot(robot: StandardParameters) -> dict[str, Any]:
     return {
         "status": {"name": robot.status.name, "sentence": robot.status.sentence},
-        "price_percent": robot.price,
+        "residual_increase_percent": robot.residual_increase,
         "distance": robot.distance,
         "gap": robot.fit.gap,
         "active": robot.fit.active,

@@ -6,7 +6,7 @@ Seed book sections 1.6.2.4 and 1.6.2.5.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import astuple, dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -116,7 +116,7 @@ class Processing(Rebuilt):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Signals(Rebuilt):
+class Signals:
     """Filtered signals at the rate of the log: t (N,) in seconds; q, v, a and raw tau (N, n).
 
     ``before`` and ``after`` (k, n) are velocities of samples before the first and after the last.
@@ -129,12 +129,6 @@ class Signals(Rebuilt):
     tau: Array
     before: Array | None = None
     after: Array | None = None
-
-    def __post_init__(self) -> None:
-        for name in ("t", "q", "v", "a", "tau"):
-            value = getattr(self, name)
-            if value.flags.writeable:
-                object.__setattr__(self, name, read_only(value))
 
     def __len__(self) -> int:
         return len(self.t)
@@ -225,18 +219,13 @@ def pieces(log: Log, processing: Processing) -> Iterator[Piece]:
 def signals(log: Log, processing: Processing) -> Signals:
     """Filtered signals of all recordings of a log, edges cut."""
     parts = [piece_signals(log, processing, piece, 0) for piece in pieces(log, processing)]
-    names = ("t", "q", "v", "a", "tau")
-    return Signals(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+    arrays = zip(*((x.t, x.q, x.v, x.a, x.tau) for x in parts), strict=True)
+    return Signals(*map(np.concatenate, arrays))
 
 
 def piece_signals(log: Log, processing: Processing, piece: Piece, reach: int) -> Signals:
     """Signals of a piece and of ``reach`` rows on either side, within the recording."""
     first, last, begin, end = _margins(log, processing, piece, reach)
-    if begin < 0 or end > len(log):
-        raise InvalidValueError(
-            f"piece: its rows {first} to {last} depend on rows {begin} to {end}, and the log has "
-            f"rows 0 to {len(log)}; use those that `pieces` gives for this log."
-        )
 
     def filtered(x: Array) -> Array:
         if processing.cutoff is None:
@@ -259,7 +248,7 @@ def slice_with_margin(log: Log, processing: Processing, piece: Piece) -> tuple[L
     rows = slice(begin, end)
     v, a = (None if x is None else x[rows] for x in (log.v, log.a))
     part = Log(log.dt, log.q[rows], log.tau[rows], v, a, names=log.names, delay=log.delay)
-    return part, Piece(*(getattr(piece, field.name) - begin for field in fields(Piece)))
+    return part, Piece(*(row - begin for row in astuple(piece)))
 
 
 def _margins(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,10 +14,7 @@ from ..estimation.covariance import (
 )
 from ..estimation.estimate import Estimate
 from ..estimation.factor import TriangularFactors
-from ..estimation.linear import (
-    group_leverage,
-    solved,
-)
+from ..estimation.linear import group_leverage, solved
 from .delay import representative_part
 from .equations import Equations
 from .methods.base import Method
@@ -32,24 +29,16 @@ _NOTED = 1.5
 """Least jackknife inflation factor for a note."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Uncertainty:
-    """Standard errors for white residuals (b,), and lags of the correlation window."""
-
-    iid_standard_errors: Array
-    correlation_lags: int
-
-
 def with_uncertainty(
     method: Method, system: Equations, factors: TriangularFactors, estimate: Estimate
-) -> tuple[Estimate, Uncertainty]:
-    """Estimate with its final covariance.
+) -> tuple[Estimate, Array, int]:
+    """Estimate with its final covariance, standard errors for white residuals (b,), and lags.
 
     Weighted least squares uses a weak prior on request or where the log determines little.
     """
     if method.covariance == "given":
         details = estimate.details
-        return estimate, Uncertainty(details.iid_standard_errors, details.correlation_lags)
+        return estimate, details.iid_standard_errors, details.correlation_lags
     white = estimate.standard_errors
     spread, ratio, inflation = _spread(method, system, factors, estimate)
     if inflation > _NOTED:
@@ -59,13 +48,23 @@ def with_uncertainty(
             "the motion may excite different parameters at different times."
         )
         estimate = replace(estimate, notes=(*estimate.notes, note))
-    shrunk_estimate = _shrunk(method, system, factors, estimate, spread, ratio)
-    if shrunk_estimate is None and method.covariance == "correlated":
-        estimate = replace(estimate, covariance=spread.covariance)
-    else:
-        estimate = estimate if shrunk_estimate is None else shrunk_estimate
-        estimate = replace(estimate, covariance=estimate.covariance * np.outer(ratio, ratio))
-    return estimate, Uncertainty(white, spread.lags)
+    shrinkage = method.shrinkage if isinstance(method, Wls) else False
+    if shrinkage is None and method.essential:  # an explicit choice of parameters is kept
+        shrinkage = False
+    if shrinkage is not False:
+        part = representative_part(system.log, system.processing.motion)
+        x = signals(part, system.processing)
+        sizes = plausible_sizes(system.base, system.names, x.q, x.v, x.a, x.tau)
+        errors = np.sqrt(np.diag(spread.covariance))
+        always = bool(shrinkage) or factors.rows < LEAST_EQUATIONS * len(factors.names)
+        shrunk_estimate = shrunk(factors, estimate, errors, ratio, sizes, always)
+        if shrunk_estimate is not None:
+            covariance = shrunk_estimate.covariance * np.outer(ratio, ratio)
+            return replace(shrunk_estimate, covariance=covariance), white, spread.lags
+    if method.covariance == "correlated":
+        return replace(estimate, covariance=spread.covariance), white, spread.lags
+    covariance = estimate.covariance * np.outer(ratio, ratio)
+    return replace(estimate, covariance=covariance), white, spread.lags
 
 
 def _spread(
@@ -88,35 +87,8 @@ def _spread(
     inflation = 1.0
     if sum(len(block) for block in part_system.blocks()) >= _SEGMENTS:
         errors = np.sqrt(np.diag(spread.covariance))
-        share = len(part) / len(system.log)
-        inflation = jackknife_inflation(
-            segments(part_system, _SEGMENTS), factors, weights, errors, share
-        )
+        parts, share = segments(part_system, _SEGMENTS), len(part) / len(system.log)
+        inflation = jackknife_inflation(parts, factors, weights, errors, share)
     spread = replace(spread, covariance=inflation**2 * spread.covariance)
     ratio = np.sqrt(np.diag(spread.covariance) / np.where(white > 0.0, white, 1.0))
     return spread, ratio, inflation
-
-
-def _shrunk(
-    method: Method,
-    system: Equations,
-    factors: TriangularFactors,
-    estimate: Estimate,
-    spread: CorrelatedCovariance,
-    ratio: Array,
-) -> Estimate | None:
-    """The estimate with a weak prior, where it is requested or the log needs it."""
-    if not isinstance(method, Wls):
-        return None
-    # an explicit choice of parameters is kept
-    choice = False if method.shrinkage is None and method.essential else method.shrinkage
-    if choice is not None and not choice:
-        return None
-    always = bool(choice) or factors.rows < LEAST_EQUATIONS * len(factors.names)
-    part = representative_part(system.log, system.processing.motion)
-    filtered = signals(part, system.processing)
-    sizes = plausible_sizes(
-        system.base, system.names, filtered.q, filtered.v, filtered.a, filtered.tau
-    )
-    errors = np.sqrt(np.diag(spread.covariance))
-    return shrunk(factors, estimate, errors, ratio, sizes, always)

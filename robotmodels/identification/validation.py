@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
-from .._arrays import Array, Rebuilt, read_only
+from .._arrays import Array, Frozen
 from ..dynamics import idm
 from ..errors import InvalidValueError
 from ..model import RobotModel
@@ -23,7 +23,7 @@ _NOISE = 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Errors(Rebuilt):
+class Errors(Frozen):
     """Errors of predicted torques, by joint. Read-only.
 
     Parameters
@@ -56,10 +56,6 @@ class Errors(Rebuilt):
     noise: Array
     samples: int
 
-    def __post_init__(self) -> None:
-        for field in fields(self)[:-1]:
-            object.__setattr__(self, field.name, read_only(getattr(self, field.name)))
-
 
 @dataclass(frozen=True, slots=True)
 class Validation:
@@ -85,36 +81,6 @@ class Validation:
     folds: None = None
 
 
-class _Sums:
-    """Running sums of torque errors e (N, n)."""
-
-    def __init__(self, n: int) -> None:
-        self.squares, self.sums, self.torque, self.rough = np.zeros((4, n))
-        self.samples = self.steps = 0
-
-    def add(self, e: Array, tau: Array) -> None:
-        """Add successive samples."""
-        self.squares += (e * e).sum(axis=0)
-        self.sums += e.sum(axis=0)
-        self.torque += (tau**2).sum(axis=0)
-        self.rough += (np.diff(e, 2, axis=0) ** 2).sum(axis=0)
-        self.samples += len(e)
-        self.steps += max(len(e) - 2, 0)
-
-    def errors(self, filtered: tuple[Array, Array, Array] | None = None) -> Errors:
-        """Errors, including those of the equations if given."""
-        none = np.full(len(self.sums), np.nan)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return Errors(
-                np.sqrt(self.squares / self.samples),
-                np.sqrt(self.squares / self.torque),
-                self.sums / self.samples,
-                *((none, none, none) if filtered is None else filtered),
-                np.sqrt(self.rough / (6.0 * max(self.steps, 1))),
-                self.samples,
-            )
-
-
 def prediction_errors(
     system: Equations, values: Array, ramp: Array, nominal: bool = False
 ) -> tuple[Errors, Errors | None]:
@@ -124,33 +90,39 @@ def prediction_errors(
     """
     if system.form is not EquationForm.TORQUE:
         system = Equations(system.base, system.names, system.log, system.processing)
-    log, n = system.log, system.log.n
     known = nominal and bool(system.model.inertia.values.any())
-    own, given = _Sums(n), _Sums(n)
-    kept, torque, taken, products = np.zeros((4, n))
-    last = np.zeros((0, n))
-    for piece in system.pieces():
-        x = piece_signals(log, system.processing, piece, 0)
-        predicted = parameter_torque(system.base, system.names, values, x.q, x.v, x.a, ramp)
-        own.add(x.tau - predicted, x.tau)
-        if known:
-            given.add(x.tau - idm(system.model, x.q, x.v, x.a), x.tau)
-        block = system.block(piece)
-        r = np.where(block.use, block.y - block.W @ values, 0.0)
-        kept += (r * r).sum(axis=0)
-        torque += np.where(block.use, block.y**2, 0.0).sum(axis=0)
-        taken += block.use.sum(axis=0)
-        chain = np.vstack((last, r))
-        products += (chain[1:] * chain[:-1]).sum(axis=0)
-        last = r[-1:]
-    if not own.samples:
+    pieces = system.pieces()
+    if not any(piece.stop > piece.start for piece in pieces):
         raise InvalidValueError(
             f"log: none of its recordings is longer than the {2 * system.processing.edges} samples "
             "that are cut at both ends; give a longer one, or shorter edges (processing=)."
         )
+    parts = []
+    for piece in pieces:
+        x, block = piece_signals(system.log, system.processing, piece, 0), system.block(piece)
+        predicted = parameter_torque(system.base, system.names, values, x.q, x.v, x.a, ramp)
+        given = idm(system.model, x.q, x.v, x.a) if known else predicted
+        sides = (block.y, block.y - block.W @ values)
+        parts.append((x.tau, predicted, given, *(np.where(block.use, y, np.nan) for y in sides)))
+    tau, predicted, given, side, r = (np.concatenate(x) for x in zip(*parts, strict=True))
+    squares, none = np.nansum(r * r, axis=0), np.full(system.log.n, np.nan)
     with np.errstate(divide="ignore", invalid="ignore"):
-        filtered = np.sqrt(kept / taken), np.sqrt(kept / torque), products / kept
-    return own.errors(filtered), given.errors() if known else None
+        filtered = (
+            np.sqrt(squares / (~np.isnan(r)).sum(axis=0)),
+            np.sqrt(squares / np.nansum(side * side, axis=0)),
+            np.nansum(r[1:] * r[:-1], axis=0) / squares,
+        )
+    found = _errors(tau - predicted, tau, filtered)
+    return found, _errors(tau - given, tau, (none, none, none)) if known else None
+
+
+def _errors(e: Array, tau: Array, filtered: tuple[Array, Array, Array]) -> Errors:
+    """Errors e (N, n) of torques tau (N, n), with those of the equations."""
+    squares = (e * e).mean(axis=0)
+    rough = (np.diff(e, 2, axis=0) ** 2).sum(axis=0) / (6.0 * max(len(e) - 2, 1))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        relative = np.sqrt(squares / (tau * tau).mean(axis=0))
+    return Errors(np.sqrt(squares), relative, e.mean(axis=0), *filtered, np.sqrt(rough), len(e))
 
 
 def no_errors(n: int) -> Errors:

@@ -5,8 +5,9 @@ This floor knows no robot object: a kernel takes the arrays of a `Chain`, one sa
 one thread and check nothing: shapes, types and finiteness are the caller's to guarantee
 (C-contiguous float64 and int64).
 
-Importing this package costs nothing; importing one of its modules imports numba and, the first
-time on a machine, compiles that module's kernels. Later processes load them from numba's cache.
+A kernel is compiled when it is first called, with the functions that it calls, and kept on the disk
+for later processes (`_cache`); `prepare.compile_all` compiles everything in advance. Importing this
+package does not import numba; importing one of its modules does.
 """
 
 from typing import NamedTuple

@@ -4,11 +4,19 @@ Inputs are declared read-only: numba then takes frozen and writable arrays alike
 compilation, where it would otherwise compile a kernel again for every mixture of the two.
 """
 
+from __future__ import annotations
+
+import sys
+import time
 from typing import Any
 
 import numpy as np
 from numba import njit, types
+from numba.core import event
+from numba.core.compiler_lock import global_compiler_lock
 from numpy.typing import NDArray
+
+from ._cache import cache_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -31,19 +39,83 @@ STACK = _input(types.float64, 3)
 CHAIN = (INTS, INTS, INTS, STACK, MATRIX, MATRIX, VECTOR)
 OUT1, OUT2, OUT3, OUT4 = (_output(ndim) for ndim in range(1, 5))
 
+KERNELS: list[Any] = []
+"""Every kernel of the modules that are imported."""
+
 
 def compiled(*signature: Any) -> Any:
-    """Return the decorator that compiles a function: cached on disk, without the GIL, exact sums.
+    """Decorator: compile a kernel for its declared signature at the first call.
 
-    With a signature: a kernel, compiled at import. Without: an inner function for kernels only.
-    Typed as Any because type checkers cannot count the arguments of ``kernel(q, *chain, ...)``.
+    Without a signature it is an inner function, compiled with the kernels that call it.
     """
-    options: dict[str, Any] = {
-        "cache": True,
-        "nogil": True,
-        "fastmath": False,
-        "error_model": "numpy",
-        "no_cpython_wrapper": not signature,
-        "no_cfunc_wrapper": True,
-    }
-    return njit(*signature, **options)
+
+    def decorate(function: Any) -> Any:
+        options: dict[str, Any] = {
+            "nogil": True,
+            "fastmath": False,
+            "error_model": "numpy",
+            "no_cpython_wrapper": not signature,
+            "no_cfunc_wrapper": True,
+        }
+        kernel: Any = njit(**options)(function)
+        if kernel is function:  # numba's compilation is switched off
+            return function
+        cache = cache_of(function)
+        if cache is not None:
+            kernel._cache = cache  # numba has no public way to another folder
+        if signature:
+            compile_for = kernel.compile
+
+            def compile_declared(_: Any) -> Any:
+                """Compile the declared signature, whatever the types of the first call."""
+                with global_compiler_lock:
+                    if not kernel.signatures:
+                        compile_for(*signature)
+                        kernel.disable_compile()
+                return kernel.get_overload(*signature)
+
+            kernel.compile = compile_declared
+            KERNELS.append(kernel)
+        return kernel
+
+    return decorate
+
+
+class _Notice(event.Listener):
+    """One line on standard error once compilation has taken a while, where a person reads it."""
+
+    text = (
+        "robotmodels: compiling for this machine, once for each kind of computation (5 to 30 s). "
+        "`robotmodels compile` compiles everything in advance."
+    )
+    after = 2.0
+    """Seconds of compilation before the line."""
+
+    def __init__(self) -> None:
+        self.depth, self.seconds, self.started = 0, 0.0, 0.0
+
+    def on_start(self, event: event.Event) -> None:
+        """Print when the time is over: functions within a kernel are events of their own."""
+        now = time.monotonic()
+        if self.depth == 0:
+            self.started = now
+        self.depth += 1
+        if self.seconds + now - self.started > self.after and self.text:
+            if _is_read(sys.stderr):
+                sys.stderr.write(f"{self.text}\n")
+                sys.stderr.flush()
+            self.text = ""
+
+    def on_end(self, event: event.Event) -> None:
+        """Add the time of a whole kernel."""
+        self.depth -= 1
+        if self.depth == 0:
+            self.seconds += time.monotonic() - self.started
+
+
+def _is_read(stream: Any) -> bool:
+    """Whether a person reads it: a terminal or a notebook."""
+    return stream is not None and (stream.isatty() or "ipykernel" in sys.modules)
+
+
+event.register("numba:compile", _Notice())

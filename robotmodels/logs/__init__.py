@@ -3,8 +3,7 @@
 Seed book sections 1.6.2.4 and 1.6.2.5.
 """
 
-from .checks import check_log
-from .findings import FindingKind, LogFinding, Severity
+from .checks import FindingKind, LogFinding, Severity, check_log
 from .log import Log, join_logs, with_delay
 from .read import read_log
 

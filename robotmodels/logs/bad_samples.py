@@ -16,8 +16,8 @@ from .time_base import regular_rows
 _TIMES, _STEPS = 6.0, 4.0
 """Least distance of an outlier: relative to the 90 % and the local 75 % quantile of the roughness
 (14 standard deviations of white noise), and in quantisation steps."""
-_NEAR, _ALIKE = 25, 0.8
-"""Neighbouring samples on either side, and least share of the distance from the neighbours."""
+_NEAR, _OF_CUBIC = 25, 0.8
+"""Neighbouring samples on either side; least distance from their median relative to the cubic."""
 _SHARES = {"q": 0.0, "tau": 0.25}
 """Least distance of an outlier relative to the 98 % range: small for positions (large spikes of
 acceleration), larger for torques (friction reversals)."""
@@ -50,10 +50,9 @@ def bad_samples(log: Log) -> list[BadSamples]:
         frozen: list[int] = []
         for rows in log.recordings():
             q, tau = log.q[rows, j], log.tau[rows, j]
-            x = q if channel == "q" else tau
-            if len(x) < _LEAST:
+            if len(q) < _LEAST:
                 continue
-            outliers += [rows.start + k for k in _outliers(x, _SHARES[channel])]
+            outliers += [rows.start + k for k in _outliers(q if channel == "q" else tau, channel)]
             ends = _frozen_positions(q) if channel == "q" else _frozen_torques(tau, q)
             frozen += [rows.start + k for start, end in ends for k in range(start + 1, end + 1)]
         each = ((False, outliers), (True, frozen))
@@ -66,28 +65,24 @@ def _roughness(x: Array) -> Array:
     return np.abs(x[2:-2] - (4.0 * (x[1:-3] + x[3:-1]) - (x[:-4] + x[4:])) / 6.0)
 
 
-def _outliers(x: Array, share: float) -> list[int]:
-    """Rows far from their neighbours, by a share of the range of the channel."""
+def _outliers(x: Array, channel: str) -> list[int]:
+    """Rows far from the cubic and the median of their neighbours; a step is far from the first."""
     some, rough = spread(x), _roughness(x)
     low, high = np.quantile(some, [0.01, 0.99])
-    span = max(share * float(high - low), 1e-9 * float(np.abs(some).max()))
+    span = max(_SHARES[channel] * float(high - low), 1e-9 * float(np.abs(some).max()))
     # roughest part, since a channel may start at rest
     parts = np.linspace(0, max(0, len(x) - _PART), _PARTS).astype(int)
     usual = max(float(np.quantile(rough[k : k + _PART], 0.9)) for k in parts)
     least = max(_TIMES * usual, _STEPS * resolution(some), span)
-    return [k for k in (2 + np.flatnonzero(rough > least)).tolist() if _stands_out(x, k, least)]
-
-
-def _stands_out(x: Array, k: int, least: float) -> bool:
-    """Whether a sample is as far from the local median as from the cubic; a step is not."""
-    off = abs(float(x[k] - np.median(x[k - 2 : k + 3])))
-    start = max(0, k - _NEAR)
-    rough = _roughness(x[start : k + _NEAR + 1])
-    at = k - start - 2
-    if not off > max(least, _ALIKE * float(rough[at])):
-        return False
-    near = np.delete(rough, slice(max(0, at - 2), at + 3))
-    return len(near) > 0 and off > _TIMES * float(np.quantile(near, 0.75))
+    outliers = []
+    for k in (2 + np.flatnonzero(rough > least)).tolist():
+        off = abs(float(x[k] - np.median(x[k - 2 : k + 3])))
+        if off > max(least, _OF_CUBIC * float(rough[k - 2])):
+            beside = rough[max(0, k - _NEAR) : max(0, k - 4)], rough[k + 1 : k - 3 + _NEAR]
+            near = np.concatenate(beside)
+            if len(near) and off > _TIMES * float(np.quantile(near, 0.75)):
+                outliers.append(k)
+    return outliers
 
 
 def _frozen_positions(x: Array) -> list[tuple[int, int]]:
@@ -102,11 +97,10 @@ def _frozen_positions(x: Array) -> list[tuple[int, int]]:
     frozen = []
     for start, end in long:
         before = np.abs(np.diff(x[max(0, start - 3) : start + 1]))
-        if not len(before) or not before.mean() > _SLOW * usual:
-            continue
         leap = end < len(x) - 1 and abs(x[end + 1] - x[end]) > _LEAP * usual
         # a coarse sensor repeats samples without a jump at speed
-        if leap or (fine and before.min() > _SLOW * usual):
+        sudden = leap or (fine and before.min(initial=np.inf) > _SLOW * usual)
+        if len(before) and before.mean() > _SLOW * usual and sudden:
             frozen.append((start, end))
     return frozen
 
@@ -131,11 +125,11 @@ def cleaned(log: Log) -> Log:
 
     Their rows are interpolated or left out like rows with missing numbers.
     """
-    bad_samples_of_log = bad_samples(log)
-    if not bad_samples_of_log:
+    findings = bad_samples(log)
+    if not findings:
         return log
     arrays = {name: np.array(x) for name in ARRAYS if (x := getattr(log, name)) is not None}
-    for some in bad_samples_of_log:
+    for some in findings:
         arrays[some.channel][some.rows, some.joint] = np.nan
     bad = np.flatnonzero(np.isnan(arrays["q"] + arrays["tau"]).any(axis=1))
     # recordings are separated in time
@@ -143,17 +137,17 @@ def cleaned(log: Log) -> Log:
     rows = regular_rows(log.dt * t, np.hstack(list(arrays.values())), "log", joints=log.n)
     blocks = np.split(rows.values, len(arrays), axis=1)
     left = len(log) - len(rows.values)
-    outliers = sum(len(some.rows) for some in bad_samples_of_log if not some.frozen)
-    frozen = sum(len(some.rows) for some in bad_samples_of_log if some.frozen)
+    frozen = sum(len(some.rows) for some in findings if some.frozen)
+    outliers = sum(len(some.rows) for some in findings) - frozen
     reason = "outliers or frozen samples, interpolated where the gap is short"
+    note = (
+        f"{outliers} outliers and {frozen} frozen samples: {max(0, len(bad) - left)} samples "
+        f"interpolated and {left} rows left out, where the log is split."
+    )
     return replace(
         log,
         **dict(zip(arrays, blocks, strict=True)),
         starts=rows.starts,
         refused=[*log.refused, RefusedRows("log", tuple(bad.tolist()), reason)],
-        notes=[
-            *log.notes,
-            f"{outliers} outliers and {frozen} frozen samples: {max(0, len(bad) - left)} samples "
-            f"interpolated and {left} rows left out, where the log is split.",
-        ],
+        notes=[*log.notes, note],
     )

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,36 +13,96 @@ from .._arrays import Array
 from ..geometry import PRISMATIC
 from ..model import RobotModel, check_model
 from .bad_samples import BadSamples, bad_samples
-from .findings import Finding, FindingKind, LogFinding, Severity, in_words
 from .log import Log, check_is_log
 from .stretches import moves, runs, spread, stretches
 
-_LONGEST_PERIOD = 0.5
-"""Longest sampling period, s, that resolves the motion of a robot."""
-_BEYOND = 0.05
-"""Tolerance outside the limits, relative to the range."""
-_TURNS, _MOST = 30.0, 1000.0
-"""Unusual and impossible angles (rad) of a joint without limits."""
-_FACTOR = 4.0
-"""Ratio of position to limit above which the unit is wrong."""
-_TOO_LARGE, _LARGE = 10.0, 1.1
-"""Ratios of torque to limit of a wrong unit, and of an excess."""
-_PER_PARAMETER = 10
-"""Least number of equations for each parameter."""
-_SATURATED, _OFTEN = 0.02, 0.01
-"""Least share of samples at an extreme value, and of repeated rows."""
-_JUMP = 20.0
-"""Least jump of a position relative to the 99 % quantile of its steps."""
-_WINDOW, _PART = 0.05, 5_000
-"""Seconds over which increments are compared (against noise), and rows of a stretch."""
-_FOLLOWS, _NOISE, _TOLERANCE = 0.95, 5.0, 0.1
-"""For derivatives: least correlation, least signal-to-noise ratio, and error of the factor."""
-_FACTORS = {
-    "degrees against radians": 180.0 / np.pi,
-    "radians against degrees": np.pi / 180.0,
-    "millimetres against metres": 1e3,
-    "of the other sign": -1.0,
-}
+_LONGEST_PERIOD = 0.5  # s, of a log that resolves the motion of a robot
+_MARGIN = 0.05  # tolerance outside the limits, relative to the range
+_UNUSUAL, _IMPOSSIBLE = 30.0, 1000.0  # rad, angles of a joint without limits
+_UNIT = 4.0  # ratio of position to limit above which the unit is wrong
+_LARGE, _TOO_LARGE = 1.1, 10.0  # ratios of torque to limit: excess, wrong unit
+_PER_PARAMETER = 10  # least number of equations for each parameter
+_SATURATED, _REPEATED = 0.02, 0.01  # least shares of extreme samples and of repeated rows
+_JUMP = 20.0  # least jump of a position relative to the 99 % quantile of its steps
+_WINDOW, _STRETCH = 0.05, 5_000  # s over which increments are compared, and rows of a stretch
+_CORRELATION, _SIGNAL, _FACTOR = 0.95, 5.0, 0.1  # of rates: least correlation and signal-to-noise
+# ratio, largest error of the factor
+
+
+class Severity(Enum):
+    """Severity of a finding; the value states the consequence.
+
+    Examples
+    --------
+    >>> Severity.USELESS.value
+    'a fit would mean nothing'
+    """
+
+    NOTE = "worth knowing"
+    DOUBTFUL = "results may be wrong"
+    USELESS = "a fit would mean nothing"
+
+
+class FindingKind(Enum):
+    """Kind of a finding; the value describes it.
+
+    Examples
+    --------
+    >>> FindingKind.STUCK.value
+    'a channel repeats its value'
+    """
+
+    WRONG_JOINT_COUNT = "log and model have different numbers of joints"
+    WRONG_JOINT_ORDER = "its joints are the model's in another order"
+    IMPLAUSIBLE_PERIOD = "the sampling period is too long for a robot"
+    POSITIONS_IN_DEGREES = "positions look like degrees"
+    MOTOR_SIDE_POSITIONS = "positions look like those of motors"
+    OUTSIDE_LIMITS = "positions are outside the limits"
+    RATES_OFF_POSITIONS = "velocities or accelerations are not the derivatives of the positions"
+    TORQUE_ABOVE_LIMITS = "torques are above the limits"
+    TORQUE_OFF_INERTIA = "torques differ in size from those of the model's inertia"
+    CONSTANT_POSITION = "a joint does not move"
+    CONSTANT_TORQUE = "a torque is constant"
+    NOTHING_MOVES = "nothing moves"
+    SATURATED = "torques stay at their extreme values"
+    STUCK = "a channel repeats its value"
+    SPIKES = "single samples are outliers"
+    JUMP = "positions jump"
+    TOO_SHORT = "the log is too short for the parameters"
+    NOT_EXCITING = "the motion does not excite all parameters"
+    SWAPPED_JOINTS = "joints look swapped"
+    WRONG_SIGN = "a sign looks wrong"
+    OUT_OF_STEP = "positions and torques are not synchronous"
+
+
+@dataclass(frozen=True, slots=True)
+class LogFinding:
+    """A finding of a check of a log; it prints as its sentence.
+
+    Parameters
+    ----------
+    kind : FindingKind
+        Its kind.
+    severity : Severity
+        Its severity.
+    joints : tuple of str
+        Joints it concerns; empty if it concerns the whole log.
+    sentence : str
+        With numbers and the remedy.
+
+    Examples
+    --------
+    >>> print(LogFinding(FindingKind.STUCK, Severity.NOTE, ("2",), "Joint 2: ..."))
+    Joint 2: ...
+    """
+
+    kind: FindingKind
+    severity: Severity
+    joints: tuple[str, ...]
+    sentence: str
+
+    def __str__(self) -> str:
+        return self.sentence
 
 
 def check_log(log: Log, model: RobotModel | None = None) -> tuple[LogFinding, ...]:
@@ -87,24 +149,30 @@ def check_log(log: Log, model: RobotModel | None = None) -> tuple[LogFinding, ..
     if model is not None:
         check_model(model)
         if model.n != log.n:
-            sentence = (
+            words = (
                 f"The log has {log.n} joints, {model.name} has {model.n}; choose columns or model "
                 "so that they agree."
             )
-            return (LogFinding(FindingKind.WRONG_JOINT_COUNT, Severity.USELESS, (), sentence),)
+            return (LogFinding(FindingKind.WRONG_JOINT_COUNT, Severity.USELESS, (), words),)
         findings += _against_model(log, model)
     if log.dt > _LONGEST_PERIOD:
-        sentence = (
+        words = (
             f"Its samples are {log.dt:.4g} s apart, too coarse for a robot motion; the times "
             "may be in milliseconds. See times= and dt= of read_log."
         )
-        findings.append(LogFinding(FindingKind.IMPLAUSIBLE_PERIOD, Severity.USELESS, (), sentence))
+        findings.append(LogFinding(FindingKind.IMPLAUSIBLE_PERIOD, Severity.USELESS, (), words))
     findings += [*_channels(log), *_rates(log)]
     order = list(Severity)[::-1]
     return tuple(sorted(findings, key=lambda finding: order.index(finding.severity)))
 
 
+def _of_joint(log: Log, j: int, kind: FindingKind, severity: Severity, words: str) -> LogFinding:
+    """A finding about joint ``j``, named in the sentence."""
+    return LogFinding(kind, severity, (log.names[j],), f"Joint {log.names[j]}: {words}")
+
+
 def _against_model(log: Log, model: RobotModel) -> Iterator[LogFinding]:
+    """Findings about the order of the joints, limits, and the number of samples."""
     names = model.table.joint_names
     if log.names != names and sorted(log.names) == sorted(names):
         words = (
@@ -115,25 +183,24 @@ def _against_model(log: Log, model: RobotModel) -> Iterator[LogFinding]:
         moved = tuple(a for a, b in zip(log.names, names, strict=True) if a != b)
         yield LogFinding(FindingKind.WRONG_JOINT_ORDER, Severity.USELESS, moved, words)
     yield from _positions(log, model)
-    for j in np.flatnonzero(np.isfinite(model.table.effort) & (model.table.effort > 0.0)).tolist():
-        for finding in _torque_limit(log.tau[:, j], model.table.effort[j]):
-            yield in_words(log, j, finding)
+    for j in np.flatnonzero(np.isfinite(model.table.effort)).tolist():
+        effort = float(model.table.effort[j])
+        usual = float(np.quantile(np.abs(spread(log.tau[:, j])), 0.99))
+        if usual > _LARGE * effort > 0.0:
+            severity = Severity.USELESS if usual > _TOO_LARGE * effort else Severity.DOUBTFUL
+            words = (
+                f"one in a hundred of its torques is above {usual:.4g}, its limit is {effort:.4g}; "
+                "check units, drive gains and gear ratios, or the limit of the model."
+            )
+            yield _of_joint(log, j, FindingKind.TORQUE_ABOVE_LIMITS, severity, words)
     count, equations = 10 * model.table.f + 4 * model.n, len(log) * log.n
     if equations < _PER_PARAMETER * count:
         severity = Severity.USELESS if equations < count else Severity.DOUBTFUL
-        words = f"The log has {len(log)} samples of {log.n} joints, {equations} equations for up to"
-        words += f" {count} parameters; record a longer motion."
+        words = (
+            f"The log has {len(log)} samples of {log.n} joints, {equations} equations for up to "
+            f"{count} parameters; record a longer motion."
+        )
         yield LogFinding(FindingKind.TOO_SHORT, severity, (), words)
-
-
-def _torque_limit(tau: Array, effort: float) -> Iterator[Finding]:
-    """Torques of a joint that do not fit their limit."""
-    usual = float(np.quantile(np.abs(spread(tau)), 0.99))
-    if usual > _LARGE * effort:
-        severity = Severity.USELESS if usual > _TOO_LARGE * effort else Severity.DOUBTFUL
-        words = f"one in a hundred of its torques is above {usual:.4g}, its limit is {effort:.4g}; "
-        words += "check units, drive gains and gear ratios, or the limit of the model."
-        yield FindingKind.TORQUE_ABOVE_LIMITS, severity, words
 
 
 def _positions(log: Log, model: RobotModel) -> Iterator[LogFinding]:
@@ -141,33 +208,31 @@ def _positions(log: Log, model: RobotModel) -> Iterator[LogFinding]:
     revolute = model.table.sigma[model.table.joint_rows] != PRISMATIC
     known = np.isfinite(model.lower) & np.isfinite(model.upper) & (model.upper > model.lower)
     turn = np.where(revolute, 2.0 * np.pi, np.inf)
-    margin = _BEYOND * np.where(known, model.upper - model.lower, 0.0)
+    margin = _MARGIN * np.where(known, model.upper - model.lower, 0.0)
     lower = np.where(known, model.lower - margin, -turn)
     upper = np.where(known, model.upper + margin, turn)
-
-    def inside(q: Array, joints: NDArray[np.bool_]) -> bool:
-        return bool(((q >= lower) & (q <= upper))[:, joints].all())
-
     ends = np.stack([log.q.min(axis=0), log.q.max(axis=0)])
     size = np.abs(ends).max(axis=0)
     beyond = known & ((ends[0] < lower) | (ends[1] > upper))
-    outside = np.flatnonzero(beyond | (revolute & (size > _TURNS)))
+    outside = np.flatnonzero(beyond | (revolute & (size > _UNUSUAL)))
     if not len(outside):
         return
-    reach = _FACTOR * np.where(known, np.maximum(np.abs(model.lower), np.abs(model.upper)), np.pi)
+    reach = _UNIT * np.where(known, np.maximum(np.abs(model.lower), np.abs(model.upper)), np.pi)
     far = bool((size > reach)[outside].any())
     # a joint without limits may turn several times; the dynamic model decides
-    certain = bool((size > np.where(known, reach, _MOST))[outside].any())
-    side = model.transmission
-    coupled = (
-        side is not None and side.is_invertible and not np.allclose(side.matrix, np.eye(log.n))
-    )
+    certain = bool((size > np.where(known, reach, _IMPOSSIBLE))[outside].any())
+
+    def within(q: Array, joints: NDArray[np.bool_]) -> bool:
+        return bool(((q >= lower) & (q <= upper))[:, joints].all())
+
+    K = model.transmission
+    coupled = K is not None and K.is_invertible and not np.allclose(K.matrix, np.eye(log.n))
     kind = FindingKind.MOTOR_SIDE_POSITIONS if far else FindingKind.OUTSIDE_LIMITS
     advice = "check units, offsets and signs, or the limits of the model."
-    if certain and side is not None and coupled and inside(side.to_joint(spread(log.q)), known):
+    if certain and K is not None and coupled and within(K.to_joint(spread(log.q)), known):
         advice = "through the model's transmission they would be within: read the log with "
         advice += "transmission=model.transmission."
-    elif far and inside(np.radians(ends), revolute):
+    elif far and within(np.radians(ends), revolute):
         kind = FindingKind.POSITIONS_IN_DEGREES
         advice = "as degrees they would be within: read the log with angles='deg', or with gears= "
         advice += "or transmission= if they are motor angles."
@@ -189,16 +254,16 @@ def _channels(log: Log) -> Iterator[LogFinding]:
     for j in range(log.n):
         of_joint = [some for some in bad if some.joint == j]
         for finding in (*_torque(log, j), *map(_bad, of_joint), *_position(log, j, of_joint)):
-            yield in_words(log, j, finding)
+            yield _of_joint(log, j, *finding)
     moving = np.ptp(log.q, axis=0) > 1e-9
     if not moving.any():
         words = "No joint moves in this log; record a motion that excites the robot, see "
         words += "exciting_trajectory."
         yield LogFinding(FindingKind.NOTHING_MOVES, Severity.USELESS, (), words)
         return
-    channels = (*(log.q[:, j] for j in np.flatnonzero(moving)), *log.tau.T)
+    channels = (*log.q[:, moving].T, *log.tau.T)
     same = np.logical_and.reduce([np.diff(x) == 0.0 for x in channels])
-    if _OFTEN * len(log) < same.sum() < len(same) and (repeated := runs(same, 3)):
+    if _REPEATED * len(log) < same.sum() < len(same) and (repeated := runs(same, 3)):
         words = (
             f"{same.sum()} rows repeat the row before in every channel (the first three in "
             f"sequence at row {repeated[0][0]}): the recorder is faster than the controller. Read "
@@ -207,7 +272,11 @@ def _channels(log: Log) -> Iterator[LogFinding]:
         yield LogFinding(FindingKind.STUCK, Severity.DOUBTFUL, (), words)
 
 
-def _torque(log: Log, j: int) -> Iterator[Finding]:
+_Finding = tuple[FindingKind, Severity, str]
+
+
+def _torque(log: Log, j: int) -> Iterator[_Finding]:
+    """Constant and saturated torques."""
     tau = log.tau[:, j]
     low, high = float(tau.min()), float(tau.max())
     if low == high:
@@ -224,7 +293,7 @@ def _torque(log: Log, j: int) -> Iterator[Finding]:
             yield FindingKind.SATURATED, Severity.DOUBTFUL, words
 
 
-def _bad(bad: BadSamples) -> Finding:
+def _bad(bad: BadSamples) -> _Finding:
     """Outliers or frozen samples of a channel, in words."""
     rows, word = bad.rows, "position" if bad.channel == "q" else "torque"
     if bad.frozen:
@@ -237,13 +306,12 @@ def _bad(bad: BadSamples) -> Finding:
             "gap is short and leaves the rows out where it is long."
         )
         return FindingKind.STUCK, Severity.DOUBTFUL, words
-    words = f"{len(rows)} samples of its {word} are outliers (the first at row {rows[0]}); fit "
-    if len(rows) == 1:
-        words = f"1 sample of its {word} is an outlier (at row {rows[0]}); fit "
-    return FindingKind.SPIKES, Severity.DOUBTFUL, words + "replaces outliers by interpolation."
+    words = f"outliers in its {word}: {len(rows)} (the first at row {rows[0]}); fit replaces them "
+    return FindingKind.SPIKES, Severity.DOUBTFUL, words + "by interpolation."
 
 
-def _position(log: Log, j: int, bad: list[BadSamples]) -> Iterator[Finding]:
+def _position(log: Log, j: int, bad: list[BadSamples]) -> Iterator[_Finding]:
+    """Positions that are constant or jump."""
     q = log.q[:, j]
     if np.ptp(q) <= 1e-9:
         words = f"it stays at {q[0] + 0.0:.4g}, and its inertia and friction are not identifiable; "
@@ -258,36 +326,37 @@ def _position(log: Log, j: int, bad: list[BadSamples]) -> Iterator[Finding]:
     usual = max(float(np.quantile(moves(x), 0.99)) for x in recordings if len(x) > 1)
     k = int(steps.argmax())
     if steps[k] > _JUMP * usual > 0.0:
-        turn = abs(steps[k] - 2.0 * np.pi) < 0.1
-        advice = "unwrap it (numpy.unwrap)" if turn else "leave the row out, or split the log there"
-        words = f"its position jumps by {steps[k]:.4g} at row {k + 1}, {steps[k] / usual:.0f} times"
-        words += f" the step that 99 % of its steps do not exceed; {advice}."
+        words = (
+            f"its position jumps by {steps[k]:.4g} at row {k + 1}, {steps[k] / usual:.0f} times "
+            "the step that 99 % of its steps do not exceed; unwrap it (numpy.unwrap) if that is a "
+            "turn, or split the log there."
+        )
         yield FindingKind.JUMP, Severity.DOUBTFUL, words
 
 
 def _rates(log: Log) -> Iterator[LogFinding]:
     """Findings where velocities or accelerations are not the derivatives of the positions."""
-    part = stretches(log, _PART)
+    part = stretches(log, _STRETCH)
     for order, word, rate in ((1, "velocities", part.v), (2, "accelerations", part.a)):
         if rate is None:
             continue
         wrong: dict[str, list[str]] = {}
         for j in range(log.n):
-            factor, follows = _compared(part, part.q[:, j], rate[:, j], order)
-            if follows < _FOLLOWS:
-                words = f"do not follow from the positions (correlation {follows:.1g})"
-            elif abs(factor - 1.0) > _TOLERANCE:
-                units = [unit for unit, x in _FACTORS.items() if abs(factor / x - 1.0) < 0.02]
-                reason = f"that is {units[0]}" if units else "which may be a gear ratio, or a wrong"
-                reason += "" if units else " sampling period"
-                words = f"are {factor:.3g} times the derivatives of the positions, {reason}"
+            factor, correlation = _compared(part, part.q[:, j], rate[:, j], order)
+            if correlation < _CORRELATION:
+                words = f"do not follow from the positions (correlation {correlation:.1g})"
+            elif abs(factor - 1.0) > _FACTOR:
+                words = f"are {factor:.3g} times the derivatives of the positions"
             else:
                 continue
             wrong.setdefault(words, []).append(log.names[j])
         for words, names in wrong.items():
             severity = Severity.USELESS if words.startswith("are") else Severity.DOUBTFUL
-            words = f"Joint{'s' * (len(names) > 1)} {', '.join(names)}: {word} {words}; read them "
-            words += f"in the unit of the positions, or leave them out ({word}=False of read_log)."
+            words = (
+                f"Joint{'s' * (len(names) > 1)} {', '.join(names)}: {word} {words}; check sign, "
+                "unit (degrees: 57.3), gear ratio and sampling period, or leave them out "
+                f"({word}=False of read_log)."
+            )
             yield LogFinding(FindingKind.RATES_OFF_POSITIONS, severity, tuple(names), words)
 
 
@@ -313,7 +382,7 @@ def _compared(log: Log, q: Array, rate: Array, order: int) -> tuple[float, float
         return 1.0, 1.0
     noise = (2.0 if order == 1 else 6.0) * (third @ third) / (20.0 * max(1, len(third)))
     (xx, xy), (_, yy) = np.cov(x, y, bias=True)
-    if not xx > max(_NOISE**2 * noise, 1e-18):
+    if not xx > max(_SIGNAL**2 * noise, 1e-18):
         return 1.0, 1.0
-    follows = xy / np.sqrt(xx * yy) if yy > 0.0 else 0.0
-    return float(np.sign(follows) * np.sqrt(yy / xx)), float(abs(follows))
+    correlation = xy / np.sqrt(xx * yy) if yy > 0.0 else 0.0
+    return float(np.sign(correlation) * np.sqrt(yy / xx)), float(abs(correlation))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import LARGEST, Array, Rebuilt, as_bounded, as_floats
+from .._arrays import LARGEST, Array, Rebuilt, as_bounded, as_floats, read_only
 from ..errors import InvalidValueError, ShapeError
 
 ARRAYS = ("q", "tau", "v", "a", "q_ref", "v_ref")
@@ -193,8 +193,7 @@ class Log(Rebuilt):
                 f"log[...]: expected log[start:stop], got {part!r:.60}; single samples are in its "
                 "arrays (log.q[k]), and decimation needs a filter (processing= of a fit)."
             )
-        start = 0 if part.start is None else part.start
-        return self.rows(start, len(self) if part.stop is None else part.stop)
+        return self.rows(part.start or 0, len(self) if part.stop is None else part.stop)
 
     def __len__(self) -> int:
         return self.q.shape[0]
@@ -243,9 +242,7 @@ def _starts(starts: ArrayLike, N: int) -> NDArray[np.int64]:
         raise InvalidValueError(
             f"starts: expected ascending numbers of rows from 0 and below {N}, got {starts!r:.80}."
         )
-    array = values.astype(np.int64)
-    array.flags.writeable = False
-    return array
+    return read_only(values, np.int64)
 
 
 def join_logs(logs: Iterable[Log]) -> Log:
@@ -346,57 +343,46 @@ def with_delay(log: Log, delay: float) -> Log:
     >>> with_delay(log, 0.002).tau.ravel()
     array([1., 2., 3.])
     """
+    from scipy.interpolate import CubicSpline
+
     check_is_log(log)
-    value = as_floats(delay, "delay")
-    if value.ndim:
+    if as_floats(delay, "delay").ndim:
         raise InvalidValueError(f"delay: expected one number of seconds, got {delay!r:.60}.")
-    seconds = float(value)
+    seconds = float(delay)
     if seconds == 0.0:
         return log
     shift = seconds / log.dt
     whole = abs(shift - round(shift)) < _WHOLE
     shift = float(round(shift)) if whole else shift
     cut = int(np.ceil(abs(shift)))
-    kept, torques, starts, dropped = [], [], [0], []
+    kept, torques, dropped = [], [], []
     for rows in log.recordings():
-        count = rows.stop - rows.start - cut
-        if count < 2:
+        N = rows.stop - rows.start
+        if cut + 2 > N:
             dropped += range(rows.start, rows.stop)
             continue
-        places = np.arange(count) + (cut if shift < 0.0 else 0)
+        places = np.arange(N - cut) + (cut if shift < 0.0 else 0)
         kept.append(rows.start + places)
-        torques.append(_at(log.tau[rows], places + shift))
-        starts.append(starts[-1] + count)
+        if whole:
+            torques.append(log.tau[rows][places + int(shift)])
+        else:
+            torques.append(CubicSpline(np.arange(N), log.tau[rows])(places + shift))
     if not kept:
         raise InvalidValueError(
             f"delay: {seconds:g} s are {abs(shift):g} samples, no recording is longer."
         )
-    refused, notes = list(log.refused), list(log.notes)
-    if dropped:
-        refused.append(
-            RefusedRows("log", tuple(dropped), "its recording is shorter than the delay")
-        )
-        notes.append(f"{len(dropped)} rows of recordings shorter than the delay were left out.")
-    how = "by whole samples" if whole else "by cubic splines"
-    notes.append(
-        f"{seconds:.6g} s of delay were removed from the torques ({shift:.4g} samples, {how}; "
-        f"{cut} rows of each recording cut)."
+    left_out = [RefusedRows("log", tuple(dropped), "its recording is shorter than the delay")]
+    note = (
+        f"{seconds:.6g} s of delay were removed from the torques ({shift:.4g} samples, "
+        f"{'by whole samples' if whole else 'by cubic splines'}; {cut} rows of each recording cut, "
+        f"{len(dropped)} rows of shorter ones left out)."
     )
     return selected(
         log,
         np.concatenate(kept),
-        starts[:-1],
+        np.cumsum([0, *map(len, kept[:-1])]),
         tau=np.concatenate(torques),
         delay=log.delay + seconds,
-        refused=refused,
-        notes=notes,
+        refused=[*log.refused, *left_out[: len(dropped)]],
+        notes=[*log.notes, note],
     )
-
-
-def _at(tau: Array, places: Array) -> Array:
-    """Torques at fractional row numbers."""
-    if np.array_equal(places, np.round(places)):
-        return tau[places.astype(np.int64)]
-    from scipy.interpolate import CubicSpline
-
-    return CubicSpline(np.arange(len(tau)), tau)(places)

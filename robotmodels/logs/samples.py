@@ -16,8 +16,7 @@ from .tables import Choice, LogTable
 from .time_base import splined
 from .units import check_units
 
-_NEAR = 1.5
-"""Longest interpolated gap of the torques, in sampling periods."""
+_NEAR = 1.5  # sampling periods: longest interpolated gap of the torques
 Given = Choice | Literal[False] | None
 
 
@@ -50,20 +49,18 @@ def read_samples(table: LogTable, second: LogTable | None, request: Request) -> 
     samples = _of_file(table, kinds, request, second is not None)
     if second is not None:
         other = _of_file(second, [torque], request, True)
-        samples.blocks[torque] = _joined(
-            samples, other, f"{table.path.name} and {second.path.name}"
-        )
+        files = f"{table.path.name} and {second.path.name}"
+        samples.blocks[torque] = _joined(samples, other, files)
         samples.notes += other.notes
-    counts = {kind: block.shape[1] for kind, block in samples.blocks.items()}
-    n = counts[Quantity.POSITION]
-    for kind, count in counts.items():
-        if count != n:
+    n = samples.blocks[Quantity.POSITION].shape[1]
+    lengths = set() if samples.t is None else {len(samples.t)}
+    for kind, block in samples.blocks.items():
+        lengths.add(len(block))
+        if block.shape[1] != n:
             raise ShapeError(
-                f"{kind.argument}: {count} columns of {table.path} for {n} columns of positions; "
-                f"give {kind.argument}=[...]."
+                f"{kind.argument}: {block.shape[1]} columns of {table.path} for {n} columns of "
+                f"positions; give {kind.argument}=[...]."
             )
-    lengths = {len(block) for block in samples.blocks.values()}
-    lengths |= set() if samples.t is None else {len(samples.t)}
     if len(lengths) > 1:
         raise InvalidValueError(
             f"{table.path}: the columns have {', '.join(map(str, sorted(lengths)))} samples; give "
@@ -78,35 +75,34 @@ def _of_file(table: LogTable, kinds: list[Quantity], request: Request, alone: bo
     taken = dict.fromkeys(columns, "time")
     samples = Samples(t, {}, None, notes)
     for kind in kinds:
+        name, given = kind.argument, request.columns[kind] is not None
         chosen = _columns(table, kind, request)
         if chosen is None and alone and not samples.blocks:
             chosen = tuple(i for i in range(table.width) if i not in taken)
         needed = kind in (Quantity.POSITION, Quantity.TORQUE)
         if chosen is None and needed:
             raise InvalidValueError(
-                f"{kind.argument}: no columns of {table.path} have a usual name, such as "
-                f"{kind.usual[0]}1; give {kind.argument}=[...], names or numbers from 0, or a "
-                f"pattern. Its columns: {table.called(range(table.width))}."
+                f"{name}: no columns of {table.path} have a usual name, such as {kind.usual[0]}1; "
+                f"give {name}=[...], names or numbers from 0, or a pattern. Its columns: "
+                f"{table.called(range(table.width))}."
             )
-        given = request.columns[kind] is not None
         if chosen is None or (not needed and not given and taken.keys() & set(chosen)):
             continue
         if not given:
-            word = kind.argument.replace("_", " ")
-            notes.append(f"{table.path.name}: {word} were found in {table.called(chosen)}.")
+            where = f"were found in {table.called(chosen)}"
+            notes.append(f"{table.path.name}: {name.replace('_', ' ')} {where}.")
         for i in chosen:
             if i in taken:
                 raise InvalidValueError(
-                    f"{kind.argument}: {table.called([i])} of {table.path} would be {taken[i]} and "
-                    f"{kind.argument} at once; give {kind.argument}= and {taken[i]}= that differ."
+                    f"{name}: {table.called([i])} of {table.path} would be {taken[i]} and {name} "
+                    f"at once; give {name}= and {taken[i]}= that differ."
                 )
-            taken[i] = kind.argument
+            taken[i] = name
         check_units(table, chosen, kind, request.angle, request.gains)
-        turned = {table.names[i].rpartition("[")[0] for i in chosen if table.names}
-        turned &= table.transposed
+        stems = {table.names[i].rpartition("[")[0] for i in chosen if table.names}
         notes += [
-            f"{table.path.name}: {name} has shape (joints, samples) and was transposed."
-            for name in sorted(turned)
+            f"{table.path.name}: {stem} has shape (joints, samples) and was transposed."
+            for stem in sorted(stems & table.transposed)
         ]
         values, names = table.read(chosen), joints_of(table, kind, chosen)
         samples.names = samples.names or names
@@ -127,20 +123,22 @@ def _in_order(samples: Samples, joints: tuple[str, ...], table: LogTable) -> Sam
     """Columns of the requested joints, in their order, where the file names joints."""
     listed, n = samples.names or (), samples.blocks[Quantity.POSITION].shape[1]
     named = f"{table.path.name}: its joints are {', '.join(listed)}"
-    if set(joints) <= set(listed) and joints != listed:
+    samples.names = joints
+    if joints == listed:
+        return samples
+    if set(joints) <= set(listed):
         order = [listed.index(name) for name in joints]
         samples.blocks = {kind: block[:, order] for kind, block in samples.blocks.items()}
         samples.notes.append(f"{named}; those of the model were taken, in its order.")
-    elif set(joints) & set(listed) and joints != listed:
+    elif set(joints) & set(listed):
         raise InvalidValueError(f"joints: expected {', '.join(joints)}; {named}. Give joints=.")
     elif len(joints) != n:
         raise ShapeError(
             f"positions: {n} columns of {table.path}, but {len(joints)} joints: "
             f"{', '.join(joints)}."
         )
-    elif listed and joints != listed:
+    elif listed:
         samples.notes.append(f"{named}; they were taken as {', '.join(joints)}, in this order.")
-    samples.names = joints
     return samples
 
 
@@ -164,7 +162,7 @@ def _columns(table: LogTable, kind: Quantity, request: Request) -> tuple[int, ..
 
 def _times(table: LogTable, request: Request) -> tuple[Array | None, tuple[int, ...], list[str]]:
     """Seconds of each row, their columns, and a note if these were found."""
-    given, unit, notes = request.time, request.times, []
+    given, unit = request.time, request.times
     detected = find_time(table) if given is None else None
     if detected is not None:
         columns, header = detected
@@ -175,16 +173,15 @@ def _times(table: LogTable, request: Request) -> tuple[Array | None, tuple[int, 
         header = time_unit_of(table.names[columns[0]]) if table.names else None
     if len(columns) > 2:
         raise InvalidValueError("time: expected one column, or two (seconds, nanoseconds).")
-    if unit is not None and header is not None and header is not unit and len(columns) == 1:
+    if unit and header and header is not unit and len(columns) == 1:
         raise InvalidValueError(
             f"{table.path}: the header has times in {header.value!r}, the argument is "
             f"times={unit.value!r}; leave it out, or give the right column as time=."
         )
     used = unit or header or TimeUnit.SECOND
-    if detected is not None:
-        reason = "the argument" if unit else "their names" if header else "default"
-        where = f"{table.called(columns)}, {used.value} by {reason}"
-        notes.append(f"{table.path.name}: times were found in {where}.")
+    reason = "the argument" if unit else "their names" if header else "default"
+    where = f"{table.called(columns)}, {used.value} by {reason}"
+    notes = [f"{table.path.name}: times were found in {where}."] if detected else []
     values = table.read(columns)
     if len(columns) == 1:
         return values[:, 0] * used.factor, columns, notes

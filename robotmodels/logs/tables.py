@@ -40,23 +40,20 @@ class LogTable:
         """Columns of numbers, not all of them finite. Shapes: -> (N, number of columns)."""
         if isinstance(self.source, CsvTable):
             return self.source.numbers_with_gaps(columns)
-        columns_of_numbers = [self.source[i] for i in columns]
-        if any(
-            isinstance(x, str) or len(x) != len(columns_of_numbers[0]) for x in columns_of_numbers
-        ):
+        chosen = [x for i in columns if not isinstance(x := self.source[i], str)]
+        if len(chosen) < len(columns) or len({len(x) for x in chosen}) > 1:
             raise InvalidValueError(
                 f"{self.path}: {self.called(columns)} are not numbers of one recording."
             )
-        return np.column_stack(columns_of_numbers)
+        return np.column_stack(chosen)
 
     def text(self, column: int) -> str:
         """First cell of a column, or the text of an array."""
         if isinstance(self.source, CsvTable):
             cells = self.source.first_row()[1]
             return cells[column] if column < len(cells) else ""
-        column_values = self.source[column]
-        text = isinstance(column_values, str)
-        return column_values if text else repr(float(column_values[0]))
+        values = self.source[column]
+        return values if isinstance(values, str) else repr(float(values[0]))
 
     def choice(self, given: Choice, what: str) -> tuple[int, ...]:
         """Columns that an argument names: by number, name, matrix or pattern."""
@@ -105,23 +102,18 @@ def open_log_table(path: Path, delimiter: str | None = None) -> LogTable:
         if delimiter is not None:
             raise InvalidValueError(f"delimiter: {path} is no text file; leave it out.")
         return table_of(path, read[suffix](path), transpose=read[suffix] is not _parquet)
-    return _text(open_table(path, delimiter))
+    table = open_table(path, delimiter)
+    first = table.first_row()[1]
+    if table.names and any(cell.startswith(("[", "(")) for cell in first):
+        return table_of(path, _list_columns(table, first))
+    return LogTable(path, table.names, table.width, table, table.width)
 
 
-def _text(table: CsvTable) -> LogTable:
-    _, first = table.first_row()
-    listed = [i for i, cell in enumerate(first) if cell.startswith(("[", "("))]
-    if listed and table.names:
-        return table_of(table.path, _list_columns(table, first, listed))
-
-    return LogTable(table.path, table.names, table.width, table, table.width)
-
-
-def _list_columns(table: CsvTable, first: list[str], listed: list[int]) -> dict[str, Any]:
+def _list_columns(table: CsvTable, first: list[str]) -> dict[str, Any]:
     """Columns of a text file some of whose cells are lists, "[0.1, 0.2]"."""
     columns: dict[str, Any] = {}
     for i, (name, cell) in enumerate(zip(table.names, first, strict=False)):
-        if i in listed:
+        if cell.startswith(("[", "(")):
             cells = [text.strip("[]() ").split(",") for _, text in table.cells(i)]
             parts = [[word.strip(" '\"") for word in row if word.strip()] for row in cells]
             columns[name] = _from_lists(table.path, name, parts)
@@ -194,19 +186,18 @@ def _parquet(path: Path) -> dict[str, Any]:
     variables: dict[str, Any] = {}
     with _opened(path, "Parquet", "write it again") as file:
         stored = pq.read_table(file)
-        for name in stored.column_names:
-            column = stored[name].to_numpy()
-            if column.dtype.kind == "M":
-                nanoseconds = column.astype("datetime64[ns]").astype(np.float64)
-                variables[name] = np.where(np.isnat(column), np.nan, nanoseconds)
-            elif column.dtype.kind != "O":
-                variables[name] = column
-            else:
-                first: Any = next((cell for cell in column if cell is not None), None)
-                missing = [np.nan] * np.size(first)
-                rows = [missing if cell is None else cell for cell in column]
-                listed = isinstance(first, np.ndarray)
-                variables[name] = _from_lists(path, name, rows) if listed else str(first)
+    for name in stored.column_names:
+        column = stored[name].to_numpy()
+        if column.dtype.kind == "M":
+            nanoseconds = column.astype("datetime64[ns]").astype(np.float64)
+            column = np.where(np.isnat(column), np.nan, nanoseconds)
+        elif column.dtype.kind == "O":
+            first: Any = next((cell for cell in column if cell is not None), None)
+            missing = [np.nan] * np.size(first)
+            rows = [missing if cell is None else cell for cell in column]
+            listed = isinstance(first, np.ndarray)
+            column = _from_lists(path, name, rows) if listed else str(first)
+        variables[name] = column
     return variables
 
 
@@ -232,18 +223,16 @@ def table_of(path: Path, stored: Mapping[str, Any], transpose: bool = True) -> L
     N = max(lengths, key=lambda length: (lengths[length], length))
     turned = {name for name, x in matrices.items() if transpose and _samples_last(x, N)}
     matrices = {name: x.T if name in turned else x for name, x in matrices.items()}
-    alike = [name for name, value in matrices.items() if len(value) == N]
+    blocks = {name: list(x.T) for name, x in matrices.items() if len(x) == N}
+    count = sum(map(len, blocks.values()))
+    blocks |= {name: [text] for name, text in texts.items()}
+    blocks |= {name: list(x.T) for name, x in matrices.items() if name not in blocks}
     names: list[str] = []
-    columns: list[Array | str] = []
     groups: dict[str, tuple[int, ...]] = {}
-    for name in (*alike, *texts, *(name for name in matrices if name not in alike)):
-        block = [texts[name]] if name in texts else list(matrices[name].T)
-        if len(block) > 1:
-            groups[name] = tuple(range(len(names), len(names) + len(block)))
+    for name, block in blocks.items():
+        groups[name] = tuple(range(len(names), len(names) + len(block)))
         names += [name] if len(block) == 1 else [f"{name}[{i}]" for i in range(len(block))]
-        columns += block
-
-    count = sum(matrices[name].shape[1] for name in alike)
+    columns = [column for block in blocks.values() for column in block]
     return LogTable(path, tuple(names), len(names), columns, count, groups, frozenset(turned))
 
 

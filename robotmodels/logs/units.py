@@ -18,14 +18,8 @@ from .columns import Quantity, split_unit
 from .tables import LogTable
 
 _ANGLES = {"rad": "rad", "deg": "deg", "°": "deg", "degree": "deg", "degrees": "deg"}
-_OTHER_POSITIONS = re.compile(
-    r"grad|gon|mrad|urad|(turn|rev|count|tick|pulse|step)s?|rpm|arcmin|arcsec|incs?|[cuk]m|in|ft"
-)
-_OTHER_TORQUES = re.compile(
-    r"[mcku]nm|[kmc]n|n[cm]m|kgf?c?m|lbf?(ft|in)|(ft|in)lbf?|ozf?in|m?a|arms|amps?|ampere|m?v|%|"
-    r"percent|counts?"
-)
-_JOINING = re.compile(r"[ .*·⋅_-]")
+_OTHER_POSITIONS = re.compile(r"grad|gon|mrad|(turn|rev|count|tick|step)s?|rpm|in|ft")
+_OTHER_TORQUES = re.compile(r"[mcku]nm|[kmc]n|n[cm]m|lbf?(ft|in)|m?a|arms|amps?|m?v|%|counts?")
 
 
 def joint_side(
@@ -87,21 +81,17 @@ def check_units(
     torques = kind in (Quantity.TORQUE, Quantity.CURRENT)
     for name in [table.names[i] for i in columns if table.names]:
         unit = split_unit(name)[1]
-        where = f"{table.path}: the column {name!r} is in {unit!r}"
-        if torques and not gains and _OTHER_TORQUES.fullmatch(_JOINING.sub("", unit)):
-            raise InvalidValueError(
-                f"{where}, not in N m; give drive_gains=, the N m (N for prismatic joints) for one "
-                "unit of it."
-            )
         plain = unit.split("/")[0].strip()
-        if not torques and _OTHER_POSITIONS.fullmatch(plain):
-            raise InvalidValueError(
-                f"{where}, which is not read; write it in rad or deg (m or mm for prismatic "
-                "joints), or remove the unit from the header and give its factor by gears=."
-            )
         header = _ANGLES.get(plain, angle.value)
-        if not torques and header != angle.value:
-            raise InvalidValueError(
-                f"{where}, the argument is angles={angle.value!r}; give angles={header!r}, or the "
-                "right columns."
-            )
+        advice = ""
+        if torques:
+            if not gains and _OTHER_TORQUES.fullmatch(re.sub("[ .*·⋅_-]", "", unit)):
+                advice = "not in N m; give drive_gains=, the N m (N for slides) for one unit of it."
+        elif _OTHER_POSITIONS.fullmatch(plain):
+            advice = "which is not read; write it in rad or deg (m or mm for slides), or remove "
+            advice += "the unit from the header and give its factor by gears=."
+        elif header != angle.value:
+            advice = f"the argument is angles={angle.value!r}; give angles={header!r}, or the "
+            advice += "right columns."
+        if advice:
+            raise InvalidValueError(f"{table.path}: the column {name!r} is in {unit!r}, {advice}")

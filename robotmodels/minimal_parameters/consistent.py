@@ -1,4 +1,4 @@
-"""Physical robots from base parameters, and from the factor of an identification.
+"""Standard parameters of physical bodies and drives, from base parameters or from a regressor.
 
 Both functions minimise squares over the standard parameters, subject to linear matrix inequalities:
 pseudo-inertias are positive definite, rotor inertias and frictions are not negative, those of
@@ -38,30 +38,237 @@ R. Cortesao, "Physical feasibility of robot base inertial parameter identificati
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import inf, sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_core, as_exact
+from .._arrays import Array, Rebuilt, as_core, as_exact, read_only
 from ..drive import DriveParameters
+from ..dynamics import base_model
 from ..errors import InvalidValueError, ShapeError
 from ..inertia import InertialParameters
+from ..model import RobotModel
 from ..regressors import parameter_vector
+from ..table_text import boxed
 from .bodies import check_definite
-from .bounds import CenterOfMassBound, center_constraints, mass_constraints
-from .constraints import drive_sizes, parameter_kinds
-from .physical import MARGIN, PhysicalProblem, Squares
+from .constraints import CenterOfMassBound, mass_constraints
+from .physical import MARGIN, PhysicalFit, PhysicalProblem, PhysicalStatus, Squares
 from .result import BaseParameters
-from .standard import StandardParameters
 
 TOLERANCE = 1.9e-4
 """Largest relative increase of the squares by the nearest robot (solver gap below 2e-4)."""
 _RANK = 1e-10
 """Rank tolerance: relative singular value of columns in natural units."""
-_ABSENT = 1e-2
-"""Largest drive parameter of the prior, relative to the data, that is ignored as a scale."""
-_UNSEEN = 1e-3
-"""Share of the torques for the smallest scale of a kind of drive parameters."""
+_ZERO = 1e-9
+"""Print tolerance of a change, relative to the largest parameter of its kind."""
+_PRINTED_KINDS = {**dict.fromkeys(("XX", "XY", "XZ", "YY", "YZ", "ZZ", "Ia"), "J")}
+_PRINTED_KINDS |= dict.fromkeys(("MX", "MY", "MZ"), "MS")
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class StandardParameters(Rebuilt):
+    """A full set of standard parameters of physical bodies and drives. Read-only.
+
+    Parameters
+    ----------
+    base : BaseParameters
+        The b base parameters and p standard parameters.
+    requested : ndarray, shape (b,)
+        Base parameters that were given, or those of the fit without constraints.
+    prior : ndarray, shape (p,)
+        Standard parameters of the prior.
+    drive_prior : DriveParameters
+        Drives of the prior, for the kinds that are not among the parameters.
+    fit : PhysicalFit
+        ``squares`` of the residuals and ``least`` without constraints, both weighted; ``distance``
+        from the prior, the root of the summed squares of the relative changes of the
+        pseudo-inertias, ``|P0^-1/2 (P - P0) P0^-1/2|``, and of the drives; ``gap``, by the solver's
+        dual value: the part of the squares by which a robot within twice the distance may be better
+        (with ``gamma``: of the sum with the weighted distance); ``active`` constraints, a sentence
+        each; ``stopped``: the ending of a solver that stopped early.
+    rows : int or None
+        Number of residuals.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> from robotmodels.minimal_parameters import base_parameters, fit_consistent, uniform_bodies
+    >>> arm = load("planar_2r")
+    >>> base = base_parameters(arm, drive=False)
+    >>> robot = fit_consistent(base, np.eye(4), [0.2, -0.1, 0.3, 0.0],
+    ...                        prior=uniform_bodies(arm, 5.0))
+    >>> "The pseudo-inertia of link 2 is singular to the margin." in robot.reason()
+    True
+    """
+
+    base: BaseParameters
+    requested: Array
+    prior: Array
+    drive_prior: DriveParameters
+    fit: PhysicalFit
+    rows: int | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("requested", "prior"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+        object.__setattr__(self, "fit", self.fit._replace(x=read_only(self.fit.x)))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The p standard parameters."""
+        return self.base.parameter_names
+
+    @property
+    def values(self) -> Array:
+        """Standard parameters of the robot, shape (p,)."""
+        return self.fit.x
+
+    @property
+    def standard_errors(self) -> None:
+        """None: an estimate on the boundary of a set has no covariance."""
+        return None
+
+    @property
+    def base_values(self) -> Array:
+        """Base parameters of the robot, shape (b,)."""
+        return read_only(self.base.matrix @ self.values)
+
+    @property
+    def deviation(self) -> Array:
+        """Base parameters of the robot minus those requested, shape (b,)."""
+        return self.base_values - self.requested
+
+    @property
+    def model(self) -> RobotModel:
+        """The robot of the base parameters with these bodies, drives and couplings."""
+        p = len(self.values) - (0 if self.friction is None else self.friction.size)
+        whole = replace(self.base, friction=None, kept=np.arange(p), matrix=np.eye(p))
+        return base_model(self.base.model.with_drive(self.drive_prior), whole, self.values[:p])
+
+    @property
+    def inertia(self) -> InertialParameters:
+        """Inertial parameters of f physical bodies."""
+        return self.model.inertia
+
+    @property
+    def drive(self) -> DriveParameters:
+        """Drive parameters of n joints; the prior's where not identified."""
+        return self.model.drive
+
+    @property
+    def friction(self) -> Array | None:
+        """Parameters of the friction model, shape (k, n)."""
+        if self.base.friction is None:
+            return None
+        kinds = self.base.friction.kinds  # type: ignore[attr-defined]
+        n = self.base.model.n
+        return self.values[len(self.values) - n * len(kinds) :].reshape(-1, n)
+
+    @property
+    def status(self) -> PhysicalStatus:
+        """Outcome."""
+        return self.fit.status
+
+    @property
+    def is_usable(self) -> bool:
+        """Whether a physical robot was found."""
+        return self.status not in (PhysicalStatus.INFEASIBLE, PhysicalStatus.FAILED)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences on the solver and on the active constraints."""
+        return (self.fit.stopped, *self.fit.active) if self.fit.stopped else self.fit.active
+
+    @property
+    def distance(self) -> float:
+        """Distance from the prior."""
+        return self.fit.distance
+
+    @property
+    def optimality(self) -> str:
+        """Sentence on the gap."""
+        return f"The sum of squares is within {100.0 * self.fit.gap:.1g} % of the optimum."
+
+    @property
+    def residual_increase(self) -> float:
+        """Percent by which the root of the squares exceeds that of the unconstrained fit."""
+        squares, least = self.fit.squares, self.fit.least
+        if squares <= least:
+            return 0.0
+        return inf if least == 0.0 else 100.0 * (sqrt(squares / least) - 1.0)
+
+    @property
+    def rms(self) -> float | None:
+        """Root of the mean weighted square of the residuals; None where rows were not given."""
+        return None if self.rows is None else sqrt(self.fit.squares / self.rows)
+
+    def reason(self) -> str:
+        """The status in words, with the gap, the solver's ending and the active constraints."""
+        parts = [self.status.sentence]
+        if self.is_usable and self.status is not PhysicalStatus.EXACT:
+            parts.append(self.optimality)
+        return " ".join((*parts, *self.notes))
+
+    def of(self, model: RobotModel) -> RobotModel:
+        """The model with these bodies and drives, ready for `robotmodels.to_urdf`.
+
+        A URDF has no place for rotor inertias, torque offsets and coupled motors: a warning lists
+        them. Raises where no physical robot was found.
+        """
+        if not self.is_usable:
+            raise InvalidValueError(
+                f"{self.reason()} Use a smaller margin, wider bounds or another prior."
+            )
+        robot = self.model
+        model = model.with_inertia(robot.inertia).with_drive(robot.drive)
+        return model.with_transmission(robot.transmission)
+
+    def __str__(self) -> str:
+        percent = self.residual_increase
+        increase = "without bound" if percent == inf else f"{percent:.3g} %"
+        worst = float(abs(self.deviation).max(initial=0.0))
+        lines = [
+            f"{self.status.sentence} {self.fit.stopped}".strip(),
+            f"Residuals: {increase} above least squares (root of weighted squares "
+            f"{sqrt(self.fit.squares):.6g}, unconstrained {sqrt(self.fit.least):.6g}). "
+            f"{self.optimality}",
+            f"Largest deviation of a base parameter {worst:.2e}, distance from the prior "
+            f"{self.distance:.3g}.",
+            *(f"- {sentence}" for sentence in self.fit.active),
+            boxed(self._columns()),
+            "SI units: XX to ZZ kg m^2, MX to MZ kg m, M kg; drives as in their tables.",
+        ]
+        return "\n".join(lines)
+
+    def _columns(self) -> list[tuple[str, list[str]]]:
+        """Columns of the table: part, parameter, prior, value and difference."""
+        part = [""] * (len(self.names) + 1)
+        for j, good in enumerate(self.inertia.is_physical):
+            part[10 * j] = f"link {j + 1}: {'' if good else 'not '}physical"
+        part[10 * self.base.model.f] = "drives"
+        letters = [name.rstrip("0123456789") for name in self.names]
+        kinds = np.array([_PRINTED_KINDS.get(kind, kind) for kind in letters])
+        sizes = np.maximum(np.abs(self.prior), np.abs(self.values))
+        columns = [("", part[: len(self.names)]), ("parameter", list(self.names))]
+        for title, numbers, form in (
+            ("prior", self.prior, ".6g"),
+            ("value", self.values, ".6g"),
+            ("difference", self.values - self.prior, "+.3g"),
+        ):
+            pairs = zip(numbers.tolist(), kinds.tolist(), strict=True)
+            small = {kind: _ZERO * sizes[kinds == kind].max() for kind in set(kinds.tolist())}
+            texts = ["0" if abs(x) <= small[kind] else f"{x:{form}}" for x, kind in pairs]
+            columns.append((title, texts))
+        return columns
+
+    def __repr__(self) -> str:
+        return (
+            f"<StandardParameters: {self.base.model.f} links, {len(self.names)} parameters, "
+            f"{self.status.name}, distance {self.distance:.3g}, residuals "
+            f"+{self.residual_increase:.3g} %>"
+        )
 
 
 def standard_parameters(
@@ -109,7 +316,7 @@ def standard_parameters(
         raise ShapeError(f"weights: expected shape (k, {len(base)}), got {W.shape}.")
     near, P0, drives = _checked_prior(base, prior, drive_prior, margin)
     squares = Squares(W @ base.matrix, W @ b, base.matrix, b)
-    fit = PhysicalProblem(base, near, P0, margin).fit(squares, b, 0.0, TOLERANCE)
+    fit = PhysicalProblem(base, near, P0, b, margin).fit(squares, b, 0.0, TOLERANCE)
     return StandardParameters(base, b, near, drives, fit)
 
 
@@ -123,7 +330,7 @@ def fit_consistent(
     prior: InertialParameters | None = None,
     drive_prior: DriveParameters | None = None,
     mass_bounds: ArrayLike | None = None,
-    centre_bounds: Sequence[CenterOfMassBound] | None = None,
+    centre_bounds: Sequence[CenterOfMassBound] = (),
     total_mass: ArrayLike | None = None,
     gamma: float = 0.0,
     tolerance: float = TOLERANCE,
@@ -148,7 +355,7 @@ def fit_consistent(
         Number of residuals, for their root mean square.
     mass_bounds : array_like, shape (f, 2), optional
         Least and greatest mass of each link, kg; infinite for none, equal where it is known.
-    centre_bounds : sequence of CenterOfMassBox or CenterOfMassEllipsoid, optional
+    centre_bounds : sequence of CenterOfMassBox or CenterOfMassEllipsoid
         Bounds of centres of mass.
     total_mass : float or array_like, shape (2,), optional
         Mass of all links together, known or between two values, kg.
@@ -182,14 +389,31 @@ def fit_consistent(
         raise InvalidValueError(f"tolerance: expected a part between 0 and 1, got {tolerance}.")
     if rows is not None and rows < 1:
         raise InvalidValueError(f"rows: expected the number of residuals, got {rows}.")
+    if not (np.isfinite(rest) and rest >= 0.0):
+        raise InvalidValueError(
+            f"rest: expected a sum of squares, zero or more, got {rest}; "
+            "give 0 for rounding below zero."
+        )
     near, P0, drives = _checked_prior(base, prior, drive_prior, margin)
-    factor, right = _checked_factor(base, R, y, rest)
-    sizes = _drive_sizes(base, near, factor, right)
-    problem = PhysicalProblem(base, near, P0, margin, sizes)
-    f, unit = base.model.f, problem.unit
-    bounds = mass_constraints(f, unit, mass_bounds, total_mass)
-    problem.bounds = (*bounds, *center_constraints(f, unit, centre_bounds or ()))
-    squares, best = _squares(base, factor, right, float(rest), unit)
+    factor = as_core(R, (len(base),), "R")
+    if factor.ndim != 2:
+        raise ShapeError(
+            f"R: expected shape (r, {len(base)}), a column for each base parameter, got "
+            f"{factor.shape}."
+        )
+    right = as_exact(y, (len(factor),), "y")
+    lengths = np.linalg.norm(factor, axis=0)
+    lengths = np.where(lengths > 0.0, lengths, 1.0)
+    rough = np.linalg.lstsq(factor / lengths, right, rcond=_RANK)[0] / lengths
+    problem = PhysicalProblem(base, near, P0, rough, margin)
+    if not factor.any():
+        raise InvalidValueError(
+            "R: every entry is zero, so that nothing is identifiable; check the log and weights."
+        )
+    squares, best = _squares(base, factor, right, float(rest), problem.natural)
+    problem.add(
+        mass_constraints(base.model.f, problem.unit, mass_bounds, total_mass, centre_bounds)
+    )
     fit = problem.fit(squares, best, float(gamma), float(tolerance))
     return StandardParameters(base, best, near, drives, fit, rows)
 
@@ -225,65 +449,17 @@ def _relative(base: BaseParameters, b: Array) -> Array:
     return np.diag(1.0 / np.where(sizes > 0, sizes, 1.0))
 
 
-def _checked_factor(
-    base: BaseParameters, R: ArrayLike, y: ArrayLike, rest: float
-) -> tuple[Array, Array]:
-    """Check a weighted system of equations. Shapes: -> R (r, b), y (r,)."""
-    factor = as_core(R, (len(base),), "R")
-    if factor.ndim != 2:
-        raise ShapeError(
-            f"R: expected shape (r, {len(base)}), a column for each base parameter, got "
-            f"{factor.shape}."
-        )
-    right = as_exact(y, (len(factor),), "y")
-    if not (np.isfinite(rest) and rest >= 0.0):
-        raise InvalidValueError(
-            f"rest: expected a sum of squares, zero or more, got {rest}; "
-            "give 0 for rounding below zero."
-        )
-    if not factor.any():
-        raise InvalidValueError(
-            "R: every entry is zero, so that nothing is identifiable; check the log and weights."
-        )
-    return factor, right
-
-
 def _squares(
-    base: BaseParameters, R: Array, y: Array, rest: float, unit: Array
+    base: BaseParameters, R: Array, y: Array, rest: float, natural: Array
 ) -> tuple[Squares, Array]:
-    """Squares of the residuals, without directions at rounding, and the unconstrained fit (b,)."""
-    scale = 1.0 / np.linalg.norm(base.matrix * unit, axis=1)
-    U, values, V = np.linalg.svd(R / scale, full_matrices=False)
+    """Squares of the residuals, without directions at rounding, and the unconstrained fit (b,).
+
+    Shapes: R (r, b), y (r,), natural (b,): sizes of the base parameters.
+    """
+    U, values, V = np.linalg.svd(R * natural, full_matrices=False)
     k = int((values > _RANK * values[0]).sum())
     U, values, V = U[:, :k], values[:k], V[:k]
     target = U.T @ y
-    level, same = target / values, (V * scale) @ base.matrix
+    level, same = target / values, (V / natural) @ base.matrix
     least = float(np.sum((y - U @ target) ** 2)) + rest
-    return Squares(U.T @ R @ base.matrix, target, same, level, least), (V.T @ level) / scale
-
-
-def _drive_sizes(base: BaseParameters, prior: Array, R: Array, y: Array) -> Array:
-    """Natural sizes of drive parameters: the prior's, else those of the data.
-
-    Shapes: prior (p,), R (r, b), y (r,) -> (p - 10 f,).
-    """
-    first = 10 * base.model.f
-    sizes, kinds = drive_sizes(base, prior), parameter_kinds(base)
-    lengths = np.linalg.norm(R, axis=0)
-    seen = lengths > 0.0
-    lengths = np.where(seen, lengths, 1.0)
-    values = np.abs(np.linalg.lstsq(R / lengths, y, rcond=_RANK)[0]) / lengths
-    whole = np.linalg.norm(y) / lengths  # size that alone explains all torques
-    for kind in set(kinds[first:].tolist()):
-        same = kinds == kind
-        kept = same[base.kept] & seen
-        rows, columns = np.nonzero(base.matrix[:, same])
-        size = 0.0
-        if kept.any():
-            size = max(float(np.median(values[kept])), _UNSEEN * float(np.median(whole[kept])))
-        elif rows.size:  # regrouped into other parameters: the size of those
-            shares = np.abs(base.matrix[:, same][rows, columns])
-            size = float(np.median(values[rows] / shares))
-        if size > 0.0 and np.abs(prior[same]).max() < _ABSENT * size:
-            sizes[same[first:]] = size
-    return sizes
+    return Squares(U.T @ R @ base.matrix, target, same, level, least), (V.T @ level) * natural

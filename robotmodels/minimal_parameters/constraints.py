@@ -1,33 +1,47 @@
-"""Convex constraints on standard parameters, and dissipativity constraints of drives.
+"""Constraints of physical robots, affine in the standard parameters x: drives, masses, centres.
 
-Sources: P. Wensing, S. Kim and J.-J. Slotine, IEEE RA-L 3(1), 2018; C. Sousa and R. Cortesao, IJRR
-33(6), 2014. Every constraint is affine in the standard parameters x.
+Drives are dissipative: rotor inertias and frictions are not negative, those of coupled motors
+together. A centre of mass lies in a box along the axes of its frame, or in an ellipsoid. Sources:
+P. Wensing, S. Kim and J.-J. Slotine, IEEE RA-L 3(1), 2018; C. Sousa and R. Cortesao, IJRR 33(6),
+2014.
+
+Parameters
+----------
+link : int
+    Frame number, 1..f.
+low, high : array_like, shape (3,)
+    Corners of a box in frame R_j, metres; infinite without a bound, equal where it is known.
+center, semi_axes : array_like, shape (3,)
+    Of an ellipsoid, in frame R_j: its centre and its positive half lengths, metres.
+rotation : array_like, shape (3, 3), optional
+    Its columns are the directions of the semi-axes in R_j; default the axes of R_j.
+
+Raises
+------
+ShapeError, InvalidValueError
+    Wrong shapes, NaN, corners the wrong way round, lengths that are not positive, no rotation.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array
-from ..drive import DriveKind, drive_kinds
-from ..friction import (
-    AsymmetricFriction,
-    CoulombFriction,
-    Friction,
-    FrictionSum,
-    StribeckFriction,
-    ViscousFriction,
-)
+from .._arrays import Array, Rebuilt, as_exact, as_reals, read_only
+from ..errors import InvalidValueError, ShapeError
+from ..regressors.columns import standard_blocks
 from .result import BaseParameters
 
 _INSIDE = 1e-9
 """Smallest eigenvalue of matrices in the solver's units: margin for its rounding."""
-_DISSIPATIVE = (ViscousFriction, CoulombFriction, AsymmetricFriction, StribeckFriction)
+_ROTATED = 1e-9
+"""Tolerance of a rotation matrix."""
+_POSITIVE = ("Ia", "Fv", "Fc", "Fvp", "Fcp", "Fvn", "Fcn", "Fs")
+"""Kinds of drive and friction parameters that are not negative."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,6 +67,14 @@ class Constraint:
             return np.array([float(s[0] - np.linalg.norm(s[1:]))])
         return s if self.cone == "nonnegative" else -np.abs(s)
 
+    def inside(self, x: Array, least: float = 0.0) -> Array:
+        """Parameters whose matrix has a multiple of 1 added, so that its slack is not negative."""
+        slack = float(self.slack(x)[0])
+        if slack >= least:
+            return x
+        one = np.eye(round(len(self.offset) ** 0.5)).ravel()
+        return x - slack * np.linalg.lstsq(self.rows, one, rcond=None)[0]
+
     def stated(
         self, cp: Any, change: Any, unit: Array, x: Array, size: float, room: float = 0.0
     ) -> Any:
@@ -69,128 +91,198 @@ class Constraint:
         return s >= 0 if self.cone == "nonnegative" else s == 0
 
 
+# --- drives --------------------------------------------------------------------------------------
+
+
+def numbers_by_kind(base: BaseParameters) -> dict[str, NDArray[np.int64]]:
+    """Numbers of the standard parameters of each kind: links, ``Ia``, ``Iam``, ``Fs``, ..."""
+    blocks = standard_blocks(base.model, base.drive, base.friction)
+    ends = np.cumsum([len(names) for names in blocks.values()])
+    kinds = zip(blocks.items(), ends.tolist(), strict=True)
+    return {kind: np.arange(end - len(names), end) for (kind, names), end in kinds}
+
+
 def positive_drives(base: BaseParameters) -> NDArray[np.int64]:
     """Numbers of the nonnegative standard parameters of drives. Shapes: -> (k,)."""
-    f, n = base.model.f, base.model.n
-    kinds = drive_kinds(base.drive)
-    starts = [10 * f + n * k for k, kind in enumerate(kinds) if kind is not DriveKind.OFFSET]
-    numbers = [range(start, start + n) for start in starts]
-    numbers += [range(start, start + n * count) for start, count, _ in _frictions(base)]
-    return np.array([k for part in numbers for k in part], dtype=np.int64)
+    numbers = [kind for name, kind in numbers_by_kind(base).items() if name in _POSITIVE]
+    return np.sort(np.concatenate(numbers)) if numbers else np.zeros(0, dtype=np.int64)
 
 
-def stribeck_numbers(base: BaseParameters) -> tuple[list[int], list[int]]:
-    """Numbers of the static and of the Coulomb friction of Stribeck curves."""
-    n = base.model.n
-    starts = [start for start, _, stribeck in _frictions(base) if stribeck]
-    coulomb = [start + n + j for start in starts for j in range(n)]
-    return [number + n for number in coulomb], coulomb
-
-
-def drive_sizes(base: BaseParameters, prior: Array) -> Array:
-    """Natural sizes of drive parameters: a prior's, beside others of the kind. Shapes: -> (d,)."""
-    sizes, kinds = np.abs(prior[10 * base.model.f :]), parameter_kinds(base)[10 * base.model.f :]
-    for kind in set(kinds.tolist()):
-        same = kinds == kind
-        sizes[same] = np.maximum(sizes[same], 1e-2 * sizes[same].max())
-    return np.where(sizes > 0, sizes, 1.0)
-
-
-def parameter_kinds(base: BaseParameters) -> NDArray[np.str_]:
-    """Kind of each standard parameter; couplings of motors have that of the joints. -> (p,)."""
-    coupling = {kind.coupling: kind.value for kind in DriveKind if kind.coupling is not None}
-    letters = [name.rstrip("0123456789") for name in base.parameter_names]
-    return np.array([coupling.get(name, name) for name in letters])
-
-
-def sign_constraints(base: BaseParameters, unit: Array) -> Iterator[Constraint]:
-    """Nonnegativity of rotor inertias, frictions and their sums. Shapes: unit (p,)."""
-    p, names = len(unit), base.parameter_names
+def drive_constraints(base: BaseParameters, unit: Array) -> Iterator[Constraint]:
+    """Dissipativity of drives, for parameters of these natural sizes (p,)."""
+    names, kinds, K = base.parameter_names, numbers_by_kind(base), base.model.transmission
     rows: list[dict[int, float]] = [{k: 1.0} for k in positive_drives(base).tolist()]
     sentences = [f"{names[k]} is zero." for row in rows for k in row]
-    motors, weights = _motors(base)
-    for kind, start, joined in _coupled_kinds(base, len(motors)):
-        if kind is DriveKind.FC:  # dry friction of coupled motors is dissipative
-            for m, j in zip(*np.nonzero(weights), strict=True):
-                rows.append({start + int(j): 1.0, joined + int(m): abs(float(weights[m, j]))})
-                both = " and ".join(names[k] for k in rows[-1])
-                sentences.append(f"Dry friction of {both} together dissipates no energy.")
-    for static, coulomb in zip(*stribeck_numbers(base), strict=True):  # the curve decreases from Fs
-        rows.append({static: 1.0, coulomb: -1.0})
-        sentences.append(f"{names[static]} of Stribeck's curve is its {names[coulomb]}.")
+    weights = np.zeros((0, base.model.n))
+    if K is not None and K.coupled_motors:
+        weights = K.weights[np.array(K.coupled_motors) - 1]
+    if "Fcm" in kinds:  # dry friction of coupled motors
+        for m, j in zip(*np.nonzero(weights), strict=True):
+            rows.append({int(kinds["Fc"][j]): 1.0, int(kinds["Fcm"][m]): abs(float(weights[m, j]))})
+            both = " and ".join(names[k] for k in rows[-1])
+            sentences.append(f"Dry friction of {both} together dissipates no energy.")
+    if "Fs" in kinds:  # the Stribeck curve decreases from Fs
+        for static, coulomb in zip(kinds["Fs"].tolist(), kinds["Fc"].tolist(), strict=True):
+            rows.append({static: 1.0, coulomb: -1.0})
+            sentences.append(f"{names[static]} of Stribeck's curve is its {names[coulomb]}.")
     if rows:
-        matrix = np.zeros((len(rows), p))
+        matrix = np.zeros((len(rows), len(unit)))
         for i, row in enumerate(rows):
             matrix[i, list(row)] = list(row.values())
         matrix /= np.abs(matrix * unit).max(axis=1)[:, None]
         yield Constraint("nonnegative", matrix, np.zeros(len(rows)), tuple(sentences))
-
-
-def coupled_constraints(
-    base: BaseParameters, unit: Array
-) -> Iterator[tuple[tuple[int, ...], Constraint]]:
-    """Matrices of rotor inertia and viscous friction of joints that motors couple, >= 0.
-
-    Each with the numbers of the parameters on its diagonal. Shapes: unit (p,).
-    """
-    motors, weights = _motors(base)
-    for kind, start, joined in _coupled_kinds(base, len(motors)):
-        if kind is DriveKind.FC:
-            continue
-        for joints, members in _connected(weights != 0.0):
-            numbers, k = start + joints, len(joints)
+    # matrices of rotor inertia and of viscous friction of the joints that motors couple
+    joints = np.flatnonzero(weights.any(axis=0))
+    for kind in ("Ia", "Fv"):
+        if f"{kind}m" in kinds:
+            numbers, motors, k = kinds[kind][joints], kinds[f"{kind}m"], len(joints)
             D = np.diag(unit[numbers] ** -0.5)
-            rows = np.zeros((k * k, len(unit)))
-            for i, number in enumerate(numbers):
-                rows[i * (k + 1), number] = 1.0 / unit[number]
-            for m in members:
-                w = weights[m, joints]
-                rows[:, joined + m] = (D @ (np.outer(w, w) - np.diag(w**2)) @ D).ravel()
-            numbers = (*numbers.tolist(), *(joined + m for m in members))
-            names = ", ".join(base.parameter_names[number] for number in numbers)
-            sentence = f"The matrix of coupled motors with {names} is singular."
-            one = Constraint("semidefinite", rows, np.zeros(k * k), (sentence,))
-            yield tuple(numbers[:k]), one
+            matrix = np.zeros((k * k, len(unit)))
+            matrix[np.arange(k) * (k + 1), numbers] = 1.0 / unit[numbers]
+            for motor, w in zip(motors.tolist(), weights[:, joints], strict=True):
+                matrix[:, motor] = (D @ (np.outer(w, w) - np.diag(w**2)) @ D).ravel()
+            several = ", ".join(names[number] for number in (*numbers, *motors))
+            sentence = f"The matrix of coupled motors with {several} is singular."
+            yield Constraint("semidefinite", matrix, np.zeros(k * k), (sentence,))
 
 
-def _motors(base: BaseParameters) -> tuple[list[int], Array]:
-    """Coupled motors, from 0, and their turns per turn of the joints (m, n)."""
-    K = base.model.transmission
-    motors = [] if K is None else [m - 1 for m in K.coupled_motors]
-    return motors, np.zeros((0, base.model.n)) if K is None else K.weights[motors]
+# --- masses and centres of mass ------------------------------------------------------------------
 
 
-def _coupled_kinds(base: BaseParameters, motors: int) -> list[tuple[DriveKind, int, int]]:
-    """Coupled kinds: number of their first parameter, and of their first coupling."""
-    kinds, f, n = drive_kinds(base.drive), base.model.f, base.model.n
-    joined = [kind for kind in kinds if kind.coupling is not None] if motors else []
-    first = 10 * f + n * len(kinds)
-    return [
-        (kind, 10 * f + n * kinds.index(kind), first + motors * i) for i, kind in enumerate(joined)
-    ]
+@dataclass(frozen=True, slots=True, eq=False)
+class CenterOfMassBox(Rebuilt):
+    """The centre of mass of a link lies in a box along the axes of its frame.
+
+    Examples
+    --------
+    >>> CenterOfMassBox(2, [0, -0.1, -0.1], [0.4, 0.1, 0.1]).link
+    2
+    """
+
+    link: int
+    low: Any
+    high: Any
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "link", int(self.link))
+        for name in ("low", "high"):
+            value = as_reals(getattr(self, name), name)
+            if value.shape != (3,):
+                raise ShapeError(f"{name}: expected shape (3,), got {value.shape}.")
+            object.__setattr__(self, name, read_only(value))
+        low, high = self.low, self.high
+        if not ((low < np.inf).all() and (high > -np.inf).all() and (low <= high).all()):
+            raise InvalidValueError(
+                f"CenterOfMassBox of link {self.link}: low must not be above high, got {low} and "
+                f"{high}; both in metres, in frame R_{self.link}."
+            )
+
+    def constraints(self, unit: Array) -> Iterator[Constraint]:
+        """``low M <= [MX MY MZ] <= high M`` for parameters of these natural sizes (p,)."""
+        *moments, mass = np.eye(len(unit))[10 * self.link - 4 : 10 * self.link]
+        for row, axis, low, high in zip(moments, "xyz", self.low, self.high, strict=True):
+            name = f"centre of mass of link {self.link} along {axis}"
+            yield from _interval(row, low, high, unit, name, mass)
 
 
-def _connected(turns: NDArray[np.bool_]) -> list[tuple[NDArray[np.int64], list[int]]]:
-    """Sets of joints connected by motors, with these motors. Shapes: turns (m, n)."""
-    from scipy.sparse.csgraph import connected_components
+@dataclass(frozen=True, slots=True, eq=False)
+class CenterOfMassEllipsoid(Rebuilt):
+    """The centre of mass of a link lies in an ellipsoid.
 
-    _, labels = connected_components(turns @ turns.T.astype(float), directed=False)
-    sets = [np.flatnonzero(labels == k) for k in range(labels.max(initial=-1) + 1)]
-    return [(np.flatnonzero(turns[members].any(axis=0)), members.tolist()) for members in sets]
+    Examples
+    --------
+    >>> CenterOfMassEllipsoid(1, [0.1, 0, 0], [0.2, 0.1, 0.1]).semi_axes
+    array([0.2, 0.1, 0.1])
+    """
+
+    link: int
+    center: Any
+    semi_axes: Any
+    rotation: Any = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "link", int(self.link))
+        for name, shape in (("center", (3,)), ("semi_axes", (3,)), ("rotation", (3, 3))):
+            object.__setattr__(self, name, read_only(as_exact(getattr(self, name), shape, name)))
+        lengths, R = self.semi_axes, self.rotation
+        if (lengths <= 0.0).any():
+            raise InvalidValueError(f"semi_axes: expected positive lengths in m, got {lengths}.")
+        if np.abs(R.T @ R - np.eye(3)).max() > _ROTATED:
+            raise InvalidValueError(
+                f"rotation: expected perpendicular unit vectors in its columns, got\n{R}"
+            )
+
+    def constraints(self, unit: Array) -> Iterator[Constraint]:
+        """``|diag(1/a) R^T ([MX MY MZ] - c M)| <= M`` for parameters of these sizes (p,)."""
+        mass = 10 * self.link - 1
+        rows = np.zeros((4, len(unit)))
+        inward = (self.rotation / self.semi_axes).T
+        rows[0, mass], rows[1:, mass - 3 : mass] = 1.0, inward
+        rows[1:, mass] = -inward @ self.center
+        sentence = f"The centre of mass of link {self.link} is on the surface of its ellipsoid."
+        yield Constraint("second_order", rows / unit[mass], np.zeros(4), (sentence,))
 
 
-def _frictions(base: BaseParameters) -> list[tuple[int, int, bool]]:
-    """For each dissipative part of the friction model: first number, kinds, whether Stribeck's."""
-    if base.friction is None:
-        return []
-    n, dissipative = base.model.n, []
-    parts: tuple[Friction, ...] = (base.friction,)
-    if isinstance(base.friction, FrictionSum):
-        parts = base.friction.parts
-    counts = [len(part.kinds) for part in parts]  # type: ignore[attr-defined]
-    start = len(base.parameter_names) - n * sum(counts)
-    for part, count in zip(parts, counts, strict=True):
-        if isinstance(part, _DISSIPATIVE):
-            dissipative.append((start, count, isinstance(part, StribeckFriction)))
-        start += n * count
-    return dissipative
+CenterOfMassBound = CenterOfMassBox | CenterOfMassEllipsoid
+
+
+def mass_constraints(
+    f: int,
+    unit: Array,
+    mass_bounds: ArrayLike | None,
+    total_mass: ArrayLike | None,
+    centre_bounds: Sequence[CenterOfMassBound],
+) -> Iterator[Constraint]:
+    """Bounds on masses (f, 2), on their sum (2,) and on centres of mass. Shapes: unit (p,)."""
+    masses = np.arange(9, 10 * f, 10)
+    intervals = []
+    if mass_bounds is not None:
+        bounds = as_reals(mass_bounds, "mass_bounds")
+        if bounds.shape != (f, 2):
+            raise ShapeError(
+                f"mass_bounds: expected shape ({f}, 2), the least and the greatest mass of each "
+                f"link in kg (-inf and inf where there is none), got {bounds.shape}."
+            )
+        intervals += [(masses[[j]], *bounds[j], f"mass of link {j + 1}") for j in range(f)]
+    if total_mass is not None:
+        total = as_reals(total_mass, "total_mass")
+        if total.shape not in ((), (2,)):
+            raise ShapeError(
+                "total_mass: expected a number, or the least and the greatest in kg, got shape "
+                f"{total.shape}."
+            )
+        intervals.append((masses, *np.broadcast_to(total, (2,)), "total mass of all links"))
+    for numbers, low, high, name in intervals:
+        if not (low <= high and high > 0.0 and low < np.inf):
+            raise InvalidValueError(
+                f"{name}: expected a least value that is not above the greatest, and a positive "
+                f"greatest value, got {low} and {high} kg."
+            )
+        row = np.zeros(len(unit))
+        row[numbers] = 1.0
+        yield from _interval(row, low, high, unit, name)
+    for bound in centre_bounds:
+        if not isinstance(bound, (CenterOfMassBox, CenterOfMassEllipsoid)):
+            raise InvalidValueError(
+                "centre_bounds: expected CenterOfMassBox or CenterOfMassEllipsoid, got "
+                f"{type(bound).__name__}."
+            )
+        if not 1 <= bound.link <= f:
+            raise InvalidValueError(
+                f"centre_bounds: there is no link {bound.link}; they are numbered 1 to {f}."
+            )
+        yield from bound.constraints(unit)
+
+
+def _interval(
+    row: Array, low: float, high: float, unit: Array, name: str, mass: Array | None = None
+) -> Iterator[Constraint]:
+    """``low <= row @ x <= high``, or relative to a mass; scaled to terms of order one."""
+    sides = [(low, 1.0, "at its lower bound"), (high, -1.0, "at its upper bound")]
+    for value, sign, side in [(low, 1.0, "known")] if low == high else sides:
+        if np.isfinite(value):
+            one, offset = (row, -value) if mass is None else (row - value * mass, 0.0)
+            scale = sign / float(np.abs(one * unit).max())
+            sentence = f"The {name} is {side}, {value:.6g} {'kg' if mass is None else 'm'}."
+            cone = "zero" if low == high else "nonnegative"
+            yield Constraint(cone, scale * one[None], np.array([scale * offset]), (sentence,))

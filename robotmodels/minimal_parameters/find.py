@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .._arrays import Array, as_core, as_floats, as_vector, batch_rows
 from .._choices import chosen
@@ -17,14 +17,16 @@ from ..estimation.columns import NOTHING
 from ..friction import Friction, check_friction, check_linear
 from ..model import RobotModel, check_model
 from .alignment import ALIGNED, aligned_robot
-from .numeric import Samples, acting_parameters, base_by_numbers, residual_torque
+from .numeric import Samples, TorqueColumns, residual_warning
 from .result import BaseMethod, BaseParameters
-from .symbolic import base_by_rules
+from .rules import EARTH, reach, regrouped, rows_of_numbers
 
 Motion = tuple[ArrayLike, ArrayLike, ArrayLike] | Any
 """Arrays (q, v, a), samples that have them, or a trajectory that can be resampled."""
 _SAMPLES = 1000
 _LARGEST = 1e-2
+_FINEST, _COARSEST = 1e-13, 1e-2
+"""Range of relative sines and lengths that may be zero or not: the numeric method decides there."""
 
 
 def base_parameters(
@@ -124,33 +126,55 @@ def base_parameters(
             "independent joints leave out; with constraint=model.transmission they are those of "
             "the free variables.",
         )
-    if way is BaseMethod.SYMBOLIC:
-        base = base_by_rules(aligned, kinds, least, friction, notes)
+    columns = TorqueColumns(aligned, kinds, friction, least, samples, G)
+    ruled = _by_rules(columns) if way is BaseMethod.SYMBOLIC else None
+    neglected, error, gap = (), None, None
+    if ruled is not None:
+        kept, matrix = ruled
     else:
-        base = base_by_numbers(aligned, kinds, samples, G, least, friction, notes)
-    return _as_given(base, model, angle, samples, G)
-
-
-def _as_given(
-    base: BaseParameters,
-    model: RobotModel,
-    angle: float,
-    samples: Samples | None,
-    constraint: Array | None,
-) -> BaseParameters:
-    """Base parameters of the robot with aligned axes as those of the robot as given."""
-    if base.model is model:
-        return replace(base, angle=angle)
-    base = replace(base, model=model, angle=angle)
-    shown = acting_parameters(model, base.drive, samples, constraint, base.friction)
-    neglected = np.array(base.parameter_names)[shown & ~base.matrix.any(axis=0)].tolist()
-    missed = residual_torque(base, samples, constraint)
-    sentence = (
-        "The torques of the robot as given differ from those of the aligned robot by up to "
-        f"{missed:.0e} of the largest."
+        kept, matrix = columns.basis.kept, columns.basis.coefficients
+        neglected, error = columns.neglected(matrix), columns.torque_error(kept, matrix)
+        notes += (*columns.notes, *residual_warning(error, least))
+        gap = columns.basis.gap if way is BaseMethod.NUMERIC else None
+    if aligned is not model:
+        columns = replace(columns, model=model)
+        neglected, error = columns.neglected(matrix), columns.torque_error(kept, matrix)
+        sentence = (
+            "The torques of the robot as given differ from those of the aligned robot by up to "
+            f"{error:.0e} of the largest."
+        )
+        notes = (notes[0], sentence, *notes[1:])
+    return BaseParameters(
+        model, kinds, kept, matrix, way, gap, friction, least, notes, neglected, error, angle
     )
-    notes = (base.notes[0], sentence, *base.notes[1:])
-    return replace(base, neglected=tuple(neglected), missed=missed, notes=notes)
+
+
+def _by_rules(columns: TorqueColumns) -> tuple[NDArray[np.int64], Array] | None:
+    """Kept parameters (b,) and combinations (b, p) by Khalil's rules.
+
+    None where the tolerance decides, and with columns that have no rule (couplings, friction).
+    """
+    model, drive = columns.model, columns.drive
+    p, lengths = len(columns.names), (model.table.d, model.table.r, model.table.b)
+    if columns.tolerance > NOTHING or p > 10 * model.f + model.n * len(drive):
+        return None
+    sizes = np.abs(np.concatenate(lengths)) / reach(model)
+    sizes = np.append(sizes, np.linalg.norm(model.gravity) / EARTH)
+    if ((sizes > _FINEST) & (sizes < _COARSEST)).any():
+        return None
+    terms, coarse = (
+        regrouped(model, *rows_of_numbers(model, zero), drive, zero)
+        for zero in (_FINEST, _COARSEST)
+    )
+    if terms.keys() != coarse.keys():
+        return None
+    kept = np.array(sorted(terms), dtype=np.int64)
+    matrix = np.zeros((len(kept), p))
+    for row, number in zip(matrix, kept.tolist(), strict=True):
+        row[list(terms[number])] = list(terms[number].values())
+    sizes = columns.sizes
+    matrix[abs(matrix * sizes) <= columns.tolerance * sizes[kept][:, None]] = 0.0
+    return kept, matrix
 
 
 def _part(tolerance: Any) -> float:

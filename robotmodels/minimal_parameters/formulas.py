@@ -21,8 +21,16 @@ from ..drive import Drives
 from ..geometry import PRISMATIC, REVOLUTE
 from ..model import RobotModel
 from ..symbolic_dgm._angles import exact_turns
-from .motion_span import EXACT, RotationRank, loads_of, motion_spans, reach
-from .rules import RowConstants, regrouped, rows_of_numbers
+from .rules import (
+    EXACT,
+    RotationRank,
+    RowConstants,
+    loads_of,
+    motion_spans,
+    reach,
+    regrouped,
+    rows_of_numbers,
+)
 
 _LONGEST = 40
 """Largest number of operations in a printed symbolic coefficient."""

@@ -7,16 +7,16 @@ Robotic Systems 8(4), 1991.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from math import ceil, sqrt
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .._arrays import Array
-from ..drive import DriveKind, Drives, drive_kinds
+from ..drive import DriveKind
 from ..estimation import ColumnBasis, column_basis
 from ..estimation.columns import NOTHING
 from ..estimation.factor import triangles_of
@@ -25,13 +25,12 @@ from ..friction.protocols import basis_at
 from ..geometry import PRISMATIC
 from ..model import RobotModel
 from ..regressors import parameter_names, torque_regressor, torque_regressor_chunks
-from .motion_span import EARTH, reach
-from .result import BaseMethod, BaseParameters
+from .rules import EARTH, reach
 
 Samples = tuple[Array, Array, Array]
 """Positions, velocities and accelerations, each (N, n)."""
 
-_ROWS_A_COLUMN, _PIECE, _FRESH = 3, 1024, 40
+_ROWS_A_COLUMN, _PIECE, _CHECKED = 3, 1024, 40
 """Rows of random motion per column; samples per piece, and of the final check."""
 _DECADES = 6.0
 """Number of velocity decades at which friction is evaluated."""
@@ -41,205 +40,146 @@ _CLEAR = 100.0
 """Least ratio of smallest kept to largest dropped residual norm for a clear rank gap."""
 _BAND = 30.0
 """Factor around the tolerance in which the widest rank gap of a log is searched."""
-_ROUNDING, _MISSED = 1e-16, 1e-9
+_ROUNDING, _WRONG = 1e-16, 1e-9
 """Rounding tolerances: residual norm of a column, relative torque error."""
 _FEW = 8
 """Names listed in a note."""
 
 
-class NumericColumns(NamedTuple):
-    """Independent columns, and the names of those neglected by the tolerance."""
+@dataclass(frozen=True, eq=False)
+class TorqueColumns:
+    """Columns of the torques of a robot, on random motion or on samples.
 
-    basis: ColumnBasis
-    neglected: tuple[str, ...]
-
-
-def base_by_numbers(
-    model: RobotModel,
-    drive: Drives,
-    samples: Samples | None = None,
-    constraint: Array | None = None,
-    tolerance: float = NOTHING,
-    friction: Friction | None = None,
-    notes: tuple[str, ...] = (),
-) -> BaseParameters:
-    """Base parameters from the columns of the regressor on random or given motion.
-
-    Shapes: samples (N, n), constraint (n, u).
+    The torques are those of the free variables of a constraint, shape (n, u), where there is one.
     """
-    kinds = drive_kinds(drive)
-    columns = base_columns(model, kinds, samples, constraint, tolerance, friction)
-    basis, names = columns.basis, parameter_names(model, kinds, friction)
-    notes = (*notes, *rank_warnings(names, basis, tolerance, samples is not None))
-    if samples is not None:
-        whole = base_columns(model, kinds, None, constraint, tolerance, friction).basis.kept
-        notes = (*notes, *_unidentifiable(names, basis.kept, whole))
-    base = BaseParameters(
-        model=model,
-        drive=kinds,
-        kept=basis.kept,
-        matrix=basis.coefficients,
-        method=BaseMethod.NUMERIC,
-        gap=basis.gap,
-        friction=friction,
-        tolerance=tolerance,
-        neglected=columns.neglected,
-    )
-    missed = residual_torque(base, samples, constraint)
-    return replace(base, notes=(*notes, *residual_warning(missed, tolerance)), missed=missed)
 
+    model: RobotModel
+    drive: tuple[DriveKind, ...]
+    friction: Friction | None = None
+    tolerance: float = NOTHING
+    samples: Samples | None = None
+    constraint: Array | None = None
 
-def base_columns(
-    model: RobotModel,
-    drive: Drives,
-    samples: Samples | None = None,
-    constraint: Array | None = None,
-    tolerance: float = NOTHING,
-    friction: Friction | None = None,
-) -> NumericColumns:
-    """Independent columns of the torque regressor; arguments as `base_by_numbers`."""
-    kinds = drive_kinds(drive)
-    scale = natural_sizes(model, kinds, friction)
-    W = torque_factor(model, kinds, samples, constraint, friction)
-    basis = column_basis(W, None, scale, tolerance)
-    if samples is not None:
-        basis = rank_gap(W, scale, tolerance, basis)
-    names = parameter_names(model, kinds, friction)
-    neglected = np.flatnonzero(_acts(W, scale) & ~basis.coefficients.any(axis=0))
-    return NumericColumns(basis, tuple(names[k] for k in neglected))
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The p standard parameters."""
+        return parameter_names(self.model, self.drive, self.friction)
 
+    @cached_property
+    def sizes(self) -> Array:
+        """Natural sizes (p,): robot of this size, unit mass, torques of its weight."""
+        model, size = self.model, reach(self.model)
+        slides = model.table.sigma[model.table.joint_rows] == PRISMATIC
+        unit, rotor = np.where(slides, size, 1.0), np.where(slides, 1.0, size**2)
+        rate = sqrt(EARTH / size)
+        torque = rotor * unit * rate**2
+        kinds = {"Ia": rotor, "Fv": rotor * rate, "Fc": torque, "offset": torque}
+        couplings = {"Ia": size**2, "Fv": size**2 * rate, "Fc": size * EARTH}
+        motors = 0 if model.transmission is None else len(model.transmission.coupled_motors)
+        parts = [np.tile([size**2] * 6 + [size] * 3 + [1.0], model.f)]
+        parts += [kinds[kind.value] for kind in self.drive]
+        parts += [np.full(motors, couplings[k.value]) for k in self.drive if k.coupling is not None]
+        if self.friction is not None:
+            speeds = unit * rate * 10.0 ** -np.arange(0.0, _DECADES + 1.0)[:, None]
+            speeds = np.concatenate((speeds, -speeds))
+            angles = np.linspace(-np.pi, np.pi, len(speeds))[:, None] * np.ones(model.n)
+            basis = np.abs(basis_at(check_linear(self.friction), speeds, angles))
+            parts += list(torque / np.maximum(_SMALL_TORQUE, basis.max(axis=0)))
+        return np.concatenate(parts)
 
-def acting_parameters(
-    model: RobotModel,
-    drive: Drives,
-    samples: Samples | None = None,
-    constraint: Array | None = None,
-    friction: Friction | None = None,
-) -> NDArray[np.bool_]:
-    """Mask of standard parameters with an effect on torques; arguments as `base_by_numbers`."""
-    W = torque_factor(model, drive, samples, constraint, friction)
-    return _acts(W, natural_sizes(model, drive, friction))
+    @cached_property
+    def factor(self) -> Array:
+        """Rows of the regressor (r, p), or a matrix with the same products of columns."""
+        slides = self.model.table.sigma[self.model.table.joint_rows] == PRISMATIC
+        units = np.where(slides, reach(self.model), 1.0)
+        samples = self._random_motion(units) if self.samples is None else self.samples
+        chunks = torque_regressor_chunks(
+            self.model, *samples, drive=self.drive, size=_PIECE, friction=self.friction
+        )
+        G = self.constraint
+        pieces = (
+            W * units[:, None] if G is None else np.einsum("iu,kip->kup", G, W) for _, W in chunks
+        )
+        return triangles_of(pieces, len(self.names))
 
+    def _random_motion(self, units: Array) -> Samples:
+        """Random motion with balanced gravity, centrifugal and inertia torques."""
+        rng = np.random.default_rng(0)
+        G = np.eye(self.model.n) if self.constraint is None else self.constraint
+        u = G.shape[1]
+        rate = sqrt(EARTH / reach(self.model))
+        N = ceil(_ROWS_A_COLUMN * len(self.names) / max(u, 1))
+        # revolute joints turn by any angle, prismatic ones move by the robot's size
+        whole = np.eye(u) * units.max(initial=0.0)
+        spread = np.diag(units) if self.constraint is None else whole
+        q, v, a = (
+            scale * rng.uniform(-1.0, 1.0, (N, u)) @ spread @ G.T
+            for scale in (np.pi, rate, rate**2)
+        )
+        if self.friction is not None:  # half of the samples over all decades: near zero velocity
+            v[::2] *= 10.0 ** (-_DECADES * rng.uniform(size=v[::2].shape))
+        return q, v, a
 
-def _acts(W: Array, scale: Array) -> NDArray[np.bool_]:
-    length = np.sqrt((W * W).sum(axis=0)) * scale
-    return length > NOTHING * length.max(initial=0.0)
-
-
-def torque_factor(
-    model: RobotModel,
-    drive: Drives,
-    samples: Samples | None = None,
-    constraint: Array | None = None,
-    friction: Friction | None = None,
-) -> Array:
-    """Rows of the regressor (r, p), or a matrix with the same products of columns."""
-    size = reach(model)
-    p = len(parameter_names(model, drive, friction))
-    slides = model.table.sigma[model.table.joint_rows] == PRISMATIC
-    units = np.where(slides, size, 1.0)
-    if samples is None:
-        samples = _random_motion(model, p, size, units, constraint, friction is not None)
-    chunks = torque_regressor_chunks(model, *samples, drive=drive, size=_PIECE, friction=friction)
-    pieces = (
-        W * units[:, None] if constraint is None else np.einsum("iu,kip->kup", constraint, W)
-        for _, W in chunks
-    )
-    return triangles_of(pieces, p)
-
-
-def _random_motion(
-    model: RobotModel, p: int, size: float, units: Array, constraint: Array | None, slow: bool
-) -> Samples:
-    """Random motion with balanced gravity, centrifugal and inertia torques."""
-    rng = np.random.default_rng(0)
-    G = np.eye(model.n) if constraint is None else constraint
-    u = G.shape[1]
-    rate = sqrt(EARTH / size)
-    N = ceil(_ROWS_A_COLUMN * p / max(u, 1))
-    # revolute joints turn by any angle, prismatic ones move by the robot's size
-    spread = np.diag(units) if constraint is None else np.eye(u) * units.max(initial=0.0)
-    q, v, a = (
-        scale * rng.uniform(-1.0, 1.0, (N, u)) @ spread @ G.T for scale in (np.pi, rate, rate**2)
-    )
-    if slow:  # half of the samples over all decades: friction may change near zero velocity
-        v[::2] *= 10.0 ** (-_DECADES * rng.uniform(size=v[::2].shape))
-    return q, v, a
-
-
-def natural_sizes(model: RobotModel, drive: Drives, friction: Friction | None = None) -> Array:
-    """Natural sizes of the parameters: robot of this size, unit mass, torques of its weight."""
-    size = reach(model)
-    link = [size**2] * 6 + [size] * 3 + [1.0]
-    slides = model.table.sigma[model.table.joint_rows] == PRISMATIC
-    unit = np.where(slides, size, 1.0)
-    rotor = np.where(slides, 1.0, size**2)
-    rate = sqrt(EARTH / size)
-    torque = rotor * unit * rate**2
-    joints = {
-        DriveKind.IA: rotor,
-        DriveKind.FV: rotor * rate,
-        DriveKind.FC: torque,
-        DriveKind.OFFSET: torque,
-    }
-    couplings = {DriveKind.IA: size**2, DriveKind.FV: size**2 * rate, DriveKind.FC: size * EARTH}
-    kinds = drive_kinds(drive)
-    motors = 0 if model.transmission is None else len(model.transmission.coupled_motors)
-    joined = [np.full(motors, couplings[kind]) for kind in kinds if kind.coupling is not None]
-    extra: list[Array] = []
-    if friction is not None:
-        linear = check_linear(friction)
-        speeds = unit * rate * 10.0 ** -np.arange(0.0, _DECADES + 1.0)[:, None]
-        speeds = np.concatenate((speeds, -speeds))
-        angles = np.linspace(-np.pi, np.pi, len(speeds))[:, None] * np.ones(model.n)
-        basis = np.abs(basis_at(linear, speeds, angles))
-        extra = list(torque / np.maximum(_SMALL_TORQUE, basis.max(axis=0)))
-    drives = [joints[kind] for kind in kinds]
-    return np.concatenate((np.tile(link, model.f), *drives, *joined, *extra))
-
-
-def residual_torque(
-    base: BaseParameters, samples: Samples | None = None, constraint: Array | None = None
-) -> float:
-    """Largest relative torque error of the base parameters."""
-    model = base.model
-    rng = np.random.default_rng(1)
-    if samples is None:
-        G = np.eye(model.n) if constraint is None else constraint
-        u = rng.uniform(-1.0, 1.0, (3, _FRESH, G.shape[1]))
-        samples = np.pi * u[0] @ G.T, 2.0 * u[1] @ G.T, 2.0 * u[2] @ G.T
-    else:
-        some = np.unique(np.linspace(0, len(samples[0]) - 1, _FRESH).astype(np.int64))
-        samples = samples[0][some], samples[1][some], samples[2][some]
-    W = torque_regressor(model, *samples, drive=base.drive, friction=base.friction)
-    if constraint is not None:
-        W = np.einsum("iu,kip->kup", constraint, W)
-    pi = rng.normal(size=W.shape[-1])
-    torque = W @ pi
-    missed = W[..., base.kept] @ (base.matrix @ pi) - torque
-    largest = float(np.abs(torque).max(initial=0.0))
-    return float(np.abs(missed).max(initial=0.0)) / largest if largest > 0.0 else 0.0
-
-
-def rank_gap(W: Array, scale: Array, tolerance: float, basis: ColumnBasis) -> ColumnBasis:
-    """Column basis with the tolerance moved to the widest gap near it.
-
-    Shapes: W (N, p), scale (p,).
-    """
-    if _ratio(basis) >= _CLEAR:
+    @cached_property
+    def basis(self) -> ColumnBasis:
+        """Independent columns; on samples the tolerance moves to the widest gap near it."""
+        basis = column_basis(self.factor, scale=self.sizes, nothing=self.tolerance)
+        if self.samples is None or _ratio(basis) >= _CLEAR:
+            return basis
+        left = np.maximum(np.append(np.sort(basis.distance)[::-1], 0.0), _ROUNDING)
+        lowest, highest = self.tolerance / _BAND, min(self.tolerance * _BAND, 0.5)
+        cuts = [
+            (above / below, min(max(sqrt(above * below), lowest), highest))
+            for above, below in pairwise(left)
+            if above > lowest and below < highest and above >= _CLEAR * below
+        ]
+        for _, cut in sorted(cuts, reverse=True):
+            again = column_basis(self.factor, scale=self.sizes, nothing=cut)
+            if _ratio(again) >= _CLEAR:
+                return again
         return basis
-    left = np.maximum(np.append(np.sort(basis.distance)[::-1], 0.0), _ROUNDING)
-    lowest, highest = tolerance / _BAND, min(tolerance * _BAND, 0.5)
-    cuts = [
-        (above / below, min(max(sqrt(above * below), lowest), highest))
-        for above, below in pairwise(left)
-        if above > lowest and below < highest and above >= _CLEAR * below
-    ]
-    for _, cut in sorted(cuts, reverse=True):
-        again = column_basis(W, None, scale, cut)
-        if _ratio(again) >= _CLEAR:
-            return again
-    return basis
+
+    def neglected(self, matrix: Array) -> tuple[str, ...]:
+        """Parameters with an effect on the torques that have no coefficient. Shapes: (b, p)."""
+        length = np.sqrt((self.factor * self.factor).sum(axis=0)) * self.sizes
+        acting = length > NOTHING * length.max(initial=0.0)
+        return tuple(self.names[k] for k in np.flatnonzero(acting & ~matrix.any(axis=0)))
+
+    def torque_error(self, kept: NDArray[np.int64], matrix: Array) -> float:
+        """Largest relative torque error of base parameters. Shapes: (b,), (b, p)."""
+        model, G = self.model, self.constraint
+        rng = np.random.default_rng(1)
+        if self.samples is None:
+            free = np.eye(model.n) if G is None else G
+            u = rng.uniform(-1.0, 1.0, (3, _CHECKED, free.shape[1])) @ free.T
+            samples = np.pi * u[0], 2.0 * u[1], 2.0 * u[2]
+        else:
+            N = len(self.samples[0])
+            some = np.unique(np.linspace(0, N - 1, _CHECKED).astype(np.int64))
+            samples = self.samples[0][some], self.samples[1][some], self.samples[2][some]
+        W = torque_regressor(model, *samples, drive=self.drive, friction=self.friction)
+        if G is not None:
+            W = np.einsum("iu,kip->kup", G, W)
+        pi = rng.normal(size=W.shape[-1])
+        torque = W @ pi
+        error = np.abs(W[..., kept] @ (matrix @ pi) - torque).max(initial=0.0)
+        largest = float(np.abs(torque).max(initial=0.0))
+        return float(error) / largest if largest > 0.0 else 0.0
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences on an uncertain rank, and on samples that excite too few parameters."""
+        logged = self.samples is not None
+        notes = rank_warnings(self.names, self.basis, self.tolerance, logged)
+        if logged:
+            whole = replace(self, samples=None).basis.kept
+            if len(self.basis.kept) < len(whole):
+                missing = np.setdiff1d(whole, self.basis.kept)
+                notes += (
+                    f"This motion excites {len(self.basis.kept)} of the {len(whole)} base "
+                    f"parameters; not kept: {_listed(self.names, missing)}.",
+                )
+        return notes
 
 
 def _ratio(basis: ColumnBasis) -> float:
@@ -270,25 +210,12 @@ def rank_warnings(
     )
 
 
-def _unidentifiable(
-    names: Sequence[str], kept: NDArray[np.int64], whole: NDArray[np.int64]
-) -> tuple[str, ...]:
-    """Note on a log that excites fewer parameters than random motion."""
-    if len(kept) >= len(whole):
-        return ()
-    missing = np.setdiff1d(whole, kept)
-    return (
-        f"This motion excites {len(kept)} of the {len(whole)} base parameters; not kept: "
-        f"{_listed(names, missing)}.",
-    )
-
-
-def residual_warning(missed: float, tolerance: float) -> tuple[str, ...]:
+def residual_warning(error: float, tolerance: float) -> tuple[str, ...]:
     """Note where the base parameters do not reproduce the torques."""
-    if missed <= max(_MISSED, _CLEAR * tolerance):
+    if error <= max(_WRONG, _CLEAR * tolerance):
         return ()
     return (
-        f"NOT TO BE USED: these base parameters have torque errors of {missed:.1e} on another "
+        f"NOT TO BE USED: these base parameters have torque errors of {error:.1e} on another "
         "motion. Lengths or angles of the table lie where rounding decides; check them.",
     )
 

@@ -7,6 +7,7 @@ in which their norm is the distance of the robot from the prior.
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -17,15 +18,9 @@ from .._arrays import Array
 from .._outcomes import Outcome
 from ..errors import MissingExtraError
 from ..inertia import InertialParameters
+from ..regressors.columns import LINKS
 from .bodies import pseudo_inertias
-from .constraints import (
-    Constraint,
-    coupled_constraints,
-    drive_sizes,
-    positive_drives,
-    sign_constraints,
-    stribeck_numbers,
-)
+from .constraints import Constraint, drive_constraints, numbers_by_kind, positive_drives
 from .result import BaseParameters
 
 MARGIN = 1e-3
@@ -42,15 +37,17 @@ _UNIQUE = 1e-8
 _RATIO, _ROUNDS = 10.0, 4
 """Ratio of the solution to the assumed sizes above which the problem is rescaled."""
 _ROOM = 1e-3
-"""Additional margin of fits, relative."""
+"""Additional margin of the nearest robot, relative, so that its base parameters are feasible."""
 _KEPT, _SAME = 1e-9, 1e-13
 """Zero tolerances of base parameter deviations, relative: of a robot, of the prior."""
-_MISSED = 5e-9
+_ROUNDING = 5e-9
 """Rounding tolerance of a constraint violation, natural units times distance."""
 _ACTIVE = 1e-5
 """Largest slack of an active constraint, natural units."""
 _GAP = 1e-4
-"""Least optimality gap of an inaccurate fit beyond the tolerance, relative to the squares."""
+"""Largest optimality gap of a converged fit beyond the tolerance, relative to the squares."""
+_SMALL = 1e-2
+"""Least drive parameter of the prior, relative to others and to the data, that sets a scale."""
 
 
 class PhysicalStatus(Outcome):
@@ -86,8 +83,8 @@ class Squares:
 
     def is_least(self, x: Array, part: float) -> bool:
         """Whether standard parameters have the least sum, up to a relative tolerance."""
-        missed = np.abs(self.same @ x - self.level).max(initial=0.0)
-        return bool(missed <= part * np.abs(self.level).max(initial=0.0))
+        error = np.abs(self.same @ x - self.level).max(initial=0.0)
+        return bool(error <= part * np.abs(self.level).max(initial=0.0))
 
 
 class PhysicalFit(NamedTuple):
@@ -107,30 +104,29 @@ class PhysicalFit(NamedTuple):
 
 
 class _Solution(NamedTuple):
-    """Result of the solver: parameters (p,) or None, its status and iterations, the dual value."""
+    """Result of the solver: parameters (p,) or None, its status and iterations.
+
+    Lower bound of the objective, and the weight of the squared distance in it.
+    """
 
     x: Array | None
     status: str
     iterations: int
     dual: float
+    weight: float
 
 
 class PhysicalProblem:
     """Physical robots near a prior; the variables are the standard parameters.
 
-    Shapes: prior (p,), P0 (f, 4, 4), sizes (p - 10 f,): natural sizes of drive parameters.
+    Shapes: prior (p,), P0 (f, 4, 4), b (b,): base parameters that give a scale.
     """
 
     def __init__(
-        self,
-        base: BaseParameters,
-        prior: Array,
-        P0: Array,
-        margin: float = MARGIN,
-        sizes: Array | None = None,
+        self, base: BaseParameters, prior: Array, P0: Array, b: Array, margin: float = MARGIN
     ) -> None:
         f, p = base.model.f, len(prior)
-        self.base, self.prior, self.margin = base, prior, margin
+        self.prior, self.margin = prior, margin
         basis = pseudo_inertias(InertialParameters(np.eye(10)))
         self.inverse = np.zeros((p, p))
         self.bodies = []
@@ -146,192 +142,161 @@ class PhysicalProblem:
             floor = -margin * np.eye(4).ravel()
             self.bodies.append(Constraint("semidefinite", rows, floor, (sentence,)))
         drives = np.arange(10 * f, p)
-        self.inverse[drives, drives] = 1.0 / (drive_sizes(base, prior) if sizes is None else sizes)
+        self.inverse[drives, drives] = 1.0 / drive_sizes(base, prior, b)
         self.scale: Array = np.asarray(np.linalg.inv(self.inverse), dtype=np.float64)
         self.unit = 1.0 / np.linalg.norm(self.inverse, axis=0)
-        self.positive, self.stribeck = positive_drives(base), stribeck_numbers(base)
-        self.coupled = dict(coupled_constraints(base, self.unit))
-        self.bounds: tuple[Constraint, ...] = ()
-        self.drives = (*sign_constraints(base, self.unit), *self.coupled.values())
+        self.natural = np.linalg.norm(base.matrix * self.unit, axis=1)
+        self.positive, kinds = positive_drives(base), numbers_by_kind(base)
+        self.stribeck = (kinds["Fs"], kinds["Fc"]) if "Fs" in kinds else None
+        self.others = tuple(drive_constraints(base, self.unit))
+
+    def add(self, bounds: Iterable[Constraint]) -> None:
+        """Add bounds on masses and centres."""
+        self.others += tuple(bounds)
 
     def distance(self, x: Array) -> float:
         """Distance of standard parameters from the prior."""
         return float(np.linalg.norm(self.inverse @ (x - self.prior)))
 
-    def size(self, b: Array) -> float:
-        """Ratio of base parameters to their natural sizes, at least 1. Shapes: b (b,)."""
-        natural = np.linalg.norm(self.base.matrix * self.unit, axis=1)
-        return max(1.0, float(np.abs(b / np.where(natural > 0, natural, 1.0)).max(initial=0.0)))
-
     def is_met(self, x: Array) -> bool:
         """Whether bodies are definite and other constraints satisfied up to rounding."""
-        allowed = _MISSED * (1.0 + self.distance(x))
-        others = (*self.drives, *self.bounds)
+        allowed = _ROUNDING * (1.0 + self.distance(x))
         definite = all(one.slack(x)[0] > -0.5 * self.margin for one in self.bodies)
-        return definite and all((one.slack(x) >= -allowed).all() for one in others)
+        return definite and all((one.slack(x) >= -allowed).all() for one in self.others)
 
     def fit(self, squares: Squares, b: Array, weight: float, tolerance: float) -> PhysicalFit:
         """Physically consistent least squares; of equal fits, the nearest to the prior.
 
         With a weight of the squared distance, the least sum of both. Shapes: b (b,).
         """
-        size = self.size(b)
-        if weight == 0.0:
-            nearest = self._nearest(squares, size)
-            if nearest is not None:
-                return self._result(nearest, squares, PhysicalStatus.EXACT)
-        x, gap, solution = self._constrained(squares, size, weight, tolerance)
-        if solution is not None and gap > _GAP + tolerance:  # second solution, scaled by the first
-            again = self._constrained(squares, self._numbers(x), weight, tolerance)
-            x, gap, solution = again if again[1] < gap else (x, gap, solution)
-        if solution is None:
-            solution = self._solve(1.0)
-            infeasible = solution.status.endswith("PrimalInfeasible")
+        size = max(
+            1.0, float(np.abs(b / np.where(self.natural > 0, self.natural, 1.0)).max(initial=0))
+        )
+        x = self._nearest_exact(squares, size) if weight == 0.0 else None
+        if x is not None:
+            return self._result(x, squares, PhysicalStatus.EXACT)
+        x, gap, found = self._least_squares(squares, size, weight)
+        if found is None:
+            found = self._solve(1.0)
+            infeasible = found.status.endswith("PrimalInfeasible")
             status = PhysicalStatus.INFEASIBLE if infeasible else PhysicalStatus.FAILED
-            return self._result(self.prior, squares, status, np.inf, solution)
+            return self._result(self.prior, squares, status, np.inf, found)
+        if weight == 0.0:
+            radius = (squares.sum(x) * (1.0 + tolerance) - squares.least) ** 0.5 or 1.0
+            ball = squares.fit / radius, squares.target / radius
+            nearer = self._solve(self._numbers(x), within=ball).x
+            nearer = x if nearer is None else self._settled(nearer)
+            # an early end may leave the ball of equal fits
+            if np.sum((ball[0] @ nearer - ball[1]) ** 2) <= 1.0 + 1e-6 and self.is_met(nearer):
+                x, gap = nearer, self._gap(nearer, squares, found, weight)
         if not self.is_met(x):
-            return self._result(self.prior, squares, PhysicalStatus.FAILED, np.inf, solution)
+            return self._result(self.prior, squares, PhysicalStatus.FAILED, np.inf, found)
         if gap > _GAP + tolerance:
-            return self._result(x, squares, PhysicalStatus.INACCURATE, gap, solution)
+            return self._result(x, squares, PhysicalStatus.INACCURATE, gap, found)
         status = PhysicalStatus.CONSTRAINED if weight == 0.0 else PhysicalStatus.WEIGHTED
         if squares.is_least(x, _KEPT):
             status = PhysicalStatus.EXACT
         return self._result(x, squares, status, gap)
 
-    def _constrained(
-        self, squares: Squares, size: float, weight: float, tolerance: float
-    ) -> tuple[Array, float, _Solution | None]:
-        """Parameters of the nearest of the best robots, their gap, and the solver's result."""
-        x, found, total, size = self._least_squares(squares, size, weight)
-        if found is None:
-            return x, np.inf, None
-        if weight == 0.0:
-            radius = (squares.sum(x) * (1.0 + tolerance) - squares.least) ** 0.5 or 1.0
-            within = squares.fit / radius, squares.target / radius
-            nearer = self._solve(self._numbers(x), within=within).x
-            if nearer is not None:  # an early end may leave the ball of equal fits
-                nearer = self._settled(nearer)
-                miss = within[0] @ nearer - within[1]
-                if miss @ miss <= 1.0 + 1e-6 and self.is_met(nearer):
-                    x = nearer
-        x = self._settled(x)
-        gap = self._gap(x, squares, found.dual, weight, total, size) if self.is_met(x) else np.inf
-        return x, gap, found
-
-    def _nearest(self, squares: Squares, size: float) -> Array | None:
+    def _nearest_exact(self, squares: Squares, size: float) -> Array | None:
         """The nearest robot with the least squares; None if no physical robot has them."""
         if squares.is_least(self.prior, _SAME) and self.is_met(self.prior):
             return self.prior
-        solution = self._solve(size, equal=(squares.same, squares.level)).x
-        if solution is None:
+        x = self._solve(size, equal=(squares.same, squares.level)).x
+        if x is None:
             return None
-        x = self._settled(solution, squares.same, squares.level)
+        x = self._settled(x, squares.same, squares.level)
         return x if squares.is_least(x, _KEPT) and self.is_met(x) else None
 
     def _least_squares(
         self, squares: Squares, size: float, weight: float
-    ) -> tuple[Array, _Solution | None, float, float]:
-        """Parameters of least squares, the solver's result, and the sizes of squares and numbers.
+    ) -> tuple[Array, float, _Solution | None]:
+        """Parameters of least squares, their gap and the solver's result.
 
-        The problem is rescaled if the assumed sizes were wrong.
+        The problem is rescaled until the assumed sizes of squares and changes were right.
         """
         smallest = max(squares.least, 1e-8 * float(squares.target @ squares.target), 1e-300)
-        x, found, total = self.prior, None, max(smallest, squares.sum(self.prior))
-        used = total, size
+        best, least, found = self.prior, np.inf, None
+        total = max(smallest, squares.sum(self.prior))
         for _ in range(_ROUNDS):
-            scaled = squares.fit / total**0.5, squares.target / total**0.5
-            again = self._solve(size, scaled, weight=weight / total or _UNIQUE / size**2)
-            if again.x is None or (found is not None and "Solved" not in again.status):
+            again = self._solve(size, squares, total, weight or _UNIQUE * total / size**2)
+            if again.x is None:
                 break
-            x, found, used = again.x, again, (total, size)
+            x = self._settled(again.x)
+            gap = self._gap(x, squares, again, weight)
+            if gap <= least:
+                best, least, found = x, gap, again
+            used = total, size
             total, size = max(smallest, squares.sum(x)), max(size, self._numbers(x))
-            if max(total, used[0]) <= _RATIO * min(total, used[0]) and size <= _RATIO * used[1]:
+            fits = max(total, used[0]) <= _RATIO * min(total, used[0])
+            if fits and size <= _RATIO * used[1] and gap <= 10.0 * _GAP:
                 break
-        return x, found, *used
+        return best, least, found
 
-    def _gap(
-        self, x: Array, squares: Squares, dual: float, weight: float, total: float, size: float
-    ) -> float:
-        """Optimality gap relative to the objective, for robots within twice the distance.
-
-        From the dual value of least squares that were divided by total, with numbers of this size.
-        """
-        if not np.isfinite(dual):
+    def _gap(self, x: Array, squares: Squares, found: _Solution, weight: float) -> float:
+        """Optimality gap relative to the objective, for robots within twice the distance."""
+        if not (np.isfinite(found.dual) and self.is_met(x)):
             return np.inf
-        here, far = (squares.sum(x) - squares.least) / total, self.distance(x) ** 2
-        if weight > 0.0:
-            here += weight / total * far
-        else:
-            dual -= 4.0 * _UNIQUE * far / size**2
-        return max(0.0, here - max(dual, 0.0)) / max(here + squares.least / total, 1e-300)
+        far = self.distance(x) ** 2
+        here = squares.sum(x) - squares.least + weight * far
+        bound = found.dual - (4.0 * found.weight * far if weight == 0.0 else 0.0)
+        return max(0.0, here - max(bound, 0.0)) / max(here + squares.least, 1e-300)
 
     def _solve(
         self,
         size: float,
-        squares: tuple[Array, Array] | None = None,
+        squares: Squares | None = None,
+        total: float = 1.0,
+        weight: float = 1.0,
         equal: tuple[Array, Array] | None = None,
         within: tuple[Array, Array] | None = None,
-        weight: float = 1.0,
     ) -> _Solution:
-        """Least ``|F x - t|^2 + weight * distance^2``, with ``E x = e`` or ``|F x - t| <= 1``."""
+        """Least ``|F x - t|^2 + weight * distance^2``, with ``E x = e`` or ``|B x - b| <= 1``."""
         cp = _cvxpy()
         change = cp.Variable(len(self.prior))
         terms = (cp, change, self.scale, self.prior, size)
-        stated = [one.stated(*terms) for one in (*self.drives, *self.bounds)]
-        # the second fit has a margin, so that its base parameters are feasible
         room = 0.0 if within is None else _ROOM * self.margin
+        stated = [one.stated(*terms) for one in self.others]
         stated += [one.stated(*terms, room) for one in self.bodies]
 
         def residual(rows: Array, right: Array) -> Any:
             return (size * rows @ self.scale) @ change - (right - rows @ self.prior)
 
-        objective = cp.sum_squares(change)
+        objective = cp.sum_squares(change) * (weight / total * size**2 if squares else 1.0)
         if squares is not None:
-            objective = cp.sum_squares(residual(*squares)) + weight * size**2 * objective
+            root = total**0.5
+            objective += cp.sum_squares(residual(squares.fit / root, squares.target / root))
         if equal is not None:
             lengths = np.maximum(size * np.linalg.norm(equal[0] @ self.scale, axis=1), 1e-300)
             stated.append(residual(equal[0] / lengths[:, None], equal[1] / lengths) == 0)
         if within is not None:
             stated.append(cp.norm(residual(*within)) <= 1)
-        problem = cp.Problem(cp.Minimize(objective), stated)
-        data, chain, inverse = problem.get_problem_data(cp.CLARABEL, solver_opts=dict(_SOLVER))
-        raw = chain.solve_via_data(problem, data, solver_opts=dict(_SOLVER))
-        with warnings.catch_warnings(), suppress(cp.error.SolverError):
-            warnings.simplefilter("ignore")  # inaccurate: the gap reports it
-            problem.unpack_results(raw, chain, inverse)
+        raw = _solved(cp.Problem(cp.Minimize(objective), stated))
         x = None if change.value is None else self.prior + size * self.scale @ change.value
-        return _Solution(x, str(raw.status), raw.iterations, raw.obj_val_dual)
+        return _Solution(x, str(raw.status), raw.iterations, raw.obj_val_dual * total, weight)
 
     def _numbers(self, x: Array) -> float:
         """Scale of a solution: root mean square change in the solver's units, at least 1."""
         return max(1.0, self.distance(x) / len(x) ** 0.5)
 
     def _settled(self, x: Array, E: Array | None = None, e: Array | None = None) -> Array:
-        """Projection onto ``E x = e`` and bounds; drives and bodies onto their boundaries."""
-        rows, right = ([], []) if E is None or e is None else ([E], [e])
-        for cone in ("zero", "nonnegative"):
-            for one in self.bounds:
-                if one.cone == cone and (cone == "zero" or one.slack(x)[0] < 0.0):
-                    rows.append(one.rows)
-                    right.append(-one.offset)
-            if rows:
-                A, b = np.concatenate(rows), np.concatenate(right)
-                x = x + self.unit * (np.linalg.pinv(A * self.unit) @ (b - A @ x))
+        """Projection onto ``E x = e`` and violated constraints, matrices inside their cones."""
+        linear = [one for one in self.others if one.cone in ("zero", "nonnegative")]
+        violated = [(one, one.slack(x) <= 0.0) for one in linear]
+        rows = [one.rows[bad] for one, bad in violated] + ([] if E is None else [E])
+        right = [-one.offset[bad] for one, bad in violated] + ([] if e is None else [e])
+        if rows:
+            A, b = np.concatenate(rows), np.concatenate(right)
+            x = x + self.unit * (np.linalg.pinv(A * self.unit) @ (b - A @ x))
         x = x.copy()
         x[self.positive] = np.maximum(x[self.positive], 0.0)
-        static, coulomb = self.stribeck
-        x[static] = np.maximum(x[static], x[coulomb])
-        for joints, one in self.coupled.items():
-            numbers = list(joints)
-            x[numbers] += max(0.0, -float(one.slack(x)[0])) * self.unit[numbers]
+        if self.stribeck is not None:
+            static, coulomb = self.stribeck
+            x[static] = np.maximum(x[static], x[coulomb])
+        for one in self.others:
+            x = one.inside(x) if one.cone == "semidefinite" else x
         for one in self.bodies:
-            if (
-                one.slack(x)[0] < -0.5 * self.margin
-            ):  # rounding of large numbers: nearest physical body
-                P = (one.rows @ x).reshape(4, 4)
-                values, vectors = np.linalg.eigh(P)
-                P = (vectors * np.maximum(values, self.margin)) @ vectors.T - P
-                x = x + np.linalg.lstsq(one.rows, P.ravel(), rcond=None)[0]
+            x = one.inside(x, -0.5 * self.margin)
         return x
 
     def _result(
@@ -344,7 +309,7 @@ class PhysicalProblem:
     ) -> PhysicalFit:
         active = [
             sentence
-            for one in (*self.drives, *self.bodies, *self.bounds)
+            for one in (*self.others, *self.bodies)
             if one.cone != "zero" and np.isfinite(gap)
             for slack, sentence in zip(one.slack(x), one.sentences, strict=True)
             if slack < _ACTIVE
@@ -356,6 +321,28 @@ class PhysicalProblem:
         return PhysicalFit(
             x, status, self.distance(x), total, squares.least, gap, tuple(active), ending
         )
+
+
+def drive_sizes(base: BaseParameters, prior: Array, b: Array) -> Array:
+    """Natural sizes of drive parameters: the prior's of their kind, else those of the data.
+
+    Shapes: prior (p,), b (b,) -> (p - 10 f,).
+    """
+    sizes, kinds = np.abs(prior), numbers_by_kind(base)
+    for kind, numbers in kinds.items():
+        if kind != LINKS and kind not in ("Iam", "Fvm", "Fcm"):
+            numbers = np.concatenate((numbers, kinds.get(f"{kind}m", numbers[:0])))
+            kept = np.isin(base.kept, numbers)
+            if kept.any():
+                values = np.abs(b[kept])
+            else:  # regrouped into other parameters
+                rows, columns = np.nonzero(base.matrix[:, numbers])
+                values = np.abs(b[rows] / base.matrix[rows, numbers[columns]])
+            data = float(np.median(values)) if values.size else 0.0
+            if sizes[numbers].max(initial=0.0) < _SMALL * data:
+                sizes[numbers] = data
+            sizes[numbers] = np.maximum(sizes[numbers], _SMALL * sizes[numbers].max(initial=0.0))
+    return np.where(sizes > 0.0, sizes, 1.0)[10 * base.model.f :]
 
 
 def nearest_body(F: Array, t: Array, radius: float = 0.1) -> Array | None:
@@ -373,12 +360,23 @@ def nearest_body(F: Array, t: Array, radius: float = 0.1) -> Array | None:
     x = cp.Variable(10)
     size = mass * float(np.abs(scaled).max(initial=0.0)) or 1.0
     squares = cp.sum_squares(scaled @ x * (mass / size) - t / size) + 1e-12 * cp.sum_squares(x)
-    body = cp.reshape(maps @ x, (4, 4), order="C") >> 1e-7 * np.eye(4)
-    problem = cp.Problem(cp.Minimize(squares), [body])
-    with warnings.catch_warnings(), suppress(cp.error.SolverError):
-        warnings.simplefilter("ignore")
-        problem.solve(solver=cp.CLARABEL, **_SOLVER)
+    _solved(
+        cp.Problem(
+            cp.Minimize(squares), [cp.reshape(maps @ x, (4, 4), order="C") >> 1e-7 * np.eye(4)]
+        )
+    )
     return None if x.value is None else mass * unit * x.value
+
+
+def _solved(problem: Any) -> Any:
+    """Solve a problem with Clarabel; its own result."""
+    cp = _cvxpy()
+    data, chain, inverse = problem.get_problem_data(cp.CLARABEL, solver_opts=dict(_SOLVER))
+    raw = chain.solve_via_data(problem, data, solver_opts=dict(_SOLVER))
+    with warnings.catch_warnings(), suppress(cp.error.SolverError):
+        warnings.simplefilter("ignore")  # inaccurate: the gap reports it
+        problem.unpack_results(raw, chain, inverse)
+    return raw
 
 
 def _cvxpy() -> Any:

@@ -74,7 +74,7 @@ class BaseParameters:
     neglected : tuple of str
         Parameters whose effect on the torques is below the tolerance, or only due to the angles of
         axes treated as aligned.
-    missed : float, optional
+    torque_error : float, optional
         Largest torque error on an independent motion, relative to the largest torque; for logged
         motion on the same samples. None for symbolic rules alone.
     angle : float
@@ -111,7 +111,7 @@ class BaseParameters:
     tolerance: float = NOTHING
     notes: tuple[str, ...] = ()
     neglected: tuple[str, ...] = ()
-    missed: float | None = None
+    torque_error: float | None = None
     angle: float = NOTHING
 
     def __post_init__(self) -> None:

@@ -20,14 +20,20 @@ product:
 - ``Ia`` of the first revolute joint goes to its ``ZZ``, and that of the first one that is not
   parallel to it, if it is perpendicular to it.
 
+The rules for one joint hold wherever a link can move freely. Near the base it cannot: before the
+first revolute joint it only translates, and as long as all revolute axes are parallel it rotates
+about one direction, which is fixed in the world and in the link (`MotionSpan`).
+
 Source: W. Khalil and F. Bennis, "Comments on direct calculation of minimum set of inertial
 parameters of serial robots", IEEE T-RA 10(1), 1994.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from enum import Enum
+from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -37,16 +43,13 @@ from .._arrays import Array
 from ..drive import DriveKind, Drives, drive_kinds
 from ..geometry import FIXED, REVOLUTE
 from ..model import RobotModel
-from .motion_span import (
-    EXACT,
-    MotionSpan,
-    RotationRank,
-    axes_in_base,
-    loads_of,
-    motion_spans,
-    parallel,
-    weight_of,
-)
+
+EXACT = 1e-11
+"""Tolerance for parallel (sine), perpendicular (cosine) and intersecting axes (relative length)."""
+EARTH = 9.81
+"""Reference gravity of the tolerances, m/s^2."""
+_LEAST = 1e-4
+"""Least reach of a robot, m."""
 
 Combination = dict[int, Any]
 """Coefficients of standard parameters by their number; numbers or formulas."""
@@ -55,16 +58,180 @@ _J = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 XX, YY, ZZ, MX, MY, MZ, M = 0, 3, 5, 6, 7, 8, 9
 
 
-class Regrouping:
+# --- motion of links -----------------------------------------------------------------------------
+
+
+class RotationRank(Enum):
+    """Directions about which a link can rotate."""
+
+    NONE, ONE, SEVERAL = range(3)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MotionSpan:
+    """Possible rotations and translations of a link, in the axes of its frame.
+
+    A centre is a point on all axes of rotation.
+    """
+
+    rotations: RotationRank
+    direction: Array
+    slides: tuple[Array, ...]
+    centre: Array | None
+
+
+def motion_spans(model: RobotModel, tolerance: float = EXACT) -> tuple[MotionSpan, ...]:
+    """The span of every link, R_0 first."""
+    chain, length = model.chain, tolerance * reach(model)
+    spans = [MotionSpan(RotationRank.NONE, np.zeros(3), (), np.zeros(3))]
+    for k in range(model.f):
+        before = spans[int(chain.antecedent[k])]
+        R, P = chain.rotation[k], chain.position[k]
+        after = _with_joint(before, int(chain.sigma[k]), R[:, 2], P, tolerance, length)
+        spans.append(
+            MotionSpan(
+                after.rotations,
+                after.direction @ R,
+                tuple(slide @ R for slide in after.slides),
+                None if after.centre is None else (after.centre - P) @ R,
+            )
+        )
+    return tuple(spans)
+
+
+def _with_joint(
+    before: MotionSpan, sigma: int, z: Array, P: Array, angle: float, length: float
+) -> MotionSpan:
+    """The span behind a joint with axis z through P, still in the axes of the antecedent."""
+    if sigma == FIXED:
+        return before
+    along = before.rotations is RotationRank.ONE and parallel(z, before.direction, angle)
+    if sigma != REVOLUTE:
+        slides = (*before.slides, z) if before.rotations is not RotationRank.SEVERAL else ()
+        # a slide along the only axis does not move the axis
+        keeps = before.rotations is RotationRank.NONE or along
+        return replace(before, slides=slides, centre=before.centre if keeps else None)
+    if before.rotations is RotationRank.NONE:
+        return MotionSpan(RotationRank.ONE, z, before.slides, P)
+    centre = _common_point(before, z, P, along, length)
+    if along:
+        return replace(before, centre=centre)
+    return MotionSpan(RotationRank.SEVERAL, np.zeros(3), (), None if before.slides else centre)
+
+
+def _common_point(
+    before: MotionSpan, z: Array, P: Array, along: bool, length: float
+) -> Array | None:
+    """A point on the axis (z, P) and on the axes before it; any point of a common axis."""
+    if before.centre is None:
+        return None
+    way, e = before.centre - P, before.direction
+    if before.rotations is RotationRank.SEVERAL or along:
+        point = P if along else before.centre
+        return point if _length_of_cross(z, way) <= length else None
+    # both axes pass through P + s z = centre + t e
+    s, t = np.linalg.lstsq(np.stack((z, -e), axis=1), way, rcond=None)[0]
+    point = P + s * z
+    return point if float(np.linalg.norm(point - before.centre - t * e)) <= length else None
+
+
+def parallel(a: Array, b: Array, tolerance: float = EXACT) -> bool:
+    """Whether two unit vectors are parallel."""
+    return _length_of_cross(a, b) <= tolerance
+
+
+def _length_of_cross(a: Array, b: Array) -> float:
+    x, y, z = a.tolist()
+    u, v, w = b.tolist()
+    return sqrt((y * w - z * v) ** 2 + (z * u - x * w) ** 2 + (x * v - y * u) ** 2)
+
+
+def reach(model: RobotModel) -> float:
+    """Reach of the table, metres; 1 where its lengths are zero."""
+    table = model.table
+    lengths = float(np.sqrt(table.d**2 + table.r**2 + table.b**2).sum())
+    return lengths if lengths > _LEAST else 1.0
+
+
+def gravities(model: RobotModel, tolerance: float = EXACT) -> list[Array]:
+    """Gravity in the axes of each frame, R_0 first, with every joint at zero; none is exactly 0."""
+    gravity = np.asarray(model.gravity) @ model.chain.base_rotation
+    found = [gravity * (np.linalg.norm(gravity) > tolerance * EARTH)]
+    for k, antecedent in enumerate(model.chain.antecedent.tolist()):
+        found.append(found[antecedent] @ model.chain.rotation[k])
+    return found
+
+
+def loads_of(model: RobotModel, tolerance: float = EXACT) -> list[float]:
+    """Gravity along the axis of each frame with every joint at zero; none is exactly 0."""
+    least = tolerance * float(np.linalg.norm(model.gravity))
+    loads = [float(gravity[2]) for gravity in gravities(model, tolerance)[1:]]
+    return [load if abs(load) > least else 0.0 for load in loads]
+
+
+# --- regrouping ----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RowConstants:
+    """Constants of a joint in the frame before it; numbers or formulas."""
+
+    rotation: Array
+    position: Array
+    load: Any
+
+
+def regrouped(
+    model: RobotModel,
+    rows: Sequence[RowConstants],
+    directions: Sequence[Array],
+    drive: Drives,
+    tolerance: float = EXACT,
+) -> dict[int, Combination]:
+    """Apply the rules to all joints, from the last to the first."""
+    work = _Regrouping(model, rows, directions, drive_kinds(drive), tolerance)
+    for j in range(model.f, 0, -1):
+        work.apply(j)
+    return work.stays
+
+
+def rows_of_numbers(
+    model: RobotModel, tolerance: float = EXACT
+) -> tuple[list[RowConstants], list[Array]]:
+    """Numeric arguments of `regrouped` from the table."""
+    chain, loads = model.chain, loads_of(model, tolerance)
+    rows = [RowConstants(*row) for row in zip(chain.rotation, chain.position, loads, strict=True)]
+    return rows, [span.direction for span in motion_spans(model, tolerance)[1:]]
+
+
+class _Regrouping:
     """State of the rules: kept standard parameters, and the combination regrouped into each."""
 
-    def __init__(self, model: RobotModel, columns: int) -> None:
-        self.antecedent = [int(a) for a in model.chain.antecedent]
-        self.stays: dict[int, Combination] = {k: {k: 1} for k in range(columns)}
+    def __init__(
+        self,
+        model: RobotModel,
+        rows: Sequence[RowConstants],
+        directions: Sequence[Array],
+        kinds: Sequence[DriveKind],
+        tolerance: float,
+    ) -> None:
+        f, n = model.f, model.n
+        self.model, self.rows, self.directions = model, rows, directions
+        self.tolerance = tolerance
+        self.starts = {kind: 10 * f + n * i for i, kind in enumerate(kinds)}
+        self.stays: dict[int, Combination] = {k: {k: 1} for k in range(10 * f + n * len(kinds))}
+        self.spans, self.gravity = motion_spans(model, tolerance), gravities(model, tolerance)
+
+    # --- sums ---
 
     def take(self, parameter: int) -> Combination:
         """Remove a parameter and return its combination."""
         return self.stays.pop(parameter)
+
+    def drop(self, j: int, places: Iterable[int]) -> None:
+        """Remove parameters of a link that have no effect."""
+        for place in places:
+            self.take(10 * (j - 1) + place)
 
     def add(self, parameter: int, factor: Any, combination: Combination) -> None:
         """Regroup a combination into a parameter; one without effect is skipped."""
@@ -100,8 +267,97 @@ class Regrouping:
                 self.add(10 * (frame - 1) + MX + i, P[i], combination)
             self.add_tensor(frame, _skew(P).T @ _skew(P), combination)
 
+    # --- rules ---
 
-def unit_tensor(place: int) -> NDArray[np.int64]:
+    def apply(self, j: int) -> None:
+        """Apply the rules of a joint; those of its drive are the first."""
+        a, sigma = int(self.model.chain.antecedent[j - 1]), self.model.chain.sigma[j - 1]
+        if sigma != FIXED:
+            self._regroup_drive(j, a)
+        if sigma == FIXED:
+            self._regroup_body(j, a)
+        elif self.spans[j].rotations is RotationRank.NONE:
+            self.drop(j, range(M))
+        elif sigma == REVOLUTE:
+            self._regroup_revolute(j, a)
+        else:
+            self._regroup_prismatic(j, a)
+
+    def _regroup_revolute(self, j: int, a: int) -> None:
+        first, span, row = 10 * (j - 1), self.spans[j], self.rows[j - 1]
+        z, P = row.rotation[:, 2], row.position
+        weight = float(np.linalg.norm(self.gravity[j]))
+        self.add_mass(a, P, self.take(first + M))
+        if span.rotations is RotationRank.ONE:
+            e = span.direction
+            self.drop(j, (*range(ZZ), MZ))
+            unloaded = not weight or parallel(e, self.gravity[j] / weight, self.tolerance)
+            across = any(not parallel(slide, e, self.tolerance) for slide in span.slides)
+            if span.centre is not None and unloaded and not across:
+                self.drop(j, (MX, MY))
+            return
+        yy = self.take(first + YY)
+        self.add(first + XX, -1, yy)
+        self.add_tensor(a, np.eye(3, dtype=np.int64) - np.outer(z, z), yy)
+        self.add_moment(a, z, P, self.take(first + MZ))
+        if span.centre is not None and not weight:
+            # all rotations about one point: first moments act as an inertia about it
+            for i, place in ((0, 2), (1, 4)):
+                self.add(first + place, span.centre[2], self.take(first + MX + i))
+
+    def _regroup_prismatic(self, j: int, a: int) -> None:
+        first, span, row, e = 10 * (j - 1), self.spans[j], self.rows[j - 1], self.directions[j - 1]
+        R = row.rotation
+        for place in range(6):
+            tensor = R @ _unit_tensor(place) @ R.T
+            self.add_tensor(a, tensor, self.take(first + place))
+        if span.rotations is not RotationRank.ONE:
+            return
+        last = max(i for i in range(3) if abs(span.direction[i]) > self.tolerance)
+        along = self.take(first + MX + last)
+        for i in range(last):
+            if abs(span.direction[i]) > self.tolerance:
+                self.add(first + MX + i, -e[i] / e[last], along)
+        if parallel(span.direction, np.array([0.0, 0.0, 1.0]), self.tolerance):
+            for i in range(2):
+                self.add_moment(a, R[:, i], row.position, self.take(first + MX + i))
+
+    def _regroup_body(self, j: int, a: int) -> None:
+        first, R, P = 10 * (j - 1), self.rows[j - 1].rotation, self.rows[j - 1].position
+        for place in range(6):
+            self.add_tensor(a, R @ _unit_tensor(place) @ R.T, self.take(first + place))
+        for i in range(3):
+            self.add_moment(a, R[:, i], P, self.take(first + MX + i))
+        self.add_mass(a, P, self.take(first + M))
+
+    def _regroup_drive(self, j: int, a: int) -> None:
+        joint, first = int(self.model.chain.joint[j - 1]), 10 * (j - 1)
+        if DriveKind.IA not in self.starts:
+            return
+        Ia, row, before = self.starts[DriveKind.IA] + joint, self.rows[j - 1], self.spans[a]
+        z = self.model.chain.rotation[j - 1][:, 2]
+        is_first, one = before.rotations is RotationRank.NONE, before.rotations is RotationRank.ONE
+        if self.model.chain.sigma[j - 1] == REVOLUTE:
+            crosses = one and abs(z @ before.direction) <= self.tolerance
+            if is_first or crosses:
+                self.add(first + ZZ, 1, self.take(Ia))
+            return
+        still = is_first or (one and parallel(z, before.direction, self.tolerance))
+        if not still or any(abs(slide @ z) > self.tolerance for slide in before.slides):
+            return
+        # M_j less the same mass in frame a acts on joint j alone, as Ia_j and, loaded, a constant
+        if row.load != 0:
+            if DriveKind.OFFSET not in self.starts:
+                return
+            moved, factor = self.take(self.starts[DriveKind.OFFSET] + joint), -1 / row.load
+            self.add(Ia, -factor, moved)
+        else:
+            moved, factor = self.take(Ia), 1
+        self.add(first + M, factor, moved)
+        self.add_mass(a, row.position, {k: -factor * c for k, c in moved.items()})
+
+
+def _unit_tensor(place: int) -> NDArray[np.int64]:
     """The inertia tensor whose parameter at a place, XX to ZZ, is 1 and whose others are 0."""
     tensor = np.zeros((3, 3), dtype=np.int64)
     i, k = _J[place]
@@ -115,174 +371,3 @@ def _skew(p: Array) -> Array:
 
 def _is_zero(value: Any) -> bool:
     return bool(value == 0) or (isinstance(value, float) and abs(value) < 1e-14)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RowConstants:
-    """Constants of a joint in the frame before it; numbers or formulas."""
-
-    rotation: Array
-    position: Array
-    load: Any
-
-
-def regrouped(
-    model: RobotModel,
-    rows: Sequence[RowConstants],
-    directions: Sequence[Array],
-    drive: Drives,
-    tolerance: float = EXACT,
-) -> dict[int, Combination]:
-    """Apply the rules to all joints, from the last to the first."""
-    f, n = model.f, model.n
-    kinds = drive_kinds(drive)
-    starts = {kind: 10 * f + n * i for i, kind in enumerate(kinds)}
-    work = Regrouping(model, 10 * f + n * len(kinds))
-    spans = motion_spans(model, tolerance)
-    gravity = np.asarray(model.gravity) @ model.chain.base_rotation
-    weight = weight_of(model, tolerance)
-    down = gravity / weight if weight > 0 else np.zeros(3)
-    vertical = _directions_along(model, spans, down, tolerance)
-    loads = loads_of(model, tolerance)
-    for j in range(f, 0, -1):
-        joint = int(model.chain.joint[j - 1])
-        sigma = int(model.chain.sigma[j - 1])
-        before, span = spans[work.antecedent[j - 1]], spans[j]
-        row, e = rows[j - 1], directions[j - 1]
-        unloaded = weight == 0.0 or vertical[j]
-        if sigma != FIXED:
-            drives = {kind: start + joint for kind, start in starts.items()}
-            _regroup_drive(work, model, j, drives, before, row, loads[j - 1] != 0.0, tolerance)
-        if sigma == FIXED:
-            _regroup_body(work, j, row)
-        elif span.rotations is RotationRank.NONE:
-            _drop(work, j, range(M))
-        elif sigma == REVOLUTE:
-            _regroup_revolute(work, j, span, row, unloaded, weight == 0.0, tolerance)
-        else:
-            _regroup_prismatic(work, j, span, row, e, tolerance)
-    return work.stays
-
-
-def rows_of_numbers(
-    model: RobotModel, tolerance: float = EXACT
-) -> tuple[list[RowConstants], list[Array]]:
-    """Numeric arguments of `regrouped` from the table."""
-    chain = model.chain
-    rows = [
-        RowConstants(R, P, load)
-        for R, P, load in zip(
-            chain.rotation, chain.position, loads_of(model, tolerance), strict=True
-        )
-    ]
-    return rows, [span.direction for span in motion_spans(model, tolerance)[1:]]
-
-
-def _regroup_revolute(
-    work: Regrouping,
-    j: int,
-    span: MotionSpan,
-    row: RowConstants,
-    unloaded: bool,
-    weightless: bool,
-    tolerance: float,
-) -> None:
-    first, a = 10 * (j - 1), work.antecedent[j - 1]
-    z, P = row.rotation[:, 2], row.position
-    work.add_mass(a, P, work.take(first + M))
-    if span.rotations is RotationRank.ONE:
-        _drop(work, j, (*range(ZZ), MZ))
-        across = span.slides_across(span.direction, tolerance)
-        if span.centre is not None and unloaded and not across:
-            _drop(work, j, (MX, MY))
-        return
-    yy = work.take(first + YY)
-    work.add(first + XX, -1, yy)
-    work.add_tensor(a, np.eye(3, dtype=np.int64) - np.outer(z, z), yy)
-    work.add_moment(a, z, P, work.take(first + MZ))
-    if span.centre is not None and weightless:
-        # all rotations about one point: first moments act as an inertia about it
-        for i, place in ((0, 2), (1, 4)):
-            work.add(first + place, span.centre[2], work.take(first + MX + i))
-
-
-def _regroup_prismatic(
-    work: Regrouping, j: int, span: MotionSpan, row: RowConstants, e: Array, tolerance: float
-) -> None:
-    first, a, R = 10 * (j - 1), work.antecedent[j - 1], row.rotation
-    for place in range(6):
-        tensor = R @ unit_tensor(place) @ R.T
-        work.add_tensor(a, tensor, work.take(first + place))
-    if span.rotations is not RotationRank.ONE:
-        return
-    last = max(i for i in range(3) if abs(span.direction[i]) > tolerance)
-    along = work.take(first + MX + last)
-    for i in range(last):
-        if abs(span.direction[i]) > tolerance:
-            work.add(first + MX + i, -e[i] / e[last], along)
-    if parallel(span.direction, np.array([0.0, 0.0, 1.0]), tolerance):
-        for i in range(2):
-            work.add_moment(a, R[:, i], row.position, work.take(first + MX + i))
-
-
-def _regroup_body(work: Regrouping, j: int, row: RowConstants) -> None:
-    first, a, R, P = 10 * (j - 1), work.antecedent[j - 1], row.rotation, row.position
-    for place in range(6):
-        work.add_tensor(a, R @ unit_tensor(place) @ R.T, work.take(first + place))
-    for i in range(3):
-        work.add_moment(a, R[:, i], P, work.take(first + MX + i))
-    work.add_mass(a, P, work.take(first + M))
-
-
-def _regroup_drive(
-    work: Regrouping,
-    model: RobotModel,
-    j: int,
-    drives: Mapping[DriveKind, int],
-    before: MotionSpan,
-    row: RowConstants,
-    loaded: bool,
-    tolerance: float,
-) -> None:
-    first, Ia, offset = 10 * (j - 1), drives.get(DriveKind.IA), drives.get(DriveKind.OFFSET)
-    if Ia is None:
-        return
-    z = model.chain.rotation[j - 1][:, 2]
-    if model.chain.sigma[j - 1] == REVOLUTE:
-        is_first = before.rotations is RotationRank.NONE
-        crosses = before.rotations is RotationRank.ONE and abs(z @ before.direction) <= tolerance
-        if is_first or crosses:
-            work.add(first + ZZ, 1, work.take(Ia))
-        return
-    still = before.rotations is RotationRank.NONE or (
-        before.rotations is RotationRank.ONE and parallel(z, before.direction, tolerance)
-    )
-    if not still or before.slides_along(z, tolerance):
-        return
-    # M_j less the same mass in frame a acts on joint j alone: as Ia_j and, loaded, as a constant
-    if loaded:
-        if offset is None:
-            return
-        moved, factor = work.take(offset), -1 / row.load
-        work.add(Ia, -factor, moved)
-    else:
-        moved, factor = work.take(Ia), 1
-    work.add(first + M, factor, moved)
-    a = work.antecedent[j - 1]
-    work.add_mass(a, row.position, {k: -factor * c for k, c in moved.items()})
-
-
-def _directions_along(
-    model: RobotModel, spans: tuple[MotionSpan, ...], down: Array, tolerance: float
-) -> list[bool]:
-    """Of each frame, whether it turns about one direction and gravity acts along it."""
-    return [
-        span.rotations is RotationRank.ONE
-        and parallel(axes_in_base(model, j) @ span.direction, down, tolerance)
-        for j, span in enumerate(spans)
-    ]
-
-
-def _drop(work: Regrouping, j: int, places: Sequence[int] | range) -> None:
-    for place in places:
-        work.take(10 * (j - 1) + place)

@@ -8,7 +8,7 @@ from .._arrays import Array
 from ..drive import Drives, drive_kinds
 from ..geometry import PRISMATIC, REVOLUTE
 from ..model import RobotModel
-from .motion_span import reach
+from .rules import reach
 
 _SAME = 1e-9
 """Tolerance of constants, relative to 1 (directions) or to the robot's size."""

@@ -63,11 +63,6 @@ class DryFriction:
     joint: NDArray[np.int64]
     motor: NDArray[np.bool_]
 
-    def first(self, count: int) -> DryFriction:
-        """The first parts only."""
-        levels = self.lower[:count], self.upper[:count], self.drives[:count]
-        return DryFriction(self.rates[:count], *levels, self.joint[:count], self.motor[:count])
-
     def joint_signs(self, signs: Array) -> Array:
         """Direction of each joint that is a part, NaN for the others, shape (n,)."""
         out = np.full(self.rates.shape[1], np.nan)
@@ -89,12 +84,10 @@ class DryFriction:
         D = self.rates[stuck]
         _, size, Vt = np.linalg.svd(D)
         rank = int((size > _RANK * size.max()).sum())
-        free = Vt[rank:].T.copy()
-        free[np.abs(free) < 1e-14] = 0.0
+        free = np.where(np.abs(Vt[rank:]) < 1e-14, 0.0, Vt[rank:]).T.copy()
         unique = rank == stuck.size
-        return Mode(
-            signs, stuck, free, np.asarray(np.linalg.pinv(D.T), np.float64) if unique else None
-        )
+        holding = np.asarray(np.linalg.pinv(D.T), np.float64) if unique else None
+        return Mode(signs, stuck, free, holding)
 
     def decided(self, v: Array, M: Array, rest: Array) -> Mode:
         """The mode of velocities v, with parts at rest that stick or slip under torques `rest`."""
@@ -125,18 +118,17 @@ class DryFriction:
         # not unique: distribution with the largest margin
         from scipy.optimize import linprog
 
-        D = self.rates[mode.stuck].T
+        k, D = mode.stuck.size, self.rates[mode.stuck].T
         level, D = reaction - D @ middle, D * half
         scale = max(float(np.abs(level).max()), float(np.abs(D).max()))
-        k = mode.stuck.size
-        eye, ones = np.eye(k), -np.ones((k, 1))
+        eye = np.eye(k)
         best = linprog(
-            np.r_[np.zeros(k), 1.0],
-            A_ub=np.block([[eye, ones], [-eye, ones]]),
+            np.append(np.zeros(k), 1.0),
+            A_ub=np.c_[np.r_[eye, -eye], -np.ones(2 * k)],
             b_ub=np.zeros(2 * k),
             A_eq=np.c_[D, np.zeros(len(D))] / scale,
             b_eq=level / scale,
-            bounds=[(None, None)] * k + [(0.0, None)],
+            bounds=(None, None),
         )
         return 1.0 - float(best.fun) if best.status == 0 else -np.inf
 
@@ -164,17 +156,17 @@ class DryFriction:
 
 def dry_friction(model: RobotModel, drive: bool, friction: Friction | None) -> DryFriction:
     """Parts with dry friction: joints, and shafts of coupled motors."""
-    n = model.n
+    n, K = model.n, model.transmission
     drives = model.drive_matrices if drive else None
     coulomb = np.zeros(n) if drives is None else drives.coulomb
     extra = jump_at_rest(friction, n)
     lower, upper = extra[0] - coulomb, extra[1] + coulomb
     joints = np.flatnonzero(lower != upper)
     rates, levels, motors = np.zeros((0, n)), np.empty(0), np.empty(0, np.int64)
-    if drives is not None and drives.coupling.size and model.transmission is not None:
+    if drives is not None and drives.coupling.size and K is not None:
         some = drives.coupled_coulomb != 0.0
         rates, levels = drives.coupling[some], drives.coupled_coulomb[some]
-        motors = (np.array(model.transmission.coupled_motors) - 1)[some]
+        motors = (np.array(K.coupled_motors) - 1)[some]
     return DryFriction(
         rates=np.concatenate([np.eye(n)[joints], rates]),
         lower=np.concatenate([lower[joints], -levels]),

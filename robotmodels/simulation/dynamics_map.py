@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, Rebuilt, as_exact, as_vector, read_only
+from .._arrays import Array, Rebuilt, as_exact, as_floats, read_only
 from ..dynamics import gravity_torque, mass_matrix
-from ..errors import InvalidValueError, ShapeError
+from ..errors import InvalidValueError
 from ..geometry import PRISMATIC
 from ..model import RobotModel, check_model
 
@@ -113,43 +112,34 @@ def dynamics_map(
     ((3, 4, 6, 6), (3, 4, 6))
     """
     check_model(model)
-    chosen = np.atleast_1d(np.asarray(joints))
-    k, n = chosen.size, model.n
-    if chosen.dtype.kind not in "iu" or chosen.ndim != 1 or len(set(chosen.tolist())) != k or k > 2:
+    n, columns = model.n, np.atleast_1d(np.asarray(joints))
+    k = columns.size
+    if not (columns.dtype.kind in "iu" and columns.shape in ((1,), (2,))) or (
+        len(set(columns.tolist())) != k or columns.min() < 0 or columns.max() >= n
+    ):
         raise InvalidValueError(
-            f"joints: expected one or two different joints, got {joints!r:.60}."
+            f"joints: expected one or two different joints, numbers from 0 to {n - 1}, got "
+            f"{joints!r:.60}."
         )
-    if not k or chosen.min() < 0 or chosen.max() >= n:
-        raise InvalidValueError(f"joints: expected numbers from 0 to {n - 1}, got {joints!r:.60}.")
     base = np.zeros(n) if q is None else as_exact(q, (n,), "q")
-    ends = np.array([_range(model, j) for j in chosen])
-    if ranges is not None:
-        ends = as_vector(ranges, 2, "ranges")
-        if ends.shape not in ((k, 2), (2,) if k == 1 else (k, 2)):
-            raise ShapeError(f"ranges: expected shape ({k}, 2), got {ends.shape}.")
-        ends = ends.reshape(k, 2)
+    if ranges is None:
+        limits = np.stack([model.lower, model.upper], axis=1)
+        slide = model.table.sigma[model.table.joint_rows] == PRISMATIC
+        whole = np.where(slide[:, None], [0.0, 1.0], [-np.pi, np.pi])
+        known = np.isfinite(limits).all(axis=1) & (model.lower < model.upper)
+        ends = np.where(known[:, None], limits, whole)[columns]
+    else:
+        given = as_floats(ranges, "ranges")
+        ends = as_exact(given[None] if k == given.ndim == 1 else given, (k, 2), "ranges")
     if (ends[:, 0] >= ends[:, 1]).any():
         raise InvalidValueError(f"ranges: expected ascending ends, got {ends.tolist()}.")
-    counts = _samples(samples, k)
-    values = [np.linspace(a, b, count) for (a, b), count in zip(ends, counts, strict=True)]
-    grid = np.broadcast_to(base, (*counts, n)).copy()
-    for j, column in zip(chosen, np.meshgrid(*values, indexing="ij"), strict=True):
-        grid[..., j] = column
-    mass, gravity = mass_matrix(model, grid, drive), gravity_torque(model, grid)
-    return DynamicsMap(model, tuple(chosen.tolist()), tuple(values), base, mass, gravity)
-
-
-def _range(model: RobotModel, j: int) -> tuple[float, float]:
-    """Limits of a joint, or a whole turn (a metre) where it has none."""
-    lower, upper = float(model.lower[j]), float(model.upper[j])
-    if np.isfinite(lower) and np.isfinite(upper) and lower < upper:
-        return lower, upper
-    prismatic = model.table.sigma[model.table.joint_rows[j]] == PRISMATIC
-    return (0.0, 1.0) if prismatic else (-np.pi, np.pi)
-
-
-def _samples(samples: Any, k: int) -> list[int]:
     counts = np.asarray((181 if k == 1 else 61) if samples is None else samples)
     if counts.dtype.kind not in "iu" or counts.shape not in ((), (k,)) or counts.min() < 2:
         raise InvalidValueError(f"samples: expected {k} whole numbers from 2, got {samples!r:.60}.")
-    return np.broadcast_to(counts, (k,)).tolist()
+    sizes = np.broadcast_to(counts, (k,)).tolist()
+    values = [np.linspace(a, b, size) for (a, b), size in zip(ends, sizes, strict=True)]
+    grid = np.broadcast_to(base, (*sizes, n)).copy()
+    for j, column in zip(columns, np.meshgrid(*values, indexing="ij"), strict=True):
+        grid[..., j] = column
+    mass, gravity = mass_matrix(model, grid, drive), gravity_torque(model, grid)
+    return DynamicsMap(model, tuple(columns.tolist()), tuple(values), base, mass, gravity)

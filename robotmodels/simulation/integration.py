@@ -58,10 +58,8 @@ class Integration:
         self.motion, self.dry, self.times, self.options = motion, motion.dry, times, options
         n = motion.n
         # limits as rows of G y + c, which is negative beyond them
-        G, c = np.zeros((2 * n, 2 * n)), np.full(2 * n, np.inf)
-        G[:n, :n], G[n:, :n] = -np.eye(n), np.eye(n)
-        if limits is not None:
-            c = np.concatenate([limits[1], -limits[0]])
+        G = np.hstack([np.vstack([-np.eye(n), np.eye(n)]), np.zeros((2 * n, n))])
+        c = np.full(2 * n, np.inf) if limits is None else np.concatenate([limits[1], -limits[0]])
         self._limits = np.flatnonzero(np.isfinite(c))
         self._G, self._c = G[self._limits], c[self._limits]
         self.t: list[float] = []
@@ -97,17 +95,17 @@ class Integration:
         import scipy.integrate
 
         options, motion = self.options, self.motion
-        make: Any = getattr(scipy.integrate, options.method.value)
+        method: Any = getattr(scipy.integrate, options.method.value)
         first = None if self._step is None else min(self._step, bound - t)
+        tolerances = {"rtol": options.rtol, "atol": options.atol, "max_step": options.max_step}
         watched = bool(self.dry.lower.size or self._limits.size)
         try:
-            solver = make(motion.derivative, t, y, bound, rtol=options.rtol, atol=options.atol,
-                          max_step=options.max_step, first_step=first)  # fmt: skip
+            solver = method(motion.derivative, t, y, bound, first_step=first, **tolerances)
             failed = not np.isfinite(solver.h_abs)
             while solver.status == "running" and not failed:
                 if motion.evaluations >= options.max_evaluations:
                     self.status = SimulationStatus.NOT_CONVERGED
-                    break
+                    return t, np.array(y), None
                 before = float(solver.h_abs)
                 solver.step()
                 if solver.status == "failed":
@@ -148,13 +146,11 @@ class Integration:
 
     def _sample(self, t: float, y: Array) -> None:
         n, motion = self.motion.n, self.motion
-        q, v = y[:n].copy(), y[n : 2 * n].copy()
+        q, v, works = np.split(y[: 2 * n + 3].copy(), [n, 2 * n])
         at = motion.at(t, q, v)
-        held = motion.joint_signs == 0.0
         self.t.append(t)
-        self.rows.append(
-            (q, v, at.a, at.tau.copy(), at.friction, held, y[2 * n : 2 * n + 3].copy())
-        )
+        held = motion.joint_signs == 0.0
+        self.rows.append((q, v, at.a, at.tau.copy(), at.friction, held, works))
 
     def _report(self, t: float) -> None:
         done = (t - self._start) / (self._end - self._start)
@@ -185,18 +181,21 @@ class Integration:
                 event = Event(root[0], -1 if limit >= 0 else int(slip[i]), limit)
         if mode.stuck.size:
             # torques after the first event belong to another mode
-            seen = ts if event is None else ts[: max(int(np.searchsorted(ts, event.t)) + 1, 2)]
+            within = ts if event is None else ts[: max(int(np.searchsorted(ts, event.t)) + 1, 2)]
 
             def margin(s: float) -> float:
                 y = np.ascontiguousarray(dense(s))
                 reaction = self.motion.at(s, y[:n], y[n : 2 * n]).reaction
                 return self.dry.margin(mode, reaction)
 
-            values = np.array([margin(float(s)) for s in seen])
-            root = first_below(margin, seen, values, -_SLACK, -_ROUNDING)
+            margins = np.array([margin(float(s)) for s in within])
+            root = first_below(margin, within, margins, -_SLACK, -_ROUNDING)
             if root is not None:
                 # past the root, so that a jump of the torques is included
-                t = first_negative(margin, *root, -_ROUNDING)
+                t, end = root
+                step = float(np.spacing(max(abs(t), abs(end))))
+                while t < end and margin(t) >= -_ROUNDING:
+                    t, step = min(t + step, end), 2.0 * step
                 event = Event(t) if event is None or t < event.t else event
         return event
 
@@ -208,7 +207,7 @@ class Integration:
             return y
         near = t - self._last_event <= _SAME_INSTANT * max(abs(t), self._end - self._start)
         self._repeats, self._last_event = self._repeats + 1 if near else 0, t
-        n, mode = self.motion.n, self.motion.mode
+        mode = self.motion.mode
         if self._repeats > 10 + 4 * self.dry.lower.size:
             self.status = SimulationStatus.CHATTERING
         elif event.part >= 0:
@@ -217,8 +216,7 @@ class Integration:
             return self._decide(t, _at_rest(y, self.dry.mode(signs)))
         else:
             try:
-                balance = self.motion.balance(t, y[:n].copy(), y[n : 2 * n].copy())
-                self._set(t, self.dry.loosened(mode, *balance))
+                self._set(t, self.dry.loosened(mode, *self.motion.balance(t, y)))
             except np.linalg.LinAlgError:
                 self.status = SimulationStatus.SINGULAR
         return y
@@ -228,10 +226,10 @@ class Integration:
         if not self.dry.lower.size:
             return y
         n, old = self.motion.n, self.motion.mode
-        q, v = y[:n].copy(), y[n : 2 * n].copy()
+        v = y[n : 2 * n].copy()
         self.motion.set_mode(self.dry.mode(self.dry.signs(v)))  # no dry friction at rest
         try:
-            mode = self.dry.decided(v, *self.motion.balance(t, q, v))
+            mode = self.dry.decided(v, *self.motion.balance(t, y))
         except np.linalg.LinAlgError:
             self.status, mode = SimulationStatus.SINGULAR, old
         self.motion.set_mode(old)
@@ -285,25 +283,13 @@ def _root(g: Callable[[float], float], left: float, low: float, zero: float) -> 
     """Where a function passes zero before `low`, or the left end if it is not above zero there."""
     from scipy.optimize import brentq
 
-    def above(t: float) -> float:
-        return g(t) - zero
-
     high = low
     # after an event it starts at zero and may increase before it decreases
     for x in (left, *(left + (low - left) * 0.5**k for k in range(1, 41))):
-        if above(x) > 0.0:
-            if above(high) >= 0.0:
+        if g(x) > zero:
+            if g(high) >= zero:
                 return high
-            root: Any = brentq(above, x, high, xtol=1e-15 * max(1.0, abs(low)))
+            root: Any = brentq(lambda t: g(t) - zero, x, high, xtol=1e-15 * max(1.0, abs(low)))
             return float(root)
         high = x if x > left else high
     return left
-
-
-def first_negative(g: Callable[[float], float], t: float, end: float, zero: float) -> float:
-    """First representable time at or after a root at which a function is negative."""
-    step = float(np.spacing(max(abs(t), abs(end))))
-    while t < end and g(t) >= zero:
-        t = min(t + step, end)
-        step *= 2.0
-    return t

@@ -16,7 +16,7 @@ from .._arrays import Array
 from ..friction import Friction
 from ..friction.protocols import by_dependence, torque_at
 from ..model import RobotModel
-from .dry_friction import SLOWEST, DryFriction, Mode, jump_at_rest
+from .dry_friction import SLOWEST, Mode, dry_friction, jump_at_rest
 
 Law = Callable[[float, Array, Array], Array]
 """Torques or a wrench at time t, positions q and velocities v."""
@@ -44,7 +44,6 @@ class Motion:
         wrench: Law | None,
         drive: bool,
         friction: Friction | None,
-        dry: DryFriction,
         width: Array | None = None,
     ) -> None:
         from ..kernels.direct_dynamics import joint_accelerations
@@ -56,8 +55,9 @@ class Motion:
         self.n, self.control, self.wrench, self.width = n, control, wrench, width
         self.extra, self.placed = by_dependence(friction)
         self.jump = jump_at_rest(friction, n)
-        # smoothed friction: no sticking parts
-        self.smooth, self.dry = dry, dry if width is None else dry.first(0)
+        self.dry = self.smooth = dry_friction(model, drive, friction)
+        if width is not None:  # no parts stick
+            self.dry = dry_friction(model, False, None)
         drives = model.drive_matrices if drive else None
         self.rotor = np.zeros((n, n)) if drives is None else np.ascontiguousarray(drives.rotor)
         self.viscous = np.zeros((n, n)) if drives is None else drives.viscous
@@ -67,7 +67,7 @@ class Motion:
         self._bodies = (*model.chain, model.inertia.values)
         self._tool = (*model.chain, *model.twin.frame(None).kernel_arguments, _WORLD_ALIGNED)
         self._gravity, self._zero = model.gravity, np.zeros((1, n))
-        level = np.abs(dry.rates.T) @ (0.5 * np.abs(dry.upper - dry.lower))
+        level = np.abs(self.smooth.rates.T) @ (0.5 * np.abs(self.smooth.upper - self.smooth.lower))
         self._weights = np.divide(1.0, level, out=np.zeros(n), where=level > 0.0)
         self.evaluations = 0
         self.singular = False
@@ -91,13 +91,10 @@ class Motion:
             return np.full(2 * n + 4, np.nan)
         v = y[n : 2 * n]
         at = self.at(t, y[:n], v)
-        works = (
-            at.tau @ v,
-            (at.friction + self.offset) @ v,
-            at.tool @ v,
-            at.reaction @ self._weights,
+        control, friction = at.tau @ v, (at.friction + self.offset) @ v
+        return np.concatenate(
+            [v, at.a, (control, friction, at.tool @ v, at.reaction @ self._weights)]
         )
-        return np.concatenate([v, at.a, works])
 
     def at(self, t: float, q: Array, v: Array) -> Loads:
         """Accelerations and torques at one time; NaN accelerations where M is singular."""
@@ -142,9 +139,10 @@ class Motion:
             tool = self.wrench(time, q, v) @ J[0]
         return tau - friction - self.offset - tool, tau, friction, tool
 
-    def balance(self, t: float, q: Array, v: Array) -> tuple[Array, Array]:
-        """Mass matrix, and the torques without reactions at rest."""
+    def balance(self, t: float, y: Array) -> tuple[Array, Array]:
+        """Mass matrix, and the torques without reactions at rest, in a state."""
         self.evaluations += 1
+        q, v = y[: self.n].copy(), y[self.n : 2 * self.n].copy()
         M, h = self.bodies(q, v)
         return M, self.load(t, q, v)[0] - h
 

@@ -12,18 +12,11 @@ from .._arrays import Array, Rebuilt
 from .._outcomes import Outcome
 from ..model import RobotModel
 
-_RESTS = 1e-6  # least scale of drifts, relative to the potential energy
-_LEAST = 1e-9  # J: least scale of drifts
+_RESTS, _LEAST = 1e-6, 1e-9  # least scale of drifts: relative to the potential energy, and in J
 
 
 class SimulationStatus(Outcome):
-    """Outcome of a simulation; fits int8. The motion until then is given for every status.
-
-    Examples
-    --------
-    >>> SimulationStatus.FINISHED.sentence
-    'The motion was followed to its end.'
-    """
+    """Outcome of a simulation; fits int8. The motion until then is given for every status."""
 
     FINISHED = 0, "The motion was followed to its end."
     LIMIT_REACHED = 1, "A joint reached one of its limits, where the motion was to be stopped."
@@ -56,13 +49,7 @@ class Integrator(Enum):
 
 
 class SimulationEventKind(Outcome):
-    """Kinds of events of a simulation.
-
-    Examples
-    --------
-    >>> SimulationEventKind.STUCK.sentence
-    'comes to rest and sticks'
-    """
+    """Kinds of events of a simulation."""
 
     STUCK = 0, "comes to rest and sticks"
     BROKE_AWAY = 1, "breaks away"
@@ -133,17 +120,15 @@ class Simulation(Rebuilt):
         Stick, slip and limits, in the order of time.
     status : SimulationStatus
         Why it ended.
-    evaluations : int
-        Number of evaluations of the model.
-    steps : int
-        Steps of the integrator.
+    evaluations, steps : int
+        Numbers of evaluations of the model and of steps of the integrator.
 
     Examples
     --------
     >>> from robotmodels.robots import load
     >>> from robotmodels.simulation import simulate
-    >>> fall = simulate(load("rx90"), np.zeros(6), np.zeros(6), t=0.2)
-    >>> fall.status, bool(fall.relative_drift < 1e-9)
+    >>> motion = simulate(load("rx90"), np.zeros(6), np.zeros(6), t=0.2)
+    >>> motion.status, bool(motion.relative_drift < 1e-9)
     (<SimulationStatus.FINISHED: 0>, True)
     """
 
@@ -168,8 +153,7 @@ class Simulation(Rebuilt):
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            value = getattr(self, field.name)
-            if isinstance(value, np.ndarray):
+            if isinstance(value := getattr(self, field.name), np.ndarray):
                 value.setflags(write=False)
 
     @property
@@ -216,21 +200,16 @@ class Simulation(Rebuilt):
         The turnover counts at least a millionth of the largest potential energy and 1e-9 J, so
         that the value of an arm at rest is not the ratio of two rounding errors.
         """
-        floor = max(_RESTS * float(np.abs(self.potential).max()), _LEAST)
-        return float(np.abs(self.drift).max()) / max(self.energy_turnover, floor)
-
-    @property
-    def drift_rate(self) -> float:
-        """Total drift per second of simulated time, W."""
-        return float(self.drift[-1]) / self.duration if self.duration > 0.0 else 0.0
+        least = max(_RESTS * float(np.abs(self.potential).max()), _LEAST)
+        return float(np.abs(self.drift).max()) / max(self.energy_turnover, least)
 
     def __str__(self) -> str:
         lines = [
             f"{self.model.name}: {self.duration:.6g} s, steps: {self.steps}, evaluations of the "
             f"model: {self.evaluations}",
             self.reason,
-            f"energy drift {self.drift[-1]:.2g} J, {self.drift_rate:.2g} W, "
-            f"{self.relative_drift:.2g} of the energy turnover",
+            f"energy drift {self.drift[-1]:.2g} J, {self.relative_drift:.2g} of the energy "
+            "turnover",
             *map(str, self.events[:10]),
         ]
         more = len(self.events) - 10

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import Array, as_exact, as_floats, as_reals, as_vector
+from .._arrays import Array, as_exact, as_floats, as_reals
 from .._choices import chosen
 from ..drive import check_all_or_none
 from ..dynamics import ddm, kinetic_energy, mass_matrix, potential_energy
 from ..errors import InertiaError, InvalidValueError, ShapeError
 from ..friction import Friction, check_friction
 from ..model import RobotModel, check_model
-from .dry_friction import check_dissipates, dry_friction
+from .dry_friction import check_dissipates
 from .integration import Integration, Options
 from .motion import Law, Motion
 from .result import Integrator, Simulation
@@ -117,14 +117,14 @@ def simulate(
     Examples
     --------
     >>> from robotmodels.robots import load
-    >>> fall = simulate(load("rx90"), np.zeros(6), np.zeros(6), t=np.linspace(0.0, 0.2, 5))
-    >>> fall.q.shape, fall.reason, bool(abs(fall.drift).max() < 1e-8)
+    >>> motion = simulate(load("rx90"), np.zeros(6), np.zeros(6), t=np.linspace(0.0, 0.2, 5))
+    >>> motion.q.shape, motion.reason, bool(abs(motion.drift).max() < 1e-8)
     ((5, 6), 'The motion was followed to its end.', True)
     """
     check_model(model)
     check_all_or_none(drive)
     n = model.n
-    q, v = _state(q0, n, "q0"), _state(v0, n, "v0")
+    q, v = as_exact(q0, (n,), "q0").copy(), as_exact(v0, (n,), "v0").copy()
     start, end, times = _times(t)
     law, knots = _law(control, n, times, "control")
     tool, tool_knots = _law(wrench, 6, times, "wrench")
@@ -143,40 +143,30 @@ def simulate(
         float(_positive(atol, "atol")),
         float(_positive(max_step, "max_step")),
         int(_positive(max_evaluations, "max_evaluations", least=1)),
-        (lambda done: _LOG.info("simulated %.0f %%", 100.0 * done))
-        if progress is True
-        else progress or None,
+        _log_progress if progress is True else progress or None,
     )
     limits = _limits(model, q) if stop_at_limits else None
-    dry = dry_friction(model, drive, friction)
-    if width is None:
-        check_dissipates(dry)
-    _check_start(model, q, v, drive, width is None and dry.lower.size > 0)
-    motion = Motion(model, law, tool, drive, friction, dry, width)
+    motion = Motion(model, law, tool, drive, friction, width)
+    check_dissipates(motion.dry)
+    _check_start(model, q, v, drive, motion.dry.lower.size > 0)
     run = Integration(motion, times, limits, options)
     with np.errstate(over="ignore", invalid="ignore"):  # an unbounded motion is a status
         run.follow(q, v, cuts)
     q, v, a, tau, taken, held, works = (np.array(x) for x in zip(*run.rows, strict=True))
+    kinetic, potential = kinetic_energy(model, q, v, drive), potential_energy(model, q)
     return Simulation(
-        model=model,
-        t=np.array(run.t),
-        q=q,
-        v=v,
-        a=a,
-        tau=tau,
-        friction=taken,
-        sticking=held,
-        kinetic=kinetic_energy(model, q, v, drive),
-        potential=potential_energy(model, q),
-        control_work=works[:, 0].copy(),
-        friction_work=works[:, 1].copy(),
-        wrench_work=works[:, 2].copy(),
+        *(model, np.array(run.t), q, v, a, tau, taken, held, kinetic, potential),
+        *works.T.copy(),
         drive=bool(drive),
         events=tuple(run.events),
         status=run.status,
         evaluations=motion.evaluations,
         steps=run.steps,
     )
+
+
+def _log_progress(done: float) -> None:
+    _LOG.info("simulated %.0f %%", 100.0 * done)
 
 
 def _law(law: Any, size: int, t: Array | None, name: str) -> tuple[Law | None, Array]:
@@ -195,20 +185,20 @@ def _law(law: Any, size: int, t: Array | None, name: str) -> tuple[Law | None, A
             f"{name}: expected a function {name}(t, q, v) -> ({size},), or an array of shape "
             f"({size},){rows}, got shape {values.shape}."
         )
-    columns = list(values.T.copy())
-    return lambda time, q, v: np.array([np.interp(time, t, x) for x in columns]), t[1:-1]
+    return lambda time, q, v: np.array([np.interp(time, t, x) for x in values.T]), t[1:-1]
 
 
 def _checked(law: Callable[..., Any], size: int, name: str) -> Law:
     """User function with checks of its values."""
 
     def value(t: float, q: Array, v: Array) -> Array:
+        where = f"{name}(t, q, v) at t = {t:.9g} s"
         try:
             answer = law(t, q.copy(), v.copy())
         except Exception as error:
-            error.add_note(f"Raised by {name}(t, q, v) at t = {t:.9g} s.")
+            error.add_note(f"Raised by {where}.")
             raise
-        return as_exact(answer, (size,), f"{name}(t, q, v) at t = {t:.9g} s")
+        return as_exact(answer, (size,), where)
 
     return value
 
@@ -227,16 +217,6 @@ def _times(t: ArrayLike) -> tuple[float, float, Array | None]:
             f"t: expected ascending times, got {times[k]} s and then {times[k + 1]} s at [{k + 1}]."
         )
     return float(times[0]), float(times[-1]), times.copy()
-
-
-def _state(values: ArrayLike, n: int, name: str) -> Array:
-    array = as_vector(values, n, name)
-    if array.ndim != 1:
-        raise ShapeError(
-            f"{name}: expected one state of shape ({n},), got {array.shape}; simulate several "
-            "one after the other."
-        )
-    return array.copy()
 
 
 def _positive(value: Any, name: str, shape: tuple[int, ...] = (), least: float = 1e-300) -> Array:
@@ -272,9 +252,8 @@ def _check_start(model: RobotModel, q: Array, v: Array, drive: bool, dry: bool) 
         finite = np.isfinite(a).all() and np.isfinite(kinetic_energy(model, q, v, drive))
     if model.transmission is not None and not model.transmission.is_invertible:
         raise InvalidValueError(
-            f"model: {model.name!r} has joints that mimic others, which simulate does not support: "
-            "their coupling would not hold. Integrate ddm, or simulate independent joints with "
-            "model.with_transmission(None)."
+            f"model: {model.name!r} has joints that mimic others, which simulate does not support. "
+            "Integrate ddm, or simulate independent joints with model.with_transmission(None)."
         )
     if not finite:
         raise InvalidValueError(

@@ -1,4 +1,9 @@
-"""Decomposition of the torques of a motion into inertia, Coriolis, gravity, friction and wrench."""
+"""Decomposition of the torques of a motion into inertia, Coriolis, gravity, friction and wrench.
+
+References
+----------
+Seed book sections 1.5.1.1 to 1.5.1.5.
+"""
 
 from __future__ import annotations
 
@@ -23,23 +28,12 @@ class TorqueParts(Rebuilt):
 
     Parameters
     ----------
-    inertia : ndarray, shape (..., n)
-        ``M(q) a``, with rotors, N m or N.
-    coriolis : ndarray, shape (..., n)
-        Coriolis and centrifugal torques ``C(q, v) v``.
-    gravity : ndarray, shape (..., n)
-        ``g(q)``.
+    inertia, coriolis, gravity : ndarray, shape (..., n)
+        ``M(q) a``, with rotors, ``C(q, v) v`` and ``g(q)``, N m or N.
     friction : ndarray, shape (..., n)
         Viscous and dry friction and offsets of the drives, and of a friction model.
     wrench : ndarray, shape (..., n)
         ``J^T wrench``.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> parts = torque_parts(load("rx90"), np.zeros(6), np.ones(6), np.zeros(6))
-    >>> parts.coriolis.shape, bool(parts.inertia.any())
-    ((6,), False)
     """
 
     inertia: Array
@@ -93,10 +87,6 @@ def torque_parts(
     ShapeError, InvalidValueError
         Arguments of the wrong length, or with NaN or infinity; a motion without samples.
 
-    References
-    ----------
-    Seed book sections 1.5.1.1 to 1.5.1.5.
-
     Examples
     --------
     >>> from robotmodels.robots import load
@@ -107,32 +97,27 @@ def torque_parts(
     check_model(model)
     check_all_or_none(drive)
     n = model.n
-    q, v, a = as_vector(q, n, "q"), as_vector(v, n, "v"), as_vector(a, n, "a")
-    arrays, names = [q, v, a], ["q", "v", "a"]
+    arrays = {"q": as_vector(q, n, "q"), "v": as_vector(v, n, "v"), "a": as_vector(a, n, "a")}
     if wrench is not None:
-        arrays.append(as_vector(wrench, 6, "wrench"))
-        names.append("wrench")
-    batch = batch_shape(tuple(arrays), tuple(names))
+        arrays["wrench"] = as_vector(wrench, 6, "wrench")
+    batch = batch_shape(tuple(arrays.values()), tuple(arrays))
     if 0 in batch:
         raise InvalidValueError("q, v, a: the motion is empty; expected at least one sample.")
-    q, v, a = (np.broadcast_to(x, (*batch, n)) for x in (q, v, a))
-    still = np.zeros((*batch, n))
-    gravity = gravity_torque(model, q)
+    q, v, a = (np.broadcast_to(arrays[name], (*batch, n)) for name in "qva")
+    tool = still = taken = np.zeros((*batch, n))
     # separate calls, so that no part loses digits to a larger one
     weightless = model.with_gravity(np.zeros(3))
     inertia = idm(weightless, q, still, a, drive=False)
-    coriolis = idm(weightless, q, v, still, drive=False)
-    taken = np.zeros((*batch, n))
     drives = model.drive_matrices if drive else None
     if drives is not None:
         inertia = inertia + a @ drives.rotor
-        taken = taken + drives.torque(v, None)
+        taken = drives.torque(v, None)
     if friction is not None:
         taken = taken + torque_at(check_friction(friction, n), v, q)
-    tool = still
     if wrench is not None:
-        tool = idm(weightless, q, still, still, wrench=arrays[3], drive=False)
-    return TorqueParts(inertia, coriolis, gravity, taken, tool)
+        tool = idm(weightless, q, still, still, wrench=arrays["wrench"], drive=False)
+    coriolis = idm(weightless, q, v, still, drive=False)
+    return TorqueParts(inertia, coriolis, gravity_torque(model, q), taken, tool)
 
 
 def simulated_torque_parts(simulation: Simulation) -> TorqueParts:
@@ -153,16 +138,12 @@ def simulated_torque_parts(simulation: Simulation) -> TorqueParts:
     InvalidValueError
         Not a simulation.
 
-    References
-    ----------
-    Seed book sections 1.5.1.1 to 1.5.1.5.
-
     Examples
     --------
     >>> from robotmodels.robots import load
     >>> from robotmodels.simulation import simulate
-    >>> fall = simulate(load("rx90"), np.zeros(6), np.zeros(6), t=0.1)
-    >>> bool(np.abs(simulated_torque_parts(fall).total).max() < 1e-12)
+    >>> motion = simulate(load("rx90"), np.zeros(6), np.zeros(6), t=0.1)
+    >>> bool(np.abs(simulated_torque_parts(motion).total).max() < 1e-12)
     True
     """
     if not isinstance(simulation, Simulation):
@@ -170,8 +151,7 @@ def simulated_torque_parts(simulation: Simulation) -> TorqueParts:
         raise InvalidValueError(f"simulation: expected the result of simulate(...), got {got}.")
     model = simulation.model
     parts = torque_parts(model, simulation.q, simulation.v, simulation.a, drive=simulation.drive)
-    offset = model.drive.offset if simulation.drive else np.zeros(model.n)
-    friction = simulation.friction + offset
+    friction = simulation.friction + (model.drive.offset if simulation.drive else 0.0)
     rest = parts.inertia, parts.coriolis, parts.gravity, friction
     # the tool's torque was a law of time: the remainder, but for rounding
     tool = simulation.tau - np.sum(rest, axis=0)

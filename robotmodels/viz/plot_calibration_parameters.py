@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._arrays import Array, as_exact, as_reals
-from ..calibration.extended_table.parameters import GeometricParameters
-from ..calibration.extended_table.skeleton import skeleton_of
+from ..calibration.extended_table import skeleton_of
+from ..calibration.parameters import GeometricParameters
 from ..calibration.result import CalibrationResult
 from ..errors import InvalidValueError, ShapeError
 from ..estimation import confidence_intervals

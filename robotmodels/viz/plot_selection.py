@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..calibration.selection.selected import SelectedConfigurations
+from ..calibration.selection import SelectedConfigurations
 from ..errors import InvalidValueError
 from .figures import (
     LIMIT_DASHES,

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..._arrays import Array, as_exact, read_only
 from ...errors import InvalidValueError
-from ..extended_table.skeleton import Frame
+from ..extended_table import Frame
 from .measurement import Evaluation, Fixture, Linearised, Measurement, View, remade
 from .noise import as_noise, part_of_noise
 from .readings import as_readings, as_values

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..._arrays import Array
-from ..extended_table.skeleton import Frame
+from ..extended_table import Frame
 from .labelled import Labelled, Labels, as_known, as_labels
 from .labelled_poses import as_known_pose, guessed_poses, labelled_poses, pose_fixtures
 from .measurement import POSE_AXES, POSE_UNITS, Evaluation, Fixture, Linearised, View, remade

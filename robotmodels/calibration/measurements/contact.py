@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..._arrays import Array
-from ..extended_table.skeleton import Frame
+from ..extended_table import Frame
 from .dilations import have_common_place
 from .labelled import Labelled, Labels, as_known, as_labels
 from .measurement import View, remade

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..._arrays import Array
-from ..extended_table.skeleton import Frame
+from ..extended_table import Frame
 from .contact import Contact
 from .labelled import Labels
 from .labelled_poses import SIX, as_known_pose, guessed_poses, labelled_poses, pose_fixtures

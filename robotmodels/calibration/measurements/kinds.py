@@ -20,9 +20,9 @@ from ...errors import InvalidValueError
 from ...geometry import REVOLUTE
 from ...kinematics.lengths import spread_configurations
 from .. import measurements as m
-from ..extended_table.differential import differential_model
-from ..extended_table.parameters import GeometricParameters
-from ..extended_table.skeleton import Frame
+from ..differential import differential_model
+from ..extended_table import Frame
+from ..parameters import GeometricParameters
 from . import Measurement
 from .satisfied import satisfied_measurement
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..._arrays import Array
 from ...errors import InvalidValueError
-from ..extended_table.skeleton import Frame
+from ..extended_table import Frame
 from .labelled import Labelled, Labels, as_known, as_labels
 from .labelled_poses import (
     POSITION,

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..._arrays import Array
-from ..extended_table.skeleton import Frame
+from ..extended_table import Frame
 
 
 class View(NamedTuple):

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..._arrays import Array, as_exact, read_only
 from ...errors import InvalidValueError
-from ..extended_table.skeleton import Frame
+from ..extended_table import Frame
 from .contact import Contact
 from .labelled import Labels
 from .measurement import Evaluation, Fixture, Linearised

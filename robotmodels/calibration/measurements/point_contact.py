@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..._arrays import Array
-from ..extended_table.skeleton import Frame
+from ..extended_table import Frame
 from .contact import Contact
 from .labelled import Labels
 from .labelled_points import as_point, known_points, labelled_points, point_fixtures

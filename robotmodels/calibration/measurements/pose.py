@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..._arrays import Array, as_core
 from ...errors import ShapeError
-from ..extended_table.skeleton import Frame
+from ..extended_table import Frame
 from .measurement import POSE_AXES, POSE_UNITS, Evaluation, Linearised, Measurement, View, remade
 from .noise import as_noise, part_of_noise
 from .readings import as_measured_poses, as_readings, as_rows

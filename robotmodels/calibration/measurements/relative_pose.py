@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..._arrays import Array
 from ...errors import InvalidValueError
-from ..extended_table.skeleton import Frame
+from ..extended_table import Frame
 from .measurement import POSE_AXES, POSE_UNITS, Evaluation, Linearised, Measurement, View, remade
 from .moving_poses import difference, motionless, relative
 from .noise import as_noise, part_of_noise

@@ -8,10 +8,9 @@ import numpy as np
 
 from ..._arrays import Array
 from ...geometry import FIXED, PRISMATIC
-from ..extended_table.differential import differential_model
-from ..extended_table.elements import Element
-from ..extended_table.parameters import GeometricParameter, GeometricParameters
-from ..extended_table.skeleton import Skeleton
+from ..differential import differential_model
+from ..extended_table import Element, Skeleton
+from ..parameters import GeometricParameter, GeometricParameters
 from . import Evaluation, Measurement
 
 _SATISFIED = 1e-13

@@ -10,7 +10,7 @@ from ... import se3
 from ...estimation import confidence_intervals
 from ...kinematics import operational_coordinates
 from ...table_text import ReportSection, ReportTable, table_of
-from ..identifiability.identifiable import Reason
+from ..identifiable import Reason
 from .units import in_unit, printed_unit
 
 if TYPE_CHECKING:

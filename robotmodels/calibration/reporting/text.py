@@ -10,9 +10,9 @@ from ..._arrays import Array
 from ...estimation import fit_diagnostics
 from ...estimation.correlation import correlated_pairs
 from ...table_text import ReportSection, ReportTable, table_of
-from ..extended_table.elements import ErrorLaw
 from ..folds import suited_fixtures
 from ..notes import is_implausible
+from ..parameters import ErrorLaw
 from ..problem import stacked
 from .measured_sections import error_section, measured_section, noise_section, outlier_section
 from .parameter_sections import left_out_section, parameter_section, place_section

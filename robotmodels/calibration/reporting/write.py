@@ -14,8 +14,8 @@ from ...errors import InvalidValueError, MissingExtraError, UrdfWarning
 from ...estimation import confidence_intervals
 from ...model import to_urdf
 from ...urdf.in_place import urdf_in_place
-from ..calibrated_robot.calibrated import CalibratedRobot
 from ..errors_seen import BlockErrors
+from ..robot import CalibratedRobot
 
 if TYPE_CHECKING:
     from ..result import CalibrationResult

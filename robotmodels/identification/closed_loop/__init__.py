@@ -4,20 +4,17 @@ from .controller import Controller, tuned_controller
 from .didim import Didim
 from .hausman import HausmanResult, hausman_test
 from .instrumental import Instrumental
-from .loop import ClosedLoop, closed_loop
 from .method import SimulationDetails
 from .output_error import OutputError
 from .simulation import simulated_log
 
 __all__ = [
-    "ClosedLoop",
     "Controller",
     "Didim",
     "HausmanResult",
     "Instrumental",
     "OutputError",
     "SimulationDetails",
-    "closed_loop",
     "hausman_test",
     "simulated_log",
     "tuned_controller",

@@ -18,7 +18,7 @@ _POSTURES = 200
 """Largest number of postures for mass matrices."""
 
 
-@dataclass(frozen=True, slots=True, init=False, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class Controller(Rebuilt):
     """A sampled controller of each joint. Read-only.
 
@@ -28,7 +28,7 @@ class Controller(Rebuilt):
     Parameters
     ----------
     kp, kd : array_like, scalar or shape (n,)
-        Gains of position (N m/rad or N/m) and velocity.
+        Gains of position (N m/rad or N/m) and velocity; at least one of the arrays has shape (n,).
     ki : array_like, scalar or shape (n,), optional
         Gain of the integral of the position error, per second; default none.
     limit : array_like, scalar or shape (n,), optional
@@ -57,42 +57,33 @@ class Controller(Rebuilt):
 
     kp: Array
     kd: Array
-    ki: Array
-    limit: Array
-    feed_forward: RobotModel | None
-    period: float | None
+    ki: ArrayLike = 0.0
+    limit: ArrayLike = np.inf
+    feed_forward: RobotModel | None = None
+    period: float | None = None
 
-    def __init__(
-        self,
-        kp: ArrayLike,
-        kd: ArrayLike,
-        ki: ArrayLike = 0.0,
-        limit: ArrayLike = np.inf,
-        feed_forward: RobotModel | None = None,
-        period: float | None = None,
-    ) -> None:
-        gains = {"kp": as_floats(kp, "kp"), "kd": as_floats(kd, "kd"), "ki": as_floats(ki, "ki")}
-        gains["limit"] = as_reals(limit, "limit")
-        lengths = {array.shape for array in gains.values() if array.ndim}
-        if feed_forward is not None:
-            lengths.add((feed_forward.n,))
-        if len(lengths) != 1 or len(next(iter(lengths))) != 1:
+    def __post_init__(self) -> None:
+        gains = {name: as_floats(getattr(self, name), name) for name in ("kp", "kd", "ki")}
+        gains["limit"] = as_reals(self.limit, "limit")
+        shapes = {array.shape for array in gains.values() if array.ndim}
+        if self.feed_forward is not None:
+            shapes.add((self.feed_forward.n,))
+        if len(shapes) != 1 or len(shape := shapes.pop()) != 1:
             raise ShapeError(
                 "kp, kd, ki, limit: expected numbers or arrays of one length (n,), at least one of "
-                f"them an array, got {sorted(lengths)}."
+                f"them an array, got shapes {[array.shape for array in gains.values()]}."
             )
         if not (gains["limit"] > 0.0).all():
-            raise InvalidValueError(f"limit: expected torques above 0, got {limit!r:.60}.")
+            raise InvalidValueError(f"limit: expected torques above 0, got {self.limit!r:.60}.")
         for name, array in gains.items():
-            object.__setattr__(self, name, read_only(np.broadcast_to(array, next(iter(lengths)))))
-        object.__setattr__(self, "feed_forward", feed_forward)
-        seconds = None if period is None else _positive(period, "period")
-        object.__setattr__(self, "period", seconds)
+            object.__setattr__(self, name, read_only(np.broadcast_to(array, shape)))
+        if self.period is not None:
+            object.__setattr__(self, "period", _positive(self.period, "period"))
 
     @property
     def n(self) -> int:
         """Number of joints."""
-        return self.kp.size
+        return len(np.asarray(self.kp))
 
 
 def tuned_controller(
@@ -103,7 +94,43 @@ def tuned_controller(
     period: float = 1e-3,
     feed_forward: bool = True,
 ) -> Controller:
-    """PD gains for a bandwidth (Hz) from the least inertia of each joint over postures q (N, n)."""
+    """PD gains for a bandwidth, from the least inertia of each joint over postures.
+
+    Parameters
+    ----------
+    robot : RobotModel
+        The robot, which is also the feed-forward model.
+    q : array_like, shape (N, n)
+        Postures.
+    bandwidth : float
+        Hz; less where the velocity loop would be too fast for the period.
+    damping : float
+        Damping ratio.
+    period : float
+        Seconds from one torque to the next.
+    feed_forward : bool
+        Whether the torques of the robot on the references are added.
+
+    Returns
+    -------
+    Controller
+        Without integral and limit.
+
+    Raises
+    ------
+    InertiaError, InvalidValueError
+        A mass matrix that is not positive definite; a number that is not positive.
+
+    References
+    ----------
+    Seed book chapter 5.
+
+    Examples
+    --------
+    >>> from robotmodels.robots import load
+    >>> tuned_controller(load("rx90"), [[0.0] * 6], bandwidth=8.0).n
+    6
+    """
     w, damping = 2.0 * np.pi * _positive(bandwidth, "bandwidth"), _positive(damping, "damping")
     inverse = inverse_masses(robot, as_floats(q, "q"))
     if inverse is None:

@@ -9,7 +9,6 @@ from typing import ClassVar
 from ..._arrays import Array
 from ...estimation.factor import TriangularFactors, reduced
 from ..equations import Block, Equations
-from .controller import Controller
 from .loop import ClosedLoop, closed_loop
 from .method import Advance, Scores, SimulatingMethod, Step, weighted_step
 from .simulation import ClosedLoopSimulator, SimulationDivergedError
@@ -30,7 +29,7 @@ class Didim(SimulatingMethod):
 
     Parameters
     ----------
-    controller, loop, start, iterations, lags
+    controller, start, iterations, lags, width, substeps
         See `Instrumental`.
 
     References
@@ -71,20 +70,19 @@ class Didim(SimulatingMethod):
 
         return advance, scores
 
-    def _default_loop(self, system: Equations, values: Array) -> ClosedLoop | None:
+    def _loop(self, system: Equations, values: Array) -> ClosedLoop | None:
         """Closed loop; torques of an assumed controller are held for a part of a sample.
 
         A held torque lags by half of its period, an error of inertia and friction.
         """
-        loop = closed_loop(system, values, self.controller)
+        loop = SimulatingMethod._loop(self, system, values)
         if loop is None or self.controller is not None:
             return loop
-        slow, period = loop.controller, system.log.dt / _PARTS
-        quick = Controller(slow.kp, slow.kd, feed_forward=slow.feed_forward, period=period)
+        quick = replace(loop.controller, period=system.log.dt / _PARTS)
+        quicker = closed_loop(system, values, quick, self.width, self.substeps)
         note = (
             f"Its torques are held for one of {_PARTS} parts of a sample. DIDIM explains torques "
             "by a motion that it simulates: without the robot's controller and references (q_ref "
             "of the log) its standard errors do not include the difference of the controllers."
         )
-        quicker = closed_loop(system, values, quick)
         return quicker and replace(quicker, notes=(*loop.notes, note))

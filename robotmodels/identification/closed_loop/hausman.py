@@ -8,15 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._arrays import Array, Rebuilt, read_only
+from ..._arrays import Array, Frozen
 from ...errors import InvalidValueError
 from ...estimation.covariance import correlated_covariance
 from ...estimation.estimate import Estimate
 from ...estimation.factor import reduced
-from ...estimation.linear import group_leverage, solved
+from ...estimation.linear import group_leverage, solved, value_sizes
 from ..equations import Block, Equations
 from .instrumental import instrument_step, paired
-from .method import GivenBlocks, torque_sizes
+from .method import GivenBlocks
 from .simulation import ClosedLoopSimulator, SimulationDivergedError
 
 _EFFECT = 0.5
@@ -24,7 +24,7 @@ _EFFECT = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class HausmanResult(Rebuilt):
+class HausmanResult(Frozen):
     """Result of the Durbin-Wu-Hausman test: bias of least squares by parameter. Read-only.
 
     Shapes: effect, standard_errors, least_squares_errors, parameter_p (b,).
@@ -37,10 +37,6 @@ class HausmanResult(Rebuilt):
     parameter_p: Array
     lags: int
     level: float
-
-    def __post_init__(self) -> None:
-        for name in ("effect", "standard_errors", "least_squares_errors", "parameter_p"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
     @property
     def p(self) -> float:
@@ -145,7 +141,7 @@ def hausman_test(
         return untested
     pairs = paired(simulator)
     factors = reduced(system.names, (block for _, block in pairs(signals)))
-    step = instrument_step(factors, values, pairs(signals), torque_sizes(factors))
+    step = instrument_step(factors, values, pairs(signals), value_sizes(factors))
     ls_values, inverse, _ = solved(factors, step.weights)
 
     def residuals() -> Iterator[Block]:

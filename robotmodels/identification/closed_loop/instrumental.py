@@ -31,14 +31,16 @@ class Instrumental(SimulatingMethod):
     ----------
     controller : Controller, optional
         Controller of the robot; default one tuned for small tracking errors.
-    loop : ClosedLoop, optional
-        Settings of the simulation, instead of ``controller``.
     start : array_like, shape (b,), optional
         Initial parameters; default weighted least squares.
     iterations : int
         Largest number of steps.
     lags : int, optional
         Lags of the covariance, see `correlated_covariance`.
+    width : array_like, scalar or shape (n,), optional
+        Velocities below which the simulated dry friction is linear; default by the log.
+    substeps : int, optional
+        Runge-Kutta steps of a sample; default as many as friction requires, up to 64.
 
     References
     ----------

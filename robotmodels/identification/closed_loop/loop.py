@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._arrays import Array, Rebuilt, as_exact, as_floats, read_only
+from ..._arrays import Array, Frozen, as_exact, as_floats
 from ...drive import DriveParameters, Transmission, drive_kinds
 from ...dynamics import base_model
 from ...errors import InvalidValueError, ShapeError
@@ -35,23 +35,11 @@ MOST = 64
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ClosedLoop(Rebuilt):
+class ClosedLoop(Frozen):
     """Settings of the simulation of a controlled robot. Read-only.
 
-    Parameters
-    ----------
-    controller : Controller
-        Controller of the robot.
-    width : ndarray, shape (n,)
-        Regularisation velocities, rad/s or m/s, below which dry friction is linear.
-    tracking_limit : ndarray, shape (n,)
-        Distances from the references, rad or m, beyond which the simulation has diverged.
-    hold, substeps : int
-        Steps of integration over which a torque is held; steps of a sample of the log.
-    referenced : bool
-        Whether the log has references; otherwise its filtered positions are followed.
-    notes : tuple of str
-        Remarks for the user.
+    Shapes (n,): friction regularisation velocities ``width``; distances from the references beyond
+    which the simulation has diverged. Integration steps per held torque and per sample; notes.
     """
 
     controller: Controller
@@ -59,12 +47,7 @@ class ClosedLoop(Rebuilt):
     tracking_limit: Array
     hold: int
     substeps: int
-    referenced: bool
     notes: tuple[str, ...] = ()
-
-    def __post_init__(self) -> None:
-        for name in ("width", "tracking_limit"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
 
 
 class FrictionRates(NamedTuple):
@@ -109,7 +92,6 @@ def closed_loop(
     system: Equations,
     values: ArrayLike,
     controller: Controller | None = None,
-    *,
     width: ArrayLike | None = None,
     substeps: int | None = None,
 ) -> ClosedLoop | None:
@@ -147,21 +129,20 @@ def closed_loop(
     needed = rates.steps(log.dt, goal)
     parts, hold = steps_of(controller, log.dt, min(needed, MOST) if substeps is None else substeps)
     step = log.dt / parts
-    rest = step * rates.dry
-    if (parts < needed and substeps is None) or not rates.stable(step):
-        over = rest / np.where(goal > 0.0, goal, np.inf)
-        joint = int(over.argmax()) if rates.stable(step) else rates.joint
+    rest, stable = step * rates.dry, rates.stable(step)
+    if (parts < needed and substeps is None) or not stable:
+        joint = int(np.argmax(rest / np.where(goal > 0.0, goal, np.inf))) if stable else rates.joint
         effect = f"dry friction is linear up to {rest[joint]:.2g} rad/s or m/s"
-        effect = effect if rates.stable(step) else "the simulation is not stable"
         notes.append(
             f"{robot.table.joint_names[joint]} is stiff: friction stops it too fast for {parts} "
-            f"steps of a sample of {log.dt:.3g} s, so that {effect}; give substeps= of "
-            "closed_loop, or use least squares."
+            f"steps of a sample of {log.dt:.3g} s, so that "
+            f"{effect if stable else 'the simulation is not stable'}; give the method more "
+            "substeps=, or use least squares."
         )
     if given is None:
         given = np.where(rest > 0.0, np.maximum(processing.dead_band, rest), 0.0)
-    limit, wide = np.maximum(np.ptp(targets, axis=0), _NEAR), np.broadcast_to(given, (n,))
-    return ClosedLoop(controller, wide, limit, hold, parts, log.q_ref is not None, tuple(notes))
+    limit = np.maximum(np.ptp(targets, axis=0), _NEAR)
+    return ClosedLoop(controller, np.broadcast_to(given, (n,)), limit, hold, parts, tuple(notes))
 
 
 def _check_supported(system: Equations) -> None:

@@ -9,12 +9,12 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import ClassVar, Literal, cast
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..._arrays import Array, Rebuilt, as_exact, read_only
+from ..._arrays import Array, Frozen, as_exact
 from ...errors import InvalidValueError
 from ...estimation.covariance import CorrelatedCovariance, correlated_covariance
 from ...estimation.estimate import Estimate, EstimateStatus
@@ -24,10 +24,11 @@ from ...estimation.linear import (
     inverse_std,
     residual_std,
     solved,
+    value_sizes,
     weighted,
 )
 from ..equations import Block, Equations
-from ..methods.base import Method
+from ..methods.base import Covariance, Method
 from .controller import Controller
 from .loop import ClosedLoop, closed_loop
 from .simulation import ClosedLoopSimulator, SimulationDivergedError
@@ -35,14 +36,14 @@ from .simulation import ClosedLoopSimulator, SimulationDivergedError
 _STILL, _ROUNDING = 1e-3, 1e-11
 """Convergence tolerances of a parameter: in standard errors, relative to its torque size."""
 _HALVINGS, _WEIGHTINGS = 8, 3
-_ALIKE = 0.02
+_SAME_WEIGHTS = 0.02
 """Convergence tolerance: relative change of the weights."""
 _WEAK = 0.3
 """Least correlation of instruments and regressor; below it instruments are weak."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SimulationDetails(Rebuilt):
+class SimulationDetails(Frozen):
     """Details of a simulating method; ``strength`` is the instrument strength.
 
     Shapes: iid_standard_errors (b,). The loop is None if the first mass matrix was not definite.
@@ -54,12 +55,8 @@ class SimulationDetails(Rebuilt):
     strength: float
     loop: ClosedLoop | None
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "iid_standard_errors", read_only(self.iid_standard_errors))
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Step:
+class Step(NamedTuple):
     """Parameters (b,) that follow from one simulation, with the weights (m,) of the equations.
 
     The next weights are those of the residuals, None where weights change in every step.
@@ -87,28 +84,24 @@ class SimulatingMethod(Method):
     """Base of the methods: initial parameters, simulations until convergence, covariance."""
 
     controller: Controller | None = None
-    loop: ClosedLoop | None = None
     start: ArrayLike | None = None
     iterations: int = 20
     lags: int | None = None
-    covariance: ClassVar[Literal["correlated", "scaled", "given"]] = "given"
+    width: ArrayLike | None = None
+    substeps: int | None = None
+    covariance: ClassVar[Covariance] = "given"
     _memory: ClassVar[int] = 0  # steps of the Anderson mixing
     _slack: ClassVar[float] = 0.0  # rounding tolerance: increase of the cost per equation
     _advice: ClassVar[tuple[str, ...]] = ()  # where the iteration does not converge
 
     def __post_init__(self) -> None:
-        if isinstance(self.iterations, bool) or not isinstance(self.iterations, (int, np.integer)):
+        n, controller = self.iterations, self.controller
+        if isinstance(n, bool) or not isinstance(n, (int, np.integer)) or n < 1:
+            raise InvalidValueError(f"iterations: expected a whole number from 1, got {n!r:.60}.")
+        if not isinstance(controller, Controller | None):
             raise InvalidValueError(
-                f"iterations: expected a whole number from 1, got {self.iterations!r:.60}."
+                f"controller: expected a Controller or None, got {type(controller).__name__}."
             )
-        if self.iterations < 1:
-            raise InvalidValueError(f"iterations: expected 1 or more, got {self.iterations}.")
-        for name, kind in (("controller", Controller), ("loop", ClosedLoop)):
-            given = getattr(self, name)
-            if given is not None and not isinstance(given, kind):
-                raise InvalidValueError(
-                    f"{name}: expected a {kind.__name__} or None, got {type(given).__name__}."
-                )
 
     @abstractmethod
     def _prepare(
@@ -116,9 +109,9 @@ class SimulatingMethod(Method):
     ) -> tuple[Advance, Scores]:
         """One step of the method, and the equations of its covariance. Shapes: size (b,)."""
 
-    def _default_loop(self, system: Equations, values: Array) -> ClosedLoop | None:
-        """Settings of the simulation where none are given. Shapes: values (b,)."""
-        return closed_loop(system, values, self.controller)
+    def _loop(self, system: Equations, values: Array) -> ClosedLoop | None:
+        """Settings of the simulation. Shapes: values (b,)."""
+        return closed_loop(system, values, self.controller, self.width, self.substeps)
 
     def solve(self, system: Equations, factors: TriangularFactors) -> Estimate:
         """Estimate the parameters; NaN where the simulation diverged."""
@@ -126,67 +119,62 @@ class SimulatingMethod(Method):
         b, n = len(system.names), system.model.n
         values = weighted(factors).values if self.start is None else self.start
         values = as_exact(values, (b,), "start")
-        loop = self._default_loop(system, values) if self.loop is None else self.loop
-        ended, scores = Iterated(values, None, EstimateStatus.UNSTABLE, 0), None
+        loop = self._loop(system, values)
+        status, count, why = EstimateStatus.UNSTABLE, 0, "its mass matrix is not positive definite"
+        last = spread = None
         if loop is not None:
-            size = torque_sizes(factors)
+            why, size = "it diverges", value_sizes(factors)
             simulator = ClosedLoopSimulator(system if system.cache else system.cached(), loop)
             advance, scores = self._prepare(simulator, factors, size)
             slack = self._slack * factors.rows
-            ended = reweighted(values, advance, size, self.iterations, slack, self._memory)
-        last, count, notes = ended.last, ended.iterations, () if loop is None else loop.notes
-        spread = None
-        if last is not None and scores is not None and ended.status is not EstimateStatus.UNSTABLE:
-            try:
-                spread = sandwich(scores(ended.values), ended.values, last, self.lags)
-            except SimulationDivergedError:
-                ended = replace(ended, status=EstimateStatus.UNSTABLE)
+            values, last, status, count = _reweighted(
+                values, advance, size, self.iterations, slack, self._memory
+            )
+            if last is not None and status is not EstimateStatus.UNSTABLE:
+                try:
+                    spread = _sandwich(scores(values), values, last, self.lags)
+                except SimulationDivergedError:
+                    status = EstimateStatus.UNSTABLE
+        notes = () if loop is None else loop.notes
         if last is None or spread is None:
-            why = "its mass matrix is not positive definite" if loop is None else "it diverges"
             whose = f"parameters after {count} iterations" if count else "first parameters"
             note = (
                 f"The robot of the {whose} cannot be simulated: {why}. Give start= of a robot "
                 "whose joints all move inertia (such as base.values of a model with its inertia), "
                 "or lower gains."
             )
-            ended, notes = replace(ended, values=np.full(b, np.nan)), (*notes, note)
-            covariance, sigma = np.full((b, b), np.nan), np.full(n, np.nan)
-            details = SimulationDetails(ended.values, 0, np.nan, 0.0, loop)
-        else:
-            covariance, sigma = spread.covariance, last.sigma
-            if last.strength < _WEAK:
-                note = (
-                    "The instruments are weak: a combination of regressor columns has a "
-                    f"correlation of {last.strength:.2g} with them. Give the robot's controller "
-                    "and references, a lower cutoff, or a motion that excites it more."
-                )
-                notes = (*notes, note)
-            if ended.status is not EstimateStatus.SOLVED:
-                notes = (*notes, ended.status.sentence, *self._advice)
-            errors = last.standard_errors
-            details = SimulationDetails(errors, spread.lags, last.condition, last.strength, loop)
+            values, nothing = np.full(b, np.nan), np.full((b, b), np.nan)
+            details = SimulationDetails(values, 0, np.nan, 0.0, loop)
+            sigma, notes = np.full(n, np.nan), (*notes, note)
+            return Estimate(system.names, values, nothing, sigma, status, count, notes, details)
+        if last.strength < _WEAK:
+            note = (
+                "The instruments are weak: a combination of regressor columns has a "
+                f"correlation of {last.strength:.2g} with them. Give the robot's controller "
+                "and references, a lower cutoff, or a motion that excites it more."
+            )
+            notes = (*notes, note)
+        if status is not EstimateStatus.SOLVED:
+            notes = (*notes, status.sentence, *self._advice)
+        details = SimulationDetails(
+            last.standard_errors, spread.lags, last.condition, last.strength, loop
+        )
         return Estimate(
-            system.names, ended.values, covariance, sigma, ended.status, count, notes, details
+            system.names, values, spread.covariance, last.sigma, status, count, notes, details
         )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Iterated:
-    """Result of an iteration. Shapes: values (b,)."""
-
-    values: Array
-    last: Step | None
-    status: EstimateStatus
-    iterations: int
+Iterated = tuple[Array, Step | None, EstimateStatus, int]
+"""Values (b,), last step, status and number of iterations."""
 
 
-def iterated(
+def _iterated(
     values: Array,
     advance: Advance,
     size: Array,
     most: int,
-    slack: float = 0.0,
-    memory: int = 0,
+    slack: float,
+    memory: int,
     weights: Array | None = None,
 ) -> Iterated:
     """Simulate and solve until the parameters converge. Shapes: values, size (b,), weights (m,)."""
@@ -194,13 +182,13 @@ def iterated(
     try:
         step = advance(values, weights)
     except SimulationDivergedError:
-        return Iterated(values, None, EstimateStatus.UNSTABLE, 0)
+        return values, None, EstimateStatus.UNSTABLE, 0
     for count in range(1, most + 1):
         move = step.values - values
         if not np.isfinite(move).all():
-            return Iterated(values, step, EstimateStatus.UNSTABLE, count)
+            return values, step, EstimateStatus.UNSTABLE, count
         if (np.abs(move) <= _STILL * step.standard_errors + _ROUNDING * size).all():
-            return Iterated(step.values, step, EstimateStatus.SOLVED, count)
+            return step.values, step, EstimateStatus.SOLVED, count
         if count == most:
             break
         past = [*past, (values / size, move / size)][-(memory + 1) :]
@@ -217,27 +205,28 @@ def iterated(
             if following.cost <= step.cost + slack:
                 break
         else:
-            return Iterated(values, step, failed, count)
+            return values, step, failed, count
         values, step = goal, following
-    return Iterated(values, step, EstimateStatus.NOT_CONVERGED, most)
+    return values, step, EstimateStatus.NOT_CONVERGED, most
 
 
-def reweighted(
+def _reweighted(
     values: Array, advance: Advance, size: Array, most: int, slack: float, memory: int
 ) -> Iterated:
     """Iterate with fixed weights, then again with weights from the residuals."""
-    ended = iterated(values, advance, size, most, slack, memory)
-    done = ended.iterations
+    values, last, status, done = _iterated(values, advance, size, most, slack, memory)
     for _ in range(_WEIGHTINGS):
-        weights = None if ended.last is None else ended.last.next_weights
-        if weights is None or ended.status is not EstimateStatus.SOLVED or done >= most:
+        weights = None if last is None else last.next_weights
+        if last is None or weights is None or status is not EstimateStatus.SOLVED or done >= most:
             break
-        before = cast(Step, ended.last).weights
-        ended = iterated(ended.values, advance, size, most - done, slack, memory, weights)
-        done += ended.iterations
-        if np.allclose(before, weights, rtol=_ALIKE, atol=0.0):
+        before = last.weights
+        values, last, status, count = _iterated(
+            values, advance, size, most - done, slack, memory, weights
+        )
+        done += count
+        if np.allclose(before, weights, rtol=_SAME_WEIGHTS, atol=0.0):
             break
-    return replace(ended, iterations=done)
+    return values, last, status, done
 
 
 def _mixed(past: list[tuple[Array, Array]]) -> Array:
@@ -246,14 +235,6 @@ def _mixed(past: list[tuple[Array, Array]]) -> Array:
     dx = np.column_stack([x - other for other, _ in past[:-1]])
     df = np.column_stack([f - other for _, other in past[:-1]])
     return x + f - (dx + df) @ np.linalg.lstsq(df, f, rcond=1e-8)[0]
-
-
-def torque_sizes(factors: TriangularFactors) -> Array:
-    """Parameter values whose separate torques have the size of the measured torque (b,)."""
-    whole = np.vstack(factors.factors)
-    length = np.linalg.norm(whole[:, :-1], axis=0)
-    torque = max(float(np.linalg.norm(whole[:, -1])), 1e-300)
-    return torque / np.where(length > 0.0, length, 1.0)
 
 
 def weighted_step(factors: TriangularFactors, values: Array, weights: Array | None) -> Step:
@@ -286,14 +267,10 @@ def check_excited(names: tuple[str, ...], shown: NDArray[np.bool_]) -> None:
 class GivenBlocks:
     """Blocks with the interface of equations, for `correlated_covariance`."""
 
-    source: Callable[[], Iterable[Block]]
-
-    def blocks(self) -> Iterable[Block]:
-        """The recomputed blocks."""
-        return self.source()
+    blocks: Callable[[], Iterable[Block]]
 
 
-def sandwich(
+def _sandwich(
     blocks: Callable[[], Iterable[Block]], values: Array, step: Step, lags: int | None
 ) -> CorrelatedCovariance:
     """Sandwich covariance for correlated residuals; the step's inverse need not be symmetric."""

@@ -37,7 +37,7 @@ class OutputError(SimulatingMethod):
 
     Parameters
     ----------
-    controller, loop, start, iterations, lags
+    controller, start, iterations, lags, width, substeps
         See `Instrumental`.
     output : str
         "torque", "position" or "both"; ``sigma`` then has an entry for each output, torques first.
@@ -118,7 +118,7 @@ class OutputError(SimulatingMethod):
             near = step.standard_errors
             lengths = np.array([float(R[:, -1] @ R[:, -1]) for R in linear.factors])
             errors = np.maximum(linear.sums(values), _ROUNDING**2 * lengths)
-            return replace(step, cost=float(step.weights**2 @ errors))
+            return step._replace(cost=float(step.weights**2 @ errors))
 
         def scores(values: Array) -> Callable[[], Iterable[Block]]:
             last = blocks(values)

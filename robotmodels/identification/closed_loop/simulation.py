@@ -226,7 +226,7 @@ def simulated_log(
     parts, hold = steps_of(controller, dt, substeps)
     least = np.zeros(n) if rates is None else dt / parts * rates.dry
     wide = np.broadcast_to(np.asarray(least if width is None else width, np.float64), (n,))
-    loop = ClosedLoop(controller, wide, np.full(n, np.inf), hold, parts, True)
+    loop = ClosedLoop(controller, wide, np.full(n, np.inf), hold, parts)
     references = targets(0, *_derivatives(q_ref, v_ref, dt, 4), controller.feed_forward, wide)
     try:
         q, v, a, tau = follow(model, loop, dt, references)

@@ -11,6 +11,9 @@ from ...estimation.estimate import Estimate, EstimateStatus
 from ...estimation.factor import TriangularFactors
 from ..equations import Equations
 
+Covariance = Literal["correlated", "scaled", "given"]
+"""Standard errors: computed for correlated residuals, scaled by the ratio of WLS, or given."""
+
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Method(ABC):
@@ -23,8 +26,7 @@ class Method(ABC):
     essential: bool | float | str = False
     name: ClassVar[str] = ""
     title: ClassVar[str] = ""
-    covariance: ClassVar[Literal["correlated", "scaled", "given"]] = "scaled"
-    """Standard errors: computed for correlated residuals, scaled by the ratio of WLS, or given."""
+    covariance: ClassVar[Covariance] = "scaled"
 
     @abstractmethod
     def solve(self, system: Equations, factors: TriangularFactors) -> Estimate:

@@ -6,8 +6,6 @@ Source: W. Khalil and E. Dombre, "Modeling, Identification and Control of Robots
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..._arrays import Array, as_floats
@@ -25,22 +23,12 @@ _LEVEL = 0.05
 """Significance level of the F test."""
 
 
-@dataclass(frozen=True, slots=True)
-class Essential:
-    """Names of the essential and of the dropped parameters (in order), and the rule as text."""
-
-    names: tuple[str, ...]
-    dropped: tuple[str, ...]
-    rule: str
-
-
 def essential(
     factors: TriangularFactors, estimate: Estimate, choice: bool | float | str = True
-) -> Essential:
-    """Drop parameters one by one, the largest relative standard error first.
+) -> tuple[tuple[str, ...], tuple[str, ...], str]:
+    """Drop parameters one by one, the largest relative standard error (white residuals) first.
 
-    ``choice`` is True for the default ratio, another ratio, or one of `RULES`. The weights are
-    those of the estimate's residuals; standard errors are those of white residuals.
+    ``choice``: True, a ratio, or one of `RULES`. Names that are kept and dropped, rule as text.
     """
     rule, ratio = _rule(choice)
     R, y, rest = factors.stacked(inverse_std(factors, estimate.sigma))
@@ -63,7 +51,7 @@ def essential(
     dropped = order[:last]
     names = tuple(name for k, name in enumerate(factors.names) if k not in dropped)
     text = rule if isinstance(choice, bool | str) else f"{rule} {ratio:g}"
-    return Essential(names, tuple(factors.names[k] for k in dropped), text)
+    return names, tuple(factors.names[k] for k in dropped), text
 
 
 def _rule(choice: bool | float | str) -> tuple[str, float]:

@@ -42,7 +42,7 @@ Examples
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -63,7 +63,7 @@ from ...estimation.total import total
 from ...model import RobotModel
 from ..equations import Equations
 from ..reduction import segments
-from .base import Method
+from .base import Covariance, Method
 
 _FOLDS = 5
 _EXACT = ("Fc", "offset")
@@ -76,7 +76,7 @@ class Ols(Method):
 
     name: ClassVar[str] = "ols"
     title: ClassVar[str] = "ordinary least squares"
-    covariance: ClassVar[Literal["correlated", "scaled", "given"]] = "correlated"
+    covariance: ClassVar[Covariance] = "correlated"
 
     def solve(self, system: Equations, factors: TriangularFactors) -> Estimate:
         """Estimate the parameters."""
@@ -95,7 +95,7 @@ class Wls(Method):
     shrinkage: bool | None = None
     name: ClassVar[str] = "wls"
     title: ClassVar[str] = "weighted least squares"
-    covariance: ClassVar[Literal["correlated", "scaled", "given"]] = "correlated"
+    covariance: ClassVar[Covariance] = "correlated"
 
     def __post_init__(self) -> None:
         if self.shrinkage not in (None, True, False):
@@ -143,7 +143,7 @@ class Ridge(Method):
             values = dict(zip(system.base.names, system.base.values(prior).tolist(), strict=True))
             prior = [values[name] for name in system.names]
         chosen = self.strength is None and self.prior_errors is None
-        folds = segments(system, _FOLDS) if chosen else None
+        folds = segments(system, _FOLDS) if chosen else ()
         return ridge(factors, prior, self.prior_errors, self.strength, folds)
 
 

@@ -1,60 +1,23 @@
-"""Robust (M-estimation) least squares: outlying equations are down-weighted.
-
-Parameters
-----------
-system : Equations
-    Equations of a log, from `equations`.
-factors : TriangularFactors
-    Factors of the same equations; weighted least squares is the start.
-
-Returns
--------
-Estimate
-    ``sigma`` are residual standard deviations from medians; the covariance takes variances
-    that differ between equations into account; ``details`` has the outliers by joint and time.
-
-Raises
-------
-InvalidValueError
-    Another loss; fewer equations than parameters.
-
-References
-----------
-P. J. Huber and E. M. Ronchetti, "Robust Statistics", 2nd ed., 2009, sections 7.6 to 7.8; V. Yohai,
-Annals of Statistics 15(2), 1987 (fixed scale for redescending losses).
-
-Examples
---------
->>> from robotmodels.datasets import example_log
->>> from robotmodels.identification import Robust, fit
->>> from robotmodels.logs import Log
->>> arm, log = example_log()
->>> tau = log.tau.copy()
->>> tau[::50] += 50.0  # one sample in fifty is wrong
->>> spoilt = Log(log.dt, log.q, tau)
->>> result = fit(arm, spoilt, Robust("tukey"), drive=("Fv",), processing={"decimation": 1})
->>> round(result.value("Fv1"), 2)
-2.0
-"""
+"""Robust (M-estimation) least squares: outlying equations are down-weighted."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._arrays import Array, Rebuilt, read_only
+from ..._arrays import Array, Frozen
 from ..._choices import chosen
 from ...estimation.estimate import Estimate, EstimateStatus
-from ...estimation.factor import TriangularFactors, merged_tree, triangle
+from ...estimation.factor import TriangularFactors, triangle
 from ...estimation.linear import (
     check_count,
     inverse_std,
     inverse_triangle,
     solved,
+    value_sizes,
     weighted,
 )
 from ...estimation.losses import Loss, loss_terms, tuning
@@ -62,14 +25,12 @@ from ..equations import Equations
 from .base import Method
 
 _MOST = 100
-_STILL = 1e-4
-"""Convergence tolerance: change of the parameters in standard errors."""
+_STILL, _STEADY = 1e-4, 1e-3
+"""Convergence tolerances: change of a parameter in standard errors, relative change of a scale."""
 _SCALES = 20
 """Largest number of passes that change the residual scales: medians may alternate."""
-_STEADY = 1e-3
-"""Convergence tolerance: relative change of the residual scales."""
 _ROUNDING = 1e-12
-"""Rounding tolerance: change of predicted torques relative to the measured ones."""
+"""Rounding tolerance: change of a parameter relative to its torque size."""
 _FAR = 4.0
 """Least residual of an outlier, in standard deviations (probability 6e-5 for normal noise)."""
 _LISTED = 1000
@@ -79,11 +40,10 @@ _ONE = np.ones(1, dtype=np.int64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Outliers(Rebuilt):
+class Outliers(Frozen):
     """Outlying equations (residuals above four standard deviations): counts by group, the largest.
 
-    Shapes: counts (m,); t (k,) s, group (k,), size (k,) in standard deviations, in the order of
-    time.
+    Shapes: counts (m,); t (k,) s, group (k,), size (k,) in standard deviations, by time.
     """
 
     counts: NDArray[np.int64]
@@ -91,19 +51,37 @@ class Outliers(Rebuilt):
     group: NDArray[np.int64]
     size: Array
 
-    def __post_init__(self) -> None:
-        for name, kind in (
-            ("counts", np.int64),
-            ("t", float),
-            ("group", np.int64),
-            ("size", float),
-        ):
-            object.__setattr__(self, name, read_only(getattr(self, name), kind))
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Robust(Method):
-    """Robust least squares by ``loss``: "huber", "cauchy" or "tukey" (or "squares")."""
+    """Robust least squares; weighted least squares is the start.
+
+    ``sigma`` of the estimate are residual standard deviations from medians, the covariance takes
+    variances that differ between equations into account, and ``details`` has the outliers by joint
+    and time.
+
+    Parameters
+    ----------
+    loss : Loss or str
+        "huber", "cauchy" or "tukey" (or "squares").
+
+    References
+    ----------
+    P. J. Huber and E. M. Ronchetti, "Robust Statistics", 2nd ed., 2009, sections 7.6 to 7.8;
+    V. Yohai, Annals of Statistics 15(2), 1987 (fixed scale for redescending losses).
+
+    Examples
+    --------
+    >>> from robotmodels.datasets import example_log
+    >>> from robotmodels.identification import Log, Robust, fit
+    >>> arm, log = example_log()
+    >>> tau = log.tau.copy()
+    >>> tau[::50] += 50.0  # one sample in fifty is wrong
+    >>> spoilt = Log(log.dt, log.q, tau)
+    >>> result = fit(arm, spoilt, Robust("tukey"), drive=("Fv",), processing={"decimation": 1})
+    >>> round(result.value("Fv1"), 2)
+    2.0
+    """
 
     loss: Loss | str = Loss.HUBER
     name: ClassVar[str] = "robust"
@@ -116,7 +94,7 @@ class Robust(Method):
         """Estimate the parameters by iteratively re-weighted least squares over the equations."""
         loss = chosen(Loss, self.loss, "loss")
         check_count(factors)
-        state = _Iteration(system, factors, weighted(factors).values)
+        state = _Iteration(system, factors)
         first = Loss.SQUARES if loss is Loss.SQUARES else Loss.HUBER
         status = state.run(first, fixed=False)
         if loss is not first:
@@ -128,28 +106,27 @@ class Robust(Method):
 class _Iteration:
     """State of the iteration: values and residual scales of the groups."""
 
-    def __init__(self, system: Equations, factors: TriangularFactors, values: Array) -> None:
+    def __init__(self, system: Equations, factors: TriangularFactors) -> None:
         self.system = system if system.cache is not None else system.cached()
-        self.factors, self.values, self.count = factors, values, 0
-        self.sigma = self.deviations(self.residuals())
+        self.factors, self.values, self.count = factors, weighted(factors).values, 0
+        self.sigma = self.scales(self.residuals())
 
-    def residuals(self) -> list[tuple[Array, NDArray[np.bool_]]]:
-        """Residuals and mask of every block."""
-        return [(b.y - b.W @ self.values, b.use) for b in self.system.blocks()]
+    def residuals(self) -> list[Array]:
+        """Residuals of every block, NaN where an equation is not used."""
+        blocks = self.system.blocks()
+        return [np.where(b.use, b.y - b.W @ self.values, np.nan) for b in blocks]
 
-    def deviations(self, residuals: list[tuple[Array, NDArray[np.bool_]]]) -> Array:
+    def scales(self, residuals: list[Array]) -> Array:
         """Standard deviations of the groups (m,) from medians, at least rounding."""
-        freedom = np.sqrt(1.0 - len(self.factors.names) / self.factors.rows)
-        e, use = (np.concatenate(parts) for parts in zip(*residuals, strict=True))
-        medians = [
-            np.median(np.abs(e[taken, j])) if taken.any() else 0.0 for j, taken in enumerate(use.T)
-        ]
-        sigma = np.array(medians) / (_NORMAL_MEDIAN * freedom)
-        return 1.0 / inverse_std(self.factors, sigma)
+        sizes = np.abs(np.concatenate(residuals)).T
+        medians = [np.median(e[~np.isnan(e)]) if (e >= 0.0).any() else 0.0 for e in sizes]
+        freedom = np.sqrt(1.0 - len(self.values) / self.factors.rows)
+        return 1.0 / inverse_std(self.factors, np.array(medians) / (_NORMAL_MEDIAN * freedom))
 
     def run(self, loss: Loss, fixed: bool) -> EstimateStatus:
         """Iterate until the values converge, with fixed or updated residual scales."""
         least = 1.0 / inverse_std(self.factors, np.zeros(len(self.sigma))).max()
+        rounding = _ROUNDING * value_sizes(self.factors)
         for count in range(1, _MOST + 1):
             self.count += 1
             residuals = self.residuals()
@@ -157,66 +134,50 @@ class _Iteration:
             inverse = inverse_triangle(R)
             moved = inverse @ y - self.values
             self.values = self.values + moved
-            errors = np.linalg.norm(inverse, axis=1)
-            still = (np.abs(moved) <= _STILL * errors).all() or self._is_rounding(moved)
+            still = np.abs(moved) <= _STILL * np.linalg.norm(inverse, axis=1) + rounding
+            steady = np.ones(1, dtype=bool)
             if not fixed and count <= _SCALES:
-                last, self.sigma = self.sigma, self.deviations(residuals)
-                change = np.abs(self.sigma - last)
-                still = still and bool((change <= _STEADY * last + 10.0 * least).all())
-            if still:
+                last, self.sigma = self.sigma, self.scales(residuals)
+                steady = np.abs(self.sigma - last) <= _STEADY * last + 10.0 * least
+            if still.all() and steady.all():
                 return EstimateStatus.SOLVED
         return EstimateStatus.NOT_CONVERGED
 
-    def _weighted_triangle(
-        self, loss: Loss, residuals: list[tuple[Array, NDArray[np.bool_]]]
-    ) -> tuple[Array, Array]:
-        c = tuning(loss, _ONE)
-
-        def factors() -> Iterator[Array]:
-            for block, (e, use) in zip(self.system.blocks(), residuals, strict=True):
-                weights = np.sqrt(loss_terms(loss, np.abs(e) / self.sigma, c)[1]) / self.sigma
-                rows = np.column_stack((block.W[use], block.y[use]))
-                yield triangle(rows * weights[use][:, None])
-
-        whole = merged_tree(factors(), lambda a, b: triangle(np.vstack((a, b))))
-        assert whole is not None  # a log has pieces
-        b = len(self.values)
-        return whole[:b, :b], whole[:b, b]
-
-    def _is_rounding(self, moved: Array) -> bool:
-        changes = [np.linalg.norm(R[:, :-1] @ moved) for R in self.factors.factors]
-        sizes = [np.linalg.norm(R[:, -1]) for R in self.factors.factors]
-        return float(max(changes)) <= _ROUNDING * float(max(sizes))
+    def _weighted_triangle(self, loss: Loss, residuals: list[Array]) -> tuple[Array, Array]:
+        b, c = len(self.values), tuning(loss, _ONE)
+        R = np.zeros((0, b + 1))
+        for block, e in zip(self.system.blocks(), residuals, strict=True):
+            weights = np.sqrt(loss_terms(loss, np.abs(e) / self.sigma, c)[1]) / self.sigma
+            rows = np.column_stack((block.W[block.use], block.y[block.use]))
+            R = triangle(np.vstack((R, rows * weights[block.use][:, None])))
+        return R[:b, :b], R[:b, b]
 
     def estimate(self, loss: Loss, status: EstimateStatus) -> Estimate:
         """The estimate with its covariance and outliers."""
         factors, c, b = self.factors, tuning(loss, _ONE), len(self.values)
         weights = 1.0 / self.sigma
-        slopes, scores, counts = np.zeros(len(weights)), np.zeros((b, b)), 0
-        far = np.zeros((0, 3))
+        slopes, scores = np.zeros(len(weights)), np.zeros((b, b))
+        far = []
         for block in self.system.blocks():
             u = np.where(block.use, (block.y - block.W @ self.values) * weights, 0.0)
             _, w, slope = loss_terms(loss, np.abs(u), c)
             slopes += np.where(block.use, slope, 0.0).sum(axis=0)
             rows = ((w * u * weights)[..., None] * block.W).reshape(-1, b)
             scores += rows.T @ rows
-            distant = np.abs(u) > _FAR
-            counts = counts + distant.sum(axis=0)
-            i, j = np.nonzero(distant)
-            listed = np.column_stack((block.t[i], j.astype(np.float64), u[i, j]))
-            far = np.vstack((far, listed))
-            far = far[np.argsort(-np.abs(far[:, 2]), kind="stable")[:_LISTED]]
-        far = far[np.lexsort((far[:, 1], far[:, 0]))]
+            i, j = np.nonzero(np.abs(u) > _FAR)
+            far.append(np.column_stack((block.t[i], j, u[i, j])))
+        t, group, size = np.concatenate(far).T
+        counts = np.bincount(group.astype(np.int64), minlength=len(weights))
         share = np.maximum(factors.counts, 1)
         _, inverse, _ = solved(factors, np.sqrt(np.maximum(slopes / share, 1e-3)) * weights)
         covariance = factors.rows / (factors.rows - b) * inverse @ scores @ inverse
-        group = far[:, 1].astype(np.int64)
-        outliers = Outliers(np.asarray(counts), far[:, 0], group, far[:, 2])
+        at = np.sort(np.argsort(-np.abs(size), kind="stable")[:_LISTED])
+        outliers = Outliers(counts, t[at], group[at].astype(np.int64), size[at])
         notes: tuple[str, ...] = ()
-        if outliers.counts.any():
-            percent = " ".join(f"{100 * x:.2g}" for x in outliers.counts / share)
+        if counts.any():
+            percent = " ".join(f"{100 * x:.2g}" for x in counts / share)
             notes = (
-                f"{int(outliers.counts.sum())} equations are more than {_FAR:g} standard deviations"
+                f"{int(counts.sum())} equations are more than {_FAR:g} standard deviations"
                 f" away (per cent by joint: {percent}); result.estimate.details lists them.",
             )
         return Estimate(

@@ -1,41 +1,4 @@
-"""Sequential identification, joint by joint from the last to the first.
-
-The torque of a joint depends on the links beyond it alone: the last joint's equations give
-parameters of the last link, with these the equations of the joint before give those of its link,
-and so on. Parameters that a step determines only in combination are left to later steps. Errors of
-known values enter the covariance, but values are not improved later; weighted least squares, which
-solves all steps at once, has smaller standard errors.
-
-Parameters
-----------
-system : Equations
-    Torque or momentum equations of a log, from `equations`.
-factors : TriangularFactors
-    Factors of the same equations.
-
-Returns
--------
-Estimate
-    ``details`` is a tuple of `SequentialStep`.
-
-Raises
-------
-InvalidValueError
-    Equations of power or energy; fewer equations than parameters.
-
-References
-----------
-Seed book section 1.6.4.
-
-Examples
---------
->>> from robotmodels.datasets import example_log
->>> from robotmodels.identification import fit
->>> arm, log = example_log()
->>> result = fit(arm, log, "sequential", drive=("Fv",))
->>> [step.joints for step in result.estimate.details]
-[(2,), (1,)]
-"""
+"""Sequential identification, joint by joint from the last to the first."""
 
 from __future__ import annotations
 
@@ -43,13 +6,11 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..._arrays import Array
 from ...errors import InvalidValueError
 from ...estimation.estimate import Estimate
-from ...estimation.factor import TriangularFactors, triangle
-from ...estimation.linear import check_count, inverse_std, residual_std
+from ...estimation.factor import TriangularFactors
+from ...estimation.linear import check_count, residual_noise, residual_std
 from ..equations import Equations
 from .base import Method
 
@@ -61,10 +22,9 @@ _RANK = 1e-7
 
 @dataclass(frozen=True, slots=True)
 class SequentialStep:
-    """Result of the equations of one joint, or of joints that motors couple.
+    """Step of one joint, or of joints that motors couple (from 1): parameters, equations.
 
-    ``joints`` from 1; ``names`` determined in this step; those ``waiting`` for later steps; the
-    number of ``equations``; ``sigma`` of their residuals, N m or N; ``condition`` of their columns.
+    ``waiting`` are left to later steps; ``sigma``: residuals, N m or N; ``condition``: of columns.
     """
 
     joints: tuple[int, ...]
@@ -77,7 +37,28 @@ class SequentialStep:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sequential(Method):
-    """Sequential least squares, joint by joint from the last to the first."""
+    """Sequential least squares, joint by joint from the last to the first.
+
+    The torque of a joint depends on the links beyond it alone: the last joint's equations give
+    parameters of the last link, with these the equations of the joint before give those of its
+    link, and so on. Parameters that a step determines only in combination are left to later steps.
+    Errors of known values enter the covariance, but values are not improved later; weighted least
+    squares has smaller standard errors. ``details`` is a tuple of steps, with
+    ``joints, names, waiting, equations, sigma, condition``.
+
+    References
+    ----------
+    Seed book section 1.6.4.
+
+    Examples
+    --------
+    >>> from robotmodels.datasets import example_log
+    >>> from robotmodels.identification import fit
+    >>> arm, log = example_log()
+    >>> result = fit(arm, log, "sequential", drive=("Fv",))
+    >>> [step.joints for step in result.estimate.details]
+    [(2,), (1,)]
+    """
 
     name: ClassVar[str] = "sequential"
     title: ClassVar[str] = "sequential least squares, from the last joint to the first"
@@ -90,34 +71,57 @@ class Sequential(Method):
                 f"'filtered' instead of {system.form.name.lower()!r}."
             )
         check_count(factors)
-        known = _Known(len(factors.names))
-        weights = 1.0 / _joint_std(factors)
-        steps = tuple(_step(known, factors, joints, weights) for joints in _joint_groups(system))
-        missing = [factors.names[k] for k in np.flatnonzero(~known.done)]
-        if missing:  # by rounding only: the steps together have the rank of all equations
-            raise InvalidValueError(
-                f"log: no step determines {', '.join(missing)}; their columns are nearly "
-                "dependent. Use weighted least squares, or fewer parameters."
+        b, noise = len(factors.names), residual_noise(factors)
+        scaled = [R / s for R, s in zip(factors.factors, noise, strict=True)]
+        joint = np.repeat(np.arange(len(scaled)), [len(R) for R in scaled])
+        A, y = (whole := np.vstack(scaled))[:, :b], whole[:, b]
+        longest = np.linalg.norm(A, axis=0)
+        # values = L @ y; equations left by earlier steps: left @ values = kept @ y
+        L, done = np.zeros((b, len(y))), np.zeros(b, dtype=bool)
+        left, kept = np.zeros((0, b)), np.zeros((0, len(y)))
+        steps = []
+        for joints in _joint_groups(system):
+            own = np.isin(joint, joints)
+            rows, rights = np.vstack((left, A[own])), np.vstack((kept, np.eye(len(y))[own]))
+            sizes = np.linalg.norm(rows, axis=0)
+            new = np.flatnonzero(~done & (sizes > _ZERO * longest))
+            U, s, Vt = np.linalg.svd(rows[:, new] / sizes[new], full_matrices=True)
+            rank = int((s > _RANK * s.max(initial=0.0)).sum())
+            # a parameter is determined if no combination without effect contains it
+            alone = np.abs(Vt[rank:]).max(axis=0, initial=0.0) <= np.sqrt(_RANK)
+            found, waiting = new[alone], new[~alone]
+            inverse = (Vt[:rank].T / s[:rank]) @ U[:, :rank].T / sizes[new][:, None]
+            L[found] = inverse[alone] @ (rights - rows[:, done] @ L[done])
+            done[found] = True
+            # equations of the other parameters, projected off the determined ones
+            Q = np.linalg.qr(rows[:, found], mode="complete")[0][:, found.size :]
+            Q = Q[:, : Q.shape[1] if waiting.size else 0]
+            left, kept = Q.T @ rows, Q.T @ rights
+            left[:, found] = 0.0
+            e = y[own] - A[own] @ (L @ y)
+            e -= A[own][:, waiting] @ np.linalg.lstsq(A[own][:, waiting], e, rcond=_RANK)[0]
+            count = int(factors.counts[list(joints)].sum())
+            sigma = np.linalg.norm(e) / np.sqrt(max(count - new.size, 1))
+            steps.append(
+                SequentialStep(
+                    tuple(j + 1 for j in joints),
+                    tuple(factors.names[k] for k in found),
+                    tuple(factors.names[k] for k in waiting),
+                    count,
+                    float(sigma * noise[list(joints)].mean()),
+                    float(s[0] / s[rank - 1]) if rank else 1.0,
+                )
             )
-        sigma = residual_std(factors, known.values)
+        if not done.all():  # by rounding only: the steps together have the rank of all equations
+            missing = ", ".join(factors.names[k] for k in np.flatnonzero(~done))
+            raise InvalidValueError(
+                f"log: no step determines {missing}; their columns are nearly dependent. Use "
+                "weighted least squares, or fewer parameters."
+            )
+        values, sigma = L @ y, residual_std(factors, L @ y)
         return Estimate(
-            factors.names,
-            known.values,
-            known.covariance,
-            sigma,
-            iterations=len(steps),
-            details=steps,
+            factors.names, values, L @ L.T, sigma, iterations=len(steps), details=tuple(steps)
         )
-
-
-class _Known:
-    """Values so far, their covariance, and equations (of unit noise) left to later steps."""
-
-    def __init__(self, b: int) -> None:
-        self.values = np.zeros(b)
-        self.covariance = np.zeros((b, b))
-        self.done = np.zeros(b, dtype=bool)
-        self.left = np.zeros((0, b + 1))
 
 
 def _joint_groups(system: Equations) -> list[tuple[int, ...]]:
@@ -133,72 +137,3 @@ def _joint_groups(system: Equations) -> list[tuple[int, ...]]:
                 label[j] = min(label[first], label[j])
     labels = sorted(set(label), reverse=True)
     return [tuple(j for j in range(n) if label[j] == k) for k in labels]
-
-
-def _joint_std(factors: TriangularFactors) -> Array:
-    """Standard deviations of the residuals of each joint's equations, solved alone (n,)."""
-    sigma = np.zeros(len(factors.factors))
-    for j, R in enumerate(factors.factors):
-        A, y = R[:, :-1], R[:, -1]
-        size = np.linalg.norm(A, axis=0)
-        seen = size > 0.0
-        U, s, _ = np.linalg.svd(A[:, seen] / size[seen], full_matrices=False)
-        rank = int((s > _RANK * s.max(initial=0.0)).sum())
-        e = y - U[:, :rank] @ (U[:, :rank].T @ y)
-        sigma[j] = np.linalg.norm(e) / np.sqrt(max(int(factors.counts[j]) - rank, 1))
-    return 1.0 / inverse_std(factors, sigma)
-
-
-def _step(
-    known: _Known, factors: TriangularFactors, joints: tuple[int, ...], weights: Array
-) -> SequentialStep:
-    """Estimate parameters from the equations of some joints and those left by earlier steps."""
-    b = len(known.values)
-    new_rows = np.vstack([weights[j] * factors.factors[j] for j in joints])
-    rows = np.vstack((known.left, new_rows))
-    lengths = [np.linalg.norm(R[:, :b], axis=0) for R in factors.factors]
-    longest = np.sqrt(np.sum((weights[:, None] * lengths) ** 2, axis=0))
-    sizes = np.linalg.norm(rows[:, :b], axis=0)
-    new = np.flatnonzero(~known.done & (sizes > _ZERO * longest))
-    count = int(sum(factors.counts[j] for j in joints))
-    told, waiting, condition = new[:0], new[:0], 1.0
-    if new.size:
-        U, s, Vt = np.linalg.svd(rows[:, new] / sizes[new])
-        rank = int((s > _RANK * s[0]).sum())
-        condition = float(s[0] / s[rank - 1])
-        # a parameter is determined if no combination without effect contains it
-        combined = np.abs(Vt[rank:]).max(axis=0, initial=0.0) > np.sqrt(_RANK)
-        told, waiting = new[~combined], new[combined]
-        inverse = (Vt[:rank].T / s[:rank]) @ U[:, :rank].T / sizes[new][:, None]
-        _determine(known, told, inverse[~combined], rows)
-        # equations of the undetermined parameters, projected off the determined ones
-        Q = np.linalg.qr(rows[:, told], mode="complete")[0][:, told.size :]
-        rest = Q.T @ rows if waiting.size else np.zeros((0, b + 1))
-        rest[:, told] = 0.0
-        known.left = triangle(rest) if len(rest) > b + 1 else rest
-    e = new_rows[:, b] - new_rows[:, :b] @ known.values
-    if waiting.size:
-        columns = new_rows[:, waiting]
-        e -= columns @ np.linalg.lstsq(columns, e, rcond=_RANK)[0]
-    mean = np.mean([1.0 / weights[j] for j in joints])
-    name = factors.names.__getitem__
-    return SequentialStep(
-        tuple(j + 1 for j in joints),
-        tuple(map(name, told.tolist())),
-        tuple(map(name, waiting.tolist())),
-        count,
-        float(np.linalg.norm(e) / np.sqrt(max(count - new.size, 1)) * mean),
-        condition,
-    )
-
-
-def _determine(known: _Known, new: NDArray[np.int64], inverse: Array, rows: Array) -> None:
-    """Set new values, and their covariance from noise and the errors of known values."""
-    done = np.flatnonzero(known.done)
-    known.values[new] = inverse @ (rows[:, -1] - rows[:, done] @ known.values[done])
-    effect = -inverse @ rows[:, done]
-    cross = effect @ known.covariance[np.ix_(done, done)]
-    known.covariance[np.ix_(new, done)] = cross
-    known.covariance[np.ix_(done, new)] = cross.T
-    known.covariance[np.ix_(new, new)] = inverse @ inverse.T + cross @ effect.T
-    known.done[new] = True

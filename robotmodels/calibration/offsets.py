@@ -9,20 +9,25 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._arrays import Array, Rebuilt, as_vector, read_only
-from ...errors import InvalidValueError
-from ...igm.asked import above_zero, mask_of
-from ...kinematics import dgm
-from ..calibrated_robot.calibrated import CalibratedRobot, as_calibrated
-from ..calibrated_robot.calibrated_pose import calibrated_pose
-from ..calibrated_robot.reading_jacobian import missing_of_pose, missing_slope, reading_jacobian
-from .corrected import CorrectedSolutions, corrected_igm
+from .._arrays import Array, Rebuilt, as_vector, read_only
+from ..errors import InvalidValueError
+from ..igm.asked import above_zero, mask_of
+from ..kinematics import dgm
+from .inverse import CorrectedSolutions, corrected_igm
+from .robot import (
+    CalibratedRobot,
+    as_calibrated,
+    calibrated_pose,
+    missing_of_pose,
+    missing_slope,
+    reading_jacobian,
+)
 
 STEPS = 50
 DEPENDENT = 1e-9  # singular values beside the largest below which offsets are not told apart
 
 if TYPE_CHECKING:
-    from ..result import CalibrationResult
+    from .result import CalibrationResult
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -171,7 +176,7 @@ def joint_offsets(
     Examples
     --------
     >>> from robotmodels.calibration import candidate_parameters
-    >>> from robotmodels.calibration.calibrated_robot.calibrated import calibrated_model
+    >>> from robotmodels.calibration.robot import calibrated_model
     >>> from robotmodels.robots import load
     >>> parameters = candidate_parameters(load("rx90"))
     >>> robot = calibrated_model(parameters, 0.01 * (np.array(parameters.names) == "theta3"))
@@ -262,7 +267,7 @@ def pose_offsets(
     Examples
     --------
     >>> from robotmodels.calibration import candidate_parameters
-    >>> from robotmodels.calibration.calibrated_robot.calibrated import calibrated_model
+    >>> from robotmodels.calibration.robot import calibrated_model
     >>> from robotmodels.igm import igm
     >>> from robotmodels.robots import load
     >>> parameters = candidate_parameters(load("rx90"))

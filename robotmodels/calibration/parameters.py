@@ -1,20 +1,64 @@
-"""The parameters that a calibration may estimate: deviations of elements of the extended table."""
+"""Laws."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from enum import Enum
 from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..._arrays import Array, Rebuilt, as_vector, read_only
-from ...errors import InvalidValueError, nearest_names
-from ...model import RobotModel
-from .elements import Element, ErrorLaw
-from .loads import gravity_loads
-from .skeleton import Skeleton
+from .._arrays import Array, Rebuilt, as_vector, read_only
+from ..errors import InvalidValueError, nearest_names
+from ..model import RobotModel
+from .extended_table import Element, Skeleton, gravity_loads
+
+
+class ErrorLaw(Enum):
+    """How the error of an element depends on the configuration.
+
+    A member's value is what the names of its parameters begin with; a constant error is called by
+    its element. Every law is linear in its parameter, whose factor is
+
+    ============  =============================================================
+    CONSTANT      1
+    GAIN          the reading of a joint (rad or m); of another joint: coupling
+    COMPLIANCE    minus the gravity torque of a joint (N m or N)
+    SINE, COSINE  of the reading: an encoder that is mounted off its axis
+    SINE_2, ...   of twice the reading: a graduated disc that is not flat
+    ============  =============================================================
+
+    Examples
+    --------
+    >>> ErrorLaw.GAIN.value
+    'gain'
+    """
+
+    CONSTANT = ""
+    GAIN = "gain"
+    COMPLIANCE = "compliance"
+    SINE = "sine"
+    COSINE = "cosine"
+    SINE_2 = "sine_2_"
+    COSINE_2 = "cosine_2_"
+
+
+class Compliance(Enum):
+    """What gives way under gravity, in proportion to its moment there.
+
+    Examples
+    --------
+    >>> Compliance.ISOTROPIC.value
+    'joints and mount, the same about all axes'
+    """
+
+    NONE = "nothing"
+    JOINTS = "joints about their axes"
+    LINKS = "joints, links about alpha and beta, and the mount, each for itself"
+    ISOTROPIC = "joints and mount, the same about all axes"
+    UNIFORM = "one for all joints and one for the mount, the same about all axes"
 
 
 @dataclass(frozen=True, slots=True)

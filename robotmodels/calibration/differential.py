@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..._arrays import Array, as_exact, as_vector
+from .._arrays import Array, as_exact, as_vector
+from .extended_table import Frame
 from .parameters import GeometricParameters
-from .skeleton import Frame
 
 
 class DifferentialModel(NamedTuple):
@@ -77,7 +77,7 @@ def differential_model(
     >>> found.T.shape, found.psi.shape
     ((5, 4, 4), (5, 6, 34))
     """
-    from ...kernels.erroneous_poses import erroneous_poses
+    from ..kernels.erroneous_poses import erroneous_poses
 
     skeleton = parameters.skeleton
     q = as_vector(q, parameters.model.n, "q")

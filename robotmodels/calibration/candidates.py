@@ -6,13 +6,12 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from ..._choices import chosen
-from ...errors import InvalidValueError
-from ...geometry import FIXED, PRISMATIC, REVOLUTE
-from ...model import RobotModel
-from .elements import Compliance, Element, ErrorLaw
-from .parameters import GeometricParameter, GeometricParameters
-from .skeleton import Frame, Skeleton, skeleton_of
+from .._choices import chosen
+from ..errors import InvalidValueError
+from ..geometry import FIXED, PRISMATIC, REVOLUTE
+from ..model import RobotModel
+from .extended_table import Element, Frame, Skeleton, skeleton_of
+from .parameters import Compliance, ErrorLaw, GeometricParameter, GeometricParameters
 
 NEARLY_PARALLEL = 0.05
 """Sine of the angle between consecutive axes below which r_j gives way to beta_j (Hayati)."""

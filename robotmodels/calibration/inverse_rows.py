@@ -1,25 +1,135 @@
-"""Newton's method from many postures to the poses of a calibrated robot."""
+"""Targets, errors and Newton's steps of a robot whose links bend, in the readings of its joints."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from math import pi
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._arrays import Array
-from ...geometry import REVOLUTE
-from ...igm.solutions import IGMSolutions
-from ..calibrated_robot.calibrated import CalibratedRobot
-from .homing_bent import Task, moved_back, reading_errors, settled_readings, sizes
+from .._arrays import Array
+from ..geometry import REVOLUTE
+from ..igm.solutions import IGMSolutions
+from ..kinematics import dgm
+from .robot import (
+    CalibratedRobot,
+    calibrated_pose,
+    missing_of_pose,
+    missing_slope,
+    reading_jacobian,
+)
+
+NEWTON_STEPS = 20
+LONGEST = 0.5  # step of a joint [rad, or the length of the arm]
+DEPENDENT = 1e-10  # singular values beside the largest that count as zero
+ROUNDED = 1e-15
+
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Task:
+    """Targets, mask and held joints of M postures of a calibrated robot.
+
+    Shapes: targets (M, 4, 4), axes (M, 3, 3), mask (6,), held (M, n), unit (n,).
+    """
+
+    robot: CalibratedRobot
+    targets: Array
+    axes: Array
+    mask: Flags
+    held: Flags
+    unit: Array
+    length: float
+
+    def at(self, rows: NDArray[np.int64]) -> Task:
+        """Of some of the postures."""
+        return replace(self, targets=self.targets[rows], axes=self.axes[rows], held=self.held[rows])
+
+
+def reading_errors(task: Task, reading: Array) -> Array:
+    """What is missing at readings (M, n): shape (M, 6), in the axes, zero where not asked."""
+    missing = missing_of_pose(calibrated_pose(task.robot, reading), task.targets)
+    return _in_axes(task.axes, missing[..., None])[..., 0] * task.mask
+
+
+def sizes(errors: Array, mask: Flags) -> Array:
+    """The larger of the missing translation (m) and rotation (rad), of errors (M, 6)."""
+    errors = errors * mask
+    return np.asarray(np.linalg.norm(errors.reshape(-1, 2, 3), axis=-1).max(axis=-1), np.float64)
+
+
+def moved_back(robot: CalibratedRobot, targets: Array, reading: Array) -> Array:
+    """Targets at which the table without bending has the errors of the bent robot.
+
+    Shapes: targets (M, 4, 4), reading (M, n) -> (M, 4, 4).
+    """
+    rigid = dgm(robot.model, robot.joint_errors.actual(reading))
+    bent = calibrated_pose(robot, reading)
+    moved = np.zeros_like(rigid)
+    moved[:, 3, 3] = 1.0
+    moved[:, :3, 3] = targets[:, :3, 3] + rigid[:, :3, 3] - bent[:, :3, 3]
+    turn = bent[:, :3, :3].swapaxes(1, 2) @ rigid[:, :3, :3]
+    moved[:, :3, :3] = targets[:, :3, :3] @ turn
+    return moved
+
+
+def settled_readings(task: Task, reading: Array) -> Array:
+    """Newton's method in the readings, with exact derivatives of joint errors and bending.
+
+    Shapes: reading (M, n) -> (M, n).
+    """
+    best = reading.copy()
+    error = sizes(reading_errors(task, best), task.mask)
+    going = np.arange(len(best))
+    for _ in range(NEWTON_STEPS):
+        going = going[error[going] > ROUNDED]
+        if not going.size:
+            break
+        part = task.at(going)
+        step = _step(part, best[going])
+        scale = np.ones(len(going))
+        open_ = np.ones(len(going), np.bool_)
+        for _ in range(6):
+            trial = best[going] + scale[:, None] * step
+            size = sizes(reading_errors(part, trial), task.mask)
+            better = open_ & (size < error[going])
+            best[going[better]], error[going[better]] = trial[better], size[better]
+            open_ &= ~better
+            if not open_.any():
+                break
+            scale[open_] *= 0.5
+        going = going[~open_]
+    return best
+
+
+def _step(task: Task, reading: Array) -> Array:
+    T = calibrated_pose(task.robot, reading)
+    missing = missing_of_pose(T, task.targets)
+    A = _in_axes(task.axes, missing_slope(reading_jacobian(task.robot, reading), missing[:, 3:]))
+    e = _in_axes(task.axes, missing[..., None])
+    weight = np.repeat([1.0 / task.length, 1.0], 3)[:, None]
+    free = np.where(task.held, 0.0, task.unit)
+    A, e = (weight * A)[:, task.mask] * free[:, None, :], (weight * e)[:, task.mask]
+    step = (np.linalg.pinv(A, DEPENDENT) @ e)[..., 0]
+    largest = np.abs(step).max(axis=-1, initial=0.0)
+    step *= np.minimum(1.0, LONGEST / np.maximum(largest, LONGEST))[:, None]
+    return np.asarray(step * free, np.float64)
+
+
+def _in_axes(axes: Array, columns: Array) -> Array:
+    """Both halves of columns (M, 6, k) along axes (M, 3, 3)."""
+    turned = axes.swapaxes(1, 2)
+    return np.concatenate([turned @ columns[:, :3], turned @ columns[:, 3:]], axis=1)
+
 
 STEPS = 15
 ROUNDS = 12  # of bringing the readings of held joints to their values
 BENT_ROUNDS = 12  # of moving targets back by what bends
 SETTLING = 0.3  # of an error that a round leaves: if more, exact slopes are quicker
-ROUNDED = 1e-14  # error that is rounding
+BENT_ROUNDED = 1e-14  # error that is rounding
 
 Flags = NDArray[np.bool_]
 
@@ -158,7 +268,7 @@ class Home:
         task = self.task(targets[pose], held[pose, candidate])
         there = reading[pose, candidate]
         size = sizes(reading_errors(task, there), self.mask)
-        left = np.flatnonzero(size > np.maximum(10.0 * residual[pose, candidate], ROUNDED))
+        left = np.flatnonzero(size > np.maximum(10.0 * residual[pose, candidate], BENT_ROUNDED))
         if left.size:
             some = task.at(left)
             there[left] = settled_readings(some, there[left])
@@ -234,7 +344,7 @@ class Home:
             going, there_q, there_r = going[led], some.q[led, 0], some.reading[led, 0]
             now = sizes(reading_errors(task.at(going), there_r), self.mask)
             better = now < residual[going]
-            settles = better & (now < SETTLING * residual[going]) & (now > ROUNDED)
+            settles = better & (now < SETTLING * residual[going]) & (now > BENT_ROUNDED)
             at = going[better]
             q[at], reading[at], residual[at] = there_q[better], there_r[better], now[better]
             going = going[settles]
@@ -260,7 +370,7 @@ class Home:
     def _steps(
         self, targets: Array, axes: Array, q: Array, there: Flags, held: Flags, most: int
     ) -> tuple[Array, Array]:
-        from ...igm._homing import brought_home
+        from ..igm._homing import brought_home
 
         residual, least = np.empty(there.shape), np.empty(there.shape)
         brought_home(

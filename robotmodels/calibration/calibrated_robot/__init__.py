@@ -1,1 +1,0 @@
-"""The robot as calibrated: a model with its deviations, and the errors that no table holds."""

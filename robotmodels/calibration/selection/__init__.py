@@ -1,1 +1,0 @@
-"""Configurations that show the parameters best."""
