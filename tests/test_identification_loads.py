@@ -142,6 +142,9 @@ def test_standard_errors_of_payloads_are_true():
         found = identify_payload(model, full, bare, processing=choices)
         scores.append((found.values - true) / found.standard_errors)
     check_scores(scores)
+    without = logged(model, motion(2, 1500, 2), 0.5, 1)
+    found = identify_payload(model, without, bare, processing=choices)
+    assert found.status.name == "INSIGNIFICANT"
 
 
 @pytest.mark.parametrize("locked", [0, 3])
@@ -157,13 +160,6 @@ def test_parameters_that_the_reference_did_not_show_are_not_those_of_the_payload
     errors = [found.standard_error(name) for name in found.identifiable]
     assert {"MX", "MY", "MZ", "M"} <= set(found.identifiable)
     assert (np.abs((found.parameters - TRUE)[where] / errors) < 4.5).all()
-
-
-def test_a_robot_without_payload():
-    model, bare, _ = pair(noise=0.3)
-    full = logged(model, motion(2, 800, 2), 0.3, 1)
-    found = identify_payload(model, full, bare, processing=raw(bare))
-    assert found.status.name == "INSIGNIFICANT"
 
 
 def test_a_consistent_body_where_least_squares_give_none():
@@ -281,24 +277,19 @@ def test_a_stribeck_curve_in_noise_is_significant_where_it_is():
     assert len(found.notes) == 2
 
 
-@pytest.mark.parametrize("name", ["planar_2r", "tx40"])
-def test_an_exact_log_gives_the_exact_friction_by_load(name):
-    Fl = np.linspace(0.05, 0.2, load(name).n)
-    model, log = friction_log(LoadFriction(Fl), name, 1200)
+def test_an_exact_log_gives_the_exact_friction_by_load():
+    Fl = np.linspace(0.05, 0.2, 6)
+    model, log = friction_log(LoadFriction(Fl), "tx40", 1200)
     found = fit_friction(model, log, "load", processing=raw(log, dead_band=0.005))
     assert found.status.name == "SOLVED"
     np.testing.assert_allclose(found.friction.Fl, Fl, atol=1e-8)
     true = found.base.values(model)
     np.testing.assert_allclose(found.values[: len(true)], true, atol=1e-8)
-
-
-def test_friction_by_load_in_noise():
-    for seed in range(3):
-        model, log = friction_log(LoadFriction([0.2, 0.0]), samples=2000, noise=0.1, seed=seed)
-        found = fit_friction(model, log, "load", processing=raw(log, 3, 0.005))
-        assert found.significant.tolist() == [True, False]
-        errors = found.standard_errors[-2:]
-        assert (np.abs(found.friction.Fl - [0.2, 0.0]) < 4.5 * errors).all()
+    model, log = friction_log(LoadFriction([0.2, 0.0]), samples=2000, noise=0.1)
+    found = fit_friction(model, log, "load", processing=raw(log, 3, 0.005))
+    assert found.significant.tolist() == [True, False]
+    errors = found.standard_errors[-2:]
+    assert (np.abs(found.friction.Fl - [0.2, 0.0]) < 4.5 * errors).all()
 
 
 @pytest.mark.parametrize("curve", ["stribeck", "load"])
