@@ -922,7 +922,7 @@ MUTATIONS = [
         "tests/test_obstacles.py -k robots_by_brute_force", True),
     Mutation("obstacles: clearance", "the first link of a pair has no radius",
         "distance, away = unit_between(point, other, along)", "distance - size[i] - size[j]",
-        "distance - size[j]", "tests/test_obstacles.py -k self_collision", True),
+        "distance - size[j]", "tests/test_obstacles.py -k robots_by_brute_force", True),
     Mutation("obstacles: clearance", "a fixed end that touches counts", "def link_distances(",
         "(~moves[:, k] & touch)", "(~moves[:, k] & ~touch)",
         "tests/test_obstacles.py -k what_no_joint_moves", True),

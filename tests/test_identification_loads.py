@@ -105,24 +105,21 @@ def test_exact_logs_give_the_exact_payload(name, together):
     assert not again.values.flags.writeable
 
 
-def test_a_payload_in_a_rotated_frame_on_an_inner_link():
+def test_payloads_of_an_inner_link_and_of_a_planar_robot_are_identified_in_part():
     model, bare, full = pair("rx90", carried=(MASS, COM, INERTIA, 3))
-    found = identify_payload(model, full, bare, 3, processing=raw(bare))
-    known = [PARAMETERS.index(name) for name in found.identifiable]
-    assert {"MX", "MY"} <= set(found.identifiable)
-    np.testing.assert_allclose(found.parameters[known], TRUE[known], atol=1e-8)
-
-
-def test_a_planar_robot_shows_four_parameters():
+    inner = identify_payload(model, full, bare, 3, processing=raw(bare))
+    known = [PARAMETERS.index(name) for name in inner.identifiable]
+    assert {"MX", "MY"} <= set(inner.identifiable)
+    np.testing.assert_allclose(inner.parameters[known], TRUE[known], atol=1e-8)
     model, bare, full = pair()
-    found = identify_payload(model, full, bare, processing=raw(bare))
-    assert found.status.name == "PARTIAL"
-    assert found.identifiable == ("ZZ", "MX", "MY", "M")
-    assert "XX, XY, XZ, YY, YZ, MZ" in found.notes[0]
-    assert found.mass == pytest.approx(MASS, abs=1e-8)
-    assert np.isnan(found.com[2])
+    planar = identify_payload(model, full, bare, processing=raw(bare))
+    assert planar.status.name == "PARTIAL"
+    assert planar.identifiable == ("ZZ", "MX", "MY", "M")
+    assert "XX, XY, XZ, YY, YZ, MZ" in planar.notes[0]
+    assert planar.mass == pytest.approx(MASS, abs=1e-8)
+    assert np.isnan(planar.com[2])
     with pytest.raises(InvalidValueError, match="MZ"):
-        _ = found.carried
+        _ = planar.carried
 
 
 def test_friction_that_differs_between_the_logs():
