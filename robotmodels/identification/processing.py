@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_floats
 from ..errors import InvalidValueError, ShapeError
 from ..logs import Log
-from ..logs.stretches import stretches
 from ..minimal_parameters import BaseParameters
 from .delay import checked_cutoff
 from .position_noise import PositionNoise, predicted_bias
@@ -31,7 +30,7 @@ _HIGHEST, _STEP, _WIDTH = 15.0, 1.3, 2.5
 """Highest cutoff of the equations in Hz (joints are flexible above); ratio of the cutoffs that are
 tried; cutoff of the positions, in cutoffs of the equations, so that it does not distort them."""
 _WINDOWS, _SECONDS = 8, 16.0
-"""Largest number and length (s) of the stretches for spectra and velocities."""
+"""Largest number and length (s) of the windows for spectra and velocities."""
 
 
 def choose_processing(
@@ -90,8 +89,8 @@ def choose_processing(
     >>> t = np.arange(0.0, 20.0, 0.001)[:, None]
     >>> swing = Log(0.001, np.sin(2 * np.pi * t), np.cos(2 * np.pi * t))
     >>> chosen = choose_processing(swing)
-    >>> round(chosen.motion, 2), chosen.decimation
-    (1.05, 152)
+    >>> round(chosen.motion, 1), round(chosen.cutoff), chosen.decimation
+    (1.1, 11, 150)
     """
     motion, noise = motion_of(log)
     if not filtered:
@@ -303,10 +302,16 @@ def motion_of(log: Log) -> tuple[float, Array]:
 
 
 def _windows(log: Log) -> list[Array]:
-    """Positions of a bounded part of a log, recording by recording."""
+    """Positions in windows of bounded number and length, spread over each recording."""
     length = max(8, int(_SECONDS / log.dt))
-    part = stretches(log, length, _WINDOWS * length)
-    return [np.asarray(part.q[rows]) for rows in part.recordings() if rows.stop - rows.start >= 8]
+    parts = [part for part in log.recordings() if part.stop - part.start >= 8]
+    spread = np.unique(np.linspace(0, max(len(parts) - 1, 0), _WINDOWS).round().astype(int))
+    windows = []
+    for part in (parts[k] for k in spread if parts):
+        count = min(max(1, _WINDOWS // len(spread)), -(-(part.stop - part.start) // length))
+        starts = np.linspace(part.start, max(part.start, part.stop - length), count)
+        windows += [slice(int(x), min(int(x) + length, part.stop)) for x in starts.round()]
+    return [np.asarray(log.q[window]) for window in windows]
 
 
 def _band(f: Array, P: Array, noise: Array) -> tuple[float, float]:
