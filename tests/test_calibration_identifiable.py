@@ -204,7 +204,7 @@ def test_contacts_are_judged_where_the_corrected_robot_meets_them():
     rng = np.random.default_rng(3)
     candidates = candidate_parameters(model)
     xi = 1e-3 * rng.normal(size=len(candidates)) * (candidates.rows > 0)
-    q, label = drawn_groups(candidates, "point_contact", 14, 8, rng, deviation=xi, limits=False)
+    q, label = drawn_groups(candidates, "point_contact", 14, 8, rng, corrections=xi, limits=False)
     T = differential_model(candidates, q, xi).T
     assert np.abs(np.diff(T[:, :3, 3], axis=0)[np.diff(label) == 0]).max() < 1e-11
     # readings of one robot violate the contacts of the other by millimetres: as they are, they

@@ -307,7 +307,7 @@ def _drawn(
     if kind.is_constraint:
         count, postures = _CONTACTS, 2 * kind.postures + 2
     groups = drawn_groups(
-        candidates, kind, count, postures, rng, frame=frame, deviation=xi, limits=False
+        candidates, kind, count, postures, rng, frame=frame, corrections=xi, limits=False
     )
     if not groups.count:
         raise InvalidValueError(
@@ -315,7 +315,7 @@ def _drawn(
             "identifiable. Measure something else (Position, Pose), or let the robot touch with "
             "fewer constraints."
         )
-    return measurement_of(candidates, kind, groups, frame=frame, deviation=xi)
+    return measurement_of(candidates, kind, groups, frame=frame, corrections=xi)
 
 
 def identifiable_on(

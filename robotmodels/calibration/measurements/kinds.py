@@ -76,11 +76,11 @@ def measurement_of(
     groups: Groups,
     *,
     frame: Frame = None,
-    deviation: Array | None = None,
+    corrections: Array | None = None,
     sigma: Array | float | None = None,
 ) -> Measurement:
     """Noise-free measurement of a robot at given configurations."""
-    T = differential_model(parameters, groups.q, deviation, frame).T
+    T = differential_model(parameters, groups.q, corrections, frame).T
     return as_kind(kind).drawn(groups.q, T, groups.label, sigma=sigma, frame=frame)
 
 
@@ -92,7 +92,7 @@ def drawn_groups(
     rng: np.random.Generator,
     *,
     frame: Frame = None,
-    deviation: Array | None = None,
+    corrections: Array | None = None,
     limits: bool = True,
 ) -> Groups:
     """Configurations spread over the joint ranges, those of a contact moved until they meet.
@@ -105,8 +105,8 @@ def drawn_groups(
         return groups_of(q.reshape(groups, postures, -1))
     first = spread_configurations(model, groups, rng)
     starts = spread_configurations(model, groups * postures * _STARTS, rng)
-    moving = parameters if deviation is not None else replace(parameters, entries=())
-    xi = np.zeros(len(moving)) if deviation is None else deviation
+    moving = parameters if corrections is not None else replace(parameters, entries=())
+    xi = np.zeros(len(moving)) if corrections is None else corrections
     T = differential_model(moving, first, xi, frame).T
     known = {g: kind.target_at(T[g], rng) for g in range(groups)}
     label = np.repeat(np.arange(groups), postures * _STARTS)
