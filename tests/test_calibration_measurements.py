@@ -468,7 +468,7 @@ def test_a_new_kind_is_drawn_read_selected_and_fitted(tmp_path):
     candidates = candidate_parameters(ARM)
     groups = drawn_groups(
         candidates, "ball-contact", 12, 14, rng, limits=False,
-        deviation=2e-3 * rng.normal(size=len(candidates)),
+        corrections=2e-3 * rng.normal(size=len(candidates)),
     )  # fmt: skip
     rows = [[*map(str, q), f"ball {g}"] for q, g in zip(*groups, strict=True)]
     file = tmp_path / "touches.csv"
