@@ -28,6 +28,14 @@ def clean_log(model, rng, noise=0.0, **options):
     return Log(dt, q, tau + noise * rng.normal(size=tau.shape), v, a)
 
 
+def recorded(name, samples, seed=7, noise=0.0, dt=0.002):
+    """A log without velocities of a robot of the catalogue that moves slowly, with friction."""
+    model, rng = rm.load(name), np.random.default_rng(seed)
+    q, v, a = swinging(model, rng, samples, dt, 5, 10.0, 0.5)
+    tau = rm.idm(model, q, v, a) + 2.0 * v + np.sign(v) + noise * rng.normal(size=q.shape)
+    return Log(dt, q, tau)
+
+
 def odd_robots():
     """Serial, prismatic, branched and coupled arms with turned bases, tools and zero lengths."""
 

@@ -11,7 +11,7 @@ import robotmodels as rm
 from robotmodels.errors import RobotModelsWarning
 from robotmodels.identification import Log, Wls, fit, predicted_torque
 
-ARMS = range(60, 90)  # of seeds 0 to 99, 94 keep the bound of 1.02 and 99 that of 1.15
+ARMS = range(60, 72)  # of seeds 0 to 99, 94 keep the bound of 1.02 and 99 that of 1.15
 
 
 @cache
@@ -21,28 +21,18 @@ def fitted(seed):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RobotModelsWarning)  # some motions show too little
         found = fit(one.model, one.log)  # with its checks: nothing correct is refused
+    assert found.factors.rows >= 20.0 * len(found.names)
+    assert any("standard errors" in note for note in found.equations.processing.notes)
     shrunk = any("Shrinkage" in note for note in found.notes)
     off = np.abs(found.values - found.base.values(one.model)) / found.standard_errors
-    return (
-        one.error(partial(predicted_torque, found)) / one.error(textbook(one.model, one.log)),
-        None if shrunk else float((off < 1.96).mean()),
-        found.factors.rows / len(found.names),
-        found.equations.processing,
-    )
-
-
-@pytest.mark.parametrize("first", range(ARMS.start, ARMS.stop, 5))
-def test_default_fits_are_accepted_and_say_what_was_chosen(first):
-    for seed in range(first, first + 5):
-        _, _, equations, chosen = fitted(seed)
-        assert equations >= 20.0, (seed, equations)
-        assert any("standard errors" in note for note in chosen.notes)
+    ratio = one.error(partial(predicted_torque, found)) / one.error(textbook(one.model, one.log))
+    return ratio, None if shrunk else float((off < 1.96).mean())
 
 
 def test_default_fits_predict_other_motion_as_a_textbook_fit_or_better():
     ratios = np.array([fitted(seed)[0] for seed in ARMS])
     assert np.median(ratios) < 1.0
-    assert (ratios <= 1.02).sum() >= 28
+    assert (ratios <= 1.02).sum() >= len(ARMS) - 1
     assert ratios.max() < 1.15
     # a motion that excites badly is where a textbook fit fails
     bad = [k for k, seed in enumerate(ARMS) if KINDS[seed % len(KINDS)] == "badly exciting"]
@@ -50,40 +40,35 @@ def test_default_fits_predict_other_motion_as_a_textbook_fit_or_better():
 
 
 def test_intervals_hold_over_the_fleet():
-    coverage = [fitted(seed)[1] for seed in ARMS]
-    kept = [x for x in coverage if x is not None]
-    assert len(kept) >= 18
+    kept = [x for x in (fitted(seed)[1] for seed in ARMS) if x is not None]
+    assert len(kept) >= 7
     assert 0.92 <= np.mean(kept) <= 0.97
+
+
+def apart(first, second):
+    """Differences of the values in standard errors, root mean square."""
+    assert first.names == second.names
+    errors = np.hypot(first.standard_errors, second.standard_errors)
+    return np.sqrt(np.mean(((first.values - second.values) / errors) ** 2))
 
 
 def test_parameters_of_two_logs_of_one_robot_agree():
     # friction of the load, of low speeds, and a spring that no model of the fit has
     ratios = []
-    for seed in range(30):
+    for seed in range(8):
         model, logs = pair(seed)
-        first, second = (fit(model, log, Wls(shrinkage=False), checked=False) for log in logs)
-        assert first.names == second.names
-        apart = (first.values - second.values) / np.hypot(
-            first.standard_errors, second.standard_errors
-        )
-        ratios.append(np.sqrt(np.mean(apart**2)))
+        ratios.append(apart(*(fit(model, x, Wls(shrinkage=False), checked=False) for x in logs)))
     assert 0.8 < np.mean(ratios) < 1.2
-
-
-def test_halves_of_the_tx40_log_agree():
     data = rm.datasets.load_tx40()
-    half = len(data.log) // 2
-    first = fit(data.model, data.log.rows(0, half))
-    second = fit(data.model, data.log.rows(half, len(data.log)))
-    apart = (first.values - second.values) / np.hypot(first.standard_errors, second.standard_errors)
-    assert np.sqrt(np.mean(apart**2)) < 1.5
+    half, N = len(data.log) // 2, len(data.log)
+    halves = data.log.rows(0, half), data.log.rows(half, N)
+    assert apart(*(fit(data.model, part) for part in halves)) < 1.5
 
 
 def test_a_log_may_begin_at_rest_with_a_coarse_encoder():
     one = case(61)
     rest, step = round(5.0 / one.log.dt), 2.0 * np.pi / 2**13
-    q, _, _ = (np.concatenate((np.repeat(x[:1], rest, axis=0), x)) for x in (one.q, one.v, one.a))
-    tau = np.concatenate((np.repeat(one.tau[:1], rest, axis=0), one.tau))
+    q, tau = (np.concatenate((np.repeat(x[:1], rest, axis=0), x)) for x in (one.q, one.tau))
     found = fit(one.model, Log(one.log.dt, np.round(q / step) * step, tau), checked=False)
     assert found.equations.processing.motion < 10.0
     assert one.error(partial(predicted_torque, found)) < 0.1
@@ -97,15 +82,6 @@ def test_a_correct_short_log_is_not_refused(seed):
         rows = round(seconds / one.log.dt)
         if 4 * len(one.log.q[:rows]) * one.log.n > 5 * len(rm.base_parameters(one.model)):
             fit(one.model, one.log.rows(0, rows), drive=("Ia", "Fv", "Fc"))
-
-
-def test_long_logs_keep_their_measured_velocities():
-    from robotmodels.logs.stretches import stretches
-
-    q = np.zeros((1000, 2))
-    part = stretches(Log(0.01, q, q, q + 1.0, q + 2.0), 50, 200)
-    assert (part.v == 1.0).all()
-    assert (part.a == 2.0).all()
 
 
 def test_few_equations_shrink_by_default_and_say_so():

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from identification_logs import clean_log, odd_robots, swinging
 
-import robotmodels as rm
 from robotmodels.estimation.linear import weighted
 from robotmodels.friction import AsymmetricFriction
 from robotmodels.identification import (
@@ -17,7 +16,7 @@ from robotmodels.identification import (
 )
 from robotmodels.identification.forms import EquationForm
 from robotmodels.minimal_parameters import base_parameters
-from robotmodels.regressors import energy_difference_regressor, power_regressor, torque_regressor
+from robotmodels.regressors import torque_regressor
 
 ROBOTS = odd_robots()
 FORMS = list(EquationForm)
@@ -77,35 +76,6 @@ def test_pieces_are_the_whole(form, decimation, monkeypatch):
             np.testing.assert_allclose(parts[name], array, rtol=0, atol=2e-11)
 
 
-def test_the_power_is_that_of_the_torques():
-    model = ROBOTS["tree"]
-    log = clean_log(model, np.random.default_rng(3), samples=700)
-    base = base_parameters(model)
-    found = collected(equations(base, log, plain(log), EquationForm.POWER))
-    torques = torque_regressor(model, log.q, log.v, log.a, columns=base.names)
-    np.testing.assert_allclose(
-        found["W"][:, 0], np.einsum("kj,kjb->kb", log.v, torques), atol=1e-11
-    )
-    np.testing.assert_allclose(found["y"][:, 0], (log.tau * log.v).sum(axis=1), atol=1e-12)
-
-
-def test_the_energy_is_the_integral_of_the_power():
-    model = ROBOTS["prismatic"]
-    log = clean_log(model, np.random.default_rng(3), samples=700)
-    base = base_parameters(model)
-    step = 13
-    found = collected(equations(base, log, plain(log, step), EquationForm.ENERGY))
-    knots = np.append(np.arange(3, 696, step), 696)
-    other = energy_difference_regressor(model, log.t, log.q, log.v, columns=base.names, knots=knots)
-    # that rule is of the second order for friction
-    np.testing.assert_allclose(found["W"][:, 0], other, atol=2e-3 * np.abs(other).max())
-    smooth = [k for k, name in enumerate(base.names) if not name.startswith(("Fv", "Fc", "off"))]
-    np.testing.assert_allclose(found["W"][:, 0, smooth], other[:, smooth], atol=1e-12)
-    np.testing.assert_allclose(found["t"], 0.5 * log.dt * (knots[1:] + knots[:-1]), atol=1e-12)
-    power = power_regressor(model, log.q, log.v, log.a, columns=base.names)
-    assert found["W"].shape[2] == power.shape[1]
-
-
 @pytest.mark.parametrize("form", FORMS)
 def test_stretches_at_rest_are_left_out(form):
     model = ROBOTS["serial"]
@@ -128,35 +98,18 @@ def test_stretches_at_rest_are_left_out(form):
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_forms_take_friction_models_and_no_drives(form):
-    model = ROBOTS["serial"]
-    rng = np.random.default_rng(8)
-    q, v, a = swinging(model, rng)
+def test_several_recordings_some_too_short_with_a_friction_model(form):
+    model, rng = ROBOTS["serial"], np.random.default_rng(8)
+    lengths = (900, 5, 2, 800)
+    parts = [swinging(model, np.random.default_rng(k), samples=n) for k, n in enumerate(lengths)]
+    q, v, a = (np.concatenate(x) for x in zip(*parts, strict=True))
     friction = AsymmetricFriction(*np.ones((4, model.n)))
     base = base_parameters(model, drive=("Ia",), friction=friction)
     true = rng.normal(size=len(base))
-    tau = (
-        torque_regressor(model, q, v, a, base.drive, columns=base.names, friction=base.friction)
-        @ true
-    )
-    log = Log(2e-3, q, tau, v, a)
-    found = weighted(reduce_equations(equations(base, log, plain(log, 5), form)))
-    assert np.abs(found.values - true).max() < 1e-7
-
-
-@pytest.mark.parametrize("form", FORMS)
-def test_several_recordings_some_too_short(form):
-    model = ROBOTS["serial"]
-    base = base_parameters(model, drive=True)
-    parts = [
-        swinging(model, np.random.default_rng(k), samples=n) for k, n in enumerate((900, 5, 2, 800))
-    ]
-    q, v, a = (np.concatenate(x) for x in zip(*parts, strict=True))
-    log = Log(2e-3, q, rm.idm(model, q, v, a), v, a, starts=(0, 900, 905, 907))
-    system = equations(base, log, plain(log), form)
-    factors = reduce_equations(system)
-    found = weighted(factors)
-    assert np.abs(found.values - base.values(model)).max() < 1e-7
+    options = {"columns": base.names, "friction": base.friction}
+    tau = torque_regressor(model, q, v, a, base.drive, **options) @ true
+    log = Log(2e-3, q, tau, v, a, starts=(0, 900, 905, 907))
+    factors = reduce_equations(equations(base, log, plain(log), form))
+    assert np.abs(weighted(factors).values - true).max() < 1e-7
     inside = {EquationForm.FILTERED: 2 * 3, EquationForm.ENERGY: 2 * 3 + 1}.get(form, 0)
-    expected = sum(max(n - inside, 0) for n in (900, 5, 2, 800))
-    assert (factors.counts == expected).all()
+    assert (factors.counts == sum(max(n - inside, 0) for n in lengths)).all()

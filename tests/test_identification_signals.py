@@ -1,4 +1,4 @@
-"""Signals of logs: filter, differences, parallel decimation, edges, dead bands, pieces."""
+"""Signals of logs: filter, differences, parallel decimation, edges, dead bands, choices."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 
 import robotmodels as rm
 from robotmodels.errors import InvalidValueError, ShapeError
-from robotmodels.identification import Processing, choose_processing, equations
+from robotmodels.identification import choose_processing, equations
 from robotmodels.identification.signals import (
     central_differences,
     decimation_window,
@@ -33,7 +33,7 @@ def gain(frequency: float, cutoff: float, order: int) -> complex:
 
 
 @pytest.mark.parametrize("order", [1, 2, 4, 6])
-@pytest.mark.parametrize("cutoff", [2.0, 50.0, 300.0])
+@pytest.mark.parametrize("cutoff", [2.0, 300.0])
 def test_the_filter_is_at_minus_three_decibels_at_its_cutoff(order, cutoff):
     assert abs(gain(cutoff, cutoff, order) - np.sqrt(0.5)) < 1e-6  # real: no delay
 
@@ -65,8 +65,6 @@ def test_central_differences_have_their_order(accuracy):
         off = np.abs(central_differences(np.sin(3.0 * t), dt, accuracy) - 3.0 * np.cos(3.0 * t))
         error.append(off[10:-10].max())
     assert abs(np.log2(error[0] / error[1]) - accuracy) < 0.05
-    squares = central_differences(np.arange(9.0) ** 2, 1.0, accuracy)
-    np.testing.assert_allclose(squares, [1, *range(2, 15, 2), 15], rtol=1e-13)
     assert central_differences(np.array([1.0, 3.0]), 0.5, accuracy).tolist() == [4.0, 4.0]
 
 
@@ -79,9 +77,8 @@ def test_the_gain_of_the_decimation_is_half_at_four_tenths_of_the_new_rate(step)
         return float(taps @ np.cos(2.0 * np.pi * f / step * k))
 
     np.testing.assert_array_equal(taps, taps[::-1])
-    assert abs(response(0.0) - 1.0) < 1e-14
-    assert abs(response(0.4) - 0.5) < 0.01
-    assert abs(response(0.2) - 1.0) < 0.01
+    for frequency, expected, bound in ((0.0, 1.0, 1e-14), (0.4, 0.5, 0.01), (0.2, 1.0, 0.01)):
+        assert abs(response(frequency) - expected) < bound
     # frequencies above the new rate less that of the motion would appear as lower ones
     assert max(abs(response(f)) for f in np.linspace(0.62, 0.5 * step, 200)) < 0.02
 
@@ -123,7 +120,7 @@ def test_dead_bands_are_four_standard_deviations_of_the_velocity_noise(rng):
 
 
 def test_samples_in_the_dead_band_take_no_part():
-    log = moved(40_000)
+    log = moved(20_000)
     base = base_parameters(rm.load("rx90"), drive=("Fv", "Fc"))
     band = np.linspace(0.05, 0.3, log.n)
     chosen = choose_processing(log, decimation=1, dead_band=band)
@@ -170,4 +167,3 @@ def test_measured_velocities_are_taken_and_filtered_alike():
 def test_choices_that_make_no_sense_are_named(options, match):
     with pytest.raises((InvalidValueError, ShapeError), match=match):
         choose_processing(moved(10_000), **options)
-    assert not Processing(DT, None, 4, 4, 1, np.zeros(1), 0, 1.0, ()).dead_band.flags.writeable

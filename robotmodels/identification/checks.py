@@ -30,17 +30,23 @@ from .delay import (
     representative_part,
     synchronisation,
 )
-from .joint_hypotheses import better_hypotheses
+from .joint_hypotheses import ADVICE, better_hypotheses
 
 
 def accepted_log(
-    log: Log, model: RobotModel, name: str, friction: Friction | None = None
+    log: Log, model: RobotModel, name: str, friction: Friction | None = None, joints: bool = True
 ) -> tuple[Log, tuple[str, ...]]:
     """Check and clean a log, with sentences on the findings; raise if it is unusable."""
-    log, findings = _cleaned(log, model)
-    if not any(finding.severity is Severity.USELESS for finding in findings):
+    findings = check_log(log, model)
+    if any(finding.kind in (FindingKind.STUCK, FindingKind.SPIKES) for finding in findings):
+        log = cleaned(log)
+    if joints and not any(finding.severity is Severity.USELESS for finding in findings):
         findings = (*findings, *check_joints(log, model, friction))
-    return log, _sentences(findings, name)
+    useless = [str(finding) for finding in findings if finding.severity is Severity.USELESS]
+    if useless:
+        advice = "(checked=False uses the log unchanged.)"
+        raise InvalidValueError(f"{name}: {' '.join(useless)} {advice}")
+    return log, tuple(map(str, findings))
 
 
 def accepted_test(
@@ -63,22 +69,8 @@ def accepted_test(
         )
     if not checked:
         return test, ()
-    test, findings = _cleaned(test, model)
-    return test, tuple(f"Of the held-out log: {each}" for each in _sentences(findings, "test"))
-
-
-def _cleaned(log: Log, model: RobotModel) -> tuple[Log, tuple[LogFinding, ...]]:
-    findings = check_log(log, model)
-    bad = any(finding.kind in (FindingKind.STUCK, FindingKind.SPIKES) for finding in findings)
-    return cleaned(log) if bad else log, findings
-
-
-def _sentences(findings: tuple[LogFinding, ...], name: str) -> tuple[str, ...]:
-    useless = [str(finding) for finding in findings if finding.severity is Severity.USELESS]
-    if useless:
-        advice = "(checked=False uses the log unchanged.)"
-        raise InvalidValueError(f"{name}: {' '.join(useless)} {advice}")
-    return tuple(str(finding) for finding in findings)
+    test, sentences = accepted_log(test, model, "test", joints=False)
+    return test, tuple(f"Of the held-out log: {sentence}" for sentence in sentences)
 
 
 def check_joints(
@@ -118,10 +110,10 @@ def _signs_and_order(
         if not likely:
             return
         best, correction = likely[0], likely[0].correction
-        words, advice = correction.words, correction.advice
+        words, advice = correction.words, ADVICE[correction.kind]
         if len(likely) > 1:
-            alike = "; ".join(other.correction.words for other in likely[1:])
-            advice = f"{advice} Equally likely: {alike}."
+            others = "; ".join(other.correction.words for other in likely[1:])
+            advice = f"{advice} Equally likely: {others}."
         sentence = (
             f"{words[0].upper()}{words[1:]}: with this correction the equations of all joints "
             f"leave {100.0 * best.left:.2g} % of the variance of the affected torques unexplained "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -84,10 +85,8 @@ def synchronisation(
     For each delay the torques are shifted back, and the residual of the dynamic model with free
     parameters is computed; the minimum over the delays is interpolated, to well below a sample.
     Inertia and friction of the model are not used. Logs of more than 1e5 samples are represented by
-    up to 20 stretches spread evenly over them. A motion that excites few parameters is sufficient.
-    The model is rigid: the log of the TX40 shows no significant delay at cutoffs of 10 to 20 Hz,
-    and torques 2.5 ms early at 40 Hz and more, which is flexibility and not a delay of the
-    recording.
+    up to 20 stretches spread evenly over them. The model is rigid: at high cutoffs (40 Hz on the
+    log of the TX40) joint flexibility looks like a delay.
 
     Parameters
     ----------
@@ -129,11 +128,7 @@ def synchronisation(
     True
     """
     check_log_and_model(log, model)
-    fc = default_cutoff(log) if cutoff is None else float(as_floats(cutoff, "cutoff"))
-    if not 0.0 < fc < 0.5 / log.dt:
-        raise InvalidValueError(
-            f"cutoff: expected a frequency between 0 and {0.5 / log.dt:g} Hz, got {fc:g}."
-        )
+    fc = default_cutoff(log) if cutoff is None else checked_cutoff(log, cutoff)
     span = max(0.02, 5.0 * log.dt) if within is None else float(as_floats(within, "within"))
     if not span >= log.dt:
         raise InvalidValueError(
@@ -145,32 +140,29 @@ def synchronisation(
     delays: Array = np.asarray(step * np.arange(-count, count + 1), np.float64)
     margin = int(np.ceil((delays[-1] + 2.0 * step) / log.dt)) + 2
     part = representative_part(log, min(fc, 1.0 / span))
-    joints = _joint_equations(part, fc, margin, model)
-    if not joints:
+    curves, inflation = np.full((2, log.n, len(delays)), np.nan)
+    power = 0.0
+    for j, residuals, freedom, size in _shifted_residuals(part, fc, margin, model, delays):
+        squares = (residuals**2).sum(axis=0)
+        variance = max(squares.min() / freedom, 1e-24 * size / len(residuals), 1e-300)
+        curves[j], power = squares / variance, power + size / variance
+        inflation[j] = [_inflation(r) for r in residuals.T]
+    if not power > 0.0:
         raise InvalidValueError(
             "log: no joint has enough samples in motion to compare torques with; see check_log."
         )
-    curves, power = np.full((log.n, len(delays)), np.nan), 0.0
-    each, errors = np.full(log.n, np.nan), np.full(log.n, np.nan)
-    for j, joint in joints.items():
-        squares = (joint.residuals(delays) ** 2).sum(axis=0)
-        rows, rank = joint.basis.shape
-        size = float((joint.tau[joint.rows] ** 2).sum())
-        variance = max(squares.min() / (rows - rank), 1e-24 * size / rows, 1e-300)
-        curves[j], power = squares / variance, power + size / variance
-        at, error = _minimum([joint], delays, curves[j])
-        if np.isfinite(error):
-            each[j], errors[j] = at, error
+    joints = np.array([_minimum(delays, *both) for both in zip(curves, inflation, strict=True)])
+    each, errors = np.where(np.isfinite(joints[:, 1:]), joints, np.nan).T
     total = np.nansum(curves, axis=0)
-    delay, standard_error = _minimum(list(joints.values()), delays, total)
+    delay, error = _minimum(delays, total, np.nanmean(inflation, axis=0))
     relative = np.sqrt(total / power)
     status = SynchronisationStatus.FLAT
     if delay in (delays[0], delays[-1]):
         status = SynchronisationStatus.AT_THE_END
     # a single sine is flat: its phase is equally well explained by friction
-    elif standard_error < span and float(np.ptp(relative)) > 1e-6:
+    elif error < span and float(np.ptp(relative)) > 1e-6:
         status = SynchronisationStatus.FOUND
-    return Synchronisation(status, delay, standard_error, each, errors, delays, relative, log.dt)
+    return Synchronisation(status, delay, error, each, errors, delays, relative, log.dt)
 
 
 def check_log_and_model(log: Log, model: RobotModel) -> None:
@@ -179,6 +171,17 @@ def check_log_and_model(log: Log, model: RobotModel) -> None:
     check_model(model)
     if model.n != log.n:
         raise ShapeError(f"log: {log.n} joints, the model {model.name} has {model.n}.")
+
+
+def checked_cutoff(log: Log, cutoff: float) -> float:
+    """User-given cutoff in Hz, below half the sampling rate."""
+    band = float(as_floats(cutoff, "cutoff"))
+    if not 0.0 < band < 0.5 / log.dt:
+        raise InvalidValueError(
+            "cutoff: expected a frequency between 0 and half the sampling rate "
+            f"({0.5 / log.dt:g} Hz), got {cutoff!r}."
+        )
+    return band
 
 
 def default_cutoff(log: Log) -> float:
@@ -228,27 +231,15 @@ def motor_speeds(model: RobotModel) -> Array:
     return np.concatenate([np.eye(model.n), model.transmission.weights[motors]])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _JointEquations:
-    """Torque of a joint (N,), rows in motion, and their orthonormal regressor."""
+def _shifted_residuals(
+    log: Log, cutoff: float, margin: int, model: RobotModel, delays: Array
+) -> Iterator[tuple[int, Array, int, float]]:
+    """Joints with enough samples in motion: number, residuals (rows, S) of the shifted torques.
 
-    tau: Array
-    dt: float
-    rows: NDArray[np.int64]
-    basis: Array
+    Then degrees of freedom, and sum of squares of the torque.
+    """
+    from scipy.ndimage import map_coordinates
 
-    def residuals(self, delays: Array) -> Array:
-        """Torques shifted by the delays, less their projection on the regressor (rows, S)."""
-        from scipy.ndimage import map_coordinates
-
-        y = map_coordinates(self.tau, [self.rows[:, None] + delays / self.dt])
-        return y - self.basis @ (self.basis.T @ y)
-
-
-def _joint_equations(
-    log: Log, cutoff: float, margin: int, model: RobotModel
-) -> dict[int, _JointEquations]:
-    """Equations of the joints that have enough samples in motion."""
     x, rows = filtered_samples(log, cutoff, margin)
     weights, dt = motor_speeds(model), log.dt
     speed = x.v @ weights.T
@@ -262,19 +253,19 @@ def _joint_equations(
     for part in log.recordings():  # the filter spreads steps as in the torques
         steps[part] = zero_phase(steps[part], cutoff, dt)
     W = torque_regressor(model, x.q[rows], x.v[rows], x.a[rows], drive=SMOOTH_DRIVE)
-    equations = {}
-    for j in range(log.n):
-        used = usable[:, j]
-        A = np.concatenate([W[used, j], steps[rows[used]] * weights[:, j]], axis=1)
+    for j, tau in enumerate(x.tau.T):
+        used = rows[usable[:, j]]
+        A = np.concatenate([W[usable[:, j], j], steps[used] * weights[:, j]], axis=1)
         size = np.linalg.norm(A, axis=0)
         U, s, _ = np.linalg.svd(A / np.where(size > 0.0, size, 1.0), full_matrices=False)
-        basis = np.ascontiguousarray(U[:, s > 1e-9 * s.max(initial=0.0)])
-        if len(basis) > basis.shape[1] + 10:
-            equations[j] = _JointEquations(x.tau[:, j], dt, rows[used], basis)
-    return equations
+        basis = U[:, s > 1e-9 * s.max(initial=0.0)]
+        if len(used) > basis.shape[1] + 10:
+            y = map_coordinates(tau, [used[:, None] + delays / dt])
+            residuals = y - basis @ (basis.T @ y)
+            yield j, residuals, len(used) - basis.shape[1], float(tau[used] @ tau[used])
 
 
-def _minimum(joints: list[_JointEquations], delays: Array, curve: Array) -> tuple[float, float]:
+def _minimum(delays: Array, curve: Array, inflation: Array) -> tuple[float, float]:
     """Delay at the minimum of a curve of residuals, and its standard error; infinite at an end."""
     from scipy.interpolate import CubicSpline
 
@@ -282,11 +273,9 @@ def _minimum(joints: list[_JointEquations], delays: Array, curve: Array) -> tupl
     if best in (0, len(delays) - 1):
         return float(delays[best]), float("inf")
     spline = CubicSpline(delays, curve)
-    roots = spline.derivative().roots(extrapolate=False)
-    candidates = np.append(roots[np.isfinite(roots)], delays[best])
-    at = float(candidates[np.argmin(spline(candidates))])
-    inflation = np.mean([_inflation(joint.residuals(np.array([at]))[:, 0]) for joint in joints])
-    return at, float(np.sqrt(2.0 * inflation / max(float(spline(at, 2)), 1e-300)))
+    candidates = np.append(spline.derivative().roots(extrapolate=False), delays[best])
+    at = float(candidates[np.nanargmin(spline(candidates))])
+    return at, float(np.sqrt(2.0 * inflation[best] / max(float(spline(at, 2)), 1e-300)))
 
 
 def _inflation(r: Array) -> float:

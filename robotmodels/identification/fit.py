@@ -186,7 +186,7 @@ def _equations(
             choice = given
         else:
             options = given | {"decimation": decimation}
-            choice = processing_for(base, log, **options, kinds=groups)
+            choice = processing_for(base, log, **options, groups=groups)
         if not form.by_joint:
             choice = replace(choice, notes=(*choice.notes, _ONE_EQUATION))
         return equations(base, log, choice, form).cached()

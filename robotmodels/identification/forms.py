@@ -29,6 +29,9 @@ from ..regressors import (
 )
 from .signals import Piece, Processing, Signals, decimation_window, piece_signals
 
+Mask = NDArray[np.bool_]
+Grid = tuple[int, int, int]
+"""Decimation, first of the decimated samples, and their number."""
 _CHUNK, _MOMENTUM_CHUNK = 1024, 128
 """Largest number of samples in a regressor chunk."""
 _LEAST_WEIGHT = 0.5
@@ -42,20 +45,19 @@ SHORT = 3
 
 
 class EquationForm(Enum):
-    """Quantity that the equations balance."""
+    """Quantity that the equations balance: of each joint (torque, filtered) or of the robot.
+
+    Torque and power need accelerations.
+    """
 
     TORQUE = "torques of the joints"
-    """The inverse dynamic model: one equation for each joint; needs accelerations."""
     FILTERED = "rates of the momenta of the joints"
-    """The momentum form through a low-pass: one for each joint, without accelerations."""
     POWER = "power of all joints together"
-    """One equation at each instant; needs accelerations."""
     ENERGY = "energy of the robot between instants"
-    """One equation for each interval, without accelerations."""
 
     @property
     def by_joint(self) -> bool:
-        """Whether each joint has equations of its own."""
+        """Whether each joint has separate equations."""
         return self in (EquationForm.TORQUE, EquationForm.FILTERED)
 
 
@@ -70,7 +72,7 @@ class Block:
     t: Array
     W: Array
     y: Array
-    use: NDArray[np.bool_]
+    use: Mask
     v: Array
 
     def __len__(self) -> int:
@@ -100,8 +102,8 @@ class EquationSource:
         return (W for _, W in parts)
 
 
-FormedRows = tuple[Array, Array, NDArray[np.bool_]]
-RowForm = Callable[[Array, Array, Array, NDArray[np.bool_]], FormedRows]
+FormedRows = tuple[Array, Array, Mask]
+RowForm = Callable[[Array, Array, Array, Mask], FormedRows]
 """From W (k, n, b), torques and velocities (k, n) and use (k, n), at the rate of the log: W
 (k, m, c), right side (k, m) and use (k, m)."""
 
@@ -180,8 +182,8 @@ def energy_block(source: EquationSource, piece: Piece) -> Block:
     of_energy = np.array([name in stored for name in source.names], dtype=bool)
     energies, losses = (np.array(source.names)[k].tolist() for k in (of_energy, ~of_energy))
     options = {"drive": base.drive, "friction": base.friction}
-    lost = power_regressor(base.model, q, v, np.zeros_like(v), columns=losses, **options)
-    power = np.column_stack((lost, (tau * v).sum(axis=1)))
+    dissipated = power_regressor(base.model, q, v, np.zeros_like(v), columns=losses, **options)
+    power = np.column_stack((dissipated, (tau * v).sum(axis=1)))
     count = len(power) - len(_INTEGRAL) + 1
     between = sum(weight * power[k : k + count] for k, weight in enumerate(_INTEGRAL))
     work = np.add.reduceat(dt * between, knots[:-1], axis=0)
@@ -206,7 +208,7 @@ FORMS: dict[EquationForm, Callable[[EquationSource, Piece], Block]] = {
 }
 
 
-def outside_dead_band(source: EquationSource, signals: Signals) -> NDArray[np.bool_]:
+def outside_dead_band(source: EquationSource, signals: Signals) -> Mask:
     """Mask (k, n) of samples outside the dead bands, where the sign of dry friction is known.
 
     Where the sign of a velocity changes, the acceleration has a step, which the filter of the
@@ -223,15 +225,13 @@ def outside_dead_band(source: EquationSource, signals: Signals) -> NDArray[np.bo
     return ~slow[start : start + len(signals)]
 
 
-def moving_joints(model: RobotModel, band: Array, v: Array) -> NDArray[np.bool_]:
+def moving_joints(model: RobotModel, band: Array, v: Array) -> Mask:
     """Mask (k, n) of joints that are, with their coupled motors, outside their dead bands."""
     mask = ~(np.abs(v) < band)
-    transmission = model.transmission
-    if transmission is not None:
+    if (transmission := model.transmission) is not None:
         for m in transmission.coupled_motors:
             w = transmission.weights[m - 1]
-            turns = ~(np.abs(v @ w) < band[m - 1])
-            mask[:, w != 0.0] &= turns[:, None]
+            mask[:, w != 0.0] &= ~(np.abs(v @ w) < band[m - 1])[:, None]
     return mask
 
 
@@ -247,20 +247,16 @@ def _no_equations(source: EquationSource, groups: int) -> Block:
     return Block(np.zeros(0), np.zeros((*y.shape, len(source.names))), y, y > 0.0, v)
 
 
-def _grid(source: EquationSource, piece: Piece) -> tuple[int, int, int]:
-    """Decimation, first of the decimated instants of a piece, and their number."""
+def _grid(source: EquationSource, piece: Piece) -> Grid:
+    """Decimated samples of a piece."""
     step = source.processing.decimation
     first = piece.start - max(piece.start - source.processing.reach, piece.low)
     return step, first, -(-(piece.stop - piece.start) // step)
 
 
 def _rows(
-    chunks: Iterable[Array],
-    y: Array,
-    v: Array,
-    use: NDArray[np.bool_],
-    form: RowForm | None = None,
-) -> Iterator[tuple[Array, NDArray[np.bool_]]]:
+    chunks: Iterable[Array], y: Array, v: Array, use: Mask, form: RowForm | None = None
+) -> Iterator[tuple[Array, Mask]]:
     """Rows [W, y] (k, m, b + 1) of successive samples, and their use (k, m)."""
     first = 0
     for W in chunks:
@@ -271,11 +267,7 @@ def _rows(
 
 
 def _decimated_block(
-    rows: Iterable[tuple[Array, NDArray[np.bool_]]],
-    t: Array,
-    v: Array,
-    grid: tuple[int, int, int],
-    least: float = _LEAST_WEIGHT,
+    rows: Iterable[tuple[Array, Mask]], t: Array, v: Array, grid: Grid, least: float = _LEAST_WEIGHT
 ) -> Block:
     """Equations of rows [W, y] at the rate of the log."""
     means, use = _decimated_rows(rows, grid, least)
@@ -285,8 +277,8 @@ def _decimated_block(
 
 
 def _decimated_rows(
-    chunks: Iterable[tuple[Array, NDArray[np.bool_]]], grid: tuple[int, int, int], least: float
-) -> tuple[Array, NDArray[np.bool_]]:
+    chunks: Iterable[tuple[Array, Mask]], grid: Grid, least: float
+) -> tuple[Array, Mask]:
     """Low-pass and decimate equations; a joint's samples in its dead band have no weight.
 
     Chunks are rows (k, m, c) in order and their use (k, m), for both sides of the equations.

@@ -27,16 +27,16 @@ _SIGNIFICANT = 4.0
 """Least mean difference of log-likelihoods, in standard errors."""
 _REVERSALS = 6
 """Least number of reversals of a joint for a certain hypothesis."""
+_ITERATIONS = 4
 _FLOOR = 1e-6
 """Least residual variance relative to the torque; smaller ones are equal."""
-_DEGREES = (
-    "Read the log with angles='deg', or with gears= or transmission= if they are motor angles."
-)
-_ORDER = "Check the order of the columns (positions=, torques= of read_log)."
-_SIGNS = (
-    "Use signs= of read_log to reverse position and torque together, or negative drive_gains= to "
-    "reverse the torque alone."
-)
+ADVICE = {
+    FindingKind.WRONG_SIGN: "Use signs= of read_log to reverse position and torque together, or "
+    "negative drive_gains= to reverse the torque alone.",
+    FindingKind.SWAPPED_JOINTS: "Check the column order (positions=, torques= of read_log).",
+    FindingKind.POSITIONS_IN_DEGREES: "Read the log with angles='deg', or with gears= or "
+    "transmission= if they are motor angles.",
+}
 
 
 class LogCorrection(NamedTuple):
@@ -44,7 +44,6 @@ class LogCorrection(NamedTuple):
 
     kind: FindingKind
     words: str
-    advice: str
     joints: tuple[int, ...]
     position: Array
     torque: Array
@@ -84,12 +83,9 @@ def better_hypotheses(
         if not np.array_equal(corrected[:3], samples[:3]):
             equations = _equations(model, corrected, cutoff, compensators)
         for correction in group:
-            torques, count = tau @ correction.torque.T, min(len(correction.joints), 2)
-            # a fit without sign constraints is at least as good, and quicker
-            if _gain(equations.fit(torques, False, share)[1], share) < count * _LIKELY:
-                continue
-            better, part = equations.fit(torques)
-            gain, significance = _gain(part, share), _significance(better - likelihood)
+            better, part = equations.fit(tau @ correction.torque.T)
+            significance, count = _significance(better - likelihood), min(len(correction.joints), 2)
+            gain = float(np.log(share / part).sum())
             left, before = (float(x[list(correction.joints)].mean()) for x in (part, share))
             # better fits of other joints are no evidence for this correction
             if gain >= count * _LIKELY and significance > _SIGNIFICANT and left < before:
@@ -98,11 +94,6 @@ def better_hypotheses(
                 hypotheses.append(Hypothesis(correction, certain, gain, left, before, significance))
     hypotheses.sort(key=lambda hypothesis: -hypothesis.gain)
     return tuple(h for h in hypotheses if h.gain > hypotheses[0].gain - _LIKELY)
-
-
-def _gain(share: Array, base: Array) -> float:
-    """Logarithm of the ratio of the products of the residual variances of all joints."""
-    return float(np.log(base / share).sum())
 
 
 def _significance(difference: Array) -> float:
@@ -116,8 +107,7 @@ def _corrections(
     model: RobotModel, q: Array, names: Sequence[str]
 ) -> Iterator[list[LogCorrection]]:
     """Signs, swaps and degrees; corrections of a list have the same positions."""
-    n, unit = model.n, np.eye(model.n)
-    wrong, swapped = FindingKind.WRONG_SIGN, FindingKind.SWAPPED_JOINTS
+    n, unit, wrong = model.n, np.eye(model.n), FindingKind.WRONG_SIGN
     changes: list[tuple[tuple[int, ...], Array]]
     changes = [((j,), unit - 2.0 * np.diag(unit[j])) for j in range(n)]
     for i, j in combinations(range(n), 2):
@@ -130,18 +120,16 @@ def _corrections(
         some = " and ".join(names[j] for j in joints)
         if len(joints) > 1:
             words = f"joints {some} look swapped in {' and '.join(columns)}"
-            return LogCorrection(swapped, words, _ORDER, joints, position, torque)
-        words, advice = f"the {columns[0][:-1]} of joint {some} has the wrong sign", _SIGNS
+            return LogCorrection(FindingKind.SWAPPED_JOINTS, words, joints, position, torque)
+        words = f"the {columns[0][:-1]} of joint {some} has the wrong sign"
         if len(columns) > 1:
             words = f"joint {some} looks flipped (wrong sign of position and torque)"
-            advice = "Give it -1 in signs= of read_log."
-        return LogCorrection(wrong, words, advice, joints, position, torque)
+        return LogCorrection(wrong, words, joints, position, torque)
 
     torques = [correction(joints, unit, change) for joints, change in changes]
     if n > 1:
         words = "the torques of all joints have the wrong sign"
-        advice = "Use negative drive_gains= of read_log."
-        torques.append(LogCorrection(wrong, words, advice, tuple(range(n)), unit, -unit))
+        torques.append(LogCorrection(wrong, words, tuple(range(n)), unit, -unit))
     yield torques
     for joints, change in changes:
         yield [correction(joints, change, unit), correction(joints, change, change)]
@@ -150,7 +138,7 @@ def _corrections(
         kind, words = FindingKind.POSITIONS_IN_DEGREES, "positions look like degrees"
         degrees = np.diag(np.where(turning, np.pi / 180.0, 1.0))
         joints = tuple(np.flatnonzero(turning).tolist())
-        yield [LogCorrection(kind, words, _DEGREES, joints, degrees, unit)]
+        yield [LogCorrection(kind, words, joints, degrees, unit)]
 
 
 class _Equations(NamedTuple):
@@ -160,21 +148,18 @@ class _Equations(NamedTuple):
     grams: Array
     free: int
 
-    def fit(
-        self, tau: Array, constrained: bool = True, share: Array | float = 1.0
-    ) -> tuple[Array, Array]:
-        """Weighted least squares of torques (T, n), from initial residual variances.
+    def fit(self, tau: Array) -> tuple[Array, Array]:
+        """Weighted least squares of torques (T, n).
 
         Returns the log-likelihood of each sample (T,) and the variance left of each torque (n,).
         """
         moments = np.einsum("jtp,tj->jp", self.W, tau)
         sizes = np.maximum(tau.var(axis=0), 1e-290)
-        free = self.free if constrained else self.W.shape[2]
-        e, variances = tau, share * sizes
-        for _ in range(4 if constrained else 2):
-            weights = 1.0 / np.maximum(variances, _FLOOR * sizes)
+        e, variances = tau, sizes
+        for _ in range(_ITERATIONS):
+            weights = 1.0 / variances
             gram = np.einsum("j,jpq->pq", weights, self.grams)
-            e = tau - (self.W @ _solved(gram, weights @ moments, free)).T
+            e = tau - (self.W @ _solved(gram, weights @ moments, self.free)).T
             variances = np.maximum((e**2).mean(axis=0), _FLOOR * sizes)
         likelihood = -0.5 * (np.log(variances) + e**2 / variances).sum(axis=1)
         return likelihood, variances / sizes

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
@@ -82,16 +81,20 @@ def predicted_bias(
         q = np.asarray(part.q[rows])
         x = np.concatenate((q, noise.draw(q, part.dt, rng), part.tau[rows]), axis=1)
         channels.append((x if step == 1 else zero_phase(x, 4.0 * highest, part.dt))[::step])
-    return partial(_bias_ratio, base, channels, step * log.dt, len(part) / len(log))
+
+    def bias(cutoff: float) -> Array:
+        signals = _filtered_rows(channels, step * log.dt, cutoff)
+        if not signals[0].any():
+            return np.zeros(len(base))
+        used = signals.shape[1] / (_PER_CUTOFF * cutoff * step * log.dt * sum(map(len, channels)))
+        return _bias_ratio(base, signals) / np.sqrt(min(1.0, used) * len(part) / len(log))
+
+    return bias
 
 
-def _bias_ratio(
-    base: BaseParameters, channels: list[Array], dt: float, share: float, cutoff: float
-) -> Array:
-    """Predicted bias in standard errors (b,); the channels cover a share of the log."""
-    tau, q, v, a, *noisy = rows = _filtered_rows(channels, dt, cutoff)
-    if not tau.any():
-        return np.zeros(len(base))
+def _bias_ratio(base: BaseParameters, signals: Array) -> Array:
+    """Predicted bias in standard errors (b,) of the equations of these samples (7, N, n)."""
+    tau, q, v, a, *noisy = signals
     options = {"columns": base.names, "friction": base.friction}
     W = torque_regressor(base.model, q, v, a, base.drive, **options)
     D = torque_regressor(base.model, noisy[0], noisy[1], noisy[2], base.drive, **options) - W
@@ -109,10 +112,7 @@ def _bias_ratio(
         weights = 1.0 / np.sqrt(np.maximum(variances, least))
     R, E = ((weights[:, None] * x).reshape(-1, len(sizes)) for x in (A, E))
     covariance = np.linalg.inv(R.T @ R + prior)
-    bias = -covariance @ (E.T @ (E @ values))
-    # the whole log has more rows than are used here
-    share *= min(1.0, rows.shape[1] / (_PER_CUTOFF * cutoff * dt * sum(map(len, channels))))
-    return np.abs(bias) / np.sqrt(np.diag(covariance) * share)
+    return np.abs(covariance @ (E.T @ (E @ values))) / np.sqrt(np.diag(covariance))
 
 
 def _filtered_rows(channels: list[Array], dt: float, cutoff: float) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_floats
 from ..errors import InvalidValueError, ShapeError
 from ..logs import Log
-from ..logs.stretches import stretches
 from ..minimal_parameters import BaseParameters
+from .delay import checked_cutoff
 from .position_noise import PositionNoise, predicted_bias
 from .signals import HALF, Processing, central_differences, zero_phase
 
@@ -30,7 +30,7 @@ _HIGHEST, _STEP, _WIDTH = 15.0, 1.3, 2.5
 """Highest cutoff of the equations in Hz (joints are flexible above); ratio of the cutoffs that are
 tried; cutoff of the positions, in cutoffs of the equations, so that it does not distort them."""
 _WINDOWS, _SECONDS = 8, 16.0
-"""Largest number and length (s) of the stretches for spectra and velocities."""
+"""Largest number and length (s) of the windows for spectra and velocities."""
 
 
 def choose_processing(
@@ -101,13 +101,13 @@ def choose_processing(
         band = min(_OF_MOTION * motion, _NYQUIST / log.dt)
         why = f"{_filtered(band)}, {band / motion:.3g} times the frequency of the motion."
     else:
-        band = _checked_cutoff(log, cutoff)
+        band = checked_cutoff(log, cutoff)
         why = f"{_filtered(band)}, as requested."
     if decimation is None:
         step = decimation_for(_EQUATIONS_OF_MOTION * motion, log.dt)
         decimation = max(1, min(step, _longest(log) // 20))
-    choices = band, decimation, dead_band, edges, why
-    return _completed(log, motion, noise, *choices, order, accuracy)
+    choices = band, decimation, dead_band, edges, why, order, accuracy
+    return _completed(log, motion, noise, *choices)
 
 
 def processing_for(
@@ -117,15 +117,15 @@ def processing_for(
     decimation: int | None = None,
     dead_band: ArrayLike | None = None,
     edges: float | None = None,
-    kinds: int | None = None,
+    groups: int | None = None,
 ) -> Processing:
-    """Choose the processing for a robot; ``kinds`` equations at a time (default one per joint).
+    """Choose the processing for a robot; ``groups`` equations at a time (default one per joint).
 
     The cutoff is the highest that biases no parameter by more than `MOST_BIAS` standard errors,
     the decimation leaves `LEAST_EQUATIONS` equations for each parameter where there are as many.
     """
     motion, noise = motion_of(log)
-    most = max(1, int(equations_per_parameter(base, log, kinds, 1) / LEAST_EQUATIONS))
+    most = max(1, int(equations_per_parameter(base, log, groups, 1) / LEAST_EQUATIONS))
     step = None if decimation is None else _checked_decimation(log, decimation)
     highest = min(max(_HIGHEST, _EQUATIONS_OF_MOTION * motion), _NYQUIST / log.dt)
     lowest = min(_EQUATIONS_OF_MOTION * motion, highest)
@@ -134,7 +134,7 @@ def processing_for(
         f"{MOST_BIAS:g} standard errors"
     )
     if cutoff is not None:
-        positions = _checked_cutoff(log, cutoff)
+        positions = checked_cutoff(log, cutoff)
         step = step or min(decimation_for(positions / _WIDTH, log.dt), most)
         band = min(positions, HALF / (step * log.dt), _NYQUIST / log.dt)
         ratio = predicted_bias(base, log, min(lowest, band), max(highest, band))(band)
@@ -174,10 +174,10 @@ def decimation_for(cutoff: float, dt: float) -> int:
 
 
 def equations_per_parameter(
-    base: BaseParameters, log: Log, kinds: int | None, decimation: int
+    base: BaseParameters, log: Log, groups: int | None, decimation: int
 ) -> float:
-    """Equations for each parameter, ``kinds`` at a time; edges and dead bands not subtracted."""
-    return len(log) * (kinds or log.n) / (decimation * len(base))
+    """Equations for each parameter, ``groups`` at a time; edges and dead bands not subtracted."""
+    return len(log) * (groups or log.n) / (decimation * len(base))
 
 
 def _completed(
@@ -204,7 +204,10 @@ def _completed(
         # white noise of density s^2 / (fs / 2) through a low-pass and a derivative
         f = min(band or np.inf, 0.5 / log.dt)
         velocity_noise = noise * 2.0 * np.pi * f * np.sqrt(2.0 * f * log.dt / 3.0)
-        fastest = _fastest(log, min(_OF_MOTION * motion, _NYQUIST / log.dt))
+        slow = min(_OF_MOTION * motion, _NYQUIST / log.dt)
+        filtered = (zero_phase(q, slow, log.dt) for q in _windows(log))
+        speeds = (np.abs(central_differences(q, log.dt, 2)) for q in filtered)
+        fastest = np.max([np.percentile(v, 99.0, axis=0) for v in speeds], axis=0)
         width = np.maximum(0.003 * fastest, 4.0 * velocity_noise)
         notes.append(f"Dead band of the velocities: {_listed(width)}.")
     else:
@@ -246,17 +249,6 @@ def _edges(log: Log, edges: float | None, band: float | None, notes: list[str]) 
     return cut
 
 
-def _checked_cutoff(log: Log, cutoff: float) -> float:
-    """User-given cutoff in Hz, below half the sampling rate."""
-    band = float(as_floats(cutoff, "cutoff"))
-    if not 0.0 < band < 0.5 / log.dt:
-        raise InvalidValueError(
-            "cutoff: expected a frequency between 0 and half the sampling rate "
-            f"({0.5 / log.dt:g} Hz), got {cutoff!r}."
-        )
-    return band
-
-
 def _checked_decimation(log: Log, step: int) -> int:
     """A decimation within the longest recording."""
     longest = _longest(log)
@@ -287,19 +279,19 @@ def motion_of(log: Log) -> tuple[float, Array]:
 
     rate, rng = 1.0 / log.dt, np.random.default_rng(0)
     noise = PositionNoise.of(log)
-    bands, power = [], []
-    if _longest(log) < 8:
+    bands, powers, windows = [], [], _windows(log)
+    if not windows:
         raise InvalidValueError(
             f"log: its longest recording has {_longest(log)} samples, which are too few for a "
             "spectrum."
         )
-    for q in _windows(log):
+    for q in windows:
         both = np.diff(np.concatenate((q, noise.draw(q, log.dt, rng)), axis=1), axis=0) * rate
         f, P = periodogram(both, rate, "hann", axis=0)
-        bands_of_joints = [_band(f[1:], P[1:, j], P[1:, log.n + j]) for j in range(log.n)]
-        bands.append([max(band, float(f[1])) for band, _ in bands_of_joints])
-        power.append([power for _, power in bands_of_joints])
-    power = np.array(power)
+        joints = np.array([_band(f[1:], P[1:, j], P[1:, log.n + j]) for j in range(log.n)])
+        bands.append(np.maximum(joints[:, 0], f[1]))
+        powers.append(joints[:, 1])
+    power = np.array(powers)
     # joints that hardly move, or by few encoder steps, are excluded
     moves = (power > 0.0) & (power > 1e-3 * power.max(axis=0))
     moves &= np.ptp(np.asarray(log.q), axis=0) > 100.0 * noise.quantisation_step
@@ -309,22 +301,31 @@ def motion_of(log: Log) -> tuple[float, Array]:
     return motion if motion > 0.0 else float(np.min(bands)), noise.std
 
 
-def _windows(log: Log) -> Iterator[Array]:
-    """Positions of a bounded part of a log, recording by recording."""
+def _windows(log: Log) -> list[Array]:
+    """Positions in windows of bounded number and length, spread over each recording."""
     length = max(8, int(_SECONDS / log.dt))
-    part = stretches(log, length, _WINDOWS * length)
-    return (np.asarray(part.q[rows]) for rows in part.recordings() if rows.stop - rows.start >= 8)
+    parts = [part for part in log.recordings() if part.stop - part.start >= 8]
+    spread = np.unique(np.linspace(0, max(len(parts) - 1, 0), _WINDOWS).round().astype(int))
+    windows = []
+    for part in (parts[k] for k in spread if parts):
+        count = min(max(1, _WINDOWS // len(spread)), -(-(part.stop - part.start) // length))
+        starts = np.linspace(part.start, max(part.start, part.stop - length), count)
+        windows += [slice(int(x), min(int(x) + length, part.stop)) for x in starts.round()]
+    return [np.asarray(log.q[window]) for window in windows]
 
 
 def _band(f: Array, P: Array, noise: Array) -> tuple[float, float]:
     """Frequency of a joint's motion and its power, from spectra of its velocity and their noise."""
+    from scipy.ndimage import uniform_filter1d
+
     width = max(3, 2 * (len(P) // 1000) + 1)
     if len(P) < width:
         return float(f[0]), float(P.sum())
     # of positions, so that their level changes little within the average
     gain = np.sin(0.5 * np.pi * f / f[-1]) ** 2
     # the noise spectrum is flat: an average over many frequencies has little variance
-    S, N = _averaged(P / gain, width), _averaged(noise / gain, 2 * (len(P) // 20) + 3)
+    S = uniform_filter1d(P / gain, width, mode="nearest")
+    N = uniform_filter1d(noise / gain, 2 * (len(P) // 20) + 3, mode="nearest")
     power = np.cumsum(np.where(S >= 10.0 * N, np.maximum(P - gain * N, 0.0), 0.0))
     if not power[-1] > 0.0:
         return 0.0, 0.0
@@ -333,28 +334,14 @@ def _band(f: Array, P: Array, noise: Array) -> tuple[float, float]:
     return (3.0 * bulk if most > 8.0 * bulk else most), float(power[-1])
 
 
-def _averaged(S: Array, width: int) -> Array:
-    return np.convolve(np.pad(S, width // 2, mode="edge"), np.full(width, 1.0 / width), "valid")
-
-
-def _fastest(log: Log, cutoff: float) -> Array:
-    """99 % quantile of the filtered absolute velocities (n,)."""
-    filtered = (zero_phase(q, cutoff, log.dt) for q in _windows(log))
-    speeds = (np.abs(central_differences(q, log.dt, 2)) for q in filtered)
-    return np.max([np.percentile(v, 99.0, axis=0) for v in speeds], axis=0)
-
-
 def checked_processing(given: object, log: Log) -> Processing | dict[str, Any]:
     """Check of a Processing against a log, or of options by name (None where not given)."""
     if isinstance(given, Processing):
-        if abs(given.dt - log.dt) > 1e-6 * log.dt:
+        joints = len(given.dead_band)
+        if joints != log.n or abs(given.dt - log.dt) > 1e-6 * log.dt:
             raise InvalidValueError(
-                f"processing: it was chosen for samples of {given.dt:g} s, the log has "
-                f"{log.dt:g} s; leave out processing= for the default choice."
-            )
-        if len(given.dead_band) != log.n:
-            raise InvalidValueError(
-                f"processing: it was chosen for {len(given.dead_band)} joints, the log has {log.n}."
+                f"processing: it was chosen for {joints} joints and samples of {given.dt:g} s, the "
+                f"log has {log.n} and {log.dt:g} s; leave out processing= for the default choice."
             )
         return given
     if given is not None and (not isinstance(given, Mapping) or set(given) - set(CHOICES)):

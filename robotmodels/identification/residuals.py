@@ -7,12 +7,12 @@ correlated series).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .._arrays import Array, Rebuilt, read_only
+from .._arrays import Array, Frozen
 from .equations import Equations
 
 _LAGS = 40
@@ -23,7 +23,7 @@ _FEW = 20
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ResidualDiagnostics(Rebuilt):
+class ResidualDiagnostics(Frozen):
     """Statistics of the residuals of m groups of equations over L lags. Read-only.
 
     Shapes: counts, mean, std, skewness, kurtosis (less 3 of a normal distribution) (m,);
@@ -40,11 +40,6 @@ class ResidualDiagnostics(Rebuilt):
     white_p: Array
     normal_p: Array
 
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            kind = np.int64 if field.name == "counts" else float
-            object.__setattr__(self, field.name, read_only(getattr(self, field.name), kind))
-
     @property
     def lags(self) -> int:
         """Number of lags."""
@@ -58,16 +53,17 @@ def residual_diagnostics(system: Equations, values: Array) -> ResidualDiagnostic
     """
     from scipy.special import chdtrc
 
-    residuals, use, instants = _series(system, values)
-    lags = max(1, min(_LAGS, instants // 4))
+    residuals, use = _series(system, values)
+    lags = max(1, min(_LAGS, int(use.any(axis=1).sum()) // 4))
     counts = use.sum(axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
         mean = residuals.sum(axis=0) / counts
         e = np.where(use, residuals - mean, 0.0)
         std = np.sqrt((e**2).sum(axis=0) / counts)
         e = e / np.where(std > 0.0, std, np.nan)
-        pairs = np.array([(use[k:] & use[: len(use) - k]).sum(axis=0) for k in range(lags + 1)]).T
-        products = np.array([(e[k:] * e[: len(e) - k]).sum(axis=0) for k in range(lags + 1)]).T
+        both = ((use[k:] & use[: len(e) - k], e[k:] * e[: len(e) - k]) for k in range(lags + 1))
+        sums = np.array([(x.sum(axis=0), y.sum(axis=0)) for x, y in both])
+        pairs, products = sums.transpose(1, 2, 0)
         rho = products / pairs
         bounds = 1.959964 / np.sqrt(pairs)
         bounds[:, 0] = 0.0
@@ -80,22 +76,13 @@ def residual_diagnostics(system: Equations, values: Array) -> ResidualDiagnostic
         F4 = 1.0 + 2.0 * (r**4).sum(axis=1)
         G = counts * (skewness**2 / (6.0 * F3) + kurtosis**2 / (24.0 * F4))
     enough = (counts >= _FEW) & (std > 0.0)
-    return ResidualDiagnostics(
-        counts,
-        mean,
-        std,
-        rho,
-        bounds,
-        skewness,
-        kurtosis,
-        np.where(enough, chdtrc(lags, Q), np.nan),
-        np.where(enough, chdtrc(2, G), np.nan),
-    )
+    white, normal = (np.where(enough, p, np.nan) for p in (chdtrc(lags, Q), chdtrc(2, G)))
+    return ResidualDiagnostics(counts, mean, std, rho, bounds, skewness, kurtosis, white, normal)
 
 
-def _series(system: Equations, values: Array) -> tuple[Array, NDArray[np.bool_], int]:
-    """Residuals (N, m), zero in gaps; mask of equations (N, m); number of instants."""
-    residuals, use, begin, instants = [], [], None, 0
+def _series(system: Equations, values: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Residuals (N, m), zero in gaps, and mask of equations (N, m)."""
+    residuals, use, begin = [], [], None
     gap = np.zeros((_LAGS, system.groups))
     for piece in system.pieces():
         block = system.block(piece)
@@ -103,7 +90,6 @@ def _series(system: Equations, values: Array) -> tuple[Array, NDArray[np.bool_],
             residuals.append(gap)
             use.append(gap > 0.0)
         begin = piece.begin
-        instants += len(block)
         residuals.append(np.where(block.use, block.y - block.W @ values, 0.0))
         use.append(block.use)
-    return np.concatenate(residuals), np.concatenate(use), instants
+    return np.concatenate(residuals), np.concatenate(use)

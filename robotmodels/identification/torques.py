@@ -80,16 +80,11 @@ def _over_dead_band(
 ) -> Array:
     """Regularised less ideal dry friction inside the dead bands (N, n)."""
     model = base.model
-    out = np.zeros(v.shape)
     frames = [int(row) + 1 for row in model.table.joint_rows]
-    wide = np.where(band > 0.0, band, 1.0)
-    inside = np.abs(v) < band
-    if not inside.any():
-        return out
-    ramp = np.where(inside, v / wide - np.sign(v), 0.0)
-    out += ramp * np.array([terms.get(f"Fc{j}", 0.0) for j in frames])
+    out: Array = _rounded_sign(v, band) * np.array([terms.get(f"Fc{j}", 0.0) for j in frames])
     if base.friction is not None:
-        friction = check_linear(base.friction)
+        friction, wide = check_linear(base.friction), np.where(band > 0.0, band, 1.0)
+        inside = np.abs(v) < band
         inner = np.where(inside, v, band)  # any value outside: its share is zero below
         share = (inner / wide + 1.0) / 2.0
         low, high = basis_at(friction, -wide, q), basis_at(friction, wide, q)
@@ -99,10 +94,13 @@ def _over_dead_band(
         out += (change * np.array(values)).sum(axis=1)
     if model.transmission is not None:
         for m in model.transmission.coupled_motors:
-            value = terms.get(f"Fcm{frames[m - 1]}", 0.0)
             w = model.transmission.weights[m - 1]
-            speed = v @ w
-            slow = np.abs(speed) < band[m - 1]
-            change = np.where(slow, speed / wide[m - 1] - np.sign(speed), 0.0)
-            out += value * np.outer(change, w)
+            change = _rounded_sign(v @ w, band[m - 1])
+            out += terms.get(f"Fcm{frames[m - 1]}", 0.0) * np.outer(change, w)
     return out
+
+
+def _rounded_sign(v: Array, width: Array) -> Array:
+    """Linear function less the sign of velocities, within the width around zero."""
+    ramp = v / np.where(width > 0.0, width, 1.0)
+    return np.where(np.abs(v) < width, ramp - np.sign(v), 0.0)

@@ -193,11 +193,9 @@ def inverse_velocities(
     out: Floats,
     codes: Ints,
 ) -> None:
-    """Joint velocities of twists, with what is known of each; ``whole, numbers`` of `packed`.
+    """Joint velocities of twists; q (N, n), twist (N, 6), secondary (N, n) or (0, n).
 
-    Shapes: q (N, n), twist (N, 6), secondary (N, n) or (0, n) -> out (N, n + 19 + k), with k =
-    min(m, n): velocities, achieved twist, error, reachable twist, singular values, damping; codes
-    (N, 2): status and rank.
+    out (N, n + 19 + k): velocities, twist, error, reachable twist, k singular values, damping.
     """
     N, n = q.shape
     f, steps, m = whole[0], whole[1], whole[2]
