@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_floats
 from ..errors import InvalidValueError, ShapeError
 from ..logs import Log
-from ..logs.stretches import stretches
 from ..minimal_parameters import BaseParameters
 from .delay import checked_cutoff
 from .position_noise import PositionNoise, predicted_bias
@@ -31,7 +30,7 @@ _HIGHEST, _STEP, _WIDTH = 15.0, 1.3, 2.5
 """Highest cutoff of the equations in Hz (joints are flexible above); ratio of the cutoffs that are
 tried; cutoff of the positions, in cutoffs of the equations, so that it does not distort them."""
 _WINDOWS, _SECONDS = 8, 16.0
-"""Largest number and length (s) of the stretches for spectra and velocities."""
+"""Largest number and length (s) of the windows for spectra and velocities."""
 
 
 def choose_processing(
@@ -91,7 +90,7 @@ def choose_processing(
     >>> swing = Log(0.001, np.sin(2 * np.pi * t), np.cos(2 * np.pi * t))
     >>> chosen = choose_processing(swing)
     >>> round(chosen.motion, 2), chosen.decimation
-    (1.05, 152)
+    (1.06, 150)
     """
     motion, noise = motion_of(log)
     if not filtered:
@@ -280,13 +279,8 @@ def motion_of(log: Log) -> tuple[float, Array]:
 
     rate, rng = 1.0 / log.dt, np.random.default_rng(0)
     noise = PositionNoise.of(log)
-    bands, powers, windows = [], [], _windows(log)
-    if not windows:
-        raise InvalidValueError(
-            f"log: its longest recording has {_longest(log)} samples, which are too few for a "
-            "spectrum."
-        )
-    for q in windows:
+    bands, powers = [], []
+    for q in _windows(log):
         both = np.diff(np.concatenate((q, noise.draw(q, log.dt, rng)), axis=1), axis=0) * rate
         f, P = periodogram(both, rate, "hann", axis=0)
         joints = np.array([_band(f[1:], P[1:, j], P[1:, log.n + j]) for j in range(log.n)])
@@ -303,10 +297,21 @@ def motion_of(log: Log) -> tuple[float, Array]:
 
 
 def _windows(log: Log) -> list[Array]:
-    """Positions of a bounded part of a log, recording by recording."""
+    """Positions in windows of bounded number and length, spread over the recordings."""
     length = max(8, int(_SECONDS / log.dt))
-    part = stretches(log, length, _WINDOWS * length)
-    return [np.asarray(part.q[rows]) for rows in part.recordings() if rows.stop - rows.start >= 8]
+    parts = [part for part in log.recordings() if part.stop - part.start >= 8]
+    if not parts:
+        raise InvalidValueError(
+            f"log: its longest recording has {_longest(log)} samples, which are too few for a "
+            "spectrum."
+        )
+    spread = np.unique(np.linspace(0, len(parts) - 1, _WINDOWS).round().astype(int))
+    windows = []
+    for part in (parts[k] for k in spread):
+        count = min(max(1, _WINDOWS // len(spread)), -(-(part.stop - part.start) // length))
+        starts = np.linspace(part.start, max(part.start, part.stop - length), count).round()
+        windows += [np.asarray(log.q[int(x) : min(int(x) + length, part.stop)]) for x in starts]
+    return windows
 
 
 def _band(f: Array, P: Array, noise: Array) -> tuple[float, float]:
