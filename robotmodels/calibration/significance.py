@@ -94,10 +94,12 @@ def insignificant_parameters(solution: Solution, start: Array) -> list[str]:
     # parameter, and constraints violated at the start seem to hold information. The worst is
     # removed first, as it may hide others.
     problem, prior = solution.problem, solution.fit.prior
-    lengths = np.array([e.element.is_length for e in problem.parameters.entries], dtype=bool)
-    largest = np.where(lengths, _LARGEST_LENGTH * problem.parameters.skeleton.size, _LARGEST_ANGLE)
     limit = np.full(problem.P + problem.F, np.inf)
-    limit[: problem.P] = largest / np.maximum(largest_factors(problem), _TINY)
+    limit[: problem.P] = [
+        _LARGEST_LENGTH * problem.parameters.skeleton.size if e.element.is_length
+        else _LARGEST_ANGLE
+        for e in problem.parameters.entries
+    ] / np.maximum(largest_factors(problem), _TINY)  # fmt: skip
     information = np.diag(np.sqrt(prior.strength) / prior.sigma)
     factors = [
         np.asarray(
