@@ -178,7 +178,7 @@ def test_the_command_compiles_in_advance(capsys, monkeypatch, tmp_path):
     names = prepare.kernel_modules()
     assert "robotmodels.kernels.poses" in names
     assert "robotmodels.igm.paul._run" in names
-    monkeypatch.setattr(prepare, "kernel_modules", lambda: ["robotmodels.kernels.energies"])
+    monkeypatch.setattr(prepare, "kernel_modules", lambda: ["robotmodels.kernels.torques"])
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     assert main(["compile", "--processes", "2"]) == 0
     assert re.match(

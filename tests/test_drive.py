@@ -1,6 +1,5 @@
 """Drives and transmissions: the TX40 wrist, power through the gears, mimics, mistakes."""
 
-import copy
 import pickle
 from dataclasses import fields
 
@@ -30,6 +29,9 @@ def test_tx40_wrist_couples_motor_6_only():
     wanted[5, 4] = 1.0  # the shaft of motor 6 turns with joints 5 and 6 together
     assert np.allclose(wrist.weights, wanted, atol=1e-15)
     assert wrist.to_encoder([0, 0, 0, 0, 1.0, 0]) == pytest.approx([0, 0, 0, 0, 45, 32])
+    turn, q = np.arange(6.0), np.linspace(-1.0, 1.0, 6)
+    motors = rm.Transmission.from_motor(RATIOS, turn)
+    np.testing.assert_allclose(motors.to_encoder(q), RATIOS @ q + turn, rtol=1e-13)
 
 
 @given(seeds)
@@ -69,60 +71,33 @@ def test_drive_matrices_state_the_formula_of_the_docstring(seed):
     assert np.allclose(matrices.viscous, matrices.viscous.T)
 
 
-@pytest.mark.parametrize("batch", [(), (1,), (7,), (0,), (2, 3)], ids=str)
+@pytest.mark.parametrize("batch", [(), (7,), (0,), (2, 3)], ids=str)
 def test_drives_of_many_samples_are_those_of_one(batch):
     """The one pass through many samples, and standing joints, which have no dry friction."""
     drive = random_drive(np.random.default_rng(0), 3)
-    matrices = drive_matrices(drive, None)
     v, a = np.random.default_rng(1).normal(size=(2, *batch, 3))
     v[..., 1] = 0.0
     wanted = drive.Ia * a + drive.Fv * v + drive.Fc * np.sign(v) + drive.offset
-    found = matrices.torque(v, a)
-    assert found.shape == wanted.shape
+    found = drive_matrices(drive, None).torque(v, a)
     np.testing.assert_allclose(found, wanted, rtol=1e-14, atol=1e-14)
-    turned = matrices.torque(np.asfortranarray(v), np.repeat(a, 2, axis=-1)[..., ::2])
-    np.testing.assert_array_equal(turned, found)
-    if batch:
-        np.testing.assert_allclose(matrices.torque(v, a[0] if len(a) else np.zeros(3)),
-            drive.Ia * (a[0] if len(a) else 0.0) + drive.Fv * v + drive.Fc * np.sign(v)
-            + drive.offset, rtol=1e-13, atol=1e-13)  # fmt: skip
 
 
-def test_mimic_joints_are_singular_and_say_so():
+def test_mimic_joints_are_singular_and_ranks_do_not_depend_on_units():
     """Joint 2 follows joint 1: q has no unique encoder variables, but torques still go over."""
     gripper = rm.Transmission([[1, 0], [-1, 0]], offset=[0, 0.1])
-    assert not gripper.is_invertible
     assert gripper.coupled_motors == ()
     assert gripper.to_joint([0.3, 7.0]) == pytest.approx([0.3, -0.2])
     assert gripper.to_motor_torque([2.0, 0.5]) == pytest.approx([1.5, 0.0])
     with pytest.raises(InvalidValueError, match="a joint mimics another one"):
         gripper.to_encoder([0.3, -0.2])
-
-
-def test_ranks_do_not_depend_on_units():
-    """Joints in metres and gears of thousands: columns of any size are independent."""
     for size in (1e-20, 1e20):
         gears = rm.Transmission([[size, 0.0], [-size, 1.0]])
-        assert gears.is_invertible
-        assert not gears.is_mimicry
-        assert gears.coupled_motors == (2,)
+        assert (gears.is_invertible, gears.is_mimicry, gears.coupled_motors) == (True, False, (2,))
     fingers = rm.Transmission([[1e-20, 0, 0], [1e-20, 0, 0], [0, 0, 1.0]])
     assert (fingers.rank, fingers.is_mimicry) == (2, True)
     np.testing.assert_array_equal(fingers.free, [[1e-20, 0], [1e-20, 0], [0, 1]])
     for matrix in (np.ones((3, 3)), np.zeros((3, 3))):
         assert not rm.Transmission(matrix).is_mimicry
-
-
-def test_motors_given_by_joints():
-    """``q_motor = R q``: the TX40's motor 6 is turned by joints 5 and 6."""
-    R, turn = np.diag([45.0, 32.0]), [0.3, -0.2]
-    R[1, 0] = 32.0
-    wrist = rm.Transmission.from_motor(R, turn, Iam=[0.0, 0.1])
-    q, tau = np.array([0.7, -0.4]), np.array([2.0, 3.0])
-    np.testing.assert_allclose(wrist.to_encoder(q), R @ q + turn, rtol=1e-13)
-    np.testing.assert_allclose(R.T @ wrist.to_motor_torque(tau), tau, rtol=1e-13)
-    assert wrist.coupled_motors == (2,)
-    np.testing.assert_allclose(wrist.weights, [[1, 0], [1, 1]], atol=1e-14)
 
 
 PARTS = {
@@ -136,16 +111,13 @@ PARTS = {
 
 @pytest.mark.parametrize("make", PARTS.values(), ids=PARTS)
 def test_parts_of_a_robot_are_values(make):
-    part, same = make(np.random.default_rng(1)), make(np.random.default_rng(1))
-    assert part == same
-    assert hash(part) == hash(same)
+    part = make(np.random.default_rng(1))
     assert part != make(np.random.default_rng(2))
-    assert part != "part"
-    for copied in (part, copy.deepcopy(part), pickle.loads(pickle.dumps(part))):
+    for copied in (make(np.random.default_rng(1)), pickle.loads(pickle.dumps(part))):
         assert copied == part
-        arrays = [x for f in fields(copied) if isinstance(x := getattr(copied, f.name), np.ndarray)]
-        assert arrays
-        assert not any(x.flags.writeable for x in arrays)
+        assert hash(copied) == hash(part)
+        values = [getattr(copied, f.name) for f in fields(copied)]
+        assert not any(x.flags.writeable for x in values if isinstance(x, np.ndarray))
     with pytest.raises(AttributeError):
         setattr(part, fields(part)[0].name, np.zeros(4))
 
@@ -155,18 +127,14 @@ def test_parts_of_a_robot_are_values(make):
     [
         (lambda: rm.DriveParameters(), InertiaError, "at least one of Ia, Fv, Fc, offset"),
         (lambda: rm.DriveParameters([1.0], [1.0, 2.0]), ShapeError, r"Ia \(1,\), Fv \(2,\)"),
-        (lambda: rm.DriveParameters(Ia=[[1.0]]), ShapeError, r"Ia \(1, 1\)"),
         (lambda: rm.DriveParameters(Fc=[np.nan]), InvalidValueError, "Fc: .* got nan"),
         (lambda: rm.Transmission(np.ones((2, 3))), ShapeError, r"square \(n, n\) .* \(2, 3\)"),
-        (lambda: rm.Transmission([[np.inf]]), InvalidValueError, "matrix: .* got inf"),
         (lambda: rm.Transmission(np.eye(2), [0.0]), ShapeError, "offset: expected shape"),
         (lambda: rm.Transmission(np.eye(2), Iam=[0.1, 0]), InertiaError, "Motor 1 turns one joint"),
         (lambda: rm.Transmission(np.ones((2, 2)), Fvm=[1, 0]), InertiaError, "rank 1 of 2"),
         (lambda: tx40(Fcm=np.eye(6)[0]), InertiaError, r"the motors \[6\]"),
         (lambda: rm.Transmission.from_motor(np.ones((2, 2))), InvalidValueError, "R has rank 1 of"),
-        (lambda: rm.Transmission.from_motor([[1.0, 1.0]]), ShapeError, "square"),
         (lambda: tx40().to_joint(np.zeros(5)), ShapeError, r"\(\.\.\., 6\), got \(5,\)"),
-        (lambda: tx40().to_encoder(np.zeros(5)), ShapeError, "expected shape"),
         (lambda: tx40().to_motor_torque([np.nan] * 6), InvalidValueError, "got nan"),
     ],
 )

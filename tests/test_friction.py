@@ -19,18 +19,13 @@ from robotmodels.regressors import parameter_names, parameter_vector, torque_reg
 
 TWO = [1.0, 2.0]
 MODELS = {
-    "viscous": lambda: ViscousFriction(TWO),
-    "Coulomb": lambda: CoulombFriction(TWO),
-    "offset": lambda: TorqueOffset(TWO),
-    "asymmetric": lambda: AsymmetricFriction(TWO, [3.0, 4.0], [5.0, 6.0], [7.0, 8.0]),
-    "Stribeck": lambda: StribeckFriction(TWO, [3.0, 4.0], [5.0, 6.0], [0.1, 0.2]),
-    "sum": lambda: FrictionSum((ViscousFriction(TWO), CoulombFriction([3.0, 4.0]))),
+    "viscous": ViscousFriction(TWO),
+    "Coulomb": CoulombFriction(TWO),
+    "offset": TorqueOffset(TWO),
+    "asymmetric": AsymmetricFriction(TWO, [3.0, 4.0], [5.0, 6.0], [7.0, 8.0]),
+    "Stribeck": StribeckFriction(TWO, [3.0, 4.0], [5.0, 6.0], [0.1, 0.2]),
+    "sum": FrictionSum((ViscousFriction(TWO), CoulombFriction([3.0, 4.0]))),
 }
-
-
-@pytest.fixture(params=MODELS)
-def friction(request):
-    return MODELS[request.param]()
 
 
 def arm(**options):
@@ -53,11 +48,12 @@ def arm(**options):
     ],
 )
 def test_torques_by_hand(name, v, torque):
-    np.testing.assert_allclose(MODELS[name]().torque(v), torque, rtol=1e-14)
+    np.testing.assert_allclose(MODELS[name].torque(v), torque, rtol=1e-14)
 
 
-@pytest.mark.parametrize("batch", [(), (1,), (3,), (2, 3), (0,)], ids=str)
-def test_leading_axes_are_the_batch(friction, batch):
+@pytest.mark.parametrize("batch", [(), (2, 3), (0,)], ids=str)
+@pytest.mark.parametrize("friction", MODELS.values(), ids=MODELS)
+def test_leading_axes_are_the_batch_and_columns_make_the_torque(friction, batch):
     v = np.random.default_rng(0).normal(size=(*batch, 2))
     torque, basis = friction.torque(v), friction.basis(v)
     assert torque.shape == (*batch, 2)
@@ -65,80 +61,33 @@ def test_leading_axes_are_the_batch(friction, batch):
     np.testing.assert_allclose((basis * friction.parameters).sum(axis=-2), torque, rtol=1e-13)
     for index in np.ndindex(*batch):
         np.testing.assert_array_equal(friction.torque(v[index]), torque[index])
-    v0 = v.copy()
-    torque[...] = np.nan
-    basis[...] = np.nan
-    np.testing.assert_array_equal(v, v0)
 
 
 def test_a_joint_sticks_between_its_breakaway_torques():
-    asymmetric = MODELS["asymmetric"]()
-    np.testing.assert_array_equal(asymmetric.breakaway, [[-7.0, -8.0], [3.0, 4.0]])
-    np.testing.assert_array_equal(MODELS["Stribeck"]().breakaway, [[-5.0, -6.0], [5.0, 6.0]])
-    np.testing.assert_array_equal(MODELS["viscous"]().breakaway, np.zeros((2, 2)))
+    np.testing.assert_array_equal(MODELS["asymmetric"].breakaway, [[-7.0, -8.0], [3.0, 4.0]])
+    np.testing.assert_array_equal(MODELS["Stribeck"].breakaway, [[-5.0, -6.0], [5.0, 6.0]])
+    np.testing.assert_array_equal(MODELS["viscous"].breakaway, np.zeros((2, 2)))
     both = FrictionSum((CoulombFriction([3.0, 4.0]), TorqueOffset(TWO)))
     np.testing.assert_array_equal(both.breakaway, [[-2.0, -2.0], [4.0, 6.0]])
 
 
-def test_models_add_up():
-    """Sums are flat, and their columns are those of the parts."""
+def test_models_add_up_and_their_columns_come_last():
     robot, v = arm(), np.array([[0.3, -0.2], [0.0, 4.0]])
-    a, b = MODELS["asymmetric"](), MODELS["Stribeck"]()
-    both = a + b + MODELS["offset"]()
+    a, b = MODELS["asymmetric"], MODELS["Stribeck"]
+    both = a + b + MODELS["offset"]
     assert not any(isinstance(part, FrictionSum) for part in both.parts)
-    assert both.kinds == (*a.kinds, *b.kinds, "offset")
+    assert isinstance(both, LinearFriction)
     np.testing.assert_allclose(both.torque(v), a.torque(v) + b.torque(v) + TWO, rtol=1e-14)
-    np.testing.assert_array_equal(both.parameters, np.vstack([a.parameters, b.parameters, TWO]))
     W = torque_regressor(robot, v, v, v, drive=False, friction=both)
     extra = W[..., -2 * len(both.kinds) :] @ both.parameters.ravel()
     np.testing.assert_allclose(extra, both.torque(v), rtol=1e-13)
-    assert isinstance(both, LinearFriction)
-    with pytest.raises(InvalidValueError, match="Fvp columns already"):
-        torque_regressor(robot, v, v, v, drive=False, friction=both + a)
-
-
-@pytest.mark.parametrize(
-    ("make", "error", "words"),
-    [
-        (lambda: ViscousFriction(1.0), ShapeError, "Fv"),
-        (lambda: ViscousFriction([[1.0]]), ShapeError, "Fv"),
-        (lambda: CoulombFriction([np.nan]), InvalidValueError, "Fc"),
-        (lambda: AsymmetricFriction([1], [1, 2], [1], [1]), ShapeError, "Fcp"),
-        (lambda: StribeckFriction([1], [1], [1], [0.0]), InvalidValueError, "vs"),
-        (lambda: StribeckFriction([1], [1], [1], [1.0], [-1]), InvalidValueError, "exponent"),
-        (
-            lambda: StribeckFriction([1, -2], [1, 1], [1, 1], [1, 1]),
-            InvalidValueError,
-            r"^Fv: .*joint 2 .*\(-2\)",
-        ),
-        (lambda: StribeckFriction([1], [-1], [1], [1.0]), InvalidValueError, "^Fc: .*joint 1"),
-        (
-            lambda: StribeckFriction([1, 1], [1, 3], [2, 2.5], [1, 1]),
-            InvalidValueError,
-            r"^Fs: .*joint 2 \(2.5\) is less than .*\(3\)",
-        ),
-        (lambda: FrictionSum(()), InvalidValueError, "at least one"),
-        (lambda: FrictionSum((ViscousFriction([1]), "x")), InvalidValueError, "parts"),
-        (
-            lambda: FrictionSum((ViscousFriction([1]), ViscousFriction([1, 2]))),
-            ShapeError,
-            "1 joints, got 2",
-        ),
-        (lambda: ViscousFriction([1.0]).torque([1.0, 2.0]), ShapeError, "^v:"),
-    ],
-)
-def test_mistakes_are_named(make, error, words):
-    with pytest.raises(error, match=words):
-        make()
-
-
-@pytest.mark.parametrize("bad", ["viscous", 3.0, [1.0, 2.0], ViscousFriction], ids=str)
-@pytest.mark.parametrize("function", [idm, ddm, torque_regressor])
-def test_what_is_no_friction_model_is_named(function, bad):
-    with pytest.raises(InvalidValueError, match="friction"):
-        function(arm(), *np.zeros((3, 2)), friction=bad)
-    with pytest.raises(ShapeError, match="2 joints, got 3"):
-        function(arm(), *np.zeros((3, 2)), friction=ViscousFriction([1.0, 2.0, 3.0]))
+    names = parameter_names(robot, True, a)
+    assert names[:-8] == parameter_names(robot)
+    assert names[-8:] == ("Fvp1", "Fvp3", "Fcp1", "Fcp3", "Fvn1", "Fvn3", "Fcn1", "Fcn3")
+    np.testing.assert_array_equal(parameter_vector(robot, True, a)[-8:], a.parameters.ravel())
+    for drive, twice in ((False, both + a), (True, b), (True, ViscousFriction(TWO))):
+        with pytest.raises(InvalidValueError, match="already"):
+            torque_regressor(robot, v, v, v, drive=drive, friction=twice)
 
 
 def test_a_model_of_your_own_is_taken():
@@ -156,39 +105,37 @@ def test_a_model_of_your_own_is_taken():
         np.testing.assert_allclose(both.torque(v), [14.0, -5.0])
         with pytest.raises(InvalidValueError, match="Quadratic is not linear"):
             torque_regressor(robot, v, v, v, friction=both)
-    with pytest.raises(InvalidValueError, match="Quadratic is not linear"):
-        torque_regressor(robot, v, v, v, friction=Quadratic())
     for other in (3.0, None, CoulombFriction):
-        with pytest.raises(TypeError, match="unsupported operand"):
-            viscous + other
         with pytest.raises(TypeError, match="unsupported operand"):
             other + (viscous + viscous)
 
 
-def test_columns_are_named_by_frame_and_come_last():
-    robot = arm()
-    friction = MODELS["asymmetric"]()
-    names = parameter_names(robot, True, friction)
-    assert names[:-8] == parameter_names(robot)
-    assert names[-8:] == ("Fvp1", "Fvp3", "Fcp1", "Fcp3", "Fvn1", "Fvn3", "Fcn1", "Fcn3")
-    np.testing.assert_array_equal(
-        parameter_vector(robot, True, friction)[-8:], friction.parameters.ravel()
-    )
-    stribeck = MODELS["Stribeck"]()
-    assert parameter_names(robot, False, stribeck)[-6:] == (
-        "Fv1", "Fv3", "Fc1", "Fc3", "Fs1", "Fs3",
-    )  # fmt: skip
-    v = np.array([0.05, -0.3])
-    W = torque_regressor(robot, v, v, v, drive=False, friction=stribeck)
-    np.testing.assert_allclose(
-        W[:, -6:] @ stribeck.parameters.ravel(), stribeck.torque(v), rtol=1e-14
-    )
+@pytest.mark.parametrize(
+    ("make", "error", "words"),
+    [
+        (lambda: ViscousFriction(1.0), ShapeError, "Fv"),
+        (lambda: CoulombFriction([np.nan]), InvalidValueError, "Fc"),
+        (lambda: AsymmetricFriction([1], [1, 2], [1], [1]), ShapeError, "Fcp"),
+        (lambda: StribeckFriction([1], [1], [1], [0.0]), InvalidValueError, "vs"),
+        (lambda: StribeckFriction([1], [1], [1], [1.0], [-1]), InvalidValueError, "exponent"),
+        (lambda: StribeckFriction([1], [-1], [1], [1.0]), InvalidValueError, "^Fc: .*joint 1"),
+        (lambda: StribeckFriction([1, 1], [1, 3], [2, 2.5], [1, 1]), InvalidValueError,
+         r"^Fs: .*joint 2 \(2.5\) is less than .*\(3\)"),
+        (lambda: FrictionSum(()), InvalidValueError, "at least one"),
+        (lambda: FrictionSum((ViscousFriction([1]), "x")), InvalidValueError, "parts"),
+        (lambda: ViscousFriction([1]) + ViscousFriction([1, 2]), ShapeError, "1 joints, got 2"),
+        (lambda: ViscousFriction([1.0]).torque([1.0, 2.0]), ShapeError, "^v:"),
+    ],
+)  # fmt: skip
+def test_mistakes_are_named(make, error, words):
+    with pytest.raises(error, match=words):
+        make()
 
 
-@pytest.mark.parametrize("name", ["viscous", "Coulomb", "offset", "Stribeck"])
-def test_a_name_that_the_drives_have_is_not_given_twice(name):
-    with pytest.raises(InvalidValueError, match="already"):
-        parameter_names(arm(), True, MODELS[name]())
-    twice = FrictionSum((ViscousFriction(TWO), ViscousFriction(TWO)))
-    with pytest.raises(InvalidValueError, match="already"):
-        parameter_names(arm(), False, twice)
+@pytest.mark.parametrize("function", [idm, ddm, torque_regressor])
+def test_what_is_no_friction_model_is_named(function):
+    for bad in ("viscous", [1.0, 2.0], ViscousFriction):
+        with pytest.raises(InvalidValueError, match="friction"):
+            function(arm(), *np.zeros((3, 2)), friction=bad)
+    with pytest.raises(ShapeError, match="2 joints, got 3"):
+        function(arm(), *np.zeros((3, 2)), friction=ViscousFriction([1.0, 2.0, 3.0]))

@@ -1,8 +1,5 @@
 """Gravity compensators: torque by energy, in all models, identified, regrouped with gravity."""
 
-import copy
-import pickle
-
 import numpy as np
 import pytest
 from identification_logs import swinging
@@ -47,7 +44,7 @@ def fitted(model, log, friction, **options):
 
 def test_the_torque_is_the_slope_of_the_energy():
     rng = np.random.default_rng(0)
-    for _ in range(50):
+    for _ in range(10):
         a, b, phi = *rng.uniform(0.05, 1.0, 2), rng.uniform(-np.pi, np.pi)
         K, P = rng.normal(size=2) * [3000.0, 500.0]
         one = GravityCompensator(2, 2, a, b, phi, [K, P])
@@ -81,51 +78,39 @@ def test_forces_by_hand():
     )
 
 
-@pytest.mark.parametrize("options", [SPRING, SERIES])
-def test_it_is_a_value_and_adds_up_with_friction(options):
-    one = GravityCompensator(2, 2, **options)
-    for again in (pickle.loads(pickle.dumps(one)), copy.deepcopy(one)):
-        assert again == one
-        assert hash(again) == hash(one)
-        assert not again.values.flags.writeable
-    assert one != GravityCompensator(2, 1, **options)
+def test_it_adds_up_with_friction():
+    one = GravityCompensator(2, 2, **SPRING)
     gears = AsymmetricFriction([1.0, 2.0], [3.0, 4.0], [5.0, 6.0], [7.0, 8.0])
     v, q = np.random.default_rng(1).normal(size=(2, 7, 2))
     both = gears + one
     np.testing.assert_allclose(both.torque(v, q), gears.torque(v) + one.torque(v, q))
     assert both.kinds == (*gears.kinds, *one.kinds)
     np.testing.assert_array_equal(both.breakaway, gears.breakaway)
-    assert one.breakaway.tolist() == [[0.0, 0.0], [0.0, 0.0]]
+    assert not one.breakaway.any()
     assert (one + gears).needs_position
 
 
 @pytest.mark.parametrize(
-    ("make", "error", "words"),
+    ("arguments", "error", "words"),
     [
-        (lambda: GravityCompensator(2, 3), InvalidValueError, r"joints: expected .* 1 to 2"),
-        (lambda: GravityCompensator(2, [1, 1]), InvalidValueError, "joints: expected different"),
-        (lambda: GravityCompensator(2, 1, a=0.1), InvalidValueError, "b: expected a, b and phi"),
-        (lambda: GravityCompensator(2, 1, 0.1, -1.0, 0.0), InvalidValueError, "b: expected pos"),
-        (lambda: GravityCompensator(2, 1, values=[1.0]).values, None, ""),
-        (lambda: GravityCompensator(2, 1, values=[1.0, 2.0]), ShapeError, r"values: .*\(4, 1\)"),
-        (lambda: GravityCompensator(2, 1).torque([0, 0]), InvalidValueError, "q: the torque"),
-        (lambda: GravityCompensator(2, 1).torque([0, 0], [0]), ShapeError, "q: "),
-        (lambda: rm.idm(rm.load("rx90"), *np.zeros((3, 6)), friction=GravityCompensator(2, 1)),
-         ShapeError, "friction of 6 joints, got 2"),
+        ({"joints": 3}, InvalidValueError, r"joints: expected .* 1 to 2"),
+        ({"joints": [1, 1]}, InvalidValueError, "joints: expected different"),
+        ({"joints": 1, "a": 0.1}, InvalidValueError, "b: expected a, b and phi"),
+        ({"joints": 1, "a": 0.1, "b": -1.0, "phi": 0.0}, InvalidValueError, "b: expected pos"),
+        ({"joints": 1, "values": [1.0, 2.0]}, ShapeError, r"values: .*\(4, 1\)"),
     ],
-)  # fmt: skip
-def test_mistakes_are_named(make, error, words):
-    if error is None:
-        make()
-        return
+)
+def test_mistakes_are_named(arguments, error, words):
     with pytest.raises(error, match=words):
-        make()
+        GravityCompensator(2, **arguments)
+    with pytest.raises(InvalidValueError, match="q: the torque"):
+        GravityCompensator(2, 1).torque([0, 0])
 
 
 @pytest.mark.parametrize("options", [SPRING, SERIES])
 def test_every_model_has_it(options):
     rng = np.random.default_rng(2)
-    model = random_arm(rng)
+    model = random_arm(rng, 3)
     one = GravityCompensator(model.n, 2, **options) + AsymmetricFriction(
         *rng.uniform(0.5, 2.0, (4, model.n))
     )
@@ -168,7 +153,7 @@ def test_its_work_between_samples_is_the_change_of_its_energy():
 
 
 @pytest.mark.parametrize("width", [None, 1e-3])
-def test_simulation_keeps_energy_and_joints_stick_against_it(width):
+def test_simulation_keeps_its_energy(width):
     rng = np.random.default_rng(3)
     model = random_arm(rng, 2)
     spring = GravityCompensator(2, 2, a=0.2, b=0.3, phi=0.4, values=[400.0, -60.0])
@@ -178,55 +163,22 @@ def test_simulation_keeps_energy_and_joints_stick_against_it(width):
     assert sim.relative_drift < 1e-8
     tau = rm.idm(smooth, sim.q, sim.v, sim.a, friction=spring)
     assert np.abs(tau).max() < 1e-9 * np.abs(spring.torque(sim.v, sim.q)).max()
-    if width is not None:
-        return
-    # at rest without gravity, the spring moves the joint only if dry friction does not hold it
-    still = model.with_gravity(np.zeros(3))
-    force = abs(spring.torque(np.zeros(2), [0.5, -0.3])[1])
-    for share, moves in ((0.99, True), (1.01, False)):
-        stuck = still.with_drive(rm.DriveParameters(Ia=[0.1, 0.1], Fc=[1e4, share * force]))
-        sim = rm.simulate(stuck, [0.5, -0.3], [0.0, 0.0], t=0.05, friction=spring)
-        assert (np.ptp(sim.q[:, 1]) > 1e-6) == moves
 
 
-@pytest.mark.parametrize("options", [SPRING, SERIES])
-@pytest.mark.parametrize("form", ["torque", "filtered", "power", "energy"])
+@pytest.mark.parametrize(("options", "form"), [(SPRING, "energy"), (SERIES, "torque")])
 def test_it_is_identified_exactly_without_noise(options, form):
-    for seed in range(3):
-        rng = np.random.default_rng(seed)
-        model = random_arm(rng)
-        true = GravityCompensator(model.n, 2, **options)
-        start = GravityCompensator(model.n, 2, **({} if options is SERIES else GEOMETRY))
-        found = fitted(model, log_of(model, true, rng), start, form=form)
-        base = rm.base_parameters(model, drive=True, friction=true)
-        truth = base.values(model)
-        limit = 1e-8
-        assert np.abs(found.values - truth).max() < limit * np.abs(truth).max()
-        q, v, a = swinging(model, rng, samples=500)
-        torque = rm.idm(model, q, v, a, friction=true)
-        quick = (np.abs(v) > 1e-3).all(axis=1)  # beyond the dead band
-        off = np.abs(predicted_torque(found, q, v, a) - torque)[quick].max()
-        assert off < limit * np.abs(torque).max()
-
-
-@pytest.mark.filterwarnings("ignore:Poor prediction")  # on purpose
-def test_a_compensator_that_is_left_out_is_seen_in_the_residuals():
-    rng = np.random.default_rng(5)
+    rng = np.random.default_rng(1)
     model = random_arm(rng)
-    true = GravityCompensator(model.n, 2, **SPRING)
-    log = log_of(model, true, rng)
-    noise = 0.5 * rng.normal(size=log.tau.shape)
-    noisy = Log(log.dt, log.q, log.tau + noise, log.v, log.a)
-    none = Log(log.dt, log.q, noisy.tau - true.torque(log.v, log.q), log.v, log.a)
-    least = fitted(model, none, None).validation.in_sample.filtered_rmse[1]
-    without = fitted(model, noisy, None, checked=False).validation.in_sample.filtered_rmse[1]
-    spring = fitted(model, noisy, GravityCompensator(model.n, 2, **GEOMETRY))
-    series = fitted(model, noisy, GravityCompensator(model.n, 2))
-    assert spring.validation.in_sample.filtered_rmse[1] == pytest.approx(least, rel=0.05)
-    assert without > 20 * least
-    # two harmonics are most of a spring whose geometry is not known
-    assert series.validation.in_sample.filtered_rmse[1] < 0.3 * without
-    assert np.abs(spring.value("Kc2") - 4000.0) < 4 * spring.standard_error("Kc2")
+    true = GravityCompensator(model.n, 2, **options)
+    start = GravityCompensator(model.n, 2, **({} if options is SERIES else GEOMETRY))
+    found = fitted(model, log_of(model, true, rng), start, form=form)
+    truth = rm.base_parameters(model, drive=True, friction=true).values(model)
+    assert np.abs(found.values - truth).max() < 1e-8 * np.abs(truth).max()
+    q, v, a = swinging(model, rng, samples=500)
+    torque = rm.idm(model, q, v, a, friction=true)
+    quick = (np.abs(v) > 1e-3).all(axis=1)  # beyond the dead band
+    off = np.abs(predicted_torque(found, q, v, a) - torque)[quick].max()
+    assert off < 1e-8 * np.abs(torque).max()
 
 
 def test_what_gravity_does_alike_is_regrouped():

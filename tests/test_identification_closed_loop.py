@@ -1,6 +1,5 @@
 """Methods that simulate the controlled robot recover the parameters of exact logs."""
 
-import importlib
 import pickle
 from dataclasses import replace
 
@@ -26,12 +25,9 @@ from robotmodels.identification import (
     tuned_controller,
 )
 from robotmodels.identification.closed_loop.loop import closed_loop, friction_rates, robot_of
-from robotmodels.identification.closed_loop.simulation import (
-    ClosedLoopSimulator,
-    SimulationDivergedError,
-    with_enough_steps,
-)
+from robotmodels.identification.closed_loop.method import instrument_step
 from robotmodels.identification.fit import _identifiable
+from robotmodels.identification.forms import Block
 from robotmodels.identification.signals import central_differences
 from robotmodels.inertia import InertialParameters
 
@@ -183,25 +179,13 @@ def test_controllers_hold_limit_and_integrate():
     assert np.abs(settled[worst]) < 0.1 * np.abs(plain[worst])
 
 
-def test_feed_forward_reduces_tracking_errors():
-    arm = robot("tx40")
-    q_ref, v_ref = motion(6, 1.0, 1e-3, 4)
-    errors = []
-    for ahead in (False, True):
-        control = tuned_controller(arm, q_ref, 5.0, period=1e-3, feed_forward=ahead)
-        errors.append(np.abs(simulated_log(arm, control, q_ref, v_ref, 1e-3).q - q_ref).max())
-    assert errors[1] < 0.1 * errors[0]
-
-
 def test_a_robot_of_base_parameters_has_the_torques_of_the_equations():
     arm = robot("tx40")
     base = rm.base_parameters(arm, drive=("Ia", "Fv"))
     q_ref, v_ref = motion(6, 0.2, 1e-3, 0)
     system = equations(base, Log(1e-3, q_ref, v_ref), choose_processing(Log(1e-3, q_ref, v_ref)))
     twin, a = robot_of(system, base.values(arm)), np.ones((200, 6))
-    assert not (twin.drive.Fc.any())
-    assert not (twin.drive.offset.any())
-    assert not (twin.transmission.Fcm.any())
+    assert not any(x.any() for x in (twin.drive.Fc, twin.drive.offset, twin.transmission.Fcm))
     assert twin.transmission.Iam.any()
     W = rm.torque_regressor(arm, q_ref, v_ref, a, drive=("Ia", "Fv"), columns=base.names)
     assert np.allclose(
@@ -209,31 +193,36 @@ def test_a_robot_of_base_parameters_has_the_torques_of_the_equations():
     )  # fmt: skip
 
 
-def test_pieces_and_recordings_are_simulated_as_one_run_each(monkeypatch):
-    arm, control, log, width = recorded("prismatic", 1.0)
-    arrays = (log.q, log.tau, log.v, log.a, log.q_ref, log.v_ref)
-    twice = Log(log.dt, *(np.vstack((x, x)) for x in arrays), starts=(0, len(log)))
-    signals = importlib.import_module("robotmodels.identification.signals")
-    monkeypatch.setattr(signals, "PIECE", 64)
-    system, _, truth = problem(arm, twice, width, decimation=5)
-    assert len(system.pieces()) > 10
-    simulator = ClosedLoopSimulator(system, closed_loop(system, truth, control, width, 1))
-    simulated = simulator.signals(truth)
-    for piece in system.pieces():
-        rows, inner = simulator.window(piece)
-        for name in ("q", "v", "a", "tau"):
-            exact, found = getattr(twice, name), getattr(simulated[piece.begin], name)
-            assert np.allclose(
-                found[inner], exact[rows], rtol=1e-7, atol=1e-7 * np.abs(exact).max()
-            )
-
-
 # --- methods --------------------------------------------------------------------------------------
+
+
+def test_a_step_of_instruments_is_the_instrumental_estimate(rng):
+    """(Z^T W)^-1 Z^T y from any start, with s^2 (Z^T W)^-1 Z^T Z (W^T Z)^-1.
+
+    The instruments differ much from the regressor, so that no product can stand for another.
+    """
+    N = 200
+    W, Z = rng.normal(size=(N, 1, 3)), rng.normal(size=(N, 1, 3))
+    W = 0.3 * W + 0.7 * Z @ rng.normal(size=(3, 3))
+    y = W[:, 0] @ [1.0, -2.0, 3.0] + 0.01 * rng.normal(size=N)
+    block = Block(np.arange(N) * 1.0, W, y[:, None], np.ones((N, 1), bool), np.ones((N, 1)))
+    start, size = np.array([0.9, -2.1, 3.2]), np.array([1.0, 0.5, 2.0])
+    found = instrument_step(("a", "b", "c"), start, lambda: [(Z, block)], size)
+    z, w = Z[:, 0], W[:, 0]
+    np.testing.assert_allclose(found.values, np.linalg.solve(z.T @ w, z.T @ y), rtol=1e-10)
+    sigma = np.sqrt(((y - w @ start) ** 2).sum() / (N - 3))
+    np.testing.assert_allclose(found.sigma, [sigma], rtol=1e-12)
+    back = np.linalg.inv(z.T @ w)
+    expected = sigma * np.sqrt(np.diag(back @ (z.T @ z) @ back.T))
+    np.testing.assert_allclose(found.standard_errors, expected, rtol=1e-9)
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_instruments_and_didim_recover_exact_parameters(kind):
     arm, control, log, width = recorded(kind)
+    if kind == "prismatic":  # two recordings
+        arrays = (log.q, log.tau, log.v, log.a, log.q_ref, log.v_ref)
+        log = Log(log.dt, *(np.vstack((x, x)) for x in arrays), starts=(0, len(log)))
     system, factors, truth = problem(arm, log, width)
     start = values_of(system, other(arm))
     assert off(start, truth, factors) > 1e-3
@@ -363,18 +352,6 @@ def test_a_joint_too_stiff_for_any_steps_is_named_and_not_simulated():
     assert "simulation is not stable" in notes
     with pytest.raises(InvalidValueError, match="substeps"):
         simulated_log(robot_of(system, truth), loop.controller, log.q_ref, log.v_ref, log.dt)
-
-
-def test_parameters_of_less_inertia_than_the_first_are_simulated_in_more_steps():
-    arm = stiff_robot(2e-3, 2.0, 1.0)
-    log, system, _, truth = stiff_problem(arm, 2.0, 1e-3)
-    loop = closed_loop(system, truth, width=0.05, substeps=1)
-    finer = with_enough_steps(stiff_robot(2e-4, 2.0, 1.0), loop, log)
-    assert 1e-3 / finer.substeps * 2.0 / 2e-4 < 2.0
-    assert finer.hold == finer.substeps
-    assert with_enough_steps(arm, loop, log) is loop
-    with pytest.raises(SimulationDivergedError):
-        with_enough_steps(stiff_robot(2e-6, 2.0, 1.0), loop, log)
 
 
 def test_didim_that_does_not_converge_has_a_status_and_finite_numbers():

@@ -1,4 +1,4 @@
-"""Physically consistent identification: the best torque fit that real robots have."""
+"""Physically consistent identification: the least torque residuals of physical robots."""
 
 import pickle
 import sys
@@ -7,49 +7,45 @@ from typing import Any
 import numpy as np
 import pytest
 from identities.random_robots import random_bodies, random_drive, random_model, random_state
-from scipy.optimize import least_squares
 from urdf_parity import urdf_parity
 
 import robotmodels as rm
-from robotmodels.errors import InertiaError, InvalidValueError, MissingExtraError, ShapeError
+from robotmodels.errors import InvalidValueError, MissingExtraError, ShapeError
 from robotmodels.friction import AsymmetricFriction, StribeckFriction, TorqueOffset, ViscousFriction
 from robotmodels.minimal_parameters import (
     CenterOfMassBox,
-    CenterOfMassEllipsoid,
     PhysicalStatus,
     base_parameters,
     fit_consistent,
+    physical,
     uniform_bodies,
 )
-from robotmodels.minimal_parameters.bodies import pseudo_inertias
 from robotmodels.regressors import parameter_vector
 
 EXACT, CONSTRAINED = PhysicalStatus.EXACT, PhysicalStatus.CONSTRAINED
+PROVED = 3e-4  # part of the squares within which a converged fit is known to be the best
+QUARTER = np.pi / 2
 
 
-def regressor(base, rng, samples=60):
-    """Reduced regressor on random motion, (N n, b)."""
-    model = base.model
-    W = rm.torque_regressor(
-        model, *random_state(model, rng, samples), drive=base.drive, friction=base.friction
+def weighted(base, motion, tau=None, sigma=1.0):
+    """Factor, right side, squares outside it, rows, reduced regressor (N n, b) and torques."""
+    W = base.reduce(
+        rm.torque_regressor(base.model, *motion, drive=base.drive, friction=base.friction)
     )
-    return base.reduce(W).reshape(-1, len(base))
-
-
-def factor(W, tau):
-    """R, y and the squares that they do not hold."""
+    W = (W / np.broadcast_to(sigma, W.shape[1])[:, None]).reshape(-1, len(base))
+    y = W @ base.values(base.model) if tau is None else (tau / sigma).ravel()
     Q, R = np.linalg.qr(W)
-    y = Q.T @ tau
-    return R, y, float(np.sum((tau - Q @ y) ** 2))
+    z = Q.T @ y
+    return R, z, float(np.sum((y - Q @ z) ** 2)), W, y
 
 
-def noisy(model, rng, noise, samples=60, prior_mass=6.0):
-    """Torques of a robot with noise: base, R, y, rest, rows, W, tau."""
+def noisy(model, rng, noise, samples=60):
+    """Base parameters of a robot, and `weighted` of torques with noise."""
     base = base_parameters(model, drive=True)
-    W = regressor(base, rng, samples)
-    tau = W @ base.values(model)
+    motion = random_state(model, rng, samples)
+    *_, tau = weighted(base, motion)
     tau = tau + noise * np.sqrt(np.mean(tau**2)) * rng.normal(size=len(tau))
-    return (base, *factor(W, tau), W, tau)
+    return base, *weighted(base, motion, tau.reshape(samples, -1))
 
 
 def arm(rng, name="planar_2r"):
@@ -72,121 +68,54 @@ def robot(kind, rng):
     return random_model(rng, f=5, drive=True, **options)
 
 
-KINDS = (
-    "rx90", "gantry", "cobra_s600", "iiwa14", "tx40", "serial", "prismatic", "tree", "coupled",
-)  # fmt: skip
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_real_robot_comes_back_at_no_price(kind, rng):
-    for _ in range(1 if kind in ("rx90", "iiwa14", "tx40") else 3):
-        model = robot(kind, rng)
-        base = base_parameters(model, drive=True)
-        values = base.values(model)
-        W = regressor(base, rng)
-        R, y, rest = factor(W, W @ values)
-        found = fit_consistent(
-            base, R, y, rest=rest, rows=len(W), prior=uniform_bodies(model, 3.0 * model.f)
-        )
-        assert found.status is EXACT
-        assert found.residual_increase == 0.0
-        assert found.fit.gap == 0.0
-        sizes = np.maximum(abs(values), 1e-3 * abs(values).max())
-        assert (abs(found.base_values - values) <= 1e-8 * sizes).all()
-        assert found.inertia.is_physical.all()
-        for part in (found.drive.Ia, found.drive.Fv, found.drive.Fc):
-            assert (part >= 0.0).all()
-        again = found.of(model)
-        q, v, a = random_state(model, rng, 20)
-        torque = rm.idm(model, q, v, a)
-        assert abs(rm.idm(again, q, v, a) - torque).max() <= 1e-8 * abs(torque).max()
-
-
-def cholesky_fit(base, W, tau, P0, margin, start):
-    """The same problem by factors: P = margin P0 + L L^T, drives squared; no cones, no solver."""
-    f, p = base.model.f, len(base.parameter_names)
-    root = np.linalg.cholesky(P0)
-    low = np.tril_indices(4)
-    offset = np.array([name.startswith("offset") for name in base.parameter_names[10 * f :]])
-
-    def standard(u):
-        x = np.zeros(p)
-        for j in range(f):
-            L = np.zeros((4, 4))
-            L[low] = u[10 * j : 10 * j + 10]
-            P = root[j] @ (margin * np.eye(4) + L @ L.T) @ root[j].T
-            J = np.trace(P[:3, :3]) * np.eye(3) - P[:3, :3]
-            x[10 * j : 10 * j + 10] = [*J[np.triu_indices(3)], *P[:3, 3], P[3, 3]]
-        x[10 * f :] = np.where(offset, u[10 * f :], u[10 * f :] ** 2)
-        return x
-
-    found = least_squares(
-        lambda u: W @ (base.matrix @ standard(u)) - tau, start, xtol=1e-14, ftol=1e-14, gtol=1e-14,
-        max_nfev=200,
-    )  # fmt: skip
-    return 2.0 * found.cost
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_the_optimum_of_an_independent_method(seed):
-    """Data of no real robot: the same least as unconstrained least squares of Cholesky factors."""
-    rng = np.random.default_rng(seed)
-    model = arm(rng)
+@pytest.mark.parametrize(
+    "kind",
+    ["rx90", "gantry", "cobra_s600", "iiwa14", "tx40", "serial", "prismatic", "tree", "coupled"],
+)
+def test_a_physical_robot_is_found_without_residuals(kind, rng):
+    model = robot(kind, rng)
     base = base_parameters(model, drive=True)
     values = base.values(model)
-    values[base.names.index("ZZ2")] *= -0.3
-    values[base.names.index("Fc1")] = -0.4
-    W = regressor(base, rng, 30)
-    tau = W @ values + 0.1 * rng.normal(size=len(W))
-    R, y, rest = factor(W, tau)
-    prior = uniform_bodies(model, 6.0)
-    found = fit_consistent(base, R, y, rest=rest, prior=prior)
-    assert found.status is CONSTRAINED
-    assert found.residual_increase > 1.0
-    assert found.fit.squares == pytest.approx(np.sum((W @ found.base_values - tau) ** 2), rel=1e-9)
-    assert found.fit.gap < 2e-4
-    starts = [0.7 * rng.normal(size=len(base.parameter_names)) for _ in range(2)]
-    P0 = pseudo_inertias(prior)
-    best = rest + min(cholesky_fit(base, R, y, P0, 1e-3, u) for u in starts)
-    assert best >= found.fit.squares * (1.0 - found.fit.gap) * (1.0 - 1e-9)  # the proof holds
-    assert found.fit.squares <= best * (1.0 + 2e-4)
-    assert "Fc1 is zero." in found.fit.active
-    assert any("pseudo-inertia of link 2" in said for said in found.fit.active)
+    prior = uniform_bodies(model, 3.0 * model.f)
+    R, y, rest, W, _ = weighted(base, random_state(model, rng, 60))
+    found = fit_consistent(base, R, y, rest=rest, rows=len(W), prior=prior)
+    assert (found.status, found.residual_increase, found.fit.gap) == (EXACT, 0.0, 0.0)
+    sizes = np.maximum(abs(values), 1e-3 * abs(values).max())
+    assert (abs(found.base_values - values) <= 1e-8 * sizes).all()
+    assert found.inertia.is_physical.all()
+    for part in (found.drive.Ia, found.drive.Fv, found.drive.Fc):
+        assert (part >= 0.0).all()
+    q, v, a = random_state(model, rng, 20)
+    torque = rm.idm(model, q, v, a)
+    assert abs(rm.idm(found.of(model), q, v, a) - torque).max() <= 1e-8 * abs(torque).max()
 
 
-def test_no_real_robot_on_the_way_to_others_fits_better(rng):
-    """Feasible directions: towards real robots, near and far, residuals do not fall."""
+def test_residuals_do_not_decrease_towards_physical_robots(rng):
+    """Feasible directions, near and far; also for the regressor itself and in other units."""
     model = arm(rng, "rx90")
     base, R, y, rest, W, tau = noisy(model, rng, 0.5, samples=15)
-    found = fit_consistent(base, R, y, rest=rest, prior=uniform_bodies(model, 20.0))
+    prior = uniform_bodies(model, 20.0)
+    found = fit_consistent(base, R, y, rest=rest, rows=len(W), prior=prior)
     assert found.status is CONSTRAINED
     assert found.residual_increase > 0.0
+    assert found.rms == pytest.approx(np.sqrt(found.fit.squares / len(W)))
+    least = found.fit.squares * (1.0 - found.fit.gap)
     for _ in range(100):
         other = model.with_inertia(random_bodies(rng, 6)).with_drive(random_drive(rng, 6))
         way = parameter_vector(other) - found.values
         for step in (1e-6, 1e-4, 1e-2, 1.0):
-            squares = np.sum((W @ (base.matrix @ (found.values + step * way)) - tau) ** 2)
-            assert squares >= found.fit.squares * (1.0 - found.fit.gap)
+            assert np.sum((W @ (base.matrix @ (found.values + step * way)) - tau) ** 2) >= least
     # the nearest base parameters fit worse: the torques are fitted here
-    near = rm.standard_parameters(base, found.requested, prior=uniform_bodies(model, 20.0))
-    assert np.sum((W @ near.base_values - tau) ** 2) >= found.fit.squares * (1.0 - found.fit.gap)
-
-
-def test_the_regressor_itself_and_other_units_give_the_same(rng):
-    model = arm(rng)
-    base, R, y, rest, W, tau = noisy(model, rng, 0.6, samples=12)
-    prior = uniform_bodies(model, 6.0)
-    found = fit_consistent(base, R, y, rest=rest, rows=len(W), prior=prior)
-    whole = fit_consistent(base, W, tau, prior=prior)
-    assert found.status is whole.status
-    assert whole.fit.squares == pytest.approx(found.fit.squares, rel=1e-7)
-    assert whole.base_values == pytest.approx(found.base_values, rel=1e-4, abs=1e-5)
-    assert found.rms == pytest.approx(np.sqrt(found.fit.squares / len(W)))
-    assert whole.rms is None
-    for scale in (1e-4, 1e4):  # weights of other units
-        again = fit_consistent(base, scale * R, scale * y, rest=scale**2 * rest, prior=prior)
-        assert again.residual_increase == pytest.approx(found.residual_increase, rel=1e-6)
-        assert again.base_values == pytest.approx(found.base_values, rel=1e-4, abs=1e-5)
+    near = rm.standard_parameters(base, found.requested, prior=prior)
+    assert np.sum((W @ near.base_values - tau) ** 2) >= least
+    for scale, (A, b, outside) in {
+        1.0: (W, tau, 0.0),
+        1e-4: (R, y, rest),
+        1e4: (R, y, rest),
+    }.items():
+        again = fit_consistent(base, scale * A, scale * b, rest=scale**2 * outside, prior=prior)
+        assert again.residual_increase == pytest.approx(found.residual_increase, rel=1e-5)
+        assert again.base_values == pytest.approx(found.base_values, rel=1e-3, abs=1e-4)
 
 
 def test_small_and_large_robots_are_the_same_problem(rng):
@@ -194,16 +123,15 @@ def test_small_and_large_robots_are_the_same_problem(rng):
     model = rm.load("rx90")
     true = model.with_inertia(uniform_bodies(model, 60.0))
     true = true.with_drive(rm.DriveParameters(Ia=[0] * 6, Fv=[10] * 6, Fc=[5] * 6, offset=[0] * 6))
-    base, R, y, rest, *_ = noisy(true, rng, 0.3, samples=15)
+    _, R, y, rest, *_ = noisy(true, rng, 0.3, samples=15)
     base = base_parameters(model, drive=True)
-    fits = {
-        s: fit_consistent(base, R, s * y, rest=s**2 * rest, prior=uniform_bodies(model, 60.0 * s))
-        for s in (1e-6, 1e-3, 1.0, 1e3, 1e6)
-    }
-    expected = fits[1.0]
+    expected, *fits = (
+        fit_consistent(base, R, s * y, rest=s**2 * rest, prior=uniform_bodies(model, 60.0 * s))
+        for s in (1.0, 1e-6, 1e6)
+    )
     assert expected.status is CONSTRAINED
     assert expected.residual_increase > 0.1
-    for s, found in fits.items():
+    for s, found in zip((1e-6, 1e6), fits, strict=True):
         assert found.status is CONSTRAINED
         assert found.fit.gap < 2e-4
         assert found.fit.squares == pytest.approx(s**2 * expected.fit.squares, rel=1e-6)
@@ -212,9 +140,9 @@ def test_small_and_large_robots_are_the_same_problem(rng):
         assert far < 1e-4 * np.abs(expected.base_values).max()
 
 
-@pytest.mark.parametrize("drives", [1e-12, 1e-6, 1e-3, 1e3, 1e6])
-def test_a_prior_of_other_sizes_is_no_proof_of_a_bad_fit(drives, rng):
-    """Drives of the prior are far from those of the torques: the best is found, or it is said."""
+@pytest.mark.parametrize("drives", [1e-12, 1e-3, 1e3, 1e6])
+def test_a_drive_prior_of_another_size(drives, rng):
+    """Drives of the prior far from those of the torques: the best is found, or INACCURATE."""
     model = rm.load("rx90").with_inertia(uniform_bodies(rm.load("rx90"), 60.0))
     model = model.with_drive(rm.DriveParameters(Ia=[0] * 6, Fv=[9] * 6, Fc=[5] * 6, offset=[0] * 6))
     base, R, y, rest, *_ = noisy(model, rng, 0.3, samples=150)
@@ -234,24 +162,19 @@ def test_a_prior_of_other_sizes_is_no_proof_of_a_bad_fit(drives, rng):
     assert best.fit.squares >= found.fit.squares * (1.0 - found.fit.gap) * (1.0 - 1e-4)
 
 
-def test_what_the_data_does_not_determine_is_the_priors(rng):
-    """A log that never moves joint 2: its columns are empty, the prior stands in."""
+def test_parameters_that_a_log_does_not_show_are_those_of_the_prior(rng):
+    """A log that never moves joint 2: its columns are empty."""
     model = arm(rng)
     base = base_parameters(model, drive=True)
     q, v, a = rng.normal(size=(3, 40, 2))
     v[:, 1] = a[:, 1] = 0.0
-    W = base.reduce(rm.torque_regressor(model, q, v, a)).reshape(-1, len(base))
-    tau = W @ base.values(model)
-    R, y, rest = factor(W, tau)
+    R, y, rest, W, tau = weighted(base, (q, v, a))
     prior = uniform_bodies(model, 6.0)
     found = fit_consistent(base, R, y, rest=rest, prior=prior, drive_prior=model.drive)
     assert found.status is EXACT
     assert abs(W @ found.base_values - tau).max() < 1e-8 * abs(tau).max()
     assert found.drive.Fv[1] == pytest.approx(model.drive.Fv[1], rel=1e-6)
     assert found.inertia.mass[0] == pytest.approx(prior.mass[0], rel=0.9)
-    # M1 acts nowhere by itself: of a prior that is the robot it is kept, also where all is noisy
-    base, R, y, rest, *_ = noisy(model, rng, 0.02)
-    assert fit_consistent(base, R, y, rest=rest).distance < 2.0
 
 
 def test_bounds_on_masses_are_kept_and_named(rng):
@@ -261,14 +184,14 @@ def test_bounds_on_masses_are_kept_and_named(rng):
     loose = fit_consistent(base, R, y, rest=rest, prior=prior)
     bounds = np.tile([-np.inf, np.inf], (6, 1))
     bounds[1] = 0.5, 0.5
-    bounds[2] = loose.inertia.mass[2] * 1.2, np.inf
+    bounds[2, 0] = loose.inertia.mass[2] * 1.2
     bounds[3] = 0.0, 0.3
     found = fit_consistent(base, R, y, rest=rest, prior=prior, mass_bounds=bounds, total_mass=9.0)
     assert found.status in (EXACT, CONSTRAINED)
-    assert found.inertia.mass[1] == pytest.approx(0.5, rel=1e-7)
-    assert found.inertia.mass[2] >= bounds[2, 0] * (1 - 1e-7)
-    assert found.inertia.mass[3] <= 0.3 * (1 + 1e-7)
-    assert found.inertia.mass.sum() == pytest.approx(9.0, rel=1e-7)
+    mass = found.inertia.mass
+    assert (mass[1], mass.sum()) == pytest.approx((0.5, 9.0), rel=1e-7)
+    assert mass[2] >= bounds[2, 0] * (1 - 1e-7)
+    assert mass[3] <= 0.3 * (1 + 1e-7)
     assert found.inertia.is_physical.all()
     assert "The mass of link 4 is at its upper bound, 0.3 kg." in found.fit.active
     assert found.fit.squares >= loose.fit.squares * (1 - 1e-5)
@@ -276,75 +199,31 @@ def test_bounds_on_masses_are_kept_and_named(rng):
     assert between.inertia.mass.sum() >= 30.0 * (1 - 1e-7)
 
 
-def test_bounds_on_centres_are_kept_and_named(rng):
+def test_bounds_on_centres_are_kept(rng):
     model = arm(rng)
     base, R, y, rest, *_ = noisy(model, rng, 0.01)
     prior = uniform_bodies(model, 6.0)
     centre = model.inertia.first_moments[1] / model.inertia.mass[1]
     low = centre + np.array([0.05, -0.1, -np.inf])
     high = centre + np.array([0.1, 0.1, np.inf])
+    known = [0.1, 0.02, -0.03]
     found = fit_consistent(
         base, R, y, rest=rest, prior=prior, mass_bounds=[[1.0, 9.0], [2.0, 2.5]],
-        centre_bounds=[CenterOfMassBox(2, low, high)],
+        centre_bounds=[CenterOfMassBox(2, low, high), CenterOfMassBox(1, known, known)],
     )  # fmt: skip
-    own = found.inertia.first_moments[1] / found.inertia.mass[1]
-    assert (own >= low - 1e-7).all()
-    assert (own <= high + 1e-7).all()
-    turned = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    ball = CenterOfMassEllipsoid(2, centre + np.array([0.3, 0.0, 0.0]), [0.1, 0.05, 0.2], turned)
-    found = fit_consistent(
-        base,
-        R,
-        y,
-        rest=rest,
-        prior=prior,
-        centre_bounds=[ball],
-        total_mass=model.inertia.mass.sum(),
-    )
-    own = found.inertia.first_moments[1] / found.inertia.mass[1]
-    inside = np.linalg.norm((turned.T @ (own - ball.center)) / ball.semi_axes)
-    assert inside == pytest.approx(1.0, abs=1e-4)
-    assert "The centre of mass of link 2 is on the surface of its ellipsoid." in found.fit.active
-    known = CenterOfMassBox(1, [0.1, 0.02, -0.03], [0.1, 0.02, -0.03])
-    found = fit_consistent(base, R, y, rest=rest, prior=prior, centre_bounds=[known])
-    own = found.inertia.first_moments[0] / found.inertia.mass[0]
-    assert own == pytest.approx([0.1, 0.02, -0.03], abs=1e-8)
-
-
-def test_bounds_that_contradict_are_a_status(rng):
-    model = arm(rng, "rx90")
-    base, R, y, rest, *_ = noisy(model, rng, 0.01)
-    prior = uniform_bodies(model, 20.0)
-    bounds = np.tile([-np.inf, np.inf], (6, 1))
-    bounds[1, 0], bounds[4, 0], bounds[5, 1] = 6.0, 7.0, 50.0
-    boxes = [CenterOfMassBox(3, [0.1, -1, -1], [0.2, 1, 1])]
-    boxes.append(CenterOfMassEllipsoid(3, [0.9, 0, 0], [0.1, 0.1, 0.1]))
-    for more in ({"mass_bounds": bounds, "total_mass": 10.0}, {"centre_bounds": boxes}):
+    centres = found.inertia.first_moments / found.inertia.mass[:, None]
+    assert (centres[1] >= low - 1e-7).all()
+    assert (centres[1] <= high + 1e-7).all()
+    assert centres[0] == pytest.approx(known, abs=1e-8)
+    contradiction = [CenterOfMassBox(2, [0.1, -1, -1], [0.2, 1, 1])]
+    contradiction.append(CenterOfMassBox(2, [0.9, -1, -1], [1.0, 1, 1]))
+    light = {"mass_bounds": [[6.0, np.inf], [7.0, np.inf]], "total_mass": 10.0}
+    for more in (light, {"centre_bounds": contradiction}):
         found = fit_consistent(base, R, y, rest=rest, prior=prior, **more)
         assert found.status is PhysicalStatus.INFEASIBLE
         assert found.reason().startswith("No physical robot satisfies the bounds; widen one")
         with pytest.raises(InvalidValueError, match="No physical robot"):
             found.of(model)
-
-
-@pytest.mark.parametrize("kind", ["tx40", "coupled"])
-def test_coupled_motors_stay_real(kind, rng):
-    model = robot(kind, rng)
-    base = base_parameters(model, drive=True)
-    values = base.values(model)
-    assert model.transmission is not None
-    motor = model.transmission.coupled_motors[-1]
-    for name, value in ((f"Fvm{motor}", 9.0), (f"Fcm{motor}", -9.0), (f"Iam{motor}", 5.0)):
-        values[base.names.index(name)] = value
-    W = regressor(base, rng)
-    R, y, rest = factor(W, W @ values)
-    found = fit_consistent(base, R, y, rest=rest, prior=uniform_bodies(model, 3.0 * model.f))
-    assert found.status is CONSTRAINED
-    drives = found.of(model).drive_matrices
-    assert drives is not None
-    for matrix in (drives.rotor, drives.viscous):
-        assert np.linalg.eigvalsh(matrix)[0] >= -1e-9 * abs(matrix).max()
-    assert any("coupled motors" in said for said in found.fit.active)
 
 
 @pytest.mark.parametrize(
@@ -355,13 +234,13 @@ def test_coupled_motors_stay_real(kind, rng):
         (ViscousFriction([1.0, 1.0]) + TorqueOffset([-1.0, 2.0]), "Fv2"),
     ],
 )
-def test_frictions_of_models_take_energy(friction, bad, rng):
+def test_friction_models_are_dissipative(friction, bad, rng):
     model = arm(rng)
     base = base_parameters(model, drive=("Ia",), friction=friction)
     values = base.values(model)
     values[base.names.index(bad)] = -2.0
-    W = regressor(base, rng)
-    R, y, rest = factor(W, W @ values)
+    R, _, rest, *_ = weighted(base, random_state(model, rng, 60), np.zeros((60, 2)))
+    y = R @ values
     found = fit_consistent(base, R, y, rest=rest, prior=uniform_bodies(model, 6.0))
     assert found.status is CONSTRAINED
     assert found.values[list(base.parameter_names).index(bad)] == pytest.approx(0.0, abs=1e-4)
@@ -395,7 +274,7 @@ def test_the_weight_trades_residuals_for_nearness(rng):
     assert not last.fit.active
 
 
-@pytest.mark.parametrize("kind", ["rx90", "serial", "tree", "coupled", "tx40"])
+@pytest.mark.parametrize("kind", ["tree", "tx40"])
 def test_torques_survive_the_urdf(kind, rng):
     model = robot(kind, rng)
     base, R, y, rest, *_ = noisy(model, rng, 0.05)
@@ -403,7 +282,7 @@ def test_torques_survive_the_urdf(kind, rng):
     links, drives, friction, lost = urdf_parity(found.of(model), rng)
     assert max(links, drives) < 1e-9
     assert friction < 1e-12
-    assert any("rotor inertia" in said for said in lost)
+    assert any("rotor inertia" in words for words in lost)
 
 
 def test_the_result_is_a_value(rng):
@@ -412,15 +291,12 @@ def test_the_result_is_a_value(rng):
     found = fit_consistent(base, R, y, rest=rest, rows=len(W), prior=uniform_bodies(model, 6.0))
     again = pickle.loads(pickle.dumps(found))
     assert again.residual_increase == found.residual_increase
-    assert not again.base_values.flags.writeable
     assert not again.values.flags.writeable
     assert found.standard_errors is None
-    assert set(found.notes) >= {*found.fit.active}
     text = str(found)
-    assert found.status.sentence in text
-    assert f"{found.residual_increase:.3g} %" in text
-    for said in found.fit.active:
-        assert said in text
+    for words in (found.status.sentence, f"{found.residual_increase:.3g} %", *found.fit.active):
+        assert words in text
+    assert {*found.notes} >= {*found.fit.active}
     assert f"residuals +{found.residual_increase:.3g} %" in repr(found)
     assert found.base_values == pytest.approx(base.values(found.of(model)), rel=1e-12, abs=1e-12)
 
@@ -440,13 +316,10 @@ def test_mistakes_are_named(rng):
         (InvalidValueError, "margin", {"margin": 1.0}),
         (InvalidValueError, "tolerance", {"tolerance": 0.0}),
         (InvalidValueError, "prior: expected 2 links", {"prior": rm.InertialParameters.zeros(3)}),
-        (InertiaError, "prior: link 1", {"prior": rm.InertialParameters.zeros(2)}),
         (InvalidValueError, "drive_prior", {"drive_prior": rm.DriveParameters.zeros(3)}),
         (ShapeError, r"mass_bounds: expected shape \(2, 2\)", {"mass_bounds": [1.0, 2.0]}),
         (InvalidValueError, "mass of link 2", {"mass_bounds": [[0, 1], [2, 1]]}),
         (InvalidValueError, "mass of link 1", {"mass_bounds": [[-5, -1], [2, 3]]}),
-        (InvalidValueError, "mass of link 1", {"mass_bounds": [[np.nan, 1], [2, 3]]}),
-        (InvalidValueError, "total mass of all", {"total_mass": -1.0}),
         (ShapeError, "total_mass", {"total_mass": [1.0, 2.0, 3.0]}),
         (InvalidValueError, "no link 3", {"centre_bounds": [CenterOfMassBox(3, [0] * 3, [1] * 3)]}),
         (InvalidValueError, "expected CenterOfMassBox", {"centre_bounds": [3]}),
@@ -460,10 +333,6 @@ def test_mistakes_are_named(rng):
         CenterOfMassBox(1, [np.inf, 0, 0], [np.inf, 1, 1])
     with pytest.raises(ShapeError, match="high"):
         CenterOfMassBox(1, [1, 0, 0], [0, 1])
-    with pytest.raises(InvalidValueError, match="semi_axes"):
-        CenterOfMassEllipsoid(1, [0, 0, 0], [1, 0, 1])
-    with pytest.raises(InvalidValueError, match="rotation"):
-        CenterOfMassEllipsoid(1, [0, 0, 0], [1, 1, 1], 2 * np.eye(3))
 
 
 def test_without_the_solver(monkeypatch, rng):
@@ -472,3 +341,126 @@ def test_without_the_solver(monkeypatch, rng):
     monkeypatch.setitem(sys.modules, "cvxpy", None)
     with pytest.raises(MissingExtraError, match=r"robotmodels\[cones\]"):
         fit_consistent(base, R, y, rest=rest, prior=uniform_bodies(model, 6.0))
+
+
+# --- noisy logs ----------------------------------------------------------------------------------
+
+
+def heavy_arm(rng):
+    """An arm of a tonne with heavy drives, and the same without parameters (6 joints)."""
+    s = rng.uniform(0.7, 1.3, 6)
+    table = rm.DHTable(
+        antecedent=range(6), sigma=[0] * 6, theta=[0, -QUARTER, 0, 0, 0, 0],
+        alpha=[0.0, -QUARTER, 0.0, -QUARTER, QUARTER, -QUARTER],
+        d=[0.0, 0.35 * s[1], 1.15 * s[2], -0.05 * s[3], 0.0, 0.0],
+        r=[0.7 * s[0], 0.0, 0.0, 1.2 * s[4], 0.0, 0.2 * s[5]],
+    )  # fmt: skip
+    bare = rm.RobotModel.from_table(table)
+    mass = np.array([400.0, 300.0, 250.0, 60.0, 30.0, 80.0]) * rng.uniform(0.6, 1.6, 6)
+    size = np.array([0.4, 0.6, 0.4, 0.3, 0.15, 0.15])
+    second = []
+    for j in range(6):
+        points = rng.normal(size=(12, 3)) * size[j] * rng.uniform(0.2, 0.6, 3)
+        S = mass[j] * points.T @ points / 12.0
+        second.append(np.trace(S) * np.eye(3) - S)
+    com = rng.uniform(-0.5, 0.5, (6, 3)) * size[:, None]
+    arm = bare.with_inertia(rm.InertialParameters.from_com(mass, com, np.array(second)))
+    sizes = {
+        "Ia": [150.0, 150.0, 100.0, 15.0, 10.0, 5.0],
+        "Fv": [1200.0, 1500.0, 1000.0, 200.0, 150.0, 80.0],
+        "Fc": [600.0, 700.0, 500.0, 150.0, 120.0, 60.0],
+    }
+    drive = {kind: np.array(size) * rng.uniform(0.3, 2.0, 6) for kind, size in sizes.items()}
+    return arm.with_drive(rm.DriveParameters(**drive, offset=np.zeros(6))), bare
+
+
+def slow_motion(rng, t):
+    """Five harmonics of 0.1 Hz."""
+    w = 0.2 * np.pi * np.arange(1.0, 6.0)[:, None]
+    size = rng.normal(size=(5, 6)) * np.array([0.6, 0.4, 0.4, 0.8, 0.6, 1.0]) / 5.0
+    phase = w * t[:, None, None] + rng.uniform(0.0, 2.0 * np.pi, (5, 6))
+    return (
+        (size * np.sin(phase)).sum(axis=1),
+        (size * w * np.cos(phase)).sum(axis=1),
+        -(size * w**2 * np.sin(phase)).sum(axis=1),
+    )
+
+
+def measured(rng, model, motion, noise, unmodelled):
+    """Torques with noise and with what no parameter explains, and the noise of each joint."""
+    q, v, _ = motion
+    tau = rm.idm(model, *motion)
+    rms = np.sqrt(np.mean(tau**2, axis=0)) + 1e-9
+    wrong = np.sin(3.0 * q) + 0.5 * np.tanh(20.0 * v) * np.cos(q)
+    return tau + rms * (noise * rng.normal(size=tau.shape) + unmodelled * wrong), rms * noise
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_noisy_logs_of_heavy_arms_converge(seed):
+    """180 to 1200 equations, noise of 5 to 30 %, unmodelled torques, a prior ten times light."""
+    rng = np.random.default_rng(seed)
+    arm, bare = heavy_arm(rng)
+    unmodelled = rng.uniform(0.0, 0.3) if seed % 3 else 0.0
+    motion = slow_motion(rng, np.linspace(0.0, 10.0, int(rng.integers(30, 200))))
+    tau, sigma = measured(rng, arm, motion, rng.uniform(0.05, 0.3), unmodelled)
+    drive = ("Ia", "Fv", "Fc")
+    base = base_parameters(bare, drive=drive)
+    R, y, rest, W, _ = weighted(base, motion, tau, sigma)
+    found = fit_consistent(base, R, y, rest=rest, rows=len(W), prior=uniform_bodies(bare, 100.0))
+    assert found.status in (EXACT, CONSTRAINED), found.reason()
+    assert found.fit.stopped == ""
+    assert found.fit.gap <= PROVED
+    assert found.inertia.is_physical.all()
+    truth = base_parameters(arm, drive=drive).values(arm)
+    squares = rest + np.sum((R @ truth - y) ** 2)
+    assert found.fit.squares <= squares * (1.0 + found.fit.gap)
+    if unmodelled == 0.0:
+        assert found.residual_increase <= 100.0 * (np.sqrt(squares / found.fit.least) - 1.0) + 0.02
+        assert found.residual_increase < 12.0
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_robots_of_any_structure_converge_on_slow_motion(seed):
+    """Priors 100 times too light or too heavy, motion that hardly shows the inertias."""
+    rng = np.random.default_rng(seed)
+    options = (
+        {"prismatic": False},
+        {},
+        {"tree": True, "fixed": True},
+        {"transmission": True, "prismatic": False},
+    )[seed % 4]
+    model = random_model(rng, f=int(rng.integers(4, 8)), drive=True, **options)
+    model = model.with_inertia(random_bodies(rng, model.f))
+    base = base_parameters(model, drive=True if seed % 3 else ("Ia", "Fv", "Fc"))
+    q, v, a = random_state(model, rng, int(rng.integers(3, 30) * len(base) / model.n))
+    w = 10.0 ** rng.uniform(-2.0, 0.5)
+    motion = (q, w * v, w * w * a)
+    tau, sigma = measured(rng, model, motion, rng.uniform(0.02, 0.4), rng.uniform(0.0, 0.5))
+    R, y, rest, W, _ = weighted(base, motion, tau, sigma)
+    mass = float(model.inertia.mass.sum()) * 10.0 ** rng.uniform(-2.0, 2.0)
+    found = fit_consistent(base, R, y, rest=rest, rows=len(W), prior=uniform_bodies(model, mass))
+    assert found.status in (EXACT, CONSTRAINED), found.reason()
+    assert found.fit.gap <= PROVED
+    truth = rest + np.sum((R @ base.values(model) - y) ** 2)
+    assert found.fit.squares <= truth * (1.0 + PROVED)
+
+
+def test_a_solver_that_stops_early_is_reported(monkeypatch):
+    rng = np.random.default_rng(0)
+    arm, bare = heavy_arm(rng)
+    motion = slow_motion(rng, np.linspace(0.0, 10.0, 60))
+    tau, sigma = measured(rng, arm, motion, 0.2, 0.1)
+    base = base_parameters(bare, drive=("Ia", "Fv", "Fc"))
+    R, y, rest, *_ = weighted(base, motion, tau, sigma)
+    best = fit_consistent(base, R, y, rest=rest, prior=uniform_bodies(bare, 100.0))
+    monkeypatch.setitem(physical._SOLVER, "max_iter", 5)
+    early = fit_consistent(base, R, y, rest=rest, prior=uniform_bodies(bare, 100.0))
+    assert best.status is CONSTRAINED
+    assert early.status is PhysicalStatus.INACCURATE
+    assert early.fit.gap > best.fit.gap
+    assert best.fit.squares >= early.fit.squares * (1.0 - early.fit.gap)  # the gap holds there too
+    assert early.fit.stopped == "The solver stopped: MaxIterations after 5 iterations."
+    for text in (early.reason(), str(early)):
+        assert early.fit.stopped in text
+        assert f"The sum of squares is within {100.0 * early.fit.gap:.1g} % of the optimum." in text
+    assert best.fit.stopped == ""

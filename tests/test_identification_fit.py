@@ -4,8 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
-from identification_logs import clean_log, odd_robots, swinging
-from identities.random_robots import random_drive
+from identification_logs import clean_log, odd_robots
 
 import robotmodels as rm
 from robotmodels.errors import InvalidValueError, ShapeError
@@ -14,10 +13,7 @@ from robotmodels.identification import (
     Ridge,
     Wls,
     choose_processing,
-    equations,
     fit,
-    predicted_torque,
-    reduce_equations,
     validate,
 )
 from robotmodels.identification.torques import parameter_torque
@@ -50,61 +46,20 @@ def as_it_is(log, decimation):
     return choose_processing(log, decimation=decimation, dead_band=1e-3, filtered=False)
 
 
-@pytest.mark.parametrize("method", ["ols", "wls", "irls"])
 @pytest.mark.parametrize("name", ROBOTS)
-def test_exact_parameters_without_noise(name, method):
+def test_exact_parameters_without_noise(name):
     model = ROBOTS[name]
     log = clean_log(model, np.random.default_rng(3))
     for decimation in (1, 25):
-        found = fit(model, log, method, processing=as_it_is(log, decimation))
+        found = fit(model, log, processing=as_it_is(log, decimation))
         truth = found.base.values(model)
         assert found.names == found.base.names
-        off = np.abs(found.values - truth).max() / np.abs(truth).max()
-        assert off < 1e-8, (name, decimation, off)
-        assert (
-            found.validation.in_sample.filtered_rmse[
-                ~np.isnan(found.validation.in_sample.filtered_rmse)
-            ].max()
-            < 1e-7
-        )
-
-
-@pytest.mark.parametrize("name", ["erd:xarm7", "rx90"])
-def test_right_angles_of_few_digits_give_no_parameter_that_no_log_shows(name):
-    rng = np.random.default_rng(3)
-    model = rm.load(name)
-    table = model.table.replace(alpha=model.table.alpha.round(4))  # as many files are written
-    model = model.with_table(table).with_drive(random_drive(rng, model.n))
-    log = clean_log(model, rng, noise=0.1)
-    found = fit(model, log, base=rm.base_parameters(model, drive=True))
-    assert found.scaled_condition < 100
-    assert not any("cannot be told apart" in note for note in found.notes)
-    assert any(
-        note.startswith("Treated as aligned: axis 2 and axis 1") for note in found.base.notes
-    )
-    z = (found.values - found.base.values(model)) / found.standard_errors
-    assert np.sqrt((z**2).mean()) < 1.3
-    every = fit(model, log, base=rm.base_parameters(model, drive=True, tolerance=1e-11))
-    assert every.scaled_condition > 1e4 * found.scaled_condition
-    # what is predicted is the torque of the table as given, to the angles that were taken
-    q, v, a = swinging(model, rng, samples=400)
-    one, other = (predicted_torque(x, q, v, a) for x in (found, every))
-    torque = rm.idm(model, q, v, a)
-    errors = [np.sqrt(((x - torque) ** 2).mean()) for x in (one, other)]
-    assert errors[0] < 1.05 * errors[1] + 1e-5 * np.abs(torque).max()
-
-
-def test_exact_from_positions_alone_to_what_differences_allow():
-    # four-point differences of a motion of 1.25 Hz at 1 kHz miss (2 pi f dt)^4 / 30 of velocities
-    model = rm.load("rx90").with_drive(ROBOTS["rx90"].drive)
-    log = clean_log(model, np.random.default_rng(0), dt=1e-3, samples=12000)
-    found = fit(
-        model,
-        Log(log.dt, log.q, log.tau),
-        processing={"decimation": 50, "cutoff": 30.0, "dead_band": 0.02},
-    )
-    truth = found.base.values(model)
-    assert np.abs(found.values - truth).max() / np.abs(truth).max() < 1e-5
+        assert np.abs(found.values - truth).max() < 1e-8 * np.abs(truth).max()
+        assert np.nanmax(found.validation.in_sample.filtered_rmse) < 1e-7
+        # the given robot is the one that moved
+        assert found.validation.nominal.rmse.max() < 1e-9
+    bare = model.with_inertia(rm.InertialParameters(np.zeros((model.f, 10))))
+    assert fit(bare, log, processing=as_it_is(log, 25)).validation.nominal is None
 
 
 def test_friction_models_are_identified():
@@ -154,7 +109,7 @@ def test_covariance_of_correlated_residuals():
     clean = clean_log(model, rng, samples=3000)
     choices = choose_processing(clean, decimation=1, dead_band=0.0, filtered=False)
     z, white, segments = [], [], 0
-    for _ in range(60):
+    for _ in range(40):
         e = rng.normal(size=(3004, 2))
         e = sum(e[k : k + 3000] for k in range(5)) / 5.0
         log = Log(clean.dt, clean.q, clean.tau + e, clean.v, clean.a)
@@ -205,21 +160,6 @@ def test_tx40_held_out(trained):
     assert (trained.validation.held_out.rmse < best).all(), trained.validation.held_out.rmse
     assert trained.validation.held_out.samples == 15750 - 2 * trained.equations.processing.edges
     assert (np.abs(trained.validation.held_out.bias) < trained.validation.held_out.rmse).all()
-
-
-def test_tx40_choices_come_from_the_log(whole):
-    choices = whole.equations.processing
-    assert 5.0 < choices.motion < 10.0
-    assert 2.5 * choices.motion < choices.torque_cutoff < choices.cutoff < 100.0
-    assert whole.factors.rows >= 20 * len(whole.names)
-    # the dead bands published with the data are about the ramps that the log's friction shows
-    published = np.array([0.0501, 0.0501, 0.0750, 0.0716, 0.0559, 0.1222])
-    assert (choices.dead_band < published).all()
-    assert (
-        (0.5 * published < whole.details.friction_ramp)
-        & (whole.details.friction_ramp < 1.5 * published)
-    ).all()
-    assert whole.scaled_condition < 40.0 < whole.condition
 
 
 def test_a_result_survives_pickling(whole):
@@ -331,24 +271,6 @@ def test_errors_say_what_to_do(tx40):
         fit(model, log, processing={"dead_band": [0.1, 0.2]})
 
 
-def test_several_recordings_are_one_log(tx40):
-    # a recording that is cut in two has the equations of its halves
-    log = tx40.log.rows(0, 24750)
-    q, tau = np.array(log.q), np.array(log.tau)
-    cut = Log(log.dt, q, tau, starts=[0, 12000])
-    choices = choose_processing(log)
-    base = rm.base_parameters(tx40.model)
-    both = reduce_equations(equations(base, cut, choices))
-    parts = [
-        reduce_equations(equations(base, log.rows(*rows), choices))
-        for rows in ((0, 12000), (12000, 24750))
-    ]
-    for j in range(6):
-        G = sum(part.factors[j].T @ part.factors[j] for part in parts)
-        assert np.allclose(both.factors[j].T @ both.factors[j], G, rtol=1e-9, atol=1e-9 * G.max())
-    assert (both.counts == parts[0].counts + parts[1].counts).all()
-
-
 # --- every method through one door -------------------------------------------------------------
 
 
@@ -365,22 +287,6 @@ def test_a_prior_is_a_robot_or_numbers(tx40):
     assert np.median(near) < np.median(far)
 
 
-def test_essential_parameters_are_those_that_are_seen(tx40, whole):
-    found = fit(tx40.model, tx40.log, Wls(essential=30))
-    assert 20 <= len(found.names) <= 32
-    published = {p.name for p in tx40.essential}
-    assert published <= set(found.names)
-    assert set(found.names) | set(found.details.dropped) == set(whole.names)
-    assert (found.relative_errors < 0.5).all()
-    assert found.details.essential_rule == "ratio 30"
-    # they predict as well
-    assert (
-        found.validation.in_sample.filtered_rmse < 1.15 * whole.validation.in_sample.filtered_rmse
-    ).all()
-    assert len(found.base_values) == 61
-    assert (found.base_values == 0.0).sum() == len(found.details.dropped)
-
-
 def test_a_result_has_the_words_of_the_contract(tx40, trained):
     from dataclasses import fields
 
@@ -394,12 +300,3 @@ def test_a_result_has_the_words_of_the_contract(tx40, trained):
     assert (nominal.rmse > trained.validation.in_sample.rmse).all()
     rows = tx40.log.rows(tx40.held_out.start, tx40.held_out.stop)
     assert (validate(trained, rows).rmse == trained.validation.held_out.rmse).all()
-
-
-def test_the_robots_own_parameters_are_the_errors_before():
-    model = ROBOTS["serial"]
-    log = clean_log(model, np.random.default_rng(3))
-    found = fit(model, log, processing=as_it_is(log, 10))
-    assert found.validation.nominal.rmse.max() < 1e-9
-    bare = model.with_inertia(rm.InertialParameters(np.zeros((model.f, 10))))
-    assert fit(bare, log, processing=as_it_is(log, 10)).validation.nominal is None

@@ -7,8 +7,8 @@ import pytest
 
 from robotmodels.drive import DriveParameters
 from robotmodels.dynamics import idm, with_payload
-from robotmodels.errors import InvalidValueError, ShapeError
-from robotmodels.friction import Friction, LoadFriction, StribeckFriction
+from robotmodels.errors import InvalidValueError
+from robotmodels.friction import LoadFriction, StribeckFriction
 from robotmodels.identification import (
     KnownPayload,
     LoadedLog,
@@ -29,16 +29,16 @@ MASS, COM, INERTIA = 3.0, np.array([0.02, 0.03, 0.1]), np.diag([0.01, 0.02, 0.01
 TRUE = InertialParameters.from_com([MASS], COM[None], INERTIA[None]).values[0]
 
 
-def motion(n, samples, seed, size=1.0):
+def motion(n, samples, seed, size=1.0, locked=()):
     """Sums of sines with their derivatives."""
-    rng = np.random.default_rng(seed)
-    t = DT * np.arange(samples)[:, None]
-    q = v = a = np.zeros((samples, n))
+    rng, t = np.random.default_rng(seed), DT * np.arange(samples)[:, None]
+    q, v, a = np.zeros((3, samples, n))
     for k in range(1, 6):
         w, part, phase = 0.2 * np.pi * k, size * rng.normal(size=n) / k, rng.uniform(0.0, 6.28, n)
-        q = q + part * np.sin(w * t + phase)
-        v = v + part * w * np.cos(w * t + phase)
-        a = a - part * w**2 * np.sin(w * t + phase)
+        part[list(locked)] = 0.0
+        q += part * np.sin(w * t + phase)
+        v += part * w * np.cos(w * t + phase)
+        a -= part * w**2 * np.sin(w * t + phase)
     return q, v, a
 
 
@@ -58,9 +58,9 @@ def robot(name="planar_2r", offset=0.3, Ia=0.1):
 def logged(model, moved, noise=0.0, seed=0, more=0.0, gains=1.0):
     """A log of torques, or of currents, which gear ratios bring to the joints."""
     side = motor_side(model)
-    found = (idm(model, *moved) + more) @ side.T / gains
-    found = found + noise * np.random.default_rng(seed).normal(size=found.shape)
-    return Log(DT, moved[0], np.linalg.solve(side, found.T).T, moved[1], moved[2])
+    tau = (idm(model, *moved) + more) @ side.T / gains
+    tau = tau + noise * np.random.default_rng(seed).normal(size=tau.shape)
+    return Log(DT, moved[0], np.linalg.solve(side, tau.T).T, moved[1], moved[2])
 
 
 def raw(log, decimation=1, dead_band=0.0):
@@ -72,18 +72,16 @@ def raw(log, decimation=1, dead_band=0.0):
 def pair(name="planar_2r", noise=0.0, seed=0, samples=800, carried=(MASS, COM, INERTIA), **options):
     """A robot, its log without and with a load."""
     model = robot(name)
-    loaded = with_payload(model, *carried)
-    bare = logged(model, motion(model.n, samples, 1), noise, 2 * seed, **options)
-    return (
-        model,
-        bare,
-        logged(loaded, motion(model.n, samples, 2), noise, 2 * seed + 1, **options),
+    moved = (motion(model.n, samples, k) for k in (1, 2))
+    robots = zip(
+        (model, with_payload(model, *carried)), moved, (2 * seed, 2 * seed + 1), strict=True
     )
+    return model, *(logged(one, way, noise, k, **options) for one, way, k in robots)
 
 
-def check_scores(scores, count):
+def check_scores(scores):
     """Means and spreads of standard scores of many logs."""
-    assert (np.abs(np.mean(scores, axis=0)) < 4.0 / np.sqrt(count)).all()
+    assert (np.abs(np.mean(scores, axis=0)) < 4.0 / np.sqrt(len(scores))).all()
     spread = np.std(scores, axis=0)
     assert ((spread > 0.67) & (spread < 1.43)).all()
 
@@ -91,8 +89,7 @@ def check_scores(scores, count):
 # --- payloads ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("together", [True, False])
-@pytest.mark.parametrize("name", ["tx40", "rx90"])
+@pytest.mark.parametrize(("name", "together"), [("tx40", False), ("rx90", True)])
 def test_exact_logs_give_the_exact_payload(name, together):
     model, bare, full = pair(name)
     choices = raw(bare)
@@ -100,7 +97,6 @@ def test_exact_logs_give_the_exact_payload(name, together):
     found = identify_payload(model, full, reference, processing=choices)
     assert found.status.name == "COMPLETE"
     np.testing.assert_allclose(found.parameters, TRUE, atol=1e-8)
-    np.testing.assert_allclose(found.com, COM, atol=1e-8)
     np.testing.assert_allclose(found.inertia, INERTIA, atol=1e-8)
     tau = idm(found.carried, full.q, full.v, full.a)
     np.testing.assert_allclose(tau, full.tau, atol=1e-7)
@@ -109,60 +105,50 @@ def test_exact_logs_give_the_exact_payload(name, together):
     assert not again.values.flags.writeable
 
 
-def test_a_payload_in_a_rotated_frame_on_an_inner_link():
-    frame = 3
-    model, bare, full = pair("rx90", carried=(MASS, COM, INERTIA, frame))
-    found = identify_payload(model, full, bare, frame, processing=raw(bare))
-    known = [PARAMETERS.index(name) for name in found.identifiable]
-    assert {"MX", "MY"} <= set(found.identifiable)
-    np.testing.assert_allclose(found.parameters[known], TRUE[known], atol=1e-8)
-
-
-def test_a_planar_robot_shows_four_parameters():
+def test_payloads_of_an_inner_link_and_of_a_planar_robot_are_identified_in_part():
+    model, bare, full = pair("rx90", carried=(MASS, COM, INERTIA, 3))
+    inner = identify_payload(model, full, bare, 3, processing=raw(bare))
+    known = [PARAMETERS.index(name) for name in inner.identifiable]
+    assert {"MX", "MY"} <= set(inner.identifiable)
+    np.testing.assert_allclose(inner.parameters[known], TRUE[known], atol=1e-8)
     model, bare, full = pair()
-    found = identify_payload(model, full, bare, processing=raw(bare))
-    assert found.status.name == "PARTIAL"
-    assert found.identifiable == ("ZZ", "MX", "MY", "M")
-    assert found.unidentifiable == ("XX", "XY", "XZ", "YY", "YZ", "MZ")
-    assert "XX" in found.notes[0]
-    assert found.mass == pytest.approx(MASS, abs=1e-8)
-    assert np.isnan(found.com[2])
+    planar = identify_payload(model, full, bare, processing=raw(bare))
+    assert planar.status.name == "PARTIAL"
+    assert planar.identifiable == ("ZZ", "MX", "MY", "M")
+    assert "XX, XY, XZ, YY, YZ, MZ" in planar.notes[0]
+    assert planar.mass == pytest.approx(MASS, abs=1e-8)
+    assert np.isnan(planar.com[2])
     with pytest.raises(InvalidValueError, match="MZ"):
-        _ = found.carried
-    with pytest.raises(InvalidValueError, match="frame"):
-        identify_payload(model, full, bare, 0, processing=raw(bare))
+        _ = planar.carried
 
 
 def test_friction_that_differs_between_the_logs():
     model, bare, _ = pair()
-    other = with_payload(robot(offset=-1.0), MASS, COM, INERTIA)
-    full = logged(other, motion(2, 800, 2))
+    full = logged(with_payload(robot(offset=-1.0), MASS, COM, INERTIA), motion(2, 800, 2))
     wrong = identify_payload(model, full, bare, processing=raw(bare))
-    assert abs(wrong.mass - MASS) > 1e-3
     right = identify_payload(model, full, bare, changed=("offset",), processing=raw(bare))
+    assert abs(wrong.mass - MASS) > 1e-3
     assert right.mass == pytest.approx(MASS, abs=1e-8)
-    with pytest.raises(InvalidValueError, match="Ia"):
-        identify_payload(model, full, bare, changed=("mass",), processing=raw(bare))
 
 
 def test_standard_errors_of_payloads_are_true():
-    scores = []
-    choices = raw(pair()[1], 5)
+    scores, choices = [], raw(pair()[1], 5)
     true = TRUE[[PARAMETERS.index(name) for name in ("ZZ", "MX", "MY", "M")]]
-    for seed in range(50):
+    for seed in range(40):
         model, bare, full = pair(noise=0.5, seed=seed, samples=1500)
         found = identify_payload(model, full, bare, processing=choices)
         scores.append((found.values - true) / found.standard_errors)
-    check_scores(scores, 50)
+    check_scores(scores)
+    without = logged(model, motion(2, 1500, 2), 0.5, 1)
+    found = identify_payload(model, without, bare, processing=choices)
+    assert found.status.name == "INSIGNIFICANT"
 
 
-@pytest.mark.parametrize("locked", [0, 1, 3, 5])
+@pytest.mark.parametrize("locked", [0, 3])
 def test_parameters_that_the_reference_did_not_show_are_not_those_of_the_payload(locked):
     """A joint that stood still without the load moves with it: no error goes to the load."""
     model, _, full = pair("rx90", 0.02)
-    q, v, a = (x.copy() for x in motion(6, 800, 1))
-    q[:, locked], v[:, locked], a[:, locked] = 0.3, 0.0, 0.0
-    bare = logged(model, (q, v, a), 0.02, 4)
+    bare = logged(model, motion(6, 800, 1, locked=[locked]), 0.02, 4)
     reference = fit(model, bare, processing=raw(bare), checked=False)
     assert reference.details.unidentifiable
     found = identify_payload(model, full, reference)
@@ -171,28 +157,16 @@ def test_parameters_that_the_reference_did_not_show_are_not_those_of_the_payload
     errors = [found.standard_error(name) for name in found.identifiable]
     assert {"MX", "MY", "MZ", "M"} <= set(found.identifiable)
     assert (np.abs((found.parameters - TRUE)[where] / errors) < 4.5).all()
-    together = identify_payload(model, full, bare, processing=raw(bare))
-    np.testing.assert_allclose(found.values, together.values, rtol=1e-9, atol=1e-12)
-
-
-def test_a_robot_without_payload():
-    model, bare, _ = pair(noise=0.3)
-    found = identify_payload(
-        model, logged(model, motion(2, 800, 2), 0.3, 1), bare, processing=raw(bare)
-    )
-    assert found.status.name == "INSIGNIFICANT"
 
 
 def test_a_consistent_body_where_least_squares_give_none():
     pytest.importorskip("clarabel")
-    light = 0.3, [0.0, 0.0, 0.02], np.diag([1e-4] * 3)
-    model, bare, full = pair("tx40", 0.3, carried=light)
+    model, bare, full = pair("tx40", 0.3, carried=(0.3, [0.0, 0.0, 0.02], np.diag([1e-4] * 3)))
     free = identify_payload(model, full, bare, processing=raw(bare))
     assert not InertialParameters(free.parameters[None]).consistency().is_physical
     found = identify_payload(model, full, bare, consistent=True, processing=raw(bare))
     assert InertialParameters(found.parameters[None]).consistency().is_physical
     assert free.cost == 0.0 < found.cost < 0.05
-    assert found.carried.n == 6
     assert abs(found.mass - 0.3) < 4.0 * found.standard_error("M")
 
 
@@ -200,7 +174,7 @@ def test_a_consistent_body_where_least_squares_give_none():
 
 
 @pytest.mark.parametrize("name", ["planar_2r", "tx40"])
-@pytest.mark.parametrize("known", [(MASS,), (MASS, COM), (MASS, COM, INERTIA)])
+@pytest.mark.parametrize("known", [(MASS,), (MASS, COM, INERTIA)])
 def test_exact_logs_give_exact_gains(name, known):
     n = load(name).n
     gains = np.linspace(0.5, 2.0, n) * np.where(np.arange(n) == 1, -1.0, 1.0)
@@ -210,21 +184,18 @@ def test_exact_logs_give_exact_gains(name, known):
     )
     assert found.status.name == "SOLVED"
     np.testing.assert_allclose(found.gains, gains, rtol=1e-8)
-    base = base_parameters(model)
-    values = [found.value(name) for name in base.names]
-    np.testing.assert_allclose(values, base.values(model), atol=1e-8)
+    values = [found.value(name) for name in found.base.names]
+    np.testing.assert_allclose(values, found.base.values(model), atol=1e-8)
     carrying = with_payload(model, MASS, COM, INERTIA)
     torque = found.applied(loaded).tau
     np.testing.assert_allclose(torque, idm(carrying, loaded.q, loaded.v, loaded.a), atol=1e-7)
     if name == "tx40" and len(known) == 1:
         assert found.value("MZ load 1") == pytest.approx(MASS * COM[2], abs=1e-8)
     assert not pickle.loads(pickle.dumps(found)).gains.flags.writeable
-    assert "gain 1" in str(found)
 
 
 def test_two_loads_without_a_log_of_the_bare_robot():
-    model, gains = robot(), np.array([0.5, 2.0])
-    logs = []
+    model, gains, logs = robot(), np.array([0.5, 2.0]), []
     for k, mass in enumerate((1.0, 4.0)):
         log = logged(with_payload(model, mass, COM, INERTIA), motion(2, 600, k), gains=gains)
         logs.append(LoadedLog(log, KnownPayload(mass, COM, INERTIA)))
@@ -235,24 +206,21 @@ def test_two_loads_without_a_log_of_the_bare_robot():
 def test_noise_leaves_no_bias_and_standard_errors_of_gains_are_true():
     gains, scores = np.array([0.5, 2.0]), []
     base = base_parameters(robot(), drive=True)
-    for seed in range(60):
+    for seed in range(40):
         model, bare, full = pair(noise=1.0, seed=seed, samples=1500, gains=gains)
         found = identify_drive_gains(
             model, bare, LoadedLog(full, KnownPayload(MASS)), base=base, processing=raw(bare, 5)
         )
         scores.append((found.gains - gains) / found.gain_standard_errors)
-    check_scores(scores, 60)
+    check_scores(scores)
 
 
 def test_a_load_that_the_logs_do_not_show():
     model, bare, full = pair(noise=0.3, carried=(1e-9, COM), gains=np.array([0.5, 2.0]))
-    forgotten = LoadedLog(full, KnownPayload(MASS, COM, INERTIA))
-    found = identify_drive_gains(model, bare, forgotten, processing=raw(bare))
-    assert found.status.name == "LOAD_INSIGNIFICANT"
-    found = identify_drive_gains(
-        model, (), LoadedLog(full, KnownPayload(MASS)), processing=raw(bare)
-    )
-    assert found.status.name == "LOAD_INSIGNIFICANT"
+    for logs, known in ((bare, (MASS, COM, INERTIA)), ((), (MASS,))):
+        loaded = LoadedLog(full, KnownPayload(*known))
+        found = identify_drive_gains(model, logs, loaded, processing=raw(bare))
+        assert found.status.name == "LOAD_INSIGNIFICANT"
     assert np.isnan(found.gains).all()
     assert str(found) == found.reason()
 
@@ -260,47 +228,45 @@ def test_a_load_that_the_logs_do_not_show():
 # --- friction curves -----------------------------------------------------------------------------
 
 
-def links_torque(model, moved):
-    return idm(model.with_drive(DriveParameters.zeros(model.n)), *moved)
+def friction_log(curve, name="planar_2r", samples=4000, noise=0.0, seed=0):
+    """A robot and its log with friction of its own; of a load without rotors and couplings."""
+    of_load = isinstance(curve, LoadFriction)
+    model = robot(name, Ia=0.0).with_transmission(None) if of_load else robot(name)
+    moved = motion(model.n, samples, 1, 0.3)
+    links = idm(model.with_drive(DriveParameters.zeros(model.n)), *moved)
+    more = curve.under_load(moved[1], links) if of_load else curve.torque(moved[1])
+    return model, logged(model, moved, noise, seed, more)
 
 
 @pytest.mark.parametrize("exponent", [1.0, 2.0])
 def test_an_exact_log_gives_the_exact_stribeck_curve(exponent):
-    model, moved = robot(), motion(2, 4000, 1, 0.3)
     curve = StribeckFriction([0, 0], [0, 0], [2.0, 0.0], [0.05, 0.05], [exponent] * 2)
-    log = logged(model, moved, more=curve.torque(moved[1]))
+    model, log = friction_log(curve)
     found = fit_friction(model, log, exponents=(1.0, 2.0), processing=raw(log, dead_band=0.005))
     assert found.status.name == "SOLVED"
     assert found.significant.tolist() == [True, False]
     assert found.value("drop1") == pytest.approx(2.0, abs=1e-8)
     assert found.value("vs1") == pytest.approx(0.05, abs=1e-8)
-    base = base_parameters(model, drive=True)
-    values = [found.value(name) for name in base.names]
-    np.testing.assert_allclose(values, base.values(model), atol=1e-8)
+    values = [found.value(name) for name in found.base.names]
+    np.testing.assert_allclose(values, found.base.values(model), atol=1e-8)
     friction = found.friction
     np.testing.assert_allclose(friction.Fs - friction.Fc, [2.0, 0.0], atol=1e-8)
     np.testing.assert_allclose(friction.Fc, 3.0, atol=1e-8)
     assert friction.exponent[0] == exponent
-    assert "drop" in str(found)
 
 
 def test_a_stribeck_curve_in_noise_is_significant_where_it_is():
-    model, moved = robot(), motion(2, 4000, 1, 0.3)
-    curve = StribeckFriction([0, 0], [0, 0], [0.0, 1.0], [0.05, 0.05])
     scores = []
-    for seed in range(12):
-        log = logged(model, moved, 0.2, seed, curve.torque(moved[1]))
+    for seed in range(6):
+        curve = StribeckFriction([0, 0], [0, 0], [0.0, 1.0], [0.05, 0.05])
+        model, log = friction_log(curve, noise=0.2, seed=seed)
         found = fit_friction(model, log, processing=raw(log, 3, 0.005))
         assert found.significant.tolist() == [False, True]
-        scores.append(
-            [
-                (found.value(name) - true) / found.standard_error(name)
-                for name, true in (("drop2", 1.0), ("vs2", 0.05))
-            ]
-        )
-    assert (np.abs(np.mean(scores, axis=0)) < 1.0).all()
+        errors = found.value("drop2") - 1.0, found.value("vs2") - 0.05
+        scores.append(errors / np.array([found.standard_error(x) for x in ("drop2", "vs2")]))
+    assert (np.abs(np.mean(scores, axis=0)) < 1.4).all()
     assert (np.abs(scores) < 4.5).all()
-    log = logged(model, moved, 0.2)
+    log = logged(model, motion(2, 4000, 1, 0.3), 0.2)
     found = fit_friction(model, log, processing=raw(log, 3, 0.005))
     assert found.status.name == "INSIGNIFICANT"
     assert found.names == base_parameters(model, drive=True).names
@@ -308,37 +274,25 @@ def test_a_stribeck_curve_in_noise_is_significant_where_it_is():
     assert len(found.notes) == 2
 
 
-@pytest.mark.parametrize("name", ["planar_2r", "tx40"])
-def test_an_exact_log_gives_the_exact_friction_by_load(name):
-    model = robot(name, Ia=0.0).with_transmission(None)
-    moved = motion(model.n, 2000, 1, 0.3)
-    Fl = np.linspace(0.05, 0.2, model.n)
-    more = LoadFriction(Fl).under_load(moved[1], links_torque(model, moved))
-    log = logged(model, moved, more=more)
+def test_an_exact_log_gives_the_exact_friction_by_load():
+    Fl = np.linspace(0.05, 0.2, 6)
+    model, log = friction_log(LoadFriction(Fl), "tx40", 1200)
     found = fit_friction(model, log, "load", processing=raw(log, dead_band=0.005))
     assert found.status.name == "SOLVED"
     np.testing.assert_allclose(found.friction.Fl, Fl, atol=1e-8)
-    base = base_parameters(model, drive=True)
-    np.testing.assert_allclose(found.values[: len(base)], base.values(model), atol=1e-8)
-
-
-def test_friction_by_load_in_noise():
-    model, moved = robot(Ia=0.0), motion(2, 2000, 1)
-    more = LoadFriction([0.1, 0.0]).under_load(moved[1], links_torque(model, moved))
-    for seed in range(4):
-        log = logged(model, moved, 0.2, seed, more)
-        found = fit_friction(model, log, "load", processing=raw(log, 3, 0.005))
-        assert found.significant.tolist() == [True, False]
-        errors = found.standard_errors[-2:]
-        assert (np.abs(found.friction.Fl - [0.1, 0.0]) < 4.5 * errors).all()
+    true = found.base.values(model)
+    np.testing.assert_allclose(found.values[: len(true)], true, atol=1e-8)
+    model, log = friction_log(LoadFriction([0.2, 0.0]), samples=2000, noise=0.1)
+    found = fit_friction(model, log, "load", processing=raw(log, 3, 0.005))
+    assert found.significant.tolist() == [True, False]
+    errors = found.standard_errors[-2:]
+    assert (np.abs(found.friction.Fl - [0.2, 0.0]) < 4.5 * errors).all()
 
 
 @pytest.mark.parametrize("curve", ["stribeck", "load"])
 def test_a_joint_that_does_not_move_shows_no_friction(curve):
-    q, v, a = (x.copy() for x in motion(6, 1500, 1))
-    q[:, 2], v[:, 2], a[:, 2] = 0.3, 0.0, 0.0
     model = robot("rx90")
-    found = fit_friction(model, logged(model, (q, v, a), 0.1), curve)
+    found = fit_friction(model, logged(model, motion(6, 1500, 1, locked=[2]), 0.1), curve)
     assert found.status.name == "INSIGNIFICANT"
     assert found.p_value[2] == 1.0
     assert "Fc3" not in found.names
@@ -346,9 +300,13 @@ def test_a_joint_that_does_not_move_shows_no_friction(curve):
 
 
 def test_mistakes_are_named():
-    model, log, _ = pair(samples=600)
+    model, log, full = pair(samples=600)
+    other = LoadedLog(Log(0.02, log.q, log.tau), KnownPayload(1.0))
     for call, words in (
+        (lambda: identify_payload(model, full, log, 0), "frame"),
+        (lambda: identify_payload(model, full, log, changed=("mass",)), "Ia"),
         (lambda: identify_drive_gains(model, log, ()), "at least one LoadedLog"),
+        (lambda: identify_drive_gains(model, log, other), "sampling periods"),
         (lambda: KnownPayload(0.0), "positive mass"),
         (lambda: KnownPayload(1.0, inertia=INERTIA), "com"),
         (lambda: fit_friction(model, log, exponents=(0.0,)), "exponents"),
@@ -357,9 +315,3 @@ def test_mistakes_are_named():
     ):
         with pytest.raises(InvalidValueError, match=words):
             call()
-    other = LoadedLog(Log(0.02, log.q, log.tau), KnownPayload(1.0))
-    with pytest.raises(InvalidValueError, match="sampling periods"):
-        identify_drive_gains(model, log, other)
-    with pytest.raises(ShapeError, match="Fl"):
-        LoadFriction([[0.1]])
-    assert not isinstance(LoadFriction([0.1]), Friction)

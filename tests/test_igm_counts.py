@@ -1,4 +1,4 @@
-"""How many solutions there are, pose by pose, as frozen in `oracles/frozen_igm_counts.json`."""
+"""How many solutions there are, pose by pose, as frozen in `oracles/igm_counts.json`."""
 
 import json
 from pathlib import Path
@@ -9,7 +9,7 @@ import pytest
 import robotmodels as rm
 
 FROZEN = json.loads(
-    (Path(__file__).parent / "oracles" / "frozen_igm_counts.json").read_text(encoding="utf-8")
+    (Path(__file__).parent / "oracles" / "igm_counts.json").read_text(encoding="utf-8")
 )
 ROUNDING = 2
 """Of the 90 poses of an arm, those at which last digits may decide: another processor merges

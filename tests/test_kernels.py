@@ -9,15 +9,10 @@ import pinocchio as pin
 import pytest
 
 from robotmodels.kernels import Chain
-from robotmodels.kernels.coriolis import coriolis_matrices
-from robotmodels.kernels.direct_dynamics import joint_accelerations
-from robotmodels.kernels.energies import kinetic_energies, potential_energies
-from robotmodels.kernels.energy_regressor import energy_regressors
-from robotmodels.kernels.jacobians import jacobian_rates, jacobians
-from robotmodels.kernels.mass_matrix import mass_matrices
-from robotmodels.kernels.newton_euler import joint_torques
-from robotmodels.kernels.poses import link_poses, tip_poses
-from robotmodels.kernels.torque_regressor import torque_regressors
+from robotmodels.kernels.mass import coriolis_matrices, joint_accelerations, mass_matrices
+from robotmodels.kernels.poses import jacobian_rates, jacobians, link_poses, tip_poses
+from robotmodels.kernels.regressors import energy_regressors, torque_regressors
+from robotmodels.kernels.torques import joint_torques, kinetic_energies, potential_energies
 
 N = 4
 R, P, F = 0, 1, 2
@@ -177,18 +172,18 @@ def all_of(robot, pi, q, v, a):
     c, g, n = robot.chain, robot.gravity, robot.n
     rows = len(q)
     return {
-        "torques": run(joint_torques, q, v, a, *c, pi, g, out=(rows, n)),
-        "masses": run(mass_matrices, q, *c, pi, out=(rows, n, n)),
-        "coriolis": run(coriolis_matrices, q, v, *c, pi, out=(rows, n, n)),
-        "kinetic": run(kinetic_energies, q, v, *c, pi, out=(rows,)),
-        "potential": run(potential_energies, q, *c, pi, g, out=(rows,)),
+        "torques": run(joint_torques, q, v, a, c, pi, g, out=(rows, n)),
+        "masses": run(mass_matrices, q, c, pi, out=(rows, n, n)),
+        "coriolis": run(coriolis_matrices, q, v, c, pi, out=(rows, n, n)),
+        "kinetic": run(kinetic_energies, q, v, c, pi, out=(rows,)),
+        "potential": run(potential_energies, q, c, pi, g, out=(rows,)),
     }
 
 
 def test_poses(robot):
     (q,) = robot.samples(1)
-    links = run(link_poses, q, *robot.chain, out=(N, robot.f, 4, 4))
-    tips = run(tip_poses, q, *robot.chain, *robot.tip(), out=(N, 4, 4))
+    links = run(link_poses, q, robot.chain, out=(N, robot.f, 4, 4))
+    tips = run(tip_poses, q, robot.chain, *robot.tip(), out=(N, 4, 4))
     data = robot.model.createData()
     for i in range(N):
         pin.forwardKinematics(robot.model, data, robot.to_pin(q[i]))
@@ -204,10 +199,10 @@ def test_jacobians_and_their_rates(robot, reference):
     q, v = robot.samples(2)
 
     def jacobian(q):
-        return run(jacobians, q, *robot.chain, *robot.tip(), reference, out=(N, 6, robot.n))
+        return run(jacobians, q, robot.chain, *robot.tip(), reference, out=(N, 6, robot.n))
 
     J = jacobian(q)
-    dJ = run(jacobian_rates, q, v, *robot.chain, *robot.tip(), reference, out=(N, 6, robot.n))
+    dJ = run(jacobian_rates, q, v, robot.chain, *robot.tip(), reference, out=(N, 6, robot.n))
     step = 1e-6
     close(dJ, (jacobian(q + step * v) - jacobian(q - step * v)) / (2 * step), 1e-7)
     joint, placement = robot.tool_frame()
@@ -253,7 +248,7 @@ def test_direct_dynamics(robot):
     rotor = robot.rng.uniform(0.1, 1.0, robot.n)
     a = np.full((N, robot.n), np.nan)
     args = (robot.pi, robot.gravity, np.diag(rotor), a)
-    assert joint_accelerations(q, v, tau, *robot.chain, *args) == -1
+    assert joint_accelerations(q, v, tau, robot.chain, *args) == -1
     model = robot.model.copy()
     model.armature = robot.to_pin(rotor)
     data = model.createData()
@@ -268,8 +263,8 @@ def test_regressors_reproduce_torques_and_energies_of_any_parameters(robot):
     pi = robot.rng.normal(size=(robot.f, 10))
     ours = all_of(robot, pi, q, v, a)
     c, g, every = robot.chain, robot.gravity, np.arange(10 * robot.f)
-    Y = run(torque_regressors, q, v, a, *c, g, every, out=(N, robot.n, 10 * robot.f))
-    h = run(energy_regressors, q, v, *c, g, every, out=(N, 1, 10 * robot.f))[:, 0]
+    Y = run(torque_regressors, q, v, a, c, g, every, out=(N, robot.n, 10 * robot.f))
+    h = run(energy_regressors, q, v, c, g, every, out=(N, 1, 10 * robot.f))[:, 0]
     close(Y @ pi.ravel(), ours["torques"])
     close(h @ pi.ravel(), ours["kinetic"] + ours["potential"])
     for k in range(robot.f):
@@ -301,7 +296,7 @@ def test_direct_dynamics_of_links_without_mass(robot):
     rotor = np.diag(20.0 * robot.rng.choice([-1.0, 1.0], robot.n))
     out = np.full((N, robot.n), np.nan)
     tau += a @ rotor
-    args = (q, v, tau, *robot.chain, pi, robot.gravity, rotor, out)
+    args = (q, v, tau, robot.chain, pi, robot.gravity, rotor, out)
     negative = np.flatnonzero(np.linalg.eigvalsh(M + rotor)[:, 0] < 0.0)
     assert joint_accelerations(*args) == (-2 - negative[0] if negative.size else -1)
     close(out, a, 1e-13 * max(10.0, np.linalg.cond(M + rotor).max()))
@@ -320,21 +315,22 @@ def test_a_singular_matrix_is_reported_and_its_row_is_nan():
     robot = make_robot([0, 1, 2], [P, R, P], seed=3)
     turn = np.array([[1.0, 0.0, 0.0], [0.0, 6e-17, -1.0], [0.0, 1.0, 6e-17]])
     rotation = np.array([robot.chain.rotation[0], turn, turn.T])
+    rotation.flags.writeable = False
     chain = robot.chain._replace(rotation=rotation)
     pi = np.zeros((3, 10))
     pi[2] = robot.pi[2]
     q, v, tau = robot.samples(rows=130)
     q[[70, 100], 1] = 0.0
     out = np.empty_like(q)
-    args = (q, v, tau, *chain, pi, robot.gravity, np.zeros((3, 3)), out)
+    args = (q, v, tau, chain, pi, robot.gravity, np.zeros((3, 3)), out)
     assert joint_accelerations(*args) == 70
     assert np.isnan(out[[70, 100]]).all()
     assert np.isfinite(np.delete(out, [70, 100], axis=0)).all()
-    back = run(joint_torques, q, v, out, *chain, pi, robot.gravity, out=q.shape)
+    back = run(joint_torques, q, v, out, chain, pi, robot.gravity, out=q.shape)
     fine = np.abs(np.sin(q[:, 1])) > 0.1
     close(back[fine], tau[fine], 1e-10)
 
-    args = (q, v, tau, *chain, 0.0 * pi, robot.gravity, np.zeros((3, 3)), out)
+    args = (q, v, tau, chain, 0.0 * pi, robot.gravity, np.zeros((3, 3)), out)
     assert joint_accelerations(*args) == 0
     assert np.isnan(out).all()
 
@@ -343,16 +339,16 @@ def check_every_kernel(robot, rows):
     q, v, a = robot.samples(rows=rows)
     c, g, n, f = robot.chain, robot.gravity, robot.n, robot.f
     all_of(robot, robot.pi, q, v, a)
-    run(tip_poses, q, *c, *robot.tip(), out=(rows, 4, 4))
-    run(link_poses, q, *c, out=(rows, f, 4, 4))
+    run(tip_poses, q, c, *robot.tip(), out=(rows, 4, 4))
+    run(link_poses, q, c, out=(rows, f, 4, 4))
     every = np.arange(10 * f)
-    run(torque_regressors, q, v, a, *c, g, every, out=(rows, n, 10 * f))
-    run(energy_regressors, q, v, *c, g, every, out=(rows, 1, 10 * f))
+    run(torque_regressors, q, v, a, c, g, every, out=(rows, n, 10 * f))
+    run(energy_regressors, q, v, c, g, every, out=(rows, 1, 10 * f))
     for reference in range(3):
-        run(jacobians, q, *c, *robot.tip(), reference, out=(rows, 6, n))
-        run(jacobian_rates, q, v, *c, *robot.tip(), reference, out=(rows, 6, n))
+        run(jacobians, q, c, *robot.tip(), reference, out=(rows, 6, n))
+        run(jacobian_rates, q, v, c, *robot.tip(), reference, out=(rows, 6, n))
     out = np.empty((rows, n))
-    assert joint_accelerations(q, v, a, *c, robot.pi, g, np.eye(n), out) == -1
+    assert joint_accelerations(q, v, a, c, robot.pi, g, np.eye(n), out) == -1
 
 
 @pytest.mark.parametrize("chain", CHAINS)
@@ -363,10 +359,10 @@ def test_empty_batch(chain):
 def test_a_chain_without_joints_still_has_poses_and_energy():
     robot = make_robot([0, 1], [F, F], seed=2)
     check_every_kernel(robot, rows=2)
-    links = run(link_poses, np.empty((1, 0)), *robot.chain, out=(1, 2, 4, 4))[0]
+    links = run(link_poses, np.empty((1, 0)), robot.chain, out=(1, 2, 4, 4))[0]
     expected = [placement.homogeneous for _, placement in robot.supports[1:]]
     close(links, expected)
-    energy = run(potential_energies, np.empty((1, 0)), *robot.chain, robot.pi, robot.gravity, out=1)
+    energy = run(potential_energies, np.empty((1, 0)), robot.chain, robot.pi, robot.gravity, out=1)
     weights = [T[:3] @ p[6:] for T, p in zip(links, robot.pi, strict=True)]
     close(energy, [-robot.gravity @ sum(weights)])
 

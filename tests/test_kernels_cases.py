@@ -10,18 +10,14 @@ from robotmodels.igm._arrange import AT_LIMIT
 from robotmodels.igm._regular import ordered_rows
 from robotmodels.kernels.bounded_velocity import nearest_inside
 from robotmodels.kernels.decimation import add_rows
-from robotmodels.kernels.differentiated_poses import (
-    differentiated_pose_rates,
-    differentiated_poses,
-)
-from robotmodels.kernels.direct_dynamics import joint_accelerations
 from robotmodels.kernels.erroneous_poses import erroneous_poses
 from robotmodels.kernels.inverses import inverses
 from robotmodels.kernels.jerk_phases import polished_phases
+from robotmodels.kernels.mass import joint_accelerations
+from robotmodels.kernels.poses import improper_pose
 from robotmodels.kernels.posture_chains import following_postures
-from robotmodels.kernels.proper_poses import improper_pose
 from robotmodels.kernels.regressor_gradient import regressor_gradients
-from robotmodels.kernels.torque_regressor import torque_regressors
+from robotmodels.kernels.regressors import torque_regressors
 from robotmodels.se3 import from_rpy
 
 # Python cannot call what is inside kernels, unless it calls nothing: then as it is written
@@ -56,7 +52,7 @@ def accelerations_of(mass, tau):
     model = rm.RobotModel.from_table(rm.DHTable.from_rows([{"sigma": 1, "alpha": 0.3}] * n))
     rest, out = np.zeros(tau.shape), np.empty(tau.shape)
     code = joint_accelerations(
-        rest, rest, tau, *model.chain, np.zeros((n, 10)), model.gravity, mass, out
+        rest, rest, tau, model.chain, np.zeros((n, 10)), model.gravity, mass, out
     )
     return code, out
 
@@ -189,7 +185,7 @@ def test_contracted_regressors_change_as_their_gradient_says(rng):
     place = np.arange(10 * model.f)
     G = rng.normal(size=(1, model.n, place.size))
     found = np.zeros(motion.shape)
-    arm = (*model.chain, model.gravity, place)
+    arm = (model.chain, model.gravity, place)
     regressor_gradients(*motion, *arm, G, *found)
 
     def contracted(change):
@@ -204,30 +200,6 @@ def test_contracted_regressors_change_as_their_gradient_says(rng):
         expected[place_of_one] = (contracted(one) - contracted(-one)) / (2.0 * h)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-7)
     assert np.abs(expected).min() > 1e-3
-
-
-def test_differentiated_poses_are_differences_of_poses(rng):
-    model = small_tree()
-    point = model.with_tool(from_rpy([0.3, -0.5, 0.9], [0.4, -0.7, 0.5])).twin.frame(None)
-    arm = (*model.chain, *point.kernel_arguments)
-    q, v = rng.uniform(-1.0, 1.0, (2, 1, model.n))
-
-    def along(x):
-        poses, slopes = np.empty((1, 4, 4)), np.empty((1, model.n, 3, 4))
-        differentiated_poses(x, *arm, poses, slopes)
-        return poses, slopes
-
-    poses, slopes, rates = np.empty((1, 4, 4)), *np.empty((2, 1, model.n, 3, 4))
-    differentiated_pose_rates(q, v, *arm, poses, slopes, rates)
-    h = 1e-5
-    for j, one in enumerate(h * np.eye(model.n)):
-        change = (along(q + one)[0] - along(q - one)[0]) / (2.0 * h)
-        np.testing.assert_allclose(slopes[:, j], change[:, :3], rtol=0, atol=1e-9)
-    for found, expected in zip((poses, slopes), along(q), strict=True):
-        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-15)
-    change = (along(q + h * v)[1] - along(q - h * v)[1]) / (2.0 * h)
-    np.testing.assert_allclose(rates, change, rtol=0, atol=1e-9)
-    assert np.abs(rates[0, :, :, 3]).max(axis=-1)[[0, 1, 3, 4]].min() > 0.01
 
 
 # --- phases of constant jerk -----------------------------------------------------------------

@@ -1,6 +1,5 @@
 """Clearance: by brute force on random robots, gradients by differences, and what does not count."""
 
-import copy
 import pickle
 
 import numpy as np
@@ -19,7 +18,7 @@ def bodies_of(rng):
     c, d, low = rng.normal(size=(3, 3))
     high, n = low + rng.uniform(0.2, 2.0, 3), rng.normal(size=3) / 3.0
     n /= np.linalg.norm(n)
-    fine = np.linspace(c, d, 2001)
+    axis = np.linspace(c, d, 2001)
 
     def box(p):
         depth = np.maximum(low - p, p - high).max(axis=1)
@@ -27,26 +26,18 @@ def bodies_of(rng):
 
     yield Sphere(c, 0.3), lambda p: np.linalg.norm(p - c, axis=1) - 0.3
     yield Plane(0.2 * n, 3.0 * n), lambda p: p @ n - 0.2
-    yield (
-        Capsule(c, d, 0.2),
-        lambda p: np.linalg.norm(p[:, None] - fine, axis=2).min(axis=1) - 0.2,
-    )
+    yield Capsule(c, d, 0.2), lambda p: np.linalg.norm(p[:, None] - axis, axis=2).min(axis=1) - 0.2
     yield Box(low, high), box
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(6))
 def test_distances_of_segments_are_those_of_their_nearest_points(seed):
     rng = np.random.default_rng(seed)
     start, end = rng.normal(size=(2, 3))
     if seed % 3 == 0:
-        end[: 1 + seed // 3 % 3] = start[: 1 + seed // 3 % 3]  # along an axis, or a point
-    t = np.linspace(0, 1, 501)[:, None]
-    line = start + t * (end - start)
+        end[: 1 + seed] = start[: 1 + seed]  # in a plane of the axes, or a point
+    line = start + np.linspace(0, 1, 501)[:, None] * (end - start)
     for body, of_points in bodies_of(rng):
-        if seed == 1 and isinstance(body, Capsule):
-            body = Capsule(body.start, body.start + 3.0 * (end - start), 0.2)  # parallel
-            fine = np.linspace(body.start, body.end, 2001)
-            of_points = lambda p, f=fine: np.linalg.norm(p[:, None] - f, axis=2).min(1) - 0.2  # noqa: E731
         distance, where, away = body.nearest(start, end)
         least = of_points(line).min()
         assert least - 4e-3 <= distance <= least + 1e-6
@@ -58,11 +49,12 @@ def test_distances_of_segments_are_those_of_their_nearest_points(seed):
             assert beside == pytest.approx(distance + 1e-5, abs=2e-6)
 
 
-def test_boxes_have_depths_and_may_be_open():
+def test_parallel_capsules_and_boxes_with_depths_and_open_sides():
+    post = Capsule([1.0, 0, 0], [1.0, 0, 3.0], 0.2)
+    assert post.nearest(np.array([0, 0, 1.0]), np.array([0, 0, 2.0]))[0] == pytest.approx(0.8)
     box = Box([-1, -1, -1], [1, 1, 1])
-    assert box.nearest(np.array([-5.0, 0, 0]), np.array([5.0, 0.5, 0]))[0] == pytest.approx(
-        0.25 / 1.05 - 1
-    )
+    depth = box.nearest(np.array([-5.0, 0, 0]), np.array([5.0, 0.5, 0]))[0]
+    assert depth == pytest.approx(0.25 / 1.05 - 1)
     assert box.nearest(np.array([3.0, 0, 0]), np.array([0.0, 3.0, 0]))[0] == pytest.approx(0.5**0.5)
     floor = Box([-np.inf] * 3, [np.inf, np.inf, 0.2])
     distance, t, away = floor.nearest(np.array([0.0, 0, 1]), np.array([9.0, 0, 0.5]))
@@ -85,8 +77,7 @@ def test_gradients_are_those_of_the_distances(model, seed):
     """At random configurations, but where another point becomes the nearest."""
     rng = np.random.default_rng(seed)
     q, _, _ = random_state(model, rng, 3)
-    bodies = [body for body, _ in bodies_of(rng)]
-    d = rng.normal(size=model.n)
+    bodies, d = [body for body, _ in bodies_of(rng)], rng.normal(size=model.n)
     (distance, slope), (a, _), (b, _), (c, _), (e, _) = (
         link_distances(model, q + h * d, bodies, self_collision=True)
         for h in (0.0, 1e-6, -1e-6, 1e-5, -1e-5)
@@ -105,41 +96,27 @@ def rods(model, q):
     return (points[first] + t * (points[1:] - points[first])).swapaxes(0, 1)
 
 
-@pytest.mark.parametrize("name", ["rx90", "ur10e", "panda", "stanford_arm"])
+@pytest.mark.parametrize("name", ["rx90", "stanford_arm"])
 def test_clearance_of_robots_by_brute_force(name):
     arm = rm.load(name).with_tool(rm.se3.translation(0.05, 0, 0.3))
-    rng = np.random.default_rng(1)
-    for q in rng.uniform(-2, 2, (5, arm.n)):
+    rng, bent = np.random.default_rng(7), []
+    for q in rng.uniform(-3, 3, (7, arm.n)):
         points = rods(arm, q)
-        moving = [k for k, rod in enumerate(points) if np.ptp(rods(arm, q + 0.3)[k] - rod) > 1e-9]
-        for body, of_points in bodies_of(rng):
-            if isinstance(body, Plane):
-                continue
-            if of_points(points[:, [0, -1]].reshape(-1, 3)).min() < 0.06:
-                continue  # an end that is fixed in the body does not count
-            least = min(of_points(points[k]).min() for k in moving)
-            found = clearance(arm, q, body, 0.05)
-            assert found == pytest.approx(least - 0.05, abs=6e-3)
-        everything = [body for body, _ in bodies_of(rng)]
-        each = [clearance(arm, q, body, 0.05) for body in everything]
-        assert clearance(arm, q, everything, 0.05) == min(each)
-
-
-@pytest.mark.parametrize("name", ["rx90", "ur10e", "stanford_arm"])
-def test_self_collision_by_brute_force(name):
-    arm = rm.load(name).with_tool(rm.se3.translation(0.05, 0, 0.3))
-    rng = np.random.default_rng(2)
-    bent = []
-    for q in rng.uniform(-3, 3, (20, arm.n)):
-        long = [rod for rod in rods(arm, q) if np.ptp(rod, axis=0).max() > 1e-9]
+        long = [rod for rod in points if np.ptp(rod, axis=0).max() > 1e-9]
         gaps = [
             np.linalg.norm(long[i][:, None] - long[j], axis=2).min()
             for j in range(len(long))
             for i in range(j - 1)  # neighbours share a joint
         ]
-        found = clearance(arm, q, [], 0.03, self_collision=True)
-        assert found == pytest.approx(min(gaps) - 0.06, abs=6e-3)
-        bent.append(found)
+        bent.append(clearance(arm, q, [], 0.03, self_collision=True))
+        assert bent[-1] == pytest.approx(min(gaps) - 0.06, abs=6e-3)
+        moving = np.ptp(rods(arm, q + 0.3) - points, axis=(1, 2)) > 1e-9
+        for body, of_points in bodies_of(rng):
+            ends = of_points(points[:, [0, -1]].reshape(-1, 3))
+            if isinstance(body, Plane) or ends.min() < 0.06:
+                continue  # an end that is fixed in the body does not count
+            least = min(of_points(rod).min() for rod in points[moving])
+            assert clearance(arm, q, body, 0.05) == pytest.approx(least - 0.05, abs=6e-3)
     assert min(bent) < 0.0 < max(bent)
     assert clearance(rm.load("planar_2r"), [0.0, 3.1], [], self_collision=True) == np.inf
 
@@ -149,12 +126,10 @@ def test_what_no_joint_moves_does_not_count():
     table = Plane([0.0, -0.1, 0.0], [0.0, 3.0, 0.0])
     assert clearance(arm, [np.pi / 2, 0.0], table) == pytest.approx(1.1)
     assert clearance(arm, [-np.pi / 2, 0.0], table) == pytest.approx(-1.9)
-    assert clearance(arm, [0.0, 0.0], Sphere([2.3, 0.4, 0.0])) == pytest.approx(0.5)
-    # a pedestal under the base: touched by the fixed end, which counts no more
-    pedestal = Capsule([0, 0, -1], [0, 0, 0], 0.2)
+    # a pedestal under the base: touched by the fixed end, which is ignored
+    pedestal, beside = Capsule([0, 0, -1], [0, 0, 0], 0.2), Sphere([-0.3, 0.0, 0.0], 0.2)
     assert clearance(arm, [0.0, 0.0], pedestal) == pytest.approx(0.8)
     assert clearance(arm, [0.0, np.pi], pedestal) == pytest.approx(-0.2)
-    beside = Sphere([-0.3, 0.0, 0.0], 0.2)
     assert clearance(arm, [0.0, 0.0], beside) == pytest.approx(0.1)
     assert clearance(arm, np.zeros((4, 2)), beside, segments=[(0, 1)]).tolist() == [np.inf] * 4
     assert clearance(arm, [0.0, 0.0], beside, segments=[(None, None)]) == pytest.approx(2.1)
@@ -163,16 +138,14 @@ def test_what_no_joint_moves_does_not_count():
 def test_leading_axes_are_the_batch_and_sizes_may_differ():
     arm, ball = rm.load("rx90"), Sphere([0.5, 0.2, 0.6], 0.1)
     q = np.random.default_rng(0).uniform(-2, 2, (2, 3, 6))
-    found = clearance(arm, q, [ball], 0.1)
-    assert found.shape == (2, 3)
-    assert found[1, 2] == clearance(arm, q[1, 2], [ball], 0.1)
+    values = clearance(arm, q, [ball], 0.1)
+    assert values.shape == (2, 3)
+    assert values[1, 2] == clearance(arm, q[1, 2], [ball], 0.1)
     assert clearance(arm, q[:0], [ball]).shape == (0, 3)
     assert clearance(arm, q, []).tolist() == [[np.inf] * 3] * 2
     many = clearance(arm, np.tile(q[0], (1500, 1)), ball, 0.1)  # more than one piece
-    assert np.array_equal(many[-3:], found[0])
-    each = [
-        clearance(arm, q, ball, segments=[pair]) - 0.01 * k for k, pair in enumerate(links(arm))
-    ]
+    assert np.array_equal(many[-3:], values[0])
+    each = [clearance(arm, q, ball, segments=[ab]) - 0.01 * k for k, ab in enumerate(links(arm))]
     sizes = 0.01 * np.arange(arm.f + 1)
     assert np.allclose(clearance(arm, q, ball, sizes), np.min(each, axis=0))
 
@@ -182,25 +155,19 @@ def test_mistakes_are_named_and_values_stay_read_only():
     for call, error, words in (
         (lambda: Sphere([0, 0], 0.1), ShapeError, "center"),
         (lambda: Sphere([0, 0, 0], -0.1), InvalidValueError, "radius"),
-        (lambda: Capsule([0, 0, 0], [0, 0, np.nan]), InvalidValueError, "end"),
         (lambda: Plane([0, 0, 0], [0, 0, 0]), InvalidValueError, "normal"),
         (lambda: Box([0, 0, 0], [1, -1, 1]), InvalidValueError, "lower below upper"),
         (lambda: Box([-np.inf] * 3, [np.inf] * 3), InvalidValueError, "finite"),
-        (lambda: Box([0, 0, np.nan], [1] * 3), InvalidValueError, "lower"),
-        (lambda: clearance(arm, q, ["floor"]), InvalidValueError, "obstacles[0]"),
-        (lambda: clearance(arm, q, 3), InvalidValueError, "obstacles[0]"),
-        (lambda: clearance(arm, q, [], -1.0), InvalidValueError, "radius"),
+        (lambda: clearance(arm, q, ["floor"]), InvalidValueError, r"obstacles\[0\]"),
         (lambda: clearance(arm, q, [], [0.1, 0.1]), InvalidValueError, "radius"),
         (lambda: clearance(arm, q, [], segments=[3]), InvalidValueError, "pairs"),
         (lambda: clearance(arm, q, [], segments=[(0, 99)]), FrameNotFoundError, "99"),
         (lambda: clearance(arm, np.zeros(5), []), ShapeError, "q"),
     ):
-        with pytest.raises(error) as caught:
+        with pytest.raises(error, match=words):
             call()
-        assert words in str(caught.value)
-    for value in (body for body, _ in bodies_of(np.random.default_rng(0))):
-        again = pickle.loads(pickle.dumps(copy.deepcopy(value)))
-        for name in value.__dataclass_fields__:
-            field = np.asarray(getattr(again, name))
-            assert field.ndim == 0 or not field.flags.writeable
-            np.testing.assert_allclose(field, getattr(value, name), rtol=1e-15)
+    for body, _ in bodies_of(np.random.default_rng(0)):
+        again = pickle.loads(pickle.dumps(body))
+        for name in body.__dataclass_fields__:
+            np.testing.assert_allclose(getattr(again, name), getattr(body, name), rtol=1e-15)
+            assert name == "radius" or not getattr(again, name).flags.writeable

@@ -9,8 +9,7 @@ import itertools
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given
-from identities.random_robots import any_models, random_model, random_state, robot_size, seeds
+from identities.random_robots import random_model, random_state, robot_size
 from scipy.spatial.transform import Rotation
 
 import robotmodels as rm
@@ -20,10 +19,6 @@ from robotmodels.errors import (
     InvalidValueError,
     NotARotationError,
     ShapeError,
-)
-from robotmodels.kinematics.coordinates._differentials import (
-    orientation_differential,
-    orientation_differential_rate,
 )
 from robotmodels.kinematics.coordinates._orientation_rates import SINGULAR
 from robotmodels.kinematics.coordinates.conversion import (
@@ -688,61 +683,6 @@ def test_rates_of_rotation_vectors_do_not_exist_at_whole_turns(rng):
 
 
 # --- Jacobian of the coordinates ---------------------------------------------------------------
-
-
-@every_kind
-def test_coordinates_change_as_the_entries_of_the_rotation_do(kind, rng):
-    """``R exp(a [u]) exp(b [w])``: differences by a, and of the derivatives by a along b."""
-    T, x = tame_poses(kind, rng, 20)
-    R, u, w = T[:, None, :3, :3], rng.normal(size=3), rng.normal(size=3)
-    U, W = se3.skew(u), se3.skew(w)
-
-    def by_a(b):
-        turned = R @ rotation_by(b * w)
-        y = operational_coordinates(poses_of(T, turned[:, 0]), kind, x)[:, None, 3:]
-        return orientation_differential(kind, y, turned, R @ U @ rotation_by(b * w))[:, 0]
-
-    def coordinates(a):
-        return operational_coordinates(poses_of(T, R[:, 0] @ rotation_by(a * u)), kind, x)[:, 3:]
-
-    same(by_a(0.0), five_point(coordinates, 2e-4), 1e-9)
-    rate = orientation_differential_rate(kind, x[:, None, 3:], R, R @ U, R @ W, R @ U @ W)
-    same(rate[:, 0], five_point(by_a, 2e-4), 1e-8)
-    assert np.abs(rate).max() > 0.1
-
-
-def poses_of(T, R):
-    """The same positions with other rotations."""
-    T = T.copy()
-    T[:, :3, :3] = R
-    return T
-
-
-def growth(*matrices):
-    """How much the rates of the angles enlarge rounding."""
-    return max(1.0, *(float(np.nanmax(np.abs(M), initial=0.0)) for M in matrices))
-
-
-@given(model=any_models(), seed=seeds)
-def test_differentiated_model_is_the_screw_jacobian_in_other_coordinates(model, seed):
-    rng = np.random.default_rng(seed)
-    q, v, _ = random_state(model, rng, 3)
-    size = max(robot_size(model, row) for row in q)
-    for frame in (None, 0, int(rng.integers(1, model.f + 1))):
-        T, twist = rm.dgm(model, q, frame), rm.dkm(model, q, v, frame)
-        J, dJ = rm.jacobian(model, q, frame), rm.jacobian_rate(model, q, v, frame)
-        for kind in KINDS:
-            x = operational_coordinates(T, kind)
-            for near in (None, x + 4 * rng.normal(size=x.shape)):
-                E = coordinate_rates(T, kind, near)
-                dE = coordinate_rates_rate(T, twist, kind, near)
-                scale, speed = growth(E), growth(twist)
-                # rounding of the pose turns the axes of nearly locked angles by eps * scale
-                tolerance = size * (1e-12 + 1e-14 * scale**2)
-                same(coordinate_jacobian(model, q, kind, frame, near), E @ J, tolerance)
-                rate = coordinate_jacobian_rate(model, q, v, kind, frame, near)
-                tolerance = size * speed * (1e-12 + 1e-14 * scale**3)
-                same(rate, E @ dJ + dE @ J, tolerance)
 
 
 def tame_robots(rng, count, kind):

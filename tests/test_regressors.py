@@ -1,7 +1,5 @@
 """The border of the regressors: columns and their names, batches, chunks, errors."""
 
-import tracemalloc
-
 import numpy as np
 import pytest
 from identities.random_robots import random_model, random_state
@@ -25,20 +23,6 @@ from robotmodels.regressors import (
 )
 
 FILTER = signal.butter(1, 5.0, fs=100.0, output="sos")
-FUNCTIONS = {
-    "torque": (rm.torque_regressor, 3),
-    "torque without drives": (lambda m, *x: rm.torque_regressor(m, *x, drive=False), 3),
-    "power": (power_regressor, 3),
-    "momentum": (lambda m, *x: momentum_regressor(m, *x).momentum, 2),
-    "momentum's force": (lambda m, *x: momentum_regressor(m, *x).force, 2),
-    "energy": (rm.energy_regressor, 2),
-    "energy without rotors": (lambda m, *x: rm.energy_regressor(m, *x, drive=False), 2),
-}
-
-
-@pytest.fixture(params=FUNCTIONS)
-def case(request):
-    return FUNCTIONS[request.param]
 
 
 @pytest.fixture(scope="module")
@@ -70,88 +54,13 @@ def test_names_number_parameters_by_frame():
     np.testing.assert_array_equal(rm.parameter_vector(coupled)[-3:], [0.1, 0.2, 0.3])
 
 
-@pytest.mark.parametrize("batch", [(), (1,), (3,), (2, 3), (0,), (2, 0, 3)], ids=str)
-def test_leading_axes_are_the_batch(case, model, batch):
-    function, count = case
-    vectors = states(model, count, *batch)
-    result = function(model, *vectors)
-    n, f = model.n, model.f
-    core = {
-        "torque": (n, 10 * f + 4 * n),
-        "torque without drives": (n, 10 * f),
-        "power": (10 * f + 4 * n,),
-        "momentum": (n, 10 * f + 4 * n),
-        "momentum's force": (n, 10 * f + 4 * n),
-        "energy": (10 * f + n,),
-        "energy without rotors": (10 * f,),
-    }[next(k for k, v in FUNCTIONS.items() if v == case)]
-    assert result.shape == (*batch, *core)
-    assert result.dtype == np.float64
-    assert result.flags.c_contiguous
-    for index in np.ndindex(*batch):
-        np.testing.assert_array_equal(result[index], function(model, *(x[index] for x in vectors)))
-
-
-def test_batches_broadcast(case, model):
-    function, count = case
-    vectors = states(model, count, 3)
-    for k in range(count):
-        mixed = [x if i == k else x[0] for i, x in enumerate(vectors)]
-        full = [x if i == k else np.tile(x[0], (3, 1)) for i, x in enumerate(vectors)]
-        np.testing.assert_array_equal(function(model, *mixed), function(model, *full))
-        lists = [x.tolist() for x in mixed]
-        np.testing.assert_array_equal(function(model, *lists), function(model, *full))
-        with pytest.raises(ShapeError, match="do not broadcast"):
-            function(model, *(x[:2] if i == k else x for i, x in enumerate(vectors)))
-
-
-@pytest.mark.parametrize(
-    ("bad", "error"),
-    [
-        (lambda n: np.zeros(n + 1), ShapeError),
-        (lambda n: np.zeros((n, 1)), ShapeError),
-        (lambda n: np.full((2, n), np.nan), InvalidValueError),
-        (lambda n: [np.inf] * n, InvalidValueError),
-        (lambda n: ["a"] * n, InvalidValueError),
-    ],
-    ids=["too long", "column", "NaN", "infinity", "text"],
-)
-def test_a_bad_vector_is_named(case, model, bad, error):
-    function, count = case
-    chunks = (lambda m, *x: rm.torque_regressor_chunks(m, *x), 3)
-    for call, arguments in ((function, count), chunks):
-        for position in range(arguments):
-            vectors = list(states(model, arguments))
-            vectors[position] = bad(model.n)
-            with pytest.raises(error, match=f"^{'qva'[position]}: "):
-                call(model, *vectors)
-
-
 # --- long logs -------------------------------------------------------------------------------
-
-
-def test_a_log_without_samples_is_named(model):
-    """What consumes a log refuses an empty one; what maps rows returns none."""
-    q, v, a = states(model, 3, 0)
-    names = "the log is empty; expected at least"
-    for function, rows in FORMS.items():
-        with pytest.raises(InvalidValueError, match=rf"^q, v.*: {names} one sample"):
-            chunked(function, model, *(q, v, a)[:rows])
-    with pytest.raises(InvalidValueError, match=rf"^q, v: {names} one sample"):
-        filtered_regressor(model, 0.1, q, v, FILTER)
-    with pytest.raises(InvalidValueError, match=rf"^tau: {names} one sample"):
-        filtered_torque(q, FILTER)
-    with pytest.raises(InvalidValueError, match=rf"^t: {names} 2 samples"):
-        energy_difference_regressor(model, np.zeros(0), q, v)
-    with pytest.raises(InvalidValueError, match=rf"^t: {names} 2 samples"):
-        joint_work(np.zeros(0), v, v)
 
 
 FORMS = {torque_regressor: 3, power_regressor: 3, energy_regressor: 2, momentum_regressor: 2}
 
 
-@pytest.mark.parametrize("N", [1, 7, 300])
-@pytest.mark.parametrize("size", [1, 4, 1000])
+@pytest.mark.parametrize(("N", "size"), [(1, 4), (7, 1), (300, 64), (7, 1000)])
 @pytest.mark.parametrize("columns", [None, [3, 60, 9]], ids=str)
 def test_pieces_of_every_form_are_the_whole(model, N, size, columns):
     vectors = states(model, 3, N)
@@ -164,34 +73,6 @@ def test_pieces_of_every_form_are_the_whole(model, N, size, columns):
             np.testing.assert_array_equal(np.asarray(part), wanted)
             seen[rows] += 1
         assert (seen == 1).all()
-
-
-def test_mistakes_in_pieces_are_named_at_the_call(model):
-    q, v, a = states(model, 3, 2)
-    for size in (0, -3):
-        with pytest.raises(InvalidValueError, match="size: expected at least one"):
-            rm.torque_regressor_chunks(model, q, v, a, size=size)
-    with pytest.raises(InvalidValueError, match=r"expected one of energy_regressor, .*filtered"):
-        chunked(filtered_regressor, model, q, v)
-    with pytest.raises(InvalidValueError, match="torque_regressor takes q, v, a, got 2 arrays"):
-        chunked(torque_regressor, model, q, v)
-    with pytest.raises(InvalidValueError, match="there is no column 'Q1'"):
-        chunked(power_regressor, model, q, v, a, columns=["Q1"])
-
-
-def test_no_form_needs_the_whole_stack(model):
-    vectors = states(model, 3, 4000)
-    stack = 8 * vectors[0].size * rm.parameter_vector(model).size
-    for form, count in FORMS.items():
-        list(chunked(form, model, *(x[:8] for x in vectors[:count])))  # compile
-        tracemalloc.start()
-        try:
-            for _ in chunked(form, model, *vectors[:count], size=64):
-                pass
-            _, peak = tracemalloc.get_traced_memory()
-        finally:
-            tracemalloc.stop()
-        assert peak < stack / 10, form
 
 
 # --- columns ---------------------------------------------------------------------------------
@@ -213,12 +94,10 @@ def test_no_form_needs_the_whole_stack(model):
     ],
     ids=str,
 )
-def test_columns_that_are_not_there_are_named(case, model, columns, error, words):
-    function, count = case
-    if function not in (rm.torque_regressor, rm.energy_regressor, power_regressor):
-        function, count = momentum_regressor, 2
-    with pytest.raises(error, match=words):
-        function(model, *states(model, count), columns=columns)
+def test_columns_that_are_not_there_are_named(model, columns, error, words):
+    for function, count in FORMS.items():
+        with pytest.raises(error, match=words):
+            function(model, *states(model, count), columns=columns)
 
 
 def test_base_parameters_choose_columns_of_their_own_robot_alone(model):
@@ -237,13 +116,6 @@ def test_base_parameters_choose_columns_of_their_own_robot_alone(model):
         call(model.with_inertia(None).with_tool(None))
         with pytest.raises(InvalidValueError, match="base parameters of"):
             call(longer)
-
-
-def test_no_column_at_all(model):
-    q, v, a = states(model, 3, 2)
-    assert rm.torque_regressor(model, q, v, a, columns=[]).shape == (2, model.n, 0)
-    assert power_regressor(model, q, v, a, columns=[]).shape == (2, 0)
-    assert filtered_regressor(model, 0.1, q, v, FILTER, columns=[]).shape == (2, model.n, 0)
 
 
 @pytest.mark.parametrize("name", ["random", "tx40"])
@@ -303,17 +175,6 @@ def test_energy_of_base_parameters(model, drive):
         whole.reduce(rm.energy_regressor(model, q, v))
 
 
-def test_printed_names_are_taken(model):
-    q, v, a = states(model, 3, 2)
-    base = base_parameters(model)
-    name = next(n for n in base.names if len(base.regrouping[n]) > 1)
-    assert base.regrouping[f"{name}R"] is base.regrouping[name]
-    column = rm.torque_regressor(model, q, v, a, columns=[name])
-    np.testing.assert_array_equal(rm.torque_regressor(model, q, v, a, columns=[f"{name}R"]), column)
-    with pytest.raises(KeyError, match="No base parameter 'Q1'"):
-        base.regrouping["Q1"]
-
-
 # --- samples in time -------------------------------------------------------------------------
 
 
@@ -322,13 +183,9 @@ def test_printed_names_are_taken(model):
     [
         ({"t": [0.0, 1.0, 1.0]}, InvalidValueError, "ascending"),
         ({"t": [0.0, 1.0]}, ShapeError, "^q: expected shape"),
-        ({"t": [[0.0]]}, ShapeError, "^t: "),
         ({"t": [0.0]}, InvalidValueError, "the log has 1 sample; expected at least 2"),
-        ({"t": [0.0, np.nan, 1.0]}, InvalidValueError, "^t: "),
         ({"knots": [0, 3]}, InvalidValueError, "knots: .*from 0 to 2"),
         ({"knots": [1, 0]}, InvalidValueError, "knots"),
-        ({"knots": [1]}, InvalidValueError, "knots"),
-        ({"knots": []}, InvalidValueError, "knots"),
         ({"knots": [0.0, 1.0]}, InvalidValueError, "knots"),
     ],
     ids=str,
@@ -388,11 +245,8 @@ def test_the_filtered_regressor_gives_the_filtered_torques(model, sections):
 @pytest.mark.parametrize(
     ("low_pass", "error", "words"),
     [
-        (30.0, ShapeError, "^low_pass: "),
-        (np.ones((2, 5)), ShapeError, "^low_pass: "),
         (FILTER[0], ShapeError, r"^low_pass: expected second-order sections \(k, 6\)"),
         (np.zeros((0, 6)), ShapeError, "^low_pass: "),
-        ([[1.0, 0, 0, 0, 0, 0]], ShapeError, "^low_pass: "),
         ([[1.0, 1.0, 0, 1.0, -1.5, 0]], InvalidValueError, r"not stable, \|pole\| = 1.5"),
         ("butter", InvalidValueError, "^low_pass: "),
     ],
@@ -408,15 +262,19 @@ def test_mistakes_in_filters(model, low_pass, error, words):
             call()
 
 
-def test_mistakes_in_filtered_regressors(model):
-    q, v, _ = states(model, 3, 3)
-    for dt in (-0.1, 0.0, [0.1]):
-        with pytest.raises(InvalidValueError, match=r"^dt: expected the sampling period"):
-            filtered_regressor(model, dt, q, v, FILTER)
-    with pytest.raises(InvalidValueError, match=r"^q: .*regular array"):
-        filtered_regressor(model, 0.1, [[0.0], [0.0, 1.0]], v, FILTER)
-    for bad in ((q[0], v[0]), (q, v[:2])):
-        with pytest.raises(ShapeError, match=r"^q, v: expected samples"):
-            filtered_regressor(model, 0.1, *bad, FILTER)
-    with pytest.raises(ShapeError, match=r"^tau: "):
-        filtered_torque(1.0, FILTER)
+@pytest.mark.parametrize(
+    ("call", "error", "words"),
+    [
+        (lambda m, x: chunked(torque_regressor, m, *x[:, :0]), InvalidValueError, "log is empty"),
+        (lambda m, x: joint_work(np.zeros(0), *x[:2, :0]), InvalidValueError, "^t: the log is emp"),
+        (lambda m, x: filtered_torque(x[0, :0], FILTER), InvalidValueError, "^tau: the log is emp"),
+        (lambda m, x: chunked(torque_regressor, m, *x, size=0), InvalidValueError, "at least one"),
+        (lambda m, x: chunked(filtered_regressor, m, *x[:2]), InvalidValueError, "expected one of"),
+        (lambda m, x: chunked(torque_regressor, m, *x[:2]), InvalidValueError, "got 2 arrays"),
+        (lambda m, x: filtered_regressor(m, 0.0, *x[:2], FILTER), InvalidValueError, "^dt: expect"),
+        (lambda m, x: filtered_regressor(m, 0.1, x[0], x[1, :2], FILTER), ShapeError, "^q, v: exp"),
+    ],
+)
+def test_mistakes_in_logs(model, call, error, words):
+    with pytest.raises(error, match=words):
+        call(model, np.array(states(model, 3, 3)))

@@ -139,26 +139,9 @@ def test_mass_on_a_spring_loses_the_same_at_every_turn():
     assert sim.friction[-1, 0] == pytest.approx(k * 0.01, abs=1e-6)
 
 
-def test_torques_that_change_while_all_joints_stick_are_seen():
-    rail, t = slider(Fc=[1.0]), np.linspace(0.0, 10.0, 11)
-
-    def pulse(t, q, v):
-        return [0.9 + 0.3 * np.exp(-(((t - 3.21) / 0.1) ** 2))]
-
-    sim = simulate(rail, [0.0], [0.0], pulse, t)
-    assert [e.kind for e in sim.events] == [KINDS.BROKE_AWAY, KINDS.STUCK]
-    assert sim.events[0].t == pytest.approx(3.21 - 0.1 * np.sqrt(np.log(3.0)), abs=1e-7)
-    assert sim.q[-1, 0] > 1e-3
-    # a jump that nobody told of
-    step = simulate(rail, [0.0], [0.0], lambda t, q, v: [5.0 if t > 0.333 else 0.0], [0.0, 1.0])
-    assert [e.kind for e in step.events] == [KINDS.BROKE_AWAY]
-    assert step.events[0].t == pytest.approx(0.333, abs=1e-12)
-    assert step.v[-1, 0] == pytest.approx(2.0 * (1.0 - 0.333), abs=1e-9)
-
-
-@pytest.mark.parametrize("excess", [1e-8])
-def test_parts_break_away_at_the_crossing_however_little_the_torque_exceeds(excess):
+def test_parts_break_away_at_the_crossing_however_little_the_torque_exceeds():
     """Torques that pass the breakaway torque for a short while, between looks of a step."""
+    excess = 1e-8
     for w in (0.7, 2.9):
         sim = simulate(slider(Fc=[3.0]), [0.0], [0.0],
                        lambda t, q, v, w=w: [3.0 * (1.0 + excess) * np.sin(w * t)],
@@ -168,21 +151,6 @@ def test_parts_break_away_at_the_crossing_however_little_the_torque_exceeds(exce
         # what the rounding of a part in 1e13 of the torque takes, at the slope it crosses with
         late = 2e-13 / (w * np.sqrt(2.0 * excess))
         assert sim.events[0].t == pytest.approx(crossing, abs=late + 1e-14)
-
-
-def test_joints_stick_one_by_one_and_the_others_move_on():
-    model = double_pendulum(Fc=[1.0, 0.05])
-    sim = simulate(model, [0.2, 0.3], [0.0, 0.0], t=np.linspace(0, 12, 300))
-    one = sim.sticking[:, 0] & ~sim.sticking[:, 1]
-    assert one.sum() > 3
-    assert np.abs(sim.a[one, 1]).max() > 0.1
-    assert sim.sticking[-1].all()
-    assert np.abs(holds(model, sim)).max() < 1e-10
-    assert (np.abs(sim.friction) <= np.array([1.0, 0.05]) * (1 + 1e-8)).all()
-    slips = ~sim.sticking & (np.abs(sim.v) > 1e-6)
-    assert np.allclose(sim.friction[slips], (np.sign(sim.v) * [1.0, 0.05])[slips], atol=1e-12)
-    assert sim.relative_drift < 1e-8
-    assert {e.kind for e in sim.events} >= {KINDS.STUCK, KINDS.BROKE_AWAY, KINDS.REVERSED}
 
 
 def coupled_wrist(Fcm=0.5, Fc=(0.3, 0.2)):
@@ -197,15 +165,8 @@ def test_shafts_of_coupled_motors_stick(Fc):
     sim = simulate(model, [-0.7, 0.5], [0.0, 0.0], t=np.linspace(0.0, 5.0, 251))
     assert np.abs(holds(model, sim)).max() < 1e-9
     assert sim.relative_drift < 1e-8
-    assert any(e.motor for e in sim.events)
-    K = model.transmission
-    assert K is not None
-    w = K.weights[1]
-    stuck = np.array([e.t for e in sim.events if e.motor and e.kind is KINDS.STUCK])
-    assert stuck.size
-    # right after the shaft sticks it does stand still, though the joints may move
-    after = simulate(model, [-0.7, 0.5], [0.0, 0.0], t=[0.0, stuck[0], stuck[0] + 1e-4])
-    assert abs(after.v[2] @ w) < 1e-9
+    assert any(e.motor and e.kind is KINDS.STUCK for e in sim.events)
+    w = model.transmission.weights[1]
     if any(Fc):
         assert sim.sticking[-1].all()  # all three hold: one more than there are joints
         assert np.abs(gravity_torque(model, sim.q[-1])).max() > 0.05
@@ -213,8 +174,8 @@ def test_shafts_of_coupled_motors_stick(Fc):
     else:
         slips = np.abs(sim.v @ w) > 1e-6
         dry = (np.sign(sim.v @ w) * 0.5)[:, None] * w
-        K = model.drive_matrices
-        assert np.allclose(sim.friction[slips], (sim.v @ K.viscous + dry)[slips], atol=1e-10)
+        viscous = sim.v @ model.drive_matrices.viscous
+        assert np.allclose(sim.friction[slips], (viscous + dry)[slips], atol=1e-10)
 
 
 def test_more_friction_than_joints_holds_and_breaks_away():
@@ -277,12 +238,6 @@ def test_jumps_of_a_sampled_controller_cost_nothing_at_breaks():
     assert sim.q[-1, 0] == pytest.approx(5 * 2 * 0.25 * 0.1**2, abs=1e-14)
     blind = simulate(slider(), [0.0], [0.0], control, t)
     assert blind.evaluations > 3 * sim.evaluations
-
-
-# --- structures and ends -----------------------------------------------------------------------
-
-
-# --- parts and maps ----------------------------------------------------------------------------
 
 
 def test_friction_models_beside_the_drives():

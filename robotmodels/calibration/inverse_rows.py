@@ -214,7 +214,7 @@ class Home:
         self.robot, self.errors = robot, robot.joint_errors
         self.mask, self.in_tool_axes, self.tolerance = mask, in_tool_axes, tolerance
         self.is_redundant = int((on_path & ~self.locked).sum()) > int(mask.sum())
-        self._arm = (*model.chain, *tool.kernel_arguments)
+        self._arm = (model.chain, *tool.kernel_arguments)
 
     def bring(
         self, targets: Array, starts: Array, there: Flags, held: Flags, wanted: Array

@@ -5,17 +5,14 @@ from __future__ import annotations
 import argparse
 import errno
 import json
-import math
 import os
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from enum import Enum
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from .._json_data import json_data
 from ..errors import InvalidValueError, MissingExtraError
 from .progress import add_quiet
 from .streams import say
@@ -89,7 +86,7 @@ def print_json(data: Any) -> None:
     """Print data as JSON that any reader takes."""
     # a terminal without Unicode gets escapes, which mean the same
     unicode = str(getattr(sys.stdout, "encoding", "") or "").lower().startswith("utf")
-    print(_json(_plain(data), json.JSONEncoder(ensure_ascii=not unicode, allow_nan=False)))
+    print(_json(json_data(data), json.JSONEncoder(ensure_ascii=not unicode, allow_nan=False)))
 
 
 def _json(data: Any, encoder: json.JSONEncoder, indent: str = "\n") -> str:
@@ -103,18 +100,3 @@ def _json(data: Any, encoder: json.JSONEncoder, indent: str = "\n") -> str:
     if isinstance(data, list) and any(isinstance(value, (dict, list)) for value in data):
         return "[" + inner + f",{inner}".join(_json(v, encoder, inner) for v in data) + indent + "]"
     return encoder.encode(data)
-
-
-def _plain(data: Any) -> Any:
-    """What `json` knows, without NaN and infinity."""
-    if isinstance(data, dict):
-        return {str(key): _plain(value) for key, value in data.items()}
-    if isinstance(data, (list, tuple)):
-        return [_plain(value) for value in data]
-    if isinstance(data, (np.ndarray, np.generic)):
-        return _plain(data.tolist())
-    if isinstance(data, Enum):
-        return data.name
-    if isinstance(data, float) and not math.isfinite(data):
-        return None
-    return data

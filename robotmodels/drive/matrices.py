@@ -38,7 +38,7 @@ class DriveMatrices:
             ])  # fmt: skip
         if self.rows and a is not None and v.ndim == a.ndim == 2 and v.shape == a.shape:
             # many samples of them: one pass through the arrays instead of seven
-            from ..kernels.drive_torques import drive_torques
+            from ..kernels.torques import drive_torques
 
             Ia, Fv, Fc, offset = np.array(self.rows).T.copy()
             out = np.empty(v.shape)

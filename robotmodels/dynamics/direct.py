@@ -105,13 +105,13 @@ def ddm(
         out = following_accelerations(model, free, q, v, tau, drive)
         warn_of_negative_mass(model)
         return out
-    from ..kernels.direct_dynamics import joint_accelerations
+    from ..kernels.mass import joint_accelerations
 
     batch, rows = batch_rows((q, v, tau), ("q", "v", "tau"))
     out = np.empty(rows[0].shape)
     rotor = np.zeros((n, n)) if drives is None else np.ascontiguousarray(drives.rotor)
     pi, gravity = model.inertia.values, model.gravity
-    failed = joint_accelerations(*rows, *model.chain, pi, gravity, rotor, out)
+    failed = joint_accelerations(*rows, model.chain, pi, gravity, rotor, out)
     if failed != -1:  # the number of a sample, or its -2 - number if the matrix is indefinite
         sample = failed if failed >= 0 else -2 - failed
         with np.errstate(over="ignore", invalid="ignore"):

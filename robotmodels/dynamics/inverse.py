@@ -103,7 +103,7 @@ def idm(
 
 def rigid_torques(model: RobotModel, q: Array, v: Array, a: Array) -> Array:
     """Torques of the rigid bodies under gravity, by the compiled recursion."""
-    from ..kernels.newton_euler import joint_torques
+    from ..kernels.torques import joint_torques
 
     return batched(joint_torques, model, {"q": q, "v": v, "a": a}, (model.n,), model.gravity)
 
@@ -118,7 +118,7 @@ def batched(
     """Result (..., *core) of a compiled recursion in table order at joint vectors (..., n)."""
     batch, rows = batch_rows(tuple(arrays.values()), tuple(arrays))
     out = np.empty((len(rows[0]), *core))
-    kernel(*rows, *model.chain, model.inertia.values, *more, out)
+    kernel(*rows, model.chain, model.inertia.values, *more, out)
     return out.reshape((*batch, *core))
 
 
@@ -131,13 +131,13 @@ def wrench_torque(model: RobotModel, q: Array, w: Array) -> Array:
             twin.model, twin.data(), twin.to_pin(q), tool.pin_id, pin.LOCAL_WORLD_ALIGNED
         )
         return twin.from_pin(w @ J.reshape(6, model.n))
-    from ..kernels.jacobians import jacobians
+    from ..kernels.poses import jacobians
 
     batch, rows = batch_rows((q, w), ("q", "wrench"))
     tau = np.empty(rows[0].shape)
     for start in range(0, len(tau), _CHUNK):
         piece = slice(start, start + _CHUNK)
         J = np.empty((len(tau[piece]), 6, model.n))
-        jacobians(rows[0][piece], *model.chain, *tool.kernel_arguments, _WORLD_ALIGNED, J)
+        jacobians(rows[0][piece], model.chain, *tool.kernel_arguments, _WORLD_ALIGNED, J)
         np.einsum("ki,kij->kj", rows[1][piece], J, out=tau[piece])
     return tau.reshape(*batch, model.n)

@@ -57,7 +57,7 @@ def mass_matrix(model: RobotModel, q: ArrayLike, drive: bool = True) -> Array:
         if not twin.in_table_order:
             M = M[np.ix_(twin.order, twin.order)]
     else:
-        from ..kernels.mass_matrix import mass_matrices
+        from ..kernels.mass import mass_matrices
 
         M = batched(mass_matrices, model, {"q": q}, (model.n, model.n))
     if drive and (drives := model.drive_matrices) is not None:
@@ -91,7 +91,7 @@ def coriolis_matrix(model: RobotModel, q: ArrayLike, v: ArrayLike) -> Array:
     if q.ndim == v.ndim == 1 and twin.serves_dynamics:
         C = pin.computeCoriolisMatrix(twin.model, twin.data(), twin.to_pin(q), twin.to_pin(v))
         return np.array(C if twin.in_table_order else C[np.ix_(twin.order, twin.order)], order="C")
-    from ..kernels.coriolis import coriolis_matrices
+    from ..kernels.mass import coriolis_matrices
 
     return batched(coriolis_matrices, model, {"q": q, "v": v}, (model.n, model.n))
 
@@ -125,7 +125,7 @@ def christoffel_blocks(model: RobotModel, q: ArrayLike) -> tuple[Array, Array]:
     >>> B.round(12), C.round(12)
     (array([[-0.1], [ 0. ]]), array([[ 0.  , -0.05], [ 0.05,  0.  ]]))
     """
-    from ..kernels.coriolis import coriolis_matrices
+    from ..kernels.mass import coriolis_matrices
 
     check_model(model)
     n = model.n
@@ -202,7 +202,7 @@ def kinetic_energy(model: RobotModel, q: ArrayLike, v: ArrayLike, drive: bool = 
             pin.computeKineticEnergy(twin.model, twin.data(), twin.to_pin(q), twin.to_pin(v))
         )
     else:
-        from ..kernels.energies import kinetic_energies
+        from ..kernels.torques import kinetic_energies
 
         energy = batched(kinetic_energies, model, {"q": q, "v": v}, ())
     if drive and (drives := model.drive_matrices) is not None:
@@ -239,7 +239,7 @@ def potential_energy(model: RobotModel, q: ArrayLike) -> Array:
     if q.ndim == 1 and twin.serves_dynamics and twin.base_is_massless:
         energy = pin.computePotentialEnergy(twin.model, twin.data(), twin.to_pin(q))
         return np.asarray(energy, dtype=np.float64)
-    from ..kernels.energies import potential_energies
+    from ..kernels.torques import potential_energies
 
     return batched(potential_energies, model, {"q": q}, (), model.gravity)
 

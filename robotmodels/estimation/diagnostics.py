@@ -110,6 +110,10 @@ def fit_diagnostics(fit: NonlinearFit) -> FitDiagnostics:
     return FitDiagnostics(relative, correlation, condition, *tests, *_influence(fit))
 
 
+def _untested(reason: str, statistic: float = np.nan) -> ResidualTest:
+    return ResidualTest(statistic, np.nan, reason)
+
+
 def confidence_intervals(fit: NonlinearFit, level: float = 0.95) -> Array:
     """Confidence intervals of single parameters.
 
@@ -171,9 +175,7 @@ def _chi_squared(fit: NonlinearFit) -> ResidualTest:
 
     statistic, left = float(fit.whitened @ fit.whitened), fit.freedom_left
     if left <= 0:
-        return ResidualTest(
-            statistic, np.nan, "There are no degrees of freedom: nothing can be tested."
-        )
+        return _untested("There are no degrees of freedom: nothing can be tested.", statistic)
     ratio = np.sqrt(statistic / left)
     text = f"Residuals are only {ratio:.3g} of the stated standard deviations, which are too large."
     p = min(1.0, 2 * min(float(chdtr(left, statistic)), float(chdtrc(left, statistic))))
@@ -191,9 +193,7 @@ def _normality(fit: NonlinearFit) -> ResidualTest:
     """Test of D'Agostino and Pearson: whether residuals without outliers are Gaussian."""
     z = fit.whitened[~np.isin(fit.block, fit.outliers)]
     if len(z) < 20 or not z.std() > 0:
-        return ResidualTest(
-            np.nan, np.nan, "Too few rows (20 are needed) to test the distribution."
-        )
+        return _untested("Too few rows (20 are needed) to test the distribution.")
     from scipy.stats import normaltest
 
     statistic, p = map(float, normaltest(z))
@@ -213,12 +213,10 @@ def _independence(fit: NonlinearFit) -> ResidualTest:
     pairs = [(a, b) for a, b in both if len(a) == len(b)]
     a, b = np.concatenate([np.zeros((2, 0)), *pairs], axis=1)
     if len(a) < 20:
-        return ResidualTest(
-            np.nan, np.nan, "Too few rows (20 pairs are needed) to test independence."
-        )
+        return _untested("Too few rows (20 pairs are needed) to test independence.")
     scale = float(np.sqrt((a @ a) * (b @ b)))
     if not scale > 0:
-        return ResidualTest(np.nan, np.nan, "There are no residuals to test.")
+        return _untested("There are no residuals to test.")
     correlation = float(a @ b) / scale
     p = float(erfc(abs(correlation) * np.sqrt(len(a) / 2)))
     text = "Successive measurements are not correlated."

@@ -26,14 +26,17 @@ class Block(Protocol):
     @property
     def W(self) -> Array:
         """Regressor."""
+        ...
 
     @property
     def y(self) -> Array:
         """Right side."""
+        ...
 
     @property
     def use(self) -> NDArray[np.bool_]:
         """Mask of used equations."""
+        ...
 
 
 class Rows(Protocol):
@@ -41,6 +44,7 @@ class Rows(Protocol):
 
     def blocks(self) -> Iterable[Block]:
         """The blocks, in order."""
+        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)

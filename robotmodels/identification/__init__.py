@@ -23,11 +23,12 @@ from .equations import equations
 from .excitation import ExcitingTrajectory, exciting_trajectory, write_trajectory
 from .fit import fit
 from .friction import fit_friction
+from .loads import KnownPayload, LoadedLog
 from .methods.linear import Irls, Ols, Ridge, Total, Wls
 from .methods.recursive import Recursive
 from .methods.robust import Robust
 from .methods.sequential import Sequential
-from .payload import KnownPayload, LoadedLog, identify_payload
+from .payload import identify_payload
 from .processing import choose_processing
 from .reduction import reduce_equations
 from .report import report

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import product
 from time import perf_counter
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from .._choices import chosen
 from ..errors import InvalidValueError, RobotModelsWarning
 from ..logs import Log
 from ..model import RobotModel
-from ..table_text import boxed
+from ..table_text import boxed, number_text
 from .fit import fit
 from .forms import EquationForm
 from .method_names import method_of
@@ -24,8 +24,7 @@ from .methods.base import Method
 from .result import IdentificationResult
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ComparedFit:
+class ComparedFit(NamedTuple):
     """Fit by one method and form of equations; result None and the reason where it was refused."""
 
     method: Method
@@ -63,18 +62,26 @@ class MethodComparison:
     @property
     def values(self) -> Array:
         """Their values by each fit, shape (rows, p); NaN where it has not identified them."""
-        return self._gathered("values")
+        return self._table("values")
 
     @property
     def standard_errors(self) -> Array:
         """Their standard errors by each fit, shape (rows, p)."""
-        return self._gathered("standard_errors")
+        return self._table("standard_errors")
+
+    def _table(self, field: str) -> Array:
+        table = np.full((len(self.fits), len(self.names)), np.nan)
+        for i, row in enumerate(self.fits):
+            if row.result is not None:
+                columns = [self.names.index(name) for name in row.result.names]
+                table[i, columns] = getattr(row.result, field)
+        return table
 
     @property
     def fit_table(self) -> str:
         """A row for each fit: status, errors, standard errors, condition, time."""
         cells = [_fit_cells(row, "held-out" if self.held_out else "own") for row in self.fits]
-        heads = next(row for row in cells if len(row) > 3)
+        heads = max(cells, key=len)
         columns = [(head, [row.get(head, "") for row in cells]) for head in heads]
         refused = [f"{row.label}: {row.refused}" for row in self.fits if row.refused]
         return "\n".join([boxed(columns), *refused])
@@ -82,20 +89,12 @@ class MethodComparison:
     @property
     def parameter_table(self) -> str:
         """A row for each parameter: its value and standard error by each fit."""
-        columns: list[tuple[str, list[str]]] = [("parameter", list(self.names))]
+        columns = [("parameter", list(self.names))]
         for row, values, errors in zip(self.fits, self.values, self.standard_errors, strict=True):
             if row.result is not None:
                 pairs = zip(values.tolist(), errors.tolist(), strict=True)
                 columns.append((row.label, [_with_error(x, s) for x, s in pairs]))
         return boxed(columns)
-
-    def _gathered(self, field: str) -> Array:
-        table = np.full((len(self.fits), len(self.names)), np.nan)
-        for i, row in enumerate(self.fits):
-            if row.result is not None:
-                columns = [self.names.index(name) for name in row.result.names]
-                table[i, columns] = getattr(row.result, field)
-        return table
 
     def __str__(self) -> str:
         return f"{self.fit_table}\n{self.parameter_table}"
@@ -148,15 +147,9 @@ def compare_methods(
 
     Examples
     --------
-    >>> from robotmodels.dynamics import idm
-    >>> from robotmodels.identification import Log
-    >>> from robotmodels.robots import load
-    >>> model, t, w = load("rx90"), 0.01 * np.arange(600)[:, None], np.linspace(1.0, 5.0, 6)
-    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
-    >>> log = Log(0.01, q, idm(model, q, v, a), v, a)
-    >>> comparison = compare_methods(
-    ...     model, log, ("ols", "wls"), ("torque", "filtered"), drive=False, checked=False
-    ... )
+    >>> from robotmodels.datasets import example_log
+    >>> options = {"methods": ("ols", "wls"), "forms": ("torque", "filtered"), "drive": ("Fv",)}
+    >>> comparison = compare_methods(*example_log(), **options)
     >>> [row.label for row in comparison.fits]
     ['ols', 'wls', 'ols, filtered', 'wls, filtered']
     """
@@ -186,28 +179,22 @@ def compare_methods(
 def _fit_cells(row: ComparedFit, word: str) -> dict[str, str]:
     """Columns of the table of fits for one of them."""
     if (result := row.result) is None or row.rmse is None:
-        return {"method": row.label, "status": "refused", "seconds": _number(row.seconds)}
+        return {"method": row.label, "status": "refused", "seconds": number_text(row.seconds, 3)}
     parts = result.validation.in_sample.filtered_relative
-    parts = parts[np.isfinite(parts)]
-    residual = 100.0 * np.sqrt(np.mean(parts**2)) if len(parts) else np.nan
-    relative = result.relative_errors
-    k = int(np.argmax(relative))
-    worst = "-" if np.isnan(relative[k]) else f"{100.0 * relative[k]:.3g} ({result.names[k]})"
+    residual = 100.0 * np.sqrt(np.mean(parts[np.isfinite(parts)] ** 2)) if len(parts) else np.nan
+    k = int(np.argmax(result.relative_errors))
+    largest = f"{number_text(100.0 * result.relative_errors[k], 3)} ({result.names[k]})"
     return {
         "method": row.label,
         "status": result.status.name.lower().replace("_", " "),
         "parameters": str(len(result.names)),
-        "residual %": _number(residual),
-        **{f"{word} RMSE {j + 1}": _number(e) for j, e in enumerate(row.rmse.tolist())},
-        "largest standard error %": worst,
-        "condition": _number(result.condition),
-        "scaled": _number(result.scaled_condition),
-        "seconds": _number(row.seconds),
+        "residual %": number_text(residual, 3),
+        **{f"{word} RMSE {j + 1}": number_text(e, 3) for j, e in enumerate(row.rmse.tolist())},
+        "largest standard error %": largest,
+        "condition": number_text(result.condition, 3),
+        "scaled": number_text(result.scaled_condition, 3),
+        "seconds": number_text(row.seconds, 3),
     }
-
-
-def _number(value: float) -> str:
-    return "-" if np.isnan(value) else f"{value:.3g}"
 
 
 def _with_error(value: float, error: float) -> str:

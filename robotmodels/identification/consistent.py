@@ -82,13 +82,9 @@ def prior_bodies(model: RobotModel) -> tuple[InertialParameters, tuple[str, ...]
             "prior=uniform_bodies(model, mass=...) (--prior MASS), or a CAD model of every link."
         )
     spread = uniform_bodies(model, total).values
-    sentences = []
-    for j in bad.tolist():
-        kind = "extent" if values[j, 9] > 0.0 else "mass"
-        mass = float(values[j, 9] if values[j, 9] > 0.0 else spread[j, 9])
-        values[j] = spread[j] * (mass / spread[j, 9])
-        sentences.append(
-            f"Link {j + 1} has no {kind} in the model: a uniform body of {mass:.3g} kg was its "
-            "prior."
-        )
-    return InertialParameters(values), tuple(sentences)
+    mass = np.where(values[:, 9] > 0.0, values[:, 9], spread[:, 9])
+    values[bad] = (spread * (mass / spread[:, 9])[:, None])[bad]
+    bodies = ", ".join(f"{j + 1} ({mass[j]:.3g} kg)" for j in bad)
+    return InertialParameters(values), (
+        f"Without mass or extent in the model, the prior is a uniform body: link {bodies}.",
+    )

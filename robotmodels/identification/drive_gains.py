@@ -36,7 +36,7 @@ from .common_equations import (
 )
 from .equations import Block, parameters_of
 from .forms import FormedRows
-from .payload import LoadedLog, common_unknowns
+from .loads import LoadedLog, common_unknowns
 from .signals import Processing
 
 _SIGNIFICANT = 3.0

@@ -39,7 +39,6 @@ from .forms import FormedRows
 from .reduction import reduce_equations
 from .signals import Processing
 
-_KINDS = {"stribeck": ("drop", "vs"), "load": ("Fl",)}
 _Curve = Callable[[Array, Array, Array, Array], tuple[Array, Array, Array]]
 """From W (k, n, b), velocities, b parameters and curve parameters (n, c): W with the slopes of the
 torque, columns of the curve parameters (k, n, c), torque of the curve (k, n)."""
@@ -68,44 +67,23 @@ class FrictionFit(NamedEstimate):
     names: tuple[str, ...]
     values: Array
     covariance: Array
+    friction: StribeckFriction | LoadFriction
     p_value: Array
-    exponent: Array
     sigma: Array
     status: FrictionStatus
 
     @property
-    def curve(self) -> str:
-        """Friction curve: "stribeck" or "load"."""
-        return "stribeck" if self.exponent.size else "load"
-
-    @property
     def significant(self) -> NDArray[np.bool_]:
-        """Joints whose curve is significant and positive, shape (n,)."""
-        return (self.p_value < _SIGNIFICANT) & (self._by_joint(_KINDS[self.curve][0]) > 0.0)
-
-    @property
-    def friction(self) -> StribeckFriction | LoadFriction:
-        """The friction of all joints, without Stribeck's curve where it is not significant."""
-        if self.curve == "load":
-            return LoadFriction(self._by_joint("Fl"))
-        # negative by noise: zero
-        Fc, drop, Fv = (np.maximum(self._by_joint(kind), 0.0) for kind in ("Fc", "drop", "Fv"))
-        vs = np.where(self.significant, self._by_joint("vs"), 1.0)
-        return StribeckFriction(Fv, Fc, Fc + drop, vs, self.exponent)
+        """Joints whose curve is significant, shape (n,)."""
+        return self.p_value < _SIGNIFICANT
 
     @property
     def notes(self) -> tuple[str, ...]:
         """Joints whose curve is not significant."""
-        size = self._by_joint(_KINDS[self.curve][0])
         return tuple(
-            f"This friction is not significant at joint {j + 1} ("
-            + ("its curve is negative)." if size[j] <= 0.0 else f"p = {self.p_value[j]:.2g}).")
+            f"This friction is not significant at joint {j + 1} (p = {self.p_value[j]:.2g})."
             for j in np.flatnonzero(~self.significant)
         )
-
-    def _by_joint(self, kind: str) -> Array:
-        values = dict(zip(self.names, self.values.tolist(), strict=True))
-        return np.array([values.get(f"{kind}{j}", 0.0) for j in _frames(self.base)])
 
 
 def fit_friction(
@@ -145,9 +123,10 @@ def fit_friction(
     FrictionFit
         ``.names, .values, .standard_errors, .covariance`` of the identifiable base parameters and
         of ``Fl`` of each joint, or of ``drop`` and ``vs`` where the curve is significant, with the
-        number of the frame (``.value("vs2")``); ``.friction`` for simulation; ``.significant`` and
-        ``.p_value`` (chi-squared tests), ``.exponent`` and ``.sigma`` (residual standard deviation)
-        of each joint; ``.status``, ``.notes``.
+        number of the frame (``.value("vs2")``); ``.friction`` for simulation, without the curves
+        that are not significant; ``.significant`` and ``.p_value`` (chi-squared tests; 1 for
+        negative curves) and ``.sigma`` (residual standard deviation) of each joint; ``.status``,
+        ``.notes``.
 
     Raises
     ------
@@ -173,7 +152,7 @@ def fit_friction(
     ('SOLVED', 1.0, 0.3)
     """
     check_model(model)
-    if curve not in _KINDS:
+    if curve not in ("stribeck", "load"):
         raise InvalidValueError(f"curve: expected 'stribeck' or 'load', got {curve!r:.60}.")
     powers = as_floats(exponents, "exponents").reshape(-1)
     if not powers.size or (powers <= 0.0).any():
@@ -265,8 +244,8 @@ class _Point:
         from scipy.stats import chi2
 
         _, weights, R, _ = self.linear()
-        size = column_lengths(R)
-        half = np.linalg.pinv(R / size, rcond=_DEPENDENT) / size[:, None]
+        lengths = column_lengths(R)
+        half = np.linalg.pinv(R / lengths, rcond=_DEPENDENT) / lengths[:, None]
         none, inverse = np.zeros(len(self.free)), half @ half.T
         covariance = correlated_covariance(self.tangents(), none, weights, inverse).covariance
         variance = np.maximum(np.diag(covariance), np.diag(inverse))  # not below rounding
@@ -275,10 +254,11 @@ class _Point:
         for j, first in enumerate(self.first):
             columns = np.arange(first, first + c)
             if np.isin(columns, self.free).all():
-                k = np.searchsorted(self.free, first)
-                p_value[j] = chi2.sf(x[first] ** 2 / variance[k], c) if R[:, k].any() else 1.0
+                k, size = np.searchsorted(self.free, first), x[first]
+                tested = size > 0.0 and R[:, k].any()
+                p_value[j] = chi2.sf(size**2 / variance[k], c) if tested else 1.0
             # without a curve its velocity is undetermined
-            if c > 1 and (p_value[j] >= _SIGNIFICANT or x[first] <= 0.0):
+            if c > 1 and p_value[j] >= _SIGNIFICANT:
                 x[first] = 0.0
                 free = np.setdiff1d(free, columns)
         return replace(self, x=x, free=free), covariance
@@ -369,22 +349,26 @@ def _refined(point: _Point, p_value: Array, exponent: Array) -> FrictionFit:
     factors = point.linear()[0]
     sigma = np.sqrt(factors.sums(np.zeros(len(point.free))) / np.maximum(factors.counts, 1))
     system, base = point.system, point.system.base
-    kinds = _KINDS["stribeck" if exponent.size else "load"]
-    names = [*system.names, *(f"{kind}{j}" for j in _frames(base) for kind in kinds)]
+    frames = [int(row) + 1 for row in base.model.table.joint_rows]
+    kinds = ("drop", "vs") if exponent.size else ("Fl",)
+    names = [*system.names, *(f"{kind}{j}" for j in frames for kind in kinds)]
     names, values = tuple(names[k] for k in point.free), point.x[point.free]
+    known = dict(zip(names, values.tolist(), strict=True))
+    parts = {k: np.array([known.get(f"{k}{j}", 0.0) for j in frames]) for k in ("Fv", "Fc", *kinds)}
+    significant = p_value < _SIGNIFICANT
+    if exponent.size:
+        # negative by noise: zero
+        Fv, Fc, drop = (np.maximum(parts[kind], 0.0) for kind in ("Fv", "Fc", "drop"))
+        vs = np.where(significant, parts["vs"], 1.0)
+        friction = StribeckFriction(Fv, Fc, Fc + drop, vs, exponent)
+    else:
+        friction = LoadFriction(parts["Fl"])
     status = FrictionStatus.SOLVED if converged else FrictionStatus.NOT_CONVERGED
-    fit = FrictionFit(base, names, values, covariance, p_value, exponent, sigma, status)
-    if not fit.significant.any():
-        return replace(fit, status=FrictionStatus.INSIGNIFICANT)
-    return fit
+    status = status if significant.any() else FrictionStatus.INSIGNIFICANT
+    return FrictionFit(base, names, values, covariance, friction, p_value, sigma, status)
 
 
 def _least_squares(R: Array, right: Array) -> Array:
     size = column_lengths(R)
     solution = np.linalg.lstsq(R / size, right, rcond=_DEPENDENT)[0]
     return (solution.T / size).T
-
-
-def _frames(base: BaseParameters) -> list[int]:
-    """Numbers of the frames of the joints."""
-    return [int(row) + 1 for row in base.model.table.joint_rows]

@@ -75,49 +75,48 @@ def report_sections(
     result: IdentificationResult, robot: StandardParameters | None = None
 ) -> tuple[ReportSection, ...]:
     """Sections of a report, for text and for pages."""
+    data = data_section(result), processing_section(result)
     if result.status is EstimateStatus.UNSTABLE:
         line = f"* {result.reason()} Method: {result.method.title}."
-        parts = (
-            ReportSection("Verdict", (line,)),
-            data_section(result),
-            processing_section(result),
-        )
-        return *parts, *_notes(result)
+        return ReportSection("Verdict", (line,)), *data, *_notes(result, "")
     diagnostics = residual_diagnostics(result.equations, result.values)
+    sides = result.validation.in_sample, result.validation.held_out
+    warning = poor_prediction(result.model, result.equations.processing, *sides)
     return (
-        _verdict(result, diagnostics),
-        data_section(result),
-        processing_section(result),
+        _verdict(result, diagnostics, warning),
+        *data,
         errors_section(result),
         parameters_section(result),
         _diagnostics(result, diagnostics),
-        *_consistent(robot),
-        *_notes(result),
+        *([] if robot is None else [_consistent(robot)]),
+        *_notes(result, warning),
     )
 
 
-def _verdict(result: IdentificationResult, diagnostics: ResidualDiagnostics) -> ReportSection:
+def _verdict(
+    result: IdentificationResult, diagnostics: ResidualDiagnostics, warning: str
+) -> ReportSection:
     """Outcome, quality of the predictions, and parameters that are not determined."""
-    estimate, details = result.estimate, result.details
+    estimate, details, names = result.estimate, result.details, result.names
     iterations = f", {estimate.iterations} iterations." if estimate.iterations > 1 else "."
-    title = result.method.title
-    sentences = [
-        *_warning(result),
-        f"{result.reason()} {title[:1].upper()}{title[1:]} of {len(result.names)} parameters on "
+    title, bound = result.method.title, f"{100.0 * WEAK:.0f} %"
+    sentences = [warning] if warning else []
+    sentences += [
+        f"{result.reason()} {title[:1].upper()}{title[1:]} of {len(names)} parameters on "
         f"{result.factors.rows} equations ({result.equations.form.value}){iterations}",
-        _prediction(result),
+        _prediction(result, bool(warning)),
     ]
-    weak = weak_parameters(estimate)
-    if weak:
+    if weak := weak_parameters(estimate):
         sentences.append(
-            f"{len(weak)} of {len(result.names)} parameters are poorly determined (relative "
-            f"standard error above {100.0 * WEAK:.0f} %), the worst first: {', '.join(weak)}."
+            f"{len(weak)} of {len(names)} parameters are poorly determined (relative standard "
+            f"error above {bound}), the worst first: {', '.join(weak)}."
         )
     else:
         k = int(np.argmax(result.relative_errors))
+        largest = percent_text(result.relative_errors[k])
         sentences.append(
-            f"All parameters are determined: no relative standard error is above {100 * WEAK:.0f} "
-            f"% (largest {percent_text(result.relative_errors[k])}, {result.names[k]})."
+            f"All parameters are determined: no relative standard error is above {bound} (largest "
+            f"{largest}, {names[k]})."
         )
     if details.unidentifiable:
         sentences.append(f"The log does not determine: {', '.join(details.unidentifiable)}.")
@@ -128,13 +127,7 @@ def _verdict(result: IdentificationResult, diagnostics: ResidualDiagnostics) -> 
     return ReportSection("Verdict", tuple(f"* {sentence}" for sentence in sentences))
 
 
-def _warning(result: IdentificationResult) -> tuple[str, ...]:
-    processing, errors = result.equations.processing, result.validation
-    doubt = poor_prediction(result.model, processing, errors.in_sample, errors.held_out)
-    return (doubt,) if doubt else ()
-
-
-def _prediction(result: IdentificationResult) -> str:
+def _prediction(result: IdentificationResult, poor: bool) -> str:
     own, test = result.validation.in_sample, result.validation.held_out
     text = (
         f"Predicted torques differ from those of the log by {_span(own.relative)} of their size, "
@@ -149,7 +142,7 @@ def _prediction(result: IdentificationResult) -> str:
         f"; from those of the held-out log by {_span(test.relative)} (both filtered: "
         f"{_span(test.filtered_relative)})."
     )
-    if _warning(result):
+    if poor:
         return text
     worse = [
         f"{name} ({100 * own.relative[j]:.3g} -> {100 * test.relative[j]:.3g} %)"
@@ -165,10 +158,11 @@ def _prediction(result: IdentificationResult) -> str:
 
 
 def _span(values: Array) -> str:
-    if not np.isfinite(values).any():
+    known = 100.0 * values[np.isfinite(values)]
+    if not known.size:
         return "-"
-    low, high = 100.0 * float(np.nanmin(values)), 100.0 * float(np.nanmax(values))
-    return f"{low:.3g} %" if len(values) == 1 else f"{low:.3g} to {high:.3g} %"
+    low, high = f"{known.min():.3g}", f"{known.max():.3g}"
+    return f"{low} %" if len(values) == 1 else f"{low} to {high} %"
 
 
 def _excitation(result: IdentificationResult, weak: bool) -> str:
@@ -189,16 +183,11 @@ def _excitation(result: IdentificationResult, weak: bool) -> str:
 
 
 def _whiteness(result: IdentificationResult, diagnostics: ResidualDiagnostics) -> str:
+    coloured = np.flatnonzero(diagnostics.white_p < SIGNIFICANCE)
     names = group_names(result)
-    coloured = [
-        name for name, p in zip(names, diagnostics.white_p, strict=True) if p < SIGNIFICANCE
-    ]
-    if not coloured:
-        text = "The residuals are white."
-    elif len(coloured) == len(names):
-        text = "The residuals are correlated in time."
-    else:
-        text = f"The residuals of {', '.join(coloured)} are correlated in time."
+    some = "" if len(coloured) == len(names) else f" of {', '.join(names[j] for j in coloured)}"
+    text = f"The residuals{some} are correlated in time."
+    text = text if len(coloured) else "The residuals are white."
     ratio = standard_error_ratio(result)
     ratio = ratio[np.isfinite(ratio)]
     lags = result.details.correlation_lags
@@ -240,13 +229,13 @@ def _diagnostics(result: IdentificationResult, diagnostics: ResidualDiagnostics)
         f"kept, {high:.1e} the largest of one that is not.",
     ]
     pairs = correlated_estimates(result.estimate)
-    if pairs:
-        more = f" (the {_PAIRS} strongest of {len(pairs)})" if len(pairs) > _PAIRS else ""
-        body.append(f"Estimates correlated by more than {CORRELATED}{more}:")
-        listed = [(a, b, f"{c:+.3f}") for a, b, c in pairs[:_PAIRS]]
-        body.append(table_of(("", "with", "correlation"), listed))
-    else:
+    if not pairs:
         body.append(f"No two estimates are correlated by more than {CORRELATED}.")
+        return ReportSection("Diagnostics", tuple(body))
+    more = f" (the {_PAIRS} strongest of {len(pairs)})" if len(pairs) > _PAIRS else ""
+    body.append(f"Estimates correlated by more than {CORRELATED}{more}:")
+    listed = [(a, b, f"{c:+.3f}") for a, b, c in pairs[:_PAIRS]]
+    body.append(table_of(("", "with", "correlation"), listed))
     return ReportSection("Diagnostics", tuple(body))
 
 
@@ -255,28 +244,24 @@ def _signed(value: float) -> str:
 
 
 def _probability(p: float) -> str:
-    if np.isnan(p):
-        return "-"
-    return "< 1e-9" if p < 1e-9 else f"{p:.2g}"
+    return "-" if np.isnan(p) else "< 1e-9" if p < 1e-9 else f"{p:.2g}"
 
 
-def _consistent(robot: StandardParameters | None) -> tuple[ReportSection, ...]:
-    if robot is None:
-        return ()
+def _consistent(robot: StandardParameters) -> ReportSection:
+    columns = zip(robot.base.names, robot.requested, robot.base_values, strict=True)
+    rows = [(name, number_text(free), number_text(real)) for name, free, real in columns]
     body: list[str | ReportTable] = [
         " ".join((robot.status.sentence, robot.fit.stopped)).strip()
         + f" Its residuals are {robot.residual_increase:.3g} % larger than those of least squares "
-        f"(root of the weighted squares). {robot.optimality}"
+        f"(root of the weighted squares). {robot.optimality}",
+        *(f"* {sentence}" for sentence in robot.fit.active),
+        table_of(("base", "least squares", "consistent robot"), rows),
     ]
-    body += [f"* {sentence}" for sentence in robot.fit.active]
-    columns = zip(robot.base.names, robot.requested, robot.base_values, strict=True)
-    rows = [(name, number_text(free), number_text(real)) for name, free, real in columns]
-    body.append(table_of(("base", "least squares", "consistent robot"), rows))
-    return (ReportSection("Physically consistent robot", tuple(body)),)
+    return ReportSection("Physically consistent robot", tuple(body))
 
 
-def _notes(result: IdentificationResult) -> tuple[ReportSection, ...]:
+def _notes(result: IdentificationResult, warning: str) -> tuple[ReportSection, ...]:
     # processing notes are in their section, the warning in the verdict
-    shown = {*result.equations.processing.notes, *_warning(result)}
+    shown = {*result.equations.processing.notes, warning}
     notes = [f"* {note}" for note in dict.fromkeys(result.notes) if note not in shown]
     return (ReportSection("Notes", tuple(notes)),) if notes else ()

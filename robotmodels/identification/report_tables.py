@@ -167,41 +167,36 @@ def _error_table(result: IdentificationResult, errors: Errors, name: str) -> Rep
             zip(result.model.table.joint_names, effort_units(result.model), strict=True)
         )
     ]
-    whole = [_root_mean_square(x) for x in (errors.relative, errors.filtered_relative)]
-    rows.append(("all", "", "", whole[0], "", "", whole[1]))
+    sides = (errors.relative, errors.filtered_relative)
+    whole = [x[np.isfinite(x)] for x in sides]
+    one, two = (percent_text(np.sqrt(np.mean(x**2))) if x.size else "-" for x in whole)
+    rows.append(("all", "", "", one, "", "", two))
     return table_of((name, "unit", "RMSE", "relative", "mean", "filtered", "relative"), rows)
-
-
-def _root_mean_square(values: Array) -> str:
-    finite = values[np.isfinite(values)]
-    return percent_text(float(np.sqrt(np.mean(finite**2)))) if finite.size else "-"
 
 
 def parameters_section(result: IdentificationResult) -> ReportSection:
     """A table of the parameters of each unit."""
-    estimate, base = result.estimate, result.base
-    units, ends = parameter_units(result), intervals(estimate)
+    base, units, ends = result.base, parameter_units(result), intervals(result.estimate)
     regrouped = dict(zip(base.names, (base.matrix != 0.0).sum(axis=1) > 1, strict=True))
     body: list[str | ReportTable] = [
         "Each base parameter with those regrouped into it (factors are metres, or their squares; "
         f"`base.regrouping` has all). A star marks relative standard errors above {100 * WEAK:.0f} "
         "%. Frames are numbered as in the robot's table."
     ]
-    for unit in dict.fromkeys(units):
-        rows = []
-        for k in (k for k, other in enumerate(units) if other == unit):
-            name, relative = result.names[k], float(estimate.relative_errors[k])
-            rows.append(
-                (
-                    f"{name}R" if regrouped[name] else name,
-                    regrouped_text(base, name),
-                    number_text(estimate.values[k]),
-                    number_text(estimate.standard_errors[k], 2),
-                    f"{percent_text(relative)}{'*' if relative > WEAK else ''}",
-                    number_text(ends[k, 0]),
-                    number_text(ends[k, 1]),
-                )
-            )
+    tables: dict[str, list[tuple[str, ...]]] = {}
+    for k, name in enumerate(result.names):
+        relative = float(result.relative_errors[k])
+        row = (
+            f"{name}R" if regrouped[name] else name,
+            regrouped_text(base, name),
+            number_text(result.values[k]),
+            number_text(result.standard_errors[k], 2),
+            f"{percent_text(relative)}{'*' if relative > WEAK else ''}",
+            number_text(ends[k, 0]),
+            number_text(ends[k, 1]),
+        )
+        tables.setdefault(units[k], []).append(row)
+    for unit, rows in tables.items():
         headings = (unit, "stands for", "value", "std err", "rel.", "95 % from", "to")
         body.append(table_of(headings, rows))
     return ReportSection("Parameters", tuple(body))
@@ -211,16 +206,15 @@ def regrouped_text(base: BaseParameters, name: str, width: int = _WIDTH) -> str:
     """Standard parameters regrouped into a base parameter, as a text of limited width."""
     row, names = base.matrix[base.names.index(name)], base.parameter_names
     kept = names.index(name)
-    size = float(np.abs(row).max())
+    others = np.flatnonzero(np.abs(row) > _ROUNDING * np.abs(row).max())
     words = []
-    for k in [kept, *(k for k in np.flatnonzero(np.abs(row) > _ROUNDING * size) if k != kept)]:
+    for k in [kept, *(k for k in others if k != kept)]:
         c = float(row[k])
         factor = "" if abs(abs(c) - 1.0) < _ROUNDING else f"{abs(c):.3g} "
         words.append(("- " if c < 0.0 else "+ ") + factor + names[k])
-    text = ""
-    for shown in range(len(words), 0, -1):
-        text = " ".join(words[:shown]).removeprefix("+ ")
-        text += "" if shown == len(words) else f" ... {len(words) - shown} more"
+    text = " ".join(words).removeprefix("+ ")
+    for shown in range(len(words) - 1, 0, -1):
         if len(text) <= width:
             break
+        text = " ".join(words[:shown]).removeprefix("+ ") + f" ... {len(words) - shown} more"
     return text

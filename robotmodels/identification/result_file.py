@@ -5,18 +5,18 @@ from __future__ import annotations
 import hashlib
 import json
 import platform
-from dataclasses import asdict, fields, is_dataclass
-from enum import Enum
+from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .._json_data import json_data
 from ..drive import drive_kinds
 from ..errors import InvalidValueError
 from ..logs import Log
-from ..model import RobotModel, to_urdf
+from ..model import to_urdf
 from .consistent import consistent_robot
 from .report_tables import group_names, intervals, parameter_units, standard_error_ratio
 from .residuals import residual_diagnostics
@@ -100,13 +100,16 @@ def result_data(
 ) -> dict[str, Any]:
     """Content of the JSON file: lists, numbers and text."""
     check_result(result)
-    base, estimate, details = result.base, result.estimate, result.details
-    names, units, ends = group_names(result), parameter_units(result), intervals(estimate)
-    ratio, diagnostics = (
-        standard_error_ratio(result),
-        residual_diagnostics(result.equations, result.values),
+    base, estimate, details, form = (
+        result.base,
+        result.estimate,
+        result.details,
+        result.equations.form,
     )
-    validation = result.validation
+    groups, units, ends = group_names(result), parameter_units(result), intervals(estimate)
+    ratio = standard_error_ratio(result)
+    residuals = asdict(residual_diagnostics(result.equations, result.values))
+    processing = result.equations.processing
     data = {
         "format": FORMAT,
         "chapter": "identification",
@@ -120,12 +123,12 @@ def result_data(
             "correlation_lags": details.correlation_lags,
             "notes": estimate.notes,
             "essential": details.essential_rule,
-            "form": result.equations.form.name,
+            "form": form.name,
             "drive": [kind.value for kind in drive_kinds(base.drive)],
             "friction": None if base.friction is None else repr(base.friction),
         },
         "data": log_data(result.equations.log),
-        "processing": _choices(result),
+        "processing": asdict(processing) | {"torque_cutoff": processing.torque_cutoff},
         "parameters": [
             {
                 "name": name,
@@ -151,27 +154,28 @@ def result_data(
         "scaled_condition": result.scaled_condition,
         "rank_gap": details.rank_gap,
         "equations": [
-            {"of": name, "used": int(used), "in_dead_band": int(left)}
-            for name, used, left in zip(
-                names, result.factors.counts, result.factors.left_out, strict=True
-            )
+            {
+                "of": name,
+                "used": result.factors.counts[j],
+                "in_dead_band": result.factors.left_out[j],
+            }
+            for j, name in enumerate(groups)
         ],
         "residuals": [
-            {"of": name}
-            | {field.name: getattr(diagnostics, field.name)[j] for field in fields(diagnostics)}
-            for j, name in enumerate(names)
+            {"of": name} | {key: values[j] for key, values in residuals.items()}
+            for j, name in enumerate(groups)
         ],
         "errors": {
             "joints": result.model.table.joint_names,
-            "in_sample": validation.in_sample,
-            "held_out": validation.held_out,
-            "nominal": validation.nominal,
+            "in_sample": result.validation.in_sample,
+            "held_out": result.validation.held_out,
+            "nominal": result.validation.nominal,
         },
         "consistent": None if robot is None else _robot(robot),
-        "versions": _versions(),
+        "versions": {"python": platform.python_version()} | {n: _version(n) for n in _PACKAGES},
         "notes": result.notes,
     }
-    return plain(data)
+    return json_data(data)
 
 
 def log_data(log: Log) -> dict[str, Any]:
@@ -193,36 +197,12 @@ def log_data(log: Log) -> dict[str, Any]:
     }
 
 
-def plain(value: Any) -> Any:
-    """Conversion to JSON data: lists, numbers (null where not finite), text and mappings."""
-    if isinstance(value, Enum):
-        return value.name.lower()
-    if isinstance(value, RobotModel):
-        return value.name
-    if is_dataclass(value) and not isinstance(value, type):
-        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
-    if isinstance(value, dict):
-        return {str(key): plain(part) for key, part in value.items()}
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, list | tuple):
-        return [plain(part) for part in value]
-    if isinstance(value, float | np.floating):
-        return float(value) if np.isfinite(value) else None
-    return int(value) if isinstance(value, np.integer) else value
-
-
 def _hash(log: Log) -> str:
     total = hashlib.sha256()
     for array in (log.q, log.tau):
         for first in range(0, len(log), _ROWS):
             total.update(np.ascontiguousarray(array[first : first + _ROWS], dtype="<f8").tobytes())
     return total.hexdigest()
-
-
-def _choices(result: IdentificationResult) -> dict[str, Any]:
-    chosen = result.equations.processing
-    return asdict(chosen) | {"torque_cutoff": chosen.torque_cutoff}
 
 
 def _robot(robot: StandardParameters) -> dict[str, Any]:
@@ -238,11 +218,8 @@ def _robot(robot: StandardParameters) -> dict[str, Any]:
     }
 
 
-def _versions() -> dict[str, str]:
-    versions = {"python": platform.python_version()}
-    for name in _PACKAGES:
-        try:
-            versions[name] = version(name)
-        except PackageNotFoundError:  # such as a source tree that was never installed
-            versions[name] = "unknown"
-    return versions
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:  # such as a source tree that was never installed
+        return "unknown"

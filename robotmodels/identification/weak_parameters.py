@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,44 +16,22 @@ WEAK = 0.3
 """Relative standard error above which a parameter is poorly determined (seed book 1.6.2.1)."""
 
 
-@dataclass(frozen=True, slots=True)
-class NegativeParameter:
-    """Negative estimate of a sum of nonnegative terms."""
+class NegativeParameter(NamedTuple):
+    """Negative estimate of a sum of nonnegative terms, its meaning and advice."""
 
     name: str
-    value: float
-    standard_error: float
-    terms: tuple[str, ...]
-
-    @property
-    def certain(self) -> bool:
-        """Whether the estimate is more than two standard errors below zero."""
-        return self.value < -2.0 * self.standard_error
-
-    @property
-    def sentence(self) -> str:
-        """Meaning and advice."""
-        terms = " + ".join(self.terms[:4]) + (" + ..." if len(self.terms) > 4 else "")
-        why = (
-            "more than noise explains: the model may be incomplete, or the log has wrong signs or "
-            "units"
-            if self.certain
-            else "within its standard error: the log does not determine it"
-        )
-        return (
-            f"{self.name} = {self.value:.3g} is negative, but {terms} cannot be; it is {why}. A "
-            "physically consistent fit avoids it."
-        )
+    certain: bool
+    """Whether the estimate is more than two standard errors below zero."""
+    sentence: str
 
 
 def negative_parameters(base: BaseParameters, estimate: Estimate) -> tuple[NegativeParameter, ...]:
     """Sums of moments of inertia, masses, rotor inertias and frictions that are negative."""
     from ..minimal_parameters.constraints import positive_drives
 
-    names = base.parameter_names
     # the fixed order of a frame's ten: XX XY XZ YY YZ ZZ MX MY MZ M
     bodies = [10 * j + k for j in range(base.model.f) for k in (0, 3, 5, 9)]
-    positive = np.zeros(len(names), dtype=bool)
+    positive = np.zeros(len(base.parameter_names), dtype=bool)
     positive[[*bodies, *positive_drives(base).tolist()]] = True
     rows = dict(zip(base.names, base.matrix, strict=True))
     negative = []
@@ -62,7 +40,20 @@ def negative_parameters(base: BaseParameters, estimate: Estimate) -> tuple[Negat
     ):
         terms = np.flatnonzero(rows[name])
         if value < 0.0 and positive[terms].all() and (rows[name][terms] > 0.0).all():
-            negative.append(NegativeParameter(name, value, error, tuple(names[k] for k in terms)))
+            certain = value < -2.0 * error
+            why = (
+                "more than noise explains: the model may be incomplete, or the log has wrong signs "
+                "or units"
+                if certain
+                else "within its standard error: the log does not determine it"
+            )
+            added = " + ".join(base.parameter_names[k] for k in terms[:4])
+            added += " + ..." if len(terms) > 4 else ""
+            sentence = (
+                f"{name} = {value:.3g} is negative, but {added} cannot be; it is {why}. A "
+                "physically consistent fit avoids it."
+            )
+            negative.append(NegativeParameter(name, certain, sentence))
     return tuple(negative)
 
 

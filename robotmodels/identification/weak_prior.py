@@ -46,16 +46,12 @@ def plausible_sizes(
         if kind.any():
             speed[kind], rate[kind] = speed[kind].max(), rate[kind].max()
             size[kind] = np.maximum(size[kind], _LEAST * size[kind].max())
-    rng = np.random.default_rng(0)
-    shape = (_SAMPLES, model.n)
-    span = np.ptp(q, axis=0)
+    rng, shape, span = np.random.default_rng(0), (_SAMPLES, model.n), np.ptp(q, axis=0)
     lower = np.maximum(model.lower, np.where(slides, q.min(axis=0) - span, -np.pi))
     upper = np.minimum(model.upper, np.where(slides, q.max(axis=0) + span, np.pi))
-    W = torque_regressor(
-        model, rng.uniform(lower, np.maximum(lower, upper), shape), speed * rng.normal(size=shape),
-        rate * rng.normal(size=shape), base.drive,
-        columns=names, friction=base.friction,
-    )  # fmt: skip
+    postures = rng.uniform(lower, np.maximum(lower, upper), shape)
+    motion = postures, speed * rng.normal(size=shape), rate * rng.normal(size=shape)
+    W = torque_regressor(model, *motion, base.drive, columns=names, friction=base.friction)
     given = np.sqrt(np.mean(W**2, axis=0)) / np.where(size > 0.0, size, np.inf)[:, None]
     most = given.max(axis=0)
     return 1.0 / np.where(most > 0.0, most, 1.0)
@@ -75,8 +71,10 @@ def shrunk(
         return None
     correlated = max(1.0, float(np.median(inflation)))
     R, y, _ = factors.stacked(first_weights(factors) / correlated)
-    likely = _likely_sizes(R, y, sizes, _groups(factors.names))
-    shrunk_values = ridge(factors, None, likely, correlated**2)
+    kinds = [name.rstrip("0123456789") for name in factors.names]
+    alike = {kind: group[0] for group in _ALIKE for kind in group}
+    _, groups = np.unique([alike.get(kind, kind) for kind in kinds], return_inverse=True)
+    shrunk_values = ridge(factors, None, _likely_sizes(R, y, sizes, groups), correlated**2)
     order = weak[np.argsort(-(deviations / sizes)[weak])]
     names = ", ".join(factors.names[k] for k in order[:_NAMED])
     more = f" and {len(order) - _NAMED} others" if len(order) > _NAMED else ""
@@ -92,15 +90,6 @@ def shrunk(
         "Wls(shrinkage=False) switches it off; a more exciting motion makes it unnecessary."
     )
     return replace(shrunk_values, status=estimate.status, notes=(*estimate.notes, note))
-
-
-def _groups(names: tuple[str, ...]) -> NDArray[np.int64]:
-    """Group number of each parameter; parameters of one kind share a group."""
-    kinds = [name.rstrip("0123456789") for name in names]
-    alike = {kind: group for group in _ALIKE for kind in group}
-    groups = [alike.get(kind, (kind,)) for kind in kinds]
-    order = {group: k for k, group in enumerate(dict.fromkeys(groups))}
-    return np.array([order[group] for group in groups])
 
 
 def _likely_sizes(R: Array, y: Array, sizes: Array, groups: NDArray[np.int64]) -> Array:

@@ -14,6 +14,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
+from ..kernels import Chain
 from ..kernels._compile import (
     CHAIN,
     INT,
@@ -264,7 +265,7 @@ def homed(
 
 @compiled(
     NOTHING(
-        STACK, STACK, OUT3, FLAGS, JOINT_FLAGS, *CHAIN, INTS, MATRIX, VECTOR, INTS, VECTOR,
+        STACK, STACK, OUT3, FLAGS, JOINT_FLAGS, CHAIN, INTS, MATRIX, VECTOR, INTS, VECTOR,
         types.float64, INT, OUT2, OUT2,
     )
 )  # fmt: skip
@@ -274,13 +275,7 @@ def brought_home(
     q: Floats,
     there: NDArray[np.bool_],
     held: NDArray[np.bool_],
-    antecedent: Ints,
-    sigma: Ints,
-    joint: Ints,
-    rotation: Floats,
-    position: Floats,
-    base_rotation: Floats,
-    base_position: Floats,
+    chain: Chain,
     path: Ints,
     tool_rotation: Floats,
     tool_position: Floats,
@@ -307,8 +302,9 @@ def brought_home(
     free = np.zeros(n, np.bool_)
     work = (e, J, A, B, lengths, column, z, o)
     arm = (
-        sigma, joint, rotation, position, whole_matrix(base_rotation),
-        whole_vector(base_position), path, whole_matrix(tool_rotation), whole_vector(tool_position),
+        chain.sigma, chain.joint, chain.rotation, chain.position, whole_matrix(chain.base_rotation),
+        whole_vector(chain.base_position), path, whole_matrix(tool_rotation),
+        whole_vector(tool_position),
     )  # fmt: skip
     asked = 0
     for c in range(6):

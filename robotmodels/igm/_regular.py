@@ -9,7 +9,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from ..kernels._compile import INT, MATRIX, STACK, VECTOR, Floats, Ints, compiled
-from ..kernels.proper_poses import improper_pose
+from ..kernels.poses import improper_pose
 from ._arrange import AT_LIMIT, before, turned_inside
 from .asked import FARTHEST, FARTHEST_POSITION, IMPROPER
 from .paul._run import run_plan

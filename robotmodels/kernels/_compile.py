@@ -16,6 +16,7 @@ from numba.core import event
 from numba.core.compiler_lock import global_compiler_lock
 from numpy.typing import NDArray
 
+from . import Chain
 from ._cache import cache_of
 
 Floats = NDArray[np.float64]
@@ -36,17 +37,18 @@ INTS = _input(types.int64, 1)
 VECTOR = _input(types.float64, 1)
 MATRIX = _input(types.float64, 2)
 STACK = _input(types.float64, 3)
-CHAIN = (INTS, INTS, INTS, STACK, MATRIX, MATRIX, VECTOR)
+CHAIN = types.NamedTuple((INTS, INTS, INTS, STACK, MATRIX, MATRIX, VECTOR), Chain)
 OUT1, OUT2, OUT3, OUT4 = (_output(ndim) for ndim in range(1, 5))
 
 KERNELS: list[Any] = []
 """Every kernel of the modules that are imported."""
 
 
-def compiled(*signature: Any) -> Any:
+def compiled(*signature: Any, inlined: bool = False) -> Any:
     """Decorator: compile a kernel for its declared signature at the first call.
 
-    Without a signature it is an inner function, compiled with the kernels that call it.
+    Without a signature it is an inner function, compiled with the kernels that call it; ``inlined``
+    makes it part of their text, where a call would pass many arrays.
     """
 
     def decorate(function: Any) -> Any:
@@ -56,6 +58,7 @@ def compiled(*signature: Any) -> Any:
             "error_model": "numpy",
             "no_cpython_wrapper": not signature,
             "no_cfunc_wrapper": True,
+            "inline": "always" if inlined else "never",
         }
         kernel: Any = njit(**options)(function)
         if kernel is function:  # numba's compilation is switched off

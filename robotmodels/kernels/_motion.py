@@ -1,14 +1,31 @@
-"""Motion of one link from that of its antecedent: position, velocity, acceleration.
+"""The recursions along the chain: positions, velocities and accelerations out, wrenches in.
 
-The forward half of every recursion in this package, in link axes (seed book section 1.5.2.2; for
+The forward half is in link axes (seed book section 1.5.2.2; for
 trees, W. Khalil and J.-F. Kleinfinger 1987). R, P are the rotation and position of frame j in its
 antecedent a; names that end in a belong to the antecedent.
 """
 
 from math import cos, sin
 
+from . import Chain
 from ._compile import Floats, compiled
-from ._vectors import Matrix, Vector, add, cross, times, transpose_times
+from ._inertia import inertia_of, inertia_times
+from ._vectors import (
+    Matrix,
+    Vector,
+    add,
+    cross,
+    matrix,
+    product,
+    put_matrix,
+    put_vector,
+    scale,
+    times,
+    transpose_times,
+    vector,
+    whole_matrix,
+    whole_vector,
+)
 
 
 @compiled()
@@ -100,3 +117,92 @@ def link_acceleration(
     else:
         u = (u[0] + 2.0 * w[1] * dq, u[1] - 2.0 * w[0] * dq, u[2] + ddq)
     return w, dw, u
+
+
+@compiled()
+def link_place(chain: Chain, k: int, q: Floats, i: int) -> tuple[Matrix, Vector]:
+    """Rotation and position of link k in its antecedent, of sample i."""
+    return link_transform(
+        chain.sigma[k],
+        coordinate(q, i, chain.joint[k]),
+        matrix(chain.rotation, k),
+        vector(chain.position, k),
+    )
+
+
+@compiled()
+def carry_place(
+    chain: Chain, k: int, Rj: Matrix, Pj: Vector, R: Floats, p: Floats
+) -> tuple[Matrix, Vector]:
+    """Place of link k in the frame of row 0, from that of its antecedent; kept in row k + 1."""
+    b = chain.antecedent[k]
+    Rb = matrix(R, b)
+    Rk = product(Rb, Rj)
+    pk = add(vector(p, b), times(Rb, Pj))
+    put_matrix(R, k + 1, Rk)
+    put_vector(p, k + 1, pk)
+    return Rk, pk
+
+
+@compiled()
+def carry_velocity(
+    chain: Chain, k: int, v: Floats, i: int, R: Matrix, P: Vector, omega: Floats, speed: Floats
+) -> tuple[Vector, Vector]:
+    """`link_velocity` of link k from that of its antecedent; kept in row k + 1."""
+    b = chain.antecedent[k]
+    rate = coordinate(v, i, chain.joint[k])
+    w, u = link_velocity(chain.sigma[k], R, P, rate, vector(omega, b), vector(speed, b))
+    put_vector(omega, k + 1, w)
+    put_vector(speed, k + 1, u)
+    return w, u
+
+
+@compiled(inlined=True)
+def carry_acceleration(
+    sigma: int,
+    b: int,
+    k: int,
+    dq: float,
+    ddq: float,
+    Rj: Matrix,
+    Pj: Vector,
+    w: Floats,
+    dw: Floats,
+    U: Floats,
+    u: Floats,
+) -> tuple[Vector, Vector, Matrix, Vector]:
+    """`link_acceleration` and U of link k from those of its antecedent b; kept in row k + 1."""
+    wj, dwj, uj = link_acceleration(
+        sigma,
+        Rj,
+        Pj,
+        dq,
+        ddq,
+        vector(w, b),
+        vector(dw, b),
+        matrix(U, b),
+        vector(u, b),
+    )
+    Uj = rotation_acceleration(wj, dwj)
+    put_vector(w, k + 1, wj)
+    put_vector(dw, k + 1, dwj)
+    put_matrix(U, k + 1, Uj)
+    put_vector(u, k + 1, uj)
+    return wj, dwj, Uj, uj
+
+
+@compiled()
+def base_against_gravity(chain: Chain, gravity: Floats, u: Floats) -> None:
+    """Acceleration of the base, row 0: accelerated against gravity it loads links as gravity."""
+    g = transpose_times(whole_matrix(chain.base_rotation), whole_vector(gravity))
+    put_vector(u, 0, (-g[0], -g[1], -g[2]))
+
+
+@compiled(inlined=True)
+def link_wrench(
+    pi: Floats, k: int, w: Vector, dw: Vector, U: Matrix, u: Vector
+) -> tuple[Vector, Vector]:
+    """Force and moment that accelerate link k: M u + U MS and J dw + w x J w + MS x u."""
+    J, MS, M = inertia_of(pi, k)
+    F = add(scale(M, u), times(U, MS))
+    return F, add(add(inertia_times(J, dw), cross(w, inertia_times(J, w))), cross(MS, u))

@@ -1,7 +1,6 @@
 """Three-vectors and matrices as tuples of scalars, which the compiler keeps in registers.
 
-A vector is (x, y, z); a 3x3 matrix is its nine entries row by row. Numba does not see a change of
-this file from the modules that use it: after an edit, delete ``__pycache__``.
+A vector is (x, y, z); a 3x3 matrix is its nine entries row by row.
 """
 
 from ._compile import Floats, compiled

@@ -6,8 +6,7 @@ y, solved by the dual active set method of D. Goldfarb and A. Idnani (1983): it 
 wish, adds the bound that is violated most, drops those that stop to press, and either ends at the
 solution or with some bounds that exclude each other. Such a set of bounds says how far s has to
 fall (a Farkas certificate is linear in s), so that s comes down to the largest value possible in
-a few steps, exactly but for rounding. Numba does not see a change of this file from the modules
-that use it: after an edit, delete ``__pycache__``.
+a few steps, exactly but for rounding.
 """
 
 from math import inf, sqrt

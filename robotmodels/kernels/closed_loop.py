@@ -9,23 +9,12 @@ from math import isfinite
 
 import numpy as np
 
-from ._compile import CHAIN, INT, MATRIX, OUT2, VECTOR, Floats, Ints, compiled
-from ._inertia import inertia_of, inertia_times, join_antecedent
-from ._motion import coordinate, link_acceleration, link_transform, rotation_acceleration
-from ._vectors import (
-    add,
-    cross,
-    matrix,
-    put_matrix,
-    put_vector,
-    scale,
-    times,
-    transpose_times,
-    vector,
-    whole_matrix,
-    whole_vector,
-)
-from .direct_dynamics import POSITIVE, solve_in_place
+from . import Chain
+from ._compile import CHAIN, INT, MATRIX, OUT2, VECTOR, Floats, compiled
+from ._inertia import inertia_of, join_antecedent
+from ._motion import base_against_gravity, carry_acceleration, coordinate, link_place, link_wrench
+from ._vectors import add, cross, matrix, put_matrix, put_vector, times, vector
+from .mass import POSITIVE, solve_in_place
 
 __all__ = ["follow_references"]
 
@@ -46,11 +35,8 @@ def direction(v: float, width: float) -> float:
 def bias_and_mass(
     q: Floats,
     v: Floats,
-    antecedent: Ints,
-    sigma: Ints,
-    joint: Ints,
-    rotation: Floats,
-    position: Floats,
+    rest: Floats,
+    chain: Chain,
     pi: Floats,
     R: Floats,
     U: Floats,
@@ -61,50 +47,35 @@ def bias_and_mass(
 ) -> None:
     """Torques h (1, n) of the state q, v (1, n) without acceleration, and its M (1, n, n).
 
-    Scratch: R, U (f + 1, 3, 3), links (6, f + 1, 3), composite (f, 10). Row 0 of links[3] holds
-    the acceleration of the base, the other rows 0 of U and links are zero.
+    Scratch: R, U (f + 1, 3, 3), links (6, f + 1, 3), composite (f, 10), with the base in rows 0;
+    rest (1, n) is zero.
     """
-    f = antecedent.shape[0]
-    n = h.shape[1]
-    P = links[0]
-    w = links[1]
-    dw = links[2]
-    u = links[3]
-    force = links[4]
-    moment = links[5]
+    f = chain.antecedent.shape[0]
+    P, w, dw, u, force, moment = links[0], links[1], links[2], links[3], links[4], links[5]
     for k in range(f):
-        b = antecedent[k]
-        c = joint[k]
-        Rj, Pj = link_transform(
-            sigma[k], coordinate(q, 0, c), matrix(rotation, k), vector(position, k)
-        )
-        wj, dwj, uj = link_acceleration(
-            sigma[k],
+        Rj, Pj = link_place(chain, k, q, 0)
+        wj, dwj, Uj, uj = carry_acceleration(
+            chain.sigma[k],
+            chain.antecedent[k],
+            k,
+            coordinate(v, 0, chain.joint[k]),
+            coordinate(rest, 0, chain.joint[k]),
             Rj,
             Pj,
-            coordinate(v, 0, c),
-            0.0,
-            vector(w, b),
-            vector(dw, b),
-            matrix(U, b),
-            vector(u, b),
+            w,
+            dw,
+            U,
+            u,
         )
-        Uj = rotation_acceleration(wj, dwj)
-        J, MS, mass = inertia_of(pi, k)
-        F = add(scale(mass, uj), times(Uj, MS))
-        N = add(add(inertia_times(J, dwj), cross(wj, inertia_times(J, wj))), cross(MS, uj))
+        F, N = link_wrench(pi, k, wj, dwj, Uj, uj)
         put_matrix(R, k + 1, Rj)
         put_vector(P, k + 1, Pj)
-        put_vector(w, k + 1, wj)
-        put_vector(dw, k + 1, dwj)
-        put_matrix(U, k + 1, Uj)
-        put_vector(u, k + 1, uj)
         put_vector(force, k + 1, F)
         put_vector(moment, k + 1, N)
         for x in range(10):
             composite[k, x] = pi[k, x]
-    for row in range(n):
-        for column in range(n):
+    for row in range(h.shape[1]):
+        for column in range(h.shape[1]):
             M[0, row, column] = 0.0
     for j in range(f, 0, -1):
         F = vector(force, j)
@@ -112,17 +83,17 @@ def bias_and_mass(
         Rj = matrix(R, j)
         Pj = vector(P, j)
         J, MS, mass = inertia_of(composite, j - 1)
-        b = antecedent[j - 1]
+        b = chain.antecedent[j - 1]
         if b > 0:
             Fb = times(Rj, F)
             Nb = add(times(Rj, N), cross(Pj, Fb))
             put_vector(force, b, add(vector(force, b), Fb))
             put_vector(moment, b, add(vector(moment, b), Nb))
             join_antecedent(composite, b - 1, Rj, Pj, J, MS, mass)
-        if sigma[j - 1] == 2:
+        if chain.sigma[j - 1] == 2:
             continue
-        column = joint[j - 1]
-        if sigma[j - 1] == 0:
+        column = chain.joint[j - 1]
+        if chain.sigma[j - 1] == 0:
             h[0, column] = N[2]
             F = (-MS[1], MS[0], 0.0)
             N = (J[2], J[4], J[5])
@@ -132,14 +103,14 @@ def bias_and_mass(
             N = (MS[1], -MS[0], 0.0)
         inner = j
         while inner > 0:
-            if sigma[inner - 1] != 2:
-                entry = N[2] if sigma[inner - 1] == 0 else F[2]
-                M[0, joint[inner - 1], column] = entry
-                M[0, column, joint[inner - 1]] = entry
+            if chain.sigma[inner - 1] != 2:
+                entry = N[2] if chain.sigma[inner - 1] == 0 else F[2]
+                M[0, chain.joint[inner - 1], column] = entry
+                M[0, column, chain.joint[inner - 1]] = entry
             Rj = matrix(R, inner)
             F = times(Rj, F)
             N = add(times(Rj, N), cross(vector(P, inner), F))
-            inner = antecedent[inner - 1]
+            inner = chain.antecedent[inner - 1]
 
 
 @compiled()
@@ -172,7 +143,7 @@ def drive_torque(
 
 @compiled(
     INT(
-        MATRIX, MATRIX, MATRIX, MATRIX, VECTOR, INT, INT, MATRIX.dtype, *CHAIN, MATRIX, VECTOR,
+        MATRIX, MATRIX, MATRIX, MATRIX, VECTOR, INT, INT, MATRIX.dtype, CHAIN, MATRIX, VECTOR,
         MATRIX, MATRIX, MATRIX, MATRIX, VECTOR, OUT2, OUT2, OUT2, OUT2, OUT2,
     )
 )  # fmt: skip
@@ -185,13 +156,7 @@ def follow_references(
     hold: int,
     substeps: int,
     dt: float,
-    antecedent: Ints,
-    sigma: Ints,
-    joint: Ints,
-    rotation: Floats,
-    position: Floats,
-    base_rotation: Floats,
-    base_position: Floats,
+    chain: Chain,
     pi: Floats,
     gravity: Floats,
     rotor: Floats,
@@ -211,7 +176,7 @@ def follow_references(
     (3, n); coupling (k, n); coupled (2,) or (2 k,); state (5, n) -> q, v, a, tau (N, n).
     """
     N, n = q.shape
-    f = antecedent.shape[0]
+    f = chain.antecedent.shape[0]
     motors = coupling.shape[0]
     step = dt / substeps
     R = np.empty((f + 1, 3, 3))
@@ -224,10 +189,10 @@ def follow_references(
     x = np.empty((1, n))
     y = np.empty((1, n))
     h = np.empty((1, n))
+    rest = np.zeros((1, n))
     taken = np.empty((1, n))
     slopes = np.empty((2, 4, n))
-    g = transpose_times(whole_matrix(base_rotation), whole_vector(gravity))
-    put_vector(links[3], 0, (-g[0], -g[1], -g[2]))
+    base_against_gravity(chain, gravity, links[3])
     ticks = int(state[4, 0])
     for i in range(N):
         for part in range(substeps):
@@ -252,10 +217,7 @@ def follow_references(
                     if stage > 0:
                         x[0, j] += ahead * slopes[0, before, j]
                         y[0, j] += ahead * slopes[1, before, j]
-                bias_and_mass(
-                    x, y, antecedent, sigma, joint, rotation, position, pi, R, U, links,
-                    composite, h, M,
-                )  # fmt: skip
+                bias_and_mass(x, y, rest, chain, pi, R, U, links, composite, h, M)
                 drive_torque(
                     y, viscous, drives[0], drives[1], coupling, coupled[:motors], drives[2],
                     coupled[motors:], taken,

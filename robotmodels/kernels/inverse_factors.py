@@ -1,8 +1,7 @@
 """What becomes of each singular value in an inverse: kept, filtered or damped.
 
 A method is four numbers: its kind, a threshold, the largest damping and the largest speed (infinite
-where there is none). `robotmodels.kinematics.inverse.methods` names them. Numba does not see a
-change of this file from the modules that use it: after an edit, delete ``__pycache__``.
+where there is none). `robotmodels.kinematics.inverse.methods` names them.
 """
 
 from math import sqrt

@@ -12,12 +12,10 @@ from numba import types
 
 from . import Chain
 from ._compile import (
-    CHAIN,
     INT,
     INTS,
     MATRIX,
     NOTHING,
-    OUT1,
     OUT2,
     STACK,
     VECTOR,
@@ -26,10 +24,10 @@ from ._compile import (
     compiled,
 )
 from .inverse_factors import inverse_factors
-from .jacobians import jacobians
+from .poses import jacobians
 from .svd import orthogonal_rows
 
-__all__ = ["inverse_of_rows", "inverse_velocities", "one_inverse_velocity", "packed"]
+__all__ = ["inverse_of_rows", "inverse_velocities", "packed"]
 
 MET, IN_PART, SINGULAR = 0, 1, 2
 """Codes of `robotmodels.kinematics.inverse.status.IKMStatus`."""
@@ -45,7 +43,7 @@ NOTICED = 1e-9
 """Part of a twist that may be missing before it is reported."""
 
 _CHUNK = 128
-_CODES = types.Array(types.int8, 1, "C")
+_CODES = types.Array(types.int8, 2, "C")
 _METHOD = (INT, types.float64, types.float64, types.float64)
 
 
@@ -162,50 +160,55 @@ def solve_row(
     return rank, damping, code
 
 
-@compiled(
-    NOTHING(
-        MATRIX, MATRIX, MATRIX, *CHAIN, INTS, MATRIX, VECTOR, INT, INTS, VECTOR, VECTOR, *_METHOD,
-        OUT2, _CODES, OUT2, OUT2, OUT2, OUT2, _CODES, OUT1,
-    )
-)  # fmt: skip
-def inverse_velocities(
-    q: Floats,
-    twist: Floats,
-    secondary: Floats,
-    antecedent: Ints,
-    sigma: Ints,
-    joint: Ints,
-    rotation: Floats,
-    position: Floats,
-    base_rotation: Floats,
-    base_position: Floats,
-    path: Ints,
-    tool_rotation: Floats,
-    tool_position: Floats,
-    reference: int,
+def packed(
+    chain: Chain,
+    point: tuple[Ints, Floats, Floats],
     asked: Ints,
     row_scale: Floats,
     column_scale: Floats,
+) -> tuple[Ints, Floats]:
+    """Robot, frame, task and scales as `inverse_velocities` takes them: integers and floats.
+
+    One pose spends 0.3 us on each array that is passed to a kernel.
+    """
+    path, *tool = point
+    sizes = chain.sigma.size, path.size, asked.size
+    whole = np.concatenate([sizes, *chain[:3], path, asked]).astype(np.int64)
+    numbers = [*chain[3:], *tool, row_scale, column_scale]
+    return whole, np.concatenate([array.ravel() for array in numbers])
+
+
+@compiled(NOTHING(INTS, VECTOR, MATRIX, MATRIX, MATRIX, INT, *_METHOD, OUT2, _CODES))
+def inverse_velocities(
+    whole: Ints,
+    numbers: Floats,
+    q: Floats,
+    twist: Floats,
+    secondary: Floats,
+    reference: int,
     kind: int,
     threshold: float,
     largest: float,
     speed: float,
-    v: Floats,
-    status: Ints,
-    achieved: Floats,
-    error: Floats,
-    reachable: Floats,
-    singular_values: Floats,
-    rank: Ints,
-    damping: Floats,
+    out: Floats,
+    codes: Ints,
 ) -> None:
-    """Joint velocities of twists, with what is known of each.
+    """Joint velocities of twists; q (N, n), twist (N, 6), secondary (N, n) or (0, n).
 
-    Shapes: q (N, n), twist (N, 6), secondary (N, n) or (0, n), asked (m,) -> v (N, n); achieved,
-    error, reachable (N, 6); singular_values (N, min(m, n)); rank, damping, status (N,).
+    out (N, n + 19 + k): velocities, twist, error, reachable twist, k singular values, damping.
     """
     N, n = q.shape
-    m, k = asked.shape[0], min(asked.shape[0], n)
+    f, steps, m = whole[0], whole[1], whole[2]
+    k = min(m, n)
+    at, E = 3 + 3 * f, 12 * f + 12
+    chain = Chain(
+        whole[3 : 3 + f], whole[3 + f : 3 + 2 * f], whole[3 + 2 * f : at],
+        numbers[: 9 * f].reshape(f, 3, 3), numbers[9 * f : 12 * f].reshape(f, 3),
+        numbers[12 * f : 12 * f + 9].reshape(3, 3), numbers[12 * f + 9 : E],
+    )  # fmt: skip
+    path, asked = whole[at : at + steps], whole[at + steps :]
+    tool_rotation, tool_position = numbers[E : E + 9].reshape(3, 3), numbers[E + 9 : E + 12]
+    row_scale, column_scale = numbers[E + 12 : E + 18], numbers[E + 18 :]
     J = np.empty((min(N, _CHUNK), 6, n))
     A, b, part = np.empty((m, n)), np.empty(m), np.empty(m)
     y, z = np.empty(n), np.empty(n)
@@ -215,9 +218,8 @@ def inverse_velocities(
     for start in range(0, N, _CHUNK):
         stop = min(start + _CHUNK, N)
         jacobians(
-            q[start:stop], antecedent, sigma, joint, rotation, position, base_rotation,
-            base_position, path, tool_rotation, tool_position, reference, J[: stop - start],
-        )  # fmt: skip
+            q[start:stop], chain, path, tool_rotation, tool_position, reference, J[: stop - start]
+        )
         for i in range(start, stop):
             c = i - start
             size = 0.0
@@ -232,79 +234,27 @@ def inverse_velocities(
             if others:
                 for j in range(n):
                     z[j] = secondary[i, j] / column_scale[j]
-            rank[i], damping[i], status[i] = solve_row(
+            codes[i, 1], out[i, n + 18 + k], codes[i, 0] = solve_row(
                 A, m, n, b, sqrt(size), kind, threshold, largest, speed, others, z, work, values,
                 y, part,
             )  # fmt: skip
             for j in range(n):
-                v[i, j] = column_scale[j] * y[j]
+                out[i, j] = column_scale[j] * y[j]
             for j in range(k):
-                singular_values[i, j] = values[j]
-            for r in range(6):
-                achieved[i, r] = error[i, r] = reachable[i, r] = 0.0
+                out[i, n + 18 + j] = values[j]
+            for r in range(18):
+                out[i, n + r] = 0.0
             for r in range(m):
                 row = asked[r]
                 total = 0.0
                 for j in range(n):
-                    total += J[c, row, j] * v[i, j]
-                achieved[i, row] = total
-                error[i, row] = twist[i, row] - total
-                reachable[i, row] = part[r] / row_scale[row]
+                    total += J[c, row, j] * out[i, j]
+                out[i, n + row] = total
+                out[i, n + 6 + row] = twist[i, row] - total
+                out[i, n + 12 + row] = part[r] / row_scale[row]
 
 
-def packed(
-    chain: Chain,
-    point: tuple[Ints, Floats, Floats],
-    asked: Ints,
-    row_scale: Floats,
-    column_scale: Floats,
-) -> tuple[Ints, Floats]:
-    """What `one_inverse_velocity` takes: whole numbers and others, each in one array."""
-    path, *tool = point
-    sizes = chain.sigma.size, path.size, asked.size
-    whole = np.concatenate([sizes, *chain[:3], path, asked]).astype(np.int64)
-    numbers = [*chain[3:], *tool, row_scale, column_scale]
-    return whole, np.concatenate([array.ravel() for array in numbers])
-
-
-@compiled(NOTHING(INTS, VECTOR, VECTOR, VECTOR, INT, *_METHOD, OUT1, _CODES))
-def one_inverse_velocity(
-    whole: Ints,
-    numbers: Floats,
-    q: Floats,
-    twist: Floats,
-    reference: int,
-    kind: int,
-    threshold: float,
-    largest: float,
-    speed: float,
-    out: Floats,
-    codes: Ints,
-) -> None:
-    """`inverse_velocities` of one row, with few arguments because each array costs 0.3 us."""
-    f, steps, m = whole[0], whole[1], whole[2]
-    n = q.shape[0]
-    k = min(m, n)
-    at = 3 + 3 * f
-    E = 12 * f + 12
-    inverse_velocities(
-        q.reshape(1, n), twist.reshape(1, 6), numbers[:0].reshape(0, n), whole[3 : 3 + f],
-        whole[3 + f : 3 + 2 * f], whole[3 + 2 * f : at], numbers[: 9 * f].reshape(f, 3, 3),
-        numbers[9 * f : 12 * f].reshape(f, 3), numbers[12 * f : 12 * f + 9].reshape(3, 3),
-        numbers[12 * f + 9 : E], whole[at : at + steps], numbers[E : E + 9].reshape(3, 3),
-        numbers[E + 9 : E + 12], reference, whole[at + steps :], numbers[E + 12 : E + 18],
-        numbers[E + 18 :], kind, threshold, largest, speed, out[:n].reshape(1, n), codes[:1],
-        out[n : n + 6].reshape(1, 6), out[n + 6 : n + 12].reshape(1, 6),
-        out[n + 12 : n + 18].reshape(1, 6), out[n + 18 : n + 18 + k].reshape(1, k), codes[1:],
-        out[n + 18 + k :],
-    )  # fmt: skip
-
-
-@compiled(
-    NOTHING(
-        STACK, MATRIX, VECTOR, VECTOR, *_METHOD, OUT2, _CODES, OUT2, OUT2, _CODES, OUT1,
-    )
-)  # fmt: skip
+@compiled(NOTHING(STACK, MATRIX, VECTOR, VECTOR, *_METHOD, OUT2, _CODES))
 def inverse_of_rows(
     J: Floats,
     rate: Floats,
@@ -314,16 +264,13 @@ def inverse_of_rows(
     threshold: float,
     largest: float,
     speed: float,
-    v: Floats,
-    status: Ints,
-    reachable: Floats,
-    singular_values: Floats,
-    rank: Ints,
-    damping: Floats,
+    out: Floats,
+    codes: Ints,
 ) -> None:
     """The same for given rows ``J v = rate``, which are comparable already.
 
-    Shapes: J (N, m, n), rate (N, m), size (N,) -> v (N, n), reachable (N, m).
+    Shapes: J (N, m, n), rate (N, m), size (N,) -> out (N, n + m + k + 1): velocities, reachable
+    rate, singular values, damping; codes (N, 2).
     """
     N, m, n = J.shape
     k = min(m, n)
@@ -336,12 +283,12 @@ def inverse_of_rows(
             b[r] = rate[i, r]
             for j in range(n):
                 A[r, j] = J[i, r, j] * column_scale[j]
-        rank[i], damping[i], status[i] = solve_row(
+        codes[i, 1], out[i, n + m + k], codes[i, 0] = solve_row(
             A, m, n, b, size[i], kind, threshold, largest, speed, 0, z, work, values, y, part
         )
         for j in range(n):
-            v[i, j] = column_scale[j] * y[j]
-        for j in range(k):
-            singular_values[i, j] = values[j]
+            out[i, j] = column_scale[j] * y[j]
         for r in range(m):
-            reachable[i, r] = part[r]
+            out[i, n + r] = part[r]
+        for j in range(k):
+            out[i, n + m + j] = values[j]

@@ -12,8 +12,9 @@ W as in `torque_regressor` (seed book section 1.6.3).
 
 import numpy as np
 
+from . import Chain
 from ._compile import CHAIN, INTS, MATRIX, NOTHING, OUT2, STACK, VECTOR, Floats, Ints, compiled
-from ._motion import coordinate, link_acceleration, link_transform, rotation_acceleration
+from ._motion import base_against_gravity, carry_acceleration, coordinate, link_place
 from ._vectors import (
     Matrix,
     Vector,
@@ -27,8 +28,6 @@ from ._vectors import (
     times,
     transpose_times,
     vector,
-    whole_matrix,
-    whole_vector,
 )
 
 __all__ = ["regressor_gradients"]
@@ -64,8 +63,7 @@ def unit_motions(
     down: Floats,
     turn: Floats,
     k: int,
-    antecedent: Ints,
-    sigma: Ints,
+    chain: Chain,
     R: Matrix,
     P: Vector,
 ) -> None:
@@ -73,29 +71,23 @@ def unit_motions(
 
     ``down (f, f, 3)`` and ``turn (f, f, 3)``: linear and angular, by link and joint.
     """
-    b = antecedent[k] - 1
+    b = chain.antecedent[k] - 1
     inner = b
     while inner >= 0:
         z = vector(turn[b], inner)
         put_vector(turn[k], inner, transpose_times(R, z))
         put_vector(down[k], inner, transpose_times(R, add(vector(down[b], inner), cross(z, P))))
-        inner = antecedent[inner] - 1
-    put_vector(turn[k], k, (0.0, 0.0, 1.0 if sigma[k] == 0 else 0.0))
-    put_vector(down[k], k, (0.0, 0.0, 1.0 if sigma[k] == 1 else 0.0))
+        inner = chain.antecedent[inner] - 1
+    put_vector(turn[k], k, (0.0, 0.0, 1.0 if chain.sigma[k] == 0 else 0.0))
+    put_vector(down[k], k, (0.0, 0.0, 1.0 if chain.sigma[k] == 1 else 0.0))
 
 
-@compiled(NOTHING(MATRIX, MATRIX, MATRIX, *CHAIN, VECTOR, INTS, STACK, OUT2, OUT2, OUT2))
+@compiled(NOTHING(MATRIX, MATRIX, MATRIX, CHAIN, VECTOR, INTS, STACK, OUT2, OUT2, OUT2))
 def regressor_gradients(
     q: Floats,
     v: Floats,
     a: Floats,
-    antecedent: Ints,
-    sigma: Ints,
-    joint: Ints,
-    rotation: Floats,
-    position: Floats,
-    base_rotation: Floats,
-    base_position: Floats,
+    chain: Chain,
     gravity: Floats,
     place: Ints,
     weight: Floats,
@@ -107,7 +99,7 @@ def regressor_gradients(
 
     Shapes: q, v, a, of_q, of_v, of_a (N, n); gravity (3,); place (10 f,); weight (N, n, c).
     """
-    f = antecedent.shape[0]
+    f = chain.antecedent.shape[0]
     Rs = np.empty((f, 3, 3))
     Ps = np.empty((f, 3))
     w = np.zeros((f + 1, 3))
@@ -123,33 +115,26 @@ def regressor_gradients(
     down_ = np.empty((f, f, 3))
     turn_ = np.empty((f, f, 3))
     g = np.empty(10)
-    gravity_base = transpose_times(whole_matrix(base_rotation), whole_vector(gravity))
-    put_vector(u, 0, scale(-1.0, gravity_base))
+    base_against_gravity(chain, gravity, u)
     for i in range(q.shape[0]):
         for k in range(f):
-            b = antecedent[k]
-            c = joint[k]
-            R, P = link_transform(
-                sigma[k], coordinate(q, i, c), matrix(rotation, k), vector(position, k)
-            )
-            wk, dwk, uk = link_acceleration(
-                sigma[k],
+            R, P = link_place(chain, k, q, i)
+            carry_acceleration(
+                chain.sigma[k],
+                chain.antecedent[k],
+                k,
+                coordinate(v, i, chain.joint[k]),
+                coordinate(a, i, chain.joint[k]),
                 R,
                 P,
-                coordinate(v, i, c),
-                coordinate(a, i, c),
-                vector(w, b),
-                vector(dw, b),
-                matrix(U, b),
-                vector(u, b),
+                w,
+                dw,
+                U,
+                u,
             )
             put_matrix(Rs, k, R)
             put_vector(Ps, k, P)
-            put_vector(w, k + 1, wk)
-            put_vector(dw, k + 1, dwk)
-            put_vector(u, k + 1, uk)
-            put_matrix(U, k + 1, rotation_acceleration(wk, dwk))
-            unit_motions(down, turn, k, antecedent, sigma, R, P)
+            unit_motions(down, turn, k, chain, R, P)
         w_[:] = 0.0
         dw_[:] = 0.0
         u_[:] = 0.0
@@ -160,8 +145,8 @@ def regressor_gradients(
             # the link's own wrench on the motion of each joint inboard, and its own joint
             inner = k
             while inner >= 0:
-                if sigma[inner] != 2:
-                    row = joint[inner]
+                if chain.sigma[inner] != 2:
+                    row = chain.joint[inner]
                     seen = False
                     for s in range(10):
                         at = place[10 * k + s]
@@ -180,21 +165,21 @@ def regressor_gradients(
                         add_vector(dw_, k + 1, add(cross(m, t), times(J, z)))
                         add_vector(w_, k + 1, triple(t, wk, m))
                         add_vector(w_, k + 1, add(cross(Jw, z), times(J, cross(z, wk))))
-                inner = antecedent[inner] - 1
+                inner = chain.antecedent[inner] - 1
             # the rule from the antecedent to the link, transposed
-            b, c = antecedent[k], joint[k]
+            b, c = chain.antecedent[k], chain.joint[k]
             R, P = matrix(Rs, k), vector(Ps, k)
             dq = coordinate(v, i, c)
             wk_, dwk_, uk_ = vector(w_, k + 1), vector(dw_, k + 1), vector(u_, k + 1)
             up = times(R, uk_)
             by_q = 0.0
-            if sigma[k] == 0:
+            if chain.sigma[k] == 0:
                 of_a[i, c] += dwk_[2]
                 of_v[i, c] += wk_[2] + spun(wk, dwk_)
                 wk_ = (wk_[0] - dwk_[1] * dq, wk_[1] + dwk_[0] * dq, wk_[2])
                 before = (dwk[0] - wk[1] * dq, dwk[1] + wk[0] * dq, 0.0)
                 by_q = spun(wk, wk_) + spun(before, dwk_) + spun(uk, uk_)
-            elif sigma[k] == 1:
+            elif chain.sigma[k] == 1:
                 of_a[i, c] += uk_[2]
                 of_v[i, c] += 2.0 * spun(wk, uk_)
                 wk_ = (wk_[0] - 2.0 * uk_[1] * dq, wk_[1] + 2.0 * uk_[0] * dq, wk_[2])
@@ -204,16 +189,16 @@ def regressor_gradients(
             add_vector(w_, b, add(times(R, wk_), triple(up, vector(w, b), P)))
             inner = b - 1
             while inner >= 0:
-                if sigma[inner] != 2:
+                if chain.sigma[inner] != 2:
                     t_, z_ = vector(down_[k], inner), vector(turn_[k], inner)
                     z = vector(turn[k], inner)
-                    if sigma[k] == 0:
+                    if chain.sigma[k] == 0:
                         by_q += spun(vector(down[k], inner), t_) + spun(z, z_)
-                    elif sigma[k] == 1:
+                    elif chain.sigma[k] == 1:
                         by_q += spun(z, t_)
                     up = times(R, t_)
                     add_vector(down_[b - 1], inner, up)
                     add_vector(turn_[b - 1], inner, add(times(R, z_), cross(P, up)))
-                inner = antecedent[inner] - 1
+                inner = chain.antecedent[inner] - 1
             if c >= 0:
                 of_q[i, c] += by_q

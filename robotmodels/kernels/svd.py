@@ -3,8 +3,7 @@
 The rows of a matrix are turned among each other, two at a time, until every two are orthogonal:
 their lengths are then the singular values. Small singular values keep their digits where the rows
 are graded (J. Demmel and K. Veselic, Jacobi's method is more accurate than QR, 1992), and a 6 x 6
-matrix takes a third of the time of LAPACK's. Numba does not see a change of this file from the
-modules that use it: after an edit, delete ``__pycache__``.
+matrix takes a third of the time of LAPACK's.
 """
 
 from math import sqrt

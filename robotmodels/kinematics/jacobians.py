@@ -81,11 +81,11 @@ def jacobian(
         )
         # with one joint Pinocchio returns a flat array
         return twin.from_pin(J.reshape(6, model.n))
-    from ..kernels.jacobians import jacobians
+    from ..kernels.poses import jacobians
 
     batch, (rows,) = batch_rows((q,), ("q",))
     out = np.empty((rows.shape[0], 6, model.n))
-    jacobians(rows, *model.chain, *point.kernel_arguments, number, out)
+    jacobians(rows, model.chain, *point.kernel_arguments, number, out)
     return out.reshape(*batch, 6, model.n)
 
 
@@ -141,11 +141,11 @@ def jacobian_rate(
         pin.updateFramePlacement(twin.model, data, point.pin_id)
         rate = pin.getFrameJacobianTimeVariation(twin.model, data, point.pin_id, pin_reference)
         return twin.from_pin(rate.reshape(6, model.n))
-    from ..kernels.jacobians import jacobian_rates
+    from ..kernels.poses import jacobian_rates
 
     batch, rows = batch_rows((q, v), ("q", "v"))
     out = np.empty((rows[0].shape[0], 6, model.n))
-    jacobian_rates(*rows, *model.chain, *point.kernel_arguments, number, out)
+    jacobian_rates(*rows, model.chain, *point.kernel_arguments, number, out)
     return out.reshape(*batch, 6, model.n)
 
 

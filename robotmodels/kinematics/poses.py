@@ -66,7 +66,7 @@ def dgm(model: RobotModel, q: ArrayLike, frame: str | int | None = None) -> Arra
 
     batch, (rows,) = batch_rows((q,), ("q",))
     out = np.empty((rows.shape[0], 4, 4))
-    tip_poses(rows, *model.chain, *point.kernel_arguments, out)
+    tip_poses(rows, model.chain, *point.kernel_arguments, out)
     return out.reshape(*batch, 4, 4)
 
 
@@ -118,5 +118,5 @@ def link_poses(model: RobotModel, q: ArrayLike) -> Array:
 
     batch, (rows,) = batch_rows((q,), ("q",))
     out = np.empty((rows.shape[0], model.f, 4, 4))
-    kernel(rows, *model.chain, out)
+    kernel(rows, model.chain, out)
     return out.reshape(*batch, model.f, 4, 4)

@@ -117,10 +117,10 @@ def transported_wrench(wrench: ArrayLike, T: Any) -> Array:
 
 def weight_torque(model: RobotModel, q: Array) -> Array:
     """Torques that hold the links against gravity."""
-    from ..kernels.newton_euler import joint_torques
+    from ..kernels.torques import joint_torques
 
     batch, (rows,) = batch_rows((q,), ("q",))
     rest = np.zeros_like(rows)
     out = np.empty(rows.shape)
-    joint_torques(rows, rest, rest, *model.chain, model.inertia.values, model.gravity, out)
+    joint_torques(rows, rest, rest, model.chain, model.inertia.values, model.gravity, out)
     return out.reshape(*batch, model.n)

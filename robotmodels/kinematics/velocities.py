@@ -127,9 +127,9 @@ def dkm_second_order(
             else pin.getFrameAcceleration
         )
         return of(twin.model, data, point.pin_id, pin_reference).vector.copy()
-    from ..kernels.accelerations import accelerations
+    from ..kernels.poses import accelerations
 
     batch, rows = batch_rows((q, v, a), ("q", "v", "a"))
     out = np.empty((rows[0].shape[0], 6))
-    accelerations(*rows, *model.chain, *point.kernel_arguments, number, out)
+    accelerations(*rows, model.chain, *point.kernel_arguments, number, out)
     return out.reshape(*batch, 6)

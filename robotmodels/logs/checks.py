@@ -17,16 +17,14 @@ from .log import Log, check_is_log
 from .stretches import moves, runs, spread, stretches
 
 _LONGEST_PERIOD = 0.5  # s, of a log that resolves the motion of a robot
-_MARGIN = 0.05  # tolerance outside the limits, relative to the range
+_MARGIN, _UNIT = 0.05, 4.0  # of limits: tolerance relative to the range, ratio of a wrong unit
 _UNUSUAL, _IMPOSSIBLE = 30.0, 1000.0  # rad, angles of a joint without limits
-_UNIT = 4.0  # ratio of position to limit above which the unit is wrong
 _LARGE, _TOO_LARGE = 1.1, 10.0  # ratios of torque to limit: excess, wrong unit
 _PER_PARAMETER = 10  # least number of equations for each parameter
 _SATURATED, _REPEATED = 0.02, 0.01  # least shares of extreme samples and of repeated rows
 _JUMP = 20.0  # least jump of a position relative to the 99 % quantile of its steps
 _WINDOW, _STRETCH = 0.05, 5_000  # s over which increments are compared, and rows of a stretch
-_CORRELATION, _SIGNAL, _FACTOR = 0.95, 5.0, 0.1  # of rates: least correlation and signal-to-noise
-# ratio, largest error of the factor
+_CORRELATION, _SIGNAL, _FACTOR = 0.95, 5.0, 0.1  # of rates: least, least over noise, tolerance
 
 
 class Severity(Enum):
@@ -306,8 +304,10 @@ def _bad(bad: BadSamples) -> _Finding:
             "gap is short and leaves the rows out where it is long."
         )
         return FindingKind.STUCK, Severity.DOUBTFUL, words
-    words = f"outliers in its {word}: {len(rows)} (the first at row {rows[0]}); fit replaces them "
-    return FindingKind.SPIKES, Severity.DOUBTFUL, words + "by interpolation."
+    words = f"{len(rows)} samples of its {word} are outliers (the first at row {rows[0]}); fit "
+    if len(rows) == 1:
+        words = f"1 sample of its {word} is an outlier (at row {rows[0]}); fit "
+    return FindingKind.SPIKES, Severity.DOUBTFUL, words + "replaces outliers by interpolation."
 
 
 def _position(log: Log, j: int, bad: list[BadSamples]) -> Iterator[_Finding]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from enum import Enum
 
 from ..errors import InvalidValueError
-from ..file_units import TimeUnit
+from ..file_units import AngleUnit, TimeUnit
 from .tables import LogTable
 
 _REFERENCE = re.compile(r"^(target|desired)_|_(ref|reference|des|desired|d|cmd)$")
@@ -40,6 +40,9 @@ class Quantity(Enum):
         return usual and is_reference == self.field.endswith("_ref")
 
 
+_ANGLES = {"rad": "rad", "deg": "deg", "°": "deg", "degree": "deg", "degrees": "deg"}
+_OTHER_POSITIONS = re.compile(r"grad|gon|mrad|(turn|rev|count|tick|step)s?|rpm|in|ft")
+_OTHER_TORQUES = re.compile(r"[mcku]nm|[kmc]n|n[cm]m|lbf?(ft|in)|m?a|arms|amps?|m?v|%|counts?")
 _UNIT = re.compile(r"\s*[\[(]\s*([a-zA-Z°%·⋅/ ._*^-]+[0-9]?)\s*[\])]\s*$")
 _INDEX = re.compile(r"^(?P<stem>.*?)[ _./-]*[\[(]?(?P<index>\d+)[\])]?$")
 _SPLIT = re.compile(r"[./]")
@@ -84,7 +87,7 @@ def find_time(table: LogTable) -> tuple[tuple[int, ...], TimeUnit | None] | None
 def find_quantity(
     table: LogTable, kind: Quantity, joints: Sequence[str] | None
 ) -> tuple[int, ...] | None:
-    """Columns of one quantity by the usual names, in the order of the joints."""
+    """Columns of one quantity by the usual names: by their numbers, or in the file's order."""
     families: dict[str, dict[str, int]] = {}
     for i, name in enumerate(table.names[: table.alike]):
         place = _family_and_joint(name, kind, joints)
@@ -108,19 +111,12 @@ def find_quantity(
                 f"are not numbered from 0 or 1 without gaps; give them as {kind.argument}=[...]."
             )
         return tuple(numbered[k] for k in sorted(numbered))
-    wanted = [name.lower() for name in joints or ()]
-    if set(found) & set(wanted):
-        missing = [name for name in joints or () if name.lower() not in found]
-        if missing:
-            raise InvalidValueError(
-                f"{kind.argument}: {table.path} has no column for {', '.join(missing)}; give "
-                f"them as {kind.argument}=[...]."
-            )
-        return tuple(found[name] for name in wanted)
     return tuple(found.values())
 
 
-def joints_of(table: LogTable, kind: Quantity, columns: Sequence[int]) -> tuple[str, ...] | None:
+def joints_of(
+    table: LogTable, kind: Quantity, columns: Sequence[int], joints: Sequence[str] | None
+) -> tuple[str, ...] | None:
     """Names of the joints of some columns that the file gives; None without them."""
     numbered = {}
     for i, name in enumerate(table.names):
@@ -133,9 +129,10 @@ def joints_of(table: LogTable, kind: Quantity, columns: Sequence[int]) -> tuple[
             numbered[int(match["index"])] = table.text(i)
     if len(numbered) == len(columns):
         return tuple(numbered[k] for k in sorted(numbered))
-    places = [_family_and_joint(table.names[i], kind, None) for i in columns if table.names]
-    names = tuple(place[1] for place in places if place and not place[1].isdecimal())
-    return names if len(names) == len(columns) else None
+    places = [_family_and_joint(table.names[i], kind, joints) for i in columns if table.names]
+    spelt = {joint.lower(): joint for joint in joints or ()}
+    names = [place[1] for place in places if place and not place[1].isdecimal()]
+    return tuple(spelt.get(x.lower(), x) for x in names) if len(names) == len(columns) else None
 
 
 def _family_and_joint(
@@ -161,3 +158,26 @@ def _family_and_joint(
         if match and kind.names(match["stem"] or match["head"]):
             return (match["stem"] or match["head"]).lower(), match[1] or match[4]
     return None
+
+
+def check_units(
+    table: LogTable, columns: Sequence[int], kind: Quantity, angle: AngleUnit, gains: bool
+) -> None:
+    """Raise for units of headers that contradict the arguments or are not supported."""
+    torques = kind in (Quantity.TORQUE, Quantity.CURRENT)
+    for name in [table.names[i] for i in columns if table.names]:
+        unit = split_unit(name)[1]
+        plain = unit.split("/")[0].strip()
+        header = _ANGLES.get(plain, angle.value)
+        advice = ""
+        if torques:
+            if not gains and _OTHER_TORQUES.fullmatch(re.sub("[ .*·⋅_-]", "", unit)):
+                advice = "not in N m; give drive_gains=, the N m (N for slides) for one unit of it."
+        elif _OTHER_POSITIONS.fullmatch(plain):
+            advice = "which is not read; write it in rad or deg (m or mm for slides), or remove "
+            advice += "the unit from the header and give its factor by gears=."
+        elif header != angle.value:
+            advice = f"the argument is angles={angle.value!r}; give angles={header!r}, or the "
+            advice += "right columns."
+        if advice:
+            raise InvalidValueError(f"{table.path}: the column {name!r} is in {unit!r}, {advice}")

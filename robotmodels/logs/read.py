@@ -10,18 +10,18 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._arrays import as_floats
+from .._arrays import Array, as_exact, as_floats
 from ..csv_table import Column
 from ..drive import Transmission
 from ..errors import InvalidValueError, ShapeError
 from ..file_units import AngleUnit, LengthUnit, TimeUnit, as_file_unit
+from ..geometry import PRISMATIC
 from ..model import RobotModel, check_model
 from .columns import Quantity
 from .log import Log, LogSource, join_logs
 from .samples import Request, read_samples
 from .tables import Choice, LogTable, open_log_table, table_of
 from .time_base import regular_rows
-from .units import joint_side
 
 Source = str | Path | Mapping[str, Any]
 _SHORTEST, _LONGEST = 1e-6, 10.0
@@ -146,8 +146,8 @@ def read_log(
     if model is not None:
         check_model(model)
     files = _sources(path, "path")
-    others = (None,) * len(files)
-    others = others if torques_from is None else _sources(torques_from, "torques_from")
+    apart = torques_from is not None
+    others = _sources(torques_from, "torques_from") if apart else (None,) * len(files)
     if len(others) != len(files):
         raise InvalidValueError(
             f"torques_from: expected a file for each of the {len(files)} of path, got "
@@ -158,7 +158,8 @@ def read_log(
     angle = as_file_unit(AngleUnit, angles, "angles")
     length = as_file_unit(LengthUnit, lengths, "lengths")
     unit = None if times is None else as_file_unit(TimeUnit, times, "times")
-    names = _names(joints, model)
+    default = None if model is None else model.table.joint_names
+    names = default if joints is None else tuple(map(str, joints))
     choices = {
         Quantity.POSITION: positions,
         Quantity.TORQUE: torques,
@@ -192,55 +193,31 @@ def read_log(
                 moved = quantity in (Quantity.POSITION, Quantity.POSITION_REFERENCE)
                 arrays[quantity.field] = values + offset if moved else values
         notes = [*raw.notes, *rows.notes]
-        coupled = model is not None and model.transmission and not model.transmission.is_mimicry
-        if model is not None and coupled and gears is None and transmission is None:
+        motors = gears is not None or transmission is not None
+        K = None if model is None or motors else model.transmission
+        if model is not None and K is not None and not K.is_mimicry:
             notes.append(
                 f"{model.name} has a transmission, but positions and torques were read as those of "
                 "the joints; give transmission=model.transmission if they are those of the motors."
             )
-        log = Log(
-            rows.dt,
-            **arrays,
-            starts=rows.starts,
-            names=raw.names,
-            sources=[_source(one, columns, len(rows.values)) for one in each if one is not None],
-            refused=rows.refused,
-            notes=notes,
-        )
-        logs.append(log)
+        sources = [_source(one, columns, len(rows.values)) for one in each if one is not None]
+        more = {"sources": sources, "refused": rows.refused, "notes": notes}
+        logs.append(Log(rows.dt, **arrays, starts=rows.starts, names=raw.names, **more))
     return logs[0] if len(logs) == 1 else join_logs(logs)
 
 
 def _sources(given: Any, what: str) -> tuple[Source, ...]:
     one = isinstance(given, str | Path | Mapping) or hasattr(given, "columns")
     sources: Any = [given] if one else given
-    if not (given_sources := tuple(sources)):
+    if not (files := tuple(sources)):
         raise InvalidValueError(f"{what}: expected a file or several, got none.")
-    return given_sources
+    return files
 
 
 def _table(source: Source, delimiter: str | None) -> LogTable:
-    if not isinstance(source, str | Path):
-        return table_of(Path("arrays"), {str(name): source[name] for name in source})
-    path = Path(source)
-    if path.is_dir():
-        raise InvalidValueError(
-            f"path: {path} is a folder; give its files, such as sorted(Path(...).glob('*.csv'))."
-        )
-    return open_log_table(path, delimiter)
-
-
-def _names(joints: Sequence[str] | None, model: RobotModel | None) -> tuple[str, ...] | None:
-    default = None if model is None else model.table.joint_names
-    if joints is None:
-        return default
-    names = tuple(map(str, joints))
-    if default is not None and len(names) != len(default):
-        raise ShapeError(
-            f"joints: {len(names)} names were given; the model has the {len(default)} joints "
-            f"{', '.join(default)}."
-        )
-    return names
+    if isinstance(source, str | Path):
+        return open_log_table(Path(source), delimiter)
+    return table_of(Path("arrays"), {str(name): source[name] for name in source})
 
 
 def _source(given: Source, values: np.ndarray, rows: int) -> LogSource:
@@ -249,3 +226,55 @@ def _source(given: Source, values: np.ndarray, rows: int) -> LogSource:
         return LogSource("arrays", hashlib.sha256(values.tobytes()).hexdigest(), rows)
     with Path(given).open("rb") as stream:
         return LogSource(Path(given).name, hashlib.file_digest(stream, "sha256").hexdigest(), rows)
+
+
+def joint_side(
+    n: int,
+    angles: AngleUnit,
+    lengths: LengthUnit,
+    signs: ArrayLike | None,
+    gears: ArrayLike | None,
+    transmission: Transmission | None,
+    drive_gains: ArrayLike | None,
+    offsets: ArrayLike | None,
+    model: RobotModel | None,
+) -> tuple[Array, Array, Array]:
+    """Matrices (n, n) from the columns of positions and torques to the joints, and an offset."""
+    unit = np.full(n, angles.factor)
+    if gears is not None and transmission is not None:
+        raise InvalidValueError(
+            "gears, transmission: give one of them; a transmission includes the gear ratios."
+        )
+    if gears is None and transmission is None and model is not None:
+        prismatic = model.table.sigma[model.table.joint_rows] == PRISMATIC
+        unit[prismatic] = lengths.factor
+    sign = _each(signs, n, "signs", 1.0)
+    if (np.abs(sign) != 1.0).any():
+        raise InvalidValueError(f"signs: expected 1 or -1 for each of the {n} joints, got {signs}.")
+    gain = sign * _each(drive_gains, n, "drive_gains", 1.0)
+    ratio = _each(gears, n, "gears", 1.0)
+    for name, value in (("drive_gains", gain), ("gears", ratio)):
+        if not value.all():
+            raise InvalidValueError(f"{name}: expected numbers other than zero.")
+    K, zero = np.diag(1.0 / ratio), np.zeros(n)
+    if transmission is not None:
+        if transmission.n != n:
+            raise ShapeError(
+                f"transmission: it has {transmission.n} joints, the log has {n} columns of "
+                "positions."
+            )
+        if not transmission.is_invertible:
+            raise InvalidValueError(
+                "transmission: joints mimic others, so that motor torques do not determine those "
+                "of the joints; give the model of the independent joints."
+            )
+        K, zero = transmission.matrix, transmission.offset
+    offset = zero + _each(offsets, n, "offsets", 0.0)
+    return (sign * unit)[:, None] * K.T, gain[:, None] * np.linalg.inv(K), offset
+
+
+def _each(value: ArrayLike | None, n: int, name: str, default: float) -> Array:
+    if value is None:
+        return np.full(n, default)
+    array = as_floats(value, name)
+    return np.full(n, float(array)) if array.ndim == 0 else as_exact(array, (n,), name)

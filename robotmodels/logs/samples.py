@@ -11,10 +11,9 @@ import numpy as np
 from .._arrays import Array
 from ..errors import InvalidValueError, ShapeError
 from ..file_units import AngleUnit, TimeUnit
-from .columns import Quantity, find_quantity, find_time, joints_of, time_unit_of
+from .columns import Quantity, check_units, find_quantity, find_time, joints_of, time_unit_of
 from .tables import Choice, LogTable
 from .time_base import splined
-from .units import check_units
 
 _NEAR = 1.5  # sampling periods: longest interpolated gap of the torques
 Given = Choice | Literal[False] | None
@@ -104,7 +103,7 @@ def _of_file(table: LogTable, kinds: list[Quantity], request: Request, alone: bo
             f"{table.path.name}: {stem} has shape (joints, samples) and was transposed."
             for stem in sorted(stems & table.transposed)
         ]
-        values, names = table.read(chosen), joints_of(table, kind, chosen)
+        values, names = table.read(chosen), joints_of(table, kind, chosen, request.joints)
         samples.names = samples.names or names
         samples.blocks[kind] = _permuted(values, names, samples.names)
     return samples

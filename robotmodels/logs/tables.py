@@ -6,8 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
-from difflib import get_close_matches
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -15,7 +14,7 @@ import numpy as np
 
 from .._arrays import Array
 from ..csv_table import Column, CsvTable, column_number, is_number, open_table
-from ..errors import InvalidValueError, MissingExtraError
+from ..errors import InvalidValueError, MissingExtraError, nearest_names
 
 Choice = Column | Sequence[Column]
 
@@ -33,7 +32,6 @@ class LogTable:
     width: int
     source: CsvTable | list[Array | str]
     alike: int
-    groups: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     transposed: frozenset[str] = frozenset()
 
     def read(self, columns: Sequence[int]) -> Array:
@@ -59,8 +57,10 @@ class LogTable:
         """Columns that an argument names: by number, name, matrix or pattern."""
         numbers: list[int] = []
         for column in [given] if isinstance(given, int | str) else given:
-            if isinstance(column, str) and column in self.groups:
-                numbers += self.groups[column]
+            # columns of a matrix q are called q[0], q[1], ...
+            matrix = [i for i, name in enumerate(self.names) if name.rpartition("[")[0] == column]
+            if matrix and column not in self.names:
+                numbers += matrix
             elif isinstance(column, str) and "*" in column and column not in self.names:
                 numbers += self._pattern(column, what)
             else:
@@ -92,10 +92,13 @@ class LogTable:
 
 def open_log_table(path: Path, delimiter: str | None = None) -> LogTable:
     """Open a file as columns: NPZ, Parquet and MAT by the suffix, text otherwise."""
+    if path.is_dir():
+        raise InvalidValueError(
+            f"path: {path} is a folder; give its files, such as sorted(Path(...).glob('*.csv'))."
+        )
     if not path.exists():
-        near = get_close_matches(path.name, [each.name for each in path.parent.glob("*")])
-        advice = f"near it are {', '.join(near)}" if near else "check its folder and its name"
-        raise _NoFileError(f"{path}: there is no such file; {advice}.")
+        near = nearest_names(path.name, [each.name for each in path.parent.glob("*")])
+        raise _NoFileError(f"{path}: there is no such file; near it: {', '.join(near) or 'none'}.")
     read = {".npz": _npz, ".parquet": _parquet, ".pq": _parquet, ".mat": _mat}
     suffix = path.suffix.lower()
     if suffix in read:
@@ -228,12 +231,10 @@ def table_of(path: Path, stored: Mapping[str, Any], transpose: bool = True) -> L
     blocks |= {name: [text] for name, text in texts.items()}
     blocks |= {name: list(x.T) for name, x in matrices.items() if name not in blocks}
     names: list[str] = []
-    groups: dict[str, tuple[int, ...]] = {}
     for name, block in blocks.items():
-        groups[name] = tuple(range(len(names), len(names) + len(block)))
         names += [name] if len(block) == 1 else [f"{name}[{i}]" for i in range(len(block))]
     columns = [column for block in blocks.values() for column in block]
-    return LogTable(path, tuple(names), len(names), columns, count, groups, frozenset(turned))
+    return LogTable(path, tuple(names), len(names), columns, count, frozenset(turned))
 
 
 def _samples_last(value: Array, N: int) -> bool:

@@ -57,10 +57,10 @@ def regular_rows(
             "seconds, or time=, the column."
         )
     known = dt if t is None else None
-    t = np.arange(N) * (known or 1.0) if t is None else t
-    good = np.isfinite(values).all(axis=1) & np.isfinite(t)
+    stamps = np.asarray(np.arange(N) * (known or 1.0) if t is None else t, np.float64)
+    good = np.isfinite(values).all(axis=1) & np.isfinite(stamps)
     kept = np.flatnonzero(good)
-    again = np.diff(t[kept], prepend=np.nan) == 0.0
+    again = np.diff(stamps[kept], prepend=np.nan) == 0.0
     if again.sum() > _REPEATED * len(kept):
         raise InvalidValueError(
             f"{source}: {again.sum()} of {len(kept)} stamps repeat the one before: they are "
@@ -71,20 +71,19 @@ def regular_rows(
         "its time is that of the row before": kept[again],
     }
     kept = kept[~again]
-    if not (len(kept) > 1 and (np.diff(t[kept]) > 0.0).any()):
+    if not (len(kept) > 1 and (np.diff(stamps[kept]) > 0.0).any()):
         raise InvalidValueError(
             f"{source}: {len(kept)} of its {N} rows have all numbers, and no two of them follow "
             "each other in time; check whether the right columns were given (time=), and whether "
             "they were recorded at the same times."
         )
     notes: list[str] = []
-    period, counts, breaks = _split(t[kept], values[kept, :joints], known, largest_gap)
+    period, counts, breaks = _split(stamps[kept], values[kept, :joints], known, largest_gap)
     if breaks.any():
-        k = int(breaks.argmax())
+        before, after = kept[breaks.argmax() : breaks.argmax() + 2]
         notes.append(
             f"{source}: time goes back or has a gap at {breaks.sum()} rows, first before row "
-            f"{kept[k + 1]}, from {t[kept[k]]:.9g} to {t[kept[k + 1]]:.9g} s; the log is split "
-            "there."
+            f"{after}, from {stamps[before]:.9g} to {stamps[after]:.9g} s; the log is split there."
         )
     if (counts > 1).any():
         notes.append(
@@ -100,7 +99,7 @@ def regular_rows(
         )
     refused["it has no neighbour in time"] = kept[alone]
     places = np.concatenate([[0], np.cumsum(counts)])
-    whole = [_filled(places[piece], t[kept[piece]], values[kept[piece]]) for piece in pieces]
+    whole = [_filled(places[piece], stamps[kept[piece]], values[kept[piece]]) for piece in pieces]
     blocks = [block for _, block in whole]
     if known is None:
         grid = period if dt is None else dt

@@ -5,18 +5,17 @@ Seed book section 1.5.3.
 
 from .bodies import uniform_bodies
 from .consistent import StandardParameters, fit_consistent, standard_parameters
-from .constraints import CenterOfMassBox, CenterOfMassEllipsoid
+from .constraints import CenterOfMassBox
 from .find import base_parameters
 from .physical import PhysicalStatus
 from .result import BaseMethod, BaseParameters
-from .values_table import BaseValues
+from .tables import BaseValues
 
 __all__ = [
     "BaseMethod",
     "BaseParameters",
     "BaseValues",
     "CenterOfMassBox",
-    "CenterOfMassEllipsoid",
     "PhysicalStatus",
     "StandardParameters",
     "base_parameters",

@@ -92,10 +92,15 @@ def check_definite(bodies: InertialParameters, name: str, frames: Sequence[str] 
         j = int(bad[0])
         link = f"link {j + 1}" + (f" ({frames[j]})" if len(frames) > j else "")
         more = f" So are {bad.size - 1} more." if bad.size > 1 else ""
+        mass = float(bodies.mass[j])
+        S = skew(bodies.first_moments[j] / (mass or 1.0))
+        moments = np.linalg.eigvalsh(bodies.tensors[j] + mass * S @ S)
         raise InertiaError(
-            f"{name}: {link} is not a body with mass and extent in three directions: "
-            f"{_defect(bodies, j)}.{more} Pass "
-            f"{name}=uniform_bodies(model, mass=...), or a CAD model of every link."
+            f"{name}: {link} is not a body with mass and extent in three directions: its mass is "
+            f"{mass:.4g} kg, its moments about its centre of mass are "
+            f"{', '.join(f'{x:.4g}' for x in moments)} kg m^2 (expected: the greatest below the "
+            f"sum of the others).{more} Pass {name}=uniform_bodies(model, mass=...), or a CAD "
+            "model of every link."
         )
     return P
 
@@ -104,25 +109,6 @@ def has_extent(bodies: InertialParameters) -> NDArray[np.bool_]:
     """Whether bodies have mass and extent in three directions. Shapes: -> (f,) bool."""
     values = np.linalg.eigvalsh(pseudo_inertias(bodies))
     return values[:, 0] > _SINGULAR * np.maximum(values[:, -1], 1e-300)
-
-
-def _defect(bodies: InertialParameters, j: int) -> str:
-    """Sentence on the property that makes a link unphysical."""
-    mass = float(bodies.mass[j])
-    if mass <= 0:
-        return f"its mass is negative, {mass:.4g} kg" if mass < 0 else "its mass is zero"
-    S = skew(bodies.first_moments[j] / mass)
-    moments = np.linalg.eigvalsh(bodies.tensors[j] + mass * S @ S)
-    shown = ", ".join(f"{x:.4g}" for x in moments)
-    slight = _SINGULAR * float(np.abs(moments).max())
-    if moments[0] < -slight:
-        return f"a moment of inertia about its centre of mass is negative ({shown} kg m^2)"
-    if moments[0] + moments[1] < moments[2] - slight:
-        return (
-            "the largest moment of inertia about its centre of mass exceeds the sum of the others "
-            f"({shown} kg m^2)"
-        )
-    return f"it is flat, thin or a point (moments about its centre of mass {shown} kg m^2)"
 
 
 def _solid(ends: list[Array], radius: float) -> Array:

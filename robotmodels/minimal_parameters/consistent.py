@@ -28,11 +28,9 @@ MissingExtraError
 
 References
 ----------
-Seed book section 1.6.3; P. Wensing, S. Kim and J.-J. Slotine, "Linear matrix inequalities for
-physically consistent inertial parameter identification", IEEE RA-L 3(1), 2018; C. Sousa and
-R. Cortesao, "Physical feasibility of robot base inertial parameter identification", IJRR 33(6),
-2014; T. Lee, P. Wensing and F. Park, "Geometric robot dynamic identification", IEEE T-RO 36(2),
-2020 (the distance).
+Seed book section 1.6.3; P. Wensing, S. Kim and J.-J. Slotine, IEEE RA-L 3(1), 2018 (LMI);
+C. Sousa and R. Cortesao, IJRR 33(6), 2014; T. Lee, P. Wensing and F. Park, "Geometric robot dynamic
+identification", IEEE T-RO 36(2), 2020 (the distance).
 """
 
 from __future__ import annotations
@@ -53,7 +51,7 @@ from ..model import RobotModel
 from ..regressors import parameter_vector
 from ..table_text import boxed
 from .bodies import check_definite
-from .constraints import CenterOfMassBound, mass_constraints
+from .constraints import CenterOfMassBox, mass_constraints
 from .physical import MARGIN, PhysicalFit, PhysicalProblem, PhysicalStatus, Squares
 from .result import BaseParameters
 
@@ -63,8 +61,6 @@ _RANK = 1e-10
 """Rank tolerance: relative singular value of columns in natural units."""
 _ZERO = 1e-9
 """Print tolerance of a change, relative to the largest parameter of its kind."""
-_PRINTED_KINDS = {**dict.fromkeys(("XX", "XY", "XZ", "YY", "YZ", "ZZ", "Ia"), "J")}
-_PRINTED_KINDS |= dict.fromkeys(("MX", "MY", "MZ"), "MS")
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -83,11 +79,10 @@ class StandardParameters(Rebuilt):
         Drives of the prior, for the kinds that are not among the parameters.
     fit : PhysicalFit
         ``squares`` of the residuals and ``least`` without constraints, both weighted; ``distance``
-        from the prior, the root of the summed squares of the relative changes of the
-        pseudo-inertias, ``|P0^-1/2 (P - P0) P0^-1/2|``, and of the drives; ``gap``, by the solver's
-        dual value: the part of the squares by which a robot within twice the distance may be better
-        (with ``gamma``: of the sum with the weighted distance); ``active`` constraints, a sentence
-        each; ``stopped``: the ending of a solver that stopped early.
+        from the prior, of the relative changes of pseudo-inertias, ``|P0^-1/2 (P - P0) P0^-1/2|``,
+        and of drives; ``gap``: the part of the squares (with ``gamma``: and of the weighted
+        distance) by which a robot within twice the distance may be better, by the solver's dual
+        value; ``active`` constraints; ``stopped``: the ending of a solver that stopped early.
     rows : int or None
         Number of residuals.
 
@@ -243,23 +238,17 @@ class StandardParameters(Rebuilt):
         return "\n".join(lines)
 
     def _columns(self) -> list[tuple[str, list[str]]]:
-        """Columns of the table: part, parameter, prior, value and difference."""
-        part = [""] * (len(self.names) + 1)
-        for j, good in enumerate(self.inertia.is_physical):
-            part[10 * j] = f"link {j + 1}: {'' if good else 'not '}physical"
-        part[10 * self.base.model.f] = "drives"
-        letters = [name.rstrip("0123456789") for name in self.names]
-        kinds = np.array([_PRINTED_KINDS.get(kind, kind) for kind in letters])
+        """Columns of the table: parameter, prior, value and difference."""
         sizes = np.maximum(np.abs(self.prior), np.abs(self.values))
-        columns = [("", part[: len(self.names)]), ("parameter", list(self.names))]
+        small = (_ZERO * _largest_of_kind(self.names, sizes)).tolist()
+        columns = [("parameter", list(self.names))]
         for title, numbers, form in (
             ("prior", self.prior, ".6g"),
             ("value", self.values, ".6g"),
             ("difference", self.values - self.prior, "+.3g"),
         ):
-            pairs = zip(numbers.tolist(), kinds.tolist(), strict=True)
-            small = {kind: _ZERO * sizes[kinds == kind].max() for kind in set(kinds.tolist())}
-            texts = ["0" if abs(x) <= small[kind] else f"{x:{form}}" for x, kind in pairs]
+            pairs = zip(numbers.tolist(), small, strict=True)
+            texts = ["0" if abs(x) <= least else f"{x:{form}}" for x, least in pairs]
             columns.append((title, texts))
         return columns
 
@@ -311,11 +300,14 @@ def standard_parameters(
     ('EXACT', 0.0)
     """
     b = as_exact(values, (len(base),), "values")
-    W = _relative(base, b) if weights is None else as_core(weights, (len(base),), "weights")
+    if weights is None:  # relative to the values, at least a thousandth of the largest of a kind
+        sizes = np.maximum(np.abs(b), 1e-3 * _largest_of_kind(base.names, np.abs(b)))
+        weights = np.diag(1.0 / np.where(sizes > 0.0, sizes, 1.0))
+    W = as_core(weights, (len(base),), "weights")
     if W.ndim != 2:
         raise ShapeError(f"weights: expected shape (k, {len(base)}), got {W.shape}.")
     near, P0, drives = _checked_prior(base, prior, drive_prior, margin)
-    squares = Squares(W @ base.matrix, W @ b, base.matrix, b)
+    squares = Squares(W, base.matrix, b, float(np.abs(b).max(initial=0.0)))
     fit = PhysicalProblem(base, near, P0, b, margin).fit(squares, b, 0.0, TOLERANCE)
     return StandardParameters(base, b, near, drives, fit)
 
@@ -330,7 +322,7 @@ def fit_consistent(
     prior: InertialParameters | None = None,
     drive_prior: DriveParameters | None = None,
     mass_bounds: ArrayLike | None = None,
-    centre_bounds: Sequence[CenterOfMassBound] = (),
+    centre_bounds: Sequence[CenterOfMassBox] = (),
     total_mass: ArrayLike | None = None,
     gamma: float = 0.0,
     tolerance: float = TOLERANCE,
@@ -355,7 +347,7 @@ def fit_consistent(
         Number of residuals, for their root mean square.
     mass_bounds : array_like, shape (f, 2), optional
         Least and greatest mass of each link, kg; infinite for none, equal where it is known.
-    centre_bounds : sequence of CenterOfMassBox or CenterOfMassEllipsoid
+    centre_bounds : sequence of CenterOfMassBox
         Bounds of centres of mass.
     total_mass : float or array_like, shape (2,), optional
         Mass of all links together, known or between two values, kg.
@@ -383,17 +375,14 @@ def fit_consistent(
     >>> robot.status.name, bool(robot.inertia.is_physical.all())
     ('CONSTRAINED', True)
     """
-    if not (np.isfinite(gamma) and gamma >= 0.0):
-        raise InvalidValueError(f"gamma: expected a weight, zero or more, got {gamma}.")
-    if not 0.0 < tolerance < 1.0:
-        raise InvalidValueError(f"tolerance: expected a part between 0 and 1, got {tolerance}.")
-    if rows is not None and rows < 1:
-        raise InvalidValueError(f"rows: expected the number of residuals, got {rows}.")
-    if not (np.isfinite(rest) and rest >= 0.0):
-        raise InvalidValueError(
-            f"rest: expected a sum of squares, zero or more, got {rest}; "
-            "give 0 for rounding below zero."
-        )
+    for name, value, good, expected in (
+        ("gamma", gamma, 0.0 <= gamma < inf, "a weight, zero or more"),
+        ("tolerance", tolerance, 0.0 < tolerance < 1.0, "a part between 0 and 1"),
+        ("rows", rows, rows is None or rows >= 1, "the number of residuals"),
+        ("rest", rest, 0.0 <= rest < inf, "a sum of squares, zero or more (0 for rounding)"),
+    ):
+        if not good:
+            raise InvalidValueError(f"{name}: expected {expected}, got {value}.")
     near, P0, drives = _checked_prior(base, prior, drive_prior, margin)
     factor = as_core(R, (len(base),), "R")
     if factor.ndim != 2:
@@ -439,14 +428,10 @@ def _checked_prior(
     return parameter_vector(robot, base.drive, base.friction), P0, drives
 
 
-def _relative(base: BaseParameters, b: Array) -> Array:
-    """Weights relative to the values, each at least a thousandth of the largest of its kind."""
-    kinds = np.array([name.rstrip("0123456789")[:1] for name in base.names])
-    sizes = np.abs(b)
-    for kind in set(kinds.tolist()):
-        same = kinds == kind
-        sizes[same] = np.maximum(sizes[same], 1e-3 * sizes[same].max())
-    return np.diag(1.0 / np.where(sizes > 0, sizes, 1.0))
+def _largest_of_kind(names: Sequence[str], sizes: Array) -> Array:
+    """Largest size of the parameters that begin with the same letter. Shapes: (p,) -> (p,)."""
+    kinds = np.array([name[:1] for name in names])
+    return np.array([sizes[kinds == kind].max() for kind in kinds.tolist()])
 
 
 def _squares(
@@ -462,4 +447,5 @@ def _squares(
     target = U.T @ y
     level, same = target / values, (V / natural) @ base.matrix
     least = float(np.sum((y - U @ target) ** 2)) + rest
-    return Squares(U.T @ R @ base.matrix, target, same, level, least), (V.T @ level) * natural
+    squares = Squares(np.diag(values), same, level, float(np.abs(level).max(initial=0.0)), least)
+    return squares, (V.T @ level) * natural

@@ -1,45 +1,25 @@
 """Constraints of physical robots, affine in the standard parameters x: drives, masses, centres.
 
-Drives are dissipative: rotor inertias and frictions are not negative, those of coupled motors
-together. A centre of mass lies in a box along the axes of its frame, or in an ellipsoid. Sources:
-P. Wensing, S. Kim and J.-J. Slotine, IEEE RA-L 3(1), 2018; C. Sousa and R. Cortesao, IJRR 33(6),
-2014.
-
-Parameters
-----------
-link : int
-    Frame number, 1..f.
-low, high : array_like, shape (3,)
-    Corners of a box in frame R_j, metres; infinite without a bound, equal where it is known.
-center, semi_axes : array_like, shape (3,)
-    Of an ellipsoid, in frame R_j: its centre and its positive half lengths, metres.
-rotation : array_like, shape (3, 3), optional
-    Its columns are the directions of the semi-axes in R_j; default the axes of R_j.
-
-Raises
-------
-ShapeError, InvalidValueError
-    Wrong shapes, NaN, corners the wrong way round, lengths that are not positive, no rotation.
+Sources: P. Wensing, S. Kim and J.-J. Slotine, IEEE RA-L 3(1), 2018; C. Sousa and R. Cortesao, IJRR
+33(6), 2014.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Rebuilt, as_exact, as_reals, read_only
+from .._arrays import Array, Rebuilt, as_reals, read_only
 from ..errors import InvalidValueError, ShapeError
 from ..regressors.columns import standard_blocks
 from .result import BaseParameters
 
 _INSIDE = 1e-9
 """Smallest eigenvalue of matrices in the solver's units: margin for its rounding."""
-_ROTATED = 1e-9
-"""Tolerance of a rotation matrix."""
 _POSITIVE = ("Ia", "Fv", "Fc", "Fvp", "Fcp", "Fvn", "Fcn", "Fs")
 """Kinds of drive and friction parameters that are not negative."""
 
@@ -48,14 +28,19 @@ _POSITIVE = ("Ia", "Fv", "Fc", "Fvp", "Fcp", "Fvn", "Fcn", "Fs")
 class Constraint:
     """Standard parameters x with ``rows @ x + offset`` in a cone. Shapes: rows (k, p), offset (k,).
 
-    The cone: zero, non-negative numbers, a first entry not below the norm of the others, or a
-    positive semidefinite matrix, row by row. A sentence for each number, or one for the cone.
+    The cone: zero, non-negative numbers, or a positive semidefinite matrix, row by row. A sentence
+    for each number, or one for the matrix, whose eigenvalues may be negative up to the allowance.
     """
 
-    cone: Literal["zero", "nonnegative", "second_order", "semidefinite"]
+    cone: Literal["zero", "nonnegative", "semidefinite"]
     rows: Array
     offset: Array
     sentences: tuple[str, ...]
+    allowance: float = 0.0
+
+    def about(self, x: Array, scale: Array) -> Constraint:
+        """The same on ``z``, for the parameters ``x + scale @ z``."""
+        return replace(self, rows=self.rows @ scale, offset=self.rows @ x + self.offset)
 
     def slack(self, x: Array) -> Array:
         """Distance to the boundary, one for each sentence; negative outside."""
@@ -63,31 +48,23 @@ class Constraint:
         if self.cone == "semidefinite":
             k = round(len(s) ** 0.5)
             return np.asarray(np.linalg.eigvalsh(s.reshape(k, k))[:1], dtype=np.float64)
-        if self.cone == "second_order":
-            return np.array([float(s[0] - np.linalg.norm(s[1:]))])
         return s if self.cone == "nonnegative" else -np.abs(s)
 
-    def inside(self, x: Array, least: float = 0.0) -> Array:
-        """Parameters whose matrix has a multiple of 1 added, so that its slack is not negative."""
+    def inside(self, x: Array) -> Array:
+        """Parameters with a multiple of 1 added to the matrix where its slack is negative."""
         slack = float(self.slack(x)[0])
-        if slack >= least:
+        if slack >= -self.allowance:
             return x
         one = np.eye(round(len(self.offset) ** 0.5)).ravel()
         return x - slack * np.linalg.lstsq(self.rows, one, rcond=None)[0]
 
-    def stated(
-        self, cp: Any, change: Any, unit: Array, x: Array, size: float, room: float = 0.0
-    ) -> Any:
-        """The constraint on ``x + size * unit @ change``, divided by size. Shapes: unit (p, p).
-
-        The eigenvalues of a matrix are at least ``room`` and the solver's rounding.
-        """
-        s = (self.rows @ unit) @ change + (self.rows @ x + self.offset) / size
+    def stated(self, cp: Any, x: Any, size: float, part: float) -> Any:
+        """The constraint on ``size x``, divided by size; matrices above a part of the allowance."""
+        s = self.rows @ x + self.offset / size
         if self.cone == "semidefinite":
             k = round(len(self.offset) ** 0.5)
-            return cp.reshape(s, (k, k), order="C") >> (_INSIDE + room / size) * np.eye(k)
-        if self.cone == "second_order":
-            return cp.SOC(s[0], s[1:])
+            least = _INSIDE + part * self.allowance / size
+            return cp.reshape(s, (k, k), order="C") >> least * np.eye(k)
         return s >= 0 if self.cone == "nonnegative" else s == 0
 
 
@@ -153,6 +130,18 @@ def drive_constraints(base: BaseParameters, unit: Array) -> Iterator[Constraint]
 class CenterOfMassBox(Rebuilt):
     """The centre of mass of a link lies in a box along the axes of its frame.
 
+    Parameters
+    ----------
+    link : int
+        Frame number, 1..f.
+    low, high : array_like, shape (3,)
+        Corners in frame R_j, metres; infinite where there is no bound, equal where it is known.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Corners of the wrong shape, NaN, or low above high.
+
     Examples
     --------
     >>> CenterOfMassBox(2, [0, -0.1, -0.1], [0.4, 0.1, 0.1]).link
@@ -185,53 +174,12 @@ class CenterOfMassBox(Rebuilt):
             yield from _interval(row, low, high, unit, name, mass)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class CenterOfMassEllipsoid(Rebuilt):
-    """The centre of mass of a link lies in an ellipsoid.
-
-    Examples
-    --------
-    >>> CenterOfMassEllipsoid(1, [0.1, 0, 0], [0.2, 0.1, 0.1]).semi_axes
-    array([0.2, 0.1, 0.1])
-    """
-
-    link: int
-    center: Any
-    semi_axes: Any
-    rotation: Any = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "link", int(self.link))
-        for name, shape in (("center", (3,)), ("semi_axes", (3,)), ("rotation", (3, 3))):
-            object.__setattr__(self, name, read_only(as_exact(getattr(self, name), shape, name)))
-        lengths, R = self.semi_axes, self.rotation
-        if (lengths <= 0.0).any():
-            raise InvalidValueError(f"semi_axes: expected positive lengths in m, got {lengths}.")
-        if np.abs(R.T @ R - np.eye(3)).max() > _ROTATED:
-            raise InvalidValueError(
-                f"rotation: expected perpendicular unit vectors in its columns, got\n{R}"
-            )
-
-    def constraints(self, unit: Array) -> Iterator[Constraint]:
-        """``|diag(1/a) R^T ([MX MY MZ] - c M)| <= M`` for parameters of these sizes (p,)."""
-        mass = 10 * self.link - 1
-        rows = np.zeros((4, len(unit)))
-        inward = (self.rotation / self.semi_axes).T
-        rows[0, mass], rows[1:, mass - 3 : mass] = 1.0, inward
-        rows[1:, mass] = -inward @ self.center
-        sentence = f"The centre of mass of link {self.link} is on the surface of its ellipsoid."
-        yield Constraint("second_order", rows / unit[mass], np.zeros(4), (sentence,))
-
-
-CenterOfMassBound = CenterOfMassBox | CenterOfMassEllipsoid
-
-
 def mass_constraints(
     f: int,
     unit: Array,
     mass_bounds: ArrayLike | None,
     total_mass: ArrayLike | None,
-    centre_bounds: Sequence[CenterOfMassBound],
+    centre_bounds: Sequence[CenterOfMassBox],
 ) -> Iterator[Constraint]:
     """Bounds on masses (f, 2), on their sum (2,) and on centres of mass. Shapes: unit (p,)."""
     masses = np.arange(9, 10 * f, 10)
@@ -262,10 +210,9 @@ def mass_constraints(
         row[numbers] = 1.0
         yield from _interval(row, low, high, unit, name)
     for bound in centre_bounds:
-        if not isinstance(bound, (CenterOfMassBox, CenterOfMassEllipsoid)):
+        if not isinstance(bound, CenterOfMassBox):
             raise InvalidValueError(
-                "centre_bounds: expected CenterOfMassBox or CenterOfMassEllipsoid, got "
-                f"{type(bound).__name__}."
+                f"centre_bounds: expected CenterOfMassBox, got {type(bound).__name__}."
             )
         if not 1 <= bound.link <= f:
             raise InvalidValueError(

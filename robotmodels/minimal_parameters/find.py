@@ -102,12 +102,12 @@ def base_parameters(
     (36, {'ZZ4': 1.0, 'YY5': 1.0})
     """
     check_model(model)
-    way = chosen(BaseMethod, method, "method")
+    kind = chosen(BaseMethod, method, "method")
     kinds = drive_kinds(drive)
     angle, least = (ALIGNED, NOTHING) if tolerance is None else (_part(tolerance),) * 2
     if friction is not None:
         check_linear(check_friction(friction, model.n))
-    if way is BaseMethod.SYMBOLIC:
+    if kind is BaseMethod.SYMBOLIC:
         for name, value in (("motion", motion), ("constraint", constraint)):
             if value is not None:
                 raise InvalidValueError(
@@ -127,15 +127,12 @@ def base_parameters(
             "the free variables.",
         )
     columns = TorqueColumns(aligned, kinds, friction, least, samples, G)
-    ruled = _by_rules(columns) if way is BaseMethod.SYMBOLIC else None
     neglected, error, gap = (), None, None
-    if ruled is not None:
-        kept, matrix = ruled
-    else:
-        kept, matrix = columns.basis.kept, columns.basis.coefficients
+    kept, matrix, numeric = _regrouping(columns, kind is BaseMethod.SYMBOLIC)
+    if numeric:
         neglected, error = columns.neglected(matrix), columns.torque_error(kept, matrix)
         notes += (*columns.notes, *residual_warning(error, least))
-        gap = columns.basis.gap if way is BaseMethod.NUMERIC else None
+        gap = columns.basis.gap if kind is BaseMethod.NUMERIC else None
     if aligned is not model:
         columns = replace(columns, model=model)
         neglected, error = columns.neglected(matrix), columns.torque_error(kept, matrix)
@@ -145,36 +142,40 @@ def base_parameters(
         )
         notes = (notes[0], sentence, *notes[1:])
     return BaseParameters(
-        model, kinds, kept, matrix, way, gap, friction, least, notes, neglected, error, angle
+        model, kinds, kept, matrix, kind, gap, friction, least, notes, neglected, error, angle
     )
 
 
-def _by_rules(columns: TorqueColumns) -> tuple[NDArray[np.int64], Array] | None:
-    """Kept parameters (b,) and combinations (b, p) by Khalil's rules.
+def _regrouping(columns: TorqueColumns, symbolic: bool) -> tuple[NDArray[np.int64], Array, bool]:
+    """Kept parameters (b,), combinations (b, p), and whether the numeric method decided.
 
-    None where the tolerance decides, and with columns that have no rule (couplings, friction).
+    It decides what depends on a zero tolerance; couplings and friction have no rule.
     """
-    model, drive = columns.model, columns.drive
-    p, lengths = len(columns.names), (model.table.d, model.table.r, model.table.b)
-    if columns.tolerance > NOTHING or p > 10 * model.f + model.n * len(drive):
-        return None
-    sizes = np.abs(np.concatenate(lengths)) / reach(model)
-    sizes = np.append(sizes, np.linalg.norm(model.gravity) / EARTH)
-    if ((sizes > _FINEST) & (sizes < _COARSEST)).any():
-        return None
-    terms, coarse = (
-        regrouped(model, *rows_of_numbers(model, zero), drive, zero)
-        for zero in (_FINEST, _COARSEST)
+    if not symbolic:
+        return columns.basis.kept, columns.basis.coefficients, True
+    model, drive, zero, sizes = columns.model, columns.drive, columns.tolerance, columns.sizes
+    fine, coarse, terms = (
+        regrouped(model, *rows_of_numbers(model, small), drive, small)
+        for small in (_FINEST, _COARSEST, zero)
     )
-    if terms.keys() != coarse.keys():
-        return None
+    table = model.table
+    small = np.abs(np.concatenate((table.d, table.r, table.b))) / reach(model)
+    small = np.append(small, np.linalg.norm(model.gravity) / EARTH)
+    has_rules = len(sizes) == 10 * model.f + model.n * len(drive)
+    clear = has_rules and zero <= NOTHING and fine.keys() == coarse.keys()
+    clear = clear and not ((small > _FINEST) & (small < _COARSEST)).any()
     kept = np.array(sorted(terms), dtype=np.int64)
-    matrix = np.zeros((len(kept), p))
+    matrix = np.zeros((len(kept), len(sizes)))
     for row, number in zip(matrix, kept.tolist(), strict=True):
         row[list(terms[number])] = list(terms[number].values())
-    sizes = columns.sizes
-    matrix[abs(matrix * sizes) <= columns.tolerance * sizes[kept][:, None]] = 0.0
-    return kept, matrix
+    matrix[abs(matrix * sizes) <= zero * sizes[kept][:, None]] = 0.0
+    if clear or (
+        np.array_equal(kept, columns.basis.kept)
+        and (matrix.any(axis=0) == columns.basis.coefficients.any(axis=0)).all()
+        and columns.torque_error(kept, matrix) <= zero
+    ):
+        return kept, matrix, not clear
+    return columns.basis.kept, columns.basis.coefficients, True
 
 
 def _part(tolerance: Any) -> float:
@@ -201,12 +202,12 @@ def _samples(model: RobotModel, motion: Any) -> Samples:
         )
     names = ("motion q", "motion v", "motion a")
     arrays = tuple(as_vector(x, model.n, s) for x, s in zip(motion, names, strict=True))
-    _, rows = batch_rows(arrays, names)
-    if rows[0].shape[0] == 0:
+    q, v, a = batch_rows(arrays, names)[1]
+    if not len(q):
         raise InvalidValueError(
             "motion: the log is empty; give at least one sample, or none for random motion."
         )
-    return rows[0], rows[1], rows[2]
+    return q, v, a
 
 
 def _constraint(
@@ -224,18 +225,14 @@ def _constraint(
         raise InvalidValueError("constraint: all zero, so that no joint moves.")
     lengths = np.linalg.norm(G, axis=0)
     kept = column_basis(G, scale=1.0 / np.where(lengths > 0.0, lengths, 1.0)).kept
-    rank, columns = len(kept), int((lengths > 0.0).sum())
-    G = np.ascontiguousarray(G[:, kept])
-    if rank == n:
-        return G, ()
-    free = "one free variable" if rank == 1 else f"{rank} free variables"
+    rank, columns = len(kept), np.count_nonzero(lengths)
     note = (
         f"Joint variables are constrained: rank {rank} of {n}, so that the torques are those of "
-        f"{free}."
+        f"{'one free variable' if rank == 1 else f'{rank} free variables'}."
     )
     if rank < columns:
         note += (
             f" The {columns} columns of the constraint depend on each other; if no joint is meant "
             "to follow others, the matrix is wrong."
         )
-    return G, (note,)
+    return np.ascontiguousarray(G[:, kept]), (note,) if rank < n else ()

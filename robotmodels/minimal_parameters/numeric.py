@@ -6,7 +6,6 @@ Robotic Systems 8(4), 1991.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -169,15 +168,31 @@ class TorqueColumns:
     @property
     def notes(self) -> tuple[str, ...]:
         """Sentences on an uncertain rank, and on samples that excite too few parameters."""
-        logged = self.samples is not None
-        notes = rank_warnings(self.names, self.basis, self.tolerance, logged)
-        if logged:
+        basis, names, notes = self.basis, np.array(self.names), ()
+        kept, other = basis.gap
+        if _ratio(basis) < _CLEAR:
+            is_kept = np.zeros(len(names), dtype=bool)
+            is_kept[basis.kept] = True
+            uncertain = np.where(
+                is_kept,
+                basis.distance < _CLEAR * other,
+                basis.distance > max(kept / _CLEAR, _ROUNDING),
+            )
+            advice = "State" if self.samples is None else "Use a richer motion, or state"
+            notes += (
+                f"No clear gap: {names[is_kept & (basis.distance == kept)][0]} is kept with "
+                f"{kept:.1e} of the largest torque beyond the others, "
+                f"{names[~is_kept & (basis.distance == other)][0]} left out with {other:.1e}. "
+                f"Uncertain: {_listed(names[uncertain])}. {advice} the zero tolerance= (here "
+                f"{self.tolerance:.0e}).",
+            )
+        if self.samples is not None:
             whole = replace(self, samples=None).basis.kept
-            if len(self.basis.kept) < len(whole):
-                missing = np.setdiff1d(whole, self.basis.kept)
+            if basis.rank < len(whole):
+                missing = names[np.setdiff1d(whole, basis.kept)]
                 notes += (
-                    f"This motion excites {len(self.basis.kept)} of the {len(whole)} base "
-                    f"parameters; not kept: {_listed(self.names, missing)}.",
+                    f"This motion excites {basis.rank} of the {len(whole)} base parameters; not "
+                    f"kept: {_listed(missing)}.",
                 )
         return notes
 
@@ -186,28 +201,6 @@ def _ratio(basis: ColumnBasis) -> float:
     """Ratio of the smallest kept to the largest dropped residual norm."""
     kept, other = basis.gap
     return kept / max(other, _ROUNDING)
-
-
-def rank_warnings(
-    names: Sequence[str], basis: ColumnBasis, tolerance: float, logged: bool
-) -> tuple[str, ...]:
-    """Note where the rank has no clear gap, with the parameters concerned."""
-    kept, other = basis.gap
-    if _ratio(basis) >= _CLEAR:
-        return ()
-    is_kept = np.zeros(len(names), dtype=bool)
-    is_kept[basis.kept] = True
-    near = np.where(
-        is_kept, basis.distance < _CLEAR * other, basis.distance > max(kept / _CLEAR, _ROUNDING)
-    )
-    least = names[int(np.flatnonzero(is_kept & (basis.distance == kept))[0])]
-    most = names[int(np.flatnonzero(~is_kept & (basis.distance == other))[0])]
-    advice = "Use a richer motion, or state" if logged else "State"
-    return (
-        f"No clear gap: {least} is kept with {kept:.1e} of the largest torque beyond the others, "
-        f"{most} left out with {other:.1e}. Uncertain: {_listed(names, np.flatnonzero(near))}. "
-        f"{advice} the zero tolerance= (here {tolerance:.0e}).",
-    )
 
 
 def residual_warning(error: float, tolerance: float) -> tuple[str, ...]:
@@ -220,6 +213,6 @@ def residual_warning(error: float, tolerance: float) -> tuple[str, ...]:
     )
 
 
-def _listed(names: Sequence[str], numbers: NDArray[np.int64]) -> str:
-    few = ", ".join([names[int(k)] for k in numbers[:_FEW]])
-    return few + (f" and {len(numbers) - _FEW} more" if len(numbers) > _FEW else "")
+def _listed(names: NDArray[np.str_]) -> str:
+    few = ", ".join(names[:_FEW].tolist())
+    return few + (f" and {len(names) - _FEW} more" if len(names) > _FEW else "")

@@ -9,7 +9,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,19 +25,14 @@ from .result import BaseParameters
 
 MARGIN = 1e-3
 """Default smallest eigenvalue of a pseudo-inertia, relative to the prior's."""
-_SOLVER = {
-    "tol_gap_abs": 1e-9,
-    "tol_gap_rel": 1e-9,
-    "tol_feas": 1e-9,
-    "max_iter": 200,
-    "accept_unknown": True,
-}
+_SOLVER = {"max_iter": 200, "accept_unknown": True}
+_SOLVER |= dict.fromkeys(("tol_gap_abs", "tol_gap_rel", "tol_feas"), 1e-9)
 _UNIQUE = 1e-8
 """Weight of the squared distance, in the solver's units, which makes least squares unique."""
-_RATIO, _ROUNDS = 10.0, 4
-"""Ratio of the solution to the assumed sizes above which the problem is rescaled."""
-_ROOM = 1e-3
-"""Additional margin of the nearest robot, relative, so that its base parameters are feasible."""
+_ROUNDS = 4
+"""Solutions of least squares, each with the sizes of the one before, until the gap is small."""
+_STRICT = 2e-3
+"""Additional margin of the nearest robot, part of the allowance: feasible base parameters."""
 _KEPT, _SAME = 1e-9, 1e-13
 """Zero tolerances of base parameter deviations, relative: of a robot, of the prior."""
 _ROUNDING = 5e-9
@@ -53,10 +48,7 @@ _SMALL = 1e-2
 class PhysicalStatus(Outcome):
     """Outcome of the search for a physical robot."""
 
-    EXACT = (
-        0,
-        "The robot has exactly these base parameters; its residuals are not increased.",
-    )
+    EXACT = 0, "The robot has exactly these base parameters; its residuals are not increased."
     CONSTRAINED = 1, "No physical robot has these base parameters; this one is the best of all."
     WEIGHTED = 2, "The best compromise of residuals and distance from the prior, by its weight."
     INACCURATE = 3, "The solver stopped early: the robot is physical, but a better one may exist."
@@ -66,25 +58,32 @@ class PhysicalStatus(Outcome):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Squares:
-    """Sum of squares ``|fit @ x - target|^2 + least`` of standard parameters.
+    """Sum of squares ``|weights @ (same @ x - level)|^2 + least``; levels are of this size.
 
-    ``same @ x = level`` where the sum is least. Shapes: fit, same (k, p), target, level (k,).
+    Shapes: weights (r, k), same (k, p), level (k,).
     """
 
-    fit: Array
-    target: Array
+    weights: Array
     same: Array
     level: Array
+    size: float
     least: float = 0.0
+
+    def about(self, x: Array, scale: Array) -> Squares:
+        """The same of ``z``, for the parameters ``x + scale @ z``."""
+        return replace(self, same=self.same @ scale, level=self.level - self.same @ x)
+
+    def rows(self, size: float) -> tuple[Array, Array]:
+        """Weighted rows (r, p) and right side (r,), both divided by a size."""
+        return self.weights @ self.same / size, self.weights @ self.level / size
 
     def sum(self, x: Array) -> float:
         """The sum of squares of standard parameters."""
-        return float(np.sum((self.fit @ x - self.target) ** 2)) + self.least
+        return float(np.sum((self.weights @ (self.same @ x - self.level)) ** 2)) + self.least
 
     def is_least(self, x: Array, part: float) -> bool:
         """Whether standard parameters have the least sum, up to a relative tolerance."""
-        error = np.abs(self.same @ x - self.level).max(initial=0.0)
-        return bool(error <= part * np.abs(self.level).max(initial=0.0))
+        return bool(np.abs(self.same @ x - self.level).max(initial=0.0) <= part * self.size)
 
 
 class PhysicalFit(NamedTuple):
@@ -104,12 +103,12 @@ class PhysicalFit(NamedTuple):
 
 
 class _Solution(NamedTuple):
-    """Result of the solver: parameters (p,) or None, its status and iterations.
+    """Result of the solver: changes (p,) or None, its status and iterations.
 
     Lower bound of the objective, and the weight of the squared distance in it.
     """
 
-    x: Array | None
+    z: Array | None
     status: str
     iterations: int
     dual: float
@@ -117,7 +116,7 @@ class _Solution(NamedTuple):
 
 
 class PhysicalProblem:
-    """Physical robots near a prior; the variables are the standard parameters.
+    """Physical robots near a prior; the variables z have the distance from the prior as their norm.
 
     Shapes: prior (p,), P0 (f, 4, 4), b (b,): base parameters that give a scale.
     """
@@ -126,120 +125,104 @@ class PhysicalProblem:
         self, base: BaseParameters, prior: Array, P0: Array, b: Array, margin: float = MARGIN
     ) -> None:
         f, p = base.model.f, len(prior)
-        self.prior, self.margin = prior, margin
+        self.base, self.prior = base, prior
         basis = pseudo_inertias(InertialParameters(np.eye(10)))
-        self.inverse = np.zeros((p, p))
-        self.bodies = []
+        inverse = np.zeros((p, p))
+        bodies = []
         for j in range(f):
             columns = slice(10 * j, 10 * j + 10)
             L = np.linalg.inv(np.linalg.cholesky(P0[j]))  # L P0 L^T = 1
             rows = np.zeros((16, p))
             rows[:, columns] = (L @ basis @ L.T).reshape(10, 16).T
-            self.inverse[columns, columns] = np.linalg.cholesky(
-                rows[:, columns].T @ rows[:, columns]
-            ).T
+            squares = rows[:, columns].T @ rows[:, columns]
+            inverse[columns, columns] = np.linalg.cholesky(squares).T
             sentence = f"The pseudo-inertia of link {j + 1} is singular to the margin."
             floor = -margin * np.eye(4).ravel()
-            self.bodies.append(Constraint("semidefinite", rows, floor, (sentence,)))
+            bodies.append(Constraint("semidefinite", rows, floor, (sentence,), 0.5 * margin))
         drives = np.arange(10 * f, p)
-        self.inverse[drives, drives] = 1.0 / drive_sizes(base, prior, b)
-        self.scale: Array = np.asarray(np.linalg.inv(self.inverse), dtype=np.float64)
-        self.unit = 1.0 / np.linalg.norm(self.inverse, axis=0)
+        inverse[drives, drives] = 1.0 / drive_sizes(base, prior, b)
+        self.scale: Array = np.asarray(np.linalg.inv(inverse), dtype=np.float64)
+        self.unit = 1.0 / np.linalg.norm(inverse, axis=0)
         self.natural = np.linalg.norm(base.matrix * self.unit, axis=1)
-        self.positive, kinds = positive_drives(base), numbers_by_kind(base)
-        self.stribeck = (kinds["Fs"], kinds["Fc"]) if "Fs" in kinds else None
-        self.others = tuple(drive_constraints(base, self.unit))
+        self.constraints: list[Constraint] = []
+        self.add((*drive_constraints(base, self.unit), *bodies))
 
-    def add(self, bounds: Iterable[Constraint]) -> None:
-        """Add bounds on masses and centres."""
-        self.others += tuple(bounds)
+    def add(self, constraints: Iterable[Constraint]) -> None:
+        """Add constraints on the standard parameters."""
+        self.constraints += [one.about(self.prior, self.scale) for one in constraints]
 
-    def distance(self, x: Array) -> float:
-        """Distance of standard parameters from the prior."""
-        return float(np.linalg.norm(self.inverse @ (x - self.prior)))
-
-    def is_met(self, x: Array) -> bool:
+    def is_met(self, z: Array) -> bool:
         """Whether bodies are definite and other constraints satisfied up to rounding."""
-        allowed = _ROUNDING * (1.0 + self.distance(x))
-        definite = all(one.slack(x)[0] > -0.5 * self.margin for one in self.bodies)
-        return definite and all((one.slack(x) >= -allowed).all() for one in self.others)
+        rounding = _ROUNDING * (1.0 + float(np.linalg.norm(z)))
+        return all((one.slack(z) >= -(one.allowance or rounding)).all() for one in self.constraints)
 
     def fit(self, squares: Squares, b: Array, weight: float, tolerance: float) -> PhysicalFit:
         """Physically consistent least squares; of equal fits, the nearest to the prior.
 
         With a weight of the squared distance, the least sum of both. Shapes: b (b,).
         """
-        size = max(
-            1.0, float(np.abs(b / np.where(self.natural > 0, self.natural, 1.0)).max(initial=0))
-        )
-        x = self._nearest_exact(squares, size) if weight == 0.0 else None
-        if x is not None:
-            return self._result(x, squares, PhysicalStatus.EXACT)
-        x, gap, found = self._least_squares(squares, size, weight)
-        if found is None:
+        squares = squares.about(self.prior, self.scale)
+        size = max(1.0, float(np.abs(b / self.natural).max(initial=0.0)))
+        prior = np.zeros_like(self.prior)
+        if not self.is_met(prior):
             found = self._solve(1.0)
-            infeasible = found.status.endswith("PrimalInfeasible")
-            status = PhysicalStatus.INFEASIBLE if infeasible else PhysicalStatus.FAILED
-            return self._result(self.prior, squares, status, np.inf, found)
-        if weight == 0.0:
-            radius = (squares.sum(x) * (1.0 + tolerance) - squares.least) ** 0.5 or 1.0
-            ball = squares.fit / radius, squares.target / radius
-            nearer = self._solve(self._numbers(x), within=ball).x
-            nearer = x if nearer is None else self._settled(nearer)
+            if found.status.endswith("PrimalInfeasible"):
+                return self._result(prior, squares, PhysicalStatus.INFEASIBLE, np.inf, found)
+        elif weight == 0.0 and squares.is_least(prior, _SAME):
+            return self._result(prior, squares, PhysicalStatus.EXACT)
+        if weight == 0.0 and (z := self._nearest_exact(squares, size)) is not None:
+            return self._result(z, squares, PhysicalStatus.EXACT)
+        z, gap, found = self._least_squares(squares, size, weight)
+        if found is not None and weight == 0.0:
+            radius = (squares.sum(z) * (1.0 + tolerance) - squares.least) ** 0.5 or 1.0
+            ball = squares.rows(radius)
+            nearer = self._solve(_rms(z), within=ball).z
+            nearer = z if nearer is None else self._settled(nearer)
             # an early end may leave the ball of equal fits
             if np.sum((ball[0] @ nearer - ball[1]) ** 2) <= 1.0 + 1e-6 and self.is_met(nearer):
-                x, gap = nearer, self._gap(nearer, squares, found, weight)
-        if not self.is_met(x):
-            return self._result(self.prior, squares, PhysicalStatus.FAILED, np.inf, found)
+                z, gap = nearer, self._gap(nearer, squares, found, weight)
+        if found is None or not self.is_met(z):
+            return self._result(prior, squares, PhysicalStatus.FAILED, np.inf, found)
         if gap > _GAP + tolerance:
-            return self._result(x, squares, PhysicalStatus.INACCURATE, gap, found)
+            return self._result(z, squares, PhysicalStatus.INACCURATE, gap, found)
         status = PhysicalStatus.CONSTRAINED if weight == 0.0 else PhysicalStatus.WEIGHTED
-        if squares.is_least(x, _KEPT):
+        if squares.is_least(z, _KEPT):
             status = PhysicalStatus.EXACT
-        return self._result(x, squares, status, gap)
+        return self._result(z, squares, status, gap)
 
     def _nearest_exact(self, squares: Squares, size: float) -> Array | None:
         """The nearest robot with the least squares; None if no physical robot has them."""
-        if squares.is_least(self.prior, _SAME) and self.is_met(self.prior):
-            return self.prior
-        x = self._solve(size, equal=(squares.same, squares.level)).x
-        if x is None:
+        if (z := self._solve(size, equal=(squares.same, squares.level)).z) is None:
             return None
-        x = self._settled(x, squares.same, squares.level)
-        return x if squares.is_least(x, _KEPT) and self.is_met(x) else None
+        z = self._settled(z, squares.same, squares.level)
+        return z if squares.is_least(z, _KEPT) and self.is_met(z) else None
 
     def _least_squares(
         self, squares: Squares, size: float, weight: float
     ) -> tuple[Array, float, _Solution | None]:
-        """Parameters of least squares, their gap and the solver's result.
+        """Changes of least squares, their gap and the solver's result.
 
         The problem is rescaled until the assumed sizes of squares and changes were right.
         """
-        smallest = max(squares.least, 1e-8 * float(squares.target @ squares.target), 1e-300)
-        best, least, found = self.prior, np.inf, None
-        total = max(smallest, squares.sum(self.prior))
+        z, gap, found = np.zeros_like(self.prior), np.inf, None
+        smallest = max(squares.least, 1e-8 * squares.sum(z), 1e-300)
         for _ in range(_ROUNDS):
+            total = max(smallest, squares.sum(z))
             again = self._solve(size, squares, total, weight or _UNIQUE * total / size**2)
-            if again.x is None:
+            if again.z is None:
                 break
-            x = self._settled(again.x)
-            gap = self._gap(x, squares, again, weight)
-            if gap <= least:
-                best, least, found = x, gap, again
-            used = total, size
-            total, size = max(smallest, squares.sum(x)), max(size, self._numbers(x))
-            fits = max(total, used[0]) <= _RATIO * min(total, used[0])
-            if fits and size <= _RATIO * used[1] and gap <= 10.0 * _GAP:
+            found, z = again, self._settled(again.z)
+            gap, size = self._gap(z, squares, found, weight), max(size, _rms(z))
+            if gap <= _GAP:
                 break
-        return best, least, found
+        return z, gap, found
 
-    def _gap(self, x: Array, squares: Squares, found: _Solution, weight: float) -> float:
+    def _gap(self, z: Array, squares: Squares, found: _Solution, weight: float) -> float:
         """Optimality gap relative to the objective, for robots within twice the distance."""
-        if not (np.isfinite(found.dual) and self.is_met(x)):
+        if not (np.isfinite(found.dual) and self.is_met(z)):
             return np.inf
-        far = self.distance(x) ** 2
-        here = squares.sum(x) - squares.least + weight * far
-        bound = found.dual - (4.0 * found.weight * far if weight == 0.0 else 0.0)
+        here = squares.sum(z) - squares.least + weight * float(z @ z)
+        bound = found.dual - (4.0 * found.weight * float(z @ z) if weight == 0.0 else 0.0)
         return max(0.0, here - max(bound, 0.0)) / max(here + squares.least, 1e-300)
 
     def _solve(
@@ -251,76 +234,69 @@ class PhysicalProblem:
         equal: tuple[Array, Array] | None = None,
         within: tuple[Array, Array] | None = None,
     ) -> _Solution:
-        """Least ``|F x - t|^2 + weight * distance^2``, with ``E x = e`` or ``|B x - b| <= 1``."""
+        """Least ``|F z - t|^2 + weight * |z|^2``, with ``E z = e`` or ``|B z - b| <= 1``."""
         cp = _cvxpy()
-        change = cp.Variable(len(self.prior))
-        terms = (cp, change, self.scale, self.prior, size)
-        room = 0.0 if within is None else _ROOM * self.margin
-        stated = [one.stated(*terms) for one in self.others]
-        stated += [one.stated(*terms, room) for one in self.bodies]
-
-        def residual(rows: Array, right: Array) -> Any:
-            return (size * rows @ self.scale) @ change - (right - rows @ self.prior)
-
-        objective = cp.sum_squares(change) * (weight / total * size**2 if squares else 1.0)
+        u = cp.Variable(len(self.prior))  # z / size
+        strict = _STRICT if within is not None else 0.0
+        stated = [one.stated(cp, u, size, strict) for one in self.constraints]
+        objective = cp.sum_squares(u) * (weight / total * size**2 if squares else 1.0)
         if squares is not None:
-            root = total**0.5
-            objective += cp.sum_squares(residual(squares.fit / root, squares.target / root))
+            rows, right = squares.rows(total**0.5)
+            objective += cp.sum_squares((size * rows) @ u - right)
         if equal is not None:
-            lengths = np.maximum(size * np.linalg.norm(equal[0] @ self.scale, axis=1), 1e-300)
-            stated.append(residual(equal[0] / lengths[:, None], equal[1] / lengths) == 0)
+            E, e = equal
+            lengths = np.maximum(size * np.linalg.norm(E, axis=1), 1e-300)
+            stated.append((size * E / lengths[:, None]) @ u == e / lengths)
         if within is not None:
-            stated.append(cp.norm(residual(*within)) <= 1)
+            stated.append(cp.norm((size * within[0]) @ u - within[1]) <= 1)
         raw = _solved(cp.Problem(cp.Minimize(objective), stated))
-        x = None if change.value is None else self.prior + size * self.scale @ change.value
-        return _Solution(x, str(raw.status), raw.iterations, raw.obj_val_dual * total, weight)
+        z = None if u.value is None else size * u.value
+        return _Solution(z, str(raw.status), raw.iterations, raw.obj_val_dual * total, weight)
 
-    def _numbers(self, x: Array) -> float:
-        """Scale of a solution: root mean square change in the solver's units, at least 1."""
-        return max(1.0, self.distance(x) / len(x) ** 0.5)
-
-    def _settled(self, x: Array, E: Array | None = None, e: Array | None = None) -> Array:
-        """Projection onto ``E x = e`` and violated constraints, matrices inside their cones."""
-        linear = [one for one in self.others if one.cone in ("zero", "nonnegative")]
-        violated = [(one, one.slack(x) <= 0.0) for one in linear]
+    def _settled(self, z: Array, E: Array | None = None, e: Array | None = None) -> Array:
+        """Projection onto ``E z = e`` and violated constraints, matrices inside their cones."""
+        linear = [one for one in self.constraints if one.cone != "semidefinite"]
+        violated = [(one, one.slack(z) <= 0.0) for one in linear]
         rows = [one.rows[bad] for one, bad in violated] + ([] if E is None else [E])
         right = [-one.offset[bad] for one, bad in violated] + ([] if e is None else [e])
         if rows:
             A, b = np.concatenate(rows), np.concatenate(right)
-            x = x + self.unit * (np.linalg.pinv(A * self.unit) @ (b - A @ x))
-        x = x.copy()
-        x[self.positive] = np.maximum(x[self.positive], 0.0)
-        if self.stribeck is not None:
-            static, coulomb = self.stribeck
-            x[static] = np.maximum(x[static], x[coulomb])
-        for one in self.others:
-            x = one.inside(x) if one.cone == "semidefinite" else x
-        for one in self.bodies:
-            x = one.inside(x, -0.5 * self.margin)
-        return x
+            z = z + np.linalg.pinv(A) @ (b - A @ z)
+        for one in self.constraints:
+            z = one.inside(z) if one.cone == "semidefinite" else z
+        return z
 
     def _result(
         self,
-        x: Array,
+        z: Array,
         squares: Squares,
         status: PhysicalStatus,
         gap: float = 0.0,
         stopped: _Solution | None = None,
     ) -> PhysicalFit:
+        x = self.prior + self.scale @ z
+        positive, kinds = positive_drives(self.base), numbers_by_kind(self.base)
+        x[positive] = np.maximum(x[positive], 0.0)
+        if "Fs" in kinds:
+            x[kinds["Fs"]] = np.maximum(x[kinds["Fs"]], x[kinds["Fc"]])
         active = [
             sentence
-            for one in (*self.others, *self.bodies)
+            for one in self.constraints
             if one.cone != "zero" and np.isfinite(gap)
-            for slack, sentence in zip(one.slack(x), one.sentences, strict=True)
+            for slack, sentence in zip(one.slack(z), one.sentences, strict=True)
             if slack < _ACTIVE
         ]
         ending = ""
         if stopped is not None:
             ending = f"The solver stopped: {stopped.status} after {stopped.iterations} iterations."
-        total = squares.least if status is PhysicalStatus.EXACT else squares.sum(x)
-        return PhysicalFit(
-            x, status, self.distance(x), total, squares.least, gap, tuple(active), ending
-        )
+        total = squares.least if status is PhysicalStatus.EXACT else squares.sum(z)
+        distance = float(np.linalg.norm(z))
+        return PhysicalFit(x, status, distance, total, squares.least, gap, tuple(active), ending)
+
+
+def _rms(z: Array) -> float:
+    """Scale of a solution: root mean square change, at least 1."""
+    return max(1.0, float(np.sqrt(np.mean(z * z))))
 
 
 def drive_sizes(base: BaseParameters, prior: Array, b: Array) -> Array:
@@ -360,16 +336,13 @@ def nearest_body(F: Array, t: Array, radius: float = 0.1) -> Array | None:
     x = cp.Variable(10)
     size = mass * float(np.abs(scaled).max(initial=0.0)) or 1.0
     squares = cp.sum_squares(scaled @ x * (mass / size) - t / size) + 1e-12 * cp.sum_squares(x)
-    _solved(
-        cp.Problem(
-            cp.Minimize(squares), [cp.reshape(maps @ x, (4, 4), order="C") >> 1e-7 * np.eye(4)]
-        )
-    )
+    body = cp.reshape(maps @ x, (4, 4), order="C") >> 1e-7 * np.eye(4)
+    _solved(cp.Problem(cp.Minimize(squares), [body]))
     return None if x.value is None else mass * unit * x.value
 
 
 def _solved(problem: Any) -> Any:
-    """Solve a problem with Clarabel; its own result."""
+    """Solve a problem with Clarabel; the result of Clarabel."""
     cp = _cvxpy()
     data, chain, inverse = problem.get_problem_data(cp.CLARABEL, solver_opts=dict(_SOLVER))
     raw = chain.solve_via_data(problem, data, solver_opts=dict(_SOLVER))

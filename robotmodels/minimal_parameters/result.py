@@ -16,15 +16,17 @@ from ..drive import Drives, drive_kinds
 from ..errors import InvalidValueError, ShapeError
 from ..estimation.columns import NOTHING
 from ..friction import Friction
-from ..geometry import PRISMATIC
+from ..geometry import PRISMATIC, REVOLUTE
 from ..latex_text import markdown
 from ..model import RobotModel, check_model
-from ..regressors import energy_parameter_names, parameter_names, parameter_vector
+from ..regressors import parameter_names, parameter_vector
 from .alignment import aligned_robot
-from .formulas import Formula, constants_of, numeric_formulas, symbolic_formulas
-from .printing import BaseTable, table_latex, table_text
-from .same_structure import structure_differences
-from .values_table import BaseValues, KeptNames, base_values
+from .formulas import Formula, constants_of, formulas, symbolic_texts
+from .rules import reach
+from .tables import BaseTable, BaseValues, KeptNames, base_values
+
+_SAME = 1e-9
+"""Tolerance of the same constants, relative to 1 (directions) or to the robot's size."""
 
 
 class BaseMethod(Enum):
@@ -51,8 +53,7 @@ class BaseParameters:
     model : RobotModel
         The robot.
     drive : bool or collection of DriveKind or str
-        Kinds of drive parameters among the p standard parameters; stored as a tuple of
-        `DriveKind`, empty where there are none.
+        Kinds of drive parameters among the p standard parameters; stored as a tuple of `DriveKind`.
     kept : ndarray of int, shape (b,)
         Numbers of the kept standard parameters.
     matrix : ndarray, shape (b, p)
@@ -62,23 +63,20 @@ class BaseParameters:
     gap : (float, float), optional
         Rank gap of the numeric method: smallest residual norm of a kept column and largest of a
         dropped one, relative to the longest column (parameters in natural units, those of a robot
-        of this size and unit mass); the tolerance is between. If the gap is small, `notes` names
-        the uncertain parameters.
+        of this size and unit mass). If it is small, `notes` names the uncertain parameters.
     friction : Friction, optional
         A linear friction model whose parameters come after those of the drives.
-    tolerance : float
-        Part of the largest torque that counts as zero.
+    tolerance, angle : float
+        Part of the largest torque that counts as zero; angle in rad up to which axes were taken as
+        parallel or perpendicular.
     notes : tuple of str
-        Findings: nearly aligned axes, constrained joints, an uncertain rank, a motion with little
-        excitation.
+        Nearly aligned axes, constrained joints, an uncertain rank, a motion with little excitation.
     neglected : tuple of str
         Parameters whose effect on the torques is below the tolerance, or only due to the angles of
         axes treated as aligned.
     torque_error : float, optional
         Largest torque error on an independent motion, relative to the largest torque; for logged
         motion on the same samples. None for symbolic rules alone.
-    angle : float
-        Angle in rad up to which axes were taken as parallel or perpendicular.
 
     Raises
     ------
@@ -186,23 +184,10 @@ class BaseParameters:
                 f"W: expected shape (..., {p}), a column for each standard parameter (with the "
                 "same friction as these base parameters, and the same drives: "
                 f"drive={tuple(kind.value for kind in drive_kinds(self.drive))}), got {W.shape}."
-                + self._energy_hint(W.shape[-1] if W.ndim else 0)
+                " An energy has no columns of Fv, Fc, offset: reduce it by base parameters without "
+                "them, base_parameters(model, drive=('Ia',))."
             )
         return np.ascontiguousarray(W[..., self.kept])
-
-    def _energy_hint(self, columns: int) -> str:
-        """Advice where a regressor has the columns of an energy."""
-        energy = energy_parameter_names(self.model, self.drive)
-        kinds = dict.fromkeys(
-            name.rstrip("0123456789") for name in self.parameter_names if name not in energy
-        )
-        sizes = len(energy), len(energy_parameter_names(self.model))
-        if columns not in sizes or not kinds:
-            return ""
-        return (
-            f" An energy has no columns of {', '.join(kinds)}: reduce it by base parameters without"
-            " them, base_parameters(model, drive=('Ia',))."
-        )
 
     def values(self, model: RobotModel) -> Array:
         """Base parameters (b,) of a model's standard parameters; raises for other structures."""
@@ -240,23 +225,23 @@ class BaseParameters:
         if self.method is BaseMethod.NUMERIC:
             return self.numbers
         model = aligned_robot(self.model, self.angle).model
-        names = self.parameter_names
-        return symbolic_formulas(model, self.drive, self.kept, self.matrix, names, self.tolerance)
+        texts = symbolic_texts(model, self.drive, self.kept, self.matrix, self.tolerance)
+        return formulas(self.parameter_names, self.kept, self.matrix, texts)
 
     @cached_property
     def numbers(self) -> tuple[Formula, ...]:
         """The formulas with numbers as coefficients."""
-        return numeric_formulas(self.parameter_names, self.kept, self.matrix)
+        return formulas(self.parameter_names, self.kept, self.matrix, {})
 
-    @cached_property
+    @property
     def text(self) -> str:
         """The table of the book, as text."""
-        return table_text(self._table)
+        return self._table.text
 
-    @cached_property
+    @property
     def latex(self) -> str:
         """The same in LaTeX."""
-        return table_latex(self._table)
+        return self._table.latex
 
     @cached_property
     def _table(self) -> BaseTable:
@@ -289,14 +274,14 @@ class BaseParameters:
         """Units of the kinds of parameters that there are."""
         slides = self.model.table.sigma[self.model.table.joint_rows] == PRISMATIC
         units = ["XX to ZZ kg m^2, MX to MZ kg m, M kg"]
-        kinds = {kind.value for kind in drive_kinds(self.drive)}
-        forces = " and ".join(kind for kind in ("Fc", "offset") if kind in kinds)
-        for joints, mark, (inertia, viscous, force) in (
+        kinds = [kind.value for kind in drive_kinds(self.drive)]
+        forces = " and ".join(kind for kind in kinds if kind in ("Fc", "offset"))
+        for joints, mark, words in (
             (~slides, "", ("kg m^2", "N m s/rad", "N m")),
             (slides, "of prismatic joints ", ("kg", "N s/m", "N")),
         ):
-            parts = [f"Ia {inertia}"] * ("Ia" in kinds) + [f"Fv {viscous}"] * ("Fv" in kinds)
-            parts += [f"{forces} {force}"] * bool(forces)
+            names = [kind if kind in kinds else "" for kind in ("Ia", "Fv")] + [forces]
+            parts = [f"{name} {unit}" for name, unit in zip(names, words, strict=True) if name]
             if joints.any() and parts:
                 units.append(mark + ", ".join(parts))
         return "; ".join(units)
@@ -315,3 +300,41 @@ class BaseParameters:
 
     def __reduce__(self) -> tuple[object, ...]:  # rebuilt, so that its arrays are read-only again
         return type(self), tuple(getattr(self, field.name) for field in fields(self))
+
+
+def structure_differences(model: RobotModel, other: RobotModel, drive: Drives) -> list[str]:
+    """Differences of two robots that change their base parameters."""
+    if model is other:
+        return []
+    a, b = model.chain, other.chain
+    if not (np.array_equal(a.antecedent, b.antecedent) and np.array_equal(a.sigma, b.sigma)):
+        return ["its frames or kinds of joints differ"]
+    differences = []
+    for k, (before, sigma) in enumerate(zip(a.antecedent.tolist(), a.sigma.tolist(), strict=True)):
+        R, S, moved = a.rotation[k], b.rotation[k], a.position[k] - b.position[k]
+        z = R[:, 2]
+        turned = z - S[:, 2] if sigma == REVOLUTE else R - S
+        if sigma == PRISMATIC:
+            moved = moved - (moved @ z) * z
+        if np.abs(turned).max() > _SAME:
+            differences.append(f"axis {k + 1} has another direction in frame {before}")
+        elif before and np.abs(moved).max() > _SAME * reach(model):  # the base has no effect
+            differences.append(f"axis {k + 1} has another place in frame {before}")
+    down, below = (np.asarray(m.gravity) @ m.chain.base_rotation for m in (model, other))
+    if np.abs(down - below).max() > _SAME * max(1.0, float(np.abs(down).max())):
+        shown = ["(" + ", ".join(f"{x:.4g}" for x in vector) + ")" for vector in (below, down)]
+        differences.append(f"gravity in the base is {shown[0]} instead of {shown[1]} m/s^2")
+    if any(kind.coupling is not None for kind in drive_kinds(drive)):
+        mine, theirs = (_coupled(m) for m in (model, other))
+        if mine.keys() != theirs.keys():
+            differences.append("other motors are coupled")
+        else:
+            far = [m for m in mine if np.abs(mine[m] - theirs[m]).max() > _SAME]
+            differences += [f"motor {m} is coupled in another way" for m in far]
+    return differences
+
+
+def _coupled(model: RobotModel) -> dict[int, Array]:
+    """Weights of the joints (n,) of each coupled motor."""
+    K = model.transmission
+    return {} if K is None else {m: K.weights[m - 1] for m in K.coupled_motors}

@@ -147,7 +147,7 @@ def origins(model: RobotModel, q: Array, frames: Sequence[Frame]) -> tuple[Array
     from ..kernels.poses import link_poses
 
     inner = np.empty((len(q), model.f, 4, 4))
-    link_poses(np.ascontiguousarray(q), *model.chain, inner)
+    link_poses(np.ascontiguousarray(q), model.chain, inner)
     base = np.broadcast_to(model.base, (len(q), 1, 4, 4))
     T = np.concatenate((base, inner), axis=1)
     places = [model.twin.frame(frame) for frame in frames]

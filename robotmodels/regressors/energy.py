@@ -245,9 +245,9 @@ def _fill_energies(
     out: Array,
 ) -> None:
     """Write the energies of the samples ``(q, v)`` into ``out (N, c)``, zero for friction."""
-    from ..kernels.energy_regressor import energy_regressors
+    from ..kernels.regressors import energy_regressors
 
-    energy_regressors(*rows, *model.chain, model.gravity, chosen.places[LINKS], out[:, None])
+    energy_regressors(*rows, model.chain, model.gravity, chosen.places[LINKS], out[:, None])
     add_powers(chosen, rotor_terms(model, rows[1]), rows[1], out, 0.5)
 
 
@@ -259,10 +259,10 @@ def _fill_powers(
     out: Array,
 ) -> None:
     """Write the powers of the samples ``(q, v, a)`` into ``out (N, c)``."""
-    from ..kernels.power_regressor import power_regressors
+    from ..kernels.regressors import power_regressors
 
     q, v, a = rows
-    power_regressors(*rows, *model.chain, model.gravity, chosen.places[LINKS], out[:, None])
+    power_regressors(*rows, model.chain, model.gravity, chosen.places[LINKS], out[:, None])
     add_powers(chosen, rotor_terms(model, a), v, out)
     add_powers(chosen, friction_terms(model, q, v, friction), v, out)
 

@@ -204,10 +204,10 @@ def _fill_momenta(
     S: Array,
 ) -> None:
     """Write the chosen columns of the samples ``(q, v)`` into ``P`` and ``S (N, n, c)``."""
-    from ..kernels.momentum_regressor import momentum_regressors
+    from ..kernels.regressors import momentum_regressors
 
     q, v = rows
-    momentum_regressors(q, v, *model.chain, model.gravity, chosen.places[LINKS], P, S)
+    momentum_regressors(q, v, model.chain, model.gravity, chosen.places[LINKS], P, S)
     add_torques(chosen, rotor_terms(model, v), P)
     add_torques(chosen, friction_terms(model, q, v, friction), S, -1.0)
 

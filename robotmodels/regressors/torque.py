@@ -133,10 +133,10 @@ def fill_torques(
     W: Array,
 ) -> None:
     """Write the chosen columns of the samples ``(q, v, a)`` into ``W (N, n, c)``."""
-    from ..kernels.torque_regressor import torque_regressors
+    from ..kernels.regressors import torque_regressors
 
     q, v, a = rows
-    torque_regressors(q, v, a, *model.chain, model.gravity, chosen.places[LINKS], W)
+    torque_regressors(q, v, a, model.chain, model.gravity, chosen.places[LINKS], W)
     add_torques(chosen, rotor_terms(model, a), W)
     add_torques(chosen, friction_terms(model, q, v, friction), W)
 

@@ -21,24 +21,14 @@ class DynamicsMap(Rebuilt):
 
     Parameters
     ----------
-    model : RobotModel
-        The robot, n joints.
-    joints : tuple of int, length 1 or 2
-        Columns of q, from 0, that vary.
+    model, joints, q
+        As for `dynamics_map`: n joints, columns of q that vary, and values of the others.
     ranges : tuple of ndarray, shapes (N1,) and (N2,)
-        Their values, rad or m, ascending.
-    q : ndarray, shape (n,)
-        Values of the others.
+        Values of the joints that vary, rad or m, ascending.
     mass : ndarray, shape (N1, n, n) or (N1, N2, n, n)
         Mass matrices.
     gravity : ndarray, shape (N1, n) or (N1, N2, n)
         Gravity torques, N m or N.
-
-    Examples
-    --------
-    >>> from robotmodels.robots import load
-    >>> dynamics_map(load("planar_2r"), 1, samples=5).mass.shape
-    (5, 2, 2)
     """
 
     model: RobotModel

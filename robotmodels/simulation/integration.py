@@ -6,7 +6,8 @@ budget is used up; here each step is searched between its ends as well.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from itertools import pairwise
 from math import nextafter
 from typing import Any, NamedTuple
@@ -26,17 +27,6 @@ _ROUNDING = 1e-13
 _SAME_INSTANT = 64 * float(np.finfo(np.float64).eps)
 
 
-class Options(NamedTuple):
-    """Settings of the integration."""
-
-    method: Integrator
-    rtol: float
-    atol: float
-    max_step: float
-    max_evaluations: int
-    progress: Callable[[float], None] | None
-
-
 class Event(NamedTuple):
     """An event: a part at rest, a joint at a limit (>= 0), or a breakaway (both -1)."""
 
@@ -53,10 +43,14 @@ class Integration:
         motion: Motion,
         times: Array | None,
         limits: tuple[Array, Array] | None,
-        options: Options,
+        method: Integrator,
+        tolerances: Mapping[str, float],
+        max_evaluations: int,
+        progress: Callable[[float], None] | None,
     ) -> None:
-        self.motion, self.dry, self.times, self.options = motion, motion.dry, times, options
-        n = motion.n
+        self.motion, self.dry, self.times, self.progress = motion, motion.dry, times, progress
+        self.method, self.tolerances = method, tolerances
+        self.max_evaluations, n = max_evaluations, motion.n
         # limits as rows of G y + c, which is negative beyond them
         G = np.hstack([np.vstack([-np.eye(n), np.eye(n)]), np.zeros((2 * n, n))])
         c = np.full(2 * n, np.inf) if limits is None else np.concatenate([limits[1], -limits[0]])
@@ -94,16 +88,15 @@ class Integration:
         """Integrate without changes of mode, to a time, an event or a failure."""
         import scipy.integrate
 
-        options, motion = self.options, self.motion
-        method: Any = getattr(scipy.integrate, options.method.value)
+        motion = self.motion
+        method: Any = getattr(scipy.integrate, self.method.value)
         first = None if self._step is None else min(self._step, bound - t)
-        tolerances = {"rtol": options.rtol, "atol": options.atol, "max_step": options.max_step}
         watched = bool(self.dry.lower.size or self._limits.size)
         try:
-            solver = method(motion.derivative, t, y, bound, first_step=first, **tolerances)
+            solver = method(motion.derivative, t, y, bound, first_step=first, **self.tolerances)
             failed = not np.isfinite(solver.h_abs)
             while solver.status == "running" and not failed:
-                if motion.evaluations >= options.max_evaluations:
+                if motion.evaluations >= self.max_evaluations:
                     self.status = SimulationStatus.NOT_CONVERGED
                     return t, np.array(y), None
                 before = float(solver.h_abs)
@@ -124,7 +117,10 @@ class Integration:
                     self._sample(time, y if time == t else dense(time))
                 if self.times is None and t > self.t[-1]:
                     self._sample(t, y)
-                self._report(t)
+                done = (t - self._start) / (self._end - self._start)
+                if self.progress is not None and (done >= self._reported + 0.01 or done >= 1.0):
+                    self._reported = done
+                    self.progress(done)
                 if event is not None:
                     return t, np.array(y), event
         except ValueError as error:
@@ -152,12 +148,6 @@ class Integration:
         held = motion.joint_signs == 0.0
         self.rows.append((q, v, at.a, at.tau.copy(), at.friction, held, works))
 
-    def _report(self, t: float) -> None:
-        done = (t - self._start) / (self._end - self._start)
-        if self.options.progress is not None and (done >= self._reported + 0.01 or done >= 1.0):
-            self._reported = done
-            self.options.progress(done)
-
     def _first_event(self, t_old: float, t_new: float, dense: Any) -> Event | None:
         """The first event inside a step: speeds and limits are linear in y, margins are not."""
         n, mode = self.motion.n, self.motion.mode
@@ -171,33 +161,30 @@ class Integration:
         least = -_ROUNDING * (1.0 + (np.abs(G) @ np.abs(Y)).max(axis=1, initial=0.0))
         event: Event | None = None
         for i in np.flatnonzero(values.min(axis=1) - np.ptp(values, axis=1) < least).tolist():
-
-            def distance(s: float, i: int = i) -> float:
-                return float(G[i] @ dense(s)[: 2 * n] + c[i])
-
+            distance = partial(lambda i, s: float(G[i] @ dense(s)[: 2 * n] + c[i]), i)
             root = first_below(distance, ts, values[i], float(least[i]))
             if root is not None and (event is None or root[0] < event.t):
                 limit = int(self._limits[i - slip.size]) % n if i >= slip.size else -1
                 event = Event(root[0], -1 if limit >= 0 else int(slip[i]), limit)
-        if mode.stuck.size:
-            # torques after the first event belong to another mode
-            within = ts if event is None else ts[: max(int(np.searchsorted(ts, event.t)) + 1, 2)]
+        if not mode.stuck.size:
+            return event
 
-            def margin(s: float) -> float:
-                y = np.ascontiguousarray(dense(s))
-                reaction = self.motion.at(s, y[:n], y[n : 2 * n]).reaction
-                return self.dry.margin(mode, reaction)
+        def margin(s: float) -> float:
+            y = np.ascontiguousarray(dense(s))
+            return self.dry.margin(mode, self.motion.at(s, y[:n], y[n : 2 * n]).reaction)
 
-            margins = np.array([margin(float(s)) for s in within])
-            root = first_below(margin, within, margins, -_SLACK, -_ROUNDING)
-            if root is not None:
-                # past the root, so that a jump of the torques is included
-                t, end = root
-                step = float(np.spacing(max(abs(t), abs(end))))
-                while t < end and margin(t) >= -_ROUNDING:
-                    t, step = min(t + step, end), 2.0 * step
-                event = Event(t) if event is None or t < event.t else event
-        return event
+        # torques after the first event belong to another mode
+        within = ts if event is None else ts[: max(int(np.searchsorted(ts, event.t)) + 1, 2)]
+        margins = np.array([margin(float(s)) for s in within])
+        root = first_below(margin, within, margins, -_SLACK, -_ROUNDING)
+        if root is None:
+            return event
+        # past the root, so that a jump of the torques is included
+        t, end = root
+        step = float(np.spacing(max(abs(t), abs(end))))
+        while t < end and margin(t) >= -_ROUNDING:
+            t, step = min(t + step, end), 2.0 * step
+        return Event(t) if event is None or t < event.t else event
 
     def _change(self, t: float, y: Array, event: Event) -> Array:
         """State after an event, which changes the mode or ends the simulation."""

@@ -46,10 +46,9 @@ class Motion:
         friction: Friction | None,
         width: Array | None = None,
     ) -> None:
-        from ..kernels.direct_dynamics import joint_accelerations
-        from ..kernels.jacobians import jacobians
-        from ..kernels.mass_matrix import mass_matrices
-        from ..kernels.newton_euler import joint_torques
+        from ..kernels.mass import joint_accelerations, mass_matrices
+        from ..kernels.poses import jacobians
+        from ..kernels.torques import joint_torques
 
         n = model.n
         self.n, self.control, self.wrench, self.width = n, control, wrench, width
@@ -64,8 +63,8 @@ class Motion:
         self.offset = np.zeros(n) if drives is None else drives.offset
         self._accelerations, self._torques = joint_accelerations, joint_torques
         self._masses, self._jacobians = mass_matrices, jacobians
-        self._bodies = (*model.chain, model.inertia.values)
-        self._tool = (*model.chain, *model.twin.frame(None).kernel_arguments, _WORLD_ALIGNED)
+        self._bodies = (model.chain, model.inertia.values)
+        self._tool = (model.chain, *model.twin.frame(None).kernel_arguments, _WORLD_ALIGNED)
         self._gravity, self._zero = model.gravity, np.zeros((1, n))
         level = np.abs(self.smooth.rates.T) @ (0.5 * np.abs(self.smooth.upper - self.smooth.lower))
         self._weights = np.divide(1.0, level, out=np.zeros(n), where=level > 0.0)

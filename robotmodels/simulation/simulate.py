@@ -12,12 +12,12 @@ from numpy.typing import ArrayLike
 from .._arrays import Array, as_exact, as_floats, as_reals
 from .._choices import chosen
 from ..drive import check_all_or_none
-from ..dynamics import ddm, kinetic_energy, mass_matrix, potential_energy
-from ..errors import InertiaError, InvalidValueError, ShapeError
+from ..dynamics import ddm, kinetic_energy, potential_energy
+from ..errors import InvalidValueError, ShapeError
 from ..friction import Friction, check_friction
 from ..model import RobotModel, check_model
 from .dry_friction import check_dissipates
-from .integration import Integration, Options
+from .integration import Integration
 from .motion import Law, Motion
 from .result import Integrator, Simulation
 
@@ -74,8 +74,7 @@ def simulate(
         own velocity.
     smoothing : array_like, scalar or shape (n,), optional
         Velocities w (rad/s or m/s) of a simpler model without events: ``tanh(v / w)`` instead of
-        ``sign(v)``. Joints then creep where they should stick, and narrow widths are stiff (take
-        ``method="Radau"``).
+        ``sign(v)``. Joints creep where they should stick; narrow widths are stiff (use "Radau").
     stop_at_limits : bool
         Whether the simulation ends where a joint reaches a finite limit of its table. Otherwise
         limits are ignored.
@@ -137,19 +136,19 @@ def simulate(
     cuts = [(float(x), x in jumps) for x in (start, *inside, end)]
     if max_evaluations is None:  # default: a few seconds of computing time
         max_evaluations = int(min(100_000 + 1e4 * (end - start) + 200 * len(cuts), 2**62))
-    options = Options(
-        chosen(Integrator, method, "method"),
-        float(_positive(rtol, "rtol", least=_FINEST)),
-        float(_positive(atol, "atol")),
-        float(_positive(max_step, "max_step")),
-        int(_positive(max_evaluations, "max_evaluations", least=1)),
-        _log_progress if progress is True else progress or None,
-    )
+    budget = int(_positive(max_evaluations, "max_evaluations", least=1))
+    integrator = chosen(Integrator, method, "method")
+    tolerances = {
+        "rtol": float(_positive(rtol, "rtol", least=_FINEST)),
+        "atol": float(_positive(atol, "atol")),
+        "max_step": float(_positive(max_step, "max_step")),
+    }
     limits = _limits(model, q) if stop_at_limits else None
     motion = Motion(model, law, tool, drive, friction, width)
     check_dissipates(motion.dry)
-    _check_start(model, q, v, drive, motion.dry.lower.size > 0)
-    run = Integration(motion, times, limits, options)
+    _check_start(model, q, v, drive)
+    report = _log_progress if progress is True else progress or None
+    run = Integration(motion, times, limits, integrator, tolerances, budget, report)
     with np.errstate(over="ignore", invalid="ignore"):  # an unbounded motion is a status
         run.follow(q, v, cuts)
     q, v, a, tau, taken, held, works = (np.array(x) for x in zip(*run.rows, strict=True))
@@ -244,7 +243,7 @@ def _limits(model: RobotModel, q: Array) -> tuple[Array, Array]:
     return lower, upper
 
 
-def _check_start(model: RobotModel, q: Array, v: Array, drive: bool, dry: bool) -> None:
+def _check_start(model: RobotModel, q: Array, v: Array, drive: bool) -> None:
     """Raise for a start without unique finite accelerations."""
     with np.errstate(over="ignore", invalid="ignore"):
         # its errors name joints without inertia, unphysical links and singular couplings
@@ -259,10 +258,4 @@ def _check_start(model: RobotModel, q: Array, v: Array, drive: bool, dry: bool) 
         raise InvalidValueError(
             f"v0: the accelerations or the energy of velocities up to {np.abs(v).max():.3g} are "
             "not finite; start slower."
-        )
-    if dry and not np.linalg.eigvalsh(mass_matrix(model, q, drive))[0] > 0.0:
-        raise InertiaError(
-            f"the mass matrix of {model.name!r} is not positive definite at q0, so that it is not "
-            "defined which joints dry friction holds. Repair the inertial parameters "
-            "(InertialParameters.consistency()), or give smoothing=."
         )

@@ -264,3 +264,11 @@ def any_models(**options):
     return st.sampled_from(["physical", "any"]).flatmap(
         lambda inertia: models(**{"inertia": inertia, "passive": True, **options})
     )
+
+
+def close(actual, expected, tolerance=1e-12):
+    """Equal relative to the largest number, at least one."""
+    actual, expected = np.asarray(actual), np.asarray(expected)
+    assert actual.shape == expected.shape
+    scale = max(1.0, np.abs(expected).max(initial=0.0))
+    np.testing.assert_allclose(actual, expected, rtol=0, atol=tolerance * scale)

@@ -6,25 +6,29 @@ from hypothesis import given
 from hypothesis import strategies as st
 from identities.random_robots import (
     any_models,
+    close,
     models,
     random_drive,
     random_parameters,
     random_pose,
-    random_rotation,
     random_state,
     seeds,
 )
 from numpy.polynomial import chebyshev
 
 import robotmodels as rm
-
-
-def close(actual, expected, tolerance=1e-12):
-    """Equal relative to the largest number, at least one."""
-    actual, expected = np.asarray(actual), np.asarray(expected)
-    assert actual.shape == expected.shape
-    scale = max(1.0, np.abs(expected).max(initial=0.0))
-    np.testing.assert_allclose(actual, expected, rtol=0, atol=tolerance * scale)
+from robotmodels.dynamics import (
+    base_model,
+    christoffel_blocks,
+    ddm,
+    idm,
+    idm_from_base,
+    with_payload,
+    without_payload,
+)
+from robotmodels.friction import AsymmetricFriction, StribeckFriction
+from robotmodels.minimal_parameters import base_parameters
+from robotmodels.regressors import parameter_vector, torque_regressor
 
 
 def singles(function, *arrays):
@@ -87,23 +91,6 @@ def test_single_calls_equal_batches(model, seed):
     close(singles(lambda x: rm.potential_energy(model, x), q), rm.potential_energy(model, q))
 
 
-@given(model=any_models(), seed=seeds)
-def test_a_sample_does_not_depend_on_its_neighbours(model, seed):
-    rng = np.random.default_rng(seed)
-    q, v, a = random_state(model, rng, 7)
-    order = rng.permutation(7)
-    for function in (
-        lambda q, v, a: rm.idm(model, q, v, a),
-        lambda q, v, a: rm.mass_matrix(model, q),
-        lambda q, v, a: rm.coriolis_matrix(model, q, v),
-        lambda q, v, a: rm.kinetic_energy(model, q, v) + rm.potential_energy(model, q),
-        lambda q, v, a: rm.torque_regressor(model, q, v, a),
-        lambda q, v, a: rm.jacobian_rate(model, q, v),
-    ):
-        shuffled = function(q[order], v[order], a[order])
-        np.testing.assert_array_equal(shuffled, function(q, v, a)[order])
-
-
 # --- inverse and direct ----------------------------------------------------------------------
 
 
@@ -161,13 +148,6 @@ def test_mass_matrix_is_symmetric_and_holds_the_rotors(model, seed):
         columns = [rm.idm(model, q, 0 * v, e, drive=drive) for e in np.eye(model.n)]
         still = rm.idm(model, q, 0 * v, 0 * v, drive=drive)
         close(np.moveaxis(np.array(columns) - still, 0, -1), M)
-
-
-@given(model=models(transmission=False), seed=seeds)
-def test_mass_matrix_of_real_bodies_is_positive_definite(model, seed):
-    q, _, _ = random_state(model, np.random.default_rng(seed), 2)
-    for M in (rm.mass_matrix(model, q), rm.mass_matrix(model, q[0], drive=False)):
-        assert np.linalg.eigvalsh(M).min() > 0
 
 
 @given(model=any_models(), seed=seeds)
@@ -254,17 +234,6 @@ def test_the_order_of_the_rows_changes_no_physics(model, seed):
 
 
 @given(model=any_models(), seed=seeds)
-def test_coriolis_torque_is_the_bias_without_gravity(model, seed):
-    q, v, _ = random_state(model, np.random.default_rng(seed), 2)
-    weightless = model.with_gravity([0.0, 0.0, 0.0])
-    bias = rm.idm(weightless, q, v, 0 * v, drive=False)
-    C = rm.coriolis_matrix(model, q, v)
-    close(np.einsum("kij,kj->ki", C, v), bias)
-    close(rm.idm(model, q, v, 0 * v, drive=False) - rm.gravity_torque(model, q), bias)
-    close(rm.coriolis_matrix(model, q[0], v[0]) @ v[0], bias[0])
-
-
-@given(model=any_models(), seed=seeds)
 def test_mass_matrix_rate_less_twice_coriolis_is_skew(model, seed):
     q, v, _ = random_state(model, np.random.default_rng(seed))
     rate = derivative(lambda t: rm.mass_matrix(model, q + np.outer(t, v)), rate_of(v))
@@ -334,17 +303,6 @@ def test_drives_store_energy_in_rotors_and_dissipate_the_rest(model, seed):
     close(friction, expected, 1e-9 * max(1.0, abs(power) / expected))
 
 
-@given(model=models(drive=True, transmission=True), seed=seeds)
-def test_friction_stops_with_the_motion(model, seed):
-    """No Coulomb torque at rest, and friction turns with the velocity."""
-    q, v, _ = random_state(model, np.random.default_rng(seed))
-    rest = rm.idm(model, q, 0 * v, 0 * v)
-    close(rest, rm.gravity_torque(model, q) + model.drive.offset)
-    bias = [rm.idm(model, q, s * v, 0 * v) - rm.idm(model, q, s * v, 0 * v, drive=False)
-            - model.drive.offset for s in (1, -1)]  # fmt: skip
-    close(bias[0], -bias[1])
-
-
 @given(model=any_models(tip="any"), seed=seeds)
 def test_virtual_work_of_the_wrench(model, seed):
     rng = np.random.default_rng(seed)
@@ -381,16 +339,6 @@ def test_gravity_torque_is_the_slope_of_the_potential(model, seed):
 
 
 @given(model=any_models(), seed=seeds)
-def test_gravity_of_any_direction_adds_up(model, seed):
-    rng = np.random.default_rng(seed)
-    q, _, _ = random_state(model, rng)
-    first, second = rng.normal(size=(2, 3))
-    parts = [rm.gravity_torque(model.with_gravity(g), q) for g in (first, second)]
-    close(rm.gravity_torque(model.with_gravity(first + second), q), sum(parts))
-    assert not rm.gravity_torque(model.with_gravity([0, 0, 0]), q).any()
-
-
-@given(model=any_models(), seed=seeds)
 def test_turning_the_whole_world_changes_no_torque(model, seed):
     """Base, gravity and wrench turned together; where the base stands never matters."""
     rng = np.random.default_rng(seed)
@@ -408,35 +356,6 @@ def test_turning_the_whole_world_changes_no_torque(model, seed):
     close(rm.kinetic_energy(turned, q, v), rm.kinetic_energy(model, q, v))
     shifted = model.with_base(model.base + np.pad(rng.normal(size=(3, 1)), ((0, 1), (3, 0))))
     close(rm.idm(shifted, q, v, a, w), rm.idm(model, q, v, a, w))
-
-
-@given(model=models(), seed=seeds)
-def test_a_falling_base_feels_no_weight(model, seed):
-    """A robot on a vertical slide that falls freely: Newton's and Einstein's elevator."""
-    rng = np.random.default_rng(seed)
-    q, v, a = random_state(model, rng)
-    table, Z = model.table, random_rotation(rng)
-    # row 1 slides along z of the base, along which gravity is turned
-    lift = rm.DHTable(
-        antecedent=np.r_[0, table.antecedent + 1],
-        sigma=np.r_[1, table.sigma],
-        **{
-            key: np.r_[0.0, getattr(table, key)]
-            for key in ("gamma", "b", "beta", "alpha", "d", "theta", "r")
-        },
-    )
-    base = np.eye(4)
-    base[:3, :3] = Z
-    falling = rm.RobotModel.from_table(
-        lift,
-        rm.InertialParameters(np.vstack([np.zeros(10), model.inertia.values])),
-        base=base,
-        gravity=-9.81 * Z[:, 2],
-    )
-    tau = rm.idm(falling, np.r_[0.3, q], np.r_[2.0, v], np.r_[-9.81, a])
-    floating = model.with_base(base).with_gravity([0, 0, 0]).with_drive(None)
-    floating = floating.with_transmission(None)
-    close(tau[1:], rm.idm(floating, q, v, a))
 
 
 # --- units -----------------------------------------------------------------------------------
@@ -491,3 +410,99 @@ def enlarged(T, size):
     T = T.copy()
     T[:3, 3] *= size
     return T
+
+
+# --- friction, payloads and base parameters ------------------------------------------------------
+
+
+@given(model=any_models(), seed=seeds)
+def test_christoffel_blocks_are_the_coriolis_torques(model, seed):
+    q, v, _ = random_state(model, np.random.default_rng(seed), 3)
+    B, C = christoffel_blocks(model, q)
+    j, k = np.triu_indices(model.n, 1)
+    torque = np.einsum("sip,sp->si", B, v[:, j] * v[:, k]) + np.einsum("sij,sj->si", C, v**2)
+    close(torque, np.einsum("sij,sj->si", rm.coriolis_matrix(model, q, v), v), 1e-12)
+    for one, many in zip(christoffel_blocks(model, q[0]), (B[0], C[0]), strict=True):
+        np.testing.assert_array_equal(one, many)
+
+
+@given(model=models(drive=True), seed=seeds, kind=st.booleans())
+def test_friction_adds_its_torque_to_both_models(model, seed, kind):
+    rng = np.random.default_rng(seed)
+    n = model.n
+    model = model.with_drive(random_drive(rng, n))
+    q, v, a = random_state(model, rng, 3)
+    Fv, Fc, fall, vs = rng.uniform(0.1, 3, (4, n))
+    friction = (
+        AsymmetricFriction(*rng.uniform(0.1, 3, (4, n)))
+        if kind
+        else StribeckFriction(Fv, Fc, Fc + fall, vs)
+    )
+    for drive in (True, False):
+        plain = idm(model, q, v, a, drive=drive)
+        tau = idm(model, q, v, a, drive=drive, friction=friction)
+        close(tau, plain + friction.torque(v))
+        close(idm(model, q[0], v[0], a[0], drive=drive, friction=friction), tau[0], 1e-11)
+        np.testing.assert_array_equal(
+            ddm(model, q, v, tau, friction=friction), ddm(model, q, v, tau - friction.torque(v))
+        )
+        assert ((friction.torque(v) * v) >= 0).all()
+    close(ddm(model, q, v, tau, drive=False, friction=friction),
+          ddm(model, q, v, plain, drive=False), 1e-9)  # fmt: skip
+
+
+@given(model=models(tip="any"), seed=seeds)
+def test_a_payload_is_a_body_on_a_fixed_frame(model, seed):
+    """The same as a row more in the table that carries it; and taken off, and moved."""
+    rng = np.random.default_rng(seed)
+    q, v, a = random_state(model, rng, 2)
+    points = rng.normal(size=(6, 3))
+    masses = rng.uniform(0.1, 1.0, 6)
+    mass = masses.sum()
+    com = masses @ points / mass
+    arms = points - com
+    inertia = np.einsum("k,kij->ij", masses, [(x @ x) * np.eye(3) - np.outer(x, x) for x in arms])
+    tau = rm.idm(model, q, v, a)
+    for frame in (None, int(rng.integers(1, model.f + 1))):
+        loaded = with_payload(model, mass, com, inertia, frame)
+        # the wrench that holds the points one by one, through the Jacobian of the frame
+        extra = np.zeros_like(tau)
+        J = rm.jacobian(model, q, frame)
+        dJ = rm.jacobian_rate(model, q, v, frame)
+        twist, rate = (np.einsum("sij,sj->si", X, y) for X, y in ((J, v), (J, a)))
+        rate = rate + np.einsum("sij,sj->si", dJ, v)
+        R = rm.dgm(model, q, frame)[:, :3, :3]
+        for m, point in zip(masses, points, strict=True):
+            r = R @ point
+            w, dw = twist[:, 3:], rate[:, 3:]
+            acc = rate[:, :3] + np.cross(dw, r) + np.cross(w, np.cross(w, r)) - model.gravity
+            extra += np.einsum("sij,si->sj", J, np.hstack([m * acc, np.cross(r, m * acc)]))
+        close(rm.idm(loaded, q, v, a), tau + extra, 1e-11)
+        back = without_payload(loaded, mass, com, inertia, frame)
+        close(back.inertia.values, model.inertia.values, 1e-13)
+        moved = with_payload(back, mass, com + 0.1, inertia, frame)
+        again = with_payload(model, mass, com + 0.1, inertia, frame)
+        close(moved.inertia.values, again.inertia.values, 1e-13)
+
+
+@given(model=models(max_frames=6), seed=seeds, drive=st.booleans())
+def test_base_parameters_alone_are_a_model(model, seed, drive):
+    """The recursion with skips, the model of zeros and the reduced regressor are one."""
+    rng = np.random.default_rng(seed)
+    q, v, a = random_state(model, rng, 3)
+    w = rng.normal(size=6)
+    base = base_parameters(model, drive=drive)
+    values = base.values(model)
+    tau = idm_from_base(model, base, values, q, v, a)
+    robot = base_model(model, base, values)
+    close(tau, idm(robot, q, v, a))
+    rigid = 0.0 if drive else idm(model, q, v, a) - idm(model, q, v, a, drive=False)
+    close(tau, torque_regressor(model, q, v, a, drive, columns=base) @ values + rigid, 1e-12)
+    friction = AsymmetricFriction(*rng.uniform(0.1, 3, (4, model.n)))
+    close(
+        idm_from_base(model, base, values, q[0], v[0], a[0], w, friction),
+        tau[0] + idm(model, q[0], v[0], a[0], w, friction=friction) - idm(model, q[0], v[0], a[0]),
+        1e-11,
+    )
+    zeros = np.setdiff1d(np.arange(base.matrix.shape[1]), base.kept)
+    assert not parameter_vector(robot, drive)[zeros].any()

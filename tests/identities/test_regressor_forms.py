@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from identities.random_robots import any_models, models, random_state, seeds
+from identities.random_robots import (
+    any_models,
+    close,
+    models,
+    random_state,
+    seeds,
+)
 from scipy.signal import butter
 
 import robotmodels as rm
@@ -26,14 +32,6 @@ from robotmodels.regressors import (
     power_regressor,
     torque_regressor,
 )
-
-
-def close(actual, expected, tolerance=1e-12):
-    """Equal relative to the largest number, at least one."""
-    actual, expected = np.asarray(actual), np.asarray(expected)
-    assert actual.shape == expected.shape
-    scale = max(1.0, np.abs(expected).max(initial=0.0))
-    np.testing.assert_allclose(actual, expected, rtol=0, atol=tolerance * scale)
 
 
 def random_friction(rng, n):
@@ -237,13 +235,45 @@ def test_filtered_form_is_the_filtered_torque(order, model, seed):
     assert errors[1] < errors[0] / 8 or errors[1] < 1e-12
 
 
+# --- column by column -----------------------------------------------------------------------------
+
+
 @given(model=any_models(), seed=seeds)
-def test_filtered_friction_is_that_of_the_torque(model, seed):
-    """Columns that need no momentum are filtered alike, whatever their jumps."""
-    rng = np.random.default_rng(seed)
-    t = np.linspace(0.0, 1.0, 50)
-    q, v, a = motion(model, rng, t)
-    dry = [p for p in parameter_names(model) if p.startswith(("Fv", "Fc", "offset"))]
-    low_pass = butter(2, 5.0, fs=49.0, output="sos")
-    W = filtered_regressor(model, t[1], q, v, low_pass, columns=dry)
-    close(W, filtered_torque(torque_regressor(model, q, v, a, columns=dry), low_pass), 1e-13)
+def test_each_column_is_the_torque_of_one_parameter(model, seed):
+    """Column by column, so that no two faults cancel in the sum."""
+    q, v, a = random_state(model, np.random.default_rng(seed))
+    W = rm.torque_regressor(model, q, v, a)
+    for k in range(10 * model.f):
+        unit = np.zeros(10 * model.f)
+        unit[k] = 1.0
+        robot = model.with_inertia(rm.InertialParameters(unit.reshape(-1, 10)))
+        close(W[:, k], rm.idm(robot, q, v, a, drive=False))
+    idle = model.with_inertia(None).with_transmission(None)
+    column = 10 * model.f
+    for kind in ("Ia", "Fv", "Fc", "offset"):
+        for j in range(model.n):
+            drive = rm.DriveParameters(**{kind: np.eye(model.n)[j]})
+            close(W[:, column], rm.idm(idle.with_drive(drive), q, v, a))
+            column += 1
+    idle = idle.with_drive(None)
+    motors = () if model.transmission is None else model.transmission.coupled_motors
+    for kind in ("Iam", "Fvm", "Fcm"):
+        for m in motors:
+            unit = rm.Transmission(model.transmission.matrix, **{kind: np.eye(model.n)[m - 1]})
+            close(W[:, column], rm.idm(idle.with_transmission(unit), q, v, a))
+            column += 1
+    assert column == W.shape[-1]
+
+
+@given(model=any_models(), seed=seeds, drive=st.booleans())
+def test_energy_regressor_times_parameters_is_the_energy(model, seed, drive):
+    q, v, _ = random_state(model, np.random.default_rng(seed), 3)
+    h = rm.energy_regressor(model, q, v, drive)
+    # friction and offsets store no energy
+    kept = [not name.startswith(("F", "offset")) for name in rm.parameter_names(model, drive)]
+    parameters = rm.parameter_vector(model, drive)[kept]
+    energy = rm.kinetic_energy(model, q, v, drive) + rm.potential_energy(model, q)
+    close(h @ parameters, energy)
+    row = rm.energy_regressor(model, q[0], v[0], drive)
+    close(row @ parameters, rm.kinetic_energy(model, q[0], v[0], drive)
+          + rm.potential_energy(model, q[0]))  # fmt: skip

@@ -1,4 +1,4 @@
-"""Write `frozen_igm_counts.json`: how many solutions `rm.igm` finds, pose by pose.
+"""Write `igm_counts.json`: how many solutions `rm.igm` finds, pose by pose.
 
     python tests/oracles/make_igm_counts.py
 
@@ -62,4 +62,4 @@ if __name__ == "__main__":
     warnings.simplefilter("ignore")
     data = {"singular": singular_poses(), "regular": regular_poses()}
     text = json.dumps(data).replace('"q": [[', '\n"q": [[').replace("]], ", "]],\n")
-    (Path(__file__).parent / "frozen_igm_counts.json").write_text(text + "\n", encoding="utf-8")
+    (Path(__file__).parent / "igm_counts.json").write_text(text + "\n", encoding="utf-8")

@@ -1,11 +1,9 @@
 """Methods that simulate the controlled robot: instruments, DIDIM, output error, and a test."""
 
 from .controller import Controller, tuned_controller
-from .didim import Didim
 from .hausman import HausmanResult, hausman_test
-from .instrumental import Instrumental
 from .method import SimulationDetails
-from .output_error import OutputError
+from .methods import Didim, Instrumental, OutputError
 from .simulation import simulated_log
 
 __all__ = [

@@ -15,8 +15,8 @@ from ...estimation.estimate import Estimate
 from ...estimation.factor import reduced
 from ...estimation.linear import group_leverage, solved, value_sizes
 from ..equations import Block, Equations
-from .instrumental import instrument_step, paired
-from .method import GivenBlocks
+from .method import GivenBlocks, instrument_step
+from .methods import instrument_pairs
 from .simulation import ClosedLoopSimulator, SimulationDivergedError
 
 _EFFECT = 0.5
@@ -111,17 +111,15 @@ def hausman_test(
 
     Examples
     --------
-    >>> import robotmodels as rm
-    >>> from robotmodels.identification import Log, fit
-    >>> from robotmodels.minimal_parameters import uniform_bodies
-    >>> arm = rm.load("planar_2r").with_gravity((0.0, -9.81, 0.0))
-    >>> arm = arm.with_inertia(uniform_bodies(arm, 5.0))
-    >>> t, w = 0.005 * np.arange(4000)[:, None], np.array([2.0, 3.1])
-    >>> q, v, a = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
-    >>> result = fit(arm, Log(0.005, q, rm.idm(arm, q, v, a) + 2.0 * v), "iv")
+    >>> from robotmodels.datasets import example_log
+    >>> from robotmodels.identification import fit
+    >>> arm, log = example_log()
+    >>> result = fit(arm, log, "iv", drive=("Fv",))
     >>> 0.0 <= hausman_test(result.equations, result.estimate).p <= 1.0
     True
     """
+    from scipy.stats import norm
+
     if not 0.0 < level < 1.0:
         raise InvalidValueError(f"level: expected a number between 0 and 1, got {level!r}.")
     if estimate.names != system.names:
@@ -136,39 +134,28 @@ def hausman_test(
         return untested
     simulator = ClosedLoopSimulator(system, loop)
     try:
-        signals = simulator.signals(values)
+        pairs = instrument_pairs(simulator, values)
     except SimulationDivergedError:  # the last step of an estimate that did not converge
         return untested
-    pairs = paired(simulator)
-    factors = reduced(system.names, (block for _, block in pairs(signals)))
-    step = instrument_step(factors, values, pairs(signals), value_sizes(factors))
+    factors = reduced(system.names, (block for _, block in pairs()))
+    step = instrument_step(system.names, values, pairs, value_sizes(factors))
     ls_values, inverse, _ = solved(factors, step.weights)
 
     def residuals() -> Iterator[Block]:
         """Scores of the difference of the estimates and of least squares."""
-        for Z, block in pairs(signals):
+        for Z, block in pairs():
             least = block.W @ inverse
             W = np.concatenate((least - Z @ step.inverse.T, least), axis=2)
             yield replace(block, W=W, y=block.y - block.W @ ls_values)
 
+    blocks, leverage = GivenBlocks(residuals), group_leverage(factors, step.weights, inverse)
     spread = correlated_covariance(
-        GivenBlocks(residuals),
-        np.zeros(2 * b),
-        step.weights,
-        np.eye(2 * b),
-        lags,
-        group_leverage(factors, step.weights, inverse),
+        blocks, np.zeros(2 * b), step.weights, np.eye(2 * b), lags, leverage
     )
     errors, least = np.sqrt(np.maximum(np.diag(spread.covariance), 0.0)).reshape(2, b)
     effect = ls_values - values
-    p = _probabilities(effect, errors, least)
-    return HausmanResult(system.names, effect, errors, least, p, spread.lags, level)
-
-
-def _probabilities(effect: Array, errors: Array, least: Array) -> Array:
-    """p-value of each effect under the largest allowed bias, with Bonferroni's correction."""
-    from scipy.stats import norm
-
+    # p-values under the largest allowed bias, with Bonferroni's correction
     safe = np.maximum(errors, np.finfo(float).tiny)
     each = sum(norm.sf((np.abs(effect) + side * _EFFECT * least) / safe) for side in (-1.0, 1.0))
-    return np.minimum(len(effect) * each, 1.0)
+    p = np.minimum(b * each, 1.0)
+    return HausmanResult(system.names, effect, errors, least, p, spread.lags, level)

@@ -1,7 +1,8 @@
-"""Common part of the methods that simulate the controlled robot: iteration and result.
+"""Common part of the methods that simulate the controlled robot: step, iteration and result.
 
-Source: H. Walker and P. Ni, "Anderson acceleration for fixed-point iterations", SIAM J. Numerical
-Analysis 49(4), 2011.
+Sources: A. Janot, P.-O. Vandanjon and M. Gautier, "A generic instrumental variable approach for
+industrial robot identification", IEEE T-CST 22(1), 2014; H. Walker and P. Ni, "Anderson
+acceleration for fixed-point iterations", SIAM J. Numerical Analysis 49(4), 2011.
 """
 
 from __future__ import annotations
@@ -9,24 +10,17 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..._arrays import Array, Frozen, as_exact
 from ...errors import InvalidValueError
 from ...estimation.covariance import CorrelatedCovariance, correlated_covariance
 from ...estimation.estimate import Estimate, EstimateStatus
 from ...estimation.factor import TriangularFactors
-from ...estimation.linear import (
-    check_count,
-    inverse_std,
-    residual_std,
-    solved,
-    value_sizes,
-    weighted,
-)
+from ...estimation.linear import check_count, value_sizes, weighted
 from ..equations import Block, Equations
 from ..methods.base import Covariance, Method
 from .controller import Controller
@@ -35,9 +29,15 @@ from .simulation import ClosedLoopSimulator, SimulationDivergedError
 
 _STILL, _ROUNDING = 1e-3, 1e-11
 """Convergence tolerances of a parameter: in standard errors, relative to its torque size."""
+_RESIDUAL = 1e-10
+"""Rounding tolerance: residuals relative to the right side."""
+_SLACK = 1e-9
+"""Rounding tolerance: relative increase of the weighted squares of residuals."""
 _HALVINGS, _WEIGHTINGS = 8, 3
 _SAME_WEIGHTS = 0.02
 """Convergence tolerance: relative change of the weights."""
+_SINGULAR = 1e10
+"""Condition number above which the simulated motion does not determine the parameters."""
 _WEAK = 0.3
 """Least correlation of instruments and regressor; below it instruments are weak."""
 
@@ -56,10 +56,14 @@ class SimulationDetails(Frozen):
     loop: ClosedLoop | None
 
 
-class Step(NamedTuple):
-    """Parameters (b,) that follow from one simulation, with the weights (m,) of the equations.
+Pairs = Callable[[], Iterable[tuple[Array, Block]]]
+"""Instruments Z (k, m, b) and equations of a simulation, for several passes."""
 
-    The next weights are those of the residuals, None where weights change in every step.
+
+class Step(NamedTuple):
+    """Parameters (b,) that follow from one simulation; weights, sigma and squares of groups (m,).
+
+    Squares are those of the residuals before the step.
     """
 
     values: Array
@@ -67,16 +71,9 @@ class Step(NamedTuple):
     inverse: Array
     sigma: Array
     weights: Array
-    next_weights: Array | None
+    squares: Array
     condition: float
-    strength: float = 1.0
-    cost: float = 0.0
-
-
-Advance = Callable[[Array, Array | None], Step]
-"""One simulation with parameters, and the weights of its equations."""
-Scores = Callable[[Array], Callable[[], Iterable[Block]]]
-"""Blocks of the covariance at the parameters, for several passes."""
+    strength: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,7 +88,7 @@ class SimulatingMethod(Method):
     substeps: int | None = None
     covariance: ClassVar[Covariance] = "given"
     _memory: ClassVar[int] = 0  # steps of the Anderson mixing
-    _slack: ClassVar[float] = 0.0  # rounding tolerance: increase of the cost per equation
+    _descends: ClassVar[bool] = False  # whether each step must reduce the residuals
     _advice: ClassVar[tuple[str, ...]] = ()  # where the iteration does not converge
 
     def __post_init__(self) -> None:
@@ -104,10 +101,8 @@ class SimulatingMethod(Method):
             )
 
     @abstractmethod
-    def _prepare(
-        self, simulator: ClosedLoopSimulator, factors: TriangularFactors, size: Array
-    ) -> tuple[Advance, Scores]:
-        """One step of the method, and the equations of its covariance. Shapes: size (b,)."""
+    def _simulated(self, simulator: ClosedLoopSimulator, values: Array, size: Array) -> Pairs:
+        """Instruments and equations of the robot with some parameters. Shapes: (b,)."""
 
     def _loop(self, system: Equations, values: Array) -> ClosedLoop | None:
         """Settings of the simulation. Shapes: values (b,)."""
@@ -125,14 +120,11 @@ class SimulatingMethod(Method):
         if loop is not None:
             why, size = "it diverges", value_sizes(factors)
             simulator = ClosedLoopSimulator(system if system.cache else system.cached(), loop)
-            advance, scores = self._prepare(simulator, factors, size)
-            slack = self._slack * factors.rows
-            values, last, status, count = _reweighted(
-                values, advance, size, self.iterations, slack, self._memory
-            )
+            values, last, status, count = self._iterated(simulator, values, size)
             if last is not None and status is not EstimateStatus.UNSTABLE:
                 try:
-                    spread = _sandwich(scores(values), values, last, self.lags)
+                    pairs = self._simulated(simulator, values, size)
+                    spread = _sandwich(pairs, values, last, self.lags)
                 except SimulationDivergedError:
                     status = EstimateStatus.UNSTABLE
         notes = () if loop is None else loop.notes
@@ -163,70 +155,49 @@ class SimulatingMethod(Method):
             system.names, values, spread.covariance, last.sigma, status, count, notes, details
         )
 
+    def _iterated(
+        self, simulator: ClosedLoopSimulator, values: Array, size: Array
+    ) -> tuple[Array, Step | None, EstimateStatus, int]:
+        """Simulate and solve until the parameters converge. Shapes: values, size (b,)."""
 
-Iterated = tuple[Array, Step | None, EstimateStatus, int]
-"""Values (b,), last step, status and number of iterations."""
+        def advance(values: Array, weights: Array | None = None) -> Step:
+            pairs = self._simulated(simulator, values, size)
+            return instrument_step(simulator.system.names, values, pairs, size, weights)
 
-
-def _iterated(
-    values: Array,
-    advance: Advance,
-    size: Array,
-    most: int,
-    slack: float,
-    memory: int,
-    weights: Array | None = None,
-) -> Iterated:
-    """Simulate and solve until the parameters converge. Shapes: values, size (b,), weights (m,)."""
-    past: list[tuple[Array, Array]] = []
-    try:
-        step = advance(values, weights)
-    except SimulationDivergedError:
-        return values, None, EstimateStatus.UNSTABLE, 0
-    for count in range(1, most + 1):
-        move = step.values - values
-        if not np.isfinite(move).all():
-            return values, step, EstimateStatus.UNSTABLE, count
-        if (np.abs(move) <= _STILL * step.standard_errors + _ROUNDING * size).all():
-            return step.values, step, EstimateStatus.SOLVED, count
-        if count == most:
-            break
-        past = [*past, (values / size, move / size)][-(memory + 1) :]
-        goals = [values + move / 2**k for k in range(_HALVINGS)]
-        if len(past) > 1:
-            goals.insert(0, _mixed(past) * size)
-        failed = EstimateStatus.NOT_CONVERGED
-        for goal in goals:
-            try:
-                following = advance(goal, step.weights)
-            except SimulationDivergedError:
-                failed = EstimateStatus.UNSTABLE
-                continue
-            if following.cost <= step.cost + slack:
+        past: list[tuple[Array, Array]] = []
+        changes = 0  # of the weights, which are constant between them
+        try:
+            step = advance(values)
+        except SimulationDivergedError:
+            return values, None, EstimateStatus.UNSTABLE, 0
+        for count in range(1, self.iterations + 1):
+            move = step.values - values
+            still = bool((np.abs(move) <= _STILL * step.standard_errors + _ROUNDING * size).all())
+            weights = _inverse(step.sigma) if still else step.weights
+            same = changes == _WEIGHTINGS or np.allclose(weights, step.weights, _SAME_WEIGHTS, 0.0)
+            if still and same:
+                return step.values, step, EstimateStatus.SOLVED, count
+            if count == self.iterations:
                 break
-        else:
-            return values, step, failed, count
-        values, step = goal, following
-    return values, step, EstimateStatus.NOT_CONVERGED, most
-
-
-def _reweighted(
-    values: Array, advance: Advance, size: Array, most: int, slack: float, memory: int
-) -> Iterated:
-    """Iterate with fixed weights, then again with weights from the residuals."""
-    values, last, status, done = _iterated(values, advance, size, most, slack, memory)
-    for _ in range(_WEIGHTINGS):
-        weights = None if last is None else last.next_weights
-        if last is None or weights is None or status is not EstimateStatus.SOLVED or done >= most:
-            break
-        before = last.weights
-        values, last, status, count = _iterated(
-            values, advance, size, most - done, slack, memory, weights
-        )
-        done += count
-        if np.allclose(before, weights, rtol=_SAME_WEIGHTS, atol=0.0):
-            break
-    return values, last, status, done
+            changes, past = changes + still, [] if still else past
+            past = [*past, (values / size, move / size)][-(self._memory + 1) :]
+            goals = [values + move / 2**k for k in range(_HALVINGS)]
+            if len(past) > 1:
+                goals.insert(0, _mixed(past) * size)
+            failed, bound = EstimateStatus.NOT_CONVERGED, step.weights**2 @ step.squares
+            for goal in goals:
+                try:
+                    following = advance(goal, weights)
+                except SimulationDivergedError:
+                    failed = EstimateStatus.UNSTABLE
+                    continue
+                cost = step.weights**2 @ following.squares
+                if not self._descends or cost <= (1.0 + _SLACK) * bound:
+                    break
+            else:
+                return values, step, failed, count
+            values, step = goal, following
+        return values, step, EstimateStatus.NOT_CONVERGED, self.iterations
 
 
 def _mixed(past: list[tuple[Array, Array]]) -> Array:
@@ -237,30 +208,65 @@ def _mixed(past: list[tuple[Array, Array]]) -> Array:
     return x + f - (dx + df) @ np.linalg.lstsq(df, f, rcond=1e-8)[0]
 
 
-def weighted_step(factors: TriangularFactors, values: Array, weights: Array | None) -> Step:
-    """Weighted least squares on the equations of one simulation."""
-    shown = [R[:, :-1].any(axis=0) for R in factors.factors]
-    check_excited(factors.names, np.any(shown, axis=0))
-    check_count(factors)
-    if weights is None:
-        weights = inverse_std(factors, residual_std(factors, values))
-    solution, inverse, rest = solved(factors, weights)
-    variances = rest / max(factors.rows - len(values), 1) * np.diag(inverse)
-    sigma = residual_std(factors, solution)
-    R, _, _ = factors.stacked(weights)
-    condition = float(np.linalg.cond(R / np.linalg.norm(R, axis=0)))
-    errors, following = np.sqrt(np.maximum(variances, 0.0)), inverse_std(factors, sigma)
-    return Step(solution, errors, inverse, sigma, weights, following, condition)
+def instrument_step(
+    names: tuple[str, ...], values: Array, pairs: Pairs, size: Array, weights: Array | None = None
+) -> Step:
+    """Solve ``Z^T S (y - W b) = 0`` for the correction of the values, which limits rounding.
 
+    Weights S are given (m,) or those of the residuals. Least squares is the case ``Z = W``.
+    """
+    from scipy.linalg import eigh
 
-def check_excited(names: tuple[str, ...], shown: NDArray[np.bool_]) -> None:
-    """Raise where a parameter has no effect on the equations."""
-    if not shown.all():
-        missing = ", ".join(names[k] for k in np.flatnonzero(~shown))
+    b, total = len(values), None
+    for Z, block in pairs():
+        e = block.y - block.W @ values
+        new = [_products(Z, block, e, size, j) for j in range(e.shape[1])]
+        new = [np.array(x) for x in zip(*new, strict=True)]
+        total = new if total is None else [x + y for x, y in zip(total, new, strict=True)]
+    assert total is not None  # a log has pieces
+    sums, Ze, squares, lengths, counts = total
+    squares = np.maximum(squares, _RESIDUAL**2 * lengths)
+    left = max(1.0 - b / max(float(counts.sum()), 1.0), 1e-3)
+    sigma = np.sqrt(squares / np.maximum(counts * left, 1e-300))
+    weights = _inverse(sigma) if weights is None else weights
+    ZW, ZZ, WW = np.einsum("j,jkxy->kxy", weights**2, sums)
+    rows, columns = np.sqrt(np.diag(ZZ)), np.sqrt(np.diag(WW))
+    if not (rows * columns).all():
+        missing = ", ".join(names[k] for k in np.flatnonzero(rows * columns == 0.0))
         raise InvalidValueError(
             f"log: the simulated motion does not depend on {missing}; its joints do not leave the "
             "dead band. Give a smaller dead band (processing=), or drop these parameters."
         )
+    scaled = ZW / np.outer(rows, columns)
+    condition = float(np.sqrt(np.linalg.cond(scaled)))
+    if not condition < _SINGULAR:
+        raise SimulationDivergedError
+    inverse = np.linalg.inv(scaled) / np.outer(columns, rows)
+    spread = inverse @ ZZ @ inverse.T * (weights**2 @ squares) / max(counts.sum() * left, 1e-300)
+    # squared canonical correlations; rounding on the diagonals makes the products definite
+    B, C = (X / np.outer(x, x) + 1e-13 * np.eye(b) for X, x in ((ZZ, rows), (WW, columns)))
+    least = eigh(scaled.T @ np.linalg.solve(B, scaled), C, eigvals_only=True)[0]
+    return Step(
+        values=values + inverse @ (weights**2 @ Ze) * size,
+        standard_errors=np.sqrt(np.maximum(np.diag(spread), 0.0)) * size,
+        inverse=inverse * np.outer(size, size),
+        sigma=sigma,
+        weights=weights,
+        squares=squares,
+        condition=condition,
+        strength=float(np.sqrt(np.clip(least, 0.0, 1.0))),
+    )
+
+
+def _inverse(sigma: Array) -> Array:
+    return 1.0 / np.where(sigma > 0.0, sigma, 1.0)
+
+
+def _products(Z: Array, block: Block, e: Array, size: Array, j: int) -> tuple[Any, ...]:
+    """Products of the used instruments, columns, residuals and right sides of a group."""
+    use = block.use[:, j]
+    z, w, r, y = Z[use, j] * size, block.W[use, j] * size, e[use, j], block.y[use, j]
+    return (z.T @ w, z.T @ z, w.T @ w), z.T @ r, r @ r, y @ y, len(r)
 
 
 @dataclass(frozen=True, slots=True)
@@ -270,18 +276,13 @@ class GivenBlocks:
     blocks: Callable[[], Iterable[Block]]
 
 
-def _sandwich(
-    blocks: Callable[[], Iterable[Block]], values: Array, step: Step, lags: int | None
-) -> CorrelatedCovariance:
+def _sandwich(pairs: Pairs, values: Array, step: Step, lags: int | None) -> CorrelatedCovariance:
     """Sandwich covariance for correlated residuals; the step's inverse need not be symmetric."""
 
-    def turned() -> Iterator[Block]:
-        for block in blocks():
-            e = block.y - block.W @ values
-            W = block.W @ step.inverse.T
-            yield replace(block, W=W, y=W @ values + e)
+    def scores() -> Iterator[Block]:
+        for Z, block in pairs():
+            yield replace(block, W=Z @ step.inverse.T, y=block.y - block.W @ values)
 
-    spread = correlated_covariance(
-        GivenBlocks(turned), values, step.weights, np.eye(len(values)), lags
-    )
+    b = len(values)
+    spread = correlated_covariance(GivenBlocks(scores), np.zeros(b), step.weights, np.eye(b), lags)
     return replace(spread, covariance=0.5 * (spread.covariance + spread.covariance.T))

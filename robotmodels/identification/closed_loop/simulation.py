@@ -138,7 +138,7 @@ def follow(robot: RobotModel, loop: ClosedLoop, dt: float, references: Targets) 
             coupled = np.concatenate((terms.coupled_coulomb, loop.width[motors]))
     gains = np.stack((control.kp, control.kd, control.ki, control.limit))
     settings = gains, loop.tracking_limit, loop.hold, loop.substeps, dt
-    bodies = *robot.chain, robot.inertia.values, robot.gravity
+    bodies = robot.chain, robot.inertia.values, robot.gravity
     matrices = map(np.ascontiguousarray, (rotor, viscous, drives, coupling))
     out = np.empty((4, len(references.q) - 1, n))
     signals = references.q, references.v, references.feed

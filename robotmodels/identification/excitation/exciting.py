@@ -198,11 +198,6 @@ def exciting_trajectory(
         ends.append((ExcitationStart(before[k], after, history, counts, status), X))
     _, X = min(ends, key=lambda end: end[0].rank(criterion))
     random = tuple(quality for quality, ok in zip(before, kept, strict=True) if ok)
-    if len(random) < len(drawn):
-        notes += (
-            f"{len(drawn) - len(random)} of {len(drawn)} random motions do not keep the limits and "
-            "are left out of the comparison.",
-        )
     done, trajectory = tuple(start for start, _ in ends), basis.trajectory(X)
     notes += (*torque_notes, _advice(done, criterion))
     extremes = search.limits_kept(problem, trajectory)
@@ -282,12 +277,8 @@ def _whole(value: Any, name: str) -> int:
     return int(value)
 
 
-def _progress(progress: Any) -> Callable[[int, int], Any]:
+def _progress(progress: bool | Progress) -> Callable[[int, int], Any]:
     """A function of (done, total)."""
     if callable(progress):
         return progress
-    if progress not in (True, False, None):
-        raise InvalidValueError(
-            f"progress: expected a flag or a function of (done, total), got {progress!r:.60}."
-        )
     return partial(_LOG.log, logging.INFO if progress else logging.DEBUG, "%d of %d stages done")

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from ..._arrays import Array, as_floats
+from ..._json_data import json_data
 from ...errors import InvalidValueError, ShapeError
 from ...geometry import REVOLUTE
 from ...trajectories import Trajectory
-from ..result_file import plain
 from .result import ExcitingTrajectory
 
 
@@ -150,7 +150,7 @@ def excitation_data(result: ExcitingTrajectory) -> dict[str, Any]:
         "notes": result.notes,
         "motion": {"generator": generator, "arguments": arguments},
     }
-    return plain(data)
+    return json_data(data)
 
 
 def _ros(names: Sequence[str], t: Array, q: Array, v: Array, a: Array) -> str:

@@ -177,7 +177,7 @@ class MotionRegressor:
         of_q, of_v, of_a = np.zeros(q.shape), np.zeros(q.shape), np.zeros(q.shape)
         chain, gravity = self.model.chain, self.model.gravity
         G = np.ascontiguousarray(G)
-        regressor_gradients(q, v, a, *chain, gravity, self.links, G, of_q, of_v, of_a)
+        regressor_gradients(q, v, a, chain, gravity, self.links, G, of_q, of_v, of_a)
         for kind, out in (("Ia", of_a), ("Fv", of_v)):
             for column, row in self.turns[kind]:
                 # the diagonal terms of a coupled motor are in the columns of its joints

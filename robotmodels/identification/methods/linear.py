@@ -4,20 +4,8 @@ Each is an object with its options; `fit` accepts it, or its name, as ``method``
 
 Parameters
 ----------
-system : Equations
-    Equations of a log, from `equations`.
-factors : TriangularFactors
-    Factors of the same equations, from `reduce_equations`.
-
-Returns
--------
-Estimate
-    Values, covariance for white residuals, and standard deviations of the residuals.
-
-Raises
-------
-InvalidValueError, ShapeError
-    Fewer equations than parameters; options out of their range or of another length.
+essential : bool, float or str
+    Drop insignificant parameters: True, a ratio of relative standard errors, or a rule.
 
 References
 ----------

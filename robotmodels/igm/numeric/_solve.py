@@ -12,6 +12,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
+from ...kernels import Chain
 from ...kernels._compile import (
     CHAIN,
     INT,
@@ -92,7 +93,7 @@ def row_space(J: Floats, weight: Floats, unit: Floats, rows: Floats, moves: Floa
 
 @compiled(
     NOTHING(
-        STACK, MATRIX, INT, MATRIX, STACK, *CHAIN, INTS, MATRIX, VECTOR, VECTOR, VECTOR, INT,
+        STACK, MATRIX, INT, MATRIX, STACK, CHAIN, INTS, MATRIX, VECTOR, VECTOR, VECTOR, INT,
         INTS, INT, FLOAT, FLOAT, VECTOR, INT, INT, OUT2, OUT2, OUT2, OUT1, ROW_FLAGS,
         ROW_FLAGS, JOINT_FLAGS, CODES,
     )
@@ -103,13 +104,7 @@ def solve_poses(
     given: int,
     starts: Floats,
     poses: Floats,
-    antecedent: Ints,
-    sigma: Ints,
-    joint: Ints,
-    rotation: Floats,
-    position: Floats,
-    base_rotation: Floats,
-    base_position: Floats,
+    chain: Chain,
     path: Ints,
     tool_rotation: Floats,
     tool_position: Floats,
@@ -140,8 +135,8 @@ def solve_poses(
     n = starts.shape[1]
     k = path.shape[0]
     arm = (
-        sigma, joint, rotation, position, whole_matrix(base_rotation),
-        whole_vector(base_position), path, whole_matrix(tool_rotation),
+        chain.sigma, chain.joint, chain.rotation, chain.position, whole_matrix(chain.base_rotation),
+        whole_vector(chain.base_position), path, whole_matrix(tool_rotation),
         whole_vector(tool_position),
     )  # fmt: skip
     q, e, J = np.empty(n), np.zeros(6), np.zeros((6, n))
@@ -161,13 +156,13 @@ def solve_poses(
         if c < 3:
             place[c], place_mask[c] = asked[c], mask[c]
     unit, turns = np.zeros(n), np.zeros(n, np.bool_)
-    for j in range(sigma.shape[0]):
-        if sigma[j] == 0:
-            turns[joint[j]] = True
+    for j in range(chain.sigma.shape[0]):
+        if chain.sigma[j] == 0:
+            turns[chain.joint[j]] = True
     free = 0
     for j in path:
-        if sigma[j - 1] != 2:
-            unit[joint[j - 1]] = 1.0 if sigma[j - 1] == 0 else 1.0 / length
+        if chain.sigma[j - 1] != 2:
+            unit[chain.joint[j - 1]] = 1.0 if chain.sigma[j - 1] == 0 else 1.0 / length
             free += 1
     # an angle that has a whole turn is not limited: it is shifted inside afterwards
     nowhere = (np.full(n, -inf), np.full(n, inf))
@@ -182,7 +177,7 @@ def solve_poses(
     has_place = place_mask[0] + place_mask[1] + place_mask[2] > 0
     all_place = place_mask[0] + place_mask[1] + place_mask[2] == 3
     j = path[0] - 1
-    centre = add(arm[5], times(arm[4], vector(position, j)))
+    centre = add(arm[5], times(arm[4], vector(chain.position, j)))
 
     generic = -1
     reference = np.empty(n)

@@ -158,7 +158,7 @@ def igm_numeric(
 
     solve_poses(
         targets.reshape(N, 4, 4), first, int(q0 is not None), search.starts, search.poses,
-        *model.chain, *search.tool, model.lower, model.upper, int(limits),
+        model.chain, *search.tool, model.lower, model.upper, int(limits),
         asked.astype(np.int64), int(mask_axes == "tool"), search.length, search.reach, tolerance,
         restarts, iterations, closest, q, error, residual, valid, inside, family, status,
     )  # fmt: skip
@@ -236,7 +236,7 @@ def _new_search(model: RobotModel, limits: bool, restarts: int, rng: Any) -> _Se
     poses = np.empty((len(starts), 4, 4))
     from ...kernels.poses import tip_poses
 
-    tip_poses(starts, *chain, *tool, poses)
+    tip_poses(starts, chain, *tool, poses)
     still = np.zeros(n)
     if limits:
         still = np.where(on_path, 0.5 * (low + high), np.clip(still, model.lower, model.upper))

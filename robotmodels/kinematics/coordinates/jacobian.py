@@ -1,22 +1,21 @@
-"""Jacobian of operational coordinates by differentiating the direct geometric model.
+"""Jacobian of operational coordinates: derivatives of the direct geometric model.
 
-Seed book section 1.3.1.1: ``J = df/dq`` of eq. [1.5]. First the entries of the pose are
-differentiated with respect to the joints, as the product of factors that they are, then the
-coordinates with respect to these entries. The screws of the joints take no part, so that this and
-``coordinate_rates @ jacobian`` are two ways to the same matrix.
+Seed book section 1.3.1.1: ``J = df/dq`` of eq. [1.5], here as the rates of the coordinates at unit
+twists, E, times the Jacobian of the frame.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..._arrays import Array, as_vector, batch_shape
 from ...model import RobotModel, check_model
-from ._differentials import orientation_differential, orientation_differential_rate
-from ._orientation_rates import singular_coordinates
-from .conversion import coordinates_of_poses, near_coordinates
+from ..jacobians import jacobian, jacobian_rate
+from ..poses import dgm
+from .conversion import near_coordinates
 from .kinds import OrientationKind, orientation_kind
+from .rates import coordinate_rates, coordinate_rates_rate
 
 
 def coordinate_jacobian(
@@ -69,18 +68,9 @@ def coordinate_jacobian(
            [1. , 1. ]])
     """
     check_model(model)
-    q = as_vector(q, model.n, "q")
     kind = orientation_kind(kind)
-    point = model.twin.frame(frame)
-    from ...kernels.differentiated_poses import differentiated_poses
-
-    batch, (rows,), close = _laid_out((q,), ("q",), kind, near)
-    poses, T_j = _room(rows, model.n)
-    differentiated_poses(rows, *model.chain, *point.kernel_arguments, poses, T_j)
-    y = coordinates_of_poses(poses, kind, close)[:, 3:]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        y_j = orientation_differential(kind, y[:, None], poses[:, None, :3, :3], T_j[..., :3])
-    return _assembled(batch, T_j, y_j, singular_coordinates(y, kind))
+    T, near = _broadcast(dgm(model, q, frame), near, kind)
+    return coordinate_rates(T, kind, near) @ jacobian(model, q, frame)
 
 
 def coordinate_jacobian_rate(
@@ -91,7 +81,7 @@ def coordinate_jacobian_rate(
     frame: str | int | None = None,
     near: ArrayLike | None = None,
 ) -> Array:
-    """Time derivative of `coordinate_jacobian` along a motion, by differentiating twice.
+    """Time derivative of `coordinate_jacobian` along a motion.
 
     Parameters
     ----------
@@ -124,59 +114,22 @@ def coordinate_jacobian_rate(
     array([-0.3,  0. ])
     """
     check_model(model)
-    q, v = as_vector(q, model.n, "q"), as_vector(v, model.n, "v")
     kind = orientation_kind(kind)
-    point = model.twin.frame(frame)
-    from ...kernels.differentiated_poses import differentiated_pose_rates
-
-    batch, (rows, speeds), close = _laid_out((q, v), ("q", "v"), kind, near)
-    poses, T_j = _room(rows, model.n)
-    T_jt = np.empty(T_j.shape)
-    differentiated_pose_rates(rows, speeds, *model.chain, *point.kernel_arguments, poses, T_j, T_jt)
-    y = coordinates_of_poses(poses, kind, close)[:, 3:]
-    R_t = np.einsum("ij,ijkl->ikl", speeds, T_j[..., :3])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        y_jt = orientation_differential_rate(
-            kind,
-            y[:, None],
-            poses[:, None, :3, :3],
-            T_j[..., :3],
-            R_t[:, None],
-            T_jt[..., :3],
-        )
-    return _assembled(batch, T_jt, y_jt, singular_coordinates(y, kind))
+    q, v = as_vector(q, model.n, "q"), as_vector(v, model.n, "v")
+    batch_shape((q, v), ("q", "v"))
+    T, near = _broadcast(dgm(model, q, frame), near, kind)
+    J = jacobian(model, q, frame)
+    twist = (J @ v[..., None])[..., 0]
+    E, dE = coordinate_rates(T, kind, near), coordinate_rates_rate(T, twist, kind, near)
+    return E @ jacobian_rate(model, q, v, frame) + dE @ J
 
 
-def _laid_out(
-    vectors: tuple[Array, ...],
-    names: tuple[str, ...],
-    kind: OrientationKind,
-    near: ArrayLike | None,
-) -> tuple[tuple[int, ...], list[Array], Array | None]:
-    """Joint vectors and coordinates to be near to, broadcast and as contiguous rows."""
-    batch = batch_shape(vectors, names)
-    close = near_coordinates(near, kind, batch)
+def _broadcast(
+    T: Array, near: ArrayLike | None, kind: OrientationKind
+) -> tuple[Array, Array | None]:
+    """Poses with the leading axes of the coordinates to be near to, which are checked."""
+    close = near_coordinates(near, kind, T.shape[:-2])
     if close is not None:
-        batch = np.broadcast_shapes(batch, close.shape[:-1])
-    count = int(np.prod(batch))
-    rows = [
-        np.ascontiguousarray(np.broadcast_to(x, (*batch, x.shape[-1]))).reshape(count, x.shape[-1])
-        for x in (vectors if close is None else (*vectors, close))
-    ]
-    return batch, rows[: len(vectors)], None if close is None else rows[-1]
-
-
-def _room(rows: Array, n: int) -> tuple[Array, Array]:
-    """Poses and their derivatives, to be written."""
-    return np.empty((len(rows), 4, 4)), np.empty((len(rows), n, 3, 4))
-
-
-def _assembled(
-    batch: tuple[int, ...], T_j: Array, y_j: Array, singular: NDArray[np.bool_]
-) -> Array:
-    """Position rows and orientation rows, one column for each joint."""
-    N, n, k = y_j.shape
-    J = np.empty((N, k + 3, n))
-    J[:, :3] = np.swapaxes(T_j[..., 3], 1, 2)
-    J[:, 3:] = np.where(singular[:, None, None], np.nan, np.swapaxes(y_j, 1, 2))
-    return J.reshape(*batch, k + 3, n)
+        batch = np.broadcast_shapes(T.shape[:-2], close.shape[:-1])
+        T = np.broadcast_to(T, (*batch, 4, 4))
+    return T, close

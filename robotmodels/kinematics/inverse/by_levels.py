@@ -116,10 +116,10 @@ def _rows(array: Array) -> Array:
 
 
 def _jacobians(model: RobotModel, known: KnownFrame, q: Array, reference: int) -> Array:
-    from ...kernels.jacobians import jacobians
+    from ...kernels.poses import jacobians
 
     J = np.empty((q.shape[0], 6, model.n))
-    jacobians(q, *model.chain, *known.point.kernel_arguments, reference, J)
+    jacobians(q, model.chain, *known.point.kernel_arguments, reference, J)
     return J
 
 
@@ -171,11 +171,8 @@ def _told(
     J = level.J * weights[:, None]
     # rows of tasks are a part of the whole as well
     size = np.maximum(size, np.linalg.norm(J * scaling.columns, axis=(1, 2)))
-    v, reachable = np.empty((N, n)), np.empty((N, m))
-    values, damping = np.empty((N, min(m, n))), np.empty(N)
-    code, rank = np.empty(N, np.int8), np.empty(N, np.int8)
-    inverse_of_rows(
-        J, rate * weights, size, scaling.columns, *method.kernel_arguments,
-        v, code, reachable, values, rank, damping,
-    )  # fmt: skip
-    return code, reachable, values, rank, damping
+    k = min(m, n)
+    out, codes = np.empty((N, n + m + k + 1)), np.empty((N, 2), np.int8)
+    inverse_of_rows(J, rate * weights, size, scaling.columns, *method.kernel_arguments, out, codes)
+    reachable, values = out[:, n : n + m], out[:, n + m : n + m + k]
+    return codes[:, 0].copy(), reachable, values.copy(), codes[:, 1].copy(), out[:, -1].copy()

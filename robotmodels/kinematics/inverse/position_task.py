@@ -71,21 +71,21 @@ class PositionTask(Rebuilt):
 
     def level(self, model: RobotModel, q: ArrayLike) -> Level:
         """Rows that ask for velocities, see `Task.level`."""
-        from ...kernels.jacobians import jacobians
+        from ...kernels.poses import jacobians
 
         batch, q, _ = rows_of(model, q)
         J = np.empty((len(q), 6, model.n))
-        jacobians(q, *model.chain, *self._place(model), 0, J)
+        jacobians(q, model.chain, *self._place(model), 0, J)
         return self._level(model, J, batch, None)
 
     def acceleration_level(self, model: RobotModel, q: ArrayLike, v: ArrayLike) -> Level:
         """Rows that ask for accelerations, see `Task.acceleration_level`."""
-        from ...kernels.jacobians import jacobian_rates, jacobians
+        from ...kernels.poses import jacobian_rates, jacobians
 
         batch, q, v = rows_of(model, q, v)
         J, rate = np.empty((2, len(q), 6, model.n))
-        jacobians(q, *model.chain, *self._place(model), 0, J)
-        jacobian_rates(q, v, *model.chain, *self._place(model), 0, rate)
+        jacobians(q, model.chain, *self._place(model), 0, J)
+        jacobian_rates(q, v, model.chain, *self._place(model), 0, rate)
         return self._level(model, J, batch, np.einsum("kij,kj->ki", rate[:, :3], v))
 
     def _place(self, model: RobotModel) -> tuple[Array, Array, Array]:

@@ -105,14 +105,14 @@ def general_rank(model: RobotModel, known: KnownFrame, scaling: Scaling, referen
     """Rank that the rows asked for have at nearly all configurations."""
     key = (reference, *map(int, scaling.asked))
     if key not in known.ranks:
-        from ...kernels.jacobians import jacobians
+        from ...kernels.poses import jacobians
 
         rng = np.random.default_rng(0)
         sliding = _sliding(model)
         q = rng.uniform(-np.pi, np.pi, (_SAMPLES, model.n))
         q *= np.where(sliding, known.length / np.pi, 1.0)
         J = np.empty((_SAMPLES, 6, model.n))
-        jacobians(q, *model.chain, *known.point.kernel_arguments, reference, J)
+        jacobians(q, model.chain, *known.point.kernel_arguments, reference, J)
         J *= known.usual.rows[:, None] * known.usual.columns
         size = np.linalg.norm(J, axis=(1, 2))
         values = np.linalg.svd(J[:, scaling.asked], compute_uv=False)

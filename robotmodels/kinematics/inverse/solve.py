@@ -27,6 +27,8 @@ _SINGULAR, _TOO_FEW = int(IKMStatus.SINGULAR), int(IKMStatus.TOO_FEW_JOINTS)
 
 def solved(model: RobotModel, request: Request) -> IKMSolution:
     """The inverse kinematic model, of the first or the second order."""
+    from ...kernels.inverse_velocity import inverse_velocities, packed
+
     reference = reference_of(request.reference)[1]
     known = known_frame(model, request.frame)
     scaling = scaling_of(model, known, request.mask, request.joint_weights, request.length)
@@ -52,15 +54,19 @@ def solved(model: RobotModel, request: Request) -> IKMSolution:
     if v is not None:
         drift = drift_rows(model, known, q, v, reference)
         rate = rate - drift
-    out = np.empty((N, n))
-    achieved, error, reachable = np.empty((N, 6)), np.empty((N, 6)), np.empty((N, 6))
-    values, damping = np.empty((N, k)), np.empty(N)
-    status, rank = np.empty(N, np.int8), np.empty(N, np.int8)
-    _kernel()(
-        q, rate, _none(n) if extra is None else extra, *model.chain, *known.point.kernel_arguments,
-        reference, scaling.asked, scaling.rows, scaling.columns, *method.kernel_arguments,
-        out, status, achieved, error, reachable, values, rank, damping,
+    out, codes = np.empty((N, n + 19 + k)), np.empty((N, 2), np.int8)
+    numbers = known.whole, known.numbers
+    if scaling is not known.usual:
+        numbers = packed(
+            model.chain, known.point.kernel_arguments, scaling.asked, scaling.rows, scaling.columns
+        )
+    inverse_velocities(
+        *numbers, q, rate, _none(n) if extra is None else extra, reference,
+        *method.kernel_arguments, out, codes,
     )  # fmt: skip
+    cuts = np.split(out, [n, n + 6, n + 12, n + 18, n + 18 + k], axis=1)
+    out, achieved, error, reachable, values, damping = (part.copy() for part in cuts)
+    damping, status, rank = damping[:, 0], codes[:, 0].copy(), codes[:, 1].copy()
     if drift is not None:
         drift *= scaling.mask
         achieved += drift
@@ -95,11 +101,12 @@ def solved_alone(
     known = known_frame(model, frame)
     n = q.size
     k = min(6, n)
-    out, codes = np.empty(n + 19 + k), np.empty(2, np.int8)
-    _one_kernel()(
-        known.whole, known.numbers, q, twist, number, *as_method(method).kernel_arguments, out,
-        codes,
+    out, codes = np.empty((1, n + 19 + k)), np.empty((1, 2), np.int8)
+    _kernel()(
+        known.whole, known.numbers, q.reshape(1, n), twist.reshape(1, 6), _none(n), number,
+        *as_method(method).kernel_arguments, out, codes,
     )  # fmt: skip
+    out, codes = out[0], codes[0]
     if codes[0] == _SINGULAR:
         tell_structure(model, known, known.usual, number, codes[:1], codes[1:])
     out.setflags(write=False)
@@ -114,11 +121,11 @@ def solved_alone(
 
 def drift_rows(model: RobotModel, known: KnownFrame, q: Array, v: Array, reference: int) -> Array:
     """Velocity-dependent acceleration of the frame, ``dJ/dt v``. Shapes: q, v (N, n) -> (N, 6)."""
-    from ...kernels.accelerations import accelerations
+    from ...kernels.poses import accelerations
 
     out = np.empty((q.shape[0], 6))
     accelerations(
-        q, v, np.zeros_like(q), *model.chain, *known.point.kernel_arguments, reference, out
+        q, v, np.zeros_like(q), model.chain, *known.point.kernel_arguments, reference, out
     )
     return out
 
@@ -165,13 +172,6 @@ def _kernel() -> Callable[..., None]:
     from ...kernels.inverse_velocity import inverse_velocities
 
     return inverse_velocities
-
-
-@cache
-def _one_kernel() -> Callable[..., None]:
-    from ...kernels.inverse_velocity import one_inverse_velocity
-
-    return one_inverse_velocity
 
 
 @lru_cache(maxsize=64)

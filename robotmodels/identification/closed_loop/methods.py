@@ -1,0 +1,225 @@
+"""Instrumental variables, direct and inverse models, and closed-loop output error."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..._arrays import Array
+from ...errors import InvalidValueError
+from ...estimation.estimate import Estimate
+from ...estimation.factor import TriangularFactors
+from ..equations import Block, Equations
+from ..forms import decimated
+from ..signals import Piece
+from .loop import ClosedLoop, closed_loop
+from .method import Pairs, SimulatingMethod
+from .simulation import ClosedLoopSimulator
+
+_PARTS = 8
+"""Holding periods of an assumed controller's torques per sample."""
+_DIFFERENCE = 1e-5
+"""Finite-difference step of a parameter, relative to its torque size."""
+_OUTPUTS = ("torque", "position", "both")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Instrumental(SimulatingMethod):
+    """Instrumental variables (IDIM-IV): consistent although noise is in the regressor.
+
+    The controlled robot is simulated with the last parameters; the regressor Z of its motion, which
+    the noise of the sensors does not reach, is the instrument: ``Z^T S (y - W b) = 0``.
+
+    Parameters
+    ----------
+    controller : Controller, optional
+        Controller of the robot; default one tuned for small tracking errors.
+    start : array_like, shape (b,), optional
+        Initial parameters; default weighted least squares.
+    iterations : int
+        Largest number of steps.
+    lags : int, optional
+        Lags of the covariance, see `correlated_covariance`.
+    width : array_like, scalar or shape (n,), optional
+        Velocities below which the simulated dry friction is linear; default by the log.
+    substeps : int, optional
+        Runge-Kutta steps of a sample; default as many as friction requires, up to 64.
+
+    References
+    ----------
+    A. Janot, P.-O. Vandanjon and M. Gautier, "A generic instrumental variable approach for
+    industrial robot identification", IEEE T-CST 22(1), 2014, section III.
+
+    Examples
+    --------
+    >>> Instrumental(iterations=5).name
+    'iv'
+    """
+
+    name: ClassVar[str] = "iv"
+    title: ClassVar[str] = "instrumental variables of the simulated robot"
+
+    def _simulated(self, simulator: ClosedLoopSimulator, values: Array, size: Array) -> Pairs:
+        """The simulated regressor and the measured equations."""
+        return instrument_pairs(simulator, values)
+
+
+def instrument_pairs(simulator: ClosedLoopSimulator, values: Array) -> Pairs:
+    """The regressor simulated with values (b,), and the measured equations."""
+    signals = simulator.signals(values)
+
+    def pairs() -> Iterator[tuple[Array, Block]]:
+        for piece, simulated in simulator.blocks(signals):
+            block = simulator.system.block(piece)
+            yield simulated.W, replace(block, use=block.use & simulated.use)
+
+    return pairs
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Didim(SimulatingMethod):
+    """Direct and inverse dynamic identification models (DIDIM): torques alone are measured.
+
+    The controlled robot is simulated with the last parameters; weighted least squares then explain
+    the measured torque by the regressor of the simulated motion. Where the log has references, the
+    measured positions serve only for the initial parameters.
+
+    Parameters
+    ----------
+    controller, start, iterations, lags, width, substeps
+        See `Instrumental`.
+
+    References
+    ----------
+    M. Gautier, A. Janot and P.-O. Vandanjon, "A new closed-loop output error method for parameter
+    identification of robot dynamics", IEEE T-CST 21(2), 2013, section III.
+
+    Examples
+    --------
+    >>> Didim().iterations
+    50
+    """
+
+    iterations: int = 50
+    name: ClassVar[str] = "didim"
+    title: ClassVar[str] = "direct and inverse dynamic identification models"
+    _memory: ClassVar[int] = 6
+    _advice: ClassVar[tuple[str, ...]] = (
+        "DIDIM does not converge where the simulated motion depends on the parameters more than "
+        "the torques determine them (a joint of little inertia under friction, for instance): use "
+        "instrumental variables, which use the measured motion too.",
+    )
+
+    def _simulated(self, simulator: ClosedLoopSimulator, values: Array, size: Array) -> Pairs:
+        """The simulated regressor and the measured torque."""
+        signals = simulator.signals(values)
+        return lambda: ((block.W, block) for _, block in simulator.blocks(signals))
+
+    def _loop(self, system: Equations, values: Array) -> ClosedLoop | None:
+        """Closed loop; torques of an assumed controller are held for a part of a sample.
+
+        A held torque lags by half of its period, an error of inertia and friction.
+        """
+        loop = SimulatingMethod._loop(self, system, values)
+        if loop is None or self.controller is not None:
+            return loop
+        quick = replace(loop.controller, period=system.log.dt / _PARTS)
+        quicker = closed_loop(system, values, quick, self.width, self.substeps)
+        note = (
+            f"Its torques are held for one of {_PARTS} parts of a sample. DIDIM explains torques "
+            "by a motion that it simulates: without the robot's controller and references (q_ref "
+            "of the log) its standard errors do not include the difference of the controllers."
+        )
+        return quicker and replace(quicker, notes=(*loop.notes, note))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OutputError(SimulatingMethod):
+    """Closed-loop output error (CLOE): simulated outputs are fitted to the measured ones.
+
+    Gauss-Newton steps on the differences of measured and simulated outputs, both through the same
+    decimation, weighted by their standard deviations. Sensitivities are differences of b
+    simulations. Torques are compared where the references keep a joint out of its dead band.
+
+    Parameters
+    ----------
+    controller, start, iterations, lags, width, substeps
+        See `Instrumental`.
+    output : str
+        "torque", "position" or "both"; ``sigma`` then has an entry for each output, torques first.
+
+    Raises
+    ------
+    InvalidValueError
+        Another output.
+
+    References
+    ----------
+    A. Janot, M. Gautier, A. Jubien and P.-O. Vandanjon, "Comparison between the CLOE method and the
+    DIDIM method for robots identification", IEEE T-CST 22(5), 2014, sections II and III.
+
+    Examples
+    --------
+    >>> OutputError(output="both").output
+    'both'
+    """
+
+    output: Literal["torque", "position", "both"] = "torque"
+    name: ClassVar[str] = "cloe"
+    title: ClassVar[str] = "closed-loop output error"
+    _descends: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        SimulatingMethod.__post_init__(self)
+        if self.output not in _OUTPUTS:
+            raise InvalidValueError(f"output: expected one of {_OUTPUTS}, got {self.output!r:.60}.")
+
+    def _outputs(self, tau: NDArray[Any], q: NDArray[Any]) -> NDArray[Any]:
+        return {"torque": tau, "position": q}.get(self.output, np.hstack((tau, q)))
+
+    def _simulated(self, simulator: ClosedLoopSimulator, values: Array, size: Array) -> Pairs:
+        """Outputs around values: ``y - y_s + S values = S b`` with the sensitivities S."""
+        system = simulator.system
+        log, step, pieces = system.log, system.processing.decimation, system.pieces()
+
+        def simulated(values: Array) -> list[Array]:
+            signals = simulator.signals(values)
+            rows = ((x, simulator.window(x)[1], signals[x.begin]) for x in pieces)
+            return [_decimated(system, x, self._outputs(s.tau[at], s.q[at])) for x, at, s in rows]
+
+        centre, moves = simulated(values), _DIFFERENCE * size
+        sides = zip(*(simulated(values + move) for move in np.diag(moves)), strict=True)
+        pairs = []
+        for piece, x, moved in zip(pieces, centre, sides, strict=True):
+            S = np.stack([(side - x) / moves[k] for k, side in enumerate(moved)], axis=2)
+            rows, inner = simulator.window(piece)
+            out = self._outputs(np.array(log.tau[rows]), np.array(log.q[rows]))
+            y = _decimated(system, piece, out) - x + S @ values
+            v = _decimated(system, piece, simulator.targets[piece.begin].v[:-1][inner])
+            use = self._outputs(simulator.use(v), np.ones(v.shape, dtype=bool))
+            t = log.dt * np.arange(piece.start, piece.stop, step, dtype=np.float64)
+            pairs.append((S, Block(t, S, y, use, v)))
+        return lambda: pairs
+
+    def solve(self, system: Equations, factors: TriangularFactors) -> Estimate:
+        """Estimate the parameters."""
+        found = SimulatingMethod.solve(self, system, factors)
+        if self.output == "torque" or system.log.q_ref is not None:
+            return found
+        note = (
+            "The log has no references: its measured positions are compared with a simulation that "
+            "follows them, which hardly depends on the parameters. Give q_ref to the log."
+        )
+        return replace(found, notes=(*found.notes, note))
+
+
+def _decimated(system: Equations, piece: Piece, rows: Array) -> Array:
+    """Decimation as for the measured equations."""
+    step = system.processing.decimation
+    centre = piece.start - max(piece.start - system.processing.reach, piece.low)
+    count = -(-(piece.stop - piece.start) // step)
+    return decimated([rows], step, centre, count)

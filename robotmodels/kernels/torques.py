@@ -1,0 +1,167 @@
+"""Joint torques by the recursive Newton-Euler algorithm, energies, and torques of the drives.
+
+Seed book section 1.5.2 (J. Luh, M. Walker and R. Paul 1980, in link frames and linear in the
+inertial parameters). Forward, velocities, accelerations and the wrench each link needs; backward,
+the wrenches that links pass on to their antecedents: a joint's torque is the component on its axis.
+Energies (section 1.5.1.2): E_j = (M v.v + 2 MS.(v x w) + w.J w) / 2 in link axes, and
+U_j = -g.(M p + R MS) with the world pose (R, p) of the link: zero for masses at the world's
+origin, as in Pinocchio.
+"""
+
+import numpy as np
+
+from . import Chain
+from ._compile import CHAIN, MATRIX, NOTHING, OUT1, OUT2, VECTOR, Floats, compiled
+from ._inertia import inertia_of, inertia_times
+from ._motion import (
+    base_against_gravity,
+    carry_acceleration,
+    carry_place,
+    carry_velocity,
+    coordinate,
+    link_place,
+    link_wrench,
+)
+from ._vectors import (
+    add,
+    cross,
+    dot,
+    matrix,
+    put_matrix,
+    put_vector,
+    scale,
+    times,
+    vector,
+    whole_matrix,
+    whole_vector,
+)
+
+__all__ = ["drive_torques", "joint_torques", "kinetic_energies", "potential_energies"]
+
+
+@compiled(NOTHING(MATRIX, MATRIX, MATRIX, CHAIN, MATRIX, VECTOR, OUT2))
+def joint_torques(
+    q: Floats,
+    v: Floats,
+    a: Floats,
+    chain: Chain,
+    pi: Floats,
+    gravity: Floats,
+    out: Floats,
+) -> None:
+    """Torques of the rigid links, without drive terms.
+
+    Shapes: q, v, a (N, n); pi (f, 10); gravity (3,) -> out (N, n).
+    """
+    f = chain.antecedent.shape[0]
+    R = np.empty((f + 1, 3, 3))
+    P = np.empty((f + 1, 3))
+    w = np.zeros((f + 1, 3))
+    dw = np.zeros((f + 1, 3))
+    U = np.zeros((f + 1, 3, 3))
+    u = np.empty((f + 1, 3))
+    force = np.empty((f + 1, 3))
+    moment = np.empty((f + 1, 3))
+    base_against_gravity(chain, gravity, u)
+    for i in range(q.shape[0]):
+        for k in range(f):
+            Rj, Pj = link_place(chain, k, q, i)
+            wj, dwj, Uj, uj = carry_acceleration(
+                chain.sigma[k],
+                chain.antecedent[k],
+                k,
+                coordinate(v, i, chain.joint[k]),
+                coordinate(a, i, chain.joint[k]),
+                Rj,
+                Pj,
+                w,
+                dw,
+                U,
+                u,
+            )
+            F, N = link_wrench(pi, k, wj, dwj, Uj, uj)
+            put_matrix(R, k + 1, Rj)
+            put_vector(P, k + 1, Pj)
+            put_vector(force, k + 1, F)
+            put_vector(moment, k + 1, N)
+        for j in range(f, 0, -1):
+            F = vector(force, j)
+            N = vector(moment, j)
+            if chain.sigma[j - 1] == 0:
+                out[i, chain.joint[j - 1]] = N[2]
+            elif chain.sigma[j - 1] == 1:
+                out[i, chain.joint[j - 1]] = F[2]
+            b = chain.antecedent[j - 1]
+            if b > 0:
+                Rj = matrix(R, j)
+                Fb = times(Rj, F)
+                Nb = add(times(Rj, N), cross(vector(P, j), Fb))
+                put_vector(force, b, add(vector(force, b), Fb))
+                put_vector(moment, b, add(vector(moment, b), Nb))
+
+
+@compiled(NOTHING(MATRIX, MATRIX, CHAIN, MATRIX, OUT1))
+def kinetic_energies(
+    q: Floats,
+    v: Floats,
+    chain: Chain,
+    pi: Floats,
+    out: Floats,
+) -> None:
+    """Kinetic energy of the rigid links, without rotors.
+
+    Shapes: q, v (N, n); pi (f, 10) -> out (N,).
+    """
+    f = chain.antecedent.shape[0]
+    omega = np.zeros((f + 1, 3))
+    speed = np.zeros((f + 1, 3))
+    for i in range(q.shape[0]):
+        twice = 0.0
+        for k in range(f):
+            Rj, Pj = link_place(chain, k, q, i)
+            wj, vj = carry_velocity(chain, k, v, i, Rj, Pj, omega, speed)
+            J, MS, M = inertia_of(pi, k)
+            twice += M * dot(vj, vj) + 2.0 * dot(MS, cross(vj, wj)) + dot(wj, inertia_times(J, wj))
+        out[i] = 0.5 * twice
+
+
+@compiled(NOTHING(MATRIX, CHAIN, MATRIX, VECTOR, OUT1))
+def potential_energies(
+    q: Floats,
+    chain: Chain,
+    pi: Floats,
+    gravity: Floats,
+    out: Floats,
+) -> None:
+    """Energy of the links in the field of gravity.
+
+    Shapes: q (N, n), pi (f, 10), gravity (3,) -> out (N,).
+    """
+    f = chain.antecedent.shape[0]
+    g = whole_vector(gravity)
+    R = np.empty((f + 1, 3, 3))
+    p = np.empty((f + 1, 3))
+    put_matrix(R, 0, whole_matrix(chain.base_rotation))
+    put_vector(p, 0, whole_vector(chain.base_position))
+    for i in range(q.shape[0]):
+        energy = 0.0
+        for k in range(f):
+            Rj, Pj = link_place(chain, k, q, i)
+            Rk, pk = carry_place(chain, k, Rj, Pj, R, p)
+            _, MS, M = inertia_of(pi, k)
+            energy -= dot(g, add(scale(M, pk), times(Rk, MS)))
+        out[i] = energy
+
+
+@compiled(NOTHING(MATRIX, MATRIX, VECTOR, VECTOR, VECTOR, VECTOR, OUT2))
+def drive_torques(
+    v: Floats, a: Floats, Ia: Floats, Fv: Floats, Fc: Floats, offset: Floats, out: Floats
+) -> None:
+    """``Ia a + Fv v + Fc sign(v) + offset``, joint by joint.
+
+    Shapes: v, a (N, n); Ia, Fv, Fc, offset (n,) -> out (N, n).
+    """
+    for i in range(v.shape[0]):
+        for j in range(v.shape[1]):
+            dry = Fc[j] if v[i, j] > 0.0 else (-Fc[j] if v[i, j] < 0.0 else 0.0)
+            out[i, j] = Ia[j] * a[i, j] + Fv[j] * v[i, j] + offset[j] + dry

@@ -1,0 +1,210 @@
+"""Tables of base parameters: their formulas as the book prints them, and their values."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .._arrays import Array, Rebuilt, read_only
+from ..errors import nearest_names
+from ..geometry import PRISMATIC
+from ..latex_text import escaped, powers
+from ..regressors.columns import plain_name
+from ..table_text import boxed
+from .formulas import Constant, Formula
+
+_WIDTH = 100
+_LONGEST = 180
+"""Longest symbolic formula, characters."""
+_UNITS = {"M": "kg", "MX": "kg m", "MY": "kg m", "MZ": "kg m", "Kc": "N/m", "Pc": "N"}
+"""Units of links and of gravity compensators; the other kinds of upper case are inertias."""
+_TURNING = {"Ia": "kg m^2", "Fv": "N m s/rad"}
+_SLIDING = {"Ia": "kg", "Fv": "N s/m"}
+
+
+class BaseTable(NamedTuple):
+    """Content of the table of the book: sentences, formulas, symbols, and lists of names.
+
+    A formula is a pair, with symbols and with numbers.
+    """
+
+    heading: str
+    notes: tuple[str, ...]
+    formulas: tuple[tuple[Formula, Formula], ...]
+    constants: tuple[Constant, ...]
+    lists: tuple[tuple[str, tuple[str, ...]], ...]
+    units: str
+    rank: str
+
+    @property
+    def text(self) -> str:
+        """The base parameters, the values of the symbols, and the other parameters."""
+        lines = [self.heading, *(_filled(note, 2) for note in self.notes)]
+        rows = self._shown()
+        if rows:
+            lines.append(
+                "Regrouped (R: in place of the sum, whose terms are not identifiable alone):"
+            )
+        width = max((len(formula.name) for formula, _ in rows), default=0) + 1
+        for formula, numbers in rows:
+            symbolic = any(c.isalpha() for term in formula.terms for c in term.text)
+            for name, one in ((formula.name + "R", formula), ("", numbers)):
+                if name or (formula != numbers and symbolic):
+                    label = f"  {name:<{width}} = "
+                    lines.append(_filled(label + _sum(one), len(label) + 2))
+        if used := self._used():
+            values = ", ".join(f"{c.text} = {c.value:.6g} {c.unit}" for c in used)
+            lines.append(_filled(f"  with {values}", 7))
+        parts = [(label, ", ".join(names)) for label, names in self.lists if names]
+        parts.append(("Units", self.units))
+        lines += [_filled(f"{label}: {words}", min(len(label) + 2, 10)) for label, words in parts]
+        if self.rank:
+            lines.append(_filled(self.rank, self.rank.index(":") + 2))
+        return "\n".join(lines)
+
+    @property
+    def latex(self) -> str:
+        """The same in LaTeX: an ``align*`` of the formulas and lines of words."""
+        out = [rf"\textbf{{{escaped(self.heading)}}}", *(escaped(note) for note in self.notes)]
+        rows = [f"{_symbol(f.name, 'R')} &= {_sum(f, True)}" for f, _ in self._shown()]
+        if rows:
+            out.append("\\begin{align*}\n" + " \\\\\n".join(rows) + "\n\\end{align*}")
+        if used := self._used():
+            values = (
+                rf"${c.latex} = {powers(f'{c.value:.6g}')}\,\mathrm{{{c.unit}}}$" for c in used
+            )
+            out.append("with " + ", ".join(values))
+        for label, names in self.lists:
+            if names:
+                out.append(f"{label}: " + ", ".join(f"${_symbol(name)}$" for name in names))
+        out.append("Units: " + re.sub(r"\^(\d)", r"$^\1$", self.units))
+        return "\n\n".join(out)
+
+    def _shown(self) -> list[tuple[Formula, Formula]]:
+        """Regrouped parameters: symbolic (numeric where too long), and numeric."""
+        return [
+            (numbers if len(_sum(formula)) > _LONGEST else formula, numbers)
+            for formula, numbers in self.formulas
+            if formula.is_regrouped
+        ]
+
+    def _used(self) -> list[Constant]:
+        """The constants that occur in the formulas."""
+        texts = " ".join(term.text for formula, _ in self._shown() for term in formula.terms)
+        words = set(re.findall(r"[A-Z]+\d*", texts))
+        return [constant for constant in self.constants if constant.text in words]
+
+
+def _filled(line: str, indent: int) -> str:
+    return textwrap.fill(
+        line, _WIDTH, subsequent_indent=" " * indent, break_long_words=False, break_on_hyphens=False
+    )
+
+
+def _sum(formula: Formula, latex: bool = False) -> str:
+    """The terms of a formula with their signs."""
+    out, times = "", r" \, " if latex else "*"
+    for term in formula.terms:
+        text = powers(term.latex) if latex else term.text
+        sign, factor = ("-", text[1:].lstrip()) if text.startswith("-") else ("", text)
+        names = " + ".join(_symbol(name) if latex else name for name in term.parameters)
+        if text and len(term.parameters) > 1:
+            names = rf"\left({names}\right)" if latex else f"({names})"
+        out += (" - " if sign else " + ") if out else sign
+        out += factor + times + names if factor else names
+    return out
+
+
+def _symbol(name: str, mark: str = "") -> str:
+    letters = name.rstrip("0123456789")
+    kind = rf"\mathrm{{{letters}}}" if letters[-1].islower() else letters
+    return f"{kind}_{{{name[len(letters) :]}{mark}}}"
+
+
+# --- values --------------------------------------------------------------------------------------
+
+
+class KeptNames(dict[str, Any]):
+    """Dictionary by parameter names that also accepts printed names (``ZZ1R``)."""
+
+    def __missing__(self, name: object) -> Any:
+        if isinstance(name, str) and (plain := plain_name(name, self)) in self:
+            return self[plain]
+        near = nearest_names(str(name), tuple(self))
+        hint = f" Did you mean {', '.join(near)}?" if near else ""
+        raise KeyError(f"No base parameter {name!r}.{hint} It may be regrouped or without effect.")
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class BaseValues(Rebuilt, Mapping[str, float]):
+    """Values of base parameters by name; prints as a table. Read-only.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Standard names of the b kept parameters.
+    printed : tuple of str
+        The same with an R where others are regrouped into them.
+    numbers : ndarray, shape (b,)
+        Values.
+    units : tuple of str
+        Units.
+
+    Examples
+    --------
+    >>> table = BaseValues(("ZZ1",), ("ZZ1R",), [2.0], ("kg m^2",))
+    >>> table["ZZ1"], len(table)
+    (2.0, 1)
+    """
+
+    names: tuple[str, ...]
+    printed: tuple[str, ...]
+    numbers: Any
+    units: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "numbers", read_only(self.numbers))
+
+    def __getitem__(self, name: str) -> float:
+        return KeptNames(zip(self.names, self.numbers.tolist(), strict=True))[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def __str__(self) -> str:
+        values = [f"{x:.6g}" for x in self.numbers.tolist()]
+        columns = (("parameter", self.printed), ("value", values), ("unit", self.units))
+        return boxed([(heading, list(column)) for heading, column in columns])
+
+    def __repr__(self) -> str:
+        return f"<BaseValues: {len(self)} base parameters>"
+
+
+def base_values(
+    names: tuple[str, ...], matrix: Array, sigma: NDArray[np.int64], values: Array
+) -> BaseValues:
+    """Base parameters with their values and units.
+
+    Shapes: matrix (b, p), sigma (f,), values (b,).
+    """
+    several = (matrix != 0.0).sum(axis=1) > 1
+    printed = (f"{n}R" if more else n for n, more in zip(names, several, strict=True))
+    return BaseValues(names, tuple(printed), values, tuple(_unit(name, sigma) for name in names))
+
+
+def _unit(name: str, sigma: NDArray[np.int64]) -> str:
+    kind = name.rstrip("0123456789")
+    if kind.isupper() or kind in _UNITS:
+        return _UNITS.get(kind, "kg m^2")
+    slides = int(sigma[int(name[len(kind) :]) - 1]) == PRISMATIC
+    units = _SLIDING if slides else _TURNING
+    return units.get(kind[:2], "N" if slides else "N m")  # Iam, Fvm, Fvp as Ia, Fv
