@@ -59,7 +59,7 @@ class Constraint:
         return x - slack * np.linalg.lstsq(self.rows, one, rcond=None)[0]
 
     def stated(self, cp: Any, x: Any, size: float, part: float) -> Any:
-        """The constraint on ``size x``, divided by size; matrices above a part of the allowance."""
+        """The constraint on ``size * x``, divided by size; matrices with a part of allowance."""
         s = self.rows @ x + self.offset / size
         if self.cone == "semidefinite":
             k = round(len(self.offset) ** 0.5)
