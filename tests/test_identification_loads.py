@@ -1,6 +1,7 @@
 """Payloads, drive gains and friction curves, identified together with the robot's parameters."""
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -192,6 +193,8 @@ def test_exact_logs_give_exact_gains(name, known):
     if name == "tx40" and len(known) == 1:
         assert found.value("MZ load 1") == pytest.approx(MASS * COM[2], abs=1e-8)
     assert not pickle.loads(pickle.dumps(found)).gains.flags.writeable
+    unsure = np.diag([*np.zeros(len(found.values) - 1), 1e3])
+    assert replace(found, covariance=unsure).status.name == "NOT_IDENTIFIABLE"
 
 
 def test_two_loads_without_a_log_of_the_bare_robot():

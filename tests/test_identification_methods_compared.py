@@ -53,7 +53,7 @@ def test_what_does_not_exist_is_listed_with_the_reason():
     assert found.fits[1].refused in found.fit_table
     assert np.isnan(found.values[1]).all()
     assert found.fits[1].rmse is None
-    assert "own RMSE 1" in found.fit_table
+    assert "in-sample RMSE 1" in found.fit_table
     assert "sequential" not in found.parameter_table
 
 

@@ -159,12 +159,12 @@ def _influence(fit: NonlinearFit) -> tuple[Array, Array]:
     leverage, influence = np.zeros((2, int(place.max(initial=-1)) + 1))
     noise = 1.0 if fit.sigma_known else max(fit.scale**2, np.finfo(float).tiny)
     for which, rows in blocks_by_size(place):
-        own, axes = np.linalg.eigh(T[rows] @ T[rows].swapaxes(1, 2))
+        shares, axes = np.linalg.eigh(T[rows] @ T[rows].swapaxes(1, 2))
         along = (axes.swapaxes(1, 2) @ r[rows][..., None])[..., 0]
-        alone = 1 - own <= 1e-10
-        change = np.where(alone, 0.0, along / np.where(alone, 1.0, 1 - own))
-        moved = (change**2 * np.maximum(own, 0.0)).sum(axis=1) / noise / max(fit.rank, 1)
-        leverage[which] = own.sum(axis=1)
+        alone = 1 - shares <= 1e-10
+        change = np.where(alone, 0.0, along / np.where(alone, 1.0, 1 - shares))
+        moved = (change**2 * np.maximum(shares, 0.0)).sum(axis=1) / noise / max(fit.rank, 1)
+        leverage[which] = shares.sum(axis=1)
         influence[which] = np.where(alone.any(axis=1), np.inf, moved)
     return leverage, influence
 

@@ -17,7 +17,6 @@ from .._arrays import Array
 from ..errors import InvalidValueError
 from ..estimation.estimate import NamedValues
 from ..estimation.factor import TriangularFactors, reduced
-from ..estimation.linear import residual_noise as residual_noise
 from ..logs import Log
 from ..logs.log import check_is_log
 from ..minimal_parameters import BaseParameters
@@ -29,6 +28,8 @@ from .signals import Piece, Processing
 
 UNIDENTIFIABLE = 1e-7
 """Rank tolerance: residual column norm relative to the largest."""
+_DEPENDENT = 1e-10
+"""Rank tolerance: singular value relative to the largest."""
 
 
 def equations_of(
@@ -87,6 +88,12 @@ def column_lengths(R: Array) -> Array:
     """Lengths of columns, 1 for those that are zero."""
     lengths = np.linalg.norm(R, axis=0)
     return np.where(lengths > 0.0, lengths, 1.0)
+
+
+def scaled_inverse(R: Array) -> Array:
+    """Pseudo-inverse of a matrix, its rank decided for columns of unit length."""
+    lengths = column_lengths(R)
+    return np.linalg.pinv(R / lengths, rcond=_DEPENDENT) / lengths[:, None]
 
 
 class NamedEstimate(NamedValues):

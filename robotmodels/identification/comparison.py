@@ -80,7 +80,7 @@ class MethodComparison:
     @property
     def fit_table(self) -> str:
         """A row for each fit: status, errors, standard errors, condition, time."""
-        cells = [_fit_cells(row, "held-out" if self.held_out else "own") for row in self.fits]
+        cells = [_fit_cells(row, "held-out" if self.held_out else "in-sample") for row in self.fits]
         heads = max(cells, key=len)
         columns = [(head, [row.get(head, "") for row in cells]) for head in heads]
         refused = [f"{row.label}: {row.refused}" for row in self.fits if row.refused]
@@ -181,9 +181,11 @@ def _fit_cells(row: ComparedFit, word: str) -> dict[str, str]:
     if (result := row.result) is None or row.rmse is None:
         return {"method": row.label, "status": "refused", "seconds": number_text(row.seconds, 3)}
     parts = result.validation.in_sample.filtered_relative
-    residual = 100.0 * np.sqrt(np.mean(parts[np.isfinite(parts)] ** 2)) if len(parts) else np.nan
+    parts = parts[np.isfinite(parts)]
+    residual = 100.0 * np.sqrt(np.mean(parts**2)) if len(parts) else np.nan
     k = int(np.argmax(result.relative_errors))
-    largest = f"{number_text(100.0 * result.relative_errors[k], 3)} ({result.names[k]})"
+    largest = f"{100.0 * result.relative_errors[k]:.3g} ({result.names[k]})"
+    largest = "-" if np.isnan(result.relative_errors[k]) else largest
     return {
         "method": row.label,
         "status": result.status.name.lower().replace("_", " "),

@@ -22,6 +22,7 @@ from ..errors import InvalidValueError
 from ..estimation import column_basis
 from ..estimation.covariance import correlated_covariance
 from ..estimation.factor import TriangularFactors
+from ..estimation.linear import residual_noise
 from ..friction import Friction
 from ..logs import Log
 from ..minimal_parameters import BaseParameters
@@ -30,9 +31,8 @@ from .common_equations import (
     UNIDENTIFIABLE,
     CommonEquations,
     NamedEstimate,
-    column_lengths,
     equations_of,
-    residual_noise,
+    scaled_inverse,
 )
 from .equations import Block, parameters_of
 from .forms import FormedRows
@@ -246,14 +246,11 @@ def _solved(factors: TriangularFactors, noise: Array) -> tuple[Array, Array]:
 
     # start: least squares of E x + known - currents gains, linear in x and the gains
     A = np.hstack((E, -currents[:, None] * motors))
-    size = column_lengths(A)
-    start = np.linalg.lstsq(A / size, -known, rcond=1e-13)[0] / size
+    start = scaled_inverse(A) @ -known
     start[c:] = 1.0 / np.where(start[c:] == 0.0, np.inf, start[c:])
     options: dict[str, Any] = {"jac": slopes, "x_scale": "jac", "xtol": 1e-12, "ftol": 1e-14}
     solution = least_squares(residuals, start, **options)
-    J = slopes(solution.x)
-    size = column_lengths(J)
-    half = np.linalg.pinv(J / size, rcond=1e-12) / size[:, None]
+    half = scaled_inverse(slopes(solution.x))
     return solution.x, half @ half.T
 
 

@@ -192,12 +192,12 @@ def _equations(
         return equations(base, log, choice, form).cached()
 
     fixed = isinstance(given, Processing)
-    asked = None if fixed else given["decimation"]
-    system = made(asked)
+    decimation = None if fixed else given["decimation"]
+    system = made(decimation)
     factors = reduce_equations(system, executor, progress)
     share = factors.rows / (LEAST_EQUATIONS * len(base))
     step = system.processing.decimation
-    if not fixed and asked is None and share < 1.0 < step:
+    if not fixed and decimation is None and share < 1.0 < step:
         # with a margin, since the excluded samples depend on the cutoff
         system = made(max(1, int(_SPARE * share * step)))
         factors = reduce_equations(system, executor)

@@ -20,7 +20,7 @@ from ..errors import InvalidValueError
 from ..estimation import column_basis
 from ..estimation.covariance import correlated_covariance
 from ..estimation.factor import TriangularFactors
-from ..estimation.linear import check_count
+from ..estimation.linear import check_count, residual_noise
 from ..friction import LoadFriction, StribeckFriction
 from ..inertia import PARAMETERS
 from ..logs import Log
@@ -32,7 +32,7 @@ from .common_equations import (
     NamedEstimate,
     column_lengths,
     equations_of,
-    residual_noise,
+    scaled_inverse,
 )
 from .equations import Equations, parameters_of
 from .forms import FormedRows
@@ -47,8 +47,6 @@ _GRID = 16
 _SOLVER: dict[str, Any] = {"x_scale": "jac", "xtol": 1e-9, "ftol": 1e-11, "gtol": None}
 _SIGNIFICANT = 1e-3
 """Significance level of a friction curve."""
-_DEPENDENT = 1e-10
-"""Rank tolerance: singular value relative to the largest."""
 
 
 class FrictionStatus(Outcome):
@@ -244,9 +242,8 @@ class _Point:
         from scipy.stats import chi2
 
         _, weights, R, _ = self.linear()
-        lengths = column_lengths(R)
-        half = np.linalg.pinv(R / lengths, rcond=_DEPENDENT) / lengths[:, None]
-        none, inverse = np.zeros(len(self.free)), half @ half.T
+        half, none = scaled_inverse(R), np.zeros(len(self.free))
+        inverse = half @ half.T
         covariance = correlated_covariance(self.tangents(), none, weights, inverse).covariance
         variance = np.maximum(np.diag(covariance), np.diag(inverse))  # not below rounding
         x, free = self.x.copy(), self.free
@@ -312,14 +309,14 @@ def _fit_stribeck(system: Equations, powers: Array) -> FrictionFit:
 
     _, _, R, y = _point(system, all_curves, np.zeros((n, c))).linear()
     tried = np.column_stack((R[:, b:], y))
-    tried -= R[:, :b] @ _least_squares(R[:, :b], tried)
+    tried -= R[:, :b] @ (scaled_inverse(R[:, :b]) @ tried)
     gain = np.abs(tried[:, -1] @ tried[:, :-1]) / column_lengths(tried[:, :-1])
     best = gain.reshape(n, c).argmax(axis=1)
     start = _point(
         system, _stribeck(exponent[best]), np.column_stack((0.0 * high, vs[range(n), best]))
     )
     columns = [*range(b), *(b + c * np.arange(n) + best)]
-    start.x[[*range(b), *start.first]] = _least_squares(R[:, columns], y)
+    start.x[[*range(b), *start.first]] = scaled_inverse(R[:, columns]) @ y
     start.limits[:, b + 1 :: 2] = 0.1 * low, 4.0 * high
     p_value = np.ones(n)
     start, _ = start.tested(p_value)  # a curve of zero has no velocity
@@ -332,7 +329,7 @@ def _fit_load(system: Equations) -> FrictionFit:
     links = np.array([name.rstrip("0123456789") in PARAMETERS for name in system.names])
     start = _point(system, _by_load(links), np.zeros((n, 1)))
     _, _, R, y = start.linear()
-    start.x[:b] = _least_squares(R[:, :b], y)
+    start.x[:b] = scaled_inverse(R[:, :b]) @ y
     return _refined(start, np.ones(n), np.zeros(0))
 
 
@@ -366,9 +363,3 @@ def _refined(point: _Point, p_value: Array, exponent: Array) -> FrictionFit:
     status = FrictionStatus.SOLVED if converged else FrictionStatus.NOT_CONVERGED
     status = status if significant.any() else FrictionStatus.INSIGNIFICANT
     return FrictionFit(base, names, values, covariance, friction, p_value, sigma, status)
-
-
-def _least_squares(R: Array, right: Array) -> Array:
-    size = column_lengths(R)
-    solution = np.linalg.lstsq(R / size, right, rcond=_DEPENDENT)[0]
-    return (solution.T / size).T

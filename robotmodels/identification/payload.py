@@ -15,7 +15,7 @@ from ..errors import InvalidValueError
 from ..estimation import column_basis
 from ..estimation.covariance import correlated_covariance
 from ..estimation.factor import TriangularFactors
-from ..estimation.linear import check_count, solved
+from ..estimation.linear import check_count, residual_noise, solved
 from ..friction import Friction
 from ..inertia import PARAMETERS
 from ..logs import Log
@@ -27,7 +27,6 @@ from .common_equations import (
     CommonEquations,
     NamedEstimate,
     equations_of,
-    residual_noise,
 )
 from .loads import UnknownPayload, common_unknowns
 from .methods.base import check_solved

@@ -128,10 +128,10 @@ def _verdict(
 
 
 def _prediction(result: IdentificationResult, poor: bool) -> str:
-    own, test = result.validation.in_sample, result.validation.held_out
+    fitted, test = result.validation.in_sample, result.validation.held_out
     text = (
-        f"Predicted torques differ from those of the log by {_span(own.relative)} of their size, "
-        f"joint by joint (both filtered: {_span(own.filtered_relative)})"
+        f"Predicted torques differ from those of the log by {_span(fitted.relative)} of their "
+        f"size, joint by joint (both filtered: {_span(fitted.filtered_relative)})"
     )
     if test is None:
         return (
@@ -145,9 +145,9 @@ def _prediction(result: IdentificationResult, poor: bool) -> str:
     if poor:
         return text
     worse = [
-        f"{name} ({100 * own.relative[j]:.3g} -> {100 * test.relative[j]:.3g} %)"
+        f"{name} ({100 * fitted.relative[j]:.3g} -> {100 * test.relative[j]:.3g} %)"
         for j, name in enumerate(result.model.table.joint_names)
-        if test.rmse[j] > _WORSE * own.rmse[j] and test.relative[j] > _WORSE * own.relative[j]
+        if test.rmse[j] > _WORSE * fitted.rmse[j] and test.relative[j] > _WORSE * fitted.relative[j]
     ]
     if worse:
         return (

@@ -100,12 +100,7 @@ def result_data(
 ) -> dict[str, Any]:
     """Content of the JSON file: lists, numbers and text."""
     check_result(result)
-    base, estimate, details, form = (
-        result.base,
-        result.estimate,
-        result.details,
-        result.equations.form,
-    )
+    base, estimate, details = result.base, result.estimate, result.details
     groups, units, ends = group_names(result), parameter_units(result), intervals(estimate)
     ratio = standard_error_ratio(result)
     residuals = asdict(residual_diagnostics(result.equations, result.values))
@@ -123,7 +118,7 @@ def result_data(
             "correlation_lags": details.correlation_lags,
             "notes": estimate.notes,
             "essential": details.essential_rule,
-            "form": form.name,
+            "form": result.equations.form.name,
             "drive": [kind.value for kind in drive_kinds(base.drive)],
             "friction": None if base.friction is None else repr(base.friction),
         },
@@ -154,12 +149,10 @@ def result_data(
         "scaled_condition": result.scaled_condition,
         "rank_gap": details.rank_gap,
         "equations": [
-            {
-                "of": name,
-                "used": result.factors.counts[j],
-                "in_dead_band": result.factors.left_out[j],
-            }
-            for j, name in enumerate(groups)
+            {"of": name, "used": used, "in_dead_band": left}
+            for name, used, left in zip(
+                groups, result.factors.counts, result.factors.left_out, strict=True
+            )
         ],
         "residuals": [
             {"of": name} | {key: values[j] for key, values in residuals.items()}

@@ -95,8 +95,8 @@ def _over_dead_band(
     if model.transmission is not None:
         for m in model.transmission.coupled_motors:
             w = model.transmission.weights[m - 1]
-            change = _rounded_sign(v @ w, band[m - 1])[:, None]
-            out += terms.get(f"Fcm{frames[m - 1]}", 0.0) * change * w
+            change = _rounded_sign(v @ w, band[m - 1])
+            out = out + terms.get(f"Fcm{frames[m - 1]}", 0.0) * change[:, None] * w
     return out
 
 

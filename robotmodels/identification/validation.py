@@ -135,22 +135,21 @@ def poor_prediction(
 ) -> str:
     """Sentence about poorly predicted torques, empty if there are none."""
     names = np.array(model.table.joint_names)
-    sides = {"the log": in_sample}
-    if held_out is not None:
-        sides["the held-out log"] = held_out
     gain = float((decimation_window(processing.decimation) ** 2).sum())
     slides = model.table.sigma[model.table.joint_rows] == 1
-    usual = None
+    usual, beyond = np.zeros(model.n), np.zeros(model.n, dtype=bool)
     sentences: list[str] = []
-    beyond = np.zeros(model.n, dtype=bool)
-    for log, side in sides.items():
+    for log, side in (("the log", in_sample), ("the held-out log", held_out)):
+        if side is None:
+            continue
         rests = np.isnan(side.filtered_relative)
         error = np.where(rests, side.rmse, side.filtered_rmse) ** 2
         part = np.where(rests, side.relative, side.filtered_relative)
         known = (part > 0.0) & np.isfinite(part)
         torque = np.where(known, error, np.inf) / np.where(known, part, 1.0) ** 2
         left = error - _NOISE * np.where(rests, 1.0, gain) * side.noise**2
-        usual = np.where(known, torque, 0.0) if usual is None else usual
+        if side is in_sample:
+            usual = np.where(known, torque, 0.0)
         worse = ~rests & (left > torque)
         poor = worse | ~rests & (left > POOR**2 * np.sqrt(torque * np.maximum(torque, usual)))
         beyond |= worse

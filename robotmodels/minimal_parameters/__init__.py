@@ -4,11 +4,12 @@ Seed book section 1.5.3.
 """
 
 from .bodies import uniform_bodies
-from .consistent import StandardParameters, fit_consistent, standard_parameters
-from .constraints import CenterOfMassBox
+from .consistent import fit_consistent, standard_parameters
+from .constraints import CenterOfMassBox, CenterOfMassEllipsoid
 from .find import base_parameters
 from .physical import PhysicalStatus
 from .result import BaseMethod, BaseParameters
+from .standard import StandardParameters
 from .tables import BaseValues
 
 __all__ = [
@@ -16,6 +17,7 @@ __all__ = [
     "BaseParameters",
     "BaseValues",
     "CenterOfMassBox",
+    "CenterOfMassEllipsoid",
     "PhysicalStatus",
     "StandardParameters",
     "base_parameters",

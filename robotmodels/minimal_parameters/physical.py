@@ -32,7 +32,7 @@ _UNIQUE = 1e-8
 _ROUNDS = 4
 """Solutions of least squares, each with the sizes of the one before, until the gap is small."""
 _STRICT = 2e-3
-"""Additional margin of the nearest robot, part of the allowance: feasible base parameters."""
+"""Additional margin of the nearest robot, part of the allowance: robust feasibility."""
 _KEPT, _SAME = 1e-9, 1e-13
 """Zero tolerances of base parameter deviations, relative: of a robot, of the prior."""
 _ROUNDING = 5e-9

@@ -174,9 +174,9 @@ def exciting_trajectory(
     count, evaluations, pool = search.shared_budget(problem)
     count = count if starts is None else _whole(starts, "starts")
     pool = pool if baseline is None else _whole(baseline, "baseline")
-    budget = (search.ITERATIONS, evaluations)
+    budget: tuple[int, float] = (search.ITERATIONS, evaluations)
     if iterations is not None:
-        budget = (_whole(iterations, "iterations"), None)
+        budget = (_whole(iterations, "iterations"), np.inf)
     report, stages, total = _progress(progress), len(search.STAGES), count * len(search.STAGES)
     generator = np.random.default_rng(rng)
     times = basis.duration / (_DENSE * samples) * np.arange(_DENSE * samples, dtype=np.float64)

@@ -82,14 +82,10 @@ class ExcitationProblem:
         """Coefficients (P, n) of the basis from those in units, (P n,)."""
         return self.units * x.reshape(self.units.shape)
 
-    def motion(self, x: Array) -> list[Array]:
-        """Positions and derivatives (N, n) at the samples, of coefficients (P n,) in units."""
-        X = self.coefficients(x)
-        return [functions @ X for functions in self.functions]
-
     def value(self, x: Array, power: float, penalty: float) -> tuple[float, Array]:
         """Smooth criterion and penalties of coefficients. Shapes: x (P n,) -> gradient (P n,)."""
-        motion = self.motion(x)
+        X = self.coefficients(x)
+        motion = [functions @ X for functions in self.functions]
         q, v, a = motion[:3]
         W = self.regressor.matrix(q, v, a)
         b = len(self.base)
@@ -234,13 +230,7 @@ def _inverted(W: Array) -> tuple[Array, Array]:
 def _trace_power(S: Array, power: int) -> tuple[float, Array]:
     """``log(tr(S^m)) / m`` and its derivative ``S^(m - 1) / tr(S^m)``, m the power."""
     size = float(np.trace(S))
-    square, left, raised = S / size, power - 1, np.eye(len(S))
-    while left:
-        if left % 2:
-            raised = _product(raised, square)
-        left //= 2
-        if left:
-            square = _product(square, square)
+    raised = np.linalg.matrix_power(S / size, power - 1)
     total = float((raised * S).sum()) / size
     return np.log(size) + np.log(total) / power, raised / (total * size)
 

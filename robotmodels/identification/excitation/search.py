@@ -47,56 +47,43 @@ def improved(
     problem: ExcitationProblem,
     X: Array,
     iterations: int,
-    evaluations: int | None,
+    evaluations: float,
     stage_done: Callable[[int], None],
 ) -> tuple[Array, Array, Array, ExcitationStatus]:
-    """Minimise the criterion from one start, stage by stage.
+    """Minimise the criterion from one start, stage by stage, by BFGS.
 
     Shapes: X (P, n) -> coefficients (P, n), history (K,), iterations of the stages (S,).
     """
-    x = (X / problem.units).ravel()
-    history: list[float] = []
-    counts, used, cut = [], 0, False
+    from scipy.optimize import minimize
+
+    x, used, allowed, cut = (X / problem.units).ravel(), 0, 0.0, False
+    stages: list[list[float]] = []
+
+    def value(x: Array, power: float, penalty: float) -> tuple[float, Array]:
+        nonlocal used
+        used += 1
+        return problem.value(x, power, penalty)
+
+    def callback(intermediate_result: Any) -> None:  # name required by SciPy
+        history = stages[-1]
+        history.append(float(intermediate_result.fun))
+        converged = len(history) > _WINDOW and history[-1 - _WINDOW] - history[-1] < _DECREASE
+        if converged or used >= allowed:
+            raise StopIteration
+
+    options: dict[str, Any] = {"maxiter": iterations, "gtol": 1e-4}
     for k, stage in enumerate(STAGES):
-        most = np.inf if evaluations is None else (evaluations - used) // (len(STAGES) - k)
-        x, values, made, cut = _stage(problem, x, stage, iterations, most)
-        history, used = [*history, *values], used + made
-        counts.append(len(values))
+        allowed = used + (evaluations - used) // (len(STAGES) - k)
+        stages.append([])
+        solution = minimize(value, x, stage, "BFGS", jac=True, callback=callback, options=options)
+        x, cut = solution.x, used >= allowed or solution.status == 1  # 1: the last iteration
         stage_done(k + 1)
     best = problem.coefficients(x)
     feasible = within_limits(problem, best)
     status = ExcitationStatus.LIMIT_OF_ITERATIONS if cut else ExcitationStatus.CONVERGED
     if feasible is None:
         status, feasible = ExcitationStatus.INFEASIBLE, best
-    return feasible, np.array(history), np.array(counts), status
-
-
-def _stage(
-    problem: ExcitationProblem, x: Array, stage: tuple[float, float], iterations: int, most: float
-) -> tuple[Array, list[float], int, bool]:
-    """BFGS until convergence or the limit: solution, values, evaluations, whether at the limit."""
-    from scipy.optimize import minimize
-
-    history: list[float] = []
-    evaluations, cut = 0, False
-
-    def value(x: Array) -> tuple[float, Array]:
-        nonlocal evaluations
-        evaluations += 1
-        return problem.value(x, *stage)
-
-    def callback(intermediate_result: Any) -> None:  # name required by SciPy
-        nonlocal cut
-        history.append(float(intermediate_result.fun))
-        if len(history) > _WINDOW and history[-1 - _WINDOW] - history[-1] < _DECREASE:
-            raise StopIteration
-        if evaluations >= most:
-            cut = True
-            raise StopIteration
-
-    options = {"maxiter": iterations, "gtol": 1e-4}
-    solution = minimize(value, x, jac=True, method="BFGS", callback=callback, options=options)
-    return solution.x, history, evaluations, cut or solution.status == 1  # 1: the last iteration
+    return feasible, np.concatenate(stages), np.array([*map(len, stages)]), status
 
 
 def random_motion(problem: ExcitationProblem, rng: np.random.Generator) -> Array:

@@ -135,10 +135,10 @@ class _Iteration:
             moved = inverse @ y - self.values
             self.values = self.values + moved
             still = np.abs(moved) <= _STILL * np.linalg.norm(inverse, axis=1) + rounding
-            steady = np.ones(1, dtype=bool)
+            last = self.sigma
             if not fixed and count <= _SCALES:
-                last, self.sigma = self.sigma, self.scales(residuals)
-                steady = np.abs(self.sigma - last) <= _STEADY * last + 10.0 * least
+                self.sigma = self.scales(residuals)
+            steady = np.abs(self.sigma - last) <= _STEADY * last + 10.0 * least
             if still.all() and steady.all():
                 return EstimateStatus.SOLVED
         return EstimateStatus.NOT_CONVERGED

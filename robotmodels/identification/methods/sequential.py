@@ -81,8 +81,9 @@ class Sequential(Method):
         left, kept = np.zeros((0, b)), np.zeros((0, len(y)))
         steps = []
         for joints in _joint_groups(system):
-            own = np.isin(joint, joints)
-            rows, rights = np.vstack((left, A[own])), np.vstack((kept, np.eye(len(y))[own]))
+            at = np.isin(joint, joints)
+            added = A[at]
+            rows, rights = np.vstack((left, added)), np.vstack((kept, np.eye(len(y))[at]))
             sizes = np.linalg.norm(rows, axis=0)
             new = np.flatnonzero(~done & (sizes > _ZERO * longest))
             U, s, Vt = np.linalg.svd(rows[:, new] / sizes[new], full_matrices=True)
@@ -98,8 +99,8 @@ class Sequential(Method):
             Q = Q[:, : Q.shape[1] if waiting.size else 0]
             left, kept = Q.T @ rows, Q.T @ rights
             left[:, found] = 0.0
-            e = y[own] - A[own] @ (L @ y)
-            e -= A[own][:, waiting] @ np.linalg.lstsq(A[own][:, waiting], e, rcond=_RANK)[0]
+            e = y[at] - added @ (L @ y)
+            e -= added[:, waiting] @ np.linalg.lstsq(added[:, waiting], e, rcond=_RANK)[0]
             count = int(factors.counts[list(joints)].sum())
             sigma = np.linalg.norm(e) / np.sqrt(max(count - new.size, 1))
             steps.append(
