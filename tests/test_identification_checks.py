@@ -147,8 +147,8 @@ def test_spikes_and_channels_that_stop_are_left_out(good):
     found = fit(model, bad, processing=choices)
     sentences = " ".join(found.notes)
     for words in (
-        "Joint 2: outliers in its position: 3 (the first at row 700)",
-        "Joint 3: outliers in its torque: 2 (the first at row 1000)",
+        "Joint 2: 3 samples of its position are outliers (the first at row 700)",
+        "Joint 3: 2 samples of its torque are outliers (the first at row 1000)",
         f"Joint 4: its position repeats for 250 samples from row {stop} while",
         "Joint 1: its torque repeats for 240 samples from row 2400 while the joint",
         "5 outliers and 488 frozen samples: 5 samples interpolated and 488 rows left",

@@ -45,7 +45,8 @@ def test_what_happens_once_in_a_long_log_is_found():
     found = {(f.kind, f.joints): f.sentence for f in check_log(log)}
     assert "110 samples from row 99950" in found[FindingKind.STUCK, ("2",)]
     assert (
-        "outliers in its position: 1 (the first at row 150000)" in found[FindingKind.SPIKES, ("1",)]
+        "1 sample of its position is an outlier (at row 150000)"
+        in found[FindingKind.SPIKES, ("1",)]
     )
     assert "at row 230000" in found[FindingKind.JUMP, ("1",)]
     assert (FindingKind.JUMP, ("2",)) not in found
