@@ -136,8 +136,8 @@ def true_errors(robot: Any, real: Any, q: ArrayLike, frame: Frame = None) -> Tru
     ``robot``: a model, a calibrated robot or the result of a fit; ``q``: three or more readings
     (N, n), other ones than those of the fit; ``frame``: the end, None is the tool.
     """
-    model, real_model = (x if isinstance(x, RobotModel) else as_calibrated(x).model
-                         for x in (robot, real))  # fmt: skip
+    models = [x if isinstance(x, RobotModel) else as_calibrated(x).model for x in (robot, real)]
+    model, real_model = models
     if model.n != real_model.n:
         raise InvalidValueError(
             f"real: expected a robot with the {model.n} joints of robot, got {real_model.n} joints."

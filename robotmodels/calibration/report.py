@@ -307,8 +307,8 @@ def _trust(result: CalibrationResult) -> ReportSection:
         f"Residuals are {fit.scale:.3g} times their standard deviations; {fit.freedom_left:.0f} "
         "degrees of freedom are left."
     ]
-    for test in (*([found.chi_squared] if fit.sigma_known else []), found.normality,
-                 found.independence):  # fmt: skip
+    tests = [found.chi_squared] if fit.sigma_known else []
+    for test in (*tests, found.normality, found.independence):
         p = "" if np.isnan(test.p) else f" (p = {test.p:.2g})"
         body.append(f"{test.sentence.rstrip('.')}{p}.")
     pairs = correlated_pairs(result.correlation, result.names, _STRONG)

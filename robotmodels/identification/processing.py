@@ -89,8 +89,8 @@ def choose_processing(
     >>> t = np.arange(0.0, 20.0, 0.001)[:, None]
     >>> swing = Log(0.001, np.sin(2 * np.pi * t), np.cos(2 * np.pi * t))
     >>> chosen = choose_processing(swing)
-    >>> round(chosen.motion, 1), round(chosen.cutoff), chosen.decimation
-    (1.1, 11, 150)
+    >>> round(chosen.motion, 2), chosen.decimation
+    (1.06, 150)
     """
     motion, noise = motion_of(log)
     if not filtered:
@@ -279,13 +279,8 @@ def motion_of(log: Log) -> tuple[float, Array]:
 
     rate, rng = 1.0 / log.dt, np.random.default_rng(0)
     noise = PositionNoise.of(log)
-    bands, powers, windows = [], [], _windows(log)
-    if not windows:
-        raise InvalidValueError(
-            f"log: its longest recording has {_longest(log)} samples, which are too few for a "
-            "spectrum."
-        )
-    for q in windows:
+    bands, powers = [], []
+    for q in _windows(log):
         both = np.diff(np.concatenate((q, noise.draw(q, log.dt, rng)), axis=1), axis=0) * rate
         f, P = periodogram(both, rate, "hann", axis=0)
         joints = np.array([_band(f[1:], P[1:, j], P[1:, log.n + j]) for j in range(log.n)])
@@ -302,16 +297,21 @@ def motion_of(log: Log) -> tuple[float, Array]:
 
 
 def _windows(log: Log) -> list[Array]:
-    """Positions in windows of bounded number and length, spread over each recording."""
+    """Positions in windows of bounded number and length, spread over the recordings."""
     length = max(8, int(_SECONDS / log.dt))
     parts = [part for part in log.recordings() if part.stop - part.start >= 8]
-    spread = np.unique(np.linspace(0, max(len(parts) - 1, 0), _WINDOWS).round().astype(int))
+    if not parts:
+        raise InvalidValueError(
+            f"log: its longest recording has {_longest(log)} samples, which are too few for a "
+            "spectrum."
+        )
+    spread = np.unique(np.linspace(0, len(parts) - 1, _WINDOWS).round().astype(int))
     windows = []
-    for part in (parts[k] for k in spread if parts):
+    for part in (parts[k] for k in spread):
         count = min(max(1, _WINDOWS // len(spread)), -(-(part.stop - part.start) // length))
-        starts = np.linspace(part.start, max(part.start, part.stop - length), count)
-        windows += [slice(int(x), min(int(x) + length, part.stop)) for x in starts.round()]
-    return [np.asarray(log.q[window]) for window in windows]
+        starts = np.linspace(part.start, max(part.start, part.stop - length), count).round()
+        windows += [np.asarray(log.q[int(x) : min(int(x) + length, part.stop)]) for x in starts]
+    return windows
 
 
 def _band(f: Array, P: Array, noise: Array) -> tuple[float, float]:
