@@ -14,6 +14,7 @@ from robotmodels.errors import InvalidValueError, MissingExtraError, ShapeError
 from robotmodels.friction import AsymmetricFriction, StribeckFriction, TorqueOffset, ViscousFriction
 from robotmodels.minimal_parameters import (
     CenterOfMassBox,
+    CenterOfMassEllipsoid,
     PhysicalStatus,
     base_parameters,
     fit_consistent,
@@ -215,8 +216,19 @@ def test_bounds_on_centres_are_kept(rng):
     assert (centres[1] >= low - 1e-7).all()
     assert (centres[1] <= high + 1e-7).all()
     assert centres[0] == pytest.approx(known, abs=1e-8)
+    turned = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    ball = CenterOfMassEllipsoid(2, centre + np.array([0.3, 0.0, 0.0]), [0.1, 0.05, 0.2], turned)
+    found = fit_consistent(
+        base, R, y, rest=rest, prior=prior, centre_bounds=[ball],
+        total_mass=model.inertia.mass.sum(),
+    )  # fmt: skip
+    own = found.inertia.first_moments[1] / found.inertia.mass[1]
+    inside = np.linalg.norm((turned.T @ (own - ball.center)) / ball.semi_axes)
+    assert found.status is CONSTRAINED
+    assert inside == pytest.approx(1.0, abs=1e-4)
+    assert "The centre of mass of link 2 is on the surface of its ellipsoid." in found.fit.active
     contradiction = [CenterOfMassBox(2, [0.1, -1, -1], [0.2, 1, 1])]
-    contradiction.append(CenterOfMassBox(2, [0.9, -1, -1], [1.0, 1, 1]))
+    contradiction.append(CenterOfMassEllipsoid(2, [0.9, 0, 0], [0.1, 0.1, 0.1]))
     light = {"mass_bounds": [[6.0, np.inf], [7.0, np.inf]], "total_mass": 10.0}
     for more in (light, {"centre_bounds": contradiction}):
         found = fit_consistent(base, R, y, rest=rest, prior=prior, **more)
@@ -333,6 +345,10 @@ def test_mistakes_are_named(rng):
         CenterOfMassBox(1, [np.inf, 0, 0], [np.inf, 1, 1])
     with pytest.raises(ShapeError, match="high"):
         CenterOfMassBox(1, [1, 0, 0], [0, 1])
+    with pytest.raises(InvalidValueError, match="positive semi_axes"):
+        CenterOfMassEllipsoid(1, [0, 0, 0], [1, 0, 1])
+    with pytest.raises(InvalidValueError, match="unit vectors"):
+        CenterOfMassEllipsoid(1, [0, 0, 0], [1, 1, 1], 2 * np.eye(3))
 
 
 def test_without_the_solver(monkeypatch, rng):

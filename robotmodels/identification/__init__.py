@@ -5,7 +5,7 @@ Seed book section 1.6.
 
 from ..estimation.covariance import correlated_covariance
 from ..logs import Log, check_log, read_log
-from ..minimal_parameters import CenterOfMassBox
+from ..minimal_parameters import CenterOfMassBox, CenterOfMassEllipsoid
 from .closed_loop import (
     Controller,
     Didim,
@@ -39,6 +39,7 @@ from .validation import Errors, Validation
 
 __all__ = [
     "CenterOfMassBox",
+    "CenterOfMassEllipsoid",
     "Controller",
     "Didim",
     "Errors",

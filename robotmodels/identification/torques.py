@@ -96,7 +96,7 @@ def _over_dead_band(
         for m in model.transmission.coupled_motors:
             w = model.transmission.weights[m - 1]
             change = _rounded_sign(v @ w, band[m - 1])
-            out += terms.get(f"Fcm{frames[m - 1]}", 0.0) * np.outer(change, w)
+            out = out + terms.get(f"Fcm{frames[m - 1]}", 0.0) * change[:, None] * w
     return out
 
 

@@ -5,7 +5,7 @@ Seed book section 1.5.3.
 
 from .bodies import uniform_bodies
 from .consistent import fit_consistent, standard_parameters
-from .constraints import CenterOfMassBox
+from .constraints import CenterOfMassBox, CenterOfMassEllipsoid
 from .find import base_parameters
 from .physical import PhysicalStatus
 from .result import BaseMethod, BaseParameters
@@ -17,6 +17,7 @@ __all__ = [
     "BaseParameters",
     "BaseValues",
     "CenterOfMassBox",
+    "CenterOfMassEllipsoid",
     "PhysicalStatus",
     "StandardParameters",
     "base_parameters",

@@ -47,7 +47,7 @@ from ..errors import InvalidValueError, ShapeError
 from ..inertia import InertialParameters
 from ..regressors import parameter_vector
 from .bodies import check_definite
-from .constraints import CenterOfMassBox, mass_constraints
+from .constraints import CenterOfMassBound, mass_constraints
 from .physical import MARGIN, PhysicalProblem, Squares
 from .result import BaseParameters
 from .standard import StandardParameters, largest_of_kind
@@ -120,7 +120,7 @@ def fit_consistent(
     prior: InertialParameters | None = None,
     drive_prior: DriveParameters | None = None,
     mass_bounds: ArrayLike | None = None,
-    centre_bounds: Sequence[CenterOfMassBox] = (),
+    centre_bounds: Sequence[CenterOfMassBound] = (),
     total_mass: ArrayLike | None = None,
     gamma: float = 0.0,
     tolerance: float = TOLERANCE,
@@ -145,7 +145,7 @@ def fit_consistent(
         Number of residuals, for their root mean square.
     mass_bounds : array_like, shape (f, 2), optional
         Least and greatest mass of each link, kg; infinite for none, equal where it is known.
-    centre_bounds : sequence of CenterOfMassBox
+    centre_bounds : sequence of CenterOfMassBox or CenterOfMassEllipsoid
         Bounds of centres of mass.
     total_mass : float or array_like, shape (2,), optional
         Mass of all links together, known or between two values, kg.

@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .._arrays import Array, Rebuilt, as_reals, read_only
+from .._arrays import Array, Rebuilt, as_exact, as_reals, read_only
 from ..errors import InvalidValueError, ShapeError
 from ..regressors.columns import standard_blocks
 from .result import BaseParameters
@@ -174,12 +174,68 @@ class CenterOfMassBox(Rebuilt):
             yield from _interval(row, low, high, unit, name, mass)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class CenterOfMassEllipsoid(Rebuilt):
+    """The centre of mass of a link lies in an ellipsoid.
+
+    Parameters
+    ----------
+    link : int
+        Frame number, 1..f.
+    center, semi_axes : array_like, shape (3,)
+        Centre in frame R_j and half lengths, metres.
+    rotation : array_like, shape (3, 3), optional
+        Its columns are the directions of the axes in R_j; default the axes of R_j.
+
+    Raises
+    ------
+    ShapeError, InvalidValueError
+        Wrong shapes, NaN, lengths that are not positive, or axes that are not orthonormal.
+
+    Examples
+    --------
+    >>> CenterOfMassEllipsoid(1, [0.1, 0, 0], [0.2, 0.1, 0.1]).semi_axes
+    array([0.2, 0.1, 0.1])
+    """
+
+    link: int
+    center: Any
+    semi_axes: Any
+    rotation: Any = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "link", int(self.link))
+        for name, shape in (("center", (3,)), ("semi_axes", (3,)), ("rotation", (3, 3))):
+            object.__setattr__(self, name, read_only(as_exact(getattr(self, name), shape, name)))
+        lengths, R = self.semi_axes, self.rotation
+        if not ((lengths > 0.0).all() and np.allclose(R.T @ R, np.eye(3), rtol=0.0, atol=1e-9)):
+            raise InvalidValueError(
+                f"CenterOfMassEllipsoid of link {self.link}: expected positive semi_axes in metres "
+                f"and perpendicular unit vectors as columns of rotation, got {lengths} and\n{R}"
+            )
+
+    def constraints(self, unit: Array) -> Iterator[Constraint]:
+        """``|diag(1/a) R^T ([MX MY MZ] - c M)| <= M`` for parameters of these sizes (p,)."""
+        mass, rows = 10 * self.link - 1, np.zeros((4, 4, len(unit)))
+        inward = (self.rotation / self.semi_axes).T
+        rows[3, :3, mass - 3 : mass] = inward
+        rows[3, :3, mass] = -inward @ self.center
+        rows += rows.swapaxes(0, 1)
+        rows[range(4), range(4), mass] = 1.0  # smallest eigenvalue: M less the norm above
+        sentence = f"The centre of mass of link {self.link} is on the surface of its ellipsoid."
+        rows = rows.reshape(16, -1) / unit[mass]
+        yield Constraint("semidefinite", rows, np.zeros(16), (sentence,))
+
+
+CenterOfMassBound = CenterOfMassBox | CenterOfMassEllipsoid
+
+
 def mass_constraints(
     f: int,
     unit: Array,
     mass_bounds: ArrayLike | None,
     total_mass: ArrayLike | None,
-    centre_bounds: Sequence[CenterOfMassBox],
+    centre_bounds: Sequence[CenterOfMassBound],
 ) -> Iterator[Constraint]:
     """Bounds on masses (f, 2), on their sum (2,) and on centres of mass. Shapes: unit (p,)."""
     masses = np.arange(9, 10 * f, 10)
@@ -210,9 +266,10 @@ def mass_constraints(
         row[numbers] = 1.0
         yield from _interval(row, low, high, unit, name)
     for bound in centre_bounds:
-        if not isinstance(bound, CenterOfMassBox):
+        if not isinstance(bound, CenterOfMassBound):
             raise InvalidValueError(
-                f"centre_bounds: expected CenterOfMassBox, got {type(bound).__name__}."
+                "centre_bounds: expected CenterOfMassBox or CenterOfMassEllipsoid, got "
+                f"{type(bound).__name__}."
             )
         if not 1 <= bound.link <= f:
             raise InvalidValueError(
