@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ._arrays import Array, read_only
+from ._arrays import Array
 from .errors import InvalidValueError, nearest_names
 
 Column = int | str
@@ -228,12 +228,6 @@ def open_table(path: str | Path, delimiter: str | None = None) -> CsvTable:
     return CsvTable(
         path, tuple(cells) if header else (), delimiter, len(cells), number - 1 + header
     )
-
-
-def stacked_columns(tables: Sequence[CsvTable], columns: Sequence[Sequence[int]]) -> Array:
-    """Columns of several files below each other. Shapes: -> (N, number of columns)."""
-    parts = [table.numbers(c) for table, c in zip(tables, columns, strict=True)]
-    return read_only(np.concatenate(parts))
 
 
 def _lines(path: Path) -> Iterator[tuple[int, str]]:
